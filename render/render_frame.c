@@ -20,7 +20,7 @@
 #include "render_polyhedra.h"
 #include "render_prepare.h"
 
-static double now(void)
+double render_seconds(void)
 {
     struct timespec t;
     clock_gettime(CLOCK_MONOTONIC, &t);
@@ -72,7 +72,7 @@ static bool grow_list(render_pending_list *list, int64_t capacity)
     return true;
 }
 
-static bool grow_pending(render_pending_list *list)
+bool render_grow_pending(render_pending_list *list)
 {
     return grow_list(list, list->capacity + list->capacity / 2 + 1024);
 }
@@ -100,7 +100,7 @@ static void drop_placeholders(fragment_list *list, int64_t first)
 
 /* ---- threads ------------------------------------------------------------------------------------------------- */
 
-static bool reserve_fragments(fragment_list *list, int64_t more)
+bool render_reserve_fragments(fragment_list *list, int64_t more)
 {
     const int64_t needed = list->count + more, grown = list->capacity + list->capacity / 2 + 1024;
     if (needed <= list->capacity) return true;
@@ -119,13 +119,7 @@ static void begin_threads(const kernel_frame *frame, kernel_thread *states, int 
     for (int i = 0; i < frame->job->part_count; i++)
         has_polyhedra = has_polyhedra || grid_has_faces(frame->job->parts[i].cells);
     for (int i = 0; i < threads; i++)
-        states[i] = (kernel_thread){.reserve = reserve_fragments,
-                                    .polyhedra = has_polyhedra ? polyhedra_create() : NULL,
-                                    .out_of_memory = false,
-                                    .find_polyhedron = polyhedra_find,
-                                    .polyhedron_scratch = polyhedra_scratch,
-                                    .grow_pending = grow_pending,
-                                    .clock_seconds = now};
+        states[i] = (kernel_thread){.polyhedra = has_polyhedra ? polyhedra_create() : NULL};
     for (int i = 0; i < threads && has_polyhedra; i++) states[i].out_of_memory = !states[i].polyhedra;
 }
 
@@ -164,14 +158,14 @@ static bool trace_frame(kernel_frame *frame, fragment_callback *take, void *stat
     begin_threads(frame, states, threads);
     *statistics = (render_statistics){.rays = job->pixels ? pixel_set_count(job->pixels, pixels) : pixels};
     if (frame->is_binned && !render_surfaces_are_small(frame)) {
-        const double start = now();
+        const double start = render_seconds();
         render_candidates_find(frame, states, threads);
-        statistics->surface_ms = 1e3 * (now() - start);
+        statistics->surface_ms = 1e3 * (render_seconds() - start);
     }
     if (frame->bins_volume) {
-        const double start = now();
+        const double start = render_seconds();
         render_candidates_find_volume(frame, states, threads);
-        statistics->volume_ms = 1e3 * (now() - start);
+        statistics->volume_ms = 1e3 * (render_seconds() - start);
     }
     frame->needs_planes = (job->surface_count && !frame->candidates) || job->volume_count;
     if (frame->needs_planes) render_trees_cover(frame);
@@ -202,7 +196,7 @@ typedef struct shared_list {
 static bool append_fragments(fragment_list *to, const fragment *items, int64_t count)
 {
     if (!count) return true;
-    if (!reserve_fragments(to, count)) return false;
+    if (!render_reserve_fragments(to, count)) return false;
     memcpy(to->items + to->count, items, (size_t)count * sizeof *items);
     to->count += count;
     return true;
@@ -232,7 +226,7 @@ static bool trace_to_list(kernel_frame *frame, int threads, fragment_list *out, 
     const int64_t first = out->count, expected = job->pixels ? 0 : (int64_t)job->camera.width * job->camera.height / 2;
     shared_list list = {.out = out, .end = first, .used = -1, .rest = base_calloc((size_t)threads, sizeof *list.rest)};
     bool is_well =
-        list.rest && reserve_fragments(out, expected) && trace_frame(frame, append_tile, &list, threads, statistics);
+        list.rest && render_reserve_fragments(out, expected) && trace_frame(frame, append_tile, &list, threads, statistics);
     out->count = list.used < 0 ? list.end : list.used;
     for (int i = 0; list.rest && i < threads; i++) {
         is_well = is_well && append_fragments(out, list.rest[i].items, list.rest[i].count);

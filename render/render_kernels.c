@@ -203,12 +203,6 @@ typedef struct kernel_tile_search {
 
 /* ---- isosurfaces in the cells that are binned in a tile ---- */
 
-SIMD_INLINE void kernel_candidate_prefetch(const kernel_frame *f, const kernel_tile_candidate *candidate)
-{
-    const int part = (int)(candidate->source / RENDER_MAX_ISOVALUES);
-    kernel_prefetch_indices(f->job->parts[part].cells, candidate->cell);
-}
-
 /* Sorts prefetched cells by their part, and leaves them in order of depth within each: a batch contains cells of one
  * part only, and cells of different blocks of a mesh alternate in depth. */
 static void kernel_prefetched_sort(const kernel_tile_candidate **items, int count)
@@ -259,7 +253,7 @@ static __attribute__((noinline)) void kernel_tile_trace_candidates(kernel_tile_t
             const bool is_transparent =
                 t->frame->isovalues[source % RENDER_MAX_ISOVALUES].surface >= t->frame->opaque_count;
             if (is_transparent != transparent || !kernel_candidate_blocks(t, candidate)) continue;
-            kernel_candidate_prefetch(t->frame, candidate);
+            kernel_prefetch_indices(t->frame->job->parts[source / RENDER_MAX_ISOVALUES].cells, candidate->cell);
             queue->prefetched[queue->prefetched_count++] = candidate;
             if (queue->prefetched_count == SIMD_WIDTH) kernel_tile_queue_prefetched(t, queue);
         }
@@ -376,7 +370,7 @@ static unsigned active_blocks(const render_job *job, int x0, int y0)
 
 static void trace_tile_surfaces(kernel_tile_trace *t)
 {
-    const double start = t->thread->clock_seconds();
+    const double start = render_seconds();
     if (t->frame->candidates)
         kernel_tile_surface_candidates(t);
     else
@@ -386,13 +380,13 @@ static void trace_tile_surfaces(kernel_tile_trace *t)
             const int i = __builtin_ctz(begun) * KERNEL_BLOCK_PACKETS + n;
             kernel_emit_opaque(&t->packets[i], &t->hits[i]);
         }
-    t->thread->surface_seconds += t->thread->clock_seconds() - start;
+    t->thread->surface_seconds += render_seconds() - start;
 }
 
 static void trace_tile_volumes(kernel_tile_trace *t)
 {
     const kernel_frame *f = t->frame;
-    const double start = t->thread->clock_seconds();
+    const double start = render_seconds();
     const int intervals = f->volume_intervals ? f->volume_intervals : 1;
     for (t->clip_interval = 0; t->clip_interval < intervals; t->clip_interval++) {
         if (f->has_segments)
@@ -400,7 +394,7 @@ static void trace_tile_volumes(kernel_tile_trace *t)
         else
             kernel_tile_volumes(t);
     }
-    t->thread->volume_seconds += t->thread->clock_seconds() - start;
+    t->thread->volume_seconds += render_seconds() - start;
 }
 
 /* Returns whether the tile meets the part of the picture in which some tree may be visible. */

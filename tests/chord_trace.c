@@ -32,7 +32,7 @@ static void chord_polyhedron(kernel_packet *p, const chord_state *state, const g
                              uint32_t index, vm rays)
 {
     polyhedron *c =
-        p->thread->find_polyhedron(p->thread->polyhedra, p->frame->job->parts[part].cells, field, part, 0, index);
+        polyhedra_find(p->thread->polyhedra, p->frame->job->parts[part].cells, field, part, 0, index);
     kernel_poly_crossings r;
     kernel_polyhedron_interval stay;
     if (!c) p->thread->out_of_memory = true;

@@ -284,11 +284,6 @@ static __attribute__((noinline)) void kernel_find_crossed(kernel_finder *s, kern
     c->count = 0;
 }
 
-static void kernel_find_all_crossed(kernel_finder *s)
-{
-    for (int i = 0; i < KERNEL_CURVED_TYPES; i++) kernel_find_crossed(s, &s->crossed[i]);
-}
-
 /* Queues the cells of the given lanes, which the isovalue crosses. A queue holds cells of one isovalue; if the isovalue
  * changes, the queue is processed first. */
 SIMD_INLINE void kernel_crossed_add(kernel_finder *s, const kernel_cells *from, int vertices, int value, unsigned lanes)

@@ -102,7 +102,7 @@ static void kernel_find_flush(kernel_finder *s)
 {
     kernel_find_queued(s);
     for (int i = 0; i < KERNEL_LANE_TYPES; i++) kernel_find_pending(s, &s->pending[i]);
-    kernel_find_all_crossed(s);
+    for (int i = 0; i < KERNEL_CURVED_TYPES; i++) kernel_find_crossed(s, &s->crossed[i]);
 }
 
 /* Number of nodes that are tested at a time, so that their prefetches overlap in time. */

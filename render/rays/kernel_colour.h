@@ -165,7 +165,7 @@ static __attribute__((noinline, unused)) void kernel_emit(kernel_packet *p, vm m
     unsigned bits = vm_bits(mask);
     fragment_list *list = &p->thread->out;
     if (!bits) return;
-    if (list->capacity - list->count < SIMD_WIDTH && !p->thread->reserve(list, SIMD_WIDTH)) {
+    if (list->capacity - list->count < SIMD_WIDTH && !render_reserve_fragments(list, SIMD_WIDTH)) {
         p->thread->out_of_memory = true;
         return;
     }

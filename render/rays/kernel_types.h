@@ -321,23 +321,20 @@ typedef struct kernel_thread {
     kernel_bin bin, volume_bin;
     uint32_t serial;   /* number of the current tile, counted from 1; cached cells of other tiles are out of date */
     fragment_list out; /* fragments of the current tile */
-    /* Ensures space for `more` more items in the list; returns false if memory ran out. */
-    bool (*reserve)(fragment_list *list, int64_t more);
-    /* Hits whose normals need samples of other ranks' cells, and the function that adds space for more; it returns
-     * false if memory ran out. */
-    render_pending_list waiting;
-    bool (*grow_pending)(render_pending_list *list);
+    render_pending_list waiting; /* hits whose normals need samples of other ranks' cells */
     bool out_of_memory;
     /* counters for render_statistics: failed inversions of cells' maps, and cells visited by volumes */
     int64_t map_failures, volume_cells;
     /* The tile's polyhedra (render_polyhedra.h); NULL if no mesh has any. */
     struct polyhedron_store *polyhedra;
-    struct polyhedron *(*find_polyhedron)(struct polyhedron_store *store, const grid *g, const grid_field *field,
-                                          int part, int layer, uint32_t index);
-    void *(*polyhedron_scratch)(struct polyhedron_store *store, size_t bytes);
     double surface_seconds, volume_seconds;
-    double (*clock_seconds)(void);
 } kernel_thread;
+
+/* Functions of render_frame.c that kernels call. The first two add space to a list, and return false if memory ran
+ * out. */
+bool render_reserve_fragments(fragment_list *list, int64_t more); /* ensures space for `more` more fragments */
+bool render_grow_pending(render_pending_list *list);
+double render_seconds(void); /* a clock */
 
 struct kernel_bundle;
 struct kernel_occluder;

@@ -294,7 +294,7 @@ static __attribute__((noinline, cold)) vm kernel_defer_hits(kernel_packet *p, co
     const uint32_t kind = s->first_kind + (uint32_t)h->value;
     render_pending_list *list = &p->thread->waiting;
     const vm waits = vm_and(hit, vf_lt(vf_set(0), h->reach));
-    if (list->capacity - list->count < SIMD_WIDTH && !p->thread->grow_pending(list)) {
+    if (list->capacity - list->count < SIMD_WIDTH && !render_grow_pending(list)) {
         p->thread->out_of_memory = true;
         return vm_none();
     }

@@ -193,11 +193,6 @@ SIMD_INLINE void kernel_cuboid_count(const kernel_cuboid_ray *ray, vm *none, vm 
     *s = vf_select(ends, b[0] / (b[0] - b[3]), zero);
 }
 
-SIMD_INLINE vf kernel_cuboid_at(const vf k[4], vf s)
-{
-    return k[0] + s * (k[1] + s * (k[2] + s * k[3]));
-}
-
 SIMD_INLINE vf kernel_cuboid_rate(const vf k[4], vf s)
 {
     return k[1] + s * (2 * k[2] + s * (3 * k[3]));
@@ -212,7 +207,7 @@ SIMD_INLINE vm kernel_cuboid_newton(const kernel_cuboid_ray *ray, vm rays, vf *s
     const vm falls = vf_lt(vf_set(0), ray->k[0]);
     vm open = rays;
     for (int step = 0; step < KERNEL_CUBOID_STEPS && vm_any(open); step++) {
-        const vf value = kernel_cuboid_at(ray->k, *s);
+        const vf *k = ray->k, value = k[0] + *s * (k[1] + *s * (k[2] + *s * k[3]));
         const vm before = vm_not(vm_xor(falls, vf_lt(vf_set(0), value)));
         low = vf_select(before, *s, low);
         high = vf_select(before, high, *s);

@@ -273,11 +273,6 @@ SIMD_INLINE void kernel_pending_packet_begin(kernel_pending_group *group)
     group->tile.x0 = group->tile.y0 = -1;
 }
 
-SIMD_INLINE int kernel_pending_lane(int x, int y)
-{
-    return y % KERNEL_PACKET_ROWS * KERNEL_PACKET_COLUMNS + x % KERNEL_PACKET_COLUMNS;
-}
-
 SIMD_INLINE void kernel_pending_surface(kernel_pending_group *group, const kernel_frame *f, uint32_t kind)
 {
     for (int n = 0; n < f->surface_count; n++) {
@@ -309,7 +304,7 @@ static void kernel_pending_group_begin(kernel_pending_group *group, const kernel
         const int column = (int)(hit->pixel % width) - x0, row = (int)(hit->pixel / width) - y0;
         if (hit->kind != kind || column < 0 || column >= KERNEL_PACKET_COLUMNS || row < 0 || row >= KERNEL_PACKET_ROWS)
             break;
-        const int lane = kernel_pending_lane(column, row);
+        const int lane = row * KERNEL_PACKET_COLUMNS + column;
         if (bits >> lane & 1) break;
         bits |= 1u << lane;
         group->lanes[group->count] = lane;

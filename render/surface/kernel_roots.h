@@ -200,11 +200,6 @@ SIMD_INLINE void kernel_search_begin(kernel_search *s)
     s->size = vf_set(0.5f);
 }
 
-SIMD_INLINE vm kernel_search_changes(const kernel_search *s)
-{
-    return vm_xor(vf_lt(s->interval->v_in, vf_set(0)), vf_lt(s->interval->v_out, vf_set(0)));
-}
-
 /* Returns the linear function L (kernel_bounds.h) of each ray's cell at depth t on the ray. */
 SIMD_INLINE vf kernel_linear_at(const kernel_curved *c, const kernel_rays *rays, vi lane, vf t)
 {
@@ -240,7 +235,7 @@ SIMD_INLINE vm kernel_ends_decide(const kernel_curved *c, const kernel_rays *ray
 SIMD_INLINE void kernel_search_whole(kernel_search *s, vm rays)
 {
     const kernel_interval *i = s->interval;
-    const vm change = kernel_search_changes(s);
+    const vm change = vm_xor(vf_lt(i->v_in, vf_set(0)), vf_lt(i->v_out, vf_set(0)));
     const vf gap = vf_max(kernel_face_gap(s, &s->low), kernel_face_gap(s, &s->high));
     const kernel_piece_class v = kernel_classify_piece(&s->map, &s->limits, &s->low, &s->high, gap, s->side);
     const vf jump = s->limits.slope * s->limits.stretch * gap + KERNEL_ROOT_BAND;

@@ -80,7 +80,7 @@ typedef struct occluder_search {
     uint32_t index;
     int count; /* number of vertices in `places` and `values`; a polyhedron lists some vertices several times */
     list places, values;
-    double reach;
+    double reach; /* distance from a hit, in tree space, within which the cell does not block the hit's rays */
 } occluder_search;
 
 static const double *place_of(const occluder_search *s, int i)
@@ -103,13 +103,6 @@ static void bounds_of(const occluder_search *s, double low[3], double high[3])
         }
 }
 
-/* Returns the distance from a hit, in tree space, within which the cell does not block the hit's rays
- * (kernel_occlusion_beyond()). */
-static double contact_distance(const occluder_search *s, double contact)
-{
-    return contact > 0 ? contact * kernel_cell_size((const double(*)[3])s->places.items, s->count) : 0;
-}
-
 static bool add_vertex(occluder_search *s, const double world[3], double value)
 {
     const render_space *space = &s->frame->job->space;
@@ -119,16 +112,6 @@ static bool add_vertex(occluder_search *s, const double world[3], double value)
     *kept = value;
     s->count++;
     return true;
-}
-
-static bool straddles(const occluder_search *s, double isovalue)
-{
-    bool below = false, above = false;
-    for (int i = 0; i < s->count; i++) {
-        below = below || value_of(s, i) < isovalue;
-        above = above || value_of(s, i) >= isovalue;
-    }
-    return below && above;
 }
 
 /* ---- tets ------------------------------------------------------------------------------------------------------ */
@@ -335,10 +318,11 @@ static void find_in_cell(occluder_search *s)
     s->count = 0;
     s->places.count = s->values.count = 0;
     if (is_polyhedron ? !list_polyhedron_vertices(s, g, field) : !list_cell_vertices(s, &c, g)) return;
-    s->reach = contact_distance(s, (double)layer->contact);
+    /* as kernel_occlusion_beyond() computes it */
+    s->reach = layer->contact > 0 ? (double)layer->contact * kernel_cell_size(s->places.items, s->count) : 0;
     for (s->value = 0; s->value < layer->value_count; s->value++) {
         const double isovalue = layer->values[s->value];
-        if (!straddles(s, isovalue)) continue;
+        if (!kernel_values_straddle(s->values.items, s->count, isovalue)) continue;
         if (kernel_is_linear(c.type))
             add_tet(s, isovalue);
         else
