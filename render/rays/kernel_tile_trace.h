@@ -34,7 +34,7 @@ typedef struct kernel_tile_trace {
     int layer;
     struct kernel_cell *cell;
     struct kernel_curved *curved;
-    struct kernel_tile_finder *search;          /* state of the tile's search for cells in trees */
+    struct kernel_tile_search *search;          /* state of the tile's search for cells in trees */
     kernel_packet packets[KERNEL_TILE_PACKETS]; /* packets of all blocks, block by block */
     kernel_hits hits[KERNEL_TILE_PACKETS];
 } kernel_tile_trace;

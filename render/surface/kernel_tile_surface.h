@@ -3,7 +3,7 @@
  *     nodes, one per lane:  ranges, depths, box of pixels ---> stack, the nearest on top
  *     from the stack:       has any pixel of the box no nearer hit?
  *     leaves' cells:        tested in lanes (kernel_candidates.h), restricted to the tile's pixels
- *     cells with pixels:    traced in batches (render_kernels.c), whose hits hide what is behind
+ *     cells with pixels:    queued and traced in batches (kernel_tile_queue.h), whose hits hide what is behind
  * A node whose box contains no pixel's centre is skipped, too. The box of pixels is computed from the distances of the
  * node's box to the planes through the tile's borders, divided by the box's farthest depth: that gives a lower bound of
  * how far beyond a border the box is. Margins are larger than all rounding errors. */
@@ -11,9 +11,14 @@
 #define RENDER_KERNEL_TILE_SURFACE_H
 
 #include <math.h>
+#include <stddef.h>
 #include <string.h>
 
+#include "kernel_bins.h"
+#include "kernel_candidates.h"
+#include "kernel_finder.h"
 #include "kernel_tile.h"
+#include "kernel_tile_queue.h"
 #include "kernel_tile_trace.h"
 #include "kernel_types.h"
 #include "mmbvh.h"
@@ -31,9 +36,12 @@ enum {
     KERNEL_FIND_PLANES
 };
 
-typedef struct kernel_tile_finder {
-    /* Callback that searches a leaf's cells for the current layer's surface. */
-    void (*search_leaf)(kernel_tile_trace *t, int part, const uint32_t *cells, int count);
+/* The state of a tile's search for cells, and the queue of cells to be traced. A thread keeps it from tile to tile. */
+typedef struct kernel_tile_search {
+    kernel_tile_trace *tile;
+    kernel_tile_queue queue;
+    kernel_candidate_list list; /* the cells that have been found and are not queued yet */
+    kernel_candidate items[2 * SIMD_WIDTH];
     /* number of pixels per unit of slope or, if the camera is orthographic, per scaled unit */
     float column_scale, row_scale;
     float pad[2]; /* margins by which columns and rows are extended, in pixels */
@@ -41,7 +49,49 @@ typedef struct kernel_tile_finder {
      * rounding error of at most `error`. size: absolute values of the normal's components. */
     float normal[3][KERNEL_FIND_PLANES], size[3][KERNEL_FIND_PLANES], offset[KERNEL_FIND_PLANES];
     float error[KERNEL_FIND_PLANES];
-} kernel_tile_finder;
+} kernel_tile_search;
+
+/* ---- cells of leaves ---- */
+
+/* Queues the cells found so far for tracing, unless nearer hits hide them. */
+static bool kernel_tile_find_flush(kernel_candidate_list *list)
+{
+    kernel_tile_search *s = (kernel_tile_search *)((char *)list - offsetof(kernel_tile_search, list));
+    kernel_tile_trace *t = s->tile;
+    for (int n = 0; n < list->count; n++) {
+        const kernel_candidate *found = &list->items[n];
+        int part;
+        const int value = kernel_tile_set_source(t, found->source, &part);
+        const kernel_tile_candidate candidate = kernel_candidate_in_tile(found, t->tile.x0, t->tile.y0);
+        if (kernel_candidate_blocks(t, &candidate) && kernel_pixels_beyond(t, candidate.box, found->near))
+            kernel_tile_queue_add(t, &s->queue, &candidate, part, value);
+    }
+    list->count = 0;
+    return true;
+}
+
+/* Prepares the search for another mesh part. Pending cells of the previous part are processed first. */
+static void kernel_tile_find_set_part(kernel_tile_trace *t, kernel_tile_search *s, int part)
+{
+    kernel_finder *finder = t->thread->finder;
+    if (finder->frame == t->frame && finder->surface == t->surface && finder->part == part) return;
+    if (finder->frame) kernel_find_flush(finder);
+    kernel_finder_begin(finder, t->frame, &(kernel_subtree){.surface = t->layer, .part = part});
+    finder->list = &s->list;
+    finder->grow = kernel_tile_find_flush;
+    finder->first[0] = t->tile.x0;
+    finder->first[1] = t->tile.y0;
+    const render_camera *c = &t->frame->job->camera;
+    finder->last[0] = t->tile.x0 + KERNEL_TILE < c->width ? t->tile.x0 + KERNEL_TILE - 1 : c->width - 1;
+    finder->last[1] = t->tile.y0 + KERNEL_TILE < c->height ? t->tile.y0 + KERNEL_TILE - 1 : c->height - 1;
+}
+
+/* Searches a leaf's cells for the current layer's surface. */
+static void kernel_tile_find_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count)
+{
+    kernel_tile_find_set_part(t, t->search, part);
+    kernel_find_leaf(t->thread->finder, cells, count);
+}
 
 /* ---- traversal of nodes ---- */
 
@@ -131,7 +181,7 @@ SIMD_INLINE vm kernel_node_pixels(vf low, vf high, vf scale, float pad, vi *box,
 /* Tests the nodes. Returns a mask of the lanes of those that may be visible. */
 SIMD_INLINE unsigned kernel_tile_find_test(const kernel_tile_trace *t, kernel_node_lanes *nodes)
 {
-    const kernel_tile_finder *s = t->search;
+    const kernel_tile_search *s = t->search;
     vf at[KERNEL_FIND_PLANES], reach[KERNEL_FIND_PLANES], middle[3], half[3];
     for (int a = 0; a < 3; a++) {
         middle[a] = 0.5f * (nodes->low[a] + nodes->high[a]);
@@ -222,7 +272,7 @@ SIMD_INLINE void kernel_tile_find_cells(kernel_tile_trace *t, int part)
             const kernel_tile_node e = stack[--top];
             if (!kernel_pixels_beyond(t, e.box, e.near)) continue;
             if (e.count) {
-                t->search->search_leaf(t, part, tree->cells + e.ref, e.count);
+                kernel_tile_find_leaf(t, part, tree->cells + e.ref, e.count);
             } else {
                 inner[inner_count++] = e.ref;
             }
@@ -252,7 +302,7 @@ SIMD_INLINE void kernel_tile_surface(kernel_tile_trace *t)
 }
 
 /* Copies six of the tile's planes out of the vectors in which kernel_planes stores them. */
-SIMD_INLINE void kernel_tile_find_planes(const kernel_planes *q, kernel_tile_finder *out)
+SIMD_INLINE void kernel_tile_find_planes(const kernel_planes *q, kernel_tile_search *out)
 {
     static const int lanes[KERNEL_FIND_PLANES] = {0,
                                                   KERNEL_BLOCKS_ACROSS,
@@ -271,10 +321,10 @@ SIMD_INLINE void kernel_tile_find_planes(const kernel_planes *q, kernel_tile_fin
     }
 }
 
-/* Sets up the search for a tile. The callback search_leaf must already be set. */
+/* Sets up the search for a tile. */
 SIMD_INLINE void kernel_tile_find_begin(kernel_tile_trace *t)
 {
-    kernel_tile_finder *s = t->search;
+    kernel_tile_search *s = t->search;
     const kernel_frame *f = t->frame;
     const bool flat = f->job->camera.is_orthographic;
     const double unit = flat ? f->job->space.scale : 1;
@@ -284,6 +334,24 @@ SIMD_INLINE void kernel_tile_find_begin(kernel_tile_trace *t)
     s->pad[0] = 0.01f + error_bound * s->column_scale + 3e-5f * (float)f->job->camera.width;
     s->pad[1] = 0.01f + error_bound * s->row_scale + 3e-5f * (float)f->job->camera.height;
     kernel_tile_find_planes(&t->tree_planes, s);
+}
+
+/* Traces the surfaces of all layers. */
+static void kernel_tile_surfaces(kernel_tile_trace *t)
+{
+    kernel_tile_search *s = t->search;
+    s->tile = t;
+    s->list = (kernel_candidate_list){.items = s->items, .capacity = 2 * SIMD_WIDTH};
+    t->thread->finder->frame = NULL;
+    kernel_tile_find_begin(t);
+    kernel_tile_queue_begin(&s->queue);
+    for (int layer = 0; layer < t->frame->surface_count; layer++) {
+        kernel_tile_set_layer(t, layer);
+        kernel_tile_surface(t);
+        if (t->thread->finder->frame) kernel_find_flush(t->thread->finder);
+        kernel_tile_find_flush(&s->list);
+        kernel_tile_queue_finish(t, &s->queue);
+    }
 }
 
 #endif
