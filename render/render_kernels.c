@@ -115,13 +115,12 @@ typedef struct kernel_memory {
     kernel_tile_search search;
 } kernel_memory;
 
-/* Returns whether one of the rectangle's pixels must be traced. */
-static bool has_active_pixel(const render_job *job, int x0, int y0, int columns, int rows)
+/* Returns whether one of the pixels of the block that begins at (x0, y0) must be traced. */
+static bool has_active_pixel(const render_job *job, int x0, int y0)
 {
-    const int x1 = x0 + columns, y1 = y0 + rows;
     if (!job->pixels) return x0 < job->camera.width && y0 < job->camera.height;
-    for (int y = y0; y < y1 && y < job->camera.height; y++)
-        for (int x = x0; x < x1 && x < job->camera.width; x++)
+    for (int y = y0; y < y0 + KERNEL_BLOCK && y < job->camera.height; y++)
+        for (int x = x0; x < x0 + KERNEL_BLOCK && x < job->camera.width; x++)
             if (pixel_set_has(job->pixels, (int64_t)y * job->camera.width + x)) return true;
     return false;
 }
@@ -131,7 +130,7 @@ static unsigned active_blocks(const render_job *job, int x0, int y0)
     unsigned blocks = 0;
     for (int i = 0; i < KERNEL_BLOCKS; i++)
         if (has_active_pixel(job, x0 + i % KERNEL_BLOCKS_ACROSS * KERNEL_BLOCK,
-                             y0 + i / KERNEL_BLOCKS_ACROSS * KERNEL_BLOCK, KERNEL_BLOCK, KERNEL_BLOCK))
+                             y0 + i / KERNEL_BLOCKS_ACROSS * KERNEL_BLOCK))
             blocks |= 1u << i;
     return blocks;
 }

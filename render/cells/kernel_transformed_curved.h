@@ -351,8 +351,7 @@ static __attribute__((noinline)) void kernel_transformed_faces(kernel_transforme
 SIMD_INLINE bool kernel_lattice_cells_are_sorted(const kernel_wide_doubles (*cells)[3])
 {
     vm sorted = vm_all_lanes();
-    for (int axis = 0; axis < 3; axis++)
-        sorted = vm_and(sorted, kernel_wide_doubles_lt(&cells[0][axis], &cells[1][axis]));
+    for (int axis = 0; axis < 3; axis++) sorted = vm_and(sorted, vd_lt(cells[0][axis].half, cells[1][axis].half));
     return vm_bits(sorted) == vm_bits(vm_all_lanes());
 }
 

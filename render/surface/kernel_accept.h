@@ -27,9 +27,6 @@
 
 /* The gradients at a cell's vertices, in camera axes, and their interpolating polynomials. */
 typedef struct kernel_smooth_cell {
-    /* mesh part and index of the cell */
-    int part;
-    int32_t index;
     kernel_cell cell;
     double gradient[3][GRID_MAX_CELL_VERTICES];
     double polynomial[3][8]; /* coefficients of the three components; not set for tets */
@@ -47,14 +44,13 @@ SIMD_INLINE void kernel_vertex_gradient(const kernel_frame *f, const render_vert
     }
 }
 
-static void kernel_smooth_setup(const kernel_packet *p, const render_surface_layer *layer, int part, int32_t index,
+static void kernel_smooth_setup(const kernel_packet *p, const render_surface_layer *layer, int part, uint32_t index,
                                 kernel_smooth_cell *out)
 {
     const grid *g = p->frame->job->parts[part].cells;
     kernel_cell *c = &out->cell;
-    out->part = part;
-    out->index = index;
-    kernel_cell_fetch(c, g, &layer->field.fields[part], (uint32_t)index);
+    c->part = part;
+    kernel_cell_fetch(c, g, &layer->field.fields[part], index);
     kernel_cell_transform_in_tile(c, p->frame, p->tile, g);
     for (int i = 0; i < c->count; i++) {
         double gradient[3];
@@ -136,15 +132,15 @@ static __attribute__((noinline)) void kernel_vertex_normals(const kernel_packet 
                                                             vf t, vi parts, vi cells, vf normal[3])
 {
     kernel_smooth_cell known;
-    known.part = -1;
+    known.cell.part = -1;
     for (unsigned left = vm_bits(rays); left; left &= left - 1) {
         const int ray = __builtin_ctz(left);
         const int part = parts[ray];
-        const int32_t index = cells[ray];
+        const uint32_t index = (uint32_t)cells[ray];
         double place[3];
         float out[3];
         if (part < 0) continue;
-        if (known.part != part || known.index != index) kernel_smooth_setup(p, s->layer, part, index, &known);
+        if (known.cell.part != part || known.cell.index != index) kernel_smooth_setup(p, s->layer, part, index, &known);
         if (kernel_is_linear(known.cell.type))
             kernel_ray_point(p, ray, t[ray], place);
         else
@@ -194,24 +190,19 @@ typedef struct kernel_surface_state {
 } kernel_surface_state;
 
 /* Transforms gradients from tile space to camera axes, by undoing the shear. */
-SIMD_INLINE void kernel_unshear(const kernel_packet *p, vf g[3])
+SIMD_INLINE void kernel_unshear(const kernel_tile *tile, vf g[3])
 {
-    g[2] -= g[0] * p->tile->shear_x + g[1] * p->tile->shear_y;
+    g[2] -= g[0] * tile->shear_x + g[1] * tile->shear_y;
 }
 
 /* Computes the unit normal, in world axes, that kernel_shade() uses: it points to the eye's side. */
 SIMD_INLINE void kernel_world_normal(const kernel_packet *p, const vf normal[3], vf out[3])
 {
     const render_camera *c = &p->frame->job->camera;
-    vm flat;
-    vf unit[3], inverse = kernel_inverse_length(normal, &flat), facing = vf_set(0);
-    for (int a = 0; a < 3; a++) {
-        unit[a] = vf_select(flat, p->view[a], normal[a] * inverse);
-        facing += unit[a] * p->view[a];
-    }
-    const vf turn = vf_select(vf_lt(facing, vf_set(0)), vf_set(-1), vf_set(1));
+    vf unit[3];
+    kernel_facing_normal(p, normal, unit);
     for (int a = 0; a < 3; a++)
-        out[a] = turn * ((unit[0] * (float)c->right[a] + unit[1] * (float)c->up[a]) + unit[2] * (float)c->forward[a]);
+        out[a] = (unit[0] * (float)c->right[a] + unit[1] * (float)c->up[a]) + unit[2] * (float)c->forward[a];
 }
 
 /* Stores the unit normal in world axes (RENDER_NORMALS), or the number of the isovalue (RENDER_VALUES), as the hit's

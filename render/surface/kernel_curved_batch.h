@@ -372,7 +372,7 @@ SIMD_INLINE void kernel_curved_batch_orient(const kernel_tile_trace *t, const vf
 {
     const bool is_later = t->surface->layer->normal == RENDER_VERTEX;
     for (int a = 0; a < 3; a++) normal[a] = is_later ? r[a] : gradient[a];
-    if (!is_later) normal[2] -= normal[0] * t->tile.shear_x + normal[1] * t->tile.shear_y;
+    if (!is_later) kernel_unshear(&t->tile, normal);
 }
 
 SIMD_INLINE void kernel_curved_batch_normal(const kernel_tile_trace *t, const kernel_map *map, const vf r[3],
@@ -452,15 +452,11 @@ SIMD_INLINE unsigned kernel_curved_batch_hit_of(kernel_tile_trace *t, kernel_cur
     return nearer;
 }
 
-static __attribute__((noinline)) unsigned kernel_curved_batch_hit(kernel_tile_trace *t, kernel_curved_batch *h)
+static __attribute__((noinline)) unsigned kernel_curved_batch_hit(kernel_tile_trace *t, kernel_curved_batch *h,
+                                                                  bool is_contracted)
 {
-    return KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_hit_of, t, h, false);
-}
-
-static __attribute__((noinline)) unsigned kernel_curved_batch_hit_contracted(kernel_tile_trace *t,
-                                                                             kernel_curved_batch *h)
-{
-    return KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_hit_of, t, h, true);
+    return is_contracted ? KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_hit_of, t, h, true)
+                         : KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_hit_of, t, h, false);
 }
 
 /* Searches for the first visible root of each of a vector of rays in `others`, from index n on, and accepts it. Returns
@@ -522,12 +518,12 @@ static unsigned kernel_curved_batch_trace_others(kernel_tile_trace *t, kernel_cu
     if (!h->rays.count) return 0;
     kernel_curved_batch_set_bounds(t, h);
     kernel_curved_batch_contract(t, h);
-    unsigned nearer = kernel_curved_batch_hit_contracted(t, h);
+    unsigned nearer = kernel_curved_batch_hit(t, h, true);
     nearer |= kernel_curved_batch_find_faces(t, h);
     kernel_curved_batch_cross(t, h);
     kernel_pixel_list_close(&h->found);
     kernel_pixel_list_close(&h->others);
-    nearer |= kernel_curved_batch_hit(t, h);
+    nearer |= kernel_curved_batch_hit(t, h, false);
     for (int n = 0; n < h->others.count; n += SIMD_WIDTH) nearer |= kernel_curved_batch_search(t, h, n);
     return nearer;
 }

@@ -193,7 +193,7 @@ SIMD_INLINE vm kernel_curved_accept(kernel_packet *p, kernel_surface_state *stat
         memcpy(h.normal, at->r, sizeof h.normal);
     } else {
         kernel_lanes_normal(map, at->r, h.normal);
-        kernel_unshear(p, h.normal);
+        kernel_unshear(p->tile, h.normal);
     }
     if (state->surface->layer->colour_map)
         h.w = kernel_maps_value_of_type(curved->colours, vi_set(curved->lane), at->r, curved->type);
