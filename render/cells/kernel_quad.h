@@ -447,52 +447,20 @@ typedef struct kernel_ray_box {
     vf slope[2][2], origin[2][2];
 } kernel_ray_box;
 
-/* A cell's edges as seen by the middle ray of the box, and the squares of their lengths in space. */
-typedef struct kernel_projected_edges {
-    vf at[12][2], square[12];
-    vf spread; /* half width plus half height of the range of the rays' slopes */
-    vf margin; /* upper bound of the rounding error of a cross product of two edges */
-} kernel_projected_edges;
-
-SIMD_INLINE void kernel_projected_edges_of(vf (*const at)[8], const kernel_ray_box *box, int type,
-                                           kernel_projected_edges *out)
-{
-    const kernel_shape *shape = kernel_cell_shape(type);
-    vf middle[2], steep[2], reach[2], longest = vf_set(0);
-    out->spread = vf_set(0);
-    for (int a = 0; a < 2; a++) {
-        middle[a] = 0.5f * (box->slope[a][0] + box->slope[a][1]);
-        out->spread += 0.5f * vf_abs(box->slope[a][1] - box->slope[a][0]);
-        steep[a] = vf_max(vf_abs(box->slope[a][0]), vf_abs(box->slope[a][1]));
-    }
-    for (int n = 0; n < shape->edge_count; n++) {
-        const int i = shape->edges[n][0], j = shape->edges[n][1];
-        const vf x = at[0][j] - at[0][i], y = at[1][j] - at[1][i], z = at[2][j] - at[2][i];
-        out->at[n][0] = x - middle[0] * z;
-        out->at[n][1] = y - middle[1] * z;
-        out->square[n] = (x * x + y * y) + z * z;
-        longest = vf_max(out->square[n], longest);
-    }
-    /* Every vertex is at most three edges away from the first. */
-    const vf far = 3.0f * vf_sqrt(longest), depth = vf_abs(at[2][0]) + far, slopes = steep[0] + steep[1];
-    for (int a = 0; a < 2; a++)
-        reach[a] = ((vf_abs(at[a][0]) + far) + vf_max(vf_abs(box->origin[a][0]), vf_abs(box->origin[a][1]))) +
-                   steep[a] * depth;
-    const vf off = 1.25e-7f * vf_max(reach[0], reach[1]), square = (2.0f + slopes * slopes) * longest;
-    out->margin = (1e-6f * square + 4.0f * off * vf_sqrt(square)) + (8.0f * off * off + KERNEL_EDGE_LEAST);
-}
-
-/* Returns the lanes whose quad looks convex along all rays of the box. sides: the quad's edges in cyclic order, and
- * whether each is reversed. */
-SIMD_INLINE vm kernel_quad_is_convex(const kernel_projected_edges *e, const signed char (*sides)[2])
+/* Returns the lanes whose quad looks convex along all rays of the box. edge: the cell's edges as seen by the middle ray
+ * of the box; square: the squares of their lengths in space; spread: half width plus half height of the range of the
+ * rays' slopes; margin: upper bound of the rounding error of a cross product of two edges; sides: the quad's edges in
+ * cyclic order, and whether each is reversed. */
+SIMD_INLINE vm kernel_quad_is_convex(const vf (*edge)[2], const vf *square, vf spread, vf margin,
+                                     const signed char (*sides)[2])
 {
     const int n[4] = {sides[0][0], sides[1][0], sides[2][0], sides[3][0]};
-    const vf along = vf_max(e->square[n[0]], e->square[n[2]]), across = vf_max(e->square[n[1]], e->square[n[3]]);
-    const vf least = vf_sqrt(along * across) * (1.0001f * e->spread) + e->margin;
+    const vf along = vf_max(square[n[0]], square[n[2]]), across = vf_max(square[n[1]], square[n[3]]);
+    const vf least = vf_sqrt(along * across) * (1.0001f * spread) + margin;
     vm left = vm_all_lanes(), right = vm_all_lanes();
     for (int i = 0; i < 4; i++) {
         const int next = (i + 1) & 3;
-        const vf *p = e->at[n[i]], *q = e->at[n[next]];
+        const vf *p = edge[n[i]], *q = edge[n[next]];
         const vf turn = sides[i][1] == sides[next][1] ? p[0] * q[1] - p[1] * q[0] : p[1] * q[0] - p[0] * q[1];
         left = vm_and(left, vf_lt(least, turn));
         right = vm_and(right, vf_lt(least, -turn));
@@ -504,12 +472,31 @@ SIMD_INLINE vm kernel_quad_is_convex(const kernel_projected_edges *e, const sign
 SIMD_INLINE vi kernel_curved_nonconvex_quads(vf (*const at)[8], const kernel_ray_box *box, int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
-    kernel_projected_edges edges;
+    vf edge[12][2], square[12], middle[2], steep[2], reach[2], longest = vf_set(0), spread = longest;
     vi nonconvex = vi_set(0);
-    kernel_projected_edges_of(at, box, type, &edges);
+    for (int a = 0; a < 2; a++) {
+        middle[a] = 0.5f * (box->slope[a][0] + box->slope[a][1]);
+        spread += 0.5f * vf_abs(box->slope[a][1] - box->slope[a][0]);
+        steep[a] = vf_max(vf_abs(box->slope[a][0]), vf_abs(box->slope[a][1]));
+    }
+    for (int n = 0; n < shape->edge_count; n++) {
+        const int i = shape->edges[n][0], j = shape->edges[n][1];
+        const vf x = at[0][j] - at[0][i], y = at[1][j] - at[1][i], z = at[2][j] - at[2][i];
+        edge[n][0] = x - middle[0] * z;
+        edge[n][1] = y - middle[1] * z;
+        square[n] = (x * x + y * y) + z * z;
+        longest = vf_max(square[n], longest);
+    }
+    /* Every vertex is at most three edges away from the first. */
+    const vf far = 3.0f * vf_sqrt(longest), depth = vf_abs(at[2][0]) + far, slopes = steep[0] + steep[1];
+    for (int a = 0; a < 2; a++)
+        reach[a] = ((vf_abs(at[a][0]) + far) + vf_max(vf_abs(box->origin[a][0]), vf_abs(box->origin[a][1]))) +
+                   steep[a] * depth;
+    const vf off = 1.25e-7f * vf_max(reach[0], reach[1]), most = (2.0f + slopes * slopes) * longest;
+    const vf margin = (1e-6f * most + 4.0f * off * vf_sqrt(most)) + (8.0f * off * off + KERNEL_EDGE_LEAST);
     for (int face = 0; face < shape->face_count; face++) {
         if (shape->faces[face].count == 3) continue;
-        const vm convex = kernel_quad_is_convex(&edges, shape->faces[face].sides);
+        const vm convex = kernel_quad_is_convex((const vf(*)[2])edge, square, spread, margin, shape->faces[face].sides);
         nonconvex |= vi_select(convex, vi_set(0), vi_set(1 << face));
     }
     return nonconvex;
