@@ -124,13 +124,13 @@ static fragment *fold_pixel(const render_folding *folding, fragment *items, int6
     return out;
 }
 
-bool render_fold(render_folding *folding, const pixel_area *area, fragment_list *list, int64_t first)
+bool render_fold(render_folding *folding, const pixel_area *area, fragment_list *list)
 {
-    const int64_t count = list->count - first, pixels = (int64_t)area->width * area->height;
+    const int64_t count = list->count, pixels = (int64_t)area->width * area->height;
     if (count == 0) return true;
     if (!reserve_folding(folding, count)) return false;
-    collect(folding, area, list->items + first, count);
-    fragment *out = list->items + first;
+    collect(folding, area, list->items, count);
+    fragment *out = list->items;
     for (int64_t k = 0; k < pixels; k++) {
         const int64_t own = folding->starts[k + 1] - folding->starts[k];
         if (own) out = fold_pixel(folding, folding->items + folding->starts[k], own, out);

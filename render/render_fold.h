@@ -16,11 +16,11 @@ typedef struct render_folding {
     int64_t capacity, *starts;
 } render_folding;
 
-/* Folds a tile's fragments, those of the list from `first` on, each of which is one sample or segment. If this rank has
+/* Folds the list of a tile's fragments, each of which is one sample or segment. If this rank has
  * all of a pixel's volume fragments in a halved interval of fragment_fold.h, they become one fragment. FRAGMENT_EARLY
  * marks a fragment in front of which a surface or another rank's fragment may lie; FRAGMENT_LATE marks overlapping
  * cells. Returns false if memory ran out. */
-bool render_fold(render_folding *folding, const pixel_area *area, fragment_list *list, int64_t first);
+bool render_fold(render_folding *folding, const pixel_area *area, fragment_list *list);
 
 void render_folding_free(render_folding *folding);
 

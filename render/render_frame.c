@@ -16,29 +16,16 @@
 #include "render.h"
 #include "render_candidates.h"
 #include "render_fold.h"
-#include "render_fragments.h"
 #include "render_kernels.h"
 #include "render_polyhedra.h"
 #include "render_prepare.h"
 
-static double now(void)
+double render_seconds(void)
 {
     struct timespec t;
     clock_gettime(CLOCK_MONOTONIC, &t);
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
-
-/* Number of fragments for which a thread has space before it begins a tile; most tiles have no more. If a tile has
- * more, the thread moves the piece's fragments to memory of its own. */
-enum { TILE_FRAGMENTS = KERNEL_TILE * KERNEL_TILE };
-
-/* The destination of fragments: a list, of which each writer has a piece, or a callback that receives them tile by
- * tile. */
-typedef struct frame_end {
-    fragment_writer *writers; /* one writer per thread */
-    fragment_callback *take;  /* callback that receives fragments; NULL: fragments stay in the writers' lists */
-    void *state;
-} frame_end;
 
 static pixel_area area_of(const render_camera *camera, int column, int row)
 {
@@ -48,13 +35,13 @@ static pixel_area area_of(const render_camera *camera, int column, int row)
 }
 
 static void trace_tiles(const kernel_table *kernels, const kernel_frame *frame, kernel_thread *thread,
-                        const frame_end *end)
+                        fragment_callback *take, void *state)
 {
     const render_camera *camera = &frame->job->camera;
     const int columns = (camera->width + KERNEL_TILE - 1) / KERNEL_TILE;
     const int rows = (camera->height + KERNEL_TILE - 1) / KERNEL_TILE;
     const int number = omp_get_thread_num();
-    fragment_list *own = &end->writers[number].list;
+    fragment_list *own = &thread->out;
     const bool folds = frame->job->reproducible && frame->job->volume_count && !frame->job->separate_samples;
     render_folding fold = {.job = frame->job, .has_segments = frame->has_segments};
 #pragma omp for schedule(dynamic, KERNEL_TILES_PER_TASK) nowait
@@ -62,13 +49,11 @@ static void trace_tiles(const kernel_table *kernels, const kernel_frame *frame, 
         if (!render_thread_begin(kernels, thread)) continue;
         if (thread->polyhedra) polyhedra_reset(thread->polyhedra);
         const pixel_area area = area_of(camera, tile % columns, tile / columns);
-        if (!end->take) fragment_writer_advance(&end->writers[number], TILE_FRAGMENTS);
-        const int64_t first = own->count;
         thread->out_of_memory = thread->out_of_memory || !render_candidates_gather(frame, thread, area.x, area.y);
         kernels->trace_tile(frame, thread, area.x, area.y);
-        if (folds) thread->out_of_memory = thread->out_of_memory || !render_fold(&fold, &area, own, first);
-        if (!end->take || thread->out_of_memory) continue;
-        thread->out_of_memory = !end->take(end->state, number, &area, own->items, own->count);
+        if (folds) thread->out_of_memory = thread->out_of_memory || !render_fold(&fold, &area, own);
+        if (thread->out_of_memory) continue;
+        thread->out_of_memory = !take(state, number, &area, own->items, own->count);
         own->count = 0;
     }
     render_folding_free(&fold);
@@ -87,7 +72,7 @@ static bool grow_list(render_pending_list *list, int64_t capacity)
     return true;
 }
 
-static bool grow_pending(render_pending_list *list)
+bool render_grow_pending(render_pending_list *list)
 {
     return grow_list(list, list->capacity + list->capacity / 2 + 1024);
 }
@@ -115,21 +100,26 @@ static void drop_placeholders(fragment_list *list, int64_t first)
 
 /* ---- threads ------------------------------------------------------------------------------------------------- */
 
+bool render_reserve_fragments(fragment_list *list, int64_t more)
+{
+    const int64_t needed = list->count + more, grown = list->capacity + list->capacity / 2 + 1024;
+    if (needed <= list->capacity) return true;
+    const int64_t capacity = grown > needed ? grown : needed;
+    fragment *items = base_realloc(list->items, (size_t)capacity * sizeof *items);
+    if (!items) return false;
+    list->items = items;
+    list->capacity = capacity;
+    return true;
+}
+
 /* Initializes the states of all threads, including those that OpenMP may not start. */
-static void begin_threads(const kernel_frame *frame, const frame_end *end, kernel_thread *states, int threads)
+static void begin_threads(const kernel_frame *frame, kernel_thread *states, int threads)
 {
     bool has_polyhedra = false;
     for (int i = 0; i < frame->job->part_count; i++)
         has_polyhedra = has_polyhedra || grid_has_faces(frame->job->parts[i].cells);
     for (int i = 0; i < threads; i++)
-        states[i] = (kernel_thread){.out = &end->writers[i].list,
-                                    .reserve = fragment_reserve,
-                                    .polyhedra = has_polyhedra ? polyhedra_create() : NULL,
-                                    .out_of_memory = false,
-                                    .find_polyhedron = polyhedra_find,
-                                    .polyhedron_scratch = polyhedra_scratch,
-                                    .grow_pending = grow_pending,
-                                    .clock_seconds = now};
+        states[i] = (kernel_thread){.polyhedra = has_polyhedra ? polyhedra_create() : NULL};
     for (int i = 0; i < threads && has_polyhedra; i++) states[i].out_of_memory = !states[i].polyhedra;
 }
 
@@ -139,6 +129,7 @@ static bool end_threads(const render_job *job, kernel_thread *states, int thread
     double surface = 0, volume = 0;
     for (int i = 0; i < threads; i++) {
         polyhedra_free(states[i].polyhedra);
+        base_free(states[i].out.items);
         base_free(states[i].memory);
         base_free(states[i].bin.buffer);
         base_free(states[i].volume_bin.buffer);
@@ -156,31 +147,32 @@ static bool end_threads(const render_job *job, kernel_thread *states, int thread
     return has_memory;
 }
 
-static bool trace_frame(kernel_frame *frame, const frame_end *end, int threads, render_statistics *statistics)
+static bool trace_frame(kernel_frame *frame, fragment_callback *take, void *state, int threads,
+                        render_statistics *statistics)
 {
     const render_job *job = frame->job;
     const kernel_table *kernels = render_kernels();
     const int64_t pixels = (int64_t)job->camera.width * job->camera.height;
     kernel_thread *states = base_calloc((size_t)threads, sizeof *states);
     if (!states) return false;
-    begin_threads(frame, end, states, threads);
+    begin_threads(frame, states, threads);
     *statistics = (render_statistics){.rays = job->pixels ? pixel_set_count(job->pixels, pixels) : pixels};
     if (frame->is_binned && !render_surfaces_are_small(frame)) {
-        const double start = now();
+        const double start = render_seconds();
         render_candidates_find(frame, states, threads);
-        statistics->surface_ms = 1e3 * (now() - start);
+        statistics->surface_ms = 1e3 * (render_seconds() - start);
     }
     if (frame->bins_volume) {
-        const double start = now();
+        const double start = render_seconds();
         render_candidates_find_volume(frame, states, threads);
-        statistics->volume_ms = 1e3 * (now() - start);
+        statistics->volume_ms = 1e3 * (render_seconds() - start);
     }
     frame->needs_planes = (job->surface_count && !frame->candidates) || job->volume_count;
     if (frame->needs_planes) render_trees_cover(frame);
 #pragma omp parallel num_threads(threads)
     {
         region_enter();
-        trace_tiles(kernels, frame, &states[omp_get_thread_num()], end);
+        trace_tiles(kernels, frame, &states[omp_get_thread_num()], take, state);
         region_leave();
     }
     render_candidates_free(frame);
@@ -189,32 +181,60 @@ static bool trace_frame(kernel_frame *frame, const frame_end *end, int threads, 
     return has_memory;
 }
 
-/* Returns the number of fragments for which memory is reserved: one at every other pixel. Reserved memory that is never
- * written costs nothing. If only a set of pixels is traced, no memory is reserved. */
-static int64_t expected_fragments(const render_job *job)
+/* ---- fragments of all tiles in one list ---------------------------------------------------------------------- */
+
+/* A list to which threads append the fragments of their tiles at once, in any order; the order differs from run to run,
+ * the set does not. Once the list has no space for a tile, the fragments of that tile and of later ones are stored in
+ * lists of the threads, which are appended at the end. */
+typedef struct shared_list {
+    fragment_list *out;
+    int64_t end;  /* number of fragments of all tiles, whether they fit into `out` or not */
+    int64_t used; /* number of fragments in `out`, once a tile has not fitted; -1 before */
+    fragment_list *rest;
+} shared_list;
+
+static bool append_fragments(fragment_list *to, const fragment *items, int64_t count)
 {
-    return job->pixels ? 0 : (int64_t)job->camera.width * job->camera.height / 2;
+    if (!count) return true;
+    if (!render_reserve_fragments(to, count)) return false;
+    memcpy(to->items + to->count, items, (size_t)count * sizeof *items);
+    to->count += count;
+    return true;
 }
 
-static bool trace_to_list(kernel_frame *frame, fragment_writer *writers, int threads, fragment_list *out,
-                          render_statistics *statistics)
+static bool append_tile(void *state, int thread, const pixel_area *area, fragment *items, int64_t count)
 {
-    fragment_pieces pieces;
-    if (!fragment_pieces_begin(&pieces, out, expected_fragments(frame->job))) return false;
-    for (int i = 0; i < threads; i++) writers[i] = (fragment_writer){.pieces = &pieces, .piece = -1};
-    const bool is_traced = trace_frame(frame, &(frame_end){.writers = writers}, threads, statistics);
-    const int64_t first = out->count;
-    const bool is_whole = fragment_pieces_end(&pieces, writers, threads);
-    if (frame->job->waiting) drop_placeholders(out, first);
-    return is_whole && is_traced;
+    shared_list *list = state;
+    fragment_list *out = list->out;
+    int64_t end;
+    (void)area;
+#pragma omp atomic capture
+    end = list->end += count;
+    if (end <= out->capacity) {
+        if (count) memcpy(out->items + end - count, items, (size_t)count * sizeof *items);
+        return true;
+    }
+    if (end - count <= out->capacity) list->used = end - count; /* true for the first tile that does not fit */
+    return append_fragments(&list->rest[thread], items, count);
 }
 
-static bool trace_to_callback(kernel_frame *frame, const frame_end *end, int threads, render_statistics *statistics)
+/* Traces a frame and appends its fragments to `out`. Memory is reserved for a fragment at every other pixel; reserved
+ * memory that is never written costs nothing. If only a set of pixels is traced, no memory is reserved. */
+static bool trace_to_list(kernel_frame *frame, int threads, fragment_list *out, render_statistics *statistics)
 {
-    for (int i = 0; i < threads; i++) end->writers[i] = (fragment_writer){.piece = -1};
-    const bool is_traced = trace_frame(frame, end, threads, statistics);
-    for (int i = 0; i < threads; i++) base_free(end->writers[i].list.items);
-    return is_traced;
+    const render_job *job = frame->job;
+    const int64_t first = out->count, expected = job->pixels ? 0 : (int64_t)job->camera.width * job->camera.height / 2;
+    shared_list list = {.out = out, .end = first, .used = -1, .rest = base_calloc((size_t)threads, sizeof *list.rest)};
+    bool is_well =
+        list.rest && render_reserve_fragments(out, expected) && trace_frame(frame, append_tile, &list, threads, statistics);
+    out->count = list.used < 0 ? list.end : list.used;
+    for (int i = 0; list.rest && i < threads; i++) {
+        is_well = is_well && append_fragments(out, list.rest[i].items, list.rest[i].count);
+        base_free(list.rest[i].items);
+    }
+    base_free(list.rest);
+    if (job->waiting) drop_placeholders(out, first);
+    return is_well;
 }
 
 /* Draws a frame. The fragments are appended to out, or, if out is NULL, passed to take() tile by tile. */
@@ -227,12 +247,8 @@ static insitu_status draw(const render_job *job, fragment_list *out, fragment_ca
     if (status != INSITU_OK) return status;
     if (!statistics) statistics = &unwanted;
     const int threads = job->threads > 0 ? job->threads : omp_get_max_threads();
-    fragment_writer *writers = base_calloc((size_t)threads, sizeof *writers);
-    const bool has_memory =
-        writers && (out ? trace_to_list(&frame, writers, threads, out, statistics)
-                        : trace_to_callback(&frame, &(frame_end){writers, take, state}, threads, statistics));
-    base_free(writers);
-    if (!has_memory)
+    if (!(out ? trace_to_list(&frame, threads, out, statistics)
+              : trace_frame(&frame, take, state, threads, statistics)))
         status = base_fail(error, INSITU_ERROR_MEMORY, "no memory for the fragments and cells of %d x %d pixels",
                            job->camera.width, job->camera.height);
     render_unprepare(&frame);

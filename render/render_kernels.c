@@ -1,17 +1,13 @@
 /* The kernels: this one file is compiled once per instruction set and exports one table (kernel_types.h). A tile traces
  * surfaces before volumes, because opaque hits end the rays. It traces the cells that have been binned for it, or finds
  * cells by traversing the trees itself. */
-#include <stddef.h>
-
 #include "grid.h"
 #include "kernel_arrays.h"
-#include "kernel_batch.h"
 #include "kernel_bins.h"
 #include "kernel_bounds.h"
 #include "kernel_candidates.h"
 #include "kernel_cell.h"
 #include "kernel_cell_cache.h"
-#include "kernel_cell_values.h"
 #include "kernel_differences.h"
 #include "kernel_finder.h"
 #include "kernel_hits.h"
@@ -19,12 +15,10 @@
 #include "kernel_occlusion_rays.h"
 #include "kernel_packet.h"
 #include "kernel_packet_surface.h"
-#include "kernel_curved_batch.h"
 #include "kernel_prefetch.h"
-#include "kernel_surface.h"
-#include "kernel_surface_cells.h"
 #include "kernel_tile.h"
 #include "kernel_tile_cells.h"
+#include "kernel_tile_queue.h"
 #include "kernel_tile_segments.h"
 #include "kernel_tile_surface.h"
 #include "kernel_tile_trace.h"
@@ -34,180 +28,7 @@
 #include "render.h"
 #include "simd.h"
 
-/* ---- a tile's cells, between search and tracing ---- */
-
-/* Sorts a transformed cell's vertices and computes its edge functions and colours, ready for tracing. */
-SIMD_INLINE void kernel_tile_prepare_cell(kernel_tile_trace *t, int part)
-{
-    t->cell->part = part;
-    kernel_cell_order(t->cell);
-    kernel_cell_lines(t->cell, t->frame, &t->tile);
-    if (t->surface->layer->colour_map)
-        kernel_values_colours(t->surface, part, t->cell->index, t->cell->vertices, t->cell->count, t->cell->g);
-}
-
-static void kernel_tile_process_candidate(kernel_tile_trace *t, const kernel_tile_candidate *candidate, int part,
-                                          int value, unsigned blocks)
-{
-    const render_surface_layer *layer = t->surface->layer;
-    const grid *g = t->frame->job->parts[part].cells;
-    kernel_cell *c = t->cell;
-    kernel_cell_fetch(c, g, &layer->field.fields[part], candidate->cell);
-    if (kernel_has_own_faces(c->type)) {
-        kernel_blocks_trace(t, blocks, part, candidate->cell, NULL, 0);
-        return;
-    }
-    kernel_cell_move_to_tile_space(c, t->frame, &t->tile, g);
-    kernel_cell_relative(c, layer->values[value]);
-    kernel_tile_prepare_cell(t, part);
-    t->curved->bounds = NULL;
-    kernel_blocks_trace(t, blocks, part, c->index, c, value);
-}
-
-/* Makes the surface layer of the candidate the current layer. source: kernel_candidate.source. Stores the candidate's
- * mesh part in *part, and returns the number of its isovalue in the layer. */
-SIMD_INLINE int kernel_tile_set_source(kernel_tile_trace *t, uint32_t source, int *part)
-{
-    const kernel_isovalue *isovalue = &t->frame->isovalues[source % RENDER_MAX_ISOVALUES];
-    *part = (int)(source / RENDER_MAX_ISOVALUES);
-    kernel_tile_set_layer(t, isovalue->surface);
-    return isovalue->value;
-}
-
-SIMD_INLINE unsigned kernel_candidate_blocks(const kernel_tile_trace *t, const kernel_tile_candidate *candidate)
-{
-    return candidate->blocks & t->traced_blocks & kernel_blocks_beyond(t, candidate->near);
-}
-
-/* Maximum number of queued cells that are traced one by one. */
-enum { KERNEL_ALONE = SIMD_WIDTH };
-
-/* A tile's cells that are queued for tracing: one vector of cells per type, and cells that are traced one by one
- * (alone). */
-typedef struct kernel_tile_queue {
-    int layer, part;      /* layer and mesh part of the last queued cell; -1: there is none yet */
-    kernel_arrays arrays; /* arrays of the layer's field on the mesh part */
-    kernel_surface_cells pending[KERNEL_LANE_TYPES];
-    kernel_batch batch;
-    kernel_curved_batch curved_batch;
-    int alone_count;
-    kernel_tile_candidate alone[KERNEL_ALONE];
-    /* binned candidates whose cells' vertex indices are being prefetched */
-    int prefetched_count;
-    const kernel_tile_candidate *prefetched[SIMD_WIDTH];
-} kernel_tile_queue;
-
-static void kernel_tile_queue_begin(kernel_tile_queue *m)
-{
-    m->layer = m->part = -1;
-    for (int i = 0; i < KERNEL_LANE_TYPES; i++) {
-        m->pending[i].type = kernel_lane_types[i];
-        m->pending[i].count = 0;
-        m->pending[i].layer = m->pending[i].part = -1;
-    }
-    kernel_curved_batch_begin(&m->curved_batch);
-    m->alone_count = m->prefetched_count = 0;
-}
-
-/* Sets the mesh part of the cells that are queued next; their layer is the current one. */
-SIMD_INLINE void kernel_tile_queue_set_part(const kernel_tile_trace *t, kernel_tile_queue *m, int part)
-{
-    if (m->layer == t->layer && m->part == part) return;
-    m->layer = t->layer;
-    m->part = part;
-    kernel_arrays_begin(&m->arrays, t->frame->job->parts[part].cells, &t->surface->layer->field.fields[part]);
-}
-
-/* Returns whether a cell of the queue's layer and part is to be queued in the vector of its type. Polyhedra never are.
- * In a mesh of mixed types a tile has few large wedges or pyramids of one type; these are traced one by one, because
- * their hits then hide other cells sooner. */
-SIMD_INLINE bool kernel_is_traced_in_vectors(const kernel_tile_queue *m, const kernel_tile_candidate *candidate,
-                                             int type)
-{
-    if (!m->arrays.has_lanes || kernel_has_own_faces(type)) return false;
-    return kernel_is_linear(type) || kernel_is_box(type) || m->arrays.type != GRID_NO_TYPE ||
-           kernel_box_pixels(candidate->box) <= KERNEL_CURVED_PIXELS;
-}
-
-/* Traces the pending cells of a type. */
-static void kernel_tile_queue_trace(kernel_tile_trace *t, kernel_tile_queue *m, kernel_surface_cells *own)
-{
-    const int layer = t->layer;
-    if (!own->count) return;
-    kernel_tile_set_layer(t, own->layer);
-    if (kernel_is_linear(own->type))
-        kernel_batch_process(t, &m->batch, own);
-    else
-        kernel_curved_batch_process(t, &m->curved_batch, own);
-    kernel_tile_set_layer(t, layer);
-}
-
-SIMD_INLINE void kernel_tile_queue_append(kernel_tile_trace *t, kernel_tile_queue *m, kernel_surface_cells *own,
-                                          const kernel_tile_candidate *candidate, int value)
-{
-    if (own->layer != m->layer || own->part != m->part) {
-        kernel_tile_queue_trace(t, m, own);
-        own->layer = m->layer;
-        own->part = m->part;
-        own->arrays = m->arrays;
-    }
-    if (own->count == SIMD_WIDTH) kernel_tile_queue_trace(t, m, own);
-    kernel_surface_cells_add(t, own, candidate, value);
-}
-
-/* Traces the cells that are in no vector, one by one. The vectors of cells are traced before, because their cells were
- * found earlier and their hits may hide the single cells. */
-static void kernel_tile_queue_trace_singly(kernel_tile_trace *t, kernel_tile_queue *m)
-{
-    if (!m->alone_count) return;
-    for (int i = 0; i < KERNEL_LANE_TYPES; i++) kernel_tile_queue_trace(t, m, &m->pending[i]);
-    for (int n = 0; n < m->alone_count; n++) {
-        int part;
-        const int value = kernel_tile_set_source(t, m->alone[n].source, &part);
-        const unsigned blocks = kernel_candidate_blocks(t, &m->alone[n]);
-        if (blocks) kernel_tile_process_candidate(t, &m->alone[n], part, value, blocks);
-    }
-    m->alone_count = 0;
-}
-
-/* Queues a cell of the current layer and the given part for tracing: in a batch if it fits one, else in the list of
- * single cells. */
-SIMD_INLINE void kernel_tile_queue_add(kernel_tile_trace *t, kernel_tile_queue *m,
-                                       const kernel_tile_candidate *candidate, int part, int value)
-{
-    kernel_tile_queue_set_part(t, m, part);
-    const int type = kernel_arrays_type(&m->arrays, candidate->cell);
-    if (kernel_is_traced_in_vectors(m, candidate, type)) {
-        kernel_tile_queue_append(t, m, &m->pending[kernel_lane_type_index(type)], candidate, value);
-        return;
-    }
-    if (m->alone_count == KERNEL_ALONE) kernel_tile_queue_trace_singly(t, m);
-    m->alone[m->alone_count++] = *candidate;
-}
-
-/* Traces all cells that are still queued. */
-static void kernel_tile_queue_finish(kernel_tile_trace *t, kernel_tile_queue *m)
-{
-    kernel_tile_queue_trace_singly(t, m);
-    for (int i = 0; i < KERNEL_LANE_TYPES; i++) kernel_tile_queue_trace(t, m, &m->pending[i]);
-}
-
-/* State of a thread that is kept from tile to tile: the tree search, and the queue of cells to be traced. */
-typedef struct kernel_tile_search {
-    kernel_tile_finder nodes; /* must be the first member, because the tile's pointer to it is cast to this struct */
-    kernel_candidate_list list;
-    kernel_tile_trace *tile;
-    kernel_tile_queue queue;
-    kernel_candidate items[2 * SIMD_WIDTH];
-} kernel_tile_search;
-
 /* ---- isosurfaces in the cells that are binned in a tile ---- */
-
-SIMD_INLINE void kernel_candidate_prefetch(const kernel_frame *f, const kernel_tile_candidate *candidate)
-{
-    const int part = (int)(candidate->source / RENDER_MAX_ISOVALUES);
-    kernel_prefetch_indices(f->job->parts[part].cells, candidate->cell);
-}
 
 /* Sorts prefetched cells by their part, and leaves them in order of depth within each: a batch contains cells of one
  * part only, and cells of different blocks of a mesh alternate in depth. */
@@ -250,7 +71,7 @@ static __attribute__((noinline)) void kernel_tile_queue_prefetched(kernel_tile_t
 static __attribute__((noinline)) void kernel_tile_trace_candidates(kernel_tile_trace *t, const kernel_by_depth *q,
                                                                    bool transparent)
 {
-    kernel_tile_queue *queue = &((kernel_tile_search *)t->search)->queue;
+    kernel_tile_queue *queue = &t->search->queue;
     kernel_tile_queue_begin(queue);
     for (int bin = 0; bin < KERNEL_DEPTHS && bin <= kernel_depth_bin(q, kernel_tile_far(t)); bin++)
         for (int i = q->first[bin]; i >= 0; i = q->items[i].next) {
@@ -259,7 +80,7 @@ static __attribute__((noinline)) void kernel_tile_trace_candidates(kernel_tile_t
             const bool is_transparent =
                 t->frame->isovalues[source % RENDER_MAX_ISOVALUES].surface >= t->frame->opaque_count;
             if (is_transparent != transparent || !kernel_candidate_blocks(t, candidate)) continue;
-            kernel_candidate_prefetch(t->frame, candidate);
+            kernel_prefetch_indices(t->frame->job->parts[source / RENDER_MAX_ISOVALUES].cells, candidate->cell);
             queue->prefetched[queue->prefetched_count++] = candidate;
             if (queue->prefetched_count == SIMD_WIDTH) kernel_tile_queue_prefetched(t, queue);
         }
@@ -278,72 +99,11 @@ SIMD_INLINE void kernel_tile_surface_candidates(kernel_tile_trace *t)
     if (f->opaque_count < f->surface_count) kernel_tile_trace_candidates(t, &by_depth, true);
 }
 
-/* ---- isosurfaces in cells that a tile finds by traversing the trees ---- */
-
-/* Queues the cells found so far for tracing, unless nearer hits hide them. */
-static bool kernel_tile_find_flush(kernel_candidate_list *list)
-{
-    kernel_tile_search *s = (kernel_tile_search *)((char *)list - offsetof(kernel_tile_search, list));
-    kernel_tile_trace *t = s->tile;
-    for (int n = 0; n < list->count; n++) {
-        const kernel_candidate *found = &list->items[n];
-        int part;
-        const int value = kernel_tile_set_source(t, found->source, &part);
-        const kernel_tile_candidate candidate =
-            kernel_candidate_in_tile(found, kernel_range_in_tile(found->x0, found->x1, t->tile.x0),
-                                     kernel_range_in_tile(found->y0, found->y1, t->tile.y0));
-        if (kernel_candidate_blocks(t, &candidate) && kernel_pixels_beyond(t, candidate.box, found->near))
-            kernel_tile_queue_add(t, &s->queue, &candidate, part, value);
-    }
-    list->count = 0;
-    return true;
-}
-
-/* Prepares the search for another mesh part. Pending cells of the previous part are processed first. */
-static void kernel_tile_find_set_part(kernel_tile_trace *t, kernel_tile_search *s, int part)
-{
-    kernel_finder *finder = t->thread->finder;
-    if (finder->frame == t->frame && finder->surface == t->surface && finder->part == part) return;
-    if (finder->frame) kernel_find_flush(finder);
-    kernel_finder_begin(finder, t->frame, &(kernel_subtree){.surface = t->layer, .part = part});
-    finder->list = &s->list;
-    finder->grow = kernel_tile_find_flush;
-    finder->first[0] = t->tile.x0;
-    finder->first[1] = t->tile.y0;
-    const render_camera *c = &t->frame->job->camera;
-    finder->last[0] = t->tile.x0 + KERNEL_TILE < c->width ? t->tile.x0 + KERNEL_TILE - 1 : c->width - 1;
-    finder->last[1] = t->tile.y0 + KERNEL_TILE < c->height ? t->tile.y0 + KERNEL_TILE - 1 : c->height - 1;
-}
-
-static void kernel_tile_find_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count)
-{
-    kernel_tile_find_set_part(t, (kernel_tile_search *)t->search, part);
-    kernel_find_leaf(t->thread->finder, cells, count);
-}
-
-static void kernel_tile_surfaces(kernel_tile_trace *t)
-{
-    kernel_tile_search *s = (kernel_tile_search *)t->search;
-    s->nodes.search_leaf = kernel_tile_find_leaf;
-    s->tile = t;
-    s->list = (kernel_candidate_list){.items = s->items, .capacity = 2 * SIMD_WIDTH};
-    t->thread->finder->frame = NULL;
-    kernel_tile_find_begin(t);
-    kernel_tile_queue_begin(&s->queue);
-    for (int layer = 0; layer < t->frame->surface_count; layer++) {
-        kernel_tile_set_layer(t, layer);
-        kernel_tile_surface(t);
-        if (t->thread->finder->frame) kernel_find_flush(t->thread->finder);
-        kernel_tile_find_flush(&s->list);
-        kernel_tile_queue_finish(t, &s->queue);
-    }
-}
-
 /* ---- tiles ---- */
 
 /* The memory that a thread keeps from tile to tile of a frame. */
 typedef struct kernel_memory {
-    kernel_cell_cache packet_cells;
+    kernel_cell packet_cells[KERNEL_CACHE_CELLS];
     kernel_cell tile_cell;
     kernel_curved tile_curved;
     kernel_curved_storage tile_curved_storage;
@@ -355,18 +115,12 @@ typedef struct kernel_memory {
     kernel_tile_search search;
 } kernel_memory;
 
-static int volume_intervals(const kernel_frame *f)
+/* Returns whether one of the pixels of the block that begins at (x0, y0) must be traced. */
+static bool has_active_pixel(const render_job *job, int x0, int y0)
 {
-    return f->volume_intervals ? f->volume_intervals : 1;
-}
-
-/* Returns whether one of the rectangle's pixels must be traced. */
-static bool has_active_pixel(const render_job *job, int x0, int y0, int columns, int rows)
-{
-    const int x1 = x0 + columns, y1 = y0 + rows;
     if (!job->pixels) return x0 < job->camera.width && y0 < job->camera.height;
-    for (int y = y0; y < y1 && y < job->camera.height; y++)
-        for (int x = x0; x < x1 && x < job->camera.width; x++)
+    for (int y = y0; y < y0 + KERNEL_BLOCK && y < job->camera.height; y++)
+        for (int x = x0; x < x0 + KERNEL_BLOCK && x < job->camera.width; x++)
             if (pixel_set_has(job->pixels, (int64_t)y * job->camera.width + x)) return true;
     return false;
 }
@@ -376,14 +130,14 @@ static unsigned active_blocks(const render_job *job, int x0, int y0)
     unsigned blocks = 0;
     for (int i = 0; i < KERNEL_BLOCKS; i++)
         if (has_active_pixel(job, x0 + i % KERNEL_BLOCKS_ACROSS * KERNEL_BLOCK,
-                             y0 + i / KERNEL_BLOCKS_ACROSS * KERNEL_BLOCK, KERNEL_BLOCK, KERNEL_BLOCK))
+                             y0 + i / KERNEL_BLOCKS_ACROSS * KERNEL_BLOCK))
             blocks |= 1u << i;
     return blocks;
 }
 
 static void trace_tile_surfaces(kernel_tile_trace *t)
 {
-    const double start = t->thread->clock_seconds();
+    const double start = render_seconds();
     if (t->frame->candidates)
         kernel_tile_surface_candidates(t);
     else
@@ -393,23 +147,21 @@ static void trace_tile_surfaces(kernel_tile_trace *t)
             const int i = __builtin_ctz(begun) * KERNEL_BLOCK_PACKETS + n;
             kernel_emit_opaque(&t->packets[i], &t->hits[i]);
         }
-    t->thread->surface_seconds += t->thread->clock_seconds() - start;
+    t->thread->surface_seconds += render_seconds() - start;
 }
 
-static void trace_tile_segments(kernel_tile_trace *t)
+static void trace_tile_volumes(kernel_tile_trace *t)
 {
-    const double start = t->thread->clock_seconds();
-    for (t->clip_interval = 0; t->clip_interval < volume_intervals(t->frame); t->clip_interval++)
-        kernel_tile_segments_trace(t);
-    t->thread->volume_seconds += t->thread->clock_seconds() - start;
-}
-
-static void trace_tile_samples(kernel_tile_trace *t)
-{
-    const double start = t->thread->clock_seconds();
-    for (t->clip_interval = 0; t->clip_interval < volume_intervals(t->frame); t->clip_interval++)
-        kernel_tile_volumes(t);
-    t->thread->volume_seconds += t->thread->clock_seconds() - start;
+    const kernel_frame *f = t->frame;
+    const double start = render_seconds();
+    const int intervals = f->volume_intervals ? f->volume_intervals : 1;
+    for (t->clip_interval = 0; t->clip_interval < intervals; t->clip_interval++) {
+        if (f->has_segments)
+            kernel_tile_segments_trace(t);
+        else
+            kernel_tile_volumes(t);
+    }
+    t->thread->volume_seconds += render_seconds() - start;
 }
 
 /* Returns whether the tile meets the part of the picture in which some tree may be visible. */
@@ -450,11 +202,7 @@ static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int
     if (!wanted) return;
     kernel_tile_begin(t, f, thread, x0, y0, wanted);
     if (f->surface_count) trace_tile_surfaces(t);
-    if (!fogs) return;
-    if (f->has_segments)
-        trace_tile_segments(t);
-    else
-        trace_tile_samples(t);
+    if (fogs) trace_tile_volumes(t);
 }
 
 static void find_candidates(const kernel_frame *f, kernel_thread *thread, const kernel_subtree *subtree,
@@ -472,7 +220,7 @@ static void find_candidates(const kernel_frame *f, kernel_thread *thread, const 
 static void begin(kernel_thread *thread)
 {
     kernel_memory *m = thread->memory;
-    thread->cells = &m->packet_cells;
+    thread->cells = m->packet_cells;
     thread->tile = &m->tile;
     thread->tile_cells = &m->cells;
     thread->tile_volume = &m->volume;
@@ -481,8 +229,8 @@ static void begin(kernel_thread *thread)
     m->tile.cell = &m->tile_cell;
     m->tile.curved = &m->tile_curved;
     m->tile_curved.storage = &m->tile_curved_storage;
-    m->tile.search = &m->search.nodes;
-    for (int i = 0; i < KERNEL_CACHE_CELLS; i++) m->packet_cells.cells[i].serial = 0;
+    m->tile.search = &m->search;
+    for (int i = 0; i < KERNEL_CACHE_CELLS; i++) m->packet_cells[i].serial = 0;
     m->segments.depth = 0;
 }
 

@@ -328,9 +328,7 @@ static tracer *tracer_create(const render_occluders *of)
     t->frame.depth_shift = t->moved_job.space.depth_origin = 0;
     t->secondary_rays = (kernel_secondary_rays){.rays = t->rays, .grow = grow_undecided};
     t->thread = (kernel_thread){.memory = base_alloc(t->kernels->memory_bytes),
-                                .polyhedra = has_polyhedra ? polyhedra_create() : NULL,
-                                .find_polyhedron = polyhedra_find,
-                                .polyhedron_scratch = polyhedra_scratch};
+                                .polyhedra = has_polyhedra ? polyhedra_create() : NULL};
     if (t->thread.memory) t->kernels->begin(&t->thread);
     if (t->thread.memory && (t->thread.polyhedra || !has_polyhedra)) return t;
     polyhedra_free(t->thread.polyhedra);

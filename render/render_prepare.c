@@ -218,7 +218,6 @@ static void prepare_surfaces(kernel_frame *f)
                 s->own_clips = job->clip_count ? layer->clips & ~f->common_clips : 0;
                 prepare_isovalues(&s->visible_values, layer);
                 if (layer->normal == RENDER_DIFFERENCES) s->value_scale = value_scale(job, i);
-                f->needs_packets = f->needs_packets || layer->normal == RENDER_DIFFERENCES;
                 if (layer->colour_map) prepare_transfer(&s->colour, layer->colour_map, 1);
                 if (layer->lines) prepare_lines(&s->lines, layer->lines);
                 f->opaque_count += is_opaque;

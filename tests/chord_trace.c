@@ -8,7 +8,6 @@
 #include "kernel_packet.h"
 #include "kernel_polyhedron.h"
 #include "kernel_tile.h"
-#include "kernel_traverse.h"
 #include "kernel_tets.h"
 #include "kernel_types.h"
 
@@ -33,7 +32,7 @@ static void chord_polyhedron(kernel_packet *p, const chord_state *state, const g
                              uint32_t index, vm rays)
 {
     polyhedron *c =
-        p->thread->find_polyhedron(p->thread->polyhedra, p->frame->job->parts[part].cells, field, part, 0, index);
+        polyhedra_find(p->thread->polyhedra, p->frame->job->parts[part].cells, field, part, 0, index);
     kernel_poly_crossings r;
     kernel_polyhedron_interval stay;
     if (!c) p->thread->out_of_memory = true;
@@ -67,10 +66,52 @@ static void chord_cell(kernel_packet *p, const chord_state *state, const grid_fi
     for (int n = 0; n < intervals; n++) chord_note(state, list[n].mask, list[n].t_in, list[n].t_out);
 }
 
-static void chord_leaf(kernel_packet *p, void *opaque_state, int part, const uint32_t *cells, int count, vm rays)
+/* Returns whether a ray may meet a node's box, which is extended by more than all rounding. */
+static bool chord_meets_box(const double base[3], const double direction[3], const float lower[4], const float upper[4])
 {
+    double from = -1e30, to = 1e30;
+    for (int a = 0; a < 3; a++) {
+        const double low = (double)lower[a] - 1e-4 - base[a], high = (double)upper[a] + 1e-4 - base[a];
+        if (fabs(direction[a]) < 1e-9) {
+            if (low > 0 || high < 0) return false;
+            continue;
+        }
+        from = fmax(from, fmin(low / direction[a], high / direction[a]));
+        to = fmin(to, fmax(low / direction[a], high / direction[a]));
+    }
+    return from <= to;
+}
+
+static unsigned chord_rays_in_box(const kernel_packet *p, const kernel_lanes *l, const mmbvh *tree, int64_t node)
+{
+    float lower[4], upper[4];
+    unsigned met = 0;
+    mmbvh_node_box(tree, node, lower, upper);
+    for (int i = 0; i < SIMD_WIDTH; i++) {
+        double base[3], direction[3];
+        kernel_tree_ray(p->frame, l->px[i], l->py[i], base, direction);
+        met |= (unsigned)chord_meets_box(base, direction, lower, upper) << i;
+    }
+    return met & vm_bits(p->active);
+}
+
+static void chord_part(kernel_packet *p, const kernel_lanes *l, const chord_state *state, int part)
+{
+    const mmbvh *tree = p->frame->job->parts[part].tree;
     const grid_field *field = &p->frame->job->surfaces[0].field.fields[part];
-    for (int n = 0; n < count; n++) chord_cell(p, opaque_state, field, part, cells[n], rays);
+    int64_t stack[MMBVH_MAX_DEPTH];
+    int top = 0;
+    if (tree->node_count) stack[top++] = 0;
+    while (top) {
+        const int64_t node = stack[--top], ref = mmbvh_node_ref(tree, node);
+        const int count = mmbvh_node_count(tree, node);
+        const unsigned met = chord_rays_in_box(p, l, tree, node);
+        if (!met) continue;
+        for (int n = 0; n < count; n++) chord_cell(p, state, field, part, tree->cells[ref + n], vm_from_bits(met));
+        if (count) continue;
+        stack[top++] = ref;
+        stack[top++] = ref + 1;
+    }
 }
 
 static void chord_tile_rays(kernel_packet *p, const kernel_lanes *l)
@@ -91,12 +132,10 @@ static void chord_tile_rays(kernel_packet *p, const kernel_lanes *l)
     p->slope_y = vf_load(lanes[3]);
 }
 
-/* Sets up a packet as kernel_packet_setup() and kernel_packet_complete() do, but for any rays, not only those of
- * pixels. */
+/* Sets up a packet as kernel_packet_begin() does, but for any rays, not only those of pixels. */
 static void chord_packet(kernel_packet *p, const kernel_frame *f, const kernel_tile *tile, kernel_thread *thread,
-                         const chord_rays *rays, int first)
+                         const chord_rays *rays, int first, kernel_lanes *l)
 {
-    kernel_lanes l;
     const int count = rays->count - first < SIMD_WIDTH ? rays->count - first : SIMD_WIDTH;
     p->frame = f;
     p->tile = tile;
@@ -104,17 +143,13 @@ static void chord_packet(kernel_packet *p, const kernel_frame *f, const kernel_t
     p->active = vm_from_bits((1u << count) - 1u);
     for (int lane = 0; lane < SIMD_WIDTH; lane++) {
         const int ray = first + (lane < count ? lane : 0);
-        l.px[lane] = rays->x[ray];
-        l.py[lane] = rays->y[ray];
+        l->px[lane] = rays->x[ray];
+        l->py[lane] = rays->y[ray];
     }
-    chord_tile_rays(p, &l);
+    chord_tile_rays(p, l);
     p->is_pencil = rays->is_pencil;
     p->u = f->job->camera.is_orthographic ? p->origin_x : p->slope_x;
     p->v = f->job->camera.is_orthographic ? p->origin_y : p->slope_y;
-    kernel_packet_tree_rays(p, &l);
-    double base[3], direction[3];
-    kernel_tree_ray(f, tile->centre_x, tile->centre_y, base, direction);
-    for (int a = 0; a < 3; a++) p->centre_direction[a] = (float)direction[a];
     p->t_near = vf_set((float)-f->depth_shift);
     p->t_far = vf_set(INFINITY);
 }
@@ -140,12 +175,11 @@ static void chord_trace(const kernel_frame *f, kernel_thread *thread, chord_rays
     for (int i = 0; i < rays->count; i++) rays->interval_count[i] = 0;
     for (int first = 0; first < rays->count; first += SIMD_WIDTH) {
         kernel_packet p;
-        chord_state state = {rays, first};
-        chord_packet(&p, f, &tile, thread, rays, first);
-        const kernel_descent descent = {NULL, p.t_near, &p.t_far, chord_leaf, &state};
-        for (int part = 0; part < f->job->part_count; part++)
-            kernel_traverse(&p, f->job->parts[part].tree, NULL, &descent, p.active, part);
+        kernel_lanes l;
+        const chord_state state = {rays, first};
+        chord_packet(&p, f, &tile, thread, rays, first, &l);
+        for (int part = 0; part < f->job->part_count; part++) chord_part(&p, &l, &state, part);
     }
 }
 
-const chord_table CHORD_TABLE = {SIMD_WIDTH, sizeof(kernel_cell_cache), chord_trace};
+const chord_table CHORD_TABLE = {SIMD_WIDTH, KERNEL_CACHE_CELLS * sizeof(kernel_cell), chord_trace};

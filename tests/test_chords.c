@@ -240,10 +240,7 @@ static void verify_ray(const render_job *job, const chord_rays *rays, int ray, c
 
 static kernel_thread open_thread(void)
 {
-    kernel_thread thread = {.cells = base_calloc(1, kernels()->cells_bytes),
-                            .polyhedra = polyhedra_create(),
-                            .find_polyhedron = polyhedra_find,
-                            .polyhedron_scratch = polyhedra_scratch};
+    kernel_thread thread = {.cells = base_calloc(1, kernels()->cells_bytes), .polyhedra = polyhedra_create()};
     assert_non_null(thread.cells);
     assert_non_null(thread.polyhedra);
     return thread;

@@ -157,7 +157,7 @@ static void make_batch(batch *b, int type, shape s)
 
 /* ---- contraction ---- */
 
-static void contract(const batch *b, kernel_contracted *out, kernel_bounds *bounds)
+static void contract(const batch *b, kernel_decided *out, kernel_bounds *bounds)
 {
     const kernel_curved cells = {.type = b->type, .at = b->at, .bounds = bounds};
     int32_t own[SIMD_WIDTH];
@@ -258,7 +258,7 @@ static double depth_bound(const batch *b, int lane, double t)
     return 6e-8 * fabs(t) + 1.8e-7 * (high - low);
 }
 
-static void verify(const batch *b, int lane, const kernel_contracted *at, count *n)
+static void verify(const batch *b, int lane, const kernel_decided *at, count *n)
 {
     reference_cell cell;
     reference_line line;
@@ -294,11 +294,11 @@ static void decided_crossings_are_right(void **state)
             while (n.rays < rays_wanted / (3 * SHAPE_COUNT)) {
                 batch b;
                 kernel_bounds bounds;
-                kernel_contracted at;
+                kernel_decided at;
                 make_batch(&b, types[k], s);
                 contract(&b, &at, &bounds);
                 for (int lane = 0; lane < SIMD_WIDTH; lane++) {
-                    n.contracting += bounds.contractions.error_growth[lane] < INFINITY;
+                    n.contracting += bounds.error_growth[lane] < INFINITY;
                     verify(&b, lane, &at, &n);
                 }
             }

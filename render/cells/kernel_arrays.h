@@ -252,12 +252,12 @@ SIMD_INLINE kernel_wide_doubles kernel_numbers_gather(const kernel_numbers *c, v
 /* Returns a < b per lane. is_narrow: whether both are stored as float32. */
 SIMD_INLINE vm kernel_raw_lt(bool is_narrow, const kernel_raw_numbers *a, const kernel_raw_numbers *b)
 {
-    return is_narrow ? vf_lt(a->narrow, b->narrow) : kernel_wide_doubles_lt(&a->wide, &b->wide);
+    return is_narrow ? vf_lt(a->narrow, b->narrow) : vd_lt(a->wide.half, b->wide.half);
 }
 
 SIMD_INLINE vm kernel_raw_eq(bool is_narrow, const kernel_raw_numbers *a, const kernel_raw_numbers *b)
 {
-    return is_narrow ? vf_eq(a->narrow, b->narrow) : kernel_wide_doubles_eq(&a->wide, &b->wide);
+    return is_narrow ? vf_eq(a->narrow, b->narrow) : vd_eq(a->wide.half, b->wide.half);
 }
 
 SIMD_INLINE void kernel_raw_swap(bool is_narrow, vm lanes, kernel_raw_numbers *a, kernel_raw_numbers *b)
@@ -267,8 +267,9 @@ SIMD_INLINE void kernel_raw_swap(bool is_narrow, vm lanes, kernel_raw_numbers *a
         a->narrow = vf_select(lanes, b->narrow, was.narrow);
         b->narrow = vf_select(lanes, was.narrow, b->narrow);
     } else {
-        a->wide = kernel_wide_doubles_select(lanes, &b->wide, &was.wide);
-        b->wide = kernel_wide_doubles_select(lanes, &was.wide, &b->wide);
+        const kernel_wide_doubles other = b->wide;
+        vd_select(lanes, other.half, was.wide.half, a->wide.half);
+        vd_select(lanes, was.wide.half, other.half, b->wide.half);
     }
 }
 
@@ -301,21 +302,15 @@ SIMD_INLINE kernel_wide_doubles kernel_raw_to_double(bool is_narrow, const kerne
 
 /* ---- cells of uniform and rectilinear lattices ---- */
 
-/* Coordinates of cells of a uniform or rectilinear lattice: those of each cell's lower end (ends[0]) and upper end
- * (ends[1]), by axis. */
-typedef struct kernel_lattice_cells {
-    kernel_wide_doubles ends[2][3];
-} kernel_lattice_cells;
-
 SIMD_INLINE bool kernel_arrays_have_axes(const kernel_arrays *p)
 {
     return p->coordinates[0].array.axis != NULL;
 }
 
-/* Reads the coordinates of hexes of a uniform or rectilinear lattice, given each hex's first vertex. It reads 6 numbers
- * per hex instead of 24. */
+/* Reads the coordinates of hexes of a uniform or rectilinear lattice, given each hex's first vertex: those of its lower
+ * end (cells[0]) and upper end (cells[1]), by axis. It reads 6 numbers per hex instead of 24. */
 static __attribute__((noinline)) void kernel_lattice_cells_read(const kernel_arrays *p, const int32_t first[SIMD_WIDTH],
-                                                                kernel_lattice_cells *out)
+                                                                kernel_wide_doubles cells[2][3])
 {
     for (int axis = 0; axis < 3; axis++) {
         const grid_axis *along = p->coordinates[axis].array.axis;
@@ -325,7 +320,7 @@ static __attribute__((noinline)) void kernel_lattice_cells_read(const kernel_arr
             ends[0][n] = at[0];
             ends[1][n] = at[1];
         }
-        for (int end = 0; end < 2; end++) memcpy(&out->ends[end][axis], ends[end], sizeof ends[end]);
+        for (int end = 0; end < 2; end++) memcpy(&cells[end][axis], ends[end], sizeof ends[end]);
     }
 }
 
@@ -361,8 +356,7 @@ SIMD_INLINE kernel_level kernel_level_of(double value)
 SIMD_INLINE vm kernel_raw_below(const kernel_numbers *c, const kernel_raw_numbers *v, const kernel_level *level)
 {
     const kernel_wide_doubles value = kernel_wide_doubles_set(level->value);
-    return kernel_numbers_are_narrow(c) ? vf_lt(v->narrow, vf_set(level->least))
-                                        : kernel_wide_doubles_lt(&v->wide, &value);
+    return kernel_numbers_are_narrow(c) ? vf_lt(v->narrow, vf_set(level->least)) : vd_lt(v->wide.half, value.half);
 }
 
 /* Returns the number v minus the level, rounded to float32. */

@@ -21,18 +21,6 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
-/* Coefficients from which surface/kernel_contraction.h computes a ray's only root. J0^-1 (X - vertex 0) + offset equals
- * r + N(r), where J0 is the map's Jacobian at the domain's middle, r is counted from that middle (or from the apex of a
- * pyramid), and nonlinear_part has the coefficients of N. The field is L + middle + a polynomial with the coefficients
- * `field`, in the same products of coordinates as N. kernel_contraction.h defines error_bound and domain_margin. */
-typedef struct kernel_contractions {
-    float offset[3][SIMD_WIDTH], middle[SIMD_WIDTH], nonlinear_part[4][3][SIMD_WIDTH], field[4][SIMD_WIDTH];
-    /* K / (1 - K), where K < 1 is the contraction constant of the iteration for reference coordinates; infinite if the
-     * iteration is not a contraction */
-    float error_growth[SIMD_WIDTH];
-    float error_bound[SIMD_WIDTH], domain_margin[SIMD_WIDTH];
-} kernel_contractions;
-
 /* Bounds for one cell and isovalue per lane. */
 typedef struct kernel_bounds {
     /* Upper bound of the difference between the value at a face and the field on the ray next to it. It is negative if
@@ -51,7 +39,15 @@ typedef struct kernel_bounds {
     /* upper bounds that kernel_roots.h calls H and K, of the second derivatives of the field and the map; for a pyramid
      * they are multiplied by its coordinate k */
     float field_curvature[SIMD_WIDTH], map_curvature[SIMD_WIDTH];
-    kernel_contractions contractions;
+    /* Coefficients from which surface/kernel_contraction.h computes a ray's only root. J0^-1 (X - vertex 0) + offset
+     * equals r + N(r), where J0 is the map's Jacobian at the domain's middle, r is counted from that middle (or from
+     * the apex of a pyramid), and terms has the coefficients of N. The field is L + middle + a polynomial with the
+     * coefficients field_terms, in the same products of coordinates as N. */
+    float offset[3][SIMD_WIDTH], middle[SIMD_WIDTH], terms[4][3][SIMD_WIDTH], field_terms[4][SIMD_WIDTH];
+    /* K / (1 - K), where K < 1 is the contraction constant of the iteration for reference coordinates; infinite if the
+     * iteration is not a contraction */
+    float error_growth[SIMD_WIDTH];
+    float error_bound[SIMD_WIDTH], domain_margin[SIMD_WIDTH]; /* defined in kernel_contraction.h */
 } kernel_bounds;
 
 /* Intermediate results in double for SIMD_WIDTH / 2 cells. */
@@ -62,36 +58,78 @@ typedef struct kernel_bounds_lanes {
     /* nonlinear_part: coefficients 4 to 7 of the map's nonlinear part N; inverse: inverse of the Jacobian at the
      * centre; reach: largest magnitude of the vertices' coordinates */
     kernel_f64 nonlinear_part[3][4], inverse[3][3], reach[3];
-    kernel_f64_mask is_solid; /* cells whose Jacobian at the centre has an inverse */
+    kernel_f64_mask is_solid;     /* cells whose Jacobian at the centre has an inverse */
+    kernel_f64 gradient[3], e[8]; /* gradient of the linear function L, and the coefficients of E = F - L */
+    /* The derivatives that differ from corner to corner, of the map's nonlinear part N minus those at the centre
+     * (bend), of the field (df) and of E (de). The indices are the component of N (for bend only), the axis, and the
+     * number in the table of derivatives (kernel_domain). */
+    kernel_f64 bend[3][3][4], df[3][4], de[3][4];
+    /* upper bounds over the cell, in reference coordinates: of |grad F| (slope), of the norm of J0^-1 J - I (theta), of
+     * |grad E| (slant), of grad E . w and of |N' w|, where w is a ray's direction in reference coordinates */
+    kernel_f64 slope, theta, slant, most_along, most_turn;
+    kernel_f64 across; /* rounding error of positions across the rays */
+    /* upper bounds of the distance of a face's computed crossing from its ray (gap), and of |J0^-1 d| over the rays'
+     * directions d (length); lower bound of |grad L . d| (rise) */
+    kernel_f64 gap, length, rise;
+    kernel_f64_mask is_regular; /* cells that are solid, and whose theta is below 0.9 */
 } kernel_bounds_lanes;
 
-/* Lists which derivatives of a map are different at the corners of a reference domain (kernel_domain_of()), for each of
- * the three axes: their number (slope_count), the corner at which each occurs first, and which one each corner has. For
- * a hex a derivative depends on the two other coordinates. For a wedge it depends on the last coordinate alone, or
- * along the last axis on the two others. For a pyramid it depends only on the coordinate along which it is taken. */
-typedef struct kernel_slope_table {
+/* KERNEL_LOW and KERNEL_HIGH are the ends of the reference domain [0, 1], extended by KERNEL_DOMAIN_RIM to both sides
+ * for points that rounding moves out of it. KERNEL_WIDE is the end along a leg of a wedge's triangle, which is extended
+ * twice as far. For a pyramid the coordinates are a / k, b / k and k. */
+#define KERNEL_DOMAIN_RIM 0.03125
+#define KERNEL_LOW -KERNEL_DOMAIN_RIM
+#define KERNEL_HIGH (1 + KERNEL_DOMAIN_RIM)
+#define KERNEL_WIDE (1 + 2 * KERNEL_DOMAIN_RIM)
+
+static const double kernel_box_corners[8][3] = {
+    {KERNEL_LOW, KERNEL_LOW, KERNEL_LOW},   {KERNEL_HIGH, KERNEL_LOW, KERNEL_LOW},
+    {KERNEL_LOW, KERNEL_HIGH, KERNEL_LOW},  {KERNEL_HIGH, KERNEL_HIGH, KERNEL_LOW},
+    {KERNEL_LOW, KERNEL_LOW, KERNEL_HIGH},  {KERNEL_HIGH, KERNEL_LOW, KERNEL_HIGH},
+    {KERNEL_LOW, KERNEL_HIGH, KERNEL_HIGH}, {KERNEL_HIGH, KERNEL_HIGH, KERNEL_HIGH}};
+
+static const double kernel_wedge_corners[6][3] = {
+    {KERNEL_LOW, KERNEL_LOW, KERNEL_LOW},   {KERNEL_WIDE, KERNEL_LOW, KERNEL_LOW},
+    {KERNEL_LOW, KERNEL_WIDE, KERNEL_LOW},  {KERNEL_LOW, KERNEL_LOW, KERNEL_HIGH},
+    {KERNEL_WIDE, KERNEL_LOW, KERNEL_HIGH}, {KERNEL_LOW, KERNEL_WIDE, KERNEL_HIGH}};
+
+/* The extended reference domain of a cell type: its middle and corners, and which derivatives of a map are different at
+ * the corners, for each of the three axes: their number (slope_count), the corner at which each occurs first, and which
+ * one each corner has. For a hex a derivative depends on the two other coordinates. For a wedge it depends on the last
+ * coordinate alone, or along the last axis on the two others. For a pyramid it depends only on the coordinate along
+ * which it is taken. */
+typedef struct kernel_domain {
+    double centre[3];
+    const double (*corners)[3];
     int corner_count, slope_count[3];
     signed char first[3][4], at[3][8];
-} kernel_slope_table;
+} kernel_domain;
 
-static const kernel_slope_table kernel_slope_tables[3] = {
-    {8,
+static const kernel_domain kernel_domains[3] = {
+    {{0.5, 0.5, 0.5},
+     kernel_box_corners,
+     8,
      {4, 4, 4},
      {{0, 2, 4, 6}, {0, 4, 1, 5}, {0, 1, 2, 3}},
      {{0, 0, 1, 1, 2, 2, 3, 3}, {0, 2, 0, 2, 1, 3, 1, 3}, {0, 1, 2, 3, 0, 1, 2, 3}}},
-    {6, {2, 2, 3}, {{0, 3}, {0, 3}, {0, 1, 2}}, {{0, 0, 0, 1, 1, 1}, {0, 0, 0, 1, 1, 1}, {0, 1, 2, 0, 1, 2}}},
-    {8,
+    {{1.0 / 3, 1.0 / 3, 0.5},
+     kernel_wedge_corners,
+     6,
+     {2, 2, 3},
+     {{0, 3}, {0, 3}, {0, 1, 2}},
+     {{0, 0, 0, 1, 1, 1}, {0, 0, 0, 1, 1, 1}, {0, 1, 2, 0, 1, 2}}},
+    {{0.5, 0.5, 0.5},
+     kernel_box_corners,
+     8,
      {2, 2, 2},
      {{0, 1}, {0, 2}, {0, 4}},
      {{0, 1, 0, 1, 0, 1, 0, 1}, {0, 0, 1, 1, 0, 0, 1, 1}, {0, 0, 0, 0, 1, 1, 1, 1}}},
 };
 
-/* The derivatives that differ from corner to corner, of the map's nonlinear part N minus those at the centre (bend), of
- * the field (df) and of E (de). The indices are the component of N (for bend only), the axis, and the number in
- * kernel_slope_table. */
-typedef struct kernel_lanes_slopes {
-    kernel_f64 bend[3][3][4], df[3][4], de[3][4];
-} kernel_lanes_slopes;
+SIMD_INLINE const kernel_domain *kernel_domain_of(int type)
+{
+    return &kernel_domains[kernel_shape_number(type)];
+}
 
 SIMD_INLINE kernel_f64 kernel_f64_set(double x)
 {
@@ -188,33 +226,32 @@ SIMD_INLINE void kernel_bounds_lanes_bend(kernel_bounds_lanes *b, int type)
 }
 
 /* Computes the gradient of the linear function L that approximates the field, rounded to float32, and the coefficients
- * of the difference E = field - L. *size is a scale for the rounding of L at positions in the cell. */
-SIMD_INLINE void kernel_bounds_lanes_linear(const kernel_bounds_lanes *b, int type, kernel_f64 gradient[3],
-                                            kernel_f64 e[8], kernel_f64 *size)
+ * of the difference E = field - L. Returns a scale for the rounding of L at positions in the cell. */
+SIMD_INLINE kernel_f64 kernel_bounds_lanes_linear(kernel_bounds_lanes *b, int type)
 {
     const double *centre = kernel_domain_of(type)->centre;
-    kernel_f64 df[3];
-    *size = (kernel_f64){0};
+    kernel_f64 df[3], size = {0};
     for (int a = 0; a < 3; a++) df[a] = kernel_f64_slope(type, b->exact[3], a, centre);
     for (int i = 0; i < 3; i++) {
         kernel_f64 g = {0};
         for (int a = 0; a < 3; a++) g += df[a] * b->inverse[a][i];
-        gradient[i] = kernel_f64_rounded(g);
-        *size += kernel_f64_abs(g) * b->reach[i];
+        b->gradient[i] = kernel_f64_rounded(g);
+        size += kernel_f64_abs(g) * b->reach[i];
     }
     for (int j = 0; j < 8; j++) {
-        e[j] = b->exact[3][j];
-        for (int i = 0; i < 3; i++) e[j] -= gradient[i] * b->exact[i][j];
+        b->e[j] = b->exact[3][j];
+        for (int i = 0; i < 3; i++) b->e[j] -= b->gradient[i] * b->exact[i][j];
     }
+    return size;
 }
 
 /* Returns the maximum over the domain's corners of |E|, where e has the coefficients of E. */
 SIMD_INLINE kernel_f64 kernel_f64_error(int type, const kernel_f64 e[8])
 {
-    const kernel_slope_table *table = &kernel_slope_tables[kernel_shape_number(type)];
+    const kernel_domain *table = kernel_domain_of(type);
     kernel_f64 most = {0};
     for (int n = 0; n < table->corner_count; n++) {
-        const double *corner = kernel_domain_of(type)->corners[n], k = kernel_has_apex(type) ? corner[2] : 1;
+        const double *corner = table->corners[n], k = kernel_has_apex(type) ? corner[2] : 1;
         const double r[3] = {corner[0] * k, corner[1] * k, corner[2]}, m = r[0] * r[1] / k;
         kernel_f64 at = (e[0] + r[0] * e[1]) + (r[1] * e[2] + r[2] * e[3]);
         if (!kernel_is_prism(type)) at += m * e[4];
@@ -227,28 +264,19 @@ SIMD_INLINE kernel_f64 kernel_f64_error(int type, const kernel_f64 e[8])
 
 /* Computes, at all corners, the gradients of the field and of E = field - L, and the difference between the derivative
  * of the map's nonlinear part N and that at the centre. */
-SIMD_INLINE void kernel_bounds_lanes_slopes(const kernel_bounds_lanes *b, int type, const kernel_f64 e[8],
-                                            kernel_lanes_slopes *out)
+SIMD_INLINE void kernel_bounds_lanes_slopes(kernel_bounds_lanes *b, int type)
 {
-    const kernel_slope_table *table = &kernel_slope_tables[kernel_shape_number(type)];
+    const kernel_domain *table = kernel_domain_of(type);
     kernel_f64 field[8];
     for (int j = 0; j < 8; j++) field[j] = kernel_f64_rounded(b->exact[3][j]);
     for (int a = 0; a < 3; a++)
         for (int n = 0; n < table->slope_count[a]; n++) {
-            const double *r = kernel_domain_of(type)->corners[(int)table->first[a][n]];
-            out->df[a][n] = kernel_f64_slope(type, field, a, r);
-            out->de[a][n] = kernel_f64_slope(type, e, a, r);
-            for (int i = 0; i < 3; i++) out->bend[i][a][n] = kernel_f64_bend(type, b->nonlinear_part[i], a, r);
+            const double *r = table->corners[(int)table->first[a][n]];
+            b->df[a][n] = kernel_f64_slope(type, field, a, r);
+            b->de[a][n] = kernel_f64_slope(type, b->e, a, r);
+            for (int i = 0; i < 3; i++) b->bend[i][a][n] = kernel_f64_bend(type, b->nonlinear_part[i], a, r);
         }
 }
-
-/* Maxima of several norms over the corners of the domain. */
-typedef struct kernel_lanes_most {
-    kernel_f64 bend; /* upper bound of the 8th power of the matrix norm of N's derivative */
-    /* squares of maxima over the corners: of |grad F|, of grad E . w, of |grad E|, and of |N' w|, where F is the field,
-     * E = F - L, N the map's nonlinear part and w a ray's direction in reference coordinates */
-    kernel_f64 df, along, steep, nonlinear_part;
-} kernel_lanes_most;
 
 SIMD_INLINE kernel_f64 kernel_f64_length(const kernel_f64 v[3])
 {
@@ -273,32 +301,40 @@ SIMD_INLINE kernel_f64 kernel_f64_eighth(const kernel_f64 m[3][3])
     return sum;
 }
 
-SIMD_INLINE void kernel_lanes_corners(const kernel_lanes_slopes *s, int type, const kernel_f64 w[3],
-                                      kernel_lanes_most *out)
+/* Computes the maxima of several norms over the corners of the domain. w: the middle ray's direction in reference
+ * coordinates. */
+SIMD_INLINE void kernel_bounds_lanes_corners(kernel_bounds_lanes *b, int type, const kernel_f64 w[3])
 {
-    const kernel_slope_table *table = &kernel_slope_tables[kernel_shape_number(type)];
+    const kernel_domain *table = kernel_domain_of(type);
+    const kernel_f64 zero = {0};
+    /* squares of the maxima; for theta an upper bound of the 8th power */
+    kernel_f64 theta = zero, slope = zero, most_along = zero, slant = zero, most_turn = zero;
     for (int n = 0; n < table->corner_count; n++) {
-        kernel_f64 bend[3][3], df[3], de[3], along = {0}, steep = {0}, nonlinear_part = {0};
+        kernel_f64 bend[3][3], df[3], de[3], along = zero, steep = zero, turn = zero;
         for (int a = 0; a < 3; a++) {
             const int at = table->at[a][n];
-            df[a] = s->df[a][at];
-            de[a] = s->de[a][at];
-            for (int i = 0; i < 3; i++) bend[i][a] = s->bend[i][a][at];
+            df[a] = b->df[a][at];
+            de[a] = b->de[a][at];
+            for (int i = 0; i < 3; i++) bend[i][a] = b->bend[i][a][at];
         }
         for (int i = 0; i < 3; i++) {
             const kernel_f64 term = bend[i][0] * w[0] + bend[i][1] * w[1] + bend[i][2] * w[2];
             along += de[i] * w[i];
             steep += de[i] * de[i];
-            nonlinear_part += term * term;
+            turn += term * term;
         }
-        const kernel_f64 eighth = kernel_f64_eighth((const kernel_f64(*)[3])bend), slope = kernel_f64_length(df);
-        if (!n) *out = (kernel_lanes_most){eighth, slope, along * along, steep, nonlinear_part};
-        out->bend = kernel_f64_more(eighth, out->bend);
-        out->df = kernel_f64_more(slope, out->df);
-        out->along = kernel_f64_more(along * along, out->along);
-        out->steep = kernel_f64_more(steep, out->steep);
-        out->nonlinear_part = kernel_f64_more(nonlinear_part, out->nonlinear_part);
+        const kernel_f64 eighth = kernel_f64_eighth((const kernel_f64(*)[3])bend), square = kernel_f64_length(df);
+        theta = n ? kernel_f64_more(eighth, theta) : eighth;
+        slope = n ? kernel_f64_more(square, slope) : square;
+        most_along = n ? kernel_f64_more(along * along, most_along) : along * along;
+        slant = n ? kernel_f64_more(steep, slant) : steep;
+        most_turn = n ? kernel_f64_more(turn, most_turn) : turn;
     }
+    b->theta = kernel_f64_sqrt(kernel_f64_sqrt(kernel_f64_sqrt(theta)));
+    b->slope = kernel_f64_rounded(kernel_f64_sqrt(slope));
+    b->most_along = kernel_f64_sqrt(most_along);
+    b->slant = kernel_f64_sqrt(slant);
+    b->most_turn = kernel_f64_sqrt(most_turn);
 }
 
 /* Computes the two planes, perpendicular to row i of the inverse Jacobian at the centre, between which all vertices
@@ -329,18 +365,6 @@ SIMD_INLINE void kernel_f64_terms(int type, const kernel_f64 nonlinear_part[4], 
     for (int j = 0; j < 3; j++) out[j] += 0.5 * nonlinear_part[3];
 }
 
-/* Results of kernel_f64_bounds() that kernel_f64_rate() and the contraction need. */
-typedef struct kernel_f64_rates {
-    /* rounding error of positions across the rays; gradient of the linear function L; coefficients of the difference E
-     * between field and L */
-    kernel_f64 across, gradient[3], e[8];
-    /* upper bounds over the cell, in reference coordinates: of the distance of a face's computed crossing from its ray
-     * (gap), of |grad F| (slope), of the norm of J0^-1 J - I (theta), of |grad E| (slant), and of |J0^-1 d| over the
-     * rays' directions d (w); and a lower bound of |grad L . d| (rise) */
-    kernel_f64 gap, slope, theta, slant, rise, w;
-    kernel_f64_mask is_regular;
-} kernel_f64_rates;
-
 /* Computes error_growth, K / (1 - K) with the contraction's constant K, and the bounds of rounding errors, in reference
  * coordinates r. Let u = 6e-8, e the vertices' largest distance from vertex 0 along an axis, and `wide` the maximum |x|
  * and |y| of rays and vertices; y and w are those of kernel_contraction.h.
@@ -354,28 +378,27 @@ typedef struct kernel_f64_rates {
  * error_bound is the sum of these errors. The computed crossings of faces lie within `gap` of the ray, and the values
  * there differ from the field by at most KERNEL_FACE_BAND. Each error moves the root by at most itself / (1 - K), and
  * domain_margin is twice the sum of all. */
-SIMD_INLINE void kernel_f64_rate(const kernel_bounds_lanes *b, int type, const kernel_f64_rates *r, int half,
-                                 kernel_contractions *out)
+SIMD_INLINE void kernel_f64_rate(const kernel_bounds_lanes *b, int type, int half, kernel_bounds *out)
 {
-    const kernel_f64 zero = {0}, one = zero + 1, speed = r->w / r->rise, wide = r->across * 5e5;
-    const kernel_f64 rate = r->theta + r->slant * speed * 1.0001, rest = one - rate;
+    const kernel_f64 zero = {0}, one = zero + 1, speed = b->length / b->rise, wide = b->across * 5e5;
+    const kernel_f64 rate = b->theta + b->slant * speed * 1.0001, rest = one - rate;
     kernel_f64 extent[3], own = zero,
-                          value = one + (kernel_f64_abs(r->gradient[0]) + kernel_f64_abs(r->gradient[1])) * wide;
+                          value = one + (kernel_f64_abs(b->gradient[0]) + kernel_f64_abs(b->gradient[1])) * wide;
     for (int a = 0; a < 3; a++) {
         extent[a] = kernel_f64_abs(b->apart[a][1]);
         for (int n = 2; n < grid_type_vertices(type); n++)
             extent[a] = kernel_f64_more(kernel_f64_abs(b->apart[a][n]), extent[a]);
     }
     for (int i = 0; i < 3; i++) {
-        kernel_f64 term = 0.125 * r->across * (kernel_f64_abs(b->inverse[i][0]) + kernel_f64_abs(b->inverse[i][1]));
+        kernel_f64 term = 0.125 * b->across * (kernel_f64_abs(b->inverse[i][0]) + kernel_f64_abs(b->inverse[i][1]));
         for (int a = 0; a < 3; a++) term += 3e-7 * kernel_f64_abs(b->inverse[i][a]) * extent[a];
         own += term * term;
     }
-    value += kernel_f64_abs(r->gradient[2]) * extent[2];
-    const kernel_f64 face = r->gap + speed * (r->slope * r->gap + 1e-6);
+    value += kernel_f64_abs(b->gradient[2]) * extent[2];
+    const kernel_f64 face = b->gap + speed * (b->slope * b->gap + 1e-6);
     const kernel_f64 error_bound = kernel_f64_sqrt(own) + speed * value * 5e-7 + 1e-6;
     const kernel_f64 domain_margin = 2 * ((face + error_bound) / rest) + 4e-6;
-    const kernel_f64_mask contracts = r->is_regular & (kernel_f64_mask)(r->rise > 0) & (kernel_f64_mask)(rate < 0.9) &
+    const kernel_f64_mask contracts = b->is_regular & (kernel_f64_mask)(b->rise > 0) & (kernel_f64_mask)(rate < 0.9) &
                                       (kernel_f64_mask)(domain_margin < 0.015625);
     kernel_f64_store(out->error_growth, half,
                      kernel_f64_select(contracts, 1.0001 * rate / rest, kernel_f64_set((double)INFINITY)));
@@ -383,13 +406,12 @@ SIMD_INLINE void kernel_f64_rate(const kernel_bounds_lanes *b, int type, const k
     kernel_f64_store(out->domain_margin, half, domain_margin);
 }
 
-SIMD_INLINE void kernel_f64_contraction_of(const kernel_bounds_lanes *b, const kernel_f64_rates *r, int half,
-                                           kernel_contractions *out, int type)
+SIMD_INLINE void kernel_f64_contraction_of(const kernel_bounds_lanes *b, int half, kernel_bounds *out, int type)
 {
     const double *centre = kernel_domain_of(type)->centre;
     kernel_f64 middle[4], terms[4];
     for (int n = 0; n < 4; n++) {
-        const kernel_f64 *c = n < 3 ? b->exact[n] : r->e;
+        const kernel_f64 *c = n < 3 ? b->exact[n] : b->e;
         middle[n] = c[0];
         if (kernel_has_apex(type)) continue;
         middle[n] += (centre[0] * c[1] + centre[1] * c[2]) + centre[2] * c[3];
@@ -401,13 +423,12 @@ SIMD_INLINE void kernel_f64_contraction_of(const kernel_bounds_lanes *b, const k
             -(b->inverse[i][0] * middle[0] + b->inverse[i][1] * middle[1] + b->inverse[i][2] * middle[2]);
         kernel_f64_store(out->offset[i], half, offset);
         kernel_f64_terms(type, b->nonlinear_part[i], terms);
-        for (int j = 0; j < kernel_nonlinear_count(type); j++)
-            kernel_f64_store(out->nonlinear_part[j][i], half, terms[j]);
+        for (int j = 0; j < kernel_nonlinear_count(type); j++) kernel_f64_store(out->terms[j][i], half, terms[j]);
     }
     kernel_f64_store(out->middle, half, middle[3]);
-    kernel_f64_terms(type, r->e + 4, terms);
-    for (int j = 0; j < kernel_nonlinear_count(type); j++) kernel_f64_store(out->field[j], half, terms[j]);
-    kernel_f64_rate(b, type, r, half, out);
+    kernel_f64_terms(type, b->e + 4, terms);
+    for (int j = 0; j < kernel_nonlinear_count(type); j++) kernel_f64_store(out->field_terms[j], half, terms[j]);
+    kernel_f64_rate(b, type, half, out);
 }
 
 /* Returns the square of the Frobenius norm of a polynomial's second derivatives over the extended domain. For a pyramid
@@ -426,8 +447,8 @@ SIMD_INLINE kernel_f64 kernel_f64_hessian(int type, const kernel_f64 c[4])
 }
 
 /* Stores the coefficients and bounds of the map and the field that the search for roots needs (kernel_roots.h). */
-SIMD_INLINE void kernel_f64_limits(const kernel_bounds_lanes *b, int type, kernel_f64 stretch, kernel_f64 slope,
-                                   int half, kernel_bounds *out)
+SIMD_INLINE void kernel_f64_limits(const kernel_bounds_lanes *b, int type, kernel_f64 stretch, int half,
+                                   kernel_bounds *out)
 {
     kernel_f64 twist = {0}, field[4];
     for (int i = 0; i < 3; i++) {
@@ -436,15 +457,15 @@ SIMD_INLINE void kernel_f64_limits(const kernel_bounds_lanes *b, int type, kerne
     }
     for (int j = 0; j < 4; j++) field[j] = kernel_f64_rounded(b->exact[3][4 + j]);
     kernel_f64_store(out->stretch, half, stretch);
-    kernel_f64_store(out->slope, half, slope);
+    kernel_f64_store(out->slope, half, b->slope);
     kernel_f64_store(out->field_curvature, half, kernel_f64_sqrt(kernel_f64_hessian(type, field)));
     kernel_f64_store(out->map_curvature, half, kernel_f64_sqrt(twist));
 }
 
-static __attribute__((noinline)) void kernel_f64_contraction(const kernel_bounds_lanes *b, const kernel_f64_rates *r,
-                                                             int half, kernel_contractions *out, int type)
+static __attribute__((noinline)) void kernel_f64_contraction(const kernel_bounds_lanes *b, int half, kernel_bounds *out,
+                                                             int type)
 {
-    KERNEL_OF_TYPE(type, kernel_f64_contraction_of, b, r, half, out);
+    KERNEL_OF_TYPE(type, kernel_f64_contraction_of, b, half, out);
 }
 
 /* Computes, for rays close to the direction (0, 0, 1), how far the field differs from L, how fast L rises along the
@@ -459,58 +480,46 @@ SIMD_INLINE void kernel_f64_bounds(const float at[4][8][SIMD_WIDTH], int half, c
 {
     const kernel_f64 zero = {0}, one = zero + 1, spread = zero + (double)beam->spread;
     kernel_bounds_lanes b;
-    kernel_lanes_slopes slopes;
-    kernel_lanes_most most;
-    kernel_f64 g[3], e[8], w[3], size, length = zero, off = zero, gap = zero;
+    kernel_f64 w[3], length = zero, off = zero, gap = zero;
     kernel_bounds_lanes_fit(&b, type, at, half);
     kernel_bounds_lanes_bend(&b, type);
-    kernel_bounds_lanes_linear(&b, type, g, e, &size);
-    kernel_bounds_lanes_slopes(&b, type, e, &slopes);
-    const kernel_f64 across =
-        2e-6 * (b.reach[0] + b.reach[1] + (double)beam->offset + (double)beam->spread * b.reach[2]);
+    const kernel_f64 size = kernel_bounds_lanes_linear(&b, type), *const g = b.gradient;
+    kernel_bounds_lanes_slopes(&b, type);
+    b.across = 2e-6 * (b.reach[0] + b.reach[1] + (double)beam->offset + (double)beam->spread * b.reach[2]);
     for (int i = 0; i < 3; i++) {
         const kernel_f64 side = kernel_f64_abs(b.inverse[i][0]) + kernel_f64_abs(b.inverse[i][1]);
         const kernel_f64 term = spread * side;
-        const kernel_f64 error_bound = across * side + 1e-6 * b.reach[2] * kernel_f64_abs(b.inverse[i][2]);
+        const kernel_f64 error_bound = b.across * side + 1e-6 * b.reach[2] * kernel_f64_abs(b.inverse[i][2]);
         w[i] = b.inverse[i][2];
         length += w[i] * w[i];
         off += term * term;
         gap += error_bound * error_bound;
         kernel_f64_planes(&b, type, i, error_bound + 1e-5, half, out);
     }
-    kernel_lanes_corners(&slopes, type, w, &most);
-    const kernel_f64 theta = kernel_f64_sqrt(kernel_f64_sqrt(kernel_f64_sqrt(most.bend)));
-    const kernel_f64_mask bends_little = (kernel_f64_mask)(theta < 0.9), is_regular = b.is_solid & bends_little;
-    const kernel_f64 stretch = kernel_f64_select(bends_little, kernel_f64_rounded(1 / (1 - theta)), kernel_f64_set(10));
-    const kernel_f64 slope = kernel_f64_rounded(kernel_f64_sqrt(most.df)), slant = kernel_f64_sqrt(most.steep);
-    kernel_f64_limits(&b, type, stretch, slope, half, out);
-    length = kernel_f64_sqrt(length), off = kernel_f64_sqrt(off);
-    const kernel_f64 whole = slant * stretch * (length + off);
+    kernel_bounds_lanes_corners(&b, type, w);
+    const kernel_f64_mask bends_little = (kernel_f64_mask)(b.theta < 0.9);
+    const kernel_f64 stretch =
+        kernel_f64_select(bends_little, kernel_f64_rounded(1 / (1 - b.theta)), kernel_f64_set(10));
+    b.is_regular = b.is_solid & bends_little;
+    kernel_f64_limits(&b, type, stretch, half, out);
+    off = kernel_f64_sqrt(off);
+    b.length = kernel_f64_sqrt(length) + off;
+    b.gap = kernel_f64_sqrt(gap);
+    const kernel_f64 whole = b.slant * stretch * b.length;
     const kernel_f64 apart =
-        kernel_f64_sqrt(most.along) +
-        slant * (kernel_f64_sqrt(most.nonlinear_part) + theta * theta * stretch * (length + off) + (one + theta) * off);
-    const kernel_f64 rise = kernel_f64_abs(g[2]) - spread * (kernel_f64_abs(g[0]) + kernel_f64_abs(g[1]));
+        b.most_along + b.slant * (b.most_turn + b.theta * b.theta * stretch * b.length + (one + b.theta) * off);
+    b.rise = kernel_f64_abs(g[2]) - spread * (kernel_f64_abs(g[0]) + kernel_f64_abs(g[1]));
     const kernel_f64 least = kernel_f64_select((kernel_f64_mask)(whole < apart), whole, apart);
-    const kernel_f64_mask rises = is_regular & (kernel_f64_mask)(rise * 0.9999 > least);
-    const kernel_f64_floats jump = kernel_f64_narrow(slope * stretch * kernel_f64_sqrt(gap)) + KERNEL_FACE_BAND;
+    const kernel_f64_mask rises = b.is_regular & (kernel_f64_mask)(b.rise * 0.9999 > least);
+    const kernel_f64_floats jump = kernel_f64_narrow(b.slope * stretch * b.gap) + KERNEL_FACE_BAND;
     kernel_f64_store(out->jump, half, kernel_f64_select(rises, kernel_f64_widen(jump), -one));
-    const kernel_f64 level = kernel_f64_rounded(e[0]), endless = kernel_f64_set((double)INFINITY);
-    e[0] -= level;
-    const kernel_f64 thickness = kernel_f64_error(type, e) + 1e-5 + 16 * 6e-8 * size;
+    const kernel_f64 level = kernel_f64_rounded(b.e[0]), endless = kernel_f64_set((double)INFINITY);
+    b.e[0] -= level;
+    const kernel_f64 thickness = kernel_f64_error(type, b.e) + 1e-5 + 16 * 6e-8 * size;
     kernel_f64_store(out->level, half, level);
     for (int a = 0; a < 3; a++) kernel_f64_store(out->gradient[a], half, g[a]);
-    kernel_f64_store(out->thickness, half, kernel_f64_select(is_regular, thickness, endless));
-    kernel_f64_rates rates = {.across = across,
-                              .gap = kernel_f64_sqrt(gap),
-                              .slope = slope,
-                              .theta = theta,
-                              .slant = slant,
-                              .rise = rise,
-                              .w = length + off,
-                              .is_regular = is_regular};
-    memcpy(rates.gradient, g, sizeof g);
-    memcpy(rates.e, e, sizeof e);
-    kernel_f64_contraction(&b, &rates, half, &out->contractions, type);
+    kernel_f64_store(out->thickness, half, kernel_f64_select(b.is_regular, thickness, endless));
+    kernel_f64_contraction(&b, half, out, type);
 }
 
 /* Computes the bounds for one cell of this type per lane, from vertex positions in tile space and vertex values

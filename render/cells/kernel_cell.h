@@ -182,11 +182,6 @@ typedef struct kernel_interval {
     vf r_in[3], r_out[3]; /* reference coordinates; set for hexes, wedges and pyramids only */
 } kernel_interval;
 
-/* A cell's vertices projected along each ray: x, y in the ray's plane, with the ray at the origin. */
-typedef struct kernel_projected {
-    vf x[GRID_MAX_CELL_VERTICES], y[GRID_MAX_CELL_VERTICES];
-} kernel_projected;
-
 SIMD_INLINE bool kernel_position_before(const double *a, const double *b)
 {
     if (a[0] != b[0]) return a[0] < b[0];

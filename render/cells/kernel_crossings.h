@@ -155,20 +155,6 @@ SIMD_INLINE void kernel_transform(const kernel_packet *p, const double *world, f
 /* The following functions intersect rays with hexes, wedges and pyramids, which have quadrilateral faces and may be
  * entered more than once by a ray (kernel_cell.h). */
 
-/* Edge functions by pairs of vertices: of the cell's edges and of its quads' diagonals. */
-typedef struct kernel_edges {
-    /* e[a][b] is set for a before b in the order of coordinates */
-    vf e[GRID_MAX_CELL_VERTICES][GRID_MAX_CELL_VERTICES];
-} kernel_edges;
-
-/* Computes the edge function of line number n of the cell, between the vertices i and j. */
-SIMD_INLINE void kernel_curved_edge(const kernel_packet *p, const kernel_cell *c, int n, int i, int j,
-                                    kernel_edges *out)
-{
-    const int a = c->rank[i] < c->rank[j] ? i : j, b = a == i ? j : i;
-    out->e[a][b] = kernel_edge(p, &c->lines[n], kernel_cell_position(c, a), kernel_cell_position(c, b));
-}
-
 SIMD_INLINE void kernel_cell_transform(kernel_cell *c, const kernel_packet *p, const grid *g)
 {
     kernel_cell_transform_in_tile(c, p->frame, p->tile, g);
@@ -212,16 +198,25 @@ SIMD_INLINE vf kernel_weighted_depth(const kernel_weights *w, const float *z)
     return kernel_weighted_sum(w, z[w->i], z[w->j], z[w->k]);
 }
 
-/* Parameters of a search for crossings that are common to all faces of the cell: the packet and its rays, the cell, its
- * projected vertices, and its edge functions. */
+/* What is common to all faces of a cell in a search for crossings. */
 typedef struct kernel_face_search {
     const kernel_packet *packet;
     const kernel_cell *cell;
     const kernel_shape *shape;
-    const kernel_projected *projected;
-    const kernel_edges *edges;
     vm rays;
+    vf x[GRID_MAX_CELL_VERTICES], y[GRID_MAX_CELL_VERTICES]; /* the cell's vertices, projected along each ray */
+    /* Edge functions by pairs of vertices: of the cell's edges and of its quads' diagonals. edge[a][b] is set for a
+     * before b in the order of coordinates. */
+    vf edge[GRID_MAX_CELL_VERTICES][GRID_MAX_CELL_VERTICES];
 } kernel_face_search;
+
+/* Computes the edge function of line number n of the cell, between the vertices i and j. */
+SIMD_INLINE void kernel_curved_edge(kernel_face_search *s, int n, int i, int j)
+{
+    const kernel_cell *c = s->cell;
+    const int a = c->rank[i] < c->rank[j] ? i : j, b = a == i ? j : i;
+    s->edge[a][b] = kernel_edge(s->packet, &c->lines[n], kernel_cell_position(c, a), kernel_cell_position(c, b));
+}
 
 SIMD_INLINE void kernel_triangle_values(const kernel_face_search *s, const kernel_weights *w, kernel_crossing *out)
 {
@@ -233,18 +228,9 @@ SIMD_INLINE void kernel_triangle_values(const kernel_face_search *s, const kerne
 }
 
 /* Returns the edge function from one corner to another, negated if they are not in the order of coordinates. */
-SIMD_INLINE vf kernel_corner_edge(const kernel_cell *c, const kernel_edges *edges, int from, int to)
+SIMD_INLINE vf kernel_corner_edge(const kernel_face_search *s, int from, int to)
 {
-    return c->rank[from] < c->rank[to] ? edges->e[from][to] : -edges->e[to][from];
-}
-
-SIMD_INLINE void kernel_quad_set(const kernel_projected *q, const float *z, const int corner[4], kernel_quad *out)
-{
-    for (int i = 0; i < 4; i++) {
-        out->x[i] = q->x[corner[i]];
-        out->y[i] = q->y[corner[i]];
-        out->z[i] = vf_set(z[corner[i]]);
-    }
+    return s->cell->rank[from] < s->cell->rank[to] ? s->edge[from][to] : -s->edge[to][from];
 }
 
 /* Computes values and reference coordinates at a crossing of a quad's bilinear patch. The isoparametric maps of both
@@ -279,9 +265,9 @@ SIMD_INLINE void kernel_triangle_order(const kernel_cell *c, const int corners[3
 }
 
 /* Returns the rays that cross the triangle, whose vertices are in the order of coordinates. */
-SIMD_INLINE vm kernel_triangle(const kernel_edges *edges, vm rays, const int ijk[3])
+SIMD_INLINE vm kernel_triangle(const kernel_face_search *s, const int ijk[3])
 {
-    return kernel_inside(rays, edges->e[ijk[0]][ijk[1]], edges->e[ijk[1]][ijk[2]], edges->e[ijk[0]][ijk[2]]);
+    return kernel_inside(s->rays, s->edge[ijk[0]][ijk[1]], s->edge[ijk[1]][ijk[2]], s->edge[ijk[0]][ijk[2]]);
 }
 
 /* Computes the crossings of rays with the triangle of three of the cell's vertices. Returns false if no ray crosses
@@ -289,13 +275,12 @@ SIMD_INLINE vm kernel_triangle(const kernel_edges *edges, vm rays, const int ijk
 SIMD_INLINE bool kernel_triangle_crossing(const kernel_face_search *s, const int corners[3], kernel_crossing *out)
 {
     const kernel_cell *c = s->cell;
-    const kernel_edges *edges = s->edges;
     int ijk[3];
     kernel_triangle_order(c, corners, ijk);
-    const vm hit = kernel_triangle(edges, s->rays, ijk);
+    const vm hit = kernel_triangle(s, ijk);
     if (!vm_any(hit)) return false;
-    kernel_weights w = kernel_weights_of(ijk[0], ijk[1], ijk[2], edges->e[ijk[0]][ijk[1]], edges->e[ijk[1]][ijk[2]],
-                                         edges->e[ijk[0]][ijk[2]]);
+    kernel_weights w = kernel_weights_of(ijk[0], ijk[1], ijk[2], s->edge[ijk[0]][ijk[1]], s->edge[ijk[1]][ijk[2]],
+                                         s->edge[ijk[0]][ijk[2]]);
     kernel_weights_recompute(s->packet, c->least[0], hit, kernel_cell_position(c, w.i), kernel_cell_position(c, w.j),
                              kernel_cell_position(c, w.k), &w);
     out->mask = hit;
@@ -322,8 +307,6 @@ static __attribute__((noinline, cold)) int kernel_collapsed_crossings(const kern
 SIMD_INLINE int kernel_quad_crossings(const kernel_face_search *s, const int corner[4], kernel_crossing *out)
 {
     const kernel_cell *c = s->cell;
-    const kernel_edges *edges = s->edges;
-    const vm rays = s->rays;
     kernel_quad quad;
     kernel_quad_point places[2];
     vm once = vm_none();
@@ -331,16 +314,20 @@ SIMD_INLINE int kernel_quad_crossings(const kernel_face_search *s, const int cor
         const int corners[3] = {corner[0], corner[half + 1], corner[half + 2]};
         int ijk[3];
         kernel_triangle_order(c, corners, ijk);
-        once = vm_xor(once, kernel_triangle(edges, rays, ijk));
+        once = vm_xor(once, kernel_triangle(s, ijk));
     }
-    quad.e01 = edges->e[corner[0]][corner[1]];
-    quad.e03 = edges->e[corner[0]][corner[3]];
-    quad.e12 = kernel_corner_edge(c, edges, corner[1], corner[2]);
-    quad.e32 = kernel_corner_edge(c, edges, corner[3], corner[2]);
-    const vm twice = kernel_quad_sides(rays, quad.e01, quad.e32, quad.e03, quad.e12);
+    quad.e01 = s->edge[corner[0]][corner[1]];
+    quad.e03 = s->edge[corner[0]][corner[3]];
+    quad.e12 = kernel_corner_edge(s, corner[1], corner[2]);
+    quad.e32 = kernel_corner_edge(s, corner[3], corner[2]);
+    const vm twice = kernel_quad_sides(s->rays, quad.e01, quad.e32, quad.e03, quad.e12);
     if (!vm_any(vm_or(once, twice))) return 0;
     if (kernel_quad_collapses(c, corner)) return kernel_collapsed_crossings(s, corner, out);
-    kernel_quad_set(s->projected, c->z, corner, &quad);
+    for (int i = 0; i < 4; i++) {
+        quad.x[i] = s->x[corner[i]];
+        quad.y[i] = s->y[corner[i]];
+        quad.z[i] = vf_set(c->z[corner[i]]);
+    }
     const int n = kernel_quad_points(&quad, once, twice, places);
     for (int i = 0; i < n; i++) kernel_quad_values(s, corner, &places[i], &out[i]);
     return n;
@@ -352,15 +339,16 @@ SIMD_INLINE int kernel_curved_crossings(const kernel_packet *p, const kernel_cel
                                         kernel_crossing out[KERNEL_MAX_CROSSINGS])
 {
     const kernel_shape *shape = kernel_cell_shape(c->type);
-    kernel_projected q;
-    kernel_edges edges;
-    const kernel_face_search s = {p, c, shape, &q, &edges, rays};
+    kernel_face_search s;
+    s.packet = p;
+    s.cell = c;
+    s.shape = shape;
+    s.rays = rays;
     for (int i = 0; i < c->count; i++) {
-        q.x[i] = kernel_project_x(p, kernel_cell_position(c, i));
-        q.y[i] = kernel_project_y(p, kernel_cell_position(c, i));
+        s.x[i] = kernel_project_x(p, kernel_cell_position(c, i));
+        s.y[i] = kernel_project_y(p, kernel_cell_position(c, i));
     }
-    for (int n = 0; n < shape->edge_count; n++)
-        kernel_curved_edge(p, c, n, shape->edges[n][0], shape->edges[n][1], &edges);
+    for (int n = 0; n < shape->edge_count; n++) kernel_curved_edge(&s, n, shape->edges[n][0], shape->edges[n][1]);
     int n = 0;
     for (int face = 0; face < shape->face_count; face++) {
         const signed char *loop = shape->faces[face].vertices;
@@ -371,7 +359,7 @@ SIMD_INLINE int kernel_curved_crossings(const kernel_packet *p, const kernel_cel
         }
         int corner[4];
         kernel_quad_corners(c, loop, corner);
-        kernel_curved_edge(p, c, shape->edge_count + face, corner[0], corner[2], &edges);
+        kernel_curved_edge(&s, shape->edge_count + face, corner[0], corner[2]);
         n += kernel_quad_crossings(&s, corner, &out[n]);
     }
     return n;

@@ -30,81 +30,63 @@ SIMD_INLINE void kernel_curved_ray_add(kernel_pixel_list *to, const kernel_pixel
 
 /* ---- faces that each ray crosses ---- */
 
-SIMD_INLINE void kernel_curved_project(const float (*at)[8][SIMD_WIDTH], const kernel_lane_rays *r, int type,
-                                       kernel_projected *out)
+/* Returns the bits of the edge function from vertex a to b of vertices that are projected along the rays; its sign bit
+ * is exact. Lowers *least to the function's magnitude if that is smaller. */
+SIMD_INLINE vi kernel_curved_side(const vf x[8], const vf y[8], int a, int b, vf *least)
 {
-    for (int i = 0; i < grid_type_vertices(type); i++) {
-        const vf z = kernel_gather_lane(at[2][i], r->lane);
-        out->x[i] = (kernel_gather_lane(at[0][i], r->lane) - r->rays.origin_x) - r->rays.slope_x * z;
-        out->y[i] = (kernel_gather_lane(at[1][i], r->lane) - r->rays.origin_y) - r->rays.slope_y * z;
-    }
-}
-
-/* Returns the bits of the edge function from vertex a to b; its sign bit is exact. Lowers *least to the function's
- * magnitude if that is smaller. */
-SIMD_INLINE vi kernel_curved_side(const kernel_projected *s, int a, int b, vf *least)
-{
-    const vf e = vf_diff_of_products(s->x[a], s->y[b], s->x[b], s->y[a]);
+    const vf e = vf_diff_of_products(x[a], y[b], x[b], y[a]);
     *least = vf_min(vf_abs(e), *least);
     return vi_from_bits(e);
 }
 
-/* Computes the edge functions of the shape's edges, and of each quad's diagonal from vertex 0 of the quad's loop. */
-SIMD_INLINE void kernel_curved_sides_of(const kernel_projected *s, int type, kernel_curved_sides *out)
-{
-    const kernel_shape *shape = kernel_cell_shape(type);
-    out->least = vf_set(INFINITY);
-    for (int n = 0; n < shape->edge_count; n++)
-        out->side[n] = kernel_curved_side(s, shape->edges[n][0], shape->edges[n][1], &out->least);
-    for (int face = 0; face < shape->face_count; face++) {
-        const signed char *loop = shape->faces[face].vertices;
-        if (shape->faces[face].count == 4)
-            out->side[shape->edge_count + face] = kernel_curved_side(s, loop[0], loop[2], &out->least);
-    }
-}
-
-/* Returns, per ray, a mask of the faces that the ray crosses: those whose edge functions all have the same sign. */
-SIMD_INLINE vi kernel_curved_crossed_faces(const kernel_curved_sides *sides, int type)
-{
-    const kernel_shape *shape = kernel_cell_shape(type);
-    vi faces = vi_set(0);
-    for (int face = 0; face < shape->face_count; face++) {
-        vi around[4];
-        kernel_face_sides(shape, face, sides, around);
-        faces |= kernel_face_bit(kernel_sides_agree(around, shape->faces[face].count), face);
-    }
-    return faces;
-}
-
-/* Returns the rays that cross exactly one of a quad's two triangles, even if the quad does not look convex; the result
- * does not depend on the diagonal along which the quad is split. Rays that may cross the quad's patch twice are added
- * to *alone, the rays to be traced cell by cell. */
-SIMD_INLINE vm kernel_curved_cross_one_triangle(const kernel_projected *s, const kernel_curved_sides *sides,
-                                                const kernel_shape *shape, int face, vm rays, vm *alone)
+/* Returns a mask of the rays that cross exactly one of a quad's two triangles, even if the quad does not look convex;
+ * the result does not depend on the diagonal along which the quad is split. around: the sides of the quad's edges, in
+ * cyclic order. Rays that may cross the quad's patch twice are added to *alone, the rays to be traced cell by cell. */
+SIMD_INLINE vm kernel_curved_cross_one_triangle(const vf x[8], const vf y[8], const signed char *loop,
+                                                const vi around[4], vi diagonal, vm rays, vm *alone)
 {
     vm side[4];
-    kernel_quad_sides_negative(shape, face, sides, side);
-    *alone = vm_or(*alone, kernel_curved_may_cross_twice(s->x, s->y, shape->faces[face].vertices, rays, side));
-    return kernel_cross_one_triangle(side, vm_sign(sides->side[shape->edge_count + face]));
+    for (int i = 0; i < 4; i++) side[i] = vm_sign(around[i]);
+    *alone = vm_or(*alone, kernel_curved_may_cross_twice(x, y, loop, rays, side));
+    return kernel_cross_one_triangle(side, vm_sign(diagonal));
 }
 
-/* Finds the two faces that each ray crosses once. Rays for which there are not exactly two such faces are added to
- * out->alone, to be traced cell by cell. at: the cells' vertices, per lane. nonconvex: per ray, one bit for each quad
- * that may not look convex; NULL: there are no such quads. */
+/* Finds the two faces that each ray crosses once: those whose edge functions all have the same sign. Rays for which
+ * there are not exactly two such faces are added to out->alone, to be traced cell by cell. at: the cells' vertices, per
+ * lane. nonconvex: per ray, one bit for each quad that may not look convex; NULL: there are no such quads. */
 SIMD_INLINE void kernel_curved_find(const float (*at)[8][SIMD_WIDTH], const kernel_lane_rays *r, const vi *nonconvex,
                                     vm rays, kernel_curved_crossed *out, int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
-    kernel_projected seen;
-    kernel_curved_sides sides;
-    kernel_curved_project(at, r, type, &seen);
-    kernel_curved_sides_of(&seen, type, &sides);
-    vm alone = vm_not(vf_lt(vf_set(KERNEL_EDGE_LEAST), sides.least));
-    vi faces = kernel_curved_crossed_faces(&sides, type);
-    for (int face = 0; nonconvex && face < shape->face_count; face++) {
-        if (shape->faces[face].count == 3 || !vm_any(vm_and(rays, vm_sign(*nonconvex << (31 - face))))) continue;
-        const vm once = kernel_curved_cross_one_triangle(&seen, &sides, shape, face, rays, &alone);
-        faces = (faces & ~vi_set(1 << face)) | vi_select(once, vi_set(1 << face), vi_set(0));
+    vf x[8], y[8], least = vf_set(INFINITY);
+    vi side[KERNEL_MAX_LINES], faces = vi_set(0);
+    for (int i = 0; i < grid_type_vertices(type); i++) {
+        const vf z = kernel_gather_lane(at[2][i], r->lane);
+        x[i] = (kernel_gather_lane(at[0][i], r->lane) - r->rays.origin_x) - r->rays.slope_x * z;
+        y[i] = (kernel_gather_lane(at[1][i], r->lane) - r->rays.origin_y) - r->rays.slope_y * z;
+    }
+    for (int n = 0; n < shape->edge_count; n++)
+        side[n] = kernel_curved_side(x, y, shape->edges[n][0], shape->edges[n][1], &least);
+    for (int face = 0; face < shape->face_count; face++) {
+        const signed char *loop = shape->faces[face].vertices;
+        if (shape->faces[face].count == 4)
+            side[shape->edge_count + face] = kernel_curved_side(x, y, loop[0], loop[2], &least);
+    }
+    vm alone = vm_not(vf_lt(vf_set(KERNEL_EDGE_LEAST), least));
+    for (int face = 0; face < shape->face_count; face++) {
+        const vi bit = vi_set(1 << face);
+        vi around[4];
+        for (int i = 0; i < 4; i++) {
+            const signed char *edge = shape->faces[face].sides[i];
+            around[i] = edge[1] ? ~side[(int)edge[0]] : side[(int)edge[0]];
+        }
+        vi crossed = kernel_sides_agree(around, shape->faces[face].count) >> (31 - face) & bit;
+        if (nonconvex && shape->faces[face].count == 4 && vm_any(vm_and(rays, vm_sign(*nonconvex << (31 - face))))) {
+            const vm once = kernel_curved_cross_one_triangle(x, y, shape->faces[face].vertices, around,
+                                                             side[shape->edge_count + face], rays, &alone);
+            crossed = vi_select(once, bit, vi_set(0));
+        }
+        faces |= crossed;
     }
     kernel_curved_count(faces, rays, alone, out);
 }

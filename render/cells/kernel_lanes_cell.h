@@ -7,10 +7,28 @@
 #include <math.h>
 #include <string.h>
 
+#include "kernel_arrays.h"
 #include "kernel_cell.h"
 #include "kernel_types.h"
 #include "kernel_wide.h"
 #include "simd.h"
+
+/* The vertices of each lane's cell while they are sorted: coordinates, vertex index, and rank, which is not set for
+ * tets. */
+typedef struct kernel_sorted_vertices {
+    kernel_raw_numbers at[8][3];
+    vi vertex[8];
+    vf rank[8];
+} kernel_sorted_vertices;
+
+/* Exchanges vertices i and j, except for their ranks, in the given lanes. */
+SIMD_INLINE void kernel_sorted_swap(kernel_sorted_vertices *h, bool is_narrow, vm lanes, int i, int j)
+{
+    const vi was = h->vertex[i];
+    for (int a = 0; a < 3; a++) kernel_raw_swap(is_narrow, lanes, &h->at[i][a], &h->at[j][a]);
+    h->vertex[i] = vi_select(lanes, h->vertex[j], was);
+    h->vertex[j] = vi_select(lanes, was, h->vertex[j]);
+}
 
 /* Transforms one vertex per lane into tile space. */
 SIMD_INLINE void kernel_lanes_transform(const kernel_frame *f, const kernel_tile *tile,

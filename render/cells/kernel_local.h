@@ -196,8 +196,8 @@ SIMD_INLINE vf kernel_local_nonlinearity(int type, const vf nonlinear_part[KERNE
     return most;
 }
 
-/* Inverts the 3 × 3 matrix whose columns are m[.][1], m[.][2] and m[.][3]. */
-SIMD_INLINE void kernel_local_invert(const vf m[3][8], vf inverse[3][3])
+/* Inverts the 3 × 3 matrix whose columns are m[.][1], m[.][2] and m[.][3]. Returns its determinant. */
+SIMD_INLINE vf kernel_local_invert(const vf m[3][8], vf inverse[3][3])
 {
     for (int i = 0; i < 3; i++) {
         const int u = 1 + (i + 1) % 3, v = 1 + (i + 2) % 3;
@@ -209,6 +209,7 @@ SIMD_INLINE void kernel_local_invert(const vf m[3][8], vf inverse[3][3])
     const vf det = (m[0][1] * inverse[0][0] + m[1][1] * inverse[0][1]) + m[2][1] * inverse[0][2], one = 1.0f / det;
     for (int i = 0; i < 3; i++)
         for (int a = 0; a < 3; a++) inverse[i][a] *= one;
+    return det;
 }
 
 /* Computes bounds of the affine approximation y of the reference coordinates: its range over all vertices, widened by

@@ -133,22 +133,16 @@ SIMD_INLINE vf kernel_dot(const vf a[3], const vf b[3])
     return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
 }
 
-/* The cross products of the rows of the Jacobian, whose rows are the gradients of the three positions. Divided by det,
- * the cross products are the columns of the inverse Jacobian. */
-typedef struct kernel_jacobian {
-    vf cross[3][3]; /* cross[i] = row i+1 × row i+2, with indices modulo 3 */
-    vf det;
-} kernel_jacobian;
-
-SIMD_INLINE void kernel_jacobian_of(const vf position[3][8], bool is_pyramid, const kernel_product *m, const vf r[3],
-                                    kernel_jacobian *out)
+/* Computes the cross products of the rows of the Jacobian, whose rows are the gradients of the three positions:
+ * cross[i] = row i+1 × row i+2, with indices modulo 3. Returns the determinant. Divided by it, the cross products are
+ * the columns of the inverse Jacobian. */
+SIMD_INLINE vf kernel_jacobian(const vf position[3][8], bool is_pyramid, const kernel_product *m, const vf r[3],
+                               vf cross[3][3])
 {
     vf row[3][3];
     for (int a = 0; a < 3; a++) kernel_gradient_of(position[a], is_pyramid, m, r, row[a]);
-    kernel_cross(row[1], row[2], out->cross[0]);
-    kernel_cross(row[2], row[0], out->cross[1]);
-    kernel_cross(row[0], row[1], out->cross[2]);
-    out->det = kernel_dot(row[0], out->cross[0]);
+    for (int i = 0; i < 3; i++) kernel_cross(row[(i + 1) % 3], row[(i + 2) % 3], cross[i]);
+    return kernel_dot(row[0], cross[0]);
 }
 
 /* The maps of cells of one type, one per lane. Positions are relative to vertex 0 in tile space, so that they are of
@@ -246,18 +240,18 @@ SIMD_INLINE vm kernel_map_newton(const kernel_rays *rays, const kernel_map *map,
     kernel_rays_at(rays, map, t, target);
     for (int step = 0; step < KERNEL_MAP_STEPS && vm_any(open); step++) {
         const kernel_product m = kernel_product_at(map->is_pyramid, r);
-        kernel_jacobian j;
-        kernel_jacobian_of(map->position, map->is_pyramid, &m, r, &j);
-        const vf inverse = vf_select(vf_eq(j.det, vf_set(0)), vf_set(0), 1.0f / j.det);
+        vf cross[3][3];
+        const vf det = kernel_jacobian(map->position, map->is_pyramid, &m, r, cross);
+        const vf inverse = vf_select(vf_eq(det, vf_set(0)), vf_set(0), 1.0f / det);
         vf residual[3], largest = vf_set(0);
         for (int a = 0; a < 3; a++) residual[a] = target[a] - kernel_value_of(map->position[a], map->is_pyramid, &m, r);
         for (int a = 0; a < 3; a++) {
-            const vf sum = (j.cross[0][a] * residual[0] + j.cross[1][a] * residual[1]) + j.cross[2][a] * residual[2];
+            const vf sum = (cross[0][a] * residual[0] + cross[1][a] * residual[1]) + cross[2][a] * residual[2];
             const vf move = vf_clamp(sum * inverse, vf_set(-1), vf_set(1));
             largest = vf_max(largest, vf_abs(move));
             r[a] = vf_select(open, vf_clamp(r[a] + move, vf_set(-1), vf_set(2)), r[a]);
         }
-        const vm solid = vm_not(vf_eq(j.det, vf_set(0)));
+        const vm solid = vm_not(vf_eq(det, vf_set(0)));
         open = vm_andnot(open, vm_and(solid, vf_le(largest, vf_set(map->tolerance))));
     }
     return open;
@@ -297,13 +291,12 @@ SIMD_INLINE vm kernel_map_invert(const kernel_rays *rays, const kernel_map *map,
 SIMD_INLINE void kernel_lanes_normal(const kernel_map *map, const vf r[3], vf out[3])
 {
     const kernel_product m = kernel_product_at(map->is_pyramid, r);
-    kernel_jacobian j;
-    vf g[3];
-    kernel_jacobian_of(map->position, map->is_pyramid, &m, r, &j);
+    vf cross[3][3], g[3];
+    kernel_jacobian(map->position, map->is_pyramid, &m, r, cross);
     kernel_gradient_of(map->field, map->is_pyramid, &m, r, g);
     /* the gradient is J^-T g, where the columns of J^-1 are cross / det; the sign of det is ignored, because callers
      * orient the normal themselves */
-    for (int a = 0; a < 3; a++) out[a] = kernel_dot(j.cross[a], g);
+    for (int a = 0; a < 3; a++) out[a] = kernel_dot(cross[a], g);
 }
 
 /* The following functions evaluate the field along a ray through a cell: by linear interpolation between the faces, or
@@ -383,44 +376,6 @@ SIMD_INLINE void kernel_reference_between(const kernel_point *low, const kernel_
 
 /* Largest difference that rounding causes between a face's value and the field there. */
 #define KERNEL_FACE_BAND 1e-6f
-#define KERNEL_DOMAIN_RIM 0.03125
-
-/* KERNEL_LOW and KERNEL_HIGH are the ends of the reference domain [0, 1], extended by KERNEL_DOMAIN_RIM to both sides
- * for points that rounding moves out of it. KERNEL_WIDE is the end along a leg of a wedge's triangle, which is extended
- * twice as far. For a pyramid the coordinates are a / k, b / k and k. */
-#define KERNEL_LOW -KERNEL_DOMAIN_RIM
-#define KERNEL_HIGH (1 + KERNEL_DOMAIN_RIM)
-#define KERNEL_WIDE (1 + 2 * KERNEL_DOMAIN_RIM)
-
-/* The middle and the corners of an extended reference domain. The last two corners of a wedge repeat others. */
-typedef struct kernel_domain {
-    double centre[3], corners[8][3];
-} kernel_domain;
-
-static const kernel_domain kernel_box_domain = {{0.5, 0.5, 0.5},
-                                                {{KERNEL_LOW, KERNEL_LOW, KERNEL_LOW},
-                                                 {KERNEL_HIGH, KERNEL_LOW, KERNEL_LOW},
-                                                 {KERNEL_LOW, KERNEL_HIGH, KERNEL_LOW},
-                                                 {KERNEL_HIGH, KERNEL_HIGH, KERNEL_LOW},
-                                                 {KERNEL_LOW, KERNEL_LOW, KERNEL_HIGH},
-                                                 {KERNEL_HIGH, KERNEL_LOW, KERNEL_HIGH},
-                                                 {KERNEL_LOW, KERNEL_HIGH, KERNEL_HIGH},
-                                                 {KERNEL_HIGH, KERNEL_HIGH, KERNEL_HIGH}}};
-
-static const kernel_domain kernel_wedge_domain = {{1.0 / 3, 1.0 / 3, 0.5},
-                                                  {{KERNEL_LOW, KERNEL_LOW, KERNEL_LOW},
-                                                   {KERNEL_WIDE, KERNEL_LOW, KERNEL_LOW},
-                                                   {KERNEL_LOW, KERNEL_WIDE, KERNEL_LOW},
-                                                   {KERNEL_LOW, KERNEL_LOW, KERNEL_HIGH},
-                                                   {KERNEL_WIDE, KERNEL_LOW, KERNEL_HIGH},
-                                                   {KERNEL_LOW, KERNEL_WIDE, KERNEL_HIGH},
-                                                   {KERNEL_WIDE, KERNEL_LOW, KERNEL_HIGH},
-                                                   {KERNEL_LOW, KERNEL_WIDE, KERNEL_HIGH}}};
-
-SIMD_INLINE const kernel_domain *kernel_domain_of(int type)
-{
-    return kernel_is_prism(type) ? &kernel_wedge_domain : &kernel_box_domain;
-}
 
 /* A range of rays: their directions are (0, 0, 1) plus up to `spread` in x and y. */
 typedef struct kernel_beam {

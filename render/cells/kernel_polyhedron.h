@@ -104,7 +104,7 @@ static bool kernel_poly_allocate(const kernel_packet *p, const polyhedron *c, ke
         points * 2 * sizeof(vf) + (edges + points) * (sizeof(vf) + sizeof(int)) +
         facets * (sizeof(kernel_triangle_crossings) + sizeof(vm) + sizeof(int) + sizeof(kernel_subtet_interval)) +
         edges * sizeof(kernel_triangle_crossings) + spare;
-    char *at = p->thread->polyhedron_scratch(p->thread->polyhedra, bytes);
+    char *at = polyhedra_scratch(p->thread->polyhedra, bytes);
     if (!at) {
         p->thread->out_of_memory = true;
         return false;
@@ -144,8 +144,7 @@ SIMD_INLINE polyhedron *kernel_polyhedron_find(kernel_packet *p, const grid_fiel
                                                uint32_t index)
 {
     kernel_thread *thread = p->thread;
-    polyhedron *c =
-        thread->find_polyhedron(thread->polyhedra, p->frame->job->parts[part].cells, field, part, layer, index);
+    polyhedron *c = polyhedra_find(thread->polyhedra, p->frame->job->parts[part].cells, field, part, layer, index);
     if (!c) thread->out_of_memory = true;
     return c && c->is_finite ? c : NULL;
 }

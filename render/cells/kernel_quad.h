@@ -37,7 +37,6 @@
 
 #include "grid.h"
 #include "kernel_shapes.h"
-#include "kernel_wide.h"
 #include "simd.h"
 
 /* A quad's corners, projected along each ray, and the edge functions of its sides. e01 is that from corner 0 to corner
@@ -201,79 +200,9 @@ static inline void kernel_quad_store_point(kernel_quad_point *out, int lane, con
     out->t[lane] = (float)place[2];
 }
 
-/* ---- SIMD_WIDTH / 2 rays, in double ---- */
-
-typedef struct kernel_f64_quad {
-    kernel_f64 x[4], y[4];
-} kernel_f64_quad;
-
-typedef struct kernel_f64_quadratic {
-    kernel_f64 c0, c1, c2;
-} kernel_f64_quadratic;
-
-SIMD_INLINE kernel_f64 kernel_f64_cross(const kernel_f64_quad *q, int i, int j)
-{
-    return q->x[i] * q->y[j] - q->x[j] * q->y[i];
-}
-
-SIMD_INLINE kernel_f64_mask kernel_f64_vanishes(const kernel_f64_quadratic *c)
-{
-    return (kernel_f64_mask)(c->c0 == 0) & (kernel_f64_mask)(c->c1 == 0) & (kernel_f64_mask)(c->c2 == 0);
-}
-
-/* Returns, per lane, the root in [0, 1] of the quadratic at which half of its derivative equals `turn`, by the same
- * formulas as kernel_scalar_root(). */
-SIMD_INLINE kernel_f64 kernel_f64_root(const kernel_f64_quadratic *c, kernel_f64 turn)
-{
-    const kernel_f64 zero = {0}, one = zero + 1;
-    const kernel_f64_mask is_sum = (kernel_f64_mask)(c->c1 * turn <= 0);
-    const kernel_f64 n = kernel_f64_select(is_sum, turn - c->c1, c->c0);
-    const kernel_f64 d = kernel_f64_select(is_sum, n + c->c2, (c->c0 - c->c1) - turn);
-    const kernel_f64 whole = kernel_f64_select(is_sum, one, zero);
-    const kernel_f64 x = kernel_f64_select((kernel_f64_mask)(d != 0), n / d, whole);
-    const kernel_f64 least = kernel_f64_select((kernel_f64_mask)(x < one), x, one);
-    return kernel_f64_select((kernel_f64_mask)(x >= 0), least, zero);
-}
-
-/* Computes the patch's point for the wanted rays in one half of the lanes. Each of these rays crosses one triangle.
- * Returns the rays for which one of the quadratics A and B vanishes, whose points must be computed one by one. */
-SIMD_INLINE kernel_f64_mask kernel_f64_single_point(const kernel_quad *quad, vm wanted, int half,
-                                                    kernel_quad_point *out)
-{
-    const kernel_f64 zero = {0}, one = zero + 1;
-    kernel_f64_quad q;
-    kernel_f64 z[4], old[3];
-    const vi turns_b = vi_from_bits(quad->e01) ^ vi_from_bits(quad->e32);
-    const kernel_f64_mask by_b = kernel_f64_of_mask(vm_sign(turns_b), half);
-    const kernel_f64_mask negative_a = kernel_f64_of_mask(vm_sign(vi_from_bits(quad->e03)), half);
-    const kernel_f64_mask negative_b = kernel_f64_of_mask(vm_sign(vi_from_bits(quad->e01)), half);
-    for (int i = 0; i < 4; i++) {
-        q.x[i] = kernel_f64_of(&quad->x[i], half);
-        q.y[i] = kernel_f64_of(&quad->y[i], half);
-        z[i] = kernel_f64_of(&quad->z[i], half);
-    }
-    const kernel_f64 across = kernel_f64_cross(&q, 0, 2);
-    const kernel_f64_quadratic a = {kernel_f64_cross(&q, 0, 3), 0.5 * (across + kernel_f64_cross(&q, 1, 3)),
-                                    kernel_f64_cross(&q, 1, 2)};
-    const kernel_f64_quadratic b = {kernel_f64_cross(&q, 0, 1), 0.5 * (across + kernel_f64_cross(&q, 3, 1)),
-                                    kernel_f64_cross(&q, 3, 2)};
-    const kernel_f64 square = kernel_f64_select(by_b, b.c1 * b.c1 - b.c0 * b.c2, a.c1 * a.c1 - a.c0 * a.c2);
-    const kernel_f64 root = kernel_f64_sqrt(kernel_f64_select((kernel_f64_mask)(square > 0), square, zero));
-    const kernel_f64_mask is_rising = (by_b & negative_b) | (~by_b & negative_a);
-    const kernel_f64 turn = kernel_f64_select(by_b ^ is_rising, root, -root);
-    const kernel_f64 s = kernel_f64_root(&a, turn), r = kernel_f64_root(&b, -turn);
-    const kernel_f64 t = (one - r) * ((one - s) * z[0] + s * z[1]) + r * ((one - s) * z[3] + s * z[2]);
-    const kernel_f64_mask rays = kernel_f64_of_mask(wanted, half);
-    vf *const lists[3] = {&out->s, &out->r, &out->t};
-    const kernel_f64 places[3] = {s, r, t};
-    for (int n = 0; n < 3; n++) {
-        old[n] = kernel_f64_of(lists[n], half);
-        kernel_f64_store_lanes(lists[n], half, kernel_f64_select(rays, places[n], old[n]));
-    }
-    return rays & (kernel_f64_vanishes(&a) | kernel_f64_vanishes(&b));
-}
-
-static __attribute__((noinline, cold)) void kernel_quad_limit(const kernel_quad *q, vm wanted, kernel_quad_point *out)
+/* Computes the points of the wanted rays, each of which crosses exactly one of the two triangles. They are few:
+ * Newton's method in float32 is accurate enough for most rays (kernel_patch_converged()). */
+static __attribute__((noinline)) void kernel_quad_single_point(const kernel_quad *q, vm wanted, kernel_quad_point *out)
 {
     for (unsigned bits = vm_bits(wanted); bits; bits &= bits - 1) {
         const int lane = __builtin_ctz(bits);
@@ -282,22 +211,6 @@ static __attribute__((noinline, cold)) void kernel_quad_limit(const kernel_quad 
         kernel_scalar_single_point(&flat, place);
         kernel_quad_store_point(out, lane, place);
     }
-}
-
-static __attribute__((noinline)) void kernel_quad_single_point(const kernel_quad *q, vm wanted, kernel_quad_point *out)
-{
-    unsigned vanishing = 0;
-    for (int half = 0; half < 2; half++) {
-        const unsigned lanes = ((1u << KERNEL_HALF) - 1) << half * KERNEL_HALF;
-        int64_t rays[KERNEL_HALF], any = 0;
-        if (!(vm_bits(wanted) & lanes)) continue;
-        const kernel_f64_mask vanish = kernel_f64_single_point(q, wanted, half, out);
-        memcpy(rays, &vanish, sizeof rays);
-        for (int i = 0; i < KERNEL_HALF; i++) any |= rays[i];
-        if (!any) continue;
-        for (int i = 0; i < KERNEL_HALF; i++) vanishing |= (unsigned)(rays[i] & 1) << (half * KERNEL_HALF + i);
-    }
-    if (__builtin_expect(vanishing, 0)) kernel_quad_limit(q, vm_from_bits(vanishing), out);
 }
 
 /* Computes the points of the wanted rays that meet the patch twice: one in out[0], the other in out[1]. Returns these
@@ -428,12 +341,6 @@ SIMD_INLINE void kernel_quads_cross(const kernel_quad *q, int count, const vm on
     }
 }
 
-SIMD_INLINE void kernel_quads_intersect(const kernel_quad *q, int count, vm once, kernel_quad_point *out)
-{
-    const vm all[2] = {once, once};
-    kernel_quads_cross(q, count, all, false, out);
-}
-
 /* Returns the rays that may meet the patch twice, by the signs of its sides alone. A ray that crosses exactly one
  * triangle is never among them. */
 SIMD_INLINE vm kernel_quad_sides(vm rays, vf e01, vf e32, vf e03, vf e12)
@@ -507,7 +414,8 @@ SIMD_INLINE int kernel_quad_points(const kernel_quad *q, vm once, vm twice, kern
     const vf zero = vf_set(0);
     int count = 0;
     if (vm_any(once)) {
-        kernel_quads_intersect(q, 1, once, &out[0]);
+        const vm all[2] = {once, once};
+        kernel_quads_cross(q, 1, all, false, &out[0]);
         count = 1;
     }
     if (!vm_any(twice)) return count;
@@ -539,52 +447,20 @@ typedef struct kernel_ray_box {
     vf slope[2][2], origin[2][2];
 } kernel_ray_box;
 
-/* A cell's edges as seen by the middle ray of the box, and the squares of their lengths in space. */
-typedef struct kernel_projected_edges {
-    vf at[12][2], square[12];
-    vf spread; /* half width plus half height of the range of the rays' slopes */
-    vf margin; /* upper bound of the rounding error of a cross product of two edges */
-} kernel_projected_edges;
-
-SIMD_INLINE void kernel_projected_edges_of(vf (*const at)[8], const kernel_ray_box *box, int type,
-                                           kernel_projected_edges *out)
-{
-    const kernel_shape *shape = kernel_cell_shape(type);
-    vf middle[2], steep[2], reach[2], longest = vf_set(0);
-    out->spread = vf_set(0);
-    for (int a = 0; a < 2; a++) {
-        middle[a] = 0.5f * (box->slope[a][0] + box->slope[a][1]);
-        out->spread += 0.5f * vf_abs(box->slope[a][1] - box->slope[a][0]);
-        steep[a] = vf_max(vf_abs(box->slope[a][0]), vf_abs(box->slope[a][1]));
-    }
-    for (int n = 0; n < shape->edge_count; n++) {
-        const int i = shape->edges[n][0], j = shape->edges[n][1];
-        const vf x = at[0][j] - at[0][i], y = at[1][j] - at[1][i], z = at[2][j] - at[2][i];
-        out->at[n][0] = x - middle[0] * z;
-        out->at[n][1] = y - middle[1] * z;
-        out->square[n] = (x * x + y * y) + z * z;
-        longest = vf_max(out->square[n], longest);
-    }
-    /* Every vertex is at most three edges away from the first. */
-    const vf far = 3.0f * vf_sqrt(longest), depth = vf_abs(at[2][0]) + far, slopes = steep[0] + steep[1];
-    for (int a = 0; a < 2; a++)
-        reach[a] = ((vf_abs(at[a][0]) + far) + vf_max(vf_abs(box->origin[a][0]), vf_abs(box->origin[a][1]))) +
-                   steep[a] * depth;
-    const vf off = 1.25e-7f * vf_max(reach[0], reach[1]), square = (2.0f + slopes * slopes) * longest;
-    out->margin = (1e-6f * square + 4.0f * off * vf_sqrt(square)) + (8.0f * off * off + KERNEL_EDGE_LEAST);
-}
-
-/* Returns the lanes whose quad looks convex along all rays of the box. sides: the quad's edges in cyclic order, and
- * whether each is reversed. */
-SIMD_INLINE vm kernel_quad_is_convex(const kernel_projected_edges *e, const signed char (*sides)[2])
+/* Returns the lanes whose quad looks convex along all rays of the box. edge: the cell's edges as seen by the middle ray
+ * of the box; square: the squares of their lengths in space; spread: half width plus half height of the range of the
+ * rays' slopes; margin: upper bound of the rounding error of a cross product of two edges; sides: the quad's edges in
+ * cyclic order, and whether each is reversed. */
+SIMD_INLINE vm kernel_quad_is_convex(const vf (*edge)[2], const vf *square, vf spread, vf margin,
+                                     const signed char (*sides)[2])
 {
     const int n[4] = {sides[0][0], sides[1][0], sides[2][0], sides[3][0]};
-    const vf along = vf_max(e->square[n[0]], e->square[n[2]]), across = vf_max(e->square[n[1]], e->square[n[3]]);
-    const vf least = vf_sqrt(along * across) * (1.0001f * e->spread) + e->margin;
+    const vf along = vf_max(square[n[0]], square[n[2]]), across = vf_max(square[n[1]], square[n[3]]);
+    const vf least = vf_sqrt(along * across) * (1.0001f * spread) + margin;
     vm left = vm_all_lanes(), right = vm_all_lanes();
     for (int i = 0; i < 4; i++) {
         const int next = (i + 1) & 3;
-        const vf *p = e->at[n[i]], *q = e->at[n[next]];
+        const vf *p = edge[n[i]], *q = edge[n[next]];
         const vf turn = sides[i][1] == sides[next][1] ? p[0] * q[1] - p[1] * q[0] : p[1] * q[0] - p[0] * q[1];
         left = vm_and(left, vf_lt(least, turn));
         right = vm_and(right, vf_lt(least, -turn));
@@ -596,12 +472,31 @@ SIMD_INLINE vm kernel_quad_is_convex(const kernel_projected_edges *e, const sign
 SIMD_INLINE vi kernel_curved_nonconvex_quads(vf (*const at)[8], const kernel_ray_box *box, int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
-    kernel_projected_edges edges;
+    vf edge[12][2], square[12], middle[2], steep[2], reach[2], longest = vf_set(0), spread = longest;
     vi nonconvex = vi_set(0);
-    kernel_projected_edges_of(at, box, type, &edges);
+    for (int a = 0; a < 2; a++) {
+        middle[a] = 0.5f * (box->slope[a][0] + box->slope[a][1]);
+        spread += 0.5f * vf_abs(box->slope[a][1] - box->slope[a][0]);
+        steep[a] = vf_max(vf_abs(box->slope[a][0]), vf_abs(box->slope[a][1]));
+    }
+    for (int n = 0; n < shape->edge_count; n++) {
+        const int i = shape->edges[n][0], j = shape->edges[n][1];
+        const vf x = at[0][j] - at[0][i], y = at[1][j] - at[1][i], z = at[2][j] - at[2][i];
+        edge[n][0] = x - middle[0] * z;
+        edge[n][1] = y - middle[1] * z;
+        square[n] = (x * x + y * y) + z * z;
+        longest = vf_max(square[n], longest);
+    }
+    /* Every vertex is at most three edges away from the first. */
+    const vf far = 3.0f * vf_sqrt(longest), depth = vf_abs(at[2][0]) + far, slopes = steep[0] + steep[1];
+    for (int a = 0; a < 2; a++)
+        reach[a] = ((vf_abs(at[a][0]) + far) + vf_max(vf_abs(box->origin[a][0]), vf_abs(box->origin[a][1]))) +
+                   steep[a] * depth;
+    const vf off = 1.25e-7f * vf_max(reach[0], reach[1]), most = (2.0f + slopes * slopes) * longest;
+    const vf margin = (1e-6f * most + 4.0f * off * vf_sqrt(most)) + (8.0f * off * off + KERNEL_EDGE_LEAST);
     for (int face = 0; face < shape->face_count; face++) {
         if (shape->faces[face].count == 3) continue;
-        const vm convex = kernel_quad_is_convex(&edges, shape->faces[face].sides);
+        const vm convex = kernel_quad_is_convex((const vf(*)[2])edge, square, spread, margin, shape->faces[face].sides);
         nonconvex |= vi_select(convex, vi_set(0), vi_set(1 << face));
     }
     return nonconvex;

@@ -72,44 +72,13 @@ SIMD_INLINE const kernel_shape *kernel_cell_shape(int type)
 /* Magnitude of an edge function below which errors of its products may be too small to be represented in float32. */
 #define KERNEL_EDGE_LEAST 1e-30f
 
-/* The edge functions of a cell on the rays: the sign bit of side[n] is set if function n is negative; `least` is the
- * smallest magnitude of all. */
-typedef struct kernel_curved_sides {
-    vi side[KERNEL_MAX_LINES];
-    vf least;
-} kernel_curved_sides;
-
-/* Returns the sides of a face's edges in cyclic order: on which side of each edge the rays lie. For a triangle the
- * fourth entry is meaningless. */
-SIMD_INLINE void kernel_face_sides(const kernel_shape *shape, int face, const kernel_curved_sides *s, vi around[4])
-{
-    for (int i = 0; i < 4; i++) {
-        const signed char *edge = shape->faces[face].sides[i];
-        around[i] = edge[1] ? ~s->side[(int)edge[0]] : s->side[(int)edge[0]];
-    }
-}
-
-/* Returns masks of the rays on the negative side of a quad's edges, in cyclic order. */
-SIMD_INLINE void kernel_quad_sides_negative(const kernel_shape *shape, int face, const kernel_curved_sides *s,
-                                            vm out[4])
-{
-    vi around[4];
-    kernel_face_sides(shape, face, s, around);
-    for (int i = 0; i < 4; i++) out[i] = vm_sign(around[i]);
-}
-
-/* Sets the sign bit for the rays that are on the same side of all edges of a face with `count` edges. */
+/* Sets the sign bit for the rays that are on the same side of all edges of a face with `count` edges. around: the sides
+ * on which the rays lie, in the signs of the edge functions. */
 SIMD_INLINE vi kernel_sides_agree(const vi around[4], int count)
 {
     vi differ = (around[0] ^ around[1]) | (around[1] ^ around[2]);
     if (count == 4) differ |= around[2] ^ around[3];
     return ~differ;
-}
-
-/* Returns the bit 1 << face in lanes whose sign bit is set, else 0. */
-SIMD_INLINE vi kernel_face_bit(vi sign, int face)
-{
-    return sign >> (31 - face) & vi_set(1 << face);
 }
 
 /* Returns the reference coordinate on an axis, which is 0 or 1, of each ray's vertex number `corner`. */

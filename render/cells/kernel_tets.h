@@ -130,32 +130,28 @@ SIMD_INLINE kernel_sums kernel_sums_select(vm m, const kernel_sums *a, const ker
                          vf_select(m, a->colour, b->colour), vf_select(m, a->weight, b->weight)};
 }
 
-/* The two crossings of each ray with a tet; either may be the nearer one. */
-typedef struct kernel_ends {
-    kernel_sums a, b;
-} kernel_ends;
-
-/* Selects, for each ray, the first and the last of the four faces that it crosses. */
-SIMD_INLINE kernel_ends kernel_tets_choose(const vm hit[4], const kernel_sums sums[4])
+/* Selects, for each ray, the first and the last of the four faces that it crosses; either may be the nearer one. */
+SIMD_INLINE void kernel_tets_choose(const vm hit[4], const kernel_sums sums[4], kernel_sums ends[2])
 {
     const kernel_sums a = kernel_sums_select(hit[1], &sums[1], &sums[2]);
     const kernel_sums b = kernel_sums_select(hit[2], &sums[2], &sums[1]);
-    return (kernel_ends){kernel_sums_select(hit[0], &sums[0], &a), kernel_sums_select(hit[3], &sums[3], &b)};
+    ends[0] = kernel_sums_select(hit[0], &sums[0], &a);
+    ends[1] = kernel_sums_select(hit[3], &sums[3], &b);
 }
 
 /* Divides each crossing's sums by its weight, and stores the nearer crossing as the entry, the other as the exit. */
-SIMD_INLINE void kernel_ends_order(const kernel_ends *ends, bool has_colour, kernel_interval *out)
+SIMD_INLINE void kernel_tets_order(const kernel_sums ends[2], bool has_colour, kernel_interval *out)
 {
-    const vf scale_a = 1.0f / ends->a.weight, scale_b = 1.0f / ends->b.weight;
-    const vf t_a = ends->a.depth * scale_a, t_b = ends->b.depth * scale_b;
-    const vf v_a = ends->a.value * scale_a, v_b = ends->b.value * scale_b;
+    const vf scale_a = 1.0f / ends[0].weight, scale_b = 1.0f / ends[1].weight;
+    const vf t_a = ends[0].depth * scale_a, t_b = ends[1].depth * scale_b;
+    const vf v_a = ends[0].value * scale_a, v_b = ends[1].value * scale_b;
     const vm swap = vf_lt(t_b, t_a);
     out->t_in = vf_select(swap, t_b, t_a);
     out->t_out = vf_select(swap, t_a, t_b);
     out->v_in = vf_select(swap, v_b, v_a);
     out->v_out = vf_select(swap, v_a, v_b);
     if (!has_colour) return;
-    const vf w_a = ends->a.colour * scale_a, w_b = ends->b.colour * scale_b;
+    const vf w_a = ends[0].colour * scale_a, w_b = ends[1].colour * scale_b;
     out->w_in = vf_select(swap, w_b, w_a);
     out->w_out = vf_select(swap, w_a, w_b);
 }
@@ -168,8 +164,8 @@ SIMD_INLINE vm kernel_tets_inaccurate(const kernel_tets *t, int n, vm hit, vf we
 
 /* Selects the crossings as kernel_tets_choose() does, with edge functions of projected vertices for rays whose weights
  * are not accurate enough. */
-SIMD_INLINE kernel_ends kernel_tets_choose_in_double(const kernel_tets *t, vm rays, const vf e[KERNEL_TET_EDGES],
-                                                     bool has_colour)
+SIMD_INLINE void kernel_tets_choose_in_double(const kernel_tets *t, vm rays, const vf e[KERNEL_TET_EDGES],
+                                              bool has_colour, kernel_sums ends[2])
 {
     vf x[4], y[4];
     kernel_sums sums[4];
@@ -188,18 +184,20 @@ SIMD_INLINE kernel_ends kernel_tets_choose_in_double(const kernel_tets *t, vm ra
         }
         sums[n] = kernel_tets_sums(t, face, ij, jk, ik, has_colour);
     }
-    return kernel_tets_choose(hit, sums);
+    kernel_tets_choose(hit, sums, ends);
 }
 
 /* Calls kernel_tets_choose_in_double() with is_one as a compile-time constant. It is not inlined, because few packets
  * have inaccurate weights. */
-static __attribute__((noinline, cold)) kernel_ends kernel_tets_recompute(const kernel_tets *t, vm rays,
-                                                                         const vf e[KERNEL_TET_EDGES], bool has_colour)
+static __attribute__((noinline, cold)) void
+kernel_tets_recompute(const kernel_tets *t, vm rays, const vf e[KERNEL_TET_EDGES], bool has_colour, kernel_sums ends[2])
 {
     const kernel_tets one = {.is_one = true, .packet = t->packet, .one = t->one};
     const kernel_tets several = {.lane_rays = t->lane_rays, .transformed = t->transformed};
-    return t->is_one ? kernel_tets_choose_in_double(&one, rays, e, has_colour)
-                     : kernel_tets_choose_in_double(&several, rays, e, false);
+    if (t->is_one)
+        kernel_tets_choose_in_double(&one, rays, e, has_colour, ends);
+    else
+        kernel_tets_choose_in_double(&several, rays, e, false, ends);
 }
 
 /* Computes where the rays enter and leave their tets, and the values there. It computes the sums of all four faces
@@ -209,7 +207,7 @@ SIMD_INLINE void kernel_tets_interval(const kernel_tets *t, vm rays, bool is_pen
 {
     vf e[KERNEL_TET_EDGES];
     vm hit[4], weak[4];
-    kernel_sums sums[4];
+    kernel_sums sums[4], ends[2];
     kernel_tets_edges(t, rays, is_pencil, e);
     kernel_tets_faces(rays, e, hit);
     out->mask = vm_or(vm_or(hit[0], hit[1]), vm_or(hit[2], hit[3]));
@@ -219,16 +217,19 @@ SIMD_INLINE void kernel_tets_interval(const kernel_tets *t, vm rays, bool is_pen
         const signed char *face = kernel_tet_face[n];
         sums[n] = kernel_tets_sums(t, face, e[(int)face[3]], e[(int)face[4]], e[(int)face[5]], has_colour);
     }
-    kernel_ends ends = kernel_tets_choose(hit, sums);
+    kernel_tets_choose(hit, sums, ends);
     if (is_pencil) {
         for (int n = 0; n < 4; n++) weak[n] = kernel_tets_inaccurate(t, n, hit[n], sums[n].weight);
         if (__builtin_expect(vm_any(vm_or(vm_or(weak[0], weak[1]), vm_or(weak[2], weak[3]))), 0)) {
             kernel_lane_rays lane_rays;
             const kernel_tets copy = kernel_tets_copy(t, &lane_rays);
-            ends = kernel_tets_recompute(&copy, rays, e, has_colour);
+            kernel_sums exact[2]; /* not `ends`, which would then be kept in memory */
+            kernel_tets_recompute(&copy, rays, e, has_colour, exact);
+            ends[0] = exact[0];
+            ends[1] = exact[1];
         }
     }
-    kernel_ends_order(&ends, has_colour, out);
+    kernel_tets_order(ends, has_colour, out);
 }
 
 /* ---- packets and one tet ---- */

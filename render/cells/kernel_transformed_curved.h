@@ -73,32 +73,17 @@ SIMD_INLINE vf kernel_curved_gather_vertex(const float (*of)[SIMD_WIDTH], int co
 
 /* ---- order of vertices ---- */
 
-/* The vertices of each lane's cell while they are permuted: coordinates, rank and vertex index. */
-typedef struct kernel_sorted_curved {
-    kernel_raw_numbers at[8][3];
-    vf rank[8];
-    vi vertex[8];
-} kernel_sorted_curved;
-
-SIMD_INLINE void kernel_vf_swap(vm lanes, vf *a, vf *b)
+SIMD_INLINE void kernel_sorted_curved_swap(kernel_sorted_vertices *h, bool is_narrow, vm lanes, int i, int j)
 {
-    const vf was = *a;
-    *a = vf_select(lanes, *b, was);
-    *b = vf_select(lanes, was, *b);
-}
-
-SIMD_INLINE void kernel_sorted_curved_swap(kernel_sorted_curved *h, bool is_narrow, vm lanes, int i, int j)
-{
-    const vi was = h->vertex[i];
-    for (int a = 0; a < 3; a++) kernel_raw_swap(is_narrow, lanes, &h->at[i][a], &h->at[j][a]);
-    kernel_vf_swap(lanes, &h->rank[i], &h->rank[j]);
-    h->vertex[i] = vi_select(lanes, h->vertex[j], was);
-    h->vertex[j] = vi_select(lanes, was, h->vertex[j]);
+    const vf was = h->rank[i];
+    kernel_sorted_swap(h, is_narrow, lanes, i, j);
+    h->rank[i] = vf_select(lanes, h->rank[j], was);
+    h->rank[j] = vf_select(lanes, was, h->rank[j]);
 }
 
 /* Computes each vertex's rank in the order of coordinates; vertices with equal coordinates are ranked in their given
  * order. */
-SIMD_INLINE void kernel_sorted_curved_rank(kernel_sorted_curved *h, bool is_narrow, int count)
+SIMD_INLINE void kernel_sorted_curved_rank(kernel_sorted_vertices *h, bool is_narrow, int count)
 {
     const vf zero = vf_set(0), one = vf_set(1);
     for (int i = 0; i < count; i++) h->rank[i] = vf_set((float)i);
@@ -112,7 +97,7 @@ SIMD_INLINE void kernel_sorted_curved_rank(kernel_sorted_curved *h, bool is_narr
 
 /* Permutes a hex's vertices: the smallest comes first, then the axes are ordered by the ranks of its three
  * neighbours. */
-SIMD_INLINE void kernel_sorted_curved_hex(kernel_sorted_curved *h, bool is_narrow)
+SIMD_INLINE void kernel_sorted_curved_hex(kernel_sorted_vertices *h, bool is_narrow)
 {
     /* vertex number for the bits of its reference coordinates x, y, z */
     static const signed char vertex[8] = {0, 1, 3, 2, 4, 5, 7, 6};
@@ -135,7 +120,7 @@ SIMD_INLINE void kernel_sorted_curved_hex(kernel_sorted_curved *h, bool is_narro
 }
 
 /* Permutes a wedge's vertices: the smallest comes first, then its smaller neighbour in its triangle. */
-SIMD_INLINE void kernel_sorted_curved_wedge(kernel_sorted_curved *h, bool is_narrow)
+SIMD_INLINE void kernel_sorted_curved_wedge(kernel_sorted_vertices *h, bool is_narrow)
 {
     vm over = vm_none();
     for (int i = 3; i < 6; i++) over = vm_or(over, vf_eq(h->rank[i], vf_set(0)));
@@ -152,7 +137,7 @@ SIMD_INLINE void kernel_sorted_curved_wedge(kernel_sorted_curved *h, bool is_nar
 
 /* Permutes a pyramid's vertices: the smallest vertex of the base comes first, then its smaller neighbour in the base;
  * the apex stays last. */
-SIMD_INLINE void kernel_sorted_curved_pyramid(kernel_sorted_curved *h, bool is_narrow)
+SIMD_INLINE void kernel_sorted_curved_pyramid(kernel_sorted_vertices *h, bool is_narrow)
 {
     const vf least = vf_min(vf_min(h->rank[0], h->rank[1]), vf_min(h->rank[2], h->rank[3]));
     const vm second = vf_eq(h->rank[1], least), third = vf_eq(h->rank[2], least), fourth = vf_eq(h->rank[3], least);
@@ -164,7 +149,7 @@ SIMD_INLINE void kernel_sorted_curved_pyramid(kernel_sorted_curved *h, bool is_n
     kernel_sorted_curved_swap(h, is_narrow, vf_lt(h->rank[3], h->rank[1]), 1, 3);
 }
 
-SIMD_INLINE void kernel_sorted_curved_sort(kernel_sorted_curved *h, bool is_narrow, int type)
+SIMD_INLINE void kernel_sorted_curved_sort(kernel_sorted_vertices *h, bool is_narrow, int type)
 {
     if (kernel_is_box(type))
         kernel_sorted_curved_hex(h, is_narrow);
@@ -176,7 +161,7 @@ SIMD_INLINE void kernel_sorted_curved_sort(kernel_sorted_curved *h, bool is_narr
 
 /* Returns the lanes with an edge of length zero: a face has collapsed (kernel_quad_collapses()), or a triangle has an
  * edge without length. */
-SIMD_INLINE vm kernel_sorted_curved_collapsed(const kernel_sorted_curved *h, bool is_narrow, int type)
+SIMD_INLINE vm kernel_sorted_curved_collapsed(const kernel_sorted_vertices *h, bool is_narrow, int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
     vm out = vm_none();
@@ -192,7 +177,7 @@ SIMD_INLINE vm kernel_sorted_curved_collapsed(const kernel_sorted_curved *h, boo
 
 /* Returns the lanes whose hex has edges parallel to the axes: in sorted order the reference coordinates are those along
  * z, y and x, and each coordinate of a vertex is that of vertex 0 or of its neighbour along the axis. */
-SIMD_INLINE vm kernel_sorted_curved_cuboids(const kernel_sorted_curved *h, bool is_narrow, int type)
+SIMD_INLINE vm kernel_sorted_curved_cuboids(const kernel_sorted_vertices *h, bool is_narrow, int type)
 {
     static const int neighbours[3] = {4, 3, 1};
     vm out = vm_all_lanes();
@@ -210,7 +195,7 @@ SIMD_INLINE vm kernel_sorted_curved_fetch(kernel_transformed_curved *out, const 
                                           int type, int32_t (*const vertices)[SIMD_WIDTH])
 {
     const int count = grid_type_vertices(type);
-    kernel_sorted_curved h;
+    kernel_sorted_vertices h;
     for (int i = 0; i < count; i++) {
         memcpy(&h.vertex[i], vertices[i], sizeof h.vertex[i]);
         kernel_arrays_positions(p, is_narrow, h.vertex[i], h.at[i]);
@@ -284,14 +269,10 @@ SIMD_INLINE void kernel_order_sides(const kernel_lanes_order *o, const vf opposi
     for (int i = 0; i < 2; i++) out[2] = vf_select(vm_not(vm_or(o->first[i], o->last[i])), opposite[i], out[2]);
 }
 
-/* For each edge of the shape, from its first vertex to its second: the edge function with its bound, and the error and
- * extent that kernel_edge_error defines. */
-typedef struct kernel_lanes_lines {
-    vf line[KERNEL_CURVED_EDGES][4], error[KERNEL_CURVED_EDGES], extent[KERNEL_CURVED_EDGES];
-} kernel_lanes_lines;
-
+/* Computes, for each edge of the shape, from its first vertex to its second: the coefficients of the edge function and
+ * its bound, then the error and extent that kernel_edge_error defines. */
 SIMD_INLINE void kernel_lanes_edge_functions(const kernel_transformed_curved *transformed, const kernel_frame *f,
-                                             const kernel_tile *tile, int type, kernel_lanes_lines *out)
+                                             const kernel_tile *tile, int type, vf out[KERNEL_CURVED_EDGES][6])
 {
     const kernel_shape *shape = kernel_cell_shape(type);
     vf at[8][3], size[8];
@@ -301,41 +282,38 @@ SIMD_INLINE void kernel_lanes_edge_functions(const kernel_transformed_curved *tr
     }
     for (int n = 0; n < shape->edge_count; n++) {
         const int i = shape->edges[n][0], j = shape->edges[n][1];
-        kernel_lanes_edge_function(f, at[i], at[j], out->line[n]);
-        kernel_lanes_edge_extent(out->line[n], tile->radius, at[i], at[j], &out->error[n], &out->extent[n]);
-        out->line[n][3] = kernel_lanes_edge_error(size[i], size[j]);
+        kernel_lanes_edge_function(f, at[i], at[j], out[n]);
+        kernel_lanes_edge_extent(out[n], tile->radius, at[i], at[j], &out[n][4], &out[n][5]);
+        out[n][3] = kernel_lanes_edge_error(size[i], size[j]);
     }
 }
 
 /* Stores a triangle's corners in the order of coordinates, the edge functions of its edges, and the least sum of
  * weights that is accurate enough. */
 SIMD_INLINE void kernel_transformed_triangle(kernel_transformed_curved *out, int type, int face, const vf rank[8],
-                                             const kernel_lanes_lines *lines)
+                                             vf (*const lines)[6])
 {
     const signed char *loop = kernel_cell_shape(type)->faces[face].vertices;
     const signed char(*sides)[2] = kernel_cell_shape(type)->faces[face].sides;
     kernel_triangle_lines *own = &out->triangles[face - kernel_first_triangle(type)];
     kernel_lanes_order o;
     vm falls[3];
-    vf opposite[3], in_order[3], errors[3], extents[3];
+    vf opposite[3], in_order[6][3];
     const vi word = kernel_triangle_word(loop, rank, &o, falls);
     memcpy(out->corners + face * SIMD_WIDTH, &word, sizeof word);
     float(*const to[4])[SIMD_WIDTH] = {own->c, own->cu, own->cv, own->bound};
-    for (int n = 0; n < 4; n++) {
+    for (int n = 0; n < 6; n++) {
         for (int i = 0; i < 3; i++) {
             const int side = (i + 1) % 3;
-            const vf v = lines->line[(int)sides[side][0]][n], turned = -v;
+            const vf v = lines[(int)sides[side][0]][n], turned = -v;
             const vm falling = sides[side][1] ? vm_not(falls[side]) : falls[side];
-            opposite[i] = n == 3 ? v : vf_select(falling, turned, v);
+            opposite[i] = n < 3 ? vf_select(falling, turned, v) : v;
         }
-        kernel_order_sides(&o, opposite, in_order);
-        for (int i = 0; i < 3; i++) vf_store(to[n][i], in_order[i]);
+        kernel_order_sides(&o, opposite, in_order[n]);
+        for (int i = 0; i < 3 && n < 4; i++) vf_store(to[n][i], in_order[n][i]);
     }
-    for (int i = 0; i < 3; i++) opposite[i] = lines->error[(int)sides[(i + 1) % 3][0]];
-    kernel_order_sides(&o, opposite, errors);
-    for (int i = 0; i < 3; i++) opposite[i] = lines->extent[(int)sides[(i + 1) % 3][0]];
-    kernel_order_sides(&o, opposite, extents);
-    const vf error = (errors[0] + errors[1]) + errors[2], extent = (extents[0] + extents[1]) + extents[2];
+    const vf error = (in_order[4][0] + in_order[4][1]) + in_order[4][2];
+    const vf extent = (in_order[5][0] + in_order[5][1]) + in_order[5][2];
     vf_store(out->least[face - kernel_first_triangle(type)], error * extent * (0.5f / KERNEL_WEIGHT_ERROR));
 }
 
@@ -343,17 +321,16 @@ SIMD_INLINE void kernel_transformed_faces_of(kernel_transformed_curved *out, con
                                              const kernel_tile *tile, int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
-    kernel_lanes_lines lines;
-    vf rank[8];
+    vf lines[KERNEL_CURVED_EDGES][6], rank[8];
     for (int i = 0; i < grid_type_vertices(type); i++) {
         vi own_rank;
         memcpy(&own_rank, out->rank[i], sizeof own_rank);
         rank[i] = vf_from_vi(own_rank);
     }
-    if (kernel_has_triangles(type)) kernel_lanes_edge_functions(out, f, tile, type, &lines);
+    if (kernel_has_triangles(type)) kernel_lanes_edge_functions(out, f, tile, type, lines);
     for (int face = 0; face < shape->face_count; face++) {
         if (kernel_has_triangles(type) && shape->faces[face].count == 3) {
-            kernel_transformed_triangle(out, type, face, rank, &lines);
+            kernel_transformed_triangle(out, type, face, rank, lines);
             continue;
         }
         const vi word = kernel_curved_quad_word(shape->faces[face].vertices, rank);
@@ -371,18 +348,17 @@ static __attribute__((noinline)) void kernel_transformed_faces(kernel_transforme
 /* ---- cells of lattices ---- */
 
 /* Returns whether coordinates increase along all axes, so that the sorted order of vertices is known. */
-SIMD_INLINE bool kernel_lattice_cells_are_sorted(const kernel_lattice_cells *cells)
+SIMD_INLINE bool kernel_lattice_cells_are_sorted(const kernel_wide_doubles (*cells)[3])
 {
     vm sorted = vm_all_lanes();
-    for (int axis = 0; axis < 3; axis++)
-        sorted = vm_and(sorted, kernel_wide_doubles_lt(&cells->ends[0][axis], &cells->ends[1][axis]));
+    for (int axis = 0; axis < 3; axis++) sorted = vm_and(sorted, vd_lt(cells[0][axis].half, cells[1][axis].half));
     return vm_bits(sorted) == vm_bits(vm_all_lanes());
 }
 
 /* Transforms the vertices of cuboids, as kernel_lanes_transform() does for single vertices, with the same bits: each
  * product is computed once for the vertices that share it. In the sorted order, bits 0, 1 and 2 of a vertex's reference
  * coordinates stand for z, y and x. */
-SIMD_INLINE void kernel_lattice_cells_transform(const kernel_lattice_cells *cells, const kernel_frame *f,
+SIMD_INLINE void kernel_lattice_cells_transform(const kernel_wide_doubles (*cells)[3], const kernel_frame *f,
                                                 const kernel_tile *tile, int half, kernel_transformed_curved *out,
                                                 int type)
 {
@@ -390,7 +366,7 @@ SIMD_INLINE void kernel_lattice_cells_transform(const kernel_lattice_cells *cell
     kernel_f64 parts[3][3][2];
     for (int axis = 0; axis < 3; axis++)
         for (int end = 0; end < 2; end++) {
-            const kernel_f64 d = cells->ends[end][axis].half[half] - eye[axis];
+            const kernel_f64 d = cells[end][axis].half[half] - eye[axis];
             for (int a = 0; a < 3; a++) parts[a][axis][end] = f->scaled_axes[a][axis] * d;
         }
     for (int i = 0; i < 8; i++) {
@@ -406,9 +382,9 @@ SIMD_INLINE void kernel_lattice_cells_transform(const kernel_lattice_cells *cell
 }
 
 /* Stores lattice cells in sorted order. The result has the same bits as that of other hexes. */
-SIMD_INLINE void kernel_lattice_cells_store(const kernel_lattice_cells *cells, int32_t (*const vertices)[SIMD_WIDTH],
-                                            const kernel_frame *f, const kernel_tile *tile,
-                                            kernel_transformed_curved *out, int type)
+SIMD_INLINE void kernel_lattice_cells_store(const kernel_wide_doubles (*cells)[3],
+                                            int32_t (*const vertices)[SIMD_WIDTH], const kernel_frame *f,
+                                            const kernel_tile *tile, kernel_transformed_curved *out, int type)
 {
     /* for each vertex in sorted order: its number in the lattice's order, and its rank */
     static const signed char given[8] = {0, 4, 7, 3, 1, 5, 6, 2}, rank[8] = {0, 1, 3, 2, 4, 5, 7, 6};
@@ -416,7 +392,7 @@ SIMD_INLINE void kernel_lattice_cells_store(const kernel_lattice_cells *cells, i
         const vi own_rank = vi_set(rank[i]);
         memcpy(out->vertex[i], vertices[(int)given[i]], sizeof out->vertex[i]);
         memcpy(out->rank[i], &own_rank, sizeof own_rank);
-        for (int axis = 0; axis < 3; axis++) out->world[axis][i] = cells->ends[rank[i] >> (2 - axis) & 1][axis];
+        for (int axis = 0; axis < 3; axis++) out->world[axis][i] = cells[rank[i] >> (2 - axis) & 1][axis];
     }
     for (int half = 0; half < 2; half++) kernel_lattice_cells_transform(cells, f, tile, half, out, type);
     out->cuboids = vm_bits(vm_all_lanes());
@@ -430,10 +406,10 @@ SIMD_INLINE vm kernel_transform_curved_vertices(kernel_transformed_curved *out, 
                                                 int32_t vertices[8][SIMD_WIDTH], int type)
 {
     if (kernel_is_box(type) && kernel_arrays_have_axes(p)) {
-        kernel_lattice_cells lattice;
-        kernel_lattice_cells_read(p, vertices[0], &lattice);
-        if (kernel_lattice_cells_are_sorted(&lattice)) {
-            kernel_lattice_cells_store(&lattice, vertices, f, tile, out, type);
+        kernel_wide_doubles lattice[2][3];
+        kernel_lattice_cells_read(p, vertices[0], lattice);
+        if (kernel_lattice_cells_are_sorted((const kernel_wide_doubles(*)[3])lattice)) {
+            kernel_lattice_cells_store((const kernel_wide_doubles(*)[3])lattice, vertices, f, tile, out, type);
             return vm_none();
         }
     }

@@ -26,38 +26,23 @@ typedef struct kernel_transformed_tets {
     vi vertex[4];
 } kernel_transformed_tets;
 
-/* A vertex of each lane's tet while the vertices are sorted: coordinates and vertex index. */
-typedef struct kernel_ordered {
-    kernel_raw_numbers at[3];
-    vi vertex;
-} kernel_ordered;
-
-/* Exchanges a and b in the lanes in which b is before a in the order of coordinates. */
-SIMD_INLINE void kernel_ordered_swap(bool is_narrow, kernel_ordered *a, kernel_ordered *b)
-{
-    const vm before = kernel_raw_before(is_narrow, b->at, a->at);
-    const vi was = a->vertex;
-    for (int axis = 0; axis < 3; axis++) kernel_raw_swap(is_narrow, before, &a->at[axis], &b->at[axis]);
-    a->vertex = vi_select(before, b->vertex, was);
-    b->vertex = vi_select(before, was, b->vertex);
-}
-
 /* Reads the vertices and sorts them by coordinates. It is a bubble sort, which only exchanges neighbours that differ;
  * so vertices with equal coordinates keep their order. */
-SIMD_INLINE void kernel_ordered_fetch(kernel_transformed_tets *out, const kernel_arrays *p, bool is_narrow,
-                                      int32_t (*const vertices)[SIMD_WIDTH])
+SIMD_INLINE void kernel_transformed_sort(kernel_transformed_tets *out, const kernel_arrays *p, bool is_narrow,
+                                         int32_t (*const vertices)[SIMD_WIDTH])
 {
-    kernel_ordered spots[4];
+    kernel_sorted_vertices h;
     for (int i = 0; i < 4; i++) {
-        memcpy(&spots[i].vertex, vertices[i], sizeof spots[i].vertex);
-        kernel_arrays_positions(p, is_narrow, spots[i].vertex, spots[i].at);
+        memcpy(&h.vertex[i], vertices[i], sizeof h.vertex[i]);
+        kernel_arrays_positions(p, is_narrow, h.vertex[i], h.at[i]);
     }
     for (int last = 3; last > 0; last--)
-        for (int i = 0; i < last; i++) kernel_ordered_swap(is_narrow, &spots[i], &spots[i + 1]);
+        for (int i = 0; i < last; i++)
+            kernel_sorted_swap(&h, is_narrow, kernel_raw_before(is_narrow, h.at[i + 1], h.at[i]), i, i + 1);
     for (int i = 0; i < 4; i++) {
-        out->vertex[i] = spots[i].vertex;
-        out->values[i] = kernel_numbers_gather(&p->values, spots[i].vertex);
-        for (int a = 0; a < 3; a++) out->world[a][i] = kernel_raw_to_double(is_narrow, &spots[i].at[a]);
+        out->vertex[i] = h.vertex[i];
+        out->values[i] = kernel_numbers_gather(&p->values, h.vertex[i]);
+        for (int a = 0; a < 3; a++) out->world[a][i] = kernel_raw_to_double(is_narrow, &h.at[i][a]);
     }
 }
 
@@ -109,9 +94,9 @@ static __attribute__((noinline)) void kernel_transform_tets(kernel_transformed_t
     for (int i = 0; i < 4; i++)
         for (int n = count; n < SIMD_WIDTH; n++) vertices[i][n] = vertices[i][0];
     if (p->has_narrow_positions)
-        kernel_ordered_fetch(out, p, true, vertices);
+        kernel_transformed_sort(out, p, true, vertices);
     else
-        kernel_ordered_fetch(out, p, false, vertices);
+        kernel_transformed_sort(out, p, false, vertices);
     kernel_transformed_positions(out, f, tile);
     kernel_transformed_lines(out, f, tile);
 }

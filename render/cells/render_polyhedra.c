@@ -4,8 +4,8 @@
  * surface (each face is cut as polygon.h defines), the unique edges, and the centre, which forms with each triangle a
  * tet on which the field is linear. All of this is computed when a ray of a tile first meets the cell, and deleted with
  * the tile: no copy of the mesh is kept. A polyhedron of v vertices has 2 v - 4 triangles and 3 v - 6 edges, and takes
- * about 200 v bytes here, about 6 KB for a Voronoi cell of 27 vertices. A store is emptied before the next cell is
- * added if it holds more than STORE_LIMIT bytes.
+ * about 200 v bytes here, about 6 KB for a Voronoi cell of 27 vertices. A store that is full is emptied; its memory
+ * grows up to STORE_LIMIT bytes, or to the size of one cell.
  *
  * Vertices are sorted by coordinates, triangles by their vertices, and edges are stored in the order in which the
  * triangles first use them. So the polyhedron is the same to the bit for any numbering of the mesh and any order of
@@ -21,19 +21,13 @@
 #include "grid.h"
 #include "memory.h"
 
-enum { TABLE_BITS = 10, BLOCK_BYTES = 1 << 18, STORE_LIMIT = 16 << 20 };
-
-typedef struct store_block {
-    struct store_block *next;
-    size_t size, used;
-} store_block;
+enum { TABLE_BITS = 10, STORE_BYTES = 1 << 18, STORE_LIMIT = 16 << 20 };
 
 struct polyhedron_store {
     polyhedron *table[1 << TABLE_BITS];
-    store_block *blocks;      /* list of memory blocks; the block in use comes first */
-    store_block *free_blocks; /* free blocks, each of BLOCK_BYTES bytes */
-    size_t bytes;             /* size of all blocks in `blocks` */
-    char *work, *scratch;     /* buffers for decomposing a cell, and for the kernels' temporary arrays */
+    char *memory; /* the polyhedra, one after the other */
+    size_t memory_bytes, used;
+    char *work, *scratch; /* buffers for decomposing a cell, and for the kernels' temporary arrays */
     size_t work_bytes, scratch_bytes;
 };
 
@@ -42,20 +36,10 @@ polyhedron_store *polyhedra_create(void)
     return base_calloc(1, sizeof(polyhedron_store));
 }
 
-static void free_blocks(store_block *block)
-{
-    while (block) {
-        store_block *next = block->next;
-        base_free(block);
-        block = next;
-    }
-}
-
 void polyhedra_free(polyhedron_store *store)
 {
     if (!store) return;
-    free_blocks(store->blocks);
-    free_blocks(store->free_blocks);
+    base_free(store->memory);
     base_free(store->work);
     base_free(store->scratch);
     base_free(store);
@@ -63,55 +47,14 @@ void polyhedra_free(polyhedron_store *store)
 
 void polyhedra_reset(polyhedron_store *store)
 {
-    if (!store->blocks) return;
-    memset(store->table, 0, sizeof store->table);
-    while (store->blocks) {
-        store_block *block = store->blocks;
-        store->blocks = block->next;
-        if (block->size == BLOCK_BYTES) {
-            block->next = store->free_blocks;
-            store->free_blocks = block;
-        } else {
-            base_free(block);
-        }
-    }
-    store->bytes = 0;
+    if (store->used) memset(store->table, 0, sizeof store->table);
+    store->used = 0;
 }
 
 /* Rounds the size up to a multiple of 64 bytes, the strictest alignment. */
 static size_t rounded(size_t bytes)
 {
     return (bytes + 63) & ~(size_t)63;
-}
-
-static bool add_block(polyhedron_store *store, size_t bytes)
-{
-    const size_t head = rounded(sizeof(store_block));
-    store_block *block = NULL;
-    if (head + bytes <= BLOCK_BYTES && store->free_blocks) {
-        block = store->free_blocks;
-        store->free_blocks = block->next;
-    } else {
-        const size_t size = head + bytes > BLOCK_BYTES ? head + bytes : BLOCK_BYTES;
-        block = base_alloc(size);
-        if (!block) return false;
-        block->size = size;
-    }
-    block->used = head;
-    block->next = store->blocks;
-    store->blocks = block;
-    store->bytes += block->size;
-    return true;
-}
-
-static void *store_alloc(polyhedron_store *store, size_t bytes)
-{
-    bytes = rounded(bytes);
-    if (!store->blocks || store->blocks->size - store->blocks->used < bytes)
-        if (!add_block(store, bytes)) return NULL;
-    char *p = (char *)store->blocks + store->blocks->used;
-    store->blocks->used += bytes;
-    return p;
 }
 
 static void *grown(char **buffer, size_t *held, size_t bytes)
@@ -127,6 +70,20 @@ static void *grown(char **buffer, size_t *held, size_t bytes)
 void *polyhedra_scratch(polyhedron_store *store, size_t bytes)
 {
     return grown(&store->scratch, &store->scratch_bytes, bytes);
+}
+
+/* Returns memory for a polyhedron; removes all others if there is no space. */
+static void *store_alloc(polyhedron_store *store, size_t bytes)
+{
+    bytes = rounded(bytes);
+    if (store->memory_bytes - store->used < bytes) {
+        const size_t twice = store->memory_bytes ? 2 * store->memory_bytes : STORE_BYTES;
+        const size_t wanted = twice < STORE_LIMIT ? twice : store->memory_bytes;
+        polyhedra_reset(store);
+        if (!grown(&store->memory, &store->memory_bytes, wanted > bytes ? wanted : bytes)) return NULL;
+    }
+    store->used += bytes;
+    return store->memory + store->used - bytes;
 }
 
 /* ---- decomposing a cell ---- */
@@ -342,7 +299,6 @@ polyhedron *polyhedra_find(polyhedron_store *store, const grid *g, const grid_fi
     const uint32_t slot = (key * 0x9e3779b1u) >> (32 - TABLE_BITS);
     for (polyhedron *c = store->table[slot]; c; c = c->next)
         if (c->index == index && c->part == part && c->layer == layer) return c;
-    if (store->bytes > STORE_LIMIT) polyhedra_reset(store);
     polyhedron *c = decompose_polyhedron(store, g, field, index);
     if (!c) return NULL;
     c->index = index;

@@ -5,35 +5,21 @@
 #include "kernel_types.h"
 #include "simd.h"
 
-/* Rows or columns of pixels from `first` to `last`, counted from the tile's first one. */
-typedef struct kernel_tile_range {
-    unsigned first, last;
-} kernel_tile_range;
-
-/* Clips the pixels from first to last to the tile whose first pixel is `begin`, and counts them from there. */
-static inline kernel_tile_range kernel_range_in_tile(int first, int last, int begin)
+/* Computes the candidate of the tile whose first pixel is (x0, y0). */
+static inline kernel_tile_candidate kernel_candidate_in_tile(const kernel_candidate *c, int x0, int y0)
 {
-    const int from = first - begin, to = last - begin;
-    return (kernel_tile_range){(unsigned)(from > 0 ? from : 0),
-                               (unsigned)(to < KERNEL_TILE - 1 ? to : KERNEL_TILE - 1)};
-}
-
-/* Returns a mask of the rows (or columns) of blocks that contain one of the pixels. */
-static inline unsigned kernel_range_blocks(kernel_tile_range s)
-{
-    return ~0u << s.first / KERNEL_BLOCK & ((2u << s.last / KERNEL_BLOCK) - 1);
-}
-
-static inline kernel_tile_candidate kernel_candidate_in_tile(const kernel_candidate *c, kernel_tile_range columns,
-                                                             kernel_tile_range rows)
-{
-    return (kernel_tile_candidate){
-        .near = c->near,
-        .far = c->far,
-        .cell = c->cell,
-        .source = c->source,
-        .blocks = (uint16_t)kernel_blocks_at(kernel_range_blocks(columns), kernel_range_blocks(rows)),
-        .box = (uint16_t)(columns.first | columns.last << 4 | rows.first << 8 | rows.last << 12)};
+    /* first and last column, first and last row of the cell's pixels in the tile */
+    const int ends[4] = {c->x0 > x0 ? c->x0 - x0 : 0, c->x1 - x0 < KERNEL_TILE - 1 ? c->x1 - x0 : KERNEL_TILE - 1,
+                         c->y0 > y0 ? c->y0 - y0 : 0, c->y1 - y0 < KERNEL_TILE - 1 ? c->y1 - y0 : KERNEL_TILE - 1};
+    unsigned blocks[2]; /* columns and rows of blocks that contain one of the pixels */
+    for (int a = 0; a < 2; a++)
+        blocks[a] = ~0u << ends[2 * a] / KERNEL_BLOCK & ((2u << ends[2 * a + 1] / KERNEL_BLOCK) - 1);
+    return (kernel_tile_candidate){.near = c->near,
+                                   .far = c->far,
+                                   .cell = c->cell,
+                                   .source = c->source,
+                                   .blocks = (uint16_t)kernel_blocks_at(blocks[0], blocks[1]),
+                                   .box = (uint16_t)(ends[0] | ends[1] << 4 | ends[2] << 8 | ends[3] << 12)};
 }
 
 /* A tile's cells are sorted by depth into KERNEL_DEPTHS bins, without an order within a bin. That is accurate enough to

@@ -1,15 +1,30 @@
 /* Finds the tets, hexes, wedges and pyramids that isosurfaces cross, SIMD_WIDTH cells at a time (kernel_candidates.h):
  *
  *     cells of one type, one per lane:   do their values straddle an isovalue?
- *     cells that do, one per lane:       the slab of kernel_outline.h and its box of pixels; for tets the points where
- *                                        the isovalue crosses their edges
+ *     cells that do, one per lane:       the slab that contains the isosurface and its box of pixels; for tets the
+ *                                        points where the isovalue crosses their edges
  *
- * Positions are differences from the eye in float32, along the camera's axes. A hit is the mean of the vertices with
- * non-negative weights, and its value is the mean of their values with the same weights (kernel_outline.h). So the hit
- * lies in the slab |L| <= E of kernel_outline.h, computed from the same rounded positions. The hit's error is then at
- * most that of the vertices, 8 roundings of their distance from the eye, which is less than the margins of
- * kernel_add_lanes(). That cells whose map is not folded contain their hits also holds only up to rounding; cells whose
- * size is near the rounding error lie within the margins anyway. */
+ * In a tet the isosurface is flat: a triangle or quadrangle whose corners are the points on the edges at which the
+ * field is zero. Hits in float32 lie on it as well. The weights from which a face's depth and value are computed all
+ * have one sign (kernel_cell.h) and err by a few units in the last place. So both are exact for some point of the face
+ * very close to the ray, and the line between two such points with values of opposite signs passes through the
+ * isosurface.
+ *
+ * Other cells: let L be linear in the point, and E its largest difference from the field F at a vertex. F - L is the
+ * mean of these differences, weighted by the shape functions, which are non-negative in the cell and sum to 1. So |F -
+ * L| <= E in the whole cell, however distorted it is; the values of faces, on their patches, are the field's. A hit is
+ * a zero of F, or is interpolated between two values of opposite signs, so that |L| <= E there too: it lies in a slab
+ * of the cell's hull, which is thin if the field is smooth. This holds for points with reference coordinates in the
+ * cell. If the cell's map is folded, solutions up to a quarter outside are accepted (kernel_map.h), where the weights'
+ * absolute values sum to at most 1.5³. The map is not folded if the derivative of its nonlinear part has a Frobenius
+ * norm of less than 1 (kernel_local.h): then no two reference points have the same position, and points between a ray's
+ * crossings of the faces are in the cell.
+ *
+ * Positions are differences from the eye in float32, along the camera's axes. The slab is computed from the same
+ * rounded positions as the hit's mean of the vertices. The hit's error is then at most that of the vertices, 8
+ * roundings of their distance from the eye, which is less than the margins of kernel_add_lanes(). That cells whose map
+ * is not folded contain their hits also holds only up to rounding; cells whose size is near the rounding error lie
+ * within the margins anyway. */
 #ifndef RENDER_KERNEL_CANDIDATE_SURFACES_H
 #define RENDER_KERNEL_CANDIDATE_SURFACES_H
 
@@ -20,7 +35,7 @@
 #include "kernel_cell_values.h"
 #include "kernel_cell.h"
 #include "kernel_finder.h"
-#include "kernel_outline.h"
+#include "kernel_local.h"
 #include "kernel_shapes.h"
 #include "kernel_tile.h"
 #include "kernel_wide.h"
@@ -34,117 +49,78 @@ typedef struct kernel_curved_lanes {
     vf at[8][3], f[8];
     /* lanes whose numbers are in float32's range and not NaN; the cells of other lanes are tested one by one */
     vm fitting_lanes;
+    /* The linear function L at the vertices. The isosurface lies in the slab |L| <= thickness; the thickness is
+     * infinite if no such slab is known. Not set for tets. */
+    vf level[8], thickness;
 } kernel_curved_lanes;
 
-/* at: the linear function L of kernel_outline.h at the vertices. The isosurface lies in the slab |L| <= thickness; the
- * thickness is infinite if no such slab is known. */
-typedef struct kernel_curved_slab {
-    vf at[8], thickness;
-} kernel_curved_slab;
-
-/* Returns the lanes whose cells are not folded, so that their map is invertible. inverse: the inverse of the Jacobian
- * at the cell's middle. The limit 0.9, instead of the exact 1, leaves a margin far larger than all rounding. */
-SIMD_INLINE vm kernel_curved_lanes_unfolded(const kernel_curved_lanes *l, const kernel_differential *d, int count,
-                                            vf inverse[3][3])
+/* Returns the lanes whose cells are not folded. terms: the coefficients of the three coordinates; inverse: the inverse
+ * of the matrix of their linear terms. The limit 0.9, instead of the exact 1, leaves a margin far larger than all
+ * rounding. */
+SIMD_INLINE vm kernel_curved_lanes_unfolded(int type, const vf terms[4][8], const vf inverse[3][3])
 {
-    vf y[8][3], off[12];
-    vm unfolded = vm_all_lanes();
-    for (int i = 1; i < count; i++) {
-        vf move[3];
-        for (int a = 0; a < 3; a++) move[a] = l->at[i][a] - l->at[0][a];
-        for (int a = 0; a < 3; a++)
-            y[i][a] = (inverse[a][0] * move[0] + inverse[a][1] * move[1]) + inverse[a][2] * move[2];
-    }
-    for (int a = 0; a < 3; a++) y[0][a] = vf_set(0);
-    for (int n = 0; n < d->column_count; n++) {
-        const signed char *v = d->columns[n].vertex;
-        off[n] = vf_set(0);
-        for (int a = 0; a < 3; a++) {
-            vf part = (y[v[1]][a] - y[v[0]][a]) - (a == d->columns[n].along ? 1.0f : 0);
-            if (v[2] != v[3]) part += y[v[3]][a] - y[v[2]][a];
-            off[n] += part * part;
-        }
-    }
-    for (int n = 0; n < d->corner_count; n++) {
-        const signed char *columns = d->corners[n];
-        unfolded = vm_and(unfolded, vf_lt(off[columns[0]] + off[columns[1]] + off[columns[2]], vf_set(0.9f)));
-    }
-    return unfolded;
+    vf nonlinear_part[KERNEL_NONLINEAR_TERMS][3];
+    for (int k = 0; k < kernel_nonlinear_count(type); k++)
+        for (int i = 0; i < 3; i++)
+            nonlinear_part[k][i] =
+                (inverse[i][0] * terms[0][4 + k] + inverse[i][1] * terms[1][4 + k]) + inverse[i][2] * terms[2][4 + k];
+    return vf_lt(kernel_local_nonlinearity(type, (const vf(*)[3])nonlinear_part), vf_set(0.9f));
 }
 
-/* Computes the linear function L (kernel_outline.h) at the vertices, and the thickness of the slab that contains the
- * isosurface. |f| is at most about 1. With r the rounding error of one coordinate, positions have an error of at most
- * r, and their mean has one of at most 8 r. Lanes whose volume is near float32's minimum are removed from
- * fitting_lanes. */
-SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, int type, kernel_curved_slab *out)
+/* Computes the linear function L at the vertices, and the thickness of the slab that contains the isosurface. |f| is at
+ * most about 1. With r the rounding error of one coordinate, positions have an error of at most r, and their mean has
+ * one of at most 8 r. Lanes whose volume is near float32's minimum are removed from fitting_lanes. */
+SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, int type)
 {
-    const kernel_differential *differential = kernel_cell_differential(type);
     const int count = grid_type_vertices(type);
-    vf d[4][3], n[3][3], middle[4], g[3], size = vf_set(0), error = size, error_bound = size;
+    vf terms[4][8], inverse[3][3], g[3], size = vf_set(0), error = size, error_bound = size;
     for (int a = 0; a < 4; a++) {
-        middle[a] = d[a][0] = d[a][1] = d[a][2] = vf_set(0);
-        for (int i = 0; i < count; i++) {
-            const vf v = a < 3 ? l->at[i][a] : l->f[i];
-            middle[a] += v * (1 / (float)count);
-            for (int k = 0; k < 3; k++) d[a][k] += v * differential->middle[k][i];
-        }
+        vf v[8];
+        for (int i = 0; i < count; i++) v[i] = a < 3 ? l->at[i][a] : l->f[i];
+        kernel_local_terms(type, v, terms[a]);
     }
-    for (int i = 0; i < 3; i++) {
-        const int u = (i + 1) % 3, v = (i + 2) % 3;
-        for (int a = 0; a < 3; a++) {
-            const int b = (a + 1) % 3, c = (a + 2) % 3;
-            n[i][a] = d[b][u] * d[c][v] - d[c][u] * d[b][v];
-        }
-    }
-    const vf volume = (d[0][0] * n[0][0] + d[1][0] * n[0][1]) + d[2][0] * n[0][2];
+    const vf volume = kernel_local_invert((const vf(*)[8])terms, inverse);
     l->fitting_lanes = vm_and(l->fitting_lanes, vf_lt(vf_set(1e-30f), vf_abs(volume)));
-    const vf inverse = 1.0f / volume;
-    for (int i = 0; i < 3; i++)
-        for (int a = 0; a < 3; a++) n[i][a] *= inverse;
-    for (int a = 0; a < 3; a++) g[a] = (d[3][0] * n[0][a] + d[3][1] * n[1][a]) + d[3][2] * n[2][a];
+    for (int a = 0; a < 3; a++)
+        g[a] = (terms[3][1] * inverse[0][a] + terms[3][2] * inverse[1][a]) + terms[3][3] * inverse[2][a];
     for (int i = 0; i < count; i++) {
-        out->at[i] = middle[3];
+        l->level[i] = terms[3][0];
         for (int a = 0; a < 3; a++) {
-            const vf part = g[a] * (l->at[i][a] - middle[a]);
-            out->at[i] += part;
+            const vf part = g[a] * (l->at[i][a] - terms[a][0]);
+            l->level[i] += part;
             size = vf_max(vf_abs(part), size);
         }
-        error = vf_max(vf_abs(out->at[i] - l->f[i]), error);
+        error = vf_max(vf_abs(l->level[i] - l->f[i]), error);
     }
-    error *= vf_select(kernel_curved_lanes_unfolded(l, differential, count, n), vf_set(1), vf_set(3.4f));
+    const vm unfolded = kernel_curved_lanes_unfolded(type, (const vf(*)[8])terms, (const vf(*)[3])inverse);
+    error *= vf_select(unfolded, vf_set(1), vf_set(3.4f));
     for (int a = 0; a < 3; a++) {
         vf reach = vf_set(0);
         for (int i = 0; i < count; i++) reach = vf_max(vf_abs(l->at[i][a]), reach);
         error_bound += vf_abs(g[a]) * reach;
     }
     const vf thickness = error + KERNEL_OUTLINE_PAD * (1 + size) + 16 * 6e-8f * error_bound;
-    out->thickness = vf_select(vf_lt(thickness, vf_set(1)), thickness, vf_set(INFINITY));
+    l->thickness = vf_select(vf_lt(thickness, vf_set(1)), thickness, vf_set(INFINITY));
 }
 
-static __attribute__((noinline)) void kernel_curved_lanes_slab(kernel_curved_lanes *l, int type,
-                                                               kernel_curved_slab *out)
+static __attribute__((noinline)) void kernel_curved_lanes_slab(kernel_curved_lanes *l, int type)
 {
-    if (kernel_is_box(type)) /* the type is a constant, so that loops have constant lengths and compilers unroll them */
-        kernel_curved_lanes_slab_of(l, kernel_curved_types[KERNEL_SHAPE_HEX], out);
-    else
-        kernel_curved_lanes_slab_of(l, type, out);
+    KERNEL_OF_TYPE(type, kernel_curved_lanes_slab_of, l);
 }
 
 /* Computes the bounds of the slab's polytope: of the vertices that lie in the slab, and of the points where lines
  * between two vertices cross the slab's sides. */
-static __attribute__((noinline)) void kernel_curved_lanes_view_bounds(const kernel_finder *s,
-                                                                      const kernel_curved_lanes *l,
-                                                                      const kernel_curved_slab *slab,
-                                                                      kernel_view_bounds *e)
+static __attribute__((noinline)) void
+kernel_curved_lanes_view_bounds(const kernel_finder *s, const kernel_curved_lanes *l, kernel_view_bounds *e)
 {
     *e = kernel_view_bounds_empty();
     for (int i = 0; i < l->count; i++) {
-        kernel_view_bounds_add(s, e, l->at[i], vf_le(vf_abs(slab->at[i]), slab->thickness));
+        kernel_view_bounds_add(s, e, l->at[i], vf_le(vf_abs(l->level[i]), l->thickness));
         for (int j = 0; j < i; j++) {
-            const vf inverse = 1.0f / (slab->at[j] - slab->at[i]);
+            const vf inverse = 1.0f / (l->level[j] - l->level[i]);
             for (int side = 0; side < 2; side++) {
-                const vf level = side ? slab->thickness : -slab->thickness, along = (level - slab->at[i]) * inverse;
-                const vm crossed = vm_xor(vf_lt(slab->at[i], level), vf_lt(slab->at[j], level));
+                const vf level = side ? l->thickness : -l->thickness, along = (level - l->level[i]) * inverse;
+                const vm crossed = vm_xor(vf_lt(l->level[i], level), vf_lt(l->level[j], level));
                 vf point[3];
                 if (!vm_any(crossed)) continue;
                 for (int a = 0; a < 3; a++) point[a] = l->at[i][a] + along * (l->at[j][a] - l->at[i][a]);
@@ -178,15 +154,15 @@ static __attribute__((noinline)) void kernel_lattice_lanes_transform(const kerne
 {
     const render_camera *camera = &s->frame->job->camera;
     const double *axes[3] = {camera->right, camera->up, camera->forward};
-    kernel_lattice_cells cells;
+    kernel_wide_doubles cells[2][3];
     vf parts[3][3][2];
-    kernel_lattice_cells_read(&s->arrays, c->vertex[0], &cells);
+    kernel_lattice_cells_read(&s->arrays, c->vertex[0], cells);
     l->count = 8;
     l->fitting_lanes = vm_all_lanes();
     for (int end = 0; end < 2; end++) {
         vf place[3];
         for (int k = 0; k < 3; k++) {
-            const kernel_raw_numbers world = {.wide = cells.ends[end][k]};
+            const kernel_raw_numbers world = {.wide = cells[end][k]};
             place[k] =
                 kernel_raw_minus(&s->arrays.coordinates[k], &world, &s->eye[k]) * (float)s->frame->job->space.scale;
             for (int a = 0; a < 3; a++) parts[a][k][end] = place[k] * (float)axes[a][k];
@@ -279,13 +255,11 @@ static __attribute__((noinline)) void kernel_find_tets(kernel_finder *s, const k
 
 /* ---- hexes, wedges and pyramids ---- */
 
-/* Adds the queue's cells to the candidates, with the bounds of the isosurface in them. */
-SIMD_INLINE void kernel_crossed_queue_process(kernel_finder *s, kernel_crossed_queue *h, int vertices)
+/* Adds the cells, which an isovalue crosses, to the candidates, with the bounds of the isosurface in them. */
+SIMD_INLINE void kernel_crossed_process(kernel_finder *s, const kernel_cells *c, int vertices)
 {
-    const kernel_level level = kernel_level_of(s->surface->layer->values[h->value]);
-    const kernel_cells *c = &h->cells;
+    const kernel_level level = kernel_level_of(s->surface->layer->values[c->value]);
     kernel_curved_lanes l;
-    kernel_curved_slab slab;
     kernel_view_bounds e;
     kernel_raw_numbers v[8];
     for (int i = 0; i < vertices; i++) kernel_arrays_values(&s->arrays, kernel_cells_vertex(c, i), c->cell, &v[i]);
@@ -294,40 +268,34 @@ SIMD_INLINE void kernel_crossed_queue_process(kernel_finder *s, kernel_crossed_q
     /* the bits of a power of two that scales the largest value to near 1: the exponent is that of the value, negated */
     const vi power = (254 << 23) - (vi_from_bits(size) & vi_set(0x7f800000));
     for (int i = 0; i < vertices; i++) l.f[i] *= vf_from_bits(power);
-    kernel_curved_lanes_slab(&l, c->type, &slab);
-    kernel_curved_lanes_view_bounds(s, &l, &slab, &e);
-    kernel_add_crossed(s, c, h->value, l.fitting_lanes, (1u << c->count) - 1, &e);
+    kernel_curved_lanes_slab(&l, c->type);
+    kernel_curved_lanes_view_bounds(s, &l, &e);
+    kernel_add_crossed(s, c, c->value, l.fitting_lanes, (1u << c->count) - 1, &e);
 }
 
-static __attribute__((noinline)) void kernel_find_crossed(kernel_finder *s, kernel_crossed_queue *h)
+static __attribute__((noinline)) void kernel_find_crossed(kernel_finder *s, kernel_cells *c)
 {
-    if (!h->cells.count) return;
-    kernel_cells_fill(&h->cells);
-    if (h->cells.vertices == 8)
-        kernel_crossed_queue_process(s, h, 8);
+    if (!c->count) return;
+    kernel_cells_fill(c);
+    if (c->vertices == 8)
+        kernel_crossed_process(s, c, 8);
     else
-        kernel_crossed_queue_process(s, h, h->cells.vertices);
-    h->cells.count = 0;
-}
-
-static void kernel_find_all_crossed(kernel_finder *s)
-{
-    for (int i = 0; i < KERNEL_CURVED_TYPES; i++) kernel_find_crossed(s, &s->crossed[i]);
+        kernel_crossed_process(s, c, c->vertices);
+    c->count = 0;
 }
 
 /* Queues the cells of the given lanes, which the isovalue crosses. A queue holds cells of one isovalue; if the isovalue
  * changes, the queue is processed first. */
-SIMD_INLINE void kernel_crossed_queue_add(kernel_finder *s, const kernel_cells *from, int vertices, int value,
-                                          unsigned lanes)
+SIMD_INLINE void kernel_crossed_add(kernel_finder *s, const kernel_cells *from, int vertices, int value, unsigned lanes)
 {
-    kernel_crossed_queue *h = &s->crossed[kernel_lane_type_index(from->type)];
-    if (lanes && value != h->value) kernel_find_crossed(s, h);
+    kernel_cells *c = &s->crossed[kernel_lane_type_index(from->type)];
+    if (lanes && value != c->value) kernel_find_crossed(s, c);
     for (; lanes; lanes &= lanes - 1) {
-        if (h->cells.count == SIMD_WIDTH) kernel_find_crossed(s, h);
-        const int n = __builtin_ctz(lanes), to = h->cells.count++;
-        h->value = value;
-        h->cells.cell[to] = from->cell[n];
-        for (int i = 0; i < vertices; i++) h->cells.vertex[i][to] = from->vertex[i][n];
+        if (c->count == SIMD_WIDTH) kernel_find_crossed(s, c);
+        const int n = __builtin_ctz(lanes), to = c->count++;
+        c->value = value;
+        c->cell[to] = from->cell[n];
+        for (int i = 0; i < vertices; i++) c->vertex[i][to] = from->vertex[i][n];
     }
 }
 
@@ -346,7 +314,7 @@ SIMD_INLINE void kernel_find_straddling(kernel_finder *s, const kernel_cells *c,
             any = vm_or(any, below);
             every = vm_and(every, below);
         }
-        kernel_crossed_queue_add(s, c, vertices, value, all & vm_bits(vm_andnot(any, every)));
+        kernel_crossed_add(s, c, vertices, value, all & vm_bits(vm_andnot(any, every)));
     }
 }
 

@@ -4,16 +4,16 @@
  * (render_candidates.c; sort-middle in the terms of Molnar et al. 1994). Tiles trace them roughly front to back, and
  * skip blocks that have nearer hits (render_kernels.c, kernel_batch.h; for volumes kernel_tile_cells.h):
  *
- *     nodes --- ranges, picture's planes ---> cells --- outlines' boxes ---> tiles --- nearest first ---> blocks
+ *     nodes --- ranges, picture's planes ---> cells --- surfaces' boxes ---> tiles --- nearest first ---> blocks
  *
  * Alternatively each tile traverses the trees (kernel_tile_surface.h). It then tests many of the nodes that its
  * neighbours test too, and transforms cells that mostly lie beside the tile. That is faster if most cells are hidden,
  * because it skips everything behind the hits. It is used for opaque surfaces with several cells per pixel, and for
  * frames in which too many cells are visible.
  *
- * A cell's pixels are the bounding box of its projected outline (kernel_outline.h), widened by a margin that is larger
- * than all rounding errors. Rays then test the cells themselves, so the picture is the same to the last bit for any
- * traversal. */
+ * A cell's pixels are the bounding box of the surface in it (kernel_candidate_surfaces.h), widened by a margin that is
+ * larger than all rounding errors. Rays then test the cells themselves, so the picture is the same to the last bit for
+ * any traversal. */
 #ifndef RENDER_KERNEL_CANDIDATES_H
 #define RENDER_KERNEL_CANDIDATES_H
 
@@ -102,67 +102,42 @@ static void kernel_find_flush(kernel_finder *s)
 {
     kernel_find_queued(s);
     for (int i = 0; i < KERNEL_LANE_TYPES; i++) kernel_find_pending(s, &s->pending[i]);
-    kernel_find_all_crossed(s);
+    for (int i = 0; i < KERNEL_CURVED_TYPES; i++) kernel_find_crossed(s, &s->crossed[i]);
 }
 
 /* Number of nodes that are tested at a time, so that their prefetches overlap in time. */
 enum { KERNEL_FRONT = 16, KERNEL_FRONT_ROOM = KERNEL_FRONT * MMBVH_MAX_DEPTH };
 
-/* A list of nodes to be tested together. An entry is 2 * node, plus 1 if the node lies completely in the picture. */
-typedef struct kernel_front {
-    int count;
-    int64_t entries[KERNEL_FRONT];
-} kernel_front;
-
 /* Returns whether the node may be visible in the picture. Sets *is_inside if it lies completely in the picture: then
  * its children need not be tested. */
 SIMD_INLINE bool kernel_node_in_picture(const kernel_finder *s, const mmbvh *tree, int64_t node, bool *is_inside)
 {
-    kernel_placement placement = {0};
     if (*is_inside) return true;
-    const kernel_sides sides = kernel_box_sides(&s->planes, tree, node, &placement);
+    const kernel_placement placement = kernel_box_placement(&s->planes, tree, node);
     const unsigned outside =
-        (sides.below & (1u | 1u << KERNEL_ROWS_LANE)) | (sides.above & (2u | 2u << KERNEL_ROWS_LANE));
+        (placement.below & (1u | 1u << KERNEL_ROWS_LANE)) | (placement.above & (2u | 2u << KERNEL_ROWS_LANE));
     *is_inside = !outside && placement.near >= s->t_near;
-    return kernel_blocks_of(sides) && !(placement.far < s->t_near);
+    return placement.blocks && !(placement.far < s->t_near);
 }
 
-/* Selects the entries whose values are visible and whose boxes are in the picture. The test of values has no branch,
- * because it rejects about half of the entries unpredictably. */
-SIMD_INLINE void kernel_front_choose(const kernel_finder *s, const mmbvh *tree, const mmbvh_ranges *ranges,
-                                     kernel_front *front, const int64_t *entries, int count)
+/* Selects the entries whose values are visible and whose boxes are in the picture, and returns their number. An entry
+ * is 2 * node, plus 1 if the node lies completely in the picture. The test of values has no branch, because it rejects
+ * about half of the entries unpredictably. */
+SIMD_INLINE int kernel_front_choose(const kernel_finder *s, const mmbvh *tree, const mmbvh_ranges *ranges,
+                                    int64_t entries[KERNEL_FRONT], int count)
 {
-    int64_t candidates[KERNEL_FRONT];
-    int left = 0;
+    int left = 0, chosen = 0;
     for (int n = 0; n < count; n++) {
-        candidates[left] = entries[n];
-        left += kernel_node_is_visible(s->visible_values, ranges, entries[n] >> 1);
+        const int64_t entry = entries[n];
+        entries[left] = entry;
+        left += kernel_node_is_visible(s->visible_values, ranges, entry >> 1);
     }
-    front->count = 0;
     for (int n = 0; n < left; n++) {
-        bool is_inside = candidates[n] & 1;
-        if (kernel_node_in_picture(s, tree, candidates[n] >> 1, &is_inside))
-            front->entries[front->count++] = candidates[n] | is_inside;
+        const int64_t entry = entries[n];
+        bool is_inside = entry & 1;
+        if (kernel_node_in_picture(s, tree, entry >> 1, &is_inside)) entries[chosen++] = entry | is_inside;
     }
-}
-
-/* Splits the selected nodes into leaves and the left children of inner nodes, and prefetches the leaves' cells and the
- * children's ranges of values. */
-SIMD_INLINE void kernel_front_expand(const mmbvh *tree, const mmbvh_ranges *ranges, const kernel_front *front,
-                                     kernel_front *leaves, kernel_front *children)
-{
-    leaves->count = children->count = 0;
-    for (int n = 0; n < front->count; n++) {
-        const int64_t node = front->entries[n] >> 1, ref = mmbvh_node_ref(tree, node);
-        const bool is_leaf = mmbvh_node_count(tree, node);
-        const char *next = ranges->low + ref * ranges->stride;
-        leaves->entries[leaves->count] = node;
-        leaves->count += is_leaf;
-        children->entries[children->count] = 2 * ref | (front->entries[n] & 1);
-        children->count += !is_leaf;
-        __builtin_prefetch(is_leaf ? (const char *)(tree->cells + ref) : next);
-        __builtin_prefetch(is_leaf ? (const char *)(tree->cells + ref + MMBVH_MAX_LEAF) : next + ranges->stride);
-    }
+    return chosen;
 }
 
 /* Traverses a subtree depth first, from the left, KERNEL_FRONT nodes at a time, and so roughly in the order of leaves
@@ -176,19 +151,28 @@ static void kernel_find_candidates(kernel_finder *s, int64_t root)
     int top = 0;
     stack[top++] = 2 * root;
     while (top && !s->list->is_full) {
-        kernel_front front, leaves, children;
         const int most = top < KERNEL_FRONT_ROOM - MMBVH_MAX_DEPTH ? KERNEL_FRONT : 1;
-        const int count = top < most ? top : most;
-        int64_t next[KERNEL_FRONT];
-        for (int n = 0; n < count; n++) next[n] = stack[--top];
-        kernel_front_choose(s, tree, ranges, &front, next, count);
-        kernel_front_expand(tree, ranges, &front, &leaves, &children);
-        for (int n = 0; n < leaves.count; n++) {
-            const int64_t leaf = leaves.entries[n];
-            kernel_find_leaf(s, tree->cells + mmbvh_node_ref(tree, leaf), mmbvh_node_count(tree, leaf));
+        int64_t front[KERNEL_FRONT], leaves[KERNEL_FRONT], children[KERNEL_FRONT];
+        int count = top < most ? top : most, leaf_count = 0, child_count = 0;
+        for (int n = 0; n < count; n++) front[n] = stack[--top];
+        count = kernel_front_choose(s, tree, ranges, front, count);
+        /* splits the nodes into leaves and the left children of inner nodes, and prefetches the leaves' cells and the
+         * children's ranges of values */
+        for (int n = 0; n < count; n++) {
+            const int64_t node = front[n] >> 1, ref = mmbvh_node_ref(tree, node);
+            const bool is_leaf = mmbvh_node_count(tree, node);
+            const char *next = ranges->low + ref * ranges->stride;
+            leaves[leaf_count] = node;
+            leaf_count += is_leaf;
+            children[child_count] = 2 * ref | (front[n] & 1);
+            child_count += !is_leaf;
+            __builtin_prefetch(is_leaf ? (const char *)(tree->cells + ref) : next);
+            __builtin_prefetch(is_leaf ? (const char *)(tree->cells + ref + MMBVH_MAX_LEAF) : next + ranges->stride);
         }
-        while (children.count) {
-            const int64_t left = children.entries[--children.count];
+        for (int n = 0; n < leaf_count; n++)
+            kernel_find_leaf(s, tree->cells + mmbvh_node_ref(tree, leaves[n]), mmbvh_node_count(tree, leaves[n]));
+        while (child_count) {
+            const int64_t left = children[--child_count];
             stack[top++] = left + 2;
             stack[top++] = left;
         }

@@ -11,17 +11,13 @@
  * all the tile's packets and all of a volume's windows of depth, unless another cell replaces it in its slot. */
 enum { KERNEL_CACHE_BITS = 8, KERNEL_CACHE_CELLS = 1 << KERNEL_CACHE_BITS };
 
-typedef struct kernel_cell_cache {
-    kernel_cell cells[KERNEL_CACHE_CELLS];
-} kernel_cell_cache;
-
 /* Returns the cell from the cache, or fetches it if it is missing. A cached cell may already be transformed. layer is
  * part of the key, because each layer fetches cells with its own field. */
 SIMD_INLINE kernel_cell *kernel_cell_cache_find(const kernel_packet *p, int layer, int part, const grid_field *field,
                                                 uint32_t index)
 {
     const uint32_t key = index + 0x85ebca6bu * (uint32_t)part + 0xc2b2ae35u * (uint32_t)layer;
-    kernel_cell *c = &p->thread->cells->cells[(key * 0x9e3779b1u) >> (32 - KERNEL_CACHE_BITS)];
+    kernel_cell *c = &p->thread->cells[(key * 0x9e3779b1u) >> (32 - KERNEL_CACHE_BITS)];
     if (c->serial == p->thread->serial && c->index == index && c->part == part && c->layer == layer) return c;
     c->serial = p->thread->serial;
     c->part = part;

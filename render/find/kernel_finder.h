@@ -1,6 +1,6 @@
 /* Searches a subtree for visible cells (kernel_candidates.h), and computes the pixels in which a single cell may be
  * visible. Cells are tested SIMD_WIDTH at a time (kernel_candidate_surfaces.h, kernel_candidate_volumes.h). Cells whose
- * numbers are too large, too small or NaN for lanes are tested one by one, by the box of their vertices. */
+ * numbers are too large, too small or NaN for lanes are tested one by one, by the bounds of their vertices. */
 #ifndef RENDER_KERNEL_FINDER_H
 #define RENDER_KERNEL_FINDER_H
 
@@ -11,7 +11,6 @@
 #include "kernel_arrays.h"
 #include "kernel_cell.h"
 #include "kernel_cell_values.h"
-#include "kernel_outline.h"
 #include "kernel_shapes.h"
 #include "kernel_tile.h"
 #include "kernel_types.h"
@@ -23,6 +22,7 @@
 typedef struct kernel_cells {
     int type, vertices; /* VTK's cell type, and the number of vertices of each cell */
     int count;
+    int value; /* for cells that an isovalue crosses: its index in the layer, the same for all cells */
     uint32_t cell[SIMD_WIDTH];
     int32_t vertex[8][SIMD_WIDTH];
 } kernel_cells;
@@ -32,7 +32,7 @@ static inline void kernel_cells_begin(kernel_cells *c, int type)
 {
     c->type = type;
     c->vertices = grid_type_vertices(type);
-    c->count = 0;
+    c->count = c->value = 0;
 }
 
 /* Fills the unused lanes, from `count` on, with copies of the first cell. */
@@ -52,13 +52,6 @@ SIMD_INLINE vi kernel_cells_vertex(const kernel_cells *c, int i)
     return vertex;
 }
 
-/* A queue of cells that one isovalue crosses, all of one type with quadrilateral faces, one per lane. It is processed
- * when all lanes are full (kernel_candidate_surfaces.h). */
-typedef struct kernel_crossed_queue {
-    kernel_cells cells;
-    int value; /* index of the isovalue in its layer, the same for all cells */
-} kernel_crossed_queue;
-
 /* The state of a search for candidates: that of one subtree, or that of one tile. */
 typedef struct kernel_finder {
     const kernel_frame *frame;
@@ -69,8 +62,7 @@ typedef struct kernel_finder {
     kernel_candidate_list *list;
     bool (*grow)(kernel_candidate_list *list);
     int part;
-    uint32_t source;     /* candidates' `source` number for the layer's first isovalue */
-    kernel_tile picture; /* the whole picture as a single tile whose axis is the direction of view */
+    uint32_t source; /* candidates' `source` number for the layer's first isovalue */
     kernel_planes planes;
     float t_near; /* ray parameter t at the eye's plane */
     /* pixels per unit of slope (per scaled unit if the camera is orthographic) along columns and rows, and the pixel
@@ -83,7 +75,8 @@ typedef struct kernel_finder {
     int queued_count;
     /* per type (kernel_lane_type_index()), cells whose vertices are being prefetched */
     kernel_cells pending[KERNEL_LANE_TYPES];
-    kernel_crossed_queue crossed[KERNEL_CURVED_TYPES];
+    /* per type with quadrilateral faces, cells that an isovalue crosses; they are processed when all lanes are full */
+    kernel_cells crossed[KERNEL_CURVED_TYPES];
     kernel_arrays arrays;
 } kernel_finder;
 
@@ -110,13 +103,9 @@ static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, 
     for (int i = 0; i < KERNEL_LANE_TYPES; i++) {
         const int type = kernel_lane_types[i];
         kernel_cells_begin(&s->pending[i], type);
-        if (kernel_is_linear(type)) continue;
-        kernel_cells_begin(&s->crossed[i].cells, type);
-        s->crossed[i].value = 0;
+        if (!kernel_is_linear(type)) kernel_cells_begin(&s->crossed[i], type);
     }
     kernel_arrays_begin(&s->arrays, f->job->parts[s->part].cells, &s->field->fields[s->part]);
-    memset(&s->picture, 0, sizeof s->picture);
-    s->picture.depth_shift = f->depth_shift;
     kernel_picture_borders(&borders, f);
     kernel_tree_planes(&s->planes, f, &borders);
     const double unit = f->job->camera.is_orthographic ? f->job->space.scale : 1;
@@ -126,83 +115,6 @@ static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, 
     s->row_scale = (float)(1 / (f->slope_dy * unit));
     s->column_0 = (float)(-f->slope_x0 / f->slope_dx);
     s->row_0 = (float)(-f->slope_y0 / f->slope_dy);
-}
-
-/* The minimum and maximum of a set of numbers. */
-typedef struct kernel_extent {
-    float low, high;
-} kernel_extent;
-
-SIMD_INLINE kernel_extent kernel_extent_of(const kernel_outline *o, vf scale, const float *of, const float *by)
-{
-    vf low = vf_set(INFINITY), high = vf_set(-INFINITY);
-    for (int i = 0; i < o->count; i += SIMD_WIDTH) {
-        const vf at = by ? vf_load(of + i) * scale / vf_load(by + i) : vf_load(of + i) * scale;
-        low = vf_min(low, at);
-        high = vf_max(high, at);
-    }
-    return (kernel_extent){vf_reduce_min(low), vf_reduce_max(high)};
-}
-
-/* Fills the last vector of points with copies of the first point. */
-SIMD_INLINE void kernel_outline_fill(kernel_outline *o)
-{
-    for (int a = 0; a < 3; a++)
-        for (int i = o->count; i % SIMD_WIDTH; i++) o->point[a][i] = o->point[a][0];
-}
-
-/* Computes the first and last pixel of an extent, clipped to the pixels from `from` to `to`. Returns false if it
- * contains none. zero: the pixel at which the extent's coordinate is 0. error_bound: error of the extent, in pixels.
- * The extent is widened by this bound, by 1/100 pixel and by 3e-5 of the numbers, which is more than the error of rays
- * that hit only by rounding. */
-SIMD_INLINE bool kernel_extent_range(kernel_extent e, float zero, float error_bound, int from, int to, uint16_t *first,
-                                     uint16_t *last)
-{
-    const float pad = 0.01f + 3e-5f * (simd_max(fabsf(e.low), fabsf(e.high)) + fabsf(zero)) + error_bound;
-    const float low = simd_max(ceilf(e.low + zero - pad), (float)from);
-    const float high = simd_min(floorf(e.high + zero + pad), (float)to);
-    if (!(low <= high)) return false;
-    *first = (uint16_t)low;
-    *last = (uint16_t)high;
-    return true;
-}
-
-/* Computes the candidate of a cell from the extents in depth, columns and rows of the surface in it. Columns and rows
- * are relative to the axis of view. Returns false if it is not visible. size: an upper bound of the cell's depths. A
- * cell near or behind the eye's plane may be anywhere, so its candidate covers the whole picture. */
-SIMD_INLINE bool kernel_extents_candidate(const kernel_finder *s, kernel_extent depth, float size,
-                                          kernel_extent columns, kernel_extent rows, kernel_candidate *out)
-{
-    const render_camera *camera = &s->frame->job->camera;
-    const float pad = KERNEL_OUTLINE_PAD * size;
-    if (depth.high + pad < s->t_near) return false;
-    out->near = depth.low - pad;
-    out->far = depth.high + pad;
-    if (!(out->near > -INFINITY)) out->near = -INFINITY; /* the comparison is negated so that it also replaces NaN */
-    if (!(out->far < INFINITY)) out->far = INFINITY;
-    if (!camera->is_orthographic && !(depth.low - s->t_near > 0.01f * size)) {
-        out->x0 = (uint16_t)s->first[0];
-        out->y0 = (uint16_t)s->first[1];
-        out->x1 = (uint16_t)s->last[0];
-        out->y1 = (uint16_t)s->last[1];
-        return true;
-    }
-    const float error_bound = 2e-6f * (camera->is_orthographic ? size + 1 : 1);
-    return kernel_extent_range(columns, s->column_0, error_bound * fabsf(s->column_scale), s->first[0], s->last[0],
-                               &out->x0, &out->x1) &&
-           kernel_extent_range(rows, s->row_0, error_bound * fabsf(s->row_scale), s->first[1], s->last[1], &out->y0,
-                               &out->y1);
-}
-
-SIMD_INLINE bool kernel_outline_candidate(const kernel_finder *s, kernel_outline *o, kernel_candidate *out)
-{
-    kernel_outline_fill(o);
-    const kernel_extent depth = kernel_extent_of(o, vf_set(1), o->point[2], NULL);
-    for (int i = 0; i < o->count; i += SIMD_WIDTH) vf_store(o->point[2] + i, vf_load(o->point[2] + i) - s->t_near);
-    const float *by = s->frame->job->camera.is_orthographic ? NULL : o->point[2];
-    const kernel_extent columns = kernel_extent_of(o, vf_set(s->column_scale), o->point[0], by);
-    const kernel_extent rows = kernel_extent_of(o, vf_set(s->row_scale), o->point[1], by);
-    return kernel_extents_candidate(s, depth, o->size[2] + fabsf(s->t_near), columns, rows, out);
 }
 
 /* Counts the candidate in each tile that its box of pixels meets. Most candidates lie in one tile or two adjacent ones,
@@ -222,64 +134,6 @@ SIMD_INLINE void kernel_count_tiles(kernel_candidate_list *list, int x0, int x1,
     }
     for (int y = 0; y <= rows; y++)
         for (int x = 0; x <= columns; x++) first[y * list->tile_columns + x]++;
-}
-
-SIMD_INLINE void kernel_add_candidate(kernel_finder *s, const kernel_candidate *candidate)
-{
-    kernel_candidate_list *list = s->list;
-    if (list->count == list->capacity && !s->grow(list)) return;
-    list->items[list->count++] = *candidate;
-    if (list->counts) kernel_count_tiles(list, candidate->x0, candidate->x1, candidate->y0, candidate->y1);
-}
-
-static void kernel_find_polyhedron(kernel_finder *s, uint32_t index)
-{
-    const grid *g = s->frame->job->parts[s->part].cells;
-    kernel_outline o = {0};
-    kernel_candidate candidate = {.cell = index, .source = s->source};
-    /* a polyhedron's outline consists of the eight corners of its vertices' bounding box */
-    float low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-    grid_walk walk = grid_walk_cell(g, index);
-    int64_t vertex;
-    while (grid_walk_next(&walk, &vertex)) {
-        double world[3];
-        float place[3];
-        grid_vertex(g, vertex, world);
-        kernel_transform_in_tile(s->frame, &s->picture, world, &place[0], &place[1], &place[2]);
-        for (int a = 0; a < 3; a++) {
-            low[a] = simd_min(place[a], low[a]);
-            high[a] = simd_max(place[a], high[a]);
-        }
-    }
-    o.count = 8;
-    for (int i = 0; i < 8; i++)
-        for (int a = 0; a < 3; a++) o.point[a][i] = i >> a & 1 ? high[a] : low[a];
-    for (int a = 0; a < 3; a++) o.size[a] = simd_max(fabsf(low[a]), fabsf(high[a]));
-    if (kernel_outline_candidate(s, &o, &candidate)) kernel_add_candidate(s, &candidate);
-}
-
-/* Adds the fetched cell to the candidates, with the pixels of its vertices' bounding box. */
-static __attribute__((noinline)) void kernel_add_cell_box(kernel_finder *s, kernel_cell *c, uint32_t source)
-{
-    kernel_outline o;
-    kernel_candidate candidate = {.cell = c->index, .source = source};
-    if (!c->is_transformed)
-        kernel_cell_move_to_tile_space(c, s->frame, &s->picture, s->frame->job->parts[s->part].cells);
-    kernel_vertex_outline(c, &o);
-    if (kernel_outline_candidate(s, &o, &candidate)) kernel_add_candidate(s, &candidate);
-}
-
-/* Adds the fetched cell to the candidates if the isovalue crosses it. */
-SIMD_INLINE void kernel_find_surface(kernel_finder *s, kernel_cell *c, int value)
-{
-    if (c->is_finite && kernel_values_straddle(c->values, c->count, s->surface->layer->values[value]))
-        kernel_add_cell_box(s, c, s->source + (uint32_t)value);
-}
-
-/* Adds the fetched cell to the candidates if its values are visible in the volume. */
-SIMD_INLINE void kernel_find_volume(kernel_finder *s)
-{
-    if (s->cell.is_finite && kernel_cell_is_visible(&s->cell, s->transfer)) kernel_add_cell_box(s, &s->cell, s->source);
 }
 
 /* ---- cells in lanes ---- */
@@ -340,8 +194,10 @@ SIMD_INLINE kernel_view_bounds kernel_view_bounds_empty(void)
     return (kernel_view_bounds){most, -most, most, -most, most, -most};
 }
 
-/* Computes the first and the last pixel between each lane's bounds low and high, with the margin of
- * kernel_extent_range(). Returns the lanes that contain a pixel. */
+/* Computes the first and the last pixel between each lane's bounds low and high, clipped to the pixels from ends[0] to
+ * ends[1]. zero: the pixel at which the bounds' coordinate is 0. error_bound: error of the bounds, in pixels. The
+ * bounds are widened by it, by 1/100 pixel and by 3e-5 of the numbers, which is more than the error of rays that hit
+ * only by rounding. Returns the lanes that contain a pixel. */
 SIMD_INLINE vm kernel_pixel_range(vf low, vf high, float zero, float error_bound, const int ends[2], vf *first,
                                   vf *last)
 {
@@ -351,8 +207,8 @@ SIMD_INLINE vm kernel_pixel_range(vf low, vf high, float zero, float error_bound
     return vf_le(*first, *last);
 }
 
-/* Adds the cells of the given lanes (a bit mask) that may be visible to the candidates. kernel_extents_candidate() does
- * the same for a single cell. */
+/* Adds the cells of the given lanes (a bit mask) that may be visible to the candidates. A cell near or behind the eye's
+ * plane may be anywhere, so its candidate covers the whole picture. */
 static void kernel_add_lanes(kernel_finder *s, const kernel_view_bounds *e, unsigned lanes, const uint32_t *cells,
                              uint32_t source)
 {
@@ -394,6 +250,54 @@ static void kernel_add_lanes(kernel_finder *s, const kernel_view_bounds *e, unsi
                                                         .y1 = (uint16_t)ends[3][n]};
         if (list->counts) kernel_count_tiles(list, ends[0][n], ends[1][n], ends[2][n], ends[3][n]);
     }
+}
+
+/* ---- cells that are tested one by one ---- */
+
+/* Extends the bounds, in all lanes, so that they contain a vertex of the mesh. */
+SIMD_INLINE void kernel_view_bounds_add_vertex(const kernel_finder *s, int64_t vertex, kernel_view_bounds *e)
+{
+    const double *eye = s->frame->job->camera.eye;
+    double world[3];
+    vf at[3];
+    grid_vertex(s->arrays.cells, vertex, world);
+    for (int a = 0; a < 3; a++) {
+        const double *axis = s->frame->scaled_axes[a];
+        at[a] = vf_set(
+            (float)(axis[0] * (world[0] - eye[0]) + axis[1] * (world[1] - eye[1]) + axis[2] * (world[2] - eye[2])));
+    }
+    kernel_view_bounds_add(s, e, at, vm_all_lanes());
+}
+
+/* Adds a polyhedron to the candidates, with the pixels of its vertices' bounds. */
+static void kernel_find_polyhedron(kernel_finder *s, uint32_t index)
+{
+    kernel_view_bounds e = kernel_view_bounds_empty();
+    grid_walk walk = grid_walk_cell(s->arrays.cells, index);
+    int64_t vertex;
+    while (grid_walk_next(&walk, &vertex)) kernel_view_bounds_add_vertex(s, vertex, &e);
+    kernel_add_lanes(s, &e, 1, &index, s->source);
+}
+
+/* Adds the fetched cell to the candidates, with the pixels of its vertices' bounds. */
+static __attribute__((noinline)) void kernel_add_cell_box(kernel_finder *s, const kernel_cell *c, uint32_t source)
+{
+    kernel_view_bounds e = kernel_view_bounds_empty();
+    for (int i = 0; i < c->count; i++) kernel_view_bounds_add_vertex(s, c->vertices[i], &e);
+    kernel_add_lanes(s, &e, 1, &c->index, source);
+}
+
+/* Adds the fetched cell to the candidates if the isovalue crosses it. */
+SIMD_INLINE void kernel_find_surface(kernel_finder *s, const kernel_cell *c, int value)
+{
+    if (c->is_finite && kernel_values_straddle(c->values, c->count, s->surface->layer->values[value]))
+        kernel_add_cell_box(s, c, s->source + (uint32_t)value);
+}
+
+/* Adds the fetched cell to the candidates if its values are visible in the volume. */
+SIMD_INLINE void kernel_find_volume(kernel_finder *s)
+{
+    if (s->cell.is_finite && kernel_cell_is_visible(&s->cell, s->transfer)) kernel_add_cell_box(s, &s->cell, s->source);
 }
 
 #endif

@@ -6,13 +6,6 @@
 #include "kernel_arrays.h"
 #include "simd.h"
 
-SIMD_INLINE void kernel_prefetch_vertex(const grid *g, const grid_field *field, int64_t v)
-{
-    __builtin_prefetch(field->values.data + v * field->values.stride);
-    for (int a = 0; a < 3 && g->coordinates[a].data; a++)
-        __builtin_prefetch(g->coordinates[a].data + v * g->coordinates[a].stride);
-}
-
 /* Prefetches a cell's vertex indices and its type. The cell's offset into the connectivity is read directly, without a
  * prefetch: only this function is delayed by the read. */
 SIMD_INLINE void kernel_prefetch_indices(const grid *g, uint32_t cell)
@@ -28,10 +21,13 @@ SIMD_INLINE void kernel_prefetch_vertices(const grid *g, const grid_field *field
 {
     const int vertices = grid_type_vertices(grid_cell_type(g, cell));
     const int64_t first = kernel_arrays_first(g, cell, vertices);
-    for (int i = 0; i < vertices; i++)
-        kernel_prefetch_vertex(g, field,
-                               g->lattice ? first + g->lattice->corner_offsets[i]
-                                          : grid_array_index(&g->connectivity, first + i));
+    for (int i = 0; i < vertices; i++) {
+        const int64_t v =
+            g->lattice ? first + g->lattice->corner_offsets[i] : grid_array_index(&g->connectivity, first + i);
+        __builtin_prefetch(field->values.data + v * field->values.stride);
+        for (int a = 0; a < 3 && g->coordinates[a].data; a++)
+            __builtin_prefetch(g->coordinates[a].data + v * g->coordinates[a].stride);
+    }
 }
 
 /* Prefetches all data of the given cells: first all indices, then all vertices. */

@@ -112,12 +112,9 @@ static void bins_free(struct kernel_bins *bins)
 static void bin_tiles(const kernel_candidate_chunk *chunk, int64_t across, uint32_t *at, kernel_tile_candidate *out)
 {
     for (const kernel_candidate *s = chunk->items, *end = s + chunk->count; s < end; s++)
-        for (int y = s->y0 / KERNEL_TILE; y <= s->y1 / KERNEL_TILE; y++) {
-            const kernel_tile_range rows = kernel_range_in_tile(s->y0, s->y1, y * KERNEL_TILE);
+        for (int y = s->y0 / KERNEL_TILE; y <= s->y1 / KERNEL_TILE; y++)
             for (int x = s->x0 / KERNEL_TILE; x <= s->x1 / KERNEL_TILE; x++)
-                out[at[y * across + x]++] =
-                    kernel_candidate_in_tile(s, kernel_range_in_tile(s->x0, s->x1, x * KERNEL_TILE), rows);
-        }
+                out[at[y * across + x]++] = kernel_candidate_in_tile(s, x * KERNEL_TILE, y * KERNEL_TILE);
 }
 
 /* Bins the cells that a thread has found. On entry starts[1 + tile] must be the number of cells in each tile. Returns
@@ -189,14 +186,9 @@ bool render_candidates_gather(const kernel_frame *frame, kernel_thread *thread, 
 
 /* ---- positions of cells in the picture ---------------------------------------------------------------------- */
 
-/* A range of positions along the columns or rows of pixels, in pixels. */
-typedef struct pixel_range {
-    double low, high;
-} pixel_range;
-
-/* Extends the ranges of columns (spans[0]) and rows (spans[1]) by a point in the trees' space. Returns the point's
- * depth from the eye, or 1 if the camera is orthographic. */
-static double widen(const kernel_frame *f, const double point[3], pixel_range spans[2])
+/* Extends the ranges, low and high, of columns (spans[0]) and rows (spans[1]) of pixels by a point in the trees' space.
+ * Returns the point's depth from the eye, or 1 if the camera is orthographic. */
+static double widen(const kernel_frame *f, const double point[3], double spans[2][2])
 {
     const render_camera *c = &f->job->camera;
     const render_space *s = &f->job->space;
@@ -210,14 +202,14 @@ static double widen(const kernel_frame *f, const double point[3], pixel_range sp
     const double depth = c->is_orthographic ? 1 : forward;
     const double at[2] = {(right / depth - f->slope_x0) / f->slope_dx, (up / depth - f->slope_y0) / f->slope_dy};
     for (int a = 0; a < 2; a++) {
-        spans[a].low = fmin(spans[a].low, at[a]);
-        spans[a].high = fmax(spans[a].high, at[a]);
+        spans[a][0] = fmin(spans[a][0], at[a]);
+        spans[a][1] = fmax(spans[a][1], at[a]);
     }
     return depth;
 }
 
 /* Extends the ranges of columns and rows by all corners of the tree's box. Returns the smallest depth of a corner. */
-static double widen_by_tree(const kernel_frame *f, const mmbvh *tree, pixel_range spans[2])
+static double widen_by_tree(const kernel_frame *f, const mmbvh *tree, double spans[2][2])
 {
     float lower[4], upper[4];
     double least = INFINITY;
@@ -233,8 +225,8 @@ static double widen_by_tree(const kernel_frame *f, const mmbvh *tree, pixel_rang
 /* The number of cells of some mesh parts, and the area of the picture that their bounding boxes cover. */
 typedef struct coverage {
     double cells;
-    double pixels;      /* sum of the areas of the parts' boxes */
-    pixel_range all[2]; /* ranges of columns and rows that all boxes together cover */
+    double pixels;    /* sum of the areas of the parts' boxes */
+    double all[2][2]; /* ranges of columns and rows that all boxes together cover */
 } coverage;
 
 /* Counts the cells and the pixels of the parts on which the field exists (ranges[part].low is set), or of all parts if
@@ -244,13 +236,15 @@ static bool measure_parts(const kernel_frame *f, const mmbvh_ranges *ranges, cov
     *out = (coverage){.all = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}}};
     for (int part = 0; part < f->job->part_count; part++) {
         const mmbvh *tree = f->job->parts[part].tree;
-        pixel_range own[2] = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
+        double own[2][2] = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
         if ((ranges && !ranges[part].low) || !tree->node_count) continue;
         if (!(widen_by_tree(f, tree, own) > 0)) return false;
-        for (int a = 0; a < 2; a++)
-            out->all[a] = (pixel_range){fmin(own[a].low, out->all[a].low), fmax(own[a].high, out->all[a].high)};
+        for (int a = 0; a < 2; a++) {
+            out->all[a][0] = fmin(own[a][0], out->all[a][0]);
+            out->all[a][1] = fmax(own[a][1], out->all[a][1]);
+        }
         out->cells += (double)tree->cell_count;
-        out->pixels += (own[0].high - own[0].low) * (own[1].high - own[1].low);
+        out->pixels += (own[0][1] - own[0][0]) * (own[1][1] - own[1][0]);
     }
     return true;
 }
@@ -263,14 +257,10 @@ static bool volume_cells_are_small(const kernel_frame *f)
     return measure_parts(f, f->job->volumes[0].field.ranges, &c) && c.cells > SMALL_CELLS * c.pixels;
 }
 
-/* Counts over a sample of leaves: cells, and cells that isovalues may cross, once per isovalue. */
-typedef struct leaf_sample {
-    double cells, crossed;
-} leaf_sample;
-
-/* Adds the counts of `samples` nodes that are spread evenly over the part's tree. About half of them are leaves; inner
- * nodes have no cells and add 0. */
-static void sample_leaves(const kernel_frame *f, const kernel_surface *s, int part, int64_t samples, leaf_sample *out)
+/* Adds counts over `samples` nodes that are spread evenly over the part's tree: of cells, and of cells that isovalues
+ * may cross, once per isovalue. About half of the nodes are leaves; inner nodes have no cells and add 0. */
+static void sample_leaves(const kernel_frame *f, const kernel_surface *s, int part, int64_t samples, double *cells,
+                          double *crossed)
 {
     const mmbvh *tree = f->job->parts[part].tree;
     const mmbvh_ranges *ranges = &s->layer->field.ranges[part];
@@ -281,9 +271,9 @@ static void sample_leaves(const kernel_frame *f, const kernel_surface *s, int pa
         float low, high;
         memcpy(&low, ranges->low + node * ranges->stride, sizeof low);
         memcpy(&high, ranges->high + node * ranges->stride, sizeof high);
-        out->cells += count;
+        *cells += count;
         for (int i = 0; i < s->visible_values.count; i++)
-            if (low <= s->visible_values.high[i] && high >= s->visible_values.low[i]) out->crossed += count;
+            if (low <= s->visible_values.high[i] && high >= s->visible_values.low[i]) *crossed += count;
     }
 }
 
@@ -295,21 +285,22 @@ bool render_surfaces_are_small(const kernel_frame *f)
     double crossed = 0;
     int values = 0;
     if (f->has_transparent || !measure_parts(f, NULL, &c)) return false;
-    const double all = (c.all[0].high - c.all[0].low) * (c.all[1].high - c.all[1].low);
+    const double all = (c.all[0][1] - c.all[0][0]) * (c.all[1][1] - c.all[1][0]);
     /* area of at least one tile, because parts may be seen edge on */
     const double pixels = fmax(fmin(c.pixels, all), KERNEL_TILE * KERNEL_TILE);
     for (int s = 0; s < f->surface_count; s++) values += f->surfaces[s].layer->value_count;
     if (!(values * c.cells > SMALL_CROSSED * pixels)) return false;
     for (int s = 0; s < f->surface_count; s++) {
-        leaf_sample leaves = {0, 0};
+        double sampled = 0, sampled_crossed = 0;
         double own = 0; /* number of cells of the parts on which the field exists */
         for (int part = 0; part < f->job->part_count; part++) {
             const double held = (double)f->job->parts[part].tree->cell_count;
             if (!f->surfaces[s].layer->field.ranges[part].low) continue;
-            sample_leaves(f, &f->surfaces[s], part, 1 + (int64_t)(SAMPLES * (held / c.cells)), &leaves);
+            sample_leaves(f, &f->surfaces[s], part, 1 + (int64_t)(SAMPLES * (held / c.cells)), &sampled,
+                          &sampled_crossed);
             own += held;
         }
-        if (leaves.cells > 0) crossed += leaves.crossed / leaves.cells * own;
+        if (sampled > 0) crossed += sampled_crossed / sampled * own;
     }
     return crossed > SMALL_CROSSED * pixels;
 }
@@ -320,7 +311,7 @@ void render_trees_cover(kernel_frame *f)
 {
     const render_job *job = f->job;
     const int most[2] = {job->camera.width - 1, job->camera.height - 1};
-    pixel_range spans[2] = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
+    double spans[2][2] = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
     double least = INFINITY, size = 2;
     for (int part = 0; part < job->part_count; part++)
         if (job->parts[part].tree->node_count) least = fmin(widen_by_tree(f, job->parts[part].tree, spans), least);
@@ -328,9 +319,9 @@ void render_trees_cover(kernel_frame *f)
         size = fmax(2 + fabs((job->camera.eye[a] - job->space.origin[a]) * job->space.scale), size);
     for (int a = 0; a < 2; a++) {
         const double pad = 1 + 32 * 6e-8 * size / (least * job->space.scale) / fabs(a ? f->slope_dy : f->slope_dx);
-        const bool is_known = least > 0 && pad < 1e6 && isfinite(spans[a].low) && isfinite(spans[a].high);
-        f->cover[a][0] = is_known ? (int)fmin(fmax(spans[a].low - pad, 0), most[a] + 1) : 0;
-        f->cover[a][1] = is_known ? (int)fmax(fmin(spans[a].high + pad, most[a]), -1) : most[a];
+        const bool is_known = least > 0 && pad < 1e6 && isfinite(spans[a][0]) && isfinite(spans[a][1]);
+        f->cover[a][0] = is_known ? (int)fmin(fmax(spans[a][0] - pad, 0), most[a] + 1) : 0;
+        f->cover[a][1] = is_known ? (int)fmax(fmin(spans[a][1] + pad, most[a]), -1) : most[a];
     }
 }
 

@@ -11,12 +11,6 @@
  * blocks, are not divided. */
 enum { SUBTREES = 128, SUBTREE_CELLS = 512 };
 
-static int64_t subtree_limit(const mmbvh *tree)
-{
-    const int64_t most = 1 + tree->cell_count / SUBTREE_CELLS;
-    return most < SUBTREES ? most : SUBTREES;
-}
-
 bool render_subtrees_begin(render_subtrees *list, int64_t trees)
 {
     *list = (render_subtrees){base_alloc((size_t)(trees * SUBTREES) * sizeof *list->items), 0};
@@ -26,7 +20,8 @@ bool render_subtrees_begin(render_subtrees *list, int64_t trees)
 void render_subtrees_add(render_subtrees *list, const kernel_frame *frame, int surface, int part)
 {
     const mmbvh *tree = frame->job->parts[part].tree;
-    const int64_t first = list->count, most = subtree_limit(tree);
+    const int64_t first = list->count, enough = 1 + tree->cell_count / SUBTREE_CELLS;
+    const int64_t most = enough < SUBTREES ? enough : SUBTREES;
     list->items[list->count++] = (kernel_subtree){.surface = surface, .part = part};
     for (int64_t next = first; next < list->count && list->count - first < most;) {
         const int64_t node = list->items[next].node;

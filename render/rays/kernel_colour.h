@@ -107,6 +107,20 @@ SIMD_INLINE vf kernel_inverse_length(const vf v[3], vm *is_zero)
     return scale / vf_sqrt((a * a + b * b) + c * c);
 }
 
+/* Computes the unit vector along n, a vector of any length in camera axes, that points to the eye's side. */
+SIMD_INLINE void kernel_facing_normal(const kernel_packet *p, const vf n[3], vf unit[3])
+{
+    vm flat;
+    const vf inverse = kernel_inverse_length(n, &flat);
+    vf facing = vf_set(0);
+    for (int a = 0; a < 3; a++) {
+        unit[a] = vf_select(flat, p->view[a], n[a] * inverse);
+        facing += unit[a] * p->view[a];
+    }
+    const vf turn = vf_select(vf_lt(facing, vf_set(0)), vf_set(-1), vf_set(1));
+    for (int a = 0; a < 3; a++) unit[a] *= turn;
+}
+
 /* Shades a colour by the Blinn-Phong model (render.h). n is any vector along the gradient, of any length, in camera
  * axes. */
 SIMD_INLINE void kernel_shade(const kernel_packet *p, const render_material *m, const vf n[3], vf colour[3])
@@ -116,16 +130,8 @@ SIMD_INLINE void kernel_shade(const kernel_packet *p, const render_material *m, 
         for (int a = 0; a < 3; a++) colour[a] *= m->ambient;
         return;
     }
-    vm flat;
-    vf unit[3], inverse = kernel_inverse_length(n, &flat);
-    vf facing = vf_set(0);
-    for (int a = 0; a < 3; a++) {
-        unit[a] = vf_select(flat, p->view[a], n[a] * inverse);
-        facing += unit[a] * p->view[a];
-    }
-    const vf turn = vf_select(vf_lt(facing, vf_set(0)), vf_set(-1), vf_set(1));
-    for (int a = 0; a < 3; a++) unit[a] *= turn;
-    vf diffuse[3], specular[3];
+    vf unit[3], diffuse[3], specular[3];
+    kernel_facing_normal(p, n, unit);
     for (int a = 0; a < 3; a++) diffuse[a] = vf_set(m->ambient), specular[a] = vf_set(0);
     for (int i = 0; i < job->light_count; i++) {
         const float *l = p->frame->light_direction[i], *c = job->lights[i].colour;
@@ -163,9 +169,9 @@ static __attribute__((noinline, unused)) void kernel_emit(kernel_packet *p, vm m
                                                           const kernel_fragments *f)
 {
     unsigned bits = vm_bits(mask);
-    fragment_list *list = p->thread->out;
+    fragment_list *list = &p->thread->out;
     if (!bits) return;
-    if (list->capacity - list->count < SIMD_WIDTH && !p->thread->reserve(list, SIMD_WIDTH)) {
+    if (list->capacity - list->count < SIMD_WIDTH && !render_reserve_fragments(list, SIMD_WIDTH)) {
         p->thread->out_of_memory = true;
         return;
     }

@@ -9,18 +9,15 @@
 /* Maximum number of crossings of transparent surfaces stored per ray; volume fragments are split at them. */
 enum { KERNEL_MAX_CUTS = 32 };
 
-/* The cell that each ray has hit: mesh part and index in it. A part of -1 means that the cell is not needed again. */
-typedef struct kernel_hit_cells {
-    vi part, index;
-} kernel_hit_cells;
-
 typedef struct kernel_hits {
     vm found;
     /* A vector of any length along the gradient, in camera axes. With normals from vertices (RENDER_VERTEX) it holds
      * the hit's reference coordinates in its cell until the tile ends. */
     vf normal[3];
-    kernel_hit_cells cells; /* set only with normals from vertices (RENDER_VERTEX) */
-    vf colour[3];           /* colour of each hit before lighting */
+    /* The cell that each ray has hit: mesh part and index in it; set only with normals from vertices (RENDER_VERTEX). A
+     * part of -1 means that the cell is not needed again. */
+    vi part, cell;
+    vf colour[3]; /* colour of each hit before lighting */
     /* distance from the hit at which central differences take samples; set only if normals come from differences */
     vf reach;
     vf kind;
@@ -34,7 +31,7 @@ static inline void kernel_hits_begin(kernel_hits *hits)
     hits->found = hits->overflowed = vm_none();
     hits->cut_count = 0;
     hits->kind = hits->reach = vf_set(0);
-    hits->cells.part = hits->cells.index = vi_set(-1);
+    hits->part = hits->cell = vi_set(-1);
     for (int a = 0; a < 3; a++) hits->normal[a] = hits->colour[a] = vf_set(0);
 }
 

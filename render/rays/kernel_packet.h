@@ -1,5 +1,4 @@
-/* A packet is SIMD_WIDTH rays of one tile. It stores its rays in two coordinate systems: tile space for cells, and tree
- * space for boxes of nodes. */
+/* A packet is SIMD_WIDTH rays of one tile, in tile space. */
 #ifndef RENDER_KERNEL_PACKET_H
 #define RENDER_KERNEL_PACKET_H
 
@@ -31,11 +30,6 @@ typedef struct kernel_packet {
     uint32_t pixel[SIMD_WIDTH];
     /* unit vector from the scene to the eye in camera axes, for shading; valid if has_view is set */
     vf view[3];
-    /* The members from here on are needed only by rays that traverse trees packet by packet; kernel_packet_complete()
-     * sets them. In tree space a ray meets a plane at t = plane * inverse - shift. */
-    vf inverse[3], shift[3];
-    float pad; /* margin by which boxes are extended: more than all rounding in the box test */
-    float centre_direction[3];
     /* samples are at t = sample_base + m * sample_step for integers m >= sample_first */
     vf sample_base, sample_step, sample_inverse;
     int sample_first;
@@ -96,29 +90,6 @@ static inline void kernel_packet_tile_rays(kernel_packet *p)
     p->slope_x = vf_load(lanes[1]);
     p->origin_y = vf_load(lanes[2]);
     p->slope_y = vf_load(lanes[3]);
-}
-
-/* Sets the packet's rays in tree space: a ray meets a plane at t = plane * inverse - shift. */
-static inline void kernel_packet_tree_rays(kernel_packet *p, const kernel_lanes *l)
-{
-    float inverse[3][SIMD_WIDTH], shift[3][SIMD_WIDTH];
-    double size = 0;
-    for (int i = 0; i < SIMD_WIDTH; i++) {
-        double base[3], direction[3];
-        kernel_tree_ray(p->frame, l->px[i], l->py[i], base, direction);
-        for (int a = 0; a < 3; a++) {
-            inverse[a][i] = (float)(1 / (fabs(direction[a]) < 1e-12 ? 1e-12 : direction[a]));
-            shift[a][i] = (float)(base[a] * (double)inverse[a][i]);
-            size = fmax(size, fabs(base[a]));
-        }
-    }
-    for (int a = 0; a < 3; a++) {
-        p->inverse[a] = vf_load(inverse[a]);
-        p->shift[a] = vf_load(shift[a]);
-    }
-    /* Positions near the scene and the base are at most size + 1. plane * inverse - shift errs by 2 roundings of that,
-     * the base by 1, the direction by 1 over the scene's size: the factor 16 leaves a margin of 2. */
-    p->pad = 16 * 6e-8f * ((float)size + 2);
 }
 
 /* Computes the directions to the eye, if that has not been done; kernel_shade() needs them. */
@@ -252,37 +223,6 @@ static inline void kernel_packet_begin(kernel_packet *p, const kernel_frame *f, 
         p->clip_length_ratio = vf_set(1);
     }
     if (f->common_clips) kernel_packet_clip(p);
-}
-
-/* Adds what rays need to traverse trees on their own, and the positions of samples for volumes. */
-static inline void kernel_packet_complete(kernel_packet *p)
-{
-    const kernel_frame *f = p->frame;
-    kernel_lanes l;
-    kernel_packet_lanes(p, &l);
-    kernel_packet_tree_rays(p, &l);
-    double base[3], direction[3];
-    kernel_tree_ray(f, p->tile->centre_x, p->tile->centre_y, base, direction);
-    for (int a = 0; a < 3; a++) p->centre_direction[a] = (float)direction[a];
-    if (f->volume_count) kernel_packet_samples(p, &l);
-}
-
-/* Computes the intervals of the packet's rays in the node's box, within the given depths. Returns the rays that meet
- * the box. */
-SIMD_INLINE vm kernel_box(const kernel_packet *p, const mmbvh *tree, int64_t node, vf *t_in, vf *t_out)
-{
-    vf low = *t_in, high = *t_out;
-    float lower[4], upper[4];
-    mmbvh_node_box(tree, node, lower, upper);
-    for (int a = 0; a < 3; a++) {
-        const vf t1 = vf_set(lower[a] - p->pad) * p->inverse[a] - p->shift[a];
-        const vf t2 = vf_set(upper[a] + p->pad) * p->inverse[a] - p->shift[a];
-        low = vf_max(low, vf_min(t1, t2));
-        high = vf_min(high, vf_max(t1, t2));
-    }
-    *t_in = low;
-    *t_out = high;
-    return vf_le(low, high);
 }
 
 /* One ray per lane in tile space: x = origin_x + slope_x * Z, and likewise y. */

@@ -80,18 +80,6 @@ typedef struct kernel_planes {
     vf offset[KERNEL_LANE_VECTORS], error[KERNEL_LANE_VECTORS];
 } kernel_planes;
 
-/* The sides of the planes on which a body lies: one bit per plane's lane. */
-typedef struct kernel_sides {
-    /* Masks of planes. below: planes for which part of the body has a distance <= 0; above: those for which part has a
-     * distance >= 0. The bit of a plane that cuts the body is set in both. */
-    unsigned below, above;
-} kernel_sides;
-
-/* Planes in double before conversion to float, one per lane; normals are in camera axes. */
-typedef struct kernel_plane_lanes {
-    double right[KERNEL_LANES], up[KERNEL_LANES], forward[KERNEL_LANES], offset[KERNEL_LANES];
-} kernel_plane_lanes;
-
 /* Slopes (perspective) or offsets (orthographic) of all borders between blocks, and of the tile's central direction. */
 typedef struct kernel_borders {
     double x[KERNEL_BLOCKS_ACROSS + 1], y[KERNEL_BLOCKS_ACROSS + 1];
@@ -119,25 +107,28 @@ static inline void kernel_picture_borders(kernel_borders *b, const kernel_frame 
     b->centre_x = b->centre_y = 0;
 }
 
-/* Computes the planes relative to the eye. Their positive side is that of greater columns and rows. */
-static inline void kernel_plane_lanes_setup(kernel_plane_lanes *l, const kernel_frame *f, const kernel_borders *b)
+/* Computes the planes relative to the eye, in double: the components of their normals along the camera's right, up and
+ * forward axes, and their offsets. Their positive side is that of greater columns and rows. */
+static inline void kernel_planes_from_eye(const kernel_frame *f, const kernel_borders *b, double axes[3][KERNEL_LANES],
+                                          double offset[KERNEL_LANES])
 {
     const bool flat = f->job->camera.is_orthographic;
     const double scale = f->job->space.scale;
-    memset(l, 0, sizeof *l);
+    memset(axes, 0, 3 * sizeof *axes);
+    memset(offset, 0, KERNEL_LANES * sizeof *offset);
     for (int n = 0; n <= KERNEL_BLOCKS_ACROSS; n++) {
         const int row = KERNEL_ROWS_LANE + n;
-        l->right[n] = 1;
-        l->up[row] = -1;
-        l->forward[n] = flat ? 0 : -b->x[n];
-        l->forward[row] = flat ? 0 : b->y[n];
-        l->offset[n] = flat ? -b->x[n] * scale : 0;
-        l->offset[row] = flat ? b->y[n] * scale : 0;
+        axes[0][n] = 1;
+        axes[1][row] = -1;
+        axes[2][n] = flat ? 0 : -b->x[n];
+        axes[2][row] = flat ? 0 : b->y[n];
+        offset[n] = flat ? -b->x[n] * scale : 0;
+        offset[row] = flat ? b->y[n] * scale : 0;
     }
-    l->forward[KERNEL_DEPTH_LANE] = l->forward[KERNEL_ALONG_LANE] = 1;
-    l->offset[KERNEL_DEPTH_LANE] = -f->depth_shift;
-    l->right[KERNEL_ALONG_LANE] = flat ? 0 : b->centre_x;
-    l->up[KERNEL_ALONG_LANE] = flat ? 0 : b->centre_y;
+    axes[2][KERNEL_DEPTH_LANE] = axes[2][KERNEL_ALONG_LANE] = 1;
+    offset[KERNEL_DEPTH_LANE] = -f->depth_shift;
+    axes[0][KERNEL_ALONG_LANE] = flat ? 0 : b->centre_x;
+    axes[1][KERNEL_ALONG_LANE] = flat ? 0 : b->centre_y;
 }
 
 /* Loads planes, one per number of each list. */
@@ -161,25 +152,24 @@ static inline void kernel_tree_planes(kernel_planes *q, const kernel_frame *f, c
 {
     const render_camera *c = &f->job->camera;
     const render_space *s = &f->job->space;
-    kernel_plane_lanes l;
+    double axes[3][KERNEL_LANES], exact[KERNEL_LANES], size = 0;
     float normal[3][KERNEL_LANES], offset[KERNEL_LANES], error[KERNEL_LANES];
-    double size = 0;
-    kernel_plane_lanes_setup(&l, f, b);
+    kernel_planes_from_eye(f, b, axes, exact);
     for (int i = 0; i < KERNEL_LANES; i++) error[i] = 0;
     for (int a = 0; a < 3; a++) {
         const double eye = (c->eye[a] - s->origin[a]) * s->scale;
         size = fabs(eye) > size ? fabs(eye) : size;
         for (int i = 0; i < KERNEL_LANES; i++) {
-            normal[a][i] = (float)(l.right[i] * c->right[a] + l.up[i] * c->up[a] + l.forward[i] * c->forward[a]);
-            l.offset[i] -= (double)normal[a][i] * eye;
+            normal[a][i] = (float)(axes[0][i] * c->right[a] + axes[1][i] * c->up[a] + axes[2][i] * c->forward[a]);
+            exact[i] -= (double)normal[a][i] * eye;
             error[i] += fabsf(normal[a][i]);
         }
     }
-    /* The magnitude of positions is at most size + 1 (kernel_packet_tree_rays()). The sum of three products has an
+    /* Positions near the scene and the eye have magnitudes of at most size + 1. The sum of three products has an
      * error of 4 roundings of this number times the 1-norm of the normal; the centre and the half widths of a box add 1
      * rounding, the normal and the offset 1 more. */
     for (int i = 0; i < KERNEL_LANES; i++) {
-        offset[i] = (float)l.offset[i];
+        offset[i] = (float)exact[i];
         error[i] = 16 * 6e-8f * (error[i] * ((float)size + 2) + fabsf(offset[i]));
     }
     kernel_planes_load(q, normal, offset, error);
@@ -207,34 +197,39 @@ static inline void kernel_tile_planes(kernel_planes *q, const kernel_frame *f, c
     kernel_planes_load(q, normal, offset, error);
 }
 
-/* Returns the blocks for which the body is on the inner side of all borders. */
-SIMD_INLINE unsigned kernel_blocks_of(kernel_sides s)
-{
-    const unsigned inner = s.above & s.below >> 1;
-    return kernel_blocks_at(inner & 15, inner >> KERNEL_ROWS_LANE & 15);
-}
-
-/* Adds one vector of planes to the sides: `low` and `high` are the body's least and greatest distance to each plane. */
-SIMD_INLINE void kernel_sides_add(kernel_sides *s, int v, vf low, vf high)
-{
-    s->below |= vm_bits(vf_le(low, vf_set(0))) << v * SIMD_WIDTH;
-    s->above |= vm_bits(vf_le(vf_set(0), high)) << v * SIMD_WIDTH;
-}
-
-/* The result of classifying a body: the blocks that it may meet, its least and greatest depth, and its position along
- * the tile's direction, by which bodies are sorted. */
+/* The result of classifying a body. */
 typedef struct kernel_placement {
-    unsigned blocks;
+    /* Masks of planes, one bit per lane. below: planes for which part of the body has a distance <= 0; above: those for
+     * which part has a distance >= 0. The bit of a plane that cuts the body is set in both. */
+    unsigned below, above;
+    unsigned blocks; /* the blocks that the body may meet */
+    /* the body's least and greatest depth, and its position along the tile's direction, by which bodies are sorted */
     float near, far, along;
 } kernel_placement;
 
-/* Returns the sides of the planes on which a node's box lies. Also sets the placement's depths and position, but not
- * its blocks. */
-SIMD_INLINE kernel_sides kernel_box_sides(const kernel_planes *q, const mmbvh *tree, int64_t node,
-                                          kernel_placement *placement)
+/* Adds one vector of planes to the placement: `low` and `high` are the body's least and greatest distance to each
+ * plane. */
+SIMD_INLINE void kernel_placement_add(kernel_placement *placement, int v, vf low, vf high)
+{
+    placement->below |= vm_bits(vf_le(low, vf_set(0))) << v * SIMD_WIDTH;
+    placement->above |= vm_bits(vf_le(vf_set(0), high)) << v * SIMD_WIDTH;
+    if (v != KERNEL_DEPTH_LANE / SIMD_WIDTH) return;
+    placement->near = low[KERNEL_DEPTH_LANE % SIMD_WIDTH];
+    placement->far = high[KERNEL_DEPTH_LANE % SIMD_WIDTH];
+}
+
+/* Computes the blocks for which the body is on the inner side of all borders. */
+SIMD_INLINE void kernel_placement_close(kernel_placement *placement)
+{
+    const unsigned inner = placement->above & placement->below >> 1;
+    placement->blocks = kernel_blocks_at(inner & 15, inner >> KERNEL_ROWS_LANE & 15);
+}
+
+/* Classifies a node's box. */
+SIMD_INLINE kernel_placement kernel_box_placement(const kernel_planes *q, const mmbvh *tree, int64_t node)
 {
     float lower[4], upper[4];
-    kernel_sides sides = {0, 0};
+    kernel_placement placement = {0};
     mmbvh_node_box(tree, node, lower, upper);
     const float middle[3] = {0.5f * (lower[0] + upper[0]), 0.5f * (lower[1] + upper[1]), 0.5f * (lower[2] + upper[2])};
     const float half[3] = {0.5f * (upper[0] - lower[0]), 0.5f * (upper[1] - lower[1]), 0.5f * (upper[2] - lower[2])};
@@ -242,60 +237,36 @@ SIMD_INLINE kernel_sides kernel_box_sides(const kernel_planes *q, const mmbvh *t
         const vf at =
             (q->normal[0][v] * middle[0] + q->normal[1][v] * middle[1]) + (q->normal[2][v] * middle[2] + q->offset[v]);
         const vf reach = (q->size[0][v] * half[0] + q->size[1][v] * half[1]) + (q->size[2][v] * half[2] + q->error[v]);
-        kernel_sides_add(&sides, v, at - reach, at + reach);
-        if (v == KERNEL_DEPTH_LANE / SIMD_WIDTH) {
-            placement->near = (at - reach)[KERNEL_DEPTH_LANE % SIMD_WIDTH];
-            placement->far = (at + reach)[KERNEL_DEPTH_LANE % SIMD_WIDTH];
-            placement->along = at[KERNEL_ALONG_LANE % SIMD_WIDTH];
-        }
+        kernel_placement_add(&placement, v, at - reach, at + reach);
+        if (v == KERNEL_ALONG_LANE / SIMD_WIDTH) placement.along = at[KERNEL_ALONG_LANE % SIMD_WIDTH];
     }
-    return sides;
-}
-
-SIMD_INLINE kernel_placement kernel_box_placement(const kernel_planes *q, const mmbvh *tree, int64_t node)
-{
-    kernel_placement placement = {0};
-    placement.blocks = kernel_blocks_of(kernel_box_sides(q, tree, node, &placement));
+    kernel_placement_close(&placement);
     return placement;
 }
 
-/* Maximum number of points of an outline: eight, padded to a whole vector. */
-enum { KERNEL_OUTLINE_POINTS = 16 };
-
-/* Points in tile space whose convex hull contains a cell: its vertices, or the corners of its bounding box. */
-typedef struct kernel_outline {
-    int count;
-    float point[3][KERNEL_OUTLINE_POINTS];
-    float size[3]; /* largest |X|, |Y|, |Z| of the cell's vertices */
-} kernel_outline;
-
-/* Relative margin that is added to an outline's extent, so that rays that hit the cell only by rounding stay within
- * it. */
+/* Relative margin that is added to the extent of a cell's points, so that rays that hit the cell only by rounding stay
+ * within it. */
 #define KERNEL_OUTLINE_PAD 1e-5f
 
-SIMD_INLINE kernel_placement kernel_outline_placement(const kernel_planes *q, const kernel_outline *o)
+/* Classifies the convex hull of points in tile space. places: the points' x, y and z. */
+SIMD_INLINE kernel_placement kernel_points_placement(const kernel_planes *q, const float *const places[3], int count)
 {
-    kernel_sides sides = {0, 0};
     kernel_placement placement = {0};
+    float most[3] = {0, 0, 0};
+    for (int a = 0; a < 3; a++)
+        for (int i = 0; i < count; i++) most[a] = fabsf(places[a][i]) > most[a] ? fabsf(places[a][i]) : most[a];
     for (int v = 0; v < KERNEL_LANE_VECTORS; v++) {
         vf low = vf_set(INFINITY), high = vf_set(-INFINITY);
-        for (int i = 0; i < o->count; i++) {
-            const vf at = (q->normal[0][v] * o->point[0][i] + q->normal[1][v] * o->point[1][i]) +
-                          (q->normal[2][v] * o->point[2][i] + q->offset[v]);
+        for (int i = 0; i < count; i++) {
+            const vf at = (q->normal[0][v] * places[0][i] + q->normal[1][v] * places[1][i]) +
+                          (q->normal[2][v] * places[2][i] + q->offset[v]);
             low = vf_min(low, at);
             high = vf_max(high, at);
         }
-        const vf size =
-            (q->size[0][v] * o->size[0] + q->size[1][v] * o->size[1]) + (q->size[2][v] * o->size[2] + q->error[v]);
-        low -= size * KERNEL_OUTLINE_PAD;
-        high += size * KERNEL_OUTLINE_PAD;
-        kernel_sides_add(&sides, v, low, high);
-        if (v == KERNEL_DEPTH_LANE / SIMD_WIDTH) {
-            placement.near = low[KERNEL_DEPTH_LANE % SIMD_WIDTH];
-            placement.far = high[KERNEL_DEPTH_LANE % SIMD_WIDTH];
-        }
+        const vf size = (q->size[0][v] * most[0] + q->size[1][v] * most[1]) + (q->size[2][v] * most[2] + q->error[v]);
+        kernel_placement_add(&placement, v, low - size * KERNEL_OUTLINE_PAD, high + size * KERNEL_OUTLINE_PAD);
     }
-    placement.blocks = kernel_blocks_of(sides);
+    kernel_placement_close(&placement);
     return placement;
 }
 

@@ -25,7 +25,6 @@ typedef struct kernel_tile_trace {
     unsigned begun;         /* mask of the blocks whose packets have been set up */
     /* number of the interval, counted from 0, in which volumes are being traced on each ray (kernel_clip.h) */
     int clip_interval;
-    int64_t first_fragment; /* index of the tile's first fragment in the thread's list */
     float t_near;
     vf far[KERNEL_BLOCKS / SIMD_WIDTH]; /* farthest t_far of the rays of each block, one block per lane */
     /* t_far of each pixel, row by row; kept only if the tile traverses the trees for surfaces */
@@ -35,7 +34,7 @@ typedef struct kernel_tile_trace {
     int layer;
     struct kernel_cell *cell;
     struct kernel_curved *curved;
-    struct kernel_tile_finder *search;          /* state of the tile's search for cells in trees */
+    struct kernel_tile_search *search;          /* state of the tile's search for cells in trees */
     kernel_packet packets[KERNEL_TILE_PACKETS]; /* packets of all blocks, block by block */
     kernel_hits hits[KERNEL_TILE_PACKETS];
 } kernel_tile_trace;
@@ -61,7 +60,6 @@ SIMD_INLINE void kernel_block_begin(kernel_tile_trace *t, int block)
         const int i = block * KERNEL_BLOCK_PACKETS + n;
         kernel_packet_begin(&t->packets[i], t->frame, &t->tile, t->thread, x + n % across * KERNEL_PACKET_COLUMNS,
                             y + n / across * KERNEL_PACKET_ROWS);
-        if (t->frame->needs_packets) kernel_packet_complete(&t->packets[i]);
         kernel_hits_begin(&t->hits[i]);
     }
 }
@@ -110,12 +108,12 @@ SIMD_INLINE bool kernel_pixels_beyond(const kernel_tile_trace *t, unsigned box, 
     return false;
 }
 
-/* Returns those of the given blocks in which a body with this outline may be visible: it meets the block, and is not
- * hidden by nearer hits. */
-SIMD_INLINE unsigned kernel_tile_visible_blocks(const kernel_tile_trace *t, const kernel_outline *outline,
+/* Returns those of the given blocks in which a cell with these vertices, whose x, y and z are given, may be visible: it
+ * meets the block, and is not hidden by nearer hits. */
+SIMD_INLINE unsigned kernel_tile_visible_blocks(const kernel_tile_trace *t, const float *const places[3], int count,
                                                 unsigned blocks)
 {
-    const kernel_placement placement = kernel_outline_placement(&t->tile_planes, outline);
+    const kernel_placement placement = kernel_points_placement(&t->tile_planes, places, count);
     if (placement.far < t->t_near) return 0;
     return blocks & placement.blocks & kernel_blocks_beyond(t, placement.near);
 }
@@ -139,7 +137,6 @@ SIMD_INLINE void kernel_tile_begin(kernel_tile_trace *t, const kernel_frame *f, 
     t->thread = thread;
     t->traced_blocks = wanted;
     t->begun = 0;
-    t->first_fragment = thread->out->count;
     t->t_near = (float)-f->depth_shift;
     for (int v = 0; v < KERNEL_BLOCKS / SIMD_WIDTH; v++) t->far[v] = vf_set(INFINITY);
     kernel_tile_setup(&t->tile, f, x0, y0);

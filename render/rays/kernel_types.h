@@ -280,11 +280,10 @@ typedef struct kernel_frame {
      * own. */
     int volume_intervals;
     bool has_transparent;
-    bool is_binned;     /* set if the cells of surfaces are binned by tile, unless there are too many */
-    bool bins_volume;   /* set if the cells of the only volume are binned by tile */
-    bool needs_planes;  /* set if tiles traverse the trees, for which they need planes */
-    bool needs_packets; /* set if single packets traverse trees as well, which normals by differences require */
-    bool has_segments;  /* set if volumes are integrated by segments; otherwise they are sampled */
+    bool is_binned;    /* set if the cells of surfaces are binned by tile, unless there are too many */
+    bool bins_volume;  /* set if the cells of the only volume are binned by tile */
+    bool needs_planes; /* set if tiles traverse the trees, for which they need planes */
+    bool has_segments; /* set if volumes are integrated by segments; otherwise they are sampled */
     /* set if the ends of intervals in tets and of bisected intervals are computed in double (kernel_exact.h) */
     bool is_double;
     kernel_pieces pieces[RENDER_MAX_VOLUMES];
@@ -300,7 +299,7 @@ typedef struct kernel_frame {
 typedef struct kernel_thread {
     /* The thread's memory, of the kernel table's memory_bytes. The table's begin() sets the pointers below into it. */
     void *memory;
-    struct kernel_cell_cache *cells; /* cells that single packets have met */
+    struct kernel_cell *cells; /* cells that single packets have met (kernel_cell_cache.h) */
     struct kernel_tile_trace *tile;
     struct kernel_tile_cells *tile_cells;
     struct kernel_tile_volume *tile_volume;
@@ -308,25 +307,22 @@ typedef struct kernel_thread {
     struct kernel_finder *finder;
     /* current tile's candidates of surfaces and of the volume; used only if the frame bins them */
     kernel_bin bin, volume_bin;
-    uint32_t serial; /* number of the current tile, counted from 1; cached cells of other tiles are out of date */
-    fragment_list *out;
-    /* Ensures space for `more` more items in the list; returns false if memory ran out. */
-    bool (*reserve)(fragment_list *list, int64_t more);
-    /* Hits whose normals need samples of other ranks' cells, and the function that adds space for more; it returns
-     * false if memory ran out. */
-    render_pending_list waiting;
-    bool (*grow_pending)(render_pending_list *list);
+    uint32_t serial;   /* number of the current tile, counted from 1; cached cells of other tiles are out of date */
+    fragment_list out; /* fragments of the current tile */
+    render_pending_list waiting; /* hits whose normals need samples of other ranks' cells */
     bool out_of_memory;
     /* counters for render_statistics: failed inversions of cells' maps, and cells visited by volumes */
     int64_t map_failures, volume_cells;
     /* The tile's polyhedra (render_polyhedra.h); NULL if no mesh has any. */
     struct polyhedron_store *polyhedra;
-    struct polyhedron *(*find_polyhedron)(struct polyhedron_store *store, const grid *g, const grid_field *field,
-                                          int part, int layer, uint32_t index);
-    void *(*polyhedron_scratch)(struct polyhedron_store *store, size_t bytes);
     double surface_seconds, volume_seconds;
-    double (*clock_seconds)(void);
 } kernel_thread;
+
+/* Functions of render_frame.c that kernels call. The first two add space to a list, and return false if memory ran
+ * out. */
+bool render_reserve_fragments(fragment_list *list, int64_t more); /* ensures space for `more` more fragments */
+bool render_grow_pending(render_pending_list *list);
+double render_seconds(void); /* a clock */
 
 struct kernel_bundle;
 struct kernel_occluder;

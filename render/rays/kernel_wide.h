@@ -99,24 +99,6 @@ typedef struct kernel_wide_doubles {
     kernel_f64 half[2];
 } kernel_wide_doubles;
 
-SIMD_INLINE vm kernel_wide_doubles_lt(const kernel_wide_doubles *a, const kernel_wide_doubles *b)
-{
-    return vd_lt(a->half, b->half);
-}
-
-SIMD_INLINE vm kernel_wide_doubles_eq(const kernel_wide_doubles *a, const kernel_wide_doubles *b)
-{
-    return vd_eq(a->half, b->half);
-}
-
-SIMD_INLINE kernel_wide_doubles kernel_wide_doubles_select(vm m, const kernel_wide_doubles *a,
-                                                           const kernel_wide_doubles *b)
-{
-    kernel_wide_doubles out;
-    vd_select(m, a->half, b->half, out.half);
-    return out;
-}
-
 SIMD_INLINE kernel_wide_doubles kernel_wide_doubles_set(double x)
 {
     const kernel_f64 all = (kernel_f64){0} + x;

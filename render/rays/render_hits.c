@@ -56,46 +56,32 @@ hit_frame hit_frame_of(const render_job *job, uint32_t pixel, float t, const flo
 
 /* ---- the hemisphere ------------------------------------------------------------------------------------------ */
 
-typedef struct hemisphere {
-    double cosine, sine; /* cosine and sine of the angle by which this pixel's spiral of ray directions is rotated */
-    double begin;        /* position of the first ray direction within the first step of the spiral, from 0 to 1 */
-} hemisphere;
-
 static double part_of(double x)
 {
     return x - floor(x);
 }
 
-static hemisphere hemisphere_of(const render_job *job, uint32_t pixel)
-{
-    const uint32_t width = (uint32_t)job->camera.width, column = pixel % width, row = pixel / width;
-    const double x = column + 5.588238 * job->frame, y = row + 5.588238 * job->frame;
-    const double turn = part_of(52.9829189 * part_of(0.06711056 * x + 0.00583715 * y)) * 6.283185307179586;
-    return (hemisphere){cos(turn), sin(turn), render_jitter(pixel, (uint32_t)job->frame)};
-}
-
 /* Cosine and sine of the golden angle, by which consecutive samples are rotated. */
 static const double golden[2] = {-0.7373688780783197, 0.6754902942615239};
 
-/* Computes `count` unit directions with z along the normal. The last ones are kept away from the horizon, where a
- * rounding error of the surface would become a large error of distance. */
-static void hemisphere_directions(const hemisphere *h, int count, double (*out)[3])
+/* The pixel's spiral begins at a position within its first step, and is rotated by `turn`. The last directions are kept
+ * away from the horizon, where a rounding error of the surface would become a large error of distance. */
+void hit_hemisphere(const render_job *job, uint32_t pixel, double (*out)[3])
 {
-    double x = h->cosine, y = h->sine;
+    const uint32_t width = (uint32_t)job->camera.width, column = pixel % width, row = pixel / width;
+    const int count = job->occlusion->samples;
+    const double begin = render_jitter(pixel, (uint32_t)job->frame);
+    const double shift = 5.588238 * job->frame;
+    const double turn = part_of(52.9829189 * part_of(0.06711056 * (column + shift) + 0.00583715 * (row + shift)));
+    double x = cos(turn * 6.283185307179586), y = sin(turn * 6.283185307179586);
     for (int k = 0; k < count; k++) {
-        const double share = fmin((k + h->begin) / count, 1 - 1.0 / 1024), radius = sqrt(share), turned = x;
+        const double share = fmin((k + begin) / count, 1 - 1.0 / 1024), radius = sqrt(share), turned = x;
         out[k][0] = radius * x;
         out[k][1] = radius * y;
         out[k][2] = sqrt(1 - share);
         x = golden[0] * turned - golden[1] * y;
         y = golden[1] * turned + golden[0] * y;
     }
-}
-
-void hit_hemisphere(const render_job *job, uint32_t pixel, double (*out)[3])
-{
-    const hemisphere h = hemisphere_of(job, pixel);
-    hemisphere_directions(&h, job->occlusion->samples, out);
 }
 
 void hit_directions(const render_job *job, uint32_t pixel, const hit_axes *a, double (*out)[3])

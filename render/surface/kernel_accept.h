@@ -27,9 +27,6 @@
 
 /* The gradients at a cell's vertices, in camera axes, and their interpolating polynomials. */
 typedef struct kernel_smooth_cell {
-    /* mesh part and index of the cell */
-    int part;
-    int32_t index;
     kernel_cell cell;
     double gradient[3][GRID_MAX_CELL_VERTICES];
     double polynomial[3][8]; /* coefficients of the three components; not set for tets */
@@ -47,14 +44,13 @@ SIMD_INLINE void kernel_vertex_gradient(const kernel_frame *f, const render_vert
     }
 }
 
-static void kernel_smooth_setup(const kernel_packet *p, const render_surface_layer *layer, int part, int32_t index,
+static void kernel_smooth_setup(const kernel_packet *p, const render_surface_layer *layer, int part, uint32_t index,
                                 kernel_smooth_cell *out)
 {
     const grid *g = p->frame->job->parts[part].cells;
     kernel_cell *c = &out->cell;
-    out->part = part;
-    out->index = index;
-    kernel_cell_fetch(c, g, &layer->field.fields[part], (uint32_t)index);
+    c->part = part;
+    kernel_cell_fetch(c, g, &layer->field.fields[part], index);
     kernel_cell_transform_in_tile(c, p->frame, p->tile, g);
     for (int i = 0; i < c->count; i++) {
         double gradient[3];
@@ -133,18 +129,18 @@ SIMD_INLINE void kernel_ray_point(const kernel_packet *p, int ray, float t, doub
 /* Replaces the reference coordinates stored in `normal` by normals, in camera axes. Hits without a cell already have
  * their normals. */
 static __attribute__((noinline)) void kernel_vertex_normals(const kernel_packet *p, const kernel_surface *s, vm rays,
-                                                            vf t, const kernel_hit_cells *cells, vf normal[3])
+                                                            vf t, vi parts, vi cells, vf normal[3])
 {
     kernel_smooth_cell known;
-    known.part = -1;
+    known.cell.part = -1;
     for (unsigned left = vm_bits(rays); left; left &= left - 1) {
         const int ray = __builtin_ctz(left);
-        const int part = cells->part[ray];
-        const int32_t index = cells->index[ray];
+        const int part = parts[ray];
+        const uint32_t index = (uint32_t)cells[ray];
         double place[3];
         float out[3];
         if (part < 0) continue;
-        if (known.part != part || known.index != index) kernel_smooth_setup(p, s->layer, part, index, &known);
+        if (known.cell.part != part || known.cell.index != index) kernel_smooth_setup(p, s->layer, part, index, &known);
         if (kernel_is_linear(known.cell.type))
             kernel_ray_point(p, ray, t[ray], place);
         else
@@ -194,24 +190,19 @@ typedef struct kernel_surface_state {
 } kernel_surface_state;
 
 /* Transforms gradients from tile space to camera axes, by undoing the shear. */
-SIMD_INLINE void kernel_unshear(const kernel_packet *p, vf g[3])
+SIMD_INLINE void kernel_unshear(const kernel_tile *tile, vf g[3])
 {
-    g[2] -= g[0] * p->tile->shear_x + g[1] * p->tile->shear_y;
+    g[2] -= g[0] * tile->shear_x + g[1] * tile->shear_y;
 }
 
 /* Computes the unit normal, in world axes, that kernel_shade() uses: it points to the eye's side. */
 SIMD_INLINE void kernel_world_normal(const kernel_packet *p, const vf normal[3], vf out[3])
 {
     const render_camera *c = &p->frame->job->camera;
-    vm flat;
-    vf unit[3], inverse = kernel_inverse_length(normal, &flat), facing = vf_set(0);
-    for (int a = 0; a < 3; a++) {
-        unit[a] = vf_select(flat, p->view[a], normal[a] * inverse);
-        facing += unit[a] * p->view[a];
-    }
-    const vf turn = vf_select(vf_lt(facing, vf_set(0)), vf_set(-1), vf_set(1));
+    vf unit[3];
+    kernel_facing_normal(p, normal, unit);
     for (int a = 0; a < 3; a++)
-        out[a] = turn * ((unit[0] * (float)c->right[a] + unit[1] * (float)c->up[a]) + unit[2] * (float)c->forward[a]);
+        out[a] = (unit[0] * (float)c->right[a] + unit[1] * (float)c->up[a]) + unit[2] * (float)c->forward[a];
 }
 
 /* Stores the unit normal in world axes (RENDER_NORMALS), or the number of the isovalue (RENDER_VALUES), as the hit's
@@ -258,58 +249,57 @@ SIMD_INLINE void kernel_paint(kernel_packet *p, const kernel_surface *s, const v
         kernel_paint_numbers(p, normal, kind, f->colour);
 }
 
+/* Hits of a vector of rays on one isovalue of a surface. */
+typedef struct kernel_surface_hits {
+    int value; /* index of the isovalue in the layer */
+    vf t;
+    /* a vector of any length along the normal, in camera axes; or, until kernel_vertex_normals() replaces them, the
+     * reference coordinates of the hits */
+    vf normal[3];
+    vf colour[3];                   /* the unlit colour */
+    vf w;                           /* value of the colour field */
+    const kernel_line_field *along; /* the field of contour lines; NULL if the surface has none */
+    vf reach;                       /* distance to the samples of differences; 0 if there are none */
+    vf opacity;                     /* used only by transparent surfaces */
+    vi part, cell;                  /* the cells that are hit, as in kernel_hits */
+} kernel_surface_hits;
+
 /* Emits hits with the same depth as their ray's nearest hit, which occur if a cell's map is folded, as separate
  * fragments. Compositing selects one of them by their bits, so that the order of cells does not matter. */
-static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, const kernel_surface *s, int value,
-                                                             vm tied, vf t, const vf normal[3], const vf colour[3])
+static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, const kernel_surface *s, vm tied,
+                                                             const kernel_surface_hits *h)
 {
-    kernel_fragments lit = {t, t, {colour[0], colour[1], colour[2]}, vf_set(0), vf_set(0)};
-    kernel_paint(p, s, normal, vf_set((float)((int)s->first_kind + value)), &lit);
-    kernel_emit(p, tied, s->first_kind + (uint32_t)value, &lit);
-}
-
-/* Properties of hits before lighting: a vector of any length along the normal, in camera axes, and the unlit colour. */
-typedef struct kernel_shading_input {
-    vf normal[3], colour[3];
-} kernel_shading_input;
-
-SIMD_INLINE kernel_shading_input kernel_shading_input_of(const vf normal[3], const vf colour[3])
-{
-    return (kernel_shading_input){{normal[0], normal[1], normal[2]}, {colour[0], colour[1], colour[2]}};
+    const uint32_t kind = s->first_kind + (uint32_t)h->value;
+    kernel_fragments lit = {h->t, h->t, {h->colour[0], h->colour[1], h->colour[2]}, vf_set(0), vf_set(0)};
+    kernel_paint(p, s, h->normal, vf_set((float)kind), &lit);
+    kernel_emit(p, tied, kind, &lit);
 }
 
 /* Adds hits whose normals need samples of other ranks to the thread's list of pending hits, and emits a placeholder
- * fragment for each, so that volumes end there. Returns the remaining hits. reach: distance to the samples; hits with
- * reach 0 need no samples and remain. */
-static __attribute__((noinline, cold)) vm kernel_defer_hits(kernel_packet *p, const kernel_surface *s, int value,
-                                                            vm hit, vf t, vf reach, const kernel_shading_input *look)
+ * fragment for each, so that volumes end there. Returns the remaining hits: those with reach 0, which need no
+ * samples. */
+static __attribute__((noinline, cold)) vm kernel_defer_hits(kernel_packet *p, const kernel_surface *s, vm hit,
+                                                            const kernel_surface_hits *h)
 {
-    const vf *normal = look->normal, *colour = look->colour;
+    const vf *normal = h->normal, *colour = h->colour;
+    const uint32_t kind = s->first_kind + (uint32_t)h->value;
     render_pending_list *list = &p->thread->waiting;
-    const vm waits = vm_and(hit, vf_lt(vf_set(0), reach));
-    if (list->capacity - list->count < SIMD_WIDTH && !p->thread->grow_pending(list)) {
+    const vm waits = vm_and(hit, vf_lt(vf_set(0), h->reach));
+    if (list->capacity - list->count < SIMD_WIDTH && !render_grow_pending(list)) {
         p->thread->out_of_memory = true;
         return vm_none();
     }
     const kernel_fragments place = {
-        t, t, {colour[0], colour[1], colour[2]}, vf_set(RENDER_PENDING_TRANSMITTANCE), vf_set(0)};
-    kernel_emit(p, waits, s->first_kind + (uint32_t)value, &place);
+        h->t, h->t, {colour[0], colour[1], colour[2]}, vf_set(RENDER_PENDING_TRANSMITTANCE), vf_set(0)};
+    kernel_emit(p, waits, kind, &place);
     for (unsigned left = vm_bits(waits); left; left &= left - 1) {
         const int i = __builtin_ctz(left);
-        list->items[list->count] = (render_pending_hit){p->pixel[i], s->first_kind + (uint32_t)value, t[i], reach[i]};
+        list->items[list->count] = (render_pending_hit){p->pixel[i], kind, h->t[i], h->reach[i]};
         list->shadings[list->count++] = (render_pending_shading){{normal[0][i], normal[1][i], normal[2][i]},
                                                                  {colour[0][i], colour[1][i], colour[2][i]}};
     }
     return vm_andnot(hit, waits);
 }
-
-/* Hits of rays. t: depth; normal: a vector along the normal, or the reference coordinates from which
- * kernel_vertex_normals() computes one; w: value of the colour field; along: the field of contour lines, NULL if the
- * surface has none. */
-typedef struct kernel_hit_points {
-    vf t, normal[3], w;
-    const kernel_line_field *along;
-} kernel_hit_points;
 
 /* Returns the value that colours the surface, in the field's units, or the isovalue if there is no colour field. w: the
  * value in the colour map's domain. */
@@ -375,12 +365,14 @@ static __attribute__((noinline, cold)) void kernel_ray_emit_equal_depth(kernel_p
                                                                         int ray, const kernel_ray_hit *hit)
 {
     const vm tied = vm_from_bits(1u << ray);
-    const vf depth = vf_set(hit->depth);
-    const vf colour[3] = {vf_set(hit->colour[0]), vf_set(hit->colour[1]), vf_set(hit->colour[2])};
-    const kernel_hit_cells cells = {vi_set(hit->part), vi_set((int32_t)hit->cell)};
-    vf normal[3] = {vf_set(hit->normal[0]), vf_set(hit->normal[1]), vf_set(hit->normal[2])};
-    if (s->layer->normal == RENDER_VERTEX) kernel_vertex_normals(p, s, tied, depth, &cells, normal);
-    kernel_emit_tied(p, s, hit->value, tied, depth, normal, colour);
+    kernel_surface_hits h = {.value = hit->value, .t = vf_set(hit->depth)};
+    for (int a = 0; a < 3; a++) {
+        h.normal[a] = vf_set(hit->normal[a]);
+        h.colour[a] = vf_set(hit->colour[a]);
+    }
+    if (s->layer->normal == RENDER_VERTEX)
+        kernel_vertex_normals(p, s, tied, h.t, vi_set(hit->part), vi_set((int32_t)hit->cell), h.normal);
+    kernel_emit_tied(p, s, tied, &h);
 }
 
 /* Keeps one ray's hit if it is the ray's nearest, as kernel_accept() does for the rays of a packet. Several lanes may
@@ -405,8 +397,8 @@ SIMD_INLINE unsigned kernel_ray_accept(kernel_tile_trace *t, int at, const kerne
         hits->colour[a][ray] = hit->colour[a];
     }
     if (s->layer->normal == RENDER_VERTEX) {
-        hits->cells.part[ray] = hit->part;
-        hits->cells.index[ray] = (int32_t)hit->cell;
+        hits->part[ray] = hit->part;
+        hits->cell[ray] = (int32_t)hit->cell;
     }
     hits->kind[ray] = (float)((int)s->first_kind + hit->value);
     return 1u << at / (KERNEL_BLOCK * KERNEL_BLOCK);

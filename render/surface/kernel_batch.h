@@ -137,8 +137,8 @@ static __attribute__((noinline)) void kernel_batch_draw_lines(const kernel_tile_
                                                               const kernel_lane_rays *r, const uint8_t *lanes,
                                                               unsigned hit, vf depth, float colour[3][SIMD_WIDTH])
 {
-    vf normal[3], drawn[3];
-    kernel_line_field along;
+    vf last[3], drawn[3];
+    kernel_line_field field;
     memset(colour, 0, 3 * sizeof *colour);
     if (!b->line_lanes) {
         memset(b->line_value, 0, sizeof b->line_value);
@@ -151,16 +151,15 @@ static __attribute__((noinline)) void kernel_batch_draw_lines(const kernel_tile_
         if (!(b->line_lanes >> n & 1)) kernel_batch_line_field(t, b, n);
         for (int a = 0; a < 3; a++) colour[a][i] = own[a];
     }
-    kernel_lane_lines lines = {.value = vf_permute(vf_load(b->line_value), r->lane),
-                               .along = vf_permute(vf_load(b->line_along), r->lane)};
+    field.value = vf_permute(vf_load(b->line_value), r->lane);
     for (int a = 0; a < 3; a++) {
-        lines.gradient[a] = vf_permute(vf_load(b->line_gradient[a]), r->lane);
-        lines.last[a] = vf_permute(b->tets.at[a][3], r->lane);
-        normal[a] = vf_permute(b->normal[a], r->lane);
+        field.gradient[a] = vf_permute(vf_load(b->line_gradient[a]), r->lane);
+        field.normal[a] = vf_permute(b->normal[a], r->lane);
+        last[a] = vf_permute(b->tets.at[a][3], r->lane);
         drawn[a] = vf_load(colour[a]);
     }
-    kernel_lane_lines_at(&lines, &r->rays, depth, normal, &along);
-    kernel_draw_lines(t->frame, &t->tile, t->surface, &r->rays, depth, &along, drawn);
+    kernel_line_field_move(&field, &r->rays, depth, last, vf_permute(vf_load(b->line_along), r->lane));
+    kernel_draw_lines(t->frame, &t->tile, t->surface, &r->rays, depth, &field, drawn);
     for (int a = 0; a < 3; a++) vf_store(colour[a], drawn[a]);
 }
 

@@ -48,18 +48,18 @@ typedef struct kernel_cell_ray {
     vf y[3], w[3], level, rise;
 } kernel_cell_ray;
 
-/* The coefficients and error bounds of kernel_contractions, gathered from each ray's own cell. */
+/* Coefficients and error bounds of kernel_bounds, gathered from each ray's own cell. */
 typedef struct kernel_contraction {
-    vf offset[3], middle, nonlinear_part[4][3], field[4], error_growth, error_bound, domain_margin;
+    vf offset[3], middle, terms[4][3], field_terms[4], error_growth, error_bound, domain_margin;
 } kernel_contraction;
 
-/* The result of the contraction test, per ray. one: rays with exactly one crossing; none: rays without a crossing. For
- * rays in `one`, t is the depth relative to vertex 0 and r the reference coordinates, accurate to
- * KERNEL_CONTRACTION_END. */
-typedef struct kernel_contracted {
+/* The result of a test that needs no crossings of faces, per ray. one: rays with exactly one crossing; none: rays
+ * without a crossing. For rays in `one`, t is the crossing's depth and r its reference coordinates. kernel_contract()
+ * computes depths relative to vertex 0, and reference coordinates that are accurate to KERNEL_CONTRACTION_END. */
+typedef struct kernel_decided {
     vm one, none;
     vf t, r[3];
-} kernel_contracted;
+} kernel_decided;
 
 /* Computes the rays in the reference spaces of their cells. */
 SIMD_INLINE void kernel_cell_ray_of(const kernel_curved *c, const kernel_rays *rays, vi lane, kernel_cell_ray *out)
@@ -82,16 +82,15 @@ SIMD_INLINE void kernel_cell_ray_of(const kernel_curved *c, const kernel_rays *r
 
 SIMD_INLINE void kernel_contraction_of(const kernel_bounds *b, vi lane, int type, kernel_contraction *out)
 {
-    const kernel_contractions *c = &b->contractions;
-    for (int i = 0; i < 3; i++) out->offset[i] = kernel_gather_lane(c->offset[i], lane);
+    for (int i = 0; i < 3; i++) out->offset[i] = kernel_gather_lane(b->offset[i], lane);
     for (int k = 0; k < kernel_nonlinear_count(type); k++) {
-        for (int i = 0; i < 3; i++) out->nonlinear_part[k][i] = kernel_gather_lane(c->nonlinear_part[k][i], lane);
-        out->field[k] = kernel_gather_lane(c->field[k], lane);
+        for (int i = 0; i < 3; i++) out->terms[k][i] = kernel_gather_lane(b->terms[k][i], lane);
+        out->field_terms[k] = kernel_gather_lane(b->field_terms[k], lane);
     }
-    out->middle = kernel_gather_lane(c->middle, lane);
-    out->error_growth = kernel_gather_lane(c->error_growth, lane);
-    out->error_bound = kernel_gather_lane(c->error_bound, lane);
-    out->domain_margin = kernel_gather_lane(c->domain_margin, lane);
+    out->middle = kernel_gather_lane(b->middle, lane);
+    out->error_growth = kernel_gather_lane(b->error_growth, lane);
+    out->error_bound = kernel_gather_lane(b->error_bound, lane);
+    out->domain_margin = kernel_gather_lane(b->domain_margin, lane);
 }
 
 /* Moves the reference coordinates r to the nearest point of the domain D, which is widened by domain_margin for hexes
@@ -163,8 +162,8 @@ SIMD_INLINE vm kernel_contraction_excludes_root(int type, const kernel_contracti
     return vf_lt(2.0f * most + error_bound, 0.999f * kernel_dot(s, s));
 }
 
-SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_cell_ray *ray, vm rays,
-                                 kernel_contracted *out, int type)
+SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_cell_ray *ray, vm rays, kernel_decided *out,
+                                 int type)
 {
     const int terms = kernel_nonlinear_count(type);
     const vf over = 1.0f / ray->rise, t = (ray->level + c->middle) * over;
@@ -174,8 +173,8 @@ SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_cell_
     out->t = vf_set(0);
     for (int i = 0; i < 3; i++) q[i] = a[i] = (ray->y[i] + c->offset[i]) - ray->w[i] * t;
     for (int k = 0; k < terms; k++) {
-        const vf rate = c->field[k] * over;
-        for (int i = 0; i < 3; i++) slope[k][i] = c->nonlinear_part[k][i] + ray->w[i] * rate;
+        const vf rate = c->field_terms[k] * over;
+        for (int i = 0; i < 3; i++) slope[k][i] = c->terms[k][i] + ray->w[i] * rate;
     }
     const vm sure = vm_and(rays, vf_lt(c->error_growth, vf_set(INFINITY)));
     for (int n = 0; n < KERNEL_CONTRACTION_STEPS; n++) {
@@ -201,7 +200,7 @@ SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_cell_
     const vm inside = vf_lt(off + c->domain_margin, kernel_contraction_border_distance(type, out->r));
     out->one = vm_andnot(vm_and(sure, vm_and(inside, vf_lt(off, vf_set(KERNEL_CONTRACTION_END)))), out->none);
     vf e = ray->level + c->middle;
-    for (int k = 0; k < terms; k++) e += c->field[k] * bend.term[k];
+    for (int k = 0; k < terms; k++) e += c->field_terms[k] * bend.term[k];
     out->t = -(e * over);
     if (kernel_has_apex(type)) return;
     for (int i = 0; i < 3; i++) out->r[i] += (float)kernel_domain_of(type)->centre[i];

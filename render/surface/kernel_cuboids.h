@@ -18,6 +18,7 @@
 
 #include "kernel_bounds.h"
 #include "kernel_cell.h"
+#include "kernel_contraction.h"
 #include "kernel_map.h"
 #include "kernel_tile_trace.h"
 #include "kernel_transformed_curved.h"
@@ -192,11 +193,6 @@ SIMD_INLINE void kernel_cuboid_count(const kernel_cuboid_ray *ray, vm *none, vm 
     *s = vf_select(ends, b[0] / (b[0] - b[3]), zero);
 }
 
-SIMD_INLINE vf kernel_cuboid_at(const vf k[4], vf s)
-{
-    return k[0] + s * (k[1] + s * (k[2] + s * k[3]));
-}
-
 SIMD_INLINE vf kernel_cuboid_rate(const vf k[4], vf s)
 {
     return k[1] + s * (2 * k[2] + s * (3 * k[3]));
@@ -211,7 +207,7 @@ SIMD_INLINE vm kernel_cuboid_newton(const kernel_cuboid_ray *ray, vm rays, vf *s
     const vm falls = vf_lt(vf_set(0), ray->k[0]);
     vm open = rays;
     for (int step = 0; step < KERNEL_CUBOID_STEPS && vm_any(open); step++) {
-        const vf value = kernel_cuboid_at(ray->k, *s);
+        const vf *k = ray->k, value = k[0] + *s * (k[1] + *s * (k[2] + *s * k[3]));
         const vm before = vm_not(vm_xor(falls, vf_lt(vf_set(0), value)));
         low = vf_select(before, *s, low);
         high = vf_select(before, high, *s);
@@ -237,15 +233,9 @@ SIMD_INLINE vf kernel_cuboid_value(const float values[8][SIMD_WIDTH], vi lane, c
     return v[0] + r[2] * (v[4] - v[0]);
 }
 
-/* The roots of a vector of rays: depth, and reference coordinates. */
-typedef struct kernel_cuboid_roots {
-    vm one, none;          /* rays with exactly one root, rays without a root */
-    vf t, r[3], normal[3]; /* of the rays in `one`; the normal is the field's gradient in tile space */
-} kernel_cuboid_roots;
-
-/* Finds the roots of the given rays, all of which have cuboids. */
+/* Finds the roots of the given rays, all of which have cuboids, and the field's gradients there, in tile space. */
 SIMD_INLINE void kernel_cuboid_roots_of(const kernel_cuboids *cells, const float (*at)[8][SIMD_WIDTH],
-                                        const kernel_lane_rays *p, vm rays, kernel_cuboid_roots *out)
+                                        const kernel_lane_rays *p, vm rays, kernel_decided *out, vf gradient[3])
 {
     kernel_cuboid_ray ray;
     vf s, g[3];
@@ -272,7 +262,7 @@ SIMD_INLINE void kernel_cuboid_roots_of(const kernel_cuboids *cells, const float
     const kernel_product m = kernel_product_at(false, out->r);
     kernel_gradient_of(ray.field, false, &m, out->r, g);
     for (int a = 0; a < 3; a++)
-        out->normal[a] = (g[0] * ray.normal[0][a] + g[1] * ray.normal[1][a]) + g[2] * ray.normal[2][a];
+        gradient[a] = (g[0] * ray.normal[0][a] + g[1] * ray.normal[1][a]) + g[2] * ray.normal[2][a];
 }
 
 #endif

@@ -167,7 +167,7 @@ SIMD_INLINE int kernel_curved_batch_keep(kernel_curved_batch *h, int n, unsigned
 
 /* Appends the rays in at->one to the list `found`, and their depths and reference coordinates to found_ends. The rays
  * in `undecided` are stored in the list `rays` from index `kept` on. Returns the new number of kept rays. */
-SIMD_INLINE int kernel_curved_batch_part(kernel_curved_batch *h, int n, const kernel_contracted *at, vf depth,
+SIMD_INLINE int kernel_curved_batch_part(kernel_curved_batch *h, int n, const kernel_decided *at, vf depth,
                                          unsigned undecided, int kept)
 {
     for (unsigned bits = vm_bits(at->one); bits; bits &= bits - 1) {
@@ -190,7 +190,7 @@ SIMD_INLINE void kernel_curved_batch_contract_of(const kernel_tile_trace *t, ker
         kernel_lane_rays p;
         kernel_cell_ray ray;
         kernel_contraction c;
-        kernel_contracted at;
+        kernel_decided at;
         kernel_lane_rays_begin(&p, t, &h->rays, n);
         p.far = kernel_pixel_far(t, p.at);
         p.active = vm_and(p.active, vf_le(kernel_gather_lane(h->queued->near, p.lane), p.far));
@@ -304,12 +304,6 @@ static __attribute__((noinline)) void kernel_curved_batch_fetch_colours(const ke
         }
 }
 
-/* Hits of a vector of rays: r, the reference coordinates, is used for colours; `normal` is a normal or r, as in
- * kernel_hits. */
-typedef struct kernel_curved_batch_points {
-    vf t, normal[3], r[3];
-} kernel_curved_batch_points;
-
 /* Reads the field of the contour lines at the vertices of the lanes' cells. */
 static __attribute__((noinline)) void kernel_curved_batch_fetch_lines(const kernel_tile_trace *t,
                                                                       kernel_curved_batch *h)
@@ -321,14 +315,15 @@ static __attribute__((noinline)) void kernel_curved_batch_fetch_lines(const kern
 }
 
 /* Computes the colours of hits if the surface has a colour field or contour lines. */
-static __attribute__((noinline)) void
-kernel_curved_batch_colours(const kernel_tile_trace *t, const kernel_curved_batch *h, const uint8_t *lanes,
-                            const kernel_lane_rays *p, const kernel_curved_batch_points *places, vf colours[3])
+static __attribute__((noinline)) void kernel_curved_batch_colours(const kernel_tile_trace *t,
+                                                                  const kernel_curved_batch *h, const uint8_t *lanes,
+                                                                  const kernel_lane_rays *p, const kernel_point *at,
+                                                                  vf colours[3])
 {
     const render_surface_layer *layer = t->surface->layer;
     if (layer->colour_map) {
         const vf place =
-            kernel_maps_value_of_type((const float(*)[SIMD_WIDTH])h->colours, p->lane, places->r, h->queued->type);
+            kernel_maps_value_of_type((const float(*)[SIMD_WIDTH])h->colours, p->lane, at->r, h->queued->type);
         kernel_base_colour(t->surface, 0, place, colours);
     } else {
         for (int i = 0; i < SIMD_WIDTH; i++)
@@ -336,23 +331,23 @@ kernel_curved_batch_colours(const kernel_tile_trace *t, const kernel_curved_batc
     }
     if (!layer->lines) return;
     kernel_line_field along;
-    KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_line_field, t, h, p->lane, places->r, &along);
-    kernel_draw_lines(t->frame, &t->tile, t->surface, &p->rays, places->t, &along, colours);
+    KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_line_field, t, h, p->lane, at->r, &along);
+    kernel_draw_lines(t->frame, &t->tile, t->surface, &p->rays, at->t, &along, colours);
 }
 
-/* Accepts the hits in `hit`, a mask of lanes. Returns a mask of the blocks that contain a ray whose hit is nearer than
- * its previous one. */
+/* Accepts the hits in `hit`, a mask of lanes. normal: normals or reference coordinates, as in kernel_hits. Returns a
+ * mask of the blocks that contain a ray whose hit is nearer than its previous one. */
 static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile_trace *t, const kernel_curved_batch *h,
                                                                      const kernel_pixel_list *rays, int first,
                                                                      const kernel_lane_rays *p, unsigned hit,
-                                                                     const kernel_curved_batch_points *places)
+                                                                     const kernel_point *points, const vf normal[3])
 {
     const render_surface_layer *layer = t->surface->layer;
     const bool has_own = layer->colour_map || layer->lines;
     unsigned blocks = 0;
     int32_t at[SIMD_WIDTH];
     vf colours[3];
-    if (has_own) kernel_curved_batch_colours(t, h, rays->lane + first, p, places, colours);
+    if (has_own) kernel_curved_batch_colours(t, h, rays->lane + first, p, points, colours);
     memcpy(at, &p->at, sizeof at);
     for (; hit; hit &= hit - 1) {
         const int i = __builtin_ctz(hit), value = h->queued->value[rays->lane[first + i]];
@@ -360,8 +355,8 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile
         const kernel_ray_hit one = {.part = h->queued->part,
                                     .value = value,
                                     .cell = h->queued->cell[rays->lane[first + i]],
-                                    .depth = places->t[i],
-                                    .normal = {places->normal[0][i], places->normal[1][i], places->normal[2][i]},
+                                    .depth = points->t[i],
+                                    .normal = {normal[0][i], normal[1][i], normal[2][i]},
                                     .colour = {has_own ? colours[0][i] : plain[0], has_own ? colours[1][i] : plain[1],
                                                has_own ? colours[2][i] : plain[2]}};
         blocks |= kernel_ray_accept(t, at[i], &one);
@@ -377,7 +372,7 @@ SIMD_INLINE void kernel_curved_batch_orient(const kernel_tile_trace *t, const vf
 {
     const bool is_later = t->surface->layer->normal == RENDER_VERTEX;
     for (int a = 0; a < 3; a++) normal[a] = is_later ? r[a] : gradient[a];
-    if (!is_later) normal[2] -= normal[0] * t->tile.shear_x + normal[1] * t->tile.shear_y;
+    if (!is_later) kernel_unshear(&t->tile, normal);
 }
 
 SIMD_INLINE void kernel_curved_batch_normal(const kernel_tile_trace *t, const kernel_map *map, const vf r[3],
@@ -386,19 +381,6 @@ SIMD_INLINE void kernel_curved_batch_normal(const kernel_tile_trace *t, const ke
     vf gradient[3] = {vf_set(0), vf_set(0), vf_set(0)};
     if (t->surface->layer->normal != RENDER_VERTEX) kernel_lanes_normal(map, r, gradient);
     kernel_curved_batch_orient(t, gradient, r, normal);
-}
-
-/* Accepts the hits of a vector of the rays in `found`, from index n on. Returns a mask of the blocks that contain a ray
- * whose hit is nearer than its previous one. */
-SIMD_INLINE unsigned kernel_curved_batch_accept_hits(kernel_tile_trace *t, kernel_curved_batch *h, int n,
-                                                     const kernel_lane_rays *p, const kernel_map *map,
-                                                     const kernel_point *at, vm hit)
-{
-    kernel_curved_batch_points places;
-    places.t = at->t;
-    kernel_curved_batch_normal(t, map, at->r, places.normal);
-    memcpy(places.r, at->r, sizeof places.r);
-    return kernel_curved_batch_accept(t, h, &h->found, n, p, vm_bits(hit), &places);
 }
 
 /* Accepts the visible hits of rays in cuboids that have exactly one root. Rays whose roots are uncertain, and rays in
@@ -412,19 +394,19 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_cross_cuboids(kern
     int kept = 0;
     for (int n = 0; n < h->rays.count; n += SIMD_WIDTH) {
         kernel_lane_rays p;
-        kernel_cuboid_roots roots;
+        kernel_decided roots;
+        vf gradient[3], normal[3];
         kernel_lane_rays_begin(&p, t, &h->rays, n);
         p.far = kernel_pixel_far(t, p.at);
         p.active = vm_and(p.active, vf_le(kernel_gather_lane(h->queued->near, p.lane), p.far));
         const vm cuboid = vf_lt(kernel_gather_lane(h->cuboids.domain_margin, p.lane), vf_set(INFINITY));
         const vm rays = vm_and(p.active, cuboid);
-        kernel_cuboid_roots_of(&h->cuboids, at, &p, rays, &roots);
+        kernel_cuboid_roots_of(&h->cuboids, at, &p, rays, &roots, gradient);
         const vm hit = vm_and(roots.one, vm_and(vf_le(vf_set(t->t_near), roots.t), vf_le(roots.t, p.far)));
         if (vm_any(hit)) {
-            kernel_curved_batch_points places = {.t = roots.t};
-            kernel_curved_batch_orient(t, roots.normal, roots.r, places.normal);
-            memcpy(places.r, roots.r, sizeof places.r);
-            nearer |= kernel_curved_batch_accept(t, h, &h->rays, n, &p, vm_bits(hit), &places);
+            const kernel_point root = {.t = roots.t, .r = {roots.r[0], roots.r[1], roots.r[2]}};
+            kernel_curved_batch_orient(t, gradient, roots.r, normal);
+            nearer |= kernel_curved_batch_accept(t, h, &h->rays, n, &p, vm_bits(hit), &root, normal);
         }
         kept = kernel_curved_batch_keep(h, n, vm_bits(vm_andnot(p.active, vm_or(roots.one, roots.none))), kept);
     }
@@ -462,20 +444,19 @@ SIMD_INLINE unsigned kernel_curved_batch_hit_of(kernel_tile_trace *t, kernel_cur
         const vm hit = vm_and(vm_andnot(p.active, open), vm_and(vf_le(vf_set(t->t_near), at.t), vf_le(at.t, p.far)));
         if (__builtin_expect(vm_any(open), 0))
             nearer |= kernel_curved_batch_trace_singly(t, h, &h->found, n, p.at, vm_bits(open));
-        if (vm_any(hit)) nearer |= kernel_curved_batch_accept_hits(t, h, n, &p, &map, &at, hit);
+        if (!vm_any(hit)) continue;
+        vf normal[3];
+        kernel_curved_batch_normal(t, &map, at.r, normal);
+        nearer |= kernel_curved_batch_accept(t, h, &h->found, n, &p, vm_bits(hit), &at, normal);
     }
     return nearer;
 }
 
-static __attribute__((noinline)) unsigned kernel_curved_batch_hit(kernel_tile_trace *t, kernel_curved_batch *h)
+static __attribute__((noinline)) unsigned kernel_curved_batch_hit(kernel_tile_trace *t, kernel_curved_batch *h,
+                                                                  bool is_contracted)
 {
-    return KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_hit_of, t, h, false);
-}
-
-static __attribute__((noinline)) unsigned kernel_curved_batch_hit_contracted(kernel_tile_trace *t,
-                                                                             kernel_curved_batch *h)
-{
-    return KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_hit_of, t, h, true);
+    return is_contracted ? KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_hit_of, t, h, true)
+                         : KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_hit_of, t, h, false);
 }
 
 /* Searches for the first visible root of each of a vector of rays in `others`, from index n on, and accepts it. Returns
@@ -486,7 +467,8 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_search(kernel_tile
     const kernel_curved_ends *ends = &h->other_ends;
     kernel_lane_rays p;
     kernel_interval i = {.w_in = vf_set(0), .w_out = vf_set(0)};
-    kernel_curved_batch_points places = {.t = vf_set(0)};
+    kernel_point first = {.t = vf_set(0)};
+    vf normals[3] = {vf_set(0), vf_set(0), vf_set(0)};
     kernel_search s;
     vm hits = vm_none();
     kernel_lane_rays_begin(&p, t, &h->others, n);
@@ -509,15 +491,12 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_search(kernel_tile
         kernel_polish(&s, &at);
         const vm hit = vm_and(s.found, vm_and(vf_le(vf_set(t->t_near), at.t), vf_le(at.t, p.far)));
         kernel_curved_batch_normal(t, &s.map, at.r, normal);
-        for (int a = 0; a < 3; a++) {
-            places.normal[a] = vf_select(hit, normal[a], places.normal[a]);
-            places.r[a] = vf_select(hit, at.r[a], places.r[a]);
-        }
-        places.t = vf_select(hit, at.t, places.t);
+        for (int a = 0; a < 3; a++) normals[a] = vf_select(hit, normal[a], normals[a]);
+        kernel_point_move(hit, &at, &first);
         hits = vm_or(hits, hit);
         kernel_search_close(&s, hit);
     } while (kernel_search_continue(&s));
-    return vm_any(hits) ? kernel_curved_batch_accept(t, h, &h->others, n, &p, vm_bits(hits), &places) : 0;
+    return vm_any(hits) ? kernel_curved_batch_accept(t, h, &h->others, n, &p, vm_bits(hits), &first, normals) : 0;
 }
 
 /* ---- batches ---- */
@@ -539,12 +518,12 @@ static unsigned kernel_curved_batch_trace_others(kernel_tile_trace *t, kernel_cu
     if (!h->rays.count) return 0;
     kernel_curved_batch_set_bounds(t, h);
     kernel_curved_batch_contract(t, h);
-    unsigned nearer = kernel_curved_batch_hit_contracted(t, h);
+    unsigned nearer = kernel_curved_batch_hit(t, h, true);
     nearer |= kernel_curved_batch_find_faces(t, h);
     kernel_curved_batch_cross(t, h);
     kernel_pixel_list_close(&h->found);
     kernel_pixel_list_close(&h->others);
-    nearer |= kernel_curved_batch_hit(t, h);
+    nearer |= kernel_curved_batch_hit(t, h, false);
     for (int n = 0; n < h->others.count; n += SIMD_WIDTH) nearer |= kernel_curved_batch_search(t, h, n);
     return nearer;
 }

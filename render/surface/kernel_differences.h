@@ -12,16 +12,15 @@
 #include "kernel_packet.h"
 #include "kernel_tets.h"
 #include "kernel_tile.h"
-#include "kernel_traverse.h"
 #include "kernel_types.h"
 #include "render.h"
 #include "simd.h"
 
 /* Normals by central differences (thesis, section 4.3.4). The field is sampled half an offset before and behind the hit
- * along each axis. The cell that contains a sample's point is found in the tree by a ray of length zero: with inverse
- * directions of 1 the box test of kernel_packet.h tests whether the point is in the box. In a leaf, the line through
- * the point along the tile's depth axis is intersected with the cells like any ray, by the same exact decisions, and
- * the point belongs to the cell whose interval [t_in, t_out) contains its depth: to one cell of a mesh or none.
+ * along each axis. The trees are traversed to the leaves whose boxes contain one of the packet's points. In a leaf, the
+ * line through the point along the tile's depth axis is intersected with the cells like any ray, by the same exact
+ * decisions, and the point belongs to the cell whose interval [t_in, t_out) contains its depth: to one cell of a mesh
+ * or none.
  *
  * Samples are the field minus the isovalue, so that the hit's own value is 0. If cells overlap, several contain a
  * point: the sample is the least of their values, whichever is tested first and on whichever rank.
@@ -36,6 +35,8 @@ typedef struct kernel_probe {
     int layer; /* number of the layer, which is part of the key of cached cells */
     double isovalue;
     vf z;      /* depths of the points at which the field is sampled */
+    vf at[3];  /* the same points in tree space */
+    float pad; /* margin by which boxes of nodes are extended: more than all rounding of the points */
     vm found;  /* rays whose point is in a cell */
     vf sample; /* least value of the field at the point over the cells that contain it */
 } kernel_probe;
@@ -94,9 +95,9 @@ SIMD_INLINE vm kernel_probe_in_box(const kernel_packet *p, const kernel_probe *p
     return rays;
 }
 
-static void kernel_probe_leaf(kernel_packet *p, void *state, int part, const uint32_t *cells, int count, vm rays)
+static void kernel_probe_leaf(kernel_packet *p, kernel_probe *probe, int part, const uint32_t *cells, int count,
+                              vm rays)
 {
-    kernel_probe *probe = state;
     const render_field *field = &probe->surface->layer->field;
     for (int n = 0; n < count; n++) {
         kernel_cell *c = kernel_cell_cache_find(p, probe->layer, part, &field->fields[part], cells[n]);
@@ -109,29 +110,85 @@ static void kernel_probe_leaf(kernel_packet *p, void *state, int part, const uin
     }
 }
 
+/* Returns the active rays whose points may be in the node's box. */
+SIMD_INLINE vm kernel_probe_in_node(const kernel_packet *p, const kernel_probe *probe, const mmbvh *tree, int64_t node)
+{
+    float lower[4], upper[4];
+    vm inside = p->active;
+    mmbvh_node_box(tree, node, lower, upper);
+    for (int a = 0; a < 3; a++) {
+        const vm above = vf_le(vf_set(lower[a] - probe->pad), probe->at[a]);
+        inside = vm_and(inside, vm_and(above, vf_le(probe->at[a], vf_set(upper[a] + probe->pad))));
+    }
+    return inside;
+}
+
+/* Samples the field in the cells of a tree. part: the tree's mesh part; -1 for the tree over all parts, whose leaves
+ * list parts. */
+static void kernel_probe_tree(kernel_packet *p, kernel_probe *probe, const mmbvh *tree, int part)
+{
+    const render_part *parts = p->frame->job->parts;
+    const mmbvh_ranges *ranges = probe->surface->layer->field.ranges;
+    int64_t stack[MMBVH_MAX_DEPTH];
+    int top = 0;
+    if (tree->node_count) stack[top++] = 0;
+    while (top) {
+        const int64_t node = stack[--top], ref = mmbvh_node_ref(tree, node);
+        const int count = mmbvh_node_count(tree, node);
+        const vm inside = kernel_probe_in_node(p, probe, tree, node);
+        if (!vm_any(inside)) continue;
+        if (!count) {
+            stack[top++] = ref;
+            stack[top++] = ref + 1;
+        } else if (part >= 0) {
+            kernel_probe_leaf(p, probe, part, tree->cells + ref, count, inside);
+        } else {
+            for (const uint32_t *own = tree->cells + ref; own < tree->cells + ref + count; own++)
+                if (ranges[*own].low) kernel_probe_tree(p, probe, parts[*own].tree, (int)*own);
+        }
+    }
+}
+
+/* Computes the points at depth t on the rays in tree space, and the margin of boxes. The points err by a few roundings
+ * (6e-8) of positions near the scene and the eye, at most 16 together. */
+static void kernel_probe_points(const kernel_packet *p, vf t, kernel_probe *probe)
+{
+    kernel_lanes l;
+    double size = 0;
+    kernel_packet_lanes(p, &l);
+    for (int i = 0; i < SIMD_WIDTH; i++) {
+        double base[3], direction[3];
+        kernel_tree_ray(p->frame, l.px[i], l.py[i], base, direction);
+        for (int a = 0; a < 3; a++) {
+            probe->at[a][i] = (float)(base[a] + (double)t[i] * direction[a]);
+            size = fmax(size, fabs(base[a]));
+        }
+    }
+    probe->pad = 16 * 6e-8f * ((float)size + 2);
+}
+
 /* Samples the field at the rays' points at depth t, moved by `offset` along a world axis (in scaled units). Returns the
  * rays whose point is in a cell. */
 SIMD_INLINE vm kernel_probe_at(const kernel_packet *p, kernel_probe *probe, vm rays, vf t, int axis, vf offset)
 {
-    const render_camera *c = &p->frame->job->camera;
+    const render_job *job = p->frame->job;
+    const render_camera *c = &job->camera;
     const float right = (float)c->right[axis], up = (float)c->up[axis], forward = (float)c->forward[axis];
-    const vf zero = vf_set(0);
     kernel_packet points = *p;
     points.active = rays;
     points.is_pencil = false;
     points.origin_x = (p->origin_x + p->slope_x * t) + offset * (right - p->tile->shear_x * forward);
     points.origin_y = (p->origin_y + p->slope_y * t) + offset * (up - p->tile->shear_y * forward);
-    points.slope_x = points.slope_y = zero;
-    for (int a = 0; a < 3; a++) {
-        points.inverse[a] = vf_set(1);
-        points.shift[a] = (t + p->shift[a]) / p->inverse[a];
-    }
-    points.shift[axis] += offset;
+    points.slope_x = points.slope_y = vf_set(0);
+    kernel_probe_points(p, t, probe);
+    probe->at[axis] += offset;
     probe->z = t + offset * forward;
     probe->found = vm_none();
-    probe->sample = zero;
-    const kernel_descent descent = {NULL, zero, &zero, kernel_probe_leaf, probe};
-    kernel_trace_parts(&points, &probe->surface->layer->field, &descent);
+    probe->sample = vf_set(0);
+    if (job->parent) kernel_probe_tree(&points, probe, job->parent, -1);
+    for (int part = 0; part < job->part_count && !job->parent; part++)
+        if (probe->surface->layer->field.ranges[part].low)
+            kernel_probe_tree(&points, probe, job->parts[part].tree, part);
     return probe->found;
 }
 
@@ -216,11 +273,6 @@ SIMD_INLINE void kernel_pending_packet_begin(kernel_pending_group *group)
     group->tile.x0 = group->tile.y0 = -1;
 }
 
-SIMD_INLINE int kernel_pending_lane(int x, int y)
-{
-    return y % KERNEL_PACKET_ROWS * KERNEL_PACKET_COLUMNS + x % KERNEL_PACKET_COLUMNS;
-}
-
 SIMD_INLINE void kernel_pending_surface(kernel_pending_group *group, const kernel_frame *f, uint32_t kind)
 {
     for (int n = 0; n < f->surface_count; n++) {
@@ -252,7 +304,7 @@ static void kernel_pending_group_begin(kernel_pending_group *group, const kernel
         const int column = (int)(hit->pixel % width) - x0, row = (int)(hit->pixel / width) - y0;
         if (hit->kind != kind || column < 0 || column >= KERNEL_PACKET_COLUMNS || row < 0 || row >= KERNEL_PACKET_ROWS)
             break;
-        const int lane = kernel_pending_lane(column, row);
+        const int lane = row * KERNEL_PACKET_COLUMNS + column;
         if (bits >> lane & 1) break;
         bits |= 1u << lane;
         group->lanes[group->count] = lane;
@@ -263,7 +315,6 @@ static void kernel_pending_group_begin(kernel_pending_group *group, const kernel
     group->t = vf_load(t);
     group->reach = vf_load(reach);
     kernel_packet_begin(&group->packet, f, &group->tile, thread, x0, y0);
-    kernel_packet_complete(&group->packet);
 }
 
 /* Samples this rank's cells around all hits of the list; out[i] gets the samples of hits[i]. */

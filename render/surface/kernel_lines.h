@@ -93,22 +93,14 @@ SIMD_INLINE void kernel_cell_line_of(const kernel_frame *f, const kernel_tile *t
     kernel_tet_line_of(f, tile, corner, value, out);
 }
 
-/* The field of contour lines in the tet of each lane, and the position of the tet's last corner in tile space. */
-typedef struct kernel_lane_lines {
-    vf value, gradient[3], along, last[3];
-} kernel_lane_lines;
-
-/* Computes the contour lines' field at hits of depth t. normal: vectors along the surface's normal. */
-SIMD_INLINE void kernel_lane_lines_at(const kernel_lane_lines *l, const kernel_rays *rays, vf t, const vf normal[3],
-                                      kernel_line_field *out)
+/* Adds to out->value, the contour lines' field at the last corner of each lane's tet, its change from there to the hits
+ * of depth t. last: the position of that corner in tile space; along: the field's change along the tile's middle ray.
+ */
+SIMD_INLINE void kernel_line_field_move(kernel_line_field *out, const kernel_rays *rays, vf t, const vf last[3],
+                                        vf along)
 {
-    const vf x = (rays->origin_x + rays->slope_x * t) - l->last[0];
-    const vf y = (rays->origin_y + rays->slope_y * t) - l->last[1];
-    out->value = (l->value + x * l->gradient[0]) + (y * l->gradient[1] + (t - l->last[2]) * l->along);
-    for (int a = 0; a < 3; a++) {
-        out->gradient[a] = l->gradient[a];
-        out->normal[a] = normal[a];
-    }
+    const vf x = (rays->origin_x + rays->slope_x * t) - last[0], y = (rays->origin_y + rays->slope_y * t) - last[1];
+    out->value = (out->value + x * out->gradient[0]) + (y * out->gradient[1] + (t - last[2]) * along);
 }
 
 /* Computes the contour lines' field, its gradient and the surface's normal at the hits of a packet in one tet. t,
@@ -120,11 +112,13 @@ static __attribute__((noinline)) void kernel_tet_line_field(const kernel_packet 
     const kernel_rays rays = kernel_packet_rays(p);
     kernel_tet_line line = c->line;
     if (!c->has_line_field) kernel_cell_line_of(p->frame, p->tile, s, c, &line);
-    kernel_lane_lines lanes = {.value = vf_set(line.value),
-                               .along = vf_set(line.along),
-                               .last = {vf_set(c->x[3]), vf_set(c->y[3]), vf_set(c->z[3])}};
-    for (int a = 0; a < 3; a++) lanes.gradient[a] = vf_set(line.gradient[a]);
-    kernel_lane_lines_at(&lanes, &rays, t, normal, out);
+    const vf last[3] = {vf_set(c->x[3]), vf_set(c->y[3]), vf_set(c->z[3])};
+    out->value = vf_set(line.value);
+    for (int a = 0; a < 3; a++) {
+        out->gradient[a] = vf_set(line.gradient[a]);
+        out->normal[a] = normal[a];
+    }
+    kernel_line_field_move(out, &rays, t, last, vf_set(line.along));
 }
 
 /* Computes the contour lines' field, its gradient and the surface's normal at the reference coordinates r, each lane in
@@ -133,14 +127,13 @@ SIMD_INLINE void kernel_map_line_field(const kernel_tile *tile, const kernel_map
                                        kernel_line_field *out)
 {
     const kernel_product m = kernel_product_at(map->is_pyramid, r);
-    kernel_jacobian j;
-    vf n[3], g[3];
-    kernel_jacobian_of(map->position, map->is_pyramid, &m, r, &j);
+    vf cross[3][3], n[3], g[3];
+    const vf det = kernel_jacobian(map->position, map->is_pyramid, &m, r, cross);
     kernel_gradient_of(map->field, map->is_pyramid, &m, r, n);
     kernel_gradient_of(line, map->is_pyramid, &m, r, g);
     for (int a = 0; a < 3; a++) {
-        out->normal[a] = kernel_dot(j.cross[a], n);
-        out->gradient[a] = kernel_dot(j.cross[a], g) / j.det;
+        out->normal[a] = kernel_dot(cross[a], n);
+        out->gradient[a] = kernel_dot(cross[a], g) / det;
     }
     out->normal[2] -= out->normal[0] * tile->shear_x + out->normal[1] * tile->shear_y;
     out->gradient[2] -= out->gradient[0] * tile->shear_x + out->gradient[1] * tile->shear_y;
@@ -162,17 +155,11 @@ static __attribute__((noinline)) void kernel_curved_line_field(const kernel_pack
     kernel_map_line_field(p->tile, map, line, r, out);
 }
 
-/* The share of each hit's pixel that the nearest line covers, and the index of that line. */
-typedef struct kernel_line_coverage {
-    vf share;
-    vi line;
-} kernel_line_coverage;
-
-/* Computes which line is nearest to each hit, and the share of the pixel that it covers: 0 if the field is constant or
- * NaN. */
-static __attribute__((noinline)) kernel_line_coverage
-kernel_lines_coverage(const kernel_frame *f, const kernel_tile *tile, const kernel_surface *s, const kernel_rays *rays,
-                      vf t, const kernel_line_field *at)
+/* Computes which line is nearest to each hit (*line), and returns the share of the pixel that it covers: 0 if the field
+ * is constant or NaN. */
+static __attribute__((noinline)) vf kernel_lines_coverage(const kernel_frame *f, const kernel_tile *tile,
+                                                          const kernel_surface *s, const kernel_rays *rays, vf t,
+                                                          const kernel_line_field *at, vi *line)
 {
     const kernel_lines *l = &s->lines;
     const vf zero = vf_set(0), one = vf_set(1), *g = at->gradient, *n = at->normal;
@@ -182,7 +169,7 @@ kernel_lines_coverage(const kernel_frame *f, const kernel_tile *tile, const kern
     const vf dx = rays->slope_x + tile->shear_x, dy = rays->slope_y + tile->shear_y;
     const vf turn = ((g[0] * dx + g[1] * dy) + g[2]), tilt = ((n[0] * dx + n[1] * dy) + n[2]);
     const vf change[3] = {(g[0] - n[0] / tilt * turn) * pixel, (g[1] - n[1] / tilt * turn) * pixel, zero};
-    kernel_line_coverage out = {zero, vi_set(0)};
+    vi nearest = vi_set(0);
     vf distance = vf_set(INFINITY), gap = distance;
     vm still;
     const vf inverse = kernel_inverse_length(change, &still);
@@ -191,13 +178,13 @@ kernel_lines_coverage(const kernel_frame *f, const kernel_tile *tile, const kern
         const vm nearer = vf_lt(away, distance);
         distance = vf_select(nearer, away, distance);
         gap = vf_select(nearer, vf_set(l->gap[i]), gap);
-        out.line = vi_select(nearer, vi_set(i), out.line);
+        nearest = vi_select(nearer, vi_set(i), nearest);
     }
     const float width = s->layer->lines->width, most = width < 1 ? width : 1;
     const vf covered = vf_min(0.5f * (width + 1) - distance * inverse, vf_set(most));
     const vf fade = vf_clamp(gap * inverse / width - 1.0f, zero, one);
-    out.share = vf_select(vm_andnot(vf_lt(zero, covered), still), covered * fade, zero);
-    return out;
+    *line = nearest;
+    return vf_select(vm_andnot(vf_lt(zero, covered), still), covered * fade, zero);
 }
 
 /* Draws contour lines over the unlit colours of hits at depth t. Returns the share of each hit's pixel that a line
@@ -206,12 +193,13 @@ SIMD_INLINE vf kernel_draw_lines(const kernel_frame *f, const kernel_tile *tile,
                                  const kernel_rays *rays, vf t, const kernel_line_field *at, vf colour[3])
 {
     const float *colours = s->layer->lines->colours;
-    const kernel_line_coverage cover = kernel_lines_coverage(f, tile, s, rays, t, at);
+    vi line;
+    const vf share = kernel_lines_coverage(f, tile, s, rays, t, at, &line);
     for (int a = 0; a < 3 && colours; a++) {
-        const vf own = vf_gather(colours + a, cover.line * 3);
-        colour[a] = s->layer->lines->is_alone ? own : (vf)(colour[a] + cover.share * (own - colour[a]));
+        const vf own = vf_gather(colours + a, line * 3);
+        colour[a] = s->layer->lines->is_alone ? own : (vf)(colour[a] + share * (own - colour[a]));
     }
-    return cover.share;
+    return share;
 }
 
 #endif

@@ -22,6 +22,10 @@ typedef struct kernel_curved_pairs {
     int count;
     int32_t ray[SIMD_WIDTH], occluder[SIMD_WIDTH];
     float level[SIMD_WIDTH], rise[SIMD_WIDTH], thickness[SIMD_WIDTH], reach[SIMD_WIDTH];
+    /* The pairs' rays. Origins and shears are along each ray's own axes kx, ky and kz (kernel_prepared_ray). */
+    int32_t record[SIMD_WIDTH]; /* index of the first float of the hex's record */
+    float axis[SIMD_WIDTH];     /* number of the axis kz, as a float; kx and ky follow it cyclically */
+    float origin[3][SIMD_WIDTH], shear[2][SIMD_WIDTH], stretch[SIMD_WIDTH], far[SIMD_WIDTH];
     kernel_transformed_curved transformed;
 } kernel_curved_pairs;
 
@@ -32,15 +36,7 @@ SIMD_INLINE bool kernel_undecided_add(kernel_secondary_rays *s, int32_t ray, int
     return true;
 }
 
-/* The rays of the pairs. Origins and shears are along each ray's own axes kx, ky and kz (kernel_prepared_ray). */
-typedef struct kernel_prepared_ray_lanes {
-    int32_t record[SIMD_WIDTH]; /* index of the first float of the hex's record */
-    float axis[SIMD_WIDTH];     /* number of the axis kz, as a float; kx and ky follow it cyclically */
-    float origin[3][SIMD_WIDTH], shear[2][SIMD_WIDTH], stretch[SIMD_WIDTH], far[SIMD_WIDTH];
-} kernel_prepared_ray_lanes;
-
-SIMD_INLINE void kernel_pair_ray(const kernel_secondary_ray *ray, int32_t record, int lane,
-                                 kernel_prepared_ray_lanes *out)
+SIMD_INLINE void kernel_pair_ray(const kernel_secondary_ray *ray, int32_t record, int lane, kernel_curved_pairs *out)
 {
     kernel_prepared_ray p;
     kernel_prepared_ray_axes(ray, &p);
@@ -63,34 +59,27 @@ SIMD_INLINE vi kernel_load_ints(const int32_t *from)
 
 /* Transforms each hex's vertices to the space of its ray: x and y across the ray, which is at their origin, and the
  * distance along the ray. */
-SIMD_INLINE void kernel_pairs_transform(kernel_curved_pairs *pairs, const float *hexes,
-                                        const kernel_prepared_ray_lanes *rays)
+SIMD_INLINE void kernel_pairs_transform(kernel_curved_pairs *pairs, const float *hexes)
 {
     kernel_transformed_curved *h = &pairs->transformed;
-    const vm along_x = vf_eq(vf_load(rays->axis), vf_set(0)), along_y = vf_eq(vf_load(rays->axis), vf_set(1));
+    const vm along_x = vf_eq(vf_load(pairs->axis), vf_set(0)), along_y = vf_eq(vf_load(pairs->axis), vf_set(1));
     vf words[2][4];
     for (int i = 0; i < 8; i++) {
         vf row[4], at[3];
-        vf_gather_rows(hexes + 4 * i, rays->record, row);
+        vf_gather_rows(hexes + 4 * i, pairs->record, row);
         for (int a = 0; a < 3; a++) {
             const vf turned = vf_select(along_x, row[(a + 1) % 3], vf_select(along_y, row[(a + 2) % 3], row[a]));
-            at[a] = turned - vf_load(rays->origin[a]);
+            at[a] = turned - vf_load(pairs->origin[a]);
         }
-        vf_store(h->at[0][i], at[0] - at[2] * vf_load(rays->shear[0]));
-        vf_store(h->at[1][i], at[1] - at[2] * vf_load(rays->shear[1]));
-        vf_store(h->at[2][i], at[2] * vf_load(rays->stretch));
+        vf_store(h->at[0][i], at[0] - at[2] * vf_load(pairs->shear[0]));
+        vf_store(h->at[1][i], at[1] - at[2] * vf_load(pairs->shear[1]));
+        vf_store(h->at[2][i], at[2] * vf_load(pairs->stretch));
         vf_store(h->at[3][i], row[3]);
     }
-    for (int i = 0; i < 2; i++) vf_gather_rows(hexes + KERNEL_CURVED_RECORD_QUADS + 4 * i, rays->record, words[i]);
+    for (int i = 0; i < 2; i++) vf_gather_rows(hexes + KERNEL_CURVED_RECORD_QUADS + 4 * i, pairs->record, words[i]);
     for (int face = 0; face < KERNEL_CURVED_FACES; face++)
         vf_store((float *)(void *)(h->corners + face * SIMD_WIDTH), words[face / 4][face % 4]);
 }
-
-/* The results for ray-hex pairs. blocked: the hex blocks the ray; undecided: the pair must be traced exactly. In all
- * other pairs the hex does not block the ray. */
-typedef struct kernel_pair_result {
-    vm blocked, undecided;
-} kernel_pair_result;
 
 /* Returns the value, at the distance t along each ray, of the linear function L that defines the slab around the
  * surface. */
@@ -119,9 +108,11 @@ static __attribute__((noinline)) vm kernel_pairs_monotone(const kernel_curved_pa
     return vm_and(vf_le(vf_set(0), jump), vf_lt(jump, vf_min(vf_abs(ends[0].value), vf_abs(ends[1].value))));
 }
 
-SIMD_INLINE kernel_pair_result kernel_pairs_classify(const kernel_curved_pairs *pairs, vm active, vf far)
+/* Returns the pairs whose hex blocks the ray. *undecided becomes the pairs that must be traced exactly; in all other
+ * pairs the hex does not block the ray. */
+SIMD_INLINE vm kernel_pairs_classify(const kernel_curved_pairs *pairs, vm active, vm *undecided)
 {
-    const vf zero = vf_set(0), reach = vf_load(pairs->reach);
+    const vf zero = vf_set(0), reach = vf_load(pairs->reach), far = vf_load(pairs->far);
     kernel_lane_rays p = {.active = active, .u = zero, .v = zero, .far = far, .rays = {zero, zero, zero, zero}};
     kernel_curved_crossed crossed;
     kernel_point ends[2];
@@ -129,8 +120,8 @@ SIMD_INLINE kernel_pair_result kernel_pairs_classify(const kernel_curved_pairs *
     for (int i = 0; i < SIMD_WIDTH; i++) lanes[i] = i;
     p.lane = kernel_load_ints(lanes);
     kernel_curved_faces(&pairs->transformed, &p, GRID_HEX, &crossed);
-    kernel_pair_result out = {vm_none(), crossed.alone};
-    if (!vm_any(crossed.two)) return out;
+    *undecided = crossed.alone;
+    if (!vm_any(crossed.two)) return vm_none();
     p.active = crossed.two;
     kernel_curved_cross(&pairs->transformed, &p, GRID_HEX, crossed.first | crossed.last << 3, ends);
     const vf from = vf_max(ends[0].t, reach), to = vf_min(ends[1].t, far);
@@ -140,31 +131,31 @@ SIMD_INLINE kernel_pair_result kernel_pairs_classify(const kernel_curved_pairs *
      * the parts of the interval before and behind these must be known to have none. */
     const vm before = vm_or(vf_eq(from, ends[0].t), kernel_pairs_clear(pairs, ends[0].t, from));
     const vm behind = vm_or(vm_and(vf_eq(to, ends[1].t), vf_lt(to, far)), kernel_pairs_clear(pairs, to, ends[1].t));
-    out.blocked = vm_and(near, vm_and(change, vm_and(before, behind)));
+    const vm blocked = vm_and(near, vm_and(change, vm_and(before, behind)));
     const vm whole = vm_and(vf_eq(from, ends[0].t), vf_eq(to, ends[1].t));
     const vm clear = vm_andnot(kernel_pairs_clear(pairs, from, to), vm_and(change, whole));
-    vm undecided = vm_andnot(vm_andnot(near, out.blocked), clear);
-    if (vm_any(undecided)) undecided = vm_andnot(undecided, vm_andnot(kernel_pairs_monotone(pairs, ends), change));
-    out.undecided = vm_or(out.undecided, undecided);
-    return out;
+    vm left = vm_andnot(vm_andnot(near, blocked), clear);
+    if (vm_any(left)) left = vm_andnot(left, vm_andnot(kernel_pairs_monotone(pairs, ends), change));
+    *undecided = vm_or(*undecided, left);
+    return blocked;
 }
 
 static __attribute__((noinline)) bool kernel_pairs_process(const kernel_occluders *o, kernel_secondary_rays *s,
                                                            kernel_curved_pairs *pairs)
 {
-    kernel_prepared_ray_lanes rays;
+    vm undecided;
     bool is_well = true;
     if (!pairs->count) return true;
     for (int i = 0; i < SIMD_WIDTH; i++) {
         const int from = i < pairs->count ? i : 0;
-        kernel_pair_ray(&s->rays[pairs->ray[from]], o->cells[pairs->occluder[from]].record, i, &rays);
+        kernel_pair_ray(&s->rays[pairs->ray[from]], o->cells[pairs->occluder[from]].record, i, pairs);
     }
-    kernel_pairs_transform(pairs, o->hexes, &rays);
+    kernel_pairs_transform(pairs, o->hexes);
     const vm active = vm_from_bits((1u << pairs->count) - 1);
-    const kernel_pair_result verdict = kernel_pairs_classify(pairs, active, vf_load(rays.far));
-    for (unsigned bits = vm_bits(verdict.blocked); bits; bits &= bits - 1)
+    const vm blocked = kernel_pairs_classify(pairs, active, &undecided);
+    for (unsigned bits = vm_bits(blocked); bits; bits &= bits - 1)
         s->rays[pairs->ray[__builtin_ctz(bits)]].is_open = false;
-    for (unsigned bits = vm_bits(vm_and(verdict.undecided, active)); bits; bits &= bits - 1) {
+    for (unsigned bits = vm_bits(vm_and(undecided, active)); bits; bits &= bits - 1) {
         const int i = __builtin_ctz(bits);
         if (s->rays[pairs->ray[i]].is_open)
             is_well = kernel_undecided_add(s, pairs->ray[i], pairs->occluder[i]) && is_well;

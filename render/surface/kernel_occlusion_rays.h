@@ -80,28 +80,9 @@ static bool kernel_meets_triangles(const kernel_frame *f, const kernel_occluder_
 
 /* ---- slabs --------------------------------------------------------------------------------------------------- */
 
-/* The results of testing one ray against the slabs of a leaf, one cell per lane. L along the ray: level + rise * t. */
-typedef struct kernel_leaf_lanes {
-    int ray;
-    float level[SIMD_WIDTH], rise[SIMD_WIDTH], thickness[SIMD_WIDTH], reach[SIMD_WIDTH];
-} kernel_leaf_lanes;
-
-/* Adds the pair of a ray and the cell in lane i to a queue: to the ray-hex pairs if the cell is a hex with a record,
- * and otherwise to the pairs that are traced exactly. Returns false if memory ran out. */
-static bool kernel_meets_slab(const kernel_occluders *o, kernel_secondary_rays *s, kernel_curved_pairs *pairs,
-                              const kernel_leaf_lanes *lanes, int i, int32_t occluder)
-{
-    if (o->cells[occluder].record < 0) return kernel_undecided_add(s, lanes->ray, occluder);
-    const int n = pairs->count++;
-    pairs->ray[n] = lanes->ray;
-    pairs->occluder[n] = occluder;
-    pairs->level[n] = lanes->level[i];
-    pairs->rise[n] = lanes->rise[i];
-    pairs->thickness[n] = lanes->thickness[i];
-    pairs->reach[n] = lanes->reach[i];
-    return pairs->count < SIMD_WIDTH || kernel_pairs_process(o, s, pairs);
-}
-
+/* Finds the cells whose slabs a ray meets, and adds the pair of the ray and each cell to a queue: to the ray-hex pairs
+ * if the cell is a hex with a record, and otherwise to the pairs that are traced exactly. Returns false if memory ran
+ * out. */
 static bool kernel_meets_slabs(const kernel_occluders *o, kernel_secondary_rays *s, kernel_curved_pairs *pairs, int ray)
 {
     const kernel_occluder_tree *tree = &o->slabs;
@@ -112,19 +93,22 @@ static bool kernel_meets_slabs(const kernel_occluders *o, kernel_secondary_rays 
     kernel_path_begin(&path, tree);
     for (int64_t leaf; s->rays[ray].is_open && (leaf = kernel_path_next(&path, &p)) >= 0;) {
         const float *rows = tree->leaves + leaf * (KERNEL_SLAB_ROWS * SIMD_WIDTH);
-        kernel_leaf_lanes lanes;
-        vf level, rise, thickness;
-        unsigned met = vm_bits(kernel_prepared_ray_slabs(&p, rows, &level, &rise, &thickness));
-        if (!met) continue;
-        lanes.ray = ray;
-        vf_store(lanes.level, level);
-        vf_store(lanes.rise, rise);
-        vf_store(lanes.thickness, thickness);
-        vf_store(lanes.reach, vf_load(rows + KERNEL_SLAB_REACH * SIMD_WIDTH));
-        for (; met; met &= met - 1) {
-            const int i = __builtin_ctz(met);
+        vf level, rise, thickness; /* L along the ray is level + rise * t */
+        for (unsigned met = vm_bits(kernel_prepared_ray_slabs(&p, rows, &level, &rise, &thickness)); met;
+             met &= met - 1) {
+            const int i = __builtin_ctz(met), n = pairs->count;
             const int32_t occluder = tree->sources[leaf * SIMD_WIDTH + i];
-            is_well = kernel_meets_slab(o, s, pairs, &lanes, i, occluder) && is_well;
+            if (o->cells[occluder].record < 0) {
+                is_well = kernel_undecided_add(s, ray, occluder) && is_well;
+                continue;
+            }
+            pairs->ray[n] = ray;
+            pairs->occluder[n] = occluder;
+            pairs->level[n] = level[i];
+            pairs->rise[n] = rise[i];
+            pairs->thickness[n] = thickness[i];
+            pairs->reach[n] = rows[KERNEL_SLAB_REACH * SIMD_WIDTH + i];
+            if (++pairs->count == SIMD_WIDTH) is_well = kernel_pairs_process(o, s, pairs) && is_well;
         }
     }
     return is_well;

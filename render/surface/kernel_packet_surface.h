@@ -3,6 +3,8 @@
 #ifndef RENDER_KERNEL_PACKET_SURFACE_H
 #define RENDER_KERNEL_PACKET_SURFACE_H
 
+#include <string.h>
+
 #include "kernel_accept.h"
 #include "kernel_colour.h"
 #include "kernel_hits.h"
@@ -20,9 +22,11 @@ SIMD_INLINE vm kernel_opaque_differences(kernel_packet *p, const kernel_surface 
     for (int value = 0; value < s->layer->value_count; value++) {
         const vm mine = vm_and(rays, vf_eq(hits->kind, vf_set((float)((int)s->first_kind + value))));
         if (!vm_any(mine)) continue;
-        kernel_shading_input look = kernel_shading_input_of(hits->normal, hits->colour);
-        ready = vm_or(ready, kernel_sample_or_defer_hits(p, s, value, mine, p->t_far, hits->reach, &look));
-        for (int a = 0; a < 3; a++) hits->normal[a] = look.normal[a];
+        kernel_surface_hits h = {.value = value, .t = p->t_far, .reach = hits->reach};
+        memcpy(h.normal, hits->normal, sizeof h.normal);
+        memcpy(h.colour, hits->colour, sizeof h.colour);
+        ready = vm_or(ready, kernel_sample_or_defer_hits(p, s, mine, &h));
+        memcpy(hits->normal, h.normal, sizeof h.normal);
     }
     return ready;
 }
@@ -37,7 +41,8 @@ SIMD_INLINE void kernel_emit_opaque(kernel_packet *p, kernel_hits *hits)
         vm write = vm_and(hits->found, mine);
         if (!vm_any(write)) continue;
         if (s->layer->normal == RENDER_DIFFERENCES) write = kernel_opaque_differences(p, s, write, hits);
-        if (s->layer->normal == RENDER_VERTEX) kernel_vertex_normals(p, s, write, p->t_far, &hits->cells, hits->normal);
+        if (s->layer->normal == RENDER_VERTEX)
+            kernel_vertex_normals(p, s, write, p->t_far, hits->part, hits->cell, hits->normal);
         kernel_fragments lit = {
             p->t_far, p->t_far, {hits->colour[0], hits->colour[1], hits->colour[2]}, vf_set(0), hits->kind};
         kernel_paint(p, s, hits->normal, hits->kind, &lit);

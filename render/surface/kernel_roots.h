@@ -79,26 +79,20 @@ SIMD_INLINE void kernel_limits_of(const kernel_bounds *b, vi lane, kernel_limits
     out->is_monotone = vf_le(vf_set(0), kernel_gather_lane(b->jump, lane));
 }
 
-/* The chord between two points in reference coordinates, and the map's product m at both. */
-typedef struct kernel_chord {
-    const kernel_point *from, *to;
-    kernel_product m[2];
-    vf move[3];
-} kernel_chord;
-
-/* Computes how far the map bends along the chord: the largest of |e1| and |e2| (*size), and of the coefficients of e's
- * derivative divided by 3 (*slope). */
-SIMD_INLINE void kernel_chord_bend(bool is_pyramid, const kernel_limits *b, const kernel_chord *c, vf *size, vf *slope)
+/* Computes how far the map bends along the chord between two points in reference coordinates: the largest of |e1| and
+ * |e2| (*size), and of the coefficients of e's derivative divided by 3 (*slope). m: the map's product at both ends;
+ * move: to - from. */
+SIMD_INLINE void kernel_chord_bend(bool is_pyramid, const kernel_limits *b, const vf from[3], const vf to[3],
+                                   const kernel_product m[2], const vf move[3], vf *size, vf *slope)
 {
-    const vf *from = c->from->r, *to = c->to->r;
     vf first = vf_set(0), second = first, between = first;
     for (int i = 0; i < 3; i++) {
         vf g0[3], g1[3];
-        kernel_gradient_of(b->nonlinear_part[i], is_pyramid, &c->m[0], from, g0);
-        kernel_gradient_of(b->nonlinear_part[i], is_pyramid, &c->m[1], to, g1);
-        const vf rise = kernel_value_of(b->nonlinear_part[i], is_pyramid, &c->m[1], to) -
-                        kernel_value_of(b->nonlinear_part[i], is_pyramid, &c->m[0], from);
-        const vf e1 = (kernel_dot(g0, c->move) - rise) * (1.0f / 3), e2 = (rise - kernel_dot(g1, c->move)) * (1.0f / 3);
+        kernel_gradient_of(b->nonlinear_part[i], is_pyramid, &m[0], from, g0);
+        kernel_gradient_of(b->nonlinear_part[i], is_pyramid, &m[1], to, g1);
+        const vf rise = kernel_value_of(b->nonlinear_part[i], is_pyramid, &m[1], to) -
+                        kernel_value_of(b->nonlinear_part[i], is_pyramid, &m[0], from);
+        const vf e1 = (kernel_dot(g0, move) - rise) * (1.0f / 3), e2 = (rise - kernel_dot(g1, move)) * (1.0f / 3);
         first += e1 * e1;
         second += e2 * e2;
         between += (e2 - e1) * (e2 - e1);
@@ -114,13 +108,12 @@ SIMD_INLINE kernel_piece_class kernel_classify_piece(const kernel_map *map, cons
                                                      const kernel_point *from, const kernel_point *to, vf gap, vf side)
 {
     const bool is_pyramid = map->is_pyramid;
-    kernel_chord chord = {
-        .from = from, .to = to, .m = {kernel_product_at(is_pyramid, from->r), kernel_product_at(is_pyramid, to->r)}};
-    vf *move = chord.move, g0[3], g1[3], bend, bend_slope;
+    const kernel_product m[2] = {kernel_product_at(is_pyramid, from->r), kernel_product_at(is_pyramid, to->r)};
+    vf move[3], g0[3], g1[3], bend, bend_slope;
     for (int a = 0; a < 3; a++) move[a] = to->r[a] - from->r[a];
-    kernel_gradient_of(map->field, is_pyramid, &chord.m[0], from->r, g0);
-    kernel_gradient_of(map->field, is_pyramid, &chord.m[1], to->r, g1);
-    kernel_chord_bend(is_pyramid, b, &chord, &bend, &bend_slope);
+    kernel_gradient_of(map->field, is_pyramid, &m[0], from->r, g0);
+    kernel_gradient_of(map->field, is_pyramid, &m[1], to->r, g1);
+    kernel_chord_bend(is_pyramid, b, from->r, to->r, m, move, &bend, &bend_slope);
     const vf d0 = kernel_dot(g0, move), d1 = kernel_dot(g1, move), rise = to->value - from->value;
     vf b1 = from->value + d0 * (1.0f / 3), b2 = to->value - d1 * (1.0f / 3), middle = 3.0f * (b2 - b1);
     vf scale = vf_set(1);
@@ -207,11 +200,6 @@ SIMD_INLINE void kernel_search_begin(kernel_search *s)
     s->size = vf_set(0.5f);
 }
 
-SIMD_INLINE vm kernel_search_changes(const kernel_search *s)
-{
-    return vm_xor(vf_lt(s->interval->v_in, vf_set(0)), vf_lt(s->interval->v_out, vf_set(0)));
-}
-
 /* Returns the linear function L (kernel_bounds.h) of each ray's cell at depth t on the ray. */
 SIMD_INLINE vf kernel_linear_at(const kernel_curved *c, const kernel_rays *rays, vi lane, vf t)
 {
@@ -247,7 +235,7 @@ SIMD_INLINE vm kernel_ends_decide(const kernel_curved *c, const kernel_rays *ray
 SIMD_INLINE void kernel_search_whole(kernel_search *s, vm rays)
 {
     const kernel_interval *i = s->interval;
-    const vm change = kernel_search_changes(s);
+    const vm change = vm_xor(vf_lt(i->v_in, vf_set(0)), vf_lt(i->v_out, vf_set(0)));
     const vf gap = vf_max(kernel_face_gap(s, &s->low), kernel_face_gap(s, &s->high));
     const kernel_piece_class v = kernel_classify_piece(&s->map, &s->limits, &s->low, &s->high, gap, s->side);
     const vf jump = s->limits.slope * s->limits.stretch * gap + KERNEL_ROOT_BAND;
@@ -425,34 +413,25 @@ SIMD_INLINE void kernel_residuals(const kernel_rays *rays, const kernel_map *map
     }
 }
 
-/* The residuals at a point of the four equations X(r) = ray(t) (distance) and F(r) = 0 (value), which hold if the point
- * lies on the ray and has the isovalue; and the map's product m there. */
-typedef struct kernel_residual {
-    kernel_product m;
-    vf distance[3], value;
-} kernel_residual;
-
-/* Does a step of Newton's method for the four equations at once; t stays between low and high. Returns the rays that
- * have not converged. */
+/* Does a step of Newton's method for the four equations X(r) = ray(t) and F(r) = 0 at once; t stays between low and
+ * high. off, value: the equations' residuals, which are 0 if the point lies on the ray and has the isovalue. Returns
+ * the rays that have not converged. */
 SIMD_INLINE vm kernel_polish_step(const kernel_rays *rays, const kernel_map *map, const kernel_point *low,
-                                  const kernel_point *high, vm wanted, const kernel_residual *residual,
-                                  kernel_point *out)
+                                  const kernel_point *high, vm wanted, const vf off[3], vf value, kernel_point *out)
 {
-    const kernel_product *m = &residual->m;
-    const vf *off = residual->distance;
+    const kernel_product m = kernel_product_at(map->is_pyramid, out->r);
     const vf zero = vf_set(0);
-    kernel_jacobian j;
-    vf gradient[3], step[3], speed[3], largest = zero;
-    kernel_jacobian_of(map->position, map->is_pyramid, m, out->r, &j);
-    kernel_gradient_of(map->field, map->is_pyramid, m, out->r, gradient);
-    const vm flat = vf_eq(j.det, zero);
-    const vf inverse = vf_select(flat, zero, 1.0f / j.det);
+    vf cross[3][3], gradient[3], step[3], speed[3], largest = zero;
+    const vf det = kernel_jacobian(map->position, map->is_pyramid, &m, out->r, cross);
+    kernel_gradient_of(map->field, map->is_pyramid, &m, out->r, gradient);
+    const vm flat = vf_eq(det, zero);
+    const vf inverse = vf_select(flat, zero, 1.0f / det);
     for (int a = 0; a < 3; a++) {
-        step[a] = ((j.cross[0][a] * off[0] + j.cross[1][a] * off[1]) + j.cross[2][a] * off[2]) * inverse;
-        speed[a] = ((j.cross[0][a] * rays->slope_x + j.cross[1][a] * rays->slope_y) + j.cross[2][a]) * inverse;
+        step[a] = ((cross[0][a] * off[0] + cross[1][a] * off[1]) + cross[2][a] * off[2]) * inverse;
+        speed[a] = ((cross[0][a] * rays->slope_x + cross[1][a] * rays->slope_y) + cross[2][a]) * inverse;
     }
-    const vf value = residual->value + kernel_dot(gradient, step), rate = kernel_dot(gradient, speed);
-    const vf move = vf_select(vf_eq(rate, zero), zero, -(value / rate));
+    const vf left = value + kernel_dot(gradient, step), rate = kernel_dot(gradient, speed);
+    const vf move = vf_select(vf_eq(rate, zero), zero, -(left / rate));
     const vf t = vf_clamp(out->t + move, low->t, high->t);
     for (int a = 0; a < 3; a++) {
         const vf change = vf_clamp(step[a] + speed[a] * (t - out->t), vf_set(-1), vf_set(1));
@@ -468,12 +447,11 @@ SIMD_INLINE void kernel_polish_last(const kernel_rays *rays, const kernel_map *m
                                     const kernel_point *high, kernel_point *out)
 {
     kernel_point last = *out;
-    kernel_residual residual;
-    residual.m = kernel_product_at(map->is_pyramid, out->r);
-    kernel_residuals(rays, map, out, residual.distance, &residual.value);
+    vf off[3], value;
+    kernel_residuals(rays, map, out, off, &value);
     /* at a double root the computed derivative of the field is only a rounding error; a step that uses it would lead
      * away from the root, and is not taken */
-    const vm away = kernel_polish_step(rays, map, low, high, wanted, &residual, &last);
+    const vm away = kernel_polish_step(rays, map, low, high, wanted, off, value, &last);
     kernel_point_move(vm_andnot(wanted, away), &last, out);
 }
 
@@ -495,19 +473,16 @@ SIMD_INLINE vm kernel_polish_lanes(const kernel_rays *rays, const kernel_map *ma
     const vf zero = vf_set(0), fall = low->value - high->value;
     const vf along = vf_clamp(vf_select(vf_eq(fall, zero), zero, low->value / fall), zero, vf_set(1));
     vm open = wanted;
-    kernel_residual residual;
     out->t = low->t + along * (high->t - low->t);
     out->value = zero;
     for (int a = 0; a < 3; a++) out->r[a] = low->r[a] + along * (high->r[a] - low->r[a]);
     for (int n = 0; n < KERNEL_POLISH_STEPS && vm_any(open); n++) {
-        const kernel_product *m = &residual.m;
-        vf target[3];
-        residual.m = kernel_product_at(map->is_pyramid, out->r);
-        kernel_rays_at(rays, map, out->t, target);
-        for (int a = 0; a < 3; a++)
-            residual.distance[a] = target[a] - kernel_value_of(map->position[a], map->is_pyramid, m, out->r);
-        residual.value = kernel_value_of(map->field, map->is_pyramid, m, out->r);
-        open = kernel_polish_step(rays, map, low, high, open, &residual, out);
+        const kernel_product m = kernel_product_at(map->is_pyramid, out->r);
+        vf off[3];
+        kernel_rays_at(rays, map, out->t, off);
+        for (int a = 0; a < 3; a++) off[a] -= kernel_value_of(map->position[a], map->is_pyramid, &m, out->r);
+        const vf value = kernel_value_of(map->field, map->is_pyramid, &m, out->r);
+        open = kernel_polish_step(rays, map, low, high, open, off, value, out);
     }
     const vm close = vm_andnot(wanted, open);
     if (vm_any(close)) kernel_polish_last(rays, map, close, low, high, out);

@@ -39,37 +39,32 @@
 /* Computes the normals of hits by differences, and returns the hits. If other ranks may have samples (job->waiting is
  * set), hits with a reach above 0 are added to the list of pending hits instead, and only the remaining hits are
  * returned. */
-SIMD_INLINE vm kernel_sample_or_defer_hits(kernel_packet *p, const kernel_surface *s, int value, vm hit, vf t, vf reach,
-                                           kernel_shading_input *look)
+SIMD_INLINE vm kernel_sample_or_defer_hits(kernel_packet *p, const kernel_surface *s, vm hit, kernel_surface_hits *h)
 {
-    if (p->frame->job->waiting) return kernel_defer_hits(p, s, value, hit, t, reach, look);
-    kernel_normals_by_differences(p, s, value, hit, t, reach, look->normal);
+    if (p->frame->job->waiting) return kernel_defer_hits(p, s, hit, h);
+    kernel_normals_by_differences(p, s, h->value, hit, h->t, h->reach, h->normal);
     return hit;
 }
 
-/* The hits of one isovalue in one cell. */
-typedef struct kernel_accepted {
-    int value;
-    vf t, reach;
-    vf opacity; /* used only by transparent surfaces */
-    kernel_shading_input look;
-    kernel_hit_cells cells;
-} kernel_accepted;
+/* Computes the normals of hits that do not have those of their cells. Returns the hits that have a normal. */
+SIMD_INLINE vm kernel_hit_normals(kernel_packet *p, const kernel_surface *s, vm hit, kernel_surface_hits *h)
+{
+    if (s->layer->normal == RENDER_VERTEX) kernel_vertex_normals(p, s, hit, h->t, h->part, h->cell, h->normal);
+    return s->layer->normal == RENDER_DIFFERENCES ? kernel_sample_or_defer_hits(p, s, hit, h) : hit;
+}
 
 /* Emits hits with the same depth as their ray's nearest hit as separate fragments. */
 static __attribute__((noinline, cold)) void kernel_accept_equal_depth(kernel_packet *p, const kernel_surface *s,
-                                                                      vm tied, const kernel_accepted *h)
+                                                                      vm tied, const kernel_surface_hits *h)
 {
-    kernel_shading_input own = h->look;
-    vm ready = tied;
-    if (s->layer->normal == RENDER_DIFFERENCES)
-        ready = kernel_sample_or_defer_hits(p, s, h->value, tied, h->t, h->reach, &own);
-    if (s->layer->normal == RENDER_VERTEX) kernel_vertex_normals(p, s, tied, h->t, &h->cells, own.normal);
-    kernel_emit_tied(p, s, h->value, ready, h->t, own.normal, own.colour);
+    kernel_surface_hits own = *h;
+    const vm ready = kernel_hit_normals(p, s, tied, &own);
+    kernel_emit_tied(p, s, ready, &own);
 }
 
 /* Stores hits of an opaque surface as the nearest ones of their rays. */
-SIMD_INLINE void kernel_accept_opaque(kernel_packet *p, kernel_surface_state *state, vm hit, const kernel_accepted *h)
+SIMD_INLINE void kernel_accept_opaque(kernel_packet *p, kernel_surface_state *state, vm hit,
+                                      const kernel_surface_hits *h)
 {
     const kernel_surface *s = state->surface;
     kernel_hits *hits = state->hits;
@@ -82,29 +77,27 @@ SIMD_INLINE void kernel_accept_opaque(kernel_packet *p, kernel_surface_state *st
     p->is_nearer = true;
     hits->found = vm_or(hits->found, hit);
     for (int a = 0; a < 3; a++) {
-        hits->normal[a] = vf_select(hit, h->look.normal[a], hits->normal[a]);
-        hits->colour[a] = vf_select(hit, h->look.colour[a], hits->colour[a]);
+        hits->normal[a] = vf_select(hit, h->normal[a], hits->normal[a]);
+        hits->colour[a] = vf_select(hit, h->colour[a], hits->colour[a]);
     }
     if (s->layer->normal == RENDER_DIFFERENCES) hits->reach = vf_select(hit, h->reach, hits->reach);
     if (s->layer->normal == RENDER_VERTEX) {
-        hits->cells.part = vi_select(hit, h->cells.part, hits->cells.part);
-        hits->cells.index = vi_select(hit, h->cells.index, hits->cells.index);
+        hits->part = vi_select(hit, h->part, hits->part);
+        hits->cell = vi_select(hit, h->cell, hits->cell);
     }
     hits->kind = vf_select(hit, vf_set((float)((int)s->first_kind + h->value)), hits->kind);
 }
 
 /* Computes the lighting of a transparent surface's hits, and emits them as fragments. */
-SIMD_INLINE void kernel_accept_transparent(kernel_packet *p, kernel_surface_state *state, vm hit, kernel_accepted *h)
+SIMD_INLINE void kernel_accept_transparent(kernel_packet *p, kernel_surface_state *state, vm hit,
+                                           kernel_surface_hits *h)
 {
     const kernel_surface *s = state->surface;
     const uint32_t kind = s->first_kind + (uint32_t)h->value;
     kernel_hits_add_crossing(state->hits, hit, h->t);
-    if (s->layer->normal == RENDER_DIFFERENCES)
-        hit = kernel_sample_or_defer_hits(p, s, h->value, hit, h->t, h->reach, &h->look);
-    if (s->layer->normal == RENDER_VERTEX) kernel_vertex_normals(p, s, hit, h->t, &h->cells, h->look.normal);
-    const vf *colour = h->look.colour;
-    kernel_fragments f = {h->t, h->t, {colour[0], colour[1], colour[2]}, 1.0f - h->opacity, vf_set(0)};
-    kernel_paint(p, s, h->look.normal, vf_set((float)kind), &f);
+    hit = kernel_hit_normals(p, s, hit, h);
+    kernel_fragments f = {h->t, h->t, {h->colour[0], h->colour[1], h->colour[2]}, 1.0f - h->opacity, vf_set(0)};
+    kernel_paint(p, s, h->normal, vf_set((float)kind), &f);
     for (int a = 0; a < 3; a++) f.colour[a] *= h->opacity;
     kernel_emit(p, hit, kind, &f);
 }
@@ -112,43 +105,43 @@ SIMD_INLINE void kernel_accept_transparent(kernel_packet *p, kernel_surface_stat
 /* Draws contour lines over the hits' colours, unless numbers are painted. Returns the visible hits: if only lines are
  * drawn, those that a line covers. */
 static __attribute__((noinline)) vm kernel_accept_lines(const kernel_packet *p, const kernel_surface *s, vm hit,
-                                                        const kernel_hit_points *at, kernel_accepted *h)
+                                                        kernel_surface_hits *h)
 {
     const kernel_rays rays = kernel_packet_rays(p);
     const bool is_alone = s->layer->lines->is_alone, are_numbers = p->frame->job->paint == RENDER_VALUES;
     if (are_numbers && !is_alone) return hit;
-    vf colour[3] = {h->look.colour[0], h->look.colour[1], h->look.colour[2]};
-    const vf share = kernel_draw_lines(p->frame, p->tile, s, &rays, at->t, at->along, colour);
-    for (int a = 0; a < 3 && !are_numbers; a++) h->look.colour[a] = colour[a];
+    vf colour[3] = {h->colour[0], h->colour[1], h->colour[2]};
+    const vf share = kernel_draw_lines(p->frame, p->tile, s, &rays, h->t, h->along, colour);
+    for (int a = 0; a < 3 && !are_numbers; a++) h->colour[a] = colour[a];
     if (are_numbers && !s->layer->colour_map)
-        h->look.colour[0] = at->along->value * (float)(1 / s->lines.inverse_width) + (float)s->lines.low;
+        h->colour[0] = h->along->value * (float)(1 / s->lines.inverse_width) + (float)s->lines.low;
     if (!is_alone) return hit;
     h->opacity *= share;
     return vm_and(hit, vf_lt(vf_set(0), share));
 }
 
 /* Accepts hits: those of an opaque surface are kept as the nearest ones; those of a transparent surface are emitted at
- * once. c: the cell; NULL for polyhedra. */
-SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c, int value, vm hit,
-                               const kernel_hit_points *at)
+ * once. c: the cell; NULL for polyhedra. The caller sets the members of *h from `value` to `along`, except for the
+ * colour. */
+SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c, vm hit,
+                               kernel_surface_hits *h)
 {
     const kernel_surface *s = state->surface;
-    kernel_accepted h = {.value = value, .t = at->t};
-    for (int a = 0; a < 3; a++) h.look.normal[a] = at->normal[a];
-    h.cells = (kernel_hit_cells){vi_set(c ? c->part : -1), vi_set(c ? (int32_t)c->index : -1)};
+    h->part = vi_set(c ? c->part : -1);
+    h->cell = vi_set(c ? (int32_t)c->index : -1);
     /* polyhedra have normals from the gradient in the cell or at the vertices, never by differences */
-    h.reach = vf_set(s->layer->normal == RENDER_DIFFERENCES && c ? kernel_difference_reach(p, s->layer, c) : 0);
-    kernel_base_colour(s, value, at->w, h.look.colour);
+    h->reach = vf_set(s->layer->normal == RENDER_DIFFERENCES && c ? kernel_difference_reach(p, s->layer, c) : 0);
+    kernel_base_colour(s, h->value, h->w, h->colour);
     if (__builtin_expect(p->frame->job->paint == RENDER_VALUES, 0))
-        h.look.colour[0] = kernel_surface_value(s, value, at->w);
+        h->colour[0] = kernel_surface_value(s, h->value, h->w);
     else if (s->layer->edge_width > 0 && c)
-        kernel_draw_edges(p, s->layer, c, at->t, h.look.colour);
-    h.opacity = vf_set(s->layer->opacity);
-    if (__builtin_expect(at->along != NULL, 0)) hit = kernel_accept_lines(p, s, hit, at, &h);
+        kernel_draw_edges(p, s->layer, c, h->t, h->colour);
+    h->opacity = vf_set(s->layer->opacity);
+    if (__builtin_expect(h->along != NULL, 0)) hit = kernel_accept_lines(p, s, hit, h);
     if (state->is_opaque)
-        kernel_accept_opaque(p, state, hit, &h);
+        kernel_accept_opaque(p, state, hit, h);
     else
-        kernel_accept_transparent(p, state, hit, &h);
+        kernel_accept_transparent(p, state, hit, h);
 }
 
 /* Traces the isosurface in a tet. It is separate from the function for other cells, which needs more vectors, so that
@@ -165,7 +158,7 @@ static __attribute__((noinline)) void kernel_tet_surface(kernel_packet *p, kerne
     const vf t = kernel_secant(i.t_in, i.v_in, i.t_out, i.v_out);
     const vm hit = kernel_visible(p, state->surface, change, t);
     if (!vm_any(hit)) return;
-    kernel_hit_points at = {.t = t, .w = vf_set(0)};
+    kernel_surface_hits at = {.value = value, .t = t};
     kernel_tet_normal(p, c, at.normal);
     if (has_colour) {
         const vf length = i.t_out - i.t_in;
@@ -177,7 +170,7 @@ static __attribute__((noinline)) void kernel_tet_surface(kernel_packet *p, kerne
         kernel_tet_line_field(p, state->surface, c, t, at.normal, &along);
         at.along = &along;
     }
-    kernel_accept(p, state, c, value, hit, &at);
+    kernel_accept(p, state, c, hit, &at);
 }
 
 /* Returns a field at the reference coordinates r in each ray's own cell. It does the same as kernel_maps_value(), but
@@ -195,21 +188,21 @@ SIMD_INLINE vm kernel_curved_accept(kernel_packet *p, kernel_surface_state *stat
 {
     const vm hit = kernel_visible(p, state->surface, found, at->t);
     if (!vm_any(hit)) return hit;
-    kernel_hit_points places = {.t = at->t, .w = vf_set(0)};
+    kernel_surface_hits h = {.value = value, .t = at->t};
     if (state->surface->layer->normal == RENDER_VERTEX) {
-        memcpy(places.normal, at->r, sizeof places.normal);
+        memcpy(h.normal, at->r, sizeof h.normal);
     } else {
-        kernel_lanes_normal(map, at->r, places.normal);
-        kernel_unshear(p, places.normal);
+        kernel_lanes_normal(map, at->r, h.normal);
+        kernel_unshear(p->tile, h.normal);
     }
     if (state->surface->layer->colour_map)
-        places.w = kernel_maps_value_of_type(curved->colours, vi_set(curved->lane), at->r, curved->type);
+        h.w = kernel_maps_value_of_type(curved->colours, vi_set(curved->lane), at->r, curved->type);
     kernel_line_field along;
     if (state->surface->layer->lines) {
         kernel_curved_line_field(p, state->surface, c, map, at->r, &along);
-        places.along = &along;
+        h.along = &along;
     }
-    kernel_accept(p, state, c, value, hit, &places);
+    kernel_accept(p, state, c, hit, &h);
     return hit;
 }
 
@@ -231,7 +224,7 @@ SIMD_INLINE void kernel_curved_robust(kernel_packet *p, kernel_surface_state *st
 }
 
 SIMD_INLINE void kernel_contract_rays(const kernel_curved *c, const kernel_rays *rays, vi lane, vm wanted,
-                                      kernel_contracted *out, int type)
+                                      kernel_decided *out, int type)
 {
     kernel_contraction contraction;
     kernel_cell_ray ray;
@@ -244,7 +237,7 @@ SIMD_INLINE void kernel_contract_rays(const kernel_curved *c, const kernel_rays 
 /* Tests the rays of a packet in one cell by contraction (kernel_contraction.h), without intersecting the cell's
  * faces. */
 static __attribute__((noinline)) void kernel_contract_packet(const kernel_curved *c, const kernel_rays *rays, vi lane,
-                                                             vm wanted, kernel_contracted *out)
+                                                             vm wanted, kernel_decided *out)
 {
     KERNEL_OF_TYPE(c->type, kernel_contract_rays, c, rays, lane, wanted, out);
 }
@@ -257,7 +250,7 @@ static __attribute__((noinline)) vm kernel_curved_accept_contracted(kernel_packe
 {
     const kernel_rays rays = kernel_packet_rays(p);
     const vi lane = vi_set(curved->lane);
-    kernel_contracted known;
+    kernel_decided known;
     kernel_contract_packet(curved, &rays, lane, wanted, &known);
     if (vm_any(known.one)) {
         kernel_map map;
@@ -634,7 +627,7 @@ static __attribute__((noinline)) void kernel_polyhedron_line_field(const kernel_
 static void kernel_polyhedron_accept(kernel_packet *p, kernel_surface_state *state, int value, kernel_poly_crossings *r,
                                      vm hit, const kernel_profile_walk *walk)
 {
-    kernel_hit_points at = {.t = walk->t, .w = walk->w};
+    kernel_surface_hits at = {.value = value, .t = walk->t, .w = walk->w};
     if (!vm_any(hit)) return;
     kernel_poly_segments(r);
     if (state->surface->layer->normal == RENDER_VERTEX)
@@ -646,7 +639,7 @@ static void kernel_polyhedron_accept(kernel_packet *p, kernel_surface_state *sta
         kernel_polyhedron_line_field(p, state->surface, r, hit, walk->t, &along);
         at.along = &along;
     }
-    kernel_accept(p, state, NULL, value, hit, &at);
+    kernel_accept(p, state, NULL, hit, &at);
 }
 
 /* Accepts the crossings of one interval. A ray ends at the first crossing of an opaque surface in front of the eye. */

@@ -3,7 +3,7 @@
  *     nodes, one per lane:  ranges, depths, box of pixels ---> stack, the nearest on top
  *     from the stack:       has any pixel of the box no nearer hit?
  *     leaves' cells:        tested in lanes (kernel_candidates.h), restricted to the tile's pixels
- *     cells with pixels:    traced in batches (render_kernels.c), whose hits hide what is behind
+ *     cells with pixels:    queued and traced in batches (kernel_tile_queue.h), whose hits hide what is behind
  * A node whose box contains no pixel's centre is skipped, too. The box of pixels is computed from the distances of the
  * node's box to the planes through the tile's borders, divided by the box's farthest depth: that gives a lower bound of
  * how far beyond a border the box is. Margins are larger than all rounding errors. */
@@ -11,9 +11,14 @@
 #define RENDER_KERNEL_TILE_SURFACE_H
 
 #include <math.h>
+#include <stddef.h>
 #include <string.h>
 
+#include "kernel_bins.h"
+#include "kernel_candidates.h"
+#include "kernel_finder.h"
 #include "kernel_tile.h"
+#include "kernel_tile_queue.h"
 #include "kernel_tile_trace.h"
 #include "kernel_types.h"
 #include "mmbvh.h"
@@ -31,20 +36,62 @@ enum {
     KERNEL_FIND_PLANES
 };
 
-/* A plane of kernel_planes (kernel_tile.h). A point's signed distance from it is normal . position + offset, with a
- * rounding error of at most `error`. size: absolute values of the normal's components. */
-typedef struct kernel_find_plane {
-    float normal[3], size[3], offset, error;
-} kernel_find_plane;
-
-typedef struct kernel_tile_finder {
-    /* Callback that searches a leaf's cells for the current layer's surface. */
-    void (*search_leaf)(kernel_tile_trace *t, int part, const uint32_t *cells, int count);
+/* The state of a tile's search for cells, and the queue of cells to be traced. A thread keeps it from tile to tile. */
+typedef struct kernel_tile_search {
+    kernel_tile_trace *tile;
+    kernel_tile_queue queue;
+    kernel_candidate_list list; /* the cells that have been found and are not queued yet */
+    kernel_candidate items[2 * SIMD_WIDTH];
     /* number of pixels per unit of slope or, if the camera is orthographic, per scaled unit */
     float column_scale, row_scale;
     float pad[2]; /* margins by which columns and rows are extended, in pixels */
-    kernel_find_plane planes[KERNEL_FIND_PLANES];
-} kernel_tile_finder;
+    /* Planes of kernel_planes (kernel_tile.h). A point's signed distance from one is normal . position + offset, with a
+     * rounding error of at most `error`. size: absolute values of the normal's components. */
+    float normal[3][KERNEL_FIND_PLANES], size[3][KERNEL_FIND_PLANES], offset[KERNEL_FIND_PLANES];
+    float error[KERNEL_FIND_PLANES];
+} kernel_tile_search;
+
+/* ---- cells of leaves ---- */
+
+/* Queues the cells found so far for tracing, unless nearer hits hide them. */
+static bool kernel_tile_find_flush(kernel_candidate_list *list)
+{
+    kernel_tile_search *s = (kernel_tile_search *)((char *)list - offsetof(kernel_tile_search, list));
+    kernel_tile_trace *t = s->tile;
+    for (int n = 0; n < list->count; n++) {
+        const kernel_candidate *found = &list->items[n];
+        int part;
+        const int value = kernel_tile_set_source(t, found->source, &part);
+        const kernel_tile_candidate candidate = kernel_candidate_in_tile(found, t->tile.x0, t->tile.y0);
+        if (kernel_candidate_blocks(t, &candidate) && kernel_pixels_beyond(t, candidate.box, found->near))
+            kernel_tile_queue_add(t, &s->queue, &candidate, part, value);
+    }
+    list->count = 0;
+    return true;
+}
+
+/* Prepares the search for another mesh part. Pending cells of the previous part are processed first. */
+static void kernel_tile_find_set_part(kernel_tile_trace *t, kernel_tile_search *s, int part)
+{
+    kernel_finder *finder = t->thread->finder;
+    if (finder->frame == t->frame && finder->surface == t->surface && finder->part == part) return;
+    if (finder->frame) kernel_find_flush(finder);
+    kernel_finder_begin(finder, t->frame, &(kernel_subtree){.surface = t->layer, .part = part});
+    finder->list = &s->list;
+    finder->grow = kernel_tile_find_flush;
+    finder->first[0] = t->tile.x0;
+    finder->first[1] = t->tile.y0;
+    const render_camera *c = &t->frame->job->camera;
+    finder->last[0] = t->tile.x0 + KERNEL_TILE < c->width ? t->tile.x0 + KERNEL_TILE - 1 : c->width - 1;
+    finder->last[1] = t->tile.y0 + KERNEL_TILE < c->height ? t->tile.y0 + KERNEL_TILE - 1 : c->height - 1;
+}
+
+/* Searches a leaf's cells for the current layer's surface. */
+static void kernel_tile_find_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count)
+{
+    kernel_tile_find_set_part(t, t->search, part);
+    kernel_find_leaf(t->thread->finder, cells, count);
+}
 
 /* ---- traversal of nodes ---- */
 
@@ -59,9 +106,12 @@ typedef struct kernel_tile_node {
     uint16_t box, count; /* number of cells of a leaf; 0 for an inner node */
 } kernel_tile_node;
 
-/* The boxes and value ranges of one node per lane. */
+/* One node per lane: its box and range of values, and the results of testing it: its least depth (near), box of pixels
+ * (box), and position along the tile's direction, by which nodes are sorted (along). */
 typedef struct kernel_node_lanes {
     vf low[3], high[3], range_low, range_high;
+    float near[SIMD_WIDTH], along[SIMD_WIDTH];
+    int32_t box[SIMD_WIDTH];
 } kernel_node_lanes;
 
 /* Reads the boxes and value ranges of nodes one by one, which works for every layout of nodes. */
@@ -115,15 +165,6 @@ SIMD_INLINE void kernel_nodes_fetch(const mmbvh *tree, const mmbvh_ranges *range
     out->range_high = vf_gather((const float *)(const void *)ranges->high, pair);
 }
 
-/* The results of testing one node per lane. near: least depth; box: box of pixels; along: position along the tile's
- * direction, by which nodes are sorted; visible_mask: mask of the nodes that may be visible. */
-typedef struct kernel_node_bounds {
-    float near[SIMD_WIDTH];
-    int32_t box[SIMD_WIDTH];
-    vf along;
-    unsigned visible_mask;
-} kernel_node_bounds;
-
 /* Adds the first and last column (shift 0) or row (shift 8) to the boxes of pixels. low: lower bound of the signed
  * distance from the tile's first border; high: upper bound of that from its last border. Returns the lanes that meet a
  * pixel. A NaN counts as meeting all pixels. */
@@ -137,20 +178,19 @@ SIMD_INLINE vm kernel_node_pixels(vf low, vf high, vf scale, float pad, vi *box,
     return vf_lt(vf_from_vi(from), vf_from_vi(to) + 0.5f);
 }
 
-/* Tests the nodes: computes their depths and boxes of pixels, and which of them may be visible. */
-SIMD_INLINE void kernel_tile_find_node_bounds(const kernel_tile_trace *t, const kernel_node_lanes *nodes,
-                                              kernel_node_bounds *out)
+/* Tests the nodes. Returns a mask of the lanes of those that may be visible. */
+SIMD_INLINE unsigned kernel_tile_find_test(const kernel_tile_trace *t, kernel_node_lanes *nodes)
 {
-    const kernel_tile_finder *s = t->search;
+    const kernel_tile_search *s = t->search;
     vf at[KERNEL_FIND_PLANES], reach[KERNEL_FIND_PLANES], middle[3], half[3];
     for (int a = 0; a < 3; a++) {
         middle[a] = 0.5f * (nodes->low[a] + nodes->high[a]);
         half[a] = 0.5f * (nodes->high[a] - nodes->low[a]);
     }
     for (int n = 0; n < KERNEL_FIND_PLANES; n++) {
-        const kernel_find_plane *p = &s->planes[n];
-        at[n] = (p->normal[0] * middle[0] + p->normal[1] * middle[1]) + (p->normal[2] * middle[2] + p->offset);
-        reach[n] = (p->size[0] * half[0] + p->size[1] * half[1]) + (p->size[2] * half[2] + p->error);
+        at[n] =
+            (s->normal[0][n] * middle[0] + s->normal[1][n] * middle[1]) + (s->normal[2][n] * middle[2] + s->offset[n]);
+        reach[n] = (s->size[0][n] * half[0] + s->size[1][n] * half[1]) + (s->size[2][n] * half[2] + s->error[n]);
     }
     const vf far = at[KERNEL_FIND_DEPTH] + reach[KERNEL_FIND_DEPTH];
     vf inverse = vf_set(1);
@@ -166,18 +206,18 @@ SIMD_INLINE void kernel_tile_find_node_bounds(const kernel_tile_trace *t, const 
     }
     shown = vm_and(
         shown, kernel_visible_values_overlap_lanes(&t->surface->visible_values, nodes->range_low, nodes->range_high));
-    vf_store(out->near, vf_max(at[KERNEL_FIND_DEPTH] - reach[KERNEL_FIND_DEPTH], vf_set(-INFINITY)));
-    memcpy(out->box, &box, sizeof box);
-    out->along = at[KERNEL_FIND_ALONG];
-    out->visible_mask = vm_bits(shown);
+    vf_store(nodes->near, vf_max(at[KERNEL_FIND_DEPTH] - reach[KERNEL_FIND_DEPTH], vf_set(-INFINITY)));
+    vf_store(nodes->along, at[KERNEL_FIND_ALONG]);
+    memcpy(nodes->box, &box, sizeof box);
+    return vm_bits(shown);
 }
 
-/* Pushes a node on the stack if it may be visible, and prefetches what is read next. Returns the number of nodes
- * pushed, 0 or 1. */
+/* Pushes a node on the stack if its lane's bit is set in `visible`, and prefetches what is read next. Returns the
+ * number of nodes pushed, 0 or 1. */
 SIMD_INLINE int kernel_tile_find_push(const mmbvh *tree, const mmbvh_ranges *ranges, int64_t node,
-                                      const kernel_node_bounds *places, int lane, kernel_tile_node *to)
+                                      const kernel_node_lanes *nodes, unsigned visible, int lane, kernel_tile_node *to)
 {
-    if (!(places->visible_mask >> lane & 1)) return 0;
+    if (!(visible >> lane & 1)) return 0;
     const int64_t ref = mmbvh_node_ref(tree, node);
     const int count = mmbvh_node_count(tree, node);
     if (count) {
@@ -188,7 +228,7 @@ SIMD_INLINE int kernel_tile_find_push(const mmbvh *tree, const mmbvh_ranges *ran
         mmbvh_prefetch_node(tree, ref + 1);
         __builtin_prefetch(ranges->low + ref * ranges->stride);
     }
-    *to = (kernel_tile_node){ref, places->near[lane], (uint16_t)places->box[lane], (uint16_t)count};
+    *to = (kernel_tile_node){ref, nodes->near[lane], (uint16_t)nodes->box[lane], (uint16_t)count};
     return 1;
 }
 
@@ -199,20 +239,17 @@ SIMD_INLINE int kernel_tile_find_children(const kernel_tile_trace *t, const mmbv
 {
     int64_t node[SIMD_WIDTH];
     kernel_node_lanes lanes;
-    kernel_node_bounds places;
-    float along[SIMD_WIDTH];
     int top = 0;
     for (int n = 0; n < KERNEL_NODES_AT_ONCE; n++) {
         node[2 * n] = left[n < count ? n : 0];
         node[2 * n + 1] = node[2 * n] + 1;
     }
     kernel_nodes_fetch(tree, ranges, node, &lanes);
-    kernel_tile_find_node_bounds(t, &lanes, &places);
-    vf_store(along, places.along);
+    const unsigned visible = kernel_tile_find_test(t, &lanes);
     for (int n = 2 * (count - 1); n >= 0; n -= 2) {
-        const int far = along[n] < along[n + 1];
-        top += kernel_tile_find_push(tree, ranges, node[n + far], &places, n + far, stack + top);
-        top += kernel_tile_find_push(tree, ranges, node[n + !far], &places, n + !far, stack + top);
+        const int far = lanes.along[n] < lanes.along[n + 1];
+        top += kernel_tile_find_push(tree, ranges, node[n + far], &lanes, visible, n + far, stack + top);
+        top += kernel_tile_find_push(tree, ranges, node[n + !far], &lanes, visible, n + !far, stack + top);
     }
     return top;
 }
@@ -235,7 +272,7 @@ SIMD_INLINE void kernel_tile_find_cells(kernel_tile_trace *t, int part)
             const kernel_tile_node e = stack[--top];
             if (!kernel_pixels_beyond(t, e.box, e.near)) continue;
             if (e.count) {
-                t->search->search_leaf(t, part, tree->cells + e.ref, e.count);
+                kernel_tile_find_leaf(t, part, tree->cells + e.ref, e.count);
             } else {
                 inner[inner_count++] = e.ref;
             }
@@ -265,7 +302,7 @@ SIMD_INLINE void kernel_tile_surface(kernel_tile_trace *t)
 }
 
 /* Copies six of the tile's planes out of the vectors in which kernel_planes stores them. */
-SIMD_INLINE void kernel_tile_find_planes(const kernel_planes *q, kernel_find_plane out[KERNEL_FIND_PLANES])
+SIMD_INLINE void kernel_tile_find_planes(const kernel_planes *q, kernel_tile_search *out)
 {
     static const int lanes[KERNEL_FIND_PLANES] = {0,
                                                   KERNEL_BLOCKS_ACROSS,
@@ -276,18 +313,18 @@ SIMD_INLINE void kernel_tile_find_planes(const kernel_planes *q, kernel_find_pla
     for (int n = 0; n < KERNEL_FIND_PLANES; n++) {
         const int v = lanes[n] / SIMD_WIDTH, i = lanes[n] % SIMD_WIDTH;
         for (int a = 0; a < 3; a++) {
-            out[n].normal[a] = q->normal[a][v][i];
-            out[n].size[a] = q->size[a][v][i];
+            out->normal[a][n] = q->normal[a][v][i];
+            out->size[a][n] = q->size[a][v][i];
         }
-        out[n].offset = q->offset[v][i];
-        out[n].error = q->error[v][i];
+        out->offset[n] = q->offset[v][i];
+        out->error[n] = q->error[v][i];
     }
 }
 
-/* Sets up the search for a tile. The callback search_leaf must already be set. */
+/* Sets up the search for a tile. */
 SIMD_INLINE void kernel_tile_find_begin(kernel_tile_trace *t)
 {
-    kernel_tile_finder *s = t->search;
+    kernel_tile_search *s = t->search;
     const kernel_frame *f = t->frame;
     const bool flat = f->job->camera.is_orthographic;
     const double unit = flat ? f->job->space.scale : 1;
@@ -296,7 +333,25 @@ SIMD_INLINE void kernel_tile_find_begin(kernel_tile_trace *t)
     s->row_scale = (float)(1 / (fabs(f->slope_dy) * unit));
     s->pad[0] = 0.01f + error_bound * s->column_scale + 3e-5f * (float)f->job->camera.width;
     s->pad[1] = 0.01f + error_bound * s->row_scale + 3e-5f * (float)f->job->camera.height;
-    kernel_tile_find_planes(&t->tree_planes, s->planes);
+    kernel_tile_find_planes(&t->tree_planes, s);
+}
+
+/* Traces the surfaces of all layers. */
+static void kernel_tile_surfaces(kernel_tile_trace *t)
+{
+    kernel_tile_search *s = t->search;
+    s->tile = t;
+    s->list = (kernel_candidate_list){.items = s->items, .capacity = 2 * SIMD_WIDTH};
+    t->thread->finder->frame = NULL;
+    kernel_tile_find_begin(t);
+    kernel_tile_queue_begin(&s->queue);
+    for (int layer = 0; layer < t->frame->surface_count; layer++) {
+        kernel_tile_set_layer(t, layer);
+        kernel_tile_surface(t);
+        if (t->thread->finder->frame) kernel_find_flush(t->thread->finder);
+        kernel_tile_find_flush(&s->list);
+        kernel_tile_queue_finish(t, &s->queue);
+    }
 }
 
 #endif

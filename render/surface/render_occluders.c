@@ -33,9 +33,7 @@ typedef struct slab {
     kernel_occluder cell;
 } slab;
 
-typedef struct hex_record {
-    float words[KERNEL_CURVED_RECORD_WORDS];
-} hex_record;
+enum { HEX_BYTES = KERNEL_CURVED_RECORD_WORDS * sizeof(float) };
 
 /* A growing list of items of one size. */
 typedef struct list {
@@ -82,7 +80,7 @@ typedef struct occluder_search {
     uint32_t index;
     int count; /* number of vertices in `places` and `values`; a polyhedron lists some vertices several times */
     list places, values;
-    double reach;
+    double reach; /* distance from a hit, in tree space, within which the cell does not block the hit's rays */
 } occluder_search;
 
 static const double *place_of(const occluder_search *s, int i)
@@ -105,13 +103,6 @@ static void bounds_of(const occluder_search *s, double low[3], double high[3])
         }
 }
 
-/* Returns the distance from a hit, in tree space, within which the cell does not block the hit's rays
- * (kernel_occlusion_beyond()). */
-static double contact_distance(const occluder_search *s, double contact)
-{
-    return contact > 0 ? contact * kernel_cell_size((const double(*)[3])s->places.items, s->count) : 0;
-}
-
 static bool add_vertex(occluder_search *s, const double world[3], double value)
 {
     const render_space *space = &s->frame->job->space;
@@ -121,16 +112,6 @@ static bool add_vertex(occluder_search *s, const double world[3], double value)
     *kept = value;
     s->count++;
     return true;
-}
-
-static bool straddles(const occluder_search *s, double isovalue)
-{
-    bool below = false, above = false;
-    for (int i = 0; i < s->count; i++) {
-        below = below || value_of(s, i) < isovalue;
-        above = above || value_of(s, i) >= isovalue;
-    }
-    return below && above;
 }
 
 /* ---- tets ------------------------------------------------------------------------------------------------------ */
@@ -255,16 +236,16 @@ static void fill_slab(const occluder_search *s, double isovalue, slab *out)
 }
 
 /* Stores the corners of the hex's faces, in the form of kernel_transformed_curved.corners. */
-static void fill_faces(const kernel_cell *c, hex_record *out)
+static void fill_faces(const kernel_cell *c, float *record)
 {
     for (int face = 0; face < 6; face++) {
         const signed char *loop = kernel_shapes[0].faces[face].vertices;
         int corner[4];
         kernel_quad_corners(c, loop, corner);
         const int32_t word = corner[0] | corner[1] << 4 | corner[2] << 8 | corner[3] << 12;
-        memcpy(&out->words[KERNEL_CURVED_RECORD_QUADS + face], &word, sizeof word);
+        memcpy(&record[KERNEL_CURVED_RECORD_QUADS + face], &word, sizeof word);
     }
-    for (int n = KERNEL_CURVED_RECORD_QUADS + 6; n < KERNEL_CURVED_RECORD_WORDS; n++) out->words[n] = 0;
+    for (int n = KERNEL_CURVED_RECORD_QUADS + 6; n < KERNEL_CURVED_RECORD_WORDS; n++) record[n] = 0;
 }
 
 static bool collapses(const kernel_cell *c)
@@ -282,11 +263,11 @@ static int32_t add_hex(occluder_search *s, const kernel_cell *c, double isovalue
 {
     const double scale = scale_of(s, isovalue);
     if (s->frame->job->clip_count || collapses(c)) return -1;
-    hex_record *record = add(s->into, &s->into->hexes, sizeof *record);
+    float *record = add(s->into, &s->into->hexes, HEX_BYTES);
     if (!record) return -1;
     for (int i = 0; i < 8; i++) {
-        for (int a = 0; a < 3; a++) record->words[4 * i + a] = (float)place_of(s, i)[a];
-        record->words[4 * i + 3] = (float)((value_of(s, i) - isovalue) * scale);
+        for (int a = 0; a < 3; a++) record[4 * i + a] = (float)place_of(s, i)[a];
+        record[4 * i + 3] = (float)((value_of(s, i) - isovalue) * scale);
     }
     fill_faces(c, record);
     return (int32_t)s->into->hexes.count - 1;
@@ -337,10 +318,11 @@ static void find_in_cell(occluder_search *s)
     s->count = 0;
     s->places.count = s->values.count = 0;
     if (is_polyhedron ? !list_polyhedron_vertices(s, g, field) : !list_cell_vertices(s, &c, g)) return;
-    s->reach = contact_distance(s, (double)layer->contact);
+    /* as kernel_occlusion_beyond() computes it */
+    s->reach = layer->contact > 0 ? (double)layer->contact * kernel_cell_size(s->places.items, s->count) : 0;
     for (s->value = 0; s->value < layer->value_count; s->value++) {
         const double isovalue = layer->values[s->value];
-        if (!straddles(s, isovalue)) continue;
+        if (!kernel_values_straddle(s->values.items, s->count, isovalue)) continue;
         if (kernel_is_linear(c.type))
             add_tet(s, isovalue);
         else
@@ -406,7 +388,7 @@ static bool join_occluder_lists(occluder_list *to, occluder_list *from)
     for (int64_t i = 0; i < from->slabs.count; i++)
         if (slabs[i].cell.record >= 0) slabs[i].cell.record += (int32_t)hexes;
     return !from->out_of_memory && join(&to->triangles, &from->triangles, sizeof(triangle)) &&
-           join(&to->slabs, &from->slabs, sizeof(slab)) && join(&to->hexes, &from->hexes, sizeof(hex_record));
+           join(&to->slabs, &from->slabs, sizeof(slab)) && join(&to->hexes, &from->hexes, HEX_BYTES);
 }
 
 static bool find_all(const kernel_frame *frame, const render_subtrees *subtrees, int threads, occluder_list *out)

@@ -38,7 +38,6 @@ typedef struct kernel_segments {
     bool is_shortened;      /* set if t_end has been lowered since the flag was last cleared */
     vf per_t;               /* number of unit distances (of the transfer function) per unit of t on each ray */
     const kernel_hits *cut; /* the packet's crossings of transparent surfaces, which cut segments; NULL: no cuts */
-    int64_t first_fragment; /* index of the tile's first fragment in the thread's list */
     int volume;
     const kernel_pieces *pieces;
     /* error allowed per share of the ray's length and of its absorption; 0: subintervals are as long as the sampling
@@ -70,13 +69,13 @@ SIMD_INLINE int kernel_packet_lane_of_pixel(const kernel_packet *p, uint32_t pix
 
 /* Finds the next depth at which transparent surfaces cut each ray, by a search of all of the tile's fragments. It is
  * used if a ray has more such depths than kernel_hits stores. */
-static vf kernel_next_cut_by_search(const kernel_packet *p, const kernel_segments *list, vf from, bool beyond)
+static vf kernel_next_cut_by_search(const kernel_packet *p, vf from, bool beyond)
 {
     float start[SIMD_WIDTH], next[SIMD_WIDTH];
     vf_store(start, from);
     vf_store(next, vf_set(INFINITY));
-    for (int64_t i = list->first_fragment; i < p->thread->out->count; i++) {
-        const fragment *hit = &p->thread->out->items[i];
+    for (int64_t i = 0; i < p->thread->out.count; i++) {
+        const fragment *hit = &p->thread->out.items[i];
         if (hit->kind < FRAGMENT_SURFACE) continue;
         const int lane = kernel_packet_lane_of_pixel(p, hit->pixel);
         if (lane < 0) continue;
@@ -92,7 +91,7 @@ SIMD_INLINE vf kernel_next_cut(const kernel_packet *p, const kernel_segments *li
 {
     vf next = vf_set(INFINITY);
     if (!list->cut) return next;
-    if (vm_any(list->cut->overflowed)) return kernel_next_cut_by_search(p, list, t, beyond);
+    if (vm_any(list->cut->overflowed)) return kernel_next_cut_by_search(p, t, beyond);
     for (int i = 0; i < list->cut->cut_count; i++) {
         const vf cut = list->cut->cut[i];
         next = vf_min(vf_select(beyond ? vf_lt(t, cut) : vf_le(t, cut), cut, next), next);

@@ -1,5 +1,5 @@
 /* Finds which of a tile's blocks a tet's outline meets, one block per lane. The outline's bounding box
- * (kernel_outline_placement()) also covers blocks beside its slanted edges; with it alone, two of five packets would be
+ * (kernel_points_placement()) also covers blocks beside its slanted edges; with it alone, two of five packets would be
  * traced for nothing.
  *
  * An edge function is affine over the tile (kernel_cell.h), so that over a block it is its value at the block's middle,

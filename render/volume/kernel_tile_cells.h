@@ -21,7 +21,6 @@
 #include "kernel_visible_values.h"
 #include "kernel_local_queue.h"
 #include "kernel_map.h"
-#include "kernel_outline.h"
 #include "kernel_packet.h"
 #include "kernel_transformed_tets.h"
 #include "kernel_prefetch.h"
@@ -78,11 +77,10 @@ static __attribute__((noinline)) unsigned kernel_tile_transform_cell(kernel_tile
 {
     const kernel_transfer *transfer = &t->frame->volumes[cells->lanes.volume];
     kernel_cell *c = &cells->cell;
-    kernel_outline outline;
+    const float *const places[3] = {c->x, c->y, c->z};
     if (!c->is_finite || !kernel_cell_is_visible(c, transfer)) return 0;
     kernel_cell_move_to_tile_space(c, t->frame, &t->tile, g);
-    kernel_vertex_outline(c, &outline);
-    const unsigned meets = kernel_tile_visible_blocks(t, &outline, blocks);
+    const unsigned meets = kernel_tile_visible_blocks(t, places, c->count, blocks);
     if (!meets) return 0;
     kernel_cell_order(c);
     kernel_cell_domain(c, transfer);

@@ -119,8 +119,7 @@ static const kernel_volume_method kernel_volume_by_segments = {
 /* ---- windows of depth ---- */
 
 /* Prepares the packet for segments of all volumes. hits: the packet's hits on surfaces. */
-SIMD_INLINE void kernel_ray_segments_begin(kernel_packet *p, kernel_segments *list, float far, const kernel_hits *hits,
-                                           int64_t first_fragment)
+SIMD_INLINE void kernel_ray_segments_begin(kernel_packet *p, kernel_segments *list, float far, const kernel_hits *hits)
 {
     const kernel_frame *f = p->frame;
     kernel_lanes lanes;
@@ -131,7 +130,6 @@ SIMD_INLINE void kernel_ray_segments_begin(kernel_packet *p, kernel_segments *li
     list->blend = kernel_blend_begin();
     list->t_last = vf_min(p->t_far, vf_set(far));
     list->cut = f->has_transparent && !f->job->separate_samples ? hits : NULL;
-    list->first_fragment = first_fragment;
     kernel_segments_set_double(p, list, f->is_double && !f->job->separate_samples);
 }
 
@@ -233,8 +231,7 @@ static void kernel_tile_segments_trace(kernel_tile_trace *t)
     int packets[KERNEL_TILE_PACKETS];
     const int count = kernel_tile_volume_begin(t, reach.blocks, packets);
     for (int n = 0; n < count; n++)
-        kernel_ray_segments_begin(&t->packets[packets[n]], &s->packets[packets[n]], reach.far, &t->hits[packets[n]],
-                                  t->first_fragment);
+        kernel_ray_segments_begin(&t->packets[packets[n]], &s->packets[packets[n]], reach.far, &t->hits[packets[n]]);
     for (int volume = 0; volume < t->frame->volume_count; volume++)
         kernel_tile_segments_windows(t, s, packets, count, volume, &reach);
     for (int n = 0; n < count; n++) {

@@ -1,0 +1,175 @@
+/* Queues a tile's cells between search and tracing, by type, until a vector of them is full. Cells that are traced in
+ * no vector are listed, and traced one by one. */
+#ifndef RENDER_KERNEL_TILE_QUEUE_H
+#define RENDER_KERNEL_TILE_QUEUE_H
+
+#include "grid.h"
+#include "kernel_arrays.h"
+#include "kernel_batch.h"
+#include "kernel_cell.h"
+#include "kernel_cell_values.h"
+#include "kernel_curved_batch.h"
+#include "kernel_surface.h"
+#include "kernel_surface_cells.h"
+#include "kernel_tile_trace.h"
+#include "kernel_types.h"
+#include "render.h"
+#include "simd.h"
+
+/* Sorts a transformed cell's vertices and computes its edge functions and colours, ready for tracing. */
+SIMD_INLINE void kernel_tile_prepare_cell(kernel_tile_trace *t, int part)
+{
+    t->cell->part = part;
+    kernel_cell_order(t->cell);
+    kernel_cell_lines(t->cell, t->frame, &t->tile);
+    if (t->surface->layer->colour_map)
+        kernel_values_colours(t->surface, part, t->cell->index, t->cell->vertices, t->cell->count, t->cell->g);
+}
+
+static void kernel_tile_process_candidate(kernel_tile_trace *t, const kernel_tile_candidate *candidate, int part,
+                                          int value, unsigned blocks)
+{
+    const render_surface_layer *layer = t->surface->layer;
+    const grid *g = t->frame->job->parts[part].cells;
+    kernel_cell *c = t->cell;
+    kernel_cell_fetch(c, g, &layer->field.fields[part], candidate->cell);
+    if (kernel_has_own_faces(c->type)) {
+        kernel_blocks_trace(t, blocks, part, candidate->cell, NULL, 0);
+        return;
+    }
+    kernel_cell_move_to_tile_space(c, t->frame, &t->tile, g);
+    kernel_cell_relative(c, layer->values[value]);
+    kernel_tile_prepare_cell(t, part);
+    t->curved->bounds = NULL;
+    kernel_blocks_trace(t, blocks, part, c->index, c, value);
+}
+
+/* Makes the surface layer of the candidate the current layer. source: kernel_candidate.source. Stores the candidate's
+ * mesh part in *part, and returns the number of its isovalue in the layer. */
+SIMD_INLINE int kernel_tile_set_source(kernel_tile_trace *t, uint32_t source, int *part)
+{
+    const kernel_isovalue *isovalue = &t->frame->isovalues[source % RENDER_MAX_ISOVALUES];
+    *part = (int)(source / RENDER_MAX_ISOVALUES);
+    kernel_tile_set_layer(t, isovalue->surface);
+    return isovalue->value;
+}
+
+SIMD_INLINE unsigned kernel_candidate_blocks(const kernel_tile_trace *t, const kernel_tile_candidate *candidate)
+{
+    return candidate->blocks & t->traced_blocks & kernel_blocks_beyond(t, candidate->near);
+}
+
+/* Maximum number of queued cells that are traced one by one. */
+enum { KERNEL_ALONE = SIMD_WIDTH };
+
+/* A tile's cells that are queued for tracing: one vector of cells per type, and cells that are traced one by one
+ * (alone). */
+typedef struct kernel_tile_queue {
+    int layer, part;      /* layer and mesh part of the last queued cell; -1: there is none yet */
+    kernel_arrays arrays; /* arrays of the layer's field on the mesh part */
+    kernel_surface_cells pending[KERNEL_LANE_TYPES];
+    kernel_batch batch;
+    kernel_curved_batch curved_batch;
+    int alone_count;
+    kernel_tile_candidate alone[KERNEL_ALONE];
+    /* binned candidates whose cells' vertex indices are being prefetched */
+    int prefetched_count;
+    const kernel_tile_candidate *prefetched[SIMD_WIDTH];
+} kernel_tile_queue;
+
+static void kernel_tile_queue_begin(kernel_tile_queue *m)
+{
+    m->layer = m->part = -1;
+    for (int i = 0; i < KERNEL_LANE_TYPES; i++) {
+        m->pending[i].type = kernel_lane_types[i];
+        m->pending[i].count = 0;
+        m->pending[i].layer = m->pending[i].part = -1;
+    }
+    kernel_curved_batch_begin(&m->curved_batch);
+    m->alone_count = m->prefetched_count = 0;
+}
+
+/* Sets the mesh part of the cells that are queued next; their layer is the current one. */
+SIMD_INLINE void kernel_tile_queue_set_part(const kernel_tile_trace *t, kernel_tile_queue *m, int part)
+{
+    if (m->layer == t->layer && m->part == part) return;
+    m->layer = t->layer;
+    m->part = part;
+    kernel_arrays_begin(&m->arrays, t->frame->job->parts[part].cells, &t->surface->layer->field.fields[part]);
+}
+
+/* Returns whether a cell of the queue's layer and part is to be queued in the vector of its type. Polyhedra never are.
+ * In a mesh of mixed types a tile has few large wedges or pyramids of one type; these are traced one by one, because
+ * their hits then hide other cells sooner. */
+SIMD_INLINE bool kernel_is_traced_in_vectors(const kernel_tile_queue *m, const kernel_tile_candidate *candidate,
+                                             int type)
+{
+    if (!m->arrays.has_lanes || kernel_has_own_faces(type)) return false;
+    return kernel_is_linear(type) || kernel_is_box(type) || m->arrays.type != GRID_NO_TYPE ||
+           kernel_box_pixels(candidate->box) <= KERNEL_CURVED_PIXELS;
+}
+
+/* Traces the pending cells of a type. */
+static void kernel_tile_queue_trace(kernel_tile_trace *t, kernel_tile_queue *m, kernel_surface_cells *own)
+{
+    const int layer = t->layer;
+    if (!own->count) return;
+    kernel_tile_set_layer(t, own->layer);
+    if (kernel_is_linear(own->type))
+        kernel_batch_process(t, &m->batch, own);
+    else
+        kernel_curved_batch_process(t, &m->curved_batch, own);
+    kernel_tile_set_layer(t, layer);
+}
+
+SIMD_INLINE void kernel_tile_queue_append(kernel_tile_trace *t, kernel_tile_queue *m, kernel_surface_cells *own,
+                                          const kernel_tile_candidate *candidate, int value)
+{
+    if (own->layer != m->layer || own->part != m->part) {
+        kernel_tile_queue_trace(t, m, own);
+        own->layer = m->layer;
+        own->part = m->part;
+        own->arrays = m->arrays;
+    }
+    if (own->count == SIMD_WIDTH) kernel_tile_queue_trace(t, m, own);
+    kernel_surface_cells_add(t, own, candidate, value);
+}
+
+/* Traces the cells that are in no vector, one by one. The vectors of cells are traced before, because their cells were
+ * found earlier and their hits may hide the single cells. */
+static void kernel_tile_queue_trace_singly(kernel_tile_trace *t, kernel_tile_queue *m)
+{
+    if (!m->alone_count) return;
+    for (int i = 0; i < KERNEL_LANE_TYPES; i++) kernel_tile_queue_trace(t, m, &m->pending[i]);
+    for (int n = 0; n < m->alone_count; n++) {
+        int part;
+        const int value = kernel_tile_set_source(t, m->alone[n].source, &part);
+        const unsigned blocks = kernel_candidate_blocks(t, &m->alone[n]);
+        if (blocks) kernel_tile_process_candidate(t, &m->alone[n], part, value, blocks);
+    }
+    m->alone_count = 0;
+}
+
+/* Queues a cell of the current layer and the given part for tracing: in a batch if it fits one, else in the list of
+ * single cells. */
+SIMD_INLINE void kernel_tile_queue_add(kernel_tile_trace *t, kernel_tile_queue *m,
+                                       const kernel_tile_candidate *candidate, int part, int value)
+{
+    kernel_tile_queue_set_part(t, m, part);
+    const int type = kernel_arrays_type(&m->arrays, candidate->cell);
+    if (kernel_is_traced_in_vectors(m, candidate, type)) {
+        kernel_tile_queue_append(t, m, &m->pending[kernel_lane_type_index(type)], candidate, value);
+        return;
+    }
+    if (m->alone_count == KERNEL_ALONE) kernel_tile_queue_trace_singly(t, m);
+    m->alone[m->alone_count++] = *candidate;
+}
+
+/* Traces all cells that are still queued. */
+static void kernel_tile_queue_finish(kernel_tile_trace *t, kernel_tile_queue *m)
+{
+    kernel_tile_queue_trace_singly(t, m);
+    for (int i = 0; i < KERNEL_LANE_TYPES; i++) kernel_tile_queue_trace(t, m, &m->pending[i]);
+}
+
+#endif
