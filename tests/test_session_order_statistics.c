@@ -97,7 +97,7 @@ static void bent_cells_have_the_moments_of_their_polynomials(void **state)
         for (int way = 0; way < 2; way++) {
             const double b = way ? 0.2 : 0;
             order_mesh mesh;
-            if (strstr(order_kinds[k].name, "pyramid") || order_kinds[k].order == 1) continue;
+            if (order_kinds[k].order == 1) continue;
             order_mesh_create(&order_kinds[k], 2, 0, bent_value, own_rank, rank_count, &mesh);
             bend_mesh(b, &mesh);
             count(OF_F FAR, &mesh.mesh, &mesh.field, text);

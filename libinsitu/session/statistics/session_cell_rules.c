@@ -191,13 +191,19 @@ static bool weigh_corners(bool is_lobatto, session_cell_rules *out)
 bool session_make_cell_rules(const session_nodes *of, insitu_vertex_order order, bool is_lobatto,
                              session_cell_rules *out)
 {
+    const bool is_pyramid = of->type == GRID_PYRAMID, has_straight = !is_pyramid && !grid_is_shell_type(of->type);
     const bool has_spacing = is_lobatto && is_box(of->type);
-    *out = (session_cell_rules){.line_count = of->type == GRID_HEX                              ? 2
-                                              : of->type == GRID_QUAD || of->type == GRID_WEDGE ? 1
-                                                                                                : 0};
-    return session_make_completion(of, order, &out->nodes) && weigh_corners(has_spacing, out) &&
-           make_rule(of, out->line_count, has_spacing, true, &out->bent) &&
-           (grid_is_shell_type(of->type) || make_rule(of, out->line_count, has_spacing, false, &out->straight));
+    const int type = is_pyramid ? GRID_HEX : of->type;
+    const session_nodes nodes = is_pyramid ? session_complete_nodes(GRID_HEX, of->order) : *of;
+    *out = (session_cell_rules){.lattice = session_complete_nodes(type, of->order),
+                                .line_count = type == GRID_HEX                          ? 2
+                                              : type == GRID_QUAD || type == GRID_WEDGE ? 1
+                                                                                        : 0};
+    if (is_pyramid) out->collapse = session_make_collapse(of->order);
+    return session_make_completion(of, order, &out->nodes) && (!is_pyramid || out->collapse) &&
+           (!has_straight || weigh_corners(has_spacing, out)) &&
+           make_rule(&nodes, out->line_count, has_spacing, true, &out->bent) &&
+           (!has_straight || make_rule(&nodes, out->line_count, has_spacing, false, &out->straight));
 }
 
 static void drop_factor(session_rule_factor *factor)
@@ -209,6 +215,7 @@ static void drop_factor(session_rule_factor *factor)
 void session_drop_cell_rules(session_cell_rules *rules)
 {
     session_drop_interpolation(&rules->nodes);
+    base_free(rules->collapse);
     base_free(rules->corner_weights);
     drop_factor(&rules->straight.first);
     drop_factor(&rules->straight.line);
@@ -239,7 +246,7 @@ static size_t count_lattice(const session_cell_rules *rules, int lines)
 
 size_t session_cell_rules_work_size(const session_cell_rules *rules)
 {
-    const size_t nodes = (size_t)rules->nodes.complete.count;
+    const size_t nodes = (size_t)(rules->nodes.complete.count + rules->lattice.count);
     size_t size = SIZE * nodes + (AXES + 1) * (size_t)rules->bent.first.node_count * BLOCK;
     for (int lines = 0; lines <= rules->line_count; lines++) size += MOST_SIZE * count_lattice(rules, lines);
     return size;
@@ -371,25 +378,41 @@ static bool is_straight(const session_cell_rules *rules, const double *tuples, c
     return most <= tolerance * size;
 }
 
+/* Computes the tuples of a collapsed hex from those of a pyramid. */
+static void expand_pyramid(const session_cell_rules *rules, const double *complete, double *expanded)
+{
+    const int columns = rules->nodes.complete.count;
+    for (int row = 0; row < rules->lattice.count; row++)
+        for (int c = 0; c < SIZE; c++) {
+            double sum = 0;
+            for (int n = 0; n < columns; n++) sum += rules->collapse[row * columns + n] * complete[SIZE * n + c];
+            expanded[SIZE * row + c] = sum;
+        }
+}
+
 void session_visit_cell(const session_cell_rules *rules, const double *tuples, double *work,
                         session_visit_points *visit, void *of)
 {
     cell_visit v = {.rules = rules, .visit = visit, .of = of};
-    const size_t nodes = (size_t)rules->nodes.complete.count;
-    double *complete = work;
-    v.functions = work + SIZE * nodes;
+    const size_t nodes = (size_t)rules->lattice.count;
+    double *complete = work, *expanded = work + SIZE * (size_t)rules->nodes.complete.count;
+    v.functions = expanded + SIZE * nodes;
     double *next = v.functions + (AXES + 1) * (size_t)rules->bent.first.node_count * BLOCK;
     for (int lines = 0; lines <= rules->line_count; lines++) {
         v.lattices[lines] = next;
         next += MOST_SIZE * count_lattice(rules, lines);
     }
     session_complete_tuples(&rules->nodes, SIZE, tuples, complete);
+    if (rules->collapse)
+        expand_pyramid(rules, complete, expanded);
+    else
+        expanded = complete;
     double *lattice = v.lattices[rules->line_count];
     for (size_t n = 0; n < nodes; n++)
         for (size_t c = 0; c < SIZE; c++)
             lattice[c * nodes + n] =
-                complete[SIZE * n + c] - (c < 3 ? tuples[(size_t)(SIZE * rules->nodes.corners[0]) + c] : 0);
-    const bool is_bent = grid_is_shell_type(rules->nodes.of.type) || !is_straight(rules, tuples, lattice);
+                expanded[SIZE * n + c] - (c < 3 ? tuples[(size_t)(SIZE * rules->nodes.corners[0]) + c] : 0);
+    const bool is_bent = !rules->straight.first.node_count || !is_straight(rules, tuples, lattice);
     v.rule = is_bent ? &rules->bent : &rules->straight;
     visit_points(&v);
 }

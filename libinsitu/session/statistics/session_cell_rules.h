@@ -25,16 +25,18 @@ typedef struct session_product_rule {
 /* The rules of one kind of cell. */
 typedef struct session_cell_rules {
     session_interpolation nodes; /* the cell's nodes, and all nodes of its order; empty if there are no rules */
+    session_nodes lattice;       /* the same as nodes.complete; a hex for pyramids, which are read as collapsed hexes */
+    double *collapse;            /* for pyramids: matrix from nodes.complete to `lattice`; otherwise NULL */
     int line_count;              /* number of factors that are lines, not counting the first one */
     int corner_count;
     double *corner_weights; /* all nodes x corners: the linear functions of the corners at the nodes */
-    /* rules of straight cells, whose positions are linear in each factor, and of bent ones; shells have only the
-     * latter */
+    /* rules of straight cells, whose positions are linear in each factor, and of bent ones; shells and pyramids have
+     * only the latter */
     session_product_rule straight, bent;
 } session_cell_rules;
 
-/* Makes the rules of a kind of cell that is not a pyramid. order and is_lobatto: as in session_make_interpolation().
- * Returns false if memory runs out; the caller must drop *out in any case. */
+/* Makes the rules of a kind of cell; pyramids have at most the order INTERPOLATION_MOST_PYRAMID. order and is_lobatto:
+ * as in session_make_interpolation(). Returns false if memory runs out; the caller must drop *out in any case. */
 bool session_make_cell_rules(const session_nodes *of, insitu_vertex_order order, bool is_lobatto,
                              session_cell_rules *out);
 void session_drop_cell_rules(session_cell_rules *rules);

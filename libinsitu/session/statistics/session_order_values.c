@@ -3,8 +3,9 @@
  * nodes; if these are finer lattices, those at every n-th point of a lattice are taken, where n is the number of pieces
  * between two nodes.
  *
- * The polynomials of pyramids are not known, so that integrals over their pieces are added up; a mesh with pyramids is
- * split at its own nodes. Linear cells have the mean of the values at their vertices, as in meshes of linear cells.
+ * Pyramids of an order above INTERPOLATION_MOST_PYRAMID have no known functions. Integrals over their pieces are added
+ * up, and a mesh with such pyramids is split at its own nodes. Linear cells have the mean of the values at their
+ * vertices, as in meshes of linear cells.
  *
  * Each cell's numbers follow from its own nodes alone, and so do not depend on the partition. */
 #include "session_order_values.h"
@@ -98,7 +99,7 @@ static void read_values(const order_pass *p, const session_interpolation *nodes,
     }
 }
 
-/* ---- linear cells and pyramids ----------------------------------------------------------------------------------- */
+/* ---- linear cells and pyramids of high order --------------------------------------------------------------------- */
 
 static grid_array array_of(const double *data, int stride)
 {
@@ -129,7 +130,13 @@ static session_cell_value find_linear_value(const order_pass *p, const session_i
     return session_read_cell_value(&one, &field, 0, &buffer->volume);
 }
 
-/* Adds up the pieces of a cell whose polynomial is not known. */
+/* Returns whether a cell's value is the sum over its pieces. Such cells are never refined (session_finer.c). */
+static bool is_summed(const session_nodes *nodes)
+{
+    return nodes->type == GRID_PYRAMID && nodes->order > INTERPOLATION_MOST_PYRAMID;
+}
+
+/* Adds up the pieces of a cell whose functions are not known. */
 static session_cell_value sum_pieces(const order_pass *p, int64_t cell, order_buffer *buffer)
 {
     const session_mesh *mesh = p->of->mesh;
@@ -238,7 +245,7 @@ static session_cell_value find_value(const order_pass *p, int64_t cell, order_bu
     if (grid_is_ghost(&p->rows.cells, cell) ||
         !grid_has_own_value(&p->of->values, session_first_piece(p->of->mesh, cell)))
         return (session_cell_value){.is_counted = false};
-    if (nodes->type == GRID_PYRAMID) return sum_pieces(p, cell, buffer);
+    if (is_summed(nodes)) return sum_pieces(p, cell, buffer);
     if (nodes->order == 1) return find_linear_value(p, &p->rules[kind].nodes, cell, buffer);
     return integrate_cell(p, &p->rules[kind], cell, buffer);
 }
@@ -284,7 +291,7 @@ static void bin_cell(const order_pass *p, int64_t cell, order_buffer *buffer, in
     const int kind = session_kind_of(&p->rows, cell);
     if (!value->is_counted || !value->is_integral || value->is_shell != binned->is_of_shells) return;
     cell_bins own = {.binned = binned, .minimum = value->minimum, .maximum = value->maximum};
-    if (p->rows.kinds[kind].nodes.type == GRID_PYRAMID) {
+    if (is_summed(&p->rows.kinds[kind].nodes)) {
         bin_pieces(p, cell, buffer, &own);
     } else {
         read_tuples(p, &p->rules[kind].nodes, cell, buffer);
@@ -307,7 +314,7 @@ static bool begin_pass(order_pass *p)
     for (int i = 0; i < p->rows.kind_count && is_made; i++) {
         const session_nodes *nodes = &p->rows.kinds[i].nodes;
         const insitu_vertex_order order = session_nodal_mesh(mesh)->vertex_order;
-        if (nodes->type == GRID_PYRAMID) continue;
+        if (is_summed(nodes)) continue;
         is_made = nodes->order == 1 ? session_make_completion(nodes, order, &p->rules[i].nodes)
                                     : session_make_cell_rules(nodes, order, p->of->is_lobatto, &p->rules[i]);
     }
