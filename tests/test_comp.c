@@ -472,8 +472,8 @@ static void spread(uint32_t block, int64_t count, int ranks, int64_t *have)
     for (int r = 0; r < ranks; r++) have[r] = r % 2 && (block >> 5) % 2 ? 0 : count;
 }
 
-/* Checks that ranks share fragments to a tenth if they have different parts of the picture and win blocks by their
- * priorities. */
+/* Checks that the numbers of fragments that ranks own differ by at most a tenth if the ranks have different parts of
+ * the picture, and blocks are assigned by the ranks' priorities. */
 static void owners_share_what_they_have(void **context)
 {
     (void)context;

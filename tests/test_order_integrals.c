@@ -287,8 +287,9 @@ static void bent_tets_of_order_7_are_exact(void **state)
     check_kind("tet 7", &nodes, INSITU_ORDER_LEXICOGRAPHIC, false, places[0], 6);
 }
 
-/* Straight tets of any order are exact: those of order 12 have more functions than are stored. Equispaced nodes of
- * order 12 multiply the rounding errors of their values by some 100. */
+/* Checks the volumes of straight tets of order 12, whose functions are computed for each cell because they are too many
+ * to be stored. The interpolation between equispaced nodes of order 12 multiplies the rounding errors of the values by
+ * about 100. */
 static void high_orders_have_their_volumes(void **state)
 {
     (void)state;

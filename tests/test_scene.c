@@ -511,7 +511,7 @@ static void statistics_and_conditions_are_read(void **state)
     scene_free(&s);
 }
 
-/* Checks warps by the names of meshes. These names are the simulation's: they have no short forms. */
+/* Checks that `meshes` maps each mesh's name to its warp. */
 static void warps_are_read_by_their_meshes(void **state)
 {
     (void)state;
