@@ -23,8 +23,8 @@ static const peer peers[] = {
     {"VTK resample", NULL, BENCH_VTK_RESAMPLE, ACCURACY_OPACITY, 0},
 };
 
-static bench_vtk_request request_of(const accuracy_context *context, const peer *p, const int *pixels, int count,
-                                    double opacities[ACCURACY_KNOTS])
+static bench_vtk_request make_request(const accuracy_context *context, const peer *p, const int *pixels, int count,
+                                      double opacities[ACCURACY_KNOTS])
 {
     const accuracy_subject *s = context->subject;
     const int resolution = context->effort->resolution >> p->coarser;
@@ -64,11 +64,11 @@ static bench_vtk_request request_of(const accuracy_context *context, const peer 
     return r;
 }
 
-static void peer_row(const accuracy_context *context, const peer *p, const int *pixels, int count, float *rgba)
+static void measure_peer_row(const accuracy_context *context, const peer *p, const int *pixels, int count, float *rgba)
 {
     double opacities[ACCURACY_KNOTS];
     bench_vtk_result result = {0};
-    const bench_vtk_request request = request_of(context, p, pixels, count, opacities);
+    const bench_vtk_request request = make_request(context, p, pixels, count, opacities);
     accuracy_row row = {.layer = "volume", .method = p->method};
     if (p->setting)
         snprintf(row.setting, sizeof row.setting, "%s", p->setting);
@@ -84,17 +84,17 @@ static void peer_row(const accuracy_context *context, const peer *p, const int *
     accuracy_print(context, &row);
 }
 
-void accuracy_peer_rows(const accuracy_context *context)
+void accuracy_measure_peer_rows(const accuracy_context *context)
 {
-    const bench_pixels *chosen = accuracy_truth_pixels(context->truth);
+    const bench_pixels *chosen = accuracy_reference_pixels(context->truth);
     const int count = bench_pixels_count(chosen);
     int *pixels = malloc(2 * (size_t)count * sizeof *pixels);
     float *rgba = malloc(4 * (size_t)count * sizeof *rgba);
     if (!pixels || !rgba) abort();
-    for (int i = 0; i < count; i++) bench_pixels_place(chosen, i, &pixels[2 * i], &pixels[2 * i + 1]);
+    for (int i = 0; i < count; i++) bench_pixels_position(chosen, i, &pixels[2 * i], &pixels[2 * i + 1]);
     for (size_t i = 0; i < sizeof peers / sizeof *peers; i++)
         if (!context->effort->is_brief || peers[i].mapper != BENCH_VTK_ZSWEEP)
-            peer_row(context, &peers[i], pixels, count, rgba);
+            measure_peer_row(context, &peers[i], pixels, count, rgba);
     free(pixels);
     free(rgba);
 }

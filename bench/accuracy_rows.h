@@ -2,7 +2,7 @@
 #ifndef ACCURACY_ROWS_H
 #define ACCURACY_ROWS_H
 
-#include "accuracy_truth.h"
+#include "accuracy_reference.h"
 
 /* The amount of work of a run. */
 typedef struct accuracy_effort {
@@ -18,17 +18,17 @@ typedef struct accuracy_effort {
 
 typedef struct accuracy_context {
     const accuracy_effort *effort;
-    const accuracy_truth *truth;
+    const accuracy_reference *truth;
     accuracy_subject *subject;
     double build; /* median of the seconds for building the tree */
 } accuracy_context;
 
 /* Builds the subject's tree and measures the time. */
-void accuracy_build(accuracy_context *context);
+void accuracy_measure_build(accuracy_context *context);
 
-void accuracy_surface_rows(const accuracy_context *context); /* prints no rows if is_brief */
-void accuracy_volume_rows(const accuracy_context *context);
-void accuracy_peer_rows(const accuracy_context *context);
+void accuracy_measure_surface_rows(const accuracy_context *context); /* prints no rows if is_brief */
+void accuracy_measure_volume_rows(const accuracy_context *context);
+void accuracy_measure_peer_rows(const accuracy_context *context);
 
 /* One row. `first` is the time from the mesh in memory to the first picture, and `frames` are those of further frames,
  * in seconds. */

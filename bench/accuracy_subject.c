@@ -62,7 +62,7 @@ static bool make_lattice(const char *name, accuracy_subject *s)
     for (test_mesh_kind kind = 0; n > 0 && kind < TEST_KIND_COUNT; kind++) {
         const char *kind_name = test_mesh_kind_name(kind);
         if (strlen(kind_name) != (size_t)(colon - name) || strncmp(kind_name, name, strlen(kind_name))) continue;
-        test_mesh_lattice(kind, n, jitter, test_wave, &s->mesh);
+        test_mesh_make_lattice(kind, n, jitter, test_wave_field, &s->mesh);
         s->look = (accuracy_view){{2.4, 1.6, 3.0}, {0, 0, 0}, {0, 1, 0}};
         s->isovalue = 0.3;
         set_transfer(s, -0.6, 0.6, tent, 0.5);
@@ -71,7 +71,7 @@ static bool make_lattice(const char *name, accuracy_subject *s)
     return false;
 }
 
-static void bounds_of(const test_mesh *mesh, double low[3], double high[3])
+static void compute_mesh_bounds(const test_mesh *mesh, double low[3], double high[3])
 {
     for (int axis = 0; axis < 3; axis++) {
         low[axis] = (double)INFINITY;
@@ -83,7 +83,7 @@ static void bounds_of(const test_mesh *mesh, double low[3], double high[3])
     }
 }
 
-static double diagonal(const double low[3], const double high[3])
+static double compute_diagonal(const double low[3], const double high[3])
 {
     return hypot(hypot(high[0] - low[0], high[1] - low[1]), high[2] - low[2]);
 }
@@ -102,8 +102,8 @@ static bool read_grid(const char *name, accuracy_subject *s)
         if (!bench_vtk_read(path, g->field, &s->mesh)) return false;
         s->look = g->look;
         s->isovalue = g->isovalue;
-        bounds_of(&s->mesh, low, high);
-        set_transfer(s, g->low, g->high, ramp, diagonal(low, high) / 10);
+        compute_mesh_bounds(&s->mesh, low, high);
+        set_transfer(s, g->low, g->high, ramp, compute_diagonal(low, high) / 10);
         return true;
     }
     return false;
@@ -125,7 +125,7 @@ double accuracy_box_size(const grid *g, int64_t cell)
     return cbrt((high[0] - low[0]) * (high[1] - low[1]) * (high[2] - low[2]));
 }
 
-static double tet_volume(const double *a, const double *b, const double *c, const double *d)
+static double compute_tet_volume(const double *a, const double *b, const double *c, const double *d)
 {
     double u[3], v[3], w[3];
     for (int i = 0; i < 3; i++) {
@@ -139,7 +139,7 @@ static double tet_volume(const double *a, const double *b, const double *c, cons
 }
 
 /* Returns the volume of a polyhedron as the sum of the tets between the triangles of its faces and its centre. */
-static double polyhedron_volume(const test_mesh *m, int64_t cell)
+static double compute_polyhedron_volume(const test_mesh *m, int64_t cell)
 {
     double centre[3] = {0, 0, 0}, sum = 0;
     int count = 0;
@@ -151,14 +151,14 @@ static double polyhedron_volume(const test_mesh *m, int64_t cell)
         const int64_t first = m->face_offsets[m->connectivity[i]], end = m->face_offsets[m->connectivity[i] + 1];
         const int64_t *v = m->face_connectivity;
         for (int64_t k = first + 1; k + 1 < end; k++)
-            sum += tet_volume(centre, m->coordinates + 3 * v[first], m->coordinates + 3 * v[k],
-                              m->coordinates + 3 * v[k + 1]);
+            sum += compute_tet_volume(centre, m->coordinates + 3 * v[first], m->coordinates + 3 * v[k],
+                                      m->coordinates + 3 * v[k + 1]);
     }
     return sum;
 }
 
 /* Returns the volume of a cell. Warped faces are divided into two triangles. */
-static double cell_volume(const test_mesh *m, int64_t cell)
+static double compute_cell_volume(const test_mesh *m, int64_t cell)
 {
     static const signed char tet[][4] = {{0, 1, 2, 3}}, pyramid[][4] = {{0, 1, 2, 4}, {0, 2, 3, 4}},
                              wedge[][4] = {{0, 1, 2, 5}, {0, 1, 5, 4}, {0, 4, 5, 3}},
@@ -172,22 +172,22 @@ static double cell_volume(const test_mesh *m, int64_t cell)
     const int count = type == GRID_TET ? 1 : type == GRID_PYRAMID ? 2 : type == GRID_WEDGE ? 3 : 6;
     const int64_t *v = m->connectivity + m->offsets[cell];
     double sum = 0;
-    if (type == GRID_POLYHEDRON) return polyhedron_volume(m, cell);
+    if (type == GRID_POLYHEDRON) return compute_polyhedron_volume(m, cell);
     for (int i = 0; i < count; i++)
-        sum += tet_volume(m->coordinates + 3 * v[tets[i][0]], m->coordinates + 3 * v[tets[i][1]],
-                          m->coordinates + 3 * v[tets[i][2]], m->coordinates + 3 * v[tets[i][3]]);
+        sum += compute_tet_volume(m->coordinates + 3 * v[tets[i][0]], m->coordinates + 3 * v[tets[i][1]],
+                                  m->coordinates + 3 * v[tets[i][2]], m->coordinates + 3 * v[tets[i][3]]);
     return sum;
 }
 
-static double mean_cell_size(const test_mesh *m)
+static double compute_mean_cell_size(const test_mesh *m)
 {
     double sum = 0;
-    for (int64_t cell = 0; cell < m->cell_count; cell++) sum += cbrt(cell_volume(m, cell));
+    for (int64_t cell = 0; cell < m->cell_count; cell++) sum += cbrt(compute_cell_volume(m, cell));
     return sum / (double)m->cell_count;
 }
 
 /* Returns the smallest full angle of view that contains all corners of the bounds. */
-static double fitting_degrees(const render_camera *camera, const double low[3], const double high[3])
+static double compute_fitting_view_angle(const render_camera *camera, const double low[3], const double high[3])
 {
     double steepest = 0;
     for (int corner = 0; corner < 8; corner++) {
@@ -203,19 +203,19 @@ static double fitting_degrees(const render_camera *camera, const double low[3], 
     return 2 * atan(steepest) * 57.29577951308232;
 }
 
-static void place(accuracy_subject *s, int size)
+static void place_camera(accuracy_subject *s, int size)
 {
     const accuracy_view *look = &s->look;
     double low[3], high[3], centre_depth = 0;
-    bounds_of(&s->mesh, low, high);
+    compute_mesh_bounds(&s->mesh, low, high);
     render_camera_look_at(&s->camera, look->eye, look->focal, look->up, 40, size, size);
-    s->degrees = fitting_degrees(&s->camera, low, high);
+    s->degrees = compute_fitting_view_angle(&s->camera, low, high);
     render_camera_look_at(&s->camera, look->eye, look->focal, look->up, s->degrees, size, size);
     for (int axis = 0; axis < 3; axis++) {
         s->space.origin[axis] = 0.5 * (low[axis] + high[axis]);
         centre_depth += (s->space.origin[axis] - look->eye[axis]) * s->camera.forward[axis];
     }
-    s->space.scale = exp2(-ceil(log2(0.5 * diagonal(low, high))));
+    s->space.scale = exp2(-ceil(log2(0.5 * compute_diagonal(low, high))));
     s->space.depth_origin = centre_depth;
 }
 
@@ -226,8 +226,8 @@ bool accuracy_subject_create(const char *name, int size, accuracy_subject *out)
     if (!make_lattice(name, out) && !read_grid(name, out)) return false;
     test_view_create(&out->mesh, (test_layout){0}, &out->view);
     out->view.cells.ghosts = NULL;
-    out->cell_size = mean_cell_size(&out->mesh);
-    place(out, size);
+    out->cell_size = compute_mean_cell_size(&out->mesh);
+    place_camera(out, size);
     return true;
 }
 
@@ -238,7 +238,7 @@ void accuracy_subject_free(accuracy_subject *s)
     test_mesh_free(&s->mesh);
 }
 
-static void begin_scene(accuracy_scene *scene, const accuracy_subject *s)
+static void initialize_scene(accuracy_scene *scene, const accuracy_subject *s)
 {
     memset(scene, 0, sizeof *scene);
     scene->part = (render_part){&s->view.cells, &s->tree, NULL};
@@ -253,11 +253,11 @@ static void begin_scene(accuracy_scene *scene, const accuracy_subject *s)
                               .is_alone = true};
 }
 
-void accuracy_scene_surface(accuracy_scene *scene, const accuracy_subject *s)
+void accuracy_scene_create_surface(accuracy_scene *scene, const accuracy_subject *s)
 {
     static const render_light light = {{0.36, 0.48, 0.8}, {1, 1, 1}};
     static const float colour[3] = {0.8f, 0.7f, 0.5f};
-    begin_scene(scene, s);
+    initialize_scene(scene, s);
     scene->surface = (render_surface_layer){.field = {&s->view.field, &scene->ranges},
                                             .value_count = 1,
                                             .values = &s->isovalue,
@@ -270,9 +270,9 @@ void accuracy_scene_surface(accuracy_scene *scene, const accuracy_subject *s)
     scene->job.surface_count = 1;
 }
 
-void accuracy_scene_volume(accuracy_scene *scene, const accuracy_subject *s)
+void accuracy_scene_create_volume(accuracy_scene *scene, const accuracy_subject *s)
 {
-    begin_scene(scene, s);
+    initialize_scene(scene, s);
     scene->transfer = (render_transfer){.low = s->knots[0],
                                         .high = s->knots[ACCURACY_KNOTS - 1],
                                         .colour_count = ACCURACY_KNOTS,

@@ -49,8 +49,8 @@ typedef struct accuracy_scene {
 
 /* Sets the scene to the opaque isosurface, with robust roots, or to the volume, with samples at a distance of one
  * cell. */
-void accuracy_scene_surface(accuracy_scene *scene, const accuracy_subject *subject);
-void accuracy_scene_volume(accuracy_scene *scene, const accuracy_subject *subject);
+void accuracy_scene_create_surface(accuracy_scene *scene, const accuracy_subject *subject);
+void accuracy_scene_create_volume(accuracy_scene *scene, const accuracy_subject *subject);
 
 /* Returns the cube root of the volume of a cell's bounding box. */
 double accuracy_box_size(const grid *cells, int64_t cell);

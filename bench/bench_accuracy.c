@@ -22,7 +22,7 @@ void accuracy_print_head(void)
 void accuracy_print(const accuracy_context *context, accuracy_row *row)
 {
     const accuracy_error *e = &row->error;
-    const bench_stats frame = bench_stats_of(row->frames, row->runs);
+    const bench_stats frame = bench_compute_stats(row->frames, row->runs);
     printf("bench_accuracy,%s,%d,%s,%lld,%d,%s,%s,%s,%s,%.5g,%.5g,%.5g,%.5g,%.5g,%d,%d,%.5g,%.5g,%d,%.5g\n",
            render_isa(), omp_get_max_threads(), context->subject->name, (long long)context->subject->mesh.cell_count,
            context->effort->size, row->layer, row->method, row->setting, row->status, 1e3 * context->build,
@@ -31,7 +31,7 @@ void accuracy_print(const accuracy_context *context, accuracy_row *row)
     fflush(stdout);
 }
 
-static bool measure(const char *name, const accuracy_effort *effort, bool with_peers)
+static bool measure_subject(const char *name, const accuracy_effort *effort, bool with_peers)
 {
     accuracy_subject subject;
     accuracy_context context = {.effort = effort, .subject = &subject};
@@ -39,18 +39,18 @@ static bool measure(const char *name, const accuracy_effort *effort, bool with_p
         fprintf(stderr, "bench_accuracy: no mesh \"%s\"\n", name);
         return false;
     }
-    accuracy_build(&context);
-    accuracy_truth *truth = accuracy_truth_create(&subject, effort->block);
+    accuracy_measure_build(&context);
+    accuracy_reference *truth = accuracy_reference_create(&subject, effort->block);
     context.truth = truth;
-    accuracy_surface_rows(&context);
-    accuracy_volume_rows(&context);
-    if (with_peers) accuracy_peer_rows(&context);
-    accuracy_truth_free(truth);
+    accuracy_measure_surface_rows(&context);
+    accuracy_measure_volume_rows(&context);
+    if (with_peers) accuracy_measure_peer_rows(&context);
+    accuracy_reference_free(truth);
     accuracy_subject_free(&subject);
     return true;
 }
 
-static int usage(int status)
+static int print_usage(int status)
 {
     fprintf(
         status ? stderr : stdout,
@@ -78,7 +78,7 @@ int main(int argc, char **argv)
     const accuracy_effort *effort = &whole;
     bool with_peers = bench_vtk_is_available(), with_head = true;
     for (int found; (found = getopt_long(argc, argv, "", list, NULL)) != -1;) {
-        if (found == HELP) return usage(0);
+        if (found == HELP) return print_usage(0);
         if (found == LARGE)
             effort = &large;
         else if (found == QUICK)
@@ -90,11 +90,11 @@ int main(int argc, char **argv)
         else if (found == NO_PEERS)
             with_peers = false;
         else
-            return usage(2); /* getopt_long() has printed the reason */
+            return print_usage(2); /* getopt_long() has printed the reason */
     }
-    if (optind == argc) return usage(2);
+    if (optind == argc) return print_usage(2);
     if (with_head) accuracy_print_head();
     for (; optind < argc; optind++)
-        if (!measure(argv[optind], effort, with_peers)) return 1;
+        if (!measure_subject(argv[optind], effort, with_peers)) return 1;
     return 0;
 }

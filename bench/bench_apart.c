@@ -21,7 +21,7 @@ static void draw_and_send(const bench_vtk_request *request, float *rgba, size_t 
     _exit(0);
 }
 
-static bool receive(int from, void *block, size_t bytes)
+static bool receive_block(int from, void *block, size_t bytes)
 {
     for (size_t got = 0; got < bytes;) {
         const ssize_t now = read(from, (char *)block + got, bytes - got);
@@ -41,7 +41,7 @@ const char *bench_unindexed_draw(const bench_vtk_request *request, int seconds, 
     if (child < 0) return "no process";
     if (child == 0) draw_and_send(request, rgba, bytes, seconds, ends[1]);
     close(ends[1]);
-    const bool is_whole = receive(ends[0], result, sizeof *result) && receive(ends[0], rgba, bytes);
+    const bool is_whole = receive_block(ends[0], result, sizeof *result) && receive_block(ends[0], rgba, bytes);
     close(ends[0]);
     waitpid(child, &status, 0);
     if (WIFSIGNALED(status)) return WTERMSIG(status) == SIGALRM ? "too slow" : "crashed";

@@ -28,14 +28,14 @@ typedef struct bench_grid {
     int32_t *connectivity;
 } bench_grid;
 
-static void *allocate(int64_t count, size_t size)
+static void *allocate_array(int64_t count, size_t size)
 {
     void *p = malloc((size_t)count * size);
     if (!p) abort();
     return p;
 }
 
-static void place_of_block(const bench_grid *g, int64_t block, int64_t first[3])
+static void compute_block_position(const bench_grid *g, int64_t block, int64_t first[3])
 {
     const int64_t along = g->scene->subject.n / g->cells;
     first[0] = block % along * g->cells;
@@ -43,7 +43,7 @@ static void place_of_block(const bench_grid *g, int64_t block, int64_t first[3])
     first[2] = block / along / along * g->cells;
 }
 
-static double coordinate(const bench_grid *g, int64_t index)
+static double compute_coordinate(const bench_grid *g, int64_t index)
 {
     const double spacing = 2.0 / g->scene->subject.n;
     return -1 + spacing * (double)index;
@@ -53,17 +53,17 @@ static void fill_block(const bench_grid *g, int64_t block)
 {
     const int64_t side = g->cells + 1;
     int64_t first[3];
-    place_of_block(g, block, first);
+    compute_block_position(g, block, first);
     for (int64_t v = 0; v < g->block_vertices; v++) {
         const int64_t at[3] = {v % side, v / side % side, v / side / side};
         double p[3];
         for (int axis = 0; axis < 3; axis++) {
-            p[axis] = coordinate(g, first[axis] + at[axis]);
+            p[axis] = compute_coordinate(g, first[axis] + at[axis]);
             if (g->coordinates[axis]) g->coordinates[axis][v] = (float)p[axis];
         }
         for (int phase = 0; phase < PHASES; phase++) {
             const double moved[3] = {p[0] + 0.01 * phase, p[1] + 0.02 * phase, p[2] + 0.03 * phase};
-            g->values[phase][block * g->block_vertices + v] = (float)test_wave(moved);
+            g->values[phase][block * g->block_vertices + v] = (float)test_wave_field(moved);
         }
     }
 }
@@ -88,10 +88,10 @@ static void create_grid(bench_grid *g, const bench_scene *scene, bench_form form
     g->block_count = along * along * along;
     g->block_vertices = (cells + 1) * (cells + 1) * (cells + 1);
     g->block_cells = cells * cells * cells;
-    for (int i = 0; i < PHASES; i++) g->values[i] = allocate(g->block_count * g->block_vertices, sizeof(float));
+    for (int i = 0; i < PHASES; i++) g->values[i] = allocate_array(g->block_count * g->block_vertices, sizeof(float));
     for (int axis = 0; axis < 3 && form == AS_HEXES; axis++)
-        g->coordinates[axis] = allocate(g->block_vertices, sizeof(float));
-    if (form == AS_HEXES) g->connectivity = allocate(CORNERS * g->block_cells, sizeof(int32_t));
+        g->coordinates[axis] = allocate_array(g->block_vertices, sizeof(float));
+    if (form == AS_HEXES) g->connectivity = allocate_array(CORNERS * g->block_cells, sizeof(int32_t));
     if (form == AS_HEXES) fill_connectivity(g);
 #pragma omp parallel for schedule(static)
     for (int64_t block = 0; block < g->block_count; block++) fill_block(g, block);
@@ -121,7 +121,7 @@ static void set_mesh(insitu_session *session, const bench_grid *g)
         insitu_lattice lattice = {
             .cells = {g->cells, g->cells, g->cells}, .origin = {-1, -1, -1}, .spacing = {spacing, spacing, spacing}};
         insitu_mesh mesh;
-        place_of_block(g, block, lattice.first);
+        compute_block_position(g, block, lattice.first);
         insitu_mesh_defaults(&mesh);
         mesh.vertex_count = g->block_vertices;
         mesh.cell_count = g->block_cells;
@@ -134,9 +134,9 @@ static void set_mesh(insitu_session *session, const bench_grid *g)
         } else {
             mesh.lattice = &lattice;
         }
-        bench_must(g->scene, session,
-                   g->form == AS_BLOCKS ? insitu_set_block(session, "cube", block, &mesh)
-                                        : insitu_set_mesh(session, "cube", &mesh));
+        bench_require_success(g->scene, session,
+                              g->form == AS_BLOCKS ? insitu_set_block(session, "cube", block, &mesh)
+                                                   : insitu_set_mesh(session, "cube", &mesh));
     }
 }
 
@@ -149,20 +149,20 @@ static void set_values(insitu_session *session, const bench_grid *g, int phase)
     field.changed = INSITU_CHANGED_VALUES;
     for (int64_t block = 0; block < g->block_count; block++) {
         field.values = (insitu_array){.data = g->values[phase] + block * g->block_vertices, .type = INSITU_FLOAT32};
-        bench_must(g->scene, session,
-                   g->form == AS_BLOCKS ? insitu_set_block_field(session, "cube", block, &field)
-                                        : insitu_set_field(session, "cube", &field));
+        bench_require_success(g->scene, session,
+                              g->form == AS_BLOCKS ? insitu_set_block_field(session, "cube", block, &field)
+                                                   : insitu_set_field(session, "cube", &field));
     }
 }
 
 static void measure_first_step(const bench_grid *g, int number, bench_series *series)
 {
     insitu_session *session = bench_open_session(g->scene, write_scene, g->scene);
-    const double began = bench_begin();
+    const double began = bench_start_timer();
     set_mesh(session, g);
     set_values(session, g, 0);
-    bench_must(g->scene, session, insitu_step(session, 0, 0));
-    bench_end(began, number, series);
+    bench_require_success(g->scene, session, insitu_step(session, 0, 0));
+    bench_stop_timer(began, number, series);
     insitu_destroy(&session);
 }
 
@@ -173,13 +173,13 @@ typedef struct bench_times {
 static void measure_new_values(insitu_session *session, const bench_grid *g, int number, bench_times *times)
 {
     set_values(session, g, number % PHASES);
-    const double began = bench_begin();
-    bench_must(g->scene, session, insitu_step(session, 0, 0));
-    bench_end(began, number, &times->whole);
+    const double began = bench_start_timer();
+    bench_require_success(g->scene, session, insitu_step(session, 0, 0));
+    bench_stop_timer(began, number, &times->whole);
     bench_add_sample(1e-3 * insitu_last_report(session)->surface_ms, number, &times->trace);
 }
 
-static void print(const bench_grid *g, const insitu_report *report, bench_times *times)
+static void print_times(const bench_grid *g, const insitu_report *report, bench_times *times)
 {
     const bench_subject *subject = &g->scene->subject;
     const char *name = form_names[g->form];
@@ -197,7 +197,7 @@ static void print(const bench_grid *g, const insitu_report *report, bench_times 
     bench_print_number(subject, measure, "bytes/cell", (double)report->bytes_copied / cells);
 }
 
-static void measure(const bench_command *command, test_mesh_kind kind, int n)
+static void measure_mesh(const bench_command *command, test_mesh_kind kind, int n)
 {
     bench_scene scene; /* only its camera is used */
     (void)kind;
@@ -221,7 +221,7 @@ static void measure(const bench_command *command, test_mesh_kind kind, int n)
         for (bench_form form = 0; form < FORM_COUNT; form++)
             measure_new_values(sessions[form], &grids[form], number, &times[form]);
     for (bench_form form = 0; form < FORM_COUNT; form++) {
-        print(&grids[form], insitu_last_report(sessions[form]), &times[form]);
+        print_times(&grids[form], insitu_last_report(sessions[form]), &times[form]);
         insitu_destroy(&sessions[form]);
         free_grid(&grids[form]);
     }
@@ -235,7 +235,7 @@ int main(int argc, char **argv)
         argc, argv,
         "Measures uniform grids of N^3 cells, MESH being hexes, as one lattice, as hexes and as blocks of\n"
         "16^3 cells: the first step, steps with new values, and bytes per cell.",
-        TEST_HEXES, measure);
+        TEST_HEXES, measure_mesh);
     MPI_Finalize();
     return status;
 }

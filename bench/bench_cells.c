@@ -45,7 +45,7 @@ static const struct {
                       {"mixed types given", {.with_types = true}},
                       {"float64 int64 types", {true, true, true, true, true}}};
 
-static void show(bench_scene *s, const picture *p)
+static void set_up_picture(bench_scene *s, const picture *p)
 {
     if (p->is_surface) {
         bench_scene_show_surfaces(s, 1);
@@ -64,7 +64,7 @@ static void show(bench_scene *s, const picture *p)
 }
 
 /* Resets the transfer function to that of bench_scene_create(). */
-static void show_band(bench_scene *s)
+static void reset_transfer_function(bench_scene *s)
 {
     s->transfer.unit_distance = bench_unit_distance;
     s->transfer.low = bench_knots[0], s->transfer.high = bench_knots[BENCH_KNOTS - 1];
@@ -75,9 +75,9 @@ static void show_band(bench_scene *s)
 
 static void time_frame(bench_scene *s, int number, bench_series *series)
 {
-    const double began = bench_begin();
+    const double began = bench_start_timer();
     bench_scene_frame(s);
-    bench_end(began, number, series);
+    bench_stop_timer(began, number, series);
 }
 
 /* Prints the error of the dense volume. If all light is lost between two samples, their sum is far from the integral,
@@ -99,7 +99,7 @@ static void measure_types(bench_scene *s, const bench_command *command)
     bench_scene_build(s);
     for (int i = 0; i < PICTURES; i++) {
         bench_series series = {0};
-        show(s, &pictures[i]);
+        set_up_picture(s, &pictures[i]);
         for (int number = 0; number <= command->runs; number++) time_frame(s, number, &series);
         bench_print_series(&s->subject, pictures[i].name, &series);
         if (pictures[i].is_surface)
@@ -108,7 +108,7 @@ static void measure_types(bench_scene *s, const bench_command *command)
             print_dense_error(s, &pictures[i]);
         else if (!pictures[i].shows_everything)
             bench_scene_integral_error(s, pictures[i].name);
-        show_band(s);
+        reset_transfer_function(s);
     }
 }
 
@@ -118,7 +118,7 @@ static void print_ratio(const bench_scene *s, const char *measure, const bench_s
     double ratios[BENCH_MAX_RUNS];
     for (int i = 0; i < series->count; i++) ratios[i] = series->seconds[i] / base->seconds[i];
     snprintf(name, sizeof name, "%s ratio", measure);
-    bench_print(&s->subject, name, "of float32", bench_stats_of(ratios, series->count));
+    bench_print(&s->subject, name, "of float32", bench_compute_stats(ratios, series->count));
 }
 
 static void measure_layouts(bench_scene *first, const bench_command *command)
@@ -140,7 +140,7 @@ static void measure_layouts(bench_scene *first, const bench_command *command)
     for (int i = 0; i < 2; i++) {
         bench_series series[LAYOUTS] = {0};
         char name[96];
-        for (int l = 0; l < LAYOUTS; l++) show(&scenes[l], &pictures[i]);
+        for (int l = 0; l < LAYOUTS; l++) set_up_picture(&scenes[l], &pictures[i]);
         for (int number = 0; number <= command->runs; number++)
             for (int l = 0; l < LAYOUTS; l++) time_frame(&scenes[l], number, &series[l]);
         const bench_series base = series[0];
@@ -154,7 +154,7 @@ static void measure_layouts(bench_scene *first, const bench_command *command)
 }
 
 /* Counts the cells whose values overlap a range, which a picture shows. */
-static double count_shown(const bench_scene *s, double low, double high)
+static double count_visible_cells(const bench_scene *s, double low, double high)
 {
     const grid *g = &s->view.cells;
     int64_t count = 0;
@@ -175,10 +175,10 @@ static double count_shown(const bench_scene *s, double low, double high)
 /* Measures the time from a step's values to the picture, which includes refitting the tree's ranges. */
 static void time_new_values(bench_scene *s, int number, bench_series *series)
 {
-    const double began = bench_begin();
+    const double began = bench_start_timer();
     if (mmbvh_refit_ranges(&s->tree, &s->view.cells, &s->view.field, &s->how) != INSITU_OK) abort();
     bench_scene_frame(s);
-    bench_end(began, number, series);
+    bench_stop_timer(began, number, series);
 }
 
 static void print_cost(const bench_scene *s, const char *measure, bench_series *series, double shown)
@@ -188,7 +188,7 @@ static void print_cost(const bench_scene *s, const char *measure, bench_series *
     for (int k = 0; k < series->count; k++) costs[k] = 1e9 * series->seconds[k] * s->subject.threads / shown;
     bench_print_series(&s->subject, measure, series);
     snprintf(name, sizeof name, "%s cost", measure);
-    bench_print(&s->subject, name, "ns/shown cell", bench_stats_of(costs, series->count));
+    bench_print(&s->subject, name, "ns/shown cell", bench_compute_stats(costs, series->count));
 }
 
 /* Measures the work of one of a thousand ranks: the whole mesh is so far away that it is AWAY_PIXELS pixels wide. */
@@ -213,10 +213,10 @@ static void measure_thousand(bench_scene *s, const bench_command *command)
                      high = is_surface            ? bench_isovalues[0]
                             : p->shows_everything ? 9
                                                   : bench_knots[2];
-        const double shown = count_shown(s, low, high);
+        const double shown = count_visible_cells(s, low, high);
         bench_series series = {0}, new_values = {0};
         char name[96];
-        show(s, p);
+        set_up_picture(s, p);
         for (int number = 0; number <= command->runs; number++) {
             time_frame(s, number, &series);
             if (is_surface) time_new_values(s, number, &new_values);
@@ -226,7 +226,7 @@ static void measure_thousand(bench_scene *s, const bench_command *command)
         print_cost(s, p->name, &series, shown);
         snprintf(name, sizeof name, "%s new values", p->name);
         if (is_surface) print_cost(s, name, &new_values, shown);
-        show_band(s);
+        reset_transfer_function(s);
     }
 }
 

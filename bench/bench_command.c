@@ -8,7 +8,7 @@
 #include "bench_stats.h"
 #include "render.h"
 
-static bool usage(const char *program, const char *about, bench_command *command, int status)
+static bool print_usage(const char *program, const char *about, bench_command *command, int status)
 {
     const char *slash = strrchr(program, '/');
     fprintf(status ? stderr : stdout,
@@ -62,7 +62,7 @@ bool bench_command_parse(int argc, char **argv, const char *about, test_mesh_kin
     bool head = true, is_good = true;
     *command = (bench_command){.runs = 5, .shrink = 1};
     for (int found; is_good && (found = getopt_long(argc, argv, "", list, NULL)) != -1;) {
-        if (found == HELP) return usage(argv[0], about, command, 0);
+        if (found == HELP) return print_usage(argv[0], about, command, 0);
         if (found == NO_HEAD)
             head = false;
         else if (found == RUNS)
@@ -78,7 +78,7 @@ bool bench_command_parse(int argc, char **argv, const char *about, test_mesh_kin
         is_good = add_mesh(argv[optind], last, command);
         if (!is_good) fprintf(stderr, "%s: expected a mesh as tets:31, at most %d\n", argv[optind], BENCH_MAX_MESHES);
     }
-    if (!is_good || !command->mesh_count) return usage(argv[0], about, command, 2);
+    if (!is_good || !command->mesh_count) return print_usage(argv[0], about, command, 2);
     if (render_isa_warning() && *render_isa_warning()) fprintf(stderr, "%s: %s\n", argv[0], render_isa_warning());
     if (head) bench_print_head();
     return true;

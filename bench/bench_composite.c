@@ -39,16 +39,16 @@ static void count_blocks(int blocks[3])
 }
 
 /* Orders the ranks' blocks from front to back; the eye is beyond the last block along every axis. */
-static void block_order(int *order)
+static void sort_blocks_by_depth(int *order)
 {
     for (int i = 0; i < rank_count; i++) order[i] = rank_count - 1 - i;
 }
 
-static void deal_out(const test_mesh *mesh, const options *o, int *owners)
+static void distribute_cells(const test_mesh *mesh, const options *o, int *owners)
 {
     int blocks[3];
     count_blocks(blocks);
-    if (o->is_random) test_partition(mesh, TEST_RANDOM, o->size, rank_count, owners);
+    if (o->is_random) test_partition_cells(mesh, TEST_RANDOM, o->size, rank_count, owners);
     for (int64_t c = 0; c < mesh->cell_count && !o->is_random; c++) {
         int block[3];
         for (int axis = 0; axis < 3; axis++) {
@@ -68,8 +68,8 @@ static void make_scene(const options *o, bench_scene *s)
     bench_scene_mesh(TEST_HEXES, o->size, &whole);
     int *owners = malloc((size_t)whole.cell_count * sizeof *owners);
     if (!owners) abort();
-    deal_out(&whole, o, owners);
-    test_mesh_part(&whole, owners, own_rank, &part);
+    distribute_cells(&whole, o, owners);
+    test_mesh_extract_part(&whole, owners, own_rank, &part);
     test_view_free(&s->view);
     test_view_create(&part, (test_layout){0}, &s->view);
     s->view.cells.ghosts = NULL;
@@ -83,7 +83,7 @@ static void make_scene(const options *o, bench_scene *s)
 
 /* ---- one rank's picture for IceT ----------------------------------------------------------------------------- */
 
-static int by_pixel(const void *a, const void *b)
+static int compare_pixels(const void *a, const void *b)
 {
     const uint32_t of_a = ((const fragment *)a)->pixel, of_b = ((const fragment *)b)->pixel;
     return (of_a > of_b) - (of_a < of_b);
@@ -114,7 +114,7 @@ static void make_picture(const fragment_list *list, bool is_surface, int width, 
     float *rgba = calloc((size_t)pixels * 4, sizeof *rgba), *depth = malloc((size_t)pixels * sizeof *depth);
     if (!sorted || !rgba || !depth) abort();
     if (list->count) memcpy(sorted, list->items, (size_t)list->count * sizeof *sorted);
-    qsort(sorted, (size_t)list->count, sizeof *sorted, by_pixel);
+    qsort(sorted, (size_t)list->count, sizeof *sorted, compare_pixels);
     for (int64_t p = 0; p < pixels; p++) depth[p] = 1;
     for (int64_t i = 0, next; i < list->count; i = next) {
         for (next = i + 1; next < list->count && sorted[next].pixel == sorted[i].pixel;) next++;
@@ -153,14 +153,14 @@ typedef struct bench {
     measure measures[COMP_SCHEDULE_COUNT + BENCH_ICET_STRATEGIES];
 } bench;
 
-static double reduce(double mine, MPI_Op op)
+static double reduce_over_ranks(double mine, MPI_Op op)
 {
     double all = 0;
     MPI_Allreduce(&mine, &all, 1, MPI_DOUBLE, op, MPI_COMM_WORLD);
     return all;
 }
 
-static double cpu_seconds(void)
+static double read_cpu_seconds(void)
 {
     struct rusage used;
     getrusage(RUSAGE_SELF, &used);
@@ -172,20 +172,20 @@ typedef struct stopwatch {
     double began, cpu_began;
 } stopwatch;
 
-static stopwatch begin(void)
+static stopwatch start_stopwatch(void)
 {
     MPI_Barrier(MPI_COMM_WORLD);
-    return (stopwatch){bench_seconds(), cpu_seconds()};
+    return (stopwatch){bench_seconds(), read_cpu_seconds()};
 }
 
-static void end(const stopwatch *watch, int number, measure *m)
+static void stop_stopwatch(const stopwatch *watch, int number, measure *m)
 {
-    const double seconds = bench_seconds() - watch->began, cpu = cpu_seconds() - watch->cpu_began;
-    bench_add_sample(reduce(seconds, MPI_MAX), number, &m->series);
-    bench_add_sample(reduce(cpu, MPI_SUM), number, &m->cpu);
+    const double seconds = bench_seconds() - watch->began, cpu = read_cpu_seconds() - watch->cpu_began;
+    bench_add_sample(reduce_over_ranks(seconds, MPI_MAX), number, &m->series);
+    bench_add_sample(reduce_over_ranks(cpu, MPI_SUM), number, &m->cpu);
 }
 
-static void run_own(bench *b, comp_schedule schedule, int number, measure *m)
+static void run_library(bench *b, comp_schedule schedule, int number, measure *m)
 {
     const fragment_list *have = &b->scene->fragments;
     const size_t bytes = (size_t)have->count * sizeof(fragment);
@@ -199,31 +199,31 @@ static void run_own(bench *b, comp_schedule schedule, int number, measure *m)
     b->group.nodes = (comp_nodes){schedule != COMP_AUTOMATIC && rank_count % 4 == 0 ? 4 : 1, false};
     base_memory_reset_peak();
     const int64_t held = base_memory_held();
-    const stopwatch watch = begin();
+    const stopwatch watch = start_stopwatch();
     if (comp_composite(&b->group, &list, background, 0, &b->out, &statistics, &error)) abort();
-    end(&watch, number, m);
+    stop_stopwatch(&watch, number, m);
     m->can = true;
-    m->bytes = reduce((double)statistics.sent_bytes, MPI_SUM);
-    m->messages = reduce((double)statistics.sent_messages, MPI_SUM);
-    m->peak = reduce((double)(base_memory_peak() - held + (int64_t)bytes), MPI_MAX);
+    m->bytes = reduce_over_ranks((double)statistics.sent_bytes, MPI_SUM);
+    m->messages = reduce_over_ranks((double)statistics.sent_messages, MPI_SUM);
+    m->peak = reduce_over_ranks((double)(base_memory_peak() - held + (int64_t)bytes), MPI_MAX);
     snprintf(m->name, sizeof m->name, "%s", comp_schedule_name(schedule));
 }
 
 static void run_icet(bench *b, int strategy, int number, measure *m)
 {
     const float *rgba;
-    const stopwatch watch = begin();
+    const stopwatch watch = start_stopwatch();
     const double bytes = bench_icet_composite(b->icet, strategy, &b->picture, &rgba);
-    end(&watch, number, m);
-    m->can = reduce(bytes, MPI_MIN) >= 0;
-    m->bytes = reduce(bytes, MPI_SUM);
+    stop_stopwatch(&watch, number, m);
+    m->can = reduce_over_ranks(bytes, MPI_MIN) >= 0;
+    m->bytes = reduce_over_ranks(bytes, MPI_SUM);
     snprintf(m->name, sizeof m->name, "IceT %s", bench_icet_strategy(strategy));
 }
 
-static void print(const bench *b, const char *layer, measure *m)
+static void print_measurement(const bench *b, const char *layer, measure *m)
 {
-    const bench_stats time = bench_stats_of(m->series.seconds, m->series.count);
-    const bench_stats cpu = bench_stats_of(m->cpu.seconds, m->cpu.count);
+    const bench_stats time = bench_compute_stats(m->series.seconds, m->series.count);
+    const bench_stats cpu = bench_compute_stats(m->cpu.seconds, m->cpu.count);
     if (own_rank || !m->can) return;
     printf("%s,%s,%d,%s,%.2f,%.2f,%.2f,%.2f,%.3f,%.0f,%.2f\n", layer, b->options->is_random ? "random" : "block",
            rank_count, m->name, 1e3 * time.median, 1e3 * time.low, 1e3 * time.high, 1e3 * cpu.median, 1e-6 * m->bytes,
@@ -238,15 +238,16 @@ static void measure_layer(bench *b, const char *layer, bool is_surface)
     make_picture(&b->scene->fragments, is_surface, b->options->width, b->options->height, &b->picture);
     int *order = malloc((size_t)rank_count * sizeof *order);
     if (!order) abort();
-    block_order(order);
+    sort_blocks_by_depth(order);
     b->picture.order = order;
     memset(b->measures, 0, sizeof b->measures);
     for (int run = 0; run <= b->options->runs; run++) {
-        for (int s = COMP_AUTOMATIC; s < COMP_SCHEDULE_COUNT; s++) run_own(b, (comp_schedule)s, run, &b->measures[s]);
+        for (int s = COMP_AUTOMATIC; s < COMP_SCHEDULE_COUNT; s++)
+            run_library(b, (comp_schedule)s, run, &b->measures[s]);
         for (int s = 0; s < BENCH_ICET_STRATEGIES && has_peer; s++)
             run_icet(b, s, run, &b->measures[COMP_SCHEDULE_COUNT + s]);
     }
-    for (int i = 0; i < COMP_SCHEDULE_COUNT + BENCH_ICET_STRATEGIES; i++) print(b, layer, &b->measures[i]);
+    for (int i = 0; i < COMP_SCHEDULE_COUNT + BENCH_ICET_STRATEGIES; i++) print_measurement(b, layer, &b->measures[i]);
     free((void *)(uintptr_t)b->picture.rgba);
     free((void *)(uintptr_t)b->picture.depth);
     free(order);

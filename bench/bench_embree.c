@@ -48,7 +48,7 @@ typedef struct leaf_node {
     uint32_t cells[];
 } leaf_node;
 
-static void *must(void *p)
+static void *require_memory(void *p)
 {
     if (!p) abort();
     return p;
@@ -69,9 +69,9 @@ bool bench_embree_is_available(void)
 bench_embree *bench_embree_create(int threads)
 {
     char options[64];
-    bench_embree *e = must(calloc(1, sizeof *e));
+    bench_embree *e = require_memory(calloc(1, sizeof *e));
     snprintf(options, sizeof options, "threads=%d", threads);
-    e->device = must(rtcNewDevice(options));
+    e->device = require_memory(rtcNewDevice(options));
     e->threads = threads;
     rtcSetDeviceErrorFunction(e->device, print_embree_error, NULL);
     return e;
@@ -92,7 +92,7 @@ void bench_embree_destroy(bench_embree *e)
 static void grow_iota(bench_embree *e, int64_t count)
 {
     if (count <= e->iota_count) return;
-    e->iota = must(realloc(e->iota, (size_t)count * sizeof *e->iota));
+    e->iota = require_memory(realloc(e->iota, (size_t)count * sizeof *e->iota));
     for (int64_t i = e->iota_count; i < count; i++) e->iota[i] = (uint32_t)i;
     e->iota_count = count;
 }
@@ -122,7 +122,7 @@ typedef struct pinhole {
     int width, height;
 } pinhole;
 
-static pinhole pinhole_of(const render_camera *c)
+static pinhole make_pinhole(const render_camera *c)
 {
     pinhole p = {.width = c->width, .height = c->height};
     double base[3], corner[3], beside[3], below[3];
@@ -164,8 +164,8 @@ make_packet(const pinhole *p, int x0, int y0, struct RTCRayHit16 *packet, int *v
     }
 }
 
-static void keep_packet(const pinhole *p, int x0, int y0, const struct RTCRayHit16 *packet, const int *valid,
-                        float *depths, float *normals)
+static void store_packet(const pinhole *p, int x0, int y0, const struct RTCRayHit16 *packet, const int *valid,
+                         float *depths, float *normals)
 {
     for (int i = 0; i < 16; i++) {
         if (!valid[i]) continue;
@@ -180,7 +180,7 @@ static void keep_packet(const pinhole *p, int x0, int y0, const struct RTCRayHit
 
 void bench_embree_trace(bench_embree *e, const render_camera *camera, float *depths, float *normals)
 {
-    const pinhole p = pinhole_of(camera);
+    const pinhole p = make_pinhole(camera);
     const int columns = (p.width + PACKET - 1) / PACKET, rows = (p.height + PACKET - 1) / PACKET;
 #pragma omp parallel for schedule(dynamic, 4) num_threads(e->threads)
     for (int row = 0; row < rows; row++)
@@ -192,7 +192,7 @@ void bench_embree_trace(bench_embree *e, const render_camera *camera, float *dep
             context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
             make_packet(&p, PACKET * column, PACKET * row, &packet, valid);
             rtcIntersect16(valid, e->scene, &context, &packet);
-            keep_packet(&p, PACKET * column, PACKET * row, &packet, valid, depths, normals);
+            store_packet(&p, PACKET * column, PACKET * row, &packet, valid, depths, normals);
         }
 }
 
@@ -231,7 +231,7 @@ void bench_embree_occlude(bench_embree *e, const bench_embree_ray *rays, int64_t
 
 /* ---- the builder for cells ---- */
 
-static struct RTCBuildPrimitive box_of(const grid *cells, int64_t cell)
+static struct RTCBuildPrimitive compute_cell_box(const grid *cells, int64_t cell)
 {
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
     grid_walk walk = grid_walk_cell(cells, cell);
@@ -257,11 +257,11 @@ void bench_embree_set_cells(bench_embree *e, const grid *cells)
 {
     const size_t bytes = (size_t)cells->cell_count * sizeof *e->boxes;
     e->cell_count = cells->cell_count;
-    e->boxes = must(aligned_alloc(32, bytes));
-    e->sorted = must(aligned_alloc(32, bytes));
+    e->boxes = require_memory(aligned_alloc(32, bytes));
+    e->sorted = require_memory(aligned_alloc(32, bytes));
 #pragma omp parallel for schedule(static)
-    for (int64_t cell = 0; cell < cells->cell_count; cell++) e->boxes[cell] = box_of(cells, cell);
-    e->bvh = must(rtcNewBVH(e->device));
+    for (int64_t cell = 0; cell < cells->cell_count; cell++) e->boxes[cell] = compute_cell_box(cells, cell);
+    e->bvh = require_memory(rtcNewBVH(e->device));
 }
 
 static void *create_inner(RTCThreadLocalAllocator allocator, unsigned count, void *user)
@@ -331,18 +331,18 @@ double bench_embree_build_cells(bench_embree *e, bench_embree_builder builder)
     arguments.setNodeBounds = is_wide ? set_wide_bounds : set_inner_bounds;
     arguments.createLeaf = create_leaf;
     const double began = bench_seconds();
-    e->root = must(rtcBuildBVH(&arguments));
+    e->root = require_memory(rtcBuildBVH(&arguments));
     return bench_seconds() - began;
 }
 
-static double half_area(const struct RTCBounds *b)
+static double compute_half_area(const struct RTCBounds *b)
 {
     const double x = (double)b->upper_x - (double)b->lower_x, y = (double)b->upper_y - (double)b->lower_y;
     const double z = (double)b->upper_z - (double)b->lower_z;
     return x * y + y * z + z * x;
 }
 
-static struct RTCBounds united(const struct RTCBounds *a, const struct RTCBounds *b)
+static struct RTCBounds unite_bounds(const struct RTCBounds *a, const struct RTCBounds *b)
 {
     return (struct RTCBounds){.lower_x = fminf(a->lower_x, b->lower_x),
                               .lower_y = fminf(a->lower_y, b->lower_y),
@@ -354,12 +354,12 @@ static struct RTCBounds united(const struct RTCBounds *a, const struct RTCBounds
 
 /* Returns the number of tests below a node, each weighted by the half area of its node. `area` is the half area of this
  * node. An inner node tests two boxes, and a leaf tests its cells. */
-static double cost_below(const tree_node *node, double area)
+static double compute_subtree_cost(const tree_node *node, double area)
 {
     if (!node->child_count) return area * node->cell_count;
     const inner_node *inner = (const inner_node *)node;
     double sum = 2 * area;
-    for (int i = 0; i < 2; i++) sum += cost_below(inner->children[i], half_area(&inner->bounds[i]));
+    for (int i = 0; i < 2; i++) sum += compute_subtree_cost(inner->children[i], compute_half_area(&inner->bounds[i]));
     return sum;
 }
 
@@ -367,6 +367,6 @@ double bench_embree_cost(const bench_embree *e)
 {
     const inner_node *root = e->root;
     if (!root->head.child_count) return 1 + (double)root->head.cell_count;
-    const struct RTCBounds all = united(&root->bounds[0], &root->bounds[1]);
-    return 1 + cost_below(&root->head, half_area(&all)) / half_area(&all);
+    const struct RTCBounds all = unite_bounds(&root->bounds[0], &root->bounds[1]);
+    return 1 + compute_subtree_cost(&root->head, compute_half_area(&all)) / compute_half_area(&all);
 }

@@ -27,13 +27,13 @@ struct bench_pixels {
     unsigned char *types;
 };
 
-static void *must(void *p)
+static void *require_memory(void *p)
 {
     if (!p) abort();
     return p;
 }
 
-static chosen_pixel choose(const bench_pixels *all, int column, int row)
+static chosen_pixel choose_pixel(const bench_pixels *all, int column, int row)
 {
     const uint64_t block = (uint64_t)(row * 100000 + column);
     const int x = column * all->block + (int)(test_uniform(2 * block, 11) * all->block);
@@ -41,7 +41,7 @@ static chosen_pixel choose(const bench_pixels *all, int column, int row)
     return (chosen_pixel){(uint32_t)(y * all->camera.width + x), x, y};
 }
 
-static void to_pixel(const render_camera *c, const double world[3], double out[2])
+static void project_to_pixel(const render_camera *c, const double world[3], double out[2])
 {
     double p[3] = {0, 0, 0};
     for (int i = 0; i < 3; i++) {
@@ -55,7 +55,7 @@ static void to_pixel(const render_camera *c, const double world[3], double out[2
     out[1] = 0.5 * c->height - 0.5 - per_slope * p[1] / p[2];
 }
 
-static bool holds_chosen(const bench_pixels *all, const double low[2], const double high[2])
+static bool contains_chosen_pixel(const bench_pixels *all, const double low[2], const double high[2])
 {
     const int last_column = (int)fmin(all->columns - 1, floor(high[0] / all->block));
     const int last_row = (int)fmin(all->rows - 1, floor(high[1] / all->block));
@@ -75,17 +75,17 @@ static bool is_wanted(const bench_pixels *all, const grid *cells, int64_t cell)
     while (grid_walk_next(&walk, &vertex)) {
         double world[3], pixel[2];
         grid_vertex(cells, vertex, world);
-        to_pixel(&all->camera, world, pixel);
+        project_to_pixel(&all->camera, world, pixel);
         for (int axis = 0; axis < 2; axis++) {
             low[axis] = fmin(low[axis], pixel[axis] - 1);
             high[axis] = fmax(high[axis], pixel[axis] + 1);
         }
     }
-    return holds_chosen(all, low, high);
+    return contains_chosen_pixel(all, low, high);
 }
 
 /* Returns the range of the cell's entries in connectivity: vertices, or faces of a polyhedron. */
-static void cell_entries(const grid *cells, int64_t cell, int64_t *first, int64_t *end)
+static void find_cell_entries(const grid *cells, int64_t cell, int64_t *first, int64_t *end)
 {
     const grid_walk walk = grid_walk_cell(cells, cell);
     *first = walk.next;
@@ -93,22 +93,22 @@ static void cell_entries(const grid *cells, int64_t cell, int64_t *first, int64_
 }
 
 /* Fills `kept` with the wanted cells, in the order of the mesh. */
-static void keep_cells(bench_pixels *all, const grid *cells, const unsigned char *wanted)
+static void copy_wanted_cells(bench_pixels *all, const grid *cells, const unsigned char *wanted)
 {
     int64_t count = 0, entries = 0, at = 0, first, end;
     for (int64_t cell = 0; cell < cells->cell_count; cell++) {
         if (!wanted[cell]) continue;
-        cell_entries(cells, cell, &first, &end);
+        find_cell_entries(cells, cell, &first, &end);
         entries += end - first;
         count++;
     }
-    all->connectivity = must(malloc(sizeof(int64_t) * (size_t)(entries + 1)));
-    all->offsets = must(malloc(sizeof(int64_t) * (size_t)(count + 1)));
-    all->types = must(malloc((size_t)(count + 1)));
+    all->connectivity = require_memory(malloc(sizeof(int64_t) * (size_t)(entries + 1)));
+    all->offsets = require_memory(malloc(sizeof(int64_t) * (size_t)(count + 1)));
+    all->types = require_memory(malloc((size_t)(count + 1)));
     all->offsets[0] = 0;
     for (int64_t cell = 0; cell < cells->cell_count; cell++) {
         if (!wanted[cell]) continue;
-        cell_entries(cells, cell, &first, &end);
+        find_cell_entries(cells, cell, &first, &end);
         all->types[at] = (unsigned char)grid_cell_type(cells, cell);
         all->offsets[at + 1] = all->offsets[at] + end - first;
         for (int64_t i = first; i < end; i++)
@@ -126,17 +126,18 @@ static void keep_cells(bench_pixels *all, const grid *cells, const unsigned char
 
 bench_pixels *bench_pixels_create(const grid *cells, const render_camera *camera, int block)
 {
-    bench_pixels *all = must(calloc(1, sizeof *all));
+    bench_pixels *all = require_memory(calloc(1, sizeof *all));
     all->camera = *camera;
     all->block = block;
     all->columns = camera->width / block;
     all->rows = camera->height / block;
-    all->pixels = must(malloc((size_t)(all->columns * all->rows) * sizeof *all->pixels));
-    for (int i = 0; i < all->columns * all->rows; i++) all->pixels[i] = choose(all, i % all->columns, i / all->columns);
-    unsigned char *wanted = must(malloc((size_t)cells->cell_count + 1));
+    all->pixels = require_memory(malloc((size_t)(all->columns * all->rows) * sizeof *all->pixels));
+    for (int i = 0; i < all->columns * all->rows; i++)
+        all->pixels[i] = choose_pixel(all, i % all->columns, i / all->columns);
+    unsigned char *wanted = require_memory(malloc((size_t)cells->cell_count + 1));
 #pragma omp parallel for schedule(static)
     for (int64_t cell = 0; cell < cells->cell_count; cell++) wanted[cell] = is_wanted(all, cells, cell);
-    keep_cells(all, cells, wanted);
+    copy_wanted_cells(all, cells, wanted);
     free(wanted);
     return all;
 }
@@ -155,7 +156,7 @@ int bench_pixels_count(const bench_pixels *all)
     return all->columns * all->rows;
 }
 
-void bench_pixels_place(const bench_pixels *all, int i, int *x, int *y)
+void bench_pixels_position(const bench_pixels *all, int i, int *x, int *y)
 {
     *x = all->pixels[i].x;
     *y = all->pixels[i].y;
@@ -174,7 +175,7 @@ static reference_ray *trace_chosen(const bench_pixels *all, const render_job *jo
     const int count = all->columns * all->rows;
     render_job kept = *job;
     kept.parts = &part;
-    reference_ray *rays = must(malloc((size_t)count * sizeof *rays));
+    reference_ray *rays = require_memory(malloc((size_t)count * sizeof *rays));
     reference_scene *scene = reference_create(&kept);
 #pragma omp parallel for schedule(dynamic)
     for (int i = 0; i < count; i++) reference_trace(scene, all->pixels[i].x, all->pixels[i].y, nothing, &rays[i]);
@@ -183,7 +184,7 @@ static reference_ray *trace_chosen(const bench_pixels *all, const render_job *jo
 }
 
 /* Returns the index of this pixel among the chosen pixels, or -1. */
-static int chosen_index(const bench_pixels *all, uint32_t pixel)
+static int find_chosen_pixel(const bench_pixels *all, uint32_t pixel)
 {
     const int x = (int)pixel % all->camera.width, y = (int)pixel / all->camera.width;
     const int column = x / all->block, row = y / all->block, i = row * all->columns + column;
@@ -198,10 +199,10 @@ void bench_pixels_merge(const bench_pixels *all, const render_space *space, cons
     enum { MANY = 4096 };
     const float nothing[4] = {0, 0, 0, 0};
     const int count = all->columns * all->rows;
-    fragment *own = must(malloc((size_t)count * MANY * sizeof *own));
-    int *own_count = must(calloc((size_t)count, sizeof *own_count));
+    fragment *own = require_memory(malloc((size_t)count * MANY * sizeof *own));
+    int *own_count = require_memory(calloc((size_t)count, sizeof *own_count));
     for (int64_t i = 0; i < fragments->count; i++) {
-        const int at = chosen_index(all, fragments->items[i].pixel);
+        const int at = find_chosen_pixel(all, fragments->items[i].pixel);
         if (at < 0) continue;
         if (own_count[at] == MANY) abort();
         own[(int64_t)at * MANY + own_count[at]++] = fragments->items[i];
@@ -215,8 +216,8 @@ void bench_pixels_merge(const bench_pixels *all, const render_space *space, cons
     free(own_count);
 }
 
-static double field_error(const bench_pixels *all, const render_job *job, const chosen_pixel *p, double depth,
-                          double (*exact)(const double position[3]))
+static double compute_field_error(const bench_pixels *all, const render_job *job, const chosen_pixel *p, double depth,
+                                  double (*exact)(const double position[3]))
 {
     double base[3], direction[3], point[3];
     render_camera_ray(&all->camera, p->x, p->y, base, direction);
@@ -228,22 +229,22 @@ bench_surface_error bench_surface_compare(const bench_pixels *all, const render_
                                           double (*exact)(const double position[3]), const fragment_list *fragments)
 {
     const int count = all->columns * all->rows;
-    float *rgba = must(malloc(4 * (size_t)count * sizeof *rgba));
-    double *depths = must(malloc((size_t)count * sizeof *depths));
-    double *errors = must(malloc(2 * (size_t)count * sizeof *errors)), *fields = errors + count;
+    float *rgba = require_memory(malloc(4 * (size_t)count * sizeof *rgba));
+    double *depths = require_memory(malloc((size_t)count * sizeof *depths));
+    double *errors = require_memory(malloc(2 * (size_t)count * sizeof *errors)), *fields = errors + count;
     reference_ray *truth = trace_chosen(all, job);
     bench_surface_error out = {.checked = count};
     int both = 0, hits = 0;
     bench_pixels_merge(all, &job->space, fragments, rgba, depths);
     for (int i = 0; i < count; i++) {
         const bool is_hit = isfinite(depths[i]), should_hit = truth[i].hit_count > 0;
-        if (is_hit) fields[hits++] = field_error(all, job, &all->pixels[i], depths[i], exact);
+        if (is_hit) fields[hits++] = compute_field_error(all, job, &all->pixels[i], depths[i], exact);
         if (is_hit && should_hit) errors[both++] = fabs(depths[i] - truth[i].hits[0].depth);
         out.disagreements += is_hit != should_hit;
         out.ambiguous += is_hit != should_hit && truth[i].ambiguous;
     }
-    out.depth = bench_stats_of(errors, both);
-    out.field = bench_stats_of(fields, hits);
+    out.depth = bench_compute_stats(errors, both);
+    out.field = bench_compute_stats(fields, hits);
     free(rgba);
     free(depths);
     free(errors);
@@ -254,9 +255,9 @@ bench_surface_error bench_surface_compare(const bench_pixels *all, const render_
 bench_stats bench_volume_compare(const bench_pixels *all, const render_job *job, const fragment_list *fragments)
 {
     const int count = all->columns * all->rows;
-    float *rgba = must(malloc(4 * (size_t)count * sizeof *rgba));
-    double *depths = must(malloc((size_t)count * sizeof *depths));
-    double *errors = must(malloc((size_t)count * sizeof *errors));
+    float *rgba = require_memory(malloc(4 * (size_t)count * sizeof *rgba));
+    double *depths = require_memory(malloc((size_t)count * sizeof *depths));
+    double *errors = require_memory(malloc((size_t)count * sizeof *errors));
     reference_ray *truth = trace_chosen(all, job);
     bench_pixels_merge(all, &job->space, fragments, rgba, depths);
     int seen = 0;
@@ -267,7 +268,7 @@ bench_stats bench_volume_compare(const bench_pixels *all, const render_job *job,
             error = fmax(error, fabs((double)rgba[4 * i + channel] - truth[i].rgba[channel]));
         errors[seen++] = error;
     }
-    const bench_stats out = bench_stats_of(errors, seen);
+    const bench_stats out = bench_compute_stats(errors, seen);
     free(rgba);
     free(depths);
     free(errors);

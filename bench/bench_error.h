@@ -15,7 +15,7 @@ bench_pixels *bench_pixels_create(const grid *cells, const render_camera *camera
 void bench_pixels_destroy(bench_pixels *pixels);
 
 int bench_pixels_count(const bench_pixels *pixels);
-void bench_pixels_place(const bench_pixels *pixels, int i, int *x, int *y);
+void bench_pixels_position(const bench_pixels *pixels, int i, int *x, int *y);
 
 /* Returns the cells that may be visible in the chosen pixels, with all vertices of the mesh. */
 const grid *bench_pixels_cells(const bench_pixels *pixels);

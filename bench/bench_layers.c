@@ -56,7 +56,7 @@ static const bench_group flow = {"bench_layers flow",
                                   {BENCH_PLANES, BENCH_LAYER_PLANES},
                                   {BENCH_MONTAGE, BENCH_LAYER_MONTAGE}}};
 
-static const float *floats(const grid_array *a)
+static const float *get_float_data(const grid_array *a)
 {
     return (const float *)(const void *)a->data;
 }
@@ -66,12 +66,12 @@ static bench_layers_vtk *create_vtk(const bench_scene *scene, float *xyz)
     const grid *g = &scene->view.cells;
     const render_camera *camera = &scene->job.camera;
     for (int64_t v = 0; v < g->vertex_count; v++)
-        for (int axis = 0; axis < 3; axis++) xyz[3 * v + axis] = floats(&g->coordinates[axis])[v];
+        for (int axis = 0; axis < 3; axis++) xyz[3 * v + axis] = get_float_data(&g->coordinates[axis])[v];
     const bench_contour_mesh mesh = {.vertex_count = g->vertex_count,
                                      .cell_count = g->cell_count,
                                      .cell_type = g->cell_type,
                                      .xyz = xyz,
-                                     .values = floats(&scene->view.field.values),
+                                     .values = get_float_data(&scene->view.field.values),
                                      .connectivity = (const int32_t *)(const void *)g->connectivity.data};
     bench_contour_view view = {.degrees = bench_degrees, .width = camera->width, .height = camera->height};
     for (int axis = 0; axis < 3; axis++) {
@@ -116,9 +116,9 @@ static void measure_pictures(const bench_scene *scene, const bench_group *group,
             bench_session_step(&sessions[i], number);
             if (!vtk || pairs[i].layer == BENCH_LAYER_NONE) continue;
             bench_layers_vtk_set(vtk, bench_session_values(&sessions[i]), bench_session_velocities(&sessions[i]));
-            const double began = bench_begin();
+            const double began = bench_start_timer();
             bench_layers_vtk_draw(vtk, pairs[i].layer);
-            bench_end(began, number, &peers[i]);
+            bench_stop_timer(began, number, &peers[i]);
         }
     for (int i = 0; i < group->count; i++) {
         print_pair(&sessions[i], group->is_by_part, &peers[i]);

@@ -38,30 +38,30 @@ typedef struct lit {
     kind kinds[KINDS];
 } lit;
 
-static void *must(void *p)
+static void *require_memory(void *p)
 {
     if (!p) abort();
     return p;
 }
 
-static void fail(lit *l)
+static void exit_with_error(lit *l)
 {
     fprintf(stderr, "bench_light: %s\n", l->scene.error.message);
     exit(1);
 }
 
-static void take_hits(lit *l)
+static void copy_hits(lit *l)
 {
     const size_t most = (size_t)l->scene.fragments.count + 1;
-    l->hits = must(realloc(l->hits, most * sizeof *l->hits));
-    l->rays = must(realloc(l->rays, most * sizeof *l->rays));
-    l->open = must(realloc(l->open, most * sizeof *l->open));
+    l->hits = require_memory(realloc(l->hits, most * sizeof *l->hits));
+    l->rays = require_memory(realloc(l->rays, most * sizeof *l->rays));
+    l->open = require_memory(realloc(l->open, most * sizeof *l->open));
     l->count = 0;
     for (int64_t i = 0; i < l->scene.fragments.count; i++)
         l->count += render_hit_of(&l->scene.job, &l->scene.fragments.items[i], &l->hits[l->count], &l->rays[l->count]);
 }
 
-static int bits_of(const render_hit_rays *rays)
+static int count_ray_bits(const render_hit_rays *rays)
 {
     return __builtin_popcountll(rays->samples) + __builtin_popcount(rays->lights);
 }
@@ -71,12 +71,12 @@ static void list_rays(lit *l, kind *k)
 {
     const render_job *job = &l->scene.job;
     double directions[RENDER_MAX_SAMPLES][3], start[3];
-    k->list = must(realloc(k->list, (size_t)(k->rays + 1) * sizeof *k->list));
-    k->theirs = must(realloc(k->theirs, (size_t)(k->rays + 1) * sizeof *k->theirs));
+    k->list = require_memory(realloc(k->list, (size_t)(k->rays + 1) * sizeof *k->list));
+    k->theirs = require_memory(realloc(k->theirs, (size_t)(k->rays + 1) * sizeof *k->theirs));
     bench_embree_ray *to = k->list;
     for (int64_t i = 0; i < l->count; i++) {
         render_hit_samples(job, &l->hits[i], start, directions);
-        for (int n = 0; n < bits_of(&l->rays[i]); n++, to++)
+        for (int n = 0; n < count_ray_bits(&l->rays[i]); n++, to++)
             for (int a = 0; a < 3; a++) {
                 to->origin[a] = (float)start[a];
                 to->direction[a] = (float)(job->occlusion->lights ? job->lights[0].direction : directions[n])[a];
@@ -89,40 +89,40 @@ static void count_rays(lit *l, kind *k)
 {
     k->rays = k->blocked = 0;
     for (int64_t i = 0; i < l->count; i++) {
-        k->rays += bits_of(&l->rays[i]);
-        k->blocked += bits_of(&l->rays[i]) - bits_of(&l->open[i]);
+        k->rays += count_ray_bits(&l->rays[i]);
+        k->blocked += count_ray_bits(&l->rays[i]) - count_ray_bits(&l->open[i]);
     }
 }
 
-static void run_kind(lit *l, kind *k, const render_occluders *occluders, int number)
+static void measure_kind(lit *l, kind *k, const render_occluders *occluders, int number)
 {
     l->scene.job.occlusion = k->occlusion;
-    take_hits(l);
+    copy_hits(l);
     memcpy(l->open, l->rays, (size_t)l->count * sizeof *l->open);
-    const double began = bench_begin();
-    if (render_occlude(occluders, l->hits, l->open, l->count, &l->scene.error)) fail(l);
-    bench_end(began, number, &k->trace);
+    const double began = bench_start_timer();
+    if (render_occlude(occluders, l->hits, l->open, l->count, &l->scene.error)) exit_with_error(l);
+    bench_stop_timer(began, number, &k->trace);
     count_rays(l, k);
     if (!l->routes.embree) return;
     list_rays(l, k);
-    const double theirs_began = bench_begin();
+    const double theirs_began = bench_start_timer();
     bench_embree_occlude(l->routes.embree, k->list, k->rays, k->theirs);
-    bench_end(theirs_began, number, &k->embree);
+    bench_stop_timer(theirs_began, number, &k->embree);
 }
 
-static void run(lit *l, int number)
+static void measure_all_kinds(lit *l, int number)
 {
-    const double began = bench_begin();
+    const double began = bench_start_timer();
     bench_scene_frame(&l->scene);
-    bench_end(began, number, &l->frame);
+    bench_stop_timer(began, number, &l->frame);
     bench_routes_run(&l->routes, bench_isovalues, 1, number);
     for (int i = 0; i < KINDS; i++) {
         render_occluders *occluders;
         l->scene.job.occlusion = l->kinds[i].occlusion;
-        const double prepare_began = bench_begin();
-        if (render_occluders_create(&l->scene.job, &occluders, &l->scene.error)) fail(l);
-        bench_end(prepare_began, number, &l->prepare);
-        run_kind(l, &l->kinds[i], occluders, number);
+        const double prepare_began = bench_start_timer();
+        if (render_occluders_create(&l->scene.job, &occluders, &l->scene.error)) exit_with_error(l);
+        bench_stop_timer(prepare_began, number, &l->prepare);
+        measure_kind(l, &l->kinds[i], occluders, number);
         render_occluders_free(occluders);
     }
 }
@@ -133,7 +133,7 @@ static void print_rate(const lit *l, const kind *k, const char *what, bench_seri
     if (!series->count) return;
     snprintf(measure, sizeof measure, "%s %s", k->name, what);
     bench_print_series(&l->scene.subject, measure, series);
-    const bench_stats stats = bench_stats_of(series->seconds, series->count);
+    const bench_stats stats = bench_compute_stats(series->seconds, series->count);
     snprintf(measure, sizeof measure, "%s %s rate", k->name, what);
     bench_print_number(&l->scene.subject, measure, "Mrays/s", 1e-3 * (double)k->rays / stats.median);
 }
@@ -150,7 +150,7 @@ static void print_agreement(const lit *l, const kind *k)
     bench_print_number(&l->scene.subject, measure, "share", (double)theirs / (double)k->rays);
 }
 
-static void print(lit *l)
+static void print_measurements(lit *l)
 {
     char measure[96];
     const bench_subject *subject = &l->scene.subject;
@@ -168,7 +168,7 @@ static void print(lit *l)
     bench_routes_print(&l->routes, "isosurface");
 }
 
-static void measure(const bench_command *command, test_mesh_kind mesh, int n)
+static void measure_mesh(const bench_command *command, test_mesh_kind mesh, int n)
 {
     static lit l;
     memset(&l, 0, sizeof l);
@@ -182,8 +182,8 @@ static void measure(const bench_command *command, test_mesh_kind mesh, int n)
     l.scene.job.paint = RENDER_UNLIT;
     l.scene.job.occlusion = &shadows;
     bench_routes_create(&l.routes, &l.scene);
-    for (int i = 0; i <= command->runs; i++) run(&l, i);
-    print(&l);
+    for (int i = 0; i <= command->runs; i++) measure_all_kinds(&l, i);
+    print_measurements(&l);
     for (int i = 0; i < KINDS; i++) {
         free(l.kinds[i].list);
         free(l.kinds[i].theirs);
@@ -201,5 +201,5 @@ int main(int argc, char **argv)
         argc, argv,
         "Measures rays from the hits of an isosurface of each MESH (tets or hexes) of N^3 cubes,\n"
         "towards a light and into the hemisphere, beside Embree's on VTK's triangles.",
-        TEST_HEXES, measure);
+        TEST_HEXES, measure_mesh);
 }

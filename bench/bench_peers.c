@@ -21,21 +21,21 @@ typedef struct peers_series {
 
 static const char *const builder_names[3] = {"low", "medium", "medium wide"};
 
-static void run(bench_scene *scene, bench_routes *routes, peers_series *series, int number)
+static void measure_peers(bench_scene *scene, bench_routes *routes, peers_series *series, int number)
 {
     for (int i = BUILDERS - 1; i >= 0; i--) {
         scene->how = builders[i].how;
-        const double build_began = bench_begin();
+        const double build_began = bench_start_timer();
         bench_scene_build(scene);
-        bench_end(build_began, number, &series->build[i]);
+        bench_stop_timer(build_began, number, &series->build[i]);
         series->cost[i] = mmbvh_cost(&scene->tree, NULL);
     }
-    const double began = bench_begin();
+    const double began = bench_start_timer();
     bench_scene_frame(scene);
-    bench_end(began, number, &series->trace);
+    bench_stop_timer(began, number, &series->trace);
     bench_routes_run(routes, bench_isovalues, 1, number);
     for (int i = 0; routes->embree && i < 3; i++) {
-        bench_begin();
+        bench_start_timer();
         bench_add_sample(bench_embree_build_cells(routes->embree, (bench_embree_builder)i), number, &series->embree[i]);
     }
 }
@@ -51,7 +51,7 @@ static void print_costs(bench_scene *scene, bench_routes *routes)
     }
 }
 
-static void print(bench_scene *scene, bench_routes *routes, peers_series *series)
+static void print_series(bench_scene *scene, bench_routes *routes, peers_series *series)
 {
     bench_print_number(&scene->subject, "rays", "Mrays", 1e-6 * scene->job.camera.width * scene->job.camera.height);
     for (int i = 0; i < BUILDERS; i++) {
@@ -71,7 +71,7 @@ static void print(bench_scene *scene, bench_routes *routes, peers_series *series
     print_costs(scene, routes);
 }
 
-static float *frame_depths(const bench_scene *scene)
+static float *draw_frame_depths(const bench_scene *scene)
 {
     const int64_t count = (int64_t)scene->job.camera.width * scene->job.camera.height;
     float *depths = malloc((size_t)count * sizeof *depths);
@@ -85,7 +85,7 @@ static float *frame_depths(const bench_scene *scene)
     return depths;
 }
 
-static void measure(const bench_command *command, test_mesh_kind kind, int n)
+static void measure_mesh(const bench_command *command, test_mesh_kind kind, int n)
 {
     bench_scene scene;
     bench_routes routes;
@@ -95,9 +95,9 @@ static void measure(const bench_command *command, test_mesh_kind kind, int n)
     bench_scene_show_surfaces(&scene, 1);
     bench_routes_create(&routes, &scene);
     if (routes.embree) bench_embree_set_cells(routes.embree, &scene.view.cells);
-    for (int i = 0; i <= command->runs; i++) run(&scene, &routes, &series, i);
-    print(&scene, &routes, &series);
-    float *depths = frame_depths(&scene);
+    for (int i = 0; i <= command->runs; i++) measure_peers(&scene, &routes, &series, i);
+    print_series(&scene, &routes, &series);
+    float *depths = draw_frame_depths(&scene);
     bench_routes_compare(&routes, depths, "isosurface", command->depths);
     bench_scene_surface_error(&scene, "isosurface");
     free(depths);
@@ -110,5 +110,5 @@ int main(int argc, char **argv)
     return bench_measure_meshes(argc, argv,
                                 "Measures building and tracing of each MESH (tets or hexes) of N^3 cubes beside VTK's\n"
                                 "extraction and Mesa, and beside Embree.",
-                                TEST_HEXES, measure);
+                                TEST_HEXES, measure_mesh);
 }

@@ -9,7 +9,7 @@
 #include "memory.h"
 
 /* Measures the speed of act() in units per second over all runs. One run before them is not counted. */
-static bench_stats speed(bench_scene *scene, int runs, void (*act)(bench_scene *), double units)
+static bench_stats measure_speed(bench_scene *scene, int runs, void (*act)(bench_scene *), double units)
 {
     double speeds[BENCH_MAX_RUNS];
     act(scene);
@@ -18,7 +18,7 @@ static bench_stats speed(bench_scene *scene, int runs, void (*act)(bench_scene *
         act(scene);
         speeds[i] = units / (bench_seconds() - began);
     }
-    return bench_stats_of(speeds, runs);
+    return bench_compute_stats(speeds, runs);
 }
 
 static void refit_ranges(bench_scene *s)
@@ -35,7 +35,7 @@ static void measure_tree(bench_scene *s, int runs)
 {
     const double cells = (double)s->subject.cells;
     base_memory_reset_peak();
-    bench_print(&s->subject, "build", "Mcells/s", speed(s, runs, bench_scene_build, 1e-6 * cells));
+    bench_print(&s->subject, "build", "Mcells/s", measure_speed(s, runs, bench_scene_build, 1e-6 * cells));
     bench_print_number(&s->subject, "build peak", "bytes/cell", (double)base_memory_peak() / cells);
     mmbvh_statistics statistics;
     if (mmbvh_check(&s->tree, &s->view.cells, &s->view.field, &statistics, &s->error) != INSITU_OK) {
@@ -45,8 +45,8 @@ static void measure_tree(bench_scene *s, int runs)
     bench_print_number(&s->subject, "tree size", "bytes/cell", (double)statistics.bytes / cells);
     bench_print_number(&s->subject, "tree cost", "tests/ray", statistics.cost);
     bench_print_number(&s->subject, "tree depth", "nodes", statistics.depth);
-    bench_print(&s->subject, "refit ranges", "Mcells/s", speed(s, runs, refit_ranges, 1e-6 * cells));
-    bench_print(&s->subject, "refit bounds", "Mcells/s", speed(s, runs, refit_bounds, 1e-6 * cells));
+    bench_print(&s->subject, "refit ranges", "Mcells/s", measure_speed(s, runs, refit_ranges, 1e-6 * cells));
+    bench_print(&s->subject, "refit bounds", "Mcells/s", measure_speed(s, runs, refit_bounds, 1e-6 * cells));
 }
 
 /* Measures a frame. Its peak memory does not include the tree. */
@@ -56,12 +56,12 @@ static void measure_frame(bench_scene *s, int runs, const char *layer)
     const double rays = 1e-6 * s->job.camera.width * s->job.camera.height;
     const int64_t held = base_memory_held();
     base_memory_reset_peak();
-    bench_print(&s->subject, layer, "Mrays/s", speed(s, runs, bench_scene_frame, rays));
+    bench_print(&s->subject, layer, "Mrays/s", measure_speed(s, runs, bench_scene_frame, rays));
     snprintf(name, sizeof name, "%s peak", layer);
     bench_print_number(&s->subject, name, "MB", 1e-6 * (double)(base_memory_peak() - held));
 }
 
-static void measure(const bench_command *command, test_mesh_kind kind, int n)
+static void measure_mesh(const bench_command *command, test_mesh_kind kind, int n)
 {
     const int runs = command->runs;
     bench_scene scene;
@@ -83,5 +83,5 @@ int main(int argc, char **argv)
         argc, argv,
         "Measures building, refitting and drawing of each MESH (tets, hexes, wedges, pyramids,\n"
         "polyhedra or mixed) of N^3 cubes.",
-        TEST_MIXED, measure);
+        TEST_MIXED, measure_mesh);
 }

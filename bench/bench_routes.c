@@ -6,18 +6,18 @@
 
 #include "session_image.h"
 
-static void *must(void *p)
+static void *require_memory(void *p)
 {
     if (!p) abort();
     return p;
 }
 
-static const float *floats(const grid_array *a)
+static const float *get_float_data(const grid_array *a)
 {
     return (const float *)(const void *)a->data;
 }
 
-static void interleave(bench_routes *r, const float *const coordinates[3], int64_t count)
+static void interleave_coordinates(bench_routes *r, const float *const coordinates[3], int64_t count)
 {
 #pragma omp parallel for schedule(static)
     for (int64_t v = 0; v < count; v++)
@@ -31,7 +31,7 @@ static void create_contour(bench_routes *r, const bench_scene *scene)
                                      .cell_count = g->cell_count,
                                      .cell_type = g->cell_type,
                                      .xyz = r->interleaved,
-                                     .values = floats(&scene->view.field.values),
+                                     .values = get_float_data(&scene->view.field.values),
                                      .connectivity = (const int32_t *)(const void *)g->connectivity.data};
     bench_contour_view view = {.degrees = bench_degrees, .width = r->camera->width, .height = r->camera->height};
     for (int axis = 0; axis < 3; axis++) {
@@ -52,15 +52,15 @@ void bench_routes_create(bench_routes *r, const bench_scene *scene)
     r->subject = &scene->subject;
     r->camera = &scene->job.camera;
     if (!bench_contour_is_available()) return;
-    r->interleaved = must(malloc(3 * (size_t)g->vertex_count * sizeof(float)));
+    r->interleaved = require_memory(malloc(3 * (size_t)g->vertex_count * sizeof(float)));
     const float *coordinates[3];
-    for (int axis = 0; axis < 3; axis++) coordinates[axis] = floats(&g->coordinates[axis]);
-    interleave(r, coordinates, g->vertex_count);
+    for (int axis = 0; axis < 3; axis++) coordinates[axis] = get_float_data(&g->coordinates[axis]);
+    interleave_coordinates(r, coordinates, g->vertex_count);
     create_contour(r, scene);
     if (!bench_embree_is_available()) return;
     r->embree = bench_embree_create(scene->subject.threads);
-    r->depths = must(malloc(pixels * sizeof *r->depths));
-    r->normals = must(malloc(3 * pixels * sizeof *r->normals));
+    r->depths = require_memory(malloc(pixels * sizeof *r->depths));
+    r->normals = require_memory(malloc(3 * pixels * sizeof *r->normals));
 }
 
 void bench_routes_free(bench_routes *r)
@@ -75,38 +75,38 @@ void bench_routes_free(bench_routes *r)
 void bench_routes_set(bench_routes *r, const float *const coordinates[3], int64_t vertex_count, const float *values)
 {
     if (!r->contour) return;
-    interleave(r, coordinates, vertex_count);
+    interleave_coordinates(r, coordinates, vertex_count);
     bench_contour_set(r->contour, r->interleaved, values);
 }
 
 static void run_embree(bench_routes *r, bench_triangles triangles, double extract, int number, bool is_fast)
 {
-    double began = bench_begin();
+    double began = bench_start_timer();
     bench_embree_build(r->embree, triangles.xyz, triangles.count, is_fast);
-    const double build = bench_end(began, number, is_fast ? &r->build_low : &r->build_medium);
-    began = bench_begin();
+    const double build = bench_stop_timer(began, number, is_fast ? &r->build_low : &r->build_medium);
+    began = bench_start_timer();
     bench_embree_trace(r->embree, r->camera, r->depths, r->normals);
-    const double trace = bench_end(began, number, is_fast ? &r->trace_low : &r->trace_medium);
+    const double trace = bench_stop_timer(began, number, is_fast ? &r->trace_low : &r->trace_medium);
     bench_add_sample(extract + build + trace, number, is_fast ? &r->embree_low : &r->embree_medium);
 }
 
 static void run_window(bench_routes *r, double extract, int number)
 {
-    double began = bench_begin();
+    double began = bench_start_timer();
     bench_contour_draw(r->contour);
-    const double first = bench_end(began, number, &r->first);
+    const double first = bench_stop_timer(began, number, &r->first);
     bench_add_sample(extract + first, number, &r->vtk);
-    began = bench_begin();
+    began = bench_start_timer();
     bench_contour_draw(r->contour);
-    bench_end(began, number, &r->later);
+    bench_stop_timer(began, number, &r->later);
 }
 
 void bench_routes_run(bench_routes *r, const double *isovalues, int count, int number)
 {
     if (!r->contour) return;
-    const double began = bench_begin();
+    const double began = bench_start_timer();
     const bench_triangles triangles = bench_contour_extract(r->contour, isovalues, count);
-    const double extract = bench_end(began, number, &r->extract);
+    const double extract = bench_stop_timer(began, number, &r->extract);
     r->triangles = triangles.count;
     if (r->has_window) run_window(r, extract, number);
     if (!r->embree) return;
@@ -145,7 +145,7 @@ void bench_routes_print(bench_routes *r, const char *name)
 static void compare_depths(bench_routes *r, const float *own, const float *theirs, const char *name, const char *peer)
 {
     const int64_t count = (int64_t)r->camera->width * r->camera->height;
-    double *differences = must(malloc((size_t)count * sizeof *differences));
+    double *differences = require_memory(malloc((size_t)count * sizeof *differences));
     char measure[96];
     int64_t either = 0, one = 0;
     int both = 0;
@@ -157,7 +157,7 @@ static void compare_depths(bench_routes *r, const float *own, const float *their
     }
     snprintf(measure, sizeof measure, "%s %s coverage difference", name, peer);
     bench_print_number(r->subject, measure, "share", either ? (double)one / (double)either : 0);
-    bench_stats depth = bench_stats_of(differences, both);
+    bench_stats depth = bench_compute_stats(differences, both);
     if (both) depth.high = differences[(int64_t)both * 99 / 100]; /* above it, at silhouettes, sheets differ */
     snprintf(measure, sizeof measure, "%s %s depth difference", name, peer);
     bench_print(r->subject, measure, "scene (max: of 99%)", depth);
@@ -169,7 +169,7 @@ static void write_depths(const bench_routes *r, const float *depths, const char 
 {
     const int64_t count = (int64_t)r->camera->width * r->camera->height;
     const double middle = sqrt(bench_eye[0] * bench_eye[0] + bench_eye[1] * bench_eye[1] + bench_eye[2] * bench_eye[2]);
-    float *rgba = must(malloc(4 * (size_t)count * sizeof *rgba));
+    float *rgba = require_memory(malloc(4 * (size_t)count * sizeof *rgba));
     char path[1024];
     base_error error;
     for (int64_t i = 0; i < count; i++) {
@@ -188,7 +188,7 @@ void bench_routes_compare(bench_routes *r, const float *depths, const char *name
     const size_t count = (size_t)r->camera->width * (size_t)r->camera->height;
     if (folder) write_depths(r, depths, folder, "insitu");
     if (r->has_window) {
-        float *drawn = must(malloc(count * sizeof *drawn));
+        float *drawn = require_memory(malloc(count * sizeof *drawn));
         bench_contour_read(r->contour, drawn);
         compare_depths(r, depths, drawn, name, "vtk");
         if (folder) write_depths(r, drawn, folder, "vtk");

@@ -26,7 +26,7 @@ static const double jitter = 0.2;
 static const float colours[BENCH_ISOVALUES][3] = {{0.8f, 0.7f, 0.5f}, {0.3f, 0.5f, 0.8f}, {0.8f, 0.3f, 0.3f}};
 static const render_light light = {{0.36, 0.48, 0.8}, {1, 1, 1}};
 
-static void must(bench_scene *scene, insitu_status status)
+static void require_success(bench_scene *scene, insitu_status status)
 {
     if (status == INSITU_OK) return;
     fprintf(stderr, "%s: %s\n", scene->subject.program, scene->error.message);
@@ -68,7 +68,7 @@ static void set_layers(bench_scene *s)
     s->volume = (render_volume_layer){{&s->view.field, &s->ranges}, &s->transfer};
 }
 
-static void forget_truth(bench_scene *s)
+static void free_reference(bench_scene *s)
 {
     if (s->pixels) bench_pixels_destroy(s->pixels);
     free(s->integrals);
@@ -78,13 +78,13 @@ static void forget_truth(bench_scene *s)
 
 void bench_scene_resize(bench_scene *s, int width, int height)
 {
-    forget_truth(s);
+    free_reference(s);
     render_camera_look_at(&s->job.camera, bench_eye, bench_focal, bench_up, bench_degrees, width, height);
 }
 
 void bench_scene_mesh(test_mesh_kind kind, int n, test_mesh *out)
 {
-    test_mesh_lattice(kind, n, jitter, test_wave, out);
+    test_mesh_make_lattice(kind, n, jitter, test_wave_field, out);
 }
 
 void bench_scene_create(bench_scene *s, const char *program, test_mesh_kind kind, int n)
@@ -109,7 +109,7 @@ void bench_scene_create(bench_scene *s, const char *program, test_mesh_kind kind
 
 void bench_scene_free(bench_scene *s)
 {
-    forget_truth(s);
+    free_reference(s);
     base_free(s->fragments.items);
     mmbvh_free(&s->tree);
     test_view_free(&s->view);
@@ -119,7 +119,8 @@ void bench_scene_build(bench_scene *s)
 {
     const double origin[3] = {0, 0, 0};
     mmbvh_free(&s->tree);
-    must(s, mmbvh_build(&s->view.cells, &s->view.field, origin, s->job.space.scale, &s->how, &s->tree, &s->error));
+    require_success(
+        s, mmbvh_build(&s->view.cells, &s->view.field, origin, s->job.space.scale, &s->how, &s->tree, &s->error));
     s->ranges = mmbvh_own_ranges(&s->tree);
 }
 
@@ -139,7 +140,7 @@ void bench_scene_show_volume(bench_scene *s)
 void bench_scene_frame(bench_scene *s)
 {
     s->fragments.count = 0;
-    must(s, render_frame(&s->job, &s->fragments, NULL, &s->error));
+    require_success(s, render_frame(&s->job, &s->fragments, NULL, &s->error));
 }
 
 /* Returns the chosen pixels, which are chosen by the first call, as not every benchmark needs them. A big mesh gets
@@ -154,7 +155,7 @@ const bench_pixels *bench_scene_pixels(bench_scene *s)
 void bench_scene_surface_error(bench_scene *s, const char *name)
 {
     char measure[96];
-    const bench_surface_error e = bench_surface_compare(bench_scene_pixels(s), &s->job, test_wave, &s->fragments);
+    const bench_surface_error e = bench_surface_compare(bench_scene_pixels(s), &s->job, test_wave_field, &s->fragments);
     const struct {
         const char *what;
         double number;
@@ -186,7 +187,7 @@ double *bench_scene_integrals(bench_scene *s, const render_transfer *transfer)
 #pragma omp parallel for schedule(dynamic)
     for (int i = 0; i < count; i++) {
         int x, y;
-        bench_pixels_place(pixels, i, &x, &y);
+        bench_pixels_position(pixels, i, &x, &y);
         reference_integral_trace(integral, x, y, nothing, NULL, 0, rgba + 4 * i);
     }
     reference_integral_free(integral);
@@ -205,7 +206,7 @@ bench_stats bench_scene_pixel_error(const bench_scene *s, const double *truth, c
             error = fmax(error, fabs((double)rgba[4 * i + channel] - truth[4 * i + channel]));
         if (truth[4 * i + 3] > 0) errors[seen++] = error;
     }
-    const bench_stats out = bench_stats_of(errors, seen);
+    const bench_stats out = bench_compute_stats(errors, seen);
     free(errors);
     return out;
 }

@@ -11,14 +11,14 @@
 
 /* Returns the load for 1920 × 1080 pixels, of which the object covers half. The busiest rank has twice the mean
  * load. */
-static comp_load load_of(int ranks)
+static comp_load make_load(int ranks)
 {
     const double covered = 0.5 * 1920 * 1080, layers = cbrt(ranks);
     const comp_grid grid = comp_grid_of(1920, 1080, ranks);
     return (comp_load){(int64_t)(2 * covered * layers / ranks), 11, comp_grid_block_pixels(&grid)};
 }
 
-static void print(const char *name, const comp_route *route, const comp_load *load)
+static void print_costs(const char *name, const comp_route *route, const comp_load *load)
 {
     const comp_cost cost = comp_cost_of(route, load, &comp_default_machine);
     printf("%d,%d,%s,%d,%.0f,%.0f,%.3f\n", route->ranks, route->nodes.ranks, name, route->round_count, cost.messages,
@@ -33,13 +33,13 @@ int main(int argc, char **argv)
     puts("ranks,ranks a node,schedule,rounds,messages,bytes,ms");
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
         const comp_nodes nodes = {counts[i] % node == 0 ? node : 1, false};
-        const comp_load load = load_of(counts[i]);
+        const comp_load load = make_load(counts[i]);
         for (comp_schedule s = COMP_DIRECT; s < COMP_SCHEDULE_COUNT; s++) {
             const comp_route route = comp_route_of(s, counts[i], nodes, 8);
-            print(comp_schedule_name(s), &route, &load);
+            print_costs(comp_schedule_name(s), &route, &load);
         }
         const comp_route best = comp_cheapest_route(counts[i], nodes, &load, &comp_default_machine);
-        print("chosen", &best, &load);
+        print_costs("chosen", &best, &load);
     }
     return 0;
 }

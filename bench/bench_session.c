@@ -84,19 +84,19 @@ const char *bench_picture_name(bench_picture picture)
     return names[picture];
 }
 
-void bench_must(const bench_scene *scene, insitu_session *session, insitu_status status)
+void bench_require_success(const bench_scene *scene, insitu_session *session, insitu_status status)
 {
     if (status == INSITU_OK) return;
     fprintf(stderr, "%s: %s\n", scene->subject.program, insitu_error(session));
     exit(1);
 }
 
-static void must(const bench_session *s, insitu_status status)
+static void require_status(const bench_session *s, insitu_status status)
 {
-    bench_must(s->scene, s->session, status);
+    bench_require_success(s->scene, s->session, status);
 }
 
-static float *copy(const float *from, int64_t count)
+static float *copy_floats(const float *from, int64_t count)
 {
     float *to = malloc((size_t)count * sizeof *to);
     if (!to) abort();
@@ -104,14 +104,14 @@ static float *copy(const float *from, int64_t count)
     return to;
 }
 
-static bool shows_q(bench_picture picture)
+static bool needs_q_criterion(bench_picture picture)
 {
     return picture == BENCH_Q_CRITERION || picture == BENCH_VORTICES;
 }
 
 static bool has_velocities(bench_picture picture)
 {
-    return shows_q(picture) || picture == BENCH_LINED_ISOSURFACE || picture == BENCH_WARPED;
+    return needs_q_criterion(picture) || picture == BENCH_LINED_ISOSURFACE || picture == BENCH_WARPED;
 }
 
 /* Returns an ABC flow with a shifted phase. */
@@ -138,22 +138,22 @@ static void make_states(bench_session *s)
     const double sway = 0.2 / s->scene->subject.n;
     for (int axis = 0; axis < 3; axis++) {
         s->coordinates[0][axis] = (float *)(void *)(uintptr_t)g->coordinates[axis].data;
-        s->coordinates[1][axis] = copy(s->coordinates[0][axis], count);
+        s->coordinates[1][axis] = copy_floats(s->coordinates[0][axis], count);
     }
     s->values[0] = (float *)(void *)(uintptr_t)s->scene->view.field.values.data;
-    s->values[1] = copy(s->values[0], count);
+    s->values[1] = copy_floats(s->values[0], count);
 #pragma omp parallel for schedule(static)
     for (int64_t v = 0; v < count; v++) {
         double p[3];
         grid_vertex(g, v, p);
         for (int axis = 0; axis < 3; axis++)
             s->coordinates[1][axis][v] = (float)(p[axis] + sway * sin(3 * p[(axis + 1) % 3]));
-        s->values[1][v] = (float)test_wave((const double[]){p[0] + 0.01, p[1] + 0.02, p[2] + 0.03});
+        s->values[1][v] = (float)test_wave_field((const double[]){p[0] + 0.01, p[1] + 0.02, p[2] + 0.03});
     }
     for (int i = 0; i < 2 && has_velocities(s->picture); i++) s->velocities[i] = make_velocities(g, 0.01 * i);
 }
 
-static void describe(bench_session *s)
+static void describe_mesh_and_field(bench_session *s)
 {
     const grid *g = &s->scene->view.cells;
     insitu_mesh_defaults(&s->mesh);
@@ -172,20 +172,20 @@ static void set_mesh(bench_session *s, insitu_session *to, unsigned changed)
     for (int axis = 0; axis < 3; axis++)
         s->mesh.coordinates[axis] = (insitu_array){.data = s->coordinates[s->place][axis], .type = INSITU_FLOAT32};
     s->mesh.changed = changed;
-    must(s, insitu_set_mesh(to, "cube", &s->mesh));
+    require_status(s, insitu_set_mesh(to, "cube", &s->mesh));
 }
 
 static void set_field(bench_session *s, insitu_session *to)
 {
     s->field.values = (insitu_array){.data = s->values[s->phase], .type = INSITU_FLOAT32};
     s->field.changed = INSITU_CHANGED_VALUES;
-    must(s, insitu_set_field(to, "cube", &s->field));
+    require_status(s, insitu_set_field(to, "cube", &s->field));
     if (!s->velocities[0]) return;
     insitu_field velocity = s->field;
     velocity.name = "v";
     velocity.component_count = 3;
     velocity.values.data = s->velocities[s->phase];
-    must(s, insitu_set_field(to, "cube", &velocity));
+    require_status(s, insitu_set_field(to, "cube", &velocity));
 }
 
 static bool is_slice(bench_picture picture)
@@ -211,8 +211,8 @@ static void write_lines(bench_picture picture, FILE *file)
 static void write_plane_or_faces(bench_picture picture, FILE *file)
 {
     char colours[96], plane[96];
-    snprintf(colours, sizeof colours, "field: %s, map: cool_to_warm, range: [%g, %g]", shows_q(picture) ? "q" : "f",
-             bench_range[0], bench_range[1]);
+    snprintf(colours, sizeof colours, "field: %s, map: cool_to_warm, range: [%g, %g]",
+             needs_q_criterion(picture) ? "q" : "f", bench_range[0], bench_range[1]);
     snprintf(plane, sizeof plane, "planes: [{normal: [%g, %g, %g], ", bench_plane[0], bench_plane[1], bench_plane[2]);
     if (picture == BENCH_PLANES)
         fprintf(file, "      - slice: {%s, %scount: %d}]", colours, plane, BENCH_PLANE_COUNT);
@@ -294,7 +294,7 @@ static void write_scene(const void *of, FILE *file)
     const scene_file *written = of;
     const bench_session *s = written->session;
     fprintf(file, "threads: %d\n", s->scene->subject.threads);
-    if (shows_q(s->picture)) fprintf(file, "fields: {q: {q_criterion: v}}\n");
+    if (needs_q_criterion(s->picture)) fprintf(file, "fields: {q: {q_criterion: v}}\n");
     if (s->picture == BENCH_WARPED) fprintf(file, "meshes: {cube: {warp: {field: v, scale: %g}}}\n", bench_warp);
     if (s->picture == BENCH_MIRRORED) fprintf(file, "meshes: {cube: {mirror: {x: %g}}}\n", bench_mirror);
     fprintf(file, "images:\n");
@@ -317,7 +317,7 @@ insitu_session *bench_open_session(const bench_scene *scene, void (*write)(const
     fclose(file);
     const insitu_status status = insitu_create(MPI_COMM_WORLD, path, &session);
     unlink(path);
-    bench_must(scene, session, status);
+    bench_require_success(scene, session, status);
     return session;
 }
 
@@ -340,7 +340,7 @@ void bench_session_create(bench_session *s, const bench_scene *scene, bench_pict
     s->picture = picture;
     s->change = change;
     make_states(s);
-    describe(s);
+    describe_mesh_and_field(s);
     s->session = open_session(s, ".png");
     set_mesh(s, s->session, INSITU_CHANGED_ALL);
     set_field(s, s->session);
@@ -356,7 +356,7 @@ void bench_session_free(bench_session *s)
     for (int i = 0; i < 2; i++) free(s->velocities[i]);
 }
 
-static void change_state(bench_session *s)
+static void advance_state(bench_session *s)
 {
     if (s->change != BENCH_NEW_VALUES) {
         s->place = !s->place;
@@ -370,11 +370,11 @@ static void change_state(bench_session *s)
 
 void bench_session_step(bench_session *s, int number)
 {
-    change_state(s);
-    const double began = bench_begin();
+    advance_state(s);
+    const double began = bench_start_timer();
     const insitu_status status = insitu_step(s->session, s->cycle++, 0);
-    bench_end(began, number, &s->whole);
-    must(s, status);
+    bench_stop_timer(began, number, &s->whole);
+    require_status(s, status);
     const insitu_report *r = insitu_last_report(s->session);
     const double parts[BENCH_PARTS] = {r->prepare_ms, r->build_ms, r->refit_ms, r->surface_ms + r->volume_ms,
                                        r->composite_ms};
@@ -423,7 +423,7 @@ float *bench_session_depths(const bench_session *s)
     again.session = open_session(s, ".exr");
     set_mesh(&again, again.session, INSITU_CHANGED_ALL);
     set_field(&again, again.session);
-    must(&again, insitu_step(again.session, 0, 0));
+    require_status(&again, insitu_step(again.session, 0, 0));
     insitu_destroy(&again.session);
     float *depths = caught_depths;
     caught_depths = NULL;

@@ -74,7 +74,7 @@ typedef struct bench_session {
 insitu_session *bench_open_session(const bench_scene *scene, void (*write)(const void *of, FILE *file), const void *of);
 
 /* If the status is an error, prints the session's message and ends the process. */
-void bench_must(const bench_scene *scene, insitu_session *session, insitu_status status);
+void bench_require_success(const bench_scene *scene, insitu_session *session, insitu_status status);
 
 /* Writes the line of a scene file with the benchmarks' camera. */
 void bench_write_camera(FILE *file);

@@ -47,7 +47,7 @@ static void measure_once(bench_session *session, int place, int number, bench_se
     bench_add_sample(sum / session->whole.count, number, &series[place]);
 }
 
-static void print(const bench_subject *subject, bench_picture picture, bench_series series[2])
+static void print_series(const bench_subject *subject, bench_picture picture, bench_series series[2])
 {
     char measure[96];
     for (int place = 0; place < 2; place++) {
@@ -70,12 +70,12 @@ static void measure_picture(bench_scene *scene, bench_picture picture, int runs)
             for (int place = 0; place < 2; place++) measure_once(&sessions[k], place, number, series[k]);
     for (int k = 0; k < 2; k++) {
         scene->subject.threads = k ? all : 1;
-        print(&scene->subject, picture, series[k]);
+        print_series(&scene->subject, picture, series[k]);
         bench_session_free(&sessions[k]);
     }
 }
 
-static void measure(const bench_command *command, test_mesh_kind kind, int n)
+static void measure_mesh(const bench_command *command, test_mesh_kind kind, int n)
 {
     static const bench_picture pictures[] = {BENCH_ISOSURFACE, BENCH_VOLUME};
     bench_scene scene;
@@ -93,7 +93,7 @@ int main(int argc, char **argv)
         argc, argv,
         "Measures steps of new values for each MESH (tets or hexes) of N^3 cubes, alone and beside a\n"
         "process that spins, on one thread and on all.",
-        TEST_HEXES, measure);
+        TEST_HEXES, measure_mesh);
     MPI_Finalize();
     kill(spinner, SIGKILL);
     return status;

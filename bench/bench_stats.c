@@ -5,16 +5,16 @@
 #include <stdlib.h>
 #include <time.h>
 
-static int compare(const void *a, const void *b)
+static int compare_doubles(const void *a, const void *b)
 {
     const double x = *(const double *)a, y = *(const double *)b;
     return (x > y) - (x < y);
 }
 
-bench_stats bench_stats_of(double *values, int count)
+bench_stats bench_compute_stats(double *values, int count)
 {
     if (!count) return (bench_stats){0};
-    qsort(values, (size_t)count, sizeof *values, compare);
+    qsort(values, (size_t)count, sizeof *values, compare_doubles);
     const double median = 0.5 * (values[(count - 1) / 2] + values[count / 2]);
     return (bench_stats){count, median, values[0], values[count - 1]};
 }
@@ -50,14 +50,14 @@ void bench_print_number(const bench_subject *subject, const char *measure, const
     bench_print(subject, measure, unit, (bench_stats){1, number, number, number});
 }
 
-double bench_begin(void)
+double bench_start_timer(void)
 {
     const struct timespec pause = {.tv_nsec = 20 * 1000 * 1000};
     nanosleep(&pause, NULL);
     return bench_seconds();
 }
 
-double bench_end(double began, int number, bench_series *series)
+double bench_stop_timer(double began, int number, bench_series *series)
 {
     const double seconds = bench_seconds() - began;
     bench_add_sample(seconds, number, series);
@@ -73,5 +73,5 @@ void bench_print_series(const bench_subject *subject, const char *measure, bench
 {
     for (int i = 0; i < series->count; i++) series->seconds[i] *= 1e3;
     bench_print(subject, measure, used_clock == CLOCK_MONOTONIC ? "ms" : "cpu ms",
-                bench_stats_of(series->seconds, series->count));
+                bench_compute_stats(series->seconds, series->count));
 }

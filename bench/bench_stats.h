@@ -10,7 +10,7 @@ typedef struct bench_stats {
 } bench_stats;
 
 /* Sorts the values and computes their statistics, which are all 0 for count 0. */
-bench_stats bench_stats_of(double *values, int count);
+bench_stats bench_compute_stats(double *values, int count);
 
 /* Returns the seconds of a monotonic clock. */
 double bench_seconds(void);
@@ -43,13 +43,13 @@ typedef struct bench_series {
 } bench_series;
 
 /* Waits until the threads of the last operation have stopped spinning, and returns the starting time. */
-double bench_begin(void);
+double bench_start_timer(void);
 
 /* Adds a time to the series, unless number is 0, the warm-up. */
 void bench_add_sample(double seconds, int number, bench_series *series);
 
 /* Adds the time since `began` to the series, and returns it. */
-double bench_end(double began, int number, bench_series *series);
+double bench_stop_timer(double began, int number, bench_series *series);
 
 /* Sorts the series and prints its times in milliseconds, as "ms" or "cpu ms". */
 void bench_print_series(const bench_subject *subject, const char *measure, bench_series *series);

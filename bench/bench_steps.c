@@ -32,7 +32,7 @@ static void measure_picture(const bench_scene *scene, bench_routes *routes, benc
     for (bench_change change = 0; change < BENCH_CHANGE_COUNT; change++) bench_session_free(&sessions[change]);
 }
 
-static void measure(const bench_command *command, test_mesh_kind kind, int n)
+static void measure_mesh(const bench_command *command, test_mesh_kind kind, int n)
 {
     bench_scene scene;
     bench_routes routes;
@@ -52,7 +52,7 @@ int main(int argc, char **argv)
         bench_measure_meshes(argc, argv,
                              "Measures whole steps for each MESH (tets or hexes) of N^3 cubes, with new values, moved\n"
                              "vertices and a new mesh, beside VTK's extraction and Mesa, and beside Embree.",
-                             TEST_HEXES, measure);
+                             TEST_HEXES, measure_mesh);
     MPI_Finalize();
     return status;
 }

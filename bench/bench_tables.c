@@ -25,9 +25,9 @@ static const struct {
     render_traversal traversal;
 } traversals[] = {{"binned", RENDER_BINNED}, {"tiles", RENDER_TILES}};
 
-static void build(bench_scene *s)
+static void build_and_print_time(bench_scene *s)
 {
-    const double began = bench_begin();
+    const double began = bench_start_timer();
     bench_scene_build(s);
     bench_print_number(&s->subject, "build", "s", bench_seconds() - began);
 }
@@ -38,11 +38,11 @@ static void measure_frames(bench_scene *s, const char *name, const bench_command
     const double rays = 1e-6 * s->job.camera.width * s->job.camera.height;
     bench_scene_frame(s);
     for (int i = 0; i < command->runs; i++) {
-        const double began = bench_begin();
+        const double began = bench_start_timer();
         bench_scene_frame(s);
         speeds[i] = rays / (bench_seconds() - began);
     }
-    bench_print(&s->subject, name, "Mrays/s", bench_stats_of(speeds, command->runs));
+    bench_print(&s->subject, name, "Mrays/s", bench_compute_stats(speeds, command->runs));
 }
 
 static void measure_surface(bench_scene *s, const char *name, const bench_command *command)
@@ -74,16 +74,16 @@ static void measure_groups(bench_scene *s, const char *prefix, const bench_comma
     }
 }
 
-static void table_groups(bench_scene *s, const bench_command *command)
+static void print_group_table(bench_scene *s, const bench_command *command)
 {
-    build(s);
+    build_and_print_time(s);
     bench_scene_resize(s, VOLUME_WIDTH / command->shrink, VOLUME_HEIGHT / command->shrink);
     measure_groups(s, "volume", command);
 }
 
-static void table_steps(bench_scene *s, const bench_command *command)
+static void print_step_table(bench_scene *s, const bench_command *command)
 {
-    build(s);
+    build_and_print_time(s);
     bench_scene_resize(s, VOLUME_WIDTH / command->shrink, VOLUME_HEIGHT / command->shrink);
     for (int step = 0; step < STEPS; step++) {
         char prefix[64];
@@ -100,9 +100,9 @@ static void measure_layers(bench_scene *s, const bench_command *command)
     measure_volume(s, "volume", command);
 }
 
-static void table_scaling(bench_scene *s, const bench_command *command)
+static void print_scaling_table(bench_scene *s, const bench_command *command)
 {
-    build(s);
+    build_and_print_time(s);
     measure_layers(s, command);
 }
 
@@ -117,18 +117,20 @@ static void measure_traversals(bench_scene *s, const bench_command *command)
     s->job.traversal = RENDER_BINNED;
 }
 
-static void table_sizes(bench_scene *s, const bench_command *command)
+static void print_size_table(bench_scene *s, const bench_command *command)
 {
     struct rusage usage;
-    build(s);
+    build_and_print_time(s);
     measure_traversals(s, command);
     measure_layers(s, command);
     getrusage(RUSAGE_SELF, &usage);
     bench_print_number(&s->subject, "process peak", "GiB", (double)usage.ru_maxrss / (1 << 20));
 }
 
-static const bench_table tables[] = {
-    {"groups", table_groups}, {"steps", table_steps}, {"sizes", table_sizes}, {"scaling", table_scaling}};
+static const bench_table tables[] = {{"groups", print_group_table},
+                                     {"steps", print_step_table},
+                                     {"sizes", print_size_table},
+                                     {"scaling", print_scaling_table}};
 
 int main(int argc, char **argv)
 {

@@ -37,7 +37,7 @@ static const struct {
     bench_vtk_mapper mapper;
 } peers[] = {{"vtk ray cast", BENCH_VTK_RAY_PARTIAL}, {"vtk projected tets", BENCH_VTK_PROJECTED}};
 
-static void make_look(const bench_scene *scene, peer_look *look)
+static void make_transfer_function(const bench_scene *scene, peer_look *look)
 {
     for (int i = 0; i < BENCH_KNOTS; i++) {
         const int entry = i * (scene->transfer.colour_count - 1) / (BENCH_KNOTS - 1);
@@ -73,12 +73,12 @@ static void print_peer(bench_scene *scene, const char *name, bench_vtk_result *r
     bench_print(&scene->subject, measure, "linear", bench_scene_pixel_error(scene, truth, rgba));
 }
 
-static int *pixel_places(const bench_pixels *pixels)
+static int *list_pixel_positions(const bench_pixels *pixels)
 {
     const int count = bench_pixels_count(pixels);
     int *places = malloc(2 * (size_t)count * sizeof *places);
     if (!places) abort();
-    for (int i = 0; i < count; i++) bench_pixels_place(pixels, i, &places[2 * i], &places[2 * i + 1]);
+    for (int i = 0; i < count; i++) bench_pixels_position(pixels, i, &places[2 * i], &places[2 * i + 1]);
     return places;
 }
 
@@ -87,9 +87,9 @@ static void measure_peers(bench_scene *scene, test_mesh_kind kind, int runs)
     peer_look look;
     test_mesh mesh;
     bench_scene_mesh(kind, scene->subject.n, &mesh);
-    make_look(scene, &look);
+    make_transfer_function(scene, &look);
     const int count = bench_pixels_count(bench_scene_pixels(scene));
-    int *places = pixel_places(scene->pixels);
+    int *places = list_pixel_positions(scene->pixels);
     double *truth = bench_scene_integrals(scene, &look.transfer);
     float *rgba = malloc(4 * (size_t)count * sizeof *rgba);
     if (!rgba) abort();
@@ -143,9 +143,9 @@ static void measure_frames(bench_scene *scene, const char *name, render_integrat
     scene->job.integration = integration;
     scene->job.max_error = max_error;
     for (int number = 0; number <= runs; number++) {
-        const double began = bench_begin();
+        const double began = bench_start_timer();
         bench_scene_frame(scene);
-        bench_end(began, number, &frames);
+        bench_stop_timer(began, number, &frames);
     }
     snprintf(measure, sizeof measure, "volume %s frame", name);
     bench_print_series(&scene->subject, measure, &frames);
@@ -153,7 +153,7 @@ static void measure_frames(bench_scene *scene, const char *name, render_integrat
     bench_scene_integral_error(scene, measure);
 }
 
-static void measure(const bench_command *command, test_mesh_kind kind, int n)
+static void measure_mesh(const bench_command *command, test_mesh_kind kind, int n)
 {
     const int runs = command->runs;
     bench_scene scene;
@@ -177,7 +177,7 @@ int main(int argc, char **argv)
         argc, argv,
         "Measures volumes of each MESH (tets or hexes) of N^3 cubes: whole steps and frames, and of\n"
         "tets beside VTK's mappers.",
-        TEST_HEXES, measure);
+        TEST_HEXES, measure_mesh);
     MPI_Finalize();
     return status;
 }

@@ -73,13 +73,13 @@ vtkStandardNewMacro(zsweep_mapper)
     vtkSmartPointer<vtkUnstructuredGrid> tets;
 };
 
-double seconds()
+double read_seconds()
 {
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
 /* Converts a grid to tets, as the ray caster and projected tetrahedra support no other cells. */
-vtkSmartPointer<vtkUnstructuredGrid> only_tets(vtkUnstructuredGrid *grid)
+vtkSmartPointer<vtkUnstructuredGrid> convert_to_tets(vtkUnstructuredGrid *grid)
 {
     if (grid->IsHomogeneous() && grid->GetNumberOfCells() > 0 && grid->GetCellType(0) == VTK_TETRA) return grid;
     vtkNew<vtkDataSetTriangleFilter> filter;
@@ -96,7 +96,7 @@ void set_ray_cast(peer &p, vtkUnstructuredGrid *grid)
         p.integrator = vtkSmartPointer<vtkUnstructuredGridLinearRayIntegrator>::New();
     else
         p.integrator = vtkSmartPointer<vtkUnstructuredGridPartialPreIntegration>::New();
-    p.tets = only_tets(grid);
+    p.tets = convert_to_tets(grid);
     mapper->SetInputData(p.tets);
     mapper->SetRayIntegrator(p.integrator);
     mapper->AutoAdjustSampleDistancesOff();
@@ -118,7 +118,7 @@ void set_zsweep(peer &p, vtkUnstructuredGrid *grid)
 void set_projected(peer &p, vtkUnstructuredGrid *grid)
 {
     auto mapper = vtkSmartPointer<vtkProjectedTetrahedraMapper>::New();
-    p.tets = only_tets(grid);
+    p.tets = convert_to_tets(grid);
     mapper->SetInputData(p.tets);
     p.mapper = mapper;
 }
@@ -216,7 +216,7 @@ bool open_window(peer &p)
     return true;
 }
 
-void render(peer &p)
+void render_window(peer &p)
 {
     p.window->Render();
     p.window->WaitForCompletion();
@@ -286,19 +286,19 @@ bool bench_vtk_draw(const bench_vtk_request *request, bench_vtk_result *result, 
     if (!open_window(p)) return false;
     const vtkSmartPointer<vtkUnstructuredGrid> grid = bench_vtk_grid(*request->mesh);
     grid->GetBounds();
-    const double began = seconds();
+    const double began = read_seconds();
     set_mapper(p, grid);
     set_property(p);
     set_view(p);
-    render(p);
-    result->first = seconds() - began;
+    render_window(p);
+    result->first = read_seconds() - began;
     result->runs = 0;
     double total = 0;
     while (result->runs < request->runs && result->runs < BENCH_VTK_MAX_RUNS &&
            (result->runs == 0 || total < request->seconds)) {
-        const double start = seconds();
-        render(p);
-        total += result->frames[result->runs++] = seconds() - start;
+        const double start = read_seconds();
+        render_window(p);
+        total += result->frames[result->runs++] = read_seconds() - start;
     }
     read_pixels(p, rgba);
     return true;

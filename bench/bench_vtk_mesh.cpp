@@ -13,12 +13,12 @@
 namespace
 {
 
-bool is_taken(int type)
+bool is_supported_cell_type(int type)
 {
     return type == VTK_TETRA || type == VTK_HEXAHEDRON || type == VTK_WEDGE || type == VTK_PYRAMID;
 }
 
-template <typename T> T *reserve(int64_t count)
+template <typename T> T *allocate_array(int64_t count)
 {
     void *block = std::calloc(static_cast<size_t>(count) + 1, sizeof(T));
     if (!block) std::abort();
@@ -82,14 +82,14 @@ bool bench_vtk_read(const char *path, const char *field, test_mesh *out)
     out->vertex_count = grid->GetNumberOfPoints();
     out->cell_count = grid->GetNumberOfCells();
     for (int64_t cell = 0; cell < out->cell_count; cell++)
-        if (!is_taken(grid->GetCellType(cell))) return false;
+        if (!is_supported_cell_type(grid->GetCellType(cell))) return false;
     out->connectivity_count = grid->GetCells()->GetNumberOfConnectivityIds();
-    out->coordinates = reserve<double>(3 * out->vertex_count);
-    out->values = reserve<double>(out->vertex_count);
-    out->offsets = reserve<int64_t>(out->cell_count + 1);
-    out->connectivity = reserve<int64_t>(out->connectivity_count);
-    out->types = reserve<unsigned char>(out->cell_count);
-    out->ghosts = reserve<unsigned char>(out->cell_count);
+    out->coordinates = allocate_array<double>(3 * out->vertex_count);
+    out->values = allocate_array<double>(out->vertex_count);
+    out->offsets = allocate_array<int64_t>(out->cell_count + 1);
+    out->connectivity = allocate_array<int64_t>(out->connectivity_count);
+    out->types = allocate_array<unsigned char>(out->cell_count);
+    out->ghosts = allocate_array<unsigned char>(out->cell_count);
     for (int64_t v = 0; v < out->vertex_count; v++) {
         grid->GetPoint(v, out->coordinates + 3 * v);
         out->values[v] = values->GetTuple1(v);

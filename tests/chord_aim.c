@@ -6,20 +6,20 @@
 #include <math.h>
 #include <string.h>
 
-static double uniform(uint64_t *counter, double low, double high)
+static double draw_uniform(uint64_t *counter, double low, double high)
 {
     return low + (high - low) * test_uniform((*counter)++, 91);
 }
 
-static int64_t whole(uint64_t *counter, int64_t count)
+static int64_t draw_uniform_index(uint64_t *counter, int64_t count)
 {
-    const int64_t i = (int64_t)uniform(counter, 0, (double)count);
+    const int64_t i = (int64_t)draw_uniform(counter, 0, (double)count);
     return i < count ? i : count - 1;
 }
 
 static void random_point(uint64_t *counter, double size, double p[3])
 {
-    for (int a = 0; a < 3; a++) p[a] = uniform(counter, -size, size);
+    for (int a = 0; a < 3; a++) p[a] = draw_uniform(counter, -size, size);
 }
 
 static void random_direction(uint64_t *counter, double d[3])
@@ -43,17 +43,17 @@ static void set_view(render_camera *camera, const double eye[3], const double fo
     camera->is_orthographic = is_orthographic;
 }
 
-static void view_from_random_point(render_camera *camera, uint64_t *counter)
+static void set_random_camera(render_camera *camera, uint64_t *counter)
 {
     double eye[3], focal[3];
-    const double distance = uniform(counter, 2, 8);
+    const double distance = draw_uniform(counter, 2, 8);
     random_direction(counter, eye);
     for (int a = 0; a < 3; a++) eye[a] *= distance;
     random_point(counter, 0.5, focal);
-    set_view(camera, eye, focal, uniform(counter, 0, 1) < 0.5, counter);
+    set_view(camera, eye, focal, draw_uniform(counter, 0, 1) < 0.5, counter);
 }
 
-static void project(const render_camera *c, const double p[3], double *x, double *y)
+static void project_to_pixel(const render_camera *c, const double p[3], double *x, double *y)
 {
     double at[3] = {0, 0, 0};
     for (int a = 0; a < 3; a++) {
@@ -75,16 +75,16 @@ typedef struct face_loop {
 } face_loop;
 
 /* Picks a random face of a tet, wedge, pyramid or hex. */
-static int typed_face(int type, uint64_t *counter, int picks[4])
+static int choose_cell_face(int type, uint64_t *counter, int picks[4])
 {
     static const int tet[4][4] = {{0, 1, 2, -1}, {0, 1, 3, -1}, {1, 2, 3, -1}, {0, 2, 3, -1}};
     static const int hex[6][4] = {{0, 1, 2, 3}, {4, 5, 6, 7}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}};
     static const int wedge[5][4] = {{0, 1, 2, -1}, {3, 4, 5, -1}, {0, 1, 4, 3}, {1, 2, 5, 4}, {2, 0, 3, 5}};
     static const int pyramid[5][4] = {{0, 1, 2, 3}, {0, 1, 4, -1}, {1, 2, 4, -1}, {2, 3, 4, -1}, {3, 0, 4, -1}};
-    const int *face = type == GRID_TET     ? tet[whole(counter, 4)]
-                      : type == GRID_HEX   ? hex[whole(counter, 6)]
-                      : type == GRID_WEDGE ? wedge[whole(counter, 5)]
-                                           : pyramid[whole(counter, 5)];
+    const int *face = type == GRID_TET     ? tet[draw_uniform_index(counter, 4)]
+                      : type == GRID_HEX   ? hex[draw_uniform_index(counter, 6)]
+                      : type == GRID_WEDGE ? wedge[draw_uniform_index(counter, 5)]
+                                           : pyramid[draw_uniform_index(counter, 5)];
     memcpy(picks, face, 4 * sizeof *picks);
     return picks[3] < 0 ? 3 : 4;
 }
@@ -93,38 +93,38 @@ static void random_face(const test_mesh *mesh, int64_t cell, uint64_t *counter, 
 {
     const int64_t *v = mesh->connectivity + mesh->offsets[cell];
     if (mesh->types[cell] == GRID_POLYHEDRON) {
-        const int64_t face = v[whole(counter, mesh->offsets[cell + 1] - mesh->offsets[cell])];
+        const int64_t face = v[draw_uniform_index(counter, mesh->offsets[cell + 1] - mesh->offsets[cell])];
         const int64_t first = mesh->face_offsets[face];
         out->count = (int)(mesh->face_offsets[face + 1] - first);
         for (int i = 0; i < out->count; i++) out->at[i] = mesh->coordinates + 3 * mesh->face_connectivity[first + i];
         return;
     }
     int picks[4];
-    out->count = typed_face(mesh->types[cell], counter, picks);
+    out->count = choose_cell_face(mesh->types[cell], counter, picks);
     for (int i = 0; i < out->count; i++) out->at[i] = mesh->coordinates + 3 * v[picks[i]];
 }
 
-static void between(const double *a, const double *b, double share, double out[3])
+static void interpolate_points(const double *a, const double *b, double share, double out[3])
 {
     for (int k = 0; k < 3; k++) out[k] = a[k] + share * (b[k] - a[k]);
 }
 
 /* Computes a point on the face: a vertex, a point of an edge (often its middle), or a point of a triangle of
  * vertices. */
-static void point_on(const face_loop *face, chord_aim aim, uint64_t *counter, double out[3])
+static void choose_point_on_face(const face_loop *face, chord_aim aim, uint64_t *counter, double out[3])
 {
-    const int64_t i = whole(counter, face->count);
+    const int64_t i = draw_uniform_index(counter, face->count);
     const double *a = face->at[i], *b = face->at[(i + 1) % face->count], *c = face->at[(i + 2) % face->count];
-    const double share = uniform(counter, 0, 1);
+    const double share = draw_uniform(counter, 0, 1);
     memcpy(out, a, 3 * sizeof *out);
     if (aim == CHORD_TO_VERTICES) return;
-    between(a, b, share < 0.25 ? 0.5 : uniform(counter, 0, 1), out);
+    interpolate_points(a, b, share < 0.25 ? 0.5 : draw_uniform(counter, 0, 1), out);
     if (aim == CHORD_TO_EDGES) return;
-    between(out, c, uniform(counter, 0, 1), out);
+    interpolate_points(out, c, draw_uniform(counter, 0, 1), out);
 }
 
 /* Computes a point outside the mesh on the line from b through a, at the given distance from a. */
-static void step_back(const double *a, const double *b, double distance, double eye[3])
+static void move_eye_back(const double *a, const double *b, double distance, double eye[3])
 {
     double square = 0;
     for (int k = 0; k < 3; k++) square += (b[k] - a[k]) * (b[k] - a[k]);
@@ -133,15 +133,15 @@ static void step_back(const double *a, const double *b, double distance, double 
 
 /* Sets a camera whose eye lies on the line of the face's first edge, or in the plane of its first three vertices. Every
  * second camera also looks along that line, so that orthographic rays run along it too. */
-static void view_along(const face_loop *face, chord_aim aim, render_camera *camera, uint64_t *counter)
+static void set_camera_along_face(const face_loop *face, chord_aim aim, render_camera *camera, uint64_t *counter)
 {
     double to[3], eye[3], focal[3];
     memcpy(to, face->at[1], sizeof to);
-    if (aim == CHORD_ALONG_FACES) between(face->at[1], face->at[2], uniform(counter, 0, 1), to);
-    step_back(face->at[0], to, uniform(counter, 4, 8), eye);
+    if (aim == CHORD_ALONG_FACES) interpolate_points(face->at[1], face->at[2], draw_uniform(counter, 0, 1), to);
+    move_eye_back(face->at[0], to, draw_uniform(counter, 4, 8), eye);
     random_point(counter, 0.5, focal);
-    const bool is_straight = uniform(counter, 0, 1) < 0.5;
-    set_view(camera, eye, is_straight ? to : focal, is_straight && uniform(counter, 0, 1) < 0.7, counter);
+    const bool is_straight = draw_uniform(counter, 0, 1) < 0.5;
+    set_view(camera, eye, is_straight ? to : focal, is_straight && draw_uniform(counter, 0, 1) < 0.7, counter);
 }
 
 /* ---- rays ---- */
@@ -157,33 +157,35 @@ static void aim_anywhere(const render_camera *camera, uint64_t *counter, chord_r
 {
     double p[3];
     random_point(counter, 1, p);
-    project(camera, p, &rays->centre_x, &rays->centre_y);
-    const double half = pow(10, uniform(counter, -4, -0.7));
+    project_to_pixel(camera, p, &rays->centre_x, &rays->centre_y);
+    const double half = pow(10, draw_uniform(counter, -4, -0.7));
     while (rays->count < CHORD_MAX_RAYS)
-        add_ray(rays, rays->centre_x + uniform(counter, -half, half), rays->centre_y + uniform(counter, -half, half));
+        add_ray(rays, rays->centre_x + draw_uniform(counter, -half, half),
+                rays->centre_y + draw_uniform(counter, -half, half));
 }
 
 /* Aims rays from the eye at most 45 degrees off the view direction. */
-static void aim_forward(uint64_t *counter, chord_rays *rays)
+static void make_ray_directions_positive(uint64_t *counter, chord_rays *rays)
 {
-    rays->centre_x = uniform(counter, -0.9, 0.9);
-    rays->centre_y = uniform(counter, -0.9, 0.9);
+    rays->centre_x = draw_uniform(counter, -0.9, 0.9);
+    rays->centre_y = draw_uniform(counter, -0.9, 0.9);
     while (rays->count < CHORD_MAX_RAYS)
-        add_ray(rays, rays->centre_x + uniform(counter, -0.1, 0.1), rays->centre_y + uniform(counter, -0.1, 0.1));
+        add_ray(rays, rays->centre_x + draw_uniform(counter, -0.1, 0.1),
+                rays->centre_y + draw_uniform(counter, -0.1, 0.1));
 }
 
 /* Aims half of the rays at the point itself, and the others past it by 1e-9 to 1e-3. */
 static void aim_at(const render_camera *camera, const double p[3], uint64_t *counter, chord_rays *rays)
 {
     double x, y;
-    const double off = uniform(counter, 0, 1) < 0.5 ? 0 : pow(10, uniform(counter, -9, -3));
-    project(camera, p, &x, &y);
+    const double off = draw_uniform(counter, 0, 1) < 0.5 ? 0 : pow(10, draw_uniform(counter, -9, -3));
+    project_to_pixel(camera, p, &x, &y);
     if (rays->count == 0) {
-        const double beside = uniform(counter, 0, 1) < 0.5 ? 0 : 0.05;
-        rays->centre_x = x + beside * uniform(counter, -1, 1);
-        rays->centre_y = y + beside * uniform(counter, -1, 1);
+        const double beside = draw_uniform(counter, 0, 1) < 0.5 ? 0 : 0.05;
+        rays->centre_x = x + beside * draw_uniform(counter, -1, 1);
+        rays->centre_y = y + beside * draw_uniform(counter, -1, 1);
     }
-    add_ray(rays, x + off * uniform(counter, -1, 1), y + off * uniform(counter, -1, 1));
+    add_ray(rays, x + off * draw_uniform(counter, -1, 1), y + off * draw_uniform(counter, -1, 1));
 }
 
 static void aim_at_cell(const test_mesh *mesh, int64_t cell, chord_aim aim, const render_camera *camera,
@@ -193,7 +195,7 @@ static void aim_at_cell(const test_mesh *mesh, int64_t cell, chord_aim aim, cons
         face_loop face;
         double p[3];
         random_face(mesh, cell, counter, &face);
-        point_on(&face, aim, counter, p);
+        choose_point_on_face(&face, aim, counter, p);
         aim_at(camera, p, counter, rays);
     }
 }
@@ -205,14 +207,14 @@ static void aim_along(const test_mesh *mesh, int64_t cell, chord_aim aim, uint64
 {
     face_loop face;
     random_face(mesh, cell, counter, &face);
-    view_along(&face, aim, camera, counter);
+    set_camera_along_face(&face, aim, camera, counter);
     aim_at(camera, face.at[0], counter, rays);
     while (rays->count < CHORD_MAX_RAYS / 2) {
         double p[3];
-        point_on(&face, (chord_aim)(CHORD_TO_VERTICES + whole(counter, 3)), counter, p);
+        choose_point_on_face(&face, (chord_aim)(CHORD_TO_VERTICES + draw_uniform_index(counter, 3)), counter, p);
         aim_at(camera, p, counter, rays);
     }
-    aim_at_cell(mesh, cell, (chord_aim)(CHORD_TO_VERTICES + whole(counter, 3)), camera, counter, rays);
+    aim_at_cell(mesh, cell, (chord_aim)(CHORD_TO_VERTICES + draw_uniform_index(counter, 3)), camera, counter, rays);
 }
 
 /* Aims along an axis or a diagonal of a face or of the cube, in either direction; eyes of perspective cameras lie on
@@ -221,19 +223,21 @@ static void aim_by_lattice(int n, uint64_t *counter, render_camera *camera, chor
 {
     const double side = 2.0 / n;
     double eye[3], focal[3], direction[3], up[3] = {0, 0, 0};
-    const int64_t first = whole(counter, 3), axes = uniform(counter, 0, 1) < 0.7 ? 1 : 2 + whole(counter, 2);
-    for (int k = 0; k < 3; k++) direction[(first + k) % 3] = k < axes ? (uniform(counter, 0, 1) < 0.5 ? -1 : 1) : 0;
+    const int64_t first = draw_uniform_index(counter, 3),
+                  axes = draw_uniform(counter, 0, 1) < 0.7 ? 1 : 2 + draw_uniform_index(counter, 2);
+    for (int k = 0; k < 3; k++)
+        direction[(first + k) % 3] = k < axes ? (draw_uniform(counter, 0, 1) < 0.5 ? -1 : 1) : 0;
     for (int a = 0; a < 3; a++) {
-        focal[a] = (double)whole(counter, n + 1) * side - 1;
+        focal[a] = (double)draw_uniform_index(counter, n + 1) * side - 1;
         eye[a] = focal[a] - 4 * direction[a];
     }
     up[(first + 2) % 3] = 1;
     render_camera_look_at(camera, eye, focal, up, 40, 1, 1);
-    camera->is_orthographic = uniform(counter, 0, 1) < 0.6;
-    project(camera, focal, &rays->centre_x, &rays->centre_y);
+    camera->is_orthographic = draw_uniform(counter, 0, 1) < 0.6;
+    project_to_pixel(camera, focal, &rays->centre_x, &rays->centre_y);
     const double depth = camera->is_orthographic ? 1 : 4 * sqrt((double)axes);
     while (rays->count < CHORD_MAX_RAYS) {
-        const int64_t i = rays->count % 8 - 3 + 8 * (whole(counter, 3) - 1), j = rays->count / 8 - 3;
+        const int64_t i = rays->count % 8 - 3 + 8 * (draw_uniform_index(counter, 3) - 1), j = rays->count / 8 - 3;
         add_ray(rays, rays->centre_x + (double)i * side / 8 / depth, rays->centre_y + (double)j * side / 8 / depth);
     }
 }
@@ -241,7 +245,7 @@ static void aim_by_lattice(int n, uint64_t *counter, render_camera *camera, chor
 void chord_aim_rays(const test_mesh *mesh, int n, chord_aim aim, uint64_t *counter, render_camera *camera,
                     chord_rays *rays)
 {
-    const int64_t cell = whole(counter, mesh->cell_count);
+    const int64_t cell = draw_uniform_index(counter, mesh->cell_count);
     double eye[3], focal[3];
     rays->count = 0;
     switch (aim) {
@@ -251,15 +255,15 @@ void chord_aim_rays(const test_mesh *mesh, int n, chord_aim aim, uint64_t *count
     case CHORD_FROM_INSIDE:
         random_point(counter, 0.9, eye);
         random_point(counter, 2, focal);
-        set_view(camera, eye, focal, uniform(counter, 0, 1) < 0.3, counter);
-        aim_forward(counter, rays);
+        set_view(camera, eye, focal, draw_uniform(counter, 0, 1) < 0.3, counter);
+        make_ray_directions_positive(counter, rays);
         break;
     case CHORD_RANDOM:
-        view_from_random_point(camera, counter);
+        set_random_camera(camera, counter);
         aim_anywhere(camera, counter, rays);
         break;
     default:
-        view_from_random_point(camera, counter);
+        set_random_camera(camera, counter);
         aim_at_cell(mesh, cell, aim, camera, counter, rays);
         break;
     }

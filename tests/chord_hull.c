@@ -5,7 +5,7 @@
 
 static const double hull_shift = 1.2e-7, end_allowed = 5e-7, slanted_from = 3e-6, touching_from = 0.01;
 
-static chord_line ray_line(const render_job *job, const chord_rays *rays, int i)
+static chord_line make_ray_line(const render_job *job, const chord_rays *rays, int i)
 {
     const render_camera *c = &job->camera;
     const double unit = c->is_orthographic ? job->space.scale : 1;
@@ -23,7 +23,7 @@ static chord_line ray_line(const render_job *job, const chord_rays *rays, int i)
 }
 
 /* Returns the depths between which the ray is inside the cube of the given half side, clipped at the eye's plane. */
-static chord_depths hull_chord(const chord_line *l, double half)
+static chord_depths clip_line_to_cube(const chord_line *l, double half)
 {
     chord_depths c = {0, (double)INFINITY};
     for (int a = 0; a < 3; a++) {
@@ -38,20 +38,20 @@ static chord_depths hull_chord(const chord_line *l, double half)
     return c.in < c.out ? c : (chord_depths){0, 0};
 }
 
-static double length_of(const chord_line *l, chord_depths c)
+static double chord_length(const chord_line *l, chord_depths c)
 {
     return (c.out - c.in) * l->length / 2;
 }
 
 chord_ray chord_hull_ray(const render_job *job, const chord_rays *rays, int i)
 {
-    chord_ray r = {.line = ray_line(job, rays, i)};
-    const chord_depths exact = hull_chord(&r.line, 1);
-    r.within = hull_chord(&r.line, 1 - 2 * hull_shift);
-    r.about = hull_chord(&r.line, 1 + 2 * hull_shift);
-    r.length = length_of(&r.line, exact);
-    r.least = length_of(&r.line, r.within);
-    r.most = length_of(&r.line, r.about);
+    chord_ray r = {.line = make_ray_line(job, rays, i)};
+    const chord_depths exact = clip_line_to_cube(&r.line, 1);
+    r.within = clip_line_to_cube(&r.line, 1 - 2 * hull_shift);
+    r.about = clip_line_to_cube(&r.line, 1 + 2 * hull_shift);
+    r.length = chord_length(&r.line, exact);
+    r.least = chord_length(&r.line, r.within);
+    r.most = chord_length(&r.line, r.about);
     return r;
 }
 

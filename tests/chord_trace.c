@@ -16,7 +16,7 @@ typedef struct chord_state {
     int first; /* number of lane 0's ray */
 } chord_state;
 
-static void chord_note(const chord_state *state, vm mask, vf t_in, vf t_out)
+static void chord_store_intervals(const chord_state *state, vm mask, vf t_in, vf t_out)
 {
     float in[SIMD_WIDTH], out[SIMD_WIDTH];
     vf_store(in, t_in);
@@ -28,11 +28,10 @@ static void chord_note(const chord_state *state, vm mask, vf t_in, vf t_out)
     }
 }
 
-static void chord_polyhedron(kernel_packet *p, const chord_state *state, const grid_field *field, int part,
-                             uint32_t index, vm rays)
+static void chord_trace_polyhedron(kernel_packet *p, const chord_state *state, const grid_field *field, int part,
+                                   uint32_t index, vm rays)
 {
-    polyhedron *c =
-        polyhedra_find(p->thread->polyhedra, p->frame->job->parts[part].cells, field, part, 0, index);
+    polyhedron *c = polyhedra_find(p->thread->polyhedra, p->frame->job->parts[part].cells, field, part, 0, index);
     kernel_poly_crossings r;
     kernel_polyhedron_interval stay;
     if (!c) p->thread->out_of_memory = true;
@@ -42,17 +41,18 @@ static void chord_polyhedron(kernel_packet *p, const chord_state *state, const g
         for (int i = 0; i <= c->vertex_count; i++) c->f[i] = 0;
     }
     if (!kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
-    while (kernel_poly_next(&r, &stay)) chord_note(state, stay.interval.mask, stay.interval.t_in, stay.interval.t_out);
+    while (kernel_poly_next(&r, &stay))
+        chord_store_intervals(state, stay.interval.mask, stay.interval.t_in, stay.interval.t_out);
 }
 
-static void chord_cell(kernel_packet *p, const chord_state *state, const grid_field *field, int part, uint32_t index,
-                       vm rays)
+static void chord_trace_cell(kernel_packet *p, const chord_state *state, const grid_field *field, int part,
+                             uint32_t index, vm rays)
 {
     kernel_cell *c = kernel_cell_cache_find(p, 0, part, field, index);
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     int intervals = 1;
     if (c->type == GRID_POLYHEDRON) {
-        chord_polyhedron(p, state, field, part, index, rays);
+        chord_trace_polyhedron(p, state, field, part, index, rays);
         return;
     }
     if (!c->is_transformed) {
@@ -63,7 +63,7 @@ static void chord_cell(kernel_packet *p, const chord_state *state, const grid_fi
         kernel_tet_interval(p, c, rays, false, &list[0]);
     else
         intervals = kernel_curved_intervals(p, c, rays, list);
-    for (int n = 0; n < intervals; n++) chord_note(state, list[n].mask, list[n].t_in, list[n].t_out);
+    for (int n = 0; n < intervals; n++) chord_store_intervals(state, list[n].mask, list[n].t_in, list[n].t_out);
 }
 
 /* Returns whether a ray may meet a node's box, which is extended by more than all rounding. */
@@ -95,7 +95,7 @@ static unsigned chord_rays_in_box(const kernel_packet *p, const kernel_lanes *l,
     return met & vm_bits(p->active);
 }
 
-static void chord_part(kernel_packet *p, const kernel_lanes *l, const chord_state *state, int part)
+static void chord_trace_part(kernel_packet *p, const kernel_lanes *l, const chord_state *state, int part)
 {
     const mmbvh *tree = p->frame->job->parts[part].tree;
     const grid_field *field = &p->frame->job->surfaces[0].field.fields[part];
@@ -107,7 +107,8 @@ static void chord_part(kernel_packet *p, const kernel_lanes *l, const chord_stat
         const int count = mmbvh_node_count(tree, node);
         const unsigned met = chord_rays_in_box(p, l, tree, node);
         if (!met) continue;
-        for (int n = 0; n < count; n++) chord_cell(p, state, field, part, tree->cells[ref + n], vm_from_bits(met));
+        for (int n = 0; n < count; n++)
+            chord_trace_cell(p, state, field, part, tree->cells[ref + n], vm_from_bits(met));
         if (count) continue;
         stack[top++] = ref;
         stack[top++] = ref + 1;
@@ -133,8 +134,8 @@ static void chord_tile_rays(kernel_packet *p, const kernel_lanes *l)
 }
 
 /* Sets up a packet as kernel_packet_begin() does, but for any rays, not only those of pixels. */
-static void chord_packet(kernel_packet *p, const kernel_frame *f, const kernel_tile *tile, kernel_thread *thread,
-                         const chord_rays *rays, int first, kernel_lanes *l)
+static void chord_trace_packet(kernel_packet *p, const kernel_frame *f, const kernel_tile *tile, kernel_thread *thread,
+                               const chord_rays *rays, int first, kernel_lanes *l)
 {
     const int count = rays->count - first < SIMD_WIDTH ? rays->count - first : SIMD_WIDTH;
     p->frame = f;
@@ -154,7 +155,7 @@ static void chord_packet(kernel_packet *p, const kernel_frame *f, const kernel_t
     p->t_far = vf_set(INFINITY);
 }
 
-static double chord_radius(const kernel_frame *f, const chord_rays *rays)
+static double chord_compute_radius(const kernel_frame *f, const chord_rays *rays)
 {
     double most = 0;
     for (int i = 0; i < rays->count; i++)
@@ -170,15 +171,15 @@ static void chord_trace(const kernel_frame *f, kernel_thread *thread, chord_rays
                               .centre_y = rays->centre_y,
                               .shear_x = flat ? 0 : (float)rays->centre_x,
                               .shear_y = flat ? 0 : (float)rays->centre_y,
-                              .radius = (float)chord_radius(f, rays)};
+                              .radius = (float)chord_compute_radius(f, rays)};
     thread->serial++;
     for (int i = 0; i < rays->count; i++) rays->interval_count[i] = 0;
     for (int first = 0; first < rays->count; first += SIMD_WIDTH) {
         kernel_packet p;
         kernel_lanes l;
         const chord_state state = {rays, first};
-        chord_packet(&p, f, &tile, thread, rays, first, &l);
-        for (int part = 0; part < f->job->part_count; part++) chord_part(&p, &l, &state, part);
+        chord_trace_packet(&p, f, &tile, thread, rays, first, &l);
+        for (int part = 0; part < f->job->part_count; part++) chord_trace_part(&p, &l, &state, part);
     }
 }
 

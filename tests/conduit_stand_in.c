@@ -14,7 +14,7 @@ struct conduit_node_impl {
     conduit_node **children;
 };
 
-static void end(const char *what, const char *name)
+static void abort_with_message(const char *what, const char *name)
 {
     fprintf(stderr, "Conduit would throw: %s: %s\n", what, name);
     abort();
@@ -33,7 +33,7 @@ conduit_node *conduit_node_create(void)
     return node;
 }
 
-static void clear(conduit_node *node)
+static void clear_node(conduit_node *node)
 {
     for (int i = 0; i < node->child_count; i++) conduit_node_destroy(node->children[i]);
     free(node->children);
@@ -45,7 +45,7 @@ static void clear(conduit_node *node)
 
 void conduit_node_destroy(conduit_node *node)
 {
-    clear(node);
+    clear_node(node);
     free(node);
 }
 
@@ -61,7 +61,7 @@ static conduit_node *first_child(const conduit_node *node, const char *path, con
     return NULL;
 }
 
-static conduit_node *find(const conduit_node *node, const char *path)
+static conduit_node *find_node(const conduit_node *node, const char *path)
 {
     while (node && *path) node = first_child(node, path, &path);
     return (conduit_node *)(uintptr_t)node;
@@ -88,14 +88,14 @@ conduit_node *conduit_node_fetch(conduit_node *node, const char *path)
 
 conduit_node *conduit_node_fetch_existing(conduit_node *node, const char *path)
 {
-    conduit_node *found = find(node, path);
-    if (!found) end("no such path", path);
+    conduit_node *found = find_node(node, path);
+    if (!found) abort_with_message("no such path", path);
     return found;
 }
 
 conduit_node *conduit_node_child(conduit_node *node, conduit_index_t number)
 {
-    if (number < 0 || number >= node->child_count) end("no such child", node->name);
+    if (number < 0 || number >= node->child_count) abort_with_message("no such child", node->name);
     return node->children[number];
 }
 
@@ -113,18 +113,18 @@ char *conduit_node_name(const conduit_node *node)
 
 int conduit_node_has_path(const conduit_node *node, const char *path)
 {
-    return find(node, path) != NULL;
+    return find_node(node, path) != NULL;
 }
 
 void *conduit_node_element_ptr(conduit_node *node, conduit_index_t number)
 {
-    if (!stand_in_size(node->id)) end("no array", node->name);
+    if (!stand_in_size(node->id)) abort_with_message("no array", node->name);
     return node->data + number * node->stride;
 }
 
 char *conduit_node_as_char8_str(conduit_node *node)
 {
-    if (node->id != STAND_IN_STRING) end("no string", node->name);
+    if (node->id != STAND_IN_STRING) abort_with_message("no string", node->name);
     return node->data;
 }
 
@@ -133,35 +133,35 @@ const conduit_datatype *conduit_node_dtype(const conduit_node *node)
     return (const conduit_datatype *)(const void *)node;
 }
 
-static const conduit_node *node_of(const conduit_datatype *type)
+static const conduit_node *find_owning_node(const conduit_datatype *type)
 {
     return (const conduit_node *)(const void *)type;
 }
 
 conduit_index_t conduit_datatype_id(const conduit_datatype *type)
 {
-    return node_of(type)->id;
+    return find_owning_node(type)->id;
 }
 
 conduit_index_t conduit_datatype_number_of_elements(const conduit_datatype *type)
 {
-    return node_of(type)->count;
+    return find_owning_node(type)->count;
 }
 
 conduit_index_t conduit_datatype_stride(const conduit_datatype *type)
 {
-    return node_of(type)->stride;
+    return find_owning_node(type)->stride;
 }
 
 int conduit_datatype_is_string(const conduit_datatype *type)
 {
-    return node_of(type)->id == STAND_IN_STRING;
+    return find_owning_node(type)->id == STAND_IN_STRING;
 }
 
-void stand_in_put(conduit_node *node, const char *path, int id, const void *data, int64_t count, int64_t stride)
+void stand_in_set_array(conduit_node *node, const char *path, int id, const void *data, int64_t count, int64_t stride)
 {
     conduit_node *at = conduit_node_fetch(node, path);
-    clear(at);
+    clear_node(at);
     at->id = id;
     at->data = (char *)(uintptr_t)data;
     at->count = count;
@@ -169,31 +169,31 @@ void stand_in_put(conduit_node *node, const char *path, int id, const void *data
 }
 
 /* Stores a copy of the bytes at the path. */
-static void put_copy(conduit_node *node, const char *path, int id, const void *data, size_t bytes)
+static void store_copy(conduit_node *node, const char *path, int id, const void *data, size_t bytes)
 {
     void *copy = malloc(bytes);
     if (!copy) abort();
     memcpy(copy, data, bytes);
-    stand_in_put(node, path, id, copy, id == STAND_IN_STRING ? (int64_t)bytes : 1, 0);
+    stand_in_set_array(node, path, id, copy, id == STAND_IN_STRING ? (int64_t)bytes : 1, 0);
     conduit_node_fetch(node, path)->owned = copy;
 }
 
 void conduit_node_set_path_char8_str(conduit_node *node, const char *path, const char *value)
 {
-    put_copy(node, path, STAND_IN_STRING, value, strlen(value) + 1);
+    store_copy(node, path, STAND_IN_STRING, value, strlen(value) + 1);
 }
 
 void conduit_node_set_path_int64(conduit_node *node, const char *path, int64_t value)
 {
-    put_copy(node, path, STAND_IN_INT64, &value, sizeof value);
+    store_copy(node, path, STAND_IN_INT64, &value, sizeof value);
 }
 
 void conduit_node_set_path_float64(conduit_node *node, const char *path, double value)
 {
-    put_copy(node, path, STAND_IN_FLOAT64, &value, sizeof value);
+    store_copy(node, path, STAND_IN_FLOAT64, &value, sizeof value);
 }
 
-void stand_in_still(conduit_node *node, const char *path)
+void stand_in_set_zero_stride(conduit_node *node, const char *path)
 {
     conduit_node_fetch_existing(node, path)->stride = 0;
 }
@@ -214,21 +214,21 @@ void stand_in_remove(conduit_node *node, const char *path)
     snprintf(parent, sizeof parent, "%.*s", last ? (int)(last - path) : 0, path);
     conduit_node *from = conduit_node_fetch_existing(node, parent);
     conduit_node *gone = first_child(from, last ? last + 1 : path, &rest);
-    if (!gone) end("no such path", path);
+    if (!gone) abort_with_message("no such path", path);
     for (int i = 0, kept = 0; i < from->child_count; i++)
         if (from->children[i] != gone) from->children[kept++] = from->children[i];
     from->child_count--;
     conduit_node_destroy(gone);
 }
 
-static int64_t packed_bytes(const conduit_node *node)
+static int64_t compute_packed_bytes(const conduit_node *node)
 {
     int64_t bytes = node->count * stand_in_size(node->id);
-    for (int i = 0; i < node->child_count; i++) bytes += packed_bytes(node->children[i]);
+    for (int i = 0; i < node->child_count; i++) bytes += compute_packed_bytes(node->children[i]);
     return bytes;
 }
 
-static char *pack(conduit_node *node, char *to)
+static char *pack_node(conduit_node *node, char *to)
 {
     const int64_t size = stand_in_size(node->id);
     if (size) {
@@ -239,14 +239,14 @@ static char *pack(conduit_node *node, char *to)
         node->stride = size;
         to += node->count * size;
     }
-    for (int i = 0; i < node->child_count; i++) to = pack(node->children[i], to);
+    for (int i = 0; i < node->child_count; i++) to = pack_node(node->children[i], to);
     return to;
 }
 
 void stand_in_pack(conduit_node *node)
 {
-    char *memory = malloc((size_t)packed_bytes(node) + 1);
+    char *memory = malloc((size_t)compute_packed_bytes(node) + 1);
     if (!memory) abort();
-    pack(node, memory + 1);
+    pack_node(node, memory + 1);
     node->owned = memory;
 }

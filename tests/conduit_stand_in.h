@@ -52,11 +52,11 @@ void conduit_node_set_path_float64(conduit_node *node, const char *path, double 
 
 /* Makes the array in memory the data of the node at the path; a stride of 0 means packed. Conduit has no such
  * function. */
-void stand_in_put(conduit_node *node, const char *path, int id, const void *data, int64_t count, int64_t stride);
+void stand_in_set_array(conduit_node *node, const char *path, int id, const void *data, int64_t count, int64_t stride);
 /* Exchanges the contents of two nodes but not their names. */
 void stand_in_swap(conduit_node *a, conduit_node *b);
 /* Sets the stride of the array at the path to 0. */
-void stand_in_still(conduit_node *node, const char *path);
+void stand_in_set_zero_stride(conduit_node *node, const char *path);
 /* Removes the node at the path. */
 void stand_in_remove(conduit_node *node, const char *path);
 /* Copies all arrays into one block of memory, one after the other from an odd address on, as Conduit's compact nodes

@@ -45,7 +45,7 @@ static struct {
 } spared[MOST_RANGES];
 static int spared_count;
 
-static int note_library(struct dl_phdr_info *info, size_t size, void *context)
+static int record_library_range(struct dl_phdr_info *info, size_t size, void *context)
 {
     (void)size, (void)context;
     const bool is_openmp = strstr(info->dlpi_name, "/libgomp") || strstr(info->dlpi_name, "/libomp");
@@ -60,16 +60,16 @@ static int note_library(struct dl_phdr_info *info, size_t size, void *context)
     return 0;
 }
 
-static bool is_spared(const void *caller)
+static bool is_exempt_caller(const void *caller)
 {
     for (int i = 0; i < spared_count; i++)
         if ((uintptr_t)caller >= spared[i].begin && (uintptr_t)caller < spared[i].end) return true;
     return false;
 }
 
-static bool must_fail(const void *caller)
+static bool should_allocation_fail(const void *caller)
 {
-    if (!heap.is_armed || heap.pauses || is_spared(caller)) return false;
+    if (!heap.is_armed || heap.pauses || is_exempt_caller(caller)) return false;
     heap.count++;
     if (heap.count != heap.fails_at && !(heap.is_for_good && heap.count > heap.fails_at)) return false;
     errno = ENOMEM;
@@ -78,7 +78,7 @@ static bool must_fail(const void *caller)
 
 void heap_start_failing(int64_t n, bool is_for_good)
 {
-    if (!spared_count) dl_iterate_phdr(note_library, NULL);
+    if (!spared_count) dl_iterate_phdr(record_library_range, NULL);
     heap.is_for_good = is_for_good;
     heap.count = 0;
     heap.fails_at = n;
@@ -110,32 +110,32 @@ bool heap_can_fail(void)
 
 void *malloc(size_t size)
 {
-    return must_fail(CALLER) ? NULL : __libc_malloc(size);
+    return should_allocation_fail(CALLER) ? NULL : __libc_malloc(size);
 }
 
 void *calloc(size_t count, size_t size)
 {
-    return must_fail(CALLER) ? NULL : __libc_calloc(count, size);
+    return should_allocation_fail(CALLER) ? NULL : __libc_calloc(count, size);
 }
 
 void *realloc(void *block, size_t size)
 {
-    return size && must_fail(CALLER) ? NULL : __libc_realloc(block, size);
+    return size && should_allocation_fail(CALLER) ? NULL : __libc_realloc(block, size);
 }
 
 void *memalign(size_t alignment, size_t size)
 {
-    return must_fail(CALLER) ? NULL : __libc_memalign(alignment, size);
+    return should_allocation_fail(CALLER) ? NULL : __libc_memalign(alignment, size);
 }
 
 void *aligned_alloc(size_t alignment, size_t size)
 {
-    return must_fail(CALLER) ? NULL : __libc_memalign(alignment, size);
+    return should_allocation_fail(CALLER) ? NULL : __libc_memalign(alignment, size);
 }
 
 int posix_memalign(void **out, size_t alignment, size_t size)
 {
-    void *block = must_fail(CALLER) ? NULL : __libc_memalign(alignment, size);
+    void *block = should_allocation_fail(CALLER) ? NULL : __libc_memalign(alignment, size);
     if (!block) return ENOMEM;
     *out = block;
     return 0;

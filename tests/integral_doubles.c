@@ -95,13 +95,13 @@ SIMD_INLINE vf kernel_exp(vf a)
 {
     return (vf){exp(a[0]), exp(a[1])};
 }
-SIMD_INLINE double extinction_of_one(double a, double clear)
+SIMD_INLINE double compute_extinction(double a, double clear)
 {
     return a < 0.5 ? -log1p(-a) : -log(clear);
 }
 SIMD_INLINE vf kernel_extinction(vf a, vf clear)
 {
-    return (vf){extinction_of_one(a[0], clear[0]), extinction_of_one(a[1], clear[1])};
+    return (vf){compute_extinction(a[0], clear[0]), compute_extinction(a[1], clear[1])};
 }
 
 enum { KERNEL_NODES = 9 };
@@ -114,7 +114,7 @@ static struct {
 #include "render_pieces.c"
 
 /* Computes the Legendre polynomial of degree KERNEL_NODES and its derivative. */
-static double legendre(double x, double *derivative)
+static double evaluate_legendre(double x, double *derivative)
 {
     double last = 1, p = x;
     for (int n = 2; n <= KERNEL_NODES; n++) {
@@ -126,7 +126,7 @@ static double legendre(double x, double *derivative)
     return p;
 }
 
-static double lagrange(int k, double x)
+static double evaluate_lagrange(int k, double x)
 {
     double product = 1;
     for (int i = 0; i < KERNEL_NODES; i++)
@@ -140,10 +140,10 @@ static void prepare_gauss(void)
     for (int i = 0; i < KERNEL_NODES; i++) {
         double slope, x = -cos(acos(-1) * (i + 0.75) / (KERNEL_NODES + 0.5));
         for (int step = 0; step < 50; step++) {
-            const double p = legendre(x, &slope);
+            const double p = evaluate_legendre(x, &slope);
             x -= p / slope;
         }
-        legendre(x, &slope);
+        evaluate_legendre(x, &slope);
         kernel_gauss.node[i] = 0.5 + 0.5 * x;
         kernel_gauss.weight[i] = 1 / ((1 - x * x) * slope * slope);
     }
@@ -152,11 +152,11 @@ static void prepare_gauss(void)
             kernel_gauss.partial[j][k] = 0;
             for (int i = 0; i < KERNEL_NODES; i++)
                 kernel_gauss.partial[j][k] += kernel_gauss.node[j] * kernel_gauss.weight[i] *
-                                              lagrange(k, kernel_gauss.node[j] * kernel_gauss.node[i]);
+                                              evaluate_lagrange(k, kernel_gauss.node[j] * kernel_gauss.node[i]);
         }
 }
 
-void integral_on_doubles(const render_transfer *t, double length, double v_in, double v_out, double out[4])
+void integrate_in_double(const render_transfer *t, double length, double v_in, double v_out, double out[4])
 {
     kernel_pieces pieces;
     base_error error = {0};

@@ -17,7 +17,7 @@ struct picture {
     std::vector<float> pixels;
 };
 
-bool read(const std::string &path, picture &out)
+bool read_picture(const std::string &path, picture &out)
 {
     auto file = OIIO::ImageInput::open(path);
     if (!file) {
@@ -34,7 +34,7 @@ bool read(const std::string &path, picture &out)
 int main(int argc, char **argv)
 {
     picture before, after;
-    if (argc != 3 || !read(argv[1], before) || !read(argv[2], after)) return 2;
+    if (argc != 3 || !read_picture(argv[1], before) || !read_picture(argv[2], after)) return 2;
     const OIIO::ImageSpec &a = before.spec, &b = after.spec;
     if (a.width != b.width || a.height != b.height || a.channelnames != b.channelnames) {
         std::printf("other sizes or channels\n");

@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-void *reference_reserve(void *block, size_t bytes)
+void *reference_reallocate(void *block, size_t bytes)
 {
     void *p = realloc(block, bytes ? bytes : 1);
     if (!p) {
@@ -15,7 +15,7 @@ void *reference_reserve(void *block, size_t bytes)
 }
 
 /* Computes the scale's function by its definition. */
-static double scaled(const render_transfer *t, double value)
+static double apply_scale(const render_transfer *t, double value)
 {
     const double size = fabs(value) / t->threshold;
     if (t->scale == RENDER_LOG) return value > 0 ? log10(value) : -INFINITY;
@@ -29,23 +29,23 @@ double reference_opacity(const render_transfer *t, double value)
     if (value < t->opacity_values[0]) return (double)t->opacities[0];
     for (int i = 0; i < last; i++) {
         const double low = t->opacity_values[i], high = t->opacity_values[i + 1];
-        const double from = scaled(t, low), to = scaled(t, high);
+        const double from = apply_scale(t, low), to = apply_scale(t, high);
         if (value < high)
-            return (double)t->opacities[i] +
-                   (scaled(t, value) - from) / (to - from) * ((double)t->opacities[i + 1] - (double)t->opacities[i]);
+            return (double)t->opacities[i] + (apply_scale(t, value) - from) / (to - from) *
+                                                 ((double)t->opacities[i + 1] - (double)t->opacities[i]);
     }
     return (double)t->opacities[last];
 }
 
-double reference_place(const render_transfer *t, double value)
+double reference_transfer_position(const render_transfer *t, double value)
 {
-    const double low = scaled(t, t->low), range = scaled(t, t->high) - low;
-    return range > 0 ? (scaled(t, value) - low) / range : 0;
+    const double low = apply_scale(t, t->low), range = apply_scale(t, t->high) - low;
+    return range > 0 ? (apply_scale(t, value) - low) / range : 0;
 }
 
 void reference_colour(const render_transfer *t, double value, double colour[3])
 {
-    const double x = reference_place(t, value);
+    const double x = reference_transfer_position(t, value);
     const double place = fmin(fmax(x, 0), 1) * (t->colour_count - (t->is_banded ? 0 : 1));
     const bool is_last = place >= t->colour_count - 1;
     const int i = t->is_banded ? (int)fmin(place, t->colour_count - 1) : is_last ? t->colour_count - 2 : (int)place;

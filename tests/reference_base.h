@@ -7,12 +7,12 @@
 #include "render.h"
 
 /* Reallocates the block as realloc() does, but ends the process if memory runs out. */
-void *reference_reserve(void *block, size_t bytes);
+void *reference_reallocate(void *block, size_t bytes);
 
 /* Return opacity and colour of a value as render.h defines them. */
 double reference_opacity(const render_transfer *t, double value);
 /* Returns the value's position in the colour table, not clamped. */
-double reference_place(const render_transfer *t, double value);
+double reference_transfer_position(const render_transfer *t, double value);
 void reference_colour(const render_transfer *t, double value, double colour[3]);
 
 static inline double reference_dot(const double *a, const double *b)

@@ -44,7 +44,7 @@ typedef struct cell_faces {
     int vertices[6][4]; /* the fourth is -1 for a triangle */
 } cell_faces;
 
-static const cell_faces *faces_of(int type)
+static const cell_faces *get_cell_faces(int type)
 {
     static const cell_faces tet = {4, {{0, 1, 2, -1}, {0, 1, 3, -1}, {1, 2, 3, -1}, {0, 2, 3, -1}}};
     static const cell_faces hex = {
@@ -54,7 +54,7 @@ static const cell_faces *faces_of(int type)
     return type == GRID_TET ? &tet : type == GRID_HEX ? &hex : type == GRID_WEDGE ? &wedge : &pyramid;
 }
 
-static bool comes_before(const double *a, const double *b)
+static bool precedes_point(const double *a, const double *b)
 {
     for (int axis = 0; axis < 3; axis++)
         if (a[axis] != b[axis]) return a[axis] < b[axis];
@@ -70,7 +70,7 @@ static int split_face(const reference_cell *cell, const int *face, int triangles
     }
     int least = 0;
     for (int i = 1; i < 4; i++)
-        if (comes_before(cell->world[face[i]], cell->world[face[least]])) least = i;
+        if (precedes_point(cell->world[face[i]], cell->world[face[least]])) least = i;
     for (int half = 0; half < 2; half++) {
         triangles[half][0] = face[least];
         triangles[half][1] = face[(least + 1 + half) % 4];
@@ -79,12 +79,12 @@ static int split_face(const reference_cell *cell, const int *face, int triangles
     return 2;
 }
 
-static void shear(const reference_line *line, const double *p, double out[2])
+static void shear_point(const reference_line *line, const double *p, double out[2])
 {
     for (int axis = 0; axis < 2; axis++) out[axis] = p[axis] - line->base[axis] - line->slope[axis] * p[2];
 }
 
-static long double cross(const double *a, const double *b)
+static long double cross_product(const double *a, const double *b)
 {
     return (long double)a[0] * (long double)b[1] - (long double)a[1] * (long double)b[0];
 }
@@ -93,7 +93,7 @@ static long double cross(const double *a, const double *b)
 static bool axis_crosses(const double *a, const double *b)
 {
     if ((a[1] >= 0) == (b[1] >= 0)) return false;
-    return a[1] < 0 ? cross(a, b) > 0 : cross(b, a) > 0;
+    return a[1] < 0 ? cross_product(a, b) > 0 : cross_product(b, a) > 0;
 }
 
 static double edge_length(const double *a, const double *b)
@@ -106,17 +106,17 @@ static void triangle_weights(const reference_cell *cell, const reference_line *l
                              double weights[3])
 {
     double p[3][2];
-    for (int i = 0; i < 3; i++) shear(line, cell->position[triangle[i]], p[i]);
-    const long double e[3] = {cross(p[1], p[2]), cross(p[2], p[0]), cross(p[0], p[1])};
+    for (int i = 0; i < 3; i++) shear_point(line, cell->position[triangle[i]], p[i]);
+    const long double e[3] = {cross_product(p[1], p[2]), cross_product(p[2], p[0]), cross_product(p[0], p[1])};
     const long double area = e[0] + e[1] + e[2];
     for (int i = 0; i < 3; i++) weights[i] = area != 0 ? (double)(e[i] / area) : 1.0 / 3;
 }
 
-static bool triangle_crossed(const reference_cell *cell, const reference_line *line, const int *triangle,
-                             reference_crossing *out)
+static bool intersect_triangle(const reference_cell *cell, const reference_line *line, const int *triangle,
+                               reference_crossing *out)
 {
     double p[3][2], weights[3];
-    for (int i = 0; i < 3; i++) shear(line, cell->position[triangle[i]], p[i]);
+    for (int i = 0; i < 3; i++) shear_point(line, cell->position[triangle[i]], p[i]);
     if ((axis_crosses(p[0], p[1]) + axis_crosses(p[1], p[2]) + axis_crosses(p[2], p[0])) % 2 == 0) return false;
     triangle_weights(cell, line, triangle, weights);
     memset(out, 0, sizeof *out);
@@ -125,7 +125,7 @@ static bool triangle_crossed(const reference_cell *cell, const reference_line *l
     return true;
 }
 
-static double beyond_unit(double u)
+static double distance_outside_unit_interval(double u)
 {
     return u < 0 ? -u : u > 1 ? u - 1 : 0;
 }
@@ -136,7 +136,7 @@ static double clamp_unit(double u)
 }
 
 /* Given w, computes the u of a + u b + w c + u w d = 0 from the better conditioned of its two equations. */
-static double solve_u(const double *a, const double *b, const double *c, const double *d, double w)
+static double solve_for_u(const double *a, const double *b, const double *c, const double *d, double w)
 {
     const double x = b[0] + w * d[0], y = b[1] + w * d[1];
     const int axis = fabs(x) >= fabs(y) ? 0 : 1;
@@ -164,7 +164,8 @@ typedef struct patch_point {
  * how many are inside the square. */
 static int solve_bilinear(const double *a, const double *b, const double *c, const double *d, patch_point points[2])
 {
-    const double qa = (double)cross(d, c), qb = (double)(cross(b, c) + cross(d, a)), qc = (double)cross(b, a);
+    const double qa = (double)cross_product(d, c), qb = (double)(cross_product(b, c) + cross_product(d, a)),
+                 qc = (double)cross_product(b, a);
     const double square = qb * qb - 4 * qa * qc;
     const double root = sqrt(fmax(square, 0)), h = -0.5 * (qb + (qb < 0 ? -root : root));
     const double candidates[2] = {h != 0 ? qc / h : 0.5, qa != 0 ? h / qa : (double)INFINITY};
@@ -172,14 +173,16 @@ static int solve_bilinear(const double *a, const double *b, const double *c, con
     for (int i = 0; i < 2; i++) {
         points[i] = (patch_point){0.5, 0.5, (double)INFINITY};
         if (!isfinite(candidates[i])) continue;
-        const double w = candidates[i], u = solve_u(a, b, c, d, w);
-        points[i] = (patch_point){u, w, beyond_unit(w) + beyond_unit(u) + bilinear_residual(a, b, c, d, u, w)};
+        const double w = candidates[i], u = solve_for_u(a, b, c, d, w);
+        points[i] = (patch_point){u, w,
+                                  distance_outside_unit_interval(w) + distance_outside_unit_interval(u) +
+                                      bilinear_residual(a, b, c, d, u, w)};
         inside += points[i].beyond < 1e-9;
     }
     return inside;
 }
 
-static double bilinear(const double values[4], double u, double w)
+static double interpolate_bilinear(const double values[4], double u, double w)
 {
     return (1 - w) * ((1 - u) * values[0] + u * values[1]) + w * ((1 - u) * values[3] + u * values[2]);
 }
@@ -188,7 +191,7 @@ static int find_patch_points(const reference_cell *cell, const reference_line *l
                              patch_point points[2])
 {
     double p[4][2], a[2], b[2], c[2], d[2];
-    for (int i = 0; i < 4; i++) shear(line, cell->position[face[i]], p[i]);
+    for (int i = 0; i < 4; i++) shear_point(line, cell->position[face[i]], p[i]);
     for (int i = 0; i < 2; i++) {
         a[i] = p[0][i];
         b[i] = p[1][i] - p[0][i];
@@ -216,7 +219,7 @@ static int move_to_patch(const reference_cell *cell, const reference_line *line,
         crossings[i].is_folded = count != 1 || inside != 1;
         crossings[i].u = clamp_unit(point->u);
         crossings[i].w = clamp_unit(point->w);
-        if (left == 2 || inside == 1) crossings[i].z = bilinear(z, crossings[i].u, crossings[i].w);
+        if (left == 2 || inside == 1) crossings[i].z = interpolate_bilinear(z, crossings[i].u, crossings[i].w);
         if (!count) crossings[i].z_triangle = crossings[i].z;
     }
     if (left == 2 && (crossings[0].z < crossings[1].z) != (crossings[0].z_triangle < crossings[1].z_triangle)) {
@@ -247,7 +250,7 @@ static int polyhedron_crossings(const reference_cell *cell, const reference_line
         int of_face = 0;
         for (int k = 0; k < 2; k++) found[k] = (reference_crossing){.face = face, .triangle = -1};
         for (next = i; next < p->triangle_count && p->face_of[next] == face; next++) {
-            if (!triangle_crossed(cell, line, p->triangles[next], &found[of_face])) continue;
+            if (!intersect_triangle(cell, line, p->triangles[next], &found[of_face])) continue;
             found[of_face].face = face;
             found[of_face++].triangle = next;
         }
@@ -262,7 +265,7 @@ int reference_crossings(const reference_cell *cell, const reference_line *line,
                         reference_crossing crossings[REFERENCE_MAX_CROSSINGS])
 {
     if (cell->type == GRID_POLYHEDRON) return polyhedron_crossings(cell, line, crossings);
-    const cell_faces *faces = faces_of(cell->type);
+    const cell_faces *faces = get_cell_faces(cell->type);
     bool is_folded = false;
     int count = 0;
     for (int face = 0; face < faces->count; face++) {
@@ -271,7 +274,7 @@ int reference_crossings(const reference_cell *cell, const reference_line *line,
         reference_crossing found[2] = {{.face = face}, {.face = face}};
         int of_face = 0;
         for (int half = 0; half < halves; half++) {
-            if (!triangle_crossed(cell, line, triangles[half], &found[of_face])) continue;
+            if (!intersect_triangle(cell, line, triangles[half], &found[of_face])) continue;
             found[of_face++].face = face;
         }
         if (halves == 2) of_face = move_to_patch(cell, line, faces->vertices[face], found, of_face, &is_folded);
@@ -294,13 +297,14 @@ double reference_face_value(const reference_cell *cell, const reference_line *li
                             const double *values, bool *is_folded)
 {
     const bool is_polyhedron = cell->type == GRID_POLYHEDRON;
-    const int *face = is_polyhedron ? cell->poly.faces[crossing->face] : faces_of(cell->type)->vertices[crossing->face];
+    const int *face =
+        is_polyhedron ? cell->poly.faces[crossing->face] : get_cell_faces(cell->type)->vertices[crossing->face];
     const bool is_quad = is_polyhedron ? cell->poly.is_patch[crossing->face] : face[3] >= 0;
     *is_folded = crossing->is_folded;
     if (!is_quad)
         return triangle_value(cell, line, is_polyhedron ? cell->poly.triangles[crossing->triangle] : face, values);
     const double corners[4] = {values[face[0]], values[face[1]], values[face[2]], values[face[3]]};
-    return bilinear(corners, crossing->u, crossing->w);
+    return interpolate_bilinear(corners, crossing->u, crossing->w);
 }
 
 static double segment_distance(const double *a, const double *b)
@@ -314,7 +318,7 @@ static double segment_distance(const double *a, const double *b)
 double reference_edge_distance(const reference_cell *cell, const reference_line *line)
 {
     const bool is_polyhedron = cell->type == GRID_POLYHEDRON;
-    const cell_faces *faces = faces_of(cell->type);
+    const cell_faces *faces = get_cell_faces(cell->type);
     const int face_count = is_polyhedron ? cell->poly.face_count : faces->count;
     double least = (double)INFINITY;
     for (int face = 0; face < face_count; face++) {
@@ -322,8 +326,8 @@ double reference_edge_distance(const reference_cell *cell, const reference_line 
         const int sides = is_polyhedron ? cell->poly.face_size[face] : loop[3] < 0 ? 3 : 4;
         for (int i = 0; i < sides; i++) {
             double a[2], b[2];
-            shear(line, cell->position[loop[i]], a);
-            shear(line, cell->position[loop[(i + 1) % sides]], b);
+            shear_point(line, cell->position[loop[i]], a);
+            shear_point(line, cell->position[loop[(i + 1) % sides]], b);
             least = fmin(least, segment_distance(a, b));
         }
     }
@@ -332,8 +336,8 @@ double reference_edge_distance(const reference_cell *cell, const reference_line 
 
 /* ---- a polyhedron along a line ---- */
 
-static bool sum_on_line(const reference_cell *cell, const reference_line *line, double z, const double *values,
-                        double *value)
+static bool interpolate_on_line(const reference_cell *cell, const reference_line *line, double z, const double *values,
+                                double *value)
 {
     const double point[3] = {line->base[0] + line->slope[0] * z, line->base[1] + line->slope[1] * z, z};
     return reference_polyhedron_interpolate(cell, point, values, value, NULL);
@@ -350,7 +354,7 @@ static double profile_end(const reference_cell *cell, const reference_line *line
     if (end->triangle < 0) return face;
     const double triangle = triangle_value(cell, line, cell->poly.triangles[end->triangle], values);
     /* Evaluates the sum slightly inside: the error is 1e-10 of the field's change along z. */
-    if (!sum_on_line(cell, line, end->z_triangle + 1e-10 * inward, values, &sum)) sum = triangle;
+    if (!interpolate_on_line(cell, line, end->z_triangle + 1e-10 * inward, values, &sum)) sum = triangle;
     return face + (sum - triangle);
 }
 
@@ -371,7 +375,7 @@ int reference_profile_breaks(const reference_cell *cell, const reference_line *l
             const int *t = cell->poly.triangles[i], sheet[3] = {t[k], t[(k + 1) % 3], cell->count};
             reference_crossing met;
             const double low = fmax(ends[0].z, ends[0].z_triangle), high = fmin(ends[1].z, ends[1].z_triangle);
-            if (triangle_crossed(cell, line, sheet, &met) && met.z > low && met.z < high)
+            if (intersect_triangle(cell, line, sheet, &met) && met.z > low && met.z < high)
                 count = insert_depth(z, count, met.z);
         }
     return count;
@@ -379,10 +383,11 @@ int reference_profile_breaks(const reference_cell *cell, const reference_line *l
 
 /* Computes the sum at a sheet, on a side that has one. A piece between two triangles of a quad whose patch the ray does
  * not meet is in no tet; the field on it is linear between its sheets. */
-static bool sum_at_sheet(const reference_cell *cell, const reference_line *line, double z, double aside,
-                         const double *values, double *value)
+static bool interpolate_at_sheet(const reference_cell *cell, const reference_line *line, double z, double aside,
+                                 const double *values, double *value)
 {
-    return sum_on_line(cell, line, z + aside, values, value) || sum_on_line(cell, line, z - aside, values, value);
+    return interpolate_on_line(cell, line, z + aside, values, value) ||
+           interpolate_on_line(cell, line, z - aside, values, value);
 }
 
 bool reference_profile_value(const reference_cell *cell, const reference_line *line, const reference_crossing ends[2],
@@ -399,7 +404,7 @@ bool reference_profile_value(const reference_cell *cell, const reference_line *l
     const bool is_last = next == count - 1 && cell->poly.is_patch[ends[1].face];
     if (!is_first && !is_last) {
         const double inner = 1e-9 * length, held = fmin(fmax(z, ends[0].z + inner), ends[1].z - inner);
-        if (sum_on_line(cell, line, held, values, value)) return true;
+        if (interpolate_on_line(cell, line, held, values, value)) return true;
     }
     /* Evaluates the sums slightly inside the piece, since a sheet may lie in the face at the other end. */
     const double aside = 1e-9 * (behind - before);
@@ -407,11 +412,11 @@ bool reference_profile_value(const reference_cell *cell, const reference_line *l
     if (next == 1)
         v0 = profile_end(cell, line, &ends[0], values, length);
     else
-        is_good = sum_at_sheet(cell, line, before, aside, values, &v0);
+        is_good = interpolate_at_sheet(cell, line, before, aside, values, &v0);
     if (next == count - 1)
         v1 = profile_end(cell, line, &ends[1], values, -length);
     else
-        is_good = sum_at_sheet(cell, line, behind, -aside, values, &v1) && is_good;
+        is_good = interpolate_at_sheet(cell, line, behind, -aside, values, &v1) && is_good;
     *value = behind > before ? v0 + (z - before) / (behind - before) * (v1 - v0) : v0;
     return is_good;
 }
@@ -438,7 +443,7 @@ static shape_function square_shape(int i, double r, double s)
 }
 
 /* Multiplies a weight of the base by a weight along the height. */
-static shape_function times_height(shape_function base, double height, double slope)
+static shape_function multiply_by_height(shape_function base, double height, double slope)
 {
     return (shape_function){base.n * height, {base.d[0] * height, base.d[1] * height, base.n * slope}};
 }
@@ -447,8 +452,8 @@ static void hex_shape(const double *p, shape_function *s)
 {
     for (int i = 0; i < 4; i++) {
         const shape_function base = square_shape(i, p[0], p[1]);
-        s[i] = times_height(base, 1 - p[2], -1);
-        s[i + 4] = times_height(base, p[2], 1);
+        s[i] = multiply_by_height(base, 1 - p[2], -1);
+        s[i + 4] = multiply_by_height(base, p[2], 1);
     }
 }
 
@@ -456,14 +461,14 @@ static void wedge_shape(const double *p, shape_function *s)
 {
     const shape_function base[3] = {{1 - p[0] - p[1], {-1, -1, 0}}, {p[0], {1, 0, 0}}, {p[1], {0, 1, 0}}};
     for (int i = 0; i < 3; i++) {
-        s[i] = times_height(base[i], 1 - p[2], -1);
-        s[i + 3] = times_height(base[i], p[2], 1);
+        s[i] = multiply_by_height(base[i], 1 - p[2], -1);
+        s[i + 3] = multiply_by_height(base[i], p[2], 1);
     }
 }
 
 static void pyramid_shape(const double *p, shape_function *s)
 {
-    for (int i = 0; i < 4; i++) s[i] = times_height(square_shape(i, p[0], p[1]), 1 - p[2], -1);
+    for (int i = 0; i < 4; i++) s[i] = multiply_by_height(square_shape(i, p[0], p[1]), 1 - p[2], -1);
     s[4] = (shape_function){p[2], {0, 0, 1}};
 }
 
@@ -495,9 +500,9 @@ static bool solve3(const double *a, const double *b, const double *c, const doub
 
 /* Computes the map's columns dP/dparameter and the remainder point - P(parameter). type and count are the cell's; they
  * are constants where this function is inlined, so that the compiler unrolls the loops. */
-static inline __attribute__((always_inline)) void map_of(const reference_cell *cell, int type, int count,
-                                                         const double *parameter, const double *point,
-                                                         double columns[3][3], double left[3])
+static inline __attribute__((always_inline)) void evaluate_map(const reference_cell *cell, int type, int count,
+                                                               const double *parameter, const double *point,
+                                                               double columns[3][3], double left[3])
 {
     shape_function s[8];
     cell_shape(type, parameter, s);
@@ -525,13 +530,13 @@ static double cell_extent(const reference_cell *cell)
     return extent;
 }
 
-static inline __attribute__((always_inline)) bool newton_in(const reference_cell *cell, int type, int count,
-                                                            const double *point, double parameter[3])
+static inline __attribute__((always_inline)) bool
+solve_by_newton_in_cell_type(const reference_cell *cell, int type, int count, const double *point, double parameter[3])
 {
     const double tolerance = 1e-13 * cell_extent(cell);
     for (int step = 0; step < 60; step++) {
         double columns[3][3], left[3], move[3];
-        map_of(cell, type, count, parameter, point, columns, left);
+        evaluate_map(cell, type, count, parameter, point, columns, left);
         if (!solve3(columns[0], columns[1], columns[2], left, move)) return false;
         const double length = length3(move), limit = length > 0.5 && type != GRID_TET ? 0.5 / length : 1;
         for (int k = 0; k < 3; k++) parameter[k] += limit * move[k];
@@ -541,25 +546,26 @@ static inline __attribute__((always_inline)) bool newton_in(const reference_cell
     return false;
 }
 
-static bool newton(const reference_cell *cell, const double *point, double parameter[3])
+static bool solve_by_newton(const reference_cell *cell, const double *point, double parameter[3])
 {
     switch (cell->type) {
-    case GRID_TET: return newton_in(cell, GRID_TET, 4, point, parameter);
-    case GRID_HEX: return newton_in(cell, GRID_HEX, 8, point, parameter);
-    case GRID_WEDGE: return newton_in(cell, GRID_WEDGE, 6, point, parameter);
-    default: return newton_in(cell, GRID_PYRAMID, 5, point, parameter);
+    case GRID_TET: return solve_by_newton_in_cell_type(cell, GRID_TET, 4, point, parameter);
+    case GRID_HEX: return solve_by_newton_in_cell_type(cell, GRID_HEX, 8, point, parameter);
+    case GRID_WEDGE: return solve_by_newton_in_cell_type(cell, GRID_WEDGE, 6, point, parameter);
+    default: return solve_by_newton_in_cell_type(cell, GRID_PYRAMID, 5, point, parameter);
     }
 }
 
-static double beyond_cell(const double *parameter)
+static double distance_outside_cell(const double *parameter)
 {
-    return fmax(beyond_unit(parameter[0]), fmax(beyond_unit(parameter[1]), beyond_unit(parameter[2])));
+    return fmax(distance_outside_unit_interval(parameter[0]),
+                fmax(distance_outside_unit_interval(parameter[1]), distance_outside_unit_interval(parameter[2])));
 }
 
 /* Inverts the map by Newton's method from the last solution, which is close if the point is the next one along a ray,
  * then from the cell's centre, and from other starts if these fail or lead far outside. Of several solutions it returns
  * the one nearest to the cell. */
-static bool invert(const reference_cell *cell, const double *point, double parameter[3])
+static bool invert_map(const reference_cell *cell, const double *point, double parameter[3])
 {
     static _Thread_local double starts[10][3] = {{0.5, 0.5, 0.5},  {0.4, 0.4, 0.5}, {0.1, 0.1, 0.1}, {0.9, 0.05, 0.1},
                                                  {0.05, 0.9, 0.1}, {0.9, 0.9, 0.1}, {0.1, 0.1, 0.9}, {0.9, 0.05, 0.9},
@@ -568,8 +574,8 @@ static bool invert(const reference_cell *cell, const double *point, double param
     for (int i = 0; i < 10 && best > 0.1; i++) {
         double p[3];
         memcpy(p, starts[i], sizeof p);
-        if (!newton(cell, point, p) || beyond_cell(p) >= best) continue;
-        best = beyond_cell(p);
+        if (!solve_by_newton(cell, point, p) || distance_outside_cell(p) >= best) continue;
+        best = distance_outside_cell(p);
         memcpy(parameter, p, sizeof p);
     }
     if (best <= 0.1) memcpy(starts[0], parameter, sizeof starts[0]);
@@ -595,12 +601,13 @@ static bool project_from_apex(const reference_cell *cell, const double *point, d
     return true;
 }
 
-static void gradient_at(const reference_cell *cell, const double *parameter, const double *values, double gradient[3])
+static void compute_gradient(const reference_cell *cell, const double *parameter, const double *values,
+                             double gradient[3])
 {
     shape_function s[8];
     double columns[3][3], rows[3][3], unused[3], slope[3] = {0, 0, 0};
     cell_shape(cell->type, parameter, s);
-    map_of(cell, cell->type, cell->count, parameter, parameter, columns, unused);
+    evaluate_map(cell, cell->type, cell->count, parameter, parameter, columns, unused);
     for (int k = 0; k < 3; k++)
         for (int i = 0; i < cell->count; i++) slope[k] += s[i].d[k] * values[i];
     for (int k = 0; k < 3; k++)
@@ -608,7 +615,7 @@ static void gradient_at(const reference_cell *cell, const double *parameter, con
     if (!solve3(rows[0], rows[1], rows[2], slope, gradient)) gradient[0] = gradient[1] = gradient[2] = 0;
 }
 
-static double value_at(const reference_cell *cell, const double *parameter, const double *values)
+static double interpolate_value(const reference_cell *cell, const double *parameter, const double *values)
 {
     shape_function s[8];
     double value = 0;
@@ -623,10 +630,10 @@ static bool interpolate_pyramid(const reference_cell *cell, const double *point,
     double moved[3], parameter[3], scale;
     *value = values[4];
     if (!project_from_apex(cell, point, moved, &scale)) return true;
-    if (!invert(cell, moved, parameter)) return false;
-    if (gradient) gradient_at(cell, parameter, values, gradient);
+    if (!invert_map(cell, moved, parameter)) return false;
+    if (gradient) compute_gradient(cell, parameter, values, gradient);
     parameter[2] = 1 - (1 - parameter[2]) / scale;
-    *value = value_at(cell, parameter, values);
+    *value = interpolate_value(cell, parameter, values);
     return true;
 }
 
@@ -638,8 +645,8 @@ bool reference_interpolate(const reference_cell *cell, const double point[3], co
     if (gradient) gradient[0] = gradient[1] = gradient[2] = 0;
     if (cell->type == GRID_POLYHEDRON) return reference_polyhedron_interpolate(cell, point, values, value, gradient);
     if (cell->type == GRID_PYRAMID) return interpolate_pyramid(cell, point, values, value, gradient);
-    if (!invert(cell, point, parameter)) return false;
-    if (gradient) gradient_at(cell, parameter, values, gradient);
-    *value = value_at(cell, parameter, values);
+    if (!invert_map(cell, point, parameter)) return false;
+    if (gradient) compute_gradient(cell, parameter, values, gradient);
+    *value = interpolate_value(cell, parameter, values);
     return true;
 }

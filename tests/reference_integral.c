@@ -91,9 +91,9 @@ static int64_t count_drawn(const render_job *job)
 
 reference_integral *reference_integral_create(const render_job *job, double tolerance)
 {
-    reference_integral *scene = reference_reserve(NULL, sizeof *scene);
+    reference_integral *scene = reference_reallocate(NULL, sizeof *scene);
     const size_t most = (size_t)count_drawn(job) * (size_t)job->volume_count;
-    *scene = (reference_integral){job, tolerance, 0, reference_reserve(NULL, most * sizeof(camera_cell))};
+    *scene = (reference_integral){job, tolerance, 0, reference_reallocate(NULL, most * sizeof(camera_cell))};
     for (int volume = 0; volume < job->volume_count; volume++)
         for (int part = 0; part < job->part_count; part++)
             for (int64_t cell = 0; cell < job->parts[part].cells->cell_count; cell++)
@@ -107,7 +107,7 @@ void reference_integral_free(reference_integral *scene)
     free(scene);
 }
 
-static double value_at(const cell_interval *s, const reference_line *line, double z)
+static double interpolate_value(const cell_interval *s, const reference_line *line, double z)
 {
     const camera_cell *placed = s->cell;
     const double point[3] = {line->base[0] + line->slope[0] * z, line->base[1] + line->slope[1] * z, z};
@@ -122,7 +122,7 @@ static double value_at(const cell_interval *s, const reference_line *line, doubl
 static void add_sample(const active_intervals *c, const cell_interval *s, double z, sample *sum)
 {
     const camera_cell *placed = s->cell;
-    const double value = value_at(s, &c->line, z);
+    const double value = interpolate_value(s, &c->line, z);
     double colour[3];
     const double clear = -log1p(-fmin(reference_opacity(placed->transfer, value), 1 - 1e-15));
     const double extinction = clear * c->length / placed->transfer->unit_distance;
@@ -131,7 +131,7 @@ static void add_sample(const active_intervals *c, const cell_interval *s, double
     for (int k = 0; k < 3; k++) sum->emission[k] += extinction * colour[k];
 }
 
-static sample sample_at(const active_intervals *c, double z)
+static sample compute_sample(const active_intervals *c, double z)
 {
     sample sum = {0};
     for (int64_t i = 0; i < c->count; i++) add_sample(c, c->active[i], z, &sum);
@@ -140,7 +140,7 @@ static sample sample_at(const active_intervals *c, double z)
 
 /* Integrates by Boole's rule: both integrals use the quartic through five samples, whose optical depth up to each
  * sample is exact. */
-static light boole(const sample s[5], double width)
+static light integrate_by_boole(const sample s[5], double width)
 {
     static const double up_to[5][5] = {{0, 0, 0, 0, 0},
                                        {251 / 2880.0, 646 / 2880.0, -264 / 2880.0, 106 / 2880.0, -19 / 2880.0},
@@ -157,14 +157,14 @@ static light boole(const sample s[5], double width)
     return out;
 }
 
-static light over(const light *front, const light *back)
+static light blend_over(const light *front, const light *back)
 {
     light out = {{0, 0, 0}, front->transmittance * back->transmittance};
     for (int c = 0; c < 3; c++) out.colour[c] = front->colour[c] + front->transmittance * back->colour[c];
     return out;
 }
 
-static double difference(const light *a, const light *b)
+static double light_difference(const light *a, const light *b)
 {
     double most = fabs(a->transmittance - b->transmittance);
     for (int c = 0; c < 3; c++) most = fmax(most, fabs(a->colour[c] - b->colour[c]));
@@ -172,27 +172,29 @@ static double difference(const light *a, const light *b)
 }
 
 /* s holds the samples at both ends, the quarters and the middle. */
-static light adapt(const active_intervals *c, double from, double to, const sample s[5], double tolerance, int depth)
+static light integrate_adaptively(const active_intervals *c, double from, double to, const sample s[5],
+                                  double tolerance, int depth)
 {
     const double middle = 0.5 * (from + to), width = to - from;
-    sample left[5] = {s[0], sample_at(c, from + width / 8), s[1], sample_at(c, from + 3 * width / 8), s[2]};
-    sample right[5] = {s[2], sample_at(c, from + 5 * width / 8), s[3], sample_at(c, from + 7 * width / 8), s[4]};
-    light a = boole(left, 0.5 * width), b = boole(right, 0.5 * width);
-    const light whole = boole(s, width), halves = over(&a, &b);
-    if ((difference(&whole, &halves) <= tolerance && depth >= 2) || depth > 40) return halves;
-    a = adapt(c, from, middle, left, 0.5 * tolerance, depth + 1);
-    b = adapt(c, middle, to, right, 0.5 * tolerance, depth + 1);
-    return over(&a, &b);
+    sample left[5] = {s[0], compute_sample(c, from + width / 8), s[1], compute_sample(c, from + 3 * width / 8), s[2]};
+    sample right[5] = {s[2], compute_sample(c, from + 5 * width / 8), s[3], compute_sample(c, from + 7 * width / 8),
+                       s[4]};
+    light a = integrate_by_boole(left, 0.5 * width), b = integrate_by_boole(right, 0.5 * width);
+    const light whole = integrate_by_boole(s, width), halves = blend_over(&a, &b);
+    if ((light_difference(&whole, &halves) <= tolerance && depth >= 2) || depth > 40) return halves;
+    a = integrate_adaptively(c, from, middle, left, 0.5 * tolerance, depth + 1);
+    b = integrate_adaptively(c, middle, to, right, 0.5 * tolerance, depth + 1);
+    return blend_over(&a, &b);
 }
 
-static light integrate(const active_intervals *c, double from, double to)
+static light integrate_light(const active_intervals *c, double from, double to)
 {
     sample s[5];
-    for (int i = 0; i < 5; i++) s[i] = sample_at(c, from + (to - from) * i / 4);
-    return adapt(c, from, to, s, c->scene->tolerance, 0);
+    for (int i = 0; i < 5; i++) s[i] = compute_sample(c, from + (to - from) * i / 4);
+    return integrate_adaptively(c, from, to, s, c->scene->tolerance, 0);
 }
 
-static bool is_near(const reference_cell *cell, const reference_line *line)
+static bool is_box_near_line(const reference_cell *cell, const reference_line *line)
 {
     for (int axis = 0; axis < 2; axis++) {
         bool below = false, above = false;
@@ -208,7 +210,7 @@ static bool is_near(const reference_cell *cell, const reference_line *line)
 }
 
 /* Collects the intervals of the cells that the ray crosses in front of the eye. */
-static cell_interval *collect(const reference_integral *scene, const reference_line *line, int64_t *count)
+static cell_interval *collect_intervals(const reference_integral *scene, const reference_line *line, int64_t *count)
 {
     cell_interval *list = NULL;
     int64_t capacity = 0;
@@ -216,12 +218,13 @@ static cell_interval *collect(const reference_integral *scene, const reference_l
     for (int64_t i = 0; i < scene->count; i++) {
         reference_crossing crossings[REFERENCE_MAX_CROSSINGS];
         const reference_cell *cell = &scene->cells[i].cell;
-        const bool may_pass = reference_box_is_near(&scene->cells[i].box, line, 0, 1e-9) && is_near(cell, line);
+        const bool may_pass =
+            reference_box_is_near(&scene->cells[i].box, line, 0, 1e-9) && is_box_near_line(cell, line);
         const int found = may_pass ? reference_crossings(cell, line, crossings) : 0;
         for (int k = 0; k + 1 < found; k += 2) {
             if (!(crossings[k + 1].z > fmax(crossings[k].z, 0))) continue;
             if (*count == capacity)
-                list = reference_reserve(list, (size_t)(capacity = 2 * capacity + 64) * sizeof *list);
+                list = reference_reallocate(list, (size_t)(capacity = 2 * capacity + 64) * sizeof *list);
             list[(*count)++] = (cell_interval){
                 &scene->cells[i], fmax(crossings[k].z, 0), crossings[k + 1].z, {crossings[k], crossings[k + 1]}};
         }
@@ -249,7 +252,7 @@ static void blend_hit(light *sum, const reference_hit *hit)
 {
     light surface = {{0, 0, 0}, 1 - hit->opacity};
     for (int c = 0; c < 3; c++) surface.colour[c] = hit->opacity * hit->colour[c];
-    *sum = over(sum, &surface);
+    *sum = blend_over(sum, &surface);
 }
 
 static int compare_numbers(const void *left, const void *right)
@@ -259,7 +262,7 @@ static int compare_numbers(const void *left, const void *right)
 }
 
 /* Finds the depths at which the interval begins, bends and ends; returns their number. */
-static int stretch_cuts(const cell_interval *s, const reference_line *line, double z[REFERENCE_MAX_BREAKS])
+static int find_interval_cuts(const cell_interval *s, const reference_line *line, double z[REFERENCE_MAX_BREAKS])
 {
     z[0] = s->z_in;
     z[1] = s->z_out;
@@ -278,10 +281,10 @@ typedef struct places {
     int64_t count, capacity;
 } places;
 
-static void add_place(places *list, double z)
+static void add_depth(places *list, double z)
 {
     if (list->count == list->capacity)
-        list->z = reference_reserve(list->z, (size_t)(list->capacity = 2 * list->capacity + 64) * sizeof *list->z);
+        list->z = reference_reallocate(list->z, (size_t)(list->capacity = 2 * list->capacity + 64) * sizeof *list->z);
     list->z[list->count++] = z;
 }
 
@@ -290,33 +293,34 @@ static void add_place(places *list, double z)
 static void add_crossing(const cell_interval *s, const reference_line *line, double low, double high, double x,
                          places *out)
 {
-    const bool rises = value_at(s, line, low) < x;
+    const bool rises = interpolate_value(s, line, low) < x;
     for (int i = 0; i < 60; i++) {
         const double middle = 0.5 * (low + high);
-        if ((value_at(s, line, middle) < x) == rises)
+        if ((interpolate_value(s, line, middle) < x) == rises)
             low = middle;
         else
             high = middle;
     }
-    add_place(out, low);
-    add_place(out, high);
+    add_depth(out, low);
+    add_depth(out, high);
 }
 
 /* Returns the greatest (sign 1) or least (sign -1) value between two depths, by golden section. */
-static double extreme(const cell_interval *s, const reference_line *line, double low, double high, double sign)
+static double find_extreme_value(const cell_interval *s, const reference_line *line, double low, double high,
+                                 double sign)
 {
     const double golden = 0.6180339887498949;
     double a = high - golden * (high - low), b = low + golden * (high - low);
-    double at_a = sign * value_at(s, line, a), at_b = sign * value_at(s, line, b);
+    double at_a = sign * interpolate_value(s, line, a), at_b = sign * interpolate_value(s, line, b);
     for (int i = 0; i < 60; i++) {
         if (at_a < at_b) {
             low = a, a = b, at_a = at_b;
             b = low + golden * (high - low);
-            at_b = sign * value_at(s, line, b);
+            at_b = sign * interpolate_value(s, line, b);
         } else {
             high = b, b = a, at_b = at_a;
             a = high - golden * (high - low);
-            at_a = sign * value_at(s, line, a);
+            at_a = sign * interpolate_value(s, line, a);
         }
     }
     return 0.5 * (low + high);
@@ -325,7 +329,7 @@ static double extreme(const cell_interval *s, const reference_line *line, double
 static void add_crossings(const cell_interval *s, const reference_line *line, double from, double to, places *out)
 {
     const render_transfer *t = s->cell->transfer;
-    const double a = value_at(s, line, from), b = value_at(s, line, to);
+    const double a = interpolate_value(s, line, from), b = interpolate_value(s, line, to);
     for (int i = 0; i < t->opacity_count; i++) {
         const double x = t->opacity_values[i];
         if ((i && x == t->opacity_values[i - 1]) || (a < x) == (b < x)) continue;
@@ -349,7 +353,7 @@ static void add_points(const cell_interval *s, const reference_line *line, doubl
     for (int i = 0; i < t->opacity_count; i++)
         is_met = is_met || (low <= t->opacity_values[i] && t->opacity_values[i] <= high);
     if (!is_met) return;
-    for (int i = 0; i <= count; i++) value[i] = value_at(s, line, from + (to - from) * i / count);
+    for (int i = 0; i <= count; i++) value[i] = interpolate_value(s, line, from + (to - from) * i / count);
     double last = from;
     for (int i = 0; i <= count; i++) {
         /* Searches for an extreme near sample i; near the first and the last sample the interval may hide it. */
@@ -357,8 +361,8 @@ static void add_points(const cell_interval *s, const reference_line *line, doubl
         const bool is_top = value[i] >= fmax(value[before], value[after]);
         const bool is_bottom = value[i] <= fmin(value[before], value[after]);
         if (count > 1 && is_top != is_bottom) {
-            const double top = extreme(s, line, from + (to - from) * before / count, from + (to - from) * after / count,
-                                       is_top ? 1 : -1);
+            const double top = find_extreme_value(s, line, from + (to - from) * before / count,
+                                                  from + (to - from) * after / count, is_top ? 1 : -1);
             if (top > last) add_crossings(s, line, last, top, out);
             last = fmax(last, top);
         }
@@ -375,13 +379,13 @@ static double *find_cuts(const cell_interval *list, int64_t count, const referen
     places all = {0};
     for (int64_t i = 0; i < count; i++) {
         double own[REFERENCE_MAX_BREAKS];
-        const int more = stretch_cuts(&list[i], line, own);
+        const int more = find_interval_cuts(&list[i], line, own);
         if (more > 2) qsort(own, (size_t)more, sizeof *own, compare_numbers);
-        for (int k = 0; k < more; k++) add_place(&all, own[k]);
+        for (int k = 0; k < more; k++) add_depth(&all, own[k]);
         for (int k = 0; k + 1 < more; k++)
             if (own[k] < own[k + 1]) add_points(&list[i], line, own[k], own[k + 1], &all);
     }
-    for (int i = 0; i < hit_count; i++) add_place(&all, hits[i].depth);
+    for (int i = 0; i < hit_count; i++) add_depth(&all, hits[i].depth);
     if (all.count) qsort(all.z, (size_t)all.count, sizeof *all.z, compare_numbers);
     *cuts = all.count;
     return all.z;
@@ -395,7 +399,7 @@ static void find_active(active_intervals *c, const cell_interval *list, int64_t 
 }
 
 /* Returns whether the job's clips of volumes keep the ray's point at depth z. */
-static bool is_kept(const active_intervals *c, double z)
+static bool is_depth_unclipped(const active_intervals *c, double z)
 {
     const render_job *job = c->scene->job;
     const render_camera *camera = &job->camera;
@@ -425,16 +429,16 @@ void reference_integral_trace(const reference_integral *scene, int x, int y, con
     light sum = {{0, 0, 0}, 1};
     int64_t count, cuts;
     int next = 0;
-    cell_interval *list = collect(scene, &c.line, &count);
+    cell_interval *list = collect_intervals(scene, &c.line, &count);
     double *z = find_cuts(list, count, &c.line, hits, hit_count, &cuts);
-    c.active = reference_reserve(NULL, (size_t)count * sizeof *c.active);
+    c.active = reference_reallocate(NULL, (size_t)count * sizeof *c.active);
     for (int64_t i = 0; i < cuts && sum.transmittance > 0; i++) {
         for (; next < hit_count && hits[next].depth <= z[i]; next++) blend_hit(&sum, &hits[next]);
-        if (i + 1 == cuts || !(z[i] < z[i + 1]) || !is_kept(&c, 0.5 * (z[i] + z[i + 1]))) continue;
+        if (i + 1 == cuts || !(z[i] < z[i + 1]) || !is_depth_unclipped(&c, 0.5 * (z[i] + z[i + 1]))) continue;
         find_active(&c, list, count, z[i], z[i + 1]);
         if (!c.count) continue;
-        const light part = integrate(&c, z[i], z[i + 1]);
-        sum = over(&sum, &part);
+        const light part = integrate_light(&c, z[i], z[i + 1]);
+        sum = blend_over(&sum, &part);
     }
     for (int k = 0; k < 3; k++) rgba[k] = sum.colour[k] + sum.transmittance * (double)background[k];
     rgba[3] = 1 - sum.transmittance * (1 - (double)background[3]);

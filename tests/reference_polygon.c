@@ -15,7 +15,7 @@ typedef struct loop {
     double normal[3], area; /* unit normal, and twice the polygon's area */
 } loop;
 
-static double area_along(const double *normal, const double *a, const double *b, const double *c)
+static double signed_area_along_normal(const double *normal, const double *a, const double *b, const double *c)
 {
     double sum = 0;
     for (int i = 0; i < 3; i++) {
@@ -48,7 +48,7 @@ static void make_loop(const double (*corners)[3], int count, loop *out)
         double unit[3] = {0, 0, 0};
         unit[axis] = 1;
         for (int i = 1; i + 1 < count; i++)
-            out->normal[axis] += area_along(unit, out->place[0], out->place[i], out->place[i + 1]);
+            out->normal[axis] += signed_area_along_normal(unit, out->place[0], out->place[i], out->place[i + 1]);
     }
     out->area =
         sqrt(out->normal[0] * out->normal[0] + out->normal[1] * out->normal[1] + out->normal[2] * out->normal[2]);
@@ -57,7 +57,7 @@ static void make_loop(const double (*corners)[3], int count, loop *out)
 
 static double corner_area(const loop *l, int a, int b, int c)
 {
-    return area_along(l->normal, l->place[a], l->place[b], l->place[c]) / l->area;
+    return signed_area_along_normal(l->normal, l->place[a], l->place[b], l->place[c]) / l->area;
 }
 
 static bool is_fan(const loop *l)
@@ -67,7 +67,7 @@ static bool is_fan(const loop *l)
     return true;
 }
 
-static bool is_same(const loop *l, int a, int b)
+static bool are_equal_points(const loop *l, int a, int b)
 {
     return memcmp(l->place[a], l->place[b], sizeof l->place[a]) == 0;
 }
@@ -77,8 +77,8 @@ static bool is_ear(const loop *l, int tip)
     const int n = l->count, a = (tip + n - 1) % n, c = (tip + 1) % n;
     if (corner_area(l, a, tip, c) <= line_slack) return false;
     for (int i = 0; i < n; i++) {
-        if (i == a || i == tip || i == c || is_same(l, i, a) || is_same(l, i, c)) continue;
-        if (!is_same(l, i, tip)) {
+        if (i == a || i == tip || i == c || are_equal_points(l, i, a) || are_equal_points(l, i, c)) continue;
+        if (!are_equal_points(l, i, tip)) {
             if (corner_area(l, a, tip, i) >= -line_slack && corner_area(l, tip, c, i) >= -line_slack &&
                 corner_area(l, c, a, i) >= -line_slack)
                 return false;
@@ -92,7 +92,7 @@ static bool is_ear(const loop *l, int tip)
     return true;
 }
 
-static void add(const loop *l, int a, int b, int c, int (*triangles)[3], int *count)
+static void add_triangle(const loop *l, int a, int b, int c, int (*triangles)[3], int *count)
 {
     int *t = triangles[(*count)++];
     t[0] = l->number[a];
@@ -100,7 +100,7 @@ static void add(const loop *l, int a, int b, int c, int (*triangles)[3], int *co
     t[2] = l->number[l->is_backward ? b : c];
 }
 
-static int first_ear(const loop *l)
+static int find_first_ear(const loop *l)
 {
     for (int i = 1; i <= l->count; i++)
         if (is_ear(l, i % l->count)) return i % l->count;
@@ -118,14 +118,14 @@ int reference_polygon_triangulate(const double (*corners)[3], int count, int (*t
     make_loop(corners, count, &l);
     const bool is_simple = l.area == 0 || (count == 4 && !reference_is_concave_quad(corners)) || is_fan(&l);
     while (l.count > 3 && !is_simple) {
-        const int ear = first_ear(&l);
+        const int ear = find_first_ear(&l);
         if (ear < 0) break;
-        add(&l, (ear + l.count - 1) % l.count, ear, (ear + 1) % l.count, triangles, &found);
+        add_triangle(&l, (ear + l.count - 1) % l.count, ear, (ear + 1) % l.count, triangles, &found);
         l.count--;
         memmove(l.number + ear, l.number + ear + 1, (size_t)(l.count - ear) * sizeof l.number[0]);
         memmove(l.place + ear, l.place + ear + 1, (size_t)(l.count - ear) * sizeof l.place[0]);
     }
-    for (int i = 1; i + 1 < l.count; i++) add(&l, 0, i, i + 1, triangles, &found);
+    for (int i = 1; i + 1 < l.count; i++) add_triangle(&l, 0, i, i + 1, triangles, &found);
     return found;
 }
 

@@ -16,7 +16,7 @@
 
 #include "grid.h"
 
-static double determinant(const double *a, const double *b, const double *c)
+static double determinant3(const double *a, const double *b, const double *c)
 {
     return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
 }
@@ -24,7 +24,7 @@ static double determinant(const double *a, const double *b, const double *c)
 /* Returns 1 if the faces run along a common edge in opposite directions, -1 if in the same direction, 0 if they have
  * none in common. An edge from a vertex to itself has no direction and does not count: collapsed faces share such edges
  * with their neighbours. */
-static int agreement(const reference_polyhedron *p, int one, int other)
+static int compare_orientations(const reference_polyhedron *p, int one, int other)
 {
     for (int i = 0; i < p->face_size[one]; i++)
         for (int k = 0; k < p->face_size[other]; k++) {
@@ -49,7 +49,7 @@ static void orient_faces(const reference_polyhedron *p, int *turn, int *piece)
             changed = false;
             for (int i = 0; i < p->face_count; i++)
                 for (int k = 0; k < p->face_count && turn[i] && piece[i] == first; k++) {
-                    const int agree = turn[k] ? 0 : agreement(p, i, k);
+                    const int agree = turn[k] ? 0 : compare_orientations(p, i, k);
                     if (!agree) continue;
                     turn[k] = agree * turn[i];
                     piece[k] = first;
@@ -85,7 +85,7 @@ static void add_triangles(reference_cell *cell)
 
 /* Returns whether the point is inside the surface of the pieces other than `mine`, by a ray in an arbitrary
  * direction. */
-static bool is_inside_others(const reference_cell *cell, const int *piece, int mine, const double *point)
+static bool is_inside_other_pieces(const reference_cell *cell, const int *piece, int mine, const double *point)
 {
     static const double direction[3] = {0.5377, 0.1834, -0.7621};
     const reference_polyhedron *p = &cell->poly;
@@ -95,9 +95,9 @@ static bool is_inside_others(const reference_cell *cell, const int *piece, int m
         if (piece[p->face_of[i]] == mine) continue;
         for (int k = 0; k < 3; k++)
             for (int axis = 0; axis < 3; axis++) d[k][axis] = cell->position[p->triangles[i][k]][axis] - point[axis];
-        for (int k = 0; k < 3; k++) along[k] = determinant(d[(k + 1) % 3], d[(k + 2) % 3], direction);
+        for (int k = 0; k < 3; k++) along[k] = determinant3(d[(k + 1) % 3], d[(k + 2) % 3], direction);
         const bool same = (along[0] > 0) == (along[1] > 0) && (along[1] > 0) == (along[2] > 0);
-        if (same && determinant(d[0], d[1], d[2]) / (along[0] + along[1] + along[2]) > 0) inside = !inside;
+        if (same && determinant3(d[0], d[1], d[2]) / (along[0] + along[1] + along[2]) > 0) inside = !inside;
     }
     return inside;
 }
@@ -108,10 +108,10 @@ static double signed_volume(const reference_cell *cell, int triangle, const doub
     for (int k = 0; k < 3; k++)
         for (int axis = 0; axis < 3; axis++)
             d[k][axis] = cell->position[cell->poly.triangles[triangle][k]][axis] - apex[axis];
-    return determinant(d[0], d[1], d[2]);
+    return determinant3(d[0], d[1], d[2]);
 }
 
-static int vertex_number(reference_cell *cell, int64_t *vertices, int64_t vertex)
+static int find_or_add_vertex(reference_cell *cell, int64_t *vertices, int64_t vertex)
 {
     int at = 0;
     while (at < cell->count && vertices[at] != vertex) at++;
@@ -140,7 +140,7 @@ void reference_polyhedron_read(const grid *g, int64_t index, reference_cell *cel
         int *loop = p->faces[p->face_count];
         p->face_size[p->face_count++] = (int)(to - from);
         for (int64_t k = from; k < to; k++)
-            *loop++ = vertex_number(cell, vertices, grid_array_index(&g->face_connectivity, k));
+            *loop++ = find_or_add_vertex(cell, vertices, grid_array_index(&g->face_connectivity, k));
     }
 }
 
@@ -161,7 +161,7 @@ void reference_polyhedron_setup(reference_cell *cell)
     for (int i = 0; i < p->triangle_count; i++) {
         const int face = p->face_of[i], mine = piece[face];
         const double own = turn[face] * signed_volume(cell, i, centre);
-        const bool is_hole = is_inside_others(cell, piece, mine, cell->position[p->faces[mine][0]]);
+        const bool is_hole = is_inside_other_pieces(cell, piece, mine, cell->position[p->faces[mine][0]]);
         p->sign[i] = own == 0 ? 0 : ((own > 0) == (volume[mine] > 0)) != is_hole ? 1 : -1;
     }
 }
@@ -178,7 +178,7 @@ static bool tet_coordinates(const reference_cell *cell, int i, const double poin
         from[axis] = point[axis] - centre[axis];
         for (int k = 0; k < 3; k++) d[k][axis] = cell->position[p->triangles[i][k]][axis] - centre[axis];
     }
-    const double volume = determinant(d[0], d[1], d[2]);
+    const double volume = determinant3(d[0], d[1], d[2]);
     if (volume == 0) return false;
     lambda[3] = 1;
     slopes[3][0] = slopes[3][1] = slopes[3][2] = 0;
@@ -197,8 +197,8 @@ static bool tet_coordinates(const reference_cell *cell, int i, const double poin
 }
 
 /* Computes the sum at a point; returns the signed number of tets that contain it. */
-static int sum_at(const reference_cell *cell, const double point[3], const double *values, double *value,
-                  double gradient[3])
+static int sum_over_tets(const reference_cell *cell, const double point[3], const double *values, double *value,
+                         double gradient[3])
 {
     const reference_polyhedron *p = &cell->poly;
     double mean = 0;
@@ -229,7 +229,7 @@ bool reference_polyhedron_interpolate(const reference_cell *cell, const double p
         const double by = step == 0 ? 0 : (step % 2 ? 1 : -1) * ldexp(1e-14, step / 2);
         double moved[3];
         for (int axis = 0; axis < 3; axis++) moved[axis] = point[axis] + by * aside[axis];
-        const bool good = sum_at(cell, moved, values, value, slope) == 1;
+        const bool good = sum_over_tets(cell, moved, values, value, slope) == 1;
         if (gradient) memcpy(gradient, slope, sizeof slope);
         if (good) return true;
     }

@@ -50,7 +50,7 @@ typedef struct camera_cell {
     double size;
 } camera_cell;
 
-static bool normalize(double *v)
+static bool normalize_vector(double *v)
 {
     const double length = sqrt(reference_dot(v, v));
     for (int axis = 0; axis < 3 && length > 0; axis++) v[axis] /= length;
@@ -59,7 +59,7 @@ static bool normalize(double *v)
 
 static reference_box *bound_cells(const grid *g, const double *positions)
 {
-    reference_box *boxes = reference_reserve(NULL, sizeof *boxes * (size_t)g->cell_count);
+    reference_box *boxes = reference_reallocate(NULL, sizeof *boxes * (size_t)g->cell_count);
     for (int64_t cell = 0; cell < g->cell_count; cell++) {
         int64_t vertex;
         if (grid_is_ghost(g, cell)) continue;
@@ -73,13 +73,13 @@ static reference_box *bound_cells(const grid *g, const double *positions)
 reference_scene *reference_create(const render_job *job)
 {
     const double *axes[3] = {job->camera.right, job->camera.up, job->camera.forward};
-    reference_scene *scene = reference_reserve(NULL, sizeof *scene);
+    reference_scene *scene = reference_reallocate(NULL, sizeof *scene);
     scene->job = job;
-    scene->positions = reference_reserve(NULL, sizeof *scene->positions * (size_t)job->part_count);
-    scene->boxes = reference_reserve(NULL, sizeof *scene->boxes * (size_t)job->part_count);
+    scene->positions = reference_reallocate(NULL, sizeof *scene->positions * (size_t)job->part_count);
+    scene->boxes = reference_reallocate(NULL, sizeof *scene->boxes * (size_t)job->part_count);
     for (int i = 0; i < job->part_count; i++) {
         const grid *g = job->parts[i].cells;
-        double *p = scene->positions[i] = reference_reserve(NULL, 3 * sizeof *p * (size_t)g->vertex_count);
+        double *p = scene->positions[i] = reference_reallocate(NULL, 3 * sizeof *p * (size_t)g->vertex_count);
         for (int64_t v = 0; v < g->vertex_count; v++) {
             double world[3];
             grid_vertex(g, v, world);
@@ -107,36 +107,36 @@ static event *add_event(trace *t)
 {
     if (t->count == t->capacity) {
         t->capacity = 2 * t->capacity + 64;
-        t->events = reference_reserve(t->events, (size_t)t->capacity * sizeof *t->events);
+        t->events = reference_reallocate(t->events, (size_t)t->capacity * sizeof *t->events);
     }
     event *e = &t->events[t->count++];
     memset(e, 0, sizeof *e);
     return e;
 }
 
-static void lessen(double *margin, double by)
+static void lower_margin(double *margin, double by)
 {
     *margin = fmin(*margin, by);
 }
 
 /* ---- surfaces ---- */
 
-static void shade(const trace *t, const render_material *m, const double base[3], const double normal[3],
-                  double colour[3])
+static void shade_hit(const trace *t, const render_material *m, const double base[3], const double normal[3],
+                      double colour[3])
 {
     double view[3] = {-t->direction[0], -t->direction[1], -t->direction[2]};
     double diffuse[3], specular[3] = {0, 0, 0};
-    normalize(view);
+    normalize_vector(view);
     for (int c = 0; c < 3; c++) diffuse[c] = (double)m->ambient;
     for (int i = 0; i < t->scene->job->light_count; i++) {
         const render_light *light = &t->scene->job->lights[i];
         double half[3];
         for (int axis = 0; axis < 3; axis++) half[axis] = light->direction[axis] + view[axis];
-        normalize(half);
+        normalize_vector(half);
         const double cosine = reference_dot(normal, light->direction), facing = fmax(0, cosine);
         const double shine = cosine > 0 ? pow(fmax(0, reference_dot(normal, half)), (double)m->shininess) : 0;
         const bool has_normal = reference_dot(normal, normal) > 0; /* without a normal the ray is ambiguous */
-        if (m->specular > 0 && has_normal) lessen(&t->out->light_margin, fabs(cosine));
+        if (m->specular > 0 && has_normal) lower_margin(&t->out->light_margin, fabs(cosine));
         for (int c = 0; c < 3; c++) {
             diffuse[c] += (double)light->colour[c] * (double)m->diffuse * facing;
             specular[c] += (double)light->colour[c] * (double)m->specular * shine;
@@ -145,7 +145,7 @@ static void shade(const trace *t, const render_material *m, const double base[3]
     for (int c = 0; c < 3; c++) colour[c] = base[c] * diffuse[c] + specular[c];
 }
 
-static void line_at(const trace *t, double z, double point[3])
+static void compute_ray_point(const trace *t, double z, double point[3])
 {
     for (int axis = 0; axis < 2; axis++) point[axis] = t->line.base[axis] + t->line.slope[axis] * z;
     point[2] = z;
@@ -154,7 +154,7 @@ static void line_at(const trace *t, double z, double point[3])
 static double value_along(trace *t, const camera_cell *c, const double *values, double z)
 {
     double point[3], value;
-    line_at(t, z, point);
+    compute_ray_point(t, z, point);
     const bool is_found = c->cell.type == GRID_POLYHEDRON
                               ? reference_profile_value(&c->cell, &t->line, c->ends, values, z, &value)
                               : reference_interpolate(&c->cell, point, values, &value, NULL);
@@ -163,8 +163,8 @@ static double value_along(trace *t, const camera_cell *c, const double *values, 
 }
 
 /* Finds the root between the interval's ends by bisection; side_in is the side of iso at z_in. */
-static double bisect(trace *t, const camera_cell *c, const double *values, double iso, double z_in, double z_out,
-                     bool side_in)
+static double bisect_root(trace *t, const camera_cell *c, const double *values, double iso, double z_in, double z_out,
+                          bool side_in)
 {
     double low = z_in, high = z_out;
     for (int step = 0; step < 36; step++) {
@@ -187,30 +187,30 @@ typedef struct crossing_search {
     double iso, range;
 } crossing_search;
 
-static double relative_along(const crossing_search *a, double z)
+static double relative_value_along_ray(const crossing_search *a, double z)
 {
     return value_along(a->t, a->c, a->values, z) - a->iso;
 }
 
 /* Finds the depth in [low, high] at which side times the field is least, by golden section. */
-static double dip(const crossing_search *a, double low, double high, double side)
+static double find_minimum(const crossing_search *a, double low, double high, double side)
 {
     const double golden = 0.6180339887498949;
     double x = high - golden * (high - low), y = low + golden * (high - low);
-    double at_x = side * relative_along(a, x), at_y = side * relative_along(a, y);
+    double at_x = side * relative_value_along_ray(a, x), at_y = side * relative_value_along_ray(a, y);
     for (int i = 0; i < 40; i++) {
         if (at_x < at_y) {
             high = y;
             y = x;
             at_y = at_x;
             x = high - golden * (high - low);
-            at_x = side * relative_along(a, x);
+            at_x = side * relative_value_along_ray(a, x);
         } else {
             low = x;
             x = y;
             at_x = at_y;
             y = low + golden * (high - low);
-            at_y = side * relative_along(a, y);
+            at_y = side * relative_value_along_ray(a, y);
         }
     }
     return 0.5 * (low + high);
@@ -220,13 +220,13 @@ enum { CROSSING_PIECES = 24 };
 
 /* Computes depths between which the field passes the isovalue at most once: evenly spaced ones, and the bottom of every
  * dip towards the isovalue between two depths on the same side. */
-static int crossing_fence(const crossing_search *a, double z_in, double z_out, double *z, double *v)
+static int find_crossing_depths(const crossing_search *a, double z_in, double z_out, double *z, double *v)
 {
     double at[CROSSING_PIECES + 1], f[CROSSING_PIECES + 1];
     int n = 0;
     for (int i = 0; i <= CROSSING_PIECES; i++) {
         at[i] = z_in + (z_out - z_in) * i / CROSSING_PIECES;
-        f[i] = relative_along(a, at[i]);
+        f[i] = relative_value_along_ray(a, at[i]);
     }
     for (int i = 0; i <= CROSSING_PIECES; i++) {
         z[n] = at[i];
@@ -238,9 +238,9 @@ static int crossing_fence(const crossing_search *a, double z_in, double z_out, d
         const bool falls = before == i || side * (f[i] - f[before]) <= 0;
         const bool rises = behind == i + 1 || side * (f[behind] - f[i + 1]) >= 0;
         if (!falls || !rises) continue;
-        z[n] = dip(a, at[i], at[i + 1], side);
-        v[n] = relative_along(a, z[n]);
-        lessen(&a->t->out->value_margin, fabs(v[n]) / a->range);
+        z[n] = find_minimum(a, at[i], at[i + 1], side);
+        v[n] = relative_value_along_ray(a, z[n]);
+        lower_margin(&a->t->out->value_margin, fabs(v[n]) / a->range);
         n++;
     }
     return n;
@@ -248,24 +248,24 @@ static int crossing_fence(const crossing_search *a, double z_in, double z_out, d
 
 /* Finds the depths at which a polyhedron's profile bends; between two of them it is linear. Rounding decides the side
  * of a bend near the isovalue. */
-static int profile_fence(const crossing_search *a, double z[REFERENCE_MAX_BREAKS], double v[REFERENCE_MAX_BREAKS])
+static int find_profile_depths(const crossing_search *a, double z[REFERENCE_MAX_BREAKS], double v[REFERENCE_MAX_BREAKS])
 {
     const int count = reference_profile_breaks(&a->c->cell, &a->t->line, a->c->ends, z);
     for (int i = 0; i < count; i++) {
-        v[i] = relative_along(a, z[i]);
-        lessen(&a->t->out->value_margin, fabs(v[i]) / a->range);
+        v[i] = relative_value_along_ray(a, z[i]);
+        lower_margin(&a->t->out->value_margin, fabs(v[i]) / a->range);
     }
     return count;
 }
 
-static void keep_off_sheets(trace *t, const camera_cell *c, double z)
+static void lower_margin_near_sheets(trace *t, const camera_cell *c, double z)
 {
     double point[3];
-    line_at(t, z, point);
-    lessen(&t->out->value_margin, reference_sheet_distance(&c->cell, point) / c->size);
+    compute_ray_point(t, z, point);
+    lower_margin(&t->out->value_margin, reference_sheet_distance(&c->cell, point) / c->size);
 }
 
-static void range_of(const double *values, int count, double *low, double *high)
+static void compute_value_range(const double *values, int count, double *low, double *high)
 {
     *low = *high = values[0];
     for (int i = 1; i < count; i++) {
@@ -274,7 +274,7 @@ static void range_of(const double *values, int count, double *low, double *high)
     }
 }
 
-static void to_world(const render_camera *camera, const double v[3], double world[3])
+static void transform_to_world(const render_camera *camera, const double v[3], double world[3])
 {
     for (int axis = 0; axis < 3; axis++)
         world[axis] = camera->right[axis] * v[0] + camera->up[axis] * v[1] + camera->forward[axis] * v[2];
@@ -306,10 +306,10 @@ static reference_hit *add_hit(trace *t, const camera_cell *c, const render_surfa
         const double inner = 1e-9 * (c->ends[1].z_triangle - c->ends[0].z_triangle);
         z = fmin(fmax(depth, c->ends[0].z_triangle + inner), c->ends[1].z_triangle - inner);
     }
-    line_at(t, z, point);
+    compute_ray_point(t, z, point);
     reference_interpolate(&c->cell, point, values, &value, gradient);
-    to_world(&t->scene->job->camera, gradient, e->hit.normal);
-    normalize(e->hit.normal);
+    transform_to_world(&t->scene->job->camera, gradient, e->hit.normal);
+    normalize_vector(e->hit.normal);
     const double crossing_search =
         reference_dot(e->hit.normal, t->direction) / sqrt(reference_dot(t->direction, t->direction));
     for (int axis = 0; axis < 3 && crossing_search > 0; axis++) e->hit.normal[axis] = -e->hit.normal[axis];
@@ -320,22 +320,23 @@ static reference_hit *add_hit(trace *t, const camera_cell *c, const render_surfa
     e->hit.conditioning = has_gradient ? 1 / fabs(crossing_search) : 1;
     e->error_bound = c->size * e->hit.conditioning;
     surface_colour(t, c, layer, value_index, depth, colour);
-    shade(t, &layer->material, colour, e->hit.normal, e->hit.colour);
+    shade_hit(t, &layer->material, colour, e->hit.normal, e->hit.colour);
     return &e->hit;
 }
 
 /* Adds all crossings. If the interpolant at a face is on another side of the isovalue than the face's value, the
  * crossing is at the face. */
-static void cross_every(trace *t, const camera_cell *c, const render_surface_layer *layer, int value_index, int surface,
-                        const double *values, const reference_crossing ends[2], const double face[2])
+static void cross_all_cells(trace *t, const camera_cell *c, const render_surface_layer *layer, int value_index,
+                            int surface, const double *values, const reference_crossing ends[2], const double face[2])
 {
     double z[REFERENCE_MAX_BREAKS], v[REFERENCE_MAX_BREAKS], low, high; /* more elements than the fence needs */
     crossing_search a = {t, c, values, layer->values[value_index], 0};
-    range_of(values, c->cell.count, &low, &high);
+    compute_value_range(values, c->cell.count, &low, &high);
     if (a.iso > high || a.iso < low || ends[1].z < 0) return;
     a.range = high - low;
     const bool is_polyhedron = c->cell.type == GRID_POLYHEDRON;
-    const int count = is_polyhedron ? profile_fence(&a, z, v) : crossing_fence(&a, ends[0].z, ends[1].z, z, v);
+    const int count =
+        is_polyhedron ? find_profile_depths(&a, z, v) : find_crossing_depths(&a, ends[0].z, ends[1].z, z, v);
     bool side = face[0] >= a.iso;
     for (int i = 0; i <= count; i++) {
         const bool is_end = i == count, now = is_end ? face[1] >= a.iso : v[i] >= 0;
@@ -343,10 +344,10 @@ static void cross_every(trace *t, const camera_cell *c, const render_surface_lay
         if (is_end || i == 0) t->out->ambiguous = true;
         double depth = is_end ? ends[1].z : ends[0].z;
         const bool is_inner = !is_end && i > 0;
-        if (is_inner) depth = bisect(t, c, values, a.iso, z[i - 1], z[i], side);
+        if (is_inner) depth = bisect_root(t, c, values, a.iso, z[i - 1], z[i], side);
         side = now;
-        lessen(&t->out->eye_margin, fabs(depth) / c->size);
-        if (is_polyhedron) keep_off_sheets(t, c, depth);
+        lower_margin(&t->out->eye_margin, fabs(depth) / c->size);
+        if (is_polyhedron) lower_margin_near_sheets(t, c, depth);
         if (depth < 0) continue;
         reference_hit *hit = add_hit(t, c, layer, value_index, surface, values, depth);
         /* The last piece of a profile ends on a quad's patch, which may lie outside the tets, so that the tets'
@@ -359,7 +360,7 @@ static void cross_surface(trace *t, const camera_cell *c, const render_surface_l
                           const double *values, const reference_crossing ends[2])
 {
     double face[2], low, high;
-    range_of(values, c->cell.count, &low, &high);
+    compute_value_range(values, c->cell.count, &low, &high);
     for (int i = 0; i < 2; i++) {
         bool is_folded;
         face[i] = reference_face_value(&c->cell, &t->line, &ends[i], values, &is_folded);
@@ -368,15 +369,15 @@ static void cross_surface(trace *t, const camera_cell *c, const render_surface_l
     for (int i = 0; i < layer->value_count; i++) {
         const double iso = layer->values[i];
         for (int end = 0; end < 2 && high > low; end++)
-            lessen(&t->out->value_margin, fabs(face[end] - iso) / (high - low));
+            lower_margin(&t->out->value_margin, fabs(face[end] - iso) / (high - low));
         if (c->cell.type != GRID_TET) {
-            cross_every(t, c, layer, i, first_surface + i, values, ends, face);
+            cross_all_cells(t, c, layer, i, first_surface + i, values, ends, face);
             continue;
         }
         const bool side = face[0] >= iso;
         if (side == (face[1] >= iso) || ends[1].z < 0) continue;
-        const double z = bisect(t, c, values, iso, ends[0].z, ends[1].z, side);
-        lessen(&t->out->eye_margin, fabs(z) / c->size);
+        const double z = bisect_root(t, c, values, iso, ends[0].z, ends[1].z, side);
+        lower_margin(&t->out->eye_margin, fabs(z) / c->size);
         if (z >= 0) add_hit(t, c, layer, i, first_surface + i, values, z);
     }
 }
@@ -419,7 +420,7 @@ static void cross_volume(trace *t, const camera_cell *c, int layer, const double
     int64_t k = (int64_t)floor(ends[0].z / spacing - t->jitter) - 1;
     for (k = k < 0 ? 0 : k;; k++) {
         const double z = ((double)k + t->jitter) * spacing;
-        lessen(&t->out->sample_margin, fmin(fabs(z - ends[0].z), fabs(z - ends[1].z)) / c->size);
+        lower_margin(&t->out->sample_margin, fmin(fabs(z - ends[0].z), fabs(z - ends[1].z)) / c->size);
         if (z >= ends[1].z) break;
         if (z < ends[0].z) continue;
         add_sample(t, t->scene->job->volumes[layer].transfer, layer, z, value_along(t, c, values, z));
@@ -440,7 +441,7 @@ static void cross_volumes(trace *t, const camera_cell *c, const reference_crossi
 
 /* ---- the ray ---- */
 
-static void place_cell(const reference_scene *scene, int part, int64_t index, camera_cell *c)
+static void load_cell(const reference_scene *scene, int part, int64_t index, camera_cell *c)
 {
     double low[3], high[3], volume = 1, longest = 0;
     c->part = &scene->job->parts[part];
@@ -469,7 +470,7 @@ static void place_cell(const reference_scene *scene, int part, int64_t index, ca
 }
 
 /* Returns whether the ray passes through the sheared box of the cell, widened by a margin. */
-static bool is_near(const trace *t, int part, int64_t index)
+static bool is_cell_near_ray(const trace *t, int part, int64_t index)
 {
     const grid *g = t->scene->job->parts[part].cells;
     if (!reference_box_is_near(&t->scene->boxes[part][index], &t->line, 1e-3, 1e-6)) return false;
@@ -489,13 +490,13 @@ static bool is_near(const trace *t, int part, int64_t index)
     return true;
 }
 
-static void cross_cell(trace *t, int part, int64_t index)
+static void intersect_cell(trace *t, int part, int64_t index)
 {
     camera_cell c;
     reference_crossing crossings[REFERENCE_MAX_CROSSINGS];
-    if (grid_is_ghost(t->scene->job->parts[part].cells, index) || !is_near(t, part, index)) return;
-    place_cell(t->scene, part, index, &c);
-    lessen(&t->out->edge_margin, reference_edge_distance(&c.cell, &t->line) / c.size);
+    if (grid_is_ghost(t->scene->job->parts[part].cells, index) || !is_cell_near_ray(t, part, index)) return;
+    load_cell(t->scene, part, index, &c);
+    lower_margin(&t->out->edge_margin, reference_edge_distance(&c.cell, &t->line) / c.size);
     const int count = reference_crossings(&c.cell, &t->line, crossings);
     for (int i = 0; i + 1 < count; i += 2) {
         memcpy(c.ends, crossings + i, sizeof c.ends);
@@ -512,7 +513,7 @@ static int compare_events(const void *left, const void *right)
     return a->order - b->order;
 }
 
-static void blend(double rgb[3], double *transmittance, const event *e)
+static void blend_event(double rgb[3], double *transmittance, const event *e)
 {
     for (int c = 0; c < 3; c++) rgb[c] += *transmittance * (1 - e->transmittance) * e->hit.colour[c];
     *transmittance *= e->transmittance;
@@ -538,12 +539,12 @@ static int64_t gather_samples(event *events, int64_t count, int64_t i)
 }
 
 /* Lowers the margin for a sample and a hit at nearly the same depth, since rounding may swap them. */
-static void margins_between(const event *events, int64_t count, double *margin)
+static void lower_margins_between_events(const event *events, int64_t count, double *margin)
 {
     for (int64_t i = 0; i + 1 < count; i++)
         if (events[i].is_sample != events[i + 1].is_sample)
-            lessen(margin,
-                   (events[i + 1].depth - events[i].depth) / fmax(events[i].error_bound, events[i + 1].error_bound));
+            lower_margin(margin, (events[i + 1].depth - events[i].depth) /
+                                     fmax(events[i].error_bound, events[i + 1].error_bound));
 }
 
 static void blend_events(trace *t, const float background[4])
@@ -552,13 +553,13 @@ static void blend_events(trace *t, const float background[4])
     double transmittance = 1;
     out->volume_transmittance = 1;
     if (t->count) qsort(t->events, (size_t)t->count, sizeof *t->events, compare_events);
-    margins_between(t->events, t->count, &out->sample_margin);
+    lower_margins_between_events(t->events, t->count, &out->sample_margin);
     for (int64_t i = 0; i < t->count; i++) {
         if (t->events[i].is_sample) i = gather_samples(t->events, t->count, i);
         const event *e = &t->events[i];
-        blend(out->rgba, &transmittance, e);
+        blend_event(out->rgba, &transmittance, e);
         if (e->is_sample) {
-            blend(out->volume_rgb, &out->volume_transmittance, e);
+            blend_event(out->volume_rgb, &out->volume_transmittance, e);
             continue;
         }
         if (out->hit_count < REFERENCE_MAX_HITS) out->hits[out->hit_count++] = e->hit;
@@ -591,7 +592,7 @@ void reference_trace(const reference_scene *scene, int x, int y, const float bac
     out->edge_margin = out->value_margin = out->sample_margin = out->eye_margin = out->light_margin = (double)INFINITY;
     begin_ray(&t, scene, x, y);
     for (int part = 0; part < scene->job->part_count; part++)
-        for (int64_t cell = 0; cell < scene->job->parts[part].cells->cell_count; cell++) cross_cell(&t, part, cell);
+        for (int64_t cell = 0; cell < scene->job->parts[part].cells->cell_count; cell++) intersect_cell(&t, part, cell);
     blend_events(&t, background);
     free(t.events);
 }
@@ -608,13 +609,13 @@ double reference_residual(const reference_scene *scene, int x, int y, const refe
     for (; surface >= layer->value_count; layer++) surface -= layer->value_count;
     iso = layer->values[surface];
     begin_ray(&t, scene, x, y);
-    place_cell(scene, hit->part, hit->cell, &c);
+    load_cell(scene, hit->part, hit->cell, &c);
     grid_cell_values(&layer->field.fields[hit->part], c.index, c.vertices, c.cell.count, values);
-    range_of(values, c.cell.count, &low, &high);
-    line_at(&t, depth, point);
+    compute_value_range(values, c.cell.count, &low, &high);
+    compute_ray_point(&t, depth, point);
     reference_interpolate(&c.cell, point, values, &value, g);
     *slope = (g[0] * t.line.slope[0] + g[1] * t.line.slope[1] + g[2]) / (high - low);
     for (int axis = 0; axis < 3; axis++) g[axis] /= high - low;
-    if (gradient) to_world(&scene->job->camera, g, gradient);
+    if (gradient) transform_to_world(&scene->job->camera, g, gradient);
     return (value - iso) / (high - low);
 }

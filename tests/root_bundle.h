@@ -19,7 +19,7 @@ typedef struct bundle {
     kernel_cell cell;
 } bundle;
 
-static inline void bundle_aim(bundle *b, int lane, const double from[3], const double to[3])
+static inline void bundle_aim_ray(bundle *b, int lane, const double from[3], const double to[3])
 {
     const double rise = to[2] - from[2];
     for (int a = 0; a < 2; a++) {
@@ -29,7 +29,7 @@ static inline void bundle_aim(bundle *b, int lane, const double from[3], const d
     }
 }
 
-static inline void bundle_open(bundle *b)
+static inline void bundle_initialize(bundle *b)
 {
     b->packet.frame = &b->frame;
     b->packet.tile = &b->tile;
@@ -40,7 +40,7 @@ static inline void bundle_open(bundle *b)
 }
 
 /* Transforms a cell whose type, count, world and values are set: tile space equals world space. */
-static inline void bundle_place(bundle *b)
+static inline void bundle_transform_cell(bundle *b)
 {
     kernel_cell_order(&b->cell);
     for (int i = 0; i < b->cell.count; i++) {
@@ -52,22 +52,23 @@ static inline void bundle_place(bundle *b)
 }
 
 /* Returns a beam that contains all directions of the packet. */
-static inline kernel_beam bundle_beam(const kernel_packet *p)
+static inline kernel_beam bundle_compute_beam(const kernel_packet *p)
 {
     const vf most = vf_max(vf_abs(p->slope_x), vf_abs(p->slope_y));
     return (kernel_beam){.spread = vf_reduce_max(most)};
 }
 
 /* Computes the packet's intervals in the cell and the cell's bounds; returns the number of intervals. */
-static inline int bundle_intervals(bundle *b, kernel_interval list[KERNEL_MAX_CELL_INTERVALS], kernel_curved *curved)
+static inline int bundle_find_intervals(bundle *b, kernel_interval list[KERNEL_MAX_CELL_INTERVALS],
+                                        kernel_curved *curved)
 {
-    const kernel_beam beam = bundle_beam(&b->packet);
+    const kernel_beam beam = bundle_compute_beam(&b->packet);
     kernel_curved_single_bounds(&b->cell, &beam, curved);
     return kernel_curved_intervals(&b->packet, &b->cell, b->packet.active, list);
 }
 
 /* Finds the first hits on all rays, and the number of hits of each. */
-static inline vm bundle_hits(bundle *b, const kernel_curved *curved, const kernel_interval *i, vf *t, vf *hits)
+static inline vm bundle_find_hits(bundle *b, const kernel_curved *curved, const kernel_interval *i, vf *t, vf *hits)
 {
     const kernel_rays rays = kernel_packet_rays(&b->packet);
     kernel_search s;

@@ -220,7 +220,7 @@ static void print_mapping(FILE *to, const scene_mapping *mapping, const char *pa
     }
 }
 
-static int compare(FILE *expected, const char *file_name)
+static int compare_output(FILE *expected, const char *file_name)
 {
     FILE *found = fopen(file_name, "r");
     if (!found) {
@@ -250,7 +250,7 @@ int main(int argument_count, char **arguments)
     print_mapping(page, &scene_top, "");
     if (argument_count == 1) return EXIT_SUCCESS;
     rewind(page);
-    const int result = compare(page, arguments[1]);
+    const int result = compare_output(page, arguments[1]);
     fclose(page);
     return result;
 }

@@ -52,7 +52,7 @@ static void write_scene(const char *output)
 static float corners[8][3], values[8];
 static const int32_t indices[8] = {0, 1, 2, 3, 4, 5, 6, 7};
 
-static void submit(insitu_session *session)
+static void submit_plane(insitu_session *session)
 {
     for (int i = 0; i < 8; i++) {
         corners[i][0] = i % 4 == 1 || i % 4 == 2;
@@ -77,7 +77,7 @@ static void submit(insitu_session *session)
     everywhere(insitu_set_field(session, "hex", &field) == INSITU_OK);
 }
 
-static bool exists(const char *name, int64_t least_bytes)
+static bool file_exists(const char *name, int64_t least_bytes)
 {
     char path[8192];
     struct stat found;
@@ -85,7 +85,7 @@ static bool exists(const char *name, int64_t least_bytes)
     return own_rank != 0 || (stat(path, &found) == 0 && found.st_size >= least_bytes);
 }
 
-static void picture_is_written_where_the_scene_says(void **context)
+static void picture_is_written_to_the_path_of_the_scene(void **context)
 {
     (void)context;
     char output[2048];
@@ -94,11 +94,11 @@ static void picture_is_written_where_the_scene_says(void **context)
     insitu_session *session = NULL;
     everywhere(insitu_create(MPI_COMM_WORLD, scene_name, &session) == INSITU_OK);
     everywhere(insitu_last_report(session)->images == 0 && !strcmp(insitu_last_report(session)->warnings, ""));
-    submit(session);
+    submit_plane(session);
     everywhere(insitu_step(session, 7, 0.5) == INSITU_OK && !strcmp(insitu_error(session), ""));
     everywhere(insitu_last_report(session)->images == 1);
     snprintf(output, sizeof output, "api_np%d/deep/a_007.png", rank_count);
-    everywhere(exists(output, 60));
+    everywhere(file_exists(output, 60));
     insitu_destroy(&session);
     everywhere(session == NULL);
 }
@@ -112,7 +112,7 @@ static void folder_that_cannot_be_written_is_named(void **context)
     write_scene(output);
     insitu_session *session = NULL;
     everywhere(insitu_create(MPI_COMM_WORLD, scene_name, &session) == INSITU_OK);
-    submit(session);
+    submit_plane(session);
     for (int cycle = 0; cycle < 2; cycle++) {
         everywhere(insitu_step(session, cycle, 0) == INSITU_ERROR_IO);
         everywhere(strstr(insitu_error(session), "rank 0: image \"a\": ") && strstr(insitu_error(session), scene_name));
@@ -130,7 +130,7 @@ static void picture_that_is_not_written_is_reported_later(void **context)
     write_scene_of("", output);
     insitu_session *session = NULL;
     everywhere(insitu_create(MPI_COMM_WORLD, scene_name, &session) == INSITU_OK);
-    submit(session);
+    submit_plane(session);
     insitu_status status = insitu_step(session, 20, 0);
     everywhere(status == INSITU_OK && insitu_last_report(session)->images == 1);
     for (int cycle = 21; cycle < 600 && status == INSITU_OK; cycle++) {
@@ -175,7 +175,7 @@ static void callers_error_handler_stays(void **context)
     MPI_Comm_free(&comm);
 }
 
-static void sessions_of_split_ranks_live_side_by_side(void **context)
+static void sessions_of_split_communicators_are_independent(void **context)
 {
     (void)context;
     MPI_Comm half;
@@ -187,11 +187,11 @@ static void sessions_of_split_ranks_live_side_by_side(void **context)
     const insitu_status status = insitu_create(half, scene_name, &session);
     MPI_Comm_free(&half); /* the session has its own communicator */
     everywhere(status == INSITU_OK);
-    submit(session);
+    submit_plane(session);
     everywhere(insitu_step(session, own_rank % 2, 0) == INSITU_OK);
     for (int cycle = 0; cycle < 2 && cycle < rank_count; cycle++) {
         snprintf(name, sizeof name, "api_np%d_%d.exr", rank_count, cycle);
-        everywhere(exists(name, 100));
+        everywhere(file_exists(name, 100));
     }
     insitu_destroy(&session);
 }
@@ -215,14 +215,14 @@ static const char scene_words[] =
     "images:\n  - name: a\n    size: [24, 16]\n    layers:\n      - isosurface: {field: x, values: [0.4]}\n"
     "    outputs:\n      - path: %s\n";
 
-static void draw_once(insitu_session *session)
+static void submit_and_draw(insitu_session *session)
 {
-    submit(session);
+    submit_plane(session);
     everywhere(insitu_step(session, 0, 0) == INSITU_OK);
     insitu_destroy(&session);
 }
 
-static void scene_given_as_text_draws_what_its_file_draws(void **context)
+static void scene_text_draws_same_pictures_as_scene_file(void **context)
 {
     (void)context;
     char output[2][2048], names[2][64], text[4096];
@@ -233,13 +233,13 @@ static void scene_given_as_text_draws_what_its_file_draws(void **context)
     insitu_session *session = NULL;
     write_scene(output[0]);
     everywhere(insitu_create(MPI_COMM_WORLD, scene_name, &session) == INSITU_OK);
-    draw_once(session);
+    submit_and_draw(session);
     snprintf(text, sizeof text, scene_words, output[1]);
     /* Rank 0's text is used, and is not read after the call. */
     const insitu_status status = insitu_create_from_text(MPI_COMM_WORLD, own_rank ? NULL : text, &session);
     memset(text, '!', sizeof text);
     everywhere(status == INSITU_OK);
-    draw_once(session);
+    submit_and_draw(session);
     everywhere(own_rank != 0 || are_same_files(names[0], names[1]));
 }
 
@@ -254,7 +254,7 @@ static const char kept_words[] =
     "     camera: {position: [5.4, %g, 0.5], focal: [0, %g, 0.5], projection: orthographic, height: %d},\n"
     "     layers: [isosurface: {field: x, values: [0.4]}], outputs: [{path: \"%s/{name}.png\"}]}\n";
 
-static bool is_the_plane(const insitu_picture *p)
+static bool is_plane_picture(const insitu_picture *p)
 {
     static const float background[4] = {1, 0, 0, 1};
     const int middle = 8 * p->width + 12;
@@ -264,7 +264,7 @@ static bool is_the_plane(const insitu_picture *p)
            p->rgba[4 * middle + 3] == 1 && fabs(p->depth[middle] - 5.0) < 5e-6;
 }
 
-static void pictures_are_kept_in_memory_where_asked_for(void **context)
+static void pictures_are_kept_in_memory_if_requested(void **context)
 {
     (void)context;
     char text[8192];
@@ -274,14 +274,14 @@ static void pictures_are_kept_in_memory_where_asked_for(void **context)
     insitu_session *session = NULL;
     int count = -1;
     everywhere(insitu_create_from_text(MPI_COMM_WORLD, text, &session) == INSITU_OK);
-    submit(session);
+    submit_plane(session);
     everywhere(insitu_step(session, 0, 0) == INSITU_OK && !insitu_last_pictures(session, &count) && count == 0);
     everywhere(insitu_keep_pictures(session, own_rank == 0) == INSITU_OK); /* rank 0's argument is used */
     everywhere(insitu_step(session, 2, 0) == INSITU_OK);
     const insitu_picture *p = insitu_last_pictures(session, &count);
     everywhere(count == here && !p == !here);
     everywhere(!p || (!strcmp(p[0].image, "plain") && !strcmp(p[1].image, "titled")));
-    everywhere(!p || (is_the_plane(&p[0]) && is_the_plane(&p[1])));
+    everywhere(!p || (is_plane_picture(&p[0]) && is_plane_picture(&p[1])));
     everywhere(!p || memcmp(p[0].rgba, p[1].rgba, 24 * 16 * 4 * sizeof(float)) == 0);
     everywhere(insitu_step(session, 3, 0) == INSITU_OK && !insitu_last_pictures(session, &count) && count == 0);
     everywhere(insitu_step(session, 4, 0) == INSITU_OK && !insitu_last_pictures(session, NULL) == !here);
@@ -310,7 +310,7 @@ static void wrong_scene_text_is_reported_with_its_line(void **context)
     everywhere(status == INSITU_ERROR_SCENE && strstr(insitu_error(NULL), "scene text:1: "));
 }
 
-static void calls_on_no_session_are_errors(void **context)
+static void calls_on_null_session_return_errors(void **context)
 {
     (void)context;
     insitu_mesh mesh;
@@ -335,15 +335,15 @@ static void calls_on_no_session_are_errors(void **context)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(picture_is_written_where_the_scene_says),
+        cmocka_unit_test(picture_is_written_to_the_path_of_the_scene),
         cmocka_unit_test(folder_that_cannot_be_written_is_named),
         cmocka_unit_test(picture_that_is_not_written_is_reported_later),
         cmocka_unit_test(callers_error_handler_stays),
-        cmocka_unit_test(sessions_of_split_ranks_live_side_by_side),
-        cmocka_unit_test(scene_given_as_text_draws_what_its_file_draws),
-        cmocka_unit_test(pictures_are_kept_in_memory_where_asked_for),
+        cmocka_unit_test(sessions_of_split_communicators_are_independent),
+        cmocka_unit_test(scene_text_draws_same_pictures_as_scene_file),
+        cmocka_unit_test(pictures_are_kept_in_memory_if_requested),
         cmocka_unit_test(wrong_scene_text_is_reported_with_its_line),
-        cmocka_unit_test(calls_on_no_session_are_errors),
+        cmocka_unit_test(calls_on_null_session_return_errors),
     };
     insitu_session *early = NULL, *late = NULL;
     const bool is_refused = insitu_create(MPI_COMM_WORLD, "x", &early) == INSITU_ERROR_MPI && !early;

@@ -36,7 +36,7 @@ static const char *write_scene_of(const layout_case *layout)
     return write_scene(layout->field_count == 3 ? scene : scene_of_two);
 }
 
-static void step_ok(doorway *d)
+static void expect_step_succeeds(doorway *d)
 {
     discard_pictures();
     const insitu_status status = insitu_blueprint_step(d->adaptor, NULL, NULL);
@@ -45,7 +45,7 @@ static void step_ok(doorway *d)
     everywhere(insitu_last_report(d->session)->images == 1 && caught_count == (own_rank == 0));
 }
 
-static void set_ok(doorway *d, const char *name, const conduit_node *node)
+static void expect_set_succeeds(doorway *d, const char *name, const conduit_node *node)
 {
     const insitu_status status = insitu_blueprint_set(d->adaptor, name, node);
     if (status) fprintf(stderr, "%s\n", insitu_blueprint_error(d->adaptor));
@@ -53,11 +53,11 @@ static void set_ok(doorway *d, const char *name, const conduit_node *node)
 }
 
 /* Draws the mesh passed by the public header; *copied is the number of bytes copied for it. */
-static caught_picture draw_plain(const char *path, const layout_case *layout, int64_t *copied)
+static caught_picture draw_by_header(const char *path, const layout_case *layout, int64_t *copied)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, path);
     everywhere(layout_submit(session, "mesh", layout) == INSITU_OK);
-    step_is_good(session, 100);
+    check_step_succeeds(session, 100);
     *copied = insitu_last_report(session)->bytes_copied;
     insitu_destroy(&session);
     return pop_caught_picture();
@@ -70,7 +70,7 @@ static bool has_colour(const caught_picture *picture)
     return has;
 }
 
-static void each_layout_is_the_plain_header_s(void **state)
+static void each_layout_draws_same_picture_as_header(void **state)
 {
     (void)state;
     for (int i = 0; i < layout_kind_count; i++) {
@@ -78,16 +78,16 @@ static void each_layout_is_the_plain_header_s(void **state)
         layout_make(&layout_kinds[i], &layout);
         const char *path = write_scene_of(&layout);
         int64_t copied;
-        caught_picture truth = draw_plain(path, &layout, &copied);
+        caught_picture truth = draw_by_header(path, &layout, &copied);
         everywhere(has_colour(&truth));
         for (int packed = 0; packed < 2; packed++) {
-            doorway d = open_door(path);
+            doorway d = open_adaptor_session(path);
             if (packed) stand_in_pack(layout.node);
-            set_ok(&d, "", layout.node);
-            step_ok(&d);
+            expect_set_succeeds(&d, "", layout.node);
+            expect_step_succeeds(&d);
             const insitu_blueprint_report *report = insitu_blueprint_last_report(d.adaptor);
             caught_picture picture = pop_caught_picture();
-            const bool is_same = own_rank || same_pictures(&picture, &truth);
+            const bool is_same = own_rank || are_same_pictures(&picture, &truth);
             if (!is_same) fprintf(stderr, "%s%s: another picture\n", layout_kinds[i].name, packed ? ", packed" : "");
             everywhere(is_same);
             everywhere(report->meshes == 1 && report->fields == layout.field_count && !*report->left_out);
@@ -96,7 +96,7 @@ static void each_layout_is_the_plain_header_s(void **state)
             everywhere(insitu_last_report(d.session)->cycle == 100);
             everywhere(insitu_last_report(d.session)->time == 3.1415);
             free_caught(&picture);
-            close_door(&d);
+            close_adaptor_session(&d);
         }
         free_caught(&truth);
         layout_free(&layout);
@@ -105,7 +105,7 @@ static void each_layout_is_the_plain_header_s(void **state)
 
 /* Checks types that are read in place: adaptor and session together copy no more than for the public header's
  * arrays. */
-static void what_the_header_says_is_not_copied(void **state)
+static void arrays_described_by_the_header_are_not_copied(void **state)
 {
     (void)state;
     static const char *const names[] = {"uniform",  "rectilinear", "structured", "strided",  "tris",
@@ -118,17 +118,17 @@ static void what_the_header_says_is_not_copied(void **state)
             layout_make(&layout_kinds[i], &layout);
             const char *path = write_scene_of(&layout);
             int64_t copied;
-            caught_picture truth = draw_plain(path, &layout, &copied);
-            doorway d = open_door(path);
-            set_ok(&d, "", layout.node);
-            step_ok(&d);
+            caught_picture truth = draw_by_header(path, &layout, &copied);
+            doorway d = open_adaptor_session(path);
+            expect_set_succeeds(&d, "", layout.node);
+            expect_step_succeeds(&d);
             everywhere(insitu_blueprint_last_report(d.adaptor)->bytes_copied == 0);
             if (insitu_last_report(d.session)->bytes_copied > copied)
                 fprintf(stderr, "%s: %s\n", names[n], insitu_last_report(d.session)->copied_why);
             everywhere(insitu_last_report(d.session)->bytes_copied <= copied);
             discard_pictures();
             free_caught(&truth);
-            close_door(&d);
+            close_adaptor_session(&d);
             layout_free(&layout);
         }
 }
@@ -136,7 +136,7 @@ static void what_the_header_says_is_not_copied(void **state)
 /* ---- several domains, names and steps --------------------------------------------------------------------------- */
 
 /* Moves the contents of the node child to parent's path; parent then owns them. */
-static void adopt(conduit_node *parent, const char *path, conduit_node *child)
+static void move_child_node(conduit_node *parent, const char *path, conduit_node *child)
 {
     conduit_node *at = conduit_node_fetch(parent, path);
     stand_in_swap(at, child);
@@ -158,15 +158,15 @@ static bool submit_block(insitu_session *session, const char *name, int64_t numb
 static caught_picture draw_both(const char *path, layout_case *a, layout_case *b, insitu_blueprint_report *report)
 {
     conduit_node *both = conduit_node_create();
-    adopt(both, "domain_000000", a->node);
-    adopt(both, "domain_000001", b->node);
+    move_child_node(both, "domain_000000", a->node);
+    move_child_node(both, "domain_000001", b->node);
     a->node = conduit_node_create();
     b->node = conduit_node_create();
-    doorway d = open_door(path);
-    set_ok(&d, "grid", both);
-    step_ok(&d);
+    doorway d = open_adaptor_session(path);
+    expect_set_succeeds(&d, "grid", both);
+    expect_step_succeeds(&d);
     *report = *insitu_blueprint_last_report(d.adaptor);
-    close_door(&d);
+    close_adaptor_session(&d);
     conduit_node_destroy(both);
     return pop_caught_picture();
 }
@@ -190,11 +190,11 @@ static void domains_are_blocks_of_one_mesh(void **state)
         everywhere(submit_block(session, "grid/mesh", 0, &a));
         everywhere(has_same ? submit_block(session, "grid/mesh", 1, &b)
                             : layout_submit(session, "grid/mesh/1", &b) == INSITU_OK);
-        step_is_good(session, 100);
+        check_step_succeeds(session, 100);
         caught_picture truth = pop_caught_picture();
         insitu_destroy(&session);
         caught_picture picture = draw_both(path, &a, &b, &report);
-        const bool is_same = own_rank || same_pictures(&picture, &truth);
+        const bool is_same = own_rank || are_same_pictures(&picture, &truth);
         everywhere(is_same);
         everywhere(report.meshes == 2 && report.fields == (has_same ? 6 : 5));
         free_caught(&picture);
@@ -205,35 +205,35 @@ static void domains_are_blocks_of_one_mesh(void **state)
 }
 
 /* Checks a mesh that is first one node, then a list of domains, then one node again. */
-static void a_mesh_becomes_blocks_and_a_whole_again(void **state)
+static void mesh_changes_to_blocks_and_back(void **state)
 {
     (void)state;
     layout_case a;
     layout_make(&layout_kinds[16], &a);
     int64_t copied;
     const char *path = write_scene(scene);
-    caught_picture truth = draw_plain(path, &a, &copied);
-    doorway d = open_door(path);
+    caught_picture truth = draw_by_header(path, &a, &copied);
+    doorway d = open_adaptor_session(path);
     conduit_node *list = conduit_node_create(), *child = conduit_node_fetch(list, "domain_000000");
     for (int step = 0; step < 4; step++) {
         const bool is_list = step % 2;
         if (is_list) stand_in_swap(child, a.node);
-        set_ok(&d, "", is_list ? list : a.node);
-        step_ok(&d);
+        expect_set_succeeds(&d, "", is_list ? list : a.node);
+        expect_step_succeeds(&d);
         if (is_list) stand_in_swap(child, a.node);
         caught_picture picture = pop_caught_picture();
-        const bool is_same = own_rank || same_pictures(&picture, &truth);
+        const bool is_same = own_rank || are_same_pictures(&picture, &truth);
         everywhere(is_same);
         free_caught(&picture);
     }
-    close_door(&d);
+    close_adaptor_session(&d);
     conduit_node_destroy(list);
     free_caught(&truth);
     layout_free(&a);
 }
 
 /* Checks a rank without domains, and then a mesh that disappears on all ranks. */
-static void meshes_come_and_go(void **state)
+static void meshes_are_added_and_removed(void **state)
 {
     (void)state;
     layout_case a, b;
@@ -241,7 +241,7 @@ static void meshes_come_and_go(void **state)
     layout_make(&layout_kinds[16], &b);
     conduit_node *empty = conduit_node_create();
     const char *path = write_scene(scene);
-    doorway d = open_door(path);
+    doorway d = open_adaptor_session(path);
     for (int step = 0; step < 6; step++) {
         const bool has_a = step % 3 != 2, has_b = step % 3 != 1, is_here = step < 3 || own_rank == 0;
         insitu_session *session = open_session(MPI_COMM_WORLD, path);
@@ -250,19 +250,19 @@ static void meshes_come_and_go(void **state)
         else
             everywhere(true);
         if (has_b) layout_submit(session, "b/mesh", &b);
-        step_is_good(session, 100);
+        check_step_succeeds(session, 100);
         caught_picture truth = pop_caught_picture();
         insitu_destroy(&session);
-        if (has_a) set_ok(&d, "a", is_here ? a.node : empty);
-        if (has_b) set_ok(&d, "b", b.node);
-        step_ok(&d);
+        if (has_a) expect_set_succeeds(&d, "a", is_here ? a.node : empty);
+        if (has_b) expect_set_succeeds(&d, "b", b.node);
+        expect_step_succeeds(&d);
         caught_picture picture = pop_caught_picture();
-        const bool is_same = own_rank || same_pictures(&picture, &truth);
+        const bool is_same = own_rank || are_same_pictures(&picture, &truth);
         everywhere(is_same);
         free_caught(&picture);
         free_caught(&truth);
     }
-    close_door(&d);
+    close_adaptor_session(&d);
     conduit_node_destroy(empty);
     layout_free(&a);
     layout_free(&b);
@@ -270,7 +270,7 @@ static void meshes_come_and_go(void **state)
 
 /* Checks that new coordinates, values and flags in the same arrays are detected, and that no tree is built if they are
  * unchanged. */
-static void changes_are_found(void **state)
+static void changed_arrays_are_detected(void **state)
 {
     (void)state;
     layout_case l;
@@ -278,25 +278,25 @@ static void changes_are_found(void **state)
         if (strcmp(layout_kinds[i].name, "vtkGhostType of bits") == 0 || strcmp(layout_kinds[i].name, "hexs") == 0) {
             layout_make(&layout_kinds[i], &l);
             const char *path = write_scene(scene);
-            doorway d = open_door(path);
+            doorway d = open_adaptor_session(path);
             double *places = (double *)(uintptr_t)l.mesh.coordinates[0].data;
             double *values = (double *)(uintptr_t)l.fields[0].values.data;
             for (int step = 0; step < 5; step++) {
                 for (int64_t v = 0; step == 1 && places && v < l.mesh.vertex_count; v++) places[3 * v] *= 1.25;
                 for (int64_t v = 0; step == 3 && v < l.mesh.vertex_count; v++) values[v] *= -0.5;
                 int64_t copied;
-                caught_picture truth = draw_plain(path, &l, &copied);
-                set_ok(&d, "", l.node);
-                step_ok(&d);
+                caught_picture truth = draw_by_header(path, &l, &copied);
+                expect_set_succeeds(&d, "", l.node);
+                expect_step_succeeds(&d);
                 caught_picture picture = pop_caught_picture();
-                const bool is_same = own_rank || same_pictures(&picture, &truth);
+                const bool is_same = own_rank || are_same_pictures(&picture, &truth);
                 everywhere(is_same);
                 const double built = insitu_last_report(d.session)->build_ms;
                 everywhere(step == 2 || step == 4 ? built == 0 : true);
                 free_caught(&picture);
                 free_caught(&truth);
             }
-            close_door(&d);
+            close_adaptor_session(&d);
             layout_free(&l);
         }
 }
@@ -308,18 +308,18 @@ static void cycles_are_counted(void **state)
     static const int64_t said[] = {-1, -1, 40, -1}, expected[] = {0, 1, 40, 41};
     layout_case l;
     layout_make(&layout_kinds[0], &l);
-    doorway d = open_door(write_scene(scene));
+    doorway d = open_adaptor_session(write_scene(scene));
     for (int step = 0; step < 4; step++) {
         if (step == 0) stand_in_remove(l.node, "state");
         if (said[step] >= 0) conduit_node_set_path_int64(l.node, "state/cycle", said[step]);
-        set_ok(&d, "", l.node);
-        step_ok(&d);
+        expect_set_succeeds(&d, "", l.node);
+        expect_step_succeeds(&d);
         everywhere(insitu_last_report(d.session)->cycle == expected[step]);
         everywhere(insitu_last_report(d.session)->time == (double)expected[step]);
         if (said[step] >= 0) stand_in_remove(l.node, "state");
     }
     discard_pictures();
-    close_door(&d);
+    close_adaptor_session(&d);
     layout_free(&l);
 }
 
@@ -334,68 +334,68 @@ typedef struct left_out_case {
     int meshes, fields;
 } left_out_case;
 
-static void of_points(conduit_node *n)
+static void make_point_cells(conduit_node *n)
 {
     conduit_node_set_path_char8_str(n, "topologies/mesh/type", "points");
 }
 
-static void of_lines(conduit_node *n)
+static void make_line_cells(conduit_node *n)
 {
     conduit_node_set_path_char8_str(n, "topologies/mesh/elements/shape", "line");
 }
 
-static void of_streams(conduit_node *n)
+static void make_streamed_topology(conduit_node *n)
 {
     conduit_node_set_path_char8_str(n, "topologies/mesh/elements/element_types/tets/shape", "tet");
 }
 
-static void of_angles(conduit_node *n)
+static void make_polar_coordinates(conduit_node *n)
 {
     static const double at[2] = {0, 1};
-    stand_in_put(n, "coordsets/coords/values/theta", STAND_IN_FLOAT64, at, 2, 0);
+    stand_in_set_array(n, "coordsets/coords/values/theta", STAND_IN_FLOAT64, at, 2, 0);
 }
 
-static void by_basis(conduit_node *n)
+static void make_basis_field(conduit_node *n)
 {
     stand_in_remove(n, "fields/braid/association");
     conduit_node_set_path_char8_str(n, "fields/braid/basis", "H1_3D_P2");
 }
 
-static void of_materials(conduit_node *n)
+static void make_material_field(conduit_node *n)
 {
     stand_in_remove(n, "fields/radial/values");
     conduit_node_set_path_float64(n, "fields/radial/matset_values/a", 1);
 }
 
-static void ghosts_at_vertices(conduit_node *n)
+static void make_vertex_ghosts(conduit_node *n)
 {
     conduit_node_set_path_char8_str(n, "state/metadata/vtk_fields/vel/attribute_type", "Ghosts");
 }
 
-static void of_one_dimension(conduit_node *n)
+static void remove_other_dimensions(conduit_node *n)
 {
     conduit_node_set_path_int64(n, "coordsets/coords/dims/j", 1);
     conduit_node_set_path_int64(n, "coordsets/coords/dims/k", 1);
 }
 
-static void with_other_strides(conduit_node *n)
+static void change_strides(conduit_node *n)
 {
     static const int64_t strides[3] = {1, 5, 23};
     static const double room[200];
-    stand_in_put(n, "fields/braid/strides", STAND_IN_INT64, strides, 3, 0);
-    stand_in_put(n, "fields/braid/values", STAND_IN_FLOAT64, room, 200, 0);
+    stand_in_set_array(n, "fields/braid/strides", STAND_IN_INT64, strides, 3, 0);
+    stand_in_set_array(n, "fields/braid/values", STAND_IN_FLOAT64, room, 200, 0);
 }
 
 static const left_out_case left_out_cases[] = {
-    {"tets", of_points, "grid/topologies/mesh/type: points are not drawn", 0, 0},
-    {"tets", of_lines, "grid/topologies/mesh/elements/shape: is \"line\"", 0, 0},
-    {"tets", of_streams, "grid/topologies/mesh/elements/element_types: ", 0, 0},
-    {"rectilinear", of_angles, "grid/coordsets/coords/values/theta: ", 0, 0},
-    {"tets", by_basis, "grid/fields/braid/basis: ", 1, 2},
-    {"tets", of_materials, "grid/fields/radial/values: ", 1, 2},
-    {"tets", ghosts_at_vertices, "grid/fields/vel/values: ghosts at vertices", 1, 2},
-    {"uniform", of_one_dimension, "grid/coordsets/coords/dims: 5 x 1 x 1 vertices", 0, 0},
-    {"uniform", with_other_strides, "grid/fields/braid/strides: has other strides", 1, 2},
+    {"tets", make_point_cells, "grid/topologies/mesh/type: points are not drawn", 0, 0},
+    {"tets", make_line_cells, "grid/topologies/mesh/elements/shape: is \"line\"", 0, 0},
+    {"tets", make_streamed_topology, "grid/topologies/mesh/elements/element_types: ", 0, 0},
+    {"rectilinear", make_polar_coordinates, "grid/coordsets/coords/values/theta: ", 0, 0},
+    {"tets", make_basis_field, "grid/fields/braid/basis: ", 1, 2},
+    {"tets", make_material_field, "grid/fields/radial/values: ", 1, 2},
+    {"tets", make_vertex_ghosts, "grid/fields/vel/values: ghosts at vertices", 1, 2},
+    {"uniform", remove_other_dimensions, "grid/coordsets/coords/dims: 5 x 1 x 1 vertices", 0, 0},
+    {"uniform", change_strides, "grid/fields/braid/strides: has other strides", 1, 2},
 };
 
 static const layout_kind *find_layout(const char *name)
@@ -405,7 +405,7 @@ static const layout_kind *find_layout(const char *name)
     abort();
 }
 
-static void what_is_left_out_is_named(void **state)
+static void unsupported_items_are_named_in_the_report(void **state)
 {
     (void)state;
     const char *path = write_scene(scene);
@@ -414,7 +414,7 @@ static void what_is_left_out_is_named(void **state)
         layout_case layout;
         layout_make(find_layout(c->layout), &layout);
         c->corrupt(layout.node);
-        doorway d = open_door(path);
+        doorway d = open_adaptor_session(path);
         const insitu_status status = insitu_blueprint_set(d.adaptor, "grid", layout.node);
         insitu_blueprint_step(d.adaptor, NULL, NULL);
         const insitu_blueprint_report *r = insitu_blueprint_last_report(d.adaptor);
@@ -425,7 +425,7 @@ static void what_is_left_out_is_named(void **state)
                     insitu_blueprint_error(d.adaptor));
         everywhere(is_well);
         discard_pictures();
-        close_door(&d);
+        close_adaptor_session(&d);
         layout_free(&layout);
     }
 }
@@ -433,14 +433,14 @@ static void what_is_left_out_is_named(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(each_layout_is_the_plain_header_s),
-        cmocka_unit_test(what_the_header_says_is_not_copied),
+        cmocka_unit_test(each_layout_draws_same_picture_as_header),
+        cmocka_unit_test(arrays_described_by_the_header_are_not_copied),
         cmocka_unit_test(domains_are_blocks_of_one_mesh),
-        cmocka_unit_test(a_mesh_becomes_blocks_and_a_whole_again),
-        cmocka_unit_test(meshes_come_and_go),
-        cmocka_unit_test(changes_are_found),
+        cmocka_unit_test(mesh_changes_to_blocks_and_back),
+        cmocka_unit_test(meshes_are_added_and_removed),
+        cmocka_unit_test(changed_arrays_are_detected),
         cmocka_unit_test(cycles_are_counted),
-        cmocka_unit_test(what_is_left_out_is_named),
+        cmocka_unit_test(unsupported_items_are_named_in_the_report),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -11,7 +11,7 @@ typedef struct doorway {
 } doorway;
 
 /* Opens a session of the scene at path, and its adaptor. Collective. */
-doorway open_door(const char *path);
-void close_door(doorway *d);
+doorway open_adaptor_session(const char *path);
+void close_adaptor_session(doorway *d);
 
 #endif

@@ -131,7 +131,7 @@ enum { FAULTS = sizeof faults / sizeof faults[0] };
 static const int64_t *replaced; /* an array to be freed, or NULL */
 
 /* Replaces the array by a copy with one different entry, or of another type. */
-static void replace(conduit_node *node, const node_fault *f, int id)
+static void replace_array(conduit_node *node, const node_fault *f, int id)
 {
     conduit_node *at = conduit_node_fetch_existing(node, f->path);
     const conduit_datatype *type = conduit_node_dtype(at);
@@ -146,10 +146,10 @@ static void replace(conduit_node *node, const node_fault *f, int id)
     }
     if (f->kind == ENTRY) copy[f->place] = f->number;
     replaced = copy;
-    stand_in_put(node, f->path, id, copy, count, 0);
+    stand_in_set_array(node, f->path, id, copy, count, 0);
 }
 
-static void corrupt(conduit_node *node, const node_fault *f)
+static void corrupt_node(conduit_node *node, const node_fault *f)
 {
     static const char nothing[8];
     conduit_node *at = f->kind >= SHORT && f->kind != AN_OBJECT ? conduit_node_fetch_existing(node, f->path) : NULL;
@@ -162,19 +162,19 @@ static void corrupt(conduit_node *node, const node_fault *f)
     case A_WORD: conduit_node_set_path_char8_str(node, f->path, f->word); break;
     case A_NUMBER: conduit_node_set_path_int64(node, f->path, f->number); break;
     case A_REAL: conduit_node_set_path_float64(node, f->path, (double)f->number); break;
-    case SHORT: stand_in_put(node, f->path, id, conduit_node_element_ptr(at, 0), count - 1, stride); break;
+    case SHORT: stand_in_set_array(node, f->path, id, conduit_node_element_ptr(at, 0), count - 1, stride); break;
     case AN_OBJECT:
         stand_in_remove(node, f->path);
         snprintf(below, sizeof below, "%s/child/child", f->path);
         conduit_node_set_path_float64(node, below, 1);
         break;
-    case NO_ADDRESS: stand_in_put(node, f->path, id, NULL, count, 0); break;
+    case NO_ADDRESS: stand_in_set_array(node, f->path, id, NULL, count, 0); break;
     case NO_STRIDE:
-        stand_in_put(node, f->path, id, nothing, count, 0);
-        stand_in_still(node, f->path);
+        stand_in_set_array(node, f->path, id, nothing, count, 0);
+        stand_in_set_zero_stride(node, f->path);
         break;
-    case FLOATS: replace(node, f, STAND_IN_FLOAT64); break;
-    case ENTRY: replace(node, f, STAND_IN_INT64); break;
+    case FLOATS: replace_array(node, f, STAND_IN_FLOAT64); break;
+    case ENTRY: replace_array(node, f, STAND_IN_INT64); break;
     }
 }
 
@@ -196,7 +196,7 @@ static bool check_message(const char *message, const node_fault *f, const char *
 }
 
 /* Checks that the adaptor draws the corrected node as if the wrong one had never been passed. */
-static void draw_mended(insitu_session *session, insitu_blueprint *adaptor, const conduit_node *node)
+static void draw_corrected_node(insitu_session *session, insitu_blueprint *adaptor, const conduit_node *node)
 {
     discard_pictures();
     everywhere(insitu_blueprint_set(adaptor, "grid", node) == INSITU_OK);
@@ -219,7 +219,7 @@ static void wrong_nodes_are_reported_on_all_ranks(void **state)
         everywhere(insitu_blueprint_create(session, &insitu_conduit_functions, MPI_COMM_WORLD, &adaptor) == INSITU_OK);
         layout_make(find_layout(f->layout), &right);
         layout_make(find_layout(f->layout), &wrong);
-        if (own_rank == bad) corrupt(wrong.node, f);
+        if (own_rank == bad) corrupt_node(wrong.node, f);
         discard_pictures();
         const insitu_status at_once = insitu_blueprint_set(adaptor, "grid", wrong.node);
         const bool is_reported =
@@ -229,7 +229,7 @@ static void wrong_nodes_are_reported_on_all_ranks(void **state)
         if (status != f->status) fprintf(stderr, "%s, %s: status %d\n", f->layout, f->path, (int)status);
         everywhere(status == f->status && check_message(insitu_blueprint_error(adaptor), f, rank));
         everywhere(caught_count == 0);
-        draw_mended(session, adaptor, right.node);
+        draw_corrected_node(session, adaptor, right.node);
         insitu_blueprint_destroy(&adaptor);
         insitu_destroy(&session);
         layout_free(&right);
@@ -250,7 +250,7 @@ static void wrong_indices_are_reported_on_all_ranks(void **state)
     insitu_blueprint *adaptor = NULL;
     insitu_blueprint_create(session, &insitu_conduit_functions, MPI_COMM_WORLD, &adaptor);
     layout_make(find_layout("tets"), &layout);
-    corrupt(layout.node, &f);
+    corrupt_node(layout.node, &f);
     everywhere(insitu_blueprint_set(adaptor, "grid", layout.node) == INSITU_OK);
     const insitu_status status = insitu_blueprint_step(adaptor, NULL, NULL);
     const char *message = insitu_blueprint_error(adaptor);
@@ -263,7 +263,7 @@ static void wrong_indices_are_reported_on_all_ranks(void **state)
     replaced = NULL;
 }
 
-static void doors_need_what_they_stand_on(void **state)
+static void adaptors_require_session_and_node(void **state)
 {
     (void)state;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
@@ -291,7 +291,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(wrong_nodes_are_reported_on_all_ranks),
         cmocka_unit_test(wrong_indices_are_reported_on_all_ranks),
-        cmocka_unit_test(doors_need_what_they_stand_on),
+        cmocka_unit_test(adaptors_require_session_and_node),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -70,40 +70,41 @@ static void add_boxes(plan *p, bool is_moved)
     add_box(p, 2, is_moved ? 0 : 1, 3, 5, 3, 3, 3);
 }
 
-static int owner_of(int number)
+static int get_owner_rank(int number)
 {
     return (number * 5 + 1) % rank_count;
 }
 
-static double spacing_of(const plan *p, const box *b)
+static double compute_spacing(const plan *p, const box *b)
 {
     return p->width / p->refinement[b->level];
 }
 
 /* Returns the position that a simulation states: the corner plus a multiple of the spacing, rounded. */
-static double position_of(const plan *p, const box *b, int axis, int layer)
+static double compute_stated_position(const plan *p, const box *b, int axis, int layer)
 {
-    return p->corner + spacing_of(p, b) * (b->lower[axis] * p->refinement[b->level] - layer);
+    return p->corner + compute_spacing(p, b) * (b->lower[axis] * p->refinement[b->level] - layer);
 }
 
 /* Returns the origin of the whole lattice as a domain implies it. */
-static double origin_of(const plan *p, const box *b, int axis, int layer)
+static double compute_lattice_origin(const plan *p, const box *b, int axis, int layer)
 {
-    const double spacing = spacing_of(p, b), at = position_of(p, b, axis, layer);
+    const double spacing = compute_spacing(p, b), at = compute_stated_position(p, b, axis, layer);
     return p->has_first ? at - spacing * (b->lower[axis] * p->refinement[b->level] - layer) : at;
 }
 
-static layer_kind layer_of(const plan *p, int number)
+static layer_kind get_ghost_layer(const plan *p, int number)
 {
     return p->has_layers ? (layer_kind)(number % 3) : NO_LAYER;
 }
 
 /* Returns the smallest origin implied by domains of the coarsest level; domains with ghost layers begin farther out. */
-static double common_origin(const plan *p, int axis)
+static double find_common_origin(const plan *p, int axis)
 {
     double least = INFINITY;
     for (int i = 0; i < p->count; i++)
-        if (p->boxes[i].level == 0) least = fmin(least, origin_of(p, &p->boxes[i], axis, layer_of(p, i) != NO_LAYER));
+        if (p->boxes[i].level == 0)
+            least = fmin(least, compute_lattice_origin(p, &p->boxes[i], axis, get_ghost_layer(p, i) != NO_LAYER));
     return least;
 }
 
@@ -120,16 +121,16 @@ typedef struct domain {
 static void measure_domain(const plan *p, int number, domain *out)
 {
     const box *b = &p->boxes[number];
-    const int of = p->refinement[b->level], layer = layer_of(p, number) != NO_LAYER;
+    const int of = p->refinement[b->level], layer = get_ghost_layer(p, number) != NO_LAYER;
     *out = (domain){.vertex_count = 1, .cell_count = 1};
     for (int axis = 0; axis < 3; axis++) {
         insitu_lattice *l = &out->lattice;
         l->cells[axis] = (b->upper[axis] - b->lower[axis]) * of + 2 * layer;
         l->interior_first[axis] = layer;
         l->interior_end[axis] = l->cells[axis] - layer;
-        l->spacing[axis] = spacing_of(p, b);
-        l->origin[axis] = common_origin(p, axis);
-        l->first[axis] = llround((position_of(p, b, axis, layer) - l->origin[axis]) / l->spacing[axis]);
+        l->spacing[axis] = compute_spacing(p, b);
+        l->origin[axis] = find_common_origin(p, axis);
+        l->first[axis] = llround((compute_stated_position(p, b, axis, layer) - l->origin[axis]) / l->spacing[axis]);
         l->refinement[axis] = p->has_levels ? of : 0;
         out->cell_count *= l->cells[axis];
         out->vertex_count *= l->cells[axis] + 1;
@@ -178,11 +179,11 @@ static void make_domains(const plan *p, domain domains[MOST_BOXES])
 {
     for (int i = 0; i < p->count; i++) {
         domains[i] = (domain){.values = NULL};
-        if (owner_of(i) == own_rank) make_domain(p, i, &domains[i]);
+        if (get_owner_rank(i) == own_rank) make_domain(p, i, &domains[i]);
     }
 }
 
-static bool set_plainly(insitu_session *session, const plan *p, const domain *domains)
+static bool set_by_header(insitu_session *session, const plan *p, const domain *domains)
 {
     bool is_set = true;
     for (int i = 0, number = 0; i < p->count; i++) {
@@ -213,7 +214,8 @@ static conduit_node *add_child(conduit_node *node, int number)
     return conduit_node_fetch(node, name);
 }
 
-static void put_field(conduit_node *node, const char *name, bool is_of_cells, int id, const void *values, int64_t count)
+static void store_field(conduit_node *node, const char *name, bool is_of_cells, int id, const void *values,
+                        int64_t count)
 {
     char path[64];
     snprintf(path, sizeof path, "fields/%s/association", name);
@@ -221,10 +223,10 @@ static void put_field(conduit_node *node, const char *name, bool is_of_cells, in
     snprintf(path, sizeof path, "fields/%s/topology", name);
     conduit_node_set_path_char8_str(node, path, "mesh");
     snprintf(path, sizeof path, "fields/%s/values", name);
-    stand_in_put(node, path, id, values, count, 0);
+    stand_in_set_array(node, path, id, values, count, 0);
 }
 
-static void put_domain(conduit_node *node, const plan *p, int number, const domain *d)
+static void store_domain(conduit_node *node, const plan *p, int number, const domain *d)
 {
     static const char *const dims[3] = {"coordsets/coords/dims/i", "coordsets/coords/dims/j",
                                         "coordsets/coords/dims/k"};
@@ -235,40 +237,41 @@ static void put_domain(conduit_node *node, const plan *p, int number, const doma
     static const char *const firsts[3] = {"topologies/mesh/elements/origin/i0", "topologies/mesh/elements/origin/j0",
                                           "topologies/mesh/elements/origin/k0"};
     const box *b = &p->boxes[number];
-    const int layer = layer_of(p, number) != NO_LAYER;
+    const int layer = get_ghost_layer(p, number) != NO_LAYER;
     conduit_node_set_path_char8_str(node, "coordsets/coords/type", "uniform");
     conduit_node_set_path_char8_str(node, "topologies/mesh/type", "uniform");
     conduit_node_set_path_char8_str(node, "topologies/mesh/coordset", "coords");
     if (p->has_levels) conduit_node_set_path_int64(node, number % 2 ? "state/level" : "state/level_id", b->level);
     for (int axis = 0; axis < 3; axis++) {
         conduit_node_set_path_int64(node, dims[axis], d->lattice.cells[axis] + 1);
-        conduit_node_set_path_float64(node, origins[axis], position_of(p, b, axis, layer));
-        conduit_node_set_path_float64(node, spacings[axis], spacing_of(p, b));
+        conduit_node_set_path_float64(node, origins[axis], compute_stated_position(p, b, axis, layer));
+        conduit_node_set_path_float64(node, spacings[axis], compute_spacing(p, b));
         if (p->has_first)
             conduit_node_set_path_int64(node, firsts[axis], b->lower[axis] * p->refinement[b->level] - layer);
     }
-    put_field(node, "f", p->is_of_cells, STAND_IN_FLOAT64, d->values, p->is_of_cells ? d->cell_count : d->vertex_count);
+    store_field(node, "f", p->is_of_cells, STAND_IN_FLOAT64, d->values,
+                p->is_of_cells ? d->cell_count : d->vertex_count);
     if (layer)
-        put_field(node, layer_of(p, number) == BY_VTK ? "vtkGhostType" : "ascent_ghosts", true, STAND_IN_INT32,
-                  d->flags, d->cell_count);
+        store_field(node, get_ghost_layer(p, number) == BY_VTK ? "vtkGhostType" : "ascent_ghosts", true, STAND_IN_INT32,
+                    d->flags, d->cell_count);
 }
 
 static conduit_node *make_node(const plan *p, const domain *domains)
 {
     conduit_node *node = conduit_node_create();
     for (int i = 0, number = 0; i < p->count; i++)
-        if (domains[i].values) put_domain(add_child(node, number++), p, i, &domains[i]);
+        if (domains[i].values) store_domain(add_child(node, number++), p, i, &domains[i]);
     return node;
 }
 
 /* ---- pictures -----------------------------------------------------------------------------------------------------
  */
 
-static caught_picture draw_plainly(const char *path, const plan *p, const domain *domains)
+static caught_picture draw_by_header(const char *path, const plan *p, const domain *domains)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, path);
-    everywhere(set_plainly(session, p, domains));
-    step_is_good(session, 0);
+    everywhere(set_by_header(session, p, domains));
+    check_step_succeeds(session, 0);
     insitu_destroy(&session);
     return pop_caught_picture();
 }
@@ -292,14 +295,14 @@ static void draw_and_compare(doorway *d, const char *path, const plan *p, bool i
     domain domains[MOST_BOXES];
     make_domains(p, domains);
     conduit_node *node = make_node(p, domains);
-    caught_picture truth = draw_plainly(path, p, domains);
+    caught_picture truth = draw_by_header(path, p, domains);
     const insitu_status status = insitu_blueprint_set(d->adaptor, "amr", node);
     conduit_node_destroy(node);
     everywhere(status == INSITU_OK);
     everywhere(insitu_blueprint_step(d->adaptor, NULL, NULL) == INSITU_OK);
     caught_picture picture = pop_caught_picture();
     const insitu_blueprint_report *report = insitu_blueprint_last_report(d->adaptor);
-    const bool is_same = own_rank || same_pictures(&picture, &truth);
+    const bool is_same = own_rank || are_same_pictures(&picture, &truth);
     const int holes = own_rank || !is_sphere ? 0 : count_holes(&picture);
     if (!is_same || holes)
         fprintf(stderr, "ratio %d, corner %g%s%s%s: %s, %d holes\n", p->refinement[1], p->corner,
@@ -326,32 +329,32 @@ static plan make_plan(int way)
                   .has_levels = true};
 }
 
-static void levels_are_those_of_plain_blocks(void **state)
+static void levels_draw_same_picture_as_blocks(void **state)
 {
     (void)state;
     for (int way = 0; way < 16; way++) {
         plan p = make_plan(way);
         add_boxes(&p, false);
         const char *path = write_scene(scene);
-        doorway d = open_door(path);
+        doorway d = open_adaptor_session(path);
         draw_and_compare(&d, path, &p, p.corner == 0);
-        close_door(&d);
+        close_adaptor_session(&d);
     }
 }
 
 /* Checks boxes that change from step to step; if they do not change, no tree is built. */
-static void levels_move(void **state)
+static void moved_levels_are_drawn(void **state)
 {
     (void)state;
     const char *path = write_scene(scene);
-    doorway d = open_door(path);
+    doorway d = open_adaptor_session(path);
     plan p = make_plan(4);
     for (int step = 0; step < 6; step++) {
         add_boxes(&p, step / 2 % 2);
         if (step == 5) p.count--; /* the finest box is removed */
         draw_and_compare(&d, path, &p, true);
     }
-    close_door(&d);
+    close_adaptor_session(&d);
 }
 
 /* Compares the domains with one block of the whole mesh on the first rank, passed by the public header: isosurfaces do
@@ -371,24 +374,24 @@ static void domains_of_one_level_have_no_seam(void **state)
         add_shifted_boxes(&p);
         add_box(&whole, 0, 0, 0, 0, SIDE, SIDE, SIDE);
         make_domain(&whole, 0, &one[0]);
-        for (int axis = 0; axis < 3; axis++) one[0].lattice.origin[axis] = common_origin(&p, axis);
+        for (int axis = 0; axis < 3; axis++) one[0].lattice.origin[axis] = find_common_origin(&p, axis);
         if (own_rank) {
             free(one[0].values);
             one[0].values = NULL;
         }
-        caught_picture truth = draw_plainly(path, &whole, one);
+        caught_picture truth = draw_by_header(path, &whole, one);
         make_domains(&p, domains);
         conduit_node *node = make_node(&p, domains);
-        doorway d = open_door(path);
+        doorway d = open_adaptor_session(path);
         everywhere(insitu_blueprint_set(d.adaptor, "amr", node) == INSITU_OK);
         everywhere(insitu_blueprint_step(d.adaptor, NULL, NULL) == INSITU_OK);
         caught_picture picture = pop_caught_picture();
-        const double off = own_rank ? 0 : colour_difference(&picture, &truth);
-        const bool is_well = own_rank || (way & 1 ? off < 1e-5 : same_pictures(&picture, &truth));
+        const double off = own_rank ? 0 : largest_colour_difference(&picture, &truth);
+        const bool is_well = own_rank || (way & 1 ? off < 1e-5 : are_same_pictures(&picture, &truth));
         if (!is_well) fprintf(stderr, "way %d: pictures differ by %g\n", way, off);
         everywhere(is_well);
         everywhere(insitu_blueprint_last_report(d.adaptor)->bytes_copied == 0);
-        close_door(&d);
+        close_adaptor_session(&d);
         conduit_node_destroy(node);
         free_caught(&picture);
         free_caught(&truth);
@@ -399,7 +402,7 @@ static void domains_of_one_level_have_no_seam(void **state)
 
 /* Checks that a domain whose cells are no fraction of the coarsest cells is reported by name, and is drawn together
  * with the cells that it overlaps. */
-static void domains_on_no_level_are_named(void **state)
+static void domains_that_fit_no_level_are_reported(void **state)
 {
     (void)state;
     plan p = make_plan(0);
@@ -413,13 +416,13 @@ static void domains_on_no_level_are_named(void **state)
     for (int i = 0; i < p.count; i++) last += domains[i].values != NULL;
     snprintf(path, sizeof path, "domain_%06d/coordsets/coords/spacing/dy", last);
     if (has_one) conduit_node_set_path_float64(node, path, 0.017);
-    doorway d = open_door(write_scene(scene));
+    doorway d = open_adaptor_session(write_scene(scene));
     everywhere(insitu_blueprint_set(d.adaptor, "amr", node) == INSITU_OK);
     everywhere(insitu_blueprint_step(d.adaptor, NULL, NULL) == INSITU_OK);
     const char *left_out = insitu_blueprint_last_report(d.adaptor)->left_out;
     everywhere(has_one == (strstr(left_out, "amr/mesh: block ") && strstr(left_out, "is on no level")));
     discard_pictures();
-    close_door(&d);
+    close_adaptor_session(&d);
     conduit_node_destroy(node);
     free_domains(&p, domains);
 }
@@ -427,10 +430,10 @@ static void domains_on_no_level_are_named(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(levels_are_those_of_plain_blocks),
-        cmocka_unit_test(levels_move),
+        cmocka_unit_test(levels_draw_same_picture_as_blocks),
+        cmocka_unit_test(moved_levels_are_drawn),
         cmocka_unit_test(domains_of_one_level_have_no_seam),
-        cmocka_unit_test(domains_on_no_level_are_named),
+        cmocka_unit_test(domains_that_fit_no_level_are_reported),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

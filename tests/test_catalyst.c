@@ -33,14 +33,14 @@ static void set_real(void *node, const char *path, double value)
 
 static const catalyst_writer writer = {set_string, set_integer, set_real};
 
-static insitu_status initialize(conduit_node *node)
+static insitu_status initialize_adaptor(conduit_node *node)
 {
     const insitu_status status = catalyst_adaptor_initialize(&insitu_conduit_functions, node);
     conduit_node_destroy(node);
     return status;
 }
 
-static conduit_node *with_scene(void)
+static conduit_node *make_initialize_node(void)
 {
     conduit_node *node = conduit_node_create();
     conduit_node_set_path_char8_str(node, "catalyst/insitu/scene_text", scene);
@@ -49,7 +49,7 @@ static conduit_node *with_scene(void)
 }
 
 /* Returns the adaptor's results in a new node. */
-static conduit_node *results(void)
+static conduit_node *fetch_results(void)
 {
     conduit_node *node = conduit_node_create();
     catalyst_adaptor_results(&writer, node);
@@ -63,7 +63,7 @@ static bool has_word(conduit_node *node, const char *path, const char *word)
     return strstr(text, word) != NULL;
 }
 
-static double number_of(conduit_node *node, const char *path)
+static double read_number(conduit_node *node, const char *path)
 {
     double real;
     int64_t whole;
@@ -75,7 +75,7 @@ static double number_of(conduit_node *node, const char *path)
 }
 
 /* Moves a mesh into the node as a channel. */
-static void put_channel(conduit_node *node, const char *channel, const char *type, const char *data, layout_case *l)
+static void store_channel(conduit_node *node, const char *channel, const char *type, const char *data, layout_case *l)
 {
     char path[256];
     snprintf(path, sizeof path, "catalyst/channels/%s/type", channel);
@@ -84,7 +84,7 @@ static void put_channel(conduit_node *node, const char *channel, const char *typ
     stand_in_swap(conduit_node_fetch(node, path), l->node);
 }
 
-static conduit_node *at_step(int64_t step)
+static conduit_node *make_execute_node(int64_t step)
 {
     conduit_node *node = conduit_node_create();
     conduit_node_set_path_int64(node, "catalyst/state/timestep", step);
@@ -99,7 +99,7 @@ static bool has_drawn(int count)
     return is_well;
 }
 
-static void scenes_are_found(void **state)
+static void scenes_are_read_from_the_node(void **state)
 {
     (void)state;
     const char *path = write_scene(scene);
@@ -110,21 +110,21 @@ static void scenes_are_found(void **state)
         if (way == 1) conduit_node_set_path_char8_str(node, "catalyst/scripts/second", path);
         if (way == 2) conduit_node_set_path_char8_str(node, "catalyst/scripts/second/filename", path);
         if (way == 3) setenv("INSITU_SCENE", path, 1);
-        everywhere(initialize(node) == INSITU_OK);
+        everywhere(initialize_adaptor(node) == INSITU_OK);
         everywhere(catalyst_adaptor_finalize() == INSITU_OK);
     }
     unsetenv("INSITU_SCENE");
-    everywhere(initialize(conduit_node_create()) == INSITU_ERROR_SCENE);
-    conduit_node *node = results();
+    everywhere(initialize_adaptor(conduit_node_create()) == INSITU_ERROR_SCENE);
+    conduit_node *node = fetch_results();
     everywhere(has_word(node, "insitu/error", "catalyst: there is no scene"));
     everywhere(has_word(node, "insitu/status", "INSITU_ERROR_SCENE"));
     conduit_node_destroy(node);
     node = conduit_node_create();
     conduit_node_set_path_char8_str(node, "catalyst/insitu/scene_text", "images: none");
-    everywhere(initialize(node) == INSITU_ERROR_SCENE);
-    node = with_scene();
+    everywhere(initialize_adaptor(node) == INSITU_ERROR_SCENE);
+    node = make_initialize_node();
     conduit_node_set_path_char8_str(node, "catalyst/mpi_comm", "world");
-    everywhere(initialize(node) == INSITU_ERROR_MESH);
+    everywhere(initialize_adaptor(node) == INSITU_ERROR_MESH);
 }
 
 /* Checks channels of one mesh, of several meshes and of domains; a rank may have no data. */
@@ -135,16 +135,16 @@ static void channels_are_drawn(void **state)
     layout_make(&layout_kinds[0], &a);
     layout_make(&layout_kinds[10], &b);
     layout_make(&layout_kinds[15], &c);
-    everywhere(initialize(with_scene()) == INSITU_OK);
-    everywhere(initialize(with_scene()) == INSITU_ERROR_ARGUMENT); /* a second call is an error */
-    conduit_node *node = at_step(7);
-    if (own_rank == 0) put_channel(node, "grid", "mesh", "data", &a);
-    put_channel(node, "parts", "multimesh", "data/walls", &b);
-    put_channel(node, "levels", "amrmesh", "data/domain_000000", &c);
+    everywhere(initialize_adaptor(make_initialize_node()) == INSITU_OK);
+    everywhere(initialize_adaptor(make_initialize_node()) == INSITU_ERROR_ARGUMENT); /* a second call is an error */
+    conduit_node *node = make_execute_node(7);
+    if (own_rank == 0) store_channel(node, "grid", "mesh", "data", &a);
+    store_channel(node, "parts", "multimesh", "data/walls", &b);
+    store_channel(node, "levels", "amrmesh", "data/domain_000000", &c);
     discard_pictures();
     everywhere(catalyst_adaptor_execute(node) == INSITU_OK && has_drawn(1));
-    conduit_node *out = results();
-    everywhere(number_of(out, "insitu/cycle") == 7 && number_of(out, "insitu/images") == 1);
+    conduit_node *out = fetch_results();
+    everywhere(read_number(out, "insitu/cycle") == 7 && read_number(out, "insitu/images") == 1);
     everywhere(has_word(out, "insitu/status", "INSITU_OK") && has_word(out, "insitu/error", ""));
     conduit_node_destroy(out);
     everywhere(catalyst_adaptor_finalize() == INSITU_OK);
@@ -154,15 +154,15 @@ static void channels_are_drawn(void **state)
     layout_free(&c);
 }
 
-static void errors_are_the_same_everywhere(void **state)
+static void errors_are_same_on_all_ranks(void **state)
 {
     (void)state;
     layout_case l;
     layout_make(&layout_kinds[0], &l);
     everywhere(catalyst_adaptor_execute(NULL) == INSITU_ERROR_ARGUMENT);
-    everywhere(initialize(with_scene()) == INSITU_OK);
-    conduit_node *node = at_step(0);
-    put_channel(node, "grid", "mesh", "data", &l);
+    everywhere(initialize_adaptor(make_initialize_node()) == INSITU_OK);
+    conduit_node *node = make_execute_node(0);
+    store_channel(node, "grid", "mesh", "data", &l);
     discard_pictures();
     for (int wrong = 0; wrong < 3; wrong++) {
         const bool is_last = own_rank == rank_count - 1;
@@ -172,7 +172,7 @@ static void errors_are_the_same_everywhere(void **state)
             conduit_node_set_path_int64(node, "catalyst/channels/grid/data/topologies/mesh/type", 3);
         const insitu_status status = catalyst_adaptor_execute(node);
         everywhere(status == INSITU_ERROR_MESH && has_drawn(0));
-        conduit_node *out = results();
+        conduit_node *out = fetch_results();
         everywhere(has_word(out, "insitu/error",
                             wrong == 0   ? "catalyst/channels/grid/type: is \"table\""
                             : wrong == 1 ? "catalyst/state/timestep: is no whole number"
@@ -188,18 +188,19 @@ static void errors_are_the_same_everywhere(void **state)
     layout_free(&l);
 }
 
-static void parameters_are_results(void **state)
+static void parameters_are_returned_as_results(void **state)
 {
     (void)state;
-    conduit_node *node = with_scene();
+    conduit_node *node = make_initialize_node();
     conduit_node_set_path_float64(node, "catalyst/insitu/parameters/inflow", 1);
     conduit_node_set_path_float64(node, "catalyst/insitu/parameters/outflow", 3);
-    everywhere(initialize(node) == INSITU_OK);
-    node = at_step(0);
+    everywhere(initialize_adaptor(node) == INSITU_OK);
+    node = make_execute_node(0);
     discard_pictures();
     catalyst_adaptor_execute(node); /* there is nothing to draw */
-    conduit_node *out = results();
-    everywhere(number_of(out, "insitu/parameters/inflow") == 2.5 && number_of(out, "insitu/parameters/outflow") == 3);
+    conduit_node *out = fetch_results();
+    everywhere(read_number(out, "insitu/parameters/inflow") == 2.5 &&
+               read_number(out, "insitu/parameters/outflow") == 3);
     conduit_node_destroy(out);
     out = conduit_node_create();
     catalyst_adaptor_about(&writer, out);
@@ -212,10 +213,10 @@ static void parameters_are_results(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(scenes_are_found),
+        cmocka_unit_test(scenes_are_read_from_the_node),
         cmocka_unit_test(channels_are_drawn),
-        cmocka_unit_test(errors_are_the_same_everywhere),
-        cmocka_unit_test(parameters_are_results),
+        cmocka_unit_test(errors_are_same_on_all_ranks),
+        cmocka_unit_test(parameters_are_returned_as_results),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

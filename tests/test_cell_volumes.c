@@ -22,7 +22,7 @@ static const double weights[POINTS] = {0.17392742256872692, 0.32607257743127307,
 
 /* Maps a point of the unit cube into the cell: the map is trilinear for hexes; for wedges the triangle is a collapsed
  * square; for pyramids the base shrinks towards the apex. */
-static void place_of(int type, double (*p)[3], const double at[3], double out[3])
+static void map_to_cell(int type, double (*p)[3], const double at[3], double out[3])
 {
     const double u = at[0], v = at[1], w = at[2];
     const double square[4] = {(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v};
@@ -38,28 +38,28 @@ static void place_of(int type, double (*p)[3], const double at[3], double out[3]
 
 /* Computes the determinant of the map's derivatives, by differences that are exact because the maps are linear along
  * each axis. */
-static double determinant_at(int type, double (*p)[3], const double at[3])
+static double compute_jacobian_determinant(int type, double (*p)[3], const double at[3])
 {
     double d[3][3];
     for (int axis = 0; axis < 3; axis++) {
         double low[3] = {at[0], at[1], at[2]}, high[3] = {at[0], at[1], at[2]}, a[3], b[3];
         low[axis] = 0;
         high[axis] = 1;
-        place_of(type, p, low, a);
-        place_of(type, p, high, b);
+        map_to_cell(type, p, low, a);
+        map_to_cell(type, p, high, b);
         for (int k = 0; k < 3; k++) d[axis][k] = b[k] - a[k];
     }
     return d[0][0] * (d[1][1] * d[2][2] - d[1][2] * d[2][1]) + d[0][1] * (d[1][2] * d[2][0] - d[1][0] * d[2][2]) +
            d[0][2] * (d[1][0] * d[2][1] - d[1][1] * d[2][0]);
 }
 
-static double integral(int type, double (*p)[3])
+static double integrate_volume(int type, double (*p)[3])
 {
     double sum = 0;
     for (int i = 0; i < POINTS * POINTS * POINTS; i++) {
         const int n[3] = {i % POINTS, i / POINTS % POINTS, i / POINTS / POINTS};
         const double at[3] = {nodes[n[0]], nodes[n[1]], nodes[n[2]]};
-        sum += weights[n[0]] * weights[n[1]] * weights[n[2]] * determinant_at(type, p, at);
+        sum += weights[n[0]] * weights[n[1]] * weights[n[2]] * compute_jacobian_determinant(type, p, at);
     }
     return fabs(sum);
 }
@@ -67,7 +67,7 @@ static double integral(int type, double (*p)[3])
 /* ---- volumes --------------------------------------------------------------------------------------------------- */
 
 /* Returns the volume of the mesh's only cell. All vertices of the mesh are the cell's, and each must be found once. */
-static double volume_of(const test_mesh *mesh)
+static double compute_mesh_volume(const test_mesh *mesh)
 {
     const test_layout wide = {.wide_coordinates = true, .wide_indices = true, .wide_values = true, .with_types = true};
     test_view view;
@@ -82,34 +82,34 @@ static double volume_of(const test_mesh *mesh)
 }
 
 /* Sums of a few hundred products of numbers of order 1 are off by less than 1e-13. */
-static void assert_near(double volume, double expected)
+static void assert_nearly_equal(double volume, double expected)
 {
     if (fabs(volume - expected) <= 1e-12) return;
     print_error("volume %.15g, expected %.15g\n", volume, expected);
     fail();
 }
 
-static void bent_cells_are_the_quadrature(void **state)
+static void volumes_of_bent_cells_match_quadrature(void **state)
 {
     (void)state;
     static const test_cell_shape shapes[4] = {TEST_UNIT_TET, TEST_UNIT_HEX, TEST_UNIT_WEDGE, TEST_UNIT_PYRAMID};
     for (int trial = 0; trial < 400; trial++) {
         test_mesh mesh;
-        test_mesh_single(shapes[trial % 4], test_linear, &mesh);
+        test_mesh_make_single_cell(shapes[trial % 4], test_linear_field, &mesh);
         for (int64_t i = 0; i < 3 * mesh.vertex_count; i++)
-            mesh.coordinates[i] += test_uniform_in((uint64_t)(1000 * trial + i), 3, -0.25, 0.25);
-        if (trial & 4) test_mesh_mirror(&mesh, false);
+            mesh.coordinates[i] += test_uniform_between((uint64_t)(1000 * trial + i), 3, -0.25, 0.25);
+        if (trial & 4) test_mesh_mirror_cells(&mesh, false);
         const int type = mesh.types[0];
         double places[8][3];
         for (int i = 0; i < grid_type_vertices(type); i++)
             memcpy(places[i], mesh.coordinates + 3 * mesh.connectivity[i], sizeof places[i]);
-        const double expected = type == GRID_TET ? NAN : integral(type, places);
-        if (type != GRID_TET) assert_near(volume_of(&mesh), expected);
-        const double before = volume_of(&mesh);
+        const double expected = type == GRID_TET ? NAN : integrate_volume(type, places);
+        if (type != GRID_TET) assert_nearly_equal(compute_mesh_volume(&mesh), expected);
+        const double before = compute_mesh_volume(&mesh);
         test_mesh_to_polyhedra(&mesh, 1);
-        assert_near(volume_of(&mesh), before);
+        assert_nearly_equal(compute_mesh_volume(&mesh), before);
         test_mesh_reorder_vertices(&mesh, (uint64_t)trial);
-        assert_near(volume_of(&mesh), before);
+        assert_nearly_equal(compute_mesh_volume(&mesh), before);
         test_mesh_free(&mesh);
     }
 }
@@ -118,7 +118,7 @@ static double shape_volume(const test_mesh *mesh, test_polyhedron_shape shape)
 {
     double places[16][3], sum = 0;
     memcpy(places, mesh->coordinates, 3 * (size_t)mesh->vertex_count * sizeof(double));
-    if (shape == TEST_CAVITY) return integral(GRID_HEX, places) - integral(GRID_HEX, places + 8);
+    if (shape == TEST_CAVITY) return integrate_volume(GRID_HEX, places) - integrate_volume(GRID_HEX, places + 8);
     /* sheared upright prisms; the area of the base follows from its corners */
     const int around = shape == TEST_L_PRISM ? 6 : 8;
     for (int i = 0; i < around; i++) {
@@ -128,23 +128,23 @@ static double shape_volume(const test_mesh *mesh, test_polyhedron_shape shape)
     return 0.85 * fabs(sum);
 }
 
-static void concave_polyhedra_are_closed_forms(void **state)
+static void volumes_of_concave_polyhedra_match_closed_forms(void **state)
 {
     (void)state;
     static const test_polyhedron_shape shapes[3] = {TEST_L_PRISM, TEST_U_PRISM, TEST_CAVITY};
     for (int i = 0; i < 3; i++)
         for (uint64_t turn = 0; turn < 20; turn++) {
             test_mesh mesh;
-            test_mesh_polyhedron(shapes[i], test_linear, &mesh);
+            test_mesh_make_polyhedron(shapes[i], test_linear_field, &mesh);
             const double expected = shape_volume(&mesh, shapes[i]);
             if (turn) test_mesh_reorder_vertices(&mesh, turn);
-            assert_near(volume_of(&mesh), expected);
+            assert_nearly_equal(compute_mesh_volume(&mesh), expected);
             test_mesh_free(&mesh);
         }
 }
 
 /* Checks a square frame: the cell's centre is in its hole and sees the inner faces from behind. */
-static void rings_are_closed_forms(void **state)
+static void volumes_of_rings_match_closed_forms(void **state)
 {
     (void)state;
     static const int picks[4][4] = {{0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}};
@@ -172,15 +172,15 @@ static void rings_are_closed_forms(void **state)
     test_mesh_add_polyhedron(&mesh, faces, count);
     for (uint64_t turn = 0; turn < 20; turn++) {
         if (turn) test_mesh_reorder_vertices(&mesh, turn);
-        assert_near(volume_of(&mesh), (1 - 0.36) * 0.5);
+        assert_nearly_equal(compute_mesh_volume(&mesh), (1 - 0.36) * 0.5);
     }
     test_mesh_free(&mesh);
 }
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(bent_cells_are_the_quadrature),
-                                       cmocka_unit_test(concave_polyhedra_are_closed_forms),
-                                       cmocka_unit_test(rings_are_closed_forms)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(volumes_of_bent_cells_match_quadrature),
+                                       cmocka_unit_test(volumes_of_concave_polyhedra_match_closed_forms),
+                                       cmocka_unit_test(volumes_of_rings_match_closed_forms)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -39,7 +39,7 @@ static const double doubled_allowed = 5e-7;
 
 static int64_t rays_wanted = 300000;
 
-static const chord_table *kernels(void)
+static const chord_table *get_kernel_table(void)
 {
 #if defined(__x86_64__)
     if (strcmp(render_isa(), "avx512") == 0) return &chord_table_avx512;
@@ -89,14 +89,14 @@ static void make_mesh(chord_mesh kind, double jitter, test_mesh *out)
     static const test_mesh_kind bases[MESH_COUNT] = {TEST_TETS,      TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS,
                                                      TEST_POLYHEDRA, TEST_MIXED, TEST_HEXES,  TEST_MIXED};
     if (kind == MESH_HONEYCOMB) {
-        test_mesh_honeycomb(SIDE, jitter / 2, test_linear, out);
+        test_mesh_make_honeycomb(SIDE, jitter / 2, test_linear_field, out);
         return;
     }
     if (kind >= MESH_REFINED) {
-        test_mesh_refined((refined_kind)(kind - MESH_REFINED), SIDE / 2, jitter / 2, test_linear, out);
+        test_mesh_make_refined((refined_kind)(kind - MESH_REFINED), SIDE / 2, jitter / 2, test_linear_field, out);
         return;
     }
-    test_mesh_lattice(bases[kind], SIDE, jitter, test_linear, out);
+    test_mesh_make_lattice(bases[kind], SIDE, jitter, test_linear_field, out);
     if (kind == MESH_QUAD_POLYHEDRA) test_mesh_to_polyhedra(out, 1);
     if (kind == MESH_BESIDE) test_mesh_to_polyhedra(out, 0.5);
 }
@@ -135,7 +135,7 @@ static int compare_floats(const void *left, const void *right)
 }
 
 /* Finds the ends that are not shared by two intervals, sorted; returns their number. */
-static int lone_ends(const chord_interval *ray_intervals, int count, float lone[2 * CHORD_MAX_INTERVALS])
+static int find_unshared_ends(const chord_interval *ray_intervals, int count, float lone[2 * CHORD_MAX_INTERVALS])
 {
     float ends[2 * CHORD_MAX_INTERVALS];
     int alone = 0;
@@ -162,7 +162,7 @@ static int clip_intervals(chord_interval *ray_intervals, int count, float near)
     return left;
 }
 
-static double depth_of(const render_job *job, float t)
+static double compute_depth(const render_job *job, float t)
 {
     return (double)t / job->space.scale + job->space.depth_origin;
 }
@@ -171,10 +171,10 @@ static double depth_of(const render_job *job, float t)
 static bool is_paired(const render_job *job, const chord_ray *r, const chord_interval *ray_intervals, int count)
 {
     float lone[2 * CHORD_MAX_INTERVALS];
-    const int alone = lone_ends(ray_intervals, count, lone);
+    const int alone = find_unshared_ends(ray_intervals, count, lone);
     if (!chord_is_touching(r) && alone != 0 && alone != 2) return false;
     for (int i = 0; i < alone; i++) {
-        const double depth = depth_of(job, lone[i]);
+        const double depth = compute_depth(job, lone[i]);
         if (chord_is_within(r, depth, depth) || chord_is_beyond(r, depth)) return false;
     }
     return true;
@@ -189,7 +189,8 @@ static void verify_neighbours(const render_job *job, const chord_ray *r, const c
     for (int i = 1, last = 0; i < count; i++) {
         const chord_interval *before = &ray_intervals[last], *now = &ray_intervals[i];
         doubled = fmax(doubled, fmin((double)before->t_out, (double)now->t_out) - (double)now->t_in);
-        if (!chord_is_touching(r) || chord_is_within(r, depth_of(job, before->t_out), depth_of(job, now->t_in)))
+        if (!chord_is_touching(r) ||
+            chord_is_within(r, compute_depth(job, before->t_out), compute_depth(job, now->t_in)))
             gap = fmax(gap, (double)now->t_in - (double)before->t_out);
         if (now->t_out > before->t_out) last = i;
     }
@@ -240,19 +241,19 @@ static void verify_ray(const render_job *job, const chord_rays *rays, int ray, c
 
 static kernel_thread open_thread(void)
 {
-    kernel_thread thread = {.cells = base_calloc(1, kernels()->cells_bytes), .polyhedra = polyhedra_create()};
+    kernel_thread thread = {.cells = base_calloc(1, get_kernel_table()->cells_bytes), .polyhedra = polyhedra_create()};
     assert_non_null(thread.cells);
     assert_non_null(thread.polyhedra);
     return thread;
 }
 
-static void trace(const render_job *job, kernel_thread *thread, chord_rays *rays)
+static void trace_rays(const render_job *job, kernel_thread *thread, chord_rays *rays)
 {
     kernel_frame frame;
     base_error error = {0};
     assert_int_equal(render_prepare(job, &frame, &error), INSITU_OK);
     polyhedra_reset(thread->polyhedra);
-    kernels()->trace(&frame, thread, rays);
+    get_kernel_table()->trace(&frame, thread, rays);
     assert_false(thread->out_of_memory);
     render_unprepare(&frame);
 }
@@ -277,7 +278,7 @@ static void verify_mesh(chord_mesh kind, double jitter, chord_aim aim, int64_t c
         f.job.space.depth_origin = fmax(depth, 0);
         for (int by_tile = 0; by_tile < 2; by_tile++) {
             rays.is_pencil = by_tile;
-            trace(&f.job, &thread, &rays);
+            trace_rays(&f.job, &thread, &rays);
             for (int i = 0; i < rays.count; i++)
                 verify_ray(&f.job, &rays, i, rays.ray_intervals[i], rays.interval_count[i], &tallies[by_tile]);
         }
@@ -336,7 +337,7 @@ static void assert_few_at_the_surface(chord_aim aim, const tally *t)
         fail_msg("%d slanted and %d touching of %d rays", (int)t->slanted, (int)t->touching, (int)t->rays);
 }
 
-static void verify(chord_aim aim, const char *what)
+static void verify_aim(chord_aim aim, const char *what)
 {
     const int64_t share = rays_wanted / (CHORD_AIM_COUNT * MESH_COUNT * 2) + 1;
     tally all[2] = {{.rays = 0}};
@@ -364,55 +365,55 @@ static void verify(chord_aim aim, const char *what)
 static void random_rays_add_up_to_their_chords(void **state)
 {
     (void)state;
-    verify(CHORD_RANDOM, "random");
+    verify_aim(CHORD_RANDOM, "random");
 }
 
 static void rays_through_vertices_add_up_to_their_chords(void **state)
 {
     (void)state;
-    verify(CHORD_TO_VERTICES, "through vertices");
+    verify_aim(CHORD_TO_VERTICES, "through vertices");
 }
 
 static void rays_through_edges_add_up_to_their_chords(void **state)
 {
     (void)state;
-    verify(CHORD_TO_EDGES, "through edges");
+    verify_aim(CHORD_TO_EDGES, "through edges");
 }
 
 static void rays_through_faces_add_up_to_their_chords(void **state)
 {
     (void)state;
-    verify(CHORD_TO_FACES, "through faces");
+    verify_aim(CHORD_TO_FACES, "through faces");
 }
 
 static void rays_along_edges_add_up_to_their_chords(void **state)
 {
     (void)state;
-    verify(CHORD_ALONG_EDGES, "along edges");
+    verify_aim(CHORD_ALONG_EDGES, "along edges");
 }
 
 static void rays_along_faces_add_up_to_their_chords(void **state)
 {
     (void)state;
-    verify(CHORD_ALONG_FACES, "along faces");
+    verify_aim(CHORD_ALONG_FACES, "along faces");
 }
 
 static void axis_aligned_rays_add_up_to_their_chords(void **state)
 {
     (void)state;
-    verify(CHORD_AXIS_ALIGNED, "axis-aligned");
+    verify_aim(CHORD_AXIS_ALIGNED, "axis-aligned");
 }
 
 static void rays_from_inside_add_up_to_their_chords(void **state)
 {
     (void)state;
-    verify(CHORD_FROM_INSIDE, "from inside");
+    verify_aim(CHORD_FROM_INSIDE, "from inside");
 }
 
 /* The command's argument is the number of rays. */
 int main(int argc, char **argv)
 {
-    if (fixture_set_is_unavailable()) return 77;
+    if (fixture_isa_is_unavailable()) return 77;
     if (argc > 1) rays_wanted = atoll(argv[1]);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(random_rays_add_up_to_their_chords),

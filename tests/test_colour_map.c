@@ -13,7 +13,7 @@
 #define NAME(word, name) name,
 static const char *const names[COLOUR_MAP_COUNT] = {COLOUR_MAPS(NAME)};
 
-static double code_of(float linear)
+static double encode_srgb(float linear)
 {
     const double l = linear;
     return 255 * (l <= 0.0031308 ? 12.92 * l : 1.055 * pow(l, 1 / 2.4) - 0.055);
@@ -23,14 +23,14 @@ static void check_entry(const float *table, int entry, int r, int g, int b, doub
 {
     const int expected[3] = {r, g, b};
     for (int c = 0; c < 3; c++) {
-        const double code = code_of(table[3 * entry + c]);
+        const double code = encode_srgb(table[3 * entry + c]);
         if (!(fabs(code - expected[c]) <= tolerance)) {
             fail_msg("entry %d channel %d is %g, expected %d", entry, c, code, expected[c]);
         }
     }
 }
 
-static const float *table_of(const char *name)
+static const float *find_colour_table(const char *name)
 {
     int count = 0;
     const float *table = colour_map_table(name, &count);
@@ -71,39 +71,39 @@ static const struct published {
 };
 enum { published_count = sizeof published / sizeof *published };
 
-static void colour_map_codes_are_the_published(void **state)
+static void colour_map_codes_match_published_codes(void **state)
 {
     (void)state;
     for (int map = 0; map < published_count; map++) {
-        const float *table = table_of(published[map].name);
+        const float *table = find_colour_table(published[map].name);
         const int m = published[map].middle;
         uint64_t hash = 0xcbf29ce484222325;
         check_entry(table, 128, m >> 16, m >> 8 & 255, m & 255, 0.5);
-        for (int i = 0; i < 768; i++) hash = (hash ^ (uint64_t)lround(code_of(table[i]))) * 0x100000001b3;
+        for (int i = 0; i < 768; i++) hash = (hash ^ (uint64_t)lround(encode_srgb(table[i]))) * 0x100000001b3;
         if (hash != published[map].hash) fail_msg("%s is not the published table", published[map].name);
     }
 }
 
 /* Moreland's map has a formula. Its published ends and middle are met to half a code, and the middle of its table of
  * 257 entries, which lies between two entries of ours, to one code more. */
-static void colour_map_meets_published_colours(void **state)
+static void colour_map_matches_published_colours(void **state)
 {
     (void)state;
-    const float *diverging = table_of("cool_to_warm");
+    const float *diverging = find_colour_table("cool_to_warm");
     check_entry(diverging, 0, 59, 76, 192, 0.5);
     check_entry(diverging, 127, 221, 221, 221, 1.5);
     check_entry(diverging, 128, 221, 221, 221, 1.5);
     check_entry(diverging, 255, 180, 4, 38, 0.5);
-    for (int i = 0; i < 256; i++) check_entry(table_of("grey"), i, i, i, i, 1e-3);
+    for (int i = 0; i < 256; i++) check_entry(find_colour_table("grey"), i, i, i, i, 1e-3);
 }
 
 static void colour_map_names_are_found(void **state)
 {
     (void)state;
     for (int i = 0; i < COLOUR_MAP_COUNT; i++) {
-        assert_non_null(table_of(names[i]));
+        assert_non_null(find_colour_table(names[i]));
         for (int j = 0; j < i; j++)
-            assert_memory_not_equal(table_of(names[i]), table_of(names[j]), 768 * sizeof(float));
+            assert_memory_not_equal(find_colour_table(names[i]), find_colour_table(names[j]), 768 * sizeof(float));
     }
 }
 
@@ -112,7 +112,7 @@ static void colour_map_lightness_rises(void **state)
     (void)state;
     static const char *const rising[] = {"viridis", "plasma", "inferno", "magma", "cividis", "batlow", "grey"};
     for (int map = 0; map < (int)(sizeof rising / sizeof *rising); map++) {
-        const float *table = table_of(rising[map]);
+        const float *table = find_colour_table(rising[map]);
         double last = -1;
         for (int i = 0; i < 256; i++) {
             const float *c = table + 3 * (size_t)i;
@@ -128,12 +128,12 @@ static void colour_map_steps_are_small(void **state)
     (void)state;
     for (int map = 0; map < COLOUR_MAP_COUNT; map++) {
         const char *name = names[map];
-        const float *table = table_of(name);
+        const float *table = find_colour_table(name);
         for (int i = 0; i < 3 * 255; i++) {
             assert_true(table[i] >= 0 && table[i] <= 1);
             /* a mistyped key or a hue that runs in the wrong direction jumps by tens of codes; sRGB is steepest in the
              * dark, where the green of cool_to_warm ends */
-            const double step = fabs(code_of(table[i + 3]) - code_of(table[i]));
+            const double step = fabs(encode_srgb(table[i + 3]) - encode_srgb(table[i]));
             if (!(step < 12)) fail_msg("%s jumps by %g codes at %d", name, step, i / 3);
         }
     }
@@ -162,9 +162,9 @@ static void colour_curve_is_srgb(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(colour_map_codes_are_the_published),
+        cmocka_unit_test(colour_map_codes_match_published_codes),
         cmocka_unit_test(colour_map_names_are_found),
-        cmocka_unit_test(colour_map_meets_published_colours),
+        cmocka_unit_test(colour_map_matches_published_colours),
         cmocka_unit_test(colour_map_lightness_rises),
         cmocka_unit_test(colour_map_steps_are_small),
         cmocka_unit_test(colour_map_of_unknown_name_is_null),

@@ -91,14 +91,14 @@ static void check_picture(const render_fixture *f, const render_transfer *t, con
         double base[3], direction[3], p[3];
         if (drawn.first[pixel] == drawn.first[pixel + 1]) continue;
         const fragment *hit = &drawn.list.items[drawn.first[pixel]];
-        const double depth = fixture_depth(f, hit->t_in);
+        const double depth = fixture_scene_depth(f, hit->t_in);
         render_camera_ray(camera, pixel % camera->width, pixel / camera->width, base, direction);
         for (int a = 0; a < 3; a++) p[a] = base[a] + depth * direction[a];
         hits++;
-        counted += check_pixel(t, test_linear(p), hit->colour, l->name);
+        counted += check_pixel(t, test_linear_field(p), hit->colour, l->name);
     }
     assert_true(hits > 300 && counted > 0.9 * hits);
-    drawn_free(&drawn);
+    drawn_frame_free(&drawn);
 }
 
 static void surfaces_without_light_have_the_maps_colours(void **state)
@@ -109,9 +109,9 @@ static void surfaces_without_light_have_the_maps_colours(void **state)
         test_mesh mesh;
         test_view colours;
         render_fixture f;
-        test_mesh_lattice(kind, 4, 0.2, test_linear, &mesh);
+        test_mesh_make_lattice(kind, 4, 0.2, test_linear_field, &mesh);
         test_view_create(&mesh, (test_layout){.wide_coordinates = true, .wide_values = true}, &colours);
-        fixture_create_lattice(&f, kind, 4, 0.2, test_wave);
+        fixture_create_lattice(&f, kind, 4, 0.2, test_wave_field);
         fixture_set_camera(&f, CAMERA_OUTSIDE, 33, 29);
         fixture_add_surface(&f, values, 2, 1);
         f.surfaces[0].colour_field = (render_field){&colours.field, f.ranges};
@@ -119,8 +119,8 @@ static void surfaces_without_light_have_the_maps_colours(void **state)
         f.surfaces[0].material = (render_material){.ambient = 1};
         for (int i = 0; i < LOOKS; i++) {
             set_scale_case(&f.transfer, &scale_cases[i]);
-            for (int set = 0; set < fixture_set_count(); set++) {
-                fixture_use_set(set);
+            for (int set = 0; set < fixture_isa_count(); set++) {
+                fixture_select_isa(set);
                 check_picture(&f, &f.transfer, &scale_cases[i]);
             }
         }
@@ -130,7 +130,7 @@ static void surfaces_without_light_have_the_maps_colours(void **state)
     }
 }
 
-static double nothing(const double p[3])
+static double undefined_field(const double p[3])
 {
     (void)p;
     return (double)NAN;
@@ -143,9 +143,9 @@ static void nan_has_its_colour(void **state)
     test_mesh mesh;
     test_view colours;
     render_fixture f;
-    test_mesh_lattice(TEST_TETS, 4, 0.2, nothing, &mesh);
+    test_mesh_make_lattice(TEST_TETS, 4, 0.2, undefined_field, &mesh);
     test_view_create(&mesh, (test_layout){.wide_coordinates = true, .wide_values = true}, &colours);
-    fixture_create_lattice(&f, TEST_TETS, 4, 0.2, test_wave);
+    fixture_create_lattice(&f, TEST_TETS, 4, 0.2, test_wave_field);
     fixture_add_surface(&f, values, 1, 1);
     f.surfaces[0].colour_field = (render_field){&colours.field, f.ranges};
     f.surfaces[0].colour_map = &f.transfer;
@@ -159,7 +159,7 @@ static void nan_has_its_colour(void **state)
         for (int64_t n = 0; n < drawn.list.count; n++)
             assert_memory_equal(drawn.list.items[n].colour, scale_cases[i].has_outside ? outside + 6 : grey,
                                 sizeof grey);
-        drawn_free(&drawn);
+        drawn_frame_free(&drawn);
     }
     test_view_free(&colours);
     test_mesh_free(&mesh);
@@ -182,9 +182,9 @@ static void scales_and_their_inverses_agree(void **state)
 
 /* ---- volumes ---- */
 
-static double growing(const double p[3])
+static double growing_field(const double p[3])
 {
-    return pow(10, 2 * test_linear(p)); /* values from 1.6e-3 to 1600 */
+    return pow(10, 2 * test_linear_field(p)); /* values from 1.6e-3 to 1600 */
 }
 
 static void set_volume(render_fixture *f, const scale_case *l, double values[3], render_transfer *t)
@@ -217,10 +217,10 @@ static void sampled_volumes_match_the_reference(void **state)
         double values[3] = {0.05, 3, 90};
         fixture_bounds bounds = fixture_usual_bounds;
         bounds.colour += 1e-5;
-        fixture_create_lattice(&f, TEST_TETS, 4, 0.2, growing);
+        fixture_create_lattice(&f, TEST_TETS, 4, 0.2, growing_field);
         fixture_set_camera(&f, CAMERA_OUTSIDE, 33, 29);
         set_volume(&f, &volume_looks[i], values, &t);
-        fixture_compare(&f, &bounds, volume_looks[i].name);
+        fixture_compare_with_reference(&f, &bounds, volume_looks[i].name);
         fixture_free(&f);
     }
 }
@@ -238,7 +238,7 @@ static void integrated_volumes_keep_their_error(void **state)
             drawn_frame drawn;
             double values[3] = {0.05, 3, 90}, worst = 0;
             const double allowed = 4e-4 + (hexes ? 0.01 : 1.01e-4);
-            fixture_create_lattice(&f, hexes ? TEST_HEXES : TEST_TETS, 4, 0.2, growing);
+            fixture_create_lattice(&f, hexes ? TEST_HEXES : TEST_TETS, 4, 0.2, growing_field);
             fixture_set_camera(&f, CAMERA_OUTSIDE, 17, 15);
             set_volume(&f, &volume_looks[i], values, &t);
             f.job.integration = RENDER_SEGMENTS;
@@ -249,12 +249,12 @@ static void integrated_volumes_keep_their_error(void **state)
                 double truth[4];
                 reference_integral_trace(scene, pixel % 17, pixel / 17, fixture_background, NULL, 0, truth);
                 for (int c = 0; c < 4; c++)
-                    worst = test_worse(worst, fabs((double)drawn.picture.rgba[4 * pixel + c] - truth[c]));
+                    worst = test_larger_error(worst, fabs((double)drawn.picture.rgba[4 * pixel + c] - truth[c]));
             }
             fprintf(stderr, "%s, %s: off by %.2g\n", volume_looks[i].name, hexes ? "hexes" : "tets", worst);
             assert_true(worst <= allowed);
             reference_integral_free(scene);
-            drawn_free(&drawn);
+            drawn_frame_free(&drawn);
             fixture_free(&f);
         }
 }
@@ -264,12 +264,12 @@ static void integrated_volumes_keep_their_error(void **state)
 static double decades, constant;
 
 /* A field that spans the decades up to 1 within [-1, 1]^3. */
-static double over_decades(const double p[3])
+static double decades_field(const double p[3])
 {
-    return pow(10, decades * 0.5 * (test_linear(p) / 1.61 - 1)); /* 1.61 is the maximum of test_linear */
+    return pow(10, decades * 0.5 * (test_linear_field(p) / 1.61 - 1)); /* 1.61 is the maximum of test_linear_field */
 }
 
-static double of_one_value(const double p[3])
+static double constant_field(const double p[3])
 {
     (void)p;
     return constant;
@@ -289,7 +289,7 @@ static void make_ramp(random_ramp *r, uint64_t seed, double unit)
 {
     const bool is_log = test_uniform(0, seed) < 0.5;
     const int count = 2 + (int)(test_uniform(1, seed) * (RAMP_POINTS - 1));
-    decades = test_uniform_in(2, seed, 2, 12);
+    decades = test_uniform_between(2, seed, 2, 12);
     const double least = pow(10, -decades);
     r->transfer = (render_transfer){.low = is_log ? least : -test_uniform(3, seed),
                                     .high = 1,
@@ -302,9 +302,9 @@ static void make_ramp(random_ramp *r, uint64_t seed, double unit)
     render_transfer *t = &r->transfer;
     t->colours = colour_map_table("viridis", &t->colour_count);
     const double from = render_scaled(t->scale, least, t->low), to = render_scaled(t->scale, least, 1);
-    const double most = pow(10, test_uniform_in(4, seed, -2, 0));
+    const double most = pow(10, test_uniform_between(4, seed, -2, 0));
     for (int i = 0; i < count; i++) {
-        const double along = (i + test_uniform_in((uint64_t)i, seed + 1, 0, 0.9)) / count;
+        const double along = (i + test_uniform_between((uint64_t)i, seed + 1, 0, 0.9)) / count;
         const double kind = test_uniform((uint64_t)i, seed + 2);
         r->values[i] = render_unscaled(t->scale, least, from + along * (to - from));
         r->opacities[i] = (float)(kind < 0.3 ? 0 : most * test_uniform((uint64_t)i, seed + 3));
@@ -312,7 +312,7 @@ static void make_ramp(random_ramp *r, uint64_t seed, double unit)
     if (test_uniform(5, seed) < 0.1) r->opacities[count / 2] = 1;
 }
 
-static double ramp_is_off(test_mesh_kind kind, test_function *field, uint64_t seed, double max_error)
+static double measure_ramp_error(test_mesh_kind kind, test_function *field, uint64_t seed, double max_error)
 {
     render_fixture f;
     random_ramp ramp;
@@ -320,7 +320,7 @@ static double ramp_is_off(test_mesh_kind kind, test_function *field, uint64_t se
     double worst = 0;
     make_ramp(&ramp, seed, 0.1);
     constant = pow(10, -decades * test_uniform(6, seed));
-    fixture_create_lattice(&f, kind, 1 + (field == over_decades), 0.2, field);
+    fixture_create_lattice(&f, kind, 1 + (field == decades_field), 0.2, field);
     fixture_set_camera(&f, CAMERA_OUTSIDE, RAMP_SIDE, RAMP_SIDE);
     fixture_set_volume(&f, 0.4);
     f.volume.transfer = &ramp.transfer;
@@ -332,10 +332,10 @@ static double ramp_is_off(test_mesh_kind kind, test_function *field, uint64_t se
         double truth[4];
         reference_integral_trace(scene, pixel % RAMP_SIDE, pixel / RAMP_SIDE, fixture_background, NULL, 0, truth);
         for (int c = 0; c < 4; c++)
-            worst = test_worse(worst, fabs((double)drawn.picture.rgba[4 * pixel + c] - truth[c]));
+            worst = test_larger_error(worst, fabs((double)drawn.picture.rgba[4 * pixel + c] - truth[c]));
     }
     reference_integral_free(scene);
-    drawn_free(&drawn);
+    drawn_frame_free(&drawn);
     fixture_free(&f);
     return worst;
 }
@@ -346,15 +346,15 @@ static double ramp_is_off(test_mesh_kind kind, test_function *field, uint64_t se
 static void ramps_along_scales_keep_max_error(void **state)
 {
     (void)state;
-    const int ramps = test_effort(40, 1000);
+    const int ramps = test_case_count(40, 1000);
     double share[2] = {0, 0};
     for (int i = 0; i < ramps; i++) {
         const test_mesh_kind kind = (test_mesh_kind)(i % TEST_KIND_COUNT);
         for (int varies = 0; varies < 2; varies++) {
             const double max_error = i % 4 || (varies && kind == TEST_POLYHEDRA) ? 0.01 : 1e-3;
             const uint64_t seed = 7000 + 10 * (uint64_t)i;
-            const double off = ramp_is_off(kind, varies ? over_decades : of_one_value, seed, max_error);
-            share[varies] = test_worse(share[varies], off / max_error);
+            const double off = measure_ramp_error(kind, varies ? decades_field : constant_field, seed, max_error);
+            share[varies] = test_larger_error(share[varies], off / max_error);
             if (!(off <= max_error))
                 fail_msg("ramp %d, %s, %s, %.1f decades: off by %g of %g", i, test_mesh_kind_name(kind),
                          varies ? "all values" : "one value", decades, off, max_error);

@@ -28,37 +28,37 @@ static const double half_ulp = 0x1p-24; /* half a unit in the last place of a fl
 
 static uint64_t state;
 
-static uint32_t next_random(void)
+static uint32_t draw_random(void)
 {
     state = state * 6364136223846793005u + 1442695040888963407u;
     return (uint32_t)(state >> 32);
 }
 
-static float next_unit(void)
+static float draw_unit(void)
 {
-    return (float)(next_random() >> 8) * 0x1p-24f;
+    return (float)(draw_random() >> 8) * 0x1p-24f;
 }
 
 static fragment random_fragment(void)
 {
-    fragment f = {.t_in = next_unit(), .transmittance = next_unit()};
-    f.t_out = f.t_in + next_unit();
-    for (int c = 0; c < 3; c++) f.colour[c] = next_unit() * (1 - f.transmittance);
-    f.kind = next_random() % 4 == 0 ? FRAGMENT_SURFACE + next_random() % 3 : FRAGMENT_VOLUME;
+    fragment f = {.t_in = draw_unit(), .transmittance = draw_unit()};
+    f.t_out = f.t_in + draw_unit();
+    for (int c = 0; c < 3; c++) f.colour[c] = draw_unit() * (1 - f.transmittance);
+    f.kind = draw_random() % 4 == 0 ? FRAGMENT_SURFACE + draw_random() % 3 : FRAGMENT_VOLUME;
     return f;
 }
 
-static void shuffle(fragment *items, int count)
+static void shuffle_fragments(fragment *items, int count)
 {
     for (int i = count - 1; i > 0; i--) {
-        const int j = (int)(next_random() % (uint32_t)(i + 1));
+        const int j = (int)(draw_random() % (uint32_t)(i + 1));
         const fragment moved = items[i];
         items[i] = items[j];
         items[j] = moved;
     }
 }
 
-static int by_depth(const void *a, const void *b)
+static int compare_depths(const void *a, const void *b)
 {
     const float of_a = ((const fragment *)a)->t_in, of_b = ((const fragment *)b)->t_in;
     return (of_a > of_b) - (of_a < of_b);
@@ -66,16 +66,16 @@ static int by_depth(const void *a, const void *b)
 
 /* Each step of the blend rounds a product and a sum of colour and a product of transmittance, all at most 1: three half
  * units for each step, and three for the background. */
-static double tolerance(int count)
+static double compute_tolerance(int count)
 {
     return 3.0 * (count + 1) * half_ulp;
 }
 
-static void reference(const fragment *items, int count, const float background[4], double rgba[4])
+static void blend_in_double(const fragment *items, int count, const float background[4], double rgba[4])
 {
     fragment sorted[most_fragments];
     memcpy(sorted, items, (size_t)count * sizeof *items);
-    qsort(sorted, (size_t)count, sizeof *sorted, by_depth);
+    qsort(sorted, (size_t)count, sizeof *sorted, compare_depths);
     double t = 1;
     rgba[0] = rgba[1] = rgba[2] = 0;
     for (int i = 0; i < count; i++) {
@@ -106,18 +106,18 @@ static void merge_matches_double_reference(void **context)
         double expected[4];
         for (int i = 0; i < count; i++) {
             items[i] = random_fragment();
-            items[i].t_in = (float)(i * 37 % 101) + 0.5f * next_unit(); /* all are distinct, since 101 is prime */
+            items[i].t_in = (float)(i * 37 % 101) + 0.5f * draw_unit(); /* all are distinct, since 101 is prime */
             items[i].t_out = items[i].t_in + (items[i].kind < FRAGMENT_SURFACE ? 0.4f : 0);
             if (items[i].kind >= FRAGMENT_SURFACE) nearest = fminf(nearest, items[i].t_in);
         }
-        reference(items, count, blue, expected);
+        blend_in_double(items, count, blue, expected);
         comp_merge_pixel(items, count, blue, rgba, &depth);
-        for (int c = 0; c < 4; c++) assert_true(fabs((double)rgba[c] - expected[c]) <= tolerance(count));
+        for (int c = 0; c < 4; c++) assert_true(fabs((double)rgba[c] - expected[c]) <= compute_tolerance(count));
         assert_true(depth == nearest);
     }
 }
 
-static void merge_of_equal_slabs_is_a_power(void **context)
+static void transmittance_of_equal_slabs_is_a_power(void **context)
 {
     (void)context;
     for (int count = 1; count <= most_fragments; count++) {
@@ -130,10 +130,10 @@ static void merge_of_equal_slabs_is_a_power(void **context)
         }
         comp_merge_pixel(items, count, black, rgba, &depth);
         const double alpha = 1 - pow(0.96875, count);
-        assert_true(fabs((double)rgba[0] - alpha) <= tolerance(count));
+        assert_true(fabs((double)rgba[0] - alpha) <= compute_tolerance(count));
         assert_true(rgba[1] == 0);
-        assert_true(fabs((double)rgba[2] - alpha / 2) <= tolerance(count));
-        assert_true(fabs((double)rgba[3] - alpha) <= tolerance(count));
+        assert_true(fabs((double)rgba[2] - alpha / 2) <= compute_tolerance(count));
+        assert_true(fabs((double)rgba[3] - alpha) <= compute_tolerance(count));
         assert_true(isinf(depth));
     }
 }
@@ -178,7 +178,7 @@ static void surface_is_before_volume_at_equal_depth(void **context)
     }
 }
 
-static void depth_is_of_the_surface_though_fog_is_opaque(void **context)
+static void depth_is_that_of_surface_behind_opaque_fog(void **context)
 {
     (void)context;
     fragment items[] = {{.t_in = 1, .t_out = 2, .colour = {0.5f, 0.5f, 0.5f}, .transmittance = 0},
@@ -190,7 +190,7 @@ static void depth_is_of_the_surface_though_fog_is_opaque(void **context)
     assert_true(rgba[0] == 0.5f && rgba[3] == 1);
 }
 
-static fragment over(const fragment *front, const fragment *back)
+static fragment blend_over(const fragment *front, const fragment *back)
 {
     fragment both = {.t_in = front->t_in, .t_out = back->t_out};
     for (int c = 0; c < 3; c++) both.colour[c] = front->colour[c] + front->transmittance * back->colour[c];
@@ -198,7 +198,7 @@ static fragment over(const fragment *front, const fragment *back)
     return both;
 }
 
-static void joining_neighbours_changes_rounding_alone(void **context)
+static void joining_adjacent_segments_changes_only_rounding(void **context)
 {
     (void)context;
     state = 3;
@@ -211,28 +211,29 @@ static void joining_neighbours_changes_rounding_alone(void **context)
             fine[i].kind = FRAGMENT_VOLUME;
             fine[i].t_in = (float)i;
             fine[i].t_out = (float)i + 1;
-            if (joined > 0 && next_random() % 2)
-                coarse[joined - 1] = over(&coarse[joined - 1], &fine[i]);
+            if (joined > 0 && draw_random() % 2)
+                coarse[joined - 1] = blend_over(&coarse[joined - 1], &fine[i]);
             else
                 coarse[joined++] = fine[i];
         }
         float rgba[4], depth, joined_rgba[4];
         comp_merge_pixel(fine, count, blue, rgba, &depth);
         comp_merge_pixel(coarse, joined, blue, joined_rgba, &depth);
-        for (int c = 0; c < 4; c++) assert_true(fabs((double)rgba[c] - (double)joined_rgba[c]) <= 2 * tolerance(count));
+        for (int c = 0; c < 4; c++)
+            assert_true(fabs((double)rgba[c] - (double)joined_rgba[c]) <= 2 * compute_tolerance(count));
     }
 }
 
 /* Returns a fragment with ties of every kind: equal depths, both zeros, fragments that differ in one field only, and
  * equal fragments. */
-static fragment tied_fragment(void)
+static fragment make_tied_fragment(void)
 {
     fragment f = random_fragment();
-    f.t_in = (float)(next_random() % 3);
-    if (f.t_in == 0 && next_random() % 2) f.t_in = -0.0f;
-    f.t_out = (float)(3 + next_random() % 2);
-    if (next_random() % 2) f.transmittance = 0.5f;
-    if (next_random() % 2) f.colour[0] = f.colour[1] = f.colour[2] = 0.25f;
+    f.t_in = (float)(draw_random() % 3);
+    if (f.t_in == 0 && draw_random() % 2) f.t_in = -0.0f;
+    f.t_out = (float)(3 + draw_random() % 2);
+    if (draw_random() % 2) f.transmittance = 0.5f;
+    if (draw_random() % 2) f.colour[0] = f.colour[1] = f.colour[2] = 0.25f;
     return f;
 }
 
@@ -244,12 +245,12 @@ static void permutations_give_the_same_bits(void **context)
         fragment items[most_fragments], sorted[most_fragments];
         const int count = 2 + trial % (most_fragments - 1);
         float rgba[4], depth, again_rgba[4], again_depth;
-        for (int i = 0; i < count; i++) items[i] = tied_fragment();
+        for (int i = 0; i < count; i++) items[i] = make_tied_fragment();
         if (count > 3) items[count - 1] = items[0];
         comp_merge_pixel(items, count, blue, rgba, &depth);
         memcpy(sorted, items, (size_t)count * sizeof *items);
         for (int again = 0; again < 10; again++) {
-            shuffle(items, count);
+            shuffle_fragments(items, count);
             comp_merge_pixel(items, count, blue, again_rgba, &again_depth);
             assert_memory_equal(rgba, again_rgba, sizeof rgba);
             assert_memory_equal(&depth, &again_depth, sizeof depth);
@@ -283,7 +284,7 @@ static void check_grid(uint32_t width, uint32_t height, int ranks)
     assert_true(every > 1 || area == (uint64_t)width * height);
     for (int trial = 0; trial < 2000; trial++) {
         const uint32_t last = (uint32_t)((uint64_t)width * height - 1);
-        const uint32_t pixel = trial == 0 ? last : next_random() % (last + (last < UINT32_MAX));
+        const uint32_t pixel = trial == 0 ? last : draw_random() % (last + (last < UINT32_MAX));
         const uint32_t strip = comp_grid_strip(&grid, pixel), at = comp_grid_at(&grid, pixel);
         const comp_area its = comp_grid_area(&grid, strip);
         assert_int_equal(comp_grid_y(&grid, pixel), pixel / width);
@@ -306,7 +307,7 @@ static void strips_share_all_pixels(void **context)
 }
 
 /* Returns the rank that wins a block, given the fragments of each rank in it. */
-static int winner_of(uint32_t block, const int64_t *fragments, int ranks)
+static int find_block_winner(uint32_t block, const int64_t *fragments, int ranks)
 {
     int32_t greatest = 0;
     for (int r = 0; r < ranks; r++) {
@@ -320,7 +321,7 @@ static int winner_of(uint32_t block, const int64_t *fragments, int ranks)
 /* Checks that the chance of a rank to win a block is proportional to the fourth power of its fragments. Of n draws with
  * chance p a rank must win pn, to within five standard deviations sqrt(n p (1 - p)), which all but one of a million
  * cases meet, plus 1/16 of the chance, to which priorities are rounded. */
-static void owners_are_drawn_by_what_they_have(void **context)
+static void owner_probability_follows_fragment_count(void **context)
 {
     (void)context;
     enum { DRAWS = 20000, RANKS = 5 };
@@ -330,7 +331,7 @@ static void owners_are_drawn_by_what_they_have(void **context)
         int won[RANKS] = {0};
         double all = 0;
         for (int r = 0; r < RANKS; r++) all += pow((double)cases[i][r], 4);
-        for (uint32_t block = 0; block < DRAWS; block++) won[winner_of(block, cases[i], RANKS)]++;
+        for (uint32_t block = 0; block < DRAWS; block++) won[find_block_winner(block, cases[i], RANKS)]++;
         for (int r = 0; r < RANKS; r++) {
             const double p = pow((double)cases[i][r], 4) / all;
             assert_true(fabs(won[r] - p * DRAWS) <= 5 * sqrt(DRAWS * p * (1 - p)) + DRAWS * p * (1 - p) / 16);
@@ -343,25 +344,25 @@ typedef struct interval {
     double lower, upper;
 } interval;
 
-static double circle(double radius, double y)
+static double circle_half_width(double radius, double y)
 {
     return fabs(y) < radius ? sqrt(radius * radius - y * y) : 0;
 }
 
-static interval interval_of_disc(double y)
+static interval compute_disc_interval(double y)
 {
-    return (interval){0, circle(0.3, y)};
+    return (interval){0, circle_half_width(0.3, y)};
 }
-static interval interval_of_ring(double y)
+static interval compute_ring_interval(double y)
 {
-    return (interval){circle(0.35, y), circle(0.45, y)};
+    return (interval){circle_half_width(0.35, y), circle_half_width(0.45, y)};
 }
-static interval interval_of_column(double y)
+static interval compute_column_interval(double y)
 {
     (void)y;
     return (interval){0, 0.15};
 }
-static interval interval_of_band(double y)
+static interval compute_band_interval(double y)
 {
     return (interval){0, fabs(y) < 0.15 ? 100 : 0};
 }
@@ -372,7 +373,7 @@ enum { MOST_RANKS = 1000 };
 
 static comp_claim claims[2 * COMP_BLOCKS_PER_RANK * MOST_RANKS];
 
-static void cover(const comp_grid *grid, uint32_t y, double from, double to)
+static void claim_span(const comp_grid *grid, uint32_t y, double from, double to)
 {
     const uint32_t begin = (uint32_t)fmin(fmax(ceil(from), 0), grid->width);
     const uint32_t end = (uint32_t)fmin(fmax(ceil(to), 0), grid->width);
@@ -383,7 +384,7 @@ static void cover(const comp_grid *grid, uint32_t y, double from, double to)
 }
 
 /* Sets claims with a fragment in each covered pixel, and no priorities. Returns the number of covered pixels. */
-static int64_t claim_shape(const comp_grid *grid, span_function *span_of)
+static int64_t set_claims_of_shape(const comp_grid *grid, span_function *span_of)
 {
     int64_t covered = 0;
     memset(claims, 0, grid->blocks * sizeof *claims);
@@ -391,10 +392,10 @@ static int64_t claim_shape(const comp_grid *grid, span_function *span_of)
         const interval s = span_of((y + 0.5) / grid->height - 0.5);
         const double middle = 0.5 * grid->width - 0.5, lower = s.lower * grid->height, upper = s.upper * grid->height;
         if (lower > 0) {
-            cover(grid, y, middle - upper, middle - lower);
-            cover(grid, y, middle + lower, middle + upper);
+            claim_span(grid, y, middle - upper, middle - lower);
+            claim_span(grid, y, middle + lower, middle + upper);
         } else {
-            cover(grid, y, middle - upper, middle + upper);
+            claim_span(grid, y, middle - upper, middle + upper);
         }
     }
     for (uint32_t b = 0; b < grid->blocks; b++) covered += claims[b].fragments;
@@ -436,10 +437,11 @@ static double check_levels(uint32_t blocks, int ranks)
  * which at least an eighth is covered, for up to a thousand ranks. Any rank may win a block then. A block has at least
  * 16 pixels: if there are fewer than ten blocks per rank on average, no rank has more than the mean plus one block
  * (check_levels()). */
-static void owners_share_what_all_have(void **context)
+static void equal_fragments_of_all_ranks_are_balanced_over_owners(void **context)
 {
     (void)context;
-    static span_function *const shapes[] = {interval_of_disc, interval_of_ring, interval_of_column, interval_of_band};
+    static span_function *const shapes[] = {compute_disc_interval, compute_ring_interval, compute_column_interval,
+                                            compute_band_interval};
     static const uint32_t widths[] = {1000, 1023, 1024, 1025, 1280, 1531, 1920, 2048, 2560, 3000, 3840, 4093, 4096};
     static const int ranks[] = {1,  2,   3,   5,   7,   8,   13,  16,  31,  32,  33,  61,  64,
                                 97, 100, 127, 128, 199, 256, 257, 401, 512, 600, 729, 997, MOST_RANKS};
@@ -452,10 +454,10 @@ static void owners_share_what_all_have(void **context)
                 const uint32_t width = widths[w], height = square ? width : width * 9 / 16;
                 const comp_grid grid = comp_grid_of(width, height, ranks[n]);
                 for (size_t k = 0; k < sizeof shapes / sizeof *shapes; k++) {
-                    const int64_t covered = claim_shape(&grid, shapes[k]);
+                    const int64_t covered = set_claims_of_shape(&grid, shapes[k]);
                     for (uint32_t b = 0; b < grid.blocks; b++)
                         claims[b].priority =
-                            comp_claim_priority(b, (int)(next_random() % (uint32_t)ranks[n]), claims[b].fragments);
+                            comp_claim_priority(b, (int)(draw_random() % (uint32_t)ranks[n]), claims[b].fragments);
                     const double skew = check_levels(grid.blocks, ranks[n]);
                     if (skew <= 1.1 || covered < ENOUGH * (int64_t)ranks[n]) continue;
                     fprintf(stderr, "%u x %u, %d ranks, shape %d: %g\n", width, height, ranks[n], (int)k, skew);
@@ -467,23 +469,23 @@ static void owners_share_what_all_have(void **context)
 
 /* Distributes a block's `count` fragments: even ranks have fragments in all of the picture, odd ranks only in a part of
  * it. */
-static void spread(uint32_t block, int64_t count, int ranks, int64_t *have)
+static void distribute_fragments(uint32_t block, int64_t count, int ranks, int64_t *have)
 {
     for (int r = 0; r < ranks; r++) have[r] = r % 2 && (block >> 5) % 2 ? 0 : count;
 }
 
 /* Checks that the numbers of fragments that ranks own differ by at most a tenth if the ranks have different parts of
  * the picture, and blocks are assigned by the ranks' priorities. */
-static void owners_share_what_they_have(void **context)
+static void different_fragments_of_ranks_are_balanced_over_owners(void **context)
 {
     (void)context;
     static const int ranks[] = {2, 3, 16, 64, 100, 509};
     for (size_t n = 0; n < sizeof ranks / sizeof *ranks; n++) {
         const comp_grid grid = comp_grid_of(1280, 720, ranks[n]);
-        claim_shape(&grid, interval_of_disc);
+        set_claims_of_shape(&grid, compute_disc_interval);
         for (uint32_t b = 0; b < grid.blocks; b++) {
             int64_t have[MOST_RANKS];
-            spread(b, claims[b].fragments, ranks[n], have);
+            distribute_fragments(b, claims[b].fragments, ranks[n], have);
             const comp_claim seen = claims[b];
             claims[b] = (comp_claim){0, 0};
             for (int r = 0; r < ranks[n]; r++)
@@ -500,17 +502,17 @@ static void owners_share_what_they_have(void **context)
 static void check_folded(const comp_route *route)
 {
     const comp_grid grid = comp_grid_of(1920, 1080, route->ranks);
-    claim_shape(&grid, interval_of_disc);
+    set_claims_of_shape(&grid, compute_disc_interval);
     for (uint32_t b = 0; b < grid.blocks; b++)
-        claims[b].priority = comp_claim_priority(b, (int)(next_random() % (uint32_t)route->ranks), claims[b].fragments);
-    comp_route_assign_places(route, claims, grid.blocks);
+        claims[b].priority = comp_claim_priority(b, (int)(draw_random() % (uint32_t)route->ranks), claims[b].fragments);
+    comp_route_assign_positions(route, claims, grid.blocks);
     for (uint32_t b = 0; b < grid.blocks; b++) assert_true(comp_priority_rank(claims[b].priority) < route->owners);
     assert_true(check_levels(grid.blocks, route->owners) <= 1.1);
 }
 
 /* Checks the same balance for routes with fewer owners than ranks: owners that have a partner win more blocks than
  * others. */
-static void fewer_owners_than_ranks_share_all(void **context)
+static void fragments_are_balanced_with_fewer_owners_than_ranks(void **context)
 {
     (void)context;
     static const int ranks[][2] = {{3, 1},  {5, 1},   {7, 1},   {12, 4},
@@ -528,7 +530,7 @@ static void fewer_owners_than_ranks_share_all(void **context)
 }
 
 /* Returns the rank that wins block b of `blocks`. */
-static int unfair_winner(int how, uint32_t b, uint32_t blocks, int ranks)
+static int get_unfair_winner(int how, uint32_t b, uint32_t blocks, int ranks)
 {
     const uint32_t count = (uint32_t)ranks;
     switch (how) {
@@ -538,28 +540,28 @@ static int unfair_winner(int how, uint32_t b, uint32_t blocks, int ranks)
         return (int)(b < count ? 0 : b % count); /* the first blocks all belong to one rank */
     /* consecutive blocks, most for the first ranks */
     case 2: return (int)((uint64_t)b * b / blocks * count / blocks);
-    case 3: return (int)(next_random() % (1 + next_random() % count)); /* a few ranks often, the others rarely */
+    case 3: return (int)(draw_random() % (1 + draw_random() % count)); /* a few ranks often, the others rarely */
     case 4: return ranks - 1;                                          /* one rank has all blocks */
-    default: return (int)(next_random() % count);
+    default: return (int)(draw_random() % count);
     }
 }
 
 /* Returns the fragments of block b: the same for all; few except in one block; any number; none in most; more than the
  * counter holds. */
-static uint32_t unfair_fragments(int how, uint32_t b, uint32_t blocks)
+static uint32_t get_unfair_fragment_count(int how, uint32_t b, uint32_t blocks)
 {
     switch (how) {
     case 0: return 512;
     case 1: return b == blocks / 2 ? 1000000 : 1;
-    case 2: return 1 + next_random() % 100000;
-    case 3: return next_random() % 10 ? 0 : 1 + next_random() % 512;
-    case 4: return UINT32_MAX - next_random() % 2;
+    case 2: return 1 + draw_random() % 100000;
+    case 3: return draw_random() % 10 ? 0 : 1 + draw_random() % 512;
+    case 4: return UINT32_MAX - draw_random() % 2;
     default: return 0; /* no rank has any fragments */
     }
 }
 
 /* Checks that the bound of check_levels() holds whichever ranks win and however many fragments there are. */
-static void unfair_lots_are_levelled(void **context)
+static void uneven_shares_are_balanced(void **context)
 {
     (void)context;
     static const int ranks[] = {1, 2, 3, 7, 16, 61, 128, MOST_RANKS};
@@ -569,16 +571,16 @@ static void unfair_lots_are_levelled(void **context)
             for (int fragments = 0; fragments < 6; fragments++)
                 for (uint32_t blocks = 1; blocks <= COMP_BLOCKS_PER_RANK * MOST_RANKS; blocks *= 11) {
                     for (uint32_t b = 0; b < blocks; b++) {
-                        claims[b].fragments = unfair_fragments(fragments, b, blocks);
-                        claims[b].priority =
-                            comp_claim_priority(b, unfair_winner(winners, b, blocks, ranks[n]), claims[b].fragments);
+                        claims[b].fragments = get_unfair_fragment_count(fragments, b, blocks);
+                        claims[b].priority = comp_claim_priority(b, get_unfair_winner(winners, b, blocks, ranks[n]),
+                                                                 claims[b].fragments);
                     }
                     check_levels(blocks, ranks[n]);
                 }
 }
 
 /* Checks that claims add up in any order, also if there are more fragments than the counter holds. */
-static void claims_add_up(void **context)
+static void claims_add_in_any_order(void **context)
 {
     (void)context;
     const comp_claim three[3] = {{5, 7}, {9, UINT32_MAX - 1}, {0, 0}};
@@ -599,7 +601,7 @@ typedef struct received_sheets {
     int64_t count, sheets;
 } received_sheets;
 
-static bool take_sheet(void *state_of, const comp_sheet *sheet, int count)
+static bool store_sheet(void *state_of, const comp_sheet *sheet, int count)
 {
     received_sheets *h = state_of;
     assert_int_equal(comp_sheet_count(sheet), count);
@@ -610,14 +612,14 @@ static bool take_sheet(void *state_of, const comp_sheet *sheet, int count)
     return true;
 }
 
-static int by_all_bits(const void *a, const void *b)
+static int compare_all_bits(const void *a, const void *b)
 {
     return memcmp(a, b, sizeof(fragment));
 }
 
 /* Checks that all fragments of a list are sent in sheets of their strips, for any number of threads; a strip sends as
  * many sheets as its fullest pixel has fragments. */
-static void strips_send_all(void **context)
+static void sheets_contain_all_fragments(void **context)
 {
     (void)context;
     enum { COUNT = 40000 };
@@ -634,17 +636,17 @@ static void strips_send_all(void **context)
             for (int i = 0; i < COUNT; i++) {
                 items[i] = random_fragment();
                 items[i].pixel =
-                    spread == 1 ? (uint32_t)i * 7 % (101 * 67) : next_random() % (101 * 67) / (uint32_t)spread;
+                    spread == 1 ? (uint32_t)i * 7 % (101 * 67) : draw_random() % (101 * 67) / (uint32_t)spread;
             }
             assert_int_equal(comp_strips_make(&grid, &(fragment_list){items, COUNT, COUNT}, &strips, NULL), INSITU_OK);
             for (uint32_t s = 0; s < grid.strips; s++) {
                 const int64_t before = h.count;
-                assert_true(comp_strips_sheets(&strips, s, layers, take_sheet, &h));
+                assert_true(comp_strips_sheets(&strips, s, layers, store_sheet, &h));
                 assert_int_equal(h.count - before, comp_strips_count(&strips, s));
             }
             assert_int_equal(h.count, COUNT);
-            qsort(items, COUNT, sizeof *items, by_all_bits);
-            qsort(back, COUNT, sizeof *back, by_all_bits);
+            qsort(items, COUNT, sizeof *items, compare_all_bits);
+            qsort(back, COUNT, sizeof *back, compare_all_bits);
             assert_memory_equal(items, back, sizeof items);
             comp_strips_free(&strips);
         }
@@ -652,7 +654,7 @@ static void strips_send_all(void **context)
     base_free(layers);
 }
 
-static void pixels_beyond_the_image_are_seen(void **context)
+static void pixels_outside_the_image_are_detected(void **context)
 {
     (void)context;
     const comp_grid grid = comp_grid_of(10, 10, 1);
@@ -668,7 +670,7 @@ static void pixels_beyond_the_image_are_seen(void **context)
 
 /* Checks samples at the same depth: together, in any order, they absorb all light that does not pass every one of them,
  * and each contributes colour in proportion to its own absorption. */
-static void samples_of_one_place_share_what_they_absorb(void **context)
+static void samples_at_one_depth_share_absorption(void **context)
 {
     (void)context;
     state = 9;
@@ -686,8 +688,8 @@ static void samples_of_one_place_share_what_they_absorb(void **context)
         }
         comp_merge_pixel(items, count, black, rgba, &depth);
         const double share = weight > 0 ? (1 - through) / weight : 1;
-        for (int c = 0; c < 3; c++) assert_true(fabs((double)rgba[c] - colour[c] * share) <= tolerance(1));
-        assert_true(fabs((double)rgba[3] - (1 - through)) <= tolerance(1));
+        for (int c = 0; c < 3; c++) assert_true(fabs((double)rgba[c] - colour[c] * share) <= compute_tolerance(1));
+        assert_true(fabs((double)rgba[3] - (1 - through)) <= compute_tolerance(1));
     }
 }
 
@@ -696,7 +698,7 @@ typedef struct medium {
     double begin, end, extinction, colour[3];
 } medium;
 
-static fragment fragment_of(const medium *m)
+static fragment make_fragment(const medium *m)
 {
     const double clear = exp(-m->extinction * (m->end - m->begin));
     fragment f = {.t_in = (float)m->begin, .t_out = (float)m->end, .transmittance = (float)clear};
@@ -727,7 +729,7 @@ static void mix_media(const medium *media, int count, const fragment *surface, d
 
 /* Checks that overlapping volume fragments are mixed. Rounding T and C to float errs by 3e-8, and so changes the
  * optical depth, at most 2 for each medium, by up to e^2 times that: 3e-7 for each medium. */
-static void stretches_that_overlap_are_mixed(void **context)
+static void overlapping_segments_are_mixed(void **context)
 {
     (void)context;
     state = 12;
@@ -738,11 +740,11 @@ static void stretches_that_overlap_are_mixed(void **context)
         float rgba[4], depth;
         const int count = 1 + trial % 12;
         for (int k = 0; k < count; k++) {
-            const double begin = (double)(next_random() % 60) / 8, most = 8 - begin;
-            media[k] = (medium){begin, begin + fmin(most, (double)(1 + next_random() % 30) / 8), 0, {0, 0, 0}};
-            media[k].extinction = 2 * (double)next_unit() / (media[k].end - begin);
-            for (int c = 0; c < 3; c++) media[k].colour[c] = (double)next_unit();
-            items[k] = fragment_of(&media[k]);
+            const double begin = (double)(draw_random() % 60) / 8, most = 8 - begin;
+            media[k] = (medium){begin, begin + fmin(most, (double)(1 + draw_random() % 30) / 8), 0, {0, 0, 0}};
+            media[k].extinction = 2 * (double)draw_unit() / (media[k].end - begin);
+            for (int c = 0; c < 3; c++) media[k].colour[c] = (double)draw_unit();
+            items[k] = make_fragment(&media[k]);
         }
         items[count] = (fragment){.t_in = 4, .t_out = 4, .colour = {0.25f, 0, 0.125f}, .transmittance = 0.5f};
         items[count].kind = FRAGMENT_SURFACE;
@@ -756,7 +758,7 @@ static void stretches_that_overlap_are_mixed(void **context)
 /* Checks a ray through a fine and a coarse mesh, which has one long interval over many short ones in a row. The time
  * must be proportional to their number: a quadratic algorithm would take minutes. All intervals mix the same two media,
  * so the result is one medium of their sum; a sum of so many errs by less than 1e-9, the floats by less than 3e-7. */
-static void many_short_stretches_under_a_long_one_take_no_time(void **context)
+static void many_short_segments_within_a_long_one_merge_fast(void **context)
 {
     (void)context;
     enum { SHORT = 200000 };
@@ -795,7 +797,7 @@ static void samples_of_neighbours_count_once(void **context)
     }
 }
 
-static bool do_overlap(const fragment *given, int count)
+static bool are_overlapping(const fragment *given, int count)
 {
     fragment items[4];
     float rgba[4], depth;
@@ -804,7 +806,7 @@ static bool do_overlap(const fragment *given, int count)
     return comp_pixel_overlaps(items, count);
 }
 
-static void overlaps_are_where_a_volume_has_not_ended(void **context)
+static void overlaps_are_found_only_before_a_volume_ends(void **context)
 {
     (void)context;
     enum { V = FRAGMENT_VOLUME, S = FRAGMENT_SURFACE, EARLY = FRAGMENT_EARLY, LATE = FRAGMENT_LATE };
@@ -864,7 +866,7 @@ static void overlaps_are_where_a_volume_has_not_ended(void **context)
         {2, {{0, 1, 1, {0}, 0.5f, V + LATE}, {0, 1, 1, {0}, 0.5f, V + FRAGMENT_LAYER + EARLY}}, false},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
-        if (do_overlap(cases[i].items, cases[i].count) != cases[i].overlap) fail_msg("case %d", (int)i);
+        if (are_overlapping(cases[i].items, cases[i].count) != cases[i].overlap) fail_msg("case %d", (int)i);
 }
 
 /* ---- tiles --------------------------------------------------------------------------------------------------- */
@@ -880,18 +882,18 @@ typedef struct tiled {
     int tile_count;
 } tiled;
 
-static int64_t next_count(int most)
+static int64_t draw_count(int most)
 {
-    return next_random() % 3 ? (int64_t)(next_random() % (uint32_t)(most + 1)) : 0;
+    return draw_random() % 3 ? (int64_t)(draw_random() % (uint32_t)(most + 1)) : 0;
 }
 
 /* Returns a fragment of a volume that may overlap others, or be a sample at the same depth. */
-static fragment crowded_fragment(uint32_t pixel)
+static fragment make_crowded_fragment(uint32_t pixel)
 {
     fragment f = random_fragment();
     f.pixel = pixel;
     f.t_in = floorf(f.t_in * 16) / 16;
-    f.t_out = f.kind >= FRAGMENT_SURFACE || next_random() % 2 ? f.t_in : f.t_out;
+    f.t_out = f.kind >= FRAGMENT_SURFACE || draw_random() % 2 ? f.t_in : f.t_out;
     return f;
 }
 
@@ -907,9 +909,10 @@ static void make_tiled(tiled *t, int width, int height, int tile, int most)
             const pixel_area area = {x, y, width - x < tile ? width - x : tile, height - y < tile ? height - y : tile};
             const int64_t first = count;
             for (int k = 0; k < area.width * area.height; k++)
-                for (int64_t left = next_count(most); left > 0; left--)
-                    t->items[count++] = crowded_fragment((uint32_t)((y + k / area.width) * width + x + k % area.width));
-            shuffle(t->items + first, (int)(count - first));
+                for (int64_t left = draw_count(most); left > 0; left--)
+                    t->items[count++] =
+                        make_crowded_fragment((uint32_t)((y + k / area.width) * width + x + k % area.width));
+            shuffle_fragments(t->items + first, (int)(count - first));
             t->starts[t->tile_count] = first;
             t->areas[t->tile_count++] = area;
         }
@@ -924,7 +927,7 @@ static void free_tiled(tiled *t)
 }
 
 /* Merges the fragments of one pixel by the merge rule; returns whether they overlap. */
-static bool merge_one(const tiled *t, uint32_t pixel, float rgba[4], float *depth)
+static bool merge_pixel(const tiled *t, uint32_t pixel, float rgba[4], float *depth)
 {
     fragment own[most_fragments];
     int count = 0;
@@ -939,7 +942,7 @@ static void check_tiled(const tiled *t, const comp_overlaps *overlaps, bool find
     int64_t count = 0;
     for (int pixel = 0; pixel < t->picture.width * t->picture.height; pixel++) {
         float rgba[4], depth;
-        const bool overlap = merge_one(t, (uint32_t)pixel, rgba, &depth) && finds_overlaps;
+        const bool overlap = merge_pixel(t, (uint32_t)pixel, rgba, &depth) && finds_overlaps;
         assert_memory_equal(rgba, t->picture.rgba + 4 * pixel, sizeof rgba);
         if (t->picture.depth) assert_memory_equal(&depth, t->picture.depth + pixel, sizeof depth);
         assert_int_equal(overlap, overlaps->count && pixel_set_has(overlaps->pixels, pixel));
@@ -949,7 +952,7 @@ static void check_tiled(const tiled *t, const comp_overlaps *overlaps, bool find
     assert_int_equal(count > 0, overlaps->pixels != NULL);
 }
 
-static void tiles_are_merged_to_the_bit(void **context)
+static void tiles_are_merged_bitwise(void **context)
 {
     (void)context;
     state = 7;
@@ -961,7 +964,7 @@ static void tiles_are_merged_to_the_bit(void **context)
         comp_overlaps overlaps;
         comp_statistics statistics;
         base_error error = {0};
-        make_tiled(&t, 1 + (int)(next_random() % 50), 1 + (int)(next_random() % 40), trial % 7 == 3 ? LARGEST_TILE : 16,
+        make_tiled(&t, 1 + (int)(draw_random() % 50), 1 + (int)(draw_random() % 40), trial % 7 == 3 ? LARGEST_TILE : 16,
                    trial % 10 ? trial % 5 : 30);
         if (trial % 3 == 0) free(t.picture.depth), t.picture.depth = NULL;
         assert_int_equal(comp_tiles_begin(&tiles, blue, 3, finds_overlaps, &t.picture, &error), INSITU_OK);
@@ -1024,27 +1027,27 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(merge_without_fragments_is_background),
         cmocka_unit_test(merge_matches_double_reference),
-        cmocka_unit_test(merge_of_equal_slabs_is_a_power),
+        cmocka_unit_test(transmittance_of_equal_slabs_is_a_power),
         cmocka_unit_test(opaque_surface_hides_what_is_behind),
         cmocka_unit_test(surface_is_before_volume_at_equal_depth),
-        cmocka_unit_test(depth_is_of_the_surface_though_fog_is_opaque),
-        cmocka_unit_test(joining_neighbours_changes_rounding_alone),
+        cmocka_unit_test(depth_is_that_of_surface_behind_opaque_fog),
+        cmocka_unit_test(joining_adjacent_segments_changes_only_rounding),
         cmocka_unit_test(permutations_give_the_same_bits),
-        cmocka_unit_test(samples_of_one_place_share_what_they_absorb),
-        cmocka_unit_test(stretches_that_overlap_are_mixed),
-        cmocka_unit_test(many_short_stretches_under_a_long_one_take_no_time),
+        cmocka_unit_test(samples_at_one_depth_share_absorption),
+        cmocka_unit_test(overlapping_segments_are_mixed),
+        cmocka_unit_test(many_short_segments_within_a_long_one_merge_fast),
         cmocka_unit_test(samples_of_neighbours_count_once),
-        cmocka_unit_test(overlaps_are_where_a_volume_has_not_ended),
+        cmocka_unit_test(overlaps_are_found_only_before_a_volume_ends),
         cmocka_unit_test(strips_share_all_pixels),
-        cmocka_unit_test(owners_are_drawn_by_what_they_have),
-        cmocka_unit_test(claims_add_up),
-        cmocka_unit_test(owners_share_what_all_have),
-        cmocka_unit_test(owners_share_what_they_have),
-        cmocka_unit_test(fewer_owners_than_ranks_share_all),
-        cmocka_unit_test(unfair_lots_are_levelled),
-        cmocka_unit_test(strips_send_all),
-        cmocka_unit_test(pixels_beyond_the_image_are_seen),
-        cmocka_unit_test(tiles_are_merged_to_the_bit),
+        cmocka_unit_test(owner_probability_follows_fragment_count),
+        cmocka_unit_test(claims_add_in_any_order),
+        cmocka_unit_test(equal_fragments_of_all_ranks_are_balanced_over_owners),
+        cmocka_unit_test(different_fragments_of_ranks_are_balanced_over_owners),
+        cmocka_unit_test(fragments_are_balanced_with_fewer_owners_than_ranks),
+        cmocka_unit_test(uneven_shares_are_balanced),
+        cmocka_unit_test(sheets_contain_all_fragments),
+        cmocka_unit_test(pixels_outside_the_image_are_detected),
+        cmocka_unit_test(tiles_are_merged_bitwise),
         cmocka_unit_test(tiles_without_memory_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -32,16 +32,16 @@ static comp_group group;
 static int own_rank, rank_count;
 static const float background[4] = {0.125f, 0.25f, 0.5f, 0.75f};
 
-static uint32_t hash(uint32_t x)
+static uint32_t hash_number(uint32_t x)
 {
     x = (x ^ (x >> 16)) * 0x7feb352du;
     x = (x ^ (x >> 15)) * 0x846ca68bu;
     return x ^ (x >> 16);
 }
 
-static float unit(uint32_t x)
+static float hash_to_unit_interval(uint32_t x)
 {
-    return (float)(hash(x) >> 8) * 0x1p-24f;
+    return (float)(hash_number(x) >> 8) * 0x1p-24f;
 }
 
 static void assert_everywhere(bool well, const char *what)
@@ -56,11 +56,13 @@ static void assert_everywhere(bool well, const char *what)
  * few. */
 static fragment make_fragment(uint32_t i, uint32_t seed, uint32_t pixel_count)
 {
-    const uint32_t key = hash(seed) + 16 * i;
-    fragment f = {.pixel = hash(key) % pixel_count, .t_in = floorf(50 * unit(key + 1)), .transmittance = unit(key + 2)};
-    f.kind = hash(key + 3) % 3 == 0 ? FRAGMENT_SURFACE + hash(key + 4) % 2 : FRAGMENT_VOLUME;
+    const uint32_t key = hash_number(seed) + 16 * i;
+    fragment f = {.pixel = hash_number(key) % pixel_count,
+                  .t_in = floorf(50 * hash_to_unit_interval(key + 1)),
+                  .transmittance = hash_to_unit_interval(key + 2)};
+    f.kind = hash_number(key + 3) % 3 == 0 ? FRAGMENT_SURFACE + hash_number(key + 4) % 2 : FRAGMENT_VOLUME;
     f.t_out = f.kind == FRAGMENT_VOLUME ? f.t_in + 1 : f.t_in;
-    for (uint32_t c = 0; c < 3; c++) f.colour[c] = (1 - f.transmittance) * unit(key + 5 + c);
+    for (uint32_t c = 0; c < 3; c++) f.colour[c] = (1 - f.transmittance) * hash_to_unit_interval(key + 5 + c);
     return f;
 }
 
@@ -76,7 +78,7 @@ static fragment make_some_fragment(uint32_t i, uint32_t seed, uint32_t pixel_cou
     return f;
 }
 
-static int distributed_to(distribution how, uint32_t i, const fragment *f, int width, uint32_t count)
+static int get_fragment_owner(distribution how, uint32_t i, const fragment *f, int width, uint32_t count)
 {
     const uint32_t x = f->pixel % (uint32_t)width, y = f->pixel / (uint32_t)width, ranks = (uint32_t)rank_count;
     switch (how) {
@@ -86,19 +88,19 @@ static int distributed_to(distribution how, uint32_t i, const fragment *f, int w
     case distribute_all_to_last: return rank_count - 1;
     case distribute_random: break;
     }
-    return (int)(hash(i + 77) % ranks);
+    return (int)(hash_number(i + 77) % ranks);
 }
 
-static int by_pixel(const void *a, const void *b)
+static int compare_pixels(const void *a, const void *b)
 {
     const uint32_t of_a = ((const fragment *)a)->pixel, of_b = ((const fragment *)b)->pixel;
     return (of_a > of_b) - (of_a < of_b);
 }
 
-static void serial_merge(fragment *all, int64_t count, image *out)
+static void merge_serially(fragment *all, int64_t count, image *out)
 {
     const int64_t pixels = (int64_t)out->width * out->height;
-    if (count) qsort(all, (size_t)count, sizeof *all, by_pixel);
+    if (count) qsort(all, (size_t)count, sizeof *all, compare_pixels);
     int64_t i = 0;
     for (int64_t p = 0; p < pixels; p++) {
         const int64_t first = i;
@@ -123,7 +125,7 @@ static void free_image(image *old)
     base_free(old->depth);
 }
 
-static bool same_image(const image *a, const image *b)
+static bool are_same_images(const image *a, const image *b)
 {
     const size_t pixels = (size_t)a->width * (size_t)a->height;
     return memcmp(a->rgba, b->rgba, 16 * pixels) == 0 && memcmp(a->depth, b->depth, 4 * pixels) == 0;
@@ -138,8 +140,8 @@ typedef struct setting {
 /* Makes fragment i of the whole set. */
 typedef fragment fragment_maker(uint32_t i, uint32_t seed, uint32_t pixel_count);
 
-static setting make_setting_of(fragment_maker *make, int width, int height, uint32_t count, distribution how,
-                               uint32_t seed)
+static setting make_setting_from_fragments(fragment_maker *make, int width, int height, uint32_t count,
+                                           distribution how, uint32_t seed)
 {
     setting s = {.count = count, .out = {.width = width, .height = height}};
     if (own_rank == 0) s.out = make_image(width, height);
@@ -149,17 +151,17 @@ static setting make_setting_of(fragment_maker *make, int width, int height, uint
     assert_true(!count || (all && s.own.items));
     for (uint32_t i = 0; i < count; i++) {
         all[i] = make(i, seed, (uint32_t)width * (uint32_t)height);
-        if (distributed_to(how, i, &all[i], width, count) == own_rank) s.own.items[s.own.count++] = all[i];
+        if (get_fragment_owner(how, i, &all[i], width, count) == own_rank) s.own.items[s.own.count++] = all[i];
     }
     s.own.capacity = count;
-    if (own_rank == 0) serial_merge(all, count, &s.expected);
+    if (own_rank == 0) merge_serially(all, count, &s.expected);
     base_free(all);
     return s;
 }
 
 static setting make_setting(int width, int height, uint32_t count, distribution how, uint32_t seed)
 {
-    return make_setting_of(make_fragment, width, height, count, how, seed);
+    return make_setting_from_fragments(make_fragment, width, height, count, how, seed);
 }
 
 static void free_setting(setting *s)
@@ -181,21 +183,21 @@ static void set_schedule(uint32_t turn)
 }
 
 /* Returns the bytes allocated for the list. */
-static int64_t held_by(const fragment_list *list)
+static int64_t get_allocated_bytes(const fragment_list *list)
 {
     return list->items ? list->capacity * (int64_t)sizeof *list->items : 0;
 }
 
-static void check_composite(int width, int height, uint32_t count, distribution how, uint32_t seed)
+static void check_compositing(int width, int height, uint32_t count, distribution how, uint32_t seed)
 {
-    setting s = make_setting_of(make_some_fragment, width, height, count, how, seed);
+    setting s = make_setting_from_fragments(make_some_fragment, width, height, count, how, seed);
     comp_statistics statistics;
     base_error error = {INSITU_OK, ""};
     const int64_t own_count = s.own.count;
-    const int64_t held = base_memory_held() - held_by(&s.own);
+    const int64_t held = base_memory_held() - get_allocated_bytes(&s.own);
     const insitu_status status = comp_composite(&group, &s.own, background, 0, &s.out, &statistics, &error);
     assert_everywhere(status == INSITU_OK && error.message[0] == '\0', "composite succeeds");
-    assert_everywhere(own_rank != 0 || same_image(&s.out, &s.expected), "the image is the serial merge");
+    assert_everywhere(own_rank != 0 || are_same_images(&s.out, &s.expected), "the image is the serial merge");
     assert_everywhere(base_memory_held() == held, "nothing is left allocated");
     assert_everywhere(statistics.sent_fragments == own_count, "fragments are counted");
     assert_everywhere(rank_count > 1 || statistics.sent_bytes == 0, "one rank sends nothing");
@@ -214,11 +216,11 @@ static void composite_equals_serial_merge(void **context)
         for (size_t c = 0; c < count_end; c++)
             for (distribution how = distribute_random; how <= distribute_all_to_last; how++) {
                 set_schedule(seed);
-                check_composite(sizes[s][0], sizes[s][1], counts[c], how, seed++);
+                check_compositing(sizes[s][0], sizes[s][1], counts[c], how, seed++);
             }
     for (uint32_t turn = 0; turn < 32; turn++) {
         set_schedule(turn);
-        check_composite(101, 67, 20000, distribute_random, seed++);
+        check_compositing(101, 67, 20000, distribute_random, seed++);
     }
 }
 
@@ -227,7 +229,7 @@ static void composite_equals_serial_merge(void **context)
 static void find_overlaps(fragment *all, uint32_t count, unsigned char *pixels)
 {
     uint32_t first = 0;
-    qsort(all, count, sizeof *all, by_pixel);
+    qsort(all, count, sizeof *all, compare_pixels);
     for (uint32_t i = 0; i < count; i++) {
         if (all[i].pixel != all[first].pixel) first = i;
         for (uint32_t j = first; j < count && all[j].pixel == all[i].pixel; j++) {
@@ -259,7 +261,7 @@ static void check_overlaps(int width, int height, uint32_t count, distribution h
     assert_everywhere(status == INSITU_OK && found.count == wanted, "all overlaps are found");
     assert_everywhere(wanted ? !memcmp(found.pixels, expected, pixel_set_bytes(pixel_count)) : !found.pixels,
                       "all ranks know the pixels");
-    assert_everywhere(own_rank != 0 || same_image(&s.out, &s.expected), "the image is the serial merge");
+    assert_everywhere(own_rank != 0 || are_same_images(&s.out, &s.expected), "the image is the serial merge");
     free_setting(&s);
     base_free(found.pixels);
     base_free(all);
@@ -284,14 +286,14 @@ static void overlaps_are_reported_on_all_ranks(void **context)
 static void large_image_equals_serial_merge(void **context)
 {
     (void)context;
-    check_composite(601, 401 * rank_count, 40000, distribute_random, 1001);
-    check_composite(1921, 1081, 1500, distribute_random, 1002);
-    check_composite(5003, 3, 700, distribute_blocks, 1003);
+    check_compositing(601, 401 * rank_count, 40000, distribute_random, 1001);
+    check_compositing(1921, 1081, 1500, distribute_random, 1002);
+    check_compositing(5003, 3, 700, distribute_blocks, 1003);
 }
 
 /* Returns a fragment of a smooth curved surface; each rank has such fragments in whole rows, as in a tile of a
  * picture. */
-static fragment smooth_fragment(uint32_t pixel, int width)
+static fragment make_smooth_fragment(uint32_t pixel, int width)
 {
     const float x = (float)(pixel % (uint32_t)width) / 500, y = (float)(pixel / (uint32_t)width) / 500;
     fragment f = {.pixel = pixel, .t_in = 1 + 0.3f * x * x + 0.1f * y, .kind = FRAGMENT_SURFACE};
@@ -303,7 +305,7 @@ static fragment smooth_fragment(uint32_t pixel, int width)
 /* Checks the size of messages. A hit has 32 bytes in memory and a finished pixel 24. For a smooth surface only the
  * depth and three colours are sent, each in one or two bytes and two bits, at most 9 bytes together, plus the headers
  * of messages and blocks. */
-static void smooth_surfaces_travel_in_a_third(void **context)
+static void smooth_surfaces_compress_to_a_third(void **context)
 {
     (void)context;
     enum { WIDTH = 512, HEIGHT = 256, MOST_BYTES = 9 };
@@ -312,7 +314,7 @@ static void smooth_surfaces_travel_in_a_third(void **context)
     s.own = (fragment_list){base_alloc(WIDTH * HEIGHT * sizeof(fragment)), 0, WIDTH * HEIGHT};
     for (uint32_t p = 0; p < WIDTH * HEIGHT; p++)
         if ((int)(p / WIDTH * (uint32_t)rank_count / HEIGHT) == own_rank)
-            s.own.items[s.own.count++] = smooth_fragment(p, WIDTH);
+            s.own.items[s.own.count++] = make_smooth_fragment(p, WIDTH);
     comp_statistics statistics;
     assert_everywhere(comp_composite(&group, &s.own, background, 0, &s.out, &statistics, NULL) == INSITU_OK,
                       "composite succeeds");
@@ -329,7 +331,7 @@ static void smooth_surfaces_travel_in_a_third(void **context)
 
 /* Compares the computed number of messages of each schedule with the messages sent: without fragments, one for each
  * partner and round, and one up the tree from each owner except rank 0. */
-static void messages_are_as_counted(void **context)
+static void messages_match_the_predicted_count(void **context)
 {
     (void)context;
     for (uint32_t turn = 0; turn < 32; turn++) {
@@ -340,7 +342,7 @@ static void messages_are_as_counted(void **context)
         assert_everywhere(comp_composite(&group, &s.own, background, 0, &s.out, &statistics, NULL) == INSITU_OK,
                           "all is well");
         const comp_route route = comp_route_of(group.schedule, rank_count, group.nodes, 8);
-        const int place = comp_route_place(&route, own_rank);
+        const int place = comp_route_position(&route, own_rank);
         const int64_t up = place > 0 && place < route.owners;
         assert_everywhere(statistics.sent_messages == comp_route_messages(&route, place) * (rank_count > 1) + up,
                           "messages are as counted");
@@ -351,7 +353,7 @@ static void messages_are_as_counted(void **context)
 
 /* Makes the n-th allocation of the victim fail, while it composites a copy of the list. Returns whether the status is
  * the same on all ranks and the error has a message, and whether the picture was drawn. */
-static bool draws_without_allocation(setting *s, int victim, int64_t n)
+static bool composite_without_allocation(setting *s, int victim, int64_t n)
 {
     const int64_t held = base_memory_held();
     base_error error = {INSITU_OK, ""};
@@ -379,13 +381,13 @@ static void failed_allocation_is_an_error_on_all(void **context)
     const bool is_many = rank_count > 8;
     for (int victim = 0, turn = 0; victim < rank_count; victim += is_many ? 5 : 1, turn++) {
         const bool is_end = victim == 0 || victim == rank_count - 1;
-        const int stride = test_is_whole() || (is_end && !is_many) ? 1 : is_many ? 4 : rank_count - 2;
+        const int stride = test_is_long_run() || (is_end && !is_many) ? 1 : is_many ? 4 : rank_count - 2;
         set_schedule((uint32_t)victim + 8 + 4 * (uint32_t)(victim / 4 % 2));
         setting s = make_setting(65, 33, 3000, distribute_random, 21);
         int64_t n = 1 + turn % stride;
-        while (!draws_without_allocation(&s, victim, n)) n += stride;
+        while (!composite_without_allocation(&s, victim, n)) n += stride;
         assert_everywhere(n > 1 + turn % stride, "some allocation could fail");
-        assert_everywhere(own_rank != 0 || same_image(&s.out, &s.expected), "the image is right afterwards");
+        assert_everywhere(own_rank != 0 || are_same_images(&s.out, &s.expected), "the image is right afterwards");
         free_setting(&s);
     }
     set_schedule(0);
@@ -408,7 +410,7 @@ static void pixel_beyond_the_image_is_an_error_on_all(void **context)
     free_setting(&s);
 }
 
-static void image_without_pixels_is_refused(void **context)
+static void empty_image_is_rejected(void **context)
 {
     (void)context;
     image none = {.height = 4}, huge = {.width = 65536, .height = 65536};
@@ -432,11 +434,11 @@ int main(int argc, char **argv)
         cmocka_unit_test(composite_equals_serial_merge),
         cmocka_unit_test(overlaps_are_reported_on_all_ranks),
         cmocka_unit_test(large_image_equals_serial_merge),
-        cmocka_unit_test(smooth_surfaces_travel_in_a_third),
-        cmocka_unit_test(messages_are_as_counted),
+        cmocka_unit_test(smooth_surfaces_compress_to_a_third),
+        cmocka_unit_test(messages_match_the_predicted_count),
         cmocka_unit_test(failed_allocation_is_an_error_on_all),
         cmocka_unit_test(pixel_beyond_the_image_is_an_error_on_all),
-        cmocka_unit_test(image_without_pixels_is_refused),
+        cmocka_unit_test(empty_image_is_rejected),
     };
     const int failed = cmocka_run_group_tests(tests, NULL, NULL);
     comp_claims_free(group.claims);

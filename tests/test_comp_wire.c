@@ -20,7 +20,7 @@
 
 static uint64_t state = 1;
 
-static uint32_t next_random(void)
+static uint32_t draw_random(void)
 {
     state = state * 6364136223846793005u + 1442695040888963407u;
     return (uint32_t)(state >> 32);
@@ -29,46 +29,46 @@ static uint32_t next_random(void)
 /* The kinds of values in a word of a record. */
 enum filling { ANY_BITS, SMOOTH, CONSTANT, AS_BEFORE, NOT_A_NUMBER, FILLING_COUNT };
 
-static uint32_t bits_of(float value)
+static uint32_t get_float_bits(float value)
 {
     uint32_t bits;
     memcpy(&bits, &value, sizeof bits);
     return bits;
 }
 
-static uint32_t filled(enum filling how, int i, int k, uint32_t before)
+static uint32_t make_filled_value(enum filling how, int i, int k, uint32_t before)
 {
     const uint32_t nans[] = {0x7fc00001u, 0xffc12345u, 0x7f800000u, 0xff800000u, 0x80000000u};
     switch (how) {
-    case SMOOTH: return bits_of(1 + 0.1f * (float)k + sinf(0.01f * (float)i));
-    case CONSTANT: return bits_of(0.25f);
+    case SMOOTH: return get_float_bits(1 + 0.1f * (float)k + sinf(0.01f * (float)i));
+    case CONSTANT: return get_float_bits(0.25f);
     case AS_BEFORE: return before;
-    case NOT_A_NUMBER: return nans[next_random() % 5];
-    default: return next_random();
+    case NOT_A_NUMBER: return nans[draw_random() % 5];
+    default: return draw_random();
     }
 }
 
 /* Sets masks with full rows, rows with gaps, and empty rows; the masks of a sparse sheet have few pixels. */
 static void fill_masks(comp_sheet *sheet)
 {
-    const uint32_t how = next_random() % 4;
+    const uint32_t how = draw_random() % 4;
     for (int r = 0; r < COMP_ROWS; r++) {
-        const uint32_t bits = next_random();
+        const uint32_t bits = draw_random();
         const uint32_t some[] = {0xffff, bits & (bits >> 16), bits % 3 ? 0xffff : bits, bits % 3 ? 0 : bits};
         sheet->masks[r] = (uint16_t)some[how];
     }
-    if (next_random() % 64 == 0) memset(sheet->masks, 0, sizeof sheet->masks);
+    if (draw_random() % 64 == 0) memset(sheet->masks, 0, sizeof sheet->masks);
 }
 
 static void fill_sheet(comp_sheet *sheet)
 {
-    comp_sheet_begin(sheet, next_random());
+    comp_sheet_begin(sheet, draw_random());
     fill_masks(sheet);
-    sheet->is_opaque = next_random() % 2;
+    sheet->is_opaque = draw_random() % 2;
     for (int w = 0; w < COMP_WORDS; w++) {
-        const enum filling how = (enum filling)(next_random() % FILLING_COUNT);
+        const enum filling how = (enum filling)(draw_random() % FILLING_COUNT);
         for (int k = 0; k < COMP_STRIP_PIXELS; k++)
-            sheet->words[w][k] = filled(how, k, w + 1, w ? sheet->words[w - 1][k] : 0);
+            sheet->words[w][k] = make_filled_value(how, k, w + 1, w ? sheet->words[w - 1][k] : 0);
     }
 }
 
@@ -103,7 +103,7 @@ static void free_pair(sheet_pair *p)
 
 /* Checks that sheets of any contents are decoded to the bit by each instruction set, whichever encoded them, and that
  * the encoded bytes are equal. */
-static void sheets_come_back(void **context)
+static void encoded_sheets_decode_unchanged(void **context)
 {
     (void)context;
     sheet_pair p = make_pair();
@@ -131,7 +131,7 @@ static void sheets_come_back(void **context)
 
 /* Checks columns of depths of a plane, exact in float32: only the first two rows have residuals, so that besides half a
  * byte for each row and word little is sent. */
-static void straight_lines_take_half_a_byte_a_row(void **context)
+static void straight_edges_compress_to_half_a_byte_per_row(void **context)
 {
     (void)context;
     sheet_pair p = make_pair();
@@ -140,7 +140,7 @@ static void straight_lines_take_half_a_byte_a_row(void **context)
     for (uint32_t k = 0; k < COMP_STRIP_PIXELS; k++)
         for (int w = 0; w < COMP_WORDS; w++)
             p.sheet->words[w][k] =
-                bits_of(1 + (float)(w + 1) * 0x1p-12f * (float)(k / COMP_LANES + 2 * k % COMP_LANES));
+                get_float_bits(1 + (float)(w + 1) * 0x1p-12f * (float)(k / COMP_LANES + 2 * k % COMP_LANES));
     const int64_t length = comp_sheet_write(p.sheet, COMP_WORDS, p.bytes) - p.bytes;
     /* The header, and for each word its first value, half a byte for each row, and two rows of at most four bytes a
      * pixel. */
@@ -149,7 +149,7 @@ static void straight_lines_take_half_a_byte_a_row(void **context)
 }
 
 /* Checks sheets of opaque hits, some at equal depths: the nearest hit remains, by the merge rule. */
-static void nearest_hits_stay(void **context)
+static void nearest_hits_are_kept_by_merge(void **context)
 {
     (void)context;
     sheet_pair p = make_pair();
@@ -160,10 +160,10 @@ static void nearest_hits_stay(void **context)
         for (int i = 0; i < 2; i++) {
             comp_sheet_begin(both[i], 7);
             for (uint32_t k = 0; k < COMP_STRIP_PIXELS; k++) {
-                fragment f = {.t_in = (float)(next_random() % 4), .kind = FRAGMENT_SURFACE + next_random() % 2};
-                if (next_random() % 16 == 0) f.t_in = NAN;
-                f.colour[0] = (float)(next_random() % 3);
-                if (next_random() % 3) comp_sheet_put(both[i], k, &f);
+                fragment f = {.t_in = (float)(draw_random() % 4), .kind = FRAGMENT_SURFACE + draw_random() % 2};
+                if (draw_random() % 16 == 0) f.t_in = NAN;
+                f.colour[0] = (float)(draw_random() % 3);
+                if (draw_random() % 3) comp_sheet_put(both[i], k, &f);
             }
         }
         expected = *p.sheet;
@@ -185,13 +185,13 @@ static void fill_numbers(comp_sheet *sheet)
 {
     comp_sheet_begin(sheet, 0);
     fill_masks(sheet);
-    sheet->is_opaque = next_random() % 2;
+    sheet->is_opaque = draw_random() % 2;
     for (uint32_t k = 0; k < COMP_STRIP_PIXELS; k++) {
-        const bool is_hit = sheet->is_opaque || next_random() % 2;
-        fragment f = {.t_in = (float)(next_random() % 4), .kind = is_hit ? FRAGMENT_SURFACE : FRAGMENT_VOLUME};
+        const bool is_hit = sheet->is_opaque || draw_random() % 2;
+        fragment f = {.t_in = (float)(draw_random() % 4), .kind = is_hit ? FRAGMENT_SURFACE : FRAGMENT_VOLUME};
         f.t_out = f.t_in;
-        f.transmittance = sheet->is_opaque ? 0 : (float)(next_random() % 1001) * 1e-3f;
-        for (int c = 0; c < 3; c++) f.colour[c] = (float)(next_random() % 1001) * 1e-3f;
+        f.transmittance = sheet->is_opaque ? 0 : (float)(draw_random() % 1001) * 1e-3f;
+        for (int c = 0; c < 3; c++) f.colour[c] = (float)(draw_random() % 1001) * 1e-3f;
         for (int w = 0; w < COMP_WORDS; w++) memcpy(&sheet->words[w][k], (const char *)&f + 4 * (w + 1), 4);
     }
 }
@@ -200,8 +200,8 @@ enum { WIDE = 40, HIGH = 50 };
 
 /* Stores a picture, colours and then depths, whose rightmost and lowest strips are cut off. Every second strip has no
  * depths. */
-static void store_by(const comp_sheet_loops *loops, const comp_sheet *pixels, const float background[4], int ranks,
-                     float *stored)
+static void store_with_loops(const comp_sheet_loops *loops, const comp_sheet *pixels, const float background[4],
+                             int ranks, float *stored)
 {
     const comp_grid grid = comp_grid_of(WIDE, HIGH, ranks);
     memset(stored, 0x55, 5 * WIDE * HIGH * sizeof *stored);
@@ -214,7 +214,7 @@ static void store_by(const comp_sheet_loops *loops, const comp_sheet *pixels, co
 }
 
 /* Checks that joining, blending and storing give the same bits with each instruction set. */
-static void sheets_are_merged_alike(void **context)
+static void sheet_merge_loops_agree(void **context)
 {
     (void)context;
     static const float background[4] = {0.1f, 0.2f, 0.3f, 0.75f};
@@ -230,7 +230,7 @@ static void sheets_are_merged_alike(void **context)
         expected = first;
         plain->join(&expected, &other, plain_left);
         plain->finish(&expected, background, &plain_pixels);
-        store_by(plain, &plain_pixels, background, ranks, plain_stored);
+        store_with_loops(plain, &plain_pixels, background, ranks, plain_stored);
         for (cpu_isa isa = CPU_PLAIN; isa <= cpu_best_isa(); isa++) {
             const comp_sheet_loops *const loops = comp_sheet_loops_of(isa);
             joined = first;
@@ -240,7 +240,7 @@ static void sheets_are_merged_alike(void **context)
             assert_int_equal(count_differences(&expected, &joined, COMP_WORDS), 0);
             loops->finish(&joined, background, &pixels);
             assert_int_equal(count_differences(&plain_pixels, &pixels, COMP_PIXEL_WORDS), 0);
-            store_by(loops, &pixels, background, ranks, stored);
+            store_with_loops(loops, &pixels, background, ranks, stored);
             assert_memory_equal(stored, plain_stored, sizeof stored);
         }
     }
@@ -249,17 +249,17 @@ static void sheets_are_merged_alike(void **context)
 /* ---- routes -------------------------------------------------------------------------------------------------- */
 
 /* Returns the position that has the fragment for the owner after the round. */
-static int carried(const comp_route *route, int round, int place, int owner)
+static int find_next_position(const comp_route *route, int round, int place, int owner)
 {
     const int stride = comp_route_stride(route, round);
     return comp_route_partner(route, round, stride, place, comp_route_digit(route, round, stride, owner));
 }
 
-static void check_way(const comp_route *route, int from, int owner)
+static void check_route_to_owner(const comp_route *route, int from, int owner)
 {
     int at = from < route->owners ? from : from - route->owners;
     for (int round = 0; round < route->round_count; round++) {
-        const int to = carried(route, round, at, owner), stride = comp_route_stride(route, round);
+        const int to = find_next_position(route, round, at, owner), stride = comp_route_stride(route, round);
         assert_in_range(to, 0, route->owners - 1);
         /* The sender is a partner of the receiver. */
         assert_int_equal(comp_route_partner(route, round, stride, to, comp_route_digit(route, round, stride, at)), at);
@@ -277,14 +277,14 @@ static void check_route(comp_schedule schedule, int ranks, comp_nodes nodes, int
     assert_true(route.owners <= ranks && 2 * route.owners > ranks - (ranks == 1));
     const int step = ranks / 97 + 1;
     for (int r = 0; r < ranks; r += step) {
-        assert_int_equal(comp_route_rank(&route, comp_route_place(&route, r)), r);
-        for (int o = 0; o < route.owners; o += step) check_way(&route, comp_route_place(&route, r), o);
-        check_way(&route, comp_route_place(&route, r), route.owners - 1);
+        assert_int_equal(comp_route_rank(&route, comp_route_position(&route, r)), r);
+        for (int o = 0; o < route.owners; o += step) check_route_to_owner(&route, comp_route_position(&route, r), o);
+        check_route_to_owner(&route, comp_route_position(&route, r), route.owners - 1);
     }
-    assert_int_equal(comp_route_place(&route, 0), 0);
+    assert_int_equal(comp_route_position(&route, 0), 0);
 }
 
-static void routes_lead_to_owners(void **context)
+static void routes_deliver_to_owners(void **context)
 {
     (void)context;
     const int many[] = {1000, 1024, 3989, 4000, 97336, 99991, 100000};
@@ -314,7 +314,7 @@ static void check_gather(int ranks, comp_nodes nodes, comp_schedule schedule)
     free(children);
 }
 
-static void gathering_is_a_tree(void **context)
+static void gather_uses_a_tree(void **context)
 {
     (void)context;
     const int counts[] = {1, 2, 3, 5, 7, 64, 65, 66, 128, 4096, 4160, 97336, 100000};
@@ -345,7 +345,7 @@ static void the_cheapest_route_is_chosen(void **context)
 }
 
 /* Checks that a round of direct send among eight ranks costs what the model states, term by term. */
-static void costs_are_those_of_the_model(void **context)
+static void route_costs_match_the_model(void **context)
 {
     (void)context;
     const comp_machine machine = {1, 10, 100, 0, 0, 0};
@@ -360,14 +360,14 @@ static void costs_are_those_of_the_model(void **context)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(sheets_come_back),
-        cmocka_unit_test(straight_lines_take_half_a_byte_a_row),
-        cmocka_unit_test(nearest_hits_stay),
-        cmocka_unit_test(sheets_are_merged_alike),
-        cmocka_unit_test(routes_lead_to_owners),
-        cmocka_unit_test(gathering_is_a_tree),
+        cmocka_unit_test(encoded_sheets_decode_unchanged),
+        cmocka_unit_test(straight_edges_compress_to_half_a_byte_per_row),
+        cmocka_unit_test(nearest_hits_are_kept_by_merge),
+        cmocka_unit_test(sheet_merge_loops_agree),
+        cmocka_unit_test(routes_deliver_to_owners),
+        cmocka_unit_test(gather_uses_a_tree),
         cmocka_unit_test(the_cheapest_route_is_chosen),
-        cmocka_unit_test(costs_are_those_of_the_model),
+        cmocka_unit_test(route_costs_match_the_model),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -19,20 +19,20 @@ static const double levels[LEVELS] = {-1.2, -0.6, 0.1, 0.7, 1.3};
 static const float black[3] = {0, 0, 0};
 static const float white[3 * LEVELS] = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1};
 
-static double distance(const double p[3])
+static double distance_field(const double p[3])
 {
     return normal[0] * p[0] + normal[1] * p[1] + normal[2] * p[2] - 0.1;
 }
 
-/* test_wave() stretched by two: its wavelength is 42 cells. */
-static double wave(const double p[3])
+/* test_wave_field() stretched by two: its wavelength is 42 cells. */
+static double wave_field(const double p[3])
 {
-    return test_wave((const double[]){p[0] / 2, p[1] / 2, p[2] / 2});
+    return test_wave_field((const double[]){p[0] / 2, p[1] / 2, p[2] / 2});
 }
 
 /* Returns how much of the point's pixel lines cover, from 0 to 1; -1 if the point is outside the picture, or so near to
  * the border of the cube that the pixel's middle may not be on the plane. */
-static double cover_at(const render_camera *c, const image *picture, const double point[3])
+static double get_line_coverage(const render_camera *c, const image *picture, const double point[3])
 {
     const double size = 2 * c->half_height / c->height;
     double x = 0, y = 0, z = 0;
@@ -59,10 +59,10 @@ static void check_kind(test_mesh_kind kind, int type, fixture_camera camera)
     render_fixture f;
     drawn_frame drawn;
     double *points;
-    test_mesh_lattice(kind, SIDE, 0.1, distance, &mesh);
-    test_mesh_lattice(kind, SIDE, 0.1, wave, &values);
+    test_mesh_make_lattice(kind, SIDE, 0.1, distance_field, &mesh);
+    test_mesh_make_lattice(kind, SIDE, 0.1, wave_field, &values);
     test_view_create(&values, (test_layout){.wide_coordinates = true, .wide_values = true}, &view);
-    fixture_create_lattice(&f, kind, SIDE, 0.1, distance);
+    fixture_create_lattice(&f, kind, SIDE, 0.1, distance_field);
     fixture_set_camera(&f, camera, WIDTH, HEIGHT);
     fixture_add_surface(&f, &through, 1, 1);
     const render_lines lines = {
@@ -75,7 +75,7 @@ static void check_kind(test_mesh_kind kind, int type, fixture_camera camera)
                                            mesh.connectivity, values.values, origin, normal, LEVELS, levels, &points);
     int64_t seen = 0, beside = 0;
     for (int64_t i = 0; i < count; i++) {
-        const double cover = cover_at(&f.job.camera, &drawn.picture, points + 3 * i);
+        const double cover = get_line_coverage(&f.job.camera, &drawn.picture, points + 3 * i);
         seen += cover >= 0;
         beside += cover >= 0 && !(cover > 0.3);
     }
@@ -83,14 +83,14 @@ static void check_kind(test_mesh_kind kind, int type, fixture_camera camera)
            (long long)beside, (long long)seen);
     assert_true(seen > 5000 && (double)beside <= 0.001 * (double)seen);
     free(points);
-    drawn_free(&drawn);
+    drawn_frame_free(&drawn);
     test_view_free(&view);
     test_mesh_free(&mesh);
     test_mesh_free(&values);
     fixture_free(&f);
 }
 
-static void points_of_vtk_s_lines_lie_on_lines(void **state)
+static void points_of_vtk_contours_lie_on_drawn_lines(void **state)
 {
     (void)state;
     check_kind(TEST_TETS, 10, CAMERA_OUTSIDE);
@@ -100,6 +100,6 @@ static void points_of_vtk_s_lines_lie_on_lines(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(points_of_vtk_s_lines_lie_on_lines)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(points_of_vtk_contours_lie_on_drawn_lines)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -35,7 +35,7 @@ enum { LOOKS = 64 };
 static int64_t rays_wanted = 240000;
 static uint64_t drawn_numbers;
 
-static double uniform(double low, double high)
+static double draw_uniform(double low, double high)
 {
     return low + (high - low) * test_uniform(drawn_numbers++, 79);
 }
@@ -56,7 +56,7 @@ typedef struct batch {
 
 static double shape_size(shape s)
 {
-    return s == TINY ? 1e-4 : s == FAR ? 0.008 : pow(10, uniform(-2.5, -0.5));
+    return s == TINY ? 1e-4 : s == FAR ? 0.008 : pow(10, draw_uniform(-2.5, -0.5));
 }
 
 /* Makes the columns of a random rotation, scaled by the extents of the cell. */
@@ -64,7 +64,7 @@ static void random_axes(const double extent[3], double axes[3][3])
 {
     double q[4], sum = 0;
     for (int i = 0; i < 4; i++) {
-        q[i] = uniform(-1, 1);
+        q[i] = draw_uniform(-1, 1);
         sum += q[i] * q[i];
     }
     for (int i = 0; i < 4; i++) q[i] /= sqrt(sum);
@@ -76,13 +76,14 @@ static void random_axes(const double extent[3], double axes[3][3])
         for (int a = 0; a < 3; a++) axes[i][a] = m[a][i] * extent[i];
 }
 
-static void place_cell(batch *b, shape s, int lane)
+static void place_cell_vertices(batch *b, shape s, int lane)
 {
     static const float apex[3] = {0.5f, 0.5f, 1};
-    const double size = shape_size(s), flat = s == FLAT ? pow(10, uniform(-4, -1)) : 1;
-    const double jitter = s == AFFINE || s == FLAT ? 0 : s == BENT ? uniform(0.2, 0.5) : uniform(0, 0.2);
-    const double extent[3] = {size, size * uniform(0.5, 1), size * flat};
-    const double middle[3] = {uniform(-0.02, 0.02), uniform(-0.02, 0.02), uniform(-0.5, 0.5) * (s != TINY)};
+    const double size = shape_size(s), flat = s == FLAT ? pow(10, draw_uniform(-4, -1)) : 1;
+    const double jitter = s == AFFINE || s == FLAT ? 0 : s == BENT ? draw_uniform(0.2, 0.5) : draw_uniform(0, 0.2);
+    const double extent[3] = {size, size * draw_uniform(0.5, 1), size * flat};
+    const double middle[3] = {draw_uniform(-0.02, 0.02), draw_uniform(-0.02, 0.02),
+                              draw_uniform(-0.5, 0.5) * (s != TINY)};
     double axes[3][3];
     random_axes(extent, axes);
     for (int i = 0; i < grid_type_vertices(b->type); i++) {
@@ -91,7 +92,7 @@ static void place_cell(batch *b, shape s, int lane)
                               : i == 4                ? apex
                                                       : base[i];
         double r[3];
-        for (int k = 0; k < 3; k++) r[k] = (double)corner[k] - 0.5 + jitter * uniform(-1, 1);
+        for (int k = 0; k < 3; k++) r[k] = (double)corner[k] - 0.5 + jitter * draw_uniform(-1, 1);
         for (int a = 0; a < 3; a++) {
             const double x = middle[a] + r[0] * axes[0][a] + r[1] * axes[1][a] + r[2] * axes[2][a];
             b->at[a][i][lane] = (float)x;
@@ -101,26 +102,27 @@ static void place_cell(batch *b, shape s, int lane)
 
 /* Sets values that are nearly linear or far from it, relative to an isovalue within their range, as
  * kernel_cell_relative() does. */
-static void place_values(batch *b, int lane)
+static void place_cell_values(batch *b, int lane)
 {
     const int count = grid_type_vertices(b->type);
-    const double noise = pow(10, uniform(-3, 0.3)), g[3] = {uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)};
+    const double noise = pow(10, draw_uniform(-3, 0.3)),
+                 g[3] = {draw_uniform(-1, 1), draw_uniform(-1, 1), draw_uniform(-1, 1)};
     double v[8], low = INFINITY, high = -INFINITY, most = 0, size = 0;
     for (int i = 1; i < count; i++)
         for (int a = 0; a < 3; a++) size = fmax(size, fabs((double)(b->at[a][i][lane] - b->at[a][0][lane])));
     for (int i = 0; i < count; i++) {
-        v[i] = noise * uniform(-1, 1);
+        v[i] = noise * draw_uniform(-1, 1);
         for (int a = 0; a < 3; a++) v[i] += g[a] * ((double)b->at[a][i][lane] - (double)b->at[a][0][lane]) / size;
         low = fmin(low, v[i]);
         high = fmax(high, v[i]);
     }
-    const double isovalue = uniform(low, high);
+    const double isovalue = draw_uniform(low, high);
     for (int i = 0; i < count; i++) most = fmax(most, fabs(v[i] -= isovalue));
     for (int i = 0; i < count; i++) b->at[3][i][lane] = (float)(v[i] / most);
 }
 
 /* Chooses a point in the bounding box of the vertices, or slightly outside it. */
-static void point_near(const batch *b, int lane, double point[3])
+static void choose_point_near_cell(const batch *b, int lane, double point[3])
 {
     for (int a = 0; a < 3; a++) {
         double low = INFINITY, high = -INFINITY;
@@ -128,17 +130,17 @@ static void point_near(const batch *b, int lane, double point[3])
             low = fmin(low, (double)b->at[a][i][lane]);
             high = fmax(high, (double)b->at[a][i][lane]);
         }
-        point[a] = low + (high - low) * uniform(-0.1, 1.1);
+        point[a] = low + (high - low) * draw_uniform(-0.1, 1.1);
     }
 }
 
 /* Aims a ray of the beam through a point near the cell. */
-static void aim(batch *b, int lane)
+static void aim_ray(batch *b, int lane)
 {
     double point[3];
-    point_near(b, lane, point);
-    b->rays.slope_x[lane] = (float)(uniform(-1, 1) * (double)b->beam.spread);
-    b->rays.slope_y[lane] = (float)(uniform(-1, 1) * (double)b->beam.spread);
+    choose_point_near_cell(b, lane, point);
+    b->rays.slope_x[lane] = (float)(draw_uniform(-1, 1) * (double)b->beam.spread);
+    b->rays.slope_y[lane] = (float)(draw_uniform(-1, 1) * (double)b->beam.spread);
     b->rays.origin_x[lane] = (float)(point[0] - (double)b->rays.slope_x[lane] * point[2]);
     b->rays.origin_y[lane] = (float)(point[1] - (double)b->rays.slope_y[lane] * point[2]);
 }
@@ -146,18 +148,19 @@ static void aim(batch *b, int lane)
 static void make_batch(batch *b, int type, shape s)
 {
     *b = (batch){.type = type};
-    b->beam = (kernel_beam){.spread = uniform(0, 1) < 0.3 ? 0 : (float)pow(10, uniform(-4, -1.5)), .offset = 0};
+    b->beam =
+        (kernel_beam){.spread = draw_uniform(0, 1) < 0.3 ? 0 : (float)pow(10, draw_uniform(-4, -1.5)), .offset = 0};
     for (int lane = 0; lane < SIMD_WIDTH; lane++) {
-        place_cell(b, s, lane);
-        place_values(b, lane);
-        aim(b, lane);
+        place_cell_vertices(b, s, lane);
+        place_cell_values(b, lane);
+        aim_ray(b, lane);
         b->beam.offset = fmaxf(b->beam.offset, fmaxf(fabsf(b->rays.origin_x[lane]), fabsf(b->rays.origin_y[lane])));
     }
 }
 
 /* ---- contraction ---- */
 
-static void contract(const batch *b, kernel_decided *out, kernel_bounds *bounds)
+static void run_contraction(const batch *b, kernel_decided *out, kernel_bounds *bounds)
 {
     const kernel_curved cells = {.type = b->type, .at = b->at, .bounds = bounds};
     int32_t own[SIMD_WIDTH];
@@ -182,7 +185,7 @@ static void contract(const batch *b, kernel_decided *out, kernel_bounds *bounds)
 
 /* ---- reference ---- */
 
-static void reference_of(const batch *b, int lane, reference_cell *cell, reference_line *line, double values[8])
+static void make_reference_cell(const batch *b, int lane, reference_cell *cell, reference_line *line, double values[8])
 {
     *cell = (reference_cell){.type = b->type, .count = grid_type_vertices(b->type)};
     for (int i = 0; i < cell->count; i++) {
@@ -202,7 +205,7 @@ typedef struct truth {
     double t; /* depth of the last root */
 } truth;
 
-static double truth_at(truth *r, double t)
+static double evaluate_reference(truth *r, double t)
 {
     const double point[3] = {r->line->base[0] + r->line->slope[0] * t, r->line->base[1] + r->line->slope[1] * t, t};
     double value;
@@ -210,11 +213,11 @@ static double truth_at(truth *r, double t)
     return value;
 }
 
-static double truth_bisect(truth *r, double low, double high, bool rises)
+static double bisect_reference_root(truth *r, double low, double high, bool rises)
 {
     for (int i = 0; i < 60; i++) {
         const double middle = 0.5 * (low + high);
-        if ((truth_at(r, middle) < 0) == rises)
+        if ((evaluate_reference(r, middle) < 0) == rises)
             low = middle;
         else
             high = middle;
@@ -223,18 +226,18 @@ static double truth_bisect(truth *r, double low, double high, bool rises)
 }
 
 /* Finds all roots in the cell. */
-static void truth_find(truth *r)
+static void find_reference_roots(truth *r)
 {
     reference_crossing ends[REFERENCE_MAX_CROSSINGS];
     const int count = reference_crossings(r->cell, r->line, ends);
     for (int i = 0; i + 1 < count; i += 2) {
         const double low = ends[i].z, step = (ends[i + 1].z - low) / LOOKS;
-        double before = truth_at(r, low);
+        double before = evaluate_reference(r, low);
         for (int n = 1; n <= LOOKS; n++) {
-            const double now = truth_at(r, low + n * step);
+            const double now = evaluate_reference(r, low + n * step);
             if ((now < 0) != (before < 0)) {
                 r->roots++;
-                r->t = truth_bisect(r, low + (n - 1) * step, low + n * step, before < 0);
+                r->t = bisect_reference_root(r, low + (n - 1) * step, low + n * step, before < 0);
             }
             before = now;
         }
@@ -258,7 +261,7 @@ static double depth_bound(const batch *b, int lane, double t)
     return 6e-8 * fabs(t) + 1.8e-7 * (high - low);
 }
 
-static void verify(const batch *b, int lane, const kernel_decided *at, count *n)
+static void verify_ray(const batch *b, int lane, const kernel_decided *at, count *n)
 {
     reference_cell cell;
     reference_line line;
@@ -268,9 +271,9 @@ static void verify(const batch *b, int lane, const kernel_decided *at, count *n)
     n->one += one;
     n->none += none;
     if (!one && !none) return;
-    reference_of(b, lane, &cell, &line, values);
+    make_reference_cell(b, lane, &cell, &line, values);
     truth r = {.cell = &cell, .line = &line, .values = values};
-    truth_find(&r);
+    find_reference_roots(&r);
     if (r.has_failed) {
         n->failed++;
         return;
@@ -282,7 +285,7 @@ static void verify(const batch *b, int lane, const kernel_decided *at, count *n)
     n->off += !(off <= 1);
 }
 
-static void decided_crossings_are_right(void **state)
+static void decided_crossings_match_the_reference(void **state)
 {
     (void)state;
     static const int types[3] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID};
@@ -296,10 +299,10 @@ static void decided_crossings_are_right(void **state)
                 kernel_bounds bounds;
                 kernel_decided at;
                 make_batch(&b, types[k], s);
-                contract(&b, &at, &bounds);
+                run_contraction(&b, &at, &bounds);
                 for (int lane = 0; lane < SIMD_WIDTH; lane++) {
                     n.contracting += bounds.error_growth[lane] < INFINITY;
-                    verify(&b, lane, &at, &n);
+                    verify_ray(&b, lane, &at, &n);
                 }
             }
             printf("%s %s: %lld rays, %lld in cells that contract, %lld with one crossing, %lld with none, %lld wrong, "
@@ -326,10 +329,10 @@ typedef struct quad_counts {
 
 /* Computes the slopes of a direction along which three consecutive vertices of a quad are seen nearly collinear;
  * returns false if no such slopes are small. */
-static bool graze(const batch *b, int lane, double slope[2])
+static bool aim_along_grazed_edge(const batch *b, int lane, double slope[2])
 {
     const kernel_shape *shape = kernel_cell_shape(b->type);
-    const int face = (int)uniform(0, shape->face_count), first = (int)uniform(0, 4);
+    const int face = (int)draw_uniform(0, shape->face_count), first = (int)draw_uniform(0, 4);
     const signed char *loop = shape->faces[face].vertices;
     double edge[2][3], normal[3];
     if (shape->faces[face].count == 3) return false;
@@ -340,8 +343,9 @@ static bool graze(const batch *b, int lane, double slope[2])
     for (int a = 0; a < 3; a++)
         normal[a] = edge[0][(a + 1) % 3] * edge[1][(a + 2) % 3] - edge[0][(a + 2) % 3] * edge[1][(a + 1) % 3];
     const int own = fabs(normal[1]) > fabs(normal[0]), other = !own;
-    slope[other] = uniform(-1, 1);
-    slope[own] = -(normal[2] + slope[other] * normal[other]) / normal[own] + pow(10, uniform(-8, -2)) * uniform(-1, 1);
+    slope[other] = draw_uniform(-1, 1);
+    slope[own] =
+        -(normal[2] + slope[other] * normal[other]) / normal[own] + pow(10, draw_uniform(-8, -2)) * draw_uniform(-1, 1);
     return fabs(slope[own]) < 1;
 }
 
@@ -350,9 +354,9 @@ static void aim_box(batch *b, kernel_rays rays[BOX_RAYS], kernel_ray_box *box)
 {
     double middle[SIMD_WIDTH][2], half[SIMD_WIDTH];
     for (int lane = 0; lane < SIMD_WIDTH; lane++) {
-        const bool grazes = uniform(0, 1) < 0.7 && graze(b, lane, middle[lane]);
+        const bool grazes = draw_uniform(0, 1) < 0.7 && aim_along_grazed_edge(b, lane, middle[lane]);
         if (!grazes) middle[lane][0] = middle[lane][1] = 0;
-        half[lane] = !grazes ? (double)b->beam.spread : uniform(0, 1) < 0.7 ? 0 : pow(10, uniform(-8, -2));
+        half[lane] = !grazes ? (double)b->beam.spread : draw_uniform(0, 1) < 0.7 ? 0 : pow(10, draw_uniform(-8, -2));
     }
     for (int a = 0; a < 2; a++)
         for (int end = 0; end < 2; end++) box->slope[a][end] = box->origin[a][end] = vf_set(end ? -INFINITY : INFINITY);
@@ -360,9 +364,9 @@ static void aim_box(batch *b, kernel_rays rays[BOX_RAYS], kernel_ray_box *box)
         vf own[2][2];
         for (int lane = 0; lane < SIMD_WIDTH; lane++) {
             double point[3];
-            point_near(b, lane, point);
+            choose_point_near_cell(b, lane, point);
             for (int a = 0; a < 2; a++) {
-                const double at = n >= 8 ? uniform(-1, 1) : n >> a & 1 ? 1 : -1;
+                const double at = n >= 8 ? draw_uniform(-1, 1) : n >> a & 1 ? 1 : -1;
                 own[0][a][lane] = (float)(middle[lane][a] + at * half[lane]);
                 own[1][a][lane] = (float)(point[a] - (double)own[0][a][lane] * point[2]);
             }
@@ -390,7 +394,7 @@ static bool is_convex_loop(const vf x[8], const vf y[8], const signed char *loop
     return left == 4 || right == 4;
 }
 
-static vi edge_of(const vf x[8], const vf y[8], int a, int b, vf *least)
+static vi evaluate_edge(const vf x[8], const vf y[8], int a, int b, vf *least)
 {
     const vf e = vf_diff_of_products(x[a], y[b], x[b], y[a]);
     *least = vf_min(vf_abs(e), *least);
@@ -399,16 +403,16 @@ static vi edge_of(const vf x[8], const vf y[8], int a, int b, vf *least)
 
 /* Returns the rays on which the signs of all edges of the quad are certain but give another result than its triangles
  * and its patch. */
-static vm edges_are_wrong(const vf x[8], const vf y[8], const signed char *loop)
+static vm find_wrong_quads(const vf x[8], const vf y[8], const signed char *loop)
 {
     vf least = vf_set(INFINITY);
     vi around[4];
     vm side[4];
     for (int i = 0; i < 4; i++) {
-        around[i] = edge_of(x, y, loop[i], loop[(i + 1) & 3], &least);
+        around[i] = evaluate_edge(x, y, loop[i], loop[(i + 1) & 3], &least);
         side[i] = vm_sign(around[i]);
     }
-    const vm once = kernel_cross_one_triangle(side, vm_sign(edge_of(x, y, loop[0], loop[2], &least)));
+    const vm once = kernel_cross_one_triangle(side, vm_sign(evaluate_edge(x, y, loop[0], loop[2], &least)));
     const vm known = vf_lt(vf_set(KERNEL_EDGE_LEAST), least);
     const vm bends = kernel_curved_may_cross_twice(x, y, loop, vm_all_lanes(), side);
     return vm_and(known, vm_or(vm_xor(once, vm_sign(kernel_sides_agree(around, 4))), bends));
@@ -426,7 +430,7 @@ static void verify_quads(const batch *b, const kernel_rays *rays, vi dents, quad
     for (int face = 0; face < shape->face_count; face++) {
         const signed char *loop = shape->faces[face].vertices;
         if (shape->faces[face].count == 3) continue;
-        const unsigned wrong = vm_bits(edges_are_wrong(x, y, loop));
+        const unsigned wrong = vm_bits(find_wrong_quads(x, y, loop));
         for (int lane = 0; lane < SIMD_WIDTH; lane++) {
             n->quads++;
             if (dents[lane] >> face & 1) continue;
@@ -437,7 +441,7 @@ static void verify_quads(const batch *b, const kernel_rays *rays, vi dents, quad
     }
 }
 
-static void quads_that_look_convex_are(void **state)
+static void quads_classified_as_convex_are_convex(void **state)
 {
     (void)state;
     static const int types[3] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID};
@@ -468,7 +472,7 @@ static void quads_that_look_convex_are(void **state)
 int main(int argc, char **argv)
 {
     if (argc > 1) rays_wanted = atoll(argv[1]);
-    const struct CMUnitTest tests[] = {cmocka_unit_test(decided_crossings_are_right),
-                                       cmocka_unit_test(quads_that_look_convex_are)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(decided_crossings_match_the_reference),
+                                       cmocka_unit_test(quads_classified_as_convex_are_convex)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

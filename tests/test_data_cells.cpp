@@ -13,7 +13,7 @@
 namespace
 {
 
-template <typename T> T *allocate(vtkIdType count)
+template <typename T> T *allocate_array(vtkIdType count)
 {
     void *block = std::calloc(static_cast<size_t>(count > 0 ? count : 1), sizeof(T));
     if (!block) std::abort();
@@ -22,7 +22,7 @@ template <typename T> T *allocate(vtkIdType count)
 
 } // namespace
 
-bool data_cells_read(const char *path, const char *field, data_cells *out)
+bool data_cells_read_file(const char *path, const char *field, data_cells *out)
 {
     if (!std::filesystem::exists(path)) return false;
     vtkNew<vtkXMLUnstructuredGridReader> reader;
@@ -40,9 +40,9 @@ bool data_cells_read(const char *path, const char *field, data_cells *out)
                       nullptr,
                       nullptr,
                       nullptr};
-    out->coordinates = allocate<double>(3 * out->vertex_count);
-    out->values = allocate<double>(out->vertex_count);
-    out->connectivity = allocate<int64_t>(out->cell_count * out->nodes);
+    out->coordinates = allocate_array<double>(3 * out->vertex_count);
+    out->values = allocate_array<double>(out->vertex_count);
+    out->connectivity = allocate_array<int64_t>(out->cell_count * out->nodes);
     for (vtkIdType v = 0; v < out->vertex_count; v++) {
         grid->GetPoint(v, out->coordinates + 3 * v);
         out->values[v] = values->GetComponent(v, 0);

@@ -20,7 +20,7 @@ typedef struct data_cells {
 
 /* Reads a .vtu file whose cells all have one type. Returns false if there is no such file, or if it has no such field
  * of one component at its points. */
-bool data_cells_read(const char *path, const char *field, data_cells *out);
+bool data_cells_read_file(const char *path, const char *field, data_cells *out);
 
 #ifdef __cplusplus
 }

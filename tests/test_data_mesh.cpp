@@ -12,46 +12,46 @@
 namespace
 {
 
-template <typename T> T *allocate(int64_t count)
+template <typename T> T *allocate_array(int64_t count)
 {
     void *block = std::calloc(static_cast<size_t>(count > 0 ? count : 1), sizeof(T));
     if (!block) std::abort();
     return static_cast<T *>(block);
 }
 
-const char *element(const insitu_array &a, int64_t i, int64_t size)
+const char *get_element(const insitu_array &a, int64_t i, int64_t size)
 {
     return static_cast<const char *>(a.data) + i * (a.stride_bytes ? a.stride_bytes : size);
 }
 
-double number(const insitu_array &a, int64_t i)
+double read_number(const insitu_array &a, int64_t i)
 {
     switch (a.type) {
-    case INSITU_FLOAT32: return static_cast<double>(*reinterpret_cast<const float *>(element(a, i, 4)));
-    case INSITU_INT32: return *reinterpret_cast<const int32_t *>(element(a, i, 4));
-    case INSITU_INT64: return static_cast<double>(*reinterpret_cast<const int64_t *>(element(a, i, 8)));
-    default: return *reinterpret_cast<const double *>(element(a, i, 8));
+    case INSITU_FLOAT32: return static_cast<double>(*reinterpret_cast<const float *>(get_element(a, i, 4)));
+    case INSITU_INT32: return *reinterpret_cast<const int32_t *>(get_element(a, i, 4));
+    case INSITU_INT64: return static_cast<double>(*reinterpret_cast<const int64_t *>(get_element(a, i, 8)));
+    default: return *reinterpret_cast<const double *>(get_element(a, i, 8));
     }
 }
 
-int64_t integer(const insitu_array &a, int64_t i)
+int64_t read_integer(const insitu_array &a, int64_t i)
 {
     switch (a.type) {
-    case INSITU_UINT8: return *reinterpret_cast<const uint8_t *>(element(a, i, 1));
-    case INSITU_INT32: return *reinterpret_cast<const int32_t *>(element(a, i, 4));
-    default: return *reinterpret_cast<const int64_t *>(element(a, i, 8));
+    case INSITU_UINT8: return *reinterpret_cast<const uint8_t *>(get_element(a, i, 1));
+    case INSITU_INT32: return *reinterpret_cast<const int32_t *>(get_element(a, i, 4));
+    default: return *reinterpret_cast<const int64_t *>(get_element(a, i, 8));
     }
 }
 
-int64_t *integers(const insitu_array &a, int64_t count)
+int64_t *read_integers(const insitu_array &a, int64_t count)
 {
-    auto *out = allocate<int64_t>(count);
-    for (int64_t i = 0; i < count; i++) out[i] = integer(a, i);
+    auto *out = allocate_array<int64_t>(count);
+    for (int64_t i = 0; i < count; i++) out[i] = read_integer(a, i);
     return out;
 }
 
 /* Meshes of tests have linear cells: a quadratic cell becomes the linear cell of its corners, which come first. */
-void keep_corners(test_mesh *mesh)
+void convert_to_linear_cells(test_mesh *mesh)
 {
     static const struct {
         int type, linear, corners;
@@ -79,32 +79,33 @@ void copy_cells(const insitu_mesh &mesh, test_mesh *out)
     const bool is_mixed = mesh.cell_types.data != nullptr;
     out->cell_count = mesh.cell_count;
     out->connectivity_count = mesh.connectivity_count;
-    out->connectivity = integers(mesh.connectivity, mesh.connectivity_count);
-    out->types = allocate<unsigned char>(mesh.cell_count);
-    out->ghosts = allocate<unsigned char>(mesh.cell_count);
-    out->offsets = allocate<int64_t>(mesh.cell_count + 1);
+    out->connectivity = read_integers(mesh.connectivity, mesh.connectivity_count);
+    out->types = allocate_array<unsigned char>(mesh.cell_count);
+    out->ghosts = allocate_array<unsigned char>(mesh.cell_count);
+    out->offsets = allocate_array<int64_t>(mesh.cell_count + 1);
     for (int64_t i = 0; i <= mesh.cell_count; i++) {
         const int64_t even = i * (mesh.connectivity_count / mesh.cell_count);
-        out->offsets[i] = mesh.offsets.data ? integer(mesh.offsets, i) : even;
+        out->offsets[i] = mesh.offsets.data ? read_integer(mesh.offsets, i) : even;
         if (i == mesh.cell_count) break;
-        out->types[i] = static_cast<unsigned char>(is_mixed ? integer(mesh.cell_types, i) : int64_t{mesh.cell_type});
+        out->types[i] =
+            static_cast<unsigned char>(is_mixed ? read_integer(mesh.cell_types, i) : int64_t{mesh.cell_type});
     }
-    keep_corners(out);
+    convert_to_linear_cells(out);
     if (!mesh.face_count) return;
     out->face_count = mesh.face_count;
     out->face_connectivity_count = mesh.face_connectivity_count;
-    out->face_offsets = integers(mesh.face_offsets, mesh.face_count + 1);
-    out->face_connectivity = integers(mesh.face_connectivity, mesh.face_connectivity_count);
+    out->face_offsets = read_integers(mesh.face_offsets, mesh.face_count + 1);
+    out->face_connectivity = read_integers(mesh.face_connectivity, mesh.face_connectivity_count);
 }
 
 void copy_vertices(const insitu_mesh &mesh, const insitu_field &field, test_mesh *out)
 {
     out->vertex_count = mesh.vertex_count;
-    out->coordinates = allocate<double>(3 * mesh.vertex_count);
-    out->values = allocate<double>(mesh.vertex_count);
+    out->coordinates = allocate_array<double>(3 * mesh.vertex_count);
+    out->values = allocate_array<double>(mesh.vertex_count);
     for (int64_t i = 0; i < mesh.vertex_count; i++) {
-        for (int axis = 0; axis < 3; axis++) out->coordinates[3 * i + axis] = number(mesh.coordinates[axis], i);
-        out->values[i] = number(field.values, i);
+        for (int axis = 0; axis < 3; axis++) out->coordinates[3 * i + axis] = read_number(mesh.coordinates[axis], i);
+        out->values[i] = read_number(field.values, i);
     }
 }
 

@@ -36,7 +36,7 @@ static void surfaces_and_samples_match_the_reference(void **state)
         cells_fixture(&f);
         fixture_add_surface(&f, pass ? clear : opaque, pass ? 2 : 1, pass ? 0.4f : 1);
         fixture_set_volume(&f, 1);
-        const fixture_outcome o = fixture_compare(&f, &fixture_usual_bounds, pass ? "clear" : "opaque");
+        const fixture_outcome o = fixture_compare_with_reference(&f, &fixture_usual_bounds, pass ? "clear" : "opaque");
         fprintf(stderr, "%d rays, %d hits, %d excluded: depth %.2g cells, colour %.2g\n", (int)o.rays, (int)o.hits,
                 (int)o.excluded, o.worst_depth, o.worst_colour);
         assert_true(o.hits > width * height / 5);
@@ -46,7 +46,7 @@ static void surfaces_and_samples_match_the_reference(void **state)
 
 /* Checks segments against the integral. They are exact on tets, and so on polyhedra: the bound is 1e-6 as in
  * test_segments.c, whose rays cross as many cells. */
-static void segments_are_the_integral(void **state)
+static void segments_match_the_integral(void **state)
 {
     (void)state;
     render_fixture f;
@@ -60,23 +60,24 @@ static void segments_are_the_integral(void **state)
     for (int p = 0; p < width * height; p += 3) {
         double rgba[4];
         reference_integral_trace(scene, p % width, p / width, fixture_background, NULL, 0, rgba);
-        for (int c = 0; c < 4; c++) worst = test_worse(worst, fabs((double)drawn.picture.rgba[4 * p + c] - rgba[c]));
+        for (int c = 0; c < 4; c++)
+            worst = test_larger_error(worst, fabs((double)drawn.picture.rgba[4 * p + c] - rgba[c]));
     }
     reference_integral_free(scene);
     fprintf(stderr, "segments: %.2g\n", worst);
     assert_true(worst < 1e-6);
-    drawn_free(&drawn);
+    drawn_frame_free(&drawn);
     fixture_free(&f);
 }
 
 /* Moves vertices by up to 1 % of a cell along each axis. This test runs last, because it changes the mesh. */
-static void moved_cells_are_their_own_tets(void **state)
+static void moved_polyhedra_match_their_split_tets(void **state)
 {
     (void)state;
     for (uint64_t i = 0; i < 3 * (uint64_t)mesh.vertex_count; i++)
-        mesh.coordinates[i] += test_uniform_in(i, 41, -0.001, 0.001);
+        mesh.coordinates[i] += test_uniform_between(i, 41, -0.001, 0.001);
     test_mesh_split_quads(&mesh);
-    const own_tets_tally t = own_tets_compare(&mesh, 0.1, 0.2, 320, 240);
+    const own_tets_tally t = compare_with_split_tets(&mesh, 0.1, 0.2, 320, 240);
     fprintf(stderr, "%d cells not star-shaped; %d pixels, %d missing, %d added; %d left out\n", (int)t.ghosts,
             (int)t.pixels, (int)t.missing, (int)t.added, (int)t.in_band);
     assert_true(t.pixels > 10000 && 1000 * t.in_band < t.pixels && 10 * t.ghosts < mesh.cell_count);
@@ -88,8 +89,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(surfaces_and_samples_match_the_reference),
-        cmocka_unit_test(segments_are_the_integral),
-        cmocka_unit_test(moved_cells_are_their_own_tets),
+        cmocka_unit_test(segments_match_the_integral),
+        cmocka_unit_test(moved_polyhedra_match_their_split_tets),
     };
     char path[4096];
     const char *folder = getenv("INSITU_TEST_DATA");
@@ -99,8 +100,8 @@ int main(void)
     }
     snprintf(path, sizeof path, "%s/poly_voronoi.vtu", folder);
     if (!test_data_mesh(path, "f", &mesh)) return 1;
-    width = test_effort(13, 23);
-    height = test_effort(11, 19);
+    width = test_case_count(13, 23);
+    height = test_case_count(11, 19);
     const int failed = cmocka_run_group_tests(tests, NULL, NULL);
     test_mesh_free(&mesh);
     return failed;

@@ -161,7 +161,7 @@ typedef struct subject {
     unsigned char *folded; /* for each pixel, whether its ray may meet a folded cell, which has no unique value */
 } subject;
 
-static void bounds_of(const test_mesh *mesh, double lower[3], double upper[3])
+static void compute_bounds(const test_mesh *mesh, double lower[3], double upper[3])
 {
     for (int axis = 0; axis < 3; axis++) lower[axis] = upper[axis] = mesh->coordinates[axis];
     for (int64_t v = 0; v < mesh->vertex_count; v++)
@@ -186,7 +186,7 @@ static void set_transfer(subject *s, const data_set *set, const opacity_shape *s
 
 /* Computes the rectangle of pixels whose rays may meet the cell: the bounds of its projection, widened by a pixel on
  * each side. */
-static void project(const render_camera *c, const grid *g, int64_t cell, int out[4])
+static void project_cell_bounds(const render_camera *c, const grid *g, int64_t cell, int out[4])
 {
     const double per_slope = 0.5 * c->height / c->half_height;
     double low[2] = {1e9, 1e9}, high[2] = {-1e9, -1e9};
@@ -261,7 +261,7 @@ static void project_cells(subject *s)
     memset(s->folded, 0, PIXELS);
     for (int64_t cell = 0; cell < g->cell_count; cell++) {
         int *r = s->rectangles[cell];
-        project(&s->f.job.camera, g, cell, r);
+        project_cell_bounds(&s->f.job.camera, g, cell, r);
         if (!is_folded(g, cell)) continue;
         for (int y = r[2]; y <= r[3]; y++)
             for (int x = r[0]; x <= r[1]; x++) s->folded[y * WIDTH + x] = 1;
@@ -275,7 +275,7 @@ static bool subject_create(subject *s, const data_set *set, const opacity_shape 
     double lower[3], upper[3], centre[3], half = 0;
     snprintf(path, sizeof path, "%s/%s.vtu", getenv("INSITU_TEST_DATA"), set->file);
     if (!test_data_mesh(path, set->field, &mesh)) return false;
-    bounds_of(&mesh, lower, upper);
+    compute_bounds(&mesh, lower, upper);
     for (int axis = 0; axis < 3; axis++) {
         centre[axis] = 0.5 * (lower[axis] + upper[axis]);
         half = fmax(half, 0.5 * (upper[axis] - lower[axis]));
@@ -317,7 +317,7 @@ static void hide_others(subject *s, int pixel, bool of_folded)
     }
 }
 
-static void truth_of(subject *s, int pixel, bool of_folded, double rgba[4])
+static void compute_reference_pixel(subject *s, int pixel, bool of_folded, double rgba[4])
 {
     hide_others(s, pixel, of_folded);
     reference_integral *scene = reference_integral_create(&s->f.job, 1e-9);
@@ -327,7 +327,7 @@ static void truth_of(subject *s, int pixel, bool of_folded, double rgba[4])
 
 /* Returns whether the ray meets a folded cell, or a face whose patch is folded there. The folded cells are drawn as a
  * fog of constant density to see whether the ray meets any. */
-static bool has_no_truth(subject *s, int pixel)
+static bool lacks_reference(subject *s, int pixel)
 {
     double rgba[4];
     reference_ray ray;
@@ -336,7 +336,7 @@ static bool has_no_truth(subject *s, int pixel)
         const render_transfer transfer = s->f.transfer;
         s->f.transfer.opacity_count = 1;
         s->f.transfer.opacities = &fog;
-        truth_of(s, pixel, true, rgba);
+        compute_reference_pixel(s, pixel, true, rgba);
         s->f.transfer = transfer;
         if (fabs(rgba[3] - (double)fixture_background[3]) > 1e-7) return true;
     }
@@ -354,7 +354,7 @@ typedef struct picture {
     session_frame frame;
 } picture;
 
-static void draw(subject *s, double max_error, picture *out)
+static void draw_subject(subject *s, double max_error, picture *out)
 {
     base_error error = {0};
     image target = {WIDTH, HEIGHT, out->rgba, out->depth, NULL, false};
@@ -367,7 +367,7 @@ static void draw(subject *s, double max_error, picture *out)
     comp_claims_free(group.claims);
 }
 
-static double pixel_difference(const picture *a, const picture *b, int pixel)
+static double compute_pixel_difference(const picture *a, const picture *b, int pixel)
 {
     double most = 0;
     for (int c = 4 * pixel; c < 4 * pixel + 4; c++) most = fmax(most, fabs((double)a->rgba[c] - (double)b->rgba[c]));
@@ -379,8 +379,8 @@ static const picture *ordered_by;
 static int compare_pixels(const void *left, const void *right)
 {
     const int a = *(const int *)left, b = *(const int *)right;
-    const double at_a = pixel_difference(&ordered_by[0], &ordered_by[ERRORS - 1], a);
-    const double at_b = pixel_difference(&ordered_by[0], &ordered_by[ERRORS - 1], b);
+    const double at_a = compute_pixel_difference(&ordered_by[0], &ordered_by[ERRORS - 1], a);
+    const double at_b = compute_pixel_difference(&ordered_by[0], &ordered_by[ERRORS - 1], b);
     return at_a != at_b ? (at_a > at_b ? -1 : 1) : a - b;
 }
 
@@ -409,7 +409,7 @@ static int choose_pixels(const data_set *set, const picture *pictures, int pixel
 /* Returns how many of the pixels may lack a reference. Only the crushed can has folded cells, which at most a seventh
  * of all its pixels meet (63 of 612, and 58 of 459); but the half of a sample in which pictures differ most may all be
  * such pixels. */
-static int most_left_out(const data_set *set, int count)
+static int get_most_unreferenced_pixels(const data_set *set, int count)
 {
     if (strcmp(set->file, "can_2") != 0) return 0;
     return pixel_count == 0 ? count / 7 : count * 3 / 4;
@@ -417,12 +417,12 @@ static int most_left_out(const data_set *set, int count)
 
 /* Returns whether the picture is empty: before the impact the can's field is 0 everywhere, where the shells are
  * transparent. */
-static bool shows_nothing(const data_set *set, const opacity_shape *shape)
+static bool is_picture_empty(const data_set *set, const opacity_shape *shape)
 {
     return strcmp(set->file, "can_0") == 0 && strcmp(shape->name, "shells") == 0;
 }
 
-static int check(const data_set *set, const opacity_shape *shape)
+static int check_picture(const data_set *set, const opacity_shape *shape)
 {
     subject s = {0};
     picture *pictures = malloc(ERRORS * sizeof *pictures);
@@ -430,20 +430,20 @@ static int check(const data_set *set, const opacity_shape *shape)
     double worst[ERRORS] = {0};
     int worst_at[ERRORS] = {0};
     assert_true(subject_create(&s, set, shape));
-    for (int e = 0; e < ERRORS; e++) draw(&s, errors[e], &pictures[e]);
+    for (int e = 0; e < ERRORS; e++) draw_subject(&s, errors[e], &pictures[e]);
     const int count = choose_pixels(set, pictures, pixels);
     for (int i = 0; i < count; i++) {
         double truth[4];
-        if (has_no_truth(&s, pixels[i])) {
+        if (lacks_reference(&s, pixels[i])) {
             folded++;
             continue;
         }
-        truth_of(&s, pixels[i], false, truth);
+        compute_reference_pixel(&s, pixels[i], false, truth);
         for (int e = 0; e < ERRORS; e++)
             for (int c = 0; c < 4; c++) {
                 const double off = fabs((double)pictures[e].rgba[4 * pixels[i] + c] - truth[c]);
                 if (off <= worst[e]) continue;
-                worst[e] = test_worse(worst[e], off);
+                worst[e] = test_larger_error(worst[e], off);
                 worst_at[e] = pixels[i];
             }
     }
@@ -456,20 +456,20 @@ static int check(const data_set *set, const opacity_shape *shape)
         broken += !is_kept;
     }
     fprintf(stderr, "\n");
-    if (folded > most_left_out(set, count)) fail_msg("%d of %d pixels have no truth", folded, count);
-    if (count == 0 && !shows_nothing(set, shape)) fail_msg("nothing to compare");
+    if (folded > get_most_unreferenced_pixels(set, count)) fail_msg("%d of %d pixels have no truth", folded, count);
+    if (count == 0 && !is_picture_empty(set, shape)) fail_msg("nothing to compare");
     subject_free(&s);
     free(pictures);
     free(pixels);
     return broken;
 }
 
-static bool is_due(size_t set, size_t shape)
+static bool is_case_selected(size_t set, size_t shape)
 {
     if (only) return strcmp(only, sets[set].file) == 0;
     for (int i = 0; i < KNOWN; i++)
         if (strcmp(known[i].file, sets[set].file) == 0) return true;
-    return test_is_whole() || (set + shape) % 4 == 1;
+    return test_is_long_run() || (set + shape) % 4 == 1;
 }
 
 static void max_error_is_kept_on_real_grids(void **state)
@@ -478,7 +478,7 @@ static void max_error_is_kept_on_real_grids(void **state)
     (void)state;
     for (size_t i = 0; i < sizeof sets / sizeof sets[0]; i++)
         for (size_t k = 0; k < sizeof shapes / sizeof shapes[0]; k++)
-            if (is_due(i, k)) broken += check(&sets[i], &shapes[k]);
+            if (is_case_selected(i, k)) broken += check_picture(&sets[i], &shapes[k]);
     assert_int_equal(broken, 0);
 }
 

@@ -20,14 +20,14 @@ namespace
 const int width = 320, height = 240;
 
 /* Returns a picture that is premultiplied grey with this opacity everywhere. */
-std::vector<float> sheet_of(float grey, float alpha)
+std::vector<float> make_grey_picture(float grey, float alpha)
 {
     std::vector<float> rgba(static_cast<std::size_t>(4 * width * height));
     for (std::size_t i = 0; i < rgba.size(); i++) rgba[i] = i % 4 == 3 ? alpha : grey * alpha;
     return rgba;
 }
 
-insitu_decorations plain()
+insitu_decorations make_plain_decorations()
 {
     insitu_decorations d{};
     d.background[0] = d.background[1] = d.background[2] = 0.25F;
@@ -37,7 +37,7 @@ insitu_decorations plain()
     return d;
 }
 
-std::vector<float> draw(const std::vector<float> &rgba, const insitu_decorations &d)
+std::vector<float> draw_decorated(const std::vector<float> &rgba, const insitu_decorations &d)
 {
     const insitu_image image{width, height, rgba.data(), nullptr, &d, 0, nullptr, nullptr};
     std::vector<float> out = rgba;
@@ -48,14 +48,14 @@ std::vector<float> draw(const std::vector<float> &rgba, const insitu_decorations
     return out;
 }
 
-float at(const std::vector<float> &rgba, int x, int y, int channel = 0)
+float pixel_channel(const std::vector<float> &rgba, int x, int y, int channel = 0)
 {
     return rgba[static_cast<std::size_t>(4 * (y * width + x) + channel)];
 }
 
-void the_picture_is_put_over_its_background(void **)
+void picture_is_blended_over_its_background(void **)
 {
-    const std::vector<float> out = draw(sheet_of(0.5F, 0.25F), plain());
+    const std::vector<float> out = draw_decorated(make_grey_picture(0.5F, 0.25F), make_plain_decorations());
     for (std::size_t i = 0; i < out.size(); i++)
         assert_true(std::fabs(out[i] - (i % 4 == 3 ? 1 : 0.125F + 0.75F * 0.25F)) < 1e-6F);
 }
@@ -65,15 +65,16 @@ void the_picture_is_put_over_its_background(void **)
 void strokes_are_before_or_behind_the_picture(void **)
 {
     const insitu_stroke strokes[] = {{{0, 50.5}, {width, 50.5}, false}, {{0, 100.5}, {width, 100.5}, true}};
-    insitu_decorations d = plain();
+    insitu_decorations d = make_plain_decorations();
     d.stroke_count = 2;
     d.strokes = strokes;
-    const std::vector<float> out = draw(sheet_of(0.5F, 0.75F), d), without = draw(sheet_of(0.5F, 0.75F), plain());
-    assert_true(std::fabs(at(out, 160, 50) - 1) < 1e-6F);
-    assert_true(std::fabs(at(out, 160, 100) - (0.375F + 0.25F)) < 1e-6F);
-    for (int y : {48, 52, 98, 102}) assert_true(at(out, 160, y) == at(without, 160, y));
-    const std::vector<float> hidden = draw(sheet_of(0.5F, 1), d);
-    assert_true(at(hidden, 160, 100) == 0.5F);
+    const std::vector<float> out = draw_decorated(make_grey_picture(0.5F, 0.75F), d),
+                             without = draw_decorated(make_grey_picture(0.5F, 0.75F), make_plain_decorations());
+    assert_true(std::fabs(pixel_channel(out, 160, 50) - 1) < 1e-6F);
+    assert_true(std::fabs(pixel_channel(out, 160, 100) - (0.375F + 0.25F)) < 1e-6F);
+    for (int y : {48, 52, 98, 102}) assert_true(pixel_channel(out, 160, y) == pixel_channel(without, 160, y));
+    const std::vector<float> hidden = draw_decorated(make_grey_picture(0.5F, 1), d);
+    assert_true(pixel_channel(hidden, 160, 100) == 0.5F);
 }
 
 /* Checks that a line's total light is its length times its width in any direction, since its edges are antialiased. */
@@ -82,12 +83,12 @@ void slanted_strokes_are_as_bright_as_straight_ones(void **)
     for (int degrees = 0; degrees < 180; degrees += 7) {
         const double angle = degrees * 3.14159265358979 / 180, dx = 90 * std::cos(angle), dy = 90 * std::sin(angle);
         const insitu_stroke stroke = {{160.3 - dx, 120.2 - dy}, {160.3 + dx, 120.2 + dy}, false};
-        insitu_decorations d = plain();
+        insitu_decorations d = make_plain_decorations();
         d.background[0] = d.background[1] = d.background[2] = 0;
         d.stroke_count = 1;
         d.strokes = &stroke;
         double sum = 0;
-        const std::vector<float> out = draw(sheet_of(0, 0), d);
+        const std::vector<float> out = draw_decorated(make_grey_picture(0, 0), d);
         for (std::size_t i = 0; i < out.size(); i += 4) sum += out[i];
         /* A tent profile one pixel wide on either side sums to 180; the round ends add at most one each. */
         assert_true(sum > 178 && sum < 183);
@@ -104,17 +105,18 @@ void a_bar_has_the_colours_of_its_map(void **)
     bar.colour_count = 3;
     for (const insitu_anchor side : {INSITU_LEFT, INSITU_RIGHT}) {
         bar.at = side;
-        insitu_decorations d = plain();
+        insitu_decorations d = make_plain_decorations();
         d.bar_count = 1;
         d.bars = &bar;
-        const std::vector<float> out = draw(sheet_of(0, 0), d);
+        const std::vector<float> out = draw_decorated(make_grey_picture(0, 0), d);
         int matched = 0;
         for (int x = 0; x < width; x++) {
             int run = 0;
             float before = -1;
             for (int y = 0; y < height; y++) {
                 /* In the table's lower half green rises from 0.2 to 0.8 while blue falls from 0.9 to 0.1. */
-                const float r = at(out, x, y, 0), g = at(out, x, y, 1), b = at(out, x, y, 2);
+                const float r = pixel_channel(out, x, y, 0), g = pixel_channel(out, x, y, 1),
+                            b = pixel_channel(out, x, y, 2);
                 const bool is_low = std::fabs((g - 0.2F) / 0.6F - (0.9F - b) / 0.8F) < 1e-4F && r < 0.31F;
                 const bool is_high = std::fabs((r - 0.3F) / 0.6F - (0.8F - g) / 0.7F) < 1e-4F && b < 0.21F && r > 0.29F;
                 if (!is_low && !is_high) continue;
@@ -138,15 +140,16 @@ void bands_are_of_equal_height(void **)
     bar.colour_count = 3;
     bar.is_banded = true;
     bar.at = INSITU_RIGHT;
-    insitu_decorations d = plain();
+    insitu_decorations d = make_plain_decorations();
     d.bar_count = 1;
     d.bars = &bar;
-    const std::vector<float> out = draw(sheet_of(0, 0), d);
+    const std::vector<float> out = draw_decorated(make_grey_picture(0, 0), d);
     int rows[3] = {0, 0, 0};
     for (int band = 0; band < 3; band++)
         for (int x = 0; x < width; x++) {
             int count = 0;
-            for (int y = 0; y < height; y++) count += at(out, x, y, band) == 0.9F && at(out, x, y, (band + 1) % 3) == 0;
+            for (int y = 0; y < height; y++)
+                count += pixel_channel(out, x, y, band) == 0.9F && pixel_channel(out, x, y, (band + 1) % 3) == 0;
             rows[band] = count > rows[band] ? count : rows[band];
         }
     /* The frame covers a row of the outer bands, and a border between bands may divide a row. */
@@ -157,14 +160,14 @@ void words_are_written_at_their_anchor(void **)
 {
     for (int anchor = INSITU_TOP_LEFT; anchor <= INSITU_BOTTOM_RIGHT; anchor++) {
         const insitu_words words{"Hill", static_cast<insitu_anchor>(anchor), 1};
-        insitu_decorations d = plain();
+        insitu_decorations d = make_plain_decorations();
         d.words_count = 1;
         d.words = &words;
-        const std::vector<float> out = draw(sheet_of(0, 0), d);
+        const std::vector<float> out = draw_decorated(make_grey_picture(0, 0), d);
         double sum = 0, x_sum = 0, y_sum = 0;
         for (int y = 0; y < height; y++)
             for (int x = 0; x < width; x++) {
-                const double light = static_cast<double>(at(out, x, y)) - 0.25;
+                const double light = static_cast<double>(pixel_channel(out, x, y)) - 0.25;
                 sum += light, x_sum += light * x, y_sum += light * y;
             }
         assert_true(sum > 10);
@@ -181,7 +184,7 @@ void words_are_written_at_their_anchor(void **)
 
 int main()
 {
-    const CMUnitTest tests[] = {cmocka_unit_test(the_picture_is_put_over_its_background),
+    const CMUnitTest tests[] = {cmocka_unit_test(picture_is_blended_over_its_background),
                                 cmocka_unit_test(strokes_are_before_or_behind_the_picture),
                                 cmocka_unit_test(slanted_strokes_are_as_bright_as_straight_ones),
                                 cmocka_unit_test(a_bar_has_the_colours_of_its_map),

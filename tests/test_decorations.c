@@ -53,7 +53,7 @@ static void ticks_are_at_round_numbers(void **state)
 }
 
 /* Checks that a tick's text is its value, to the last printed digit, and that its position is that of the value. */
-static void ticks_stand_where_their_numbers_are(void **state)
+static void ticks_are_at_the_positions_of_their_values(void **state)
 {
     (void)state;
     srand(7);
@@ -78,7 +78,7 @@ static void ticks_stand_where_their_numbers_are(void **state)
 
 /* Checks that value i of 0 .. 3 in four bands lies in band i, [i / 4, (i + 1) / 4) of the bar, although its position in
  * the range is i / 3. */
-static void bands_of_ids_have_them_in_their_middle(void **state)
+static void bands_of_ids_are_centred_on_the_ids(void **state)
 {
     (void)state;
     static const struct {
@@ -138,7 +138,7 @@ static void check_corners(const render_camera *c, const double lower[3], const d
     }
 }
 
-static int behind(const render_camera *c, const double lower[3], const double upper[3])
+static int count_corners_behind_eye(const render_camera *c, const double lower[3], const double upper[3])
 {
     insitu_stroke strokes[SESSION_BOX_EDGES];
     int count = 0;
@@ -147,7 +147,7 @@ static int behind(const render_camera *c, const double lower[3], const double up
     return count;
 }
 
-static void edges_are_where_rays_see_them(void **state)
+static void edges_are_drawn_where_rays_meet_them(void **state)
 {
     (void)state;
     const double lower[3] = {-1, 2, 0}, upper[3] = {3, 3, 5}, focal[3] = {1, 2.5, 2.5}, up[3] = {0, 1, 0};
@@ -173,7 +173,7 @@ static void edges_that_data_hides_are_reported(void **state)
     render_camera c;
     for (int i = 0; i < 3; i++) {
         assert_true(render_camera_look_at(&c, eyes[i], focal, up, 40, 64, 64));
-        assert_int_equal(behind(&c, lower, upper), expected[i]);
+        assert_int_equal(count_corners_behind_eye(&c, lower, upper), expected[i]);
     }
     const double inside[3] = {0.4, 0.4, 0.4};
     insitu_stroke strokes[SESSION_BOX_EDGES];
@@ -235,7 +235,7 @@ static void check_rulers(const render_camera *c, const double lower[3], const do
     }
 }
 
-static void rulers_stand_where_their_numbers_are(void **state)
+static void rulers_are_aligned_with_their_numbers(void **state)
 {
     (void)state;
     const double lower[3] = {-1, 2, 0}, upper[3] = {3, 3, 5}, focal[3] = {1, 2.5, 2.5}, up[3] = {0, 1, 0};
@@ -252,7 +252,7 @@ static void rulers_stand_where_their_numbers_are(void **state)
 
 /* Checks that rays through both ends of the bar, moved to the middle of the picture, are as far apart at the point's
  * depth as the number states, and that the bar's length is a tenth to a fifth of the picture. */
-static void scale_bars_are_as_long_as_they_say(void **state)
+static void scale_bars_have_the_stated_length(void **state)
 {
     (void)state;
     const double up[3] = {0, 1, 0}, focal[3] = {0, 0, 0};
@@ -275,11 +275,11 @@ static void scale_bars_are_as_long_as_they_say(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(ticks_are_at_round_numbers),
-                                       cmocka_unit_test(ticks_stand_where_their_numbers_are),
-                                       cmocka_unit_test(bands_of_ids_have_them_in_their_middle),
-                                       cmocka_unit_test(edges_are_where_rays_see_them),
+                                       cmocka_unit_test(ticks_are_at_the_positions_of_their_values),
+                                       cmocka_unit_test(bands_of_ids_are_centred_on_the_ids),
+                                       cmocka_unit_test(edges_are_drawn_where_rays_meet_them),
                                        cmocka_unit_test(edges_that_data_hides_are_reported),
-                                       cmocka_unit_test(rulers_stand_where_their_numbers_are),
-                                       cmocka_unit_test(scale_bars_are_as_long_as_they_say)};
+                                       cmocka_unit_test(rulers_are_aligned_with_their_numbers),
+                                       cmocka_unit_test(scale_bars_have_the_stated_length)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -33,7 +33,7 @@ struct slab {
     std::vector<std::int32_t> hexes;
 };
 
-std::int32_t vertex(int i, int j, int k)
+std::int32_t vertex_index(int i, int j, int k)
 {
     return i + (NX + 1) * (j + (NY + 1) * k);
 }
@@ -52,11 +52,11 @@ slab make_slab()
     for (int c = 0; c < NX * NY * NZ; c++)
         for (int n = 0; n < 8; n++)
             s.hexes.push_back(
-                vertex(c % NX + (n % 4 == 1 || n % 4 == 2), c / NX % NY + n % 4 / 2, c / NX / NY + n / 4));
+                vertex_index(c % NX + (n % 4 == 1 || n % 4 == 2), c / NX % NY + n % 4 / 2, c / NX / NY + n / 4));
     return s;
 }
 
-void submit(insitu_session *session, const slab &s)
+void submit_slab(insitu_session *session, const slab &s)
 {
     insitu_mesh mesh;
     insitu_field field;
@@ -76,7 +76,7 @@ void submit(insitu_session *session, const slab &s)
 }
 
 /* Draws one picture. Each file has its own name, because OpenImageIO caches files that it has read. */
-void draw(const std::string &name, const std::string &layers)
+void draw_picture(const std::string &name, const std::string &layers)
 {
     const std::string scene = folder + "/scene.yaml";
     if (own_rank == 0)
@@ -86,14 +86,14 @@ void draw(const std::string &name, const std::string &layers)
     const slab s = make_slab();
     insitu_session *session = nullptr;
     assert_int_equal(insitu_create(MPI_COMM_WORLD, scene.c_str(), &session), INSITU_OK);
-    submit(session, s);
+    submit_slab(session, s);
     assert_int_equal(insitu_step(session, 0, 0), INSITU_OK);
     assert_int_equal(insitu_destroy(&session), INSITU_OK);
 }
 
 /* Compares the flattened deep file with the flat file. The roundings are 2^-24 of values of at most 1: for each sample
  * three in compositing, one in A, and three in OpenImageIO. */
-void compare(const std::string &name)
+void compare_flattened_file(const std::string &name)
 {
     if (own_rank != 0) return;
     const OIIO::ImageBuf deep(folder + "/" + name + "_deep.exr"), picture(folder + "/" + name + ".exr");
@@ -118,16 +118,17 @@ void compare(const std::string &name)
     assert_true(most > 1);
 }
 
-void flattened_surfaces_are_the_picture(void **)
+void flattened_deep_surfaces_match_the_flat_picture(void **)
 {
-    draw("surfaces", "      - isosurface: {field: f, values: [-0.5, 0, 0.5], opacity: 0.3}\n");
-    compare("surfaces");
+    draw_picture("surfaces", "      - isosurface: {field: f, values: [-0.5, 0, 0.5], opacity: 0.3}\n");
+    compare_flattened_file("surfaces");
 }
 
-void flattened_volume_is_the_picture(void **)
+void flattened_deep_volume_matches_the_flat_picture(void **)
 {
-    draw("volume", "      - volume: {field: f}\n      - isosurface: {field: f, values: [-0.5, 0.5], opacity: 0.3}\n");
-    compare("volume");
+    draw_picture("volume",
+                 "      - volume: {field: f}\n      - isosurface: {field: f, values: [-0.5, 0.5], opacity: 0.3}\n");
+    compare_flattened_file("volume");
 }
 
 } // namespace
@@ -141,8 +142,8 @@ int main(int argc, char **argv)
     if (own_rank == 0) std::filesystem::create_directories(folder);
     MPI_Barrier(MPI_COMM_WORLD);
     const CMUnitTest tests[] = {
-        cmocka_unit_test(flattened_surfaces_are_the_picture),
-        cmocka_unit_test(flattened_volume_is_the_picture),
+        cmocka_unit_test(flattened_deep_surfaces_match_the_flat_picture),
+        cmocka_unit_test(flattened_deep_volume_matches_the_flat_picture),
     };
     const int failures = cmocka_run_group_tests(tests, nullptr, nullptr);
     MPI_Finalize();

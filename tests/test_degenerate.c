@@ -37,7 +37,7 @@ static void assert_finite(const drawn_frame *drawn)
         if (!isfinite(drawn->picture.rgba[i])) fail_msg("pixel %d is not finite", (int)(i / 4));
 }
 
-static void draw(const test_mesh *mesh, scene_kind scene, fixture_camera camera, drawn_frame *out)
+static void draw_mesh(const test_mesh *mesh, scene_kind scene, fixture_camera camera, drawn_frame *out)
 {
     render_fixture f;
     open_scene(&f, mesh, scene, camera, 61, 47);
@@ -65,12 +65,12 @@ static int64_t face_size(const test_mesh *mesh, int64_t face)
     return mesh->face_offsets[face + 1] - mesh->face_offsets[face];
 }
 
-static int64_t face_vertex(const test_mesh *mesh, int64_t face, int64_t i)
+static int64_t get_face_vertex(const test_mesh *mesh, int64_t face, int64_t i)
 {
     return mesh->face_connectivity[mesh->face_offsets[face] + i % face_size(mesh, face)];
 }
 
-static int faces_of(const test_mesh *mesh, int64_t cell)
+static int count_cell_faces(const test_mesh *mesh, int64_t cell)
 {
     return (int)(mesh->offsets[cell + 1] - mesh->offsets[cell]);
 }
@@ -84,7 +84,7 @@ static void copy_cell(const test_mesh *from, int64_t cell, const int64_t *more, 
         test_mesh_add_cell(to, from->types[cell], own, all);
         return;
     }
-    const int own_count = faces_of(from, cell);
+    const int own_count = count_cell_faces(from, cell);
     assert_true(own_count + count <= 64);
     for (int i = 0; i < own_count; i++) faces[i] = own[i];
     for (int i = 0; i < count; i++) faces[own_count + i] = more[i];
@@ -97,7 +97,7 @@ static void copy_faces(const test_mesh *from, test_mesh *to)
         test_mesh_add_face(to, from->face_connectivity + from->face_offsets[face], face_size(from, face));
 }
 
-static void finish_copy(test_mesh *mesh, test_mesh *copy)
+static void complete_copy(test_mesh *mesh, test_mesh *copy)
 {
     test_mesh_free(mesh);
     *mesh = *copy;
@@ -114,12 +114,13 @@ static void repeat_vertices(test_mesh *mesh)
         const int64_t size = face_size(mesh, face), twice = face % 3 ? face % size : -1;
         int64_t loop[64], count = 0;
         for (int64_t i = 0; i < size; i++)
-            for (int64_t k = 0; k < (i == twice ? 1 + face % 3 : 1); k++) loop[count++] = face_vertex(mesh, face, i);
+            for (int64_t k = 0; k < (i == twice ? 1 + face % 3 : 1); k++)
+                loop[count++] = get_face_vertex(mesh, face, i);
         if (face % 3 == 2) loop[count++] = loop[0];
         test_mesh_add_face(&copy, loop, count);
     }
     for (int64_t cell = 0; cell < mesh->cell_count; cell++) copy_cell(mesh, cell, NULL, 0, &copy);
-    finish_copy(mesh, &copy);
+    complete_copy(mesh, &copy);
 }
 
 /* Adds for every vertex a face that consists of this vertex only. A cell gets the face of the first vertex of its first
@@ -130,10 +131,10 @@ static void add_point_faces(test_mesh *mesh)
     copy_faces(mesh, &copy);
     for (int64_t v = 0; v < mesh->vertex_count; v++) test_mesh_add_face(&copy, (const int64_t[]){v, v, v}, 3);
     for (int64_t cell = 0; cell < mesh->cell_count; cell++) {
-        const int64_t more = mesh->face_count + face_vertex(mesh, mesh->connectivity[mesh->offsets[cell]], 0);
+        const int64_t more = mesh->face_count + get_face_vertex(mesh, mesh->connectivity[mesh->offsets[cell]], 0);
         copy_cell(mesh, cell, &more, mesh->types[cell] == GRID_POLYHEDRON, &copy);
     }
-    finish_copy(mesh, &copy);
+    complete_copy(mesh, &copy);
 }
 
 /* Reverses the orientation of all faces, or of every second one. */
@@ -147,7 +148,7 @@ static void reverse_faces(test_mesh *mesh)
         }
 }
 
-static void reorder_every_second(test_mesh *mesh)
+static void reverse_every_second_cell(test_mesh *mesh)
 {
     test_mesh copy = begin_copy(mesh), turned = begin_copy(mesh);
     copy_faces(mesh, &turned);
@@ -158,7 +159,7 @@ static void reorder_every_second(test_mesh *mesh)
     }
     for (int64_t cell = 0; cell < mesh->cell_count; cell++) copy_cell(mesh, cell, NULL, 0, &copy);
     test_mesh_free(&turned);
-    finish_copy(mesh, &copy);
+    complete_copy(mesh, &copy);
 }
 
 /* ---- cells without volume next to others ----------------------------------------------------------------------- */
@@ -224,8 +225,8 @@ static void add_flat_cells(test_mesh *mesh)
     for (int64_t cell = 0, next = 0; cell < mesh->cell_count; cell++) {
         if (mesh->types[cell] != GRID_POLYHEDRON || cell % 2) continue;
         const int64_t *faces = mesh->connectivity + mesh->offsets[cell];
-        const int64_t v[3] = {face_vertex(mesh, faces[0], 0), face_vertex(mesh, faces[0], 1),
-                              face_vertex(mesh, faces[0], 2)};
+        const int64_t v[3] = {get_face_vertex(mesh, faces[0], 0), get_face_vertex(mesh, faces[0], 1),
+                              get_face_vertex(mesh, faces[0], 2)};
         switch (next++ % FLAT_KINDS) {
         case 0: add_pillow(&copy, faces[0]); break;
         case 1: add_bent_pillow(&copy, faces[0], faces[1]); break;
@@ -234,7 +235,7 @@ static void add_flat_cells(test_mesh *mesh)
         default: add_tet(&copy, (const int64_t[]){v[0], v[0], v[0], v[0]}); break;
         }
     }
-    finish_copy(mesh, &copy);
+    complete_copy(mesh, &copy);
 }
 
 /* ---- the same bits --------------------------------------------------------------------------------------------- */
@@ -243,7 +244,7 @@ static void add_flat_cells(test_mesh *mesh)
 static void make_mesh(int kind, double jitter, test_mesh *mesh)
 {
     static const test_mesh_kind kinds[4] = {TEST_POLYHEDRA, TEST_HEXES, TEST_HEXES, TEST_MIXED};
-    test_mesh_lattice(kinds[kind], 4, jitter, test_wave, mesh);
+    test_mesh_make_lattice(kinds[kind], 4, jitter, test_wave_field, mesh);
     if (kind) test_mesh_to_polyhedra(mesh, kind == 2 ? 1 : 0.5);
 }
 
@@ -255,13 +256,13 @@ static void assert_same_bits(rewriting *rewrite)
                 test_mesh mesh;
                 drawn_frame first, other;
                 make_mesh(kind, camera == CAMERA_ALONG_X ? 0 : 0.1, &mesh);
-                draw(&mesh, scene, camera, &first);
+                draw_mesh(&mesh, scene, camera, &first);
                 rewrite(&mesh);
-                draw(&mesh, scene, camera, &other);
+                draw_mesh(&mesh, scene, camera, &other);
                 assert_true(first.list.count > 100);
-                drawn_assert_same(&first, &other);
-                drawn_free(&first);
-                drawn_free(&other);
+                drawn_frame_assert_same(&first, &other);
+                drawn_frame_free(&first);
+                drawn_frame_free(&other);
                 test_mesh_free(&mesh);
             }
 }
@@ -272,20 +273,20 @@ static void repeated_vertices_of_faces_change_no_pixel(void **state)
     assert_same_bits(repeat_vertices);
 }
 
-static void faces_in_one_place_change_no_pixel(void **state)
+static void coincident_faces_change_no_pixel(void **state)
 {
     (void)state;
     assert_same_bits(add_point_faces);
 }
 
-static void faces_turned_over_change_no_pixel(void **state)
+static void reversed_faces_change_no_pixel(void **state)
 {
     (void)state;
     assert_same_bits(reverse_faces);
-    assert_same_bits(reorder_every_second);
+    assert_same_bits(reverse_every_second_cell);
 }
 
-static void polyhedra_of_no_volume_change_no_pixel(void **state)
+static void polyhedra_without_volume_change_no_pixel(void **state)
 {
     (void)state;
     assert_same_bits(add_flat_cells);
@@ -305,7 +306,7 @@ static void assert_reference(const test_mesh *mesh, fixture_camera camera, const
      * excluded. */
     fixture_bounds bounds = fixture_usual_bounds;
     bounds.excluded = 3e-3;
-    const fixture_outcome o = fixture_compare(&f, &bounds, what);
+    const fixture_outcome o = fixture_compare_with_reference(&f, &bounds, what);
     assert_true(o.hits > 20);
     fixture_free(&f);
     open_scene(&f, mesh, SEGMENTS, camera, 23, 19);
@@ -318,13 +319,13 @@ static void assert_reference(const test_mesh *mesh, fixture_camera camera, const
         reference_integral_trace(scene, pixel % 23, pixel / 23, fixture_background, NULL, 0, truth);
         for (int c = 0; c < 4; c++) {
             const double off = fabs((double)drawn.picture.rgba[4 * pixel + c] - truth[c]);
-            worst = test_worse(worst, off);
+            worst = test_larger_error(worst, off);
         }
     }
     fprintf(stderr, "%s, %s, by segments: %.2g\n", what, fixture_camera_name(camera), worst);
     assert_true(worst < 1e-5);
     reference_integral_free(scene);
-    drawn_free(&drawn);
+    drawn_frame_free(&drawn);
     fixture_free(&f);
 }
 
@@ -364,12 +365,12 @@ static bool face_has_middle(int64_t face, int64_t low)
     return test_uniform((uint64_t)(face * 1000 + low), 4) < 0.5;
 }
 
-static void hang_face(const test_mesh *mesh, int64_t face, split_edges *edges, test_mesh *copy)
+static void add_middle_to_face(const test_mesh *mesh, int64_t face, split_edges *edges, test_mesh *copy)
 {
     int64_t loop[64], count = 0;
     for (int64_t i = 0; i < face_size(mesh, face); i++) {
-        const int64_t a = face_vertex(mesh, face, i);
-        const split_edge *e = find_split(edges, copy, a, face_vertex(mesh, face, i + 1));
+        const int64_t a = get_face_vertex(mesh, face, i);
+        const split_edge *e = find_split(edges, copy, a, get_face_vertex(mesh, face, i + 1));
         loop[count++] = a;
         if (e && face_has_middle(face, e->low)) loop[count++] = e->middle;
     }
@@ -378,16 +379,17 @@ static void hang_face(const test_mesh *mesh, int64_t face, split_edges *edges, t
 
 /* Adds to a cell a face without area for each edge of which only one of the cell's two faces has the middle as a
  * vertex. */
-static int hang_cell(const test_mesh *mesh, int64_t cell, split_edges *edges, test_mesh *copy, int64_t more[32])
+static int add_flat_faces_to_cell(const test_mesh *mesh, int64_t cell, split_edges *edges, test_mesh *copy,
+                                  int64_t more[32])
 {
     int count = 0;
     const int64_t *faces = mesh->connectivity + mesh->offsets[cell];
     for (int e = 0; e < edges->count; e++) {
         split_edge *edge = &edges->items[e];
         int at_edge = 0, with = 0;
-        for (int i = 0; i < faces_of(mesh, cell); i++)
+        for (int i = 0; i < count_cell_faces(mesh, cell); i++)
             for (int64_t k = 0; k < face_size(mesh, faces[i]); k++) {
-                const int64_t a = face_vertex(mesh, faces[i], k), b = face_vertex(mesh, faces[i], k + 1);
+                const int64_t a = get_face_vertex(mesh, faces[i], k), b = get_face_vertex(mesh, faces[i], k + 1);
                 if ((a < b ? a : b) != edge->low || (a < b ? b : a) != edge->high) continue;
                 at_edge++;
                 with += face_has_middle(faces[i], edge->low);
@@ -402,49 +404,49 @@ static int hang_cell(const test_mesh *mesh, int64_t cell, split_edges *edges, te
 }
 
 /* Adds vertices in the middle of edges; returns how many cells have faces without area, which neighbours share. */
-static int hang_middles(test_mesh *mesh)
+static int add_edge_middles(test_mesh *mesh)
 {
     test_mesh copy = begin_copy(mesh);
     split_edges edges = {test_allocate(mesh->face_connectivity_count, sizeof(split_edge)), 0};
     int64_t more[32];
     int cells = 0;
-    for (int64_t face = 0; face < mesh->face_count; face++) hang_face(mesh, face, &edges, &copy);
+    for (int64_t face = 0; face < mesh->face_count; face++) add_middle_to_face(mesh, face, &edges, &copy);
     for (int64_t cell = 0; cell < mesh->cell_count; cell++) {
-        const int count = hang_cell(mesh, cell, &edges, &copy, more);
+        const int count = add_flat_faces_to_cell(mesh, cell, &edges, &copy, more);
         cells += count > 0;
         copy_cell(mesh, cell, more, count, &copy);
     }
     free(edges.items);
-    finish_copy(mesh, &copy);
+    complete_copy(mesh, &copy);
     return cells;
 }
 
 /* Checks vertices in the middle of edges that some faces do not have, with the edge's value there; in jittered lattices
  * they are off the edges by rounding. With other values, the field as defined jumps at the face without area, and a
  * ray's profile may take either side up to the next sheet: then the picture must only consist of finite numbers. */
-static void faces_of_no_area_match_the_reference(void **state)
+static void faces_without_area_match_the_reference(void **state)
 {
     (void)state;
     for (fixture_camera camera = 0; camera < CAMERA_ALONG_X; camera++)
         for (int kind = 0; kind < 2; kind++) {
             test_mesh mesh;
-            if (!test_is_whole() && ((int)camera + kind) % 2) continue;
-            test_mesh_lattice(kind ? TEST_TETS : TEST_HEXES, 3, 0.1, test_wave, &mesh);
+            if (!test_is_long_run() && ((int)camera + kind) % 2) continue;
+            test_mesh_make_lattice(kind ? TEST_TETS : TEST_HEXES, 3, 0.1, test_wave_field, &mesh);
             test_mesh_to_polyhedra(&mesh, 1);
-            assert_true(hang_middles(&mesh) > 10);
+            assert_true(add_edge_middles(&mesh) > 10);
             assert_reference(&mesh, camera, kind ? "tets with faces of no area" : "hexes with faces of no area");
-            test_mesh_set_values(&mesh, test_wave);
+            test_mesh_set_values(&mesh, test_wave_field);
             for (scene_kind scene = 0; scene < SCENE_COUNT; scene++) {
                 drawn_frame drawn;
-                draw(&mesh, scene, camera, &drawn);
-                drawn_free(&drawn);
+                draw_mesh(&mesh, scene, camera, &drawn);
+                drawn_frame_free(&drawn);
             }
             test_mesh_free(&mesh);
         }
 }
 
 /* Checks two tets with one common face, which passes a vertex twice, at the point where the tets touch. */
-static void face_through_a_vertex_twice_matches_the_reference(void **state)
+static void face_with_a_repeated_vertex_matches_the_reference(void **state)
 {
     (void)state;
     static const double places[7][3] = {{0, 0, -0.3},     {-0.7, -0.5, -0.3}, {-0.6, 0.6, -0.3}, {0.7, -0.6, -0.3},
@@ -459,7 +461,7 @@ static void face_through_a_vertex_twice_matches_the_reference(void **state)
         for (int i = 0; i < 6; i++) faces[i] = test_mesh_add_face(&mesh, loops[i], 3);
         faces[6] = test_mesh_add_face(&mesh, (const int64_t[]){0, 1, 2, 0, 4, 3}, 6);
         test_mesh_add_polyhedron(&mesh, faces, 7);
-        test_mesh_set_values(&mesh, test_wave);
+        test_mesh_set_values(&mesh, test_wave_field);
         assert_reference(&mesh, camera, "a face through a vertex twice");
         test_mesh_free(&mesh);
     }
@@ -477,15 +479,15 @@ static void flat_polyhedra_are_finite(void **state)
             for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++) {
                 test_mesh mesh;
                 drawn_frame drawn;
-                test_mesh_single(shapes[s], test_wave, &mesh);
+                test_mesh_make_single_cell(shapes[s], test_wave_field, &mesh);
                 for (int64_t v = 0; v < mesh.vertex_count; v++) mesh.values[v] = 2 * test_uniform((uint64_t)v, 5) - 1;
                 test_mesh_to_polyhedra(&mesh, 1);
-                draw(&mesh, scene, camera, &drawn);
+                draw_mesh(&mesh, scene, camera, &drawn);
                 for (int64_t i = 0; scene == SEGMENTS && i < 4 * 61 * 47; i++)
                     if (fabs((double)(drawn.picture.rgba[i] - fixture_background[i % 4])) > 1e-6)
                         fail_msg("%s, %s: pixel %d", test_cell_shape_name(shapes[s]), fixture_camera_name(camera),
                                  (int)(i / 4));
-                drawn_free(&drawn);
+                drawn_frame_free(&drawn);
                 test_mesh_free(&mesh);
             }
 }
@@ -494,11 +496,11 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(repeated_vertices_of_faces_change_no_pixel),
-        cmocka_unit_test(faces_in_one_place_change_no_pixel),
-        cmocka_unit_test(faces_turned_over_change_no_pixel),
-        cmocka_unit_test(polyhedra_of_no_volume_change_no_pixel),
-        cmocka_unit_test(faces_of_no_area_match_the_reference),
-        cmocka_unit_test(face_through_a_vertex_twice_matches_the_reference),
+        cmocka_unit_test(coincident_faces_change_no_pixel),
+        cmocka_unit_test(reversed_faces_change_no_pixel),
+        cmocka_unit_test(polyhedra_without_volume_change_no_pixel),
+        cmocka_unit_test(faces_without_area_match_the_reference),
+        cmocka_unit_test(face_with_a_repeated_vertex_matches_the_reference),
         cmocka_unit_test(flat_polyhedra_are_finite),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

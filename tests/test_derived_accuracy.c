@@ -21,14 +21,14 @@
 
 static const double a = 1.7320508075688772, b = 1.4142135623730951, c = 1, k = 3.14159265358979324;
 
-static void flow(const double p[3], double u[3])
+static void evaluate_velocity(const double p[3], double u[3])
 {
     u[0] = a * sin(k * p[2]) + c * cos(k * p[1]);
     u[1] = b * sin(k * p[0]) + a * cos(k * p[2]);
     u[2] = c * sin(k * p[1]) + b * cos(k * p[0]);
 }
 
-static double true_q_criterion(const double p[3])
+static double exact_q_criterion(const double p[3])
 {
     const double xy = -k * c * sin(k * p[1]), xz = k * a * cos(k * p[2]), yx = k * b * cos(k * p[0]);
     const double yz = -k * a * sin(k * p[2]), zx = -k * b * sin(k * p[0]), zy = k * c * cos(k * p[1]);
@@ -44,8 +44,8 @@ typedef struct sample_sums {
 static void add_sample(const double p[3], const double values[6], sample_sums *sums)
 {
     double u[3];
-    const double q = true_q_criterion(p);
-    flow(p, u);
+    const double q = exact_q_criterion(p);
+    evaluate_velocity(p, u);
     sums->ours += (values[0] - q) * (values[0] - q);
     sums->vtks += (values[1] - q) * (values[1] - q);
     sums->square += q * q;
@@ -73,7 +73,7 @@ static void find_weights(int corners, int place, double weights[8])
 }
 
 /* nodes has 6 numbers for each vertex. */
-static sample_sums compare(const test_mesh *mesh, const double (*nodes)[6])
+static sample_sums compare_with_exact(const test_mesh *mesh, const double (*nodes)[6])
 {
     sample_sums sums = {0};
     for (int64_t cell = 0; cell < mesh->cell_count; cell++) {
@@ -92,15 +92,15 @@ static sample_sums compare(const test_mesh *mesh, const double (*nodes)[6])
     return sums;
 }
 
-static const session_mesh *mesh_of(const insitu_session *session)
+static const session_mesh *get_session_mesh(const insitu_session *session)
 {
     return session_find_mesh(&session->meshes, "m");
 }
 
-static double node_value(const insitu_session *session, const char *name, int component, int64_t vertex)
+static double get_vertex_value(const insitu_session *session, const char *name, int component, int64_t vertex)
 {
     const grid_field values =
-        session_given_field(mesh_of(session), session_find_field(mesh_of(session), name), component);
+        session_caller_field(get_session_mesh(session), session_find_field(get_session_mesh(session), name), component);
     return grid_field_value(&values, vertex);
 }
 
@@ -115,7 +115,8 @@ static insitu_field describe_velocity(const test_mesh *mesh, const float *veloci
     return u;
 }
 
-static insitu_session *begin(const test_mesh *mesh, const float *velocity, const char *scene)
+static insitu_session *open_session_with_mesh_and_velocity(const test_mesh *mesh, const float *velocity,
+                                                           const char *scene)
 {
     insitu_session *session = NULL;
     insitu_mesh given;
@@ -139,7 +140,7 @@ static float *make_velocity(const test_mesh *mesh)
     assert_non_null(velocity);
     for (int64_t v = 0; v < mesh->vertex_count; v++) {
         double u[3];
-        flow(mesh->coordinates + 3 * v, u);
+        evaluate_velocity(mesh->coordinates + 3 * v, u);
         for (int i = 0; i < 3; i++) velocity[3 * v + i] = (float)u[i];
     }
     return velocity;
@@ -150,28 +151,28 @@ typedef struct grid_errors {
     double ours, vtks, curl, divergence;
 } grid_errors;
 
-static grid_errors errors_on(test_mesh_kind kind, int n, double jitter)
+static grid_errors measure_errors(test_mesh_kind kind, int n, double jitter)
 {
     test_mesh mesh;
-    test_mesh_lattice(kind, n, jitter, test_linear, &mesh);
+    test_mesh_make_lattice(kind, n, jitter, test_linear_field, &mesh);
     float *velocity = make_velocity(&mesh);
     double *q = calloc((size_t)mesh.vertex_count, sizeof *q),
            (*nodes)[6] = calloc((size_t)mesh.vertex_count, sizeof *nodes);
     assert_true(q && nodes);
     test_vtk_q_criterion(mesh.vertex_count, mesh.coordinates, mesh.cell_count, mesh.types[0], mesh.connectivity,
                          velocity, 1, q);
-    insitu_session *session =
-        begin(&mesh, velocity,
-              "fields: {q: {q_criterion: u}, w: {vorticity: u}, d: {divergence: u}, all: q + w.x + d}\nimages: [{name: "
-              "a, when: {field: all, above: 1e30}, layers: [{slice: {field: q}}]}]\n");
+    insitu_session *session = open_session_with_mesh_and_velocity(
+        &mesh, velocity,
+        "fields: {q: {q_criterion: u}, w: {vorticity: u}, d: {divergence: u}, all: q + w.x + d}\nimages: [{name: "
+        "a, when: {field: all, above: 1e30}, layers: [{slice: {field: q}}]}]\n");
     assert_int_equal(insitu_step(session, 0, 0), INSITU_OK);
     for (int64_t v = 0; v < mesh.vertex_count; v++) {
-        nodes[v][0] = node_value(session, "q", 0, v);
+        nodes[v][0] = get_vertex_value(session, "q", 0, v);
         nodes[v][1] = q[v];
-        for (int i = 0; i < 3; i++) nodes[v][2 + i] = node_value(session, "w", i, v);
-        nodes[v][5] = node_value(session, "d", 0, v);
+        for (int i = 0; i < 3; i++) nodes[v][2 + i] = get_vertex_value(session, "w", i, v);
+        nodes[v][5] = get_vertex_value(session, "d", 0, v);
     }
-    const sample_sums sums = compare(&mesh, (const double(*)[6])nodes);
+    const sample_sums sums = compare_with_exact(&mesh, (const double(*)[6])nodes);
     insitu_destroy(&session);
     free(velocity);
     free(q);
@@ -187,8 +188,8 @@ static void q_criterion_is_as_accurate_as_vtks(void **state)
     for (test_mesh_kind kind = TEST_TETS; kind <= TEST_HEXES; kind++)
         for (int jittered = 0; jittered < 2; jittered++) {
             double before = 0;
-            for (int n = 8; n <= test_effort(16, 32); n *= 2) {
-                const grid_errors e = errors_on(kind, n, jittered ? 0.2 : 0);
+            for (int n = 8; n <= test_case_count(16, 32); n *= 2) {
+                const grid_errors e = measure_errors(kind, n, jittered ? 0.2 : 0);
                 fprintf(
                     stderr,
                     "%s%s, n = %2d: Q %.4f, VTK's %.4f, ratio %.3f, of order %.2f; vorticity %.4f, divergence %.4f\n",
@@ -201,12 +202,12 @@ static void q_criterion_is_as_accurate_as_vtks(void **state)
 }
 
 /* Returns the time of a step with new velocities for a slice of Q, at all vertices: the minimum over several steps. */
-static double seconds_for_q_criterion(const test_mesh *mesh, const float *velocity)
+static double time_q_criterion(const test_mesh *mesh, const float *velocity)
 {
     static const char scene[] = "threads: 1\nfields: {q: {q_criterion: u}}\nimages: [{name: a, size: [8, 8], layers: "
                                 "[{slice: {field: q, range: [0, 1]}}], outputs: [{path: /dev/null/a.png}]}]\n";
     double least = INFINITY;
-    insitu_session *session = begin(mesh, velocity, scene);
+    insitu_session *session = open_session_with_mesh_and_velocity(mesh, velocity, scene);
     for (int run = 0; run < 5; run++) {
         insitu_field u = describe_velocity(mesh, velocity);
         assert_int_equal(insitu_set_field(session, "m", &u), INSITU_OK);
@@ -222,16 +223,16 @@ static double seconds_for_q_criterion(const test_mesh *mesh, const float *veloci
 static void q_criterion_takes_less_time_than_vtks(void **state)
 {
     (void)state;
-    if (!test_is_whole()) skip();
+    if (!test_is_long_run()) skip();
     for (test_mesh_kind kind = TEST_TETS; kind <= TEST_HEXES; kind++) {
         test_mesh mesh;
-        test_mesh_lattice(kind, 48, 0.2, test_linear, &mesh);
+        test_mesh_make_lattice(kind, 48, 0.2, test_linear_field, &mesh);
         float *velocity = make_velocity(&mesh);
         double *q = calloc((size_t)mesh.vertex_count, sizeof *q);
         assert_non_null(q);
         const double vtks = test_vtk_q_criterion(mesh.vertex_count, mesh.coordinates, mesh.cell_count, mesh.types[0],
                                                  mesh.connectivity, velocity, 5, q);
-        const double ours = seconds_for_q_criterion(&mesh, velocity);
+        const double ours = time_q_criterion(&mesh, velocity);
         fprintf(stderr, "%s: Q of %lld vertices in %.1f ms, VTK in %.1f ms, ratio %.3f\n", test_mesh_kind_name(kind),
                 (long long)mesh.vertex_count, 1e3 * ours, 1e3 * vtks, ours / vtks);
         assert_true(ours <= (kind == TEST_TETS ? 0.5 : 0.4) * vtks);

@@ -19,18 +19,19 @@ static int cubes = 8, width = 320, height = 240;
 /* Makes a dual mesh; noise is added to the values of the wave. */
 static void make_dual(int n, double noise, test_mesh *out)
 {
-    test_mesh_dual(n, 0.15, test_wave, out);
-    for (int64_t v = 0; v < out->vertex_count; v++) out->values[v] += noise * test_uniform_in((uint64_t)v, 31, -1, 1);
+    test_mesh_make_dual(n, 0.15, test_wave_field, out);
+    for (int64_t v = 0; v < out->vertex_count; v++)
+        out->values[v] += noise * test_uniform_between((uint64_t)v, 31, -1, 1);
 }
 
-static void duals_are_their_own_tets(void **state)
+static void dual_cells_match_their_split_tets(void **state)
 {
     (void)state;
     for (int pass = 0; pass < 2; pass++) {
         test_mesh mesh;
         make_dual(cubes, pass ? 0.4 : 0, &mesh);
         test_mesh_split_quads(&mesh);
-        const own_tets_tally t = own_tets_compare(&mesh, 2.0 / cubes, 0.3, width, height);
+        const own_tets_tally t = compare_with_split_tets(&mesh, 2.0 / cubes, 0.3, width, height);
         printf("%lld cells, %lld of them not star-shaped, %s: %lld pixels, %lld missing, %lld added; %lld left out\n",
                (long long)mesh.cell_count, (long long)t.ghosts, pass ? "noise" : "wave", (long long)t.pixels,
                (long long)t.missing, (long long)t.added, (long long)t.in_band);
@@ -55,7 +56,8 @@ static void duals_match_the_reference(void **state)
                        (const double[]){0, 0, 0});
         fixture_set_camera(&f, camera, 33, 29);
         fixture_add_surface(&f, values, 2, 0.5f);
-        const fixture_outcome o = fixture_compare(&f, &fixture_usual_bounds, fixture_camera_name(camera));
+        const fixture_outcome o =
+            fixture_compare_with_reference(&f, &fixture_usual_bounds, fixture_camera_name(camera));
         assert_true(o.hits > 100);
         fixture_free(&f);
         test_mesh_free(&mesh);
@@ -65,7 +67,7 @@ static void duals_match_the_reference(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(duals_are_their_own_tets),
+        cmocka_unit_test(dual_cells_match_their_split_tets),
         cmocka_unit_test(duals_match_the_reference),
     };
     if (argc > 1) cubes = atoi(argv[1]), width = 1280, height = 960;

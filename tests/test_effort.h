@@ -6,16 +6,16 @@
 #include <stdbool.h>
 #include <stdlib.h>
 
-static inline bool test_is_whole(void)
+static inline bool test_is_long_run(void)
 {
     const char *whole = getenv("INSITU_TEST_WHOLE");
     return whole && whole[0] == '1';
 }
 
 /* Returns the number of cases to run. */
-static inline int test_effort(int usual, int whole)
+static inline int test_case_count(int usual, int whole)
 {
-    return test_is_whole() ? whole : usual;
+    return test_is_long_run() ? whole : usual;
 }
 
 #endif

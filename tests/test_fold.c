@@ -50,7 +50,7 @@ static void make_ray(ray *r, double density, double gap, double surface)
 }
 
 /* Distributes runs of consecutive fragments over the ranks. */
-static void distribute(ray *r, double change)
+static void distribute_fragments(ray *r, double change)
 {
     int owner = 0;
     for (int64_t i = 0; i < r->count; i++) {
@@ -61,7 +61,7 @@ static void distribute(ray *r, double change)
 
 /* Computes the fragments that the rank sends: for each connected run between surfaces, the fold of each tree node that
  * the rank has completely. */
-static int64_t send(const ray *r, int rank, fragment *out)
+static int64_t fold_for_rank(const ray *r, int rank, fragment *out)
 {
     int64_t count = 0;
     for (int64_t i = 0, n; i < r->count; i += n) {
@@ -85,12 +85,12 @@ static int64_t send(const ray *r, int rank, fragment *out)
 
 static const float background[4] = {0.1f, 0.2f, 0.3f, 1};
 
-static void merge(const ray *r, float rgba[4], int64_t *sent)
+static void merge_folded_fragments(const ray *r, float rgba[4], int64_t *sent)
 {
     fragment items[MOST];
     float depth;
     *sent = 0;
-    for (int rank = 0; rank < RANKS; rank++) *sent += send(r, rank, items + *sent);
+    for (int rank = 0; rank < RANKS; rank++) *sent += fold_for_rank(r, rank, items + *sent);
     comp_merge_folded_pixel(items, *sent, background, rgba, &depth);
 }
 
@@ -109,7 +109,7 @@ static void blend_in_double(const ray *r, double rgba[4])
 /* Compares the result with blending in double. A fragment adds a product and a sum of colours and a product of
  * transmittances, which affects all fragments behind it: three roundings of 2^-24 of values of at most 1. Dark segments
  * may be left out. */
-static void verify(const ray *r, const float rgba[4])
+static void verify_pixel(const ray *r, const float rgba[4])
 {
     double expected[4];
     blend_in_double(r, expected);
@@ -120,7 +120,7 @@ static void verify(const ray *r, const float rgba[4])
     }
 }
 
-static void fold_is_the_same_on_any_ranks(void **state)
+static void folded_result_does_not_depend_on_distribution(void **state)
 {
     static ray r;
     int64_t whole = 0, parts = 0;
@@ -130,12 +130,12 @@ static void fold_is_the_same_on_any_ranks(void **state)
         int64_t sent;
         make_ray(&r, n % 3 ? 2 : 200, n % 2 ? 0.05 : 0, n % 5 ? 0 : 0.1);
         memset(r.owners, 0, sizeof r.owners);
-        merge(&r, alone, &sent);
+        merge_folded_fragments(&r, alone, &sent);
         whole += sent;
-        verify(&r, alone);
+        verify_pixel(&r, alone);
         for (int distributed = 0; distributed < 4; distributed++) {
-            distribute(&r, distributed == 0 ? 1 : 0.3 / (1 + 3 * distributed));
-            merge(&r, shared, &sent);
+            distribute_fragments(&r, distributed == 0 ? 1 : 0.3 / (1 + 3 * distributed));
+            merge_folded_fragments(&r, shared, &sent);
             parts += sent;
             assert_memory_equal(alone, shared, sizeof alone);
         }
@@ -145,6 +145,6 @@ static void fold_is_the_same_on_any_ranks(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(fold_is_the_same_on_any_ranks)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(folded_result_does_not_depend_on_distribution)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -19,9 +19,9 @@ static const test_mesh_kind kinds[4] = {TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS, 
 static const double values[3] = {-0.3, 0.1, 0.4};
 
 /* Moves vertices by up to 1.33 cells: most cells are then inverted somewhere. */
-static void tangle(test_mesh_kind kind, test_mesh *out)
+static void make_tangled_mesh(test_mesh_kind kind, test_mesh *out)
 {
-    test_mesh_lattice(kind, SIDE, 0.2, test_wave, out);
+    test_mesh_make_lattice(kind, SIDE, 0.2, test_wave_field, out);
     for (int64_t v = 0; v < out->vertex_count; v++)
         for (int a = 0; a < 3; a++)
             out->coordinates[3 * v + a] += (4.0 / 3 * test_uniform((uint64_t)(3 * v + a), 11) - 2.0 / 3) * 2 / SIDE;
@@ -41,7 +41,7 @@ static void set_scene(render_fixture *f, scene_kind scene)
     f->surfaces[0].difference = 1;
 }
 
-static void stage(render_fixture *f, const test_mesh *mesh, fixture_camera camera, scene_kind scene)
+static void set_up_frame(render_fixture *f, const test_mesh *mesh, fixture_camera camera, scene_kind scene)
 {
     fixture_create(f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 2.0 / SIDE, 1,
                    (const double[]){0, 0, 0});
@@ -56,12 +56,12 @@ static void assert_finite(const fragment *item)
     if (!is_finite) fail_msg("pixel %u: t %g to %g", item->pixel, (double)item->t_in, (double)item->t_out);
 }
 
-static bool is_due(int kind, fixture_camera camera, scene_kind scene)
+static bool is_case_selected(int kind, fixture_camera camera, scene_kind scene)
 {
-    return test_is_whole() || (kind + (int)camera + (int)scene) % 4 == 0;
+    return test_is_long_run() || (kind + (int)camera + (int)scene) % 4 == 0;
 }
 
-static void folded_cells_make_numbers(void **state)
+static void folded_cells_give_finite_pixels(void **state)
 {
     (void)state;
     int64_t failures = 0;
@@ -71,15 +71,15 @@ static void folded_cells_make_numbers(void **state)
                 test_mesh mesh;
                 render_fixture f;
                 drawn_frame drawn;
-                if (!is_due(k, camera, scene)) continue;
-                tangle(kinds[k], &mesh);
-                stage(&f, &mesh, camera, scene);
+                if (!is_case_selected(k, camera, scene)) continue;
+                make_tangled_mesh(kinds[k], &mesh);
+                set_up_frame(&f, &mesh, camera, scene);
                 fixture_draw(&f, &drawn);
                 assert_true(drawn.list.count > 100);
                 for (int64_t i = 0; i < drawn.list.count; i++) assert_finite(&drawn.list.items[i]);
                 for (int i = 0; i < 4 * WIDTH * HEIGHT; i++) assert_true(isfinite(drawn.picture.rgba[i]));
                 failures += drawn.statistics.map_failures;
-                drawn_free(&drawn);
+                drawn_frame_free(&drawn);
                 fixture_free(&f);
                 test_mesh_free(&mesh);
             }
@@ -93,23 +93,23 @@ static void draw_distributed(const test_mesh *mesh, scene_kind scene, drawn_fram
 {
     render_fixture parts[RANKS];
     int *owners = malloc((size_t)mesh->cell_count * sizeof *owners);
-    test_partition(mesh, TEST_RANDOM, SIDE, RANKS, owners);
+    test_partition_cells(mesh, TEST_RANDOM, SIDE, RANKS, owners);
     for (int rank = 0; rank < RANKS; rank++) {
         test_mesh part;
-        test_mesh_part(mesh, owners, rank, &part);
-        test_mesh_shuffle(&part, (uint64_t)rank + 20);
+        test_mesh_extract_part(mesh, owners, rank, &part);
+        test_mesh_shuffle_cells(&part, (uint64_t)rank + 20);
         test_mesh_reorder_vertices(&part, (uint64_t)rank + 40);
-        stage(&parts[rank], &part, CAMERA_OUTSIDE, scene);
+        set_up_frame(&parts[rank], &part, CAMERA_OUTSIDE, scene);
         parts[rank].job.is_alone = false;
         parts[rank].job.separate_samples = scene == SAMPLES;
         test_mesh_free(&part);
     }
-    fixture_draw_apart(parts, RANKS, out);
+    fixture_draw_distributed(parts, RANKS, out);
     for (int rank = 0; rank < RANKS; rank++) fixture_free(&parts[rank]);
     free(owners);
 }
 
-static void numbers_of_cells_and_ranks_do_not_show(void **state)
+static void numbering_and_ranks_change_no_pixel(void **state)
 {
     static const scene_kind scenes[2] = {CLEAR, SAMPLES};
     (void)state;
@@ -118,22 +118,22 @@ static void numbers_of_cells_and_ranks_do_not_show(void **state)
             test_mesh mesh;
             render_fixture f;
             drawn_frame whole, distributed;
-            tangle(kinds[k], &mesh);
-            stage(&f, &mesh, CAMERA_OUTSIDE, scenes[s]);
+            make_tangled_mesh(kinds[k], &mesh);
+            set_up_frame(&f, &mesh, CAMERA_OUTSIDE, scenes[s]);
             f.job.separate_samples = scenes[s] == SAMPLES;
             fixture_draw(&f, &whole);
             draw_distributed(&mesh, scenes[s], &distributed);
-            if (scenes[s] != SAMPLES) drawn_assert_same(&whole, &distributed);
-            if (!(drawn_difference(&whole, &distributed) <= 1e-6))
-                fail_msg("off by %g", drawn_difference(&whole, &distributed));
-            drawn_free(&whole);
-            drawn_free(&distributed);
+            if (scenes[s] != SAMPLES) drawn_frame_assert_same(&whole, &distributed);
+            if (!(drawn_frame_difference(&whole, &distributed) <= 1e-6))
+                fail_msg("off by %g", drawn_frame_difference(&whole, &distributed));
+            drawn_frame_free(&whole);
+            drawn_frame_free(&distributed);
             fixture_free(&f);
             test_mesh_free(&mesh);
         }
 }
 
-static void maps_of_sound_cells_converge(void **state)
+static void inverse_maps_of_valid_cells_converge(void **state)
 {
     (void)state;
     for (int k = 0; k < 4; k++)
@@ -142,9 +142,9 @@ static void maps_of_sound_cells_converge(void **state)
                 test_mesh mesh;
                 render_fixture f;
                 drawn_frame drawn;
-                if (!is_due(k, camera, scene)) continue;
-                test_mesh_lattice(kinds[k], SIDE, 0.2, test_wave, &mesh);
-                stage(&f, &mesh, camera, scene);
+                if (!is_case_selected(k, camera, scene)) continue;
+                test_mesh_make_lattice(kinds[k], SIDE, 0.2, test_wave_field, &mesh);
+                set_up_frame(&f, &mesh, camera, scene);
                 fixture_draw(&f, &drawn);
                 /* Along x, rays lie in faces and edges at the border of the mesh, where a pyramid's map has no inverse
                  * at its apex. */
@@ -153,7 +153,7 @@ static void maps_of_sound_cells_converge(void **state)
                 if (drawn.statistics.map_failures > allowed)
                     fail_msg("%s, %s: %lld inverse maps failed", test_mesh_kind_name(kinds[k]),
                              fixture_camera_name(camera), (long long)drawn.statistics.map_failures);
-                drawn_free(&drawn);
+                drawn_frame_free(&drawn);
                 fixture_free(&f);
                 test_mesh_free(&mesh);
             }
@@ -161,11 +161,11 @@ static void maps_of_sound_cells_converge(void **state)
 
 int main(void)
 {
-    if (fixture_set_is_unavailable()) return 77;
+    if (fixture_isa_is_unavailable()) return 77;
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(folded_cells_make_numbers),
-        cmocka_unit_test(numbers_of_cells_and_ranks_do_not_show),
-        cmocka_unit_test(maps_of_sound_cells_converge),
+        cmocka_unit_test(folded_cells_give_finite_pixels),
+        cmocka_unit_test(numbering_and_ranks_change_no_pixel),
+        cmocka_unit_test(inverse_maps_of_valid_cells_converge),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -50,7 +50,7 @@ const phrase phrases[] = {
 };
 
 /* Draws white letters on opaque black. */
-std::vector<float> draw(const char *text, std::string &warning)
+std::vector<float> draw_text(const char *text, std::string &warning)
 {
     const insitu_words words{text, INSITU_TOP_LEFT, 1};
     insitu_decorations what{};
@@ -72,20 +72,20 @@ std::vector<float> draw(const char *text, std::string &warning)
 }
 
 /* Renders the text by FreeType, from `left` on this baseline. */
-class oracle
+class freetype_reference
 {
   public:
-    oracle()
+    freetype_reference()
     {
         assert_int_equal(FT_Init_FreeType(&library_), 0);
         assert_int_equal(FT_New_Face(library_, "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf", 0, &face_), 0);
         assert_int_equal(FT_Set_Pixel_Sizes(face_, 0, size), 0);
     }
-    ~oracle() { FT_Done_FreeType(library_); }
-    oracle(const oracle &) = delete;
-    oracle &operator=(const oracle &) = delete;
+    ~freetype_reference() { FT_Done_FreeType(library_); }
+    freetype_reference(const freetype_reference &) = delete;
+    freetype_reference &operator=(const freetype_reference &) = delete;
 
-    std::vector<float> draw(const std::vector<char32_t> &characters, int left, int baseline)
+    std::vector<float> draw_text(const std::vector<char32_t> &characters, int left, int baseline)
     {
         std::vector<float> out(static_cast<std::size_t>(width * height));
         FT_UInt before = 0;
@@ -95,7 +95,7 @@ class oracle
             if (before) FT_Get_Kerning(face_, before, glyph, FT_KERNING_DEFAULT, &kern);
             left += static_cast<int>(kern.x >> 6);
             assert_int_equal(FT_Load_Glyph(face_, glyph, FT_LOAD_RENDER), 0);
-            put(out, left, baseline);
+            draw_glyph(out, left, baseline);
             left += static_cast<int>(face_->glyph->advance.x >> 6);
             before = glyph;
         }
@@ -103,7 +103,7 @@ class oracle
     }
 
   private:
-    void put(std::vector<float> &out, int left, int baseline)
+    void draw_glyph(std::vector<float> &out, int left, int baseline)
     {
         const FT_GlyphSlot g = face_->glyph;
         for (unsigned row = 0; row < g->bitmap.rows; row++)
@@ -120,7 +120,7 @@ class oracle
     FT_Face face_ = nullptr;
 };
 
-double difference(const std::vector<float> &a, const std::vector<float> &b)
+double largest_difference(const std::vector<float> &a, const std::vector<float> &b)
 {
     double worst = 0;
     for (std::size_t i = 0; i < a.size(); i++) worst = std::fmax(worst, std::fabs(static_cast<double>(a[i] - b[i])));
@@ -130,16 +130,16 @@ double difference(const std::vector<float> &a, const std::vector<float> &b)
 /* Finds the block of text near the corner; all its pixels must equal FreeType's up to roundings of a few 2^-24. */
 void expect_glyphs(const char *text, const std::vector<char32_t> &characters, std::string &warning)
 {
-    oracle truth;
-    const std::vector<float> found = draw(text, warning);
+    freetype_reference reference;
+    const std::vector<float> found = draw_text(text, warning);
     double least = 2;
     for (int left = 0; left < 30 && least > 1e-5; left++)
         for (int baseline = size; baseline < 2 * size + 10 && least > 1e-5; baseline++)
-            least = std::fmin(least, difference(found, truth.draw(characters, left, baseline)));
+            least = std::fmin(least, largest_difference(found, reference.draw_text(characters, left, baseline)));
     if (!(least < 1e-5)) fail_msg("\"%s\": pixels differ by %g", text, least);
 }
 
-void words_beyond_ascii_are_freetypes_glyphs(void **)
+void text_beyond_ascii_matches_freetype_glyphs(void **)
 {
     for (const phrase &p : phrases) {
         std::string warning;
@@ -149,7 +149,7 @@ void words_beyond_ascii_are_freetypes_glyphs(void **)
 }
 
 /* Checks a missing glyph: DejaVuSans has no Chinese characters and draws glyph 0, a box. */
-void a_missing_glyph_is_a_box_and_a_warning(void **)
+void missing_glyph_gives_a_box_and_a_warning(void **)
 {
     std::string warning;
     expect_glyphs("\u6e29 a", {0x6E29, ' ', 'a'}, warning);
@@ -168,12 +168,12 @@ void bytes_that_are_not_utf8_are_replaced(void **)
         std::string warning;
         assert_int_equal(decode_utf8(c.text, is_bad).size(), c.characters);
         assert_true(is_bad);
-        draw(c.text, warning);
+        draw_text(c.text, warning);
         assert_non_null(std::strstr(warning.c_str(), "not UTF-8"));
     }
 }
 
-std::string font_fault(const std::string &folders)
+std::string find_font_error(const std::string &folders)
 {
     const insitu_words words{"a", INSITU_TOP_LEFT, 1};
     insitu_decorations what{};
@@ -187,16 +187,16 @@ std::string font_fault(const std::string &folders)
     return faults.font;
 }
 
-void a_font_of_the_users_that_cannot_be_read_is_a_warning(void **)
+void unreadable_user_font_gives_a_warning(void **)
 {
     const std::filesystem::path folder = std::filesystem::temp_directory_path() / ("glyphs" + std::to_string(getpid()));
     const std::string file = folder / "DejaVuSans.ttf", system = "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf";
     std::filesystem::create_directory(folder);
-    const std::string absent = font_fault(folder);
+    const std::string absent = find_font_error(folder);
     std::ofstream(file) << "no font";
-    const std::string unreadable = font_fault("/nowhere:" + folder.string());
+    const std::string unreadable = find_font_error("/nowhere:" + folder.string());
     std::filesystem::copy_file(system, file, std::filesystem::copy_options::overwrite_existing);
-    const std::string good = font_fault(folder);
+    const std::string good = find_font_error(folder);
     std::filesystem::remove_all(folder);
     assert_non_null(std::strstr(absent.c_str(), ("OPENIMAGEIO_FONTS, which is " + folder.string()).c_str()));
     assert_non_null(std::strstr(absent.c_str(), ("words are drawn by " + system).c_str()));
@@ -208,9 +208,9 @@ void a_font_of_the_users_that_cannot_be_read_is_a_warning(void **)
 
 int main()
 {
-    const CMUnitTest tests[] = {cmocka_unit_test(words_beyond_ascii_are_freetypes_glyphs),
-                                cmocka_unit_test(a_missing_glyph_is_a_box_and_a_warning),
+    const CMUnitTest tests[] = {cmocka_unit_test(text_beyond_ascii_matches_freetype_glyphs),
+                                cmocka_unit_test(missing_glyph_gives_a_box_and_a_warning),
                                 cmocka_unit_test(bytes_that_are_not_utf8_are_replaced),
-                                cmocka_unit_test(a_font_of_the_users_that_cannot_be_read_is_a_warning)};
+                                cmocka_unit_test(unreadable_user_font_gives_a_warning)};
     return cmocka_run_group_tests(tests, nullptr, nullptr);
 }

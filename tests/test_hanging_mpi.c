@@ -41,7 +41,7 @@ enum { VOLUME_COUNT = sizeof volumes / sizeof volumes[0] };
 
 static const double surface_values[2] = {0.05, 0.3};
 
-static void stage(render_fixture *f, const test_mesh *mesh, const drawing *d, fixture_camera camera)
+static void set_up_frame(render_fixture *f, const test_mesh *mesh, const drawing *d, fixture_camera camera)
 {
     fixture_create(f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 2.0 / SIDE, 1,
                    (const double[]){0, 0, 0});
@@ -53,7 +53,7 @@ static void stage(render_fixture *f, const test_mesh *mesh, const drawing *d, fi
     f->job.extent = 2 * sqrt(3);
 }
 
-static int64_t draw(render_fixture *f, MPI_Comm comm, bool is_alone, image *out)
+static int64_t draw_mesh(render_fixture *f, MPI_Comm comm, bool is_alone, image *out)
 {
     session_frame frame;
     base_error error = {0};
@@ -77,23 +77,23 @@ static void free_image(image *picture)
 static int64_t draw_whole(const test_mesh *mesh, const drawing *d, fixture_camera camera, image *out)
 {
     render_fixture f;
-    stage(&f, mesh, d, camera);
-    const int64_t overlaps = draw(&f, MPI_COMM_SELF, true, out);
+    set_up_frame(&f, mesh, d, camera);
+    const int64_t overlaps = draw_mesh(&f, MPI_COMM_SELF, true, out);
     fixture_free(&f);
     return overlaps;
 }
 
 /* Draws as the session does: every rank draws its share. */
-static int64_t draw_shares(const test_mesh *mesh, test_partition_kind partition, const drawing *d,
-                           fixture_camera camera, image *out)
+static int64_t draw_distributed(const test_mesh *mesh, test_partition_kind partition, const drawing *d,
+                                fixture_camera camera, image *out)
 {
     render_fixture f;
     test_mesh share;
     int *owners = malloc((size_t)mesh->cell_count * sizeof *owners);
-    test_partition(mesh, partition, SIDE, rank_count, owners);
-    test_mesh_part(mesh, owners, my_rank, &share);
-    stage(&f, &share, d, camera);
-    const int64_t overlaps = draw(&f, MPI_COMM_WORLD, rank_count == 1, out);
+    test_partition_cells(mesh, partition, SIDE, rank_count, owners);
+    test_mesh_extract_part(mesh, owners, my_rank, &share);
+    set_up_frame(&f, &share, d, camera);
+    const int64_t overlaps = draw_mesh(&f, MPI_COMM_WORLD, rank_count == 1, out);
     fixture_free(&f);
     test_mesh_free(&share);
     free(owners);
@@ -107,10 +107,11 @@ static void assert_everywhere(bool is_well)
     assert_true(all);
 }
 
-static double difference(const image *a, const image *b)
+static double largest_image_difference(const image *a, const image *b)
 {
     double worst = 0;
-    for (int i = 0; i < 4 * PIXELS; i++) worst = test_worse(worst, fabs((double)a->rgba[i] - (double)b->rgba[i]));
+    for (int i = 0; i < 4 * PIXELS; i++)
+        worst = test_larger_error(worst, fabs((double)a->rgba[i] - (double)b->rgba[i]));
     return worst;
 }
 
@@ -134,7 +135,7 @@ enum { CASE_COUNT = sizeof cases / sizeof cases[0] };
 
 static void make_mesh(const hanging_case *c, test_function *f, test_mesh *out)
 {
-    test_mesh_hanging(c->kind, SIDE, c->side, c->shape, f, out);
+    test_mesh_make_hanging(c->kind, SIDE, c->side, c->shape, f, out);
     if (c->is_polyhedral) test_mesh_to_polyhedra(out, 1);
 }
 
@@ -152,13 +153,13 @@ static bool is_as_integrated(const test_mesh *mesh, const drawing *d, fixture_ca
                              const char *what)
 {
     render_fixture f;
-    stage(&f, mesh, d, camera);
+    set_up_frame(&f, mesh, d, camera);
     reference_integral *scene = reference_integral_create(&f.job, 1e-8);
     double worst = 0;
     for (int p = 0; p < PIXELS; p += 29) {
         double rgba[4];
         reference_integral_trace(scene, p % WIDTH, p / WIDTH, fixture_background, NULL, 0, rgba);
-        for (int c = 0; c < 4; c++) worst = test_worse(worst, fabs((double)drawn->rgba[4 * p + c] - rgba[c]));
+        for (int c = 0; c < 4; c++) worst = test_larger_error(worst, fabs((double)drawn->rgba[4 * p + c] - rgba[c]));
     }
     reference_integral_free(scene);
     fixture_free(&f);
@@ -173,10 +174,10 @@ static bool is_one_picture(const test_mesh *mesh, test_partition_kind partition,
 {
     image ours, whole;
     bool good = true;
-    const int64_t overlaps = draw_shares(mesh, partition, d, camera, &ours);
+    const int64_t overlaps = draw_distributed(mesh, partition, d, camera, &ours);
     if (my_rank == 0) {
         const int64_t alone = draw_whole(mesh, d, camera, &whole);
-        const double off = difference(&whole, &ours);
+        const double off = largest_image_difference(&whole, &ours);
         good = !overlaps && !alone && off <= 1e-6;
         if (!good || getenv("INSITU_TEST_VERBOSE"))
             fprintf(stderr, "%s, %d ranks, %s, %s, %s: %d pixels overlap, %d alone; colour differs by %g\n", what,
@@ -190,7 +191,7 @@ static bool is_one_picture(const test_mesh *mesh, test_partition_kind partition,
     return good;
 }
 
-static void hanging_nodes_are_no_overlaps(void **state)
+static void hanging_nodes_do_not_count_as_overlaps(void **state)
 {
     (void)state;
     bool good = true;
@@ -198,7 +199,7 @@ static void hanging_nodes_are_no_overlaps(void **state)
         test_mesh mesh;
         char what[80];
         name_case(&cases[i], what, sizeof what);
-        make_mesh(&cases[i], test_wave, &mesh);
+        make_mesh(&cases[i], test_wave_field, &mesh);
         for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++) {
             const drawing *d = &volumes[(i + (int)camera) % VOLUME_COUNT];
             const test_partition_kind partition = (i / VOLUME_COUNT + (int)camera) % 2 ? TEST_BLOCK : TEST_RANDOM;
@@ -211,15 +212,15 @@ static void hanging_nodes_are_no_overlaps(void **state)
 
 /* ---- surfaces ------------------------------------------------------------------------------------------------ */
 
-/* Computes the depth at which the ray of a pixel meets the plane on which test_linear() has the value. Returns whether
- * that point is well inside the mesh: all shapes contain the ball of radius 0.5. */
+/* Computes the depth at which the ray of a pixel meets the plane on which test_linear_field() has the value. Returns
+ * whether that point is well inside the mesh: all shapes contain the ball of radius 0.5. */
 static bool intersects_plane(const render_camera *camera, int p, double value, double *depth)
 {
     double base[3], direction[3], end[3], distance = 0;
     render_camera_ray(camera, p % WIDTH, p / WIDTH, base, direction);
-    const double at_base = test_linear(base);
+    const double at_base = test_linear_field(base);
     for (int a = 0; a < 3; a++) end[a] = base[a] + direction[a];
-    const double slope = test_linear(end) - at_base;
+    const double slope = test_linear_field(end) - at_base;
     *depth = (value - at_base) / slope;
     for (int a = 0; a < 3; a++) {
         const double x = base[a] + *depth * direction[a];
@@ -239,16 +240,16 @@ static bool is_plane_whole(const hanging_case *c, fixture_camera camera)
     double worst = 0, depth;
     char what[80];
     name_case(c, what, sizeof what);
-    make_mesh(c, test_linear, &mesh);
-    draw_shares(&mesh, TEST_RANDOM, &plane, camera, &drawn);
-    stage(&f, &mesh, &plane, camera);
+    make_mesh(c, test_linear_field, &mesh);
+    draw_distributed(&mesh, TEST_RANDOM, &plane, camera, &drawn);
+    set_up_frame(&f, &mesh, &plane, camera);
     for (int p = 0; p < PIXELS && my_rank == 0; p++) {
         if (!intersects_plane(&f.job.camera, p, surface_values[0], &depth)) continue;
         met++;
         if (!(drawn.depth[p] < INFINITY))
             holes++;
         else
-            worst = test_worse(worst, fabs(fixture_depth(&f, drawn.depth[p]) - depth));
+            worst = test_larger_error(worst, fabs(fixture_scene_depth(&f, drawn.depth[p]) - depth));
     }
     const bool good = my_rank != 0 || (met > 30 && !holes && worst < 1e-5);
     if (!good)
@@ -275,19 +276,19 @@ static void surfaces_continue_across_hanging_nodes(void **state)
 /* Checks refinement that moves hanging nodes off the coarse face, so that cells do overlap. Any number of ranks must
  * detect that, and pictures agree to max_error: whether an overlap that is almost transparent is detected depends on
  * the partition. */
-static void nodes_off_the_coarse_face_overlap(void **state)
+static void nodes_off_the_coarse_face_count_as_overlaps(void **state)
 {
     (void)state;
     bool good = true;
     for (int v = 0; v < 3; v++) {
         test_mesh mesh;
         image ours, whole;
-        test_mesh_hanging(TEST_HEXES, SIDE, 2, TEST_HANGING_ROUND, test_wave, &mesh);
-        const int64_t overlaps = draw_shares(&mesh, TEST_RANDOM, &volumes[v], CAMERA_OUTSIDE, &ours);
+        test_mesh_make_hanging(TEST_HEXES, SIDE, 2, TEST_HANGING_ROUND, test_wave_field, &mesh);
+        const int64_t overlaps = draw_distributed(&mesh, TEST_RANDOM, &volumes[v], CAMERA_OUTSIDE, &ours);
         if (my_rank == 0) {
             const double bound = volumes[v].max_error > 0 ? volumes[v].max_error : 1e-6;
             const int64_t alone = draw_whole(&mesh, &volumes[v], CAMERA_OUTSIDE, &whole);
-            const double off = difference(&whole, &ours);
+            const double off = largest_image_difference(&whole, &ours);
             good = good && overlaps > 50 && alone > 50 && off <= bound;
             if (!good)
                 fprintf(stderr, "%s, %d ranks: %d pixels overlap, %d alone; colour differs by %g\n", volumes[v].name,
@@ -303,9 +304,9 @@ static void nodes_off_the_coarse_face_overlap(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(hanging_nodes_are_no_overlaps),
+        cmocka_unit_test(hanging_nodes_do_not_count_as_overlaps),
         cmocka_unit_test(surfaces_continue_across_hanging_nodes),
-        cmocka_unit_test(nodes_off_the_coarse_face_overlap),
+        cmocka_unit_test(nodes_off_the_coarse_face_count_as_overlaps),
     };
     MPI_Init(&argc, &argv);
     MPI_Comm_rank(MPI_COMM_WORLD, &my_rank);

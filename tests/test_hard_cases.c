@@ -15,7 +15,7 @@ static const test_mesh_kind kinds[5] = {TEST_TETS, TEST_HEXES, TEST_WEDGES, TEST
 /* The scenes: an opaque surface, transparent surfaces in a sampled volume, and a volume by segments. */
 typedef enum scene_kind { OPAQUE, SURFACES_IN_SAMPLES, SEGMENTS, SCENE_COUNT } scene_kind;
 
-static void draw(const test_mesh *mesh, scene_kind scene, fixture_camera camera, drawn_frame *out)
+static void draw_mesh(const test_mesh *mesh, scene_kind scene, fixture_camera camera, drawn_frame *out)
 {
     render_fixture f;
     fixture_create(&f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 0.5, 1,
@@ -34,7 +34,7 @@ typedef enum collapse { TO_A_POINT, TO_AN_EDGE, TO_A_FACE, COLLAPSE_COUNT } coll
 
 /* Returns the index of the vertex that replaces vertex i. TO_A_FACE leaves the cell's first face with all its corners,
  * so that the cell is that face twice. */
-static int stand_in(int type, collapse how, int i)
+static int find_replacing_vertex(int type, collapse how, int i)
 {
     static const int tet[4] = {0, 1, 2, 2}, pyramid[5] = {0, 1, 1, 0, 4};
     if (how == TO_A_POINT) return 0;
@@ -42,7 +42,7 @@ static int stand_in(int type, collapse how, int i)
     return type == GRID_TET ? tet[i] : type == GRID_PYRAMID ? pyramid[i] : type == GRID_WEDGE ? i % 3 : i % 4;
 }
 
-static void *grow(void *block, int64_t count, size_t size)
+static void *grow_array(void *block, int64_t count, size_t size)
 {
     void *larger = realloc(block, (size_t)count * size);
     assert_non_null(larger);
@@ -53,23 +53,23 @@ static void *grow(void *block, int64_t count, size_t size)
 static void add_collapsed(test_mesh *mesh)
 {
     const int64_t cells = mesh->cell_count, most = cells + cells / 3 + 1;
-    mesh->types = grow(mesh->types, most, 1);
-    mesh->ghosts = grow(mesh->ghosts, most, 1);
-    mesh->offsets = grow(mesh->offsets, most + 1, sizeof *mesh->offsets);
-    mesh->connectivity = grow(mesh->connectivity, 8 * most, sizeof *mesh->connectivity);
+    mesh->types = grow_array(mesh->types, most, 1);
+    mesh->ghosts = grow_array(mesh->ghosts, most, 1);
+    mesh->offsets = grow_array(mesh->offsets, most + 1, sizeof *mesh->offsets);
+    mesh->connectivity = grow_array(mesh->connectivity, 8 * most, sizeof *mesh->connectivity);
     for (int64_t cell = 0; cell < cells; cell += 3) {
         const int64_t first = mesh->offsets[cell];
         const int type = mesh->types[cell], count = grid_type_vertices(type);
         for (int i = 0; i < count; i++)
             mesh->connectivity[mesh->connectivity_count++] =
-                mesh->connectivity[first + stand_in(type, (collapse)(cell / 3 % COLLAPSE_COUNT), i)];
+                mesh->connectivity[first + find_replacing_vertex(type, (collapse)(cell / 3 % COLLAPSE_COUNT), i)];
         mesh->ghosts[mesh->cell_count] = 0;
         mesh->types[mesh->cell_count++] = (unsigned char)type;
         mesh->offsets[mesh->cell_count] = mesh->connectivity_count;
     }
 }
 
-static void cells_of_no_volume_change_no_pixel(void **state)
+static void cells_without_volume_change_no_pixel(void **state)
 {
     (void)state;
     for (int k = 0; k < 5; k++)
@@ -77,14 +77,14 @@ static void cells_of_no_volume_change_no_pixel(void **state)
             for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++) {
                 test_mesh mesh;
                 drawn_frame without, with;
-                test_mesh_lattice(kinds[k], 4, camera == CAMERA_ALONG_X ? 0 : 0.1, test_wave, &mesh);
-                draw(&mesh, scene, camera, &without);
+                test_mesh_make_lattice(kinds[k], 4, camera == CAMERA_ALONG_X ? 0 : 0.1, test_wave_field, &mesh);
+                draw_mesh(&mesh, scene, camera, &without);
                 add_collapsed(&mesh);
-                draw(&mesh, scene, camera, &with);
+                draw_mesh(&mesh, scene, camera, &with);
                 assert_true(without.list.count > 100);
-                drawn_assert_same(&without, &with);
-                drawn_free(&without);
-                drawn_free(&with);
+                drawn_frame_assert_same(&without, &with);
+                drawn_frame_free(&without);
+                drawn_frame_free(&with);
                 test_mesh_free(&mesh);
             }
 }
@@ -92,7 +92,7 @@ static void cells_of_no_volume_change_no_pixel(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(cells_of_no_volume_change_no_pixel),
+        cmocka_unit_test(cells_without_volume_change_no_pixel),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -10,7 +10,8 @@
 #include "render.h"
 
 /* Computes the direction of sample k of `samples` above the normal n, for a pixel of a picture of the given width. */
-static inline void test_hemisphere(uint32_t pixel, uint32_t width, int samples, int k, const double n[3], double out[3])
+static inline void test_hemisphere_direction(uint32_t pixel, uint32_t width, int samples, int k, const double n[3],
+                                             double out[3])
 {
     const double pi = acos(-1.0), x = pixel % width, y = pixel / width;
     const double noise = fmod(52.9829189 * fmod(0.06711056 * x + 0.00583715 * y, 1), 1);

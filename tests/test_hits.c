@@ -21,10 +21,10 @@ typedef struct tally {
     int64_t rays, hits, excluded, folded, different, beyond, tangent;
     double residual, depth; /* the largest errors */
     double raw;             /* largest error of depth of hits that are not tangent, in cells */
-    double moved;           /* largest error of depth of all hits, relative to depth_moved() */
+    double moved;           /* largest error of depth of all hits, relative to compute_depth_uncertainty() */
 } tally;
 
-static int hits_of(const drawn_frame *drawn, int64_t pixel, const fragment *hits[REFERENCE_MAX_HITS])
+static int list_hits(const drawn_frame *drawn, int64_t pixel, const fragment *hits[REFERENCE_MAX_HITS])
 {
     int count = 0;
     for (int64_t i = drawn->first[pixel]; i < drawn->first[pixel + 1] && count < REFERENCE_MAX_HITS; i++)
@@ -34,7 +34,7 @@ static int hits_of(const drawn_frame *drawn, int64_t pixel, const fragment *hits
 
 /* Returns the residual allowed at a hit. The hit's float32 t is off by half a unit in the last place of 1 in scaled
  * units, and so is the depth of each vertex; the slope turns these errors into values. */
-static double residual_allowed(const render_fixture *f, double slope)
+static double compute_allowed_residual(const render_fixture *f, double slope)
 {
     return 1e-6 + (3e-8 + 3e-8) / f->job.space.scale * fabs(slope);
 }
@@ -43,7 +43,7 @@ static double residual_allowed(const render_fixture *f, double slope)
  * by half a unit in the last place of 1 in scaled units, 3e-8. Across the ray a vertex is off by 3e-8 along both axes,
  * 4.2e-8 together, which the angle between ray and surface turns into depth. The field is off by half a unit of its
  * values and as much in their sum, 6e-8 of their range, which the slope turns into depth. */
-static double depth_moved(const render_fixture *f, const reference_hit *truth, double slope)
+static double compute_depth_uncertainty(const render_fixture *f, const reference_hit *truth, double slope)
 {
     const double scaled_cell = f->cell_size * f->job.space.scale;
     return (6e-8 + 4.2e-8 * truth->conditioning) / scaled_cell + 6e-8 / (fabs(slope) * f->cell_size);
@@ -53,7 +53,7 @@ static double depth_moved(const render_fixture *f, const reference_hit *truth, d
  * rounding alone may move the hit farther. That happens at slopes of the field below about 0.03 ranges per cell. */
 static void verify_depth(const render_fixture *f, const reference_hit *truth, double depth, double slope, tally *t)
 {
-    const double off = fabs(depth - truth->depth) / f->cell_size, moved = depth_moved(f, truth, slope);
+    const double off = fabs(depth - truth->depth) / f->cell_size, moved = compute_depth_uncertainty(f, truth, slope);
     t->moved = fmax(t->moved, off / moved);
     if (moved > depth_allowed)
         t->tangent++;
@@ -65,11 +65,11 @@ static void verify_hit(const render_fixture *f, const reference_scene *scene, in
                        const fragment *hit, tally *t)
 {
     double slope;
-    const double depth = fixture_depth(f, hit->t_in);
+    const double depth = fixture_scene_depth(f, hit->t_in);
     const double residual = fabs(reference_residual(scene, x, y, truth, depth, &slope, NULL));
     t->hits++;
     t->beyond += residual > 1e-6;
-    t->residual = fmax(t->residual, residual - residual_allowed(f, slope) + 1e-6);
+    t->residual = fmax(t->residual, residual - compute_allowed_residual(f, slope) + 1e-6);
     /* The slope turns an error of the field of 1e-6 ranges into this error of depth. */
     const double grazing = 1e-6 / fabs(slope) / f->cell_size;
     t->depth = fmax(t->depth, fabs(depth - truth->depth) / f->cell_size - grazing);
@@ -91,7 +91,7 @@ static void verify_ray(const render_fixture *f, const drawn_frame *drawn, const 
         t->folded++;
         return;
     }
-    const int count = hits_of(drawn, (int64_t)y * f->job.camera.width + x, hits);
+    const int count = list_hits(drawn, (int64_t)y * f->job.camera.width + x, hits);
     if (t->is_opaque && ray.hit_count > 1) ray.hit_count = 1;
     bool same = count == ray.hit_count;
     for (int i = 0; same && i < count; i++) same = hits[i]->kind - FRAGMENT_SURFACE == (uint32_t)ray.hits[i].surface;
@@ -111,7 +111,7 @@ static void verify_frame(const render_fixture *f, double margin, tally *t)
     for (int y = 0; y < f->job.camera.height; y++)
         for (int x = 0; x < f->job.camera.width; x++) verify_ray(f, &drawn, scene, x, y, margin, t);
     reference_free(scene);
-    drawn_free(&drawn);
+    drawn_frame_free(&drawn);
 }
 
 static void print_tally(const char *what, const tally *t)
@@ -123,7 +123,7 @@ static void print_tally(const char *what, const tally *t)
 }
 
 /* Adds many surfaces: they have many silhouettes, where rays meet a surface twice at nearly the same depth. */
-static void add_many_robust(render_fixture *f)
+static void add_many_surfaces(render_fixture *f)
 {
     static const float black[48];
     static double values[16];
@@ -139,7 +139,7 @@ static void add_robust(render_fixture *f, float opacity)
 
 /* Checks that the rays close to another decision are at most the fixture's fraction, 0.2 % (test_render_fixture.c), and
  * that no cell is folded: lattices are jittered by 0.2, so that corners stay on their side of the opposite faces. */
-static void assert_few_left_out(const tally *t)
+static void assert_few_excluded(const tally *t)
 {
     if (500 * t->excluded > t->rays) fail_msg("%d of %d rays excluded", (int)t->excluded, (int)t->rays);
     assert_int_equal(t->folded, 0);
@@ -162,8 +162,8 @@ static void robust_hits_are_on_the_surface(void **state)
             render_fixture f;
             tally t = {.rays = 0};
             /* the usual run draws one or two cameras for each kind */
-            if (!test_is_whole() && (k + (int)camera) % 2) continue;
-            fixture_create_lattice(&f, kinds[k], kinds[k] == TEST_PYRAMIDS ? 3 : 4, 0.2, test_wave);
+            if (!test_is_long_run() && (k + (int)camera) % 2) continue;
+            fixture_create_lattice(&f, kinds[k], kinds[k] == TEST_PYRAMIDS ? 3 : 4, 0.2, test_wave_field);
             fixture_set_camera(&f, camera, 53, 45);
             add_robust(&f, 0.4f); /* transparent, so that all crossings are drawn, not only the first */
             verify_frame(&f, 1e-6, &t);
@@ -172,7 +172,7 @@ static void robust_hits_are_on_the_surface(void **state)
             assert_int_equal(t.different, 0);
             assert_depths(&t, 250);
             assert_true(t.residual <= 1e-6);
-            assert_few_left_out(&t);
+            assert_few_excluded(&t);
             fixture_free(&f);
         }
 }
@@ -185,7 +185,7 @@ static void robust_hits_are_on_the_surface(void **state)
 static void make_cuboids(test_mesh_kind kind, bool random, uint64_t seed, test_mesh *out)
 {
     static const double planes[5] = {-1, -0.3, -0.2995, 0.4, 1};
-    test_mesh_lattice(kind, 4, 0, test_wave, out);
+    test_mesh_make_lattice(kind, 4, 0, test_wave_field, out);
     for (int64_t v = 0; v < out->vertex_count; v++) {
         for (int a = 0; a < 3; a++) {
             double *x = &out->coordinates[3 * v + a];
@@ -193,13 +193,13 @@ static void make_cuboids(test_mesh_kind kind, bool random, uint64_t seed, test_m
             *x = planes[i] + (2 * (*x + 1) - i) * (planes[i + 1] - planes[i]);
             *x = *x * (1 - 0.1 * a) + 0.001 * a;
         }
-        out->values[v] = random ? 2 * test_uniform((uint64_t)v, seed) - 1 : test_wave(out->coordinates + 3 * v);
+        out->values[v] = random ? 2 * test_uniform((uint64_t)v, seed) - 1 : test_wave_field(out->coordinates + 3 * v);
     }
 }
 
 static void verify_cuboids(test_mesh_kind kind, bool random, tally *t)
 {
-    for (uint64_t seed = 0; seed < (test_is_whole() ? 12 : 3); seed++)
+    for (uint64_t seed = 0; seed < (test_is_long_run() ? 12 : 3); seed++)
         for (fixture_camera camera = 0; camera < CAMERA_PLANE; camera++) {
             const test_layout layout = {.wide_coordinates = seed % 2, .wide_values = seed % 3 == 0};
             test_mesh mesh;
@@ -230,7 +230,7 @@ static void opaque_hits_in_cuboids_match_the_reference(void **state)
         assert_depths(&t, 250);
         /* across thin cells random values change so fast that the rounding of a vertex changes them by up to 1e-3 */
         if (turn == 0) assert_true(t.residual <= 1e-6);
-        assert_few_left_out(&t);
+        assert_few_excluded(&t);
     }
 }
 
@@ -248,18 +248,18 @@ static void make_ill_shaped(ill_shaped kind, uint64_t seed, test_mesh *out)
 {
     static const test_cell_shape shapes[ILL_SHAPED_COUNT] = {TEST_UNIT_HEX, TEST_UNIT_HEX, TEST_UNIT_WEDGE,
                                                              TEST_UNIT_PYRAMID};
-    test_mesh_single(shapes[kind], test_linear, out);
+    test_mesh_make_single_cell(shapes[kind], test_linear_field, out);
     for (uint64_t i = 0; i < (uint64_t)out->vertex_count; i++) {
         double *p = out->coordinates + 3 * i;
         const double amount = kind == ILL_SHAPED_WARPED || kind == ILL_SHAPED_APEX ? 0.2 : 0.1;
-        for (uint64_t a = 0; a < 3; a++) p[a] += test_uniform_in(3 * i + a, seed, -amount, amount);
-        out->values[i] = test_uniform_in(i, seed + 1000, -1, 1.5);
+        for (uint64_t a = 0; a < 3; a++) p[a] += test_uniform_between(3 * i + a, seed, -amount, amount);
+        out->values[i] = test_uniform_between(i, seed + 1000, -1, 1.5);
         /* Moves a corner inwards almost to the plane of its neighbours, which makes dents on both sides of its edges.
          * Beyond that plane the hex's map would fold, and a point would have several values. */
         if (kind == ILL_SHAPED_CONCAVE && i == 6)
-            for (uint64_t a = 0; a < 3; a++) p[a] = test_uniform_in(a, seed + 2000, 0.24, 0.3);
+            for (uint64_t a = 0; a < 3; a++) p[a] = test_uniform_between(a, seed + 2000, 0.24, 0.3);
         if (kind == ILL_SHAPED_WEDGE && i >= 3) {
-            const double angle = test_uniform_in(0, seed + 3000, -0.8, 0.8), x = p[0], y = p[1];
+            const double angle = test_uniform_between(0, seed + 3000, -0.8, 0.8), x = p[0], y = p[1];
             p[0] = cos(angle) * x - sin(angle) * y;
             p[1] = sin(angle) * x + cos(angle) * y;
         }
@@ -284,13 +284,13 @@ static void robust_hits_in_ill_shaped_cells_match_the_reference(void **state)
             if (kind == ILL_SHAPED_APEX)
                 assert_true(render_camera_look_at(&f.job.camera, (const double[]){2.4, 1.6, 3.0},
                                                   mesh.coordinates + 3 * 4, (const double[]){0, 1, 0}, 2, 31, 29));
-            add_many_robust(&f);
+            add_many_surfaces(&f);
             verify_frame(&f, 1e-6, &t);
             fixture_free(&f);
             test_mesh_free(&mesh);
         }
         print_tally(names[kind], &t);
-        assert_few_left_out(&t);
+        assert_few_excluded(&t);
         assert_true(t.hits > 800);
         assert_int_equal(t.different, 0);
         assert_depths(&t, 1000);
@@ -302,7 +302,7 @@ static void robust_hits_in_ill_shaped_cells_match_the_reference(void **state)
 
 /* Sets white diffuse surfaces under a red, a green and a blue light from three sides of the eye: a hit's colour is then
  * its normal in the axes of the lights, without the negative components. */
-static void light_by_axes(render_fixture *f, render_light lights[3])
+static void set_axis_lights(render_fixture *f, render_light lights[3])
 {
     static const float white[9] = {1, 1, 1, 1, 1, 1, 1, 1, 1};
     const double inner = sqrt(1.0 / 3), outer = sqrt(2.0 / 3);
@@ -321,7 +321,7 @@ static void light_by_axes(render_fixture *f, render_light lights[3])
 }
 
 /* Returns the difference between the fragment's colour and the colour of the gradient, oriented towards the eye. */
-static double normal_error(const render_fixture *f, const fragment *hit, const double gradient[3])
+static double compute_normal_error(const render_fixture *f, const fragment *hit, const double gradient[3])
 {
     const int width = f->job.camera.width;
     double base[3], direction[3], length = 0, facing = 0, off = 0;
@@ -348,10 +348,10 @@ static void verify_normal(const render_fixture *f, const reference_scene *scene,
 {
     const int x = (int)hit->pixel % f->job.camera.width, y = (int)hit->pixel / f->job.camera.width;
     double slope, gradient[3];
-    reference_residual(scene, x, y, truth, fixture_depth(f, hit->t_in), &slope, gradient);
+    reference_residual(scene, x, y, truth, fixture_scene_depth(f, hit->t_in), &slope, gradient);
     const double length = sqrt(gradient[0] * gradient[0] + gradient[1] * gradient[1] + gradient[2] * gradient[2]);
     if (fabs(slope) < 1e-4 * length) return;
-    const double off = normal_error(f, hit, gradient), allowed = 4e-6 / (length * f->cell_size) + 1e-6;
+    const double off = compute_normal_error(f, hit, gradient), allowed = 4e-6 / (length * f->cell_size) + 1e-6;
     if (!(off <= allowed)) fail_msg("pixel %d, %d: normal off by %g, allowed %g", x, y, off, allowed);
     ++*checked;
 }
@@ -364,17 +364,17 @@ static void cell_gradients_match_the_reference(void **state)
         drawn_frame drawn;
         render_light lights[3];
         int64_t checked = 0, rays = 0, left_out = 0;
-        fixture_create_lattice(&f, kinds[k], 3, 0.2, test_wave);
+        fixture_create_lattice(&f, kinds[k], 3, 0.2, test_wave_field);
         fixture_set_camera(&f, CAMERA_OUTSIDE, 43, 37);
         add_robust(&f, 0.5f);
-        light_by_axes(&f, lights);
+        set_axis_lights(&f, lights);
         fixture_draw(&f, &drawn);
         reference_scene *scene = reference_create(&f.job);
         for (int p = 0; p < 43 * 37; p++) {
             const fragment *hits[REFERENCE_MAX_HITS];
             reference_ray ray;
             reference_trace(scene, p % 43, p / 43, fixture_background, &ray);
-            const int count = hits_of(&drawn, p, hits);
+            const int count = list_hits(&drawn, p, hits);
             rays++;
             if (ray.ambiguous || ray.edge_margin < 1e-6 || ray.value_margin < 1e-6) {
                 left_out++;
@@ -388,7 +388,7 @@ static void cell_gradients_match_the_reference(void **state)
         assert_true(checked > 300);
         assert_true(500 * left_out <= rays);
         reference_free(scene);
-        drawn_free(&drawn);
+        drawn_frame_free(&drawn);
         fixture_free(&f);
     }
 }
@@ -399,7 +399,7 @@ static void add_differences(render_fixture *f, const double *values, int count, 
     fixture_add_surface(f, values, count, opacity);
     f->surfaces[0].normal = RENDER_DIFFERENCES;
     f->surfaces[0].difference = difference;
-    light_by_axes(f, lights);
+    set_axis_lights(f, lights);
 }
 
 /* Checks differences of a linear field. Isoparametric cells represent it exactly, so all differences, including
@@ -417,33 +417,33 @@ static void differences_of_a_linear_field_are_exact(void **state)
                 drawn_frame drawn;
                 render_light lights[3];
                 double worst = 0;
-                fixture_create_lattice(&f, kind, 3, 0.2, test_linear);
+                fixture_create_lattice(&f, kind, 3, 0.2, test_linear_field);
                 fixture_set_camera(&f, camera, 35, 31);
                 add_differences(&f, values, 3, opaque ? 1 : 0.5f, 0.5, lights);
                 fixture_draw(&f, &drawn);
                 for (int64_t i = 0; i < drawn.list.count; i++)
-                    worst = test_worse(worst, normal_error(&f, &drawn.list.items[i], gradient));
+                    worst = test_larger_error(worst, compute_normal_error(&f, &drawn.list.items[i], gradient));
                 assert_true(drawn.list.count > 100);
                 if (!(worst <= 2e-5)) fail_msg("%s: normal off by %g", test_mesh_kind_name(kind), worst);
-                drawn_free(&drawn);
+                drawn_frame_free(&drawn);
                 fixture_free(&f);
             }
 }
 
-static double quadratic(const double p[3])
+static double quadratic_field(const double p[3])
 {
     return p[0] * p[0] + 0.5 * p[1] * p[1] + 0.7 * p[2] * p[2] + 0.3 * p[0] * p[1];
 }
 
 /* Returns the mean error of normals against the field's own gradient at the hit. */
-static double quadratic_error(int n, render_normal normal, double difference)
+static double measure_quadratic_error(int n, render_normal normal, double difference)
 {
     static const double value[1] = {0.3};
     render_fixture f;
     drawn_frame drawn;
     render_light lights[3];
     double sum = 0;
-    fixture_create_lattice(&f, TEST_HEXES, n, 0, quadratic);
+    fixture_create_lattice(&f, TEST_HEXES, n, 0, quadratic_field);
     fixture_set_camera(&f, CAMERA_OUTSIDE, 64, 64);
     add_differences(&f, value, 1, 1, difference, lights);
     f.surfaces[0].normal = normal;
@@ -452,12 +452,12 @@ static double quadratic_error(int n, render_normal normal, double difference)
         const fragment *hit = &drawn.list.items[i];
         double base[3], d[3], p[3];
         render_camera_ray(&f.job.camera, (int)hit->pixel % 64, (int)hit->pixel / 64, base, d);
-        for (int a = 0; a < 3; a++) p[a] = base[a] + fixture_depth(&f, hit->t_in) * d[a];
-        sum += normal_error(&f, hit, (const double[]){2 * p[0] + 0.3 * p[1], p[1] + 0.3 * p[0], 1.4 * p[2]});
+        for (int a = 0; a < 3; a++) p[a] = base[a] + fixture_scene_depth(&f, hit->t_in) * d[a];
+        sum += compute_normal_error(&f, hit, (const double[]){2 * p[0] + 0.3 * p[1], p[1] + 0.3 * p[0], 1.4 * p[2]});
     }
     assert_true(drawn.list.count > 300);
     sum /= (double)drawn.list.count;
-    drawn_free(&drawn);
+    drawn_frame_free(&drawn);
     fixture_free(&f);
     return sum;
 }
@@ -469,9 +469,10 @@ static double quadratic_error(int n, render_normal normal, double difference)
 static void differences_of_a_quadratic_field_are_of_second_order(void **state)
 {
     (void)state;
-    const double coarse = quadratic_error(8, RENDER_DIFFERENCES, 1), fine = quadratic_error(16, RENDER_DIFFERENCES, 1);
-    const double gradient = quadratic_error(16, RENDER_GRADIENT, 1),
-                 half = quadratic_error(16, RENDER_DIFFERENCES, 0.5);
+    const double coarse = measure_quadratic_error(8, RENDER_DIFFERENCES, 1),
+                 fine = measure_quadratic_error(16, RENDER_DIFFERENCES, 1);
+    const double gradient = measure_quadratic_error(16, RENDER_GRADIENT, 1),
+                 half = measure_quadratic_error(16, RENDER_DIFFERENCES, 0.5);
     printf("normals of a quadratic field: differences %.2g, on cells of half the size %.2g, over half of these %.2g; "
            "gradient %.2g\n",
            coarse, fine, half, gradient);

@@ -37,7 +37,7 @@ static void block_create(block_rank *b, int rank)
         .is_computed = true, .rank = rank, .near_count = count, .near_ranks = b->near, .boxes = b->boxes};
 }
 
-static uint64_t hash_of(const double point[3])
+static uint64_t hash_position(const double point[3])
 {
     uint64_t h = 1469598103934665603u;
     for (int a = 0; a < 3; a++) h = (h ^ (uint64_t)(point[a] * 8 + 0.5)) * 1099511628211u;
@@ -56,7 +56,7 @@ static int count_homes(const block_rank *own, block_rank *neighbours, int neighb
     for (int v = 0; v < 9 * 9 * 9; v++) {
         const double point[1][3] = {{low[0] + v % 9 / 8.0, low[1] + v / 9 % 9 / 8.0, low[2] + v / 81 / 8.0}};
         if (!session_is_in_other_box(&own->homes, point[0])) continue;
-        const int home = session_find_home(&own->homes, point, 1, hash_of(point[0]), 0);
+        const int home = session_find_home(&own->homes, point, 1, hash_position(point[0]), 0);
         (*shared)++;
         homes += !is_home[home];
         is_home[home] = true;
@@ -66,13 +66,14 @@ static int count_homes(const block_rank *own, block_rank *neighbours, int neighb
                 if (neighbours[n].near[k] == neighbours[n].homes.rank) box = &neighbours[n].boxes[k];
             bool has_it = true;
             for (int a = 0; a < 3; a++) has_it = has_it && box->lower[a] <= point[0][a] && point[0][a] <= box->upper[a];
-            if (has_it) assert_int_equal(session_find_home(&neighbours[n].homes, point, 1, hash_of(point[0]), 0), home);
+            if (has_it)
+                assert_int_equal(session_find_home(&neighbours[n].homes, point, 1, hash_position(point[0]), 0), home);
         }
     }
     return homes;
 }
 
-static void homes_by_coordinates_are_near_and_the_same_for_all(void **state)
+static void home_ranks_by_coordinates_agree_on_all_ranks(void **state)
 {
     static const int ranks[] = {0, SIDE / 2, SIDE * SIDE / 2 + SIDE / 2, RANKS / 2 + SIDE * SIDE / 2 + SIDE / 2,
                                 RANKS - 1};
@@ -91,7 +92,7 @@ static void homes_by_coordinates_are_near_and_the_same_for_all(void **state)
 }
 
 /* Checks homes by id: a share includes its first id, and ids below the first share belong to it too. */
-static void homes_by_id_are_the_shares_owners(void **state)
+static void home_ranks_by_id_match_partition_owners(void **state)
 {
     (void)state;
     int64_t firsts[MOST_SHARES];
@@ -116,7 +117,7 @@ static void homes_by_id_are_the_shares_owners(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(homes_by_coordinates_are_near_and_the_same_for_all),
-                                       cmocka_unit_test(homes_by_id_are_the_shares_owners)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(home_ranks_by_coordinates_agree_on_all_ranks),
+                                       cmocka_unit_test(home_ranks_by_id_match_partition_owners)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -49,7 +49,7 @@ typedef struct file_bytes {
     unsigned char bytes[MOST_BYTES];
 } file_bytes;
 
-static void path_of(const picture_case *c, char path[1024])
+static void make_picture_path(const picture_case *c, char path[1024])
 {
     snprintf(path, 1024, "%s/%s", folder, c->name);
 }
@@ -77,7 +77,7 @@ static insitu_status write_picture(const picture_case *c, base_error *error)
                                 .decorations = c->is_decorated ? &decorations : NULL,
                                 .deep = &deep};
     char path[1024];
-    path_of(c, path);
+    make_picture_path(c, path);
     *error = (base_error){0};
     return session_write_image(&image, c->format, path, error);
 }
@@ -94,7 +94,7 @@ static void clear_date(file_bytes *file)
 static bool read_picture(const picture_case *c, file_bytes *out)
 {
     char path[1024];
-    path_of(c, path);
+    make_picture_path(c, path);
     FILE *file = fopen(path, "rb");
     out->count = file ? fread(out->bytes, 1, MOST_BYTES, file) : 0;
     if (file) fclose(file);
@@ -107,7 +107,7 @@ static bool is_same(const file_bytes *a, const file_bytes *b)
     return a->count == b->count && !memcmp(a->bytes, b->bytes, a->count);
 }
 
-static int files_in_folder(void)
+static int count_files(void)
 {
     DIR *entries = opendir(folder);
     int count = 0;
@@ -120,7 +120,7 @@ static int files_in_folder(void)
 static void remove_picture(const picture_case *c)
 {
     char path[1024];
-    path_of(c, path);
+    make_picture_path(c, path);
     unlink(path);
 }
 
@@ -140,7 +140,7 @@ typedef struct shortage {
     rlim_t spare;
 } shortage;
 
-static rlim_t address_bytes(void)
+static rlim_t read_address_space_size(void)
 {
     long pages = 0;
     FILE *file = fopen("/proc/self/statm", "r");
@@ -155,7 +155,7 @@ static insitu_status write_in_shortage(const picture_case *c, const shortage *s,
     base_error error;
     getrlimit(RLIMIT_AS, &before);
     tight = before;
-    tight.rlim_cur = address_bytes() + s->spare;
+    tight.rlim_cur = read_address_space_size() + s->spare;
     if (s->n)
         heap_start_failing(s->n, false);
     else
@@ -167,7 +167,7 @@ static insitu_status write_in_shortage(const picture_case *c, const shortage *s,
     return status;
 }
 
-static verdict verify(const picture_case *c, const file_bytes *expected, const shortage *s, outcome *out)
+static verdict classify_outcome(const picture_case *c, const file_bytes *expected, const shortage *s, outcome *out)
 {
     static file_bytes found;
     const insitu_status status = write_in_shortage(c, s, out);
@@ -175,7 +175,7 @@ static verdict verify(const picture_case *c, const file_bytes *expected, const s
     if (status == INSITU_OK && !(is_there && is_same(&found, expected))) return OTHER_PICTURE;
     if (status != INSITU_OK && is_there) return OTHER_PICTURE;
     if (status != INSITU_OK && status != INSITU_ERROR_MEMORY && status != INSITU_ERROR_IO) return OTHER_ERROR;
-    if (files_in_folder() != is_there) return LEFT_FILES;
+    if (count_files() != is_there) return LEFT_FILES;
     base_error error;
     if (write_picture(c, &error) || !read_picture(c, &found) || !is_same(&found, expected)) {
         snprintf(out->message, sizeof out->message, "%.255s", error.message);
@@ -196,7 +196,7 @@ static bool try_in_child(const picture_case *c, const file_bytes *expected, cons
         setrlimit(RLIMIT_CORE, &no_core);
         alarm(SECONDS);
         outcome mine = {0};
-        mine.verdict = verify(c, expected, s, &mine);
+        mine.verdict = classify_outcome(c, expected, s, &mine);
         _exit(write(pipe_ends[1], &mine, sizeof mine) == (ssize_t)sizeof mine ? 0 : 1);
     }
     close(pipe_ends[1]);
@@ -207,7 +207,7 @@ static bool try_in_child(const picture_case *c, const file_bytes *expected, cons
     return is_reported && WIFEXITED(status);
 }
 
-static void expect(const picture_case *c, file_bytes *expected)
+static void write_expected_file(const picture_case *c, file_bytes *expected)
 {
     const pid_t child = fork();
     base_error error;
@@ -221,7 +221,7 @@ static void expect(const picture_case *c, file_bytes *expected)
 }
 
 /* Returns whether the picture was written; fails the test for any other outcome than a picture or an error. */
-static bool survives(const picture_case *c, const file_bytes *expected, const shortage *s, outcome *out)
+static bool check_shortage(const picture_case *c, const file_bytes *expected, const shortage *s, outcome *out)
 {
     const bool is_alive = try_in_child(c, expected, s, out);
     if (!is_alive || (out->verdict != GOOD && out->verdict != REFUSED))
@@ -232,7 +232,7 @@ static bool survives(const picture_case *c, const file_bytes *expected, const sh
 
 /* ---- tests ---------------------------------------------------------------------------------------------------- */
 
-static void failing_allocation_is_the_same_picture_or_an_error(void **context)
+static void failed_allocation_gives_same_picture_or_error(void **context)
 {
     (void)context;
     static file_bytes expected;
@@ -244,9 +244,9 @@ static void failing_allocation_is_the_same_picture_or_an_error(void **context)
          * there is memory to spare. */
         if (cases[i].format == INSITU_DEEP_EXR) continue;
         int refused = 0;
-        expect(&cases[i], &expected);
+        write_expected_file(&cases[i], &expected);
         for (;; n += stride) {
-            refused += !survives(&cases[i], &expected, &(shortage){.n = n}, &out);
+            refused += !check_shortage(&cases[i], &expected, &(shortage){.n = n}, &out);
             if (out.allocations < n) break; /* n is beyond the last allocation */
         }
         assert_true(n > 500);
@@ -254,7 +254,7 @@ static void failing_allocation_is_the_same_picture_or_an_error(void **context)
     }
 }
 
-static void tight_memory_is_the_same_picture_or_an_error(void **context)
+static void memory_limit_gives_same_picture_or_error(void **context)
 {
     (void)context;
     static file_bytes expected;
@@ -263,9 +263,9 @@ static void tight_memory_is_the_same_picture_or_an_error(void **context)
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         outcome out = {0};
         int refused = 0;
-        expect(&cases[i], &expected);
+        write_expected_file(&cases[i], &expected);
         for (rlim_t spare = 0; spare < most; spare += step)
-            refused += !survives(&cases[i], &expected, &(shortage){.spare = spare}, &out);
+            refused += !check_shortage(&cases[i], &expected, &(shortage){.spare = spare}, &out);
         assert_true(refused > 0);
         assert_int_equal(out.verdict, GOOD);
     }
@@ -299,8 +299,8 @@ int main(int argument_count, char **arguments)
         return 1;
     }
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(failing_allocation_is_the_same_picture_or_an_error),
-        cmocka_unit_test(tight_memory_is_the_same_picture_or_an_error),
+        cmocka_unit_test(failed_allocation_gives_same_picture_or_error),
+        cmocka_unit_test(memory_limit_gives_same_picture_or_error),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

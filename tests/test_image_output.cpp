@@ -41,22 +41,22 @@ fs::path folder; /* folder of this run, empty at its start */
 struct picture {
     int width, height;
     std::vector<float> rgba, depth;
-    insitu_image view(bool with_depth) const
+    insitu_image make_view(bool with_depth) const
     {
         return {width, height, rgba.data(), with_depth ? depth.data() : nullptr, nullptr, 0, nullptr, nullptr};
     }
 };
 
-std::uint32_t hash(std::uint32_t x)
+std::uint32_t hash_number(std::uint32_t x)
 {
     x = (x ^ (x >> 16)) * 0x7feb352dU;
     x = (x ^ (x >> 15)) * 0x846ca68bU;
     return x ^ (x >> 16);
 }
 
-float number(std::size_t i)
+float make_number(std::size_t i)
 {
-    return static_cast<float>(hash(static_cast<std::uint32_t>(i)) >> 8) / 16777216.0F;
+    return static_cast<float>(hash_number(static_cast<std::uint32_t>(i)) >> 8) / 16777216.0F;
 }
 
 /* Makes premultiplied colours of every alpha, or opaque ones; some are slightly outside [0, 1], as highlights are. */
@@ -65,15 +65,16 @@ picture make_picture(int width, int height, bool opaque)
     const std::size_t count = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
     picture p{width, height, std::vector<float>(4 * count), std::vector<float>(count)};
     for (std::size_t i = 0; i < count; i++) {
-        const float alpha = opaque ? 1 : i % 7 == 0 ? 0 : i % 7 == 1 ? 1 : number(5 * i);
-        for (std::size_t c = 0; c < 3; c++) p.rgba[4 * i + c] = alpha * (1.1F * number(5 * i + 1 + c) - 0.05F);
+        const float alpha = opaque ? 1 : i % 7 == 0 ? 0 : i % 7 == 1 ? 1 : make_number(5 * i);
+        for (std::size_t c = 0; c < 3; c++) p.rgba[4 * i + c] = alpha * (1.1F * make_number(5 * i + 1 + c) - 0.05F);
         p.rgba[4 * i + 3] = alpha;
-        p.depth[i] = i % 3 == 0 ? std::numeric_limits<float>::infinity() : 1e3F * number(5 * i + 4);
+        p.depth[i] = i % 3 == 0 ? std::numeric_limits<float>::infinity() : 1e3F * make_number(5 * i + 4);
     }
     return p;
 }
 
-insitu_status write(const insitu_image &image, insitu_image_format format, const fs::path &path, base_error &error)
+insitu_status write_image(const insitu_image &image, insitu_image_format format, const fs::path &path,
+                          base_error &error)
 {
     error = base_error{};
     return session_write_image(&image, format, path.c_str(), &error);
@@ -82,7 +83,7 @@ insitu_status write(const insitu_image &image, insitu_image_format format, const
 void write_ok(const insitu_image &image, insitu_image_format format, const fs::path &path)
 {
     base_error error;
-    if (write(image, format, path, error) != INSITU_OK) fail_msg("%s", error.message);
+    if (write_image(image, format, path, error) != INSITU_OK) fail_msg("%s", error.message);
 }
 
 template <typename number_type>
@@ -111,7 +112,7 @@ template <typename code>
 void check_png(const picture &p, insitu_image_format format, OIIO::TypeDesc type, std::size_t channels)
 {
     const fs::path path = folder / "png" / "round_trip.png";
-    write_ok(p.view(true), format, path);
+    write_ok(p.make_view(true), format, path);
     OIIO::ImageSpec spec;
     const std::vector<code> codes = read_back<code>(path, type, spec);
     assert_int_equal(spec.width, p.width);
@@ -169,11 +170,11 @@ void png16_is_within_half_a_code(void **)
     }
 }
 
-void png_of_numbers_that_are_not_is_black(void **)
+void nan_pixels_are_black_in_png(void **)
 {
     const float nan = std::numeric_limits<float>::quiet_NaN(), infinity = std::numeric_limits<float>::infinity();
     const picture p{2, 1, {nan, infinity, -infinity, 1, nan, nan, nan, nan}, {0, 0}};
-    write_ok(p.view(false), INSITU_PNG8, folder / "nan.png");
+    write_ok(p.make_view(false), INSITU_PNG8, folder / "nan.png");
     OIIO::ImageSpec spec;
     const auto codes = read_back<std::uint8_t>(folder / "nan.png", OIIO::TypeDesc::UINT8, spec);
     assert_int_equal(codes.size(), 8);
@@ -186,7 +187,7 @@ void exr_has_channels_of_other_numbers(void **)
     const picture p = make_picture(17, 11, false);
     const fs::path path = folder / "exr" / "channels.exr";
     const insitu_channel channels[] = {{"N.X", p.rgba.data() + 1, 4}, {"value", p.depth.data(), 1}};
-    insitu_image image = p.view(true);
+    insitu_image image = p.make_view(true);
     image.channel_count = 2;
     image.channels = channels;
     write_ok(image, INSITU_EXR, path);
@@ -213,7 +214,7 @@ void exr_is_bitwise(void **)
         for (const std::size_t channels : {std::size_t{4}, std::size_t{5}}) {
             const picture p = make_picture(size[0], size[1], false);
             const fs::path path = folder / "deep" / "er" / "round_trip.exr";
-            write_ok(p.view(channels == 5), INSITU_EXR, path);
+            write_ok(p.make_view(channels == 5), INSITU_EXR, path);
             OIIO::ImageSpec spec;
             const std::vector<float> values = read_back<float>(path, OIIO::TypeDesc::FLOAT, spec);
             assert_int_equal(spec.nchannels, channels);
@@ -240,13 +241,13 @@ deep_picture make_deep_picture(int width, int height)
 {
     deep_picture p{width, height, {}, {}, {}};
     for (std::size_t i = 0; i < static_cast<std::size_t>(width) * static_cast<std::size_t>(height); i++) {
-        const auto count = static_cast<std::uint32_t>(i % 5 == 0 ? 0 : hash(static_cast<std::uint32_t>(i)) % 12);
+        const auto count = static_cast<std::uint32_t>(i % 5 == 0 ? 0 : hash_number(static_cast<std::uint32_t>(i)) % 12);
         p.first.push_back(static_cast<std::int64_t>(p.samples.size()));
         p.counts.push_back(count);
         for (std::size_t n = 0; n < count; n++) {
             insitu_deep_sample sample = {};
-            sample.rgba[3] = number(7 * i + n);
-            for (std::size_t c = 0; c < 3; c++) sample.rgba[c] = sample.rgba[3] * number(11 * i + 3 * n + c);
+            sample.rgba[3] = make_number(7 * i + n);
+            for (std::size_t c = 0; c < 3; c++) sample.rgba[c] = sample.rgba[3] * make_number(11 * i + 3 * n + c);
             sample.z = static_cast<float>(n) + 1;
             sample.z_back = n % 2 ? sample.z : sample.z + 0.75F;
             p.samples.push_back(sample);
@@ -263,7 +264,7 @@ insitu_status write_deep(const deep_picture &p, const fs::path &path, base_error
     image.width = p.width;
     image.height = p.height;
     image.deep = &deep;
-    return write(image, INSITU_DEEP_EXR, path, error);
+    return write_image(image, INSITU_DEEP_EXR, path, error);
 }
 
 void check_deep_pixel(const deep_picture &p, const OIIO::DeepData &data, std::size_t i)
@@ -337,12 +338,12 @@ std::size_t count_files(const fs::path &in)
     return count;
 }
 
-void writing_leaves_the_picture_alone(void **)
+void writing_does_not_change_the_picture(void **)
 {
     const fs::path in = folder / "alone";
     const picture first = make_picture(20, 10, true), second = make_picture(5, 4, true);
-    write_ok(first.view(false), INSITU_PNG8, in / "a.png");
-    write_ok(second.view(false), INSITU_PNG8, in / "a.png");
+    write_ok(first.make_view(false), INSITU_PNG8, in / "a.png");
+    write_ok(second.make_view(false), INSITU_PNG8, in / "a.png");
     assert_int_equal(count_files(in), 1);
     OIIO::ImageSpec spec;
     read_back<std::uint8_t>(in / "a.png", OIIO::TypeDesc::UINT8, spec);
@@ -350,12 +351,12 @@ void writing_leaves_the_picture_alone(void **)
 }
 
 /* Checks paths that cannot be written. Root may write anywhere, so no case depends on permissions. */
-void unwritable_places_are_reported(void **)
+void unwritable_paths_are_reported(void **)
 {
     const fs::path in = folder / "unwritable";
     fs::create_directories(in / "taken.png" / "below");
     const picture p = make_picture(3, 2, true);
-    write_ok(p.view(false), INSITU_PNG8, in / "file.png");
+    write_ok(p.make_view(false), INSITU_PNG8, in / "file.png");
     const std::size_t before = count_files(in);
     const struct {
         fs::path path;
@@ -369,7 +370,7 @@ void unwritable_places_are_reported(void **)
     for (const auto &c : cases) {
         for (const auto format : {INSITU_PNG8, INSITU_PNG16, INSITU_EXR}) {
             base_error error;
-            assert_int_equal(write(p.view(true), format, c.path, error), INSITU_ERROR_IO);
+            assert_int_equal(write_image(p.make_view(true), format, c.path, error), INSITU_ERROR_IO);
             const std::string start = c.path.string() + ": cannot be written: ";
             if (std::strncmp(error.message, start.c_str(), start.size()) != 0 || !std::strstr(error.message, c.why)) {
                 fail_msg("%s", error.message);
@@ -386,7 +387,7 @@ void full_disk_is_reported_and_leaves_the_old_picture(void **)
     const picture small = make_picture(2, 2, true), large = make_picture(200, 200, false);
     for (const auto format : {INSITU_PNG8, INSITU_PNG16, INSITU_EXR}) {
         const fs::path path = in / "a";
-        write_ok(small.view(true), format, path);
+        write_ok(small.make_view(true), format, path);
         const std::uintmax_t size = fs::file_size(path);
         rlimit before;
         getrlimit(RLIMIT_FSIZE, &before);
@@ -394,7 +395,7 @@ void full_disk_is_reported_and_leaves_the_old_picture(void **)
         const auto handler = std::signal(SIGXFSZ, SIG_IGN);
         setrlimit(RLIMIT_FSIZE, &small_limit);
         base_error error;
-        const insitu_status status = write(large.view(true), format, path, error);
+        const insitu_status status = write_image(large.make_view(true), format, path, error);
         setrlimit(RLIMIT_FSIZE, &before);
         std::signal(SIGXFSZ, handler);
         assert_int_equal(status, INSITU_ERROR_IO);
@@ -420,20 +421,20 @@ void longest_legal_name_is_written(void **)
     const picture p = make_picture(3, 2, true);
     for (const std::size_t length : {std::size_t{244}, std::size_t{255}}) {
         const fs::path path = in / (std::string(length - 4, 'a') + ".png");
-        write_ok(p.view(false), INSITU_PNG8, path);
+        write_ok(p.make_view(false), INSITU_PNG8, path);
         assert_true(fs::is_regular_file(path));
     }
     assert_int_equal(count_files(in), 2);
 }
 
 /* Checks an attack: someone with write access to the folder plants links with the former name of the temporary file. */
-void planted_links_keep_their_victims(void **)
+void writing_does_not_follow_planted_links(void **)
 {
     const fs::path in = folder / "planted", victim = folder / "victim";
     fs::create_directories(in);
     std::ofstream(victim) << "precious";
     fs::create_symlink(fs::absolute(victim), in / (".a.png." + std::to_string(getpid()) + ".part.png"));
-    write_ok(make_picture(3, 2, true).view(false), INSITU_PNG8, in / "a.png");
+    write_ok(make_picture(3, 2, true).make_view(false), INSITU_PNG8, in / "a.png");
     std::string found;
     std::ifstream(victim) >> found;
     assert_string_equal(found.c_str(), "precious");
@@ -455,20 +456,21 @@ void files_of_killed_runs_are_removed(void **)
     assert_int_equal(mkfifo((in / pipe).c_str(), 0600), 0);
     const int writer = open((in / held).c_str(), O_RDWR);
     assert_int_equal(flock(writer, LOCK_EX), 0);
-    write_ok(make_picture(3, 2, true).view(false), INSITU_PNG8, in / "a.png");
+    write_ok(make_picture(3, 2, true).make_view(false), INSITU_PNG8, in / "a.png");
     assert_false(fs::exists(in / left));
     for (const std::string &name : {held, others[0], others[1], others[2]}) assert_true(fs::exists(in / name));
     assert_true(fs::is_symlink(fs::symlink_status(in / link)) && fs::is_fifo(in / pipe));
     close(writer);
 }
 
-void pipe_in_the_picture_s_place_is_reported(void **)
+void pipe_at_the_picture_path_is_reported(void **)
 {
     const fs::path in = folder / "pipe";
     fs::create_directories(in);
     assert_int_equal(mkfifo((in / "a.png").c_str(), 0600), 0);
     base_error error;
-    assert_int_equal(write(make_picture(3, 2, true).view(false), INSITU_PNG8, in / "a.png", error), INSITU_ERROR_IO);
+    assert_int_equal(write_image(make_picture(3, 2, true).make_view(false), INSITU_PNG8, in / "a.png", error),
+                     INSITU_ERROR_IO);
     assert_non_null(std::strstr(error.message, "a.png: cannot be written: there is a named pipe"));
     assert_true(fs::is_fifo(in / "a.png"));
     assert_int_equal(count_files(in), 1);
@@ -476,7 +478,7 @@ void pipe_in_the_picture_s_place_is_reported(void **)
 
 /* Checks a picture at a position inside a larger one: it is blended over its background, as in its own file, and pixels
  * around it do not change. It is refused if it exceeds the columns of the larger one. */
-void pictures_are_put_into_places(void **)
+void images_are_written_into_regions_of_a_picture(void **)
 {
     const int width = 7, height = 5, larger = 20, rows = 9, left = 4, top = 3;
     const std::vector<float> own(static_cast<std::size_t>(4 * width * height), 0.25F);
@@ -501,22 +503,22 @@ void pictures_are_put_into_places(void **)
     assert_string_equal(error.message, "no image, or no place for it");
 }
 
-void nonsense_is_refused(void **)
+void invalid_arguments_are_rejected(void **)
 {
     const picture p = make_picture(3, 2, true);
-    insitu_image no_pixels = p.view(false), no_width = p.view(false);
+    insitu_image no_pixels = p.make_view(false), no_width = p.make_view(false);
     no_pixels.rgba = nullptr;
     no_width.width = 0;
     base_error error;
-    assert_int_equal(write(no_pixels, INSITU_PNG8, folder / "n.png", error), INSITU_ERROR_ARGUMENT);
-    assert_int_equal(write(no_width, INSITU_PNG8, folder / "n.png", error), INSITU_ERROR_ARGUMENT);
+    assert_int_equal(write_image(no_pixels, INSITU_PNG8, folder / "n.png", error), INSITU_ERROR_ARGUMENT);
+    assert_int_equal(write_image(no_width, INSITU_PNG8, folder / "n.png", error), INSITU_ERROR_ARGUMENT);
     insitu_image_format unknown = INSITU_PNG8;
     const int number_of_none = 7;
     static_assert(sizeof unknown == sizeof number_of_none, "an enum is an int");
     std::memcpy(&unknown, &number_of_none, sizeof unknown); /* an invalid number, which C callers may pass */
-    assert_int_equal(write(p.view(false), unknown, folder / "n.png", error), INSITU_ERROR_ARGUMENT);
-    assert_int_equal(write(p.view(false), INSITU_PNG8, "", error), INSITU_ERROR_ARGUMENT);
-    assert_int_equal(write(p.view(false), INSITU_DEEP_EXR, folder / "n.exr", error), INSITU_ERROR_ARGUMENT);
+    assert_int_equal(write_image(p.make_view(false), unknown, folder / "n.png", error), INSITU_ERROR_ARGUMENT);
+    assert_int_equal(write_image(p.make_view(false), INSITU_PNG8, "", error), INSITU_ERROR_ARGUMENT);
+    assert_int_equal(write_image(p.make_view(false), INSITU_DEEP_EXR, folder / "n.exr", error), INSITU_ERROR_ARGUMENT);
     assert_false(fs::exists(folder / "n.png"));
 }
 
@@ -530,20 +532,20 @@ int main(int argument_count, char **arguments)
         cmocka_unit_test(png8_is_within_half_a_code),
         cmocka_unit_test(png8_is_exact_where_codes_change),
         cmocka_unit_test(png16_is_within_half_a_code),
-        cmocka_unit_test(png_of_numbers_that_are_not_is_black),
+        cmocka_unit_test(nan_pixels_are_black_in_png),
         cmocka_unit_test(exr_is_bitwise),
         cmocka_unit_test(exr_has_channels_of_other_numbers),
         cmocka_unit_test(deep_exr_is_bitwise),
         cmocka_unit_test(deep_exr_is_flattened_by_openimageio),
-        cmocka_unit_test(writing_leaves_the_picture_alone),
-        cmocka_unit_test(unwritable_places_are_reported),
+        cmocka_unit_test(writing_does_not_change_the_picture),
+        cmocka_unit_test(unwritable_paths_are_reported),
         cmocka_unit_test(full_disk_is_reported_and_leaves_the_old_picture),
         cmocka_unit_test(longest_legal_name_is_written),
-        cmocka_unit_test(planted_links_keep_their_victims),
+        cmocka_unit_test(writing_does_not_follow_planted_links),
         cmocka_unit_test(files_of_killed_runs_are_removed),
-        cmocka_unit_test(pipe_in_the_picture_s_place_is_reported),
-        cmocka_unit_test(pictures_are_put_into_places),
-        cmocka_unit_test(nonsense_is_refused),
+        cmocka_unit_test(pipe_at_the_picture_path_is_reported),
+        cmocka_unit_test(images_are_written_into_regions_of_a_picture),
+        cmocka_unit_test(invalid_arguments_are_rejected),
     };
     const int failures = cmocka_run_group_tests(tests, nullptr, nullptr);
     fs::remove_all(folder);

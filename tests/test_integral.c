@@ -29,7 +29,7 @@ typedef struct piece {
 } piece;
 
 /* Returns a multiple of 1/1024, which is the same in float, so that both builds use the same function. */
-static double coarse(uint64_t index, uint64_t seed)
+static double draw_coarse_number(uint64_t index, uint64_t seed)
 {
     return floor(1024 * test_uniform(index, seed)) / 1024;
 }
@@ -41,15 +41,16 @@ static void make_transfer(random_transfer *r, uint64_t seed, double most)
     t->colour_count = 2 + (int)(test_uniform(0, seed) * (MAX_COLOURS - 2));
     /* The colour table has 2^n + 1 entries, whose positions are exact in float. */
     t->colour_count = t->colour_count > 33 ? 33 : t->colour_count > 17 ? 17 : t->colour_count > 5 ? 5 : 2;
-    for (int i = 0; i < 3 * t->colour_count; i++) r->colours[i] = (float)coarse(10 + (uint64_t)i, seed);
+    for (int i = 0; i < 3 * t->colour_count; i++) r->colours[i] = (float)draw_coarse_number(10 + (uint64_t)i, seed);
     t->opacity_count = 1 + (int)(test_uniform(1, seed) * (MAX_POINTS - 1));
     double at = -0.25;
     for (int i = 0; i < t->opacity_count; i++) {
-        const double gap =
-            test_uniform(200 + (uint64_t)i, seed) < 0.2 ? 0 : 0.0625 + 0.25 * coarse(300 + (uint64_t)i, seed);
+        const double gap = test_uniform(200 + (uint64_t)i, seed) < 0.2
+                               ? 0
+                               : 0.0625 + 0.25 * draw_coarse_number(300 + (uint64_t)i, seed);
         r->values[i] = at += gap;
         const bool is_clear = test_uniform(400 + (uint64_t)i, seed) < 0.2;
-        r->opacities[i] = is_clear ? 0 : (float)(most * coarse(500 + (uint64_t)i, seed));
+        r->opacities[i] = is_clear ? 0 : (float)(most * draw_coarse_number(500 + (uint64_t)i, seed));
     }
     t->colours = r->colours;
     t->opacity_values = r->values;
@@ -58,7 +59,7 @@ static void make_transfer(random_transfer *r, uint64_t seed, double most)
 
 /* ---- the oracle ---- */
 
-static long double opacity_near(const render_transfer *t, long double middle, long double x)
+static long double evaluate_opacity_near(const render_transfer *t, long double middle, long double x)
 {
     int i = 0;
     while (i < t->opacity_count && (long double)t->opacity_values[i] <= middle) i++;
@@ -69,7 +70,7 @@ static long double opacity_near(const render_transfer *t, long double middle, lo
     return a + (x - low) / (high - low) * (b - a);
 }
 
-static long double colour_at(const render_transfer *t, long double x, int c)
+static long double evaluate_colour(const render_transfer *t, long double x, int c)
 {
     const int last = t->colour_count - 1;
     const long double place = fminl(fmaxl(x, 0), 1) * last;
@@ -79,7 +80,7 @@ static long double colour_at(const render_transfer *t, long double x, int c)
 }
 
 /* Returns the optical depth from 0 to s. */
-static long double depth_to(const piece *p, long double s)
+static long double compute_optical_depth(const piece *p, long double s)
 {
     const long double u0 = 1 - p->a0, u1 = u0 - s * (p->a1 - p->a0), change = u0 - u1;
     if (fabsl(change) < 1e-4L * u0) {
@@ -92,24 +93,25 @@ static long double depth_to(const piece *p, long double s)
     return p->length * s * (g0 - g1) / change;
 }
 
-static long double emission(const piece *p, int c, long double s)
+static long double compute_emission(const piece *p, int c, long double s)
 {
     const long double a = p->a0 + s * (p->a1 - p->a0);
     if (a >= 1) return 0;
-    return (p->c0[c] + s * (p->c1[c] - p->c0[c])) * -log1pl(-a) * p->length * expl(-depth_to(p, s));
+    return (p->c0[c] + s * (p->c1[c] - p->c0[c])) * -log1pl(-a) * p->length * expl(-compute_optical_depth(p, s));
 }
 
-static long double simpson(const piece *p, int c, long double from, long double to, const long double f[3],
-                           long double tolerance, int depth)
+static long double integrate_by_simpson(const piece *p, int c, long double from, long double to, const long double f[3],
+                                        long double tolerance, int depth)
 {
     const long double width = to - from, middle = 0.5L * (from + to);
-    const long double q1 = emission(p, c, from + 0.25L * width), q3 = emission(p, c, from + 0.75L * width);
+    const long double q1 = compute_emission(p, c, from + 0.25L * width),
+                      q3 = compute_emission(p, c, from + 0.75L * width);
     const long double whole = width / 6 * (f[0] + 4 * f[1] + f[2]);
     const long double halves = width / 12 * (f[0] + 4 * q1 + 2 * f[1] + 4 * q3 + f[2]);
     if ((depth > 5 && fabsl(whole - halves) < 15 * tolerance) || depth > 40) return halves + (halves - whole) / 15;
     const long double left[3] = {f[0], q1, f[1]}, right[3] = {f[1], q3, f[2]};
-    return simpson(p, c, from, middle, left, tolerance / 2, depth + 1) +
-           simpson(p, c, middle, to, right, tolerance / 2, depth + 1);
+    return integrate_by_simpson(p, c, from, middle, left, tolerance / 2, depth + 1) +
+           integrate_by_simpson(p, c, middle, to, right, tolerance / 2, depth + 1);
 }
 
 static int collect_cuts(const render_transfer *t, long double v0, long double v1, long double cuts[MAX_CUTS])
@@ -130,8 +132,8 @@ static int collect_cuts(const render_transfer *t, long double v0, long double v1
 }
 
 /* Computes rgb, transmittance and optical depth into out; the tolerance is relative to the depth. */
-static void oracle(const render_transfer *t, double length, double v_in, double v_out, long double tolerance,
-                   long double out[5])
+static void integrate_exactly(const render_transfer *t, double length, double v_in, double v_out, long double tolerance,
+                              long double out[5])
 {
     const long double v0 = (long double)v_in, v1 = (long double)v_out;
     long double cuts[MAX_CUTS];
@@ -140,32 +142,34 @@ static void oracle(const render_transfer *t, double length, double v_in, double 
     for (int i = 0; i + 1 < count; i++) {
         if (cuts[i] == cuts[i + 1]) continue; /* at a control point with infinite extinction there is no integral */
         const long double x0 = v0 + cuts[i] * (v1 - v0), x1 = v0 + cuts[i + 1] * (v1 - v0), m = 0.5L * (x0 + x1);
-        piece p = {.a0 = opacity_near(t, m, x0), .a1 = opacity_near(t, m, x1)};
+        piece p = {.a0 = evaluate_opacity_near(t, m, x0), .a1 = evaluate_opacity_near(t, m, x1)};
         p.length = (long double)length * (cuts[i + 1] - cuts[i]);
         for (int c = 0; c < 3; c++) {
-            p.c0[c] = colour_at(t, x0, c);
-            p.c1[c] = colour_at(t, x1, c);
-            const long double f[3] = {emission(&p, c, 0), emission(&p, c, 0.5L), emission(&p, c, 1)};
-            const long double depth = depth_to(&p, 1);
-            if (depth > 0) out[c] += expl(-out[4]) * simpson(&p, c, 0, 1, f, tolerance * fminl(depth, 1), 0);
+            p.c0[c] = evaluate_colour(t, x0, c);
+            p.c1[c] = evaluate_colour(t, x1, c);
+            const long double f[3] = {compute_emission(&p, c, 0), compute_emission(&p, c, 0.5L),
+                                      compute_emission(&p, c, 1)};
+            const long double depth = compute_optical_depth(&p, 1);
+            if (depth > 0)
+                out[c] += expl(-out[4]) * integrate_by_simpson(&p, c, 0, 1, f, tolerance * fminl(depth, 1), 0);
         }
-        out[4] += depth_to(&p, 1);
+        out[4] += compute_optical_depth(&p, 1);
     }
     out[3] = expl(-out[4]);
 }
 
 /* Computes how the light depends on the field's value x, with colour b behind: the derivatives (s (c - b))' of the
  * three channels and s' (for alpha), then s and |s'|. */
-static void brute_slopes(const render_transfer *t, long double x, long double b, long double out[6])
+static void differentiate_by_brute_force(const render_transfer *t, long double x, long double b, long double out[6])
 {
-    const long double step = 1e-6L, a = opacity_near(t, x, x), clear = 1 - a;
-    const long double slope = (opacity_near(t, x, x + step) - a) / step / clear, extinction = -log1pl(-a);
+    const long double step = 1e-6L, a = evaluate_opacity_near(t, x, x), clear = 1 - a;
+    const long double slope = (evaluate_opacity_near(t, x, x + step) - a) / step / clear, extinction = -log1pl(-a);
     for (int c = 0; c < 3; c++) {
         const long double place = fminl(fmaxl(x, 0), 1) * (t->colour_count - 1);
         const int i = (int)fminl(place, t->colour_count - 2);
         const long double rise = (long double)t->colours[3 * i + 3 + c] - (long double)t->colours[3 * i + c];
         const long double colour_slope = x > 0 && x < 1 ? rise * (t->colour_count - 1) : 0;
-        out[c] = slope * (colour_at(t, x, c) - b) + extinction * colour_slope;
+        out[c] = slope * (evaluate_colour(t, x, c) - b) + extinction * colour_slope;
     }
     out[3] = slope;
     out[4] = extinction;
@@ -173,7 +177,7 @@ static void brute_slopes(const render_transfer *t, long double x, long double b,
 }
 
 /* Computes what kernel_light_variation bounds, by brute force from many values of the range and several b. */
-static void brute_swing(const render_transfer *t, double low, double high, double out[4])
+static void find_variation_by_brute_force(const render_transfer *t, double low, double high, double out[4])
 {
     enum { VALUES = 300, BEHIND = 4 };
     double swing = 0, cost = 0;
@@ -183,7 +187,8 @@ static void brute_swing(const render_transfer *t, double low, double high, doubl
         for (int k = 0; k < 4; k++) least[k] = INFINITY, most[k] = -INFINITY;
         for (int i = 0; i <= VALUES; i++) {
             long double slopes[6];
-            brute_slopes(t, low + (high - low) * (long double)i / VALUES, (long double)n / BEHIND, slopes);
+            differentiate_by_brute_force(t, low + (high - low) * (long double)i / VALUES, (long double)n / BEHIND,
+                                         slopes);
             for (int k = 0; k < 4; k++) {
                 least[k] = fmin(least[k], (double)slopes[k]);
                 most[k] = fmax(most[k], (double)slopes[k]);
@@ -205,7 +210,8 @@ static void brute_swing(const render_transfer *t, double low, double high, doubl
 typedef void integral(const render_transfer *t, double length, double v_in, double v_out, double out[4]);
 
 /* Returns the largest error, relative to the optical depth if that is below 1, over the requested decades of depth. */
-static double worst_of(integral *of, int count, double most, double tolerance, double *deepest, double *shallowest)
+static double find_largest_error(integral *of, int count, double most, double tolerance, double *deepest,
+                                 double *shallowest)
 {
     double worst = 0;
     *deepest = 0;
@@ -214,14 +220,14 @@ static double worst_of(integral *of, int count, double most, double tolerance, d
         random_transfer r;
         const uint64_t seed = 1000 + (uint64_t)n;
         make_transfer(&r, seed, most);
-        const double v_in = 1.5 * coarse(1, seed + 7) - 0.25;
+        const double v_in = 1.5 * draw_coarse_number(1, seed + 7) - 0.25;
         const bool is_level = n % 11 == 0;
         const double interval = n % 3 == 0 ? 1 / 64.0 : 1.5,
-                     v_out = is_level ? v_in : v_in + interval * (coarse(2, seed + 7) - 0.5);
+                     v_out = is_level ? v_in : v_in + interval * (draw_coarse_number(2, seed + 7) - 0.5);
         const double length = ldexp(1, (int)(38 * test_uniform(3, seed)) - 28);
         long double truth[5];
         double found[4];
-        oracle(&r.transfer, length, v_in, v_out, (long double)tolerance, truth);
+        integrate_exactly(&r.transfer, length, v_in, v_out, (long double)tolerance, truth);
         of(&r.transfer, length, v_in, v_out, found);
         const double depth = (double)truth[4], scale = fmin(1, depth);
         for (int c = 0; c < 4; c++) {
@@ -244,19 +250,19 @@ static void integral_is_exact_in_double(void **state)
 {
     (void)state;
     double deep, shallow;
-    const double worst = worst_of(integral_on_doubles, 200, 0.999, 1e-15, &deep, &shallow);
+    const double worst = find_largest_error(integrate_in_double, 200, 0.999, 1e-15, &deep, &shallow);
     fprintf(stderr, "double: %.2g, depths %.2g to %.2g\n", worst, shallow, deep);
     assert_true(shallow < 1e-8 && deep > 1e3);
     assert_true(worst < 1e-12);
 }
 
-static void integral_is_near_in_float(void **state)
+static void float_integral_is_within_the_bound(void **state)
 {
     static const double most[4] = {0.25, 0.9, 0.99, 0.9999};
     (void)state;
     for (int i = 0; i < 4; i++) {
         double deep, shallow;
-        const double worst = worst_of(integral_on_floats, floats, most[i], 1e-9, &deep, &shallow);
+        const double worst = find_largest_error(integrate_in_float, floats, most[i], 1e-9, &deep, &shallow);
         fprintf(stderr, "float, opacities to %g: %.2g, depths %.2g to %.2g\n", most[i], worst, shallow, deep);
         assert_true(shallow < 1e-8 && deep > (i ? 500 : 100));
         assert_true(worst < 1e-6);
@@ -275,21 +281,21 @@ static void opaque_points_are_integrated(void **state)
         r.values[0] = 0.125, r.values[1] = 0.5, r.values[2] = 0.75;
         r.opacities[0] = 0.25f, r.opacities[1] = 1, r.opacities[2] = 0;
         /* A quarter of the segments begin or end at the pole itself, and some hardly leave it. */
-        const double near = 0.5 + (coarse(2, (uint64_t)n + 9) - 0.5) * (n % 16 < 4 ? 1.0 / 4096 : 1);
-        const double other = n % 4 ? coarse(1, (uint64_t)n + 9) : 0.5;
+        const double near = 0.5 + (draw_coarse_number(2, (uint64_t)n + 9) - 0.5) * (n % 16 < 4 ? 1.0 / 4096 : 1);
+        const double other = n % 4 ? draw_coarse_number(1, (uint64_t)n + 9) : 0.5;
         const double v_in = n % 8 ? other : near, v_out = n % 8 ? near : other;
         const double length = ldexp(1, n % 20 - 16);
         long double truth[5];
         double found[4];
-        oracle(&r.transfer, length, v_in, v_out, 1e-10L, truth);
-        integral_on_floats(&r.transfer, length, v_in, v_out, found);
-        for (int c = 0; c < 4; c++) worst = test_worse(worst, fabs(found[c] - (double)truth[c]));
+        integrate_exactly(&r.transfer, length, v_in, v_out, 1e-10L, truth);
+        integrate_in_float(&r.transfer, length, v_in, v_out, found);
+        for (int c = 0; c < 4; c++) worst = test_larger_error(worst, fabs(found[c] - (double)truth[c]));
     }
     fprintf(stderr, "opaque points: %.2g\n", worst);
     assert_true(worst < 1e-6);
 }
 
-static void opacity_of_one_lets_nothing_through(void **state)
+static void opacity_of_one_absorbs_all_light(void **state)
 {
     (void)state;
     random_transfer r;
@@ -297,7 +303,7 @@ static void opacity_of_one_lets_nothing_through(void **state)
     make_transfer(&r, 1, 1);
     r.transfer.opacity_count = 1;
     r.opacities[0] = 1;
-    integral_on_floats(&r.transfer, 0.01, 0, 0, found);
+    integrate_in_float(&r.transfer, 0.01, 0, 0, found);
     for (int c = 0; c < 3; c++) assert_true(fabs(found[c] - (double)r.colours[c]) < 1e-6);
     assert_true(found[3] < 1e-7);
 }
@@ -305,7 +311,7 @@ static void opacity_of_one_lets_nothing_through(void **state)
 /* Checks that no bound is below the variation over the range's own values, and that none is above the variation over a
  * range wider by two of 128 bins at either end, times 1.25 plus the overestimate of interval arithmetic within a bin.
  * Values beyond all bins belong to the bin at that end. */
-static void swings_are_bounds(void **state)
+static void light_variation_bounds_hold(void **state)
 {
     enum { RANGES = 20 };
     (void)state;
@@ -317,15 +323,15 @@ static void swings_are_bounds(void **state)
         const double first = fmin(0, r.values[0]), last = fmax(1, r.values[r.transfer.opacity_count - 1]);
         const double bin = (last - first) / 128;
         for (uint64_t i = 0; i < RANGES; i++) {
-            ranges[i][0] = test_uniform_in(i, 9000 + n, first - 0.1, last + 0.1);
-            ranges[i][1] = ranges[i][0] + pow(10, test_uniform_in(RANGES + i, 9000 + n, -4, 0.2));
+            ranges[i][0] = test_uniform_between(i, 9000 + n, first - 0.1, last + 0.1);
+            ranges[i][1] = ranges[i][0] + pow(10, test_uniform_between(RANGES + i, 9000 + n, -4, 0.2));
         }
-        integral_swings(&r.transfer, RANGES, (const double(*)[2])ranges, found);
+        integral_variations(&r.transfer, RANGES, (const double(*)[2])ranges, found);
         for (int i = 0; i < RANGES; i++) {
             double truth[4], wide[4];
             const double low = ranges[i][0], high = ranges[i][1], more = 2 * bin + 0.25 * (high - low);
-            brute_swing(&r.transfer, low, high, truth);
-            brute_swing(&r.transfer, fmin(low, last) - 2 * bin, fmax(high, first) + more, wide);
+            find_variation_by_brute_force(&r.transfer, low, high, truth);
+            find_variation_by_brute_force(&r.transfer, fmin(low, last) - 2 * bin, fmax(high, first) + more, wide);
             for (int k = 0; k < 4; k++) assert_true(found[i][k] >= truth[k] * (1 - 1e-4) - 1e-6);
             loosest = fmax(loosest, (found[i][0] - wide[0]) / fmax(wide[1], 1e-9));
         }
@@ -339,11 +345,9 @@ int main(int argc, char **argv)
 {
     if (argc > 1) floats = atoi(argv[1]);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(integral_is_exact_in_double),
-        cmocka_unit_test(integral_is_near_in_float),
-        cmocka_unit_test(opaque_points_are_integrated),
-        cmocka_unit_test(opacity_of_one_lets_nothing_through),
-        cmocka_unit_test(swings_are_bounds),
+        cmocka_unit_test(integral_is_exact_in_double),  cmocka_unit_test(float_integral_is_within_the_bound),
+        cmocka_unit_test(opaque_points_are_integrated), cmocka_unit_test(opacity_of_one_absorbs_all_light),
+        cmocka_unit_test(light_variation_bounds_hold),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -77,17 +77,17 @@ static int case_count;
 
 /* Returns a layer with opacities from 1e-9 to 1e-3 per cell at five random values: the transmittance of most segments
  * rounds to 1, but their emission is visible. */
-static const char *faint_layer(int which)
+static const char *make_faint_layer(int which)
 {
     static char texts[MOST_FAINT][256];
     char *text = texts[which];
     const uint64_t of = 100 + (uint64_t)which;
     size_t size = (size_t)snprintf(text, sizeof *texts, "      - volume: {field: f, opacity: [");
     for (int knot = 0; knot < 5; knot++) {
-        const double inner = 0.25 * (knot + test_uniform_in(of, (uint64_t)knot, -0.3, 0.3));
+        const double inner = 0.25 * (knot + test_uniform_between(of, (uint64_t)knot, -0.3, 0.3));
         const double at = knot == 0 ? 0 : knot == 4 ? 1 : inner;
         size += (size_t)snprintf(text + size, sizeof *texts - size, "%s[%.3f, %.3g]", knot ? ", " : "", at,
-                                 pow(10, test_uniform_in(of, 10 + (uint64_t)knot, -9, -3)));
+                                 pow(10, test_uniform_between(of, 10 + (uint64_t)knot, -9, -3)));
     }
     snprintf(text + size, sizeof *texts - size, "]}\n");
     return text;
@@ -101,12 +101,12 @@ static void make_cases(void)
     static const char *const names[] = {"faint, samples", "faint, segments", "faint, max_error",
                                         "faint, max_error 1e-4"};
     memcpy(cases, listed, sizeof listed);
-    case_count = LISTED + test_effort(4, MOST_FAINT);
+    case_count = LISTED + test_case_count(4, MOST_FAINT);
     for (int i = 0; i + LISTED < case_count; i++)
-        cases[LISTED + i] = (image_case){names[i % 4], TO_THE_BIT, faint_layer(i), samplings[i % 4], NULL};
+        cases[LISTED + i] = (image_case){names[i % 4], TO_THE_BIT, make_faint_layer(i), samplings[i % 4], NULL};
 }
 
-static const char *scene_of_all(void)
+static const char *write_scene_of_all_cases(void)
 {
     static char text[32768];
     size_t size = 0;
@@ -132,7 +132,8 @@ static const test_mesh_kind kinds[] = {TEST_HEXES, TEST_TETS, TEST_POLYHEDRA, TE
 enum { KINDS = sizeof kinds / sizeof *kinds };
 
 /* Calls visit for each vertex of the cell, more than once for vertices that its faces share. */
-static void for_vertices(const test_mesh *mesh, int64_t cell, void (*visit)(void *state, int64_t vertex), void *state)
+static void for_each_vertex(const test_mesh *mesh, int64_t cell, void (*visit)(void *state, int64_t vertex),
+                            void *state)
 {
     for (int64_t i = mesh->offsets[cell]; i < mesh->offsets[cell + 1]; i++) {
         const int64_t entry = mesh->connectivity[i];
@@ -151,18 +152,18 @@ typedef struct mean_place {
     int count;
 } mean_place;
 
-static void add_place(void *state, int64_t vertex)
+static void add_vertex_position(void *state, int64_t vertex)
 {
     mean_place *mean = state;
     for (int a = 0; a < 3; a++) mean->sum[a] += mean->mesh->coordinates[3 * vertex + a];
     mean->count++;
 }
 
-static uint64_t morton_code(const test_mesh *mesh, int64_t cell)
+static uint64_t compute_morton_code(const test_mesh *mesh, int64_t cell)
 {
     mean_place mean = {.mesh = mesh};
     uint64_t code = 0;
-    for_vertices(mesh, cell, add_place, &mean);
+    for_each_vertex(mesh, cell, add_vertex_position, &mean);
     for (int bit = 9; bit >= 0; bit--)
         for (int a = 0; a < 3; a++) {
             const double part = (mean.sum[a] / mean.count + 1) / 2;
@@ -182,19 +183,19 @@ static void distribute_morton(const test_mesh *mesh, int *owners)
     const size_t cells = (size_t)mesh->cell_count;
     uint64_t *codes = calloc(cells, sizeof *codes);
     assert_non_null(codes);
-    for (size_t i = 0; i < cells; i++) codes[i] = morton_code(mesh, (int64_t)i);
+    for (size_t i = 0; i < cells; i++) codes[i] = compute_morton_code(mesh, (int64_t)i);
     qsort(codes, cells, sizeof *codes, compare_codes);
     for (size_t i = 0; i < cells; i++)
         owners[codes[i] & 0xffffffffu] = (int)((uint64_t)i * (uint64_t)rank_count / cells);
     free(codes);
 }
 
-static void distribute(const test_mesh *mesh, distribution how, int side, int *owners)
+static void distribute_cells(const test_mesh *mesh, distribution how, int side, int *owners)
 {
     static const test_partition_kind known[] = {TEST_BLOCK, TEST_BLOCK, TEST_RANDOM, TEST_CHECKERBOARD, TEST_RANDOM};
     const int empty = rank_count / 2;
     const bool has_empty = how == RANK_EMPTY && rank_count > 1;
-    test_partition(mesh, known[how], side, has_empty ? rank_count - 1 : rank_count, owners);
+    test_partition_cells(mesh, known[how], side, has_empty ? rank_count - 1 : rank_count, owners);
     if (how == MORTON) distribute_morton(mesh, owners);
     for (int64_t i = 0; has_empty && i < mesh->cell_count; i++) owners[i] += owners[i] >= empty;
 }
@@ -216,15 +217,15 @@ static void find_vertex(void *state, int64_t vertex)
 }
 
 /* Adds the cells that share a vertex with the selected cells. */
-static void take_layer(const test_mesh *mesh, unsigned char *taken)
+static void add_neighbour_layer(const test_mesh *mesh, unsigned char *taken)
 {
     vertex_set set = {.has = calloc((size_t)mesh->vertex_count, 1)};
     assert_non_null(set.has);
     for (int64_t i = 0; i < mesh->cell_count; i++)
-        if (taken[i]) for_vertices(mesh, i, add_vertex, &set);
+        if (taken[i]) for_each_vertex(mesh, i, add_vertex, &set);
     for (int64_t i = 0; i < mesh->cell_count; i++) {
         set.found = false;
-        for_vertices(mesh, i, find_vertex, &set);
+        for_each_vertex(mesh, i, find_vertex, &set);
         if (set.found) taken[i] = 1;
     }
     free(set.has);
@@ -237,13 +238,13 @@ typedef struct input {
     insitu_field cells;
 } input;
 
-static void describe(input *in, const int *origin)
+static void describe_fields(input *in, const int *origin)
 {
     const int64_t cells = in->vertices.part.cell_count;
     input_describe(&in->vertices);
     in->cell_values = calloc((size_t)cells + 1, sizeof *in->cell_values);
     assert_non_null(in->cell_values);
-    for (int64_t i = 0; i < cells; i++) in->cell_values[i] = test_uniform_in((uint64_t)origin[i], 9, -1, 1);
+    for (int64_t i = 0; i < cells; i++) in->cell_values[i] = test_uniform_between((uint64_t)origin[i], 9, -1, 1);
     in->cells = in->vertices.field;
     in->cells.name = "c";
     in->cells.centring = INSITU_CELL;
@@ -264,40 +265,40 @@ static void extract_rank_cells(const test_mesh *mesh, const int *owners, int lay
     int *of_part = calloc(cells, sizeof *of_part), *origin = calloc(cells, sizeof *origin);
     assert_true(taken && of_part && origin);
     for (size_t i = 0; i < cells; i++) taken[i] = owners[i] == own_rank;
-    for (int layer = 0; layer < layers; layer++) take_layer(mesh, taken);
+    for (int layer = 0; layer < layers; layer++) add_neighbour_layer(mesh, taken);
     int count = 0;
     for (size_t i = 0; i < cells; i++) {
         of_part[i] = taken[i] ? 0 : 1;
         if (taken[i]) origin[count++] = (int)i;
     }
     *out = (input){0};
-    test_mesh_part(mesh, of_part, 0, &out->vertices.part);
+    test_mesh_extract_part(mesh, of_part, 0, &out->vertices.part);
     for (int i = 0; i < count; i++) out->vertices.part.ghosts[i] = owners[origin[i]] != own_rank;
     test_mesh_reorder_vertices(&out->vertices.part, 11 + (uint64_t)own_rank);
-    describe(out, origin);
+    describe_fields(out, origin);
     free(taken);
     free(of_part);
     free(origin);
 }
 
-static void take_whole(const test_mesh *mesh, input *out)
+static void make_whole_input(const test_mesh *mesh, input *out)
 {
     int *owners = calloc((size_t)mesh->cell_count, sizeof *owners), *origin = calloc((size_t)mesh->cell_count, 4);
     assert_true(owners && origin);
     for (int i = 0; i < (int)mesh->cell_count; i++) origin[i] = i;
     *out = (input){0};
-    test_mesh_part(mesh, owners, 0, &out->vertices.part);
-    describe(out, origin);
+    test_mesh_extract_part(mesh, owners, 0, &out->vertices.part);
+    describe_fields(out, origin);
     free(owners);
     free(origin);
 }
 
 /* ---- pictures ------------------------------------------------------------------------------------------------- */
 
-static void draw(insitu_session *session, const input *in, int cycle)
+static void submit_and_step(insitu_session *session, const input *in, int cycle)
 {
     discard_pictures();
-    insitu_status status = submit(session, &in->vertices);
+    insitu_status status = submit_input(session, &in->vertices);
     if (!status) status = insitu_set_field(session, "m", &in->cells);
     if (!status) status = insitu_step(session, cycle, 0);
     if (status) fprintf(stderr, "rank %d: %s\n", own_rank, insitu_error(session));
@@ -313,7 +314,7 @@ typedef struct tally {
 
 static tally tallies[MOST_CASES];
 
-static int code_of(const float *rgba, int channel)
+static int encode_channel(const float *rgba, int channel)
 {
     const double alpha = (double)rgba[3], linear = alpha > 0 ? (double)rgba[channel] / alpha : 0;
     if (channel == 3) return (int)(fmin(fmax(alpha, 0), 1) * 255 + 0.5);
@@ -321,44 +322,44 @@ static int code_of(const float *rgba, int channel)
     return (int)(255 * (l <= 0.0031308 ? 12.92 * l : 1.055 * pow(l, 1 / 2.4) - 0.055) + 0.5);
 }
 
-static bool compare(const caught_picture *a, const caught_picture *b, const image_case *c, tally *t)
+static bool compare_pictures(const caught_picture *a, const caught_picture *b, const image_case *c, tally *t)
 {
     double worst = 0;
     int depths = 0;
     for (int i = 0; i < 4 * PIXELS; i++) {
-        const int off = abs(code_of(a->rgba + i / 4 * 4, i % 4) - code_of(b->rgba + i / 4 * 4, i % 4));
+        const int off = abs(encode_channel(a->rgba + i / 4 * 4, i % 4) - encode_channel(b->rgba + i / 4 * 4, i % 4));
         if (off) t->codes[off > 1]++;
-        worst = test_worse(worst, fabs((double)a->rgba[i] - (double)b->rgba[i]));
+        worst = test_larger_error(worst, fabs((double)a->rgba[i] - (double)b->rgba[i]));
     }
     for (int p = 0; p < PIXELS; p++) depths += memcmp(a->depth + p, b->depth + p, sizeof(float)) != 0;
     const bool is_same = !depths && !memcmp(a->rgba, b->rgba, 4 * PIXELS * sizeof(float));
     t->pictures++;
     t->same += is_same;
     t->depths += depths;
-    t->worst = test_worse(t->worst, worst);
+    t->worst = test_larger_error(t->worst, worst);
     return is_same || (c->promise == TO_A_MILLIONTH && !depths && worst <= 1e-6);
 }
 
-static bool are_the_same(const caught_picture *whole, const char *what)
+static bool are_same_pictures_within_tolerance(const caught_picture *whole, const char *what)
 {
     bool are_well = caught_count == case_count;
     for (int i = 0; i < caught_count; i++) {
         const double before = tallies[i].worst;
         tallies[i].worst = 0;
-        if (!compare(&whole[i], &caught[i], &cases[i], &tallies[i])) {
+        if (!compare_pictures(&whole[i], &caught[i], &cases[i], &tallies[i])) {
             fprintf(stderr, "%d ranks, %s, %s: off by %g\n", rank_count, what, cases[i].name, tallies[i].worst);
             are_well = false;
         }
-        tallies[i].worst = test_worse(before, tallies[i].worst);
+        tallies[i].worst = test_larger_error(before, tallies[i].worst);
     }
     return are_well;
 }
 
 /* ---- the matrix ----------------------------------------------------------------------------------------------- */
 
-static bool is_due(int kind, int how, int layers)
+static bool is_case_selected(int kind, int how, int layers)
 {
-    return test_is_whole() || (kind + how + layers) % 6 == 0;
+    return test_is_long_run() || (kind + how + layers) % 6 == 0;
 }
 
 static bool verify_mesh(insitu_session *session, int kind, int side, const test_mesh *mesh, const caught_picture *whole)
@@ -371,13 +372,13 @@ static bool verify_mesh(insitu_session *session, int kind, int side, const test_
         for (int layers = 0; layers <= MOST_LAYERS; layers++) {
             char what[96];
             input part;
-            if (!is_due(kind, how, layers)) continue;
+            if (!is_case_selected(kind, how, layers)) continue;
             snprintf(what, sizeof what, "%s, %s, %d ghost layers", test_mesh_kind_name(kinds[kind]),
                      distribution_names[how], layers);
-            distribute(mesh, (distribution)how, side, owners);
+            distribute_cells(mesh, (distribution)how, side, owners);
             extract_rank_cells(mesh, owners, layers, &part);
-            draw(session, &part, cycle++);
-            if (own_rank == 0) are_well = are_the_same(whole, what) && are_well;
+            submit_and_step(session, &part, cycle++);
+            if (own_rank == 0) are_well = are_same_pictures_within_tolerance(whole, what) && are_well;
             free_input(&part);
         }
     free(owners);
@@ -389,10 +390,10 @@ static void draw_whole(const char *scene, const test_mesh *mesh, caught_picture 
 {
     static int cycle;
     input whole;
-    take_whole(mesh, &whole);
+    make_whole_input(mesh, &whole);
     insitu_session *session = open_session(MPI_COMM_SELF, scene);
     discard_pictures();
-    assert_int_equal(submit(session, &whole.vertices), INSITU_OK);
+    assert_int_equal(submit_input(session, &whole.vertices), INSITU_OK);
     assert_int_equal(insitu_set_field(session, "m", &whole.cells), INSITU_OK);
     assert_int_equal(insitu_step(session, cycle++, 0), INSITU_OK);
     assert_int_equal(caught_count, case_count);
@@ -405,14 +406,14 @@ static void draw_whole(const char *scene, const test_mesh *mesh, caught_picture 
 static void pictures_do_not_depend_on_the_partition(void **state)
 {
     (void)state;
-    const int side = test_effort(3, 4);
-    const char *scene = scene_of_all();
+    const int side = test_case_count(3, 4);
+    const char *scene = write_scene_of_all_cases();
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
     bool are_well = true;
     for (int kind = 0; kind < KINDS; kind++) {
         test_mesh mesh;
         caught_picture whole[MOST_CASES] = {{0}};
-        test_mesh_lattice(kinds[kind], side, 0.2, test_wave, &mesh);
+        test_mesh_make_lattice(kinds[kind], side, 0.2, test_wave_field, &mesh);
         if (own_rank == 0) draw_whole(scene, &mesh, whole);
         are_well = verify_mesh(session, kind, side, &mesh, whole) && are_well;
         for (int i = 0; i < case_count && own_rank == 0; i++) free_caught(&whole[i]);

@@ -22,35 +22,35 @@ extern "C" {
 namespace
 {
 
-int measure(const std::string &text, int size)
+int measure_text_width(const std::string &text, int size)
 {
     static const typeface font;
     return font.width_of(text, size);
 }
 
-insitu_image image_of(int width, int height, const insitu_decorations &what)
+insitu_image make_image(int width, int height, const insitu_decorations &what)
 {
     return {width, height, nullptr, nullptr, &what, 0, nullptr, nullptr};
 }
 
-bool are_apart(const area &a, const area &b)
+bool are_disjoint(const area &a, const area &b)
 {
     return a.x1 <= b.x0 || b.x1 <= a.x0 || a.y1 <= b.y0 || b.y1 <= a.y0;
 }
 
 /* Returns the box of a line of text: in DejaVuSans capitals and digits reach 0.73 of the size above the baseline. */
-area box_of(const placed_line &line, int size)
+area compute_line_box(const placed_line &line, int size)
 {
-    return {line.x, line.baseline - 0.73 * size, line.x + measure(line.text, size), line.baseline};
+    return {line.x, line.baseline - 0.73 * size, line.x + measure_text_width(line.text, size), line.baseline};
 }
 
 void check_lines(const block &b)
 {
     for (std::size_t i = 0; i < b.lines.size(); i++) {
-        const area box = box_of(b.lines[i], b.size);
+        const area box = compute_line_box(b.lines[i], b.size);
         assert_true(box.x0 >= b.bounds.x0 && box.y0 >= b.bounds.y0 && box.x1 <= b.bounds.x1 && box.y1 <= b.bounds.y1);
-        for (std::size_t k = 0; k < i; k++) assert_true(are_apart(box, box_of(b.lines[k], b.size)));
-        if (b.kind == block_kind::bar) assert_true(are_apart(box, b.gradient));
+        for (std::size_t k = 0; k < i; k++) assert_true(are_disjoint(box, compute_line_box(b.lines[k], b.size)));
+        if (b.kind == block_kind::bar) assert_true(are_disjoint(box, b.gradient));
     }
 }
 
@@ -84,7 +84,7 @@ void check_covered(const block &b, const insitu_decorations &what)
         const insitu_rectangle &r = what.covered[i];
         const area covered = {static_cast<double>(r.x), static_cast<double>(r.y), static_cast<double>(r.x + r.width),
                               static_cast<double>(r.y + r.height)};
-        assert_true(are_apart(b.bounds, covered));
+        assert_true(are_disjoint(b.bounds, covered));
     }
 }
 
@@ -93,7 +93,7 @@ void check_layout(const layout &places, const insitu_image &image)
     for (std::size_t i = 0; i < places.blocks.size(); i++) {
         const block &b = places.blocks[i];
         assert_true(b.bounds.x0 >= 0 && b.bounds.y0 >= 0 && b.bounds.x1 <= image.width && b.bounds.y1 <= image.height);
-        for (std::size_t k = 0; k < i; k++) assert_true(are_apart(b.bounds, places.blocks[k].bounds));
+        for (std::size_t k = 0; k < i; k++) assert_true(are_disjoint(b.bounds, places.blocks[k].bounds));
         check_lines(b);
         if (is_decoration(b)) check_covered(b, *image.decorations);
         if (b.kind == block_kind::bar) check_bar(b);
@@ -104,12 +104,12 @@ void check_layout(const layout &places, const insitu_image &image)
 void random_blocks_neither_overlap_nor_leave_the_picture(void **)
 {
     random_decorations random(2);
-    const int most[2] = {test_effort(1000, 8192), test_effort(1000, 4320)};
-    for (int i = 0; i < test_effort(150, 500); i++) {
-        const int width = static_cast<int>(std::exp(random.real(std::log(200), std::log(most[0] + 0.5))));
-        const int height = static_cast<int>(std::exp(random.real(std::log(200), std::log(most[1] + 0.5))));
-        const insitu_image image = image_of(width, height, random.make(width, height));
-        check_layout(make_layout(image, measure), image);
+    const int most[2] = {test_case_count(1000, 8192), test_case_count(1000, 4320)};
+    for (int i = 0; i < test_case_count(150, 500); i++) {
+        const int width = static_cast<int>(std::exp(random.draw_real(std::log(200), std::log(most[0] + 0.5))));
+        const int height = static_cast<int>(std::exp(random.draw_real(std::log(200), std::log(most[1] + 0.5))));
+        const insitu_image image = make_image(width, height, random.make_decorations(width, height));
+        check_layout(make_layout(image, measure_text_width), image);
     }
 }
 
@@ -118,12 +118,12 @@ void random_blocks_neither_overlap_nor_leave_the_picture(void **)
 const float colours[] = {0, 0, 0, 1, 1, 1};
 const insitu_tick ticks[] = {{0, "0"}, {0.2, "0.2"}, {0.4, "0.4"}, {0.6, "0.6"}, {0.8, "0.8"}, {1, "1"}};
 
-insitu_colour_bar bar_named(const char *label)
+insitu_colour_bar make_bar(const char *label)
 {
     return {label, colours, 2, false, nullptr, nullptr, INSITU_RIGHT, 6, ticks};
 }
 
-insitu_decorations bars_of(const std::vector<insitu_colour_bar> &bars)
+insitu_decorations make_decorations_with_bars(const std::vector<insitu_colour_bar> &bars)
 {
     insitu_decorations what{};
     what.size = 0.03;
@@ -132,14 +132,14 @@ insitu_decorations bars_of(const std::vector<insitu_colour_bar> &bars)
     return what;
 }
 
-void four_bars_have_room_for_numbers(void **)
+void four_colour_bars_fit_with_their_numbers(void **)
 {
-    const std::vector<insitu_colour_bar> bars = {bar_named("Equivalent (von-Mises) stress / MPa"), bar_named("b"),
-                                                 bar_named("c"), bar_named("d")};
-    const insitu_decorations what = bars_of(bars);
+    const std::vector<insitu_colour_bar> bars = {make_bar("Equivalent (von-Mises) stress / MPa"), make_bar("b"),
+                                                 make_bar("c"), make_bar("d")};
+    const insitu_decorations what = make_decorations_with_bars(bars);
     for (const int height : {200, 480, 720, 4320}) {
-        const insitu_image image = image_of(height * 16 / 9, height, what);
-        const layout places = make_layout(image, measure);
+        const insitu_image image = make_image(height * 16 / 9, height, what);
+        const layout places = make_layout(image, measure_text_width);
         check_layout(places, image);
         assert_int_equal(places.blocks.size(), 4);
         for (const block &b : places.blocks) assert_true(b.ticks.size() >= 2);
@@ -151,39 +151,39 @@ void a_label_of_many_letters_is_wrapped(void **)
 {
     const std::string word(60, 'w');
     for (const std::string &label : {std::string("A label of fifty letters and more, with blanks in it"), word}) {
-        const std::vector<insitu_colour_bar> bars = {bar_named(label.c_str())};
-        const insitu_decorations what = bars_of(bars);
-        const insitu_image image = image_of(640, 480, what);
-        const layout places = make_layout(image, measure);
+        const std::vector<insitu_colour_bar> bars = {make_bar(label.c_str())};
+        const insitu_decorations what = make_decorations_with_bars(bars);
+        const insitu_image image = make_image(640, 480, what);
+        const layout places = make_layout(image, measure_text_width);
         check_layout(places, image);
         assert_int_equal(places.blocks.size(), 1);
         assert_true(places.blocks[0].bounds.x0 > 640 * 2 / 3);
     }
 }
 
-void words_at_right_stand_beside_the_bar(void **)
+void text_at_right_is_beside_the_colour_bar(void **)
 {
-    const std::vector<insitu_colour_bar> bars = {bar_named("f")};
+    const std::vector<insitu_colour_bar> bars = {make_bar("f")};
     const insitu_words words[] = {{"a text at right", INSITU_RIGHT, 1}};
-    insitu_decorations what = bars_of(bars);
+    insitu_decorations what = make_decorations_with_bars(bars);
     what.words = words;
     what.words_count = 1;
-    const insitu_image image = image_of(640, 480, what);
-    const layout places = make_layout(image, measure);
+    const insitu_image image = make_image(640, 480, what);
+    const layout places = make_layout(image, measure_text_width);
     check_layout(places, image);
     assert_int_equal(places.blocks.size(), 2);
 }
 
 /* Checks a picture that covers a corner, with a height of a third, four fifths or all of the picture below: the bar
  * must be below or above it, with at least 0.4 of the height, if there is space, and next to it otherwise. */
-void bars_keep_clear_of_covered_corners(void **)
+void colour_bars_avoid_covered_corners(void **)
 {
-    const std::vector<insitu_colour_bar> bars = {bar_named("Temperature [K]")};
+    const std::vector<insitu_colour_bar> bars = {make_bar("Temperature [K]")};
     const insitu_words words[] = {{"A title at the top, as wide as half of the picture", INSITU_TOP, 1.4F},
                                   {"t = 0.5", INSITU_BOTTOM_RIGHT, 1}};
     for (const int corner : {0, 1, 2, 3})
         for (const int height : {160, 384, 480}) {
-            insitu_decorations what = bars_of(bars);
+            insitu_decorations what = make_decorations_with_bars(bars);
             const insitu_rectangle covered = {corner & 1 ? 408 : 12,
                                               height == 480 ? 0
                                               : corner & 2  ? 468 - height
@@ -194,8 +194,8 @@ void bars_keep_clear_of_covered_corners(void **)
             what.has_axes = true;
             what.covered = &covered;
             what.covered_count = 1;
-            const insitu_image image = image_of(640, 480, what);
-            const layout places = make_layout(image, measure);
+            const insitu_image image = make_image(640, 480, what);
+            const layout places = make_layout(image, measure_text_width);
             check_layout(places, image);
             assert_true(places.left_out.empty());
             const auto bar = std::find_if(places.blocks.begin(), places.blocks.end(),
@@ -209,13 +209,13 @@ void bars_keep_clear_of_covered_corners(void **)
 }
 
 /* Checks 20 bars with letters a fifth of the picture high, which do not fit. */
-void what_has_no_room_is_named(void **)
+void decorations_that_do_not_fit_are_reported(void **)
 {
-    const std::vector<insitu_colour_bar> bars(20, bar_named("pressure"));
-    insitu_decorations what = bars_of(bars);
+    const std::vector<insitu_colour_bar> bars(20, make_bar("pressure"));
+    insitu_decorations what = make_decorations_with_bars(bars);
     what.size = 0.2;
-    const insitu_image image = image_of(200, 200, what);
-    const layout places = make_layout(image, measure);
+    const insitu_image image = make_image(200, 200, what);
+    const layout places = make_layout(image, measure_text_width);
     check_layout(places, image);
     assert_false(places.left_out.empty());
     assert_string_equal(places.left_out[0].c_str(), "the colour bar \"pressure\"");
@@ -226,10 +226,10 @@ void what_has_no_room_is_named(void **)
 int main()
 {
     const CMUnitTest tests[] = {cmocka_unit_test(random_blocks_neither_overlap_nor_leave_the_picture),
-                                cmocka_unit_test(four_bars_have_room_for_numbers),
+                                cmocka_unit_test(four_colour_bars_fit_with_their_numbers),
                                 cmocka_unit_test(a_label_of_many_letters_is_wrapped),
-                                cmocka_unit_test(words_at_right_stand_beside_the_bar),
-                                cmocka_unit_test(bars_keep_clear_of_covered_corners),
-                                cmocka_unit_test(what_has_no_room_is_named)};
+                                cmocka_unit_test(text_at_right_is_beside_the_colour_bar),
+                                cmocka_unit_test(colour_bars_avoid_covered_corners),
+                                cmocka_unit_test(decorations_that_do_not_fit_are_reported)};
     return cmocka_run_group_tests(tests, nullptr, nullptr);
 }

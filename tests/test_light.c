@@ -32,7 +32,7 @@ typedef struct hits {
     render_hit_rays *rays, *open;
 } hits;
 
-static void take_hits(const render_fixture *f, hits *out)
+static void copy_hits(const render_fixture *f, hits *out)
 {
     base_error error = {0};
     *out = (hits){0};
@@ -57,7 +57,7 @@ static void free_hits(hits *h)
 
 /* ---- rays in double ------------------------------------------------------------------------------------------ */
 
-static void unfold(const float folded[2], double n[3])
+static void decode_normal(const float folded[2], double n[3])
 {
     n[0] = (double)folded[0];
     n[1] = (double)folded[1];
@@ -70,12 +70,12 @@ static void unfold(const float folded[2], double n[3])
     for (int a = 0; a < 3; a++) n[a] /= length;
 }
 
-static void start_of(const render_fixture *f, const render_hit *hit, const double n[3], double out[3])
+static void compute_ray_start(const render_fixture *f, const render_hit *hit, const double n[3], double out[3])
 {
     double base[3], direction[3];
     render_camera_ray(&f->job.camera, (int)(hit->pixel % WIDTH), (int)(hit->pixel / WIDTH), base, direction);
     for (int a = 0; a < 3; a++)
-        out[a] = base[a] + fixture_depth(f, hit->t) * direction[a] + RENDER_LIFT / f->job.space.scale * n[a];
+        out[a] = base[a] + fixture_scene_depth(f, hit->t) * direction[a] + RENDER_LIFT / f->job.space.scale * n[a];
 }
 
 typedef struct tally {
@@ -91,7 +91,7 @@ static void grow_box(const double place[3], double low[3], double high[3])
 }
 
 /* Returns the cube root of the volume of the cell's box. */
-static double size_of(const test_mesh *mesh, int64_t cell)
+static double compute_cell_size(const test_mesh *mesh, int64_t cell)
 {
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
     for (int64_t i = mesh->offsets[cell]; i < mesh->offsets[cell + 1]; i++) {
@@ -132,14 +132,15 @@ static int is_blocked_by_brute_force(const render_fixture *f, const test_mesh *m
     if (ray.ambiguous || ray.map_failed || ray.edge_margin < 2e-5 || ray.value_margin < 2e-5) return -1;
     if (ray.eye_margin * f->cell_size < 0.4 * lift) return -1;
     for (int i = 0; i < ray.hit_count; i++) {
-        const double depth = ray.hits[i].depth, contact = (double)clear.contact * size_of(mesh, ray.hits[i].cell);
+        const double depth = ray.hits[i].depth,
+                     contact = (double)clear.contact * compute_cell_size(mesh, ray.hits[i].cell);
         if (fabs(depth - reach) < 1e-4 || (contact > 0 && fabs(depth - contact) < 1e-4)) return -1;
         is_met = is_met || (depth < reach && depth > contact);
     }
     return is_met;
 }
 
-static void verify(int said, bool is_open, const char *what, tally *t)
+static void count_ray_result(int said, bool is_open, const char *what, tally *t)
 {
     t->rays++;
     t->blocked += said == 1;
@@ -153,16 +154,16 @@ static void verify_hit(const render_fixture *f, const test_mesh *mesh, const hit
 {
     const render_hit *hit = &h->hits[i];
     double n[3], start[3], d[3];
-    unfold(hit->normal, n);
-    start_of(f, hit, n, start);
+    decode_normal(hit->normal, n);
+    compute_ray_start(f, hit, n, start);
     for (int k = 0; k < SAMPLES; k += 3) {
-        test_hemisphere(hit->pixel, WIDTH, SAMPLES, k, n, d);
-        verify(is_blocked_by_brute_force(f, mesh, start, d, radius), h->open[i].samples >> k & 1, what, t);
+        test_hemisphere_direction(hit->pixel, WIDTH, SAMPLES, k, n, d);
+        count_ray_result(is_blocked_by_brute_force(f, mesh, start, d, radius), h->open[i].samples >> k & 1, what, t);
     }
     for (int k = 0; k < LIGHTS; k++)
         if (h->rays[i].lights >> k & 1)
-            verify(is_blocked_by_brute_force(f, mesh, start, f->lights[k].direction, INFINITY),
-                   h->open[i].lights >> k & 1, what, t);
+            count_ray_result(is_blocked_by_brute_force(f, mesh, start, f->lights[k].direction, INFINITY),
+                             h->open[i].lights >> k & 1, what, t);
 }
 
 static void verify_mesh(const test_mesh *mesh, fixture_camera camera, float contact, const char *what)
@@ -177,44 +178,44 @@ static void verify_mesh(const test_mesh *mesh, fixture_camera camera, float cont
     f.job.paint = RENDER_UNLIT;
     f.job.occlusion = &occlusion;
     assert_int_equal(f.job.light_count, LIGHTS);
-    for (int set = 0; set < fixture_set_count(); set++) {
+    for (int set = 0; set < fixture_isa_count(); set++) {
         base_error error = {0};
         tally t = {0};
         hits h;
-        fixture_use_set(set);
-        take_hits(&f, &h);
+        fixture_select_isa(set);
+        copy_hits(&f, &h);
         render_occluders *occluders;
         assert_int_equal(render_occluders_create(&f.job, &occluders, &error), INSITU_OK);
         assert_int_equal(render_occlude(occluders, h.hits, h.open, h.count, &error), INSITU_OK);
         render_occluders_free(occluders);
         for (int64_t i = 0; i < h.count; i++)
-            if (test_is_whole() || i % (set + 1 == fixture_set_count() ? 2 : 7) == 0)
+            if (test_is_long_run() || i % (set + 1 == fixture_isa_count() ? 2 : 7) == 0)
                 verify_hit(&f, mesh, &h, i, what, &t);
         free_hits(&h);
         if (t.wrong || t.undecided_rays * 4 > t.rays || t.blocked < t.rays / 20 || t.rays < 50)
-            fail_msg("%s, %s: of %lld rays %lld blocked, %lld unsure, %lld wrong", what, fixture_set_name(set),
+            fail_msg("%s, %s: of %lld rays %lld blocked, %lld unsure, %lld wrong", what, fixture_isa_name(set),
                      (long long)t.rays, (long long)t.blocked, (long long)t.undecided_rays, (long long)t.wrong);
     }
     fixture_free(&f);
 }
 
-static void rays_meet_what_all_cells_say(void **state)
+static void occlusion_of_lattices_matches_brute_force(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         test_mesh mesh;
-        test_mesh_lattice(kind, SIDE, 0.2, test_wave, &mesh);
+        test_mesh_make_lattice(kind, SIDE, 0.2, test_wave_field, &mesh);
         verify_mesh(&mesh, kind % 2 ? CAMERA_ORTHOGRAPHIC : CAMERA_OUTSIDE, 0, test_mesh_kind_name(kind));
         verify_mesh(&mesh, kind % 2 ? CAMERA_INSIDE : CAMERA_ORTHOGRAPHIC, 0.5F, test_mesh_kind_name(kind));
         test_mesh_free(&mesh);
     }
 }
 
-static void rays_meet_what_honeycombs_say(void **state)
+static void occlusion_of_honeycombs_matches_brute_force(void **state)
 {
     test_mesh mesh;
     (void)state;
-    test_mesh_honeycomb(SIDE, 0.2, test_wave, &mesh);
+    test_mesh_make_honeycomb(SIDE, 0.2, test_wave_field, &mesh);
     verify_mesh(&mesh, CAMERA_OUTSIDE, 0, "honeycomb");
     verify_mesh(&mesh, CAMERA_ORTHOGRAPHIC, 0.5F, "honeycomb");
     test_mesh_free(&mesh);
@@ -223,8 +224,8 @@ static void rays_meet_what_honeycombs_say(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(rays_meet_what_all_cells_say),
-        cmocka_unit_test(rays_meet_what_honeycombs_say),
+        cmocka_unit_test(occlusion_of_lattices_matches_brute_force),
+        cmocka_unit_test(occlusion_of_honeycombs_matches_brute_force),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -23,7 +23,7 @@ static const float white[12] = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1};
 
 /* ---- surfaces and fields ---------------------------------------------------------------------------------------- */
 
-static double distance(const double p[3])
+static double distance_field(const double p[3])
 {
     return normal[0] * p[0] + normal[1] * p[1] + normal[2] * p[2] - 0.1;
 }
@@ -37,7 +37,7 @@ static double square_radius(const double p[3])
 static double plane_depth(const double base[3], const double direction[3])
 {
     const double along = normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2];
-    return -distance(base) / along;
+    return -distance_field(base) / along;
 }
 
 static double sphere_depth(const double base[3], const double direction[3])
@@ -50,7 +50,7 @@ static double sphere_depth(const double base[3], const double direction[3])
     return (-b - sqrt(b * b - a * square_radius(base))) / a;
 }
 
-static double quadratic(const double p[3])
+static double quadratic_field(const double p[3])
 {
     return 0.6 * p[0] - 0.4 * p[1] + 0.3 * p[2] + 0.1 * p[0] * p[0] - 0.08 * p[0] * p[2] + 0.06 * p[1] * p[1];
 }
@@ -74,13 +74,22 @@ typedef struct lines_case {
  * 0.6, and 2e-3 for the square of the radius, whose slope is 1.6. A pixel is 0.03 of the scene, so that lines are off
  * by up to 0.02 and 0.04 of a pixel. */
 static const lines_case cases[] = {
-    {"a linear field on a plane", distance, plane_depth, test_linear, CAMERA_OUTSIDE, 1.5F, 4, 0.2, 3, {-0.3, 0, 0.25}},
-    {"thin lines", distance, plane_depth, test_linear, CAMERA_OUTSIDE, 0.7F, 4, 0.2, 2, {-0.1, 0.3}},
-    {"wide lines", distance, plane_depth, test_linear, CAMERA_ORTHOGRAPHIC, 4, 4, 0.2, 2, {-0.3, 0.25}},
-    {"a quadratic field on a plane",
-     distance,
+    {"a linear field on a plane",
+     distance_field,
      plane_depth,
-     quadratic,
+     test_linear_field,
+     CAMERA_OUTSIDE,
+     1.5F,
+     4,
+     0.2,
+     3,
+     {-0.3, 0, 0.25}},
+    {"thin lines", distance_field, plane_depth, test_linear_field, CAMERA_OUTSIDE, 0.7F, 4, 0.2, 2, {-0.1, 0.3}},
+    {"wide lines", distance_field, plane_depth, test_linear_field, CAMERA_ORTHOGRAPHIC, 4, 4, 0.2, 2, {-0.3, 0.25}},
+    {"a quadratic field on a plane",
+     distance_field,
+     plane_depth,
+     quadratic_field,
      CAMERA_OUTSIDE,
      1.5F,
      40,
@@ -90,7 +99,7 @@ static const lines_case cases[] = {
     {"a linear field on a sphere",
      square_radius,
      sphere_depth,
-     test_linear,
+     test_linear_field,
      CAMERA_OUTSIDE,
      1.5F,
      40,
@@ -111,7 +120,7 @@ typedef struct truth {
 
 /* Returns the field at a position in the picture, whose origin is the middle of the first pixel; NaN outside the
  * surface and near the border of the cube. */
-static double field_at(const truth *t, double x, double y)
+static double evaluate_field(const truth *t, double x, double y)
 {
     render_camera camera = t->camera;
     double base[3], direction[3], at[3];
@@ -133,9 +142,9 @@ static double line_distance(const truth *t, double level, double x, double y)
     const double h = 1e-3;
     double px = x, py = y;
     for (int step = 0; step < 4; step++) {
-        const double dx = (field_at(t, px + h, py) - field_at(t, px - h, py)) / (2 * h);
-        const double dy = (field_at(t, px, py + h) - field_at(t, px, py - h)) / (2 * h);
-        const double move = (field_at(t, px, py) - level) / (dx * dx + dy * dy);
+        const double dx = (evaluate_field(t, px + h, py) - evaluate_field(t, px - h, py)) / (2 * h);
+        const double dy = (evaluate_field(t, px, py + h) - evaluate_field(t, px, py - h)) / (2 * h);
+        const double move = (evaluate_field(t, px, py) - level) / (dx * dx + dy * dy);
         px -= move * dx;
         py -= move * dy;
     }
@@ -144,7 +153,7 @@ static double line_distance(const truth *t, double level, double x, double y)
 
 /* Returns the fraction of points in the pixel that lie in the strip. No point is farther than half a pixel's diagonal
  * from the pixel's middle. */
-static double exact_cover(const truth *t, double level, double x, double y)
+static double compute_exact_coverage(const truth *t, double level, double x, double y)
 {
     const double reach = 0.5 * (double)t->of->width, middle = line_distance(t, level, x, y);
     int inside = 0;
@@ -158,27 +167,27 @@ static double exact_cover(const truth *t, double level, double x, double y)
 static bool is_inside(const truth *t, double x, double y)
 {
     const double far = (double)t->of->width + 3;
-    return isfinite(field_at(t, x - far, y - far)) && isfinite(field_at(t, x + far, y - far)) &&
-           isfinite(field_at(t, x - far, y + far)) && isfinite(field_at(t, x + far, y + far));
+    return isfinite(evaluate_field(t, x - far, y - far)) && isfinite(evaluate_field(t, x + far, y - far)) &&
+           isfinite(evaluate_field(t, x - far, y + far)) && isfinite(evaluate_field(t, x + far, y + far));
 }
 
-static double pixel_cover(const truth *t, int x, int y)
+static double compute_pixel_coverage(const truth *t, int x, int y)
 {
     int nearest = 0;
-    double value = field_at(t, x, y);
+    double value = evaluate_field(t, x, y);
     if (!is_inside(t, x, y)) return -1;
     for (int i = 1; i < t->of->count; i++)
         if (fabs(value - t->of->values[i]) < fabs(value - t->of->values[nearest])) nearest = i;
-    return exact_cover(t, t->of->values[nearest], x, y);
+    return compute_exact_coverage(t, t->of->values[nearest], x, y);
 }
 
-static truth *find_truth(const lines_case *of, const render_camera *camera)
+static truth *compute_reference(const lines_case *of, const render_camera *camera)
 {
     truth *t = malloc(sizeof *t);
     assert_non_null(t);
     t->of = of;
     t->camera = *camera;
-    for (int p = 0; p < PIXELS; p++) t->cover[p] = pixel_cover(t, p % WIDTH, p / WIDTH);
+    for (int p = 0; p < PIXELS; p++) t->cover[p] = compute_pixel_coverage(t, p % WIDTH, p / WIDTH);
     return t;
 }
 
@@ -195,8 +204,8 @@ typedef struct lines_frame {
 static void create_frame(lines_frame *out, const lines_case *of, test_mesh_kind kind, test_layout layout)
 {
     test_mesh lines;
-    test_mesh_lattice(kind, of->cubes, of->jitter, of->surface, &out->mesh);
-    test_mesh_lattice(kind, of->cubes, of->jitter, of->field, &lines);
+    test_mesh_make_lattice(kind, of->cubes, of->jitter, of->surface, &out->mesh);
+    test_mesh_make_lattice(kind, of->cubes, of->jitter, of->field, &lines);
     test_view_create(&lines, layout, &out->field);
     test_mesh_free(&lines);
     fixture_create(&out->f, &out->mesh, 1, layout, 2.0 / of->cubes, 1, (const double[]){0, 0, 0});
@@ -224,7 +233,7 @@ typedef struct lines_error {
     double squares, drawn, exact; /* sums over the pixels that lines touch */
 } lines_error;
 
-static lines_error compare(const truth *t, const drawn_frame *drawn)
+static lines_error compare_coverage(const truth *t, const drawn_frame *drawn)
 {
     lines_error e = {0};
     for (int p = 0; p < PIXELS; p++) {
@@ -249,17 +258,17 @@ static const test_layout layouts[2] = {{.wide_coordinates = true, .wide_values =
 static void check_frame(const truth *t, const lines_frame *frame, const char *kind, int set)
 {
     drawn_frame drawn;
-    fixture_use_set(set);
+    fixture_select_isa(set);
     fixture_draw(&frame->f, &drawn);
-    const lines_error e = compare(t, &drawn);
+    const lines_error e = compare_coverage(t, &drawn);
     const double rms = sqrt(e.squares / e.count), share = e.drawn / e.exact;
     if (getenv("TEST_LINES_SHOW"))
-        printf("%s, %s, %s: %d pixels, %.4f rms, width %.4f\n", t->of->name, kind, fixture_set_name(set), e.count, rms,
+        printf("%s, %s, %s: %d pixels, %.4f rms, width %.4f\n", t->of->name, kind, fixture_isa_name(set), e.count, rms,
                share);
     if (!(e.count > 100 && rms < 0.02 && fabs(share - 1) < 0.01))
-        fail_msg("%s, %s, %s: %d pixels, %g rms, %g of the width", t->of->name, kind, fixture_set_name(set), e.count,
+        fail_msg("%s, %s, %s: %d pixels, %g rms, %g of the width", t->of->name, kind, fixture_isa_name(set), e.count,
                  rms, share);
-    drawn_free(&drawn);
+    drawn_frame_free(&drawn);
 }
 
 /* Checks a case on all kinds of cells; on fine lattices only tets and hexes. */
@@ -270,14 +279,14 @@ static void check_case(const lines_case *of)
         lines_frame frame;
         if (of->cubes > 8 && kind != TEST_TETS && kind != TEST_HEXES) continue;
         create_frame(&frame, of, kind, layouts[(int)kind % 2]);
-        if (!t) t = find_truth(of, &frame.f.job.camera);
-        for (int set = 0; set < fixture_set_count(); set++) check_frame(t, &frame, test_mesh_kind_name(kind), set);
+        if (!t) t = compute_reference(of, &frame.f.job.camera);
+        for (int set = 0; set < fixture_isa_count(); set++) check_frame(t, &frame, test_mesh_kind_name(kind), set);
         free_frame(&frame);
     }
     free(t);
 }
 
-static void lines_cover_what_strips_do(void **state)
+static void line_coverage_matches_exact_strips(void **state)
 {
     (void)state;
     for (int i = 0; i < CASES; i++) check_case(&cases[i]);
@@ -298,16 +307,16 @@ static void lines_are_the_same_on_any_partition(void **state)
             test_mesh values;
             drawn_frame one, several;
             create_frame(&whole, of, kind, layouts[0]);
-            test_mesh_lattice(kind, of->cubes, of->jitter, of->field, &values);
+            test_mesh_make_lattice(kind, of->cubes, of->jitter, of->field, &values);
             int *owners = malloc((size_t)values.cell_count * sizeof *owners);
             assert_non_null(owners);
-            test_partition(&values, partition, of->cubes, RANKS, owners);
+            test_partition_cells(&values, partition, of->cubes, RANKS, owners);
             for (int rank = 0; rank < RANKS; rank++) {
                 test_mesh part;
-                test_mesh_part(&values, owners, rank, &part);
+                test_mesh_extract_part(&values, owners, rank, &part);
                 test_view_create(&part, layouts[0], &fields[rank]);
                 test_mesh_free(&part);
-                test_mesh_part(&whole.mesh, owners, rank, &part);
+                test_mesh_extract_part(&whole.mesh, owners, rank, &part);
                 fixture_create(&parts[rank], &part, 1, layouts[0], 2.0 / of->cubes, 1, (const double[]){0, 0, 0});
                 test_mesh_free(&part);
                 lines[rank] = whole.lines;
@@ -319,16 +328,16 @@ static void lines_are_the_same_on_any_partition(void **state)
                 parts[rank].surfaces[0].lines = &lines[rank];
             }
             fixture_draw(&whole.f, &one);
-            fixture_draw_apart(parts, RANKS, &several);
-            drawn_assert_same(&one, &several);
+            fixture_draw_distributed(parts, RANKS, &several);
+            drawn_frame_assert_same(&one, &several);
             for (int rank = 0; rank < RANKS; rank++) {
                 fixture_free(&parts[rank]);
                 test_view_free(&fields[rank]);
             }
             free(owners);
             test_mesh_free(&values);
-            drawn_free(&one);
-            drawn_free(&several);
+            drawn_frame_free(&one);
+            drawn_frame_free(&several);
             free_frame(&whole);
         }
 }
@@ -336,7 +345,7 @@ static void lines_are_the_same_on_any_partition(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(lines_cover_what_strips_do),
+        cmocka_unit_test(line_coverage_matches_exact_strips),
         cmocka_unit_test(lines_are_the_same_on_any_partition),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

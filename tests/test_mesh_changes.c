@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-void test_mesh_round(test_mesh *mesh)
+void test_mesh_round_to_float(test_mesh *mesh)
 {
     for (int64_t i = 0; i < 3 * mesh->vertex_count; i++) mesh->coordinates[i] = (double)(float)mesh->coordinates[i];
     for (int64_t i = 0; i < mesh->vertex_count; i++) mesh->values[i] = (double)(float)mesh->values[i];
@@ -17,7 +17,7 @@ typedef struct symmetry {
     int order[3][8];
 } symmetry;
 
-static const symmetry *symmetries(int type)
+static const symmetry *get_symmetries(int type)
 {
     static const symmetry tet = {2, {{1, 0, 2, 3}, {1, 2, 3, 0}}};
     static const symmetry hex = {3, {{4, 5, 6, 7, 0, 1, 2, 3}, {1, 2, 3, 0, 5, 6, 7, 4}, {0, 4, 5, 1, 3, 7, 6, 2}}};
@@ -26,7 +26,7 @@ static const symmetry *symmetries(int type)
     return type == GRID_TET ? &tet : type == GRID_HEX ? &hex : type == GRID_WEDGE ? &wedge : &pyramid;
 }
 
-static void reorder(test_mesh *mesh, int64_t cell, const int *order)
+static void reorder_vertices(test_mesh *mesh, int64_t cell, const int *order)
 {
     int64_t *v = mesh->connectivity + mesh->offsets[cell], old[8];
     const int count = grid_type_vertices(mesh->types[cell]);
@@ -34,15 +34,15 @@ static void reorder(test_mesh *mesh, int64_t cell, const int *order)
     for (int i = 0; i < count; i++) v[i] = old[order[i]];
 }
 
-void test_mesh_mirror(test_mesh *mesh, bool every_second)
+void test_mesh_mirror_cells(test_mesh *mesh, bool every_second)
 {
     for (int64_t cell = 0; cell < mesh->cell_count; cell++)
         if (mesh->types[cell] != GRID_POLYHEDRON && (!every_second || test_hash((uint64_t)cell, 4) & 1))
-            reorder(mesh, cell, symmetries(mesh->types[cell])->order[0]);
+            reorder_vertices(mesh, cell, get_symmetries(mesh->types[cell])->order[0]);
 }
 
 /* Returns a random permutation of 0 .. count - 1. */
-static int64_t *permutation(int64_t count, uint64_t seed)
+static int64_t *make_permutation(int64_t count, uint64_t seed)
 {
     int64_t *order = test_allocate(count, sizeof *order);
     for (int64_t i = 0; i < count; i++) {
@@ -56,7 +56,8 @@ static int64_t *permutation(int64_t count, uint64_t seed)
 /* Adds the faces of old in another order and with renumbered vertices; returns the new number of each face. */
 static int64_t *shuffle_faces(const test_mesh *old, const int64_t *vertex_to, uint64_t seed, test_mesh *mesh)
 {
-    int64_t *face_from = permutation(old->face_count, seed), *face_to = test_allocate(old->face_count, sizeof *face_to);
+    int64_t *face_from = make_permutation(old->face_count, seed),
+            *face_to = test_allocate(old->face_count, sizeof *face_to);
     if (old->face_count) test_mesh_allocate_faces(mesh, old->face_count, old->face_connectivity_count);
     for (int64_t i = 0; i < old->face_count; i++) {
         const int64_t from = face_from[i], first = mesh->face_connectivity_count;
@@ -69,9 +70,10 @@ static int64_t *shuffle_faces(const test_mesh *old, const int64_t *vertex_to, ui
     return face_to;
 }
 
-void test_mesh_shuffle(test_mesh *mesh, uint64_t seed)
+void test_mesh_shuffle_cells(test_mesh *mesh, uint64_t seed)
 {
-    int64_t *vertex_to = permutation(mesh->vertex_count, seed), *cell_from = permutation(mesh->cell_count, seed + 1);
+    int64_t *vertex_to = make_permutation(mesh->vertex_count, seed),
+            *cell_from = make_permutation(mesh->cell_count, seed + 1);
     test_mesh old = *mesh;
     test_mesh_allocate(mesh, old.vertex_count, old.cell_count, old.connectivity_count);
     mesh->vertex_count = old.vertex_count;
@@ -107,7 +109,7 @@ static void swap_indices(int64_t *a, int64_t *b)
     *b = old;
 }
 
-static void reverse(int64_t *items, int64_t count)
+static void reverse_items(int64_t *items, int64_t count)
 {
     for (int64_t i = 0; i < count / 2; i++) swap_indices(&items[i], &items[count - 1 - i]);
 }
@@ -116,9 +118,9 @@ static void reverse(int64_t *items, int64_t count)
 static void rotate_loop(int64_t *items, int64_t count, uint64_t seed)
 {
     const int64_t by = (int64_t)(test_hash(1, seed) % (uint64_t)count);
-    reverse(items, by);
-    reverse(items + by, count - by);
-    if (test_hash(2, seed) & 1) reverse(items, count);
+    reverse_items(items, by);
+    reverse_items(items + by, count - by);
+    if (test_hash(2, seed) & 1) reverse_items(items, count);
 }
 
 void test_mesh_reorder_vertices(test_mesh *mesh, uint64_t seed)
@@ -133,9 +135,9 @@ void test_mesh_reorder_vertices(test_mesh *mesh, uint64_t seed)
                 swap_indices(&faces[k], &faces[test_hash((uint64_t)(64 * i + k), seed) % (uint64_t)(k + 1)]);
             continue;
         }
-        const symmetry *s = symmetries(mesh->types[i]);
+        const symmetry *s = get_symmetries(mesh->types[i]);
         for (uint64_t turn = 0; turn < 12; turn++)
-            reorder(mesh, i, s->order[test_hash((uint64_t)i * 16 + turn, seed) % (uint64_t)s->count]);
+            reorder_vertices(mesh, i, s->order[test_hash((uint64_t)i * 16 + turn, seed) % (uint64_t)s->count]);
     }
 }
 

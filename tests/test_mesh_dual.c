@@ -24,20 +24,21 @@ const char *test_random_name(test_random_polyhedron kind)
     return names[kind];
 }
 
-static double dot(const double *a, const double *b)
+static double dot_product(const double *a, const double *b)
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-static void normalize(double *v)
+static void normalize_vector(double *v)
 {
-    const double length = sqrt(dot(v, v));
+    const double length = sqrt(dot_product(v, v));
     for (int a = 0; a < 3; a++) v[a] /= length;
 }
 
 static void random_direction(uint64_t index, uint64_t seed, double out[3])
 {
-    const double z = test_uniform_in(2 * index, seed, -1, 1), angle = 6.283185307 * test_uniform(2 * index + 1, seed);
+    const double z = test_uniform_between(2 * index, seed, -1, 1),
+                 angle = 6.283185307 * test_uniform(2 * index + 1, seed);
     out[0] = sqrt(1 - z * z) * cos(angle);
     out[1] = sqrt(1 - z * z) * sin(angle);
     out[2] = z;
@@ -51,7 +52,7 @@ static void spread_points(hull *h, uint64_t seed)
     for (uint64_t n = 0, tries = 0; n < (uint64_t)h->point_count; tries++) {
         double nearest = 4;
         random_direction(tries, seed, h->points[n]);
-        for (uint64_t i = 0; i < n; i++) nearest = fmin(nearest, 2 - 2 * dot(h->points[i], h->points[n]));
+        for (uint64_t i = 0; i < n; i++) nearest = fmin(nearest, 2 - 2 * dot_product(h->points[i], h->points[n]));
         if (nearest >= least * least)
             n++;
         else
@@ -65,14 +66,15 @@ static void triangle_normal(const hull *h, const int *t, double out[3])
     for (int k = 0; k < 2; k++)
         for (int a = 0; a < 3; a++) d[k][a] = h->points[t[k + 1]][a] - h->points[t[0]][a];
     for (int a = 0; a < 3; a++) out[a] = d[0][(a + 1) % 3] * d[1][(a + 2) % 3] - d[0][(a + 2) % 3] * d[1][(a + 1) % 3];
-    normalize(out);
+    normalize_vector(out);
 }
 
 /* Returns whether all points of the hull are behind the triangle's plane. */
 static bool is_outside(const hull *h, const int *t, const double *normal)
 {
     for (int i = 0; i < h->point_count; i++)
-        if (i != t[0] && i != t[1] && i != t[2] && dot(normal, h->points[i]) > dot(normal, h->points[t[0]]))
+        if (i != t[0] && i != t[1] && i != t[2] &&
+            dot_product(normal, h->points[i]) > dot_product(normal, h->points[t[0]]))
             return false;
     return true;
 }
@@ -103,12 +105,12 @@ static void make_hull(uint64_t seed, hull *h)
         find_triangles(h);
         is_good = h->triangle_count == 2 * h->point_count - 4;
         for (int t = 0; t < h->triangle_count; t++)
-            is_good = is_good && dot(h->normals[t], h->points[h->triangles[t][0]]) > 0.05;
+            is_good = is_good && dot_product(h->normals[t], h->points[h->triangles[t][0]]) > 0.05;
     }
 }
 
 /* Lists the triangles around a point: the corner after the point in one triangle leads to the next triangle. */
-static int triangles_around(const hull *h, int point, int64_t out[MOST_TRIANGLES])
+static int list_triangles_around(const hull *h, int point, int64_t out[MOST_TRIANGLES])
 {
     int first = -1, next = -1, count = 0;
     do {
@@ -129,12 +131,12 @@ static int triangles_around(const hull *h, int point, int64_t out[MOST_TRIANGLES
 static void add_random_vertex(test_mesh *mesh, const double *direction, double least, uint64_t seed)
 {
     const uint64_t index = (uint64_t)mesh->vertex_count;
-    const double radius = test_uniform_in(index, seed, least, 1);
+    const double radius = test_uniform_between(index, seed, least, 1);
     const double p[3] = {radius * direction[0], radius * direction[1], radius * direction[2]};
-    mesh->values[test_mesh_add_vertex(mesh, p)] = test_uniform_in(index, seed + 1, -1, 1);
+    mesh->values[test_mesh_add_vertex(mesh, p)] = test_uniform_between(index, seed + 1, -1, 1);
 }
 
-void test_mesh_random(test_random_polyhedron kind, uint64_t seed, test_mesh *out)
+void test_mesh_make_random_polyhedron(test_random_polyhedron kind, uint64_t seed, test_mesh *out)
 {
     const bool is_hull = kind == TEST_RANDOM_HULL;
     const double least = kind == TEST_RANDOM_SPIKY ? 0.2 : 0.75;
@@ -149,7 +151,7 @@ void test_mesh_random(test_random_polyhedron kind, uint64_t seed, test_mesh *out
         add_random_vertex(out, is_hull ? h.points[i] : h.normals[i], least, test_hash(seed, 3));
     for (int i = 0; i < face_count; i++) {
         for (int k = 0; is_hull && k < 3; k++) loop[k] = h.triangles[i][k];
-        faces[i] = test_mesh_add_face(out, loop, is_hull ? 3 : triangles_around(&h, i, loop));
+        faces[i] = test_mesh_add_face(out, loop, is_hull ? 3 : list_triangles_around(&h, i, loop));
     }
     test_mesh_add_polyhedron(out, faces, face_count);
 }
@@ -172,7 +174,7 @@ typedef struct tet_mesh {
     edge *table;
 } tet_mesh;
 
-static int64_t corner_number(const tet_mesh *m, int x, int y, int z)
+static int64_t get_corner_index(const tet_mesh *m, int x, int y, int z)
 {
     return x + (m->n + 1) * (y + (int64_t)(m->n + 1) * z);
 }
@@ -180,7 +182,7 @@ static int64_t corner_number(const tet_mesh *m, int x, int y, int z)
 static void place_points(tet_mesh *m, double jitter)
 {
     const double side = 2.0 / m->n;
-    const int64_t corners = corner_number(m, m->n, m->n, m->n) + 1;
+    const int64_t corners = get_corner_index(m, m->n, m->n, m->n) + 1;
     for (int64_t i = 0; i < m->point_count; i++) {
         const bool is_corner = i < corners;
         const int64_t at = is_corner ? i : i - corners, across = is_corner ? m->n + 1 : m->n;
@@ -189,7 +191,7 @@ static void place_points(tet_mesh *m, double jitter)
         for (int a = 0; a < 3; a++) is_inner = is_inner && (!is_corner || (place[a] > 0 && place[a] < m->n));
         for (int a = 0; a < 3; a++) {
             m->points[i][a] = ((double)place[a] + (is_corner ? 0 : 0.5)) * side - 1;
-            if (is_inner) m->points[i][a] += jitter * side * test_uniform_in((uint64_t)(3 * i + a), 21, -1, 1);
+            if (is_inner) m->points[i][a] += jitter * side * test_uniform_between((uint64_t)(3 * i + a), 21, -1, 1);
         }
     }
 }
@@ -204,7 +206,7 @@ static void add_face_tets(tet_mesh *m, const int cube[3], int axis, int side, in
         at[axis] += side;
         at[(axis + 1) % 3] += i == 1 || i == 2;
         at[(axis + 2) % 3] += i >= 2;
-        around[i] = corner_number(m, at[0], at[1], at[2]);
+        around[i] = get_corner_index(m, at[0], at[1], at[2]);
     }
     const int first = test_uniform((uint64_t)(3 * around[0] + axis), 22) < 0.5;
     for (int half = 0; half < 2; half++) {
@@ -218,7 +220,7 @@ static void add_face_tets(tet_mesh *m, const int cube[3], int axis, int side, in
 
 static void make_tets(tet_mesh *m)
 {
-    int64_t centre = corner_number(m, m->n, m->n, m->n) + 1;
+    int64_t centre = get_corner_index(m, m->n, m->n, m->n) + 1;
     for (int z = 0; z < m->n; z++)
         for (int y = 0; y < m->n; y++)
             for (int x = 0; x < m->n; x++, centre++)
@@ -254,7 +256,7 @@ static bool tet_has(const int64_t *tet, int64_t point)
 }
 
 /* Returns whether two tets have a common triangle. */
-static bool are_beside(const int64_t *one, const int64_t *other)
+static bool are_adjacent_tets(const int64_t *one, const int64_t *other)
 {
     int common = 0;
     for (int i = 0; i < 4; i++) common += tet_has(other, one[i]);
@@ -267,7 +269,7 @@ static void order_around(const tet_mesh *m, edge *e)
     for (int i = 0; i + 1 < e->tet_count; i++)
         for (int k = i + 1; k < e->tet_count; k++) {
             const int64_t tet = e->tets[k];
-            if (!are_beside(m->tets[e->tets[i]], m->tets[tet])) continue;
+            if (!are_adjacent_tets(m->tets[e->tets[i]], m->tets[tet])) continue;
             e->tets[k] = e->tets[i + 1];
             e->tets[i + 1] = tet;
             break;
@@ -306,11 +308,11 @@ static void add_means(const tet_mesh *m, test_mesh *out)
     }
 }
 
-void test_mesh_dual(int n, double jitter, test_function *f, test_mesh *out)
+void test_mesh_make_dual(int n, double jitter, test_function *f, test_mesh *out)
 {
     tet_mesh m = {.n = n};
     const int64_t cubes = (int64_t)n * n * n, edges = 24 * cubes;
-    m.point_count = corner_number(&m, n, n, n) + 1 + cubes;
+    m.point_count = get_corner_index(&m, n, n, n) + 1 + cubes;
     m.table_size = 4 * edges;
     m.points = test_allocate(m.point_count, sizeof *m.points);
     m.tets = test_allocate(12 * cubes, sizeof *m.tets);

@@ -15,13 +15,13 @@ typedef enum test_random_polyhedron {
 const char *test_random_name(test_random_polyhedron kind);
 
 /* Makes one cell around the origin, inside the unit ball, with random values in [-1, 1]. */
-void test_mesh_random(test_random_polyhedron kind, uint64_t seed, test_mesh *out);
+void test_mesh_make_random_polyhedron(test_random_polyhedron kind, uint64_t seed, test_mesh *out);
 
 /* Makes the dual of a tet mesh, which divides the cube [-1, 1]^3 into n^3 cubes, with inner corners moved by up to
  * jitter of a cube's side, and each cube into twelve tets around its centre with random diagonals of its faces. The
  * dual has a cell for every inner corner and centre, a face for every edge, and a vertex at the mean of every tet;
  * cells cut by the hull are left out. Cells have 8 to 26 faces of 3 to 8 vertices. */
-void test_mesh_dual(int n, double jitter, test_function *f, test_mesh *out);
+void test_mesh_make_dual(int n, double jitter, test_function *f, test_mesh *out);
 
 /* Splits faces of four vertices, which are bilinear, into two triangles each, the same in both of their cells. All
  * cells must be polyhedra. */

@@ -31,21 +31,21 @@ const char *mesh_form_name(mesh_form form)
     return names[form];
 }
 
-bool formed_has_corners(mesh_form form)
+bool formed_mesh_has_corners(mesh_form form)
 {
     return form < MESH_POLYHEDRA || form == MESH_SHELLS;
 }
 
 /* ---- the part -------------------------------------------------------------------------------------------------- */
 
-static test_mesh_kind kind_of(mesh_form form)
+static test_mesh_kind get_mesh_kind(mesh_form form)
 {
     static const test_mesh_kind kinds[] = {TEST_TETS, TEST_HEXES, TEST_WEDGES};
     return form <= MESH_ROWS ? kinds[form] : TEST_MIXED;
 }
 
 /* Makes a mesh whose cells are the faces of polyhedra; some of them are polygons. */
-static void take_faces_as_cells(test_mesh *part)
+static void make_mesh_of_faces(test_mesh *part)
 {
     const int64_t count = part->face_count;
     part->types = realloc(part->types, (size_t)count + 1);
@@ -69,14 +69,14 @@ static void take_faces_as_cells(test_mesh *part)
 static void make_part(formed_mesh *m)
 {
     test_mesh whole;
-    test_mesh_lattice(kind_of(m->form), m->side, 0.2, test_wave, &whole);
+    test_mesh_make_lattice(get_mesh_kind(m->form), m->side, 0.2, test_wave_field, &whole);
     if (m->form >= MESH_POLYHEDRA) test_mesh_to_polyhedra(&whole, 1);
     int *owners = test_calloc((size_t)whole.cell_count, sizeof *owners);
-    test_partition(&whole, TEST_BLOCK, m->side, m->count, owners);
-    test_mesh_part(&whole, owners, m->rank, &m->part);
+    test_partition_cells(&whole, TEST_BLOCK, m->side, m->count, owners);
+    test_mesh_extract_part(&whole, owners, m->rank, &m->part);
     test_free(owners);
     test_mesh_free(&whole);
-    if (m->form == MESH_SHELLS) take_faces_as_cells(&m->part);
+    if (m->form == MESH_SHELLS) make_mesh_of_faces(&m->part);
 }
 
 /* ---- the forms ------------------------------------------------------------------------------------------------- */
@@ -144,13 +144,13 @@ static void describe_mesh(formed_mesh *m)
 static int64_t corner_count(const formed_mesh *m)
 {
     const insitu_mesh *mesh = &m->mesh;
-    if (!formed_has_corners(m->form)) return 0;
+    if (!formed_mesh_has_corners(m->form)) return 0;
     if (mesh->cell_count <= 0 || mesh->cell_count > INT32_MAX) return mesh->cell_count;
     if (mesh->offsets.data) return mesh->connectivity_count;
     return mesh->cell_count * (m->form == MESH_TETS ? 4 : m->form == MESH_HEXES ? 8 : 6);
 }
 
-void formed_fit_fields(formed_mesh *m)
+void formed_mesh_resize_fields(formed_mesh *m)
 {
     m->fields[FORMED_F].count = m->mesh.vertex_count;
     m->fields[FORMED_C].count = m->mesh.cell_count;
@@ -185,8 +185,8 @@ static void describe_fields(formed_mesh *m)
     m->corner_values = test_allocate(corners, sizeof(double));
     m->patch_values = test_allocate(3, sizeof(double));
     m->index = test_allocate(part->vertex_count, sizeof *m->index);
-    for (int64_t i = 0; i < cells; i++) m->cell_values[i] = test_uniform_in((uint64_t)i, 3, -1, 1);
-    for (int64_t i = 0; i < corners; i++) m->corner_values[i] = test_uniform_in((uint64_t)i, 4, -1, 1);
+    for (int64_t i = 0; i < cells; i++) m->cell_values[i] = test_uniform_between((uint64_t)i, 3, -1, 1);
+    for (int64_t i = 0; i < corners; i++) m->corner_values[i] = test_uniform_between((uint64_t)i, 4, -1, 1);
     for (int64_t i = 0; i < part->vertex_count; i++) m->index[i] = part->vertex_count - 1 - i + m->mesh.index_base;
     for (int i = 0; i < FORMED_FIELDS; i++) {
         insitu_field_defaults(&m->fields[i]);
@@ -202,12 +202,12 @@ static void describe_fields(formed_mesh *m)
     m->fields[FORMED_D].values = (insitu_array){m->corner_values, INSITU_FLOAT64, 0};
     m->fields[FORMED_D].centring = INSITU_CORNER;
     if (m->faces.owner) describe_patch(m);
-    formed_fit_fields(m);
+    formed_mesh_resize_fields(m);
 }
 
 /* ---- the whole ------------------------------------------------------------------------------------------------- */
 
-void formed_create(mesh_form form, int side, int rank, int count, formed_mesh *out)
+void formed_mesh_create(mesh_form form, int side, int rank, int count, formed_mesh *out)
 {
     *out = (formed_mesh){.form = form, .side = side, .rank = rank, .count = count};
     make_part(out);
@@ -215,7 +215,7 @@ void formed_create(mesh_form form, int side, int rank, int count, formed_mesh *o
     describe_fields(out);
 }
 
-void formed_free(formed_mesh *m)
+void formed_mesh_free(formed_mesh *m)
 {
     void *const arrays[] = {m->narrow_coordinates, m->narrow_connectivity, m->rows,        m->ids, m->index,
                             m->cell_values,        m->corner_values,       m->patch_values};
@@ -224,14 +224,14 @@ void formed_free(formed_mesh *m)
     test_mesh_free(&m->part);
 }
 
-void formed_renew(formed_mesh *m)
+void formed_mesh_restore(formed_mesh *m)
 {
     const formed_mesh last = *m;
-    formed_free(m);
-    formed_create(last.form, last.side, last.rank, last.count, m);
+    formed_mesh_free(m);
+    formed_mesh_create(last.form, last.side, last.rank, last.count, m);
 }
 
-insitu_status formed_submit(insitu_session *session, const formed_mesh *m, bool with_corners)
+insitu_status formed_mesh_submit(insitu_session *session, const formed_mesh *m, bool with_corners)
 {
     insitu_status status = insitu_set_mesh(session, "m", &m->mesh);
     for (int i = 0; i < FORMED_FIELDS; i++) {

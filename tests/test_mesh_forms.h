@@ -39,18 +39,18 @@ typedef struct formed_mesh {
     double *cell_values, *corner_values, *patch_values;
 } formed_mesh;
 
-void formed_create(mesh_form form, int side, int rank, int count, formed_mesh *out);
-void formed_free(formed_mesh *m);
+void formed_mesh_create(mesh_form form, int side, int rank, int count, formed_mesh *out);
+void formed_mesh_free(formed_mesh *m);
 /* Makes the arrays and their descriptions again, correct. */
-void formed_renew(formed_mesh *m);
+void formed_mesh_restore(formed_mesh *m);
 /* Sets the fields' numbers of values to the numbers of vertices, cells and corners in the mesh's description. */
-void formed_fit_fields(formed_mesh *m);
+void formed_mesh_resize_fields(formed_mesh *m);
 
-bool formed_has_corners(mesh_form form);
+bool formed_mesh_has_corners(mesh_form form);
 
 /* Passes the mesh "m" and its fields to the session, including those at corners if with_corners. Returns the first
  * status that is not OK. */
-insitu_status formed_submit(insitu_session *session, const formed_mesh *m, bool with_corners);
+insitu_status formed_mesh_submit(insitu_session *session, const formed_mesh *m, bool with_corners);
 
 /* Scenes with pictures of all kinds of layers on "m", one scene with the field at corners. */
 extern const char formed_scene[], formed_corner_scene[];

@@ -24,7 +24,7 @@ const char *test_hanging_shape_name(test_hanging_shape shape)
 }
 
 /* Maps the cube onto a ball of radius 1. */
-static void to_ball(const double p[3], double out[3])
+static void map_cube_to_ball(const double p[3], double out[3])
 {
     for (int a = 0; a < 3; a++) {
         const double u = p[(a + 1) % 3] * p[(a + 1) % 3], v = p[(a + 2) % 3] * p[(a + 2) % 3];
@@ -33,7 +33,7 @@ static void to_ball(const double p[3], double out[3])
 }
 
 /* Rotates about the axis (1, 2, 3) by an angle of cosine 0.8, and scales by 0.55. */
-static void rotate(const double p[3], double out[3])
+static void rotate_position(const double p[3], double out[3])
 {
     const double length = sqrt(14), axis[3] = {1 / length, 2 / length, 3 / length};
     const double along = axis[0] * p[0] + axis[1] * p[1] + axis[2] * p[2];
@@ -44,24 +44,24 @@ static void rotate(const double p[3], double out[3])
     }
 }
 
-static void map(const hanging *h, const double p[3], double out[3])
+static void map_position(const hanging *h, const double p[3], double out[3])
 {
     if (h->shape >= TEST_HANGING_CURVED)
-        to_ball(p, out);
+        map_cube_to_ball(p, out);
     else if (h->shape == TEST_HANGING_ROTATED)
-        rotate(p, out);
+        rotate_position(p, out);
     else
         memcpy(out, p, 3 * sizeof *out);
 }
 
 /* Computes the position of a lattice point of the finest lattice in the cube [-1, 1]^3. */
-static void lattice_place(const hanging *h, const int64_t at[3], double out[3])
+static void compute_lattice_position(const hanging *h, const int64_t at[3], double out[3])
 {
     for (int a = 0; a < 3; a++) out[a] = 2.0 * (double)at[a] / (double)(h->n * h->side) - 1;
 }
 
 /* Interpolates position and value at a lattice point from the corners of its cube. */
-static void cube_mean(const hanging *h, const int64_t at[3], double position[3], double *value)
+static void interpolate_in_cube(const hanging *h, const int64_t at[3], double position[3], double *value)
 {
     int64_t cube[3];
     double share[3];
@@ -78,22 +78,22 @@ static void cube_mean(const hanging *h, const int64_t at[3], double position[3],
             weight *= corner >> a & 1 ? share[a] : 1 - share[a];
         }
         if (!(weight > 0)) continue;
-        lattice_place(h, place, flat);
-        map(h, flat, p);
+        compute_lattice_position(h, place, flat);
+        map_position(h, flat, p);
         for (int a = 0; a < 3; a++) position[a] += weight * p[a];
         *value += weight * h->f(p);
     }
 }
 
-static int64_t vertex_at(hanging *h, const int64_t at[3])
+static int64_t find_or_add_vertex(hanging *h, const int64_t at[3])
 {
     int64_t *vertex = &h->vertices[at[0] + h->line * (at[1] + h->line * at[2])];
     double flat[3], own[3], mean[3], value;
     if (*vertex >= 0) return *vertex;
     const bool is_inside = at[0] % h->side && at[1] % h->side && at[2] % h->side;
-    lattice_place(h, at, flat);
-    map(h, flat, own);
-    cube_mean(h, at, mean, &value);
+    compute_lattice_position(h, at, flat);
+    map_position(h, flat, own);
+    interpolate_in_cube(h, at, mean, &value);
     *vertex = test_mesh_add_vertex(h->mesh, h->shape == TEST_HANGING_CURVED ? mean : own);
     h->mesh->values[*vertex] = is_inside ? h->f(h->mesh->coordinates + 3 * *vertex) : value;
     return *vertex;
@@ -105,7 +105,7 @@ static void add_cells(hanging *h, test_mesh_kind kind, const int64_t at[3], int 
     int64_t corners[8];
     for (int b = 0; b < 8; b++) {
         const int64_t place[3] = {at[0] + (b & 1) * width, at[1] + (b >> 1 & 1) * width, at[2] + (b >> 2) * width};
-        corners[b] = vertex_at(h, place);
+        corners[b] = find_or_add_vertex(h, place);
     }
     test_mesh_add_cube(h->mesh, kind, corners);
 }
@@ -121,7 +121,8 @@ static void add_refined(hanging *h, test_mesh_kind kind, const int64_t cube[3], 
     }
 }
 
-void test_mesh_hanging(test_mesh_kind kind, int n, int side, test_hanging_shape shape, test_function *f, test_mesh *out)
+void test_mesh_make_hanging(test_mesh_kind kind, int n, int side, test_hanging_shape shape, test_function *f,
+                            test_mesh *out)
 {
     hanging h = {n, side, shape, f, (int64_t)n * side + 1, NULL, out};
     const int64_t places = h.line * h.line * h.line, cells = 6 * places;

@@ -19,7 +19,7 @@ const char *test_hanging_shape_name(test_hanging_shape shape);
 /* Makes n^3 cubes, a third of which are divided into side^3 cubes each (2 or 4): hexes, wedges or tets, for TEST_HEXES,
  * TEST_WEDGES and TEST_TETS. In curved shapes only hexes share one patch on both sides. Values at hanging nodes are the
  * bilinear ones of the coarse face: they agree with a coarse hex, and with other cells if the function is linear. */
-void test_mesh_hanging(test_mesh_kind kind, int n, int side, test_hanging_shape shape, test_function *f,
-                       test_mesh *out);
+void test_mesh_make_hanging(test_mesh_kind kind, int n, int side, test_hanging_shape shape, test_function *f,
+                            test_mesh *out);
 
 #endif

@@ -29,7 +29,7 @@ typedef struct wall {
     int64_t brick_count;
 } wall;
 
-static void *allocate(int64_t count, size_t size)
+static void *allocate_array(int64_t count, size_t size)
 {
     void *p = calloc((size_t)(count > 0 ? count : 1), size);
     if (!p) {
@@ -54,7 +54,7 @@ static brick make_brick(const wall *w, int row, int64_t low, int64_t high)
 static wall make_wall(int n)
 {
     wall w = {.n = n, .columns = 2 * n + 1, .level = (int64_t)(n + 1) * (2 * n + 1)};
-    w.bricks = allocate((int64_t)n * (n + 1), sizeof *w.bricks);
+    w.bricks = allocate_array((int64_t)n * (n + 1), sizeof *w.bricks);
     for (int row = 0; row < n; row++)
         for (int64_t low = row % 2 ? -1 : 0; low < 2 * n; low += 2)
             w.bricks[w.brick_count++] = make_brick(&w, row, low < 0 ? 0 : low, low + 2 > 2 * n ? 2 * n : low + 2);
@@ -93,7 +93,7 @@ static int64_t add_face(test_mesh *mesh, const int64_t *vertices, int count)
 
 /* Returns the quad above an edge of a brick, adding it only once for the two bricks that share it. first is the number
  * of the layer's first quad. */
-static int64_t side_face(const wall *w, int layer, int64_t a, int64_t b, int64_t first, test_mesh *out)
+static int64_t find_or_add_side_face(const wall *w, int layer, int64_t a, int64_t b, int64_t first, test_mesh *out)
 {
     const int64_t low = layer * w->level + (a < b ? a : b), high = layer * w->level + (a < b ? b : a);
     for (int64_t face = first; face < out->face_count; face++) {
@@ -110,7 +110,7 @@ static void add_layer(const wall *w, int layer, test_mesh *out)
         const brick *b = &w->bricks[i];
         for (int k = 0; k < b->count; k++)
             out->connectivity[out->connectivity_count++] =
-                side_face(w, layer, b->corners[k], b->corners[(k + 1) % b->count], first, out);
+                find_or_add_side_face(w, layer, b->corners[k], b->corners[(k + 1) % b->count], first, out);
         /* The horizontal faces were added first, level by level. */
         out->connectivity[out->connectivity_count++] = layer * w->brick_count + i;
         out->connectivity[out->connectivity_count++] = (layer + 1) * w->brick_count + i;
@@ -129,19 +129,19 @@ static void add_lids(const wall *w, test_mesh *out)
         }
 }
 
-void test_mesh_honeycomb(int n, double jitter, test_function *f, test_mesh *out)
+void test_mesh_make_honeycomb(int n, double jitter, test_function *f, test_mesh *out)
 {
     const wall w = make_wall(n);
     const int64_t cells = n * w.brick_count, faces = (MAX_CORNERS + 2) * (cells + w.brick_count);
     memset(out, 0, sizeof *out);
-    out->coordinates = allocate(3 * (n + 1) * w.level, sizeof(double));
-    out->values = allocate((n + 1) * w.level, sizeof(double));
-    out->offsets = allocate(cells + 1, sizeof(int64_t));
-    out->connectivity = allocate((MAX_CORNERS + 2) * cells, sizeof(int64_t));
-    out->types = allocate(cells, 1);
-    out->ghosts = allocate(cells, 1);
-    out->face_offsets = allocate(faces + 1, sizeof(int64_t));
-    out->face_connectivity = allocate(MAX_CORNERS * faces, sizeof(int64_t));
+    out->coordinates = allocate_array(3 * (n + 1) * w.level, sizeof(double));
+    out->values = allocate_array((n + 1) * w.level, sizeof(double));
+    out->offsets = allocate_array(cells + 1, sizeof(int64_t));
+    out->connectivity = allocate_array((MAX_CORNERS + 2) * cells, sizeof(int64_t));
+    out->types = allocate_array(cells, 1);
+    out->ghosts = allocate_array(cells, 1);
+    out->face_offsets = allocate_array(faces + 1, sizeof(int64_t));
+    out->face_connectivity = allocate_array(MAX_CORNERS * faces, sizeof(int64_t));
     place_vertices(&w, jitter, out);
     add_lids(&w, out);
     for (int layer = 0; layer < n; layer++) add_layer(&w, layer, out);

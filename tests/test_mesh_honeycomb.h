@@ -6,6 +6,6 @@
 
 /* Divides the cube [-1, 1]^3 into n layers of n rows of hexagonal prisms; every second row has half prisms at the hull.
  * Inner vertices are moved along each axis by up to jitter times the distance between layers. */
-void test_mesh_honeycomb(int n, double jitter, test_function *f, test_mesh *out);
+void test_mesh_make_honeycomb(int n, double jitter, test_function *f, test_mesh *out);
 
 #endif

@@ -79,7 +79,7 @@ static int64_t add_centre(test_mesh *mesh, const int64_t *corners)
 
 /* Returns the kind of the cube of even parity at a position of the mixed mesh: 0 for a hex, 1 for wedges, 2 for
  * tets. */
-static int mixed_choice(const int place[3])
+static int choose_mixed_cell_type(const int place[3])
 {
     return (int)(test_hash((uint64_t)(place[0] + 1024 * place[1] + 1024 * 1024 * place[2]), 2) % 3);
 }
@@ -88,7 +88,7 @@ static void add_mixed(test_mesh *mesh, int n, const int place[3], const int64_t 
 {
     if ((place[0] + place[1] + place[2]) % 2 == 0) {
         void (*const add[3])(test_mesh *, const int64_t *) = {add_hex, add_wedges, add_tets};
-        add[mixed_choice(place)](mesh, corners);
+        add[choose_mixed_cell_type(place)](mesh, corners);
         return;
     }
     const int64_t centre = add_centre(mesh, corners);
@@ -96,7 +96,7 @@ static void add_mixed(test_mesh *mesh, int n, const int place[3], const int64_t 
         int beside[3] = {place[0], place[1], place[2]};
         beside[face / 2] += face % 2 ? 1 : -1;
         const bool outside = beside[face / 2] < 0 || beside[face / 2] >= n;
-        const int choice = outside ? 0 : mixed_choice(beside);
+        const int choice = outside ? 0 : choose_mixed_cell_type(beside);
         close_face(mesh, corners, centre, cube_faces[face], choice == 2 || (choice == 1 && face >= 4));
     }
 }
@@ -122,7 +122,7 @@ static void add_cube(test_mesh *mesh, test_mesh_kind kind, int n, const int plac
     }
 }
 
-void test_mesh_lattice(test_mesh_kind kind, int n, double jitter, test_function *f, test_mesh *out)
+void test_mesh_make_lattice(test_mesh_kind kind, int n, double jitter, test_function *f, test_mesh *out)
 {
     static const int64_t cells[TEST_KIND_COUNT] = {6, 1, 2, 6, 6, 12};
     static const int64_t connectivity[TEST_KIND_COUNT] = {24, 8, 12, 30, 24, 48};
@@ -133,6 +133,6 @@ void test_mesh_lattice(test_mesh_kind kind, int n, double jitter, test_function 
     for (int k = 0; k < n; k++)
         for (int j = 0; j < n; j++)
             for (int i = 0; i < n; i++) add_cube(out, kind, n, (const int[]){i, j, k});
-    if (kind == TEST_POLYHEDRA) test_mesh_grow_together(out);
+    if (kind == TEST_POLYHEDRA) test_mesh_merge_tets(out);
     test_mesh_set_values(out, f);
 }

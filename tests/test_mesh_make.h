@@ -39,6 +39,6 @@ typedef struct test_faces {
 const test_faces *test_faces_of(int type);
 
 /* Joins the tets of a mesh into polyhedra of up to six tets. */
-void test_mesh_grow_together(test_mesh *mesh);
+void test_mesh_merge_tets(test_mesh *mesh);
 
 #endif

@@ -65,7 +65,7 @@ static const node_list lists[] = {
     {INSITU_PYRAMID, G, "ab ad ae bc be cd ce de abcd"},
 };
 
-static insitu_cell_type linear_type(insitu_cell_type type)
+static insitu_cell_type get_linear_type(insitu_cell_type type)
 {
     switch (type) {
     case INSITU_QUADRATIC_TET:
@@ -79,7 +79,7 @@ static insitu_cell_type linear_type(insitu_cell_type type)
     }
 }
 
-static int listed_count(insitu_cell_type type)
+static int get_listed_node_count(insitu_cell_type type)
 {
     switch (type) {
     case INSITU_QUADRATIC_TET: return 10;
@@ -99,12 +99,12 @@ typedef struct node_weights {
 
 static void list_nodes(const order_kind *kind, node_weights *out)
 {
-    const insitu_cell_type linear = linear_type(kind->type);
+    const insitu_cell_type linear = get_linear_type(kind->type);
     const int corners = grid_type_vertices((int)linear);
     const insitu_vertex_order layout = kind->layout == INSITU_ORDER_VTK_BEFORE_9_1 ? V : kind->layout;
     const node_list *list = lists;
     while (list->type != linear || list->layout != layout) list++;
-    out->count = listed_count(kind->type);
+    out->count = get_listed_node_count(kind->type);
     for (int c = 0; c < corners; c++) out->of[c][c] = 1;
     const char *at = list->nodes;
     for (int n = corners; n < out->count; n++) {
@@ -119,9 +119,9 @@ static void add_node(node_weights *out, const double weights[8])
     memcpy(out->of[out->count++], weights, 8 * sizeof *weights);
 }
 
-static void loop_nodes(const order_kind *kind, node_weights *out)
+static void make_loop_nodes(const order_kind *kind, node_weights *out)
 {
-    const insitu_cell_type linear = linear_type(kind->type);
+    const insitu_cell_type linear = get_linear_type(kind->type);
     const int p = kind->order;
     for (int k = 0; k <= p; k++)
         for (int j = 0; j <= p; j++)
@@ -146,7 +146,7 @@ static void loop_nodes(const order_kind *kind, node_weights *out)
 /* ---- cells in a cube ------------------------------------------------------------------------------------------- */
 
 /* Corners of a cube's cells: 0..7 by bits along x, y, z; 8 its middle. */
-static int cells_of_cube(insitu_cell_type linear, const signed char (**cells)[8])
+static int get_cells_of_cube(insitu_cell_type linear, const signed char (**cells)[8])
 {
     static const signed char hex[1][8] = {{0, 1, 3, 2, 4, 5, 7, 6}};
     static const signed char wedges[2][8] = {{0, 1, 3, 4, 5, 7}, {0, 3, 2, 4, 7, 6}};
@@ -166,14 +166,14 @@ typedef struct maker {
     double bend;
 } maker;
 
-double order_mesh_moved(double bend, const double point[3], int axis)
+double order_mesh_make_moved(double bend, const double point[3], int axis)
 {
     const double *p = point;
     const int next = (axis + 1) % 3, last = (axis + 2) % 3;
     return p[axis] + bend * sin(2.3 * p[next] + 0.7 * axis) * cos(1.9 * p[last]) * (1 - p[axis] * p[axis]);
 }
 
-static int64_t number_of(maker *m, const int64_t place[3])
+static int64_t find_or_add_node(maker *m, const int64_t place[3])
 {
     int64_t *number = &m->numbers[place[0] + m->across * (place[1] + m->across * place[2])];
     if (*number >= 0) return *number;
@@ -181,7 +181,7 @@ static int64_t number_of(maker *m, const int64_t place[3])
     for (int axis = 0; axis < 3; axis++) point[axis] = -1 + 2 * (double)place[axis] / (m->across - 1);
     *number = m->out->vertex_count++;
     for (int axis = 0; axis < 3; axis++)
-        m->out->coordinates[3 * *number + axis] = order_mesh_moved(m->bend, point, axis);
+        m->out->coordinates[3 * *number + axis] = order_mesh_make_moved(m->bend, point, axis);
     return *number;
 }
 
@@ -195,12 +195,12 @@ static void add_cell(maker *m, const node_weights *nodes, const signed char corn
                 at += nodes->of[n][c] * (corners[c] == 8 ? 0.5 : (double)(corners[c] >> axis & 1));
             place[axis] = llround((cube[axis] + at) * m->units);
         }
-        m->out->connectivity[m->out->cell_count * nodes->count + n] = number_of(m, place);
+        m->out->connectivity[m->out->cell_count * nodes->count + n] = find_or_add_node(m, place);
     }
     m->out->cell_count++;
 }
 
-static void describe(const order_kind *kind, order_mesh *out)
+static void describe_mesh(const order_kind *kind, order_mesh *out)
 {
     insitu_mesh_defaults(&out->mesh);
     insitu_mesh_interleaved(&out->mesh, out->coordinates, INSITU_FLOAT64);
@@ -219,12 +219,12 @@ static void describe(const order_kind *kind, order_mesh *out)
 void order_mesh_create(const order_kind *kind, int side, double bend, order_function *value, int rank, int ranks,
                        order_mesh *out)
 {
-    const insitu_cell_type linear = linear_type(kind->type);
+    const insitu_cell_type linear = get_linear_type(kind->type);
     const signed char(*cells)[8];
-    const int count = cells_of_cube(linear, &cells), corners = grid_type_vertices((int)linear);
+    const int count = get_cells_of_cube(linear, &cells), corners = grid_type_vertices((int)linear);
     node_weights *nodes = calloc(1, sizeof *nodes);
     if (kind->layout == L)
-        loop_nodes(kind, nodes);
+        make_loop_nodes(kind, nodes);
     else
         list_nodes(kind, nodes);
     *out = (order_mesh){.nodes = nodes->count};
@@ -241,12 +241,12 @@ void order_mesh_create(const order_kind *kind, int side, double bend, order_func
         if (n % ranks == rank) add_cell(&m, nodes, cells[n % count], corners, cube);
     }
     for (int64_t i = 0; i < out->vertex_count; i++) out->values[i] = value(out->coordinates + 3 * i);
-    describe(kind, out);
+    describe_mesh(kind, out);
     free(m.numbers);
     free(nodes);
 }
 
-order_mesh order_mesh_linear_hexes(const order_mesh *of, int p)
+order_mesh order_mesh_make_linear_hexes(const order_mesh *of, int p)
 {
     order_mesh out = *of;
     const int n = p + 1;
@@ -273,17 +273,17 @@ void order_mesh_free(order_mesh *mesh)
     *mesh = (order_mesh){0};
 }
 
-double order_sphere(const double p[3])
+double order_sphere_field(const double p[3])
 {
     return p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
 }
 
-double order_wavy(const double p[3])
+double order_wave_field(const double p[3])
 {
     return sin(2 * p[0]) * cos(1.5 * p[1]) + 0.5 * p[2];
 }
 
-double order_plane(const double p[3])
+double order_plane_field(const double p[3])
 {
     return p[2] + 0.3 * p[0] + 0.2 * p[1];
 }

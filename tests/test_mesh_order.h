@@ -32,9 +32,9 @@ typedef struct order_mesh {
 typedef double order_function(const double point[3]);
 
 /* The squared distance from the origin, a wave, and a plane that is not along the axes. */
-double order_sphere(const double point[3]);
-double order_wavy(const double point[3]);
-double order_plane(const double point[3]);
+double order_sphere_field(const double point[3]);
+double order_wave_field(const double point[3]);
+double order_plane_field(const double point[3]);
 
 /* side^3 cubes of [-1, 1]^3, of the kind's cells; those of the rank, dealt one by one to so many ranks. bend: how far
  * vertices inside and on the faces of the cube are moved. */
@@ -42,11 +42,11 @@ void order_mesh_create(const order_kind *kind, int side, double bend, order_func
                        order_mesh *out);
 
 /* Returns the coordinate of a point of the cube after the vertices have been moved. */
-double order_mesh_moved(double bend, const double point[3], int axis);
+double order_mesh_make_moved(double bend, const double point[3], int axis);
 
 /* Returns the linear hexes between the nodes of lexicographic hexes of order p, with connectivity of its own, which the
  * caller frees; the rest is the mesh's. */
-order_mesh order_mesh_linear_hexes(const order_mesh *of, int p);
+order_mesh order_mesh_make_linear_hexes(const order_mesh *of, int p);
 void order_mesh_free(order_mesh *mesh);
 
 #endif

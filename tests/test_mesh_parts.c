@@ -10,7 +10,7 @@ const char *test_partition_kind_name(test_partition_kind kind)
     return names[kind];
 }
 
-static int owner_of(test_partition_kind kind, const double centre[3], int64_t cell, int n, int ranks)
+static int choose_owner(test_partition_kind kind, const double centre[3], int64_t cell, int n, int ranks)
 {
     if (kind == TEST_RANDOM) return (int)(test_hash((uint64_t)cell, 5) % (uint64_t)ranks);
     const int cuts = kind == TEST_BLOCK ? ranks : n;
@@ -22,7 +22,7 @@ static int owner_of(test_partition_kind kind, const double centre[3], int64_t ce
     return kind == TEST_BLOCK ? place[0] : (place[0] + place[1] + place[2]) % ranks;
 }
 
-void test_partition(const test_mesh *mesh, test_partition_kind kind, int n, int ranks, int *owners)
+void test_partition_cells(const test_mesh *mesh, test_partition_kind kind, int n, int ranks, int *owners)
 {
     for (int64_t cell = 0; cell < mesh->cell_count; cell++) {
         double centre[3] = {0, 0, 0};
@@ -39,12 +39,12 @@ void test_partition(const test_mesh *mesh, test_partition_kind kind, int n, int 
                 for (int axis = 0; axis < 3; axis++) centre[axis] += mesh->coordinates[3 * loop[j] + axis];
         }
         for (int axis = 0; axis < 3; axis++) centre[axis] /= (double)count;
-        owners[cell] = owner_of(kind, centre, cell, n, ranks);
+        owners[cell] = choose_owner(kind, centre, cell, n, ranks);
     }
 }
 
 /* Returns the part's number of a vertex, which is assigned at its first use. */
-static int64_t part_vertex(const test_mesh *mesh, int64_t *local, int64_t v, test_mesh *out)
+static int64_t find_or_add_part_vertex(const test_mesh *mesh, int64_t *local, int64_t v, test_mesh *out)
 {
     if (local[v] >= 0) return local[v];
     local[v] = test_mesh_add_vertex(out, mesh->coordinates + 3 * v);
@@ -52,7 +52,8 @@ static int64_t part_vertex(const test_mesh *mesh, int64_t *local, int64_t v, tes
     return local[v];
 }
 
-static void part_polyhedron(const test_mesh *mesh, int64_t *local, int64_t *local_face, int64_t cell, test_mesh *out)
+static void copy_polyhedron_to_part(const test_mesh *mesh, int64_t *local, int64_t *local_face, int64_t cell,
+                                    test_mesh *out)
 {
     const int64_t first = out->connectivity_count, count = mesh->offsets[cell + 1] - mesh->offsets[cell];
     test_mesh_add_polyhedron(out, mesh->connectivity + mesh->offsets[cell], count);
@@ -62,13 +63,13 @@ static void part_polyhedron(const test_mesh *mesh, int64_t *local, int64_t *loca
             const int64_t at = out->face_connectivity_count, size = mesh->face_offsets[face + 1] - begin;
             local_face[face] = test_mesh_add_face(out, mesh->face_connectivity + begin, size);
             for (int64_t j = at; j < at + size; j++)
-                out->face_connectivity[j] = part_vertex(mesh, local, out->face_connectivity[j], out);
+                out->face_connectivity[j] = find_or_add_part_vertex(mesh, local, out->face_connectivity[j], out);
         }
         out->connectivity[i] = local_face[face];
     }
 }
 
-void test_mesh_part(const test_mesh *mesh, const int *owners, int rank, test_mesh *out)
+void test_mesh_extract_part(const test_mesh *mesh, const int *owners, int rank, test_mesh *out)
 {
     int64_t *local = test_allocate(mesh->vertex_count, sizeof *local);
     int64_t *local_face = test_allocate(mesh->face_count, sizeof *local_face);
@@ -81,11 +82,11 @@ void test_mesh_part(const test_mesh *mesh, const int *owners, int rank, test_mes
         int64_t vertices[8];
         out->ghosts[out->cell_count] = mesh->ghosts[cell];
         if (mesh->types[cell] == GRID_POLYHEDRON) {
-            part_polyhedron(mesh, local, local_face, cell, out);
+            copy_polyhedron_to_part(mesh, local, local_face, cell, out);
             continue;
         }
         for (int i = 0; i < grid_type_vertices(mesh->types[cell]); i++)
-            vertices[i] = part_vertex(mesh, local, mesh->connectivity[mesh->offsets[cell] + i], out);
+            vertices[i] = find_or_add_part_vertex(mesh, local, mesh->connectivity[mesh->offsets[cell] + i], out);
         test_mesh_add_cell(out, mesh->types[cell], vertices, (const int[]){0, 1, 2, 3, 4, 5, 6, 7});
     }
     free(local);

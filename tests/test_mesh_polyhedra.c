@@ -59,7 +59,7 @@ static int64_t face_table_find(face_table *t, const int64_t *vertices, int count
     return at;
 }
 
-static int64_t cell_face(face_table *t, const test_mesh *mesh, int64_t cell, int face)
+static int64_t find_or_add_cell_face(face_table *t, const test_mesh *mesh, int64_t cell, int face)
 {
     const int *picks = test_faces_of(mesh->types[cell])->vertices[face];
     const int count = picks[3] < 0 ? 3 : 4;
@@ -87,7 +87,7 @@ void test_mesh_to_polyhedra(test_mesh *mesh, double share)
         }
         int64_t faces[6];
         const int count = test_faces_of(old.types[cell])->count;
-        for (int i = 0; i < count; i++) faces[i] = table.faces[cell_face(&table, &old, cell, i)];
+        for (int i = 0; i < count; i++) faces[i] = table.faces[find_or_add_cell_face(&table, &old, cell, i)];
         test_mesh_add_polyhedron(mesh, faces, count);
     }
     face_table_free(&table);
@@ -152,7 +152,7 @@ static bool group_grow(tet_group *g, const face_table *t, const int64_t (*faces_
 }
 
 /* Joins the mesh's tets into polyhedra of up to GROUP_TETS. */
-void test_mesh_grow_together(test_mesh *mesh)
+void test_mesh_merge_tets(test_mesh *mesh)
 {
     test_mesh old = *mesh;
     face_table table;
@@ -165,7 +165,7 @@ void test_mesh_grow_together(test_mesh *mesh)
     test_mesh_allocate_faces(mesh, 4 * old.cell_count, 12 * old.cell_count);
     face_table_open(&table, NULL, 4 * old.cell_count);
     for (int64_t cell = 0; cell < old.cell_count; cell++)
-        for (int i = 0; i < 4; i++) faces_of[cell][i] = cell_face(&table, &old, cell, i);
+        for (int i = 0; i < 4; i++) faces_of[cell][i] = find_or_add_cell_face(&table, &old, cell, i);
     for (int64_t cell = 0; cell < old.cell_count; cell++) {
         tet_group g = {0};
         if (is_taken[cell]) continue;

@@ -44,12 +44,12 @@ static void refine_cell(const session_interpolation *of, const order_mesh *mesh,
 
 /* Refines the cells in columns of cubes along z: all (column is -1), those with an even number, or those with an odd
  * one. */
-static void refine(const order_kind *kind, int side, double bend, int column, fine_nodes *out)
+static void refine_cells(const order_kind *kind, int side, double bend, int column, fine_nodes *out)
 {
     order_mesh mesh;
     session_nodes nodes;
     session_interpolation of;
-    order_mesh_create(kind, side, bend, test_linear, 0, 1, &mesh);
+    order_mesh_create(kind, side, bend, test_linear_field, 0, 1, &mesh);
     const int64_t of_cube = mesh.cell_count / (side * side * side);
     assert_true(session_nodes_of((int)kind->type, mesh.nodes, &nodes));
     assert_true(session_make_interpolation(&nodes, kind->layout, PARTS, false, &of));
@@ -95,13 +95,13 @@ static void add_pieces(fine_nodes *nodes, test_mesh *out)
     free(nodes->coordinates);
 }
 
-void test_mesh_refined(refined_kind kind, int side, double bend, test_function *f, test_mesh *out)
+void test_mesh_make_refined(refined_kind kind, int side, double bend, test_function *f, test_mesh *out)
 {
     static const order_kind *const kinds[] = {&tet_10, &hex_20, &hex_27, &wedge_18, &hex_27};
     fine_nodes nodes[2] = {0};
     int64_t vertices = 0, cells = 0;
-    refine(kinds[kind], side, bend, kind == REFINED_MIXED ? 0 : -1, &nodes[0]);
-    if (kind == REFINED_MIXED) refine(&wedge_18, side, bend, 1, &nodes[1]);
+    refine_cells(kinds[kind], side, bend, kind == REFINED_MIXED ? 0 : -1, &nodes[0]);
+    if (kind == REFINED_MIXED) refine_cells(&wedge_18, side, bend, 1, &nodes[1]);
     for (int i = 0; i < 2; i++) {
         vertices += nodes[i].mesh.vertex_count;
         cells += nodes[i].mesh.cell_count * ORDER * ORDER * ORDER;

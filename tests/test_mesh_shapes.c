@@ -72,7 +72,7 @@ static void make_cavity(test_mesh *mesh)
     test_mesh_add_polyhedron(mesh, faces, 12);
 }
 
-void test_mesh_polyhedron(test_polyhedron_shape shape, test_function *f, test_mesh *out)
+void test_mesh_make_polyhedron(test_polyhedron_shape shape, test_function *f, test_mesh *out)
 {
     static const double l[6][2] = {{-0.5, -0.5}, {0.5, -0.45}, {0.5, -0.1}, {0.0, 0.0}, {-0.1, 0.5}, {-0.5, 0.4}};
     static const double u[8][2] = {{-0.5, -0.5}, {0.5, -0.5},  {0.5, 0.5},   {0.3, 0.45},
@@ -154,7 +154,7 @@ static void shape_vertex(test_cell_shape shape, int i, double p[3])
     }
 }
 
-void test_mesh_single(test_cell_shape shape, test_function *f, test_mesh *out)
+void test_mesh_make_single_cell(test_cell_shape shape, test_function *f, test_mesh *out)
 {
     const int type = shape_type(shape);
     const int64_t indices[8] = {0, 1, 2, 3, 4, 5, 6, 7};

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void store(void *to, int64_t i, bool wide, bool is_integer, double number, int64_t index)
+static void store_number(void *to, int64_t i, bool wide, bool is_integer, double number, int64_t index)
 {
     if (is_integer && wide)
         ((int64_t *)to)[i] = index;
@@ -20,13 +20,13 @@ static void store(void *to, int64_t i, bool wide, bool is_integer, double number
 static grid_array view_numbers(const double *numbers, int64_t count, int from_stride, int stride, bool wide, void *to)
 {
     const int64_t width = wide ? 8 : 4;
-    for (int64_t i = 0; i < count; i++) store(to, i * stride, wide, false, numbers[i * from_stride], 0);
+    for (int64_t i = 0; i < count; i++) store_number(to, i * stride, wide, false, numbers[i * from_stride], 0);
     return (grid_array){.data = to, .stride = stride * width, .is_wide = wide};
 }
 
 static grid_array view_indices(const int64_t *indices, int64_t count, bool wide, void *to)
 {
-    for (int64_t i = 0; i < count; i++) store(to, i, wide, true, 0, indices[i]);
+    for (int64_t i = 0; i < count; i++) store_number(to, i, wide, true, 0, indices[i]);
     return (grid_array){.data = to, .stride = wide ? 8 : 4, .is_wide = wide, .is_integer = true};
 }
 
@@ -45,7 +45,7 @@ static void view_values(const test_mesh *mesh, test_layout layout, test_view *ou
     const int stride = layout.is_interleaved ? 2 : 1;
     out->storage[1] = test_allocate(mesh->vertex_count * stride, 8);
     for (int64_t i = 0; i < mesh->vertex_count * stride; i++)
-        store(out->storage[1], i, layout.wide_values, false, (double)NAN, 0);
+        store_number(out->storage[1], i, layout.wide_values, false, (double)NAN, 0);
     out->field.values = view_numbers(mesh->values, mesh->vertex_count, 1, stride, layout.wide_values, out->storage[1]);
     out->field.component_count = 1;
     out->field.component_stride = layout.wide_values ? 8 : 4;

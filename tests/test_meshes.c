@@ -16,7 +16,7 @@ void *test_allocate(int64_t count, size_t size)
     return p;
 }
 
-static uint64_t mix(uint64_t x)
+static uint64_t mix_bits(uint64_t x)
 {
     x += 0x9e3779b97f4a7c15u;
     x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
@@ -26,7 +26,7 @@ static uint64_t mix(uint64_t x)
 
 uint64_t test_hash(uint64_t index, uint64_t seed)
 {
-    return mix(index ^ mix(seed));
+    return mix_bits(index ^ mix_bits(seed));
 }
 
 double test_uniform(uint64_t index, uint64_t seed)
@@ -34,17 +34,17 @@ double test_uniform(uint64_t index, uint64_t seed)
     return (double)(test_hash(index, seed) >> 11) * 0x1p-53;
 }
 
-double test_uniform_in(uint64_t index, uint64_t seed, double low, double high)
+double test_uniform_between(uint64_t index, uint64_t seed, double low, double high)
 {
     return low + (high - low) * test_uniform(index, seed);
 }
 
-double test_wave(const double p[3])
+double test_wave_field(const double p[3])
 {
     return sin(6 * p[0]) * cos(6 * p[1]) + sin(6 * p[1]) * cos(6 * p[2]) + sin(6 * p[2]) * cos(6 * p[0]);
 }
 
-double test_linear(const double p[3])
+double test_linear_field(const double p[3])
 {
     return 0.3 * p[0] - 0.7 * p[1] + 0.5 * p[2] + 0.1;
 }

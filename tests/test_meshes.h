@@ -43,7 +43,7 @@ const char *test_mesh_kind_name(test_mesh_kind kind);
 
 /* Divides the cube [-1, 1]^3 into n^3 cubes. Inner vertices are moved along each axis by up to jitter of a cube's side,
  * by a hash of the vertex's lattice index. */
-void test_mesh_lattice(test_mesh_kind kind, int n, double jitter, test_function *f, test_mesh *out);
+void test_mesh_make_lattice(test_mesh_kind kind, int n, double jitter, test_function *f, test_mesh *out);
 
 typedef enum test_cell_shape {
     TEST_UNIT_TET,
@@ -63,7 +63,7 @@ typedef enum test_cell_shape {
 
 const char *test_cell_shape_name(test_cell_shape shape);
 
-void test_mesh_single(test_cell_shape shape, test_function *f, test_mesh *out);
+void test_mesh_make_single_cell(test_cell_shape shape, test_function *f, test_mesh *out);
 
 typedef enum test_polyhedron_shape {
     TEST_L_PRISM,     /* the base is a hexagon with a concave corner */
@@ -76,7 +76,7 @@ typedef enum test_polyhedron_shape {
 
 const char *test_polyhedron_name(test_polyhedron_shape shape);
 
-void test_mesh_polyhedron(test_polyhedron_shape shape, test_function *f, test_mesh *out);
+void test_mesh_make_polyhedron(test_polyhedron_shape shape, test_function *f, test_mesh *out);
 
 /* Makes cells of the four types into polyhedra with the same vertices and faces, which neighbours share. share is the
  * fraction of cells, chosen by a hash; 1: all. */
@@ -86,14 +86,14 @@ void test_mesh_set_values(test_mesh *mesh, test_function *f);
 void test_mesh_free(test_mesh *mesh);
 
 /* Rounds coordinates and values to float32, so that layouts of both widths have the same numbers. */
-void test_mesh_round(test_mesh *mesh);
+void test_mesh_round_to_float(test_mesh *mesh);
 
 /* Reorders the vertices of every cell (or, with every_second, of half of the cells, chosen by a hash) to those of its
  * mirror image: cells become left-handed. */
-void test_mesh_mirror(test_mesh *mesh, bool every_second);
+void test_mesh_mirror_cells(test_mesh *mesh, bool every_second);
 
 /* Changes the order of the cells and of the vertices; geometry and field stay the same. */
-void test_mesh_shuffle(test_mesh *mesh, uint64_t seed);
+void test_mesh_shuffle_cells(test_mesh *mesh, uint64_t seed);
 
 /* Reorders each cell's vertices by a random symmetry of its kind (rotations and mirrors); a face begins at another
  * vertex and has the opposite orientation, and a polyhedron's faces are in another order. Geometry and field stay the
@@ -113,10 +113,10 @@ typedef enum test_partition_kind {
 const char *test_partition_kind_name(test_partition_kind kind);
 
 /* Computes owners (cell_count), each cell's rank: slabs along x, a hash of the cell, or cubes of side 2 / n in turn. */
-void test_partition(const test_mesh *mesh, test_partition_kind kind, int n, int ranks, int *owners);
+void test_partition_cells(const test_mesh *mesh, test_partition_kind kind, int n, int ranks, int *owners);
 
 /* Makes a mesh of the cells of one rank, with its own numbering of vertices. */
-void test_mesh_part(const test_mesh *mesh, const int *owners, int rank, test_mesh *out);
+void test_mesh_extract_part(const test_mesh *mesh, const int *owners, int rank, test_mesh *out);
 
 typedef struct test_layout {
     bool wide_coordinates, wide_indices, wide_values; /* elements of 8 bytes */
@@ -136,12 +136,12 @@ void test_view_create(const test_mesh *mesh, test_layout layout, test_view *out)
 void test_view_free(test_view *view);
 
 /* Returns sin 6x cos 6y + sin 6y cos 6z + sin 6z cos 6x. */
-double test_wave(const double position[3]);
+double test_wave_field(const double position[3]);
 /* Returns 0.3 x - 0.7 y + 0.5 z + 0.1, which is exact on every cell. */
-double test_linear(const double position[3]);
+double test_linear_field(const double position[3]);
 
 /* Returns the larger error. NaN counts as infinite, so that a later error does not hide it. */
-static inline double test_worse(double worst, double off)
+static inline double test_larger_error(double worst, double off)
 {
     return off <= worst ? worst : off == off ? off : (double)INFINITY;
 }
@@ -149,6 +149,6 @@ static inline double test_worse(double worst, double off)
 /* Returns a uniform number in [0, 1) for an index and a seed. */
 double test_uniform(uint64_t index, uint64_t seed);
 /* Returns a uniform number in [low, high) for an index and a seed. */
-double test_uniform_in(uint64_t index, uint64_t seed, double low, double high);
+double test_uniform_between(uint64_t index, uint64_t seed, double low, double high);
 
 #endif

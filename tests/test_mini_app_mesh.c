@@ -15,7 +15,7 @@
 
 static const int sizes[][3] = {{1, 1, 1}, {2, 3, 2}, {5, 4, 8}, {7, 7, 7}};
 
-static void measure(const wave_mesh *mesh, int32_t cell, wave_cell_geometry *out)
+static void compute_cell_geometry(const wave_mesh *mesh, int32_t cell, wave_cell_geometry *out)
 {
     int32_t v[8];
     int64_t id[8];
@@ -38,7 +38,7 @@ static void check_box(const wave_lattice *lattice)
     assert_int_equal(mesh.cells, mesh.own_cells);
     for (int32_t c = 0; c < mesh.own_cells; ++c) {
         wave_cell_geometry g;
-        measure(&mesh, c, &g);
+        compute_cell_geometry(&mesh, c, &g);
         assert_true(g.volume > 0);
         sum += g.volume;
         for (int a = 0; a < 3; ++a) {
@@ -55,7 +55,7 @@ static void check_box(const wave_lattice *lattice)
     wave_mesh_free(&mesh);
 }
 
-static void volumes_of_every_kind_fill_the_box_and_faces_meet(void **state)
+static void cells_of_every_kind_fill_the_box(void **state)
 {
     (void)state;
     for (int kind = WAVE_TETS; kind <= WAVE_MIXED; ++kind) {
@@ -69,7 +69,7 @@ static void volumes_of_every_kind_fill_the_box_and_faces_meet(void **state)
 }
 
 /* Computes the centroid of a cell with flat faces, by tets from vertex 0 over each face's triangles. */
-static void exact_centroid(const wave_cell_shape *shape, double x[8][3], double centroid[3])
+static void compute_exact_centroid(const wave_cell_shape *shape, double x[8][3], double centroid[3])
 {
     double volume = 0, e[3][3];
     for (int a = 0; a < 3; ++a) centroid[a] = 0;
@@ -104,7 +104,7 @@ static void centroids_of_flat_cells_are_exact(void **state)
                 double x[8][3], exact[3];
                 for (int i = 0; i < shape->vertex_count; ++i) wave_lattice_vertex(&lattice, cells[c].vertex[i], x[i]);
                 wave_cell_measure(shape, (const double(*)[3])x, cells[c].vertex, &g);
-                exact_centroid(shape, x, exact);
+                compute_exact_centroid(shape, x, exact);
                 /* about 50 roundings of coordinates of at most 2 */
                 for (int a = 0; a < 3; ++a) assert_true(fabs(g.centroid[a] - exact[a]) <= 50 * 2 * 2.3e-16);
             }
@@ -126,7 +126,7 @@ static void mixed_mesh_has_all_four_types(void **state)
 }
 
 /* Checks the count of unmatched faces, on which the other tests rely: a hex next to tets has faces without a match. */
-static void faces_that_do_not_meet_are_counted(void **state)
+static void unmatched_faces_are_counted(void **state)
 {
     (void)state;
     const int size[3] = {2, 2, 2};
@@ -178,7 +178,7 @@ static void partitions_give_each_cell_to_one_rank(void **state)
 }
 
 /* Checks that the cells which a sends to b are those which b receives from a, in the same order. */
-static void sends_are_the_other_ranks_receives(void **state)
+static void sends_match_receives_of_other_ranks(void **state)
 {
     (void)state;
     enum { RANKS = 3 };
@@ -209,12 +209,9 @@ static void sends_are_the_other_ranks_receives(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(volumes_of_every_kind_fill_the_box_and_faces_meet),
-        cmocka_unit_test(centroids_of_flat_cells_are_exact),
-        cmocka_unit_test(mixed_mesh_has_all_four_types),
-        cmocka_unit_test(faces_that_do_not_meet_are_counted),
-        cmocka_unit_test(partitions_give_each_cell_to_one_rank),
-        cmocka_unit_test(sends_are_the_other_ranks_receives),
+        cmocka_unit_test(cells_of_every_kind_fill_the_box),      cmocka_unit_test(centroids_of_flat_cells_are_exact),
+        cmocka_unit_test(mixed_mesh_has_all_four_types),         cmocka_unit_test(unmatched_faces_are_counted),
+        cmocka_unit_test(partitions_give_each_cell_to_one_rank), cmocka_unit_test(sends_match_receives_of_other_ranks),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

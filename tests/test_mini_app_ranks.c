@@ -41,7 +41,7 @@ static void free_model(model *m)
     wave_mesh_free(&m->mesh);
 }
 
-static int by_id(const void *a, const void *b)
+static int compare_ids(const void *a, const void *b)
 {
     int64_t x = *(const int64_t *)a, y = *(const int64_t *)b;
     return (x > y) - (x < y);
@@ -53,8 +53,8 @@ static int count_differences(const model *part, const model *whole)
     int differences = 0;
     for (int32_t c = 0; c < part->mesh.cells; ++c) {
         double a[4], b[4];
-        const int64_t *at =
-            bsearch(&part->mesh.cell_ids[c], whole->mesh.cell_ids, (size_t)whole->mesh.cells, sizeof(int64_t), by_id);
+        const int64_t *at = bsearch(&part->mesh.cell_ids[c], whole->mesh.cell_ids, (size_t)whole->mesh.cells,
+                                    sizeof(int64_t), compare_ids);
         if (!at) return part->mesh.cells;
         wave_solver_get(&part->solver, c, a);
         wave_solver_get(&whole->solver, (int32_t)(at - whole->mesh.cell_ids), b);
@@ -63,7 +63,7 @@ static int count_differences(const model *part, const model *whole)
     return differences;
 }
 
-static void compare(wave_cells cells, wave_partition_kind kind, const wave_setup *base, int index_bytes)
+static void compare_partitions(wave_cells cells, wave_partition_kind kind, const wave_setup *base, int index_bytes)
 {
     static const int size[3] = {5, 4, 8};
     wave_lattice lattice = wave_lattice_make(size, cells, 0.2);
@@ -89,7 +89,7 @@ static void every_partition_computes_the_same_bits(void **state)
     const wave_setup setup = {.real_bytes = 8, .reflecting = true, .order = 2};
     for (int kind = WAVE_BLOCK; kind <= WAVE_CHECKERBOARD; ++kind) {
         for (int cells = WAVE_TETS; cells <= WAVE_MIXED; ++cells) {
-            compare((wave_cells)cells, (wave_partition_kind)kind, &setup, 4);
+            compare_partitions((wave_cells)cells, (wave_partition_kind)kind, &setup, 4);
         }
     }
 }
@@ -100,12 +100,12 @@ static void other_arrays_and_walls_compute_the_same_bits(void **state)
     for (int i = 0; i < 8; ++i) {
         const wave_setup setup = {
             .real_bytes = (i & 1) ? 4 : 8, .is_soa = (i & 2) != 0, .order = 1 + (i >> 2), .swell = 0.05};
-        compare(WAVE_MIXED, WAVE_RANDOM, &setup, (i & 2) ? 8 : 4);
+        compare_partitions(WAVE_MIXED, WAVE_RANDOM, &setup, (i & 2) ? 8 : 4);
     }
 }
 
 /* Checks that vertices which ranks share are drawn at the same position: the library matches them by their bits. */
-static void moved_vertices_stay_together(void **state)
+static void moved_shared_vertices_stay_equal(void **state)
 {
     (void)state;
     static const int size[3] = {4, 4, 4};
@@ -142,7 +142,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_partition_computes_the_same_bits),
         cmocka_unit_test(other_arrays_and_walls_compute_the_same_bits),
-        cmocka_unit_test(moved_vertices_stay_together),
+        cmocka_unit_test(moved_shared_vertices_stay_equal),
     };
     MPI_Init(&argc, &argv);
     int failed = cmocka_run_group_tests(tests, NULL, NULL);

@@ -21,7 +21,7 @@ typedef struct model {
 } model;
 
 /* Returns a setup with speed and density 1 everywhere. */
-static wave_setup plain_setup(int order)
+static wave_setup make_uniform_setup(int order)
 {
     const wave_medium uniform = {.count = 1, .bottom = {-INFINITY}, .speed = {1}, .density = {1}};
     return (wave_setup){.real_bytes = 8, .reflecting = true, .order = order, .medium = uniform};
@@ -43,7 +43,7 @@ static void free_model(model *m)
 
 /* Returns a pulse along x that is an exact solution, travelling at speed 1 with u = p / Z. At 5 widths it is e^-12.5 of
  * its height. */
-static double pulse(double x, double time)
+static double exact_pulse(double x, double time)
 {
     double r = (x + 0.35 - time) / 0.12;
     return exp(-0.5 * r * r);
@@ -54,17 +54,17 @@ static void set_pulse(model *m)
     for (int32_t c = 0; c < m->mesh.own_cells; ++c) {
         double x[3];
         wave_solver_centroid(&m->solver, c, x);
-        double p = pulse(x[0], 0), q[4] = {p, p, 0, 0};
+        double p = exact_pulse(x[0], 0), q[4] = {p, p, 0, 0};
         wave_solver_set(&m->solver, c, q);
     }
     wave_solver_start(&m->solver);
 }
 
 /* Returns the mean of |p - exact| over the box at time 0.6, divided by the pulse's own mean. */
-static double pulse_error(int n, wave_cells cells, int order)
+static double measure_pulse_error(int n, wave_cells cells, int order)
 {
     const int size[3] = {n, 4, 4};
-    wave_setup setup = plain_setup(order);
+    wave_setup setup = make_uniform_setup(order);
     model m;
     double error = 0, whole = 0;
     make_model(&m, size, cells, 0, &setup);
@@ -76,8 +76,8 @@ static double pulse_error(int n, wave_cells cells, int order)
         double x[3], q[4];
         wave_solver_centroid(&m.solver, c, x);
         wave_solver_get(&m.solver, c, q);
-        error += m.solver.volume[c] * fabs(q[0] - pulse(x[0], 0.6));
-        whole += m.solver.volume[c] * fabs(pulse(x[0], 0.6));
+        error += m.solver.volume[c] * fabs(q[0] - exact_pulse(x[0], 0.6));
+        whole += m.solver.volume[c] * fabs(exact_pulse(x[0], 0.6));
     }
     free_model(&m);
     return error / whole;
@@ -86,7 +86,7 @@ static double pulse_error(int n, wave_cells cells, int order)
 static void check_order(wave_cells cells, int order, double least, double most_error)
 {
     double e[3];
-    for (int i = 0; i < 3; ++i) e[i] = pulse_error(40 << i, cells, order);
+    for (int i = 0; i < 3; ++i) e[i] = measure_pulse_error(40 << i, cells, order);
     double first = log2(e[0] / e[1]), second = log2(e[1] / e[2]);
     print_message("cells %d order %d: errors %.4f %.4f %.4f, observed %.2f %.2f\n", (int)cells, order, e[0], e[1], e[2],
                   first, second);
@@ -127,17 +127,17 @@ static void plane_wave_converges_with_order_1_by_the_first_order_scheme(void **s
     check_order(WAVE_HEXES, 1, 0.7, 0.25);
 }
 
-static double bell(double r)
+static double bell_function(double r)
 {
     return exp(-0.5 * r * r);
 }
 
 /* Returns a downward pulse after 0.8 time units: half of it was reflected at z = -1, where the impedance changes from 1
  * to 3 (R = (3 - 1) / (3 + 1)), and 1 + R of its pressure was transmitted, faster and so stretched by 1.5. */
-static double parted_pulse(double z)
+static double exact_transmitted_pulse(double z)
 {
     double width = 0.08;
-    return z > -1 ? 0.5 * bell((z + 0.6) / width) : 1.5 * bell((z + 1.6) / (1.5 * width));
+    return z > -1 ? 0.5 * bell_function((z + 0.6) / width) : 1.5 * bell_function((z + 1.6) / (1.5 * width));
 }
 
 static void interface_reflects_and_transmits_by_its_impedances(void **state)
@@ -145,7 +145,7 @@ static void interface_reflects_and_transmits_by_its_impedances(void **state)
     (void)state;
     const int size[3] = {4, 4, 160};
     for (int kind = WAVE_TETS; kind <= WAVE_HEXES; ++kind) {
-        wave_setup setup = plain_setup(2);
+        wave_setup setup = make_uniform_setup(2);
         model m;
         double error = 0, whole = 0;
         setup.medium = (wave_medium){.count = 2, .bottom = {-1, -2}, .speed = {1, 1.5}, .density = {1, 2}};
@@ -153,7 +153,7 @@ static void interface_reflects_and_transmits_by_its_impedances(void **state)
         for (int32_t c = 0; c < m.mesh.own_cells; ++c) {
             double x[3];
             wave_solver_centroid(&m.solver, c, x);
-            double p = bell((x[2] + 0.6) / 0.08), q[4] = {p, 0, 0, -p};
+            double p = bell_function((x[2] + 0.6) / 0.08), q[4] = {p, 0, 0, -p};
             wave_solver_set(&m.solver, c, q);
         }
         wave_solver_start(&m.solver);
@@ -164,8 +164,8 @@ static void interface_reflects_and_transmits_by_its_impedances(void **state)
             double x[3], q[4];
             wave_solver_centroid(&m.solver, c, x);
             wave_solver_get(&m.solver, c, q);
-            error += m.solver.volume[c] * fabs(q[0] - parted_pulse(x[2]));
-            whole += m.solver.volume[c] * parted_pulse(x[2]);
+            error += m.solver.volume[c] * fabs(q[0] - exact_transmitted_pulse(x[2]));
+            whole += m.solver.volume[c] * exact_transmitted_pulse(x[2]);
         }
         print_message("cells %d: error %.4f behind an interface\n", kind, error / whole);
         /* The width is 6.4 cubes; the plane pulses above have errors of 0.01 at 4.8 and 0.002 at 9.6 cubes. The
@@ -183,7 +183,7 @@ static void one_step_solves_riemanns_problem(void **state)
     const int size[3] = {1, 1, 2};
     /* the lower cube, the upper cube */
     const double c[2] = {1.5, 1}, rho[2] = {2, 1}, p[2] = {0.3, -0.7}, u[2] = {0.4, 0.25};
-    wave_setup setup = plain_setup(1);
+    wave_setup setup = make_uniform_setup(1);
     model m;
     setup.medium = (wave_medium){.count = 2, .bottom = {-1, -2}, .speed = {c[1], c[0]}, .density = {rho[1], rho[0]}};
     make_model(&m, size, WAVE_HEXES, 0, &setup);
@@ -230,7 +230,7 @@ static void mass_is_conserved_between_rigid_walls(void **state)
     const int size[3] = {10, 9, 10};
     for (int kind = WAVE_TETS; kind <= WAVE_MIXED; ++kind) {
         for (int order = 1; order <= 2; ++order) {
-            wave_setup setup = plain_setup(order);
+            wave_setup setup = make_uniform_setup(order);
             wave_lattice lattice = wave_lattice_make(size, (wave_cells)kind, 0.1);
             model m;
             setup.medium = wave_medium_layered(&lattice);
@@ -247,11 +247,11 @@ static void mass_is_conserved_between_rigid_walls(void **state)
 
 /* Checks that the source adds the volume it promises: nothing by the end of the wavelet; half way, the integral of its
  * rate. */
-static void source_adds_the_volume_it_promises(void **state)
+static void source_adds_the_stated_volume(void **state)
 {
     (void)state;
     const int size[3] = {16, 16, 16};
-    wave_setup setup = plain_setup(2);
+    wave_setup setup = make_uniform_setup(2);
     model m;
     wave_lattice lattice = wave_lattice_make(size, WAVE_HEXES, 0);
     setup.source = wave_source_default(&lattice, &setup.medium);
@@ -269,7 +269,7 @@ static void source_adds_the_volume_it_promises(void **state)
 }
 
 /* Checks the controls of a source: a factor on its rate, and repetition of its pulse. */
-static void source_is_steered(void **state)
+static void source_follows_steering_parameters(void **state)
 {
     (void)state;
     const int size[3] = {4, 4, 4};
@@ -291,13 +291,13 @@ static void source_is_steered(void **state)
 /* Checks that energy does not increase. Upwind fluxes only dissipate: for the first-order scheme within its time step
  * this is a theorem, for any cells and any layers. For the second-order scheme there is no proof; it must not gain
  * energy over the run. */
-static void energy_never_rises(void **state)
+static void energy_does_not_increase(void **state)
 {
     (void)state;
     const int size[3] = {8, 8, 8};
     for (int kind = WAVE_TETS; kind <= WAVE_MIXED; ++kind) {
         for (int order = 1; order <= 2; ++order) {
-            wave_setup setup = plain_setup(order);
+            wave_setup setup = make_uniform_setup(order);
             wave_lattice lattice = wave_lattice_make(size, (wave_cells)kind, 0.2);
             model m;
             setup.medium = wave_medium_layered(&lattice);
@@ -320,12 +320,12 @@ static void energy_never_rises(void **state)
 /* Checks absorbing walls: such a wall reflects (1 - cos t) / (1 + cos t) of a wave that arrives at an angle t to its
  * normal: from the middle of the box at most 0.27 (in the corners), which is 0.02 to 0.03 of the energy over all
  * directions. Rigid walls reflect everything, and only the scheme dissipates. */
-static void absorbing_walls_let_a_wave_go(void **state)
+static void absorbing_walls_do_not_reflect_a_wave(void **state)
 {
     (void)state;
     const int size[3] = {20, 20, 20};
     for (int reflecting = 0; reflecting < 2; ++reflecting) {
-        wave_setup setup = plain_setup(2);
+        wave_setup setup = make_uniform_setup(2);
         model m;
         setup.reflecting = reflecting != 0;
         make_model(&m, size, WAVE_HEXES, 0, &setup);
@@ -340,7 +340,7 @@ static void absorbing_walls_let_a_wave_go(void **state)
 }
 
 /* Returns the signed volume of a tet at its drawn positions. */
-static double drawn_volume(const model *m, int32_t cell)
+static double compute_drawn_volume(const model *m, int32_t cell)
 {
     const float *x = m->solver.grid.coordinates.values;
     int32_t v[8];
@@ -356,14 +356,14 @@ static double drawn_volume(const model *m, int32_t cell)
 
 /* Checks that the default displacement of vertices is visible and inverts no cell: the pictures are to show a wave, not
  * torn cells. */
-static void moving_mesh_swells_without_turning_cells_inside_out(void **state)
+static void moving_mesh_inverts_no_cells(void **state)
 {
     (void)state;
     const int size[3] = {24, 24, 24};
     char *arguments[] = {"insitu-wave", "--moving"};
     char message[80];
     wave_options options;
-    wave_setup setup = plain_setup(2);
+    wave_setup setup = make_uniform_setup(2);
     wave_lattice lattice = wave_lattice_make(size, WAVE_TETS, 0);
     model m;
     assert_true(wave_options_parse(2, arguments, &options, message, sizeof message));
@@ -378,7 +378,7 @@ static void moving_mesh_swells_without_turning_cells_inside_out(void **state)
     while (m.solver.time < 2 * setup.source.delay) {
         wave_solver_step(&m.solver);
         for (int32_t c = 0; c < m.mesh.own_cells; ++c) {
-            double ratio = drawn_volume(&m, c) / m.solver.volume[c];
+            double ratio = compute_drawn_volume(&m, c) / m.solver.volume[c];
             least = fmin(least, ratio);
             most = fmax(most, ratio);
         }
@@ -389,13 +389,13 @@ static void moving_mesh_swells_without_turning_cells_inside_out(void **state)
     free_model(&m);
 }
 
-static void float_stays_near_double(void **state)
+static void float_result_is_near_double_result(void **state)
 {
     (void)state;
     const int size[3] = {8, 8, 8};
     double peak[2];
     for (int i = 0; i < 2; ++i) {
-        wave_setup setup = plain_setup(2);
+        wave_setup setup = make_uniform_setup(2);
         model m;
         setup.real_bytes = i ? 4 : 8;
         setup.is_soa = i != 0;
@@ -420,12 +420,12 @@ int main(int argc, char **argv)
         cmocka_unit_test(one_step_solves_riemanns_problem),
         cmocka_unit_test(interface_reflects_and_transmits_by_its_impedances),
         cmocka_unit_test(mass_is_conserved_between_rigid_walls),
-        cmocka_unit_test(source_adds_the_volume_it_promises),
-        cmocka_unit_test(energy_never_rises),
-        cmocka_unit_test(source_is_steered),
-        cmocka_unit_test(absorbing_walls_let_a_wave_go),
-        cmocka_unit_test(moving_mesh_swells_without_turning_cells_inside_out),
-        cmocka_unit_test(float_stays_near_double),
+        cmocka_unit_test(source_adds_the_stated_volume),
+        cmocka_unit_test(energy_does_not_increase),
+        cmocka_unit_test(source_follows_steering_parameters),
+        cmocka_unit_test(absorbing_walls_do_not_reflect_a_wave),
+        cmocka_unit_test(moving_mesh_inverts_no_cells),
+        cmocka_unit_test(float_result_is_near_double_result),
     };
     MPI_Init(&argc, &argv);
     int failed = cmocka_run_group_tests(tests, NULL, NULL);

@@ -18,25 +18,25 @@ static const double no_shift[3] = {0, 0, 0};
 
 static mmbvh_options variant; /* the layout and the builder that all tests of a group use */
 
-static mmbvh_options by_threads(int threads)
+static mmbvh_options make_thread_options(int threads)
 {
     mmbvh_options options = variant;
     options.threads = threads;
     return options;
 }
 
-static mmbvh build_by(const lattice *l, const grid_field *field, int threads)
+static mmbvh build_with_threads(const lattice *l, const grid_field *field, int threads)
 {
     mmbvh tree;
     base_error error = {0};
-    const mmbvh_options options = by_threads(threads);
+    const mmbvh_options options = make_thread_options(threads);
     const insitu_status status = mmbvh_build(&l->g, field, no_shift, 1, &options, &tree, &error);
     if (status) fail_msg("%s", error.message);
     return tree;
 }
 
 /* Computes the box of a cell in the tree's coordinates, in double. */
-static void cell_box(const lattice *l, const mmbvh *tree, int64_t cell, double lower[3], double upper[3])
+static void compute_cell_box(const lattice *l, const mmbvh *tree, int64_t cell, double lower[3], double upper[3])
 {
     int64_t vertices[GRID_MAX_CELL_VERTICES];
     const int count = grid_cell_vertices(&l->g, cell, vertices);
@@ -54,28 +54,29 @@ static void cell_box(const lattice *l, const mmbvh *tree, int64_t cell, double l
 }
 
 /* Rounds down by functions of the C library, not by the tree's own. */
-static float float_below(double x)
+static float round_down_to_float(double x)
 {
     const float f = (float)x;
     return (double)f > x ? nextafterf(f, -INFINITY) : f;
 }
 
-static float float_above(double x)
+static float round_up_to_float(double x)
 {
     const float f = (float)x;
     return (double)f < x ? nextafterf(f, INFINITY) : f;
 }
 
 /* Computes a leaf's box and range by brute force. */
-static node_view leaf_by_hand(const lattice *l, const mmbvh *tree, const grid_field *field, int64_t index)
+static node_view compute_leaf_by_brute_force(const lattice *l, const mmbvh *tree, const grid_field *field,
+                                             int64_t index)
 {
-    node_view leaf = view_node(tree, index);
+    node_view leaf = read_node(tree, index);
     double low = INFINITY, high = -INFINITY,
            box[2][3] = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
     for (int k = 0; k < leaf.count; k++) {
         const int64_t cell = tree->cells[leaf.ref + k];
         double lower[3], upper[3], values[GRID_MAX_CELL_VERTICES];
-        cell_box(l, tree, cell, lower, upper);
+        compute_cell_box(l, tree, cell, lower, upper);
         for (int axis = 0; axis < 3; axis++) {
             box[0][axis] = fmin(box[0][axis], lower[axis]);
             box[1][axis] = fmax(box[1][axis], upper[axis]);
@@ -89,11 +90,11 @@ static node_view leaf_by_hand(const lattice *l, const mmbvh *tree, const grid_fi
         }
     }
     for (int axis = 0; axis < 3; axis++) {
-        leaf.lower[axis] = float_below(box[0][axis]);
-        leaf.upper[axis] = float_above(box[1][axis]);
+        leaf.lower[axis] = round_down_to_float(box[0][axis]);
+        leaf.upper[axis] = round_up_to_float(box[1][axis]);
     }
-    leaf.range_low = low <= high ? float_below(low) : INFINITY;
-    leaf.range_high = low <= high ? float_above(high) : -INFINITY;
+    leaf.range_low = low <= high ? round_down_to_float(low) : INFINITY;
+    leaf.range_high = low <= high ? round_up_to_float(high) : -INFINITY;
     return leaf;
 }
 
@@ -116,12 +117,12 @@ static void assert_tight_box(const mmbvh *tree, const node_view *node, const nod
 static void assert_tight(const lattice *l, const mmbvh *tree, const grid_field *field)
 {
     for (int64_t i = 0; i < tree->node_count; i++) {
-        const node_view node = view_node(tree, i);
+        const node_view node = read_node(tree, i);
         node_view expected;
         if (node.count) {
-            expected = leaf_by_hand(l, tree, field, i);
+            expected = compute_leaf_by_brute_force(l, tree, field, i);
         } else {
-            const node_view pair[2] = {view_node(tree, node.ref), view_node(tree, node.ref + 1)};
+            const node_view pair[2] = {read_node(tree, node.ref), read_node(tree, node.ref + 1)};
             expected = pair[0];
             for (int axis = 0; axis < 3; axis++) {
                 expected.lower[axis] = fminf(pair[0].lower[axis], pair[1].lower[axis]);
@@ -136,14 +137,14 @@ static void assert_tight(const lattice *l, const mmbvh *tree, const grid_field *
     }
 }
 
-static void every_layout_builds_a_proved_and_tight_tree(void **state)
+static void every_layout_builds_a_valid_tight_tree(void **state)
 {
     (void)state;
     for (int kind = LATTICE_TETS; kind <= LATTICE_MIXED; kind++) {
         for (int bits = 0; bits < 16; bits++) {
             const lattice_layout layout = {bits & 1, bits >> 1 & 1, bits >> 2 & 1, bits >> 3 & 1};
             lattice l = make_lattice(7, (lattice_kind)kind, layout);
-            mmbvh tree = build_by(&l, &l.field, 2);
+            mmbvh tree = build_with_threads(&l, &l.field, 2);
             const mmbvh_statistics s = assert_proved(&tree, &l.g, &l.field);
             assert_tight(&l, &tree, &l.field);
             assert_int_equal(tree.unusable_cells, 0);
@@ -177,10 +178,10 @@ static void same_bytes_for_any_number_of_threads(void **state)
     (void)state;
     static const int threads[] = {1, 2, 3, 8, 8, 8};
     lattice l = make_lattice(31, LATTICE_TETS, (lattice_layout){false, false, true, false});
-    mmbvh first = build_by(&l, &l.field, 1);
+    mmbvh first = build_with_threads(&l, &l.field, 1);
     assert_proved(&first, &l.g, &l.field);
     for (size_t i = 0; i < sizeof threads / sizeof *threads; i++) {
-        mmbvh tree = build_by(&l, &l.field, threads[i]);
+        mmbvh tree = build_with_threads(&l, &l.field, threads[i]);
         assert_same_nodes(&tree, &first);
         assert_memory_equal(tree.cells, first.cells, (size_t)first.cell_count * sizeof *first.cells);
         assert_true(tree.built_cost == first.built_cost);
@@ -199,20 +200,20 @@ static void ghosts_are_not_in_the_tree(void **state)
     for (int64_t cell = 0; cell < l.g.cell_count; cell++) {
         /* makes the bounds of the remaining cells smaller than those of all cells */
         const bool outer = cell < l.g.cell_count / 3;
-        l.ghosts[3 * cell] = outer || hash_unit((uint64_t)cell) < 0.4 ? 2 : 0;
+        l.ghosts[3 * cell] = outer || hash_to_unit_interval((uint64_t)cell) < 0.4 ? 2 : 0;
         ghosts += l.ghosts[3 * cell] != 0;
     }
     l.g.ghosts = l.ghosts;
     l.g.ghosts_stride = 3;
     l.g.ghosts_bytes = 1;
-    mmbvh tree = build_by(&l, &l.field, 2);
+    mmbvh tree = build_with_threads(&l, &l.field, 2);
     assert_int_equal(tree.cell_count, l.g.cell_count - ghosts);
     assert_proved(&tree, &l.g, &l.field);
     assert_tight(&l, &tree, &l.field);
     mmbvh_free(&tree);
 
     for (int64_t cell = 0; cell < l.g.cell_count; cell++) l.ghosts[3 * cell] = 1;
-    tree = build_by(&l, &l.field, 2);
+    tree = build_with_threads(&l, &l.field, 2);
     assert_int_equal(tree.node_count, 0);
     assert_proved(&tree, &l.g, &l.field);
     mmbvh_free(&tree);
@@ -220,11 +221,11 @@ static void ghosts_are_not_in_the_tree(void **state)
 }
 
 /* Sets the values of some vertices to NaN or infinity; returns how many cells have such a vertex. */
-static int64_t poison(lattice *l)
+static int64_t corrupt_vertex_values(lattice *l)
 {
     for (int64_t v = 0; v < l->g.vertex_count; v++) {
-        const double u = hash_unit((uint64_t)(7 * v));
-        if (u < 0.03) put_number(&l->field.values, v, u < 0.01 ? (double)NAN : u < 0.02 ? INFINITY : -INFINITY);
+        const double u = hash_to_unit_interval((uint64_t)(7 * v));
+        if (u < 0.03) set_number(&l->field.values, v, u < 0.01 ? (double)NAN : u < 0.02 ? INFINITY : -INFINITY);
     }
     int64_t count = 0;
     for (int64_t cell = 0; cell < l->g.cell_count; cell++) {
@@ -241,17 +242,17 @@ static void values_that_are_not_finite_are_counted_and_left_out(void **state)
     (void)state;
     for (int kind = LATTICE_TETS; kind <= LATTICE_MIXED; kind++) {
         lattice l = make_lattice(9, (lattice_kind)kind, (lattice_layout){false, false, kind == LATTICE_HEXES, false});
-        const int64_t unusable = poison(&l);
+        const int64_t unusable = corrupt_vertex_values(&l);
         assert_true(unusable > 0 && unusable < l.g.cell_count);
-        mmbvh tree = build_by(&l, &l.field, 2);
+        mmbvh tree = build_with_threads(&l, &l.field, 2);
         assert_int_equal(tree.unusable_cells, unusable);
         assert_proved(&tree, &l.g, &l.field);
         assert_tight(&l, &tree, &l.field);
-        for (int64_t v = 0; v < l.g.vertex_count; v++) put_number(&l.field.values, v, (double)NAN);
+        for (int64_t v = 0; v < l.g.vertex_count; v++) set_number(&l.field.values, v, (double)NAN);
         mmbvh_refit_ranges(&tree, &l.g, &l.field, NULL);
         assert_int_equal(tree.unusable_cells, l.g.cell_count);
         for (int64_t i = 0; i < tree.node_count; i++) {
-            const node_view node = view_node(&tree, i);
+            const node_view node = read_node(&tree, i);
             assert_true(node.range_low == INFINITY && node.range_high == -INFINITY);
         }
         mmbvh_free(&tree);
@@ -263,15 +264,15 @@ static void values_beyond_floats_round_outward(void **state)
 {
     (void)state;
     lattice l = make_lattice(2, LATTICE_HEXES, (lattice_layout){false, false, true, false});
-    for (int64_t v = 0; v < l.g.vertex_count; v++) put_number(&l.field.values, v, v % 2 ? 1e300 : 2e300);
-    mmbvh tree = build_by(&l, &l.field, 1);
+    for (int64_t v = 0; v < l.g.vertex_count; v++) set_number(&l.field.values, v, v % 2 ? 1e300 : 2e300);
+    mmbvh tree = build_with_threads(&l, &l.field, 1);
     assert_proved(&tree, &l.g, &l.field);
-    node_view root = view_node(&tree, 0);
+    node_view root = read_node(&tree, 0);
     assert_true(root.range_low == FLT_MAX && root.range_high == INFINITY);
-    for (int64_t v = 0; v < l.g.vertex_count; v++) put_number(&l.field.values, v, v % 2 ? -1e-300 : 1e-300);
+    for (int64_t v = 0; v < l.g.vertex_count; v++) set_number(&l.field.values, v, v % 2 ? -1e-300 : 1e-300);
     mmbvh_refit_ranges(&tree, &l.g, &l.field, NULL);
     assert_proved(&tree, &l.g, &l.field);
-    root = view_node(&tree, 0);
+    root = read_node(&tree, 0);
     assert_true(root.range_low == -FLT_TRUE_MIN && root.range_high == FLT_TRUE_MIN);
     mmbvh_free(&tree);
     free_lattice(&l);
@@ -281,10 +282,10 @@ static void no_field_gives_infinite_ranges(void **state)
 {
     (void)state;
     lattice l = make_lattice(5, LATTICE_TETS, (lattice_layout){0});
-    mmbvh tree = build_by(&l, NULL, 2);
+    mmbvh tree = build_with_threads(&l, NULL, 2);
     assert_proved(&tree, &l.g, NULL);
     for (int64_t i = 0; i < tree.node_count; i++) {
-        const node_view node = view_node(&tree, i);
+        const node_view node = read_node(&tree, i);
         assert_true(node.range_low == -INFINITY && node.range_high == INFINITY);
     }
     mmbvh_free(&tree);
@@ -296,10 +297,10 @@ static void refitted_ranges_equal_a_fresh_build(void **state)
 {
     (void)state;
     lattice l = make_lattice(31, LATTICE_HEXES, (lattice_layout){false, false, false, false});
-    mmbvh old = build_by(&l, &l.field, 2);
-    for (int64_t v = 0; v < l.g.vertex_count; v++) put_number(&l.field.values, v, hash_unit((uint64_t)v));
-    const int64_t unusable = poison(&l);
-    mmbvh fresh = build_by(&l, &l.field, 2);
+    mmbvh old = build_with_threads(&l, &l.field, 2);
+    for (int64_t v = 0; v < l.g.vertex_count; v++) set_number(&l.field.values, v, hash_to_unit_interval((uint64_t)v));
+    const int64_t unusable = corrupt_vertex_values(&l);
+    mmbvh fresh = build_with_threads(&l, &l.field, 2);
     assert_memory_not_equal(node_bytes(&old), node_bytes(&fresh), (size_t)fresh.node_count * node_size(&fresh));
     for (int threads = 1; threads <= 3; threads++) {
         for (int64_t i = 0; i < old.node_count; i++) corrupt_range(&old, i);
@@ -320,18 +321,18 @@ static void refitted_ranges_are_tight_in_every_layout(void **state)
         for (int bits = 0; bits < 8; bits++) {
             const lattice_layout layout = {false, bits & 1, bits >> 1 & 1, bits >> 2 & 1};
             lattice l = make_lattice(7, (lattice_kind)kind, layout);
-            mmbvh tree = build_by(&l, &l.field, 2);
+            mmbvh tree = build_with_threads(&l, &l.field, 2);
             for (int64_t v = 0; v < l.g.vertex_count; v++) {
-                const double u = hash_unit((uint64_t)v);
-                put_number(&l.field.values, v, u < 0.2 ? 0.0 : u < 0.4 ? -0.0 : u - 0.7);
+                const double u = hash_to_unit_interval((uint64_t)v);
+                set_number(&l.field.values, v, u < 0.2 ? 0.0 : u < 0.4 ? -0.0 : u - 0.7);
             }
-            const int64_t unusable = poison(&l);
+            const int64_t unusable = corrupt_vertex_values(&l);
             assert_int_equal(mmbvh_refit_ranges(&tree, &l.g, &l.field, &(mmbvh_options){.threads = 2}), INSITU_OK);
             assert_int_equal(tree.unusable_cells, unusable);
             assert_proved(&tree, &l.g, &l.field);
             assert_tight(&l, &tree, &l.field);
             for (int64_t i = 0; i < tree.node_count; i++) {
-                const node_view node = view_node(&tree, i);
+                const node_view node = read_node(&tree, i);
                 assert_true(node.range_low != 0 || !signbit(node.range_low));
                 assert_true(node.range_high != 0 || !signbit(node.range_high));
             }
@@ -346,16 +347,16 @@ static void refitted_bounds_contain_moved_vertices_tightly(void **state)
     for (int bits = 0; bits < 6; bits++) {
         const lattice_layout layout = {bits & 1, false, false, bits & 1};
         lattice l = make_lattice(18, (lattice_kind)(bits / 2), layout);
-        mmbvh tree = build_by(&l, &l.field, 2);
+        mmbvh tree = build_with_threads(&l, &l.field, 2);
         mmbvh_refit_bounds(&tree, &l.g, &(mmbvh_options){.threads = 2});
-        mmbvh same = build_by(&l, &l.field, 2);
+        mmbvh same = build_with_threads(&l, &l.field, 2);
         assert_same_nodes(&tree, &same);
         assert_true(mmbvh_cost(&tree, NULL) == tree.built_cost);
         for (int64_t v = 0; v < l.g.vertex_count; v++) {
             double p[3];
             grid_vertex(&l.g, v, p);
-            put_number(&l.g.coordinates[0], v, p[0] + 3 * sin(p[1]));
-            put_number(&l.g.coordinates[2], v, p[2] * 1.5 - 7);
+            set_number(&l.g.coordinates[0], v, p[0] + 3 * sin(p[1]));
+            set_number(&l.g.coordinates[2], v, p[2] * 1.5 - 7);
         }
         assert_int_not_equal(mmbvh_check(&tree, &l.g, &l.field, NULL, NULL), INSITU_OK);
         mmbvh_refit_bounds(&tree, &l.g, &(mmbvh_options){.threads = 2});
@@ -376,7 +377,7 @@ static void assert_pairs_equal_refit(lattice *l, const mmbvh *tree, const grid_f
     int64_t unusable = -1;
     assert_int_equal(mmbvh_compute_ranges(tree, &l->g, field, &(mmbvh_options){.threads = 2}, pairs, &unusable),
                      INSITU_OK);
-    mmbvh other = build_by(l, field, 1);
+    mmbvh other = build_with_threads(l, field, 1);
     assert_proved(&other, &l->g, field);
     assert_tight(l, &other, field);
     assert_int_equal(unusable, other.unusable_cells);
@@ -389,15 +390,15 @@ static void assert_pairs_equal_refit(lattice *l, const mmbvh *tree, const grid_f
     free(pairs);
 }
 
-static void further_fields_have_ranges_beside_the_tree(void **state)
+static void additional_fields_have_separate_ranges(void **state)
 {
     (void)state;
     lattice l = make_lattice(19, LATTICE_MIXED, (lattice_layout){0});
-    mmbvh tree = build_by(&l, &l.field, 2);
+    mmbvh tree = build_with_threads(&l, &l.field, 2);
     assert_pairs_equal_refit(&l, &tree, &l.field);
 
     double *vectors = malloc((size_t)l.g.cell_count * 3 * sizeof *vectors);
-    for (int64_t i = 0; i < 3 * l.g.cell_count; i++) vectors[i] = hash_unit((uint64_t)i) - 0.5;
+    for (int64_t i = 0; i < 3 * l.g.cell_count; i++) vectors[i] = hash_to_unit_interval((uint64_t)i) - 0.5;
     vectors[3 * 17 + 1] = NAN;
     grid_field field = {.values = {.data = (const char *)vectors, .stride = 24, .is_wide = true},
                         .component_stride = 8,
@@ -412,7 +413,7 @@ static void further_fields_have_ranges_beside_the_tree(void **state)
     assert_pairs_equal_refit(&l, &tree, &field);
 
     int32_t *integers = malloc((size_t)l.g.vertex_count * sizeof *integers);
-    for (int64_t v = 0; v < l.g.vertex_count; v++) integers[v] = (int32_t)(2e9 * hash_unit((uint64_t)v));
+    for (int64_t v = 0; v < l.g.vertex_count; v++) integers[v] = (int32_t)(2e9 * hash_to_unit_interval((uint64_t)v));
     const grid_field materials = {.values = {.data = (const char *)integers, .stride = 4, .is_integer = true},
                                   .component_count = 1};
     assert_pairs_equal_refit(&l, &tree, &materials);
@@ -428,18 +429,18 @@ static lattice make_coincident(int64_t count)
     lattice l = make_lattice(1, LATTICE_TETS, (lattice_layout){0});
     free(l.connectivity);
     l.g.connectivity = make_array(&l.connectivity, 4 * count, false, true, false);
-    for (int64_t i = 0; i < 4 * count; i++) put_index(&l.g.connectivity, i, lattice_tets[0][i % 4]);
+    for (int64_t i = 0; i < 4 * count; i++) set_index(&l.g.connectivity, i, lattice_tets[0][i % 4]);
     l.g.cell_count = count;
     return l;
 }
 
-static void coincident_cells_are_halved(void **state)
+static void coincident_cells_are_split_in_halves(void **state)
 {
     (void)state;
     static const int64_t counts[] = {0, 1, 2, 7, 8, 100, 100000};
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
         lattice l = make_coincident(counts[i]);
-        mmbvh tree = build_by(&l, &l.field, 2);
+        mmbvh tree = build_with_threads(&l, &l.field, 2);
         const mmbvh_statistics s = assert_proved(&tree, &l.g, &l.field);
         const int64_t halvings = counts[i] > 7 ? (int64_t)ceil(log2((double)counts[i] / 7)) : 0;
         /* Along the space-filling curve, coinciding cells are ordered by their number and split down to four
@@ -489,13 +490,13 @@ static void depth_is_bounded_where_cells_shrink_without_end(void **state)
 
 /* Checks boxes of which every seventh, the sample from which the first planes are chosen, lies at 0, and the others at
  * random positions between 1 and 2. */
-static void planes_are_found_where_a_sample_finds_none(void **state)
+static void split_planes_are_found_if_sampling_finds_none(void **state)
 {
     (void)state;
     enum { COUNT = 40000 };
     static float lower[COUNT][3], upper[COUNT][3], ranges[COUNT][2];
     for (int64_t i = 0; i < COUNT; i++) {
-        lower[i][0] = i % 7 ? 1 + (float)hash_unit((uint64_t)i) : 0;
+        lower[i][0] = i % 7 ? 1 + (float)hash_to_unit_interval((uint64_t)i) : 0;
         upper[i][0] = lower[i][0] + 0.001f;
         upper[i][1] = upper[i][2] = 1;
     }
@@ -511,14 +512,14 @@ static void planes_are_found_where_a_sample_finds_none(void **state)
 
 /* Checks refitting with one cell far off on either side: one of the root's children is a leaf, the other has all other
  * cells, in either order. */
-static void refit_reaches_all_below_a_leafs_sibling(void **state)
+static void refit_updates_siblings_of_leaves(void **state)
 {
     (void)state;
     for (int side = 0; side < 2; side++) {
         lattice l = make_lattice(25, LATTICE_HEXES, (lattice_layout){0});
         const int64_t vertex = side ? l.g.vertex_count - 1 : 0;
-        for (int axis = 0; axis < 3; axis++) put_number(&l.g.coordinates[axis], vertex, side ? 1e4 : -1e4);
-        mmbvh tree = build_by(&l, &l.field, 2);
+        for (int axis = 0; axis < 3; axis++) set_number(&l.g.coordinates[axis], vertex, side ? 1e4 : -1e4);
+        mmbvh tree = build_with_threads(&l, &l.field, 2);
         assert_true(mmbvh_node_count(&tree, 1 + side) > 0 && mmbvh_node_count(&tree, 2 - side) == 0);
         for (int64_t i = 0; i < tree.node_count; i++) {
             corrupt_range(&tree, i);
@@ -533,17 +534,17 @@ static void refit_reaches_all_below_a_leafs_sibling(void **state)
     }
 }
 
-static void parent_tree_holds_every_mesh(void **state)
+static void parent_tree_contains_every_mesh(void **state)
 {
     (void)state;
     enum { COUNT = 1000 };
     static float lower[COUNT][3], upper[COUNT][3], ranges[COUNT][2];
     for (int64_t i = 0; i < COUNT; i++) {
         for (int axis = 0; axis < 3; axis++) {
-            lower[i][axis] = (float)(10 * hash_unit((uint64_t)(6 * i + axis)));
-            upper[i][axis] = lower[i][axis] + (float)hash_unit((uint64_t)(6 * i + axis + 3));
+            lower[i][axis] = (float)(10 * hash_to_unit_interval((uint64_t)(6 * i + axis)));
+            upper[i][axis] = lower[i][axis] + (float)hash_to_unit_interval((uint64_t)(6 * i + axis + 3));
         }
-        ranges[i][0] = (float)hash_unit((uint64_t)i) - 2;
+        ranges[i][0] = (float)hash_to_unit_interval((uint64_t)i) - 2;
         ranges[i][1] = i % 9 ? ranges[i][0] + 1 : -INFINITY;
         if (i % 9 == 0) ranges[i][0] = INFINITY;
     }
@@ -553,7 +554,7 @@ static void parent_tree_holds_every_mesh(void **state)
         assert_proved(&tree, NULL, NULL);
         assert_int_equal(tree.cell_count, count);
         for (int64_t i = 0; i < tree.node_count; i++) {
-            const node_view node = view_node(&tree, i);
+            const node_view node = read_node(&tree, i);
             for (int k = 0; k < node.count; k++) {
                 const uint32_t mesh = tree.cells[node.ref + k];
                 assert_true(node.range_low <= ranges[mesh][0] && ranges[mesh][1] <= node.range_high);
@@ -567,20 +568,21 @@ static void parent_tree_holds_every_mesh(void **state)
 }
 
 /* Checks that a traversal which enters only boxes that contain a point reaches every cell whose own box contains it. */
-static void descent_to_a_point_misses_no_cell(void **state)
+static void point_query_finds_every_cell(void **state)
 {
     (void)state;
     lattice l = make_lattice(9, LATTICE_MIXED, (lattice_layout){0});
-    mmbvh tree = build_by(&l, &l.field, 2);
+    mmbvh tree = build_with_threads(&l, &l.field, 2);
     bool *met = malloc((size_t)l.g.cell_count * sizeof *met);
     for (int64_t n = 0; n < 200; n++) {
         double p[3];
-        for (int axis = 0; axis < 3; axis++) p[axis] = 10 * hash_unit((uint64_t)(1000 + 3 * n + axis)) - 0.5;
+        for (int axis = 0; axis < 3; axis++)
+            p[axis] = 10 * hash_to_unit_interval((uint64_t)(1000 + 3 * n + axis)) - 0.5;
         if (n < 50) grid_vertex(&l.g, 13 * n, p); /* also at the corners of boxes */
         memset(met, 0, (size_t)l.g.cell_count * sizeof *met);
         int64_t stack[MMBVH_MAX_DEPTH + 1] = {0};
         for (int height = 1; height > 0;) {
-            const node_view node = view_node(&tree, stack[--height]);
+            const node_view node = read_node(&tree, stack[--height]);
             bool inside = true;
             for (int axis = 0; axis < 3; axis++) {
                 inside = inside && node.lower[axis] <= p[axis] && p[axis] <= node.upper[axis];
@@ -590,7 +592,7 @@ static void descent_to_a_point_misses_no_cell(void **state)
         }
         for (int64_t cell = 0; cell < l.g.cell_count; cell++) {
             double lower[3], upper[3];
-            cell_box(&l, &tree, cell, lower, upper);
+            compute_cell_box(&l, &tree, cell, lower, upper);
             bool inside = true;
             for (int axis = 0; axis < 3; axis++) inside = inside && lower[axis] <= p[axis] && p[axis] <= upper[axis];
             assert_true(!inside || met[cell]);
@@ -610,7 +612,7 @@ static void cost_grows_with_the_side_not_the_cells(void **state)
     double costs[2];
     for (int i = 0; i < 2; i++) {
         lattice l = make_lattice(i ? 30 : 10, LATTICE_HEXES, (lattice_layout){0});
-        mmbvh tree = build_by(&l, NULL, 2);
+        mmbvh tree = build_with_threads(&l, NULL, 2);
         const mmbvh_statistics s = assert_proved(&tree, &l.g, NULL);
         assert_true(s.cost == tree.built_cost && s.cells_a_leaf >= 1 && s.cells_a_leaf <= 7);
         assert_true(s.sibling_overlap > 0 && s.sibling_overlap < 0.6);
@@ -622,7 +624,7 @@ static void cost_grows_with_the_side_not_the_cells(void **state)
     assert_true(costs[1] / costs[0] < 5);
 }
 
-static void cost_of_a_tree_by_hand(void **state)
+static void cost_of_a_tree_matches_manual_computation(void **state)
 {
     (void)state;
     mmbvh_node nodes[3] = {{.upper = {4, 2, 1}, .ref = 1},
@@ -634,13 +636,13 @@ static void cost_of_a_tree_by_hand(void **state)
     assert_true(fabs(mmbvh_cost(&tree, NULL) - (3 + (3 * 5 + 2 * 5) / 14.0)) < 1e-14);
 }
 
-static void failed_allocations_give_an_error_and_leave_nothing(void **state)
+static void failed_allocations_return_an_error_without_a_leak(void **state)
 {
     (void)state;
     lattice l = make_lattice(22, LATTICE_TETS, (lattice_layout){0}); /* 63,888 tets: enough for a top and subtrees */
     for (int threads = 1; threads <= 2; threads++) {
         const int64_t held = base_memory_held(), before = base_memory_allocations();
-        mmbvh tree = build_by(&l, &l.field, threads);
+        mmbvh tree = build_with_threads(&l, &l.field, threads);
         const int64_t allocations = base_memory_allocations() - before;
         mmbvh_free(&tree);
         assert_int_equal(base_memory_held(), held);
@@ -649,7 +651,7 @@ static void failed_allocations_give_an_error_and_leave_nothing(void **state)
             base_error error = {0};
             memset(&tree, 0xff, sizeof tree);
             base_memory_fail_nth(n);
-            const mmbvh_options options = by_threads(threads);
+            const mmbvh_options options = make_thread_options(threads);
             assert_int_equal(mmbvh_build(&l.g, &l.field, no_shift, 1, &options, &tree, &error), INSITU_ERROR_MEMORY);
             assert_int_equal(error.status, INSITU_ERROR_MEMORY);
             const mmbvh zeroed = {0};
@@ -678,7 +680,7 @@ static void wrong_arguments_are_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_layout_builds_a_proved_and_tight_tree),
+        cmocka_unit_test(every_layout_builds_a_valid_tight_tree),
         cmocka_unit_test(shifted_and_scaled_bounds_are_rounded_outward),
         cmocka_unit_test(same_bytes_for_any_number_of_threads),
         cmocka_unit_test(ghosts_are_not_in_the_tree),
@@ -688,16 +690,16 @@ int main(void)
         cmocka_unit_test(refitted_ranges_equal_a_fresh_build),
         cmocka_unit_test(refitted_ranges_are_tight_in_every_layout),
         cmocka_unit_test(refitted_bounds_contain_moved_vertices_tightly),
-        cmocka_unit_test(further_fields_have_ranges_beside_the_tree),
-        cmocka_unit_test(coincident_cells_are_halved),
+        cmocka_unit_test(additional_fields_have_separate_ranges),
+        cmocka_unit_test(coincident_cells_are_split_in_halves),
         cmocka_unit_test(depth_is_bounded_where_cells_shrink_without_end),
-        cmocka_unit_test(planes_are_found_where_a_sample_finds_none),
-        cmocka_unit_test(refit_reaches_all_below_a_leafs_sibling),
-        cmocka_unit_test(parent_tree_holds_every_mesh),
-        cmocka_unit_test(descent_to_a_point_misses_no_cell),
+        cmocka_unit_test(split_planes_are_found_if_sampling_finds_none),
+        cmocka_unit_test(refit_updates_siblings_of_leaves),
+        cmocka_unit_test(parent_tree_contains_every_mesh),
+        cmocka_unit_test(point_query_finds_every_cell),
         cmocka_unit_test(cost_grows_with_the_side_not_the_cells),
-        cmocka_unit_test(cost_of_a_tree_by_hand),
-        cmocka_unit_test(failed_allocations_give_an_error_and_leave_nothing),
+        cmocka_unit_test(cost_of_a_tree_matches_manual_computation),
+        cmocka_unit_test(failed_allocations_return_an_error_without_a_leak),
         cmocka_unit_test(wrong_arguments_are_refused),
     };
     /* test_mmbvh_layout checks that both layouts contain the same tree, for either builder. */

@@ -21,7 +21,7 @@ typedef struct subject {
     float *narrow;
 } subject;
 
-static grid_numbering number_along(const int64_t counts[3], int64_t padding, bool is_reversed, int64_t *length)
+static grid_numbering make_numbering(const int64_t counts[3], int64_t padding, bool is_reversed, int64_t *length)
 {
     grid_numbering out = {{0}, {0}, {0}, {0}};
     int64_t stride = 1;
@@ -41,14 +41,14 @@ static grid_numbering number_along(const int64_t counts[3], int64_t padding, boo
     return out;
 }
 
-static void *room(int64_t count, size_t size)
+static void *allocate_zeroed(int64_t count, size_t size)
 {
     void *out = calloc((size_t)count, size);
     assert_non_null(out);
     return out;
 }
 
-static double value_at(int64_t i, int64_t j, int64_t k, int turn)
+static double compute_value(int64_t i, int64_t j, int64_t k, int turn)
 {
     return sin(0.7 * (double)i + turn) * cos(0.9 * (double)j) + 0.3 * sin(1.1 * (double)k) + 0.2 * turn;
 }
@@ -60,13 +60,13 @@ static void set_values(subject *s, int turn)
         for (int64_t j = 0; j <= cells[1]; j++)
             for (int64_t i = 0; i <= cells[0]; i++) {
                 const int64_t v = i * stride[0] + j * stride[1] + k * stride[2];
-                s->wide[v] = value_at(i, j, k, turn);
+                s->wide[v] = compute_value(i, j, k, turn);
                 s->narrow[v] = (float)s->wide[v];
             }
 }
 
 /* Makes a lattice; layers is the number of ghost layers on each side. */
-static void make(const int64_t cells[3], int64_t padding, bool is_reversed, int64_t layers, subject *s)
+static void make_padded_lattice(const int64_t cells[3], int64_t padding, bool is_reversed, int64_t layers, subject *s)
 {
     static const signed char hex[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
                                           {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
@@ -80,20 +80,20 @@ static void make(const int64_t cells[3], int64_t padding, bool is_reversed, int6
         l->drawn_first[axis] = cells[axis] ? layers : 0;
         l->drawn_end[axis] = sides[axis] - l->drawn_first[axis];
         l->cell_count *= sides[axis];
-        s->axes[axis] = room(vertices[axis], sizeof(double));
+        s->axes[axis] = allocate_zeroed(vertices[axis], sizeof(double));
         for (int64_t n = 0; n < vertices[axis]; n++) s->axes[axis][n] = 0.1 * (double)n + 0.004 * (double)(n * n % 7);
         l->axes[axis] = (grid_axis){s->axes[axis], vertices[axis], &l->vertex_numbering, axis};
         s->g.coordinates[axis] = (grid_array){.is_wide = true, .axis = &l->axes[axis]};
     }
-    l->vertex_numbering = number_along(vertices, padding, is_reversed, &s->g.vertex_count);
-    l->cell_numbering = number_along(sides, padding, is_reversed, &s->g.cell_count);
+    l->vertex_numbering = make_numbering(vertices, padding, is_reversed, &s->g.vertex_count);
+    l->cell_numbering = make_numbering(sides, padding, is_reversed, &s->g.cell_count);
     l->has_ghosts = layers > 0 || s->g.cell_count != l->cell_count;
     for (int i = 0; i < 8; i++)
         for (int axis = 0; axis < 3; axis++) l->corner_offsets[i] += hex[i][axis] * l->vertex_numbering.stride[axis];
     s->g.lattice = l;
     s->g.cell_type = cells[2] ? GRID_HEX : GRID_QUAD;
-    s->wide = room(s->g.vertex_count, sizeof *s->wide);
-    s->narrow = room(s->g.vertex_count, sizeof *s->narrow);
+    s->wide = allocate_zeroed(s->g.vertex_count, sizeof *s->wide);
+    s->narrow = allocate_zeroed(s->g.vertex_count, sizeof *s->narrow);
     for (int64_t v = 0; v < s->g.vertex_count; v++) s->narrow[v] = (float)(s->wide[v] = (double)NAN);
     set_values(s, 0);
 }
@@ -105,7 +105,7 @@ static void free_subject(subject *s)
     free(s->narrow);
 }
 
-static grid_field field_of(const subject *s, bool is_wide)
+static grid_field make_field(const subject *s, bool is_wide)
 {
     const int64_t size = is_wide ? (int64_t)sizeof *s->wide : (int64_t)sizeof *s->narrow;
     const void *data = is_wide ? (const void *)s->wide : s->narrow;
@@ -118,7 +118,7 @@ static void assert_ranges(const subject *s, const mmbvh *tree, const grid_field 
 {
     int64_t unusable = 0;
     for (int64_t i = 0; i < tree->node_count; i++) {
-        const node_view node = view_node(tree, i);
+        const node_view node = read_node(tree, i);
         double low = (double)INFINITY, high = -low;
         for (int n = 0; n < node.count; n++) {
             const int64_t cell = tree->cells[node.ref + n];
@@ -141,9 +141,9 @@ static void assert_ranges(const subject *s, const mmbvh *tree, const grid_field 
 static void check_lattice(const int64_t cells[3], int64_t padding, bool is_reversed, int64_t layers)
 {
     subject s;
-    make(cells, padding, is_reversed, layers, &s);
+    make_padded_lattice(cells, padding, is_reversed, layers, &s);
     for (int is_wide = 0; is_wide < 2; is_wide++) {
-        const grid_field field = field_of(&s, is_wide);
+        const grid_field field = make_field(&s, is_wide);
         const mmbvh_options options = {.threads = 2, .layout = is_wide ? MMBVH_REFERENCE : MMBVH_COMPACT};
         mmbvh tree;
         set_values(&s, 0);
@@ -160,7 +160,7 @@ static void check_lattice(const int64_t cells[3], int64_t padding, bool is_rever
     free_subject(&s);
 }
 
-static void trees_are_proved_and_their_ranges_tight(void **state)
+static void brick_trees_are_valid_with_tight_ranges(void **state)
 {
     (void)state;
     static const int64_t sides[][3] = {{1, 1, 1},  {2, 3, 1},  {7, 1, 1}, {8, 1, 1},    {5, 4, 6},   {16, 16, 16},
@@ -182,8 +182,8 @@ static void small_boxes_fill_their_leaves(void **state)
     for (size_t i = 0; i < sizeof sides / sizeof sides[0]; i++) {
         subject s;
         mmbvh tree;
-        make(sides[i], 0, false, 0, &s);
-        const grid_field field = field_of(&s, false);
+        make_padded_lattice(sides[i], 0, false, 0, &s);
+        const grid_field field = make_field(&s, false);
         assert_int_equal(mmbvh_build(&s.g, &field, no_shift, 1, NULL, &tree, NULL), INSITU_OK);
         const mmbvh_statistics statistics = assert_proved(&tree, &s.g, &field);
         assert_true(statistics.cells_a_leaf > 5.5);
@@ -195,7 +195,7 @@ static void small_boxes_fill_their_leaves(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(trees_are_proved_and_their_ranges_tight),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(brick_trees_are_valid_with_tight_ranges),
                                        cmocka_unit_test(small_boxes_fill_their_leaves)};
     return cmocka_run_group_tests_name("mmbvh_bricks", tests, NULL, NULL);
 }

@@ -27,14 +27,14 @@ typedef struct lattice {
 } lattice;
 
 /* Returns a number in [0, 1) that depends only on the bits of i. */
-static inline double hash_unit(uint64_t i)
+static inline double hash_to_unit_interval(uint64_t i)
 {
     i = (i ^ (i >> 30)) * 0xbf58476d1ce4e5b9u;
     i = (i ^ (i >> 27)) * 0x94d049bb133111ebu;
     return (double)((i ^ (i >> 31)) >> 11) * 0x1p-53;
 }
 
-static inline void put_number(const grid_array *a, int64_t i, double value)
+static inline void set_number(const grid_array *a, int64_t i, double value)
 {
     char *p = (char *)a->data + i * a->stride;
     if (a->is_wide) {
@@ -45,7 +45,7 @@ static inline void put_number(const grid_array *a, int64_t i, double value)
     }
 }
 
-static inline void put_index(const grid_array *a, int64_t i, int64_t value)
+static inline void set_index(const grid_array *a, int64_t i, int64_t value)
 {
     char *p = (char *)a->data + i * a->stride;
     if (a->is_wide) {
@@ -83,10 +83,10 @@ static inline void make_points(lattice *l, int n, lattice_layout layout)
         const int64_t ijk[3] = {v % side, v / side % side, v / side / side};
         double p[3];
         for (int axis = 0; axis < 3; axis++) {
-            p[axis] = (double)ijk[axis] + 0.6 * (hash_unit((uint64_t)(3 * v + axis)) - 0.5);
-            put_number(&g->coordinates[axis], v, p[axis]);
+            p[axis] = (double)ijk[axis] + 0.6 * (hash_to_unit_interval((uint64_t)(3 * v + axis)) - 0.5);
+            set_number(&g->coordinates[axis], v, p[axis]);
         }
-        put_number(&l->field.values, v, sin(0.7 * p[0]) + 0.3 * p[1] * cos(0.2 * p[2]));
+        set_number(&l->field.values, v, sin(0.7 * p[0]) + 0.3 * p[1] * cos(0.2 * p[2]));
     }
 }
 
@@ -107,9 +107,9 @@ static inline void write_cell(lattice_writer *w, int type, const signed char *co
 {
     lattice *l = w->l;
     for (int i = 0; i < grid_type_vertices(type); i++) {
-        put_index(&l->g.connectivity, w->entries + i, w->corner[corners[i]]);
+        set_index(&l->g.connectivity, w->entries + i, w->corner[corners[i]]);
     }
-    if (l->offsets) put_index(&l->g.offsets, w->cells, w->entries);
+    if (l->offsets) set_index(&l->g.offsets, w->cells, w->entries);
     if (l->types) l->types[w->cells * l->g.cell_types_stride] = (char)type;
     w->entries += grid_type_vertices(type);
     w->cells++;

@@ -16,7 +16,7 @@
 
 static const double no_shift[3] = {0, 0, 0};
 
-static mmbvh build(const lattice *l, mmbvh_layout layout, mmbvh_builder builder)
+static mmbvh build_tree(const lattice *l, mmbvh_layout layout, mmbvh_builder builder)
 {
     mmbvh tree;
     base_error error = {0};
@@ -28,7 +28,7 @@ static mmbvh build(const lattice *l, mmbvh_layout layout, mmbvh_builder builder)
 /* Checks random boxes in a random grid: sizes and distances from 1e-9 to 1e9, from the whole grid to a point. The
  * stored box must contain the given one; its lower bound is off by a step and one for rounding, its extent by 1/256 and
  * a sixteenth of a step (mmbvh_compact.h). */
-static void compact_box_holds_and_is_tight(void **state)
+static void compact_box_is_conservative_and_tight(void **state)
 {
     (void)state;
     mmbvh_compact_node node = {0};
@@ -38,10 +38,13 @@ static void compact_box_holds_and_is_tight(void **state)
         float low[4], high[4], grid_lower[3], grid_upper[3];
         for (uint64_t axis = 0; axis < 3; axis++) {
             const uint64_t seed = 64 * n + 8 * axis;
-            const double size = pow(10, 18 * hash_unit(seed) - 9), far = hash_unit(seed + 1) < 0.5 ? 0 : 1;
-            const double begin = far * pow(10, 18 * hash_unit(seed + 2) - 9) * (hash_unit(seed + 3) - 0.5);
-            const double extent = hash_unit(seed + 4) < 0.1 ? 0 : size * pow(10, -7 * hash_unit(seed + 5));
-            const double place = begin + (size - extent) * hash_unit(seed + 6);
+            const double size = pow(10, 18 * hash_to_unit_interval(seed) - 9),
+                         far = hash_to_unit_interval(seed + 1) < 0.5 ? 0 : 1;
+            const double begin =
+                far * pow(10, 18 * hash_to_unit_interval(seed + 2) - 9) * (hash_to_unit_interval(seed + 3) - 0.5);
+            const double extent =
+                hash_to_unit_interval(seed + 4) < 0.1 ? 0 : size * pow(10, -7 * hash_to_unit_interval(seed + 5));
+            const double place = begin + (size - extent) * hash_to_unit_interval(seed + 6);
             grid_lower[axis] = (float)begin;
             grid_upper[axis] = (float)(begin + size);
             lower[axis] = fmaxf((float)place, grid_lower[axis]);
@@ -85,18 +88,18 @@ static void box_beyond_the_grid_is_refused(void **state)
 
 /* Checks that both layouts have the same nodes, leaf for leaf, with the same ranges to the bit, and that each compact
  * box contains that of the other layout. */
-static void layouts_hold_one_tree(void **state)
+static void layouts_represent_the_same_tree(void **state)
 {
     (void)state;
     lattice l = make_lattice(12, LATTICE_MIXED, (lattice_layout){true, false, true, false});
     for (int builder = MMBVH_SAH; builder <= MMBVH_MORTON; builder++) {
-        mmbvh compact = build(&l, MMBVH_COMPACT, (mmbvh_builder)builder);
-        mmbvh reference = build(&l, MMBVH_REFERENCE, (mmbvh_builder)builder);
+        mmbvh compact = build_tree(&l, MMBVH_COMPACT, (mmbvh_builder)builder);
+        mmbvh reference = build_tree(&l, MMBVH_REFERENCE, (mmbvh_builder)builder);
         assert_true(compact.compact && !compact.nodes && reference.nodes && !reference.compact);
         assert_int_equal(compact.node_count, reference.node_count);
         assert_int_equal(mmbvh_bytes(&reference) - mmbvh_bytes(&compact), 16 * compact.node_count);
         for (int64_t i = 0; i < compact.node_count; i++) {
-            const node_view a = view_node(&compact, i), b = view_node(&reference, i);
+            const node_view a = read_node(&compact, i), b = read_node(&reference, i);
             assert_true(a.count == b.count && a.ref == b.ref);
             assert_true(a.range_low == b.range_low && a.range_high == b.range_high);
             for (int axis = 0; axis < 3; axis++) {
@@ -110,7 +113,7 @@ static void layouts_hold_one_tree(void **state)
     free_lattice(&l);
 }
 
-static void boxes_without_end_take_the_reference_layout(void **state)
+static void infinite_boxes_use_the_reference_layout(void **state)
 {
     (void)state;
     float lower[30], upper[30], ranges[20] = {0};
@@ -122,16 +125,16 @@ static void boxes_without_end_take_the_reference_layout(void **state)
     assert_int_equal(mmbvh_build_boxes(lower, upper, ranges, 10, NULL, &tree, NULL), INSITU_OK);
     assert_true(tree.nodes && !tree.compact);
     assert_proved(&tree, NULL, NULL);
-    assert_true(view_node(&tree, 0).upper[17 % 3] == INFINITY);
+    assert_true(read_node(&tree, 0).upper[17 % 3] == INFINITY);
     mmbvh_free(&tree);
 }
 
 /* Counts the cells tested by a traversal of the nodes whose boxes contain the point. */
-static int64_t cells_tested_at(const mmbvh *tree, const double p[3])
+static int64_t count_cells_tested(const mmbvh *tree, const double p[3])
 {
     int64_t tested = 0, stack[MMBVH_MAX_DEPTH + 1] = {0};
     for (int height = 1; height > 0;) {
-        const node_view node = view_node(tree, stack[--height]);
+        const node_view node = read_node(tree, stack[--height]);
         bool inside = true;
         for (int axis = 0; axis < 3; axis++) {
             inside = inside && (double)node.lower[axis] <= p[axis] && p[axis] <= (double)node.upper[axis];
@@ -159,26 +162,27 @@ static void cells_of_very_different_sizes_are_distinguished(void **state)
             for (int axis = 0; axis < 3; axis++) {
                 const double x = p[axis];
                 const double y = x < 5 ? x : x > 15 ? x - 10 + 2e-4 : 5 + (x - 5) * 2e-5;
-                put_number(&l.g.coordinates[axis], v, y);
+                set_number(&l.g.coordinates[axis], v, y);
             }
         }
         /* Shuffles the cells, so that their numbers do not depend on their positions. */
         for (int64_t cell = l.g.cell_count - 1; cell > 0; cell--) {
-            const int64_t other = (int64_t)(hash_unit(seed++) * (double)(cell + 1));
+            const int64_t other = (int64_t)(hash_to_unit_interval(seed++) * (double)(cell + 1));
             for (int k = 0; k < 8; k++) {
                 const int64_t a = grid_array_index(&l.g.connectivity, 8 * cell + k);
                 const int64_t b = grid_array_index(&l.g.connectivity, 8 * other + k);
-                put_index(&l.g.connectivity, 8 * cell + k, b);
-                put_index(&l.g.connectivity, 8 * other + k, a);
+                set_index(&l.g.connectivity, 8 * cell + k, b);
+                set_index(&l.g.connectivity, 8 * other + k, a);
             }
         }
-        mmbvh tree = build(&l, (mmbvh_layout)layout, MMBVH_SAH);
+        mmbvh tree = build_tree(&l, (mmbvh_layout)layout, MMBVH_SAH);
         assert_proved(&tree, &l.g, &l.field);
         int64_t tested = 0;
         for (uint64_t n = 0; n < 1000; n++) {
             double p[3];
-            for (uint64_t axis = 0; axis < 3; axis++) p[axis] = 5 + 2e-4 * (0.1 + 0.8 * hash_unit(3 * n + axis));
-            tested += cells_tested_at(&tree, p);
+            for (uint64_t axis = 0; axis < 3; axis++)
+                p[axis] = 5 + 2e-4 * (0.1 + 0.8 * hash_to_unit_interval(3 * n + axis));
+            tested += count_cells_tested(&tree, p);
         }
         /* On a side, a jittered hex's box is 1.3 to 1.6 times its cell, and a leaf's box half as much again: a point is
          * in about 4 leaves of 4 cells. The compact boxes have steps as large as a cell. */
@@ -194,13 +198,13 @@ static void vertices_of_no_cell_do_not_coarsen_the_tree(void **state)
     (void)state;
     lattice l = make_lattice(12, LATTICE_HEXES, (lattice_layout){true, false, true, false});
     for (int builder = MMBVH_SAH; builder <= MMBVH_MORTON; builder++) {
-        mmbvh tight = build(&l, MMBVH_COMPACT, (mmbvh_builder)builder);
+        mmbvh tight = build_tree(&l, MMBVH_COMPACT, (mmbvh_builder)builder);
         grid far = l.g;
         far.vertex_count++;
         for (int axis = 0; axis < 3; axis++) {
             l.coordinates = realloc(l.coordinates, (size_t)far.vertex_count * 24);
             for (int a = 0; a < 3; a++) l.g.coordinates[a].data = far.coordinates[a].data = l.coordinates + 8 * a;
-            put_number(&far.coordinates[axis], far.vertex_count - 1, builder ? 1e8 : -1e8);
+            set_number(&far.coordinates[axis], far.vertex_count - 1, builder ? 1e8 : -1e8);
         }
         mmbvh tree;
         const mmbvh_options options = {.builder = (mmbvh_builder)builder};
@@ -220,7 +224,7 @@ static void scale_mesh(lattice *l, double scale)
     for (int64_t v = 0; v < l->g.vertex_count; v++) {
         double p[3];
         grid_vertex(&l->g, v, p);
-        for (int axis = 0; axis < 3; axis++) put_number(&l->g.coordinates[axis], v, p[axis] * scale);
+        for (int axis = 0; axis < 3; axis++) set_number(&l->g.coordinates[axis], v, p[axis] * scale);
     }
 }
 
@@ -230,7 +234,7 @@ static void refit_follows_a_mesh_that_grows_and_shrinks(void **state)
 {
     (void)state;
     lattice l = make_lattice(18, LATTICE_TETS, (lattice_layout){true, false, true, false});
-    mmbvh tree = build(&l, MMBVH_COMPACT, MMBVH_SAH);
+    mmbvh tree = build_tree(&l, MMBVH_COMPACT, MMBVH_SAH);
     static const double scales[] = {1.01, 1000, 1e-3, 1e-6, 1e6};
     for (int i = 0; i < 5; i++) {
         scale_mesh(&l, scales[i]);
@@ -239,7 +243,7 @@ static void refit_follows_a_mesh_that_grows_and_shrinks(void **state)
         /* Boxes are rounded differently on another grid: by 1/256 of an extent on three axes. */
         assert_true(fabs(s.cost / tree.built_cost - 1) < 3.0 / 256);
     }
-    put_number(&l.g.coordinates[0], 5, INFINITY);
+    set_number(&l.g.coordinates[0], 5, INFINITY);
     assert_int_equal(mmbvh_refit_bounds(&tree, &l.g, NULL), INSITU_ERROR_MESH);
     mmbvh_free(&tree);
     free_lattice(&l);
@@ -247,12 +251,12 @@ static void refit_follows_a_mesh_that_grows_and_shrinks(void **state)
 
 /* Checks that a tree built along the space-filling curve costs at most half more than one by the surface area
  * heuristic. */
-static void curve_costs_little_more_than_planes(void **state)
+static void morton_builder_costs_little_more_than_plane_builder(void **state)
 {
     (void)state;
     for (int kind = LATTICE_TETS; kind <= LATTICE_HEXES; kind++) {
         lattice l = make_lattice(20, (lattice_kind)kind, (lattice_layout){0});
-        mmbvh planes = build(&l, MMBVH_COMPACT, MMBVH_SAH), curve = build(&l, MMBVH_COMPACT, MMBVH_MORTON);
+        mmbvh planes = build_tree(&l, MMBVH_COMPACT, MMBVH_SAH), curve = build_tree(&l, MMBVH_COMPACT, MMBVH_MORTON);
         assert_true(planes.built_cost < curve.built_cost && curve.built_cost < 1.5 * planes.built_cost);
         mmbvh_free(&planes);
         mmbvh_free(&curve);
@@ -262,14 +266,14 @@ static void curve_costs_little_more_than_planes(void **state)
 
 /* Checks that the tree of 178,746 tets takes 16 bytes per cell, and that building it takes at most 2.5 times as
  * much. */
-static void memory_is_what_was_promised(void **state)
+static void tree_memory_is_within_the_stated_bounds(void **state)
 {
     (void)state;
     lattice l = make_lattice(31, LATTICE_TETS, (lattice_layout){0});
     for (int builder = MMBVH_SAH; builder <= MMBVH_MORTON; builder++) {
         const int64_t before = base_memory_held();
         base_memory_reset_peak();
-        mmbvh tree = build(&l, MMBVH_COMPACT, (mmbvh_builder)builder);
+        mmbvh tree = build_tree(&l, MMBVH_COMPACT, (mmbvh_builder)builder);
         const int64_t peak = base_memory_peak() - before, held = base_memory_held() - before;
         assert_int_equal(held, mmbvh_bytes(&tree));
         assert_true(held <= 16 * l.g.cell_count);
@@ -283,15 +287,15 @@ static void memory_is_what_was_promised(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(compact_box_holds_and_is_tight),
+        cmocka_unit_test(compact_box_is_conservative_and_tight),
         cmocka_unit_test(box_beyond_the_grid_is_refused),
-        cmocka_unit_test(layouts_hold_one_tree),
-        cmocka_unit_test(boxes_without_end_take_the_reference_layout),
+        cmocka_unit_test(layouts_represent_the_same_tree),
+        cmocka_unit_test(infinite_boxes_use_the_reference_layout),
         cmocka_unit_test(cells_of_very_different_sizes_are_distinguished),
         cmocka_unit_test(vertices_of_no_cell_do_not_coarsen_the_tree),
         cmocka_unit_test(refit_follows_a_mesh_that_grows_and_shrinks),
-        cmocka_unit_test(curve_costs_little_more_than_planes),
-        cmocka_unit_test(memory_is_what_was_promised),
+        cmocka_unit_test(morton_builder_costs_little_more_than_plane_builder),
+        cmocka_unit_test(tree_memory_is_within_the_stated_bounds),
     };
     return cmocka_run_group_tests_name("mmbvh_layout", tests, NULL, NULL);
 }

@@ -13,7 +13,7 @@ typedef struct node_view {
     int64_t ref;
 } node_view;
 
-static inline node_view view_node(const mmbvh *tree, int64_t index)
+static inline node_view read_node(const mmbvh *tree, int64_t index)
 {
     node_view v = {.count = mmbvh_node_count(tree, index), .ref = mmbvh_node_ref(tree, index)};
     const mmbvh_ranges own = mmbvh_own_ranges(tree);

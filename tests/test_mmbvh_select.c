@@ -31,8 +31,8 @@ static void make_queries(const grid_field *field, mmbvh_query queries[QUERIES])
 static test_mesh make_mesh(test_mesh_kind kind, int side)
 {
     test_mesh mesh;
-    test_mesh_lattice(kind, side, 0.2, test_wave, &mesh);
-    test_mesh_round(&mesh);
+    test_mesh_make_lattice(kind, side, 0.2, test_wave_field, &mesh);
+    test_mesh_round_to_float(&mesh);
     for (int64_t v = 0; v < mesh.vertex_count; v++) {
         const double u = test_uniform((uint64_t)v, 1);
         if (u < 0.005) mesh.values[v] = u < 0.002 ? (double)NAN : u < 0.0035 ? (double)INFINITY : -(double)INFINITY;
@@ -44,7 +44,7 @@ static test_mesh make_mesh(test_mesh_kind kind, int side)
 }
 
 /* Returns -1 if the cell is unusable, else whether the query selects it. */
-static int expected_selection(const test_view *view, const mmbvh_query *query, int64_t cell)
+static int select_by_brute_force(const test_view *view, const mmbvh_query *query, int64_t cell)
 {
     double low = (double)INFINITY, high = -(double)INFINITY;
     grid_walk walk = grid_walk_cell(&view->cells, cell);
@@ -72,7 +72,7 @@ static int64_t assert_selects(const test_view *view, const mmbvh_query *queries,
     for (int64_t cell = 0; cell < view->cells.cell_count; cell++) {
         bool shows = false;
         for (int i = 0; i < count && !grid_is_ghost(&view->cells, cell); i++) {
-            const int seen = expected_selection(view, &queries[i], cell);
+            const int seen = select_by_brute_force(view, &queries[i], cell);
             shows |= seen > 0;
             unusable_by_hand[i] += seen < 0;
         }
@@ -100,7 +100,7 @@ static void assert_selects_all_queries(const test_mesh *mesh, test_layout layout
     test_view_free(&view);
 }
 
-static void just_the_cells_that_can_show_are_selected(void **state)
+static void only_cells_that_may_be_visible_are_selected(void **state)
 {
     (void)state;
     for (int kind = 0; kind < TEST_KIND_COUNT; kind++) {
@@ -116,7 +116,7 @@ static void just_the_cells_that_can_show_are_selected(void **state)
 
 /* Checks components, magnitudes, values at cells, integers, and doubles whose rounding to float decides the
  * selection. */
-static void fields_of_other_kinds_are_selected_by(void **state)
+static void selection_supports_all_field_kinds(void **state)
 {
     (void)state;
     for (int kind = TEST_TETS; kind <= TEST_MIXED; kind++) {
@@ -130,8 +130,9 @@ static void fields_of_other_kinds_are_selected_by(void **state)
         int32_t *integers = malloc((size_t)count * sizeof *integers);
         assert_true(vectors && integers);
         for (int64_t i = 0; i < 3 * count; i++)
-            vectors[i] = 1 + (test_uniform((uint64_t)i, 3) < 0.4 ? 0 : test_uniform_in((uint64_t)i, 4, -5e-8, 5e-8));
-        for (int64_t i = 0; i < count; i++) integers[i] = (int32_t)test_uniform_in((uint64_t)i, 5, -3, 3);
+            vectors[i] =
+                1 + (test_uniform((uint64_t)i, 3) < 0.4 ? 0 : test_uniform_between((uint64_t)i, 4, -5e-8, 5e-8));
+        for (int64_t i = 0; i < count; i++) integers[i] = (int32_t)test_uniform_between((uint64_t)i, 5, -3, 3);
         vectors[3 * 11 + 2] = (double)NAN;
         const grid_field fields[] = {
             {.values = {.data = (const char *)vectors, .stride = 24, .is_wide = true},
@@ -179,8 +180,8 @@ static void cells_without_a_query_are_not_selected(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(just_the_cells_that_can_show_are_selected),
-        cmocka_unit_test(fields_of_other_kinds_are_selected_by),
+        cmocka_unit_test(only_cells_that_may_be_visible_are_selected),
+        cmocka_unit_test(selection_supports_all_field_kinds),
         cmocka_unit_test(cells_without_a_query_are_not_selected),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -13,7 +13,7 @@
 
 enum { COUNT = 300000 /* so many that the keys of several digits exceed what one thread sorts alone */ };
 
-static uint64_t next_random(uint64_t *state)
+static uint64_t draw_random(uint64_t *state)
 {
     *state ^= *state << 13;
     *state ^= *state >> 7;
@@ -21,7 +21,7 @@ static uint64_t next_random(uint64_t *state)
     return *state;
 }
 
-static int compare(const void *a, const void *b)
+static int compare_keys(const void *a, const void *b)
 {
     uint64_t x, y;
     memcpy(&x, a, sizeof x);
@@ -32,38 +32,38 @@ static int compare(const void *a, const void *b)
 /* Makes a code of the given number of bits; a mesh may use any part of the codes. */
 typedef uint64_t code_maker(uint64_t random, int64_t i, int bits);
 
-static uint64_t even(uint64_t random, int64_t i, int bits)
+static uint64_t make_uniform_code(uint64_t random, int64_t i, int bits)
 {
     (void)i;
     return random & ((UINT64_C(1) << bits) - 1);
 }
 
 /* Returns codes of cells that get smaller towards a corner: half of the keys are in half of the box, and so on. */
-static uint64_t refined(uint64_t random, int64_t i, int bits)
+static uint64_t make_refined_code(uint64_t random, int64_t i, int bits)
 {
-    return even(random, i, bits) >> (random >> 58) % (unsigned)bits;
+    return make_uniform_code(random, i, bits) >> (random >> 58) % (unsigned)bits;
 }
 
 /* Returns codes that, except for one, are all in the lower half of the bits. */
-static uint64_t outlier(uint64_t random, int64_t i, int bits)
+static uint64_t make_outlier_code(uint64_t random, int64_t i, int bits)
 {
-    return i ? even(random, i, bits) >> bits / 2 : (UINT64_C(1) << bits) - 1;
+    return i ? make_uniform_code(random, i, bits) >> bits / 2 : (UINT64_C(1) << bits) - 1;
 }
 
-static uint64_t equal(uint64_t random, int64_t i, int bits)
+static uint64_t make_equal_code(uint64_t random, int64_t i, int bits)
 {
     (void)random;
     (void)i;
     return bits ? 1 : 0;
 }
 
-static uint64_t descending(uint64_t random, int64_t i, int bits)
+static uint64_t make_descending_code(uint64_t random, int64_t i, int bits)
 {
     (void)random;
     return ((UINT64_C(1) << bits) - 1) - (uint64_t)i;
 }
 
-static void check(code_maker *make, int64_t count, int threads)
+static void check_sorted(code_maker *make, int64_t count, int threads)
 {
     const double lower[3] = {0, 0, 0}, upper[3] = {1, 1, 1};
     morton_coder coder;
@@ -72,10 +72,10 @@ static void check(code_maker *make, int64_t count, int threads)
     uint64_t *keys = malloc(bytes), *other = malloc(bytes), *right = malloc(bytes), state = 88172645463325252u;
     assert_true(keys && other && right);
     for (int64_t i = 0; i < count; i++) {
-        const uint64_t code = make(next_random(&state), i, coder.code_bits);
+        const uint64_t code = make(draw_random(&state), i, coder.code_bits);
         keys[i] = right[i] = code << coder.index_bits | (uint64_t)i;
     }
-    qsort(right, (size_t)count, sizeof *right, compare);
+    qsort(right, (size_t)count, sizeof *right, compare_keys);
     assert_true(morton_sort(&coder, keys, other, count, threads));
     assert_memory_equal(keys, right, bytes);
     free(keys);
@@ -83,19 +83,20 @@ static void check(code_maker *make, int64_t count, int threads)
     free(right);
 }
 
-static void keys_ascend(void **state)
+static void sorted_keys_ascend(void **state)
 {
-    static code_maker *const makers[] = {even, refined, outlier, equal, descending};
+    static code_maker *const makers[] = {make_uniform_code, make_refined_code, make_outlier_code, make_equal_code,
+                                         make_descending_code};
     static const int64_t counts[] = {1, 2, 24, 25, 1000, 16384, 16385, COUNT};
     (void)state;
     for (size_t maker = 0; maker < sizeof makers / sizeof *makers; maker++) {
         for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
-            for (int threads = 1; threads <= 3; threads++) check(makers[maker], counts[i], threads);
+            for (int threads = 1; threads <= 3; threads++) check_sorted(makers[maker], counts[i], threads);
         }
     }
 }
 
-static void lack_of_memory_is_reported(void **state)
+static void failed_allocation_is_reported(void **state)
 {
     static uint64_t keys[20000], other[20000];
     const double lower[3] = {0, 0, 0}, upper[3] = {1, 1, 1};
@@ -109,8 +110,8 @@ static void lack_of_memory_is_reported(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(keys_ascend),
-        cmocka_unit_test(lack_of_memory_is_reported),
+        cmocka_unit_test(sorted_keys_ascend),
+        cmocka_unit_test(failed_allocation_is_reported),
     };
     return cmocka_run_group_tests_name("mmbvh_sort", tests, NULL, NULL);
 }

@@ -23,24 +23,24 @@ typedef struct subject {
 } subject;
 
 /* Moves vertices inwards, so that the grid of the compact layout still contains the mesh. */
-static void move(lattice *l, double by)
+static void move_vertices(lattice *l, double by)
 {
     for (int64_t v = 0; v < l->g.vertex_count; v++) {
         double p[3];
         grid_vertex(&l->g, v, p);
-        put_number(&l->g.coordinates[0], v, 9 + (1 - by) * (p[0] - 9));
-        put_number(&l->g.coordinates[2], v, 9 + (1 - 2 * by) * (p[2] - 9));
+        set_number(&l->g.coordinates[0], v, 9 + (1 - by) * (p[0] - 9));
+        set_number(&l->g.coordinates[2], v, 9 + (1 - 2 * by) * (p[2] - 9));
     }
 }
 
-static subject make(lattice_kind kind, lattice_layout layout, mmbvh_layout nodes)
+static subject make_subject(lattice_kind kind, lattice_layout layout, mmbvh_layout nodes)
 {
     subject s = {.l = make_lattice(18, kind, layout)};
     const mmbvh_options options = {.threads = 2, .layout = nodes};
     assert_int_equal(mmbvh_build(&s.l.g, &s.l.field, no_shift, 1, &options, &s.tree, NULL), INSITU_OK);
     s.pairs = malloc((size_t)s.tree.node_count * 2 * sizeof *s.pairs);
     for (int64_t i = 0; i < s.tree.node_count; i++) {
-        const node_view node = view_node(&s.tree, i);
+        const node_view node = read_node(&s.tree, i);
         s.pairs[2 * i] = node.lower[2]; /* the range of a field that equals the height */
         s.pairs[2 * i + 1] = node.upper[2];
     }
@@ -49,7 +49,7 @@ static subject make(lattice_kind kind, lattice_layout layout, mmbvh_layout nodes
 
 static void choose_visible(subject *s)
 {
-    const node_view root = view_node(&s->tree, 0);
+    const node_view root = read_node(&s->tree, 0);
     const float low = root.range_low, high = root.range_high, floor = s->pairs[0];
     s->intervals[0] = (mmbvh_interval){low + 0.3f * (high - low), low + 0.3f * (high - low)};
     s->intervals[1] = (mmbvh_interval){low + 0.9f * (high - low), high};
@@ -65,16 +65,16 @@ static void free_subject(subject *s)
     free_lattice(&s->l);
 }
 
-static bool shows(const subject *s, int64_t i)
+static bool is_leaf_visible(const subject *s, int64_t i)
 {
-    const node_view node = view_node(&s->tree, i);
+    const node_view node = read_node(&s->tree, i);
     bool does = s->pairs[2 * i] <= s->intervals[2].high && s->pairs[2 * i + 1] >= s->intervals[2].low;
     for (int k = 0; k < 2; k++)
         does = does || (node.range_low <= s->intervals[k].high && node.range_high >= s->intervals[k].low);
     return does;
 }
 
-static void grow(node_view *to, const node_view *by)
+static void extend_bounds(node_view *to, const node_view *by)
 {
     for (int axis = 0; axis < 3; axis++) {
         to->lower[axis] = fminf(to->lower[axis], by->lower[axis]);
@@ -83,9 +83,9 @@ static void grow(node_view *to, const node_view *by)
 }
 
 /* Computes the box of a leaf's cells at their current positions. */
-static node_view box_by_hand(const subject *s, int64_t leaf)
+static node_view compute_leaf_box(const subject *s, int64_t leaf)
 {
-    node_view box = view_node(&s->tree, leaf);
+    node_view box = read_node(&s->tree, leaf);
     for (int axis = 0; axis < 3; axis++) box.lower[axis] = INFINITY, box.upper[axis] = -INFINITY;
     for (int k = 0; k < box.count; k++) {
         int64_t vertices[GRID_MAX_CELL_VERTICES];
@@ -95,7 +95,7 @@ static node_view box_by_hand(const subject *s, int64_t leaf)
             grid_vertex(&s->l.g, vertices[i], p);
             const node_view point = {.lower = {(float)p[0], (float)p[1], (float)p[2]},
                                      .upper = {(float)p[0], (float)p[1], (float)p[2]}};
-            grow(&box, &point);
+            extend_bounds(&box, &point);
         }
     }
     return box;
@@ -104,17 +104,17 @@ static node_view box_by_hand(const subject *s, int64_t leaf)
 /* Traverses the visible nodes below a node and checks that their bounds are contained in its own; returns their bounds.
  * Single precision and the compact layout need a slack, relative to the mesh's size: 2 of its 2^20 steps and 1/256 of
  * the box, which is as wide as a leaf. */
-static node_view assert_holds(const subject *s, int64_t i, int64_t *visited)
+static node_view assert_bounds_contain_subtree(const subject *s, int64_t i, int64_t *visited)
 {
     ++*visited;
-    const node_view node = view_node(&s->tree, i);
-    node_view held = box_by_hand(s, i);
+    const node_view node = read_node(&s->tree, i);
+    node_view held = compute_leaf_box(s, i);
     if (!node.count) {
         for (int axis = 0; axis < 3; axis++) held.lower[axis] = INFINITY, held.upper[axis] = -INFINITY;
         for (int side = 0; side < 2; side++) {
-            if (!shows(s, node.ref + side)) continue;
-            const node_view below = assert_holds(s, node.ref + side, visited);
-            grow(&held, &below);
+            if (!is_leaf_visible(s, node.ref + side)) continue;
+            const node_view below = assert_bounds_contain_subtree(s, node.ref + side, visited);
+            extend_bounds(&held, &below);
         }
     }
     for (int axis = 0; axis < 3; axis++) {
@@ -125,7 +125,7 @@ static node_view assert_holds(const subject *s, int64_t i, int64_t *visited)
 }
 
 /* Checks that any number of threads makes the same tree and computes the same area, since sums have a fixed order. */
-static void assert_same_by_one_thread(const subject *s, const mmbvh *before)
+static void assert_same_with_any_threads(const subject *s, const mmbvh *before)
 {
     mmbvh again = *before;
     bool is_whole;
@@ -136,7 +136,7 @@ static void assert_same_by_one_thread(const subject *s, const mmbvh *before)
     assert_true(again.area == s->tree.area);
 }
 
-static mmbvh copy_of(const mmbvh *tree)
+static mmbvh copy_tree(const mmbvh *tree)
 {
     mmbvh copy = *tree;
     const size_t bytes = (size_t)tree->node_count * node_size(tree);
@@ -159,26 +159,26 @@ static int64_t count_stale(const subject *s, const mmbvh *before, const mmbvh *w
 {
     int64_t stale = 0;
     for (int64_t i = 0; i < s->tree.node_count; i++) {
-        const node_view was = view_node(before, i), is = view_node(&s->tree, i), all = view_node(whole, i);
+        const node_view was = read_node(before, i), is = read_node(&s->tree, i), all = read_node(whole, i);
         stale += memcmp(&was.lower, &is.lower, 12) == 0 && memcmp(&is.lower, &all.lower, 12) != 0;
     }
     return stale;
 }
 
-static void check(subject *s)
+static void check_visible_refit(subject *s)
 {
-    mmbvh before = copy_of(&s->tree), whole = copy_of(&s->tree), other = copy_of(&s->tree);
+    mmbvh before = copy_tree(&s->tree), whole = copy_tree(&s->tree), other = copy_tree(&s->tree);
     bool is_whole = true;
     int64_t visited = 0;
-    move(&s->l, 0.02);
+    move_vertices(&s->l, 0.02);
     choose_visible(s);
     /* Visibilities refer to each tree's own ranges, which are the same. */
     assert_int_equal(
         mmbvh_refit_visible_bounds(&s->tree, &s->l.g, s->visible, 2, &(mmbvh_options){.threads = 2}, &is_whole),
         INSITU_OK);
     assert_false(is_whole);
-    assert_holds(s, 0, &visited);
-    assert_same_by_one_thread(s, &other);
+    assert_bounds_contain_subtree(s, 0, &visited);
+    assert_same_with_any_threads(s, &other);
     assert_int_equal(mmbvh_refit_bounds(&whole, &s->l.g, &(mmbvh_options){.threads = 2}), INSITU_OK);
     assert_true(visited > 100 && visited < s->tree.node_count);
     assert_true(count_stale(s, &before, &whole) > s->tree.node_count / 10);
@@ -191,32 +191,32 @@ static void check(subject *s)
     free_copy(&other);
 }
 
-static void bounds_hold_what_shows_and_stay_where_nothing_does(void **state)
+static void only_visible_bounds_are_refitted(void **state)
 {
     (void)state;
     for (int kind = LATTICE_TETS; kind <= LATTICE_MIXED; kind++)
         for (int bits = 0; bits < 8; bits++) {
             const lattice_layout layout = {bits & 1, bits >> 1 & 1, bits >> 1 & 1, bits >> 1 & 1};
-            subject s = make((lattice_kind)kind, layout, bits >> 2 ? MMBVH_REFERENCE : MMBVH_COMPACT);
-            check(&s);
+            subject s = make_subject((lattice_kind)kind, layout, bits >> 2 ? MMBVH_REFERENCE : MMBVH_COMPACT);
+            check_visible_refit(&s);
             free_subject(&s);
         }
 }
 
 /* Checks that the area which refits keep up to date equals that of a pass over all nodes: n sums of positive doubles
  * and as many differences are off by at most 2 n 2^-53 of the largest sum. */
-static void area_is_carried_on(void **state)
+static void refit_updates_the_visible_area(void **state)
 {
     (void)state;
-    subject s = make(LATTICE_HEXES, (lattice_layout){0}, MMBVH_COMPACT);
+    subject s = make_subject(LATTICE_HEXES, (lattice_layout){0}, MMBVH_COMPACT);
     for (int i = 0; i < 5; i++) {
         bool is_whole;
-        move(&s.l, 0.02);
+        move_vertices(&s.l, 0.02);
         choose_visible(&s);
         mmbvh_refit_visible_bounds(&s.tree, &s.l.g, s.visible, i % 2 ? 0 : 2, NULL, &is_whole);
         assert_true(is_whole == (i % 2 == 1));
         if (!is_whole) continue;
-        const node_view root = view_node(&s.tree, 0);
+        const node_view root = read_node(&s.tree, 0);
         const double x = (double)root.upper[0] - (double)root.lower[0],
                      y = (double)root.upper[1] - (double)root.lower[1],
                      z = (double)root.upper[2] - (double)root.lower[2];
@@ -226,15 +226,15 @@ static void area_is_carried_on(void **state)
     free_subject(&s);
 }
 
-static void nothing_visible_is_no_work(void **state)
+static void invisible_trees_are_not_refitted(void **state)
 {
     (void)state;
-    subject s = make(LATTICE_TETS, (lattice_layout){0}, MMBVH_COMPACT);
-    mmbvh before = copy_of(&s.tree);
+    subject s = make_subject(LATTICE_TETS, (lattice_layout){0}, MMBVH_COMPACT);
+    mmbvh before = copy_tree(&s.tree);
     bool is_whole;
     choose_visible(&s);
     s.visible[0].interval_count = 0;
-    move(&s.l, 0.02);
+    move_vertices(&s.l, 0.02);
     assert_int_equal(mmbvh_refit_visible_bounds(&s.tree, &s.l.g, s.visible, 1, NULL, &is_whole), INSITU_OK);
     assert_same_nodes(&s.tree, &before);
     assert_int_equal(mmbvh_refit_visible_bounds(&s.tree, &s.l.g, s.visible, 1, NULL, NULL), INSITU_ERROR_ARGUMENT);
@@ -245,9 +245,9 @@ static void nothing_visible_is_no_work(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(bounds_hold_what_shows_and_stay_where_nothing_does),
-        cmocka_unit_test(area_is_carried_on),
-        cmocka_unit_test(nothing_visible_is_no_work),
+        cmocka_unit_test(only_visible_bounds_are_refitted),
+        cmocka_unit_test(refit_updates_the_visible_area),
+        cmocka_unit_test(invisible_trees_are_not_refitted),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -21,7 +21,7 @@ static const char *const method_names[METHOD_COUNT] = {"samples", "segments", "m
 static const double max_error = 1e-2;
 
 /* A field from 0 at the mesh's corner next to the eye of CAMERA_OUTSIDE to 1 at the opposite corner. */
-static double front_to_back(const double position[3])
+static double front_to_back_field(const double position[3])
 {
     return 0.5 - (2.4 * position[0] + 1.6 * position[1] + 3 * position[2]) / (2 * (2.4 + 1.6 + 3));
 }
@@ -47,9 +47,9 @@ static void set_medium(render_fixture *f, method how, double depth)
     f->job.sample_group = RENDER_MAX_GROUP;
 }
 
-static void stage(render_fixture *f, test_mesh_kind kind, int n, method how, double depth)
+static void set_up_frame(render_fixture *f, test_mesh_kind kind, int n, method how, double depth)
 {
-    fixture_create_lattice(f, kind, n, 0.2, front_to_back);
+    fixture_create_lattice(f, kind, n, 0.2, front_to_back_field);
     fixture_set_camera(f, CAMERA_OUTSIDE, WIDTH, HEIGHT);
     set_medium(f, how, depth);
 }
@@ -61,7 +61,7 @@ static void compare_samples(render_fixture *f, const char *what)
 {
     for (int i = 0; i < 2; i++) {
         f->job.traversal = traversals[i];
-        fixture_compare(f, &fixture_usual_bounds, what);
+        fixture_compare_with_reference(f, &fixture_usual_bounds, what);
     }
 }
 
@@ -78,10 +78,10 @@ static void compare_integrals(render_fixture *f, double most, const char *what)
         double rgba[4];
         reference_integral_trace(truth, p % WIDTH, p / WIDTH, fixture_background, NULL, 0, rgba);
         for (int k = 0; k < 8; k++)
-            worst = test_worse(worst, fabs((double)drawn[k / 4].picture.rgba[4 * p + k % 4] - rgba[k % 4]));
+            worst = test_larger_error(worst, fabs((double)drawn[k / 4].picture.rgba[4 * p + k % 4] - rgba[k % 4]));
     }
     reference_integral_free(truth);
-    for (int i = 0; i < 2; i++) drawn_free(&drawn[i]);
+    for (int i = 0; i < 2; i++) drawn_frame_free(&drawn[i]);
     if (!(worst <= most)) fail_msg("%s: off by %g", what, worst);
 }
 
@@ -89,15 +89,15 @@ static void compare_integrals(render_fixture *f, double most, const char *what)
  * A thousand times as much, nearly 1e-4, would be detected: it is about ten times the error of samples
  * (fixture_usual_bounds). For segments, values at their ends are off by up to 4e-7 of the function's domain
  * (docs/development/decisions/volume.md), and colours by that times the number of table entries. */
-static void pictures_are_those_of_all_cells(void **state)
+static void skipping_hidden_cells_changes_no_picture(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
         for (method how = 0; how < METHOD_COUNT; how++) {
             char what[96];
             render_fixture f;
-            if (!test_is_whole() && ((int)kind + (int)how) % 2) continue;
-            stage(&f, kind, 5, how, 12);
+            if (!test_is_long_run() && ((int)kind + (int)how) % 2) continue;
+            set_up_frame(&f, kind, 5, how, 12);
             snprintf(what, sizeof what, "%s, %s", test_mesh_kind_name(kind), method_names[how]);
             if (how == SAMPLES)
                 compare_samples(&f, what);
@@ -109,7 +109,7 @@ static void pictures_are_those_of_all_cells(void **state)
 
 /* Compares pictures of several ranks. A rank skips only what is behind its own cells, which is less than one rank skips
  * that has all cells. */
-static void ranks_leave_out_what_nobody_sees(void **state)
+static void ranks_skip_cells_behind_their_own_cells(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
@@ -118,13 +118,13 @@ static void ranks_leave_out_what_nobody_sees(void **state)
                 test_mesh mesh;
                 render_fixture whole, parts[RANKS];
                 drawn_frame one, all;
-                stage(&whole, kind, 6, how, 12);
-                test_mesh_lattice(kind, 6, 0.2, front_to_back, &mesh);
+                set_up_frame(&whole, kind, 6, how, 12);
+                test_mesh_make_lattice(kind, 6, 0.2, front_to_back_field, &mesh);
                 int *owners = malloc((size_t)mesh.cell_count * sizeof *owners);
-                test_partition(&mesh, partition, 6, RANKS, owners);
+                test_partition_cells(&mesh, partition, 6, RANKS, owners);
                 for (int rank = 0; rank < RANKS; rank++) {
                     test_mesh part;
-                    test_mesh_part(&mesh, owners, rank, &part);
+                    test_mesh_extract_part(&mesh, owners, rank, &part);
                     fixture_create(&parts[rank], &part, 1, (test_layout){.wide_coordinates = true, .wide_values = true},
                                    whole.cell_size, 1, (const double[]){0, 0, 0});
                     fixture_set_camera(&parts[rank], CAMERA_OUTSIDE, WIDTH, HEIGHT);
@@ -134,12 +134,12 @@ static void ranks_leave_out_what_nobody_sees(void **state)
                     test_mesh_free(&part);
                 }
                 fixture_draw(&whole, &one);
-                fixture_draw_apart(parts, RANKS, &all);
-                if (!(drawn_difference(&one, &all) <= 1e-6))
+                fixture_draw_distributed(parts, RANKS, &all);
+                if (!(drawn_frame_difference(&one, &all) <= 1e-6))
                     fail_msg("%s, %s, %s: off by %g", test_mesh_kind_name(kind), test_partition_kind_name(partition),
-                             method_names[how], drawn_difference(&one, &all));
-                drawn_free(&one);
-                drawn_free(&all);
+                             method_names[how], drawn_frame_difference(&one, &all));
+                drawn_frame_free(&one);
+                drawn_frame_free(&all);
                 for (int rank = 0; rank < RANKS; rank++) fixture_free(&parts[rank]);
                 fixture_free(&whole);
                 free(owners);
@@ -147,17 +147,17 @@ static void ranks_leave_out_what_nobody_sees(void **state)
             }
 }
 
-static int64_t cells_placed(test_mesh_kind kind, render_traversal traversal, double depth)
+static int64_t count_cells_placed(test_mesh_kind kind, render_traversal traversal, double depth)
 {
     render_fixture f;
     drawn_frame drawn;
-    stage(&f, kind, 24, SAMPLES, depth);
+    set_up_frame(&f, kind, 24, SAMPLES, depth);
     fixture_set_camera(&f, CAMERA_OUTSIDE, 8 * WIDTH, 8 * HEIGHT);
     f.job.step = 0.5 * f.cell_size;
     f.job.traversal = traversal;
     fixture_draw(&f, &drawn);
     const int64_t placed = drawn.statistics.volume_cells;
-    drawn_free(&drawn);
+    drawn_frame_free(&drawn);
     fixture_free(&f);
     return placed;
 }
@@ -165,14 +165,14 @@ static int64_t cells_placed(test_mesh_kind kind, render_traversal traversal, dou
 /* Checks that cells are skipped. Three of a ray's 24 cells or more absorb all light. A window as deep as memory allows
  * contains all cells. Windows whose depth depends on the light are at least four cells deep, and a slanted face takes
  * two to three cells in a tile; the first tile has a deep window. */
-static void few_cells_are_placed(void **state)
+static void few_cells_of_opaque_media_are_transformed(void **state)
 {
     static const test_mesh_kind kinds[] = {TEST_TETS, TEST_HEXES, TEST_MIXED};
     (void)state;
     for (int k = 0; k < 3; k++)
         for (render_traversal traversal = RENDER_BINNED; traversal <= RENDER_TILES; traversal++) {
-            const int64_t thin = cells_placed(kinds[k], traversal, 0.1);
-            const int64_t dense = cells_placed(kinds[k], traversal, 80);
+            const int64_t thin = count_cells_placed(kinds[k], traversal, 0.1);
+            const int64_t dense = count_cells_placed(kinds[k], traversal, 80);
             const double share = (double)dense / (double)thin;
             fprintf(stderr, "%s, traversal %d: %.3f of %lld cells\n", test_mesh_kind_name(kinds[k]), (int)traversal,
                     share, (long long)thin);
@@ -182,8 +182,8 @@ static void few_cells_are_placed(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(pictures_are_those_of_all_cells),
-                                       cmocka_unit_test(ranks_leave_out_what_nobody_sees),
-                                       cmocka_unit_test(few_cells_are_placed)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(skipping_hidden_cells_changes_no_picture),
+                                       cmocka_unit_test(ranks_skip_cells_behind_their_own_cells),
+                                       cmocka_unit_test(few_cells_of_opaque_media_are_transformed)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

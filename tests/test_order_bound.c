@@ -41,7 +41,7 @@ typedef struct cell_functions {
     double weights[4][POWERS][POWERS][POWERS];
 } cell_functions;
 
-static bool is_in_space(const session_nodes *of, const int q[3])
+static bool is_in_polynomial_space(const session_nodes *of, const int q[3])
 {
     const int p = of->order, plane = q[0] + q[1];
     switch (of->type) {
@@ -59,7 +59,7 @@ static bool is_in_space(const session_nodes *of, const int q[3])
 }
 
 /* Computes a function at a point, or its derivative along an axis if that is not negative. */
-static double evaluate(const cell_functions *of, int function, const double at[3], int axis)
+static double evaluate_function(const cell_functions *of, int function, const double at[3], int axis)
 {
     double powers[3][POWERS], sum = 0;
     for (int a = 0; a < 3; a++) {
@@ -79,7 +79,7 @@ static void add_terms(const session_nodes *of, int function, double size, double
 {
     for (int i = 0; i < POWERS * POWERS * POWERS; i++) {
         const int q[3] = {i % POWERS, i / POWERS % POWERS, i / POWERS / POWERS}, sum = q[0] + q[1] + q[2];
-        if (sum > 1 && is_in_space(of, q))
+        if (sum > 1 && is_in_polynomial_space(of, q))
             out->weights[function][q[2]][q[1]][q[0]] += size * random_number() * pow(fall, sum - 2);
     }
 }
@@ -96,7 +96,7 @@ static void add_linear(int function, const double slopes[3], cell_functions *out
 static void place_node(const bound_kind *kind, int i, int j, int k, double out[3])
 {
     double line[NODES_MOST_ORDER + 1];
-    session_place_nodes(kind->nodes.order, kind->is_lobatto, line);
+    session_compute_node_positions(kind->nodes.order, kind->is_lobatto, line);
     out[0] = line[i];
     out[1] = line[j];
     out[2] = line[k];
@@ -107,11 +107,11 @@ static void make_tuples(const bound_kind *kind, const cell_functions *of, double
     const int p = kind->nodes.order;
     for (int i = 0; i < (p + 1) * (p + 1) * (p + 1); i++) {
         const int n[3] = {i % (p + 1), i / (p + 1) % (p + 1), i / (p + 1) / (p + 1)};
-        if (!session_is_node(&kind->nodes, n[0], n[1], n[2])) continue;
+        if (!session_has_node(&kind->nodes, n[0], n[1], n[2])) continue;
         const int at = session_node_index(&kind->nodes, kind->order, n[0], n[1], n[2]);
         double place[3];
         place_node(kind, n[0], n[1], n[2], place);
-        for (int f = 0; f < 4 && at < kind->nodes.count; f++) tuples[at][f] = evaluate(of, f, place, -1);
+        for (int f = 0; f < 4 && at < kind->nodes.count; f++) tuples[at][f] = evaluate_function(of, f, place, -1);
     }
 }
 
@@ -123,7 +123,7 @@ typedef struct cut_cell {
     double (*tuples)[4];
 } cut_cell;
 
-static void cut(const bound_kind *kind, const cell_functions *of, int parts, cut_cell *out)
+static void cut_cell_into_pieces(const bound_kind *kind, const cell_functions *of, int parts, cut_cell *out)
 {
     const int type = kind->nodes.type, r = parts * kind->nodes.order;
     const session_nodes fine = session_complete_nodes(type, r);
@@ -133,10 +133,10 @@ static void cut(const bound_kind *kind, const cell_functions *of, int parts, cut
     assert_true(session_make_pattern(session_lagrange_type(type), &fine, INSITU_ORDER_LEXICOGRAPHIC, &out->pattern));
     for (int i = 0; i < (r + 1) * (r + 1) * (r + 1); i++) {
         const int n[3] = {i % (r + 1), i / (r + 1) % (r + 1), i / (r + 1) / (r + 1)};
-        if (!session_is_node(&fine, n[0], n[1], n[2])) continue;
+        if (!session_has_node(&fine, n[0], n[1], n[2])) continue;
         const int at = session_node_index(&fine, INSITU_ORDER_LEXICOGRAPHIC, n[0], n[1], n[2]);
         for (int a = 0; a < 3; a++) out->places[at][a] = (double)n[a] / r;
-        for (int f = 0; f < 4; f++) out->tuples[at][f] = evaluate(of, f, out->places[at], -1);
+        for (int f = 0; f < 4; f++) out->tuples[at][f] = evaluate_function(of, f, out->places[at], -1);
     }
 }
 
@@ -148,7 +148,7 @@ static void free_cut(cut_cell *of)
 }
 
 /* Finds a random point of a piece, in coordinates along its edges at the first corner. */
-static void place_point(int type, double out[3])
+static void choose_point_in_piece(int type, double out[3])
 {
     const bool is_flat = type == GRID_TRIANGLE || type == GRID_QUAD;
     double sum;
@@ -159,7 +159,7 @@ static void place_point(int type, double out[3])
 }
 
 /* Finds the weights of the corners with which a piece interpolates. */
-static void weigh_corners(int type, const double at[3], double weights[8])
+static void compute_corner_weights(int type, const double at[3], double weights[8])
 {
     const session_shape *shape = session_shape_of(type);
     for (int c = 0; c < 8; c++) {
@@ -181,12 +181,12 @@ typedef struct piece_point {
     double at[3], tuple[4];
 } piece_point;
 
-static piece_point interpolate(const cut_cell *of, int type, const int *corners, const double local[3])
+static piece_point interpolate_in_piece(const cut_cell *of, int type, const int *corners, const double local[3])
 {
     piece_point out = {{0}, {0}};
     const int count = grid_type_vertices(type);
     double weights[8];
-    weigh_corners(type, local, weights);
+    compute_corner_weights(type, local, weights);
     for (int c = 0; c < count; c++) {
         for (int a = 0; a < 3; a++) out.at[a] += weights[c] * of->places[corners[c]][a];
         for (int f = 0; f < 4; f++) out.tuple[f] += weights[c] * of->tuples[corners[c]][f];
@@ -197,7 +197,8 @@ static piece_point interpolate(const cut_cell *of, int type, const int *corners,
 /* ---- bounds of positions ----------------------------------------------------------------------------------------- */
 
 /* Returns the bound of the lattice that gives the smallest one. */
-static session_cell_bound bound_of(const bound_kind *kind, const cell_functions *of, const session_isovalues *isovalues)
+static session_cell_bound compute_smallest_bound(const bound_kind *kind, const cell_functions *of,
+                                                 const session_isovalues *isovalues)
 {
     static double tuples[MOST_NODES][4];
     session_bound bound;
@@ -225,9 +226,10 @@ static double largest_shift(const cell_functions *functions, const cut_cell *of,
         const int count = grid_type_vertices(of->pattern.types[piece]);
         for (int n = 0; n < points; n++) {
             double local[3], square = 0;
-            place_point(of->pattern.types[piece], local);
-            const piece_point point = interpolate(of, of->pattern.types[piece], corners, local);
-            for (int a = 0; a < 3; a++) square += pow(point.tuple[a] - evaluate(functions, a, point.at, -1), 2);
+            choose_point_in_piece(of->pattern.types[piece], local);
+            const piece_point point = interpolate_in_piece(of, of->pattern.types[piece], corners, local);
+            for (int a = 0; a < 3; a++)
+                square += pow(point.tuple[a] - evaluate_function(functions, a, point.at, -1), 2);
             worst = fmax(worst, sqrt(square));
         }
         corners += count;
@@ -240,10 +242,10 @@ static void check_positions(const bound_kind *kind, double fall, double ratios[2
     cell_functions *of = calloc(1, sizeof *of);
     of->order = kind->nodes.order;
     for (int f = 0; f < 3; f++) add_terms(&kind->nodes, f, 1, fall, of);
-    const session_cell_bound bound = bound_of(kind, of, NULL);
+    const session_cell_bound bound = compute_smallest_bound(kind, of, NULL);
     for (int parts = 1; parts <= MOST_PARTS && parts * of->order <= 16; parts++) {
         cut_cell pieces;
-        cut(kind, of, parts, &pieces);
+        cut_cell_into_pieces(kind, of, parts, &pieces);
         const double shift = largest_shift(of, &pieces, 8) * parts * parts;
         if (!(shift <= bound.position_error * (1 + 1e-9)))
             fprintf(stderr, "%s, %d parts: positions are off by %g, and the bound is %g\n", kind->name, parts, shift,
@@ -290,7 +292,7 @@ static void positions_are_within_the_bound(void **state)
 {
     (void)state;
     bound_kind kinds[40];
-    const int count = list_kinds(kinds), cells = test_effort(2, 60);
+    const int count = list_kinds(kinds), cells = test_case_count(2, 60);
     for (int k = 0; k < count; k++)
         for (int smooth = 0; smooth < 2; smooth++) {
             double ratios[2] = {INFINITY, 0};
@@ -308,8 +310,8 @@ static double find_gradient(const cell_functions *of, const double at[3], double
 {
     double m[3][3], slopes[3];
     for (int a = 0; a < 3; a++) {
-        for (int f = 0; f < 3; f++) m[f][a] = evaluate(of, f, at, a);
-        slopes[a] = evaluate(of, 3, at, a);
+        for (int f = 0; f < 3; f++) m[f][a] = evaluate_function(of, f, at, a);
+        slopes[a] = evaluate_function(of, 3, at, a);
     }
     double determinant = 0;
     for (int r = 0; r < 3; r++)
@@ -333,12 +335,12 @@ static double distance_to_surface(const cell_functions *of, const double start[3
     for (int step = 0; step < 60 && fabs(rest) > 1e-13; step++) {
         double inverse[3][3], gradient[3], length = 0;
         find_gradient(of, at, inverse, gradient);
-        rest = evaluate(of, 3, at, -1) - value;
+        rest = evaluate_function(of, 3, at, -1) - value;
         for (int x = 0; x < 3; x++) length += gradient[x] * gradient[x];
         for (int a = 0; a < 3; a++)
             for (int x = 0; x < 3; x++) at[a] -= inverse[a][x] * gradient[x] * rest / length;
     }
-    for (int x = 0; x < 3; x++) square += pow(evaluate(of, x, at, -1) - from[x], 2);
+    for (int x = 0; x < 3; x++) square += pow(evaluate_function(of, x, at, -1) - from[x], 2);
     return fabs(rest) < 1e-12 ? sqrt(square) : INFINITY;
 }
 
@@ -347,13 +349,13 @@ static double distance_to_surface(const cell_functions *of, const double start[3
 static bool find_crossing(const cut_cell *of, int type, const int *corners, double value, piece_point *out)
 {
     double ends[2][3], middle[3];
-    place_point(type, ends[0]);
-    place_point(type, ends[1]);
-    const bool is_above = interpolate(of, type, corners, ends[0]).tuple[3] > value;
-    if (is_above == (interpolate(of, type, corners, ends[1]).tuple[3] > value)) return false;
+    choose_point_in_piece(type, ends[0]);
+    choose_point_in_piece(type, ends[1]);
+    const bool is_above = interpolate_in_piece(of, type, corners, ends[0]).tuple[3] > value;
+    if (is_above == (interpolate_in_piece(of, type, corners, ends[1]).tuple[3] > value)) return false;
     for (int turn = 0; turn < 60; turn++) {
         for (int a = 0; a < 3; a++) middle[a] = 0.5 * (ends[0][a] + ends[1][a]);
-        *out = interpolate(of, type, corners, middle);
+        *out = interpolate_in_piece(of, type, corners, middle);
         memcpy(ends[(out->tuple[3] > value) != is_above], middle, sizeof middle);
     }
     return true;
@@ -386,15 +388,15 @@ typedef struct surface_tally {
 static void check_surface(const bound_kind *kind, const cell_functions *of, surface_tally *tally)
 {
     const double inside[3] = {0.2 + 0.1 * random_number(), 0.3 + 0.2 * random_number(), 0.25 + 0.2 * random_number()};
-    const double value = evaluate(of, 3, inside, -1);
-    const session_cell_bound bound = bound_of(kind, of, &(session_isovalues){1, &value, 0});
+    const double value = evaluate_function(of, 3, inside, -1);
+    const session_cell_bound bound = compute_smallest_bound(kind, of, &(session_isovalues){1, &value, 0});
     assert_true(bound.is_crossed);
     tally->crossed++;
     const bool is_bounded = bound.surface_error < 2 * bound.radius / of->order;
     tally->unbounded += !is_bounded;
     for (int parts = 1; parts <= MOST_PARTS && is_bounded && parts * of->order <= 12; parts++) {
         cut_cell pieces;
-        cut(kind, of, parts, &pieces);
+        cut_cell_into_pieces(kind, of, parts, &pieces);
         const double distance = largest_distance(of, &pieces, value) * parts * parts;
         if (!(distance <= bound.surface_error))
             fprintf(stderr, "%s of order %d, %d parts: the surface is off by %g, and the bound is %g\n", kind->name,
@@ -427,7 +429,7 @@ static void isosurfaces_are_within_the_bound(void **state)
     (void)state;
     static const double curves[] = {0.05, 0.2, 0.6};
     bound_kind kinds[40];
-    const int count = list_kinds(kinds), cells = test_effort(3, 200);
+    const int count = list_kinds(kinds), cells = test_case_count(3, 200);
     cell_functions *of = malloc(sizeof *of);
     for (int k = 0; k < count; k++) {
         if (kinds[k].nodes.type == GRID_TRIANGLE || kinds[k].nodes.type == GRID_QUAD) continue;
@@ -460,10 +462,10 @@ static void crossings_between_nodes_are_found(void **state)
     of->weights[3][0][0][1] = -0.6;
     of->weights[3][0][0][0] = 0.09;
     const double values[] = {0.01, -0.02, 0.5};
-    assert_true(bound_of(&kind, of, &(session_isovalues){1, &values[0], 0}).is_crossed);
-    assert_false(bound_of(&kind, of, &(session_isovalues){1, &values[1], 0}).is_crossed);
-    assert_false(bound_of(&kind, of, &(session_isovalues){1, &values[2], 0}).is_crossed);
-    assert_false(bound_of(&kind, of, &(session_isovalues){0, NULL, 0}).is_crossed);
+    assert_true(compute_smallest_bound(&kind, of, &(session_isovalues){1, &values[0], 0}).is_crossed);
+    assert_false(compute_smallest_bound(&kind, of, &(session_isovalues){1, &values[1], 0}).is_crossed);
+    assert_false(compute_smallest_bound(&kind, of, &(session_isovalues){1, &values[2], 0}).is_crossed);
+    assert_false(compute_smallest_bound(&kind, of, &(session_isovalues){0, NULL, 0}).is_crossed);
     free(of);
 }
 
@@ -478,13 +480,13 @@ static void linear_cells_have_no_error(void **state)
         *of = (cell_functions){.order = kinds[k].nodes.order};
         for (int f = 0; f < 4; f++) add_linear(f, (const double[]){f == 0, f == 1 || f == 3, f == 2}, of);
         const double value = 0.25;
-        const session_cell_bound bound = bound_of(&kinds[k], of, &(session_isovalues){1, &value, 0});
+        const session_cell_bound bound = compute_smallest_bound(&kinds[k], of, &(session_isovalues){1, &value, 0});
         assert_true(bound.is_crossed && bound.surface_error < 1e-11);
     }
     free(of);
 }
 
-static void values_that_are_not_finite_are_not_measured(void **state)
+static void cells_with_infinite_values_have_no_bound(void **state)
 {
     (void)state;
     const bound_kind kind = {"hex", session_complete_nodes(GRID_HEX, 2), INSITU_ORDER_LEXICOGRAPHIC, false};
@@ -492,20 +494,18 @@ static void values_that_are_not_finite_are_not_measured(void **state)
     const double value = 0.25;
     of->order = 2;
     for (int f = 0; f < 4; f++) add_linear(f, (const double[]){f == 0 || f == 3, f == 1, f == 2}, of);
-    assert_true(bound_of(&kind, of, &(session_isovalues){1, &value, 0}).is_crossed);
+    assert_true(compute_smallest_bound(&kind, of, &(session_isovalues){1, &value, 0}).is_crossed);
     of->weights[3][0][0][0] = NAN;
-    assert_false(bound_of(&kind, of, &(session_isovalues){1, &value, 0}).is_crossed);
+    assert_false(compute_smallest_bound(&kind, of, &(session_isovalues){1, &value, 0}).is_crossed);
     free(of);
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(positions_are_within_the_bound),
-        cmocka_unit_test(isosurfaces_are_within_the_bound),
-        cmocka_unit_test(crossings_between_nodes_are_found),
-        cmocka_unit_test(linear_cells_have_no_error),
-        cmocka_unit_test(values_that_are_not_finite_are_not_measured),
+        cmocka_unit_test(positions_are_within_the_bound),           cmocka_unit_test(isosurfaces_are_within_the_bound),
+        cmocka_unit_test(crossings_between_nodes_are_found),        cmocka_unit_test(linear_cells_have_no_error),
+        cmocka_unit_test(cells_with_infinite_values_have_no_bound),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

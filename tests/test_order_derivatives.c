@@ -15,7 +15,7 @@
 
 enum { MOST_POWER = 4 };
 
-static double nothing(const double p[3])
+static double zero_field(const double p[3])
 {
     return p[0];
 }
@@ -23,7 +23,7 @@ static double nothing(const double p[3])
 /* ---- polynomials ------------------------------------------------------------------------------------------------- */
 
 /* The product of powers of x + 0.3, y + 0.4 and z + 0.5, and its gradient. */
-static double monomial(const double at[3], const int powers[3], double gradient[3])
+static double evaluate_monomial(const double at[3], const int powers[3], double gradient[3])
 {
     double value = 1;
     for (int a = 0; a < 3; a++) {
@@ -35,7 +35,7 @@ static double monomial(const double at[3], const int powers[3], double gradient[
 }
 
 /* Which monomials the cell's polynomials contain. */
-static bool is_in_space(const session_nodes *of, const int q[3])
+static bool is_in_polynomial_space(const session_nodes *of, const int q[3])
 {
     const int p = of->order, plane = q[0] + q[1];
     switch (of->type) {
@@ -63,27 +63,27 @@ static double find_error(const session_nodes *of, const session_derivatives *d, 
             double edge[3] = {0}, rise = 0;
             for (int t = d->starts[d->axis_count * n + axis]; t < d->starts[d->axis_count * n + axis + 1]; t++) {
                 for (int a = 0; a < 3; a++) edge[a] += d->weights[t] * places[d->nodes[t]][a];
-                rise += d->weights[t] * monomial(places[d->nodes[t]], powers, unused);
+                rise += d->weights[t] * evaluate_monomial(places[d->nodes[t]], powers, unused);
             }
-            monomial(places[n], powers, gradient);
+            evaluate_monomial(places[n], powers, gradient);
             worst = fmax(worst, fabs(rise - (edge[0] * gradient[0] + edge[1] * gradient[1] + edge[2] * gradient[2])));
         }
     return worst;
 }
 
-static double worst_error(const session_nodes *of, const session_derivatives *d, const double (*places)[3])
+static double find_largest_error(const session_nodes *of, const session_derivatives *d, const double (*places)[3])
 {
     double worst = 0;
     for (int i = 0; i < (MOST_POWER + 1) * (MOST_POWER + 1) * (MOST_POWER + 1); i++) {
         const int powers[3] = {i % (MOST_POWER + 1), i / (MOST_POWER + 1) % (MOST_POWER + 1),
                                i / (MOST_POWER + 1) / (MOST_POWER + 1)};
-        if (is_in_space(of, powers)) worst = fmax(worst, find_error(of, d, places, powers));
+        if (is_in_polynomial_space(of, powers)) worst = fmax(worst, find_error(of, d, places, powers));
     }
     return worst;
 }
 
 /* Returns the volume of the box of a node's derivatives of places, or the area of their parallelogram. */
-static double box_volume(const session_derivatives *d, int node, const double (*places)[3])
+static double compute_box_volume(const session_derivatives *d, int node, const double (*places)[3])
 {
     double e[3][3] = {{0}};
     for (int axis = 0; axis < d->axis_count; axis++)
@@ -95,19 +95,19 @@ static double box_volume(const session_derivatives *d, int node, const double (*
 }
 
 /* volume: that of the box. */
-static void derivatives_are_right(const char *name, const session_nodes *of, const session_derivatives *d,
-                                  const double (*places)[3], double volume)
+static void check_derivatives(const char *name, const session_nodes *of, const session_derivatives *d,
+                              const double (*places)[3], double volume)
 {
-    const double error = worst_error(of, d, places);
+    const double error = find_largest_error(of, d, places);
     if (!(error < ROUNDING)) fprintf(stderr, "%s, order %d: a derivative is off by %g\n", name, of->order, error);
     assert_true(error < ROUNDING);
-    for (int n = 0; n < of->count; n++) assert_true(fabs(box_volume(d, n, places) - volume) < ROUNDING);
+    for (int n = 0; n < of->count; n++) assert_true(fabs(compute_box_volume(d, n, places) - volume) < ROUNDING);
 }
 
 /* ---- cells ------------------------------------------------------------------------------------------------------- */
 
 /* Moves nodes that are equispaced in a cube of [-1, 1]^3 to Gauss-Lobatto points. */
-static void place_lobatto(int p, double *coordinates, int64_t count)
+static void move_nodes_to_lobatto_points(int p, double *coordinates, int64_t count)
 {
     const double of3[4] = {-1, -1 / sqrt(5), 1 / sqrt(5), 1}, of4[5] = {-1, -sqrt(3. / 7), 0, sqrt(3. / 7), 1};
     for (int64_t i = 0; i < 3 * count; i++) {
@@ -123,8 +123,8 @@ static void check_kind(const order_kind *kind, bool is_lobatto)
     session_polynomials polynomials;
     session_mesh of = {0};
     double(*places)[3] = malloc(200 * sizeof *places);
-    order_mesh_create(kind, 1, 0, nothing, 0, 1, &mesh);
-    if (is_lobatto) place_lobatto(kind->order, mesh.coordinates, mesh.vertex_count);
+    order_mesh_create(kind, 1, 0, zero_field, 0, 1, &mesh);
+    if (is_lobatto) move_nodes_to_lobatto_points(kind->order, mesh.coordinates, mesh.vertex_count);
     of.given = mesh.mesh;
     of.cells.vertex_count = mesh.vertex_count;
     assert_true(session_polynomials_create(&of, &polynomials));
@@ -134,7 +134,7 @@ static void check_kind(const order_kind *kind, bool is_lobatto)
         const session_derivatives *d = session_derivatives_of(&polynomials, cell, places[0], 3);
         assert_int_equal(d->axis_count, strstr(kind->name, "pyramid") ? 0 : 3);
         if (d->axis_count)
-            derivatives_are_right(kind->name, &polynomials.rows.kinds[0].nodes, d, (const double(*)[3])places, 8);
+            check_derivatives(kind->name, &polynomials.rows.kinds[0].nodes, d, (const double(*)[3])places, 8);
     }
     session_polynomials_free(&polynomials);
     order_mesh_free(&mesh);
@@ -177,12 +177,12 @@ static void shells_have_their_derivatives(void **state)
             assert_true(session_nodes_of(is_quad ? INSITU_LAGRANGE_QUAD : INSITU_LAGRANGE_TRIANGLE, count, &of));
             assert_true(session_make_derivatives(&of, INSITU_ORDER_LEXICOGRAPHIC, false, 1, &d));
             assert_int_equal(d.axis_count, 2);
-            derivatives_are_right("shell", &of, &d, (const double(*)[3])places, 1);
+            check_derivatives("shell", &of, &d, (const double(*)[3])places, 1);
             session_drop_derivatives(&d);
         }
     assert_true(session_nodes_of(INSITU_QUADRATIC_QUAD, 8, &of));
     assert_true(session_make_derivatives(&of, INSITU_ORDER_VTK, false, 1, &d));
-    derivatives_are_right("quad of 8 nodes", &of, &d, of8, 1);
+    check_derivatives("quad of 8 nodes", &of, &d, of8, 1);
     session_drop_derivatives(&d);
 }
 
@@ -199,7 +199,7 @@ static void finer_lattices_have_derivatives(void **state)
         session_derivatives d;
         for (int n = 0; n < (fine + 1) * (fine + 1) * (fine + 1); n++) {
             const int at[3] = {n % (fine + 1), n / (fine + 1) % (fine + 1), n / (fine + 1) / (fine + 1)};
-            if (!session_is_node(&of, at[0], at[1], at[2])) continue;
+            if (!session_has_node(&of, at[0], at[1], at[2])) continue;
             double *place = places[session_node_index(&of, INSITU_ORDER_LEXICOGRAPHIC, at[0], at[1], at[2])];
             for (int a = 0; a < 3; a++) place[a] = (double)at[a] / fine;
         }
@@ -207,7 +207,7 @@ static void finer_lattices_have_derivatives(void **state)
         session_nodes coarse = session_complete_nodes(type, p);
         const int most = 2 * coarse.count * d.axis_count * of.count;
         coarse.count = of.count; /* derivatives at all nodes of polynomials of the lower order */
-        derivatives_are_right("finer lattice", &coarse, &d, (const double(*)[3])places, 1);
+        check_derivatives("finer lattice", &coarse, &d, (const double(*)[3])places, 1);
         assert_true(d.starts[d.axis_count * of.count] <= most);
         session_drop_derivatives(&d);
         free(places);

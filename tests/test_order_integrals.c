@@ -14,7 +14,7 @@
 #include "session_cell_rules.h"
 #include "test_mesh_order.h"
 
-static double nothing(const double p[3])
+static double zero_field(const double p[3])
 {
     return p[0];
 }
@@ -22,7 +22,7 @@ static double nothing(const double p[3])
 /* ---- rules ------------------------------------------------------------------------------------------------------- */
 
 /* The integral over the unit simplex is a! b! c! / (a + b + c + dimensions)! (Dirichlet). */
-static double integral_of_monomial(int dimensions, const int powers[3])
+static double integrate_monomial(int dimensions, const int powers[3])
 {
     const int all = powers[0] + powers[1] + powers[2] + dimensions;
     return exp(lgamma(powers[0] + 1) + lgamma(powers[1] + 1) + lgamma(powers[2] + 1) - lgamma(all + 1));
@@ -42,7 +42,7 @@ static void check_rule(int dimensions, int per_axis)
             for (int n = 0; n < rule.count; n++)
                 sum += rule.weights[n] * pow(rule.points[n][0], powers[0]) * pow(rule.points[n][1], b) *
                        pow(rule.points[n][2], c);
-            const double expected = integral_of_monomial(dimensions, powers);
+            const double expected = integrate_monomial(dimensions, powers);
             if (!(fabs(sum - expected) <= 4e-15 * (degree + 10) * expected))
                 fail_msg("%d dimensions, %d points: %.17g, expected %.17g", dimensions, per_axis, sum, expected);
         }
@@ -70,7 +70,7 @@ typedef struct polynomials {
     double factors[MOST_TERMS][FUNCTIONS];
 } polynomials;
 
-static bool is_in_space(const session_nodes *of, const int q[3])
+static bool is_in_polynomial_space(const session_nodes *of, const int q[3])
 {
     const int p = of->order, plane = q[0] + q[1];
     if (of->type == GRID_TET) return plane + q[2] <= p;
@@ -93,7 +93,7 @@ static void make_polynomials(const session_nodes *of, double bend, unsigned seed
     out->count = 0;
     for (int n = 0; n < size * size * size; n++) {
         const int q[3] = {n % size, n / size % size, n / size / size}, all = q[0] + q[1] + q[2];
-        if (!is_in_space(of, q)) continue;
+        if (!is_in_polynomial_space(of, q)) continue;
         for (int f = 0; f < FUNCTIONS; f++) {
             const double random = random_number(&seed);
             out->factors[out->count][f] = f < 3 ? bend * random / ((1 + all) * (1 + all)) + (all == 1 && q[f]) : random;
@@ -102,28 +102,28 @@ static void make_polynomials(const session_nodes *of, double bend, unsigned seed
     }
 }
 
-static double whole_power(double x, int power)
+static double integer_power(double x, int power)
 {
     double out = 1;
     for (int n = 0; n < power; n++) out *= x;
     return out;
 }
 
-static double term_value(const int powers[3], const double at[3], int derived)
+static double evaluate_term(const int powers[3], const double at[3], int derived)
 {
     double value = 1;
     for (int a = 0; a < 3; a++)
-        value *= a != derived ? whole_power(at[a], powers[a])
-                 : powers[a]  ? powers[a] * whole_power(at[a], powers[a] - 1)
+        value *= a != derived ? integer_power(at[a], powers[a])
+                 : powers[a]  ? powers[a] * integer_power(at[a], powers[a] - 1)
                               : 0;
     return value;
 }
 
 /* derived: the axis along which the derivative is taken, or -1 */
-static double function_value(const polynomials *of, int function, const double at[3], int derived)
+static double evaluate_function(const polynomials *of, int function, const double at[3], int derived)
 {
     double sum = 0;
-    for (int t = 0; t < of->count; t++) sum += of->factors[t][function] * term_value(of->powers[t], at, derived);
+    for (int t = 0; t < of->count; t++) sum += of->factors[t][function] * evaluate_term(of->powers[t], at, derived);
     return sum;
 }
 
@@ -155,11 +155,11 @@ static integrals integrate_cube(const polynomials *of, int points)
             weight *= line.weights[at[a]];
         }
         for (int a = 0; a < 3; a++)
-            for (int f = 0; f < 3; f++) d[a][f] = function_value(of, f, x, a);
+            for (int f = 0; f < 3; f++) d[a][f] = evaluate_function(of, f, x, a);
         for (int a = 0; a < 3; a++) {
             const int b = (a + 1) % 3, c = (a + 2) % 3;
             const double measure = weight * d[0][a] * (d[1][b] * d[2][c] - d[1][c] * d[2][b]);
-            const double value = function_value(of, 3, x, -1);
+            const double value = evaluate_function(of, 3, x, -1);
             add_points(&out, 1, &measure, &value);
         }
     }
@@ -169,7 +169,7 @@ static integrals integrate_cube(const polynomials *of, int points)
 
 /* Sums of up to 1e5 points and 512 nodes, each rounded by 1e-16, whose rounding errors add up at random; the squares of
  * values are up to some ten times their mean. */
-static bool is_near(double sum, double expected, double size)
+static bool is_nearly_equal(double sum, double expected, double size)
 {
     return fabs(sum - expected) <= 1e-12 * size;
 }
@@ -177,8 +177,8 @@ static bool is_near(double sum, double expected, double size)
 static void check_integrals(const char *name, const integrals *sums, const integrals *expected)
 {
     const double size = expected->volume + expected->second;
-    if (is_near(sums->volume, expected->volume, size) && is_near(sums->first, expected->first, size) &&
-        is_near(sums->second, expected->second, size))
+    if (is_nearly_equal(sums->volume, expected->volume, size) && is_nearly_equal(sums->first, expected->first, size) &&
+        is_nearly_equal(sums->second, expected->second, size))
         return;
     fail_msg("%s: %.16g %.16g %.16g, expected %.16g %.16g %.16g", name, sums->volume, sums->first, sums->second,
              expected->volume, expected->first, expected->second);
@@ -195,7 +195,7 @@ static void check_cells(const char *name, const session_cell_rules *rules, const
     for (int cell = 0; cell < cells; cell++) {
         for (int n = 0; n < nodes; n++)
             for (int f = 0; f < FUNCTIONS; f++)
-                tuples[4 * n + f] = function_value(of, f, places + 3 * (cell * nodes + n), -1);
+                tuples[4 * n + f] = evaluate_function(of, f, places + 3 * (cell * nodes + n), -1);
         session_visit_cell(rules, tuples, work, add_points, &sums);
     }
     const integrals expected = integrate_cube(of, (5 * rules->nodes.of.order + 1) / 2 + 1);
@@ -217,7 +217,7 @@ static void check_kind(const char *name, const session_nodes *nodes, insitu_vert
     session_drop_cell_rules(&rules);
 }
 
-static void cells_have_the_integrals_of_their_polynomials(void **state)
+static void cell_integrals_match_their_polynomials(void **state)
 {
     (void)state;
     for (int k = 0; k < order_kind_count; k++) {
@@ -225,7 +225,7 @@ static void cells_have_the_integrals_of_their_polynomials(void **state)
         order_mesh mesh;
         session_nodes nodes;
         if (strstr(kind->name, "pyramid")) continue;
-        order_mesh_create(kind, 1, 0, nothing, 0, 1, &mesh);
+        order_mesh_create(kind, 1, 0, zero_field, 0, 1, &mesh);
         assert_true(session_nodes_of((int)kind->type, mesh.nodes, &nodes));
         double *places = malloc((size_t)(mesh.cell_count * mesh.nodes) * 3 * sizeof *places);
         for (int64_t i = 0; i < mesh.cell_count * mesh.nodes; i++)
@@ -290,7 +290,7 @@ static void bent_tets_of_order_7_are_exact(void **state)
 /* Checks the volumes of straight tets of order 12, whose functions are computed for each cell because they are too many
  * to be stored. The interpolation between equispaced nodes of order 12 multiplies the rounding errors of the values by
  * about 100. */
-static void high_orders_have_their_volumes(void **state)
+static void volumes_of_high_order_cells_are_exact(void **state)
 {
     (void)state;
     for (int p = 6; p <= 12; p += 3) {
@@ -310,7 +310,7 @@ static void high_orders_have_their_volumes(void **state)
                 }
         session_visit_cell(&rules, tuples, work, add_points, &sums);
         const int once[3] = {p, 0, 0}, twice[3] = {2 * p, 0, 0};
-        const integrals expected = {2 / 6., 2 * integral_of_monomial(3, once), 2 * integral_of_monomial(3, twice)};
+        const integrals expected = {2 / 6., 2 * integrate_monomial(3, once), 2 * integrate_monomial(3, twice)};
         check_integrals("tet", &sums, &expected);
         free(tuples);
         free(work);
@@ -322,10 +322,10 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(rules_are_exact_for_their_degree),
-        cmocka_unit_test(cells_have_the_integrals_of_their_polynomials),
+        cmocka_unit_test(cell_integrals_match_their_polynomials),
         cmocka_unit_test(cells_between_lobatto_points_are_exact),
         cmocka_unit_test(bent_tets_of_order_7_are_exact),
-        cmocka_unit_test(high_orders_have_their_volumes),
+        cmocka_unit_test(volumes_of_high_order_cells_are_exact),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

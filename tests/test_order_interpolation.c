@@ -17,7 +17,7 @@
 
 enum { MOST_POWER = 4, MOST_NODES = 17 * 17 * 17 };
 
-static double nothing(const double p[3])
+static double zero_field(const double p[3])
 {
     return p[0];
 }
@@ -29,7 +29,7 @@ static bool is_pyramid(const order_kind *kind)
 
 /* ---- closed forms ------------------------------------------------------------------------------------------------ */
 
-static double monomial(const double at[3], const int powers[3])
+static double evaluate_monomial(const double at[3], const int powers[3])
 {
     double value = 1;
     for (int a = 0; a < 3; a++) value *= pow(at[a] + 0.3 + 0.1 * a, powers[a]);
@@ -37,7 +37,7 @@ static double monomial(const double at[3], const int powers[3])
 }
 
 /* Which monomials the cell's polynomials contain. */
-static bool is_in_space(const session_nodes *of, const int q[3])
+static bool is_in_polynomial_space(const session_nodes *of, const int q[3])
 {
     const int p = of->order, plane = q[0] + q[1];
     switch (of->type) {
@@ -66,14 +66,14 @@ static void check_monomial(const session_interpolation *of, const double (*place
         memcpy(corners[c], places[of->corners[c]], sizeof corners[c]);
     for (int n = 0; n < of->of.count; n++) {
         memcpy(tuples[n], places[n], sizeof places[n]);
-        tuples[n][3] = monomial(places[n], powers);
+        tuples[n][3] = evaluate_monomial(places[n], powers);
     }
     assert_true(session_interpolation_work_size(of, 4) <= sizeof room / sizeof room[0]);
     session_interpolate(of, (const double(*)[3])corners, 4, tuples[0], room, fine[0]);
     for (int k = 0; k <= p; k++)
         for (int j = 0; j <= p; j++)
             for (int i = 0; i <= p; i++) {
-                if (!session_is_node(&of->fine, i, j, k)) continue;
+                if (!session_has_node(&of->fine, i, j, k)) continue;
                 const double *at = fine[session_node_index(&of->fine, INSITU_ORDER_LEXICOGRAPHIC, i, j, k)];
                 const int steps[3] = {i, j, k};
                 for (int a = 0; a < 3; a++) {
@@ -82,14 +82,14 @@ static void check_monomial(const session_interpolation *of, const double (*place
                         place += (corners[corner_of_axis[is_box][axis]][a] - corners[0][a]) * steps[axis] / p;
                     worst = fmax(worst, fabs(at[a] - place));
                 }
-                worst = fmax(worst, fabs(at[3] - monomial(at, powers)));
+                worst = fmax(worst, fabs(at[3] - evaluate_monomial(at, powers)));
             }
     if (!(worst < ROUNDING)) fprintf(stderr, "%s, to order %d: a value is off by %g\n", name, p, worst);
     assert_true(worst < ROUNDING);
 }
 
 /* Moves nodes that are equispaced in a cube of [-1, 1]^3 to Gauss-Lobatto points of order 4. */
-static void place_lobatto(order_mesh *mesh)
+static void move_nodes_to_lobatto_points(order_mesh *mesh)
 {
     const double of4[5] = {-1, -sqrt(3. / 7), 0, sqrt(3. / 7), 1};
     for (int64_t i = 0; i < 3 * mesh->vertex_count; i++)
@@ -103,8 +103,8 @@ static void check_kind(const order_kind *kind, int parts, bool is_lobatto)
     session_nodes nodes;
     session_interpolation of;
     double(*places)[3] = malloc(200 * sizeof *places);
-    order_mesh_create(kind, 1, 0, nothing, 0, 1, &mesh);
-    if (is_lobatto) place_lobatto(&mesh);
+    order_mesh_create(kind, 1, 0, zero_field, 0, 1, &mesh);
+    if (is_lobatto) move_nodes_to_lobatto_points(&mesh);
     assert_true(session_nodes_of((int)kind->type, mesh.nodes, &nodes));
     if (kind->order == 1) nodes.order = 1;
     assert_true(session_make_interpolation(&nodes, kind->layout, parts, is_lobatto, &of));
@@ -114,7 +114,8 @@ static void check_kind(const order_kind *kind, int parts, bool is_lobatto)
         for (int i = 0; i < (MOST_POWER + 1) * (MOST_POWER + 1) * (MOST_POWER + 1); i++) {
             const int powers[3] = {i % (MOST_POWER + 1), i / (MOST_POWER + 1) % (MOST_POWER + 1),
                                    i / (MOST_POWER + 1) / (MOST_POWER + 1)};
-            if (is_in_space(&nodes, powers)) check_monomial(&of, (const double(*)[3])places, powers, kind->name);
+            if (is_in_polynomial_space(&nodes, powers))
+                check_monomial(&of, (const double(*)[3])places, powers, kind->name);
         }
     }
     session_drop_interpolation(&of);
@@ -133,7 +134,7 @@ static void polynomials_are_reproduced(void **state)
 /* ---- turned cells ------------------------------------------------------------------------------------------------ */
 
 /* Stores the permutation of this number of `count` things. */
-static void permute(int number, int count, int out[4])
+static void make_permutation(int number, int count, int out[4])
 {
     for (int n = 0; n < count; n++) out[n] = n;
     for (int n = 0; n < count; n++) {
@@ -144,23 +145,23 @@ static void permute(int number, int count, int out[4])
     }
 }
 
-static int count_turns(int type)
+static int count_rotations(int type)
 {
     return type == GRID_HEX ? 48 : type == GRID_TET ? 24 : 12;
 }
 
 /* Finds where a node of a lattice of order p is if the cell is described in one of the ways in which it can be. */
-static void turn(int type, int number, int p, const int at[3], int out[3])
+static void rotate_node(int type, int number, int p, const int at[3], int out[3])
 {
     int order[4];
     if (type == GRID_HEX) {
-        permute(number / 8, 3, order);
+        make_permutation(number / 8, 3, order);
         for (int a = 0; a < 3; a++) out[a] = number >> a & 1 ? p - at[order[a]] : at[order[a]];
         return;
     }
     const bool is_tet = type == GRID_TET;
     const int rest = p - at[0] - at[1], b[4] = {at[0], at[1], is_tet ? at[2] : rest, rest - at[2]};
-    permute(is_tet ? number : number / 2, is_tet ? 4 : 3, order);
+    make_permutation(is_tet ? number : number / 2, is_tet ? 4 : 3, order);
     for (int a = 0; a < 3; a++) out[a] = b[order[a]];
     if (!is_tet) out[2] = number % 2 ? p - at[2] : at[2];
 }
@@ -179,15 +180,15 @@ static double random_number(void)
 }
 
 /* Compares the fine nodes of a cell with those of the same cell as it is turned. */
-static void check_turn(const session_interpolation *of, insitu_vertex_order order, int number, const char *name)
+static void check_rotated_cell(const session_interpolation *of, insitu_vertex_order order, int number, const char *name)
 {
     static double tuples[2][200][4], fine[2][MOST_NODES][4], room[3 * 4 * MOST_NODES];
     const int type = of->of.type, p = of->of.order, r = of->fine.order;
     int wrong = 0, turned[3];
     for (int i = 0; i < (p + 1) * (p + 1) * (p + 1); i++) {
         const int at[3] = {i % (p + 1), i / (p + 1) % (p + 1), i / (p + 1) / (p + 1)};
-        if (!session_is_node(&of->of, at[0], at[1], at[2])) continue;
-        turn(type, number, p, at, turned);
+        if (!session_has_node(&of->of, at[0], at[1], at[2])) continue;
+        rotate_node(type, number, p, at, turned);
         const int from = session_node_index(&of->of, order, at[0], at[1], at[2]);
         const int to = session_node_index(&of->of, order, turned[0], turned[1], turned[2]);
         if (from >= of->of.count) continue;
@@ -201,8 +202,8 @@ static void check_turn(const session_interpolation *of, insitu_vertex_order orde
     }
     for (int i = 0; i < (r + 1) * (r + 1) * (r + 1); i++) {
         const int at[3] = {i % (r + 1), i / (r + 1) % (r + 1), i / (r + 1) / (r + 1)};
-        if (!session_is_node(&of->fine, at[0], at[1], at[2])) continue;
-        turn(type, number, r, at, turned);
+        if (!session_has_node(&of->fine, at[0], at[1], at[2])) continue;
+        rotate_node(type, number, r, at, turned);
         const double *a = fine[0][session_node_index(&of->fine, INSITU_ORDER_LEXICOGRAPHIC, at[0], at[1], at[2])];
         const double *b =
             fine[1][session_node_index(&of->fine, INSITU_ORDER_LEXICOGRAPHIC, turned[0], turned[1], turned[2])];
@@ -213,7 +214,7 @@ static void check_turn(const session_interpolation *of, insitu_vertex_order orde
     assert_int_equal(wrong, 0);
 }
 
-static void turned_cells_have_the_same_bits_on_faces(void **state)
+static void rotated_cells_have_the_same_bits_on_faces(void **state)
 {
     (void)state;
     for (int k = 0; k < order_kind_count; k++) {
@@ -225,7 +226,7 @@ static void turned_cells_have_the_same_bits_on_faces(void **state)
         for (int way = 0; way < 4; way++) {
             const bool is_lobatto = way % 2;
             assert_true(session_make_interpolation(&nodes, kind->layout, 2 + way / 2, is_lobatto, &of));
-            for (int n = 0; n < count_turns(nodes.type); n++) check_turn(&of, kind->layout, n, kind->name);
+            for (int n = 0; n < count_rotations(nodes.type); n++) check_rotated_cell(&of, kind->layout, n, kind->name);
             session_drop_interpolation(&of);
         }
     }
@@ -254,7 +255,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(polynomials_are_reproduced),
-        cmocka_unit_test(turned_cells_have_the_same_bits_on_faces),
+        cmocka_unit_test(rotated_cells_have_the_same_bits_on_faces),
         cmocka_unit_test(constants_are_exact),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -34,7 +34,7 @@ namespace
 {
 
 /* Calls use with i, j, k and the place in reference coordinates of every node on the lattice. */
-template <typename Use> void for_nodes(const session_nodes &of, Use use)
+template <typename Use> void for_each_node(const session_nodes &of, Use use)
 {
     const int p = of.order;
     const bool is_flat = of.type == GRID_TRIANGLE || of.type == GRID_QUAD;
@@ -48,7 +48,7 @@ template <typename Use> void for_nodes(const session_nodes &of, Use use)
             }
 }
 
-void expect_place(int type, const session_nodes &of, const double *theirs, int i, int j, int k)
+void expect_node_position(int type, const session_nodes &of, const double *theirs, int i, int j, int k)
 {
     const int place = session_node_index(&of, INSITU_ORDER_VTK, i, j, k), p = of.order;
     double at[3] = {static_cast<double>(i) / p, static_cast<double>(j) / p, static_cast<double>(k) / p};
@@ -78,7 +78,7 @@ vtkSmartPointer<vtkCell> make_cell(int type, int64_t count)
     return cell;
 }
 
-void lagrange_nodes_are_vtks(void **)
+void lagrange_nodes_match_vtk(void **)
 {
     for (int type = INSITU_LAGRANGE_TRIANGLE; type <= INSITU_LAGRANGE_WEDGE; type++)
         for (int p = 1; p <= 6; p++) {
@@ -90,15 +90,15 @@ void lagrange_nodes_are_vtks(void **)
             const double *theirs = cell->GetParametricCoords();
             assert_non_null(theirs);
             std::vector<int> seen(static_cast<size_t>(count));
-            for_nodes(of, [&](int i, int j, int k) {
-                expect_place(type, of, theirs, i, j, k);
+            for_each_node(of, [&](int i, int j, int k) {
+                expect_node_position(type, of, theirs, i, j, k);
                 seen[static_cast<size_t>(session_node_index(&of, INSITU_ORDER_VTK, i, j, k))]++;
             });
             for (const int times : seen) assert_int_equal(times, 1);
         }
 }
 
-void quadratic_nodes_are_vtks(void **)
+void quadratic_nodes_match_vtk(void **)
 {
     for (const int type : {22, 24, 28, 29, 32}) {
         session_nodes of;
@@ -106,7 +106,8 @@ void quadratic_nodes_are_vtks(void **)
         vtkNew<vtkGenericCell> cell;
         cell->SetCellType(type);
         assert_int_equal(cell->GetNumberOfPoints(), of.count);
-        for_nodes(of, [&](int i, int j, int k) { expect_place(type, of, cell->GetParametricCoords(), i, j, k); });
+        for_each_node(
+            of, [&](int i, int j, int k) { expect_node_position(type, of, cell->GetParametricCoords(), i, j, k); });
     }
 }
 
@@ -117,7 +118,7 @@ void old_hexes_have_two_edges_swapped(void **)
         session_nodes of;
         assert_true(session_nodes_of(INSITU_LAGRANGE_HEX, session_node_count(INSITU_LAGRANGE_HEX, p), &of));
         const int r = p - 1, first = 8 + 10 * r;
-        for_nodes(of, [&](int i, int j, int k) {
+        for_each_node(of, [&](int i, int j, int k) {
             const int now = session_node_index(&of, INSITU_ORDER_VTK, i, j, k);
             int old = now;
             if (now >= first && now < first + r) old += r;
@@ -128,7 +129,7 @@ void old_hexes_have_two_edges_swapped(void **)
 }
 
 /* Every node has one place, whatever the order. */
-void places_are_permutations(void **)
+void node_positions_are_permutations(void **)
 {
     const insitu_vertex_order orders[] = {INSITU_ORDER_LEXICOGRAPHIC, INSITU_ORDER_GMSH, INSITU_ORDER_EXODUS};
     for (int type = INSITU_LAGRANGE_TRIANGLE; type <= INSITU_LAGRANGE_PYRAMID; type++)
@@ -138,7 +139,7 @@ void places_are_permutations(void **)
                 assert_true(session_nodes_of(type, session_node_count(type, p), &of));
                 if (session_order_refused(&of, order)) continue;
                 std::vector<int> seen(static_cast<size_t>(of.count));
-                for_nodes(of, [&](int i, int j, int k) {
+                for_each_node(of, [&](int i, int j, int k) {
                     const int place = session_node_index(&of, order, i, j, k);
                     assert_in_range(place, 0, of.count - 1);
                     seen[static_cast<size_t>(place)]++;
@@ -152,10 +153,10 @@ void places_are_permutations(void **)
 int main()
 {
     const CMUnitTest tests[] = {
-        cmocka_unit_test(lagrange_nodes_are_vtks),
-        cmocka_unit_test(quadratic_nodes_are_vtks),
+        cmocka_unit_test(lagrange_nodes_match_vtk),
+        cmocka_unit_test(quadratic_nodes_match_vtk),
         cmocka_unit_test(old_hexes_have_two_edges_swapped),
-        cmocka_unit_test(places_are_permutations),
+        cmocka_unit_test(node_positions_are_permutations),
     };
     return cmocka_run_group_tests(tests, nullptr, nullptr);
 }

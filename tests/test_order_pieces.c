@@ -19,7 +19,7 @@
 
 enum { SIDE = 2, WAYS = 48 };
 
-static double nothing(const double p[3])
+static double zero_field(const double p[3])
 {
     return p[0];
 }
@@ -50,7 +50,7 @@ static int compare_keys(const void *a, const void *b)
     return memcmp(a, b, sizeof(face_key));
 }
 
-static grid grid_of(const order_mesh *mesh, const session_topology *t)
+static grid make_grid(const order_mesh *mesh, const session_topology *t)
 {
     grid g = {.vertex_count = mesh->vertex_count,
               .cell_count = t->cell_count,
@@ -95,7 +95,7 @@ static bool is_on_border(const order_mesh *mesh, const face_key *key)
     return is_on;
 }
 
-static void faces_match(const order_mesh *mesh, const grid *g, const char *name, int way)
+static void check_faces_match(const order_mesh *mesh, const grid *g, const char *name, int way)
 {
     face_key *keys = malloc((size_t)g->cell_count * 6 * sizeof *keys);
     const int64_t count = list_faces(g, keys);
@@ -114,7 +114,7 @@ static void faces_match(const order_mesh *mesh, const grid *g, const char *name,
 }
 
 /* Volumes of pieces with flat faces add up to the cube's but for rounding. */
-static void volumes_add_up(const grid *g, bool is_mirrored)
+static void check_volumes_add_up(const grid *g, bool is_mirrored)
 {
     double sum = 0;
     for (int64_t cell = 0; cell < g->cell_count; cell++) {
@@ -133,14 +133,14 @@ static void cut_and_verify(const order_kind *kind, int way, double bend)
 {
     order_mesh mesh;
     base_error error = {.status = INSITU_OK};
-    order_mesh_create(kind, SIDE, bend, nothing, 0, 1, &mesh);
+    order_mesh_create(kind, SIDE, bend, zero_field, 0, 1, &mesh);
     permute_axes(&mesh, way);
     session_mesh cut = {.name = (char[]){"m"}, .given = mesh.mesh};
     assert_int_equal(session_split_cells(&cut, 1, &error), INSITU_OK);
-    const grid g = grid_of(&mesh, &cut.topology);
+    const grid g = make_grid(&mesh, &cut.topology);
     const bool is_mirrored = (way / 24 + (way & 1) + (way >> 1 & 1) + (way >> 2 & 1)) % 2 == 1;
-    faces_match(&mesh, &g, kind->name, way);
-    if (bend == 0) volumes_add_up(&g, is_mirrored);
+    check_faces_match(&mesh, &g, kind->name, way);
+    if (bend == 0) check_volumes_add_up(&g, is_mirrored);
     for (int64_t i = 1; i < g.cell_count; i++) assert_true(cut.topology.parents[i] - cut.topology.parents[i - 1] <= 1);
     assert_int_equal(cut.topology.parents[g.cell_count - 1], mesh.cell_count - 1);
     session_drop_topology(&cut.topology);

@@ -25,7 +25,7 @@ static int my_rank, rank_count;
 
 /* ---- meshes -------------------------------------------------------------------------------------------------- */
 
-static void *grown(void *block, int64_t count, size_t size, const void *more, int64_t more_count)
+static void *append_array(void *block, int64_t count, size_t size, const void *more, int64_t more_count)
 {
     char *p = realloc(block, (size_t)(count + more_count) * size);
     assert_non_null(p);
@@ -34,7 +34,7 @@ static void *grown(void *block, int64_t count, size_t size, const void *more, in
 }
 
 /* Adds the cells of `more` to the mesh and frees `more`. */
-static void join(test_mesh *mesh, test_mesh *more)
+static void append_mesh(test_mesh *mesh, test_mesh *more)
 {
     for (int64_t cell = 0; cell < more->cell_count; cell++) {
         const int64_t by = more->types[cell] == GRID_POLYHEDRON ? mesh->face_count : mesh->vertex_count;
@@ -43,20 +43,22 @@ static void join(test_mesh *mesh, test_mesh *more)
     if (more->face_count) {
         for (int64_t i = 0; i < more->face_connectivity_count; i++) more->face_connectivity[i] += mesh->vertex_count;
         for (int64_t i = 0; i <= more->face_count; i++) more->face_offsets[i] += mesh->face_connectivity_count;
-        mesh->face_connectivity = grown(mesh->face_connectivity, mesh->face_connectivity_count, 8,
-                                        more->face_connectivity, more->face_connectivity_count);
-        mesh->face_offsets = grown(mesh->face_offsets, mesh->face_count, 8, more->face_offsets, more->face_count + 1);
+        mesh->face_connectivity = append_array(mesh->face_connectivity, mesh->face_connectivity_count, 8,
+                                               more->face_connectivity, more->face_connectivity_count);
+        mesh->face_offsets =
+            append_array(mesh->face_offsets, mesh->face_count, 8, more->face_offsets, more->face_count + 1);
         mesh->face_connectivity_count += more->face_connectivity_count;
         mesh->face_count += more->face_count;
     }
     for (int64_t i = 0; i <= more->cell_count; i++) more->offsets[i] += mesh->connectivity_count;
-    mesh->coordinates = grown(mesh->coordinates, 3 * mesh->vertex_count, 8, more->coordinates, 3 * more->vertex_count);
-    mesh->values = grown(mesh->values, mesh->vertex_count, 8, more->values, more->vertex_count);
+    mesh->coordinates =
+        append_array(mesh->coordinates, 3 * mesh->vertex_count, 8, more->coordinates, 3 * more->vertex_count);
+    mesh->values = append_array(mesh->values, mesh->vertex_count, 8, more->values, more->vertex_count);
     mesh->connectivity =
-        grown(mesh->connectivity, mesh->connectivity_count, 8, more->connectivity, more->connectivity_count);
-    mesh->offsets = grown(mesh->offsets, mesh->cell_count, 8, more->offsets, more->cell_count + 1);
-    mesh->types = grown(mesh->types, mesh->cell_count, 1, more->types, more->cell_count);
-    mesh->ghosts = grown(mesh->ghosts, mesh->cell_count, 1, more->ghosts, more->cell_count);
+        append_array(mesh->connectivity, mesh->connectivity_count, 8, more->connectivity, more->connectivity_count);
+    mesh->offsets = append_array(mesh->offsets, mesh->cell_count, 8, more->offsets, more->cell_count + 1);
+    mesh->types = append_array(mesh->types, mesh->cell_count, 1, more->types, more->cell_count);
+    mesh->ghosts = append_array(mesh->ghosts, mesh->cell_count, 1, more->ghosts, more->cell_count);
     mesh->vertex_count += more->vertex_count;
     mesh->cell_count += more->cell_count;
     mesh->connectivity_count += more->connectivity_count;
@@ -64,20 +66,20 @@ static void join(test_mesh *mesh, test_mesh *more)
 }
 
 /* Makes a lattice, and inside it a smaller one of the next kind with another field. */
-static void interpenetrating(test_mesh_kind kind, test_mesh *out)
+static void make_interpenetrating_lattices(test_mesh_kind kind, test_mesh *out)
 {
     test_mesh inner;
-    test_mesh_lattice(kind, SIDE, 0.2, test_wave, out);
-    test_mesh_lattice((kind + 1) % TEST_KIND_COUNT, 3, 0.2, test_linear, &inner);
+    test_mesh_make_lattice(kind, SIDE, 0.2, test_wave_field, out);
+    test_mesh_make_lattice((kind + 1) % TEST_KIND_COUNT, 3, 0.2, test_linear_field, &inner);
     test_mesh_transform(&inner, 0.6, (const double[]){0.3, 0.25, -0.2});
-    join(out, &inner);
+    append_mesh(out, &inner);
 }
 
 /* Makes a lattice in which every third vertex is displaced: cells are inverted, and overlap neighbours and their
  * neighbours. */
-static void tangled(test_mesh_kind kind, test_mesh *out)
+static void make_tangled_lattice(test_mesh_kind kind, test_mesh *out)
 {
-    test_mesh_lattice(kind, SIDE, 0.2, test_wave, out);
+    test_mesh_make_lattice(kind, SIDE, 0.2, test_wave_field, out);
     for (int64_t v = 0; v < out->vertex_count; v += 3)
         for (int a = 0; a < 3; a++) {
             double *x = &out->coordinates[3 * v + a];
@@ -111,7 +113,7 @@ typedef struct staged {
 /* Whether scenes with surfaces only use normals by differences. */
 static bool is_by_differences;
 
-static void stage(staged *s, const test_mesh *mesh, const drawing *d)
+static void set_up_frame(staged *s, const test_mesh *mesh, const drawing *d)
 {
     fixture_create(&s->f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 2.0 / SIDE, 1,
                    (const double[]){0, 0, 0});
@@ -146,12 +148,12 @@ static void stage(staged *s, const test_mesh *mesh, const drawing *d)
 
 static session_frame frame; /* the last frame that was drawn */
 
-static int64_t draw(const test_mesh *mesh, const drawing *d, MPI_Comm comm, bool is_alone, image *out)
+static int64_t draw_mesh(const test_mesh *mesh, const drawing *d, MPI_Comm comm, bool is_alone, image *out)
 {
     staged s;
     base_error error = {0};
     *out = (image){WIDTH, HEIGHT, malloc(4 * PIXELS * sizeof(float)), malloc(PIXELS * sizeof(float)), NULL, false};
-    stage(&s, mesh, d);
+    set_up_frame(&s, mesh, d);
     s.f.job.is_alone = is_alone;
     int ranks = 1;
     MPI_Comm_size(comm, &ranks);
@@ -171,13 +173,13 @@ static void free_image(image *picture)
 }
 
 /* Draws as the session does: every rank draws its share. */
-static int64_t draw_shares(const test_mesh *mesh, test_partition_kind partition, const drawing *d, image *out)
+static int64_t draw_distributed(const test_mesh *mesh, test_partition_kind partition, const drawing *d, image *out)
 {
     test_mesh share;
     int *owners = malloc((size_t)mesh->cell_count * sizeof *owners);
-    test_partition(mesh, partition, SIDE, rank_count, owners);
-    test_mesh_part(mesh, owners, my_rank, &share);
-    const int64_t overlaps = draw(&share, d, MPI_COMM_WORLD, rank_count == 1, out);
+    test_partition_cells(mesh, partition, SIDE, rank_count, owners);
+    test_mesh_extract_part(mesh, owners, my_rank, &share);
+    const int64_t overlaps = draw_mesh(&share, d, MPI_COMM_WORLD, rank_count == 1, out);
     test_mesh_free(&share);
     free(owners);
     return overlaps;
@@ -205,7 +207,7 @@ static bool same_images(const image *whole, const image *other, const drawing *d
         depths += memcmp(whole->depth + p, other->depth + p, sizeof(float)) != 0;
         for (int c = 0; c < 4; c++) {
             const double off = fabs((double)whole->rgba[4 * p + c] - (double)other->rgba[4 * p + c]);
-            colour = test_worse(colour, off);
+            colour = test_larger_error(colour, off);
         }
     }
     if (depths || !(colour <= bound))
@@ -228,9 +230,9 @@ static bool is_doubtful(const reference_ray *ray)
 static bool is_as_counted(const test_mesh *mesh, const drawing *d, const image *drawn, const char *what)
 {
     staged s;
-    stage(&s, mesh, d);
+    set_up_frame(&s, mesh, d);
     reference_scene *scene = reference_create(&s.f.job);
-    const int every = test_effort(5, 1);
+    const int every = test_case_count(5, 1);
     int doubtful = 0, wrong = 0;
     double worst = 0;
     for (int p = 0; p < PIXELS; p += every) {
@@ -243,7 +245,7 @@ static bool is_as_counted(const test_mesh *mesh, const drawing *d, const image *
             continue;
         }
         wrong += !(off <= fixture_usual_bounds.colour);
-        worst = test_worse(worst, off);
+        worst = test_larger_error(worst, off);
     }
     reference_free(scene);
     fixture_free(&s.f);
@@ -258,10 +260,10 @@ static bool is_as_counted(const test_mesh *mesh, const drawing *d, const image *
 static bool is_as_integrated(const test_mesh *mesh, const drawing *d, const image *drawn, const char *what)
 {
     staged s;
-    stage(&s, mesh, d);
+    set_up_frame(&s, mesh, d);
     reference_scene *surfaces = reference_create(&s.f.job);
     reference_integral *scene = reference_integral_create(&s.f.job, d->max_error / 1000);
-    const int every = test_effort(151, 17);
+    const int every = test_case_count(151, 17);
     int doubtful = 0, count = 0;
     double worst = 0;
     for (int p = 0; p < PIXELS; p += every, count++) {
@@ -274,7 +276,7 @@ static bool is_as_integrated(const test_mesh *mesh, const drawing *d, const imag
             continue;
         }
         reference_integral_trace(scene, p % WIDTH, p / WIDTH, fixture_background, ray.hits, ray.hit_count, rgba);
-        for (int c = 0; c < 4; c++) worst = test_worse(worst, fabs((double)drawn->rgba[4 * p + c] - rgba[c]));
+        for (int c = 0; c < 4; c++) worst = test_larger_error(worst, fabs((double)drawn->rgba[4 * p + c] - rgba[c]));
     }
     reference_integral_free(scene);
     reference_free(surfaces);
@@ -291,19 +293,19 @@ enum { FEWEST = 30 };
 
 /* Returns whether a case is drawn. By default every fourth case is drawn on one rank, and every sixth one, different
  * cases, on 2, 3 and 7 ranks. */
-static bool is_due(int kind, int scene)
+static bool is_case_selected(int kind, int scene)
 {
-    return test_is_whole() || (kind + scene + rank_count) % (rank_count == 1 ? 4 : 6) == 0;
+    return test_is_long_run() || (kind + scene + rank_count) % (rank_count == 1 ? 4 : 6) == 0;
 }
 
-static void compare(const test_mesh *mesh, const drawing *d, bool with_reference, const char *what)
+static void compare_partitions(const test_mesh *mesh, const drawing *d, bool with_reference, const char *what)
 {
     image ours, whole;
     bool good = true;
-    const int64_t overlaps = draw_shares(mesh, TEST_RANDOM, d, &ours);
+    const int64_t overlaps = draw_distributed(mesh, TEST_RANDOM, d, &ours);
     if (my_rank == 0) {
         int64_t alone = overlaps;
-        if (rank_count > 1) alone = draw(mesh, d, MPI_COMM_SELF, true, &whole);
+        if (rank_count > 1) alone = draw_mesh(mesh, d, MPI_COMM_SELF, true, &whole);
         if (overlaps < FEWEST || alone < FEWEST)
             fprintf(stderr, "%s, scene %d: %d pixels overlap, %d alone\n", what, (int)d->scene, (int)overlaps,
                     (int)alone);
@@ -311,7 +313,7 @@ static void compare(const test_mesh *mesh, const drawing *d, bool with_reference
         const bool is_found = (overlaps >= FEWEST && alone >= FEWEST) || (d->max_error > 0 && d->scene == TWO_VOLUMES);
         good = is_found && (rank_count == 1 || same_images(&whole, &ours, d, what));
         /* The reference is slow, and one comparison suffices, since the picture is the same on any number of ranks. */
-        if (with_reference && (rank_count == 1 || test_is_whole()))
+        if (with_reference && (rank_count == 1 || test_is_long_run()))
             good = (d->max_error > 0 ? is_as_integrated : is_as_counted)(mesh, d, &ours, what) && good;
         if (rank_count > 1) free_image(&whole);
     }
@@ -319,61 +321,63 @@ static void compare(const test_mesh *mesh, const drawing *d, bool with_reference
     assert_everywhere(good);
 }
 
-static void lattices_in_one_another_are_as_counted(void **state)
+static void nested_lattices_have_the_counted_overlaps(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         test_mesh mesh;
-        interpenetrating(kind, &mesh);
+        make_interpenetrating_lattices(kind, &mesh);
         for (scene_kind scene = 0; scene < SCENE_COUNT; scene++) {
             const drawing d = {scene, scene % 2 ? CAMERA_ORTHOGRAPHIC : CAMERA_OUTSIDE, 0, MANY, 0, false};
-            if (rank_count == 1 || is_due((int)kind, (int)scene)) compare(&mesh, &d, true, test_mesh_kind_name(kind));
+            if (rank_count == 1 || is_case_selected((int)kind, (int)scene))
+                compare_partitions(&mesh, &d, true, test_mesh_kind_name(kind));
         }
         test_mesh_free(&mesh);
     }
 }
 
-static void segments_in_one_another_are_as_integrated(void **state)
+static void segments_of_nested_lattices_match_integration(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         test_mesh mesh;
-        interpenetrating(kind, &mesh);
+        make_interpenetrating_lattices(kind, &mesh);
         for (scene_kind scene = 0; scene < SCENE_COUNT; scene++) {
             const drawing d = {scene, scene % 2 ? CAMERA_ORTHOGRAPHIC : CAMERA_OUTSIDE, 0,
                                MANY,  pow(10, -2 - ((int)kind + (int)scene) % 3),       false};
-            if (is_due((int)kind, (int)scene)) compare(&mesh, &d, true, test_mesh_kind_name(kind));
+            if (is_case_selected((int)kind, (int)scene)) compare_partitions(&mesh, &d, true, test_mesh_kind_name(kind));
         }
         test_mesh_free(&mesh);
     }
 }
 
 /* Checks two fields in the cells of one mesh. */
-static void segments_of_two_volumes_are_as_integrated(void **state)
+static void segments_of_two_volumes_match_integration(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         test_mesh mesh;
-        test_mesh_lattice(kind, SIDE, 0.2, test_wave, &mesh);
+        test_mesh_make_lattice(kind, SIDE, 0.2, test_wave_field, &mesh);
         const drawing d = {TWO_VOLUMES, CAMERA_INSIDE, 0, MANY / 40, pow(10, -2 - (int)kind % 3), false};
-        if (is_due((int)kind, 0)) compare(&mesh, &d, true, test_mesh_kind_name(kind));
+        if (is_case_selected((int)kind, 0)) compare_partitions(&mesh, &d, true, test_mesh_kind_name(kind));
         const drawing stepped = {TWO_VOLUMES, CAMERA_INSIDE, 0, MANY / 40, pow(10, -2 - (int)kind % 3), true};
-        if (is_due((int)kind, 1)) compare(&mesh, &stepped, true, test_mesh_kind_name(kind));
+        if (is_case_selected((int)kind, 1)) compare_partitions(&mesh, &stepped, true, test_mesh_kind_name(kind));
         test_mesh_free(&mesh);
     }
 }
 
 /* Checks displaced lattices. Inverted hexes have no inverse map that both sides of a face would find: only tets are
  * compared with the reference. */
-static void tangled_lattices_are_the_same_everywhere(void **state)
+static void tangled_lattices_are_same_on_any_ranks(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         test_mesh mesh;
-        tangled(kind, &mesh);
+        make_tangled_lattice(kind, &mesh);
         for (scene_kind scene = 0; scene < SCENE_COUNT; scene++) {
             const drawing d = {scene, scene == VOLUME ? CAMERA_INSIDE : CAMERA_OUTSIDE, 3, MANY, 0, false};
-            if (is_due((int)kind, (int)scene)) compare(&mesh, &d, kind == TEST_TETS, test_mesh_kind_name(kind));
+            if (is_case_selected((int)kind, (int)scene))
+                compare_partitions(&mesh, &d, kind == TEST_TETS, test_mesh_kind_name(kind));
         }
         test_mesh_free(&mesh);
     }
@@ -381,7 +385,7 @@ static void tangled_lattices_are_the_same_everywhere(void **state)
 
 /* Returns whether the last frame took no more turns than fragment_limit requires: the number of pixels of a turn grows
  * at most eightfold, and a turn may make half of the fragments that the previous turn predicted. */
-static bool are_passes_few(int64_t fragment_limit)
+static bool is_pass_count_minimal(int64_t fragment_limit)
 {
     int64_t most = 0;
     MPI_Allreduce(&frame.fragments, &most, 1, MPI_INT64_T, MPI_MAX, MPI_COMM_WORLD);
@@ -392,11 +396,11 @@ static bool are_passes_few(int64_t fragment_limit)
 static void draw_in_passes(const test_mesh *mesh, drawing d, int64_t fragment_limit)
 {
     image at_once, in_turns;
-    draw_shares(mesh, TEST_RANDOM, &d, &at_once);
+    draw_distributed(mesh, TEST_RANDOM, &d, &at_once);
     assert_everywhere(frame.turns == 1);
     d.fragment_limit = fragment_limit;
-    draw_shares(mesh, TEST_RANDOM, &d, &in_turns);
-    const bool is_few = are_passes_few(d.fragment_limit);
+    draw_distributed(mesh, TEST_RANDOM, &d, &in_turns);
+    const bool is_few = is_pass_count_minimal(d.fragment_limit);
     const bool is_same = my_rank != 0 || (!memcmp(at_once.rgba, in_turns.rgba, 4 * PIXELS * sizeof(float)) &&
                                           !memcmp(at_once.depth, in_turns.depth, PIXELS * sizeof(float)));
     free_image(&at_once);
@@ -406,11 +410,11 @@ static void draw_in_passes(const test_mesh *mesh, drawing d, int64_t fragment_li
 
 /* Checks pictures drawn in turns. Rays of samples make as many fragments as estimated before the first turn, those of
  * segments far fewer. */
-static void passes_make_the_same_bits(void **state)
+static void number_of_passes_changes_no_bit(void **state)
 {
     (void)state;
     test_mesh mesh;
-    interpenetrating(TEST_MIXED, &mesh);
+    make_interpenetrating_lattices(TEST_MIXED, &mesh);
     draw_in_passes(&mesh, (drawing){TRANSPARENT_VOLUME, CAMERA_OUTSIDE, 0, MANY, 0, false}, 1000);
     draw_in_passes(&mesh, (drawing){TWO_VOLUMES, CAMERA_OUTSIDE, 0, MANY, 0.01, false}, 3000);
     test_mesh_free(&mesh);
@@ -427,9 +431,9 @@ static void differences_among_overlapping_cells_are_the_same_bits(void **state)
         const drawing d = {i % 2 ? TRANSPARENT_VOLUME : OPAQUE_VOLUME, CAMERA_OUTSIDE, 0, MANY, 0, false};
         test_mesh mesh;
         image ours, alone = {0};
-        interpenetrating(kinds[i / 2], &mesh);
-        draw_shares(&mesh, TEST_RANDOM, &d, &ours);
-        if (my_rank == 0) draw(&mesh, &d, MPI_COMM_SELF, true, &alone);
+        make_interpenetrating_lattices(kinds[i / 2], &mesh);
+        draw_distributed(&mesh, TEST_RANDOM, &d, &ours);
+        if (my_rank == 0) draw_mesh(&mesh, &d, MPI_COMM_SELF, true, &alone);
         const bool is_same = my_rank != 0 || (!memcmp(alone.rgba, ours.rgba, 4 * PIXELS * sizeof(float)) &&
                                               !memcmp(alone.depth, ours.depth, PIXELS * sizeof(float)));
         free_image(&ours);
@@ -442,7 +446,7 @@ static void differences_among_overlapping_cells_are_the_same_bits(void **state)
 
 /* ---- meshes without overlaps --------------------------------------------------------------------------------- */
 
-static void nothing_overlaps(const test_mesh *mesh, test_partition_kind partition, double max_error, const char *what)
+static void check_no_overlap(const test_mesh *mesh, test_partition_kind partition, double max_error, const char *what)
 {
     for (scene_kind scene = 0; scene < SCENE_COUNT; scene++)
         for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++) {
@@ -453,8 +457,8 @@ static void nothing_overlaps(const test_mesh *mesh, test_partition_kind partitio
              * in all pixels. */
             if (scene != VOLUME && max_error > 0) continue;
             /* The usual run draws each scene from every other camera. */
-            if (!test_is_whole() && max_error == 0 && ((int)scene + (int)camera + rank_count) % 2) continue;
-            const int64_t overlaps = draw_shares(mesh, partition, &d, &drawn);
+            if (!test_is_long_run() && max_error == 0 && ((int)scene + (int)camera + rank_count) % 2) continue;
+            const int64_t overlaps = draw_distributed(mesh, partition, &d, &drawn);
             free_image(&drawn);
             if (overlaps)
                 fprintf(stderr, "%s, scene %d, %s: %d pixels overlap\n", what, (int)scene, fixture_camera_name(camera),
@@ -469,10 +473,10 @@ static void conforming_meshes_have_no_overlap(void **state)
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
         for (test_partition_kind partition = TEST_RANDOM; partition < TEST_PARTITION_COUNT; partition++) {
             test_mesh mesh;
-            if (!is_due((int)kind, (int)partition)) continue;
-            test_mesh_lattice(kind, SIDE, partition == TEST_RANDOM ? 0 : 0.2, test_wave, &mesh);
-            nothing_overlaps(&mesh, partition, 0, test_mesh_kind_name(kind));
-            nothing_overlaps(&mesh, partition, 0.1, test_mesh_kind_name(kind));
+            if (!is_case_selected((int)kind, (int)partition)) continue;
+            test_mesh_make_lattice(kind, SIDE, partition == TEST_RANDOM ? 0 : 0.2, test_wave_field, &mesh);
+            check_no_overlap(&mesh, partition, 0, test_mesh_kind_name(kind));
+            check_no_overlap(&mesh, partition, 0.1, test_mesh_kind_name(kind));
             test_mesh_free(&mesh);
         }
 }
@@ -483,10 +487,10 @@ static void a_cell_does_not_overlap_itself(void **state)
     (void)state;
     for (test_cell_shape shape = 0; shape < TEST_SHAPE_COUNT; shape++) {
         test_mesh mesh;
-        if (!is_due((int)shape, 0)) continue;
-        test_mesh_single(shape, test_linear, &mesh);
-        nothing_overlaps(&mesh, TEST_RANDOM, 0, test_cell_shape_name(shape));
-        nothing_overlaps(&mesh, TEST_RANDOM, 0.1, test_cell_shape_name(shape));
+        if (!is_case_selected((int)shape, 0)) continue;
+        test_mesh_make_single_cell(shape, test_linear_field, &mesh);
+        check_no_overlap(&mesh, TEST_RANDOM, 0, test_cell_shape_name(shape));
+        check_no_overlap(&mesh, TEST_RANDOM, 0.1, test_cell_shape_name(shape));
         test_mesh_free(&mesh);
     }
 }
@@ -494,11 +498,11 @@ static void a_cell_does_not_overlap_itself(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(lattices_in_one_another_are_as_counted),
-        cmocka_unit_test(segments_in_one_another_are_as_integrated),
-        cmocka_unit_test(segments_of_two_volumes_are_as_integrated),
-        cmocka_unit_test(tangled_lattices_are_the_same_everywhere),
-        cmocka_unit_test(passes_make_the_same_bits),
+        cmocka_unit_test(nested_lattices_have_the_counted_overlaps),
+        cmocka_unit_test(segments_of_nested_lattices_match_integration),
+        cmocka_unit_test(segments_of_two_volumes_match_integration),
+        cmocka_unit_test(tangled_lattices_are_same_on_any_ranks),
+        cmocka_unit_test(number_of_passes_changes_no_bit),
         cmocka_unit_test(differences_among_overlapping_cells_are_the_same_bits),
         cmocka_unit_test(conforming_meshes_have_no_overlap),
         cmocka_unit_test(a_cell_does_not_overlap_itself),

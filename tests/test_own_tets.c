@@ -45,7 +45,7 @@ static bool is_star_shaped(const reference_polyhedron *p)
     return true;
 }
 
-int64_t test_own_tets(test_mesh *mesh, test_mesh *out)
+int64_t test_mesh_split_polyhedra(test_mesh *mesh, test_mesh *out)
 {
     static reference_cell cell;
     int64_t vertices[REFERENCE_MAX_VERTICES], entries = 0, ghosts = 0;
@@ -69,8 +69,8 @@ int64_t test_own_tets(test_mesh *mesh, test_mesh *out)
     return ghosts;
 }
 
-static void draw(const test_mesh *mesh, double cell_size, const double *value, int width, int height, render_fixture *f,
-                 drawn_frame *out)
+static void draw_surface(const test_mesh *mesh, double cell_size, const double *value, int width, int height,
+                         render_fixture *f, drawn_frame *out)
 {
     fixture_create(f, mesh, 1, doubles, cell_size, 1, (const double[]){0, 0, 0});
     fixture_set_camera(f, CAMERA_OUTSIDE, width, height);
@@ -101,22 +101,22 @@ static void compare_pixel(const reference_scene *scene, int x, int y, double own
         t->added++;
 }
 
-own_tets_tally own_tets_compare(test_mesh *polyhedra, double cell_size, double value, int width, int height)
+own_tets_tally compare_with_split_tets(test_mesh *polyhedra, double cell_size, double value, int width, int height)
 {
     own_tets_tally t = {.pixels = 0};
     render_fixture whole, parts;
     drawn_frame own, other;
     test_mesh tets;
-    t.ghosts = test_own_tets(polyhedra, &tets);
-    draw(polyhedra, cell_size, &value, width, height, &whole, &own);
-    draw(&tets, cell_size, &value, width, height, &parts, &other);
+    t.ghosts = test_mesh_split_polyhedra(polyhedra, &tets);
+    draw_surface(polyhedra, cell_size, &value, width, height, &whole, &own);
+    draw_surface(&tets, cell_size, &value, width, height, &parts, &other);
     reference_scene *scene = reference_create(&parts.job);
     for (int64_t i = 0; i < (int64_t)width * height; i++)
-        compare_pixel(scene, (int)(i % width), (int)(i / width), fixture_depth(&whole, own.picture.depth[i]),
-                      fixture_depth(&parts, other.picture.depth[i]), 1e-3 * cell_size, &t);
+        compare_pixel(scene, (int)(i % width), (int)(i / width), fixture_scene_depth(&whole, own.picture.depth[i]),
+                      fixture_scene_depth(&parts, other.picture.depth[i]), 1e-3 * cell_size, &t);
     reference_free(scene);
-    drawn_free(&own);
-    drawn_free(&other);
+    drawn_frame_free(&own);
+    drawn_frame_free(&other);
     fixture_free(&whole);
     fixture_free(&parts);
     test_mesh_free(&tets);

@@ -7,7 +7,7 @@
 /* Makes the tets on the canonical triangles of a mesh's polyhedra, with the cells' centres as new vertices. The tets of
  * a cell that is not star-shaped overlap: such a cell becomes a ghost without tets. Returns the number of these
  * cells. */
-int64_t test_own_tets(test_mesh *mesh, test_mesh *out);
+int64_t test_mesh_split_polyhedra(test_mesh *mesh, test_mesh *out);
 
 typedef struct own_tets_tally {
     int64_t pixels;  /* pixels that show the tets' surface */
@@ -19,6 +19,6 @@ typedef struct own_tets_tally {
 
 /* Draws both meshes, which fill [-1, 1]^3, by robust roots at the isovalue, and compares each pixel; cell_size is that
  * of fixture_create(). */
-own_tets_tally own_tets_compare(test_mesh *polyhedra, double cell_size, double value, int width, int height);
+own_tets_tally compare_with_split_tets(test_mesh *polyhedra, double cell_size, double value, int width, int height);
 
 #endif

@@ -18,7 +18,7 @@ static void find_sides(const test_mesh *part, int64_t *first, int64_t *second)
         }
 }
 
-static void take_face(owned *o, const test_mesh *part, int64_t face, int64_t at, int64_t first, int64_t second)
+static void append_face(owned *o, const test_mesh *part, int64_t face, int64_t at, int64_t first, int64_t second)
 {
     const int64_t *vertices = part->face_connectivity + part->face_offsets[face];
     const int64_t count = part->face_offsets[face + 1] - part->face_offsets[face];
@@ -76,10 +76,10 @@ owned make_owned(const test_mesh *part, int32_t base)
     int64_t *first = test_allocate(faces, sizeof *first), *second = test_allocate(faces, sizeof *second), at = 0;
     find_sides(part, first, second);
     for (int64_t face = 0; face < faces; face++)
-        if (second[face] >= 0) take_face(&o, part, face, at++, first[face], second[face]);
+        if (second[face] >= 0) append_face(&o, part, face, at++, first[face], second[face]);
     o.inner = at;
     for (int64_t face = 0; face < faces; face++)
-        if (second[face] < 0) take_face(&o, part, face, at++, first[face], second[face]);
+        if (second[face] < 0) append_face(&o, part, face, at++, first[face], second[face]);
     o.middle = o.inner + (faces - o.inner) / 3;
     make_narrow(&o, faces, base);
     make_apart(&o, part->cell_count, base);

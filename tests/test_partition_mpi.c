@@ -46,7 +46,7 @@ enum { WIDTH = 67, HEIGHT = 51, PIXELS = WIDTH * HEIGHT, SIDE = 4 };
 static int my_rank, rank_count;
 static double worst[SCENE_COUNT]; /* on rank 0 only */
 
-static void draw(const test_mesh *mesh, const scene *scene, MPI_Comm comm, bool is_alone, image *out)
+static void draw_mesh(const test_mesh *mesh, const scene *scene, MPI_Comm comm, bool is_alone, image *out)
 {
     static const double values[2] = {-0.2, 0.3};
     render_fixture f;
@@ -90,11 +90,11 @@ static bool same_images(const image *whole, const image *other, const scene *sce
         depths += memcmp(whole->depth + p, other->depth + p, sizeof(float)) != 0;
         for (int c = 0; c < 4; c++) {
             const double off = fabs((double)whole->rgba[4 * p + c] - (double)other->rgba[4 * p + c]);
-            colour = test_worse(colour, off);
+            colour = test_larger_error(colour, off);
         }
     }
     const double bound = scene->has_volume ? 1e-6 : 0;
-    worst[scene - scenes] = test_worse(worst[scene - scenes], colour);
+    worst[scene - scenes] = test_larger_error(worst[scene - scenes], colour);
     if (depths || !(colour <= bound))
         fprintf(stderr, "%s, %d ranks, %s: %d depths differ, colour by %g\n", what, rank_count, scene->name, depths,
                 colour);
@@ -105,20 +105,21 @@ static bool same_images(const image *whole, const image *other, const scene *sce
 static void extract_rank_cells(const test_mesh *mesh, const int *owners, bool ghosts, test_mesh *out)
 {
     int *all = calloc((size_t)mesh->cell_count, sizeof *all);
-    test_mesh_part(mesh, ghosts ? all : owners, ghosts ? 0 : my_rank, out);
+    test_mesh_extract_part(mesh, ghosts ? all : owners, ghosts ? 0 : my_rank, out);
     for (int64_t i = 0; ghosts && i < mesh->cell_count; i++) out->ghosts[i] = owners[i] != my_rank;
     free(all);
 }
 
-static void compare(const test_mesh *mesh, const int *owners, bool ghosts, const scene *scene, const char *what)
+static void compare_with_whole(const test_mesh *mesh, const int *owners, bool ghosts, const scene *scene,
+                               const char *what)
 {
     test_mesh part;
     image whole = {0}, ours = {0};
     int good = 1;
     extract_rank_cells(mesh, owners, ghosts, &part);
-    draw(&part, scene, MPI_COMM_WORLD, rank_count == 1, &ours);
+    draw_mesh(&part, scene, MPI_COMM_WORLD, rank_count == 1, &ours);
     if (my_rank == 0) {
-        draw(mesh, scene, MPI_COMM_SELF, true, &whole);
+        draw_mesh(mesh, scene, MPI_COMM_SELF, true, &whole);
         good = same_images(&whole, &ours, scene, what);
         free_image(&whole);
     }
@@ -130,59 +131,60 @@ static void compare(const test_mesh *mesh, const int *owners, bool ghosts, const
 
 /* Returns whether a case is drawn. By default each scene of each kind is drawn on one rank, and in each partition on
  * one of 2, 3, 4 and 7 ranks. */
-static bool is_due(test_partition_kind partition, test_mesh_kind kind, int scene)
+static bool is_case_selected(test_partition_kind partition, test_mesh_kind kind, int scene)
 {
     if (rank_count == 1) return partition == TEST_RANDOM;
-    return test_is_whole() || ((int)partition + (int)kind + scene + (rank_count == 7 ? 1 : rank_count)) % 4 == 0;
+    return test_is_long_run() || ((int)partition + (int)kind + scene + (rank_count == 7 ? 1 : rank_count)) % 4 == 0;
 }
 
 static void compare_partition(test_partition_kind partition)
 {
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         test_mesh mesh;
-        test_mesh_lattice(kind, SIDE, 0.2, test_wave, &mesh);
+        test_mesh_make_lattice(kind, SIDE, 0.2, test_wave_field, &mesh);
         int *owners = malloc((size_t)mesh.cell_count * sizeof *owners);
-        test_partition(&mesh, partition, SIDE, rank_count, owners);
+        test_partition_cells(&mesh, partition, SIDE, rank_count, owners);
         for (int i = 0; i < SCENE_COUNT; i++)
-            if (is_due(partition, kind, i))
-                compare(&mesh, owners, false, &scenes[i], test_partition_kind_name(partition));
+            if (is_case_selected(partition, kind, i))
+                compare_with_whole(&mesh, owners, false, &scenes[i], test_partition_kind_name(partition));
         free(owners);
         test_mesh_free(&mesh);
     }
 }
 
-static void blocks_make_the_whole_image(void **state)
+static void block_partition_draws_the_whole_image(void **state)
 {
     (void)state;
     compare_partition(TEST_BLOCK);
 }
 
-static void random_cells_make_the_whole_image(void **state)
+static void random_partition_draws_the_whole_image(void **state)
 {
     (void)state;
     compare_partition(TEST_RANDOM);
 }
 
-static void checkerboards_make_the_whole_image(void **state)
+static void checkerboard_partition_draws_the_whole_image(void **state)
 {
     (void)state;
     compare_partition(TEST_CHECKERBOARD);
 }
 
 /* Checks ranks without cells: the last rank has all cells, or there are fewer cells than ranks. */
-static void empty_ranks_take_part(void **state)
+static void ranks_without_cells_participate(void **state)
 {
     (void)state;
     test_mesh mesh;
-    test_mesh_lattice(TEST_MIXED, SIDE, 0.2, test_wave, &mesh);
+    test_mesh_make_lattice(TEST_MIXED, SIDE, 0.2, test_wave_field, &mesh);
     int *owners = malloc((size_t)mesh.cell_count * sizeof *owners);
     for (int64_t i = 0; i < mesh.cell_count; i++) owners[i] = rank_count - 1;
-    for (int i = 0; i < SCENE_COUNT; i++) compare(&mesh, owners, false, &scenes[i], "all with the last");
+    for (int i = 0; i < SCENE_COUNT; i++) compare_with_whole(&mesh, owners, false, &scenes[i], "all with the last");
     free(owners);
     test_mesh_free(&mesh);
-    test_mesh_single(TEST_UNIT_HEX, test_linear, &mesh);
+    test_mesh_make_single_cell(TEST_UNIT_HEX, test_linear_field, &mesh);
     const int nobody_else[1] = {0};
-    for (int i = 0; i < SCENE_COUNT; i++) compare(&mesh, nobody_else, false, &scenes[i], "fewer cells than ranks");
+    for (int i = 0; i < SCENE_COUNT; i++)
+        compare_with_whole(&mesh, nobody_else, false, &scenes[i], "fewer cells than ranks");
     test_mesh_free(&mesh);
 }
 
@@ -190,10 +192,10 @@ static void ghosts_of_other_ranks_change_nothing(void **state)
 {
     (void)state;
     test_mesh mesh;
-    test_mesh_lattice(TEST_MIXED, SIDE, 0.2, test_wave, &mesh);
+    test_mesh_make_lattice(TEST_MIXED, SIDE, 0.2, test_wave_field, &mesh);
     int *owners = malloc((size_t)mesh.cell_count * sizeof *owners);
-    test_partition(&mesh, TEST_RANDOM, SIDE, rank_count, owners);
-    for (int i = 0; i < SCENE_COUNT; i++) compare(&mesh, owners, true, &scenes[i], "ghosts");
+    test_partition_cells(&mesh, TEST_RANDOM, SIDE, rank_count, owners);
+    for (int i = 0; i < SCENE_COUNT; i++) compare_with_whole(&mesh, owners, true, &scenes[i], "ghosts");
     free(owners);
     test_mesh_free(&mesh);
 }
@@ -201,8 +203,10 @@ static void ghosts_of_other_ranks_change_nothing(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(blocks_make_the_whole_image),          cmocka_unit_test(random_cells_make_the_whole_image),
-        cmocka_unit_test(checkerboards_make_the_whole_image),   cmocka_unit_test(empty_ranks_take_part),
+        cmocka_unit_test(block_partition_draws_the_whole_image),
+        cmocka_unit_test(random_partition_draws_the_whole_image),
+        cmocka_unit_test(checkerboard_partition_draws_the_whole_image),
+        cmocka_unit_test(ranks_without_cells_participate),
         cmocka_unit_test(ghosts_of_other_ranks_change_nothing),
     };
     MPI_Init(&argc, &argv);

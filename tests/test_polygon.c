@@ -24,7 +24,7 @@ typedef struct polygon {
     double plane[MOST][2], corners[MOST][3];
 } polygon;
 
-static void add(polygon *p, double x, double y)
+static void add_vertex(polygon *p, double x, double y)
 {
     p->plane[p->count][0] = x;
     p->plane[p->count++][1] = y;
@@ -37,21 +37,21 @@ static void make_star(uint64_t seed, int count, polygon *p)
 {
     for (int i = 0; i < count; i++) {
         const double angle = 2 * acos(-1) * (i + 0.4 * test_uniform((uint64_t)i, seed)) / count;
-        const double radius = test_uniform_in((uint64_t)i, seed + 1, 0.1, 1);
-        add(p, radius * cos(angle), radius * sin(angle));
+        const double radius = test_uniform_between((uint64_t)i, seed + 1, 0.1, 1);
+        add_vertex(p, radius * cos(angle), radius * sin(angle));
     }
 }
 
 static void make_comb(int teeth, polygon *p)
 {
     for (int i = 0; i < teeth; i++) {
-        add(p, i, 0);
-        add(p, i + 0.3, 3 + 0.1 * (i % 3));
-        add(p, i + 0.6, 0);
+        add_vertex(p, i, 0);
+        add_vertex(p, i + 0.3, 3 + 0.1 * (i % 3));
+        add_vertex(p, i + 0.6, 0);
     }
-    add(p, teeth, 0);
-    add(p, teeth, -1);
-    for (int i = teeth - 1; i >= 0; i--) add(p, i, -1); /* collinear corners */
+    add_vertex(p, teeth, 0);
+    add_vertex(p, teeth, -1);
+    for (int i = teeth - 1; i >= 0; i--) add_vertex(p, i, -1); /* collinear corners */
 }
 
 static void make_spiral(int turns, polygon *p)
@@ -61,7 +61,7 @@ static void make_spiral(int turns, polygon *p)
         for (int i = 0; i <= steps; i++) {
             const int k = side ? steps - i : i;
             const double angle = acos(-1) / 6 * k, radius = 1 + 0.1 * k - 0.6 * side;
-            add(p, radius * cos(angle), radius * sin(angle));
+            add_vertex(p, radius * cos(angle), radius * sin(angle));
         }
 }
 
@@ -69,15 +69,15 @@ static void make_spiral(int turns, polygon *p)
 static void make_bridge(polygon *p)
 {
     static const double at[10][2] = {{0, 0}, {4, 0}, {4, 4}, {0, 4}, {0, 0}, {1, 1}, {1, 3}, {3, 3}, {3, 1}, {1, 1}};
-    for (int i = 0; i < 10; i++) add(p, at[i][0], at[i][1]);
+    for (int i = 0; i < 10; i++) add_vertex(p, at[i][0], at[i][1]);
 }
 
 /* Makes an L with corners repeated two and three times, and with corners in the middle of edges. */
-static void make_untidy(polygon *p)
+static void make_irregular_polygon(polygon *p)
 {
     static const double at[14][2] = {{0, 0}, {1, 0}, {2, 0}, {2, 0}, {2, 1}, {1.5, 1}, {1, 1},
                                      {1, 1}, {1, 1}, {1, 2}, {0, 2}, {0, 1}, {0, 0.5}, {0, 0.25}};
-    for (int i = 0; i < 14; i++) add(p, at[i][0], at[i][1]);
+    for (int i = 0; i < 14; i++) add_vertex(p, at[i][0], at[i][1]);
 }
 
 /* Makes polygon number `which`: the U and the dart of our examples, then the polygons of the functions above. */
@@ -87,9 +87,10 @@ static void make_polygon(int which, polygon *p)
     static const double dart[4][2] = {{0, 0}, {2, 0.1}, {0.5, 0.5}, {0.1, 2}};
     p->count = 0;
     if (which == 0)
-        for (int i = 0; i < 8; i++) add(p, u[i][0], u[i][1]);
+        for (int i = 0; i < 8; i++) add_vertex(p, u[i][0], u[i][1]);
     else if (which <= 4)
-        for (int i = 0; i < 4; i++) add(p, dart[(i + which) % 4][0], dart[(i + which) % 4][1] * (which % 2 ? 1 : -1));
+        for (int i = 0; i < 4; i++)
+            add_vertex(p, dart[(i + which) % 4][0], dart[(i + which) % 4][1] * (which % 2 ? 1 : -1));
     else if (which == 5)
         make_comb(60, p);
     else if (which == 6)
@@ -97,7 +98,7 @@ static void make_polygon(int which, polygon *p)
     else if (which == 7)
         make_bridge(p);
     else if (which == 8)
-        make_untidy(p);
+        make_irregular_polygon(p);
     else
         make_star((uint64_t)which, which % 5 == 0 ? 5 + which : 4 + which % 7, p);
 }
@@ -106,7 +107,7 @@ enum { POLYGONS = 300 };
 
 /* Moves the polygon into space by a rotation that depends on `which`, and, if bent, off its plane by up to a tenth of a
  * unit. */
-static void place(int which, bool is_bent, polygon *p)
+static void embed_in_space(int which, bool is_bent, polygon *p)
 {
     const double a = 0.7 * which, b = 1.1 * which;
     for (int i = 0; i < p->count; i++) {
@@ -135,7 +136,7 @@ static void cut_polygon(const polygon *p, cut *out)
     free(room);
 }
 
-static double area_of(const polygon *p, const int *t)
+static double triangle_area(const polygon *p, const int *t)
 {
     const double *a = p->plane[t[0]], *b = p->plane[t[1]], *c = p->plane[t[2]];
     return ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])) / 2;
@@ -144,12 +145,12 @@ static double area_of(const polygon *p, const int *t)
 static double polygon_area(const polygon *p)
 {
     double sum = 0;
-    for (int i = 1; i + 1 < p->count; i++) sum += area_of(p, (const int[]){0, i, i + 1});
+    for (int i = 1; i + 1 < p->count; i++) sum += triangle_area(p, (const int[]){0, i, i + 1});
     return sum;
 }
 
 /* Returns how often the loop winds around the point. */
-static int winding(const double (*loop)[2], const int *numbers, int count, const double at[2])
+static int compute_winding_number(const double (*loop)[2], const int *numbers, int count, const double at[2])
 {
     int turns = 0;
     for (int i = 0; i < count; i++) {
@@ -172,11 +173,11 @@ static void assert_covered_once(const polygon *p, const cut *c, int which)
             high[axis] = fmax(high[axis], p->plane[i][axis]);
         }
     for (uint64_t k = 0; k < 400; k++) {
-        const double at[2] = {test_uniform_in(k, 3, low[0], high[0]), test_uniform_in(k, 4, low[1], high[1])};
-        const int expected = winding((const double(*)[2])p->plane, NULL, p->count, at);
+        const double at[2] = {test_uniform_between(k, 3, low[0], high[0]), test_uniform_between(k, 4, low[1], high[1])};
+        const int expected = compute_winding_number((const double(*)[2])p->plane, NULL, p->count, at);
         int sum = 0, most = 0;
         for (int i = 0; i < c->count; i++) {
-            const int turns = winding((const double(*)[2])p->plane, c->triangles[i], 3, at);
+            const int turns = compute_winding_number((const double(*)[2])p->plane, c->triangles[i], 3, at);
             sum += turns;
             most += abs(turns);
         }
@@ -195,9 +196,9 @@ static void polygons_are_covered_once(void **state)
             static cut c;
             double sum = 0;
             make_polygon(which, &p);
-            place(which, bent, &p);
+            embed_in_space(which, bent, &p);
             cut_polygon(&p, &c);
-            for (int i = 0; i < c.count; i++) sum += area_of(&p, c.triangles[i]);
+            for (int i = 0; i < c.count; i++) sum += triangle_area(&p, c.triangles[i]);
             assert_true(fabs(sum - polygon_area(&p)) <= 1e-12 * p.count); /* roundings of numbers of at most 60 */
             /* Bent polygons are triangulated with another normal: along this one a thin triangle may be reversed. */
             if (!bent) assert_covered_once(&p, &c, which);
@@ -213,11 +214,11 @@ static int compare_triangles(const void *a, const void *b)
 
 /* Lists the triangles by their coordinates, sorted within each triangle and then among triangles. Triangles without
  * area are skipped, since they depend on which of the corners at the same position is used. */
-static int list_places(const polygon *p, const cut *c, double (*out)[9])
+static int list_sorted_triangles(const polygon *p, const cut *c, double (*out)[9])
 {
     int count = 0;
     for (int i = 0; i < c->count; i++) {
-        if (fabs(area_of(p, c->triangles[i])) < 1e-12) continue;
+        if (fabs(triangle_area(p, c->triangles[i])) < 1e-12) continue;
         double *t = out[count++];
         for (int k = 0; k < 3; k++) memcpy(t + 3 * k, p->corners[c->triangles[i][k]], 3 * sizeof *t);
         qsort(t, 3, 3 * sizeof *t, compare_triangles);
@@ -226,7 +227,7 @@ static int list_places(const polygon *p, const cut *c, double (*out)[9])
     return count;
 }
 
-static void triangles_depend_on_places_alone(void **state)
+static void triangulation_depends_on_positions_only(void **state)
 {
     (void)state;
     for (int which = 0; which < POLYGONS; which++)
@@ -235,11 +236,11 @@ static void triangles_depend_on_places_alone(void **state)
             static cut c;
             static double own[MOST][9], found[MOST][9];
             make_polygon(which, &p);
-            place(which, bent, &p);
+            embed_in_space(which, bent, &p);
             cut_polygon(&p, &c);
-            const int count = list_places(&p, &c, own);
+            const int count = list_sorted_triangles(&p, &c, own);
             c.count = reference_polygon_triangulate((const double(*)[3])p.corners, p.count, c.triangles);
-            assert_int_equal(list_places(&p, &c, found), count);
+            assert_int_equal(list_sorted_triangles(&p, &c, found), count);
             assert_memory_equal(own, found, (size_t)count * sizeof *own);
             for (int turn = 0; turn < 6; turn++) {
                 const int start = (int)(test_uniform((uint64_t)(6 * which + turn), 5) * p.count);
@@ -250,7 +251,7 @@ static void triangles_depend_on_places_alone(void **state)
                     memcpy(other.plane[i], p.plane[from], sizeof p.plane[from]);
                 }
                 cut_polygon(&other, &c);
-                assert_int_equal(list_places(&other, &c, found), count);
+                assert_int_equal(list_sorted_triangles(&other, &c, found), count);
                 assert_memory_equal(own, found, (size_t)count * sizeof *own);
             }
         }
@@ -264,8 +265,8 @@ static void convex_polygons_are_fans(void **state)
         static cut c;
         int least = 0;
         p.count = 0;
-        for (int i = 0; i < count; i++) add(&p, cos(0.1 + 6.28318 * i / count), sin(0.1 + 6.28318 * i / count));
-        place(count, true, &p);
+        for (int i = 0; i < count; i++) add_vertex(&p, cos(0.1 + 6.28318 * i / count), sin(0.1 + 6.28318 * i / count));
+        embed_in_space(count, true, &p);
         for (int i = 1; i < count; i++)
             if (p.corners[i][0] < p.corners[least][0]) least = i;
         cut_polygon(&p, &c);
@@ -277,7 +278,7 @@ static void convex_polygons_are_fans(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(polygons_are_covered_once),
-                                       cmocka_unit_test(triangles_depend_on_places_alone),
+                                       cmocka_unit_test(triangulation_depends_on_positions_only),
                                        cmocka_unit_test(convex_polygons_are_fans)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -68,7 +68,7 @@ typedef struct tally {
 
 /* ---- the cell ---- */
 
-static double at_place(const linear *f, const double p[3])
+static double evaluate_linear(const linear *f, const double p[3])
 {
     return f->at_origin + f->gradient[0] * p[0] + f->gradient[1] * p[1] + f->gradient[2] * p[2];
 }
@@ -91,7 +91,7 @@ static bool make_weight(const double *apex, const double *const base[3], linear 
     if (volume == 0) return false;
     for (int a = 0; a < 3; a++) out->gradient[a] /= volume;
     out->at_origin = 0;
-    out->at_origin = -at_place(out, base[0]);
+    out->at_origin = -evaluate_linear(out, base[0]);
     return true;
 }
 
@@ -156,7 +156,7 @@ static void make_subject(const render_fixture *f, subject *s)
 
 /* ---- a ray ---- */
 
-static reference_line line_of(const render_camera *camera, int x, int y)
+static reference_line make_pixel_line(const render_camera *camera, int x, int y)
 {
     double base[3], direction[3];
     reference_line line = {{0, 0}, {0, 0}};
@@ -171,18 +171,18 @@ static reference_line line_of(const render_camera *camera, int x, int y)
 }
 
 /* Restricts f to the line: its value there is value + slope z. */
-static void direction_along_line(const linear *f, const reference_line *line, double *value, double *slope)
+static void restrict_to_line(const linear *f, const reference_line *line, double *value, double *slope)
 {
-    *value = at_place(f, (const double[3]){line->base[0], line->base[1], 0});
+    *value = evaluate_linear(f, (const double[3]){line->base[0], line->base[1], 0});
     *slope = f->gradient[0] * line->slope[0] + f->gradient[1] * line->slope[1] + f->gradient[2];
 }
 
-static bool clip(const tet *t, const reference_line *line, interval *out)
+static bool clip_line_to_tet(const tet *t, const reference_line *line, interval *out)
 {
     double value, slope;
     *out = (interval){.z = {-(double)INFINITY, (double)INFINITY}, .slope = t->slope, .sign = t->sign};
     for (int i = 0; i < 4; i++) {
-        direction_along_line(&t->inside[i], line, &value, &slope);
+        restrict_to_line(&t->inside[i], line, &value, &slope);
         if (slope == 0 && value < 0) return false;
         if (slope == 0) continue;
         const int end = slope < 0;
@@ -191,7 +191,7 @@ static bool clip(const tet *t, const reference_line *line, interval *out)
         out->z[end] = z;
         out->is_face[end] = i == 3;
     }
-    direction_along_line(&t->value, line, &value, &slope);
+    restrict_to_line(&t->value, line, &value, &slope);
     for (int end = 0; end < 2; end++) out->v[end] = value + slope * out->z[end];
     return out->z[0] < out->z[1];
 }
@@ -202,23 +202,23 @@ static int compare_numbers(const void *left, const void *right)
     return (a > b) - (a < b);
 }
 
-static double interval_at(const interval *s, double z)
+static double interpolate_in_interval(const interval *s, double z)
 {
     return s->v[0] + (z - s->z[0]) / (s->z[1] - s->z[0]) * (s->v[1] - s->v[0]);
 }
 
 /* Computes the ray's intervals in the tets, and their ends in order. */
-static int intervals_of(const subject *s, const reference_line *line, interval *ray_intervals, double *ends)
+static int find_intervals(const subject *s, const reference_line *line, interval *ray_intervals, double *ends)
 {
     int count = 0;
-    for (int i = 0; i < s->tet_count; i++) count += clip(&s->tets[i], line, &ray_intervals[count]);
+    for (int i = 0; i < s->tet_count; i++) count += clip_line_to_tet(&s->tets[i], line, &ray_intervals[count]);
     for (int i = 0; i < 2 * count; i++) ends[i] = ray_intervals[i / 2].z[i % 2];
     qsort(ends, 2 * (size_t)count, sizeof *ends, compare_numbers);
     return count;
 }
 
 /* Returns the value of the face that the ray meets at z. */
-static double face_value(const interval *ray_intervals, int count, double z)
+static double find_face_value(const interval *ray_intervals, int count, double z)
 {
     double nearest = (double)INFINITY, value = 0;
     for (int i = 0; i < count; i++)
@@ -248,28 +248,28 @@ static bool add_piece(const interval *ray_intervals, int count, double z0, doubl
     for (int i = 0; i < count; i++) {
         if (!(ray_intervals[i].z[0] < middle && middle < ray_intervals[i].z[1])) continue;
         cover += ray_intervals[i].sign;
-        v[0] += ray_intervals[i].sign * interval_at(&ray_intervals[i], z0);
-        v[1] += ray_intervals[i].sign * interval_at(&ray_intervals[i], z1);
+        v[0] += ray_intervals[i].sign * interpolate_in_interval(&ray_intervals[i], z0);
+        v[1] += ray_intervals[i].sign * interpolate_in_interval(&ray_intervals[i], z1);
     }
     if (cover != 1) {
         if (cover && z1 - z0 > 1e-9) fail_msg("a place is in the cell %d times", cover);
         return false;
     }
-    if (!p->count) add_point(p, z0, face_value(ray_intervals, count, z0));
+    if (!p->count) add_point(p, z0, find_face_value(ray_intervals, count, z0));
     add_point(p, z0, v[0]);
     add_point(p, z1, v[1]);
     return true;
 }
 
 /* Makes the next interval in the cell, from end number *next on; returns false if there is none. */
-static bool next_stay(const interval *ray_intervals, int count, const double *ends, int *next, path *p)
+static bool make_next_path(const interval *ray_intervals, int count, const double *ends, int *next, path *p)
 {
     p->count = 0;
     for (; *next + 1 < 2 * count; ++*next) {
         if (ends[*next + 1] - ends[*next] < 1e-13) continue;
         if (!add_piece(ray_intervals, count, ends[*next], ends[*next + 1], p) && p->count) break;
     }
-    if (p->count) add_point(p, p->z[p->count - 1], face_value(ray_intervals, count, p->z[p->count - 1]));
+    if (p->count) add_point(p, p->z[p->count - 1], find_face_value(ray_intervals, count, p->z[p->count - 1]));
     return p->count > 0;
 }
 
@@ -355,7 +355,7 @@ static bool verify_path(const verify *j, const path *p, double band, const ray_h
 }
 
 /* Returns the width of the band. If tets overlap, the slopes of a sum's terms add up, usually three of them. */
-static double band_of(const verify *j, const interval *ray_intervals, int count)
+static double compute_error_band(const verify *j, const interval *ray_intervals, int count)
 {
     double steepest = 0;
     for (int i = 0; i < count; i++) steepest = fmax(steepest, ray_intervals[i].slope);
@@ -367,7 +367,7 @@ static void verify_ray(const verify *j, const reference_line *line, ray_hits *hi
     static interval ray_intervals[REFERENCE_MAX_TRIANGLES];
     static double ends[2 * REFERENCE_MAX_TRIANGLES];
     static path p;
-    const int count = intervals_of(j->s, line, ray_intervals, ends);
+    const int count = find_intervals(j->s, line, ray_intervals, ends);
     int next = 0;
     bool goes_on = true;
     if (!count && !hits->count) return;
@@ -376,8 +376,8 @@ static void verify_ray(const verify *j, const reference_line *line, ray_hits *hi
         return;
     }
     j->t->rays++;
-    const double band = band_of(j, ray_intervals, count);
-    while (next_stay(ray_intervals, count, ends, &next, &p)) {
+    const double band = compute_error_band(j, ray_intervals, count);
+    while (make_next_path(ray_intervals, count, ends, &next, &p)) {
         cut_at_eye(&p);
         if (!p.count) continue;
         mark_hits(j, &p, band, hits);
@@ -386,22 +386,23 @@ static void verify_ray(const verify *j, const reference_line *line, ray_hits *hi
     for (int i = 0; i < hits->count; i++) j->t->wrong += !hits->is_good[i];
 }
 
-static void hits_of(const render_fixture *f, const drawn_frame *drawn, int64_t pixel, ray_hits *out)
+static void list_hits(const render_fixture *f, const drawn_frame *drawn, int64_t pixel, ray_hits *out)
 {
     *out = (ray_hits){.count = 0};
     for (int64_t i = drawn->first[pixel]; i < drawn->first[pixel + 1] && out->count < REFERENCE_MAX_HITS; i++)
-        out->z[out->count++] = fixture_depth(f, drawn->list.items[i].t_in);
+        out->z[out->count++] = fixture_scene_depth(f, drawn->list.items[i].t_in);
 }
 
 /* ---- frames ---- */
 
 /* Sets a camera at a random side, sometimes inside the mesh or orthographic. */
-static void view_from_random_side(render_fixture *f, uint64_t seed)
+static void set_random_camera(render_fixture *f, uint64_t seed)
 {
-    const double angle = test_uniform_in(0, seed, 0, 6.283), height = test_uniform_in(1, seed, -0.9, 0.9);
+    const double angle = test_uniform_between(0, seed, 0, 6.283), height = test_uniform_between(1, seed, -0.9, 0.9);
     const double distance = seed % 8 == 7 ? 0.1 : 3, across = distance * sqrt(1 - height * height);
     const double eye[3] = {across * cos(angle), across * sin(angle), distance * height};
-    const double target[3] = {test_uniform_in(2, seed, -0.02, 0.02), test_uniform_in(3, seed, -0.02, 0.02), 0};
+    const double target[3] = {test_uniform_between(2, seed, -0.02, 0.02), test_uniform_between(3, seed, -0.02, 0.02),
+                              0};
     render_camera *c = &f->job.camera;
     assert_true(render_camera_look_at(c, eye, target, (const double[]){0, 0.1, 1}, 30, WIDTH, HEIGHT));
     c->is_orthographic = seed % 8 == 3;
@@ -426,20 +427,20 @@ static void verify_frame(const render_fixture *f, const double iso, tally *t)
     for (int y = 0; y < HEIGHT; y++)
         for (int x = 0; x < WIDTH; x++) {
             ray_hits hits;
-            hits_of(f, &drawn, (int64_t)y * WIDTH + x, &hits);
-            const reference_line line = line_of(&f->job.camera, x, y);
+            list_hits(f, &drawn, (int64_t)y * WIDTH + x, &hits);
+            const reference_line line = make_pixel_line(&f->job.camera, x, y);
             verify_ray(&j, &line, &hits);
         }
-    drawn_free(&drawn);
+    drawn_frame_free(&drawn);
 }
 
 static void verify_cell(const test_mesh *mesh, uint64_t seed, tally *t)
 {
     render_fixture f;
-    const double values[1] = {test_uniform_in(4, seed, -0.6, 0.6)};
+    const double values[1] = {test_uniform_between(4, seed, -0.6, 0.6)};
     fixture_create(&f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
                    (const double[]){0, 0, 0});
-    view_from_random_side(&f, seed);
+    set_random_camera(&f, seed);
     fixture_add_surface(&f, values, 1, seed % 2 ? 1 : 0.4f);
     verify_frame(&f, values[0], t);
     fixture_free(&f);
@@ -465,7 +466,7 @@ static void random_polyhedra_miss_no_crossing(void **state)
         tally t = {.rays = 0};
         for (uint64_t seed = 0; t.rays < wanted_rays / 4; seed++) {
             test_mesh mesh;
-            test_mesh_random(kind, 1000 * kind + seed, &mesh);
+            test_mesh_make_random_polyhedron(kind, 1000 * kind + seed, &mesh);
             test_mesh_split_quads(&mesh);
             verify_cell(&mesh, seed, &t);
             test_mesh_free(&mesh);
@@ -481,11 +482,11 @@ static void concave_polyhedra_miss_no_crossing(void **state)
     (void)state;
     for (uint64_t seed = 0; t.rays < wanted_rays / 4; seed++) {
         test_mesh mesh;
-        test_mesh_polyhedron((test_polyhedron_shape)(seed / 2 % TEST_POLYHEDRON_COUNT), test_linear, &mesh);
+        test_mesh_make_polyhedron((test_polyhedron_shape)(seed / 2 % TEST_POLYHEDRON_COUNT), test_linear_field, &mesh);
         for (uint64_t i = 0; i < (uint64_t)mesh.vertex_count; i++) {
             for (uint64_t a = 0; a < 3; a++)
-                mesh.coordinates[3 * i + a] += test_uniform_in(3 * i + a, seed, -0.02, 0.02);
-            mesh.values[i] = test_uniform_in(i, seed + 1000, -1, 1);
+                mesh.coordinates[3 * i + a] += test_uniform_between(3 * i + a, seed, -0.02, 0.02);
+            mesh.values[i] = test_uniform_between(i, seed + 1000, -1, 1);
         }
         test_mesh_split_quads(&mesh);
         verify_cell(&mesh, seed, &t);
@@ -495,14 +496,14 @@ static void concave_polyhedra_miss_no_crossing(void **state)
 }
 
 /* Returns whether the field passes the value on the ray. */
-static bool passes(const subject *s, const reference_line *line, double value)
+static bool is_value_crossed(const subject *s, const reference_line *line, double value)
 {
     static interval ray_intervals[REFERENCE_MAX_TRIANGLES];
     static double ends[2 * REFERENCE_MAX_TRIANGLES];
     static path p;
     int next = 0;
-    const int count = intervals_of(s, line, ray_intervals, ends);
-    while (next_stay(ray_intervals, count, ends, &next, &p))
+    const int count = find_intervals(s, line, ray_intervals, ends);
+    while (make_next_path(ray_intervals, count, ends, &next, &p))
         for (int k = 0; k < p.count; k++)
             if (p.v[k] > value) return true;
     return false;
@@ -515,7 +516,7 @@ static void make_hook(test_mesh *out)
 {
     static const double base[8][2] = {{-1.2, -0.5}, {0, -0.5},   {0, 0.3},   {0.3, 0.3},
                                       {0.3, -0.5},  {0.5, -0.5}, {0.5, 0.5}, {-1.2, 0.5}};
-    test_mesh_polyhedron(TEST_U_PRISM, test_linear, out);
+    test_mesh_make_polyhedron(TEST_U_PRISM, test_linear_field, out);
     for (int i = 0; i < 16; i++) {
         for (int a = 0; a < 2; a++) out->coordinates[3 * i + a] = base[i % 8][a];
         out->coordinates[3 * i + 1] = base[i % 8][1];
@@ -540,15 +541,15 @@ static void sums_beyond_the_vertices_show_no_surface(void **state)
                    (const double[]){0, 0, 0});
     fixture_add_surface(&f, &value, 1, 0.4f);
     for (uint64_t seed = 0; seed < 16; seed++) {
-        view_from_random_side(&f, seed);
+        set_random_camera(&f, seed);
         make_subject(&f, &s);
         fixture_draw(&f, &drawn);
         assert_int_equal(drawn.list.count, 0);
         for (int i = 0; i < WIDTH * HEIGHT; i++) {
-            const reference_line line = line_of(&f.job.camera, i % WIDTH, i / WIDTH);
-            beyond += passes(&s, &line, value);
+            const reference_line line = make_pixel_line(&f.job.camera, i % WIDTH, i / WIDTH);
+            beyond += is_value_crossed(&s, &line, value);
         }
-        drawn_free(&drawn);
+        drawn_frame_free(&drawn);
     }
     printf("%d rays pass values beyond those of the vertices\n", beyond);
     assert_true(beyond > 10);
@@ -558,7 +559,7 @@ static void sums_beyond_the_vertices_show_no_surface(void **state)
 
 int main(int argc, char **argv)
 {
-    if (fixture_set_is_unavailable()) return 77;
+    if (fixture_isa_is_unavailable()) return 77;
     if (argc > 1) wanted_rays = atoll(argv[1]);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(random_polyhedra_miss_no_crossing),

@@ -36,15 +36,15 @@ void draw_and_check(int width, int height, const insitu_decorations &what)
 void random_decorations_are_drawn_in_time(void **)
 {
     random_decorations random(1);
-    const int pictures = test_effort(400, 10000), most = test_effort(200, 2200);
+    const int pictures = test_case_count(400, 10000), most = test_case_count(200, 2200);
     for (int i = 0; i < pictures; i++) {
-        const int width = random.whole(1, most), height = random.whole(1, most);
-        draw_and_check(width, height, random.make(width, height));
+        const int width = random.draw_integer(1, most), height = random.draw_integer(1, most);
+        draw_and_check(width, height, random.make_decorations(width, height));
     }
 }
 
 /* Checks a former error: blocks that touched up to rounding pushed each other forever, at one height in twenty. */
-void words_over_axes_are_drawn_at_every_height(void **)
+void text_over_axes_is_drawn_at_every_height(void **)
 {
     const insitu_words words[] = {{"run 42", INSITU_BOTTOM_LEFT, 1}, {"t = 0.5", INSITU_BOTTOM_LEFT, 1}};
     insitu_decorations what{};
@@ -53,14 +53,14 @@ void words_over_axes_are_drawn_at_every_height(void **)
     what.words = words;
     what.has_axes = true;
     for (int a = 0; a < 3; a++) what.axes[a][a] = 1;
-    for (int height = 1; height <= 2200; height += test_effort(5, 1)) draw_and_check(200, height, what);
+    for (int height = 1; height <= 2200; height += test_case_count(5, 1)) draw_and_check(200, height, what);
 }
 
 } // namespace
 
 int main()
 {
-    const CMUnitTest tests[] = {cmocka_unit_test(words_over_axes_are_drawn_at_every_height),
+    const CMUnitTest tests[] = {cmocka_unit_test(text_over_axes_is_drawn_at_every_height),
                                 cmocka_unit_test(random_decorations_are_drawn_in_time)};
     return cmocka_run_group_tests(tests, nullptr, nullptr);
 }

@@ -50,14 +50,14 @@ static reference_line random_line(uint64_t index)
                             {test_uniform(index, 13) - 0.5, test_uniform(index, 14) - 0.5}};
 }
 
-static void crossings_of_unit_hex_are_those_of_its_slabs(void **state)
+static void crossings_of_unit_hex_match_slab_test(void **state)
 {
     (void)state;
     test_mesh mesh;
     reference_cell cell;
     double values[REFERENCE_MAX_VERTICES];
     int met = 0;
-    test_mesh_single(TEST_UNIT_HEX, test_linear, &mesh);
+    test_mesh_make_single_cell(TEST_UNIT_HEX, test_linear_field, &mesh);
     load_cell(&mesh, 0, &cell, values);
     for (uint64_t i = 0; i < 2000; i++) {
         const reference_line line = random_line(i);
@@ -81,7 +81,7 @@ static void crossings_of_unit_hex_are_those_of_its_slabs(void **state)
 }
 
 /* Returns a line that is random, passes through a vertex, or passes through a point of an edge. */
-static reference_line aimed_line(const reference_cell *cell, uint64_t i)
+static reference_line make_aimed_line(const reference_cell *cell, uint64_t i)
 {
     reference_line line = random_line(i);
     if (i % 3 == 0) return line;
@@ -100,10 +100,10 @@ static void crossings_of_every_shape_are_even(void **state)
         test_mesh mesh;
         reference_cell cell;
         double values[REFERENCE_MAX_VERTICES];
-        test_mesh_single(shape, test_linear, &mesh);
+        test_mesh_make_single_cell(shape, test_linear_field, &mesh);
         load_cell(&mesh, 0, &cell, values);
         for (uint64_t i = 0; i < 3000; i++) {
-            const reference_line line = aimed_line(&cell, i);
+            const reference_line line = make_aimed_line(&cell, i);
             reference_crossing crossings[REFERENCE_MAX_CROSSINGS];
             assert_int_equal(reference_crossings(&cell, &line, crossings) % 2, 0);
         }
@@ -117,7 +117,7 @@ static void intervals_of_lattices_tile_the_ray(void **state)
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         test_mesh mesh;
-        test_mesh_lattice(kind, 4, 0.2, test_linear, &mesh);
+        test_mesh_make_lattice(kind, 4, 0.2, test_linear_field, &mesh);
         for (uint64_t i = 0; i < 40; i++) {
             reference_line line = random_line(i);
             if (i % 4 == 0)
@@ -143,7 +143,7 @@ static void intervals_of_lattices_tile_the_ray(void **state)
 }
 
 /* Computes a point inside the cell: the mean of the vertices moved towards one of them. */
-static void inner_point(const reference_cell *cell, uint64_t i, double point[3])
+static void choose_inner_point(const reference_cell *cell, uint64_t i, double point[3])
 {
     double total = 0;
     point[0] = point[1] = point[2] = 0;
@@ -163,15 +163,15 @@ static void linear_field_is_exact_in_every_cell(void **state)
         test_mesh mesh;
         reference_cell cell;
         double values[REFERENCE_MAX_VERTICES];
-        test_mesh_single(shape, test_linear, &mesh);
+        test_mesh_make_single_cell(shape, test_linear_field, &mesh);
         load_cell(&mesh, 0, &cell, values);
         /* The error of the gradient is the rounding of values (1e-16) over the smallest extent (1e-4). */
         const double bound = shape == TEST_SLIVER_TET ? 1e-11 : 1e-12;
         for (uint64_t i = 0; i < 300; i++) {
             double point[3], value, gradient[3];
-            inner_point(&cell, i, point);
+            choose_inner_point(&cell, i, point);
             assert_true(reference_interpolate(&cell, point, values, &value, gradient));
-            assert_true(fabs(value - test_linear(point)) < 1e-12);
+            assert_true(fabs(value - test_linear_field(point)) < 1e-12);
             for (int axis = 0; axis < 3; axis++) assert_true(fabs(gradient[axis] - slope[axis]) < bound);
         }
         test_mesh_free(&mesh);
@@ -201,7 +201,7 @@ static void load_collapsed_prism(unsigned turns, reference_cell *cell, double va
     }
     memset(cell->position[0], 0, sizeof cell->position[0]);
     memcpy(cell->world, cell->position, sizeof cell->world);
-    for (int i = 0; i < cell->count; i++) values[i] = test_linear(cell->position[i]);
+    for (int i = 0; i < cell->count; i++) values[i] = test_linear_field(cell->position[i]);
     reference_polyhedron_setup(cell);
 }
 
@@ -216,14 +216,14 @@ static void collapsed_prisms_are_pyramids(void **state)
         load_collapsed_prism(turns, &cell, values);
         for (uint64_t i = 0; i < 100; i++) {
             double point[3], value;
-            inner_point(&cell, i, point);
+            choose_inner_point(&cell, i, point);
             assert_true(reference_interpolate(&cell, point, values, &value, NULL));
-            assert_true(fabs(value - test_linear(point)) < 1e-12);
+            assert_true(fabs(value - test_linear_field(point)) < 1e-12);
         }
     }
 }
 
-static double cubic(const double p[3])
+static double trilinear_field(const double p[3])
 {
     return p[0] * p[1] * p[2] + p[0] * p[1] - 2 * p[2] * p[0] + p[1];
 }
@@ -234,13 +234,13 @@ static void trilinear_field_is_exact_in_a_box(void **state)
     test_mesh mesh;
     reference_cell cell;
     double values[REFERENCE_MAX_VERTICES];
-    test_mesh_single(TEST_UNIT_HEX, cubic, &mesh);
+    test_mesh_make_single_cell(TEST_UNIT_HEX, trilinear_field, &mesh);
     load_cell(&mesh, 0, &cell, values);
     for (uint64_t i = 0; i < 300; i++) {
         double p[3], value, gradient[3];
-        inner_point(&cell, i, p);
+        choose_inner_point(&cell, i, p);
         assert_true(reference_interpolate(&cell, p, values, &value, gradient));
-        assert_true(fabs(value - cubic(p)) < 1e-13);
+        assert_true(fabs(value - trilinear_field(p)) < 1e-13);
         assert_true(fabs(gradient[0] - (p[1] * p[2] + p[1] - 2 * p[2])) < 1e-12);
         assert_true(fabs(gradient[1] - (p[0] * p[2] + p[0] + 1)) < 1e-12);
         assert_true(fabs(gradient[2] - (p[0] * p[1] - 2 * p[0])) < 1e-12);
@@ -259,11 +259,11 @@ static void gradient_agrees_with_differences(void **state)
         test_mesh mesh;
         reference_cell cell;
         double values[REFERENCE_MAX_VERTICES];
-        test_mesh_single(shape, test_wave, &mesh);
+        test_mesh_make_single_cell(shape, test_wave_field, &mesh);
         load_cell(&mesh, 0, &cell, values);
         for (uint64_t i = 0; i < 100; i++) {
             double p[3], value, gradient[3];
-            inner_point(&cell, i, p);
+            choose_inner_point(&cell, i, p);
             assert_true(reference_interpolate(&cell, p, values, &value, gradient));
             for (int axis = 0; axis < 3; axis++) {
                 double ahead[3] = {p[0], p[1], p[2]}, behind[3] = {p[0], p[1], p[2]}, f1, f0;
@@ -280,7 +280,7 @@ static void gradient_agrees_with_differences(void **state)
 
 /* Checks that on plane faces the face's value is the limit of the values inside, and that two cells agree on a shared
  * face to the bit. */
-static void face_values_join_the_interior(void **state)
+static void face_values_are_continuous_with_the_interior(void **state)
 {
     (void)state;
     static const test_cell_shape shapes[] = {TEST_UNIT_TET,     TEST_UNIT_HEX,     TEST_UNIT_WEDGE,
@@ -289,7 +289,7 @@ static void face_values_join_the_interior(void **state)
         test_mesh mesh;
         reference_cell cell;
         double values[REFERENCE_MAX_VERTICES];
-        test_mesh_single(shapes[s], test_wave, &mesh);
+        test_mesh_make_single_cell(shapes[s], test_wave_field, &mesh);
         load_cell(&mesh, 0, &cell, values);
         for (uint64_t i = 0; i < 500; i++) {
             const reference_line line = random_line(i);
@@ -328,12 +328,12 @@ static const double opacity_at[1] = {0};
 static const float opacity[1] = {0.4f};
 static const float no_background[4] = {0, 0, 0, 0};
 
-static void frame_setup(frame_fixture *f, test_mesh_kind kind, bool is_orthographic)
+static void set_up_frame(frame_fixture *f, test_mesh_kind kind, bool is_orthographic)
 {
     const double eye[3] = {2.4, 1.6, 3.0}, focal[3] = {0, 0, 0}, up[3] = {0, 1, 0};
     test_mesh mesh;
     memset(f, 0, sizeof *f);
-    test_mesh_lattice(kind, 3, 0.2, test_linear, &mesh);
+    test_mesh_make_lattice(kind, 3, 0.2, test_linear_field, &mesh);
     test_view_create(&mesh, (test_layout){.wide_coordinates = true, .wide_values = true}, &f->view);
     test_mesh_free(&mesh);
     f->iso = 0.2;
@@ -380,7 +380,7 @@ static void isosurface_of_a_linear_field_is_its_plane(void **state)
     for (int pass = 0; pass < 2 * TEST_KIND_COUNT; pass++) {
         frame_fixture f;
         int hits = 0, ambiguous = 0;
-        frame_setup(&f, (test_mesh_kind)(pass / 2), pass % 2);
+        set_up_frame(&f, (test_mesh_kind)(pass / 2), pass % 2);
         f.job.surface_count = 1;
         reference_scene *scene = reference_create(&f.job);
         for (int pixel = 0; pixel < 24 * 20; pixel++) {
@@ -388,7 +388,7 @@ static void isosurface_of_a_linear_field_is_its_plane(void **state)
             reference_ray ray;
             render_camera_ray(&f.job.camera, pixel % 24, pixel / 24, base, d);
             reference_trace(scene, pixel % 24, pixel / 24, no_background, &ray);
-            const double slope = 0.3 * d[0] - 0.7 * d[1] + 0.5 * d[2], z = (f.iso - test_linear(base)) / slope;
+            const double slope = 0.3 * d[0] - 0.7 * d[1] + 0.5 * d[2], z = (f.iso - test_linear_field(base)) / slope;
             const bool inside = cube_interval(base, d, &low, &high) && z > low && z < high;
             assert_int_equal(ray.hit_count, inside);
             if (!inside) continue;
@@ -414,13 +414,13 @@ static void isosurface_of_a_linear_field_is_its_plane(void **state)
     }
 }
 
-static void volume_of_constant_extinction_is_beers_law(void **state)
+static void constant_extinction_follows_beers_law(void **state)
 {
     (void)state;
     for (int pass = 0; pass < 2 * TEST_KIND_COUNT; pass++) {
         frame_fixture f;
         int met = 0;
-        frame_setup(&f, (test_mesh_kind)(pass / 2), pass % 2);
+        set_up_frame(&f, (test_mesh_kind)(pass / 2), pass % 2);
         f.job.volume_count = 1;
         reference_scene *scene = reference_create(&f.job);
         for (int pixel = 0; pixel < 24 * 20; pixel++) {
@@ -447,16 +447,16 @@ static void volume_of_constant_extinction_is_beers_law(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(crossings_of_unit_hex_are_those_of_its_slabs),
+        cmocka_unit_test(crossings_of_unit_hex_match_slab_test),
         cmocka_unit_test(crossings_of_every_shape_are_even),
         cmocka_unit_test(intervals_of_lattices_tile_the_ray),
         cmocka_unit_test(linear_field_is_exact_in_every_cell),
         cmocka_unit_test(collapsed_prisms_are_pyramids),
         cmocka_unit_test(trilinear_field_is_exact_in_a_box),
         cmocka_unit_test(gradient_agrees_with_differences),
-        cmocka_unit_test(face_values_join_the_interior),
+        cmocka_unit_test(face_values_are_continuous_with_the_interior),
         cmocka_unit_test(isosurface_of_a_linear_field_is_its_plane),
-        cmocka_unit_test(volume_of_constant_extinction_is_beers_law),
+        cmocka_unit_test(constant_extinction_follows_beers_law),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

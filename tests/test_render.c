@@ -22,7 +22,7 @@ static void assert_few_ambiguous(const fixture_outcome *o, double share)
     if ((double)o->ambiguous > share * (double)o->rays) fail_msg("%d of %d ambiguous", (int)o->ambiguous, (int)o->rays);
 }
 
-static const char *case_name(test_mesh_kind kind, fixture_camera camera, const char *what)
+static const char *make_case_name(test_mesh_kind kind, fixture_camera camera, const char *what)
 {
     static char name[96];
     snprintf(name, sizeof name, "%s, %s, %s", test_mesh_kind_name(kind), fixture_camera_name(camera), what);
@@ -30,7 +30,7 @@ static const char *case_name(test_mesh_kind kind, fixture_camera camera, const c
 }
 
 /* Returns the side of the lattice, which is smaller for kinds with many cells per cube. */
-static int lattice_side(test_mesh_kind kind)
+static int choose_lattice_side(test_mesh_kind kind)
 {
     return kind == TEST_HEXES ? 6 : kind == TEST_WEDGES ? 5 : 4;
 }
@@ -41,10 +41,11 @@ static void surface_matches_the_reference_for_every_kind_and_camera(void **state
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
         for (fixture_camera camera = 0; camera < CAMERA_ALONG_X; camera++) {
             render_fixture f;
-            fixture_create_lattice(&f, kind, lattice_side(kind), 0.2, test_wave);
+            fixture_create_lattice(&f, kind, choose_lattice_side(kind), 0.2, test_wave_field);
             fixture_set_camera(&f, camera, 39, 33);
             fixture_add_surface(&f, one_value, 1, 1);
-            const fixture_outcome o = fixture_compare(&f, &fixture_usual_bounds, case_name(kind, camera, "one value"));
+            const fixture_outcome o =
+                fixture_compare_with_reference(&f, &fixture_usual_bounds, make_case_name(kind, camera, "one value"));
             assert_true(o.hits > 150);
             assert_few_ambiguous(&o, kind == TEST_TETS ? 0 : 0.02);
             fixture_free(&f);
@@ -52,9 +53,9 @@ static void surface_matches_the_reference_for_every_kind_and_camera(void **state
 }
 
 /* Returns whether a case is drawn. By default each kind of mesh is drawn from one or two of the cameras. */
-static bool is_due(test_mesh_kind kind, fixture_camera camera, int variant)
+static bool is_case_selected(test_mesh_kind kind, fixture_camera camera, int variant)
 {
-    return test_is_whole() || ((int)kind + (int)camera + variant) % 3 == 0;
+    return test_is_long_run() || ((int)kind + (int)camera + variant) % 3 == 0;
 }
 
 static void surfaces_of_several_values_match_the_reference(void **state)
@@ -63,13 +64,14 @@ static void surfaces_of_several_values_match_the_reference(void **state)
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
         for (fixture_camera camera = 0; camera < CAMERA_PLANE; camera++) {
             render_fixture f;
-            if (!is_due(kind, camera, 0)) continue;
-            fixture_create_lattice(&f, kind, lattice_side(kind), 0.2, test_wave);
+            if (!is_case_selected(kind, camera, 0)) continue;
+            fixture_create_lattice(&f, kind, choose_lattice_side(kind), 0.2, test_wave_field);
             fixture_set_camera(&f, camera, 27, 23);
             fixture_add_surface(&f, four_values, 4, 1);
-            fixture_compare(&f, &fixture_usual_bounds, case_name(kind, camera, "four values"));
+            fixture_compare_with_reference(&f, &fixture_usual_bounds, make_case_name(kind, camera, "four values"));
             f.surfaces[0].opacity = 0.4f;
-            fixture_compare(&f, &fixture_usual_bounds, case_name(kind, camera, "four transparent values"));
+            fixture_compare_with_reference(&f, &fixture_usual_bounds,
+                                           make_case_name(kind, camera, "four transparent values"));
             fixture_free(&f);
         }
 }
@@ -79,11 +81,12 @@ static void transparent_surfaces_before_an_opaque_one_match_the_reference(void *
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         render_fixture f;
-        fixture_create_lattice(&f, kind, lattice_side(kind), 0.2, test_wave);
+        fixture_create_lattice(&f, kind, choose_lattice_side(kind), 0.2, test_wave_field);
         fixture_set_camera(&f, CAMERA_OUTSIDE, 33, 29);
         fixture_add_surface(&f, four_values, 2, 0.3f);
         fixture_add_surface(&f, four_values + 2, 2, 1);
-        fixture_compare(&f, &fixture_usual_bounds, case_name(kind, CAMERA_OUTSIDE, "transparent before opaque"));
+        fixture_compare_with_reference(&f, &fixture_usual_bounds,
+                                       make_case_name(kind, CAMERA_OUTSIDE, "transparent before opaque"));
         fixture_free(&f);
     }
 }
@@ -96,7 +99,7 @@ static void lights_behind_surfaces_leave_them_dark(void **state)
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
         for (fixture_camera camera = 0; camera < CAMERA_INSIDE; camera++) {
             render_fixture f;
-            fixture_create_lattice(&f, kind, lattice_side(kind), 0.2, test_wave);
+            fixture_create_lattice(&f, kind, choose_lattice_side(kind), 0.2, test_wave_field);
             fixture_set_camera(&f, camera, 33, 29);
             fixture_add_surface(&f, one_value, 1, 1);
             f.surfaces[0].material = (render_material){.ambient = 0.1f, .diffuse = 0.3f, .specular = 1, .shininess = 4};
@@ -105,7 +108,7 @@ static void lights_behind_surfaces_leave_them_dark(void **state)
                 f.lights[0].direction[a] = ahead + side;
                 f.lights[1].direction[a] = ahead - side;
             }
-            fixture_compare(&f, &fixture_usual_bounds, case_name(kind, camera, "lights behind"));
+            fixture_compare_with_reference(&f, &fixture_usual_bounds, make_case_name(kind, camera, "lights behind"));
             fixture_free(&f);
         }
 }
@@ -116,10 +119,10 @@ static void volume_matches_the_reference_for_every_kind_and_camera(void **state)
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
         for (fixture_camera camera = 0; camera < CAMERA_ALONG_X; camera++) {
             render_fixture f;
-            fixture_create_lattice(&f, kind, lattice_side(kind), 0.2, test_wave);
+            fixture_create_lattice(&f, kind, choose_lattice_side(kind), 0.2, test_wave_field);
             fixture_set_camera(&f, camera, 37, 31);
             fixture_set_volume(&f, 0.3);
-            fixture_compare(&f, &fixture_usual_bounds, case_name(kind, camera, "volume"));
+            fixture_compare_with_reference(&f, &fixture_usual_bounds, make_case_name(kind, camera, "volume"));
             fixture_free(&f);
         }
 }
@@ -131,22 +134,22 @@ static void volume_and_surfaces_match_the_reference_together(void **state)
         for (fixture_camera camera = 0; camera < CAMERA_PLANE; camera++)
             for (int transparent = 0; transparent < 2; transparent++) {
                 render_fixture f;
-                if (!is_due(kind, camera, transparent)) continue;
-                fixture_create_lattice(&f, kind, lattice_side(kind), 0.2, test_wave);
+                if (!is_case_selected(kind, camera, transparent)) continue;
+                fixture_create_lattice(&f, kind, choose_lattice_side(kind), 0.2, test_wave_field);
                 fixture_set_camera(&f, camera, 25, 21);
                 fixture_add_surface(&f, four_values + 1, 2, transparent ? 0.5f : 1);
                 fixture_set_volume(&f, 0.4);
                 const char *what = transparent ? "volume and transparent surfaces" : "volume and surfaces";
-                fixture_compare(&f, &fixture_usual_bounds, case_name(kind, camera, what));
+                fixture_compare_with_reference(&f, &fixture_usual_bounds, make_case_name(kind, camera, what));
                 f.job.is_alone = false;
-                fixture_compare(&f, &fixture_usual_bounds, case_name(kind, camera, what));
+                fixture_compare_with_reference(&f, &fixture_usual_bounds, make_case_name(kind, camera, what));
                 fixture_free(&f);
             }
 }
 
-static double short_wave(const double p[3])
+static double short_wave_field(const double p[3])
 {
-    return test_wave((const double[]){2 * p[0], 2 * p[1], 2 * p[2]});
+    return test_wave_field((const double[]){2 * p[0], 2 * p[1], 2 * p[2]});
 }
 
 /* Checks rays that cross more surfaces than a packet can store: their volume fragments end at every sample. */
@@ -160,7 +163,7 @@ static void volume_between_many_surfaces_matches_the_reference(void **state)
         render_fixture f;
         drawn_frame drawn;
         int crowded = 0;
-        fixture_create_lattice(&f, TEST_TETS, 7, 0.2, short_wave);
+        fixture_create_lattice(&f, TEST_TETS, 7, 0.2, short_wave_field);
         fixture_set_camera(&f, CAMERA_OUTSIDE, 29, 27);
         fixture_add_surface(&f, values, 16, 0.03f);
         f.surfaces[0].colours = colours;
@@ -174,19 +177,19 @@ static void volume_between_many_surfaces_matches_the_reference(void **state)
             crowded += hits > 32 && hits <= REFERENCE_MAX_HITS;
         }
         assert_true(crowded > 10);
-        fixture_compare(&f, &fixture_usual_bounds, "many surfaces");
-        drawn_free(&drawn);
+        fixture_compare_with_reference(&f, &fixture_usual_bounds, "many surfaces");
+        drawn_frame_free(&drawn);
         fixture_free(&f);
     }
 }
 
 /* ---- closed forms ---- */
 
-static double ray_linear(const render_camera *camera, int pixel, double *at_base)
+static double linear_field_along_ray(const render_camera *camera, int pixel, double *at_base)
 {
     double base[3], d[3];
     render_camera_ray(camera, pixel % camera->width, pixel / camera->width, base, d);
-    *at_base = test_linear(base);
+    *at_base = test_linear_field(base);
     return 0.3 * d[0] - 0.7 * d[1] + 0.5 * d[2];
 }
 
@@ -197,19 +200,19 @@ static void compare_plane(test_mesh_kind kind, fixture_camera camera, bool is_wa
 {
     render_fixture f;
     drawn_frame drawn;
-    fixture_create_lattice(&f, kind, 3, is_warped ? 0.2 : 0, test_linear);
+    fixture_create_lattice(&f, kind, 3, is_warped ? 0.2 : 0, test_linear_field);
     fixture_set_camera(&f, camera, 41, 37);
     fixture_add_surface(&f, linear_values, 3, 0.5f);
     fixture_draw(&f, &drawn);
     for (int64_t i = 0; i < drawn.list.count; i++) {
         const fragment *hit = &drawn.list.items[i];
         double at_base;
-        const double slope = ray_linear(&f.job.camera, (int)hit->pixel, &at_base);
-        const double value = at_base + slope * fixture_depth(&f, hit->t_in);
+        const double slope = linear_field_along_ray(&f.job.camera, (int)hit->pixel, &at_base);
+        const double value = at_base + slope * fixture_scene_depth(&f, hit->t_in);
         assert_true(fabs(value - linear_values[hit->kind - FRAGMENT_SURFACE]) < 2e-6 + 1e-6 * fabs(slope));
     }
     assert_true(drawn.list.count > 300);
-    drawn_free(&drawn);
+    drawn_frame_free(&drawn);
     fixture_free(&f);
 }
 
@@ -232,7 +235,7 @@ static void constant_volume_counts_every_sample_once(void **state)
             render_fixture f;
             drawn_frame drawn;
             int off = 0, met = 0;
-            fixture_create_lattice(&f, kind, 4, camera == CAMERA_ALONG_X ? 0 : 0.2, test_linear);
+            fixture_create_lattice(&f, kind, 4, camera == CAMERA_ALONG_X ? 0 : 0.2, test_linear_field);
             fixture_set_camera(&f, camera, 43, 41);
             fixture_set_volume(&f, 0.23);
             f.transfer.opacity_count = 1;
@@ -257,8 +260,8 @@ static void constant_volume_counts_every_sample_once(void **state)
                 off += fabs(1 - (double)drawn.picture.rgba[4 * p + 3] - clear) > 1e-5;
             }
             assert_true(met > 300);
-            if (off) fail_msg("%s: %d of %d rays", case_name(kind, camera, "samples"), off, met);
-            drawn_free(&drawn);
+            if (off) fail_msg("%s: %d of %d rays", make_case_name(kind, camera, "samples"), off, met);
+            drawn_frame_free(&drawn);
             fixture_free(&f);
         }
 }
@@ -272,7 +275,7 @@ static void lattice_lines_have_no_holes(void **state)
         render_fixture f;
         drawn_frame drawn;
         int met = 0;
-        fixture_create_lattice(&f, kind, 4, 0, test_linear);
+        fixture_create_lattice(&f, kind, 4, 0, test_linear_field);
         fixture_set_camera(&f, CAMERA_ALONG_X, 43, 41);
         static const double value[1] = {0.1};
         fixture_add_surface(&f, value, 1, 0.5f);
@@ -280,14 +283,14 @@ static void lattice_lines_have_no_holes(void **state)
         for (int p = 0; p < 43 * 41; p++) {
             double base[3], d[3], at_base;
             render_camera_ray(&f.job.camera, p % 43, p / 43, base, d);
-            const double slope = ray_linear(&f.job.camera, p, &at_base), z = (0.1 - at_base) / slope;
+            const double slope = linear_field_along_ray(&f.job.camera, p, &at_base), z = (0.1 - at_base) / slope;
             const double x = base[0] + z * d[0];
             if (fabs(base[1]) >= 1 || fabs(base[2]) >= 1 || fabs(fabs(x) - 1) < 1e-5) continue;
             met++;
             assert_int_equal(drawn.first[p + 1] - drawn.first[p], fabs(x) < 1);
         }
         assert_true(met > 800);
-        drawn_free(&drawn);
+        drawn_frame_free(&drawn);
         fixture_free(&f);
     }
 }
@@ -305,14 +308,14 @@ static void single_cells_match_the_reference(void **state)
         for (fixture_camera camera = 0; camera < CAMERA_INSIDE; camera++) {
             test_mesh mesh;
             render_fixture f;
-            test_mesh_single(shape, test_linear, &mesh);
+            test_mesh_make_single_cell(shape, test_linear_field, &mesh);
             fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
                            (const double[]){0, 0, 0});
             fixture_set_camera(&f, camera, 39, 33);
             fixture_add_surface(&f, values, 3, 0.5f);
             fixture_set_volume(&f, 0.05);
             const bool is_thin = shape == TEST_SLIVER_TET || shape >= TEST_FLAT_TET;
-            fixture_compare(&f, is_thin ? &thin : &fixture_usual_bounds, test_cell_shape_name(shape));
+            fixture_compare_with_reference(&f, is_thin ? &thin : &fixture_usual_bounds, test_cell_shape_name(shape));
             fixture_free(&f);
             test_mesh_free(&mesh);
         }
@@ -327,13 +330,14 @@ static void surfaces_along_slivers_match_the_reference(void **state)
     for (fixture_camera camera = 0; camera < CAMERA_INSIDE; camera++) {
         test_mesh mesh;
         render_fixture f;
-        test_mesh_single(TEST_SLIVER_TET, test_linear, &mesh);
+        test_mesh_make_single_cell(TEST_SLIVER_TET, test_linear_field, &mesh);
         for (int v = 0; v < 4; v++) mesh.values[v] = v == 3 ? 0.5 : -0.5;
         fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
                        (const double[]){0, 0, 0});
         fixture_set_camera(&f, camera, 121, 101);
         fixture_add_surface(&f, values, 3, 0.5f);
-        const fixture_outcome met = fixture_compare(&f, &fixture_usual_bounds, fixture_camera_name(camera));
+        const fixture_outcome met =
+            fixture_compare_with_reference(&f, &fixture_usual_bounds, fixture_camera_name(camera));
         assert_true(met.hits > 100);
         fixture_free(&f);
         test_mesh_free(&mesh);
@@ -346,14 +350,14 @@ static void left_handed_cells_match_the_reference(void **state)
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         test_mesh mesh;
         render_fixture f;
-        test_mesh_lattice(kind, 3, 0.2, test_wave, &mesh);
-        test_mesh_mirror(&mesh, true);
+        test_mesh_make_lattice(kind, 3, 0.2, test_wave_field, &mesh);
+        test_mesh_mirror_cells(&mesh, true);
         fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 2.0 / 3, 1,
                        (const double[]){0, 0, 0});
         fixture_set_camera(&f, CAMERA_OUTSIDE, 33, 29);
         fixture_add_surface(&f, one_value, 1, 0.5f);
         fixture_set_volume(&f, 0.3);
-        fixture_compare(&f, &fixture_usual_bounds, case_name(kind, CAMERA_OUTSIDE, "left-handed"));
+        fixture_compare_with_reference(&f, &fixture_usual_bounds, make_case_name(kind, CAMERA_OUTSIDE, "left-handed"));
         fixture_free(&f);
         test_mesh_free(&mesh);
     }
@@ -368,13 +372,13 @@ static void far_coordinates_match_the_reference(void **state)
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         test_mesh mesh;
         render_fixture f;
-        test_mesh_lattice(kind, 4, 0.2, test_wave, &mesh);
+        test_mesh_make_lattice(kind, 4, 0.2, test_wave_field, &mesh);
         test_mesh_transform(&mesh, 1000, far_away);
         fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 500, 1000, far_away);
         fixture_set_camera(&f, CAMERA_OUTSIDE, 33, 29);
         fixture_add_surface(&f, one_value, 1, 0.5f);
         fixture_set_volume(&f, 0.3);
-        fixture_compare(&f, &fixture_usual_bounds, case_name(kind, CAMERA_OUTSIDE, "far away"));
+        fixture_compare_with_reference(&f, &fixture_usual_bounds, make_case_name(kind, CAMERA_OUTSIDE, "far away"));
         fixture_free(&f);
         test_mesh_free(&mesh);
     }
@@ -387,9 +391,9 @@ static void two_volumes_share_their_light(void **state)
         test_mesh mesh;
         test_view second;
         render_fixture f;
-        test_mesh_lattice(kind, 4, 0.2, test_linear, &mesh);
+        test_mesh_make_lattice(kind, 4, 0.2, test_linear_field, &mesh);
         test_view_create(&mesh, (test_layout){.wide_coordinates = true, .wide_values = true}, &second);
-        fixture_create_lattice(&f, kind, 4, 0.2, test_wave);
+        fixture_create_lattice(&f, kind, 4, 0.2, test_wave_field);
         fixture_set_camera(&f, CAMERA_OUTSIDE, 33, 29);
         fixture_set_volume(&f, 0.3);
         float *pairs = malloc((size_t)f.trees[0].node_count * 2 * sizeof *pairs);
@@ -408,7 +412,7 @@ static void two_volumes_share_their_light(void **state)
         const render_volume_layer both[2] = {f.volume, {{&second.field, &ranges}, &other}};
         f.job.volumes = both;
         f.job.volume_count = 2;
-        fixture_compare(&f, &fixture_usual_bounds, case_name(kind, CAMERA_OUTSIDE, "two volumes"));
+        fixture_compare_with_reference(&f, &fixture_usual_bounds, make_case_name(kind, CAMERA_OUTSIDE, "two volumes"));
         free(pairs);
         fixture_free(&f);
         test_view_free(&second);
@@ -424,7 +428,7 @@ static void cell_centred_volume_matches_the_reference(void **state)
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
         for (int is_alone = 0; is_alone < 2; is_alone++) {
             render_fixture f;
-            fixture_create_lattice(&f, kind, 4, 0.2, test_wave);
+            fixture_create_lattice(&f, kind, 4, 0.2, test_wave_field);
             const int64_t cells = f.views[0].cells.cell_count;
             double *values = malloc((size_t)cells * sizeof *values);
             for (int64_t i = 0; i < cells; i++) values[i] = 2 * test_uniform((uint64_t)i, 21) - 1;
@@ -436,20 +440,21 @@ static void cell_centred_volume_matches_the_reference(void **state)
             fixture_set_camera(&f, CAMERA_OUTSIDE, 33, 29);
             fixture_set_volume(&f, 0.2);
             f.job.is_alone = is_alone;
-            fixture_compare(&f, &fixture_usual_bounds, case_name(kind, CAMERA_OUTSIDE, "cell-centred"));
+            fixture_compare_with_reference(&f, &fixture_usual_bounds,
+                                           make_case_name(kind, CAMERA_OUTSIDE, "cell-centred"));
             free(values);
             fixture_free(&f);
         }
 }
 
 /* A field of very large values: the transfer function and the isovalue scale with them. */
-static double huge_wave(const double p[3])
+static double huge_wave_field(const double p[3])
 {
-    return 1e30 * test_wave(p);
+    return 1e30 * test_wave_field(p);
 }
-static double tiny_wave(const double p[3])
+static double tiny_wave_field(const double p[3])
 {
-    return 1e-30 * test_wave(p);
+    return 1e-30 * test_wave_field(p);
 }
 
 static void values_of_any_size_match_the_reference(void **state)
@@ -460,14 +465,15 @@ static void values_of_any_size_match_the_reference(void **state)
         for (int tiny = 0; tiny < 2; tiny++) {
             render_fixture f;
             const double scale = tiny ? 1e-30 : 1e30, tent[3] = {-0.6 * scale, 0, 0.6 * scale};
-            fixture_create_lattice(&f, kind, 3, 0.2, tiny ? tiny_wave : huge_wave);
+            fixture_create_lattice(&f, kind, 3, 0.2, tiny ? tiny_wave_field : huge_wave_field);
             fixture_set_camera(&f, CAMERA_OUTSIDE, 33, 29);
             fixture_add_surface(&f, tiny ? tiny_values : huge_values, 1, 0.5f);
             fixture_set_volume(&f, 0.3);
             f.transfer.low *= scale;
             f.transfer.high *= scale;
             f.transfer.opacity_values = tent;
-            fixture_compare(&f, &fixture_usual_bounds, case_name(kind, CAMERA_OUTSIDE, tiny ? "1e-30" : "1e30"));
+            fixture_compare_with_reference(&f, &fixture_usual_bounds,
+                                           make_case_name(kind, CAMERA_OUTSIDE, tiny ? "1e-30" : "1e30"));
             fixture_free(&f);
         }
 }
@@ -479,16 +485,17 @@ static void surface_coloured_by_the_field_matches_the_reference(void **state)
         test_mesh mesh;
         test_view colours;
         render_fixture f;
-        test_mesh_lattice(kind, 4, 0.2, test_linear, &mesh);
+        test_mesh_make_lattice(kind, 4, 0.2, test_linear_field, &mesh);
         test_view_create(&mesh, (test_layout){.wide_coordinates = true, .wide_values = true}, &colours);
-        fixture_create_lattice(&f, kind, 4, 0.2, test_wave);
+        fixture_create_lattice(&f, kind, 4, 0.2, test_wave_field);
         fixture_set_camera(&f, CAMERA_OUTSIDE, 33, 29);
         fixture_set_volume(&f, 0.3);
         f.job.volume_count = 0;
         fixture_add_surface(&f, four_values, 4, 1);
         f.surfaces[0].colour_field = (render_field){&colours.field, f.ranges};
         f.surfaces[0].colour_map = &f.transfer;
-        fixture_compare(&f, &fixture_usual_bounds, case_name(kind, CAMERA_OUTSIDE, "coloured by a field"));
+        fixture_compare_with_reference(&f, &fixture_usual_bounds,
+                                       make_case_name(kind, CAMERA_OUTSIDE, "coloured by a field"));
         test_view_free(&colours);
         test_mesh_free(&mesh);
         fixture_free(&f);
@@ -501,11 +508,11 @@ static void one_pixel_images_match_the_reference(void **state)
     static const int sizes[4][2] = {{1, 1}, {1, 9}, {17, 1}, {3, 5}};
     for (int i = 0; i < 4; i++) {
         render_fixture f;
-        fixture_create_lattice(&f, TEST_HEXES, 3, 0.2, test_wave);
+        fixture_create_lattice(&f, TEST_HEXES, 3, 0.2, test_wave_field);
         fixture_set_camera(&f, CAMERA_OUTSIDE, sizes[i][0], sizes[i][1]);
         fixture_add_surface(&f, one_value, 1, 0.5f);
         fixture_set_volume(&f, 0.3);
-        fixture_compare(&f, &fixture_usual_bounds, "small images");
+        fixture_compare_with_reference(&f, &fixture_usual_bounds, "small images");
         fixture_free(&f);
     }
 }
@@ -529,20 +536,20 @@ static void surfaces_of_cells_smaller_than_pixels_match_the_reference(void **sta
         for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++) {
             render_fixture f;
             drawn_frame drawn[2];
-            fixture_create_lattice(&f, kind, lattice_side(kind), 0.2, test_wave);
+            fixture_create_lattice(&f, kind, choose_lattice_side(kind), 0.2, test_wave_field);
             fixture_set_camera(&f, camera, 9, 5);
             fixture_add_surface(&f, four_values, 2, 1);
             fixture_add_surface(&f, one_value, 1, 1);
             if (camera % 2) build_reference_layout(&f);
             if (camera < CAMERA_ALONG_X)
-                fixture_compare(&f, &fixture_usual_bounds, case_name(kind, camera, "small cells"));
+                fixture_compare_with_reference(&f, &fixture_usual_bounds, make_case_name(kind, camera, "small cells"));
             for (render_traversal t = RENDER_BINNED; t <= RENDER_TILES; t++) {
                 f.job.traversal = t;
                 fixture_draw(&f, &drawn[t]);
-                drawn_assert_same(&drawn[0], &drawn[t]);
+                drawn_frame_assert_same(&drawn[0], &drawn[t]);
                 assert_int_equal(drawn[0].list.count, drawn[t].list.count);
             }
-            for (int t = 0; t < 2; t++) drawn_free(&drawn[t]);
+            for (int t = 0; t < 2; t++) drawn_frame_free(&drawn[t]);
             fixture_free(&f);
         }
 }
@@ -575,8 +582,8 @@ int main(void)
         cmocka_unit_test(lattice_lines_have_no_holes),
     };
     int failed = cmocka_run_group_tests(tests, NULL, NULL);
-    for (int set = 0; set < fixture_set_count(); set++) {
-        fixture_use_set(set);
+    for (int set = 0; set < fixture_isa_count(); set++) {
+        fixture_select_isa(set);
         failed += cmocka_run_group_tests(of_a_set, NULL, NULL);
     }
     return failed;

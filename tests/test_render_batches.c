@@ -25,12 +25,12 @@ static void create_as(render_fixture *f, const test_mesh *meshes, int count, int
     fixture_set_camera(f, camera, WIDTH, HEIGHT);
 }
 
-static void create(render_fixture *f, const test_mesh *meshes, int count, int n, fixture_camera camera)
+static void create_fixture(render_fixture *f, const test_mesh *meshes, int count, int n, fixture_camera camera)
 {
     create_as(f, meshes, count, n, camera, (test_layout){.is_interleaved = n % 2});
 }
 
-static void compare(render_fixture *f)
+static void compare_with_single_cells(render_fixture *f)
 {
     drawn_frame batches, alone;
     /* A box that contains everything. It clips one layer only, since a clip of all layers would cut the rays. */
@@ -43,26 +43,30 @@ static void compare(render_fixture *f)
         fixture_draw(f, &alone);
         assert_true(batches.list.count > 100);
         assert_int_equal(batches.list.count, alone.list.count);
-        drawn_assert_same(&batches, &alone);
-        drawn_free(&alone);
+        drawn_frame_assert_same(&batches, &alone);
+        drawn_frame_free(&alone);
     }
-    drawn_free(&batches);
+    drawn_frame_free(&batches);
     fixture_free(f);
 }
 
-static bool is_due(int turn)
+static bool is_case_selected(int turn)
 {
-    return test_is_whole() || turn % 6 == 0;
+    return test_is_long_run() || turn % 6 == 0;
 }
 
-static void batches_draw_what_single_cells_do(void **state)
+static void batches_draw_same_picture_as_single_cells(void **state)
 {
     (void)state;
     static const test_mesh_kind kinds[] = {TEST_TETS, TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS, TEST_MIXED};
     static const struct {
         int n;
         test_function *field;
-    } lattices[] = {{2, test_wave}, {4, test_wave}, {7, test_wave}, {13, test_wave}, {16, test_linear}};
+    } lattices[] = {{2, test_wave_field},
+                    {4, test_wave_field},
+                    {7, test_wave_field},
+                    {13, test_wave_field},
+                    {16, test_linear_field}};
     for (size_t i = 0; i < sizeof lattices / sizeof *lattices; i++)
         for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++)
             for (int turn = 0; turn < 2 * (int)(sizeof kinds / sizeof *kinds); turn++) {
@@ -71,18 +75,18 @@ static void batches_draw_what_single_cells_do(void **state)
                 const double jitter = jittered ? 0.2 : 1e-4;
                 render_fixture f;
                 test_mesh mesh;
-                if (!is_due((int)i + (int)camera + turn)) continue;
-                test_mesh_lattice(kinds[turn / 2], lattices[i].n, jitter, lattices[i].field, &mesh);
-                create(&f, &mesh, 1, lattices[i].n, camera);
+                if (!is_case_selected((int)i + (int)camera + turn)) continue;
+                test_mesh_make_lattice(kinds[turn / 2], lattices[i].n, jitter, lattices[i].field, &mesh);
+                create_fixture(&f, &mesh, 1, lattices[i].n, camera);
                 fixture_add_surface(&f, values, 1 + jittered, 1);
-                compare(&f);
+                compare_with_single_cells(&f);
                 test_mesh_free(&mesh);
             }
 }
 
 /* Checks cells with any order of vertices, in arrays of all layouts; some have an edge without length, so that some
  * quads collapse to triangles and some triangles to an edge. */
-static void cells_are_numbered_anyhow(void **state)
+static void cell_numbering_changes_no_batch(void **state)
 {
     static const test_mesh_kind kinds[] = {TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS, TEST_MIXED};
     (void)state;
@@ -91,8 +95,8 @@ static void cells_are_numbered_anyhow(void **state)
             const int n = turn / 2 % 2 ? 12 : 5;
             render_fixture f;
             test_mesh mesh;
-            if (!is_due((int)camera + turn)) continue;
-            test_mesh_lattice(kinds[turn / 6], n, 0.2, test_wave, &mesh);
+            if (!is_case_selected((int)camera + turn)) continue;
+            test_mesh_make_lattice(kinds[turn / 6], n, 0.2, test_wave_field, &mesh);
             for (int64_t c = 0; turn % 6 < 4 && c < mesh.cell_count; c += 7)
                 mesh.connectivity[mesh.offsets[c] + 1] = mesh.connectivity[mesh.offsets[c]];
             test_mesh_reorder_vertices(&mesh, (uint64_t)turn);
@@ -100,13 +104,13 @@ static void cells_are_numbered_anyhow(void **state)
                 &f, &mesh, 1, n, camera,
                 (test_layout){.wide_coordinates = turn % 2, .wide_indices = turn % 6 == 4, .is_interleaved = true});
             fixture_add_surface(&f, values, 2, 1);
-            compare(&f);
+            compare_with_single_cells(&f);
             test_mesh_free(&mesh);
         }
 }
 
 /* Checks that all cells of a batch belong to one mesh and one layer. */
-static void meshes_and_layers_take_turns(void **state)
+static void batches_contain_one_mesh_and_layer(void **state)
 {
     (void)state;
     static const test_mesh_kind kinds[][2] = {
@@ -115,19 +119,19 @@ static void meshes_and_layers_take_turns(void **state)
         for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++) {
             render_fixture f;
             test_mesh meshes[2];
-            test_mesh_lattice(kinds[kind][0], 7, 0.2, test_wave, &meshes[0]);
-            test_mesh_lattice(kinds[kind][1], 8, 0.1, test_linear, &meshes[1]);
-            create(&f, meshes, 2, 7, camera);
+            test_mesh_make_lattice(kinds[kind][0], 7, 0.2, test_wave_field, &meshes[0]);
+            test_mesh_make_lattice(kinds[kind][1], 8, 0.1, test_linear_field, &meshes[1]);
+            create_fixture(&f, meshes, 2, 7, camera);
             fixture_add_surface(&f, values, 2, 1);
             fixture_add_surface(&f, values + 2, 2, kind % 2 ? 1 : 0.4f);
             f.surfaces[1].colours = other_colours[0];
-            compare(&f);
+            compare_with_single_cells(&f);
             for (int i = 0; i < 2; i++) test_mesh_free(&meshes[i]);
         }
 }
 
 /* Checks ties: each hit occurs twice. */
-static void ties_are_kept(void **state)
+static void hits_at_equal_depth_are_kept(void **state)
 {
     (void)state;
     static const test_mesh_kind kinds[] = {TEST_TETS, TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS};
@@ -135,17 +139,17 @@ static void ties_are_kept(void **state)
         const int n = turn % 2 ? 16 : 4;
         render_fixture f;
         test_mesh meshes[2];
-        for (int i = 0; i < 2; i++) test_mesh_lattice(kinds[turn / 2], n, 0.2, test_linear, &meshes[i]);
-        create(&f, meshes, 2, n, CAMERA_OUTSIDE);
+        for (int i = 0; i < 2; i++) test_mesh_make_lattice(kinds[turn / 2], n, 0.2, test_linear_field, &meshes[i]);
+        create_fixture(&f, meshes, 2, n, CAMERA_OUTSIDE);
         fixture_add_surface(&f, values, 1, 1);
-        compare(&f);
+        compare_with_single_cells(&f);
         for (int i = 0; i < 2; i++) test_mesh_free(&meshes[i]);
     }
 }
 
 /* Checks cells with values of extreme size, from tiny ones to NaN: they are traced one by one, and mixed with other
  * cells in one vector. */
-static void odd_values_are_found_one_by_one(void **state)
+static void unusual_values_are_handled_one_by_one(void **state)
 {
     static const float opacity[1] = {0.3f};
     static const double odd[] = {3e31, -3e31, 1e-41, (double)INFINITY, (double)NAN, 3e38};
@@ -155,10 +159,10 @@ static void odd_values_are_found_one_by_one(void **state)
         const bool as_volume = turn == 1;
         render_fixture f;
         test_mesh mesh;
-        test_mesh_lattice(kinds[turn], 7, 0.2, test_wave, &mesh);
+        test_mesh_make_lattice(kinds[turn], 7, 0.2, test_wave_field, &mesh);
         for (int64_t v = 5; v < mesh.vertex_count; v += 37)
             mesh.values[v] = odd[v / 37 % (int64_t)(sizeof odd / sizeof *odd)];
-        create(&f, &mesh, 1, 7, CAMERA_OUTSIDE);
+        create_fixture(&f, &mesh, 1, 7, CAMERA_OUTSIDE);
         if (as_volume) {
             fixture_set_volume(&f, 0.1);
             f.transfer.opacity_count = 1; /* the same opacity for all values, however large */
@@ -166,14 +170,14 @@ static void odd_values_are_found_one_by_one(void **state)
         } else {
             fixture_add_surface(&f, values, 1, 1); /* with two isovalues, many hits would be tied */
         }
-        compare(&f);
+        compare_with_single_cells(&f);
         test_mesh_free(&mesh);
     }
 }
 
 /* Checks contour lines, drawn over the colours of isovalues and over a colour map; the order of a cell's vertices is
  * that of their coordinates, whatever order the mesh has. */
-static void lines_are_those_of_single_cells(void **state)
+static void lines_of_batches_match_single_cells(void **state)
 {
     static const test_mesh_kind kinds[] = {TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS, TEST_MIXED};
     static const double levels[3] = {-0.4, 0.05, 0.3};
@@ -184,12 +188,12 @@ static void lines_are_those_of_single_cells(void **state)
         render_fixture f;
         test_mesh mesh, other;
         test_view view;
-        test_mesh_lattice(kinds[turn / 4], n, 0.2, test_wave, &mesh);
-        test_mesh_lattice(kinds[turn / 4], n, 0.2, test_linear, &other);
+        test_mesh_make_lattice(kinds[turn / 4], n, 0.2, test_wave_field, &mesh);
+        test_mesh_make_lattice(kinds[turn / 4], n, 0.2, test_linear_field, &other);
         test_mesh_reorder_vertices(&mesh, 3);
         test_mesh_reorder_vertices(&other, 3);
         test_view_create(&other, (test_layout){.is_interleaved = true}, &view);
-        create(&f, &mesh, 1, n, (fixture_camera)(turn % (int)CAMERA_COUNT));
+        create_fixture(&f, &mesh, 1, n, (fixture_camera)(turn % (int)CAMERA_COUNT));
         fixture_add_surface(&f, values, 2, 1);
         const render_lines lines = {
             .field = {&view.field, f.ranges}, .count = 3, .values = levels, .width = 2, .colours = white};
@@ -200,7 +204,7 @@ static void lines_are_those_of_single_cells(void **state)
             f.surfaces[0].colour_field = (render_field){&view.field, f.ranges};
             f.surfaces[0].colour_map = &f.transfer;
         }
-        compare(&f);
+        compare_with_single_cells(&f);
         test_view_free(&view);
         test_mesh_free(&mesh);
         test_mesh_free(&other);
@@ -209,11 +213,14 @@ static void lines_are_those_of_single_cells(void **state)
 
 int main(void)
 {
-    if (fixture_set_is_unavailable()) return 77;
+    if (fixture_isa_is_unavailable()) return 77;
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(batches_draw_what_single_cells_do), cmocka_unit_test(cells_are_numbered_anyhow),
-        cmocka_unit_test(meshes_and_layers_take_turns),      cmocka_unit_test(ties_are_kept),
-        cmocka_unit_test(odd_values_are_found_one_by_one),   cmocka_unit_test(lines_are_those_of_single_cells),
+        cmocka_unit_test(batches_draw_same_picture_as_single_cells),
+        cmocka_unit_test(cell_numbering_changes_no_batch),
+        cmocka_unit_test(batches_contain_one_mesh_and_layer),
+        cmocka_unit_test(hits_at_equal_depth_are_kept),
+        cmocka_unit_test(unusual_values_are_handled_one_by_one),
+        cmocka_unit_test(lines_of_batches_match_single_cells),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

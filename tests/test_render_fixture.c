@@ -81,7 +81,7 @@ void fixture_create(render_fixture *f, const test_mesh *meshes, int count, test_
 void fixture_create_lattice(render_fixture *f, test_mesh_kind kind, int n, double jitter, test_function *field)
 {
     test_mesh mesh;
-    test_mesh_lattice(kind, n, jitter, field, &mesh);
+    test_mesh_make_lattice(kind, n, jitter, field, &mesh);
     fixture_create(f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 2.0 / n, 1,
                    (const double[]){0, 0, 0});
     test_mesh_free(&mesh);
@@ -152,8 +152,8 @@ void fixture_set_function(render_fixture *f, fixture_function *function, uint64_
 {
     double *values = function->values;
     for (uint64_t i = 0; i < FIXTURE_POINTS; i++) {
-        values[i] = step && i == 2 ? values[1] : 0.25 * (double)i + test_uniform_in(i, seed, 0.05, 0.2);
-        function->opacities[i] = (float)test_uniform_in(i, seed + 1, 0, most);
+        values[i] = step && i == 2 ? values[1] : 0.25 * (double)i + test_uniform_between(i, seed, 0.05, 0.2);
+        function->opacities[i] = (float)test_uniform_between(i, seed + 1, 0, most);
     }
     for (uint64_t i = 0; i < 3 * FIXTURE_COLOURS; i++) function->colours[i] = (float)test_uniform(i, seed + 2);
     f->transfer = (render_transfer){.low = 0,
@@ -166,7 +166,7 @@ void fixture_set_function(render_fixture *f, fixture_function *function, uint64_
                                     .unit_distance = unit};
 }
 
-double fixture_depth(const render_fixture *f, float t)
+double fixture_scene_depth(const render_fixture *f, float t)
 {
     return (double)t / f->job.space.scale + f->job.space.depth_origin;
 }
@@ -179,7 +179,7 @@ static int compare_fragments(const void *left, const void *right)
     return (a->kind < b->kind) - (a->kind > b->kind);
 }
 
-static void index_pixels(drawn_frame *out, int64_t pixels)
+static void build_pixel_index(drawn_frame *out, int64_t pixels)
 {
     if (out->list.count) qsort(out->list.items, (size_t)out->list.count, sizeof *out->list.items, compare_fragments);
     out->first = malloc((size_t)(pixels + 1) * sizeof *out->first);
@@ -193,23 +193,23 @@ static void index_pixels(drawn_frame *out, int64_t pixels)
 
 static int used_set = CPU_ISA_COUNT - 1;
 
-int fixture_set_count(void)
+int fixture_isa_count(void)
 {
     return render_isa_level() + 1;
 }
 
-const char *fixture_set_name(int set)
+const char *fixture_isa_name(int set)
 {
     return cpu_isa_name((cpu_isa)set);
 }
 
-void fixture_use_set(int set)
+void fixture_select_isa(int set)
 {
     used_set = set;
     render_isa_limit(set);
 }
 
-bool fixture_set_is_unavailable(void)
+bool fixture_isa_is_unavailable(void)
 {
     const char *query = getenv("INSITU_ISA");
     const bool is_lacking = query && strcmp(query, render_isa()) != 0;
@@ -219,10 +219,10 @@ bool fixture_set_is_unavailable(void)
 
 void fixture_draw(const render_fixture *f, drawn_frame *out)
 {
-    fixture_draw_apart(f, 1, out);
+    fixture_draw_distributed(f, 1, out);
 }
 
-void fixture_draw_apart(const render_fixture *fixtures, int count, drawn_frame *out)
+void fixture_draw_distributed(const render_fixture *fixtures, int count, drawn_frame *out)
 {
     const int width = fixtures[0].job.camera.width, height = fixtures[0].job.camera.height;
     const int64_t pixels = (int64_t)width * height;
@@ -232,7 +232,7 @@ void fixture_draw_apart(const render_fixture *fixtures, int count, drawn_frame *
         if (render_frame(&fixtures[i].job, &out->list, &out->statistics, &error) != INSITU_OK)
             fail_msg("render_frame: %s", error.message);
     }
-    index_pixels(out, pixels);
+    build_pixel_index(out, pixels);
     out->picture = (image){.width = width,
                            .height = height,
                            .rgba = malloc((size_t)pixels * 4 * sizeof(float)),
@@ -242,7 +242,7 @@ void fixture_draw_apart(const render_fixture *fixtures, int count, drawn_frame *
                          out->picture.rgba + 4 * p, out->picture.depth + p);
 }
 
-void drawn_free(drawn_frame *drawn)
+void drawn_frame_free(drawn_frame *drawn)
 {
     free(drawn->picture.rgba);
     free(drawn->picture.depth);
@@ -260,28 +260,28 @@ static void print_difference(const drawn_frame *a, const drawn_frame *b, int64_t
              (double)y[3]);
 }
 
-void drawn_assert_same_depth(const drawn_frame *a, const drawn_frame *b)
+void drawn_frame_assert_same_depths(const drawn_frame *a, const drawn_frame *b)
 {
     const int64_t pixels = (int64_t)a->picture.width * a->picture.height;
     for (int64_t p = 0; p < pixels; p++)
         if (memcmp(a->picture.depth + p, b->picture.depth + p, sizeof(float))) print_difference(a, b, p);
 }
 
-void drawn_assert_same(const drawn_frame *a, const drawn_frame *b)
+void drawn_frame_assert_same(const drawn_frame *a, const drawn_frame *b)
 {
     const int64_t pixels = (int64_t)a->picture.width * a->picture.height;
-    drawn_assert_same_depth(a, b);
+    drawn_frame_assert_same_depths(a, b);
     for (int64_t p = 0; p < pixels; p++)
         if (memcmp(a->picture.rgba + 4 * p, b->picture.rgba + 4 * p, 4 * sizeof(float))) print_difference(a, b, p);
 }
 
-double drawn_difference(const drawn_frame *a, const drawn_frame *b)
+double drawn_frame_difference(const drawn_frame *a, const drawn_frame *b)
 {
     const int64_t numbers = 4 * (int64_t)a->picture.width * a->picture.height;
     double worst = 0;
     for (int64_t i = 0; i < numbers; i++) {
         const double off = fabs((double)a->picture.rgba[i] - (double)b->picture.rgba[i]);
-        worst = test_worse(worst, off);
+        worst = test_larger_error(worst, off);
     }
     return worst;
 }
@@ -305,7 +305,7 @@ static bool is_excluded(const reference_ray *ray, double margin)
 }
 
 /* Lists the pixel's surface fragments up to the first opaque one. */
-static int surface_fragments(const drawn_frame *drawn, int64_t pixel, const fragment *hits[REFERENCE_MAX_HITS])
+static int list_surface_fragments(const drawn_frame *drawn, int64_t pixel, const fragment *hits[REFERENCE_MAX_HITS])
 {
     int count = 0;
     for (int64_t i = drawn->first[pixel]; i < drawn->first[pixel + 1] && count < REFERENCE_MAX_HITS; i++) {
@@ -326,14 +326,14 @@ static void print_hits(const comparison *c, int x, int y, const reference_ray *r
         fprintf(stderr, "  reference: %.9g surface %d, conditioning %.3g, slowness %.3g\n", ray->hits[i].depth,
                 ray->hits[i].surface, ray->hits[i].conditioning, ray->hits[i].slowness);
     for (int i = 0; i < count; i++)
-        fprintf(stderr, "  kernels:   %.9g surface %u\n", fixture_depth(c->f, hits[i]->t_in),
+        fprintf(stderr, "  kernels:   %.9g surface %u\n", fixture_scene_depth(c->f, hits[i]->t_in),
                 hits[i]->kind - FRAGMENT_SURFACE);
 }
 
 static void compare_hits(comparison *c, int x, int y, const reference_ray *ray)
 {
     const fragment *hits[REFERENCE_MAX_HITS];
-    const int count = surface_fragments(c->drawn, (int64_t)y * c->f->job.camera.width + x, hits);
+    const int count = list_surface_fragments(c->drawn, (int64_t)y * c->f->job.camera.width + x, hits);
     bool same = count == ray->hit_count;
     for (int i = 0; same && i < count; i++) same = hits[i]->kind - FRAGMENT_SURFACE == (uint32_t)ray->hits[i].surface;
     if (!same && !ray->ambiguous) {
@@ -349,9 +349,9 @@ static void compare_hits(comparison *c, int x, int y, const reference_ray *ray)
          * ends of its piece, which a slowly varying field turns into depth. */
         const double grazing =
             fmax(fmax(5e-7 * ray->hits[i].conditioning, 1.2e-7 * ray->hits[i].slowness) - c->bounds->depth, 0);
-        const double off = fabs(fixture_depth(c->f, hits[i]->t_in) - ray->hits[i].depth);
+        const double off = fabs(fixture_scene_depth(c->f, hits[i]->t_in) - ray->hits[i].depth);
         c->outcome.total_depth += off / c->f->cell_size;
-        worst = test_worse(worst, off / c->f->cell_size - grazing);
+        worst = test_larger_error(worst, off / c->f->cell_size - grazing);
     }
     double *kept = ray->ambiguous ? &c->outcome.worst_ambiguous : &c->outcome.worst_depth;
     if (worst > *kept && !ray->ambiguous && worst > c->bounds->depth) print_hits(c, x, y, ray, count, hits);
@@ -364,7 +364,7 @@ static void compare_colour(comparison *c, int x, int y, const reference_ray *ray
     double worst = 0;
     for (int i = 0; i < 4; i++) {
         const double off = fabs((double)rgba[i] - ray->rgba[i]);
-        worst = test_worse(worst, off);
+        worst = test_larger_error(worst, off);
     }
     if (!(worst <= c->bounds->colour) && !(worst <= c->outcome.worst_colour))
         fprintf(stderr, "%s, pixel %d, %d: %.7g %.7g %.7g %.7g, reference %.7g %.7g %.7g %.7g, %d samples\n", c->what,
@@ -398,7 +398,7 @@ static void compare_rays(const render_job *job, comparison *sets, int count)
     reference_free(scene);
 }
 
-static void verify(const comparison *c, const char *set)
+static void check_isa_outcome(const comparison *c, const char *set)
 {
     const fixture_outcome *o = &c->outcome;
     if (getenv("INSITU_TEST_VERBOSE"))
@@ -412,21 +412,21 @@ static void verify(const comparison *c, const char *set)
         fail_msg("%s: %d of %d rays excluded", c->what, (int)o->excluded, (int)o->rays);
 }
 
-fixture_outcome fixture_compare(const render_fixture *f, const fixture_bounds *bounds, const char *what)
+fixture_outcome fixture_compare_with_reference(const render_fixture *f, const fixture_bounds *bounds, const char *what)
 {
     drawn_frame drawn[CPU_ISA_COUNT];
     comparison sets[CPU_ISA_COUNT];
-    const int count = fixture_set_count(), used_before = used_set;
+    const int count = fixture_isa_count(), used_before = used_set;
     for (int i = 0; i < count; i++) {
-        fixture_use_set(i);
+        fixture_select_isa(i);
         fixture_draw(f, &drawn[i]);
         sets[i] = (comparison){.f = f, .bounds = bounds, .what = what, .drawn = &drawn[i]};
     }
-    fixture_use_set(used_before);
+    fixture_select_isa(used_before);
     compare_rays(&f->job, sets, count);
     for (int i = 0; i < count; i++) {
-        verify(&sets[i], fixture_set_name(i));
-        drawn_free(&drawn[i]);
+        check_isa_outcome(&sets[i], fixture_isa_name(i));
+        drawn_frame_free(&drawn[i]);
     }
     return sets[count - 1].outcome;
 }

@@ -73,27 +73,27 @@ extern const float fixture_background[4];
 
 /* Returns the depth along the camera's axis in scene units of a fragment's t, which is (depth - depth_origin) *
  * scale. */
-double fixture_depth(const render_fixture *f, float t);
+double fixture_scene_depth(const render_fixture *f, float t);
 
 void fixture_draw(const render_fixture *f, drawn_frame *out);
-/* The instruction sets of this machine, up to that of INSITU_ISA, by number. fixture_use_set() selects the set of all
- * later frames; the default is the best. One reference is compared with all of them. */
-int fixture_set_count(void);
-const char *fixture_set_name(int set);
-void fixture_use_set(int set);
+/* The instruction sets of this machine, up to that of INSITU_ISA, by number. fixture_select_isa() selects the set of
+ * all later frames; the default is the best. One reference is compared with all of them. */
+int fixture_isa_count(void);
+const char *fixture_isa_name(int set);
+void fixture_select_isa(int set);
 /* For programs that are run once for each set: returns whether INSITU_ISA names a set that this machine lacks. The
  * programs then return 77. */
-bool fixture_set_is_unavailable(void);
+bool fixture_isa_is_unavailable(void);
 /* Draws each fixture as a separate rank and merges all fragments. */
-void fixture_draw_apart(const render_fixture *fixtures, int count, drawn_frame *out);
-void drawn_free(drawn_frame *drawn);
+void fixture_draw_distributed(const render_fixture *fixtures, int count, drawn_frame *out);
+void drawn_frame_free(drawn_frame *drawn);
 
 /* Checks that every pixel's depth has the same bits; fails at the first difference. */
-void drawn_assert_same_depth(const drawn_frame *a, const drawn_frame *b);
+void drawn_frame_assert_same_depths(const drawn_frame *a, const drawn_frame *b);
 /* Checks that every pixel's colour and depth have the same bits; fails at the first difference. */
-void drawn_assert_same(const drawn_frame *a, const drawn_frame *b);
+void drawn_frame_assert_same(const drawn_frame *a, const drawn_frame *b);
 /* Returns the largest difference of a channel. */
-double drawn_difference(const drawn_frame *a, const drawn_frame *b);
+double drawn_frame_difference(const drawn_frame *a, const drawn_frame *b);
 
 /* Bounds of the difference between kernels and reference. */
 typedef struct fixture_bounds {
@@ -114,6 +114,6 @@ typedef struct fixture_outcome {
 
 /* Draws with every instruction set and compares all rays; fails the test if a bound is exceeded, with the worst ray in
  * the message. Returns the outcome of the best set. */
-fixture_outcome fixture_compare(const render_fixture *f, const fixture_bounds *bounds, const char *what);
+fixture_outcome fixture_compare_with_reference(const render_fixture *f, const fixture_bounds *bounds, const char *what);
 
 #endif

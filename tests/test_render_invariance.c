@@ -34,9 +34,9 @@ static void mesh_fixture(render_fixture *f, const test_mesh *meshes, int count, 
     add_layers(f, scene);
 }
 
-static void lattice_fixture(render_fixture *f, test_mesh_kind kind, scene_kind scene, fixture_camera camera)
+static void create_lattice_fixture(render_fixture *f, test_mesh_kind kind, scene_kind scene, fixture_camera camera)
 {
-    fixture_create_lattice(f, kind, 4, 0.2, test_wave);
+    fixture_create_lattice(f, kind, 4, 0.2, test_wave_field);
     fixture_set_camera(f, camera, 61, 47);
     add_layers(f, scene);
 }
@@ -47,14 +47,14 @@ static void threads_do_not_change_a_bit(void **state)
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         render_fixture f;
         drawn_frame one, more;
-        lattice_fixture(&f, kind, TRANSPARENT_VOLUME, CAMERA_OUTSIDE);
+        create_lattice_fixture(&f, kind, TRANSPARENT_VOLUME, CAMERA_OUTSIDE);
         fixture_draw(&f, &one);
         for (f.job.threads = 2; f.job.threads <= 3; f.job.threads++) {
             fixture_draw(&f, &more);
-            drawn_assert_same(&one, &more);
-            drawn_free(&more);
+            drawn_frame_assert_same(&one, &more);
+            drawn_frame_free(&more);
         }
-        drawn_free(&one);
+        drawn_frame_free(&one);
         fixture_free(&f);
     }
 }
@@ -68,7 +68,7 @@ typedef struct received_tiles {
     bool has_stray_pixel;
 } received_tiles;
 
-static bool take_tile(void *state, int thread, const pixel_area *area, fragment *items, int64_t count)
+static bool store_tile(void *state, int thread, const pixel_area *area, fragment *items, int64_t count)
 {
     received_tiles *t = state;
     bool is_well;
@@ -87,7 +87,7 @@ static bool take_tile(void *state, int thread, const pixel_area *area, fragment 
     return is_well;
 }
 
-static int by_bytes(const void *a, const void *b)
+static int compare_bytes(const void *a, const void *b)
 {
     return memcmp(a, b, sizeof(fragment));
 }
@@ -101,19 +101,19 @@ static void compare_tiles_with_list(render_fixture *f)
     base_error error = {0};
     assert_int_equal(render_frame(&f->job, &list, NULL, &error), INSITU_OK);
     t.list.items = malloc((size_t)list.count * sizeof *t.list.items + 1);
-    assert_int_equal(render_frame_tiles(&f->job, take_tile, &t, NULL, &error), INSITU_OK);
+    assert_int_equal(render_frame_tiles(&f->job, store_tile, &t, NULL, &error), INSITU_OK);
     assert_false(t.has_stray_pixel);
     for (int64_t p = 0; p < pixels; p++) assert_int_equal(t.pixels[p], 1);
     assert_int_equal(t.list.count, list.count);
-    qsort(list.items, (size_t)list.count, sizeof *list.items, by_bytes);
-    qsort(t.list.items, (size_t)list.count, sizeof *list.items, by_bytes);
+    qsort(list.items, (size_t)list.count, sizeof *list.items, compare_bytes);
+    qsort(t.list.items, (size_t)list.count, sizeof *list.items, compare_bytes);
     assert_memory_equal(t.list.items, list.items, (size_t)list.count * sizeof *list.items);
     free(t.list.items);
     base_free(list.items);
 }
 
 /* Checks that every pixel is in one tile, and that the tile contains everything that the list has of it. */
-static void tiles_have_what_the_list_has(void **state)
+static void tiles_have_the_fragments_of_the_list(void **state)
 {
     (void)state;
     unsigned char pixels[(61 * 47 + 7) / 8] = {0};
@@ -122,7 +122,7 @@ static void tiles_have_what_the_list_has(void **state)
     for (scene_kind scene = 0; scene < SCENE_COUNT; scene++)
         for (int trial = 0; trial < 4; trial++) {
             render_fixture f;
-            lattice_fixture(&f, trial % 2 ? TEST_POLYHEDRA : TEST_HEXES, scene, CAMERA_OUTSIDE);
+            create_lattice_fixture(&f, trial % 2 ? TEST_POLYHEDRA : TEST_HEXES, scene, CAMERA_OUTSIDE);
             f.job.threads = 1 + trial;
             f.job.pixels = trial < 2 ? NULL : pixels;
             f.job.separate_samples = trial == 3;
@@ -136,12 +136,12 @@ static void refused_tiles_end_the_frame(void **state)
     (void)state;
     const int64_t held = base_memory_held();
     render_fixture f;
-    lattice_fixture(&f, TEST_TETS, TRANSPARENT, CAMERA_OUTSIDE);
+    create_lattice_fixture(&f, TEST_TETS, TRANSPARENT, CAMERA_OUTSIDE);
     for (int after = 0; after < 12; after += 5) {
         received_tiles t = {.width = f.job.camera.width, .refuse_after = after};
         base_error error = {0};
         t.list.items = malloc(sizeof(fragment) * 61 * 47 * 64);
-        assert_int_equal(render_frame_tiles(&f.job, take_tile, &t, NULL, &error), INSITU_ERROR_MEMORY);
+        assert_int_equal(render_frame_tiles(&f.job, store_tile, &t, NULL, &error), INSITU_ERROR_MEMORY);
         free(t.list.items);
     }
     fixture_free(&f);
@@ -156,10 +156,10 @@ static void draw_by_traversals(render_fixture *f)
     for (int i = 0; i < 2; i++) {
         f->job.traversal = (render_traversal)i;
         fixture_draw(f, &drawn[i]);
-        drawn_assert_same(&drawn[0], &drawn[i]);
+        drawn_frame_assert_same(&drawn[0], &drawn[i]);
         assert_int_equal(drawn[0].list.count, drawn[i].list.count);
     }
-    for (int i = 0; i < 2; i++) drawn_free(&drawn[i]);
+    for (int i = 0; i < 2; i++) drawn_frame_free(&drawn[i]);
 }
 
 /* Compares traversals for cells of ten pixels and of three, with some pixels left out. */
@@ -170,7 +170,7 @@ static void compare_traversals(test_mesh_kind kind, int n, scene_kind scene, fix
     unsigned char pixels[(WIDTH * HEIGHT + 7) / 8] = {0};
     for (int64_t p = 0; p < WIDTH * HEIGHT; p++)
         if (p * p % 7 < 3) pixel_set_add(pixels, p);
-    fixture_create_lattice(&f, kind, n, 0.2, test_wave);
+    fixture_create_lattice(&f, kind, n, 0.2, test_wave_field);
     fixture_set_camera(&f, camera, WIDTH, HEIGHT);
     add_layers(&f, scene);
     if (scene == TRANSPARENT && kind == TEST_HEXES) {
@@ -205,17 +205,17 @@ static void sample_groups_draw_the_same(void **state)
         for (scene_kind scene = VOLUME; scene < SCENE_COUNT; scene++) {
             render_fixture f;
             drawn_frame one, more;
-            lattice_fixture(&f, kind, scene, CAMERA_OUTSIDE);
+            create_lattice_fixture(&f, kind, scene, CAMERA_OUTSIDE);
             f.job.sample_group = 1;
             fixture_draw(&f, &one);
             for (int i = 1; i < 4; i++) {
                 f.job.sample_group = groups[i];
                 fixture_draw(&f, &more);
-                drawn_assert_same_depth(&one, &more);
-                assert_true(drawn_difference(&one, &more) <= 1e-6);
-                drawn_free(&more);
+                drawn_frame_assert_same_depths(&one, &more);
+                assert_true(drawn_frame_difference(&one, &more) <= 1e-6);
+                drawn_frame_free(&more);
             }
-            drawn_free(&one);
+            drawn_frame_free(&one);
             fixture_free(&f);
         }
 }
@@ -228,16 +228,16 @@ static void order_and_numbering_do_not_change_a_bit(void **state)
             test_mesh mesh;
             render_fixture f;
             drawn_frame first, other;
-            test_mesh_lattice(kind, 4, 0.2, test_wave, &mesh);
+            test_mesh_make_lattice(kind, 4, 0.2, test_wave_field, &mesh);
             mesh_fixture(&f, &mesh, 1, 4, scene, CAMERA_OUTSIDE);
             fixture_draw(&f, &first);
             fixture_free(&f);
-            test_mesh_shuffle(&mesh, 77);
+            test_mesh_shuffle_cells(&mesh, 77);
             mesh_fixture(&f, &mesh, 1, 4, scene, CAMERA_OUTSIDE);
             fixture_draw(&f, &other);
-            drawn_assert_same(&first, &other);
-            drawn_free(&first);
-            drawn_free(&other);
+            drawn_frame_assert_same(&first, &other);
+            drawn_frame_free(&first);
+            drawn_frame_free(&other);
             fixture_free(&f);
             test_mesh_free(&mesh);
         }
@@ -250,7 +250,7 @@ static double depth_difference(const drawn_frame *a, const drawn_frame *b)
     for (int64_t p = 0; p < (int64_t)a->picture.width * a->picture.height; p++) {
         const double x = (double)a->picture.depth[p], y = (double)b->picture.depth[p];
         if (isinf(x) && isinf(y)) continue;
-        worst = test_worse(worst, fabs(x - y));
+        worst = test_larger_error(worst, fabs(x - y));
     }
     return worst;
 }
@@ -266,7 +266,7 @@ static void reordered_cells_draw_the_same(void **state)
             test_mesh mesh;
             render_fixture f;
             drawn_frame first, other;
-            test_mesh_lattice(kind, 4, 0.2, test_wave, &mesh);
+            test_mesh_make_lattice(kind, 4, 0.2, test_wave_field, &mesh);
             mesh_fixture(&f, &mesh, 1, 4, scene, CAMERA_OUTSIDE);
             fixture_draw(&f, &first);
             fixture_free(&f);
@@ -275,12 +275,12 @@ static void reordered_cells_draw_the_same(void **state)
             fixture_draw(&f, &other);
             if (getenv("INSITU_TEST_VERBOSE"))
                 fprintf(stderr, "turned %s, scene %d: depth %.2g, colour %.2g\n", test_mesh_kind_name(kind), (int)scene,
-                        depth_difference(&first, &other), drawn_difference(&first, &other));
-            if (kind == TEST_TETS) drawn_assert_same(&first, &other);
+                        depth_difference(&first, &other), drawn_frame_difference(&first, &other));
+            if (kind == TEST_TETS) drawn_frame_assert_same(&first, &other);
             assert_true(depth_difference(&first, &other) < 5e-6);
-            assert_true(drawn_difference(&first, &other) < 2e-5);
-            drawn_free(&first);
-            drawn_free(&other);
+            assert_true(drawn_frame_difference(&first, &other) < 2e-5);
+            drawn_frame_free(&first);
+            drawn_frame_free(&other);
             fixture_free(&f);
             test_mesh_free(&mesh);
         }
@@ -292,8 +292,8 @@ static void layouts_do_not_change_a_bit(void **state)
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         test_mesh mesh;
         drawn_frame first;
-        test_mesh_lattice(kind, 3, 0.2, test_wave, &mesh);
-        test_mesh_round(&mesh);
+        test_mesh_make_lattice(kind, 3, 0.2, test_wave_field, &mesh);
+        test_mesh_round_to_float(&mesh);
         for (unsigned bits = 0; bits < 32; bits++) {
             const test_layout layout = {bits & 1, bits & 2, bits & 4, bits & 8, bits & 16};
             render_fixture f;
@@ -303,12 +303,12 @@ static void layouts_do_not_change_a_bit(void **state)
             add_layers(&f, TRANSPARENT_VOLUME);
             fixture_draw(&f, bits ? &other : &first);
             if (bits) {
-                drawn_assert_same(&first, &other);
-                drawn_free(&other);
+                drawn_frame_assert_same(&first, &other);
+                drawn_frame_free(&other);
             }
             fixture_free(&f);
         }
-        drawn_free(&first);
+        drawn_frame_free(&first);
         test_mesh_free(&mesh);
     }
 }
@@ -316,18 +316,18 @@ static void layouts_do_not_change_a_bit(void **state)
 /* ---- parts and ranks ---- */
 
 /* Distributes the mesh's cells. With ghosts, every part has all cells, of which those of other parts are ghosts. */
-static void distribute(const test_mesh *mesh, test_partition_kind partition, int n, int parts, bool ghosts,
-                       test_mesh *out)
+static void distribute_cells(const test_mesh *mesh, test_partition_kind partition, int n, int parts, bool ghosts,
+                             test_mesh *out)
 {
     int *owners = malloc((size_t)mesh->cell_count * sizeof *owners);
-    test_partition(mesh, partition, n, parts, owners);
+    test_partition_cells(mesh, partition, n, parts, owners);
     for (int part = 0; part < parts; part++) {
         if (!ghosts) {
-            test_mesh_part(mesh, owners, part, &out[part]);
+            test_mesh_extract_part(mesh, owners, part, &out[part]);
             continue;
         }
         int *all = calloc((size_t)mesh->cell_count, sizeof *all);
-        test_mesh_part(mesh, all, 0, &out[part]);
+        test_mesh_extract_part(mesh, all, 0, &out[part]);
         for (int64_t i = 0; i < mesh->cell_count; i++) out[part].ghosts[i] = owners[i] != part;
         free(all);
     }
@@ -338,10 +338,10 @@ static void distribute(const test_mesh *mesh, test_partition_kind partition, int
  * and a pixel has about 30. */
 static void assert_same_to_rounding(const drawn_frame *whole, const drawn_frame *parts, scene_kind scene)
 {
-    drawn_assert_same_depth(whole, parts);
-    const double off = drawn_difference(whole, parts);
+    drawn_frame_assert_same_depths(whole, parts);
+    const double off = drawn_frame_difference(whole, parts);
     if (off > 1e-6) fail_msg("colour off by %g", off);
-    if (scene == OPAQUE || scene == TRANSPARENT) drawn_assert_same(whole, parts);
+    if (scene == OPAQUE || scene == TRANSPARENT) drawn_frame_assert_same(whole, parts);
 }
 
 static void compare_distributed(test_mesh_kind kind, scene_kind scene, test_partition_kind partition, int parts,
@@ -351,23 +351,23 @@ static void compare_distributed(test_mesh_kind kind, scene_kind scene, test_part
     test_mesh mesh, distributed[5];
     render_fixture f, apart[5];
     drawn_frame whole, other;
-    test_mesh_lattice(kind, 4, 0.2, test_wave, &mesh);
+    test_mesh_make_lattice(kind, 4, 0.2, test_wave_field, &mesh);
     mesh_fixture(&f, &mesh, 1, 4, scene, camera);
     fixture_draw(&f, &whole);
     fixture_free(&f);
-    distribute(&mesh, partition, 4, parts, ghosts, distributed);
+    distribute_cells(&mesh, partition, 4, parts, ghosts, distributed);
     for (int i = 0; i < parts; i++) {
         mesh_fixture(&apart[i], &distributed[i], 1, 4, scene, camera);
         apart[i].job.is_alone = false;
     }
-    fixture_draw_apart(apart, parts, &other);
+    fixture_draw_distributed(apart, parts, &other);
     assert_same_to_rounding(&whole, &other, scene);
-    drawn_free(&other);
+    drawn_frame_free(&other);
     mesh_fixture(&f, distributed, parts, 4, scene, camera);
     fixture_draw(&f, &other);
     assert_same_to_rounding(&whole, &other, scene);
-    drawn_free(&other);
-    drawn_free(&whole);
+    drawn_frame_free(&other);
+    drawn_frame_free(&whole);
     fixture_free(&f);
     for (int i = 0; i < parts; i++) {
         fixture_free(&apart[i]);
@@ -382,8 +382,8 @@ static void compare_volume_traversals(test_mesh_kind kind, scene_kind scene, fix
 {
     render_fixture f;
     test_mesh mesh, parts[2];
-    test_mesh_lattice(kind, 5, 0.2, test_wave, &mesh);
-    distribute(&mesh, TEST_CHECKERBOARD, 5, 2, false, parts);
+    test_mesh_make_lattice(kind, 5, 0.2, test_wave_field, &mesh);
+    distribute_cells(&mesh, TEST_CHECKERBOARD, 5, 2, false, parts);
     fixture_create(&f, parts, 2, layout, 0.4, 1, origin);
     fixture_set_camera(&f, camera, 61, 47);
     add_layers(&f, scene);
@@ -403,7 +403,7 @@ static void traversals_of_volumes_do_not_change_a_bit(void **state)
         }
 }
 
-static void parts_and_ranks_draw_the_whole(void **state)
+static void parts_and_ranks_draw_the_whole_picture(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
@@ -424,8 +424,8 @@ static void samples_on_faces_have_one_owner(void **state)
             test_mesh mesh, distributed[3];
             render_fixture apart[3];
             drawn_frame drawn;
-            test_mesh_lattice(kind, 4, 0, test_wave, &mesh);
-            distribute(&mesh, partition, 4, 3, false, distributed);
+            test_mesh_make_lattice(kind, 4, 0, test_wave_field, &mesh);
+            distribute_cells(&mesh, partition, 4, 3, false, distributed);
             for (int i = 0; i < 3; i++) {
                 mesh_fixture(&apart[i], &distributed[i], 1, 4, VOLUME, CAMERA_ALONG_X);
                 apart[i].job.camera.eye[0] = 3.125;
@@ -436,7 +436,7 @@ static void samples_on_faces_have_one_owner(void **state)
                 apart[i].transfer.opacities = constant;
                 apart[i].transfer.unit_distance = 0.25;
             }
-            fixture_draw_apart(apart, 3, &drawn);
+            fixture_draw_distributed(apart, 3, &drawn);
             const double clear = pow(0.8, 8) * (1 - (double)fixture_background[3]);
             for (int p = 0; p < 61 * 47; p++) {
                 double base[3], d[3];
@@ -444,7 +444,7 @@ static void samples_on_faces_have_one_owner(void **state)
                 if (fabs(base[1]) >= 1 || fabs(base[2]) >= 1) continue;
                 assert_true(fabs(1 - (double)drawn.picture.rgba[4 * p + 3] - clear) < 1e-6);
             }
-            drawn_free(&drawn);
+            drawn_frame_free(&drawn);
             for (int i = 0; i < 3; i++) {
                 fixture_free(&apart[i]);
                 test_mesh_free(&distributed[i]);
@@ -470,8 +470,8 @@ static void parent_tree_changes_nothing(void **state)
         float lower[5][3], upper[5][3], ranges[5][2];
         mmbvh parent;
         base_error error = {0};
-        test_mesh_lattice(TEST_MIXED, 4, 0.2, test_wave, &mesh);
-        distribute(&mesh, TEST_BLOCK, 4, 5, false, distributed);
+        test_mesh_make_lattice(TEST_MIXED, 4, 0.2, test_wave_field, &mesh);
+        distribute_cells(&mesh, TEST_BLOCK, 4, 5, false, distributed);
         mesh_fixture(&f, distributed, 5, 4, scene, CAMERA_OUTSIDE);
         fixture_draw(&f, &without);
         for (int i = 0; i < 5; i++) {
@@ -488,10 +488,10 @@ static void parent_tree_changes_nothing(void **state)
             INSITU_OK);
         f.job.parent = &parent;
         fixture_draw(&f, &with);
-        drawn_assert_same(&without, &with);
+        drawn_frame_assert_same(&without, &with);
         mmbvh_free(&parent);
-        drawn_free(&without);
-        drawn_free(&with);
+        drawn_frame_free(&without);
+        drawn_frame_free(&with);
         fixture_free(&f);
         for (int i = 0; i < 5; i++) test_mesh_free(&distributed[i]);
         test_mesh_free(&mesh);
@@ -500,7 +500,7 @@ static void parent_tree_changes_nothing(void **state)
 
 /* ---- values that are not finite ---- */
 
-static bool touches(const test_mesh *mesh, int64_t cell)
+static bool contains_plane_vertex(const test_mesh *mesh, int64_t cell)
 {
     for (int64_t i = mesh->offsets[cell]; i < mesh->offsets[cell + 1]; i++) {
         const int64_t entry = mesh->connectivity[i];
@@ -530,27 +530,27 @@ static void draw_opaque_ends(const test_mesh *mesh, scene_kind scene, int way, d
 }
 
 /* Checks that cells with a NaN or an infinity are treated as missing, to the bit. */
-static void cells_with_values_not_finite_are_not_there(void **state)
+static void cells_with_infinite_values_are_skipped(void **state)
 {
     (void)state;
     static const double wrong[3] = {(double)NAN, (double)INFINITY, -(double)INFINITY};
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         test_mesh mesh, without;
-        test_mesh_lattice(kind, 4, 0.2, test_wave, &mesh);
+        test_mesh_make_lattice(kind, 4, 0.2, test_wave_field, &mesh);
         for (int i = 0; i < 3; i++) mesh.values[31 + 20 * i] = wrong[i];
         int *owners = malloc((size_t)mesh.cell_count * sizeof *owners);
-        for (int64_t i = 0; i < mesh.cell_count; i++) owners[i] = touches(&mesh, i);
-        test_mesh_part(&mesh, owners, 0, &without);
+        for (int64_t i = 0; i < mesh.cell_count; i++) owners[i] = contains_plane_vertex(&mesh, i);
+        test_mesh_extract_part(&mesh, owners, 0, &without);
         assert_true(without.cell_count < mesh.cell_count);
         for (scene_kind scene = 0; scene < SCENE_COUNT; scene++)
             for (int way = 0; way < (scene == VOLUME || scene == OPAQUE_VOLUME ? 3 : 1); way++) {
                 drawn_frame first, other;
                 draw_opaque_ends(&mesh, scene, way, &first);
                 draw_opaque_ends(&without, scene, way, &other);
-                drawn_assert_same(&first, &other);
+                drawn_frame_assert_same(&first, &other);
                 for (int i = 0; i < 4 * 61 * 47; i++) assert_true(isfinite(first.picture.rgba[i]));
-                drawn_free(&first);
-                drawn_free(&other);
+                drawn_frame_free(&first);
+                drawn_frame_free(&other);
             }
         free(owners);
         test_mesh_free(&mesh);
@@ -575,7 +575,7 @@ static void constant_equal_to_the_isovalue_has_no_surface(void **state)
         fixture_add_surface(&f, values, 2, 1);
         fixture_draw(&f, &drawn);
         assert_int_equal(drawn.list.count, 0);
-        drawn_free(&drawn);
+        drawn_frame_free(&drawn);
         fixture_free(&f);
     }
 }
@@ -588,7 +588,7 @@ static double plane_field(const double p[3])
     return p[0];
 }
 
-static void isovalue_at_vertices_leaves_no_hole(void **state)
+static void isovalue_at_vertices_gives_no_hole(void **state)
 {
     (void)state;
     static const double zero[1] = {0};
@@ -612,18 +612,18 @@ static void isovalue_at_vertices_leaves_no_hole(void **state)
                 const int hits = (int)(drawn.first[p + 1] - drawn.first[p]);
                 several += hits > 1;
                 for (int64_t i = drawn.first[p]; i < drawn.first[p + 1]; i++)
-                    assert_true(fabs(fixture_depth(&f, drawn.list.items[i].t_in) - z) < 1e-5);
+                    assert_true(fabs(fixture_scene_depth(&f, drawn.list.items[i].t_in) - z) < 1e-5);
                 if (hits % 2 != inside)
                     fail_msg("%s, %s, pixel %d, %d: %d hits", test_mesh_kind_name(kind), fixture_camera_name(camera),
                              p % 43, p / 43, hits);
             }
             assert_true(met > 0 && several <= 43);
-            drawn_free(&drawn);
+            drawn_frame_free(&drawn);
             fixture_free(&f);
         }
 }
 
-static void jitter_is_uniform_and_of_pixel_and_frame(void **state)
+static void jitter_is_uniform_per_pixel_and_frame(void **state)
 {
     (void)state;
     double sum = 0, product = 0;
@@ -643,7 +643,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(threads_do_not_change_a_bit),
-        cmocka_unit_test(tiles_have_what_the_list_has),
+        cmocka_unit_test(tiles_have_the_fragments_of_the_list),
         cmocka_unit_test(refused_tiles_end_the_frame),
         cmocka_unit_test(traversals_do_not_change_a_bit),
         cmocka_unit_test(sample_groups_draw_the_same),
@@ -651,14 +651,14 @@ int main(void)
         cmocka_unit_test(reordered_cells_draw_the_same),
         cmocka_unit_test(layouts_do_not_change_a_bit),
         cmocka_unit_test(traversals_of_volumes_do_not_change_a_bit),
-        cmocka_unit_test(parts_and_ranks_draw_the_whole),
+        cmocka_unit_test(parts_and_ranks_draw_the_whole_picture),
         cmocka_unit_test(samples_on_faces_have_one_owner),
         cmocka_unit_test(ghosts_change_nothing),
         cmocka_unit_test(parent_tree_changes_nothing),
-        cmocka_unit_test(cells_with_values_not_finite_are_not_there),
+        cmocka_unit_test(cells_with_infinite_values_are_skipped),
         cmocka_unit_test(constant_equal_to_the_isovalue_has_no_surface),
-        cmocka_unit_test(isovalue_at_vertices_leaves_no_hole),
-        cmocka_unit_test(jitter_is_uniform_and_of_pixel_and_frame),
+        cmocka_unit_test(isovalue_at_vertices_gives_no_hole),
+        cmocka_unit_test(jitter_is_uniform_per_pixel_and_frame),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -43,7 +43,7 @@ static void draw_scene(int frame, float *numbers)
     const int scene = frame % SCENES;
     render_fixture f;
     drawn_frame drawn;
-    fixture_create_lattice(&f, (test_mesh_kind)(frame / (SCENES * CAMERA_PLANE)), 4, 0.2, test_wave);
+    fixture_create_lattice(&f, (test_mesh_kind)(frame / (SCENES * CAMERA_PLANE)), 4, 0.2, test_wave_field);
     fixture_set_camera(&f, (fixture_camera)(frame / SCENES % CAMERA_PLANE), WIDTH, HEIGHT);
     if (scene % 2 == 0) fixture_add_surface(&f, values, 2, scene == 0 ? 1 : 0.4f);
     if (scene != 0) fixture_set_volume(&f, 0.3);
@@ -56,50 +56,50 @@ static void draw_scene(int frame, float *numbers)
     fixture_draw(&f, &drawn);
     memcpy(numbers, drawn.picture.rgba, 4 * WIDTH * HEIGHT * sizeof *numbers);
     memcpy(numbers + 4 * WIDTH * HEIGHT, drawn.picture.depth, WIDTH * HEIGHT * sizeof *numbers);
-    drawn_free(&drawn);
+    drawn_frame_free(&drawn);
     fixture_free(&f);
 }
 
 /* Returns whether a frame is drawn. */
-static bool is_due(int frame)
+static bool is_case_selected(int frame)
 {
     const int scene = frame % SCENES, camera = frame / SCENES % CAMERA_PLANE, kind = frame / (SCENES * CAMERA_PLANE);
-    return test_is_whole() || (kind + scene) % CAMERA_PLANE == camera;
+    return test_is_long_run() || (kind + scene) % CAMERA_PLANE == camera;
 }
 
 /* Returns the largest difference of numbers first .. last; infinite if only one of them is infinite. */
-static double worst_difference(const float *a, const float *b, int first, int last)
+static double find_largest_difference(const float *a, const float *b, int first, int last)
 {
     double worst = 0;
     for (int i = first; i < last; i++) {
         const double x = (double)a[i], y = (double)b[i];
         if (isinf(x) && isinf(y)) continue;
-        worst = test_worse(worst, fabs(x - y));
+        worst = test_larger_error(worst, fabs(x - y));
     }
     return worst;
 }
 
-static void every_set_draws_what_plain_draws(void **state)
+static void every_isa_draws_the_scalar_picture(void **state)
 {
     static float plain[NUMBERS], other[NUMBERS];
     (void)state;
     for (int frame = 0; frame < FRAMES; frame++) {
-        if (!is_due(frame)) continue;
-        for (int set = 0; set < fixture_set_count(); set++) {
-            fixture_use_set(set);
+        if (!is_case_selected(frame)) continue;
+        for (int set = 0; set < fixture_isa_count(); set++) {
+            fixture_select_isa(set);
             draw_scene(frame, set ? other : plain);
             if (!set) continue;
-            const double colour = worst_difference(plain, other, 0, 4 * WIDTH * HEIGHT);
-            const double depth = worst_difference(plain, other, 4 * WIDTH * HEIGHT, NUMBERS);
+            const double colour = find_largest_difference(plain, other, 0, 4 * WIDTH * HEIGHT);
+            const double depth = find_largest_difference(plain, other, 4 * WIDTH * HEIGHT, NUMBERS);
             if (depth <= 5e-6 && colour <= 2e-5) continue;
             fail_msg("frame %d, %s and plain: depth %.2g of the scene's size, colour %.2g", frame,
-                     fixture_set_name(set), depth, colour);
+                     fixture_isa_name(set), depth, colour);
         }
     }
 }
 
 /* Computes the set that INSITU_ISA selects in a process. */
-static void set_of(const char *isa, char used[16])
+static void find_selected_isa(const char *isa, char used[16])
 {
     char command[600];
     snprintf(command, sizeof command, "INSITU_ISA=%s '%s' set", isa, program);
@@ -109,23 +109,23 @@ static void set_of(const char *isa, char used[16])
     assert_int_equal(pclose(answer), 0);
 }
 
-static void the_environment_chooses_the_set(void **state)
+static void environment_variable_selects_the_isa(void **state)
 {
     char used[16];
     (void)state;
-    for (int set = 0; set < fixture_set_count(); set++) {
-        set_of(fixture_set_name(set), used);
-        assert_string_equal(used, fixture_set_name(set));
+    for (int set = 0; set < fixture_isa_count(); set++) {
+        find_selected_isa(fixture_isa_name(set), used);
+        assert_string_equal(used, fixture_isa_name(set));
     }
-    set_of("mmx", used);
+    find_selected_isa("mmx", used);
     assert_string_not_equal(used, "mmx");
 }
 
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_set_draws_what_plain_draws),
-        cmocka_unit_test(the_environment_chooses_the_set),
+        cmocka_unit_test(every_isa_draws_the_scalar_picture),
+        cmocka_unit_test(environment_variable_selects_the_isa),
     };
     program = argv[0];
     if (argc > 1) return puts(render_isa()) < 0;

@@ -20,7 +20,7 @@ static void mesh_fixture(render_fixture *f, const test_mesh *meshes, int count, 
                    (const double[]){0, 0, 0});
 }
 
-static const char *case_name(const char *what, fixture_camera camera)
+static const char *make_case_name(const char *what, fixture_camera camera)
 {
     static char name[96];
     snprintf(name, sizeof name, "%s, %s", what, fixture_camera_name(camera));
@@ -32,13 +32,13 @@ static void compare_shape(test_polyhedron_shape shape, fixture_camera camera, bo
 {
     test_mesh mesh;
     render_fixture f;
-    test_mesh_polyhedron(shape, is_linear ? test_linear : test_wave, &mesh);
+    test_mesh_make_polyhedron(shape, is_linear ? test_linear_field : test_wave_field, &mesh);
     mesh_fixture(&f, &mesh, 1, 1);
     fixture_set_camera(&f, camera, 49, 43);
     fixture_add_surface(&f, values, 3, 0.5f);
     fixture_set_volume(&f, 0.05);
     const fixture_outcome o =
-        fixture_compare(&f, &fixture_usual_bounds, case_name(test_polyhedron_name(shape), camera));
+        fixture_compare_with_reference(&f, &fixture_usual_bounds, make_case_name(test_polyhedron_name(shape), camera));
     assert_true(o.hits > 20);
     assert_true(!is_linear || 100 * o.ambiguous <= o.rays);
     fixture_free(&f);
@@ -84,7 +84,7 @@ static void sums_through_spokes_match_the_reference(void **state)
         test_mesh mesh;
         render_fixture f;
         double worst = 0;
-        test_mesh_polyhedron(shapes[s], test_linear, &mesh);
+        test_mesh_make_polyhedron(shapes[s], test_linear_field, &mesh);
         for (int64_t v = 0; v < mesh.vertex_count; v++) mesh.values[v] = 2 * test_uniform((uint64_t)v, 5) - 1;
         mesh_fixture(&f, &mesh, 1, 1);
         fixture_set_volume(&f, 1);
@@ -99,9 +99,9 @@ static void sums_through_spokes_match_the_reference(void **state)
             reference_integral_free(scene);
             for (int c = 0; c < 4; c++) {
                 const double off = fabs((double)drawn.picture.rgba[c] - truth[c]);
-                worst = test_worse(worst, off);
+                worst = test_larger_error(worst, off);
             }
-            drawn_free(&drawn);
+            drawn_frame_free(&drawn);
         }
         fprintf(stderr, "%s, rays through spokes: %.2g\n", test_polyhedron_name(shapes[s]), worst);
         assert_true(worst < 1e-5);
@@ -154,7 +154,7 @@ static void assert_same_as_polyhedra(test_mesh_kind kind, double share, double j
     for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++) {
         test_mesh mesh;
         drawn_frame first, other;
-        test_mesh_lattice(kind, 4, jitter, test_wave, &mesh);
+        test_mesh_make_lattice(kind, 4, jitter, test_wave_field, &mesh);
         draw_mesh(&mesh, camera, set, &first);
         test_mesh_to_polyhedra(&mesh, share);
         draw_mesh(&mesh, camera, set, &other);
@@ -162,14 +162,14 @@ static void assert_same_as_polyhedra(test_mesh_kind kind, double share, double j
         if (set == set_constant_volume)
             assert_same_alpha(&first, &other);
         else
-            drawn_assert_same(&first, &other);
-        drawn_free(&first);
-        drawn_free(&other);
+            drawn_frame_assert_same(&first, &other);
+        drawn_frame_free(&first);
+        drawn_frame_free(&other);
         test_mesh_free(&mesh);
     }
 }
 
-static void tets_given_as_polyhedra_are_tets(void **state)
+static void tets_passed_as_polyhedra_match_tets(void **state)
 {
     (void)state;
     for (int lattice = 0; lattice < 2; lattice++) {
@@ -180,7 +180,7 @@ static void tets_given_as_polyhedra_are_tets(void **state)
 
 /* Checks that intervals have the same bits whichever of a face's cells is a polyhedron, so that no sample is lost or
  * counted twice. */
-static void intervals_of_polyhedra_are_those_of_the_types(void **state)
+static void intervals_of_polyhedra_match_typed_cells(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
@@ -197,13 +197,14 @@ static void polyhedra_beside_other_cells_match_the_reference(void **state)
             for (int half = 0; half < 2; half++) {
                 test_mesh mesh;
                 render_fixture f;
-                test_mesh_lattice(kinds[i], 4, 0.2, test_wave, &mesh);
+                test_mesh_make_lattice(kinds[i], 4, 0.2, test_wave_field, &mesh);
                 test_mesh_to_polyhedra(&mesh, half ? 0.5 : 1);
                 mesh_fixture(&f, &mesh, 1, 0.5);
                 fixture_set_camera(&f, camera, 33, 29);
                 fixture_add_surface(&f, wave_values, 2, 0.5f);
                 fixture_set_volume(&f, 0.3);
-                fixture_compare(&f, &fixture_usual_bounds, case_name(test_mesh_kind_name(kinds[i]), camera));
+                fixture_compare_with_reference(&f, &fixture_usual_bounds,
+                                               make_case_name(test_mesh_kind_name(kinds[i]), camera));
                 fixture_free(&f);
                 test_mesh_free(&mesh);
             }
@@ -217,7 +218,7 @@ static void linear_surface_of_warped_polyhedra_is_a_plane(void **state)
     test_mesh mesh;
     render_fixture f;
     drawn_frame drawn;
-    test_mesh_lattice(TEST_HEXES, 4, 0.2, test_linear, &mesh);
+    test_mesh_make_lattice(TEST_HEXES, 4, 0.2, test_linear_field, &mesh);
     test_mesh_to_polyhedra(&mesh, 0.7);
     mesh_fixture(&f, &mesh, 1, 0.5);
     fixture_set_camera(&f, CAMERA_OUTSIDE, 61, 47);
@@ -228,12 +229,12 @@ static void linear_surface_of_warped_polyhedra_is_a_plane(void **state)
         double base[3], d[3];
         render_camera_ray(&f.job.camera, (int)hit->pixel % 61, (int)hit->pixel / 61, base, d);
         const double slope = 0.3 * d[0] - 0.7 * d[1] + 0.5 * d[2];
-        const double value = test_linear(base) + slope * fixture_depth(&f, hit->t_in);
+        const double value = test_linear_field(base) + slope * fixture_scene_depth(&f, hit->t_in);
         if (!(fabs(value - values[hit->kind - FRAGMENT_SURFACE]) < 2e-6 + 1e-6 * fabs(slope)))
             fail_msg("pixel %u: value %.9g", hit->pixel, value);
     }
     assert_true(drawn.list.count > 300);
-    drawn_free(&drawn);
+    drawn_frame_free(&drawn);
     fixture_free(&f);
     test_mesh_free(&mesh);
 }
@@ -246,11 +247,11 @@ static void draw_distributed(const test_mesh *mesh, bool is_turned, scene_set *s
 {
     render_fixture parts[RANKS];
     int *owners = malloc((size_t)mesh->cell_count * sizeof *owners);
-    test_partition(mesh, TEST_RANDOM, 4, RANKS, owners);
+    test_partition_cells(mesh, TEST_RANDOM, 4, RANKS, owners);
     for (int rank = 0; rank < RANKS; rank++) {
         test_mesh part;
-        test_mesh_part(mesh, owners, rank, &part);
-        test_mesh_shuffle(&part, (uint64_t)rank + 20);
+        test_mesh_extract_part(mesh, owners, rank, &part);
+        test_mesh_shuffle_cells(&part, (uint64_t)rank + 20);
         if (is_turned) test_mesh_reorder_vertices(&part, (uint64_t)rank + 40);
         mesh_fixture(&parts[rank], &part, 1, 0.5);
         fixture_set_camera(&parts[rank], CAMERA_OUTSIDE, 61, 47);
@@ -258,31 +259,31 @@ static void draw_distributed(const test_mesh *mesh, bool is_turned, scene_set *s
         parts[rank].job.is_alone = false;
         test_mesh_free(&part);
     }
-    fixture_draw_apart(parts, RANKS, out);
+    fixture_draw_distributed(parts, RANKS, out);
     for (int rank = 0; rank < RANKS; rank++) fixture_free(&parts[rank]);
     free(owners);
 }
 
 /* Checks cells that are distributed at random over seven ranks, each with its own order of cells, vertices and
  * faces. */
-static void random_ownership_changes_nothing(void **state)
+static void random_cell_owners_change_no_pixel(void **state)
 {
     (void)state;
     for (int pass = 0; pass < 6; pass++) {
         test_mesh mesh;
         drawn_frame alone, distributed;
-        test_mesh_lattice(pass % 3 == 0   ? TEST_POLYHEDRA
-                          : pass % 3 == 1 ? TEST_HEXES
-                                          : TEST_MIXED,
-                          4, 0.2, test_wave, &mesh);
+        test_mesh_make_lattice(pass % 3 == 0   ? TEST_POLYHEDRA
+                               : pass % 3 == 1 ? TEST_HEXES
+                                               : TEST_MIXED,
+                               4, 0.2, test_wave_field, &mesh);
         if (pass % 3) test_mesh_to_polyhedra(&mesh, pass % 3 == 1 ? 1 : 0.6);
         draw_mesh(&mesh, CAMERA_OUTSIDE, pass < 3 ? set_surfaces : set_volume, &alone);
         draw_distributed(&mesh, pass % 3 < 2, pass < 3 ? set_surfaces : set_volume, &distributed);
-        if (pass < 3) drawn_assert_same(&alone, &distributed);
-        if (!(drawn_difference(&alone, &distributed) <= 1e-6))
-            fail_msg("off by %g", drawn_difference(&alone, &distributed));
-        drawn_free(&alone);
-        drawn_free(&distributed);
+        if (pass < 3) drawn_frame_assert_same(&alone, &distributed);
+        if (!(drawn_frame_difference(&alone, &distributed) <= 1e-6))
+            fail_msg("off by %g", drawn_frame_difference(&alone, &distributed));
+        drawn_frame_free(&alone);
+        drawn_frame_free(&distributed);
         test_mesh_free(&mesh);
     }
 }
@@ -293,11 +294,11 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(shapes_match_the_reference),
         cmocka_unit_test(sums_through_spokes_match_the_reference),
-        cmocka_unit_test(tets_given_as_polyhedra_are_tets),
-        cmocka_unit_test(intervals_of_polyhedra_are_those_of_the_types),
+        cmocka_unit_test(tets_passed_as_polyhedra_match_tets),
+        cmocka_unit_test(intervals_of_polyhedra_match_typed_cells),
         cmocka_unit_test(polyhedra_beside_other_cells_match_the_reference),
         cmocka_unit_test(linear_surface_of_warped_polyhedra_is_a_plane),
-        cmocka_unit_test(random_ownership_changes_nothing),
+        cmocka_unit_test(random_cell_owners_change_no_pixel),
     };
     if (argc > 1) cmocka_set_test_filter(argv[1]);
     return cmocka_run_group_tests(tests, NULL, NULL);

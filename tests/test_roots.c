@@ -30,12 +30,12 @@ typedef struct cubic {
     long double c[4];
 } cubic;
 
-static double uniform(double low, double high)
+static double draw_uniform(double low, double high)
 {
     return low + (high - low) * test_uniform(drawn_numbers++, 77);
 }
 
-static void hex_corner(int i, int corner[3])
+static void get_hex_corner(int i, int corner[3])
 {
     corner[0] = (i & 3) == 1 || (i & 3) == 2;
     corner[1] = (i & 3) >= 2;
@@ -43,7 +43,7 @@ static void hex_corner(int i, int corner[3])
 }
 
 /* Returns the field on the ray of a lane as a polynomial of t. */
-static cubic exact_cubic(const bundle *b, int lane)
+static cubic expand_cubic(const bundle *b, int lane)
 {
     const long double base[3] = {(long double)b->packet.origin_x[lane], (long double)b->packet.origin_y[lane], 0};
     const long double slope[3] = {(long double)b->packet.slope_x[lane], (long double)b->packet.slope_y[lane], 1};
@@ -51,7 +51,7 @@ static cubic exact_cubic(const bundle *b, int lane)
     for (int i = 0; i < 8; i++) {
         int corner[3];
         cubic weight = {{(long double)b->values[i], 0, 0, 0}};
-        hex_corner(i, corner);
+        get_hex_corner(i, corner);
         for (int a = 0; a < 3; a++) {
             const long double c0 = corner[a] ? base[a] : 1 - base[a], c1 = corner[a] ? slope[a] : -slope[a];
             for (int k = 3; k >= 0; k--) weight.c[k] = weight.c[k] * c0 + (k ? weight.c[k - 1] * c1 : 0);
@@ -61,18 +61,18 @@ static cubic exact_cubic(const bundle *b, int lane)
     return sum;
 }
 
-static long double at(const cubic *g, long double t)
+static long double evaluate_cubic(const cubic *g, long double t)
 {
     return ((g->c[3] * t + g->c[2]) * t + g->c[1]) * t + g->c[0];
 }
 
 /* Finds where g, which is monotonic between low and high, passes v. */
-static long double pass(const cubic *g, long double low, long double high, long double v)
+static long double find_monotonic_root(const cubic *g, long double low, long double high, long double v)
 {
-    const bool rises = at(g, high) > at(g, low);
+    const bool rises = evaluate_cubic(g, high) > evaluate_cubic(g, low);
     for (int i = 0; i < 80; i++) {
         const long double middle = (low + high) / 2;
-        if ((at(g, middle) < v) == rises)
+        if ((evaluate_cubic(g, middle) < v) == rises)
             low = middle;
         else
             high = middle;
@@ -81,7 +81,7 @@ static long double pass(const cubic *g, long double low, long double high, long 
 }
 
 /* Computes the ends of the pieces on which g is monotonic; returns how many ends there are, 2 to 4. */
-static int monotone_ends(const cubic *g, long double low, long double high, long double ends[4])
+static int find_monotonic_ends(const cubic *g, long double low, long double high, long double ends[4])
 {
     const long double a = 3 * g->c[3], b = g->c[2], c = g->c[1], root = sqrtl(fmaxl(b * b - a * c, 0));
     const long double h = -(b + (b < 0 ? -root : root));
@@ -106,20 +106,21 @@ typedef struct truth {
     long double roots[3];
 } truth;
 
-static truth find_truth(const cubic *g, long double low, long double high)
+static truth find_exact_root(const cubic *g, long double low, long double high)
 {
     truth out = {.certain = false};
     long double ends[4];
-    const int n = monotone_ends(g, low, high, ends);
+    const int n = find_monotonic_ends(g, low, high, ends);
     int side = 0;
     for (int i = 0; i < n; i++) {
-        const long double v = at(g, ends[i]);
-        if (i && (v < 0) != (at(g, ends[i - 1]) < 0)) out.roots[out.count++] = pass(g, ends[i - 1], ends[i], 0);
+        const long double v = evaluate_cubic(g, ends[i]);
+        if (i && (v < 0) != (evaluate_cubic(g, ends[i - 1]) < 0))
+            out.roots[out.count++] = find_monotonic_root(g, ends[i - 1], ends[i], 0);
         if (fabsl(v) <= band || out.certain) continue;
         const int now = v < 0 ? -1 : 1;
         if (side && now != side) {
             out.certain = true;
-            out.certain_t = pass(g, ends[i - 1], ends[i], now * band);
+            out.certain_t = find_monotonic_root(g, ends[i - 1], ends[i], now * band);
         }
         side = now;
     }
@@ -131,35 +132,35 @@ static void random_points(double from[3], double to[3])
 {
     do {
         for (int a = 0; a < 3; a++) {
-            from[a] = uniform(0.02, 0.98);
-            to[a] = uniform(0.02, 0.98);
+            from[a] = draw_uniform(0.02, 0.98);
+            to[a] = draw_uniform(0.02, 0.98);
         }
     } while (fabs(to[2] - from[2]) < 0.2);
 }
 
 /* Aims rays near the first one, from 1e-7 to 1e-1 off, or anywhere. Bounds are made for rays around the depth axis, as
  * those of a tile are: half of the near ones are such rays. */
-static void aim_all(bundle *b, bool is_near)
+static void aim_all_rays(bundle *b, bool is_near)
 {
-    const double lean = is_near && uniform(0, 1) < 0.5 ? pow(10, uniform(-3, -1)) : 1;
+    const double lean = is_near && draw_uniform(0, 1) < 0.5 ? pow(10, draw_uniform(-3, -1)) : 1;
     double from[3], to[3];
     random_points(from, to);
     for (int a = 0; a < 2; a++) to[a] = from[a] + lean * (to[a] - from[a]);
-    bundle_aim(b, 0, from, to);
+    bundle_aim_ray(b, 0, from, to);
     for (int lane = 1; lane < SIMD_WIDTH; lane++) {
         double p[3], q[3];
         random_points(p, q);
-        const double off = pow(10, uniform(-7, -1));
+        const double off = pow(10, draw_uniform(-7, -1));
         for (int a = 0; a < 3 && is_near; a++) {
             p[a] = from[a] + off * (p[a] - 0.5);
             q[a] = to[a] + off * (q[a] - 0.5);
         }
-        bundle_aim(b, lane, p, q);
+        bundle_aim_ray(b, lane, p, q);
     }
 }
 
 /* Scales the values in float32 to a maximum of 1, as kernel_cell_relative() does. */
-static void normalize(double values[8])
+static void normalize_values(double values[8])
 {
     double largest = 0;
     for (int i = 0; i < 8; i++) largest = fmax(largest, fabs(values[i]));
@@ -169,10 +170,10 @@ static void normalize(double values[8])
 /* Shifts the values so that the cubic of ray 0 has an extreme whose value is miss. */
 static void make_double_root(bundle *b, double miss)
 {
-    const cubic g = exact_cubic(b, 0);
+    const cubic g = expand_cubic(b, 0);
     long double ends[4];
-    const int n = monotone_ends(&g, 0, 1, ends);
-    const double v = (double)at(&g, ends[n > 2 ? 1 : 0]);
+    const int n = find_monotonic_ends(&g, 0, 1, ends);
+    const double v = (double)evaluate_cubic(&g, ends[n > 2 ? 1 : 0]);
     for (int i = 0; i < 8; i++) b->values[i] -= v + miss;
 }
 
@@ -180,7 +181,7 @@ static void make_double_root(bundle *b, double miss)
  * spread, three close ones. */
 static void make_triple_root(bundle *b, double place, double spread)
 {
-    const cubic g = exact_cubic(b, 0);
+    const cubic g = expand_cubic(b, 0);
     const double x0 = (double)b->packet.origin_x[0], x1 = (double)b->packet.slope_x[0];
     const double y0 = (double)b->packet.origin_y[0], y1 = (double)b->packet.slope_y[0];
     const double lead = (double)g.c[3], bent = (-3 * lead * place - (double)g.c[2]) / (x1 * y1);
@@ -190,7 +191,7 @@ static void make_triple_root(bundle *b, double place, double spread)
         lead * place * (spread * spread - place * place) - (double)g.c[0] - bent * x0 * y0 - slope * x0;
     for (int i = 0; i < 8; i++) {
         int c[3];
-        hex_corner(i, c);
+        get_hex_corner(i, c);
         b->values[i] += level + slope * c[0] + bent * c[0] * c[1];
     }
 }
@@ -198,25 +199,25 @@ static void make_triple_root(bundle *b, double place, double spread)
 static void make_bundle(bundle *b, int64_t n)
 {
     const int kind = (int)(n % 8);
-    const double small = (uniform(0, 1) < 0.5 ? -1 : 1) * pow(10, uniform(-9, -1));
+    const double small = (draw_uniform(0, 1) < 0.5 ? -1 : 1) * pow(10, draw_uniform(-9, -1));
     memset(b, 0, sizeof *b);
-    aim_all(b, kind >= 4);
+    aim_all_rays(b, kind >= 4);
     /* The values of kind 3 mostly increase along the rays, so that many cells are known to be monotonic. */
-    for (int i = 0; i < 8; i++) b->values[i] = uniform(-1, 1) + (kind == 1 ? 0.6 : 0);
+    for (int i = 0; i < 8; i++) b->values[i] = draw_uniform(-1, 1) + (kind == 1 ? 0.6 : 0);
     for (int i = 0; i < 8 && kind == 3; i++) b->values[i] = 0.2 * b->values[i] + (i < 4 ? -0.7 : 0.7);
     if (kind == 4 || kind == 5) make_double_root(b, kind == 4 ? small : 0);
-    if (kind == 6 || kind == 7) make_triple_root(b, uniform(0.2, 0.8), kind == 6 ? fabs(small) : 0);
-    normalize(b->values);
-    bundle_open(b);
+    if (kind == 6 || kind == 7) make_triple_root(b, draw_uniform(0.2, 0.8), kind == 6 ? fabs(small) : 0);
+    normalize_values(b->values);
+    bundle_initialize(b);
     b->cell.type = GRID_HEX;
     b->cell.count = 8;
     for (int i = 0; i < 8; i++) {
         int c[3];
-        hex_corner(i, c);
+        get_hex_corner(i, c);
         for (int a = 0; a < 3; a++) b->cell.world[i][a] = c[a];
         b->cell.values[i] = b->values[i];
     }
-    bundle_place(b);
+    bundle_transform_cell(b);
 }
 
 typedef struct count {
@@ -231,7 +232,7 @@ static void verify_robust(count *c, const cubic *g, const truth *t, bool hit, lo
     /* t itself is rounded by half a unit in the last place of 2. */
     if (t->certain && (!hit || at_t > t->certain_t + 1.2e-7L)) c->missed++;
     if (!hit) return;
-    const double residual = (double)fabsl(at(g, at_t));
+    const double residual = (double)fabsl(evaluate_cubic(g, at_t));
     c->worst = fmax(c->worst, residual);
     if (residual > (double)band) c->off++;
 }
@@ -248,16 +249,16 @@ static void verify_bundle(bundle *b, rates *r)
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     kernel_curved_storage room;
     kernel_curved curved = {.storage = &room};
-    const int intervals = bundle_intervals(b, list, &curved);
+    const int intervals = bundle_find_intervals(b, list, &curved);
     r->monotone += room.bounds.jump[0] >= 0;
     for (int n = 0; n < intervals; n++) {
         vf t, hits;
         const vm change = vm_xor(vf_lt(list[n].v_in, vf_set(0)), vf_lt(list[n].v_out, vf_set(0)));
-        const unsigned hit = vm_bits(bundle_hits(b, &curved, &list[n], &t, &hits));
+        const unsigned hit = vm_bits(bundle_find_hits(b, &curved, &list[n], &t, &hits));
         for (int lane = 0; lane < SIMD_WIDTH; lane++) {
             if (!(vm_bits(list[n].mask) >> lane & 1)) continue;
-            const cubic g = exact_cubic(b, lane);
-            const truth truth = find_truth(&g, (long double)list[n].t_in[lane], (long double)list[n].t_out[lane]);
+            const cubic g = expand_cubic(b, lane);
+            const truth truth = find_exact_root(&g, (long double)list[n].t_in[lane], (long double)list[n].t_out[lane]);
             verify_robust(&r->robust, &g, &truth, hit >> lane & 1, (long double)t[lane]);
             /* Crossings alternate, so their number is odd if the signs at both faces differ. */
             if (((int)hits[lane] & 1) != (int)(vm_bits(change) >> lane & 1)) r->further_crossings++;

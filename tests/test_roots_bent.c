@@ -30,7 +30,7 @@
 static int64_t rays_wanted = 150000;
 static uint64_t drawn_numbers;
 
-static double uniform(double low, double high)
+static double draw_uniform(double low, double high)
 {
     return low + (high - low) * test_uniform(drawn_numbers++, 78);
 }
@@ -53,7 +53,7 @@ typedef struct ray_profile {
     knot knots[PROFILE_MAX]; /* the field is monotonic from each knot to the next */
 } ray_profile;
 
-static knot ray_profile_at(ray_profile *c, double t)
+static knot ray_profile_evaluate(ray_profile *c, double t)
 {
     const double point[3] = {c->line.base[0] + c->line.slope[0] * t, c->line.base[1] + c->line.slope[1] * t, t};
     double gradient[3];
@@ -83,14 +83,14 @@ static void ray_profile_add_piece(ray_profile *c, knot a, knot b)
         turns[1] = swap;
     }
     for (int i = 0; i < 2 && square > 0; i++)
-        if (turns[i] > 0 && turns[i] < 1) ray_profile_add(c, ray_profile_at(c, a.t + turns[i] * h));
+        if (turns[i] > 0 && turns[i] < 1) ray_profile_add(c, ray_profile_evaluate(c, a.t + turns[i] * h));
     ray_profile_add(c, b);
 }
 
 static void ray_profile_halve(ray_profile *c, knot a, knot b, int halvings)
 {
     const double h = b.t - a.t;
-    const knot middle = ray_profile_at(c, 0.5 * (a.t + b.t));
+    const knot middle = ray_profile_evaluate(c, 0.5 * (a.t + b.t));
     const double f = 0.5 * (a.f + b.f) + 0.125 * h * (a.slope - b.slope);
     const double slope = 1.5 * (b.f - a.f) - 0.25 * h * (a.slope + b.slope);
     const bool is_cubic = fabs(middle.f - f) < 1e-9 && fabs(middle.slope * h - slope) < 1e-9;
@@ -105,20 +105,20 @@ static void ray_profile_halve(ray_profile *c, knot a, knot b, int halvings)
 
 static void ray_profile_trace(ray_profile *c, double low, double high)
 {
-    const knot first = ray_profile_at(c, low);
+    const knot first = ray_profile_evaluate(c, low);
     c->count = 0;
     ray_profile_add(c, first);
-    ray_profile_halve(c, first, ray_profile_at(c, high), 0);
+    ray_profile_halve(c, first, ray_profile_evaluate(c, high), 0);
 }
 
 /* Finds where the field passes v between two knots. */
-static double ray_profile_pass(ray_profile *c, const knot *from, const knot *to, double v)
+static double ray_profile_find_crossing(ray_profile *c, const knot *from, const knot *to, double v)
 {
     const bool rises = to->f > from->f;
     double low = from->t, high = to->t;
     for (int i = 0; i < 50; i++) {
         const double middle = 0.5 * (low + high);
-        if ((ray_profile_at(c, middle).f < v) == rises)
+        if ((ray_profile_evaluate(c, middle).f < v) == rises)
             low = middle;
         else
             high = middle;
@@ -127,7 +127,7 @@ static double ray_profile_pass(ray_profile *c, const knot *from, const knot *to,
 }
 
 /* Returns whether there is a certain crossing; *t is the depth that the first hit must not exceed. */
-static bool ray_profile_certain(ray_profile *c, double band, double *t)
+static bool ray_profile_find_certain_crossing(ray_profile *c, double band, double *t)
 {
     int side = 0;
     for (int i = 0; i < c->count; i++) {
@@ -135,7 +135,7 @@ static bool ray_profile_certain(ray_profile *c, double band, double *t)
         if (fabs(v) <= band) continue;
         const int now = v < 0 ? -1 : 1;
         if (side && now != side) {
-            *t = ray_profile_pass(c, &c->knots[i - 1], &c->knots[i], now * band);
+            *t = ray_profile_find_crossing(c, &c->knots[i - 1], &c->knots[i], now * band);
             return true;
         }
         side = now;
@@ -152,7 +152,7 @@ static const double unit_hex[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}
 static const double unit_wedge[6][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}};
 static const double unit_pyramid[5][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0.5, 0.5, 1}};
 
-static void twist(double *p, double angle)
+static void rotate_point(double *p, double angle)
 {
     const double x = p[0] - 0.5, y = p[1] - 0.5;
     p[0] = 0.5 + cos(angle) * x - sin(angle) * y;
@@ -164,22 +164,22 @@ static void place_vertices(bent kind, reference_cell *cell)
     static const double amounts[BENT_COUNT] = {0.15, 0.05, 0.05, 0.08, 0.15};
     const bool is_hex = kind <= BENT_TWISTED;
     const double(*unit)[3] = is_hex ? unit_hex : kind == BENT_WEDGE ? unit_wedge : unit_pyramid;
-    const double angle = uniform(-0.9, 0.9), dent = uniform(0.55, 0.65);
+    const double angle = draw_uniform(-0.9, 0.9), dent = draw_uniform(0.55, 0.65);
     memset(cell, 0, sizeof *cell);
     cell->type = is_hex ? GRID_HEX : kind == BENT_WEDGE ? GRID_WEDGE : GRID_PYRAMID;
     cell->count = is_hex ? 8 : kind == BENT_WEDGE ? 6 : 5;
     for (int i = 0; i < cell->count; i++) {
         double p[3];
-        for (int a = 0; a < 3; a++) p[a] = unit[i][a] + uniform(-amounts[kind], amounts[kind]);
-        if ((kind == BENT_TWISTED || kind == BENT_WEDGE) && unit[i][2] > 0) twist(p, angle);
+        for (int a = 0; a < 3; a++) p[a] = unit[i][a] + draw_uniform(-amounts[kind], amounts[kind]);
+        if ((kind == BENT_TWISTED || kind == BENT_WEDGE) && unit[i][2] > 0) rotate_point(p, angle);
         /* Moves a corner almost to the plane of its neighbours. */
-        for (int a = 0; a < 3 && kind == BENT_CONCAVE && i == 6; a++) p[a] = dent + uniform(0, 0.1);
+        for (int a = 0; a < 3 && kind == BENT_CONCAVE && i == 6; a++) p[a] = dent + draw_uniform(0, 0.1);
         for (int a = 0; a < 3; a++) cell->position[i][a] = cell->world[i][a] = (double)(float)p[a];
     }
 }
 
 /* Computes the position of a point of a hex or wedge, which is linear in each of its coordinates. */
-static void cell_place(const reference_cell *cell, const double r[3], double out[3])
+static void compute_cell_position(const reference_cell *cell, const double r[3], double out[3])
 {
     const int base = cell->count / 2;
     for (int a = 0; a < 3; a++) {
@@ -194,15 +194,15 @@ static void cell_place(const reference_cell *cell, const double r[3], double out
     }
 }
 
-static double cell_determinant(const reference_cell *cell, const double r[3])
+static double compute_jacobian_determinant(const reference_cell *cell, const double r[3])
 {
     double column[3][3];
     for (int k = 0; k < 3; k++) {
         double low[3] = {r[0], r[1], r[2]}, high[3] = {r[0], r[1], r[2]}, p[3], q[3];
         low[k] = 0;
         high[k] = 1;
-        cell_place(cell, low, p);
-        cell_place(cell, high, q);
+        compute_cell_position(cell, low, p);
+        compute_cell_position(cell, high, q);
         for (int a = 0; a < 3; a++) column[k][a] = q[a] - p[a];
     }
     double sum = 0;
@@ -221,7 +221,7 @@ static bool is_solid(const reference_cell *cell)
         const double r[3] = {n % STEPS / (STEPS - 1.0), n / STEPS % STEPS / (STEPS - 1.0),
                              n / STEPS / STEPS / (STEPS - 1.0)};
         if (cell->type == GRID_WEDGE && r[0] + r[1] > 1) continue;
-        if (cell_determinant(cell, r) < 0.08) return false;
+        if (compute_jacobian_determinant(cell, r) < 0.08) return false;
     }
     return true;
 }
@@ -234,35 +234,35 @@ static void random_points(const reference_cell *cell, double from[3], double to[
 {
     do {
         for (int a = 0; a < 3; a++) {
-            from[a] = uniform(0.05, 0.95);
-            to[a] = uniform(0.05, 0.95);
+            from[a] = draw_uniform(0.05, 0.95);
+            to[a] = draw_uniform(0.05, 0.95);
         }
         if (cell->type != GRID_PYRAMID) continue;
-        const double off = pow(10, uniform(-4, -1));
-        for (int a = 0; a < 3; a++) to[a] = cell->position[4][a] + off * uniform(-1, 1);
+        const double off = pow(10, draw_uniform(-4, -1));
+        for (int a = 0; a < 3; a++) to[a] = cell->position[4][a] + off * draw_uniform(-1, 1);
         to[2] = cell->position[4][2] - off;
     } while (fabs(to[2] - from[2]) < 0.2);
 }
 
 /* Aims rays near the first one, from 1e-7 to 1e-1 off, or anywhere. */
-static void aim_all(bundle *b, const reference_cell *cell, bool is_near)
+static void aim_all_rays(bundle *b, const reference_cell *cell, bool is_near)
 {
     double from[3], to[3];
     random_points(cell, from, to);
-    bundle_aim(b, 0, from, to);
+    bundle_aim_ray(b, 0, from, to);
     for (int lane = 1; lane < SIMD_WIDTH; lane++) {
         double p[3], q[3];
         random_points(cell, p, q);
-        const double off = pow(10, uniform(-7, -1));
+        const double off = pow(10, draw_uniform(-7, -1));
         for (int a = 0; a < 3 && is_near; a++) {
             p[a] = from[a] + off * (p[a] - 0.5);
             q[a] = to[a] + off * (q[a] - 0.5);
         }
-        bundle_aim(b, lane, p, q);
+        bundle_aim_ray(b, lane, p, q);
     }
 }
 
-static reference_line line_of(const bundle *b, int lane)
+static reference_line make_lane_line(const bundle *b, int lane)
 {
     return (reference_line){{(double)b->packet.origin_x[lane], (double)b->packet.origin_y[lane]},
                             {(double)b->packet.slope_x[lane], (double)b->packet.slope_y[lane]}};
@@ -272,7 +272,7 @@ static reference_line line_of(const bundle *b, int lane)
 static bool trace_first(const bundle *b, const reference_cell *cell, ray_profile *c)
 {
     reference_crossing ends[REFERENCE_MAX_CROSSINGS];
-    *c = (ray_profile){.cell = cell, .values = b->values, .line = line_of(b, 0)};
+    *c = (ray_profile){.cell = cell, .values = b->values, .line = make_lane_line(b, 0)};
     if (reference_crossings(cell, &c->line, ends) < 2 || !(ends[1].z - ends[0].z > 0.01)) return false;
     ray_profile_trace(c, ends[0].z, ends[1].z);
     return true;
@@ -306,19 +306,19 @@ static void make_triple_root(bundle *b, const reference_cell *cell, ray_profile 
         const double side = k->slope < k[-1].slope ? 1 : -1;
         for (int step = 0; step < 60; step++) {
             const double x = low + (high - low) / 3, y = high - (high - low) / 3;
-            if (side * ray_profile_at(c, x).slope < side * ray_profile_at(c, y).slope)
+            if (side * ray_profile_evaluate(c, x).slope < side * ray_profile_evaluate(c, y).slope)
                 high = y;
             else
                 low = x;
         }
-        const knot flat = ray_profile_at(c, 0.5 * (low + high));
+        const knot flat = ray_profile_evaluate(c, 0.5 * (low + high));
         shift_values(b, cell, (flat.slope - slope) * flat.t - flat.f, slope - flat.slope);
         return;
     }
 }
 
 /* Scales the values in float32 to a maximum of 1, as kernel_cell_relative() does. */
-static void normalize(double *values, int count)
+static void normalize_values(double *values, int count)
 {
     double largest = 0;
     for (int i = 0; i < count; i++) largest = fmax(largest, fabs(values[i]));
@@ -327,21 +327,21 @@ static void normalize(double *values, int count)
 
 static void make_bundle(bundle *b, reference_cell *cell, ray_profile *scratch, bent kind, int roots)
 {
-    const double small = (uniform(0, 1) < 0.5 ? -1 : 1) * pow(10, uniform(-9, -1));
+    const double small = (draw_uniform(0, 1) < 0.5 ? -1 : 1) * pow(10, draw_uniform(-9, -1));
     do place_vertices(kind, cell);
     while (!is_solid(cell));
     memset(b, 0, sizeof *b);
-    aim_all(b, cell, roots > 0);
-    for (int i = 0; i < cell->count; i++) b->values[i] = uniform(-1, 1);
+    aim_all_rays(b, cell, roots > 0);
+    for (int i = 0; i < cell->count; i++) b->values[i] = draw_uniform(-1, 1);
     if (roots == 1 || roots == 2) make_double_root(b, cell, scratch, roots == 1 ? small : 0);
     if (roots == 3 || roots == 4) make_triple_root(b, cell, scratch, roots == 3 ? small : 0);
-    normalize(b->values, cell->count);
-    bundle_open(b);
+    normalize_values(b->values, cell->count);
+    bundle_initialize(b);
     b->cell.type = cell->type;
     b->cell.count = cell->count;
     memcpy(b->cell.world, cell->world, (size_t)cell->count * sizeof *cell->world);
     memcpy(b->cell.values, b->values, sizeof b->values);
-    bundle_place(b);
+    bundle_transform_cell(b);
 }
 
 /* ---- the comparison ---- */
@@ -351,17 +351,17 @@ typedef struct count {
     double worst, worst_band; /* largest residual relative to the band; largest band */
 } count;
 
-static double sum_of(const vf c[8])
+static double sum_lanes(const vf c[8])
 {
     double sum = 0;
     for (int i = 0; i < 8; i++) sum += fabs((double)c[i][0]);
     return sum;
 }
 
-static double band_of(const kernel_map *map, const ray_profile *c)
+static double compute_error_band(const kernel_map *map, const ray_profile *c)
 {
-    double band = 7 * 6e-8 * sum_of(map->field);
-    for (int a = 0; a < 3; a++) band += c->steepest[a] * 6e-8 * (7 * sum_of(map->position[a]) + 3 * 1.5 + 0.5);
+    double band = 7 * 6e-8 * sum_lanes(map->field);
+    for (int a = 0; a < 3; a++) band += c->steepest[a] * 6e-8 * (7 * sum_lanes(map->position[a]) + 3 * 1.5 + 0.5);
     return band;
 }
 
@@ -369,8 +369,8 @@ static void verify_ray(count *n, const kernel_map *map, ray_profile *c, double l
 {
     double certain_t = 0;
     ray_profile_trace(c, low, high);
-    const double band = band_of(map, c);
-    const bool certain = ray_profile_certain(c, band, &certain_t);
+    const double band = compute_error_band(map, c);
+    const bool certain = ray_profile_find_certain_crossing(c, band, &certain_t);
     n->rays++;
     n->certain += certain;
     n->inverse_failures += c->has_failed;
@@ -378,14 +378,15 @@ static void verify_ray(count *n, const kernel_map *map, ray_profile *c, double l
     /* t itself is rounded by half a unit in the last place of 2. */
     if (certain && (!hit || hit_t > certain_t + 1.2e-7)) n->missed++;
     if (!hit) return;
-    const double residual = fabs(ray_profile_at(c, hit_t).f) / band;
+    const double residual = fabs(ray_profile_evaluate(c, hit_t).f) / band;
     n->worst = fmax(n->worst, residual);
     n->off += residual > 1;
 }
 
 /* Counts rays whose first crossing, or number of crossings, differs if they are traced alone: the result of a ray must
  * not depend on the others of its packet. */
-static int64_t differ_alone(bundle *b, const kernel_curved *curved, const kernel_interval *i, vf t, vf hits)
+static int64_t count_differences_if_traced_alone(bundle *b, const kernel_curved *curved, const kernel_interval *i, vf t,
+                                                 vf hits)
 {
     int64_t differing = 0;
     for (unsigned rays = vm_bits(i->mask); rays; rays &= rays - 1) {
@@ -393,7 +394,7 @@ static int64_t differ_alone(bundle *b, const kernel_curved *curved, const kernel
         kernel_interval alone = *i;
         vf own_t, own_hits;
         alone.mask = vm_from_bits(1u << lane);
-        bundle_hits(b, curved, &alone, &own_t, &own_hits);
+        bundle_find_hits(b, curved, &alone, &own_t, &own_hits);
         differing += own_t[lane] != t[lane] || own_hits[lane] != hits[lane];
     }
     return differing;
@@ -405,15 +406,15 @@ static void verify_bundle(bundle *b, const reference_cell *cell, ray_profile *c,
     kernel_map map;
     kernel_curved_storage room;
     kernel_curved curved = {.storage = &room};
-    const int intervals = bundle_intervals(b, list, &curved);
+    const int intervals = bundle_find_intervals(b, list, &curved);
     kernel_map_setup(&map, &b->cell);
     for (int i = 0; i < intervals; i++) {
         vf t, hits;
-        const unsigned hit = vm_bits(bundle_hits(b, &curved, &list[i], &t, &hits));
-        n->differing += differ_alone(b, &curved, &list[i], t, hits);
+        const unsigned hit = vm_bits(bundle_find_hits(b, &curved, &list[i], &t, &hits));
+        n->differing += count_differences_if_traced_alone(b, &curved, &list[i], t, hits);
         for (int lane = 0; lane < SIMD_WIDTH; lane++) {
             if (!(vm_bits(list[i].mask) >> lane & 1)) continue;
-            *c = (ray_profile){.cell = cell, .values = b->values, .line = line_of(b, lane)};
+            *c = (ray_profile){.cell = cell, .values = b->values, .line = make_lane_line(b, lane)};
             verify_ray(n, &map, c, (double)list[i].t_in[lane], (double)list[i].t_out[lane], hit >> lane & 1,
                        (double)t[lane]);
         }

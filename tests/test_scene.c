@@ -19,7 +19,7 @@
 #include "scene_document.h"
 
 /* Converts by sRGB's definition, in double, independent of the library's. */
-static double linear(double s)
+static double convert_srgb_to_linear(double s)
 {
     return s <= 0.04045 ? s / 12.92 : pow((s + 0.055) / 1.055, 2.4);
 }
@@ -28,12 +28,12 @@ static double linear(double s)
  * slope of the curve is < 2.5. */
 #define COLOUR_TOLERANCE 1e-6
 
-static void assert_near(double value, double expected, double tolerance)
+static void assert_nearly_equal(double value, double expected, double tolerance)
 {
     if (!(fabs(value - expected) <= tolerance)) fail_msg("%.17g, expected %.17g within %g", value, expected, tolerance);
 }
 
-static insitu_status parse(const char *text, scene *s, base_error *error)
+static insitu_status parse_scene(const char *text, scene *s, base_error *error)
 {
     *error = (base_error){.status = INSITU_OK};
     return scene_parse(text, strlen(text), "scene.yaml", NULL, s, error);
@@ -42,7 +42,7 @@ static insitu_status parse(const char *text, scene *s, base_error *error)
 static void parse_good(const char *text, scene *s)
 {
     base_error error;
-    if (parse(text, s, &error) != INSITU_OK) fail_msg("refused: %s", error.message);
+    if (parse_scene(text, s, &error) != INSITU_OK) fail_msg("refused: %s", error.message);
 }
 
 static const char every_key[] =
@@ -208,9 +208,9 @@ static const char fewest_keys[] = "images:\n"
 
 static void check_vector(const double v[3], double x, double y, double z)
 {
-    assert_near(v[0], x, 1e-15);
-    assert_near(v[1], y, 1e-15);
-    assert_near(v[2], z, 1e-15);
+    assert_nearly_equal(v[0], x, 1e-15);
+    assert_nearly_equal(v[1], y, 1e-15);
+    assert_nearly_equal(v[2], z, 1e-15);
 }
 
 /* Checks that the map has the whole table, to the bit. */
@@ -225,9 +225,9 @@ static void check_built_in(const scene_colour_map *map, const char *name)
 
 static void check_colour(const float c[3], double r, double g, double b)
 {
-    assert_near(c[0], r, COLOUR_TOLERANCE);
-    assert_near(c[1], g, COLOUR_TOLERANCE);
-    assert_near(c[2], b, COLOUR_TOLERANCE);
+    assert_nearly_equal(c[0], r, COLOUR_TOLERANCE);
+    assert_nearly_equal(c[1], g, COLOUR_TOLERANCE);
+    assert_nearly_equal(c[2], b, COLOUR_TOLERANCE);
 }
 
 static void scene_image_keys_are_read(void **state)
@@ -247,7 +247,7 @@ static void scene_image_keys_are_read(void **state)
     assert_int_equal(image->width, 640);
     assert_int_equal(image->height, 480);
     assert_int_equal(image->cycle_interval, 10);
-    check_colour(image->background, 0.5 * linear(0.5), 0.5 * linear(0.25), 0.5);
+    check_colour(image->background, 0.5 * convert_srgb_to_linear(0.5), 0.5 * convert_srgb_to_linear(0.25), 0.5);
     assert_true(image->background[3] == 0.5F);
     assert_true(image->step == 0 && image->step_cells == 0.25);
     assert_false(image->jitter);
@@ -295,7 +295,7 @@ static void scene_view_keys_are_read(void **state)
     assert_int_equal(s.images[0].light_count, 2);
     check_vector(lights[0].direction, 0, 0, 1);
     assert_true(lights[0].is_in_world);
-    check_colour(lights[0].colour, 0.5, 0.5 * linear(0.5), 0);
+    check_colour(lights[0].colour, 0.5, 0.5 * convert_srgb_to_linear(0.5), 0);
     check_vector(lights[1].direction, 0.6, 0, 0.8);
     assert_false(lights[1].is_in_world);
     assert_int_equal(s.images[0].shadows, 1);
@@ -304,7 +304,7 @@ static void scene_view_keys_are_read(void **state)
     scene_free(&s);
 }
 
-static void shadows_are_by_all_lights_that_do_not_say_otherwise(void **state)
+static void lights_cast_shadows_by_default(void **state)
 {
     static const char text[] = "images:\n  - name: a\n    %s\n"
                                "    layers: [{isosurface: {field: f, values: [0]}}]\n"
@@ -344,8 +344,8 @@ static void scene_isosurface_keys_are_read(void **state)
     assert_int_equal(first->value_count, 3);
     assert_true(first->values[0] == 0.2 && first->values[1] == 0.5 && first->values[2] == -1e-3);
     check_colour(first->colours, 1, 0, 0);
-    check_colour(first->colours + 3, linear(0.5), linear(0.25), 0);
-    check_colour(first->colours + 6, linear(0.5), linear(0.25), 0);
+    check_colour(first->colours + 3, convert_srgb_to_linear(0.5), convert_srgb_to_linear(0.25), 0);
+    check_colour(first->colours + 6, convert_srgb_to_linear(0.5), convert_srgb_to_linear(0.25), 0);
     assert_true(first->opacity == 0.5F);
     assert_true(first->material.ambient == 0.1F && first->material.diffuse == 0.2F);
     assert_true(first->material.specular == 0.3F && first->material.shininess == 40);
@@ -403,7 +403,8 @@ static void scene_image_defaults_hold(void **state)
     assert_int_equal(s.writing, SCENE_WRITE_BEHIND);
     assert_true(s.finer_pieces == 0 && s.surface_error == 0.25 && !s.is_surface_error_given && s.finer_memory == 4096);
     assert_true(image->width == 1280 && image->height == 720 && image->cycle_interval == 1);
-    check_colour(image->background, linear(0.08), linear(0.09), linear(0.11));
+    check_colour(image->background, convert_srgb_to_linear(0.08), convert_srgb_to_linear(0.09),
+                 convert_srgb_to_linear(0.11));
     assert_true(image->background[3] == 1);
     assert_true(image->step == 0 && image->step_cells == 0.5);
     assert_true(image->jitter && image->frames == 1);
@@ -415,7 +416,7 @@ static void scene_image_defaults_hold(void **state)
     for (int i = 0; i < 2; i++) {
         const double *d = image->lights[i].direction;
         assert_false(image->lights[i].is_in_world);
-        assert_near(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], 1, 1e-15);
+        assert_nearly_equal(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], 1, 1e-15);
         assert_true(d[2] > 0); /* the light comes from the eye's side */
     }
     assert_int_equal(image->outputs[0].format, SCENE_PNG8);
@@ -423,7 +424,7 @@ static void scene_image_defaults_hold(void **state)
 }
 
 /* Checks the integration method for a scene's sampling keys and its number of volumes. */
-static void sampling_is_by_what_is_said(void **state)
+static void sampling_method_follows_the_keys(void **state)
 {
     (void)state;
     static const struct {
@@ -465,7 +466,7 @@ static void sampling_is_by_what_is_said(void **state)
     }
 }
 
-static void clips_are_of_the_image_and_of_layers(void **state)
+static void clips_are_read_for_images_and_layers(void **state)
 {
     (void)state;
     scene s;
@@ -512,7 +513,7 @@ static void statistics_and_conditions_are_read(void **state)
 }
 
 /* Checks that `meshes` maps each mesh's name to its warp. */
-static void warps_are_read_by_their_meshes(void **state)
+static void warps_are_read_per_mesh(void **state)
 {
     (void)state;
     static const scene_warp expected[] = {
@@ -538,7 +539,7 @@ static void warps_are_read_by_their_meshes(void **state)
     scene_free(&s);
 }
 
-static void mirrors_are_read_by_their_meshes(void **state)
+static void mirrors_are_read_per_mesh(void **state)
 {
     (void)state;
     static const scene_mirror expected[] = {
@@ -584,14 +585,14 @@ static void parameters_are_read_by_their_names(void **state)
     scene_free(&s);
 }
 
-static void surfaces_have_their_colours(void **state)
+static void surface_colours_are_read(void **state)
 {
     (void)state;
     scene s;
     parse_good(every_key, &s);
     assert_int_equal(s.images[0].surface_count, 3);
     const scene_surface *surface = s.images[0].surfaces;
-    check_colour(surface[0].colour, linear(1), linear(0.5), linear(0));
+    check_colour(surface[0].colour, convert_srgb_to_linear(1), convert_srgb_to_linear(0.5), convert_srgb_to_linear(0));
     assert_true(surface[0].opacity == 0.5F && !surface[0].has_colour_by && !surface[0].meshes_field.name);
     const scene_threshold *threshold = &surface[1].threshold;
     assert_false(surface[0].threshold.is_given);
@@ -600,21 +601,24 @@ static void surfaces_have_their_colours(void **state)
     assert_true(threshold->field.component == 1 && !threshold->field.at_vertices);
     assert_true(surface[2].threshold.low == -3 && isinf(surface[2].threshold.high));
     assert_true(surface[0].edge_width == 2 && surface[1].edge_width >= 1);
-    check_colour(surface[0].edge_colour, linear(0), linear(0.5), linear(1));
-    check_colour(surface[1].edge_colour, linear(0.1), linear(0.1), linear(0.1));
+    check_colour(surface[0].edge_colour, convert_srgb_to_linear(0), convert_srgb_to_linear(0.5),
+                 convert_srgb_to_linear(1));
+    check_colour(surface[1].edge_colour, convert_srgb_to_linear(0.1), convert_srgb_to_linear(0.1),
+                 convert_srgb_to_linear(0.1));
     assert_true(surface[0].meshes_field.mesh_count == 2 && scene_field_is_on(&surface[0].meshes_field, "sea/3"));
     assert_false(scene_field_is_on(&surface[0].meshes_field, "seaside"));
     assert_true(surface[1].opacity == 1 && surface[1].has_colour_by && surface[1].colour_by.at_vertices);
     assert_true(scene_field_is_on(&surface[1].meshes_field, "any"));
     assert_string_equal(surface[1].colour_by.name, "q");
     check_built_in(&surface[1].colour_map, "grey");
-    check_colour(surface[1].colour, linear(0.8), linear(0.8), linear(0.8));
+    check_colour(surface[1].colour, convert_srgb_to_linear(0.8), convert_srgb_to_linear(0.8),
+                 convert_srgb_to_linear(0.8));
     assert_true(surface[1].material.diffuse == 0.75F);
     scene_free(&s);
 }
 
 /* Checks entries of the list that stand for many planes: at offsets, or spread over the data. */
-static void planes_come_in_numbers(void **state)
+static void several_planes_are_read(void **state)
 {
     (void)state;
     static const double offsets[] = {-1, 0.5, 2}, shares[] = {-0.75, -0.25, 0.25, 0.75};
@@ -670,7 +674,7 @@ static void slices_have_planes_of_unit_normals(void **state)
     scene_free(&s);
 }
 
-static void lines_are_of_what_colours_the_layer(void **state)
+static void contour_lines_use_the_colour_field(void **state)
 {
     (void)state;
     scene s;
@@ -721,7 +725,7 @@ static void scene_layer_defaults_hold(void **state)
     scene_free(&s);
 }
 
-static void scene_up_defaults_to_z_where_the_view_is_along_y(void **state)
+static void scene_up_defaults_to_z_for_views_along_y(void **state)
 {
     (void)state;
     scene s;
@@ -747,7 +751,7 @@ static void check_example(const char *folder, const char *name)
     scene_free(&s);
 }
 
-static void scene_examples_are_good(void **state)
+static void scene_examples_are_valid(void **state)
 {
     const char *folder = *state;
     if (!folder) skip();
@@ -1218,7 +1222,7 @@ static const struct bad_file {
     {14, "      - cinema: a.cdb\n        bits: 12", 15, {"outputs[0].bits: 12"}},
 };
 
-static void text_with_line(int line, const char *by, char *text)
+static void replace_line(int line, const char *by, char *text)
 {
     *text = '\0';
     for (int i = 0; i < good_line_count; i++) {
@@ -1227,12 +1231,12 @@ static void text_with_line(int line, const char *by, char *text)
     }
 }
 
-static void scene_that_bad_files_are_made_of_is_good(void **state)
+static void unmodified_scene_of_error_cases_is_valid(void **state)
 {
     (void)state;
     char text[4096];
     scene s;
-    text_with_line(0, "", text);
+    replace_line(0, "", text);
     parse_good(text, &s);
     scene_free(&s);
 }
@@ -1246,10 +1250,10 @@ static void scene_bad_files_are_reported_line_key_and_expectation(void **state)
         char text[4096], where[32];
         scene s;
         base_error error;
-        text_with_line(bad->line, bad->by, text);
+        replace_line(bad->line, bad->by, text);
         snprintf(where, sizeof where, "scene.yaml:%d: ", bad->reported);
         const int64_t held = base_memory_held();
-        const insitu_status status = parse(text, &s, &error);
+        const insitu_status status = parse_scene(text, &s, &error);
         bool is_reported = status == INSITU_ERROR_SCENE && strncmp(error.message, where, strlen(where)) == 0;
         for (int w = 0; w < 3 && bad->words[w]; w++) is_reported = is_reported && strstr(error.message, bad->words[w]);
         is_reported = is_reported && s.image_count == 0 && !s.images && base_memory_held() == held;
@@ -1274,7 +1278,7 @@ static void scene_whole_file_faults_are_reported(void **state)
     for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
         scene s;
         base_error error;
-        assert_int_equal(parse(files[i][0], &s, &error), INSITU_ERROR_SCENE);
+        assert_int_equal(parse_scene(files[i][0], &s, &error), INSITU_ERROR_SCENE);
         if (strncmp(error.message, files[i][1], strlen(files[i][1])) != 0) fail_msg("%s", error.message);
     }
 }
@@ -1320,7 +1324,7 @@ static void scene_every_failed_allocation_is_an_error_without_a_leak(void **stat
         scene s;
         base_error error;
         base_memory_fail_nth(n);
-        status = parse(every_key, &s, &error);
+        status = parse_scene(every_key, &s, &error);
         base_memory_fail_nth(0);
         if (status != INSITU_OK) {
             assert_int_equal(status, INSITU_ERROR_MEMORY);
@@ -1379,7 +1383,7 @@ static void scene_texts_have_their_placeholders_replaced(void **state)
     base_memory_fail_nth(0);
 }
 
-static void keys_that_exclude_others_are_read(void **state)
+static void mutually_exclusive_keys_are_checked(void **state)
 {
     (void)state;
     scene s;
@@ -1508,21 +1512,21 @@ int main(int argument_count, char **arguments)
         cmocka_unit_test(scene_isosurface_keys_are_read),
         cmocka_unit_test(scene_volume_keys_are_read),
         cmocka_unit_test(scene_image_defaults_hold),
-        cmocka_unit_test(sampling_is_by_what_is_said),
-        cmocka_unit_test(shadows_are_by_all_lights_that_do_not_say_otherwise),
+        cmocka_unit_test(sampling_method_follows_the_keys),
+        cmocka_unit_test(lights_cast_shadows_by_default),
         cmocka_unit_test(scene_layer_defaults_hold),
-        cmocka_unit_test(planes_come_in_numbers),
+        cmocka_unit_test(several_planes_are_read),
         cmocka_unit_test(slices_have_planes_of_unit_normals),
-        cmocka_unit_test(lines_are_of_what_colours_the_layer),
-        cmocka_unit_test(surfaces_have_their_colours),
+        cmocka_unit_test(contour_lines_use_the_colour_field),
+        cmocka_unit_test(surface_colours_are_read),
         cmocka_unit_test(statistics_and_conditions_are_read),
-        cmocka_unit_test(warps_are_read_by_their_meshes),
-        cmocka_unit_test(mirrors_are_read_by_their_meshes),
+        cmocka_unit_test(warps_are_read_per_mesh),
+        cmocka_unit_test(mirrors_are_read_per_mesh),
         cmocka_unit_test(parameters_are_read_by_their_names),
-        cmocka_unit_test(clips_are_of_the_image_and_of_layers),
-        cmocka_unit_test(scene_up_defaults_to_z_where_the_view_is_along_y),
-        cmocka_unit_test_prestate(scene_examples_are_good, argument_count > 1 ? arguments[1] : NULL),
-        cmocka_unit_test(scene_that_bad_files_are_made_of_is_good),
+        cmocka_unit_test(clips_are_read_for_images_and_layers),
+        cmocka_unit_test(scene_up_defaults_to_z_for_views_along_y),
+        cmocka_unit_test_prestate(scene_examples_are_valid, argument_count > 1 ? arguments[1] : NULL),
+        cmocka_unit_test(unmodified_scene_of_error_cases_is_valid),
         cmocka_unit_test(scene_bad_files_are_reported_line_key_and_expectation),
         cmocka_unit_test(scene_whole_file_faults_are_reported),
         cmocka_unit_test(scene_huge_file_is_refused),
@@ -1530,7 +1534,7 @@ int main(int argument_count, char **arguments)
         cmocka_unit_test(scene_every_failed_allocation_is_an_error_without_a_leak),
         cmocka_unit_test(scene_numbers_do_not_follow_the_locale),
         cmocka_unit_test(scene_texts_have_their_placeholders_replaced),
-        cmocka_unit_test(keys_that_exclude_others_are_read),
+        cmocka_unit_test(mutually_exclusive_keys_are_checked),
         cmocka_unit_test(derived_fields_are_sorted_and_read),
         cmocka_unit_test(schema_keys_have_help_and_defaults),
     };

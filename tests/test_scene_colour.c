@@ -17,12 +17,12 @@
 #define NAME(word, name) name,
 static const char *const names[COLOUR_MAP_COUNT] = {COLOUR_MAPS(NAME)};
 
-static double linear(double s)
+static double convert_srgb_to_linear(double s)
 {
     return s <= 0.04045 ? s / 12.92 : pow((s + 0.055) / 1.055, 2.4);
 }
 
-static double srgb_of(float linear)
+static double convert_linear_to_srgb(float linear)
 {
     const double l = linear;
     return l <= 0.0031308 ? 12.92 * l : 1.055 * pow(l, 1 / 2.4) - 0.055;
@@ -34,7 +34,7 @@ static double srgb_of(float linear)
 
 static void check_colour(const float c[3], double r, double g, double b)
 {
-    const double expected[3] = {linear(r), linear(g), linear(b)};
+    const double expected[3] = {convert_srgb_to_linear(r), convert_srgb_to_linear(g), convert_srgb_to_linear(b)};
     for (int i = 0; i < 3; i++)
         if (!(fabs((double)c[i] - expected[i]) <= COLOUR_TOLERANCE))
             fail_msg("channel %d is %.9g, expected %.9g", i, (double)c[i], expected[i]);
@@ -88,7 +88,7 @@ static insitu_status read_stored(const char *path, char **text, int64_t *size, b
 }
 
 /* Parses a scene with the given keys after "field: f" of a surface's colour_by. */
-static insitu_status parse(const char *keys, scene_attachments *files, scene *s, base_error *error)
+static insitu_status parse_colour_keys(const char *keys, scene_attachments *files, scene *s, base_error *error)
 {
     char text[2048];
     snprintf(text, sizeof text,
@@ -102,17 +102,17 @@ static insitu_status parse(const char *keys, scene_attachments *files, scene *s,
 
 static scene parsed;
 
-static const scene_colour_map *map_of(const char *keys)
+static const scene_colour_map *parse_colour_map(const char *keys)
 {
     base_error error;
     scene_attachments files = {.read = read_stored};
     scene_free(&parsed);
-    if (parse(keys, &files, &parsed, &error) != INSITU_OK) fail_msg("%s: %s", keys, error.message);
+    if (parse_colour_keys(keys, &files, &parsed, &error) != INSITU_OK) fail_msg("%s: %s", keys, error.message);
     scene_attachments_free(&files);
     return &parsed.images[0].isosurfaces[0].colour_map;
 }
 
-static const float *entry(const scene_colour_map *map, int i)
+static const float *get_table_entry(const scene_colour_map *map, int i)
 {
     return map->colours + 3 * (size_t)i;
 }
@@ -125,7 +125,7 @@ static void every_map_is_found_by_its_name(void **state)
         int count;
         const char *name = names[i];
         snprintf(keys, sizeof keys, ", map: %s", name);
-        const scene_colour_map *map = map_of(keys);
+        const scene_colour_map *map = parse_colour_map(keys);
         assert_string_equal(map->name, name);
         assert_memory_equal(map->colours, colour_map_table(name, &count), 768 * sizeof(float));
         assert_true(map->count == 256 && !map->is_banded && map->scale == SCENE_LINEAR && !map->range.is_fixed);
@@ -136,28 +136,28 @@ static void every_map_is_found_by_its_name(void **state)
 
 /* Checks a table made from a list: every other entry is a colour of the list; between them colours are linear in
  * sRGB. */
-static void lists_become_tables_through_their_colours(void **state)
+static void colour_lists_are_interpolated_to_tables(void **state)
 {
     (void)state;
-    const scene_colour_map *map = map_of(", map: {colours: [[0, 0, 0], [1, 0, 0], [1, 0.5, 1]]}");
+    const scene_colour_map *map = parse_colour_map(", map: {colours: [[0, 0, 0], [1, 0, 0], [1, 0.5, 1]]}");
     assert_int_equal(map->count, 257);
     assert_string_equal(map->name, "");
-    check_colour(entry(map, 0), 0, 0, 0);
-    check_colour(entry(map, 64), 0.5, 0, 0);
-    check_colour(entry(map, 128), 1, 0, 0);
-    check_colour(entry(map, 192), 1, 0.25, 0.5);
-    check_colour(entry(map, 256), 1, 0.5, 1);
-    map = map_of(", map: {colours: [[0, 0, 0], [1, 0, 0], [1, 0.5, 1]], at: [0, 0.25, 1]}");
+    check_colour(get_table_entry(map, 0), 0, 0, 0);
+    check_colour(get_table_entry(map, 64), 0.5, 0, 0);
+    check_colour(get_table_entry(map, 128), 1, 0, 0);
+    check_colour(get_table_entry(map, 192), 1, 0.25, 0.5);
+    check_colour(get_table_entry(map, 256), 1, 0.5, 1);
+    map = parse_colour_map(", map: {colours: [[0, 0, 0], [1, 0, 0], [1, 0.5, 1]], at: [0, 0.25, 1]}");
     assert_int_equal(map->count, 1025);
-    check_colour(entry(map, 128), 0.5, 0, 0);
-    check_colour(entry(map, 256), 1, 0, 0);
-    check_colour(entry(map, 640), 1, 0.25, 0.5);
-    map = map_of(", map: {colours: [[0, 0, 0], [1, 1, 1], [0, 0, 1], [0, 0, 0]], at: [0, 0.5, 0.5, 1]}");
-    check_colour(entry(map, 511), 511.0 / 512, 511.0 / 512, 511.0 / 512);
-    check_colour(entry(map, 512), 0, 0, 1);
-    map = map_of(", map: {colours: [[0, 0, 0], [1, 1, 1]], at: [0, 1]}");
+    check_colour(get_table_entry(map, 128), 0.5, 0, 0);
+    check_colour(get_table_entry(map, 256), 1, 0, 0);
+    check_colour(get_table_entry(map, 640), 1, 0.25, 0.5);
+    map = parse_colour_map(", map: {colours: [[0, 0, 0], [1, 1, 1], [0, 0, 1], [0, 0, 0]], at: [0, 0.5, 0.5, 1]}");
+    check_colour(get_table_entry(map, 511), 511.0 / 512, 511.0 / 512, 511.0 / 512);
+    check_colour(get_table_entry(map, 512), 0, 0, 1);
+    map = parse_colour_map(", map: {colours: [[0, 0, 0], [1, 1, 1]], at: [0, 1]}");
     assert_int_equal(map->count, 256);
-    for (int i = 0; i < 256; i++) check_colour(entry(map, i), i / 255.0, i / 255.0, i / 255.0);
+    for (int i = 0; i < 256; i++) check_colour(get_table_entry(map, i), i / 255.0, i / 255.0, i / 255.0);
 }
 
 static void maps_are_reversed_and_cut_into_bands(void **state)
@@ -165,92 +165,96 @@ static void maps_are_reversed_and_cut_into_bands(void **state)
     (void)state;
     int count;
     const float *viridis = colour_map_table("viridis", &count);
-    const scene_colour_map *map = map_of(", reversed: true");
-    for (int i = 0; i < 256; i++) assert_memory_equal(entry(map, i), viridis + 3 * (255 - i), 3 * sizeof(float));
-    map = map_of(", discrete: 6, map: grey");
+    const scene_colour_map *map = parse_colour_map(", reversed: true");
+    for (int i = 0; i < 256; i++)
+        assert_memory_equal(get_table_entry(map, i), viridis + 3 * (255 - i), 3 * sizeof(float));
+    map = parse_colour_map(", discrete: 6, map: grey");
     assert_true(map->is_banded && map->count == 6);
-    for (int i = 0; i < 6; i++) check_colour(entry(map, i), i / 5.0, i / 5.0, i / 5.0); /* entries 0, 51, 102, ... */
-    map = map_of(", discrete: 6, map: grey, reversed: true");
-    for (int i = 0; i < 6; i++) check_colour(entry(map, i), 1 - i / 5.0, 1 - i / 5.0, 1 - i / 5.0);
-    map = map_of(", discrete: 1, map: {colours: [[0, 0, 0], [0, 1, 0], [0, 0, 1]]}");
+    for (int i = 0; i < 6; i++)
+        check_colour(get_table_entry(map, i), i / 5.0, i / 5.0, i / 5.0); /* entries 0, 51, 102, ... */
+    map = parse_colour_map(", discrete: 6, map: grey, reversed: true");
+    for (int i = 0; i < 6; i++) check_colour(get_table_entry(map, i), 1 - i / 5.0, 1 - i / 5.0, 1 - i / 5.0);
+    map = parse_colour_map(", discrete: 1, map: {colours: [[0, 0, 0], [0, 1, 0], [0, 0, 1]]}");
     assert_int_equal(map->count, 1);
-    check_colour(entry(map, 0), 0, 1, 0);
+    check_colour(get_table_entry(map, 0), 0, 1, 0);
 }
 
-static void scales_and_outside_are_read(void **state)
+static void scales_and_out_of_range_colours_are_read(void **state)
 {
     (void)state;
-    const scene_colour_map *map = map_of(", scale: log, range: [1e-3, 1e3], below: [1, 0, 0], nan: [0, 1, 0]");
+    const scene_colour_map *map =
+        parse_colour_map(", scale: log, range: [1e-3, 1e3], below: [1, 0, 0], nan: [0, 1, 0]");
     assert_true(map->scale == SCENE_LOG && map->has_below && !map->has_above && map->has_nan);
     check_colour(map->outside_colours[0], 1, 0, 0);
-    assert_memory_equal(map->outside_colours[1], entry(map, 255), 3 * sizeof(float));
+    assert_memory_equal(map->outside_colours[1], get_table_entry(map, 255), 3 * sizeof(float));
     check_colour(map->outside_colours[2], 0, 1, 0);
-    map = map_of(", scale: symlog, threshold: 1e-2, above: [0, 0, 1], reversed: true");
+    map = parse_colour_map(", scale: symlog, threshold: 1e-2, above: [0, 0, 1], reversed: true");
     assert_true(map->scale == SCENE_SYMLOG && map->threshold == 1e-2 && !map->has_below && map->has_above);
-    assert_memory_equal(map->outside_colours[0], entry(map, 0), 3 * sizeof(float));
+    assert_memory_equal(map->outside_colours[0], get_table_entry(map, 0), 3 * sizeof(float));
     check_colour(map->outside_colours[1], 0, 0, 1);
 }
 
-static void ranges_say_where_they_come_from(void **state)
+static void sources_of_ranges_are_read(void **state)
 {
     (void)state;
-    const scene_range *r = &map_of("")->range;
+    const scene_range *r = &parse_colour_map("")->range;
     assert_true(!r->is_fixed && r->source == SCENE_RANGE_DATA);
-    assert_true(map_of(", range: data")->range.source == SCENE_RANGE_DATA);
-    assert_true(map_of(", range: run, scale: log")->range.source == SCENE_RANGE_RUN);
-    assert_true(map_of(", range: symmetric")->range.source == SCENE_RANGE_SYMMETRIC);
-    r = &map_of(", range: {percentile: [2, 98.5]}")->range;
+    assert_true(parse_colour_map(", range: data")->range.source == SCENE_RANGE_DATA);
+    assert_true(parse_colour_map(", range: run, scale: log")->range.source == SCENE_RANGE_RUN);
+    assert_true(parse_colour_map(", range: symmetric")->range.source == SCENE_RANGE_SYMMETRIC);
+    r = &parse_colour_map(", range: {percentile: [2, 98.5]}")->range;
     assert_true(!r->is_fixed && r->source == SCENE_RANGE_PERCENTILES && r->low == 2 && r->high == 98.5);
-    r = &map_of(", range: [-1, 1e9]")->range;
+    r = &parse_colour_map(", range: [-1, 1e9]")->range;
     assert_true(r->is_fixed && r->low == -1 && r->high == 1e9);
 }
 
 /* Checks tables from ParaView's files. The greys of CIELAB are those of sRGB; its lightness is 116 cbrt(Y) - 16 for a
  * luminance Y. */
-static void files_of_paraview_become_tables(void **state)
+static void paraview_colour_maps_become_tables(void **state)
 {
     (void)state;
     int count;
-    const scene_colour_map *map = map_of(", map: {file: one.json}");
-    check_colour(entry(map, 0), 0, 0, 0);
-    check_colour(entry(map, 128), 1, 0, 0);
-    check_colour(entry(map, 192), 1, 0.5, 0.5);
-    map = map_of(", map: {file: several.json, name: red}");
+    const scene_colour_map *map = parse_colour_map(", map: {file: one.json}");
+    check_colour(get_table_entry(map, 0), 0, 0, 0);
+    check_colour(get_table_entry(map, 128), 1, 0, 0);
+    check_colour(get_table_entry(map, 192), 1, 0.5, 0.5);
+    map = parse_colour_map(", map: {file: several.json, name: red}");
     assert_string_equal(map->name, "red");
-    check_colour(entry(map, 64), 0.5, 0, 0);
-    map = map_of(", map: {file: several.json, name: grey / Lab}");
+    check_colour(get_table_entry(map, 64), 0.5, 0, 0);
+    map = parse_colour_map(", map: {file: several.json, name: grey / Lab}");
     for (int i = 0; i < 256; i += 15) {
         const double f = (100.0 * i / 255 + 16) / 116, y = f > 6.0 / 29 ? f * f * f : (f - 4.0 / 29) * 108 / 841;
-        for (int c = 0; c < 3; c++) assert_true(fabs((double)entry(map, i)[c] - y) < 1e-5);
+        for (int c = 0; c < 3; c++) assert_true(fabs((double)get_table_entry(map, i)[c] - y) < 1e-5);
     }
-    map = map_of(", map: {file: several.json, name: hues}");
-    check_colour(entry(map, 0), 1, 0, 0);
-    check_colour(entry(map, 51), 1, 204 * 0.2 / 51, 0);
-    check_colour(entry(map, 255), 0, 0, 1);
-    map = map_of(", map: {file: several.json, name: steps}");
-    check_colour(entry(map, 0), 0, 0, 0);
-    check_colour(entry(map, 1), 1, 0, 0);
-    check_colour(entry(map, 128), 1, 0, 0);
-    check_colour(entry(map, 129), 1, 1, 1);
-    map = map_of(", map: {file: indexed.json}, reversed: true");
+    map = parse_colour_map(", map: {file: several.json, name: hues}");
+    check_colour(get_table_entry(map, 0), 1, 0, 0);
+    check_colour(get_table_entry(map, 51), 1, 204 * 0.2 / 51, 0);
+    check_colour(get_table_entry(map, 255), 0, 0, 1);
+    map = parse_colour_map(", map: {file: several.json, name: steps}");
+    check_colour(get_table_entry(map, 0), 0, 0, 0);
+    check_colour(get_table_entry(map, 1), 1, 0, 0);
+    check_colour(get_table_entry(map, 128), 1, 0, 0);
+    check_colour(get_table_entry(map, 129), 1, 1, 1);
+    map = parse_colour_map(", map: {file: indexed.json}, reversed: true");
     assert_true(map->is_banded && map->count == 3);
-    check_colour(entry(map, 0), 0, 1, 0);
-    check_colour(entry(map, 1), 1, 0.5, 1);
-    map = map_of(", map: {file: several.json, name: uneven}");
-    check_colour(entry(map, 256), 1, 0, 0);
+    check_colour(get_table_entry(map, 0), 0, 1, 0);
+    check_colour(get_table_entry(map, 1), 1, 0.5, 1);
+    map = parse_colour_map(", map: {file: several.json, name: uneven}");
+    check_colour(get_table_entry(map, 256), 1, 0, 0);
     /* The middle of Moreland's own map has a lightness of 88, that of the file 88.1: the difference is less than a
      * code. */
     const float *moreland = colour_map_table("cool_to_warm", &count);
-    map = map_of(", map: {file: several.json, name: moreland}");
+    map = parse_colour_map(", map: {file: several.json, name: moreland}");
     for (int i = 0; i < 3; i++) {
         const int of_file[3] = {0, 128, 256}, of_ours[3] = {0, 127, 255};
         for (int c = 0; c < 3; c++)
-            assert_true(fabs(srgb_of(entry(map, of_file[i])[c]) - srgb_of(moreland[3 * of_ours[i] + c])) < 1.5 / 255);
+            assert_true(fabs(convert_linear_to_srgb(get_table_entry(map, of_file[i])[c]) -
+                             convert_linear_to_srgb(moreland[3 * of_ours[i] + c])) < 1.5 / 255);
     }
 }
 
 /* Checks that one rank reads the files and that all other ranks parse its copy. */
-static void files_are_read_once_and_then_passed_on(void **state)
+static void colour_files_are_read_once_and_reused(void **state)
 {
     (void)state;
     base_error error;
@@ -258,23 +262,24 @@ static void files_are_read_once_and_then_passed_on(void **state)
     scene_attachments files = {.read = read_stored};
     reads = 0;
     const char *keys = ", map: {file: one.json}}\n  - volume:\n      {field: f, map: {file: ../maps/one.json}";
-    assert_int_equal(parse(keys, &files, &s, &error), INSITU_ERROR_SCENE); /* another path, at which there is no file */
+    assert_int_equal(parse_colour_keys(keys, &files, &s, &error),
+                     INSITU_ERROR_SCENE); /* another path, at which there is no file */
     assert_non_null(strstr(error.message, "maps/scene.yaml:9: images[0].layers[1].volume.map.file: "
                                           "maps/../maps/one.json: cannot be read: no such file"));
     keys = ", map: {file: one.json}}\n  - volume:\n      {field: f, map: {file: one.json, name: red}";
     scene_attachments_free(&files);
     reads = 0;
-    assert_int_equal(parse(keys, &files, &s, &error), INSITU_OK);
+    assert_int_equal(parse_colour_keys(keys, &files, &s, &error), INSITU_OK);
     assert_true(reads == 1 && files.count == 1);
     files.read = NULL;
-    assert_int_equal(parse(keys, &files, &again, &error), INSITU_OK);
+    assert_int_equal(parse_colour_keys(keys, &files, &again, &error), INSITU_OK);
     const scene_colour_map *a = &s.images[0].volumes[0].colour_map, *b = &again.images[0].volumes[0].colour_map;
     assert_memory_equal(a->colours, b->colours, 3 * (size_t)a->count * sizeof *a->colours);
     scene_free(&s);
     scene_free(&again);
     scene_attachments_free(&files);
-    assert_int_equal(parse(keys, &files, &s, &error), INSITU_ERROR_SCENE);
-    assert_int_equal(parse(keys, NULL, &s, &error), INSITU_ERROR_SCENE);
+    assert_int_equal(parse_colour_keys(keys, &files, &s, &error), INSITU_ERROR_SCENE);
+    assert_int_equal(parse_colour_keys(keys, NULL, &s, &error), INSITU_ERROR_SCENE);
     assert_non_null(strstr(error.message, "no file can be read here"));
 }
 
@@ -347,7 +352,7 @@ static const char *const bad_keys[][3] = {
     {", range: symmetric, scale: log", "range: symmetric is not allowed beside scale: log", "symlog"},
 };
 
-static void wrong_keys_are_reported_with_place_and_expectation(void **state)
+static void wrong_keys_are_reported_with_position_and_expectation(void **state)
 {
     (void)state;
     const int64_t held = base_memory_held();
@@ -356,7 +361,7 @@ static void wrong_keys_are_reported_with_place_and_expectation(void **state)
         scene s;
         base_error error;
         scene_attachments files = {.read = read_stored};
-        const insitu_status status = parse(bad_keys[i][0], &files, &s, &error);
+        const insitu_status status = parse_colour_keys(bad_keys[i][0], &files, &s, &error);
         const bool is_reported = strncmp(error.message, place, strlen(place)) == 0 &&
                                  strstr(error.message, bad_keys[i][1]) && strstr(error.message, bad_keys[i][2]);
         scene_attachments_free(&files);
@@ -365,7 +370,7 @@ static void wrong_keys_are_reported_with_place_and_expectation(void **state)
     }
 }
 
-static void volumes_refuse_what_only_surfaces_have(void **state)
+static void volumes_reject_surface_keys(void **state)
 {
     (void)state;
     static const char *const keys[][2] = {
@@ -394,7 +399,7 @@ static void failed_allocations_are_errors_without_a_leak(void **state)
         base_error error;
         scene_attachments files = {.read = read_stored};
         base_memory_fail_nth(n);
-        status = parse(", discrete: 5, map: {file: several.json, name: uneven}", &files, &s, &error);
+        status = parse_colour_keys(", discrete: 5, map: {file: several.json, name: uneven}", &files, &s, &error);
         base_memory_fail_nth(0);
         assert_true(status == INSITU_OK || status == INSITU_ERROR_MEMORY);
         scene_free(&s);
@@ -408,14 +413,14 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_map_is_found_by_its_name),
-        cmocka_unit_test(lists_become_tables_through_their_colours),
+        cmocka_unit_test(colour_lists_are_interpolated_to_tables),
         cmocka_unit_test(maps_are_reversed_and_cut_into_bands),
-        cmocka_unit_test(scales_and_outside_are_read),
-        cmocka_unit_test(ranges_say_where_they_come_from),
-        cmocka_unit_test(files_of_paraview_become_tables),
-        cmocka_unit_test(files_are_read_once_and_then_passed_on),
-        cmocka_unit_test(wrong_keys_are_reported_with_place_and_expectation),
-        cmocka_unit_test(volumes_refuse_what_only_surfaces_have),
+        cmocka_unit_test(scales_and_out_of_range_colours_are_read),
+        cmocka_unit_test(sources_of_ranges_are_read),
+        cmocka_unit_test(paraview_colour_maps_become_tables),
+        cmocka_unit_test(colour_files_are_read_once_and_reused),
+        cmocka_unit_test(wrong_keys_are_reported_with_position_and_expectation),
+        cmocka_unit_test(volumes_reject_surface_keys),
         cmocka_unit_test(failed_allocations_are_errors_without_a_leak),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1204,7 +1204,7 @@ static bool is_reported(const mistake *m, const char *message)
     return strstr(message, m->words[1]) && strstr(message, m->words[2]);
 }
 
-static void mistakes_are_reported_with_line_key_and_what_to_write(void **state)
+static void mistakes_are_reported_with_line_key_and_suggestion(void **state)
 {
     (void)state;
     int wrong = 0;
@@ -1223,7 +1223,7 @@ static void mistakes_are_reported_with_line_key_and_what_to_write(void **state)
     assert_int_equal(wrong, 0);
 }
 
-static void the_scene_without_mistakes_is_taken(void **state)
+static void scene_without_mistakes_is_accepted(void **state)
 {
     (void)state;
     const mistake none = {1, 1, lines[0], 0, {"", "", ""}};
@@ -1236,7 +1236,7 @@ static void the_scene_without_mistakes_is_taken(void **state)
 }
 
 /* Checks the time to find a mistake after many lines: the search must read each line only a few times. */
-static void a_mistake_behind_many_lines_is_found(void **state)
+static void mistake_after_many_lines_is_found(void **state)
 {
     (void)state;
     static char text[1 << 20];
@@ -1252,9 +1252,9 @@ static void a_mistake_behind_many_lines_is_found(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(mistakes_are_reported_with_line_key_and_what_to_write),
-        cmocka_unit_test(the_scene_without_mistakes_is_taken),
-        cmocka_unit_test(a_mistake_behind_many_lines_is_found),
+        cmocka_unit_test(mistakes_are_reported_with_line_key_and_suggestion),
+        cmocka_unit_test(scene_without_mistakes_is_accepted),
+        cmocka_unit_test(mistake_after_many_lines_is_found),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

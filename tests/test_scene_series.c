@@ -22,16 +22,16 @@ static void parse_good(const char *text, scene *s)
     if (scene_parse(text, strlen(text), "scene.yaml", NULL, s, &error) != INSITU_OK) fail_msg("%s", error.message);
 }
 
-static void assert_near(double value, double expected, double tolerance)
+static void assert_nearly_equal(double value, double expected, double tolerance)
 {
     if (!(fabs(value - expected) <= tolerance)) fail_msg("%.17g, expected %.17g within %g", value, expected, tolerance);
 }
 
 static void check_vector(const double v[3], double x, double y, double z)
 {
-    assert_near(v[0], x, ANGLE_TOLERANCE);
-    assert_near(v[1], y, ANGLE_TOLERANCE);
-    assert_near(v[2], z, ANGLE_TOLERANCE);
+    assert_nearly_equal(v[0], x, ANGLE_TOLERANCE);
+    assert_nearly_equal(v[1], y, ANGLE_TOLERANCE);
+    assert_nearly_equal(v[2], z, ANGLE_TOLERANCE);
 }
 
 static void parse_camera(const char *camera, scene *s)
@@ -87,9 +87,9 @@ static void orbits_are_circles_about_any_axis(void **state)
         for (int a = 0; a < 3; a++)
             along += k->direction[a] * k->up[a], between += k->direction[a] * other->direction[a];
         const double theta = elevations[i / 7] * degree, phi = 360.0 / 7 * (i % 7) * degree;
-        assert_near(along, sin(theta), ANGLE_TOLERANCE);
-        assert_near(between, sin(theta) * sin(theta) + cos(theta) * cos(theta) * cos(phi), 2 * ANGLE_TOLERANCE);
-        assert_near(k->phi, 360.0 / 7 * (i % 7) - 30, 1e-12);
+        assert_nearly_equal(along, sin(theta), ANGLE_TOLERANCE);
+        assert_nearly_equal(between, sin(theta) * sin(theta) + cos(theta) * cos(theta) * cos(phi), 2 * ANGLE_TOLERANCE);
+        assert_nearly_equal(k->phi, 360.0 / 7 * (i % 7) - 30, 1e-12);
         assert_true(k->theta == elevations[i / 7] && k->zoom == 2 && k->fits_box && k->is_orthographic);
     }
     scene_free(&s);
@@ -203,7 +203,7 @@ static void databases_have_the_columns_of_their_images(void **state)
     scene_free(&s);
 }
 
-static void grids_number_their_cells(void **state)
+static void grid_cells_are_numbered(void **state)
 {
     (void)state;
     scene s;
@@ -236,7 +236,7 @@ static bool has_inset(const scene_montage *m, scene_anchor corner, int x, int y,
 
 /* Checks insets: their frames are a four-hundredth of 480 pixels wide, and the margins next to them a fiftieth of 480,
  * rounded up. */
-static void insets_lie_over_the_corners_of_grids(void **state)
+static void insets_cover_the_corners_of_grids(void **state)
 {
     (void)state;
     scene s;
@@ -266,7 +266,7 @@ static void insets_lie_over_the_corners_of_grids(void **state)
 
 /* Checks the width of strips of bars: text of 0.03 of the height has 0.03 * 24 * 9 = 6.48 pixels; text of 0.1 has
  * 21.6. */
-static void strips_of_bars_are_as_wide_as_words_need(void **state)
+static void colour_bar_strips_fit_their_labels(void **state)
 {
     (void)state;
     static const struct {
@@ -296,7 +296,7 @@ static const char moving[] = "angle: 30, path: [{time: 1, position: [0, 0, 8], f
                              "{time: 5, position: [6, 3, 8], focal: [0, 0, 0], up: [0, 0, 1]}, "
                              "{time: 5.5, position: [0, 3, 8], focal: [0, 0, 1]}]";
 
-static void paths_go_through_their_places_and_stay_at_the_ends(void **state)
+static void camera_paths_interpolate_positions_and_stop_at_ends(void **state)
 {
     (void)state;
     scene s;
@@ -321,7 +321,7 @@ static void paths_go_through_their_places_and_stay_at_the_ends(void **state)
 }
 
 /* Checks that between two positions, interpolated by cycles, the camera has moved 3 s^2 - 2 s^3 of the distance. */
-static void paths_of_two_places_ease_in_and_out(void **state)
+static void camera_paths_of_two_positions_ease_in_and_out(void **state)
 {
     (void)state;
     scene s;
@@ -341,7 +341,7 @@ static void paths_of_two_places_ease_in_and_out(void **state)
 /* Checks that the slope is the same on both sides of each position, by differences, and that the path stays between
  * neighbouring positions. The second derivative of a cubic is below 12 times its rise, so a difference over h is off by
  * less than 6 h of the rise. */
-static void paths_are_smooth_and_do_not_swing_out(void **state)
+static void camera_paths_are_smooth_without_overshoot(void **state)
 {
     (void)state;
     enum { STEPS = 4000 };
@@ -353,7 +353,8 @@ static void paths_are_smooth_and_do_not_swing_out(void **state)
         const scene_camera before = scene_camera_at(c, 0, at - h), here = scene_camera_at(c, 0, at),
                            after = scene_camera_at(c, 0, at + h);
         for (int a = 0; a < 3; a++)
-            assert_near((after.eye[a] - here.eye[a]) / h, (here.eye[a] - before.eye[a]) / h, 2 * 6 * h * 6 / 0.25);
+            assert_nearly_equal((after.eye[a] - here.eye[a]) / h, (here.eye[a] - before.eye[a]) / h,
+                                2 * 6 * h * 6 / 0.25);
     }
     for (int n = 0; n <= STEPS; n++) {
         const double time = 1 + 4.5 * n / STEPS;
@@ -367,7 +368,7 @@ static void paths_are_smooth_and_do_not_swing_out(void **state)
         assert_true(at.angle >= 30 && at.angle <= 50 && at.eye[2] == 8);
     }
     /* x rises by 4 in 1, then by 2 in 3: the slope at the position between them is 12 / (7 / 4 + 5 / (2 / 3)). */
-    assert_near(scene_camera_at(c, 0, 1.5).eye[0], 2 - 12 / (1.75 + 7.5) / 8, 1e-14);
+    assert_nearly_equal(scene_camera_at(c, 0, 1.5).eye[0], 2 - 12 / (1.75 + 7.5) / 8, 1e-14);
     scene_free(&s);
 }
 
@@ -379,13 +380,13 @@ int main(void)
         cmocka_unit_test(orbits_have_their_defaults),
         cmocka_unit_test(sweeps_make_each_combination_once),
         cmocka_unit_test(sweeps_go_through_planes),
-        cmocka_unit_test(grids_number_their_cells),
-        cmocka_unit_test(insets_lie_over_the_corners_of_grids),
-        cmocka_unit_test(strips_of_bars_are_as_wide_as_words_need),
+        cmocka_unit_test(grid_cells_are_numbered),
+        cmocka_unit_test(insets_cover_the_corners_of_grids),
+        cmocka_unit_test(colour_bar_strips_fit_their_labels),
         cmocka_unit_test(databases_have_the_columns_of_their_images),
-        cmocka_unit_test(paths_go_through_their_places_and_stay_at_the_ends),
-        cmocka_unit_test(paths_of_two_places_ease_in_and_out),
-        cmocka_unit_test(paths_are_smooth_and_do_not_swing_out),
+        cmocka_unit_test(camera_paths_interpolate_positions_and_stop_at_ends),
+        cmocka_unit_test(camera_paths_of_two_positions_ease_in_and_out),
+        cmocka_unit_test(camera_paths_are_smooth_without_overshoot),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -134,7 +134,7 @@ static const char *const forms[][2] = {
     {"outputs: [c.png, {path: d.exr}]", "outputs: [{path: c.png}, {path: d.exr}]"},
 };
 
-static void short_forms_mean_their_full_forms(void **context)
+static void short_forms_equal_their_full_forms(void **context)
 {
     (void)context;
     for (size_t i = 0; i < sizeof forms / sizeof *forms; i++) {
@@ -179,7 +179,7 @@ static const struct {
     {"decorations: {titel: x}", {"\"titel\" is unknown (did you mean title?)"}},
 };
 
-static void words_that_are_nearly_right_are_named(void **context)
+static void similar_words_are_suggested(void **context)
 {
     (void)context;
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
@@ -194,7 +194,7 @@ static void words_that_are_nearly_right_are_named(void **context)
     }
 }
 
-static void far_words_are_not_guessed(void **context)
+static void dissimilar_words_get_no_suggestion(void **context)
 {
     (void)context;
     static const char *const keys[] = {"field", "values", "opacity", "colour_by"};
@@ -208,10 +208,10 @@ static void far_words_are_not_guessed(void **context)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(short_forms_mean_their_full_forms),
+        cmocka_unit_test(short_forms_equal_their_full_forms),
         cmocka_unit_test(colours_of_maps_have_names),
-        cmocka_unit_test(words_that_are_nearly_right_are_named),
-        cmocka_unit_test(far_words_are_not_guessed),
+        cmocka_unit_test(similar_words_are_suggested),
+        cmocka_unit_test(dissimilar_words_get_no_suggestion),
     };
     return cmocka_run_group_tests_name("scene_shorthand", tests, NULL, NULL);
 }

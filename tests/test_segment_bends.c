@@ -35,7 +35,7 @@ typedef struct chord_deviations {
     double off[3][8], mean[8];
 } chord_deviations;
 
-static void cell_of(const render_fixture *f, const test_mesh *mesh, reference_cell *cell)
+static void load_cell(const render_fixture *f, const test_mesh *mesh, reference_cell *cell)
 {
     const render_camera *c = &f->job.camera;
     const double *axes[3] = {c->right, c->up, c->forward};
@@ -103,7 +103,7 @@ static bool sample_deviations(const reference_cell *cell, chord_deviations *out)
 }
 
 /* Subtracts from a its projection onto b. */
-static void take_out(int count, const double b[8], double a[8])
+static void subtract_projection(int count, const double b[8], double a[8])
 {
     double ab = 0, bb = 0;
     for (int i = 0; i < count; i++) ab += a[i] * b[i], bb += b[i] * b[i];
@@ -125,8 +125,8 @@ static void aim_values(const chord_deviations *looks, bend_aim aim, double *valu
         found[2][i] = d[1][i];
     }
     for (int n = 0; n < wanted; n++) {
-        for (int before = 0; before < n; before++) take_out(looks->count, found[before], found[n]);
-        take_out(looks->count, found[n], values);
+        for (int before = 0; before < n; before++) subtract_projection(looks->count, found[before], found[n]);
+        subtract_projection(looks->count, found[n], values);
     }
     for (int i = 0; i < looks->count; i++) largest = fmax(largest, fabs(values[i]));
     for (int i = 0; i < looks->count; i++) values[i] = 0.5 + 0.45 * values[i] / fmax(largest, 1e-30);
@@ -142,23 +142,23 @@ static bool verify_cell(test_cell_shape shape, bend_aim aim, uint64_t seed, doub
     fixture_function function;
     reference_cell cell;
     chord_deviations looks;
-    const double jitter = test_uniform_in(0, 100 * seed + 3, 0.1, 0.35);
-    test_mesh_single(shape, test_linear, &mesh);
+    const double jitter = test_uniform_between(0, 100 * seed + 3, 0.1, 0.35);
+    test_mesh_make_single_cell(shape, test_linear_field, &mesh);
     for (uint64_t i = 0; i < 3 * (uint64_t)mesh.vertex_count; i++)
-        mesh.coordinates[i] = 1.4 * (mesh.coordinates[i] + test_uniform_in(i, 100 * seed + 1, -jitter, jitter));
+        mesh.coordinates[i] = 1.4 * (mesh.coordinates[i] + test_uniform_between(i, 100 * seed + 1, -jitter, jitter));
     for (uint64_t i = 0; i < (uint64_t)mesh.vertex_count; i++)
-        mesh.values[i] = test_uniform_in(i, 100 * seed + 2, 0, 1);
-    step_begin(&f, &mesh, CAMERA_ORTHOGRAPHIC, SIDE);
-    cell_of(&f, &mesh, &cell);
+        mesh.values[i] = test_uniform_between(i, 100 * seed + 2, 0, 1);
+    step_fixture_create(&f, &mesh, CAMERA_ORTHOGRAPHIC, SIDE);
+    load_cell(&f, &mesh, &cell);
     bool is_seen = is_unfolded(&mesh) && sample_deviations(&cell, &looks);
     if (is_seen && aim != ANY) aim_values(&looks, aim, mesh.values);
     fixture_free(&f);
     if (is_seen) {
-        step_begin(&f, &mesh, CAMERA_ORTHOGRAPHIC, SIDE);
+        step_fixture_create(&f, &mesh, CAMERA_ORTHOGRAPHIC, SIDE);
         f.job.camera.half_height = 0.03;
-        const double unit = pow(10, test_uniform_in(0, 100 * seed, -2, 1));
+        const double unit = pow(10, test_uniform_between(0, 100 * seed, -2, 1));
         fixture_set_function(&f, &function, 100 * seed + 9, false, 0.95, unit);
-        step_verify(&f, test_effort(2, 1), 1e-7, worst);
+        step_measure_errors(&f, test_case_count(2, 1), 1e-7, worst);
         fixture_free(&f);
     }
     test_mesh_free(&mesh);
@@ -169,30 +169,30 @@ static bool verify_cell(test_cell_shape shape, bend_aim aim, uint64_t seed, doub
  * the chord does not bound their deviation in parts. */
 static const uint64_t hard_seeds[] = {188, 1349};
 
-static void max_error_is_kept_where_looks_say_little(void **state)
+static void max_error_is_kept_if_samples_miss_the_bend(void **state)
 {
     (void)state;
     double worst_of_hard[3] = {0};
     for (size_t i = 0; i < sizeof hard_seeds / sizeof hard_seeds[0]; i++)
         assert_true(verify_cell(TEST_UNIT_HEX, BLIND, hard_seeds[i], worst_of_hard));
-    step_assert_kept(worst_of_hard, "hard cells");
+    step_assert_errors_within_bounds(worst_of_hard, "hard cells");
     for (int s = 0; s < SHAPES; s++)
         for (bend_aim aim = 0; aim < AIMS; aim++) {
             double worst[3] = {0};
             char what[80];
             int seen = 0;
             if (aim == BLIND && shapes[s] != TEST_UNIT_HEX) continue;
-            const int wanted = test_effort(20, 1500);
+            const int wanted = test_case_count(20, 1500);
             for (uint64_t seed = 0; seen < wanted && seed < 8 * (uint64_t)wanted; seed++)
                 seen += verify_cell(shapes[s], aim, seed, worst);
             snprintf(what, sizeof what, "%s, %s, %d cells", test_cell_shape_name(shapes[s]), aim_names[aim], seen);
-            step_assert_kept(worst, what);
+            step_assert_errors_within_bounds(worst, what);
             assert_true(2 * seen > wanted);
         }
 }
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(max_error_is_kept_where_looks_say_little)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(max_error_is_kept_if_samples_miss_the_bend)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

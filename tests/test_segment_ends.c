@@ -15,7 +15,7 @@
 enum { SIDE = 9, PIXELS = SIDE * SIDE, LAYERS = 8 };
 
 /* Computes the colours of the reference picture; NaN if rounding may decide otherwise. */
-static void truth_of(const render_fixture *f, double rgba[4 * PIXELS])
+static void compute_reference(const render_fixture *f, double rgba[4 * PIXELS])
 {
     reference_integral *scene = reference_integral_create(&f->job, 1e-9);
     reference_scene *surfaces = f->job.surface_count ? reference_create(&f->job) : NULL;
@@ -30,14 +30,14 @@ static void truth_of(const render_fixture *f, double rgba[4 * PIXELS])
     reference_integral_free(scene);
 }
 
-static double error_of(const render_fixture *f, const double truth[4 * PIXELS])
+static double find_largest_error(const render_fixture *f, const double truth[4 * PIXELS])
 {
     drawn_frame drawn;
     double worst = 0;
     fixture_draw(f, &drawn);
     for (int i = 0; i < 4 * PIXELS; i++)
-        if (!isnan(truth[i])) worst = test_worse(worst, fabs((double)drawn.picture.rgba[i] - truth[i]));
-    drawn_free(&drawn);
+        if (!isnan(truth[i])) worst = test_larger_error(worst, fabs((double)drawn.picture.rgba[i] - truth[i]));
+    drawn_frame_free(&drawn);
     return worst;
 }
 
@@ -54,10 +54,10 @@ static void set_segments(render_fixture *f, double max_error)
 /* Makes a slab of layers of tets, seen from above. Coordinates near 0.7 are rounded by 6e-8. */
 static void make_layers(double thickness, test_mesh *out)
 {
-    test_mesh_lattice(TEST_TETS, LAYERS, 0, test_wave, out);
+    test_mesh_make_lattice(TEST_TETS, LAYERS, 0, test_wave_field, out);
     for (int64_t v = 0; v < out->vertex_count; v++) {
         double *p = out->coordinates + 3 * v;
-        out->values[v] = 0.3 * test_wave((const double[]){p[0], p[1], 3 * p[2]});
+        out->values[v] = 0.3 * test_wave_field((const double[]){p[0], p[1], 3 * p[2]});
         p[2] = 0.7 + 0.5 * thickness * p[2];
     }
 }
@@ -82,8 +82,8 @@ static void thin_tets_are_not_lost(void **state)
                                           (const double[]){0.03, 0.02, 0}, (const double[]){0, 1, 0}, 30, SIDE, SIDE));
         set_segments(&f, 0);
         f.transfer.unit_distance = thickness;
-        truth_of(&f, truth);
-        const double worst = error_of(&f, truth);
+        compute_reference(&f, truth);
+        const double worst = find_largest_error(&f, truth);
         fprintf(stderr, "layers of %.2g: %.2g\n", thickness / LAYERS, worst);
         assert_true(worst <= 0.1 * 6e-8 / thickness);
         fixture_free(&f);
@@ -93,14 +93,14 @@ static void thin_tets_are_not_lost(void **state)
 
 /* ---- cells of every kind ---- */
 
-static double bent_field(const double p[3])
+static double quadratic_field(const double p[3])
 {
     return 0.5 + 0.35 * sin(2.1 * p[0] + 0.3) * cos(1.7 * p[1]) + 0.3 * sin(2.3 * p[2] + p[0]);
 }
 
 /* Finds the largest error for each max_error, 1e-2 to 1e-4, of one mesh and function. Returns whether the function has
  * a step. */
-static bool verify(const test_mesh *mesh, uint64_t seed, bool step, float opacity, double worst[3])
+static bool verify_mesh(const test_mesh *mesh, uint64_t seed, bool step, float opacity, double worst[3])
 {
     static const double values[2] = {0.35, 0.6};
     render_fixture f;
@@ -111,12 +111,12 @@ static bool verify(const test_mesh *mesh, uint64_t seed, bool step, float opacit
     fixture_set_camera(&f, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, SIDE, SIDE);
     set_segments(&f, 0);
     fixture_set_function(&f, &function, 100 * seed + 9, step, seed % 3 ? 0.5 : 0.9,
-                         pow(10, test_uniform_in(0, 100 * seed + 10, -2, 4)));
+                         pow(10, test_uniform_between(0, 100 * seed + 10, -2, 4)));
     if (opacity > 0) fixture_add_surface(&f, values, 2, opacity);
-    truth_of(&f, truth);
+    compute_reference(&f, truth);
     for (int i = 0; i < 3; i++) {
         f.job.max_error = pow(10, -2 - i);
-        worst[i] = test_worse(worst[i], error_of(&f, truth));
+        worst[i] = test_larger_error(worst[i], find_largest_error(&f, truth));
     }
     fixture_free(&f);
     return function.values[1] == function.values[2];
@@ -135,9 +135,9 @@ static void max_error_is_kept_in_dense_media(void **state)
             int steps = 0;
             for (uint64_t seed = 0; seed < 6; seed++) {
                 test_mesh mesh;
-                test_mesh_lattice(kind, 2, 0.2, bent_field, &mesh);
+                test_mesh_make_lattice(kind, 2, 0.2, quadratic_field, &mesh);
                 /* The two densest media have a step, one for each camera. */
-                steps += verify(&mesh, seed, seed % 5 == 0, opacities[surface], worst);
+                steps += verify_mesh(&mesh, seed, seed % 5 == 0, opacities[surface], worst);
                 test_mesh_free(&mesh);
             }
             fprintf(stderr, "%s, surfaces of opacity %g: %.2g, %.2g, %.2g\n", test_mesh_kind_name(kind),

@@ -18,11 +18,11 @@ static const double widths[WIDTHS] = {9e-3, 1e-3, 1e-4, 1e-5, 1e-6};
 
 /* Returns a vertex's value as a fraction of the ramp: from a third below to a third above it; or the ramp's lower end
  * for half of the vertices (a hex's lower quad); or one value for all. */
-static double share_of(int field, uint64_t vertex, uint64_t seed)
+static double compute_ramp_fraction(int field, uint64_t vertex, uint64_t seed)
 {
-    const double share = test_uniform_in(vertex, 100 * seed + 5, -0.3, 1.3);
+    const double share = test_uniform_between(vertex, 100 * seed + 5, -0.3, 1.3);
     if (field == 1) return vertex < 4 ? 0 : share;
-    return field == 2 ? test_uniform_in(0, 100 * seed + 5, 0.1, 0.9) : share;
+    return field == 2 ? test_uniform_between(0, 100 * seed + 5, 0.1, 0.9) : share;
 }
 
 /* Bounds how much light changes if a value is off by 4e-7 of the domain, which is the error of polyhedra's values in
@@ -30,7 +30,7 @@ static double share_of(int field, uint64_t vertex, uint64_t seed)
  * For light, let extinction k be off by dk(s). With the transmittance T(s) up to s, light L = int c k T ds is off by
  * int dk (c T - int_s c k T) ds, whose bracket is at most T for colours c in [0, 1]. So light is off by at most int dk
  * T ds, which is at most dk times the length, and at most the largest dk / k, since int k T ds <= 1. */
-static double rounding_of(const step_function *function, double width, double unit)
+static double bound_rounding(const step_function *function, double width, double unit)
 {
     const double a = (double)function->opacities[1], b = (double)function->opacities[2], way = 1.8 * 1.24 * sqrt(3);
     const double off = 4e-7 * fabs(b - a) / width, seen = off / (1 - fmax(a, b)) * way / unit;
@@ -62,16 +62,16 @@ static void verify_ramp(test_cell_shape shape, ramp_scene scene, double width, u
         memcpy(function.opacities, opacities[seed / FIELDS % 3], sizeof function.opacities);
         step_make_cell(shape, seed, &mesh);
         for (int64_t i = 0; i < mesh.vertex_count; i++)
-            mesh.values[i] = begin + width * share_of((int)(seed % FIELDS), (uint64_t)i, seed);
+            mesh.values[i] = begin + width * compute_ramp_fraction((int)(seed % FIELDS), (uint64_t)i, seed);
         if (scene == POLYHEDRON) test_mesh_to_polyhedra(&mesh, 1);
-        step_begin(&f, &mesh, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, SIDE);
+        step_fixture_create(&f, &mesh, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, SIDE);
         step_set_function(&f, &function, begin, width, unit);
         if (scene == CUT) fixture_add_surface(&f, &middle, 1, FILM);
-        step_verify(&f, 1, 1e-7, cell_worst);
+        step_measure_errors(&f, 1, 1e-7, cell_worst);
         for (int i = 0; i < 3; i++) {
             raw = fmax(raw, cell_worst[i]);
-            if (scene == POLYHEDRON) cell_worst[i] -= rounding_of(&function, width, unit);
-            worst[i] = test_worse(worst[i], cell_worst[i]);
+            if (scene == POLYHEDRON) cell_worst[i] -= bound_rounding(&function, width, unit);
+            worst[i] = test_larger_error(worst[i], cell_worst[i]);
         }
         fixture_free(&f);
         test_mesh_free(&mesh);
@@ -88,15 +88,15 @@ static void verify_ramps(ramp_scene scene)
         for (int k = 0; k < WIDTHS; k++) {
             double worst[3] = {0};
             char what[80];
-            const int every = test_effort(SEEDS, 1);
+            const int every = test_case_count(SEEDS, 1);
             verify_ramp(step_shapes[kind], scene, widths[k], (uint64_t)((kind + k) % every), (uint64_t)every, worst);
             snprintf(what, sizeof what, "%s%s within a ramp of %g", test_cell_shape_name(step_shapes[kind]), how[scene],
                      widths[k]);
-            step_assert_kept(worst, what);
+            step_assert_errors_within_bounds(worst, what);
         }
 }
 
-static void fields_within_a_narrow_ramp(void **state)
+static void fields_within_narrow_ramps_keep_max_error(void **state)
 {
     (void)state;
     verify_ramps(ALONE);
@@ -104,13 +104,13 @@ static void fields_within_a_narrow_ramp(void **state)
 
 /* Checks cells that are cut by a surface which transmits all but a ten-millionth of the light: the picture must be the
  * same. */
-static void cut_fields_within_a_narrow_ramp(void **state)
+static void clipped_fields_within_narrow_ramps_keep_max_error(void **state)
 {
     (void)state;
     verify_ramps(CUT);
 }
 
-static void polyhedra_within_a_narrow_ramp(void **state)
+static void polyhedra_within_narrow_ramps_keep_max_error(void **state)
 {
     (void)state;
     verify_ramps(POLYHEDRON);
@@ -119,9 +119,9 @@ static void polyhedra_within_a_narrow_ramp(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(fields_within_a_narrow_ramp),
-        cmocka_unit_test(cut_fields_within_a_narrow_ramp),
-        cmocka_unit_test(polyhedra_within_a_narrow_ramp),
+        cmocka_unit_test(fields_within_narrow_ramps_keep_max_error),
+        cmocka_unit_test(clipped_fields_within_narrow_ramps_keep_max_error),
+        cmocka_unit_test(polyhedra_within_narrow_ramps_keep_max_error),
     };
     if (argc > 1) cmocka_set_test_filter(argv[1]);
     return cmocka_run_group_tests(tests, NULL, NULL);

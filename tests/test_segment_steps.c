@@ -20,7 +20,7 @@
 enum { SAMPLES = 1000 };
 
 /* Computes the field along the ray of a picture of one pixel; returns how many of the samples are inside the cell. */
-static int values_on_ray(const render_fixture *f, const test_mesh *mesh, int type, double values[SAMPLES])
+static int sample_values_on_ray(const render_fixture *f, const test_mesh *mesh, int type, double values[SAMPLES])
 {
     const render_camera *camera = &f->job.camera;
     const double *axes[3] = {camera->right, camera->up, camera->forward};
@@ -55,7 +55,7 @@ static int values_on_ray(const render_fixture *f, const test_mesh *mesh, int typ
 
 /* Computes the largest value within the ray's interval, or the smallest (sign -1): that of the parabola through three
  * samples. Returns false if it is at an end, or hardly differs from that at an end. */
-static bool extreme_of(const double values[SAMPLES], double sign, double *at)
+static bool find_extreme_value(const double values[SAMPLES], double sign, double *at)
 {
     int best = 0;
     for (int i = 1; i < SAMPLES; i++)
@@ -77,16 +77,16 @@ static void verify_hex(step_function function, fixture_camera camera, double wid
     double worst[3] = {0};
     char what[80];
     step_make_hex(&mesh);
-    step_begin(&f, &mesh, camera, STEP_SIDE);
+    step_fixture_create(&f, &mesh, camera, STEP_SIDE);
     step_set_function(&f, &function, 0.6, width, unit);
-    step_verify(&f, test_effort(2, 1), 1e-7, worst);
+    step_measure_errors(&f, test_case_count(2, 1), 1e-7, worst);
     snprintf(what, sizeof what, "a ramp of %g, unit distance %g, %s", width, unit, fixture_camera_name(camera));
-    step_assert_kept(worst, what);
+    step_assert_errors_within_bounds(worst, what);
     fixture_free(&f);
     test_mesh_free(&mesh);
 }
 
-static void a_hex_that_barely_reaches_a_step(void **state)
+static void hexes_that_barely_reach_a_step_keep_max_error(void **state)
 {
     static const double units[2] = {0.005, 0.1};
     (void)state;
@@ -98,7 +98,7 @@ static void a_hex_that_barely_reaches_a_step(void **state)
 /* Checks a cubic. Along the middle ray, the hex's diagonal, the field is 0.2 - 0.4 s + 3 s^2 - 2 s^3: it falls to 0.186
  * and rises to 0.8. At this minimum its deviation from the chord is less than a sixth of that at a quarter, the half
  * and three quarters. */
-static void a_cubic_that_dips_below_a_step(void **state)
+static void cubics_that_dip_below_a_step_keep_max_error(void **state)
 {
     static const double values[8] = {0.2, 0.2 / 3, 2.8 / 3, 0.2 / 3, 0.2 / 3, 2.8 / 3, 0.8, 2.8 / 3};
     test_mesh mesh;
@@ -107,7 +107,7 @@ static void a_cubic_that_dips_below_a_step(void **state)
     double worst[3] = {0};
     (void)state;
     step_make_hex(&mesh);
-    step_begin(&f, &mesh, CAMERA_ORTHOGRAPHIC, 1);
+    step_fixture_create(&f, &mesh, CAMERA_ORTHOGRAPHIC, 1);
     const render_camera camera = f.job.camera;
     fixture_free(&f);
     for (int i = 0; i < 8; i++)
@@ -122,24 +122,24 @@ static void a_cubic_that_dips_below_a_step(void **state)
                 along[0] * camera.forward[a] + along[1] * camera.right[a] + along[2] * camera.up[a];
         }
     memcpy(mesh.values, values, sizeof values);
-    step_begin(&f, &mesh, CAMERA_ORTHOGRAPHIC, 1);
+    step_fixture_create(&f, &mesh, CAMERA_ORTHOGRAPHIC, 1);
     step_set_function(&f, &function, 0.187, 0, 0.005); /* in another bin of the bounds than 0.2 */
-    step_verify(&f, 1, 1e-7, worst);
-    step_assert_kept(worst, "a dip");
+    step_measure_errors(&f, 1, 1e-7, worst);
+    step_assert_errors_within_bounds(worst, "a dip");
     fixture_free(&f);
     test_mesh_free(&mesh);
 }
 
 /* Returns how far beyond 0.6 the field of the hex rises on the ray of a picture of one pixel, with the eye moved
  * sideways and up; NaN if its maximum is at an end. */
-static double hex_past_step(render_fixture *f, const test_mesh *mesh, double sideways, double up)
+static double compute_rise_above_step(render_fixture *f, const test_mesh *mesh, double sideways, double up)
 {
     static double values[SAMPLES];
     double most;
     fixture_set_camera(f, CAMERA_ORTHOGRAPHIC, 1, 1);
     render_camera *c = &f->job.camera;
     for (int a = 0; a < 3; a++) c->eye[a] += sideways * c->right[a] + up * c->up[a];
-    if (!values_on_ray(f, mesh, GRID_HEX, values) || !extreme_of(values, 1, &most)) return (double)NAN;
+    if (!sample_values_on_ray(f, mesh, GRID_HEX, values) || !find_extreme_value(values, 1, &most)) return (double)NAN;
     return most - 0.6;
 }
 
@@ -148,28 +148,28 @@ static void move_eye_past_step(render_fixture *f, const test_mesh *mesh, double 
 {
     const double step = 0.05;
     for (double up = -1; up < 1; up += step) {
-        double after = hex_past_step(f, mesh, -1, up);
+        double after = compute_rise_above_step(f, mesh, -1, up);
         for (double low = -1; low < 1; low += step) {
             const double before = after;
-            after = hex_past_step(f, mesh, low + step, up);
+            after = compute_rise_above_step(f, mesh, low + step, up);
             const bool rises = after > past;
             double from = low, to = low + step;
             if (isnan(before) || isnan(after) || (before > past) == rises) continue;
             for (int i = 0; i < 50; i++) {
                 const double middle = 0.5 * (from + to);
-                if ((hex_past_step(f, mesh, middle, up) > past) == rises)
+                if ((compute_rise_above_step(f, mesh, middle, up) > past) == rises)
                     to = middle;
                 else
                     from = middle;
             }
-            assert_true(fabs(hex_past_step(f, mesh, to, up) - past) < 0.01 * past);
+            assert_true(fabs(compute_rise_above_step(f, mesh, to, up) - past) < 0.01 * past);
             return;
         }
     }
     fail_msg("no ray comes to the step by %g", past);
 }
 
-static void a_ray_on_which_it_barely_does(void **state)
+static void rays_that_barely_reach_a_step_keep_max_error(void **state)
 {
     static const double units[2] = {0.005, 0.1}, passes[4] = {3e-3, 1e-4, 1e-5, 1e-6};
     (void)state;
@@ -177,16 +177,16 @@ static void a_ray_on_which_it_barely_does(void **state)
         test_mesh mesh;
         render_fixture f;
         step_make_hex(&mesh);
-        step_begin(&f, &mesh, CAMERA_ORTHOGRAPHIC, 1);
+        step_fixture_create(&f, &mesh, CAMERA_ORTHOGRAPHIC, 1);
         move_eye_past_step(&f, &mesh, passes[n]);
         for (int k = 0; k < 2; k++) {
             step_function function = {.opacities = {0, 0, 0.9f, 0.9f}};
             double worst[3] = {0};
             char what[64];
             step_set_function(&f, &function, 0.6, 0, units[k]);
-            step_verify(&f, 1, 1e-7, worst);
+            step_measure_errors(&f, 1, 1e-7, worst);
             snprintf(what, sizeof what, "unit distance %g, by %g", units[k], passes[n]);
-            step_assert_kept(worst, what);
+            step_assert_errors_within_bounds(worst, what);
         }
         fixture_free(&f);
         test_mesh_free(&mesh);
@@ -198,9 +198,9 @@ static void a_ray_on_which_it_barely_does(void **state)
 enum { KINDS = 4, SEEDS = 12 };
 
 /* By default a sixth of the seeds is drawn; the selection changes with the kind. */
-static void random_cells_and_steps(void **state)
+static void random_cells_with_steps_keep_max_error(void **state)
 {
-    const uint64_t every = (uint64_t)test_effort(6, 1);
+    const uint64_t every = (uint64_t)test_case_count(6, 1);
     (void)state;
     for (int polyhedra = 0; polyhedra < 2; polyhedra++)
         for (int kind = 0; kind < KINDS; kind++) {
@@ -211,19 +211,19 @@ static void random_cells_and_steps(void **state)
                 fixture_function function;
                 step_make_cell(step_shapes[kind], 16 * seed + (uint64_t)kind, &mesh);
                 if (polyhedra) test_mesh_to_polyhedra(&mesh, 1);
-                step_begin(&f, &mesh, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, STEP_SIDE);
+                step_fixture_create(&f, &mesh, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, STEP_SIDE);
                 /* The optical depth across the cell is from 2 to 900. */
                 fixture_set_function(&f, &function, 100 * seed + 9, true, seed % 3 ? 0.5 : 0.9,
-                                     pow(10, test_uniform_in(0, 100 * seed + 10, -2.2, 0)));
+                                     pow(10, test_uniform_between(0, 100 * seed + 10, -2.2, 0)));
                 assert_true(function.values[1] == function.values[2]);
-                step_verify(&f, test_effort(2, 1), 1e-7, worst);
+                step_measure_errors(&f, test_case_count(2, 1), 1e-7, worst);
                 fixture_free(&f);
                 test_mesh_free(&mesh);
             }
             char what[64];
             snprintf(what, sizeof what, "steps in %s%s", test_cell_shape_name(step_shapes[kind]),
                      polyhedra ? " as polyhedron" : "");
-            step_assert_kept(worst, what);
+            step_assert_errors_within_bounds(worst, what);
         }
 }
 
@@ -236,23 +236,24 @@ static const double passes[PASSES] = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 3e-7, 1e-7, 
 
 /* Checks a cell's field that passes a step upwards, or (sign -1) downwards, by each of the amounts. Returns whether the
  * field has such an extreme. */
-static bool graze(render_fixture *f, const double values[SAMPLES], double sign, double width, double worst[PASSES][3])
+static bool check_grazed_step(render_fixture *f, const double values[SAMPLES], double sign, double width,
+                              double worst[PASSES][3])
 {
     step_function function = {.opacities = {0, 0, 0.9f, 0.9f}};
     double at;
     if (sign < 0) memcpy(function.opacities, (const float[]){0.9f, 0.9f, 0, 0}, sizeof function.opacities);
-    if (!extreme_of(values, sign, &at)) return false;
+    if (!find_extreme_value(values, sign, &at)) return false;
     for (int k = 0; k < PASSES; k++)
         for (int dense = 0; dense < 2; dense++) {
             step_set_function(f, &function, at - sign * passes[k], width, dense ? 0.005 : 0.1);
-            step_verify(f, 1, 1e-7, worst[k]);
+            step_measure_errors(f, 1, 1e-7, worst[k]);
         }
     return true;
 }
 
 enum { GRAZED = 3 }; /* hexes, wedges and pyramids; along a ray in a tet the field is linear */
 
-static void graze_by_rays(int kind, int rays, double width)
+static void check_grazing_rays(int kind, int rays, double width)
 {
     static const int types[GRAZED] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID};
     static double values[SAMPLES];
@@ -262,9 +263,9 @@ static void graze_by_rays(int kind, int rays, double width)
         test_mesh mesh;
         render_fixture f;
         step_make_cell(step_shapes[kind], seed, &mesh);
-        step_begin(&f, &mesh, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, 1);
-        if (values_on_ray(&f, &mesh, types[kind], values))
-            for (int sign = -1; sign <= 1; sign += 2) count += graze(&f, values, sign, width, worst);
+        step_fixture_create(&f, &mesh, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, 1);
+        if (sample_values_on_ray(&f, &mesh, types[kind], values))
+            for (int sign = -1; sign <= 1; sign += 2) count += check_grazed_step(&f, values, sign, width, worst);
         fixture_free(&f);
         test_mesh_free(&mesh);
     }
@@ -272,35 +273,35 @@ static void graze_by_rays(int kind, int rays, double width)
         char what[80];
         snprintf(what, sizeof what, "%d rays in %s past a ramp of %g by %g", count,
                  test_cell_shape_name(step_shapes[kind]), width, passes[k]);
-        step_assert_kept(worst[k], what);
+        step_assert_errors_within_bounds(worst[k], what);
     }
     assert_true(count >= rays);
 }
 
-static void rays_that_graze_a_step(void **state)
+static void rays_that_graze_a_step_keep_max_error(void **state)
 {
     (void)state;
-    for (int kind = 0; kind < GRAZED; kind++) graze_by_rays(kind, test_effort(2, 10), 0);
+    for (int kind = 0; kind < GRAZED; kind++) check_grazing_rays(kind, test_case_count(2, 10), 0);
 }
 
-static void rays_that_graze_a_steep_ramp(void **state)
+static void rays_that_graze_a_steep_ramp_keep_max_error(void **state)
 {
     static const double widths[] = {1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 0.02, 0.1};
     (void)state;
     for (int i = 0; i < (int)(sizeof widths / sizeof *widths); i++)
         for (int kind = 0; kind < GRAZED; kind++)
-            if (test_is_whole() || kind == i % GRAZED) graze_by_rays(kind, test_effort(1, 2), widths[i]);
+            if (test_is_long_run() || kind == i % GRAZED) check_grazing_rays(kind, test_case_count(1, 2), widths[i]);
 }
 
 /* ---- ramps almost as steep as a step ---- */
 
-static void steep_ramps_are_kept_as_steps_are(void **state)
+static void steep_ramps_keep_max_error(void **state)
 {
     static const double widths[] = {1e-2, 1e-3, 1e-4, 1e-6};
     (void)state;
     for (int k = 0; k < (int)(sizeof widths / sizeof *widths); k++)
         for (int dense = 0; dense < 2; dense++)
-            if (test_is_whole() || dense == k % 2)
+            if (test_is_long_run() || dense == k % 2)
                 verify_hex((step_function){.opacities = {0, 0.02f, 0.9f, 0.5f}}, CAMERA_OUTSIDE, widths[k],
                            dense ? 0.005 : 0.1);
 }
@@ -309,7 +310,7 @@ static void steep_ramps_are_kept_as_steps_are(void **state)
 
 /* Checks that cells traced in lanes cut a ray as single cells do. Next to a transparent surface, which is invisible
  * here, cells are traced one by one: only the order of segments that begin at the same depth may differ. */
-static void lanes_cut_as_cells_alone_do(void **state)
+static void lanes_are_split_like_single_cells(void **state)
 {
     static const double nowhere = 1e6;
     (void)state;
@@ -319,7 +320,7 @@ static void lanes_cut_as_cells_alone_do(void **state)
         drawn_frame drawn[3];
         step_function function = {.opacities = {0, 0.1f, 0.9f, 0.6f}};
         step_make_cell(step_shapes[kind], 3, &mesh);
-        step_begin(&f, &mesh, CAMERA_OUTSIDE, STEP_SIDE);
+        step_fixture_create(&f, &mesh, CAMERA_OUTSIDE, STEP_SIDE);
         step_set_function(&f, &function, 0.6, 0, 0.02);
         f.job.max_error = 1e-4;
         for (int i = 0; i < 3; i++) {
@@ -327,9 +328,9 @@ static void lanes_cut_as_cells_alone_do(void **state)
             if (i == 0) fixture_add_surface(&f, &nowhere, 1, 0.5f);
             fixture_draw(&f, &drawn[i]);
             f.job.surface_count = 0;
-            assert_true(drawn_difference(&drawn[0], &drawn[i]) < 5e-7);
+            assert_true(drawn_frame_difference(&drawn[0], &drawn[i]) < 5e-7);
         }
-        for (int i = 0; i < 3; i++) drawn_free(&drawn[i]);
+        for (int i = 0; i < 3; i++) drawn_frame_free(&drawn[i]);
         fixture_free(&f);
         test_mesh_free(&mesh);
     }
@@ -339,14 +340,14 @@ static void lanes_cut_as_cells_alone_do(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_hex_that_barely_reaches_a_step),
-        cmocka_unit_test(a_ray_on_which_it_barely_does),
-        cmocka_unit_test(a_cubic_that_dips_below_a_step),
-        cmocka_unit_test(random_cells_and_steps),
-        cmocka_unit_test(rays_that_graze_a_step),
-        cmocka_unit_test(rays_that_graze_a_steep_ramp),
-        cmocka_unit_test(steep_ramps_are_kept_as_steps_are),
-        cmocka_unit_test(lanes_cut_as_cells_alone_do),
+        cmocka_unit_test(hexes_that_barely_reach_a_step_keep_max_error),
+        cmocka_unit_test(rays_that_barely_reach_a_step_keep_max_error),
+        cmocka_unit_test(cubics_that_dip_below_a_step_keep_max_error),
+        cmocka_unit_test(random_cells_with_steps_keep_max_error),
+        cmocka_unit_test(rays_that_graze_a_step_keep_max_error),
+        cmocka_unit_test(rays_that_graze_a_steep_ramp_keep_max_error),
+        cmocka_unit_test(steep_ramps_keep_max_error),
+        cmocka_unit_test(lanes_are_split_like_single_cells),
     };
     if (argc > 1) cmocka_set_test_filter(argv[1]);
     return cmocka_run_group_tests(tests, NULL, NULL);

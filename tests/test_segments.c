@@ -15,9 +15,9 @@
 
 /* Returns the reference of a fixture's picture: width * height * 4 numbers. In the usual run only every other pixel is
  * computed, and the others are NaN. */
-static double *truth_of(const render_fixture *f)
+static double *compute_reference(const render_fixture *f)
 {
-    const int width = f->job.camera.width, height = f->job.camera.height, every = test_effort(2, 1);
+    const int width = f->job.camera.width, height = f->job.camera.height, every = test_case_count(2, 1);
     double *rgba = malloc((size_t)width * (size_t)height * 4 * sizeof *rgba);
     reference_integral *scene = reference_integral_create(&f->job, 1e-9);
     reference_scene *surfaces = f->job.surface_count ? reference_create(&f->job) : NULL;
@@ -37,7 +37,7 @@ static double *truth_of(const render_fixture *f)
 
 /* Returns the largest difference of a channel and computes the mean of all; pixels whose reference is NaN do not
  * count. */
-static double error_of_set(const render_fixture *f, const double *truth, double *mean)
+static double find_largest_error_of_isa(const render_fixture *f, const double *truth, double *mean)
 {
     drawn_frame drawn;
     const int pixels = f->job.camera.width * f->job.camera.height;
@@ -46,23 +46,23 @@ static double error_of_set(const render_fixture *f, const double *truth, double 
     for (int i = 0; i < 4 * pixels; i++) {
         const double off = fabs((double)drawn.picture.rgba[i] - truth[i]);
         if (isnan(truth[i])) continue;
-        worst = test_worse(worst, off);
+        worst = test_larger_error(worst, off);
         total += off;
     }
-    drawn_free(&drawn);
+    drawn_frame_free(&drawn);
     *mean = total / (4 * pixels);
     return worst;
 }
 
-/* Returns the largest error of all instruction sets, as error_of_set() does for one. */
-static double error_of(const render_fixture *f, const double *truth, double *mean)
+/* Returns the largest error of all instruction sets, as find_largest_error_of_isa() does for one. */
+static double find_largest_error(const render_fixture *f, const double *truth, double *mean)
 {
     double worst = 0, most = 0;
-    for (int set = 0; set < fixture_set_count(); set++) {
+    for (int set = 0; set < fixture_isa_count(); set++) {
         double of_set;
-        fixture_use_set(set);
-        worst = test_worse(worst, error_of_set(f, truth, &of_set));
-        most = test_worse(most, of_set);
+        fixture_select_isa(set);
+        worst = test_larger_error(worst, find_largest_error_of_isa(f, truth, &of_set));
+        most = test_larger_error(most, of_set);
     }
     if (mean) *mean = most;
     return worst;
@@ -85,10 +85,10 @@ static void tets_are_exact_for_every_camera(void **state)
     (void)state;
     for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++) {
         render_fixture f;
-        fixture_create_lattice(&f, TEST_TETS, 4, camera == CAMERA_ALONG_X ? 0 : 0.2, test_wave);
+        fixture_create_lattice(&f, TEST_TETS, 4, camera == CAMERA_ALONG_X ? 0 : 0.2, test_wave_field);
         fixture_set_camera(&f, camera, 29, 23);
         set_segments(&f, 1, 0);
-        double *truth = truth_of(&f), worst = error_of(&f, truth, NULL);
+        double *truth = compute_reference(&f), worst = find_largest_error(&f, truth, NULL);
         fprintf(stderr, "tets, %s: %.2g\n", fixture_camera_name(camera), worst);
         assert_true(worst < EXACT);
         free(truth);
@@ -100,7 +100,7 @@ static void tets_are_exact_for_every_camera(void **state)
  * cameras occur. */
 static uint64_t random_tets(void)
 {
-    return (uint64_t)test_effort(32, 80);
+    return (uint64_t)test_case_count(32, 80);
 }
 
 /* Returns whether the opacity has a step: for one of four groups of seeds, so that steps occur with slivers and other
@@ -114,10 +114,10 @@ static bool has_step(uint64_t seed)
 static void begin_random_tet(uint64_t seed, test_mesh *mesh, render_fixture *f)
 {
     const bool is_sliver = seed % 5 == 0;
-    test_mesh_single(is_sliver ? TEST_SLIVER_TET : TEST_UNIT_TET, test_linear, mesh);
+    test_mesh_make_single_cell(is_sliver ? TEST_SLIVER_TET : TEST_UNIT_TET, test_linear_field, mesh);
     for (uint64_t i = 0; i < 12; i++)
-        mesh->coordinates[i] += test_uniform_in(i, 100 * seed + 7, -0.25, 0.25) * (is_sliver ? 1e-5 : 1);
-    for (uint64_t i = 0; i < 4; i++) mesh->values[i] = test_uniform_in(i, 100 * seed + 8, -0.1, 1.1);
+        mesh->coordinates[i] += test_uniform_between(i, 100 * seed + 7, -0.25, 0.25) * (is_sliver ? 1e-5 : 1);
+    for (uint64_t i = 0; i < 4; i++) mesh->values[i] = test_uniform_between(i, 100 * seed + 8, -0.1, 1.1);
     fixture_create(f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
                    (const double[]){0, 0, 0});
     fixture_set_camera(f, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, 15, 13);
@@ -140,10 +140,10 @@ static void random_tets_are_exact(void **state)
             fixture_function function;
             begin_random_tet(seed, &mesh, &f);
             fixture_set_function(&f, &function, 100 * seed + 9, has_step(seed), most[k],
-                                 pow(10, test_uniform_in(0, 100 * seed + 10, -3, 4)));
+                                 pow(10, test_uniform_between(0, 100 * seed + 10, -3, 4)));
             steps += function.values[1] == function.values[2];
-            double *truth = truth_of(&f);
-            worst = test_worse(worst, error_of(&f, truth, NULL));
+            double *truth = compute_reference(&f);
+            worst = test_larger_error(worst, find_largest_error(&f, truth, NULL));
             free(truth);
             fixture_free(&f);
             test_mesh_free(&mesh);
@@ -159,10 +159,10 @@ static void linear_fields_are_exact_on_every_kind(void **state)
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         render_fixture f;
-        fixture_create_lattice(&f, kind, 4, 0.2, test_linear);
+        fixture_create_lattice(&f, kind, 4, 0.2, test_linear_field);
         fixture_set_camera(&f, CAMERA_OUTSIDE, 29, 23);
         set_segments(&f, 100, 0);
-        double *truth = truth_of(&f), worst = error_of(&f, truth, NULL);
+        double *truth = compute_reference(&f), worst = find_largest_error(&f, truth, NULL);
         fprintf(stderr, "linear, %s: %.2g\n", test_mesh_kind_name(kind), worst);
         assert_true(worst < EXACT);
         free(truth);
@@ -170,21 +170,21 @@ static void linear_fields_are_exact_on_every_kind(void **state)
     }
 }
 
-static void surfaces_cut_segments(void **state)
+static void surfaces_split_segments(void **state)
 {
     static const double values[4] = {-0.4, -0.1, 0.2, 0.5};
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         render_fixture f;
-        fixture_create_lattice(&f, kind, 3, 0.2, test_wave);
+        fixture_create_lattice(&f, kind, 3, 0.2, test_wave_field);
         fixture_set_camera(&f, CAMERA_OUTSIDE, 25, 21);
         set_segments(&f, 1, 1e-4);
         fixture_add_surface(&f, values, 3, 0.4f);
         fixture_add_surface(&f, values + 3, 1, 1);
-        double *truth = truth_of(&f);
+        double *truth = compute_reference(&f);
         for (int alone = 0; alone < 2; alone++) {
             f.job.is_alone = alone;
-            const double worst = error_of(&f, truth, NULL);
+            const double worst = find_largest_error(&f, truth, NULL);
             fprintf(stderr, "surfaces, %s: %.2g\n", test_mesh_kind_name(kind), worst);
             assert_true(worst <= 1e-4);
         }
@@ -194,14 +194,14 @@ static void surfaces_cut_segments(void **state)
 }
 
 /* Computes errors for steps of 1/4, 1/8 ... of a cell; returns the order observed between the first and the last. */
-static double order_of(render_fixture *f, const double *truth, render_integration how, int halvings)
+static double measure_convergence_order(render_fixture *f, const double *truth, render_integration how, int halvings)
 {
     double first = 0, last = 0;
     f->job.integration = how;
     for (int i = 0; i <= halvings; i++) {
         double mean;
         f->job.step = f->cell_size * ldexp(1, -i - 2);
-        const double worst = error_of(f, truth, &mean);
+        const double worst = find_largest_error(f, truth, &mean);
         fprintf(stderr, "%s, step of 1/%d cell: mean %.3g, worst %.3g\n", how ? "segments" : "samples", 4 << i, mean,
                 worst);
         if (i == 0) first = mean;
@@ -210,15 +210,16 @@ static double order_of(render_fixture *f, const double *truth, render_integratio
     return log2(first / last) / halvings;
 }
 
-static void orders_on_jittered_hexes(void **state)
+static void segments_converge_on_jittered_hexes(void **state)
 {
     (void)state;
     render_fixture f;
-    fixture_create_lattice(&f, TEST_HEXES, 5, 0.2, test_wave);
+    fixture_create_lattice(&f, TEST_HEXES, 5, 0.2, test_wave_field);
     fixture_set_camera(&f, CAMERA_OUTSIDE, 29, 23);
     set_segments(&f, 1, 0);
-    double *truth = truth_of(&f);
-    const double segments = order_of(&f, truth, RENDER_SEGMENTS, 4), samples = order_of(&f, truth, RENDER_SAMPLES, 5);
+    double *truth = compute_reference(&f);
+    const double segments = measure_convergence_order(&f, truth, RENDER_SEGMENTS, 4),
+                 samples = measure_convergence_order(&f, truth, RENDER_SAMPLES, 5);
     fprintf(stderr, "observed orders: segments %.2f, samples %.2f\n", segments, samples);
     /* The order is third at the transfer function's control points, fourth elsewhere. It is first in the intervals that
      * are shorter than a step and are not cut, of which each halving leaves half. */
@@ -241,11 +242,11 @@ static void random_tets_keep_max_error(void **state)
         fixture_function function;
         begin_random_tet(seed, &mesh, &f);
         fixture_set_function(&f, &function, 100 * seed + 9, has_step(seed), seed % 3 ? 0.5 : 1,
-                             pow(10, test_uniform_in(0, 100 * seed + 10, -3, 4)));
-        double *truth = truth_of(&f);
+                             pow(10, test_uniform_between(0, 100 * seed + 10, -3, 4)));
+        double *truth = compute_reference(&f);
         for (int i = 0; i < DIGITS; i++) {
             f.job.max_error = pow(10, -2 - i);
-            worst[i] = test_worse(worst[i], error_of(&f, truth, NULL));
+            worst[i] = test_larger_error(worst[i], find_largest_error(&f, truth, NULL));
         }
         free(truth);
         fixture_free(&f);
@@ -266,7 +267,7 @@ static void verify_tiles(test_mesh_kind kind, int side, bool with_surface, doubl
     drawn_frame drawn[2];
     double worst = 0;
     test_mesh mesh;
-    test_mesh_lattice(kind, side, 0.2, test_wave, &mesh);
+    test_mesh_make_lattice(kind, side, 0.2, test_wave_field, &mesh);
     /* Arrays have 4-byte elements, so that several tets are transformed at once. */
     fixture_create(&f, &mesh, 1, (test_layout){.is_interleaved = with_surface}, 2.0 / side, 1,
                    (const double[]){0, 0, 0});
@@ -284,17 +285,17 @@ static void verify_tiles(test_mesh_kind kind, int side, bool with_surface, doubl
         fixture_draw(&f, &drawn[1]);
         for (int i = 0; i < 4 * 61 * 47; i++) {
             const double off = fabs((double)drawn[0].picture.rgba[i] - (double)drawn[1].picture.rgba[i]);
-            worst = test_worse(worst, off);
+            worst = test_larger_error(worst, off);
         }
-        drawn_free(&drawn[1]);
+        drawn_frame_free(&drawn[1]);
     }
     fprintf(stderr, "in lanes and alone, %s, max_error %g: %.2g\n", test_mesh_kind_name(kind), max_error, worst);
     assert_true(worst < 5e-7);
-    drawn_free(&drawn[0]);
+    drawn_frame_free(&drawn[0]);
     fixture_free(&f);
 }
 
-static void lanes_have_what_cells_alone_have(void **state)
+static void lanes_match_single_cells(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
@@ -316,14 +317,14 @@ static void max_error_is_kept_on_every_kind(void **state)
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
         for (fixture_camera camera = 0; camera < CAMERA_PLANE; camera++) {
             render_fixture f;
-            if (!test_is_whole() && (int)camera != (int)kind % 3) continue;
-            fixture_create_lattice(&f, kind, 4, 0.2, test_wave);
+            if (!test_is_long_run() && (int)camera != (int)kind % 3) continue;
+            fixture_create_lattice(&f, kind, 4, 0.2, test_wave_field);
             fixture_set_camera(&f, camera, 21, 17);
             set_segments(&f, 1, 0);
-            double *truth = truth_of(&f);
+            double *truth = compute_reference(&f);
             for (int i = 2; i <= 4; i++) {
                 f.job.max_error = pow(10, -i);
-                const double worst = error_of(&f, truth, NULL);
+                const double worst = find_largest_error(&f, truth, NULL);
                 fprintf(stderr, "max_error 1e-%d, %s, %s: %.2g\n", i, test_mesh_kind_name(kind),
                         fixture_camera_name(camera), worst);
                 assert_true(worst <= f.job.max_error);
@@ -335,7 +336,7 @@ static void max_error_is_kept_on_every_kind(void **state)
 
 /* Checks cells distributed over ranks, each drawn alone, with all fragments merged: only the rounding of "over" may
  * differ. */
-static void parts_make_the_whole(void **state)
+static void parts_draw_the_whole_picture(void **state)
 {
     static const double values[2] = {-0.2, 0.3};
     (void)state;
@@ -346,13 +347,13 @@ static void parts_make_the_whole(void **state)
                 test_mesh mesh;
                 render_fixture whole, parts[RANKS];
                 drawn_frame at_once, apart;
-                test_mesh_lattice(kind, N, 0.2, test_wave, &mesh);
+                test_mesh_make_lattice(kind, N, 0.2, test_wave_field, &mesh);
                 int *owners = malloc((size_t)mesh.cell_count * sizeof *owners);
-                test_partition(&mesh, distribute, N, RANKS, owners);
+                test_partition_cells(&mesh, distribute, N, RANKS, owners);
                 for (int i = 0; i <= RANKS; i++) {
                     render_fixture *f = i ? &parts[i - 1] : &whole;
                     test_mesh part = mesh;
-                    if (i) test_mesh_part(&mesh, owners, i - 1, &part);
+                    if (i) test_mesh_extract_part(&mesh, owners, i - 1, &part);
                     fixture_create(f, &part, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 2.0 / N,
                                    1, (const double[]){0, 0, 0});
                     if (i) test_mesh_free(&part);
@@ -363,15 +364,15 @@ static void parts_make_the_whole(void **state)
                     f->job.is_alone = i == 0;
                 }
                 fixture_draw(&whole, &at_once);
-                fixture_draw_apart(parts, RANKS, &apart);
-                const double off = drawn_difference(&at_once, &apart);
+                fixture_draw_distributed(parts, RANKS, &apart);
+                const double off = drawn_frame_difference(&at_once, &apart);
                 for (int p = 0; p < 37 * 31; p++)
                     assert_true(
                         !comp_pixel_overlaps(apart.list.items + apart.first[p], apart.first[p + 1] - apart.first[p]));
                 if (!(off <= 1e-6))
                     fail_msg("%s, %s: %g", test_mesh_kind_name(kind), test_partition_kind_name(distribute), off);
-                drawn_free(&at_once);
-                drawn_free(&apart);
+                drawn_frame_free(&at_once);
+                drawn_frame_free(&apart);
                 for (int i = 0; i < RANKS; i++) fixture_free(&parts[i]);
                 fixture_free(&whole);
                 free(owners);
@@ -381,7 +382,7 @@ static void parts_make_the_whole(void **state)
 
 /* Checks values far outside of the function's domain, which files use for missing values: they are clamped to 1e18
  * widths of the domain. */
-static void values_of_any_size_are_held(void **state)
+static void values_of_any_magnitude_keep_max_error(void **state)
 {
     static const double odd[] = {3e31, -3e31, 3e38, -3e38};
     (void)state;
@@ -391,7 +392,7 @@ static void values_of_any_size_are_held(void **state)
             for (int held = 0; held < 2; held++) {
                 render_fixture f;
                 test_mesh mesh;
-                test_mesh_lattice(TEST_TETS, 5, 0.2, test_wave, &mesh);
+                test_mesh_make_lattice(TEST_TETS, 5, 0.2, test_wave_field, &mesh);
                 for (int64_t v = 5; v < mesh.vertex_count; v += 23) {
                     const double value = odd[v / 23 % 4];
                     mesh.values[v] = !held ? value : value < 0 ? -1e30 : 1e30;
@@ -405,14 +406,14 @@ static void values_of_any_size_are_held(void **state)
                 test_mesh_free(&mesh);
             }
             for (int i = 0; i < 4 * 29 * 23; i++) assert_true(isfinite(drawn[0].picture.rgba[i]));
-            drawn_assert_same(&drawn[0], &drawn[1]);
-            for (int i = 0; i < 2; i++) drawn_free(&drawn[i]);
+            drawn_frame_assert_same(&drawn[0], &drawn[1]);
+            for (int i = 0; i < 2; i++) drawn_frame_free(&drawn[i]);
         }
 }
 
 /* Checks more meshes at the same position than a window can store: none may be dropped. All have the same constant
  * opacity. */
-static void overlapping_meshes_are_all_seen(void **state)
+static void all_overlapping_meshes_are_visible(void **state)
 {
     static const float constant[1] = {0.001f};
     enum { COPIES = 100 };
@@ -420,7 +421,7 @@ static void overlapping_meshes_are_all_seen(void **state)
     test_mesh mesh;
     render_fixture f;
     drawn_frame drawn;
-    test_mesh_single(TEST_UNIT_TET, test_linear, &mesh);
+    test_mesh_make_single_cell(TEST_UNIT_TET, test_linear_field, &mesh);
     test_mesh many = {.vertex_count = 4, .cell_count = COPIES, .connectivity_count = 4 * COPIES};
     many.coordinates = mesh.coordinates;
     many.values = mesh.values;
@@ -441,7 +442,7 @@ static void overlapping_meshes_are_all_seen(void **state)
         f.transfer.opacities = constant;
         fixture_draw(&f, &drawn);
         for (int p = 0; p < 23 * 21; p++) clear[all][p] = 2 * (1 - (double)drawn.picture.rgba[4 * p + 3]);
-        drawn_free(&drawn);
+        drawn_frame_free(&drawn);
         fixture_free(&f);
     }
     /* The bound is 100 times the logarithm of a number that is rounded by 6e-8. */
@@ -463,8 +464,8 @@ static void pictures_do_not_depend_on_the_order_of_cells(void **state)
         for (int i = 0; i < 2; i++) {
             test_mesh mesh;
             render_fixture f;
-            test_mesh_lattice(kind, 4, 0.2, test_wave, &mesh);
-            if (i) test_mesh_shuffle(&mesh, 3);
+            test_mesh_make_lattice(kind, 4, 0.2, test_wave_field, &mesh);
+            if (i) test_mesh_shuffle_cells(&mesh, 3);
             fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 0.5, 1,
                            (const double[]){0, 0, 0});
             fixture_set_camera(&f, CAMERA_OUTSIDE, 39, 33);
@@ -473,8 +474,8 @@ static void pictures_do_not_depend_on_the_order_of_cells(void **state)
             fixture_free(&f);
             test_mesh_free(&mesh);
         }
-        drawn_assert_same(&drawn[0], &drawn[1]);
-        for (int i = 0; i < 2; i++) drawn_free(&drawn[i]);
+        drawn_frame_assert_same(&drawn[0], &drawn[1]);
+        for (int i = 0; i < 2; i++) drawn_frame_free(&drawn[i]);
     }
 }
 
@@ -484,23 +485,23 @@ int main(void)
         cmocka_unit_test(tets_are_exact_for_every_camera),
         cmocka_unit_test(random_tets_are_exact),
         cmocka_unit_test(linear_fields_are_exact_on_every_kind),
-        cmocka_unit_test(surfaces_cut_segments),
-        cmocka_unit_test(orders_on_jittered_hexes),
+        cmocka_unit_test(surfaces_split_segments),
+        cmocka_unit_test(segments_converge_on_jittered_hexes),
         cmocka_unit_test(max_error_is_kept_on_every_kind),
         cmocka_unit_test(random_tets_keep_max_error),
     };
     /* Tests that draw by themselves, run with each instruction set. */
     const struct CMUnitTest of_a_set[] = {
-        cmocka_unit_test(lanes_have_what_cells_alone_have),
+        cmocka_unit_test(lanes_match_single_cells),
         cmocka_unit_test(small_tets_are_the_same_in_lanes),
-        cmocka_unit_test(parts_make_the_whole),
-        cmocka_unit_test(values_of_any_size_are_held),
-        cmocka_unit_test(overlapping_meshes_are_all_seen),
+        cmocka_unit_test(parts_draw_the_whole_picture),
+        cmocka_unit_test(values_of_any_magnitude_keep_max_error),
+        cmocka_unit_test(all_overlapping_meshes_are_visible),
         cmocka_unit_test(pictures_do_not_depend_on_the_order_of_cells),
     };
     int failed = cmocka_run_group_tests(tests, NULL, NULL);
-    for (int set = 0; set < fixture_set_count(); set++) {
-        fixture_use_set(set);
+    for (int set = 0; set < fixture_isa_count(); set++) {
+        fixture_select_isa(set);
         failed += cmocka_run_group_tests(of_a_set, NULL, NULL);
     }
     return failed;

@@ -25,12 +25,12 @@ static void step_draws(insitu_session *session, int64_t cycle, int images)
 {
     discard_pictures();
     const insitu_status status = insitu_step(session, cycle, 0.5 * (double)cycle);
-    reported_everywhere(session, status, INSITU_OK, "");
+    check_reported_everywhere(session, status, INSITU_OK, "");
     everywhere(insitu_last_report(session)->images == images);
     everywhere(caught_count == (own_rank == 0 ? images : 0));
 }
 
-static int covered_pixels(const caught_picture *picture)
+static int count_covered_pixels(const caught_picture *picture)
 {
     int count = 0;
     for (int i = 0; i < picture->width * picture->height; i++)
@@ -45,7 +45,7 @@ static void images_are_drawn_when_due(void **context)
     (void)context;
     insitu_session *session =
         open_session(MPI_COMM_WORLD, write_scene("images:\n" IMAGE("a", "2", SURFACE, "") IMAGE("b", "3", VOLUME, "")));
-    everywhere(submit(session, &input) == INSITU_OK);
+    everywhere(submit_input(session, &input) == INSITU_OK);
     const int expected[] = {2, 0, 1, 1, 1, 0, 2};
     for (int cycle = 0; cycle < 7; cycle++) step_draws(session, cycle, expected[cycle]);
     everywhere(own_rank != 0 || (!strcmp(caught[0].path, "a_6.exr") && !strcmp(caught[1].path, "b_6.exr")));
@@ -58,49 +58,49 @@ static void unchanged_input_rebuilds_nothing(void **context)
     (void)context;
     insitu_session *session =
         open_session(MPI_COMM_WORLD, write_scene("images:\n" IMAGE("a", "1", SURFACE, "      - " VOLUME "\n")));
-    everywhere(submit(session, &input) == INSITU_OK);
+    everywhere(submit_input(session, &input) == INSITU_OK);
     step_draws(session, 0, 1);
     const caught_picture first = caught[0];
     caught_count = 0;
     everywhere(insitu_last_report(session)->build_ms > 0 || input.part.cell_count == 0);
     session_input same = input;
     same.mesh.changed = same.field.changed = INSITU_CHANGED_NOTHING;
-    everywhere(submit(session, &same) == INSITU_OK);
+    everywhere(submit_input(session, &same) == INSITU_OK);
     step_draws(session, 1, 1);
     const insitu_report *report = insitu_last_report(session);
     everywhere(report->build_ms == 0 && report->refit_ms == 0);
-    everywhere(own_rank != 0 || same_pictures(&first, &caught[0]));
+    everywhere(own_rank != 0 || are_same_pictures(&first, &caught[0]));
     same.field.changed = INSITU_CHANGED_VALUES; /* what the caller states, although no values changed */
-    everywhere(submit(session, &same) == INSITU_OK);
+    everywhere(submit_input(session, &same) == INSITU_OK);
     step_draws(session, 2, 1);
     everywhere(report->build_ms == 0 && report->refit_ms == 0);
     everywhere(strstr(report->left_out, "\"f\" has the values of the last picture"));
-    everywhere(own_rank != 0 || same_pictures(&first, &caught[0]));
+    everywhere(own_rank != 0 || are_same_pictures(&first, &caught[0]));
     same.field.changed = INSITU_CHANGED_NOTHING;
     same.mesh.changed = INSITU_CHANGED_GEOMETRY;
-    everywhere(submit(session, &same) == INSITU_OK);
+    everywhere(submit_input(session, &same) == INSITU_OK);
     step_draws(session, 3, 1);
     everywhere(report->build_ms == 0 && (report->refit_ms > 0 || input.part.cell_count == 0));
-    everywhere(own_rank != 0 || same_pictures(&first, &caught[0]));
+    everywhere(own_rank != 0 || are_same_pictures(&first, &caught[0]));
     if (own_rank == 0) free(first.rgba), free(first.depth);
     insitu_destroy(&session);
 }
 
 /* Checks that a single changed value on one rank, at any index, is detected. */
-static void changed_values_are_noticed(void **context)
+static void changed_values_are_detected(void **context)
 {
     (void)context;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene("images:\n" IMAGE("a", "1", VOLUME, "")));
     session_input in;
     input_create(&in, TEST_TETS, 4, TEST_BLOCK, own_rank, rank_count);
-    everywhere(submit(session, &in) == INSITU_OK);
+    everywhere(submit_input(session, &in) == INSITU_OK);
     step_draws(session, 0, 1);
     in.mesh.changed = INSITU_CHANGED_NOTHING;
     for (int64_t cycle = 1; cycle < 20; cycle++) {
         const int64_t spots[] = {0, in.part.vertex_count / 3 + cycle, in.part.vertex_count - cycle};
         if (in.part.vertex_count > 60)
             in.part.values[spots[cycle % 3]] = nextafter(in.part.values[spots[cycle % 3]], 9);
-        everywhere(submit(session, &in) == INSITU_OK);
+        everywhere(submit_input(session, &in) == INSITU_OK);
         step_draws(session, cycle, 1);
         everywhere(insitu_last_report(session)->refit_ms > 0 || in.part.vertex_count <= 60);
     }
@@ -110,11 +110,11 @@ static void changed_values_are_noticed(void **context)
 
 /* Checks that if everything is moved and scaled by powers of two, the picture stays the same, and its depth is
  * scaled. */
-static void moved_mesh_gives_the_moved_picture(void **context)
+static void moved_mesh_draws_the_moved_picture(void **context)
 {
     (void)context;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
-    everywhere(submit(session, &input) == INSITU_OK);
+    everywhere(submit_input(session, &input) == INSITU_OK);
     step_draws(session, 0, 1);
     const caught_picture first = caught[0];
     caught_count = 0;
@@ -124,10 +124,10 @@ static void moved_mesh_gives_the_moved_picture(void **context)
     insitu_mesh_interleaved(&moved.mesh, coordinates, INSITU_FLOAT64);
     moved.mesh.changed = INSITU_CHANGED_GEOMETRY;
     moved.field.changed = INSITU_CHANGED_NOTHING;
-    everywhere(submit(session, &moved) == INSITU_OK);
+    everywhere(submit_input(session, &moved) == INSITU_OK);
     step_draws(session, 1, 1);
     for (int i = 0; own_rank == 0 && i < 24 * 16; i++) caught[0].depth[i] /= 64;
-    everywhere(own_rank != 0 || same_pictures(&first, &caught[0]));
+    everywhere(own_rank != 0 || are_same_pictures(&first, &caught[0]));
     if (own_rank == 0) free(first.rgba), free(first.depth);
     insitu_destroy(&session);
     test_free(coordinates);
@@ -135,14 +135,14 @@ static void moved_mesh_gives_the_moved_picture(void **context)
 
 /* ---- borrowed and copied ------------------------------------------------------------------------------------- */
 
-static insitu_array as_array(const grid_array *a)
+static insitu_array make_array(const grid_array *a)
 {
     const insitu_type type =
         a->is_integer ? (a->is_wide ? INSITU_INT64 : INSITU_INT32) : (a->is_wide ? INSITU_FLOAT64 : INSITU_FLOAT32);
     return (insitu_array){a->data, type, a->stride};
 }
 
-static void plain_layouts_are_not_copied(void **context)
+static void native_layouts_are_not_copied(void **context)
 {
     (void)context;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
@@ -150,7 +150,7 @@ static void plain_layouts_are_not_copied(void **context)
     session_input in;
     input_create(&in, TEST_HEXES, 4, TEST_BLOCK, own_rank, rank_count);
     rounded = in.part;
-    test_mesh_round(&rounded);
+    test_mesh_round_to_float(&rounded);
     caught_picture first = {0};
     for (int bits = 0; bits < 32; bits++) {
         const test_layout layout = {.wide_coordinates = bits & 1,
@@ -164,18 +164,18 @@ static void plain_layouts_are_not_copied(void **context)
         insitu_field field = in.field;
         insitu_mesh_defaults(&mesh);
         mesh.vertex_count = view.cells.vertex_count;
-        for (int axis = 0; axis < 3; axis++) mesh.coordinates[axis] = as_array(&view.cells.coordinates[axis]);
+        for (int axis = 0; axis < 3; axis++) mesh.coordinates[axis] = make_array(&view.cells.coordinates[axis]);
         mesh.cell_count = view.cells.cell_count;
         mesh.cell_type = INSITU_HEX;
         mesh.connectivity_count = rounded.connectivity_count;
-        mesh.connectivity = as_array(&view.cells.connectivity);
-        if (view.cells.offsets.data) mesh.offsets = as_array(&view.cells.offsets);
+        mesh.connectivity = make_array(&view.cells.connectivity);
+        if (view.cells.offsets.data) mesh.offsets = make_array(&view.cells.offsets);
         if (view.cells.cell_types) {
             const insitu_type types[] = {[1] = INSITU_UINT8, [4] = INSITU_INT32, [8] = INSITU_INT64};
             mesh.cell_types =
                 (insitu_array){view.cells.cell_types, types[view.cells.cell_types_bytes], view.cells.cell_types_stride};
         }
-        field.values = as_array(&view.field.values);
+        field.values = make_array(&view.field.values);
         everywhere(insitu_set_mesh(session, "m", &mesh) == INSITU_OK);
         everywhere(insitu_set_field(session, "m", &field) == INSITU_OK);
         step_draws(session, bits, 1);
@@ -192,7 +192,7 @@ static void plain_layouts_are_not_copied(void **context)
             first = caught[0];
             caught_count = 0;
         }
-        everywhere(own_rank != 0 || bits == 0 || same_pictures(&first, &caught[0]));
+        everywhere(own_rank != 0 || bits == 0 || are_same_pictures(&first, &caught[0]));
         test_view_free(&view);
     }
     free(first.rgba);
@@ -201,13 +201,13 @@ static void plain_layouts_are_not_copied(void **context)
     input_free(&in);
 }
 
-static void cells_that_no_picture_shows_are_left_out(void **context)
+static void cells_invisible_in_all_pictures_are_skipped(void **context)
 {
     (void)context;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
     insitu_field other = input.field;
     other.name = "g";
-    everywhere(submit(session, &input) == INSITU_OK);
+    everywhere(submit_input(session, &input) == INSITU_OK);
     step_draws(session, 0, 1);
     const int64_t trees = insitu_last_report(session)->bytes_trees;
     everywhere(insitu_set_field(session, "m", &other) == INSITU_OK);
@@ -220,7 +220,7 @@ static void cells_that_no_picture_shows_are_left_out(void **context)
     insitu_destroy(&session);
 }
 
-static int64_t over_ranks(int64_t value)
+static int64_t sum_over_ranks(int64_t value)
 {
     int64_t sum = 0;
     MPI_Allreduce(&value, &sum, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
@@ -237,15 +237,15 @@ static void mirrored_cells_are_counted(void **context)
         insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
         session_input in;
         input_create(&in, (test_mesh_kind)kind, 3, TEST_BLOCK, own_rank, rank_count);
-        everywhere(submit(session, &in) == INSITU_OK);
+        everywhere(submit_input(session, &in) == INSITU_OK);
         step_draws(session, 0, 1);
         const int64_t before = insitu_last_report(session)->cells_inverted, cells = in.part.cell_count;
         if (kind == TEST_PYRAMIDS)
-            everywhere(2 * over_ranks(before) == over_ranks(cells));
+            everywhere(2 * sum_over_ranks(before) == sum_over_ranks(cells));
         else
             everywhere(kind == TEST_MIXED || before == 0);
-        test_mesh_mirror(&in.part, false);
-        everywhere(submit(session, &in) == INSITU_OK);
+        test_mesh_mirror_cells(&in.part, false);
+        everywhere(submit_input(session, &in) == INSITU_OK);
         step_draws(session, 1, 1);
         everywhere(insitu_last_report(session)->cells_inverted == cells - before);
         insitu_destroy(&session);
@@ -260,37 +260,37 @@ static void ghosts_are_counted_and_not_drawn(void **context)
     session_input in;
     input_create(&in, TEST_HEXES, 4, TEST_BLOCK, own_rank, rank_count);
     for (int64_t cell = 0; cell < in.part.cell_count; cell += 3) in.part.ghosts[cell] = 1;
-    test_mesh_mirror(&in.part, false);
-    everywhere(submit(session, &in) == INSITU_OK);
+    test_mesh_mirror_cells(&in.part, false);
+    everywhere(submit_input(session, &in) == INSITU_OK);
     step_draws(session, 0, 1);
     const int64_t ghosts = (in.part.cell_count + 2) / 3;
     everywhere(insitu_last_report(session)->cells_ghost == ghosts);
     everywhere(insitu_last_report(session)->cells_inverted == in.part.cell_count - ghosts);
     memset(in.part.ghosts, 1, (size_t)in.part.cell_count);
-    everywhere(submit(session, &in) == INSITU_OK);
+    everywhere(submit_input(session, &in) == INSITU_OK);
     step_draws(session, 1, 1);
-    everywhere(own_rank != 0 || covered_pixels(&caught[0]) == 0);
+    everywhere(own_rank != 0 || count_covered_pixels(&caught[0]) == 0);
     insitu_destroy(&session);
     input_free(&in);
 }
 
 /* ---- few or no cells ----------------------------------------------------------------------------------------- */
 
-static void no_cells_anywhere_give_the_background(void **context)
+static void empty_meshes_draw_the_background(void **context)
 {
     (void)context;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
     step_draws(session, 0, 1);
-    everywhere(own_rank != 0 || (covered_pixels(&caught[0]) == 0 && isinf(caught[0].depth[0])));
+    everywhere(own_rank != 0 || (count_covered_pixels(&caught[0]) == 0 && isinf(caught[0].depth[0])));
     insitu_mesh none;
     insitu_mesh_defaults(&none);
     everywhere(insitu_set_mesh(session, "m", &none) == INSITU_OK);
     step_draws(session, 1, 1);
-    everywhere(own_rank != 0 || covered_pixels(&caught[0]) == 0);
+    everywhere(own_rank != 0 || count_covered_pixels(&caught[0]) == 0);
     insitu_destroy(&session);
 }
 
-static void cells_of_one_rank_are_seen(void **context)
+static void cells_on_one_rank_are_drawn(void **context)
 {
     (void)context;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
@@ -301,16 +301,16 @@ static void cells_of_one_rank_are_seen(void **context)
         insitu_mesh none;
         insitu_mesh_defaults(&none);
         if (own_rank == holder)
-            everywhere(submit(session, &all) == INSITU_OK);
+            everywhere(submit_input(session, &all) == INSITU_OK);
         else /* odd ranks have an empty mesh, even ranks have none */
             everywhere(insitu_set_mesh(session, "m", own_rank % 2 ? &none : NULL) == INSITU_OK);
         step_draws(session, holder, 1);
-        everywhere(own_rank != 0 || covered_pixels(&caught[0]) > 20);
+        everywhere(own_rank != 0 || count_covered_pixels(&caught[0]) > 20);
         if (own_rank == 0 && holder == 0) {
             first = caught[0];
             caught_count = 0;
         }
-        everywhere(own_rank != 0 || holder == 0 || same_pictures(&first, &caught[0]));
+        everywhere(own_rank != 0 || holder == 0 || are_same_pictures(&first, &caught[0]));
     }
     free(first.rgba);
     free(first.depth);
@@ -319,11 +319,11 @@ static void cells_of_one_rank_are_seen(void **context)
 }
 
 /* Checks that if every rank's part is divided into two meshes with separate names, the picture is that of one mesh. */
-static void meshes_of_many_names_make_one_picture(void **context)
+static void several_meshes_draw_one_picture(void **context)
 {
     (void)context;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
-    everywhere(submit(session, &input) == INSITU_OK);
+    everywhere(submit_input(session, &input) == INSITU_OK);
     step_draws(session, 0, 1);
     const caught_picture first = caught[0];
     caught_count = 0;
@@ -339,19 +339,19 @@ static void meshes_of_many_names_make_one_picture(void **context)
         everywhere(insitu_set_field(session, name, &in->field) == INSITU_OK);
     }
     step_draws(session, 1, 1);
-    everywhere(own_rank != 0 || same_pictures(&first, &caught[0]));
+    everywhere(own_rank != 0 || are_same_pictures(&first, &caught[0]));
     if (own_rank == 0) free(first.rgba), free(first.depth);
     insitu_destroy(&session);
     for (int half = 0; half < 2; half++) input_free(&halves[half]);
 }
 
-static bool warns_of_overlaps(const insitu_session *session)
+static bool has_overlap_warning(const insitu_session *session)
 {
     return strstr(insitu_last_report(session)->warnings, "where cells overlap") != NULL;
 }
 
 /* Checks two meshes at the same position, both on one rank or distributed: one picture, and a warning on every rank. */
-static void overlapping_meshes_make_one_picture(void **context)
+static void overlapping_meshes_draw_one_picture(void **context)
 {
     (void)context;
     insitu_session *session =
@@ -372,22 +372,22 @@ static void overlapping_meshes_make_one_picture(void **context)
             everywhere(!has_part || insitu_set_field(session, name, &in[i].field) == INSITU_OK);
         }
         step_draws(session, turn, 1);
-        everywhere(warns_of_overlaps(session) == (turn == 0)); /* the warning is given once */
+        everywhere(has_overlap_warning(session) == (turn == 0)); /* the warning is given once */
         if (own_rank != 0 || turn) continue;
         first = caught[0];
         caught_count = 0;
     }
     double worst = 0;
     for (int i = 0; own_rank == 0 && i < 24 * 16 * 4; i++)
-        worst = test_worse(worst, fabs((double)first.rgba[i] - (double)caught[0].rgba[i]));
-    everywhere(worst <= 1e-6 && (own_rank != 0 || covered_pixels(&first) > 20));
+        worst = test_larger_error(worst, fabs((double)first.rgba[i] - (double)caught[0].rgba[i]));
+    everywhere(worst <= 1e-6 && (own_rank != 0 || count_covered_pixels(&first) > 20));
     everywhere(insitu_set_mesh(session, "tets", NULL) == INSITU_OK);
     step_draws(session, 2, 1);
-    everywhere(!warns_of_overlaps(session));
+    everywhere(!has_overlap_warning(session));
     everywhere(insitu_set_mesh(session, "tets", &distributed[1].mesh) == INSITU_OK);
     everywhere(insitu_set_field(session, "tets", &distributed[1].field) == INSITU_OK);
     step_draws(session, 3, 1);
-    everywhere(warns_of_overlaps(session)); /* and again after the overlap has disappeared and returned */
+    everywhere(has_overlap_warning(session)); /* and again after the overlap has disappeared and returned */
     free(first.rgba);
     free(first.depth);
     insitu_destroy(&session);
@@ -406,12 +406,12 @@ static void constant_fields_are_drawn(void **context)
     const double constants[] = {0, 7, -1e30, 1e-300};
     for (int i = 0; i < 4; i++) {
         for (int64_t v = 0; v < in.part.vertex_count; v++) in.part.values[v] = constants[i];
-        everywhere(submit(session, &in) == INSITU_OK);
+        everywhere(submit_input(session, &in) == INSITU_OK);
         step_draws(session, i, 1);
         bool is_finite = true;
         for (int p = 0; own_rank == 0 && p < 24 * 16 * 4; p++) is_finite = is_finite && isfinite(caught[0].rgba[p]);
         everywhere(is_finite);
-        everywhere(own_rank != 0 || covered_pixels(&caught[0]) > 20);
+        everywhere(own_rank != 0 || count_covered_pixels(&caught[0]) > 20);
     }
     insitu_destroy(&session);
     input_free(&in);
@@ -425,25 +425,25 @@ static void missing_field_leaves_the_other_picture(void **context)
     insitu_session *session = open_session(
         MPI_COMM_WORLD, write_scene("images:\n" IMAGE("a", "1", "isosurface: {field: presure, values: [1]}", "") IMAGE(
                             "b", "1", SURFACE, "") IMAGE("c", "1", "volume: {field: f, component: 2}", "")));
-    everywhere(submit(session, &input) == INSITU_OK);
+    everywhere(submit_input(session, &input) == INSITU_OK);
     discard_pictures();
     const insitu_status status = insitu_step(session, 0, 0);
-    reported_everywhere(session, status, INSITU_ERROR_FIELD, ".yaml:7: no mesh has the field \"presure\"; there are",
-                        "\"f\" (mesh \"m\")");
+    check_reported_everywhere(session, status, INSITU_ERROR_FIELD,
+                              ".yaml:7: no mesh has the field \"presure\"; there are", "\"f\" (mesh \"m\")");
     everywhere(insitu_last_report(session)->images == 1);
     everywhere(own_rank != 0 || (caught_count == 1 && !strcmp(caught[0].path, "b_0.exr")));
     insitu_destroy(&session);
 }
 
-static void component_that_is_not_there_is_named(void **context)
+static void missing_component_is_reported(void **context)
 {
     (void)context;
     insitu_session *session =
         open_session(MPI_COMM_WORLD, write_scene("images:\n" IMAGE("c", "1", "volume: {field: f, component: 2}", "")));
-    everywhere(submit(session, &input) == INSITU_OK);
+    everywhere(submit_input(session, &input) == INSITU_OK);
     const insitu_status status = insitu_step(session, 0, 0);
-    reported_everywhere(session, status, INSITU_ERROR_FIELD, ".yaml:7: component 2 of field \"f\"",
-                        "it has components 0 to 0");
+    check_reported_everywhere(session, status, INSITU_ERROR_FIELD, ".yaml:7: component 2 of field \"f\"",
+                              "it has components 0 to 0");
     insitu_destroy(&session);
 }
 
@@ -458,18 +458,18 @@ static void images_are_drawn_when_their_time_has_passed(void **context)
         open_session(MPI_COMM_WORLD, write_scene("images:\n  - name: a\n    size: [24, 16]\n    every_time: 0.25\n"
                                                  "    layers:\n      - " SURFACE "\n"
                                                  "    outputs:\n      - path: a_{cycle}_{time:.2f}.exr\n"));
-    everywhere(submit(session, &input) == INSITU_OK);
+    everywhere(submit_input(session, &input) == INSITU_OK);
     double time = 0;
     for (int cycle = 0; cycle < 11; cycle++, time += 0.1) {
         discard_pictures();
-        reported_everywhere(session, insitu_step(session, cycle, time), INSITU_OK, "");
+        check_reported_everywhere(session, insitu_step(session, cycle, time), INSITU_OK, "");
         everywhere(insitu_last_report(session)->images == expected[cycle]);
     }
     everywhere(own_rank != 0 || !strcmp(caught[0].path, "a_10_1.00.exr"));
     const double later[] = {7.1, 7.1, 7.2, 7.3};
     const int then[] = {1, 0, 0, 1};
     for (int i = 0; i < 4; i++) {
-        reported_everywhere(session, insitu_step(session, 11 + i, later[i]), INSITU_OK, "");
+        check_reported_everywhere(session, insitu_step(session, 11 + i, later[i]), INSITU_OK, "");
         everywhere(insitu_last_report(session)->images == then[i]);
     }
     discard_pictures();
@@ -481,9 +481,9 @@ static void ranks_at_different_cycles_are_reported(void **context)
     (void)context;
     if (rank_count < 2) return;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
-    everywhere(submit(session, &input) == INSITU_OK);
+    everywhere(submit_input(session, &input) == INSITU_OK);
     const insitu_status status = insitu_step(session, own_rank == 1 ? 5 : 4, 0);
-    reported_everywhere(session, status, INSITU_ERROR_MPI, "ranks disagree on the cycle: 4 on one, 5 on another");
+    check_reported_everywhere(session, status, INSITU_ERROR_MPI, "ranks disagree on the cycle: 4 on one, 5 on another");
     step_draws(session, 6, 1);
     insitu_destroy(&session);
 }
@@ -493,23 +493,23 @@ static void picture_that_cannot_be_written_is_reported_on_all_ranks(void **conte
     (void)context;
     insitu_session *session =
         open_session(MPI_COMM_WORLD, write_scene("images:\n" IMAGE("a", "1", SURFACE, "") IMAGE("b", "1", VOLUME, "")));
-    everywhere(submit(session, &input) == INSITU_OK);
+    everywhere(submit_input(session, &input) == INSITU_OK);
     discard_pictures();
     unwritable = "a_";
     const insitu_status status = insitu_step(session, 3, 0);
     unwritable = NULL;
-    reported_everywhere(session, status, INSITU_ERROR_IO, "rank 0: image \"a\": a_3.exr: cannot be written");
+    check_reported_everywhere(session, status, INSITU_ERROR_IO, "rank 0: image \"a\": a_3.exr: cannot be written");
     everywhere(own_rank != 0 || (caught_count == 1 && !strcmp(caught[0].path, "b_3.exr")));
     step_draws(session, 4, 2);
     insitu_destroy(&session);
 }
 
-static void edited_scene_is_taken_and_a_broken_one_is_not(void **context)
+static void edited_scene_is_used_unless_it_is_invalid(void **context)
 {
     (void)context;
     static const char edited[] = "the scene file was edited: its images are drawn from this step on";
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
-    everywhere(submit(session, &input) == INSITU_OK);
+    everywhere(submit_input(session, &input) == INSITU_OK);
     step_draws(session, 0, 1);
     write_scene("images:\n" IMAGE("first", "1", SURFACE, "") IMAGE("second", "1", VOLUME, ""));
     for (int again = 0; again < 2; again++) {
@@ -530,13 +530,13 @@ static void edited_scene_is_taken_and_a_broken_one_is_not(void **context)
 
 /* Checks images without outputs: they are drawn if the caller keeps pictures in memory; otherwise a warning says that
  * they are not drawn. */
-static void images_without_outputs_are_for_memory(void **context)
+static void images_without_outputs_are_kept_in_memory(void **context)
 {
     (void)context;
     static const char scene[] = "images:\n  - {name: a, size: [24, 16], layers: [" SURFACE "]}\n";
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
     int count = 0;
-    everywhere(submit(session, &input) == INSITU_OK);
+    everywhere(submit_input(session, &input) == INSITU_OK);
     for (int cycle = 0; cycle < 4; cycle++) {
         if (cycle == 2) everywhere(insitu_keep_pictures(session, 1) == INSITU_OK);
         discard_pictures();
@@ -550,20 +550,20 @@ static void images_without_outputs_are_for_memory(void **context)
     insitu_destroy(&session);
 }
 
-static void bad_scene_opens_no_session(void **context)
+static void invalid_scene_opens_no_session(void **context)
 {
     (void)context;
     insitu_session *session = (insitu_session *)&input;
     insitu_status status = insitu_create(MPI_COMM_WORLD, write_scene("images:\n  - nmae: a\n"), &session);
     everywhere(session == NULL);
-    reported_everywhere(NULL, status, INSITU_ERROR_SCENE, ".yaml:2: ", "nmae");
+    check_reported_everywhere(NULL, status, INSITU_ERROR_SCENE, ".yaml:2: ", "nmae");
     status = insitu_create(MPI_COMM_WORLD, own_rank == 0 ? "/nowhere/at/all.yaml" : NULL, &session);
-    reported_everywhere(NULL, status, INSITU_ERROR_SCENE, "/nowhere/at/all.yaml: cannot be read");
+    check_reported_everywhere(NULL, status, INSITU_ERROR_SCENE, "/nowhere/at/all.yaml: cannot be read");
     status = insitu_create(MPI_COMM_WORLD, own_rank == 0 ? NULL : "x", &session);
-    reported_everywhere(NULL, status, INSITU_ERROR_ARGUMENT, "insitu_create: no scene is given");
+    check_reported_everywhere(NULL, status, INSITU_ERROR_ARGUMENT, "insitu_create: no scene is given");
     write_scene(plain_scene);
     status = insitu_create(MPI_COMM_WORLD, write_scene(plain_scene), own_rank == rank_count - 1 ? NULL : &session);
-    reported_everywhere(NULL, status, INSITU_ERROR_ARGUMENT, "no place for the session");
+    check_reported_everywhere(NULL, status, INSITU_ERROR_ARGUMENT, "no place for the session");
     everywhere(insitu_create(MPI_COMM_NULL, "x", &session) == INSITU_ERROR_ARGUMENT);
     everywhere(insitu_destroy(&session) == INSITU_OK && insitu_destroy(NULL) == INSITU_OK);
 }
@@ -575,21 +575,21 @@ static const char full_scene[] =
                       "      - isosurface: {field: c, values: [0], colour_by: {field: f}, opacity: 0.5}\n"
                       "      - " VOLUME "\n    sampling: {frames: 2}\n");
 
-static insitu_status submit_both(insitu_session *session, insitu_field *cells)
+static insitu_status submit_two_meshes(insitu_session *session, insitu_field *cells)
 {
-    const insitu_status status = submit(session, &input);
+    const insitu_status status = submit_input(session, &input);
     return status ? status : insitu_set_field(session, "m", cells);
 }
 
 /* Checks a pipe as scene: opening a pipe without a writer would block forever. */
-static void scene_that_is_no_file_is_reported(void **context)
+static void missing_scene_file_is_reported(void **context)
 {
     (void)context;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
     const char *scene = write_scene(plain_scene);
     char kept[1100];
     snprintf(kept, sizeof kept, "%s.kept", scene);
-    everywhere(submit(session, &input) == INSITU_OK);
+    everywhere(submit_input(session, &input) == INSITU_OK);
     step_draws(session, 0, 1);
     everywhere(own_rank != 0 || (rename(scene, kept) == 0 && mkfifo(scene, 0600) == 0));
     for (int cycle = 1; cycle < 3; cycle++) {
@@ -598,15 +598,16 @@ static void scene_that_is_no_file_is_reported(void **context)
     }
     insitu_session *other = NULL;
     const insitu_status status = insitu_create(MPI_COMM_WORLD, scene, &other);
-    reported_everywhere(NULL, status, INSITU_ERROR_SCENE, scene, "is a named pipe (FIFO), expected a regular file");
+    check_reported_everywhere(NULL, status, INSITU_ERROR_SCENE, scene,
+                              "is a named pipe (FIFO), expected a regular file");
     everywhere(own_rank != 0 || (unlink(scene) == 0 && rename(kept, scene) == 0));
     const insitu_status of_folder = insitu_create(MPI_COMM_WORLD, "/", &other);
-    reported_everywhere(NULL, of_folder, INSITU_ERROR_SCENE,
-                        "/: cannot be read: it is a directory, expected a regular file");
+    check_reported_everywhere(NULL, of_folder, INSITU_ERROR_SCENE,
+                              "/: cannot be read: it is a directory, expected a regular file");
     insitu_destroy(&session);
 }
 
-static void memory_is_given_back(void **context)
+static void memory_is_freed(void **context)
 {
     (void)context;
     const int64_t before = base_memory_held();
@@ -615,7 +616,7 @@ static void memory_is_given_back(void **context)
     cells.name = "c", cells.centring = INSITU_CELL, cells.count = input.part.cell_count;
     int64_t held = 0;
     for (int cycle = 0; cycle < 4; cycle++) {
-        everywhere(submit_both(session, &cells) == INSITU_OK);
+        everywhere(submit_two_meshes(session, &cells) == INSITU_OK);
         step_draws(session, cycle, 1);
         everywhere(cycle < 2 || base_memory_held() == held);
         held = base_memory_held();
@@ -635,22 +636,22 @@ static void picture_memory_is_kept_to_a_limit(void **context)
     static const char huge[] = "images:\n  - name: h\n    size: [2049, 2048]\n    layers:\n      - " SURFACE
                                "\n    outputs: [{path: h.png}]\n";
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
-    everywhere(submit(session, &input) == INSITU_OK);
+    everywhere(submit_input(session, &input) == INSITU_OK);
     step_draws(session, 0, 1);
     const caught_picture first = caught[0];
     caught_count = 0;
     everywhere(insitu_last_report(session)->bytes_pictures == (own_rank == 0 ? 24 * 16 * 20 : 0));
     insitu_destroy(&session);
     session = open_session(MPI_COMM_WORLD, write_scene(large));
-    everywhere(submit(session, &input) == INSITU_OK);
+    everywhere(submit_input(session, &input) == INSITU_OK);
     for (int cycle = 0; cycle < 2; cycle++) {
         step_draws(session, cycle, 2);
         everywhere(insitu_last_report(session)->bytes_pictures == (own_rank == 0 ? 100 * 70 * 16 : 0));
-        everywhere(own_rank != 0 || (!caught[0].depth && same_pictures(&first, &caught[1])));
+        everywhere(own_rank != 0 || (!caught[0].depth && are_same_pictures(&first, &caught[1])));
     }
     insitu_destroy(&session);
     session = open_session(MPI_COMM_WORLD, write_scene(huge));
-    everywhere(submit(session, &input) == INSITU_OK);
+    everywhere(submit_input(session, &input) == INSITU_OK);
     step_draws(session, 0, 1);
     everywhere(insitu_last_report(session)->bytes_pictures == 0);
     everywhere(own_rank != 0 || insitu_last_report(session)->bytes_peak >= 2049 * 2048 * 16);
@@ -660,13 +661,13 @@ static void picture_memory_is_kept_to_a_limit(void **context)
 
 /* Makes allocation n of a set and a step fail, on one rank or on all; afterwards everything must be as if it had not
  * failed. */
-static void failing_allocation_is_an_error_and_no_more(void **context)
+static void failed_allocation_returns_an_error(void **context)
 {
     (void)context;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(full_scene));
     insitu_field cells = input.field;
     cells.name = "c", cells.centring = INSITU_CELL, cells.count = input.part.cell_count;
-    everywhere(submit_both(session, &cells) == INSITU_OK);
+    everywhere(submit_two_meshes(session, &cells) == INSITU_OK);
     step_draws(session, 0, 1);
     const caught_picture first = caught[0];
     caught_count = 0;
@@ -677,21 +678,21 @@ static void failing_allocation_is_an_error_and_no_more(void **context)
             const int64_t count_before = base_memory_allocations();
             const bool is_armed = with_all || own_rank == rank_count - 1;
             base_memory_fail_nth(is_armed ? n : 0);
-            submit_both(session, &cells);
+            submit_two_meshes(session, &cells);
             const insitu_status status = insitu_step(session, n, 0);
             base_memory_fail_nth(0);
             int is_over = !is_armed || base_memory_allocations() - count_before < n;
             MPI_Allreduce(MPI_IN_PLACE, &is_over, 1, MPI_INT, MPI_LAND, MPI_COMM_WORLD);
             if (is_over) {
-                reported_everywhere(session, status, INSITU_OK, "");
+                check_reported_everywhere(session, status, INSITU_OK, "");
                 break;
             }
             failures += status != INSITU_OK;
             if (status != INSITU_OK && status != INSITU_ERROR_FIELD) /* the field of a refused mesh may fail too */
-                reported_everywhere(session, status, INSITU_ERROR_MEMORY, "memory");
-            everywhere(submit_both(session, &cells) == INSITU_OK);
+                check_reported_everywhere(session, status, INSITU_ERROR_MEMORY, "memory");
+            everywhere(submit_two_meshes(session, &cells) == INSITU_OK);
             step_draws(session, n, 1);
-            everywhere(own_rank != 0 || same_pictures(&first, &caught[0]));
+            everywhere(own_rank != 0 || are_same_pictures(&first, &caught[0]));
         }
         everywhere(failures > 20);
     }
@@ -712,21 +713,21 @@ static void failing_allocation_opens_no_session(void **context)
         const insitu_status status = insitu_create(MPI_COMM_WORLD, scene, &session);
         base_memory_fail_nth(0);
         everywhere((status == INSITU_OK) == (session != NULL));
-        if (status != INSITU_OK) reported_everywhere(NULL, status, INSITU_ERROR_MEMORY, "memory");
+        if (status != INSITU_OK) check_reported_everywhere(NULL, status, INSITU_ERROR_MEMORY, "memory");
         insitu_destroy(&session);
         everywhere(base_memory_held() == before);
         if (status == INSITU_OK) break;
     }
 }
 
-static int begin_tests(void **state)
+static int set_up_test_group(void **state)
 {
     (void)state;
     input_create(&input, TEST_HEXES, 4, TEST_RANDOM, own_rank, rank_count);
     return 0;
 }
 
-static int end_tests(void **state)
+static int tear_down_test_group(void **state)
 {
     (void)state;
     input_free(&input);
@@ -738,30 +739,30 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(images_are_drawn_when_due),
         cmocka_unit_test(unchanged_input_rebuilds_nothing),
-        cmocka_unit_test(changed_values_are_noticed),
-        cmocka_unit_test(moved_mesh_gives_the_moved_picture),
-        cmocka_unit_test(plain_layouts_are_not_copied),
-        cmocka_unit_test(cells_that_no_picture_shows_are_left_out),
+        cmocka_unit_test(changed_values_are_detected),
+        cmocka_unit_test(moved_mesh_draws_the_moved_picture),
+        cmocka_unit_test(native_layouts_are_not_copied),
+        cmocka_unit_test(cells_invisible_in_all_pictures_are_skipped),
         cmocka_unit_test(mirrored_cells_are_counted),
         cmocka_unit_test(ghosts_are_counted_and_not_drawn),
-        cmocka_unit_test(no_cells_anywhere_give_the_background),
-        cmocka_unit_test(cells_of_one_rank_are_seen),
-        cmocka_unit_test(meshes_of_many_names_make_one_picture),
-        cmocka_unit_test(overlapping_meshes_make_one_picture),
+        cmocka_unit_test(empty_meshes_draw_the_background),
+        cmocka_unit_test(cells_on_one_rank_are_drawn),
+        cmocka_unit_test(several_meshes_draw_one_picture),
+        cmocka_unit_test(overlapping_meshes_draw_one_picture),
         cmocka_unit_test(constant_fields_are_drawn),
         cmocka_unit_test(missing_field_leaves_the_other_picture),
-        cmocka_unit_test(component_that_is_not_there_is_named),
+        cmocka_unit_test(missing_component_is_reported),
         cmocka_unit_test(ranks_at_different_cycles_are_reported),
         cmocka_unit_test(images_are_drawn_when_their_time_has_passed),
         cmocka_unit_test(picture_that_cannot_be_written_is_reported_on_all_ranks),
-        cmocka_unit_test(edited_scene_is_taken_and_a_broken_one_is_not),
-        cmocka_unit_test(images_without_outputs_are_for_memory),
-        cmocka_unit_test(bad_scene_opens_no_session),
-        cmocka_unit_test(scene_that_is_no_file_is_reported),
-        cmocka_unit_test(memory_is_given_back),
+        cmocka_unit_test(edited_scene_is_used_unless_it_is_invalid),
+        cmocka_unit_test(images_without_outputs_are_kept_in_memory),
+        cmocka_unit_test(invalid_scene_opens_no_session),
+        cmocka_unit_test(missing_scene_file_is_reported),
+        cmocka_unit_test(memory_is_freed),
         cmocka_unit_test(picture_memory_is_kept_to_a_limit),
-        cmocka_unit_test(failing_allocation_is_an_error_and_no_more),
+        cmocka_unit_test(failed_allocation_returns_an_error),
         cmocka_unit_test(failing_allocation_opens_no_session),
     };
-    return run_session_tests(argc, argv, tests, begin_tests, end_tests);
+    return run_session_tests(argc, argv, tests, set_up_test_group, tear_down_test_group);
 }

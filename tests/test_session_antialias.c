@@ -44,7 +44,7 @@ static void samples_are_spread_evenly(void **state)
 
 /* Adds the colour that the ray through a position in the picture sees: that of the plane inside the cube. Returns false
  * near the plane's border. */
-static bool add_truth(const render_camera *c, double x, double y, double sum[4])
+static bool add_exact_sample(const render_camera *c, double x, double y, double sum[4])
 {
     static const double normal[3] = {1. / 3, 2. / 3, -2. / 3};
     const double pixel = 2 * c->half_height / HEIGHT, across = (x - 0.5 * WIDTH) * pixel,
@@ -61,7 +61,7 @@ static bool add_truth(const render_camera *c, double x, double y, double sum[4])
     }
     int count = 0;
     const float *table = colour_map_table("turbo", &count);
-    const double place = fmin(fmax((test_linear(at) + 1.5) / 3.2, 0), 1) * (count - 1);
+    const double place = fmin(fmax((test_linear_field(at) + 1.5) / 3.2, 0), 1) * (count - 1);
     const int entry = (int)fmin(place, count - 2);
     for (int i = 0; i < 3 && outside < 0; i++) {
         const double a = (double)table[3 * entry + i], b = (double)table[3 * entry + 3 + i];
@@ -83,21 +83,21 @@ static bool is_mean(const float *rgba, int pixel, int count)
     for (int k = 0; k < count; k++) {
         double offset[2];
         render_camera_sample(count, k, offset);
-        is_clear =
-            add_truth(&camera, pixel % WIDTH + 0.5 + offset[0], pixel / WIDTH + 0.5 + offset[1], sum) && is_clear;
+        is_clear = add_exact_sample(&camera, pixel % WIDTH + 0.5 + offset[0], pixel / WIDTH + 0.5 + offset[1], sum) &&
+                   is_clear;
     }
-    for (int i = 0; i < 4; i++) off = test_worse(off, fabs((double)rgba[i] - sum[i] / count));
+    for (int i = 0; i < 4; i++) off = test_larger_error(off, fabs((double)rgba[i] - sum[i] / count));
     return !is_clear || off < 10 * 5 * 3e-7 / 3.2 * 12;
 }
 
 /* ---- pictures ------------------------------------------------------------------------------------------------ */
 
 /* Draws one picture; scene is a file that write_scene() made on all ranks. */
-static caught_picture draw(MPI_Comm comm, const char *scene, const session_input *in, int64_t *rays)
+static caught_picture draw_picture(MPI_Comm comm, const char *scene, const session_input *in, int64_t *rays)
 {
     insitu_session *session = open_session(comm, scene);
     discard_pictures();
-    assert_int_equal(submit(session, in), INSITU_OK);
+    assert_int_equal(submit_input(session, in), INSITU_OK);
     assert_int_equal(insitu_step(session, 0, 0), INSITU_OK);
     *rays = insitu_last_report(session)->rays;
     const caught_picture picture = pop_caught_picture();
@@ -107,7 +107,7 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const session_input
 
 /* Checks a picture of count samples against plain, the picture with one sample for each pixel. rays is the number of
  * traced rays, from which the number of edge pixels follows. */
-static bool is_truth(const caught_picture *picture, const caught_picture *plain, int count, int64_t rays)
+static bool is_exact_mean(const caught_picture *picture, const caught_picture *plain, int count, int64_t rays)
 {
     unsigned char edges[PIXELS / 8] = {0};
     const image picture_before = {.width = WIDTH, .height = HEIGHT, .rgba = plain->rgba};
@@ -125,7 +125,7 @@ static bool is_truth(const caught_picture *picture, const caught_picture *plain,
     return is_well && memcmp(picture->depth, plain->depth, PIXELS * sizeof(float)) == 0;
 }
 
-static void edges_are_means_and_the_rest_is_as_before(void **state)
+static void edges_are_sample_means_and_other_pixels_are_unchanged(void **state)
 {
     (void)state;
     static const char *const scenes[] = {IMAGE("    antialias: 2\n", SLICE), IMAGE("    antialias: 4\n", SLICE),
@@ -134,15 +134,15 @@ static void edges_are_means_and_the_rest_is_as_before(void **state)
     int64_t rays = 0;
     bool is_well = true;
     input_create(&whole, TEST_TETS, SIDE, TEST_BLOCK, 0, 1);
-    test_mesh_set_values(&whole.part, test_linear);
+    test_mesh_set_values(&whole.part, test_linear_field);
     caught_picture plain = {0};
     const char *scene = write_scene(IMAGE("", SLICE));
-    if (own_rank == 0) plain = draw(MPI_COMM_SELF, scene, &whole, &rays);
+    if (own_rank == 0) plain = draw_picture(MPI_COMM_SELF, scene, &whole, &rays);
     for (int i = 0; i < 4; i++) {
         scene = write_scene(scenes[i]);
         if (own_rank != 0) continue;
-        caught_picture picture = draw(MPI_COMM_SELF, scene, &whole, &rays);
-        is_well = is_truth(&picture, &plain, 2 << i, rays) && is_well;
+        caught_picture picture = draw_picture(MPI_COMM_SELF, scene, &whole, &rays);
+        is_well = is_exact_mean(&picture, &plain, 2 << i, rays) && is_well;
         free_caught(&picture);
     }
     everywhere(is_well);
@@ -159,12 +159,12 @@ static void check_on_ranks(const char *text, test_mesh_kind kind, double worst)
     int64_t rays = 0;
     caught_picture alone = {0};
     input_create(&whole, kind, SIDE, TEST_BLOCK, 0, 1);
-    if (own_rank == 0) alone = draw(MPI_COMM_SELF, scene, &whole, &rays);
+    if (own_rank == 0) alone = draw_picture(MPI_COMM_SELF, scene, &whole, &rays);
     input_create(&part, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
-    caught_picture picture = draw(MPI_COMM_WORLD, scene, &part, &rays);
+    caught_picture picture = draw_picture(MPI_COMM_WORLD, scene, &part, &rays);
     double off = 0;
     for (int i = 0; i < 4 * PIXELS && own_rank == 0; i++)
-        off = test_worse(off, fabs((double)picture.rgba[i] - (double)alone.rgba[i]));
+        off = test_larger_error(off, fabs((double)picture.rgba[i] - (double)alone.rgba[i]));
     everywhere(off <= worst);
     everywhere(own_rank != 0 || memcmp(picture.depth, alone.depth, PIXELS * sizeof(float)) == 0);
     if (own_rank == 0) free_caught(&alone), free_caught(&picture);
@@ -172,7 +172,7 @@ static void check_on_ranks(const char *text, test_mesh_kind kind, double worst)
     input_free(&whole);
 }
 
-static void any_ranks_make_one_picture(void **state)
+static void any_rank_count_draws_one_picture(void **state)
 {
     (void)state;
     check_on_ranks(IMAGE("    antialias: 4\n", SLICE), TEST_TETS, 0);
@@ -184,7 +184,7 @@ static void any_ranks_make_one_picture(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(samples_are_spread_evenly),
-                                       cmocka_unit_test(edges_are_means_and_the_rest_is_as_before),
-                                       cmocka_unit_test(any_ranks_make_one_picture)};
+                                       cmocka_unit_test(edges_are_sample_means_and_other_pixels_are_unchanged),
+                                       cmocka_unit_test(any_rank_count_draws_one_picture)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -30,7 +30,7 @@ static const char *const images[] = {
 };
 enum { IMAGES = sizeof images / sizeof images[0] };
 
-static const char *scene(void)
+static const char *write_block_scene(void)
 {
     static char text[8192];
     int at = snprintf(text, sizeof text,
@@ -46,19 +46,19 @@ static const char *scene(void)
 
 /* ---- the whole mesh ---------------------------------------------------------------------------------------------- */
 
-static double place_of(int axis, int index)
+static double compute_coordinate(int axis, int index)
 {
     static const double origin[3] = {-1, -0.75, -0.5}, spacing[3] = {0.15, 0.1, 0.13};
     return origin[axis] + spacing[axis] * (double)index;
 }
 
-static double value_at(const int at[3])
+static double compute_vertex_value(const int at[3])
 {
-    const double x = place_of(0, at[0]), y = place_of(1, at[1]), z = place_of(2, at[2]);
+    const double x = compute_coordinate(0, at[0]), y = compute_coordinate(1, at[1]), z = compute_coordinate(2, at[2]);
     return sqrt(x * x + y * y + z * z) + 0.1 * sin(5 * x + y);
 }
 
-static double value_in(const int at[3])
+static double compute_cell_value(const int at[3])
 {
     return 0.5 + 0.5 * sin(0.7 * at[0]) * cos(0.5 * at[1] + 0.3 * at[2]);
 }
@@ -73,7 +73,7 @@ typedef struct cell_arrays {
     int32_t *hexes, *ghosts;
 } cell_arrays;
 
-static void create(cell_arrays *a, int64_t vertices, int64_t cells)
+static void create_arrays(cell_arrays *a, int64_t vertices, int64_t cells)
 {
     *a = (cell_arrays){.vertex_count = vertices, .cell_count = cells};
     a->places = malloc((size_t)vertices * sizeof *a->places);
@@ -84,7 +84,7 @@ static void create(cell_arrays *a, int64_t vertices, int64_t cells)
     assert_true(a->places && a->f && a->c && a->hexes && a->ghosts);
 }
 
-static void destroy(cell_arrays *a)
+static void destroy_arrays(cell_arrays *a)
 {
     free(a->places);
     free(a->f);
@@ -95,13 +95,13 @@ static void destroy(cell_arrays *a)
 
 typedef insitu_status set_function(insitu_session *session, int64_t number, const insitu_field *field);
 
-static insitu_status set_whole_field(insitu_session *session, int64_t number, const insitu_field *field)
+static insitu_status set_field_of_whole_mesh(insitu_session *session, int64_t number, const insitu_field *field)
 {
     (void)number;
     return insitu_set_field(session, "m", field);
 }
 
-static insitu_status set_one_block_field(insitu_session *session, int64_t number, const insitu_field *field)
+static insitu_status set_field_of_block(insitu_session *session, int64_t number, const insitu_field *field)
 {
     return insitu_set_block_field(session, "m", number, field);
 }
@@ -124,12 +124,12 @@ static bool set_fields(insitu_session *session, int64_t number, const cell_array
 /* Makes a list of every rank_count-th cell, from number own_rank on. */
 static void make_list(cell_arrays *a)
 {
-    create(a, LINE * LINE * LINE, CELLS * CELLS * CELLS);
+    create_arrays(a, LINE * LINE * LINE, CELLS * CELLS * CELLS);
     int64_t count = 0;
     for (int v = 0; v < LINE * LINE * LINE; v++) {
         const int at[3] = {v % LINE, v / LINE % LINE, v / LINE / LINE};
-        for (int axis = 0; axis < 3; axis++) a->places[v][axis] = place_of(axis, at[axis]);
-        a->f[v] = value_at(at);
+        for (int axis = 0; axis < 3; axis++) a->places[v][axis] = compute_coordinate(axis, at[axis]);
+        a->f[v] = compute_vertex_value(at);
     }
     for (int cell = 0; cell < CELLS * CELLS * CELLS; cell++) {
         const int at[3] = {cell % CELLS, cell / CELLS % CELLS, cell / CELLS / CELLS};
@@ -137,7 +137,7 @@ static void make_list(cell_arrays *a)
         for (int i = 0; i < 8; i++)
             a->hexes[8 * count + i] =
                 at[0] + corners[i][0] + LINE * (at[1] + corners[i][1] + LINE * (at[2] + corners[i][2]));
-        a->c[count++] = value_in(at);
+        a->c[count++] = compute_cell_value(at);
     }
     a->cell_count = count;
 }
@@ -152,7 +152,7 @@ static bool set_list(insitu_session *session, const cell_arrays *a)
     mesh.cell_type = INSITU_HEX;
     mesh.connectivity_count = 8 * a->cell_count;
     mesh.connectivity = (insitu_array){a->hexes, INSITU_INT32, 0};
-    return insitu_set_mesh(session, "m", &mesh) == INSITU_OK && set_fields(session, 0, a, set_whole_field);
+    return insitu_set_mesh(session, "m", &mesh) == INSITU_OK && set_fields(session, 0, a, set_field_of_whole_mesh);
 }
 
 /* ---- blocks ------------------------------------------------------------------------------------------------------ */
@@ -164,7 +164,7 @@ typedef struct block {
     int64_t *ids; /* ids of the block's vertices in the whole mesh */
 } block;
 
-static bool is_own(const block *b, const int at[3])
+static bool is_own_cell(const block *b, const int at[3])
 {
     for (int axis = 0; axis < 3; axis++)
         if (at[axis] < b->own_first[axis] || at[axis] >= b->own_end[axis]) return false;
@@ -177,12 +177,12 @@ static void fill_block(block *b)
     const int wide[3] = {b->cells[0] + 1, b->cells[1] + 1, b->cells[2] + 1};
     b->ids = malloc((size_t)wide[0] * (size_t)wide[1] * (size_t)wide[2] * sizeof *b->ids);
     assert_non_null(b->ids);
-    create(&b->a, (int64_t)wide[0] * wide[1] * wide[2], (int64_t)b->cells[0] * b->cells[1] * b->cells[2]);
+    create_arrays(&b->a, (int64_t)wide[0] * wide[1] * wide[2], (int64_t)b->cells[0] * b->cells[1] * b->cells[2]);
     for (int v = 0; v < b->a.vertex_count; v++) {
         const int at[3] = {b->first[0] + v % wide[0], b->first[1] + v / wide[0] % wide[1],
                            b->first[2] + v / wide[0] / wide[1]};
-        for (int axis = 0; axis < 3; axis++) b->a.places[v][axis] = place_of(axis, at[axis]);
-        b->a.f[v] = value_at(at);
+        for (int axis = 0; axis < 3; axis++) b->a.places[v][axis] = compute_coordinate(axis, at[axis]);
+        b->a.f[v] = compute_vertex_value(at);
         b->ids[v] = at[0] + LINE * (at[1] + LINE * at[2]);
     }
     for (int cell = 0; cell < b->a.cell_count; cell++) {
@@ -191,8 +191,8 @@ static void fill_block(block *b)
         for (int i = 0; i < 8; i++)
             b->a.hexes[8 * cell + i] =
                 at[0] + corners[i][0] + wide[0] * (at[1] + corners[i][1] + wide[1] * (at[2] + corners[i][2]));
-        b->a.c[cell] = is_own(b, at) ? value_in(whole) : -40;
-        b->a.ghosts[cell] = is_own(b, at) ? 0 : 0x10000; /* its lowest byte is 0 */
+        b->a.c[cell] = is_own_cell(b, at) ? compute_cell_value(whole) : -40;
+        b->a.ghosts[cell] = is_own_cell(b, at) ? 0 : 0x10000; /* its lowest byte is 0 */
     }
 }
 
@@ -245,18 +245,18 @@ static insitu_status set_block(insitu_session *session, const block *b, unsigned
 
 static void destroy_block(block *b)
 {
-    destroy(&b->a);
+    destroy_arrays(&b->a);
     free(b->ids);
 }
 
 static bool submit_block(insitu_session *session, const block *b, unsigned changed)
 {
-    return set_block(session, b, changed) == INSITU_OK && set_fields(session, b->number, &b->a, set_one_block_field);
+    return set_block(session, b, changed) == INSITU_OK && set_fields(session, b->number, &b->a, set_field_of_block);
 }
 
 /* Returns the rank that has a block. Of several ranks the last one has none; or each rank has the blocks of slabs, so
  * that ranks share vertices only where slabs meet. */
-static int owner_of(int number)
+static int get_block_owner(int number)
 {
     if (are_in_slabs) return number % distribute[0] % rank_count;
     return rank_count < 3 ? number % rank_count : (7 * number + 3) % 11 % (rank_count - 1);
@@ -275,14 +275,14 @@ static void step_ok(insitu_session *session, int cycle)
     everywhere(status == INSITU_OK);
 }
 
-static int begin_tests(void **state)
+static int set_up_test_group(void **state)
 {
     cell_arrays list;
     (void)state;
-    if (!enter_folder("blocks")) return 1;
+    if (!enter_test_folder("blocks")) return 1;
     for (int number = 0; number < BLOCKS; number++) make_block(number, &blocks[number]);
     make_list(&list);
-    insitu_session *session = open_session(MPI_COMM_WORLD, scene());
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_block_scene());
     everywhere(set_list(session, &list));
     if (!own_rank) remove("numbers.csv");
     step_ok(session, 0);
@@ -291,11 +291,11 @@ static int begin_tests(void **state)
     caught_count = 0;
     insitu_destroy(&session);
     read_file("numbers.csv", sizeof true_numbers, true_numbers);
-    destroy(&list);
+    destroy_arrays(&list);
     return 0;
 }
 
-static int end_tests(void **state)
+static int tear_down_test_group(void **state)
 {
     (void)state;
     for (int number = 0; number < BLOCKS; number++) destroy_block(&blocks[number]);
@@ -303,36 +303,37 @@ static int end_tests(void **state)
     return 0;
 }
 
-static int covered(const caught_picture *p)
+static int count_covered_pixels(const caught_picture *p)
 {
     int count = 0;
     for (int i = 0; i < p->width * p->height; i++) count += p->rgba[4 * i + 3] > 0;
     return count;
 }
 
-static void pictures_are_the_truth(void)
+static void check_pictures_match_reference(void)
 {
     everywhere(own_rank || caught_count == IMAGES);
     for (int i = 0; i < caught_count; i++) {
-        if (!same_pictures(&caught[i], &truth[i])) fprintf(stderr, "differs: %s\n", images[i]);
-        assert_true(covered(&truth[i]) > 100);
-        assert_true(same_pictures(&caught[i], &truth[i]));
+        if (!are_same_pictures(&caught[i], &truth[i])) fprintf(stderr, "differs: %s\n", images[i]);
+        assert_true(count_covered_pixels(&truth[i]) > 100);
+        assert_true(are_same_pictures(&caught[i], &truth[i]));
     }
     discard_pictures();
 }
 
-static void blocks_are_the_list_of_their_cells(void **state)
+static void blocks_draw_same_picture_as_their_cell_list(void **state)
 {
     char numbers[4096];
     (void)state;
-    insitu_session *session = open_session(MPI_COMM_WORLD, scene());
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_block_scene());
     bool is_set = true;
     for (int number = 0; number < BLOCKS; number++)
-        if (owner_of(number) == own_rank) is_set = is_set && submit_block(session, &blocks[number], INSITU_CHANGED_ALL);
+        if (get_block_owner(number) == own_rank)
+            is_set = is_set && submit_block(session, &blocks[number], INSITU_CHANGED_ALL);
     everywhere(is_set);
     if (!own_rank) remove("numbers.csv");
     step_ok(session, 0);
-    pictures_are_the_truth();
+    check_pictures_match_reference();
     read_file("numbers.csv", sizeof numbers, numbers);
     everywhere(strcmp(numbers, true_numbers) == 0);
     int64_t cells = insitu_last_report(session)->cells - insitu_last_report(session)->cells_ghost;
@@ -341,18 +342,18 @@ static void blocks_are_the_list_of_their_cells(void **state)
     insitu_destroy(&session);
 }
 
-static void ids_join_blocks(void **state)
+static void vertex_ids_connect_blocks(void **state)
 {
     with_ids = are_in_slabs = true;
-    blocks_are_the_list_of_their_cells(state);
+    blocks_draw_same_picture_as_their_cell_list(state);
     with_ids = are_in_slabs = false;
 }
 
 /* Checks blocks that move to other ranks at every step, while some stay. */
-static void blocks_come_and_go(void **state)
+static void blocks_are_added_and_removed(void **state)
 {
     (void)state;
-    insitu_session *session = open_session(MPI_COMM_WORLD, scene());
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_block_scene());
     for (int cycle = 0; cycle < 4; cycle++) {
         bool is_set = true;
         for (int number = 0; number < BLOCKS; number++) {
@@ -365,7 +366,7 @@ static void blocks_come_and_go(void **state)
         }
         everywhere(is_set);
         step_ok(session, cycle);
-        pictures_are_the_truth();
+        check_pictures_match_reference();
     }
     insitu_destroy(&session);
 }
@@ -376,7 +377,7 @@ static void whole_and_blocks_replace_each_other(void **state)
     cell_arrays list;
     (void)state;
     make_list(&list);
-    insitu_session *session = open_session(MPI_COMM_WORLD, scene());
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_block_scene());
     for (int cycle = 0; cycle < 4; cycle++) {
         bool is_set = true;
         for (int number = 0; number < BLOCKS && cycle % 2; number++)
@@ -386,9 +387,9 @@ static void whole_and_blocks_replace_each_other(void **state)
         if (cycle % 2 == 0) is_set = set_list(session, &list);
         everywhere(is_set);
         step_ok(session, cycle);
-        pictures_are_the_truth();
+        check_pictures_match_reference();
     }
-    destroy(&list);
+    destroy_arrays(&list);
     insitu_destroy(&session);
 }
 
@@ -397,7 +398,7 @@ static void whole_and_blocks_replace_each_other(void **state)
 static void set_all(insitu_session *session)
 {
     for (int number = 0; number < BLOCKS; number++)
-        if (owner_of(number) == own_rank) submit_block(session, &blocks[number], INSITU_CHANGED_ALL);
+        if (get_block_owner(number) == own_rank) submit_block(session, &blocks[number], INSITU_CHANGED_ALL);
 }
 
 static void wrong_calls_are_reported_at_once(void **state)
@@ -405,7 +406,7 @@ static void wrong_calls_are_reported_at_once(void **state)
     insitu_field field;
     insitu_mesh mesh;
     (void)state;
-    insitu_session *session = open_session(MPI_COMM_WORLD, scene());
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_block_scene());
     insitu_mesh_defaults(&mesh);
     insitu_field_defaults(&field);
     field.name = "f";
@@ -426,41 +427,41 @@ static void wrong_calls_are_reported_at_once(void **state)
 static void faults_of_one_block_are_reported_on_all_ranks(void **state)
 {
     const int corrupted = 5;
-    const bool is_mine = owner_of(corrupted) == own_rank;
+    const bool is_mine = get_block_owner(corrupted) == own_rank;
     insitu_mesh mesh;
     (void)state;
-    insitu_session *session = open_session(MPI_COMM_WORLD, scene());
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_block_scene());
     set_all(session);
     insitu_mesh_defaults(&mesh);
     mesh.vertex_count = -1;
     if (is_mine) insitu_set_block(session, "m", corrupted, &mesh);
-    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_ARGUMENT,
-                        "mesh \"m[5]\": vertex_count is -1");
+    check_reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_ARGUMENT,
+                              "mesh \"m[5]\": vertex_count is -1");
     blocks[corrupted].a.hexes[77] = -4; /* block 5 is a list of cells */
     if (is_mine) submit_block(session, &blocks[corrupted], INSITU_CHANGED_ALL);
-    reported_everywhere(session, insitu_step(session, 1, 1), INSITU_ERROR_MESH, "mesh \"m[5]\": cell 9 ");
+    check_reported_everywhere(session, insitu_step(session, 1, 1), INSITU_ERROR_MESH, "mesh \"m[5]\": cell 9 ");
     blocks[corrupted].a.hexes[77] = blocks[corrupted].a.hexes[69] + 1;
     if (is_mine) insitu_set_block(session, "m", corrupted, NULL);
     destroy_block(&blocks[corrupted]);
     make_block(corrupted, &blocks[corrupted]);
     if (is_mine) set_block(session, &blocks[corrupted], INSITU_CHANGED_ALL); /* the block is set without its fields */
     if (rank_count > 1 || is_mine)
-        reported_everywhere(session, insitu_step(session, 2, 2), INSITU_ERROR_FIELD,
-                            "mesh \"m[5]\": field \"c\" is not set, other blocks have it");
+        check_reported_everywhere(session, insitu_step(session, 2, 2), INSITU_ERROR_FIELD,
+                                  "mesh \"m[5]\": field \"c\" is not set, other blocks have it");
     discard_pictures();
     if (is_mine) submit_block(session, &blocks[corrupted], 0);
     step_ok(session, 3);
-    pictures_are_the_truth();
+    check_pictures_match_reference();
     insitu_destroy(&session);
 }
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(blocks_are_the_list_of_their_cells),
-                                       cmocka_unit_test(ids_join_blocks),
-                                       cmocka_unit_test(blocks_come_and_go),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(blocks_draw_same_picture_as_their_cell_list),
+                                       cmocka_unit_test(vertex_ids_connect_blocks),
+                                       cmocka_unit_test(blocks_are_added_and_removed),
                                        cmocka_unit_test(whole_and_blocks_replace_each_other),
                                        cmocka_unit_test(wrong_calls_are_reported_at_once),
                                        cmocka_unit_test(faults_of_one_block_are_reported_on_all_ranks)};
-    return run_session_tests(argc, argv, tests, begin_tests, end_tests);
+    return run_session_tests(argc, argv, tests, set_up_test_group, tear_down_test_group);
 }

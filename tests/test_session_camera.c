@@ -11,7 +11,7 @@
 
 #include "session_camera.h"
 
-static double uniform(double low, double high)
+static double draw_uniform(double low, double high)
 {
     return low + (high - low) * ((double)rand() / RAND_MAX);
 }
@@ -20,10 +20,10 @@ static session_extent random_extent(void)
 {
     session_extent e = {.cell_count = 1, .solid_count = 1};
     double square = 0;
-    const double size = pow(10, uniform(-3, 6));
+    const double size = pow(10, draw_uniform(-3, 6));
     for (int a = 0; a < 3; a++) {
-        e.lower[a] = size * uniform(-5, 5);
-        e.upper[a] = e.lower[a] + size * (rand() % 7 ? uniform(0.01, 1) : 0); /* some boxes are flat */
+        e.lower[a] = size * draw_uniform(-5, 5);
+        e.upper[a] = e.lower[a] + size * (rand() % 7 ? draw_uniform(0.01, 1) : 0); /* some boxes are flat */
         square += pow(e.upper[a] - e.lower[a], 2);
     }
     e.half_diagonal = 0.5 * sqrt(square);
@@ -33,15 +33,15 @@ static session_extent random_extent(void)
 static scene_image random_image(void)
 {
     scene_image image = {.width = 64 + rand() % 400, .height = 64 + rand() % 400};
-    image.camera = (scene_camera){.is_automatic = true, .angle = uniform(5, 60), .zoom = 1};
-    for (int a = 0; a < 3; a++) image.camera.direction[a] = uniform(-1, 1);
+    image.camera = (scene_camera){.is_automatic = true, .angle = draw_uniform(5, 60), .zoom = 1};
+    for (int a = 0; a < 3; a++) image.camera.direction[a] = draw_uniform(-1, 1);
     image.camera.up[rand() % 3] = 1;
     return image;
 }
 
 /* Computes the bounds of the extent in the picture, whose borders are -1 and 1; returns false if a corner is not in
  * front of the eye. */
-static bool borders(const render_camera *c, const session_extent *e, double low[2], double high[2])
+static bool compute_projected_bounds(const render_camera *c, const session_extent *e, double low[2], double high[2])
 {
     const double half[2] = {c->half_height * c->width / c->height, c->half_height};
     bool are_before = true;
@@ -89,7 +89,7 @@ static void check_box(bool is_orthographic)
         image.camera.fits_box = true;
         image.camera.is_orthographic = is_orthographic;
         if (!(extent.half_diagonal > 0) || !session_make_camera(&extent, &image, &camera)) continue;
-        assert_true(borders(&camera, &extent, low, high));
+        assert_true(compute_projected_bounds(&camera, &extent, low, high));
         double most = 0;
         for (int a = 0; a < 2; a++) most = fmax(most, fmax(-low[a], high[a]));
         assert_true(most <= 0.95 + 1e-9);
@@ -113,13 +113,13 @@ static void a_box_fills_an_orthographic_frame(void **state)
 
 /* Returns the fraction of half a side that decorations leave free: a colour bar takes 6.5 heights of text, a title 2.4,
  * a ruler 3. */
-static double left_by(double words, double size, int pixels)
+static double fraction_left_by_decorations(double words, double size, int pixels)
 {
     return fmax(0.95 - 2 * words * size / pixels, 0.5);
 }
 
 /* Checks that the data reaches both borders of the tighter side and crosses none. */
-static void decorations_keep_their_room(void **state)
+static void decorations_keep_their_space(void **state)
 {
     (void)state;
     srand(12);
@@ -136,11 +136,11 @@ static void decorations_keep_their_room(void **state)
         d->title = i % 7 ? (char *)(uintptr_t) "title" : NULL;
         if (!(extent.half_diagonal > 0) || !session_make_camera(&extent, &image, &camera)) continue;
         const double size = 0.03 * image.height, ruled = d->has_rulers ? 3 : 0;
-        const double most[2] = {left_by(ruled + (i % 3 == 2 ? 6.5 : 0), size, image.width),
-                                left_by(i % 7 ? 2.4 : 0, size, image.height)};
-        const double least[2] = {-left_by(ruled + (i % 3 == 1 ? 6.5 : 0), size, image.width),
-                                 -left_by(ruled, size, image.height)};
-        assert_true(borders(&camera, &extent, low, high));
+        const double most[2] = {fraction_left_by_decorations(ruled + (i % 3 == 2 ? 6.5 : 0), size, image.width),
+                                fraction_left_by_decorations(i % 7 ? 2.4 : 0, size, image.height)};
+        const double least[2] = {-fraction_left_by_decorations(ruled + (i % 3 == 1 ? 6.5 : 0), size, image.width),
+                                 -fraction_left_by_decorations(ruled, size, image.height)};
+        assert_true(compute_projected_bounds(&camera, &extent, low, high));
         bool is_filled = is_close(&camera, &extent);
         for (int a = 0; a < 2; a++) {
             assert_true(low[a] >= least[a] - 1e-9 && high[a] <= most[a] + 1e-9);
@@ -153,7 +153,7 @@ static void decorations_keep_their_room(void **state)
 
 /* Checks that the sphere around the bounds, seen from the eye, does not overlap the space of bars and texts, is as
  * large as possible, and is off-centre only if necessary. */
-static void a_sphere_keeps_off_decorations(void **state)
+static void sphere_does_not_overlap_decorations(void **state)
 {
     (void)state;
     srand(13);
@@ -199,7 +199,7 @@ static void a_sphere_keeps_off_decorations(void **state)
     }
 }
 
-static void zoom_and_height_are_what_they_say(void **state)
+static void zoom_and_height_scale_the_view(void **state)
 {
     (void)state;
     const session_extent extent = {.lower = {0, 0, 0}, .upper = {2, 2, 2}, .half_diagonal = sqrt(3), .cell_count = 1};
@@ -230,7 +230,7 @@ static bool is_faced(const session_extent *extent, const scene_image *image, int
     static const double towards[3] = {1, -1, 1};
     render_camera c;
     double low[2], high[2], most = 0;
-    if (!session_make_camera(extent, image, &c) || !borders(&c, extent, low, high)) return false;
+    if (!session_make_camera(extent, image, &c) || !compute_projected_bounds(&c, extent, low, high)) return false;
     for (int a = 0; a < 2; a++) most = fmax(most, fmax(-low[a], high[a]));
     return c.is_orthographic && fabs(c.right[right[axis]] - 1) < 1e-12 && fabs(c.up[up[axis]] - 1) < 1e-12 &&
            fabs(c.forward[axis] + towards[axis]) < 1e-12 && fabs(most - 0.95) < 1e-9;
@@ -260,7 +260,7 @@ static void flat_data_is_seen_from_the_front(void **state)
 }
 
 /* Checks that each key that the scene gives is used, and that the others are derived from the data. */
-static void keys_of_the_scene_come_before_flat_data(void **state)
+static void scene_keys_override_the_view_of_flat_data(void **state)
 {
     (void)state;
     const session_extent flat = {.upper = {2, 1, 0}, .half_diagonal = sqrt(1.25), .cell_count = 9};
@@ -297,10 +297,10 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(a_box_fills_the_frame),
                                        cmocka_unit_test(a_box_fills_an_orthographic_frame),
-                                       cmocka_unit_test(decorations_keep_their_room),
-                                       cmocka_unit_test(a_sphere_keeps_off_decorations),
-                                       cmocka_unit_test(zoom_and_height_are_what_they_say),
+                                       cmocka_unit_test(decorations_keep_their_space),
+                                       cmocka_unit_test(sphere_does_not_overlap_decorations),
+                                       cmocka_unit_test(zoom_and_height_scale_the_view),
                                        cmocka_unit_test(flat_data_is_seen_from_the_front),
-                                       cmocka_unit_test(keys_of_the_scene_come_before_flat_data)};
+                                       cmocka_unit_test(scene_keys_override_the_view_of_flat_data)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

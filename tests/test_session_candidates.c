@@ -33,11 +33,11 @@ static insitu_session *open_tree(scene_tree tree, const char *scene)
 }
 
 /* Makes a step of both sessions, whose meshes are set, and checks that the pictures are the same. */
-static void step_both(insitu_session *full, insitu_session *other, int64_t cycle)
+static void step_and_compare(insitu_session *full, insitu_session *other, int64_t cycle)
 {
     discard_pictures();
-    reported_everywhere(full, insitu_step(full, cycle, 0), INSITU_OK, "");
-    reported_everywhere(other, insitu_step(other, cycle, 0), INSITU_OK, "");
+    check_reported_everywhere(full, insitu_step(full, cycle, 0), INSITU_OK, "");
+    check_reported_everywhere(other, insitu_step(other, cycle, 0), INSITU_OK, "");
     if (own_rank == 0) {
         const caught_picture *a = &caught[0], *b = &caught[1];
         const size_t pixels = (size_t)a->width * (size_t)a->height;
@@ -53,19 +53,19 @@ static void step_both(insitu_session *full, insitu_session *other, int64_t cycle
 
 static void step_same(insitu_session *full, insitu_session *other, const session_input *in, int64_t cycle)
 {
-    everywhere(submit(full, in) == INSITU_OK && submit(other, in) == INSITU_OK);
-    step_both(full, other, cycle);
+    everywhere(submit_input(full, in) == INSITU_OK && submit_input(other, in) == INSITU_OK);
+    step_and_compare(full, other, cycle);
 }
 
 /* Returns the number of cells in the trees of all ranks. */
-static int64_t tree_cells(const insitu_session *session)
+static int64_t count_tree_cells(const insitu_session *session)
 {
     int64_t own = session->meshes.count ? session->meshes.items[0]->tree.cell_count : 0, all = 0;
     MPI_Allreduce(&own, &all, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
     return all;
 }
 
-static void change_values(session_input *in, double by)
+static void shift_values(session_input *in, double by)
 {
     for (int64_t i = 0; i < in->part.vertex_count; i++) in->part.values[i] += by;
 }
@@ -79,7 +79,7 @@ static void compare_trees(scene_tree tree, const char *images, test_mesh_kind ki
     input_create(&in, kind, 6, TEST_CHECKERBOARD, own_rank, rank_count);
     step_same(full, other, &in, 0);
     in.mesh.changed = INSITU_CHANGED_NOTHING;
-    change_values(&in, 0.15);
+    shift_values(&in, 0.15);
     step_same(full, other, &in, 1);
     in.field.changed = INSITU_CHANGED_NOTHING;
     step_same(full, other, &in, 2);
@@ -98,14 +98,14 @@ static void compare_trees(scene_tree tree, const char *images, test_mesh_kind ki
     insitu_destroy(&other);
 }
 
-static void partial_trees_draw_what_full_ones_do(void **context)
+static void partial_trees_draw_same_picture_as_full_trees(void **context)
 {
     static const char *const images[] = {IMAGE(SURFACE),         IMAGE(SURFACES),  IMAGE(VOLUME),     IMAGE(STEPPED),
                                          IMAGE(SURFACE STEPPED), IMAGE(OWN_RANGE), IMAGE(DIFFERENCES)};
     (void)context;
     for (size_t i = 0; i < sizeof images / sizeof images[0]; i++)
         for (size_t kind = 0; kind < sizeof kinds / sizeof kinds[0]; kind++) {
-            if (!test_is_whole() && (i + kind) % 2) continue;
+            if (!test_is_long_run() && (i + kind) % 2) continue;
             compare_trees(SCENE_TREE_PARTIAL, images[i], kinds[kind]);
             if (kind == 0) compare_trees(SCENE_TREE_AUTO, images[i], kinds[kind]);
         }
@@ -113,7 +113,7 @@ static void partial_trees_draw_what_full_ones_do(void **context)
 
 /* Checks partial trees: only values in an interval 0.1 wide are visible, a slice of the cells; the report states how
  * many cells are left out. */
-static void partial_trees_are_of_the_cells_that_show(void **context)
+static void partial_trees_contain_the_visible_cells(void **context)
 {
     (void)context;
     session_input in;
@@ -129,9 +129,9 @@ static void partial_trees_are_of_the_cells_that_show(void **context)
     }
     MPI_Allreduce(&straddling, &all, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
     insitu_session *session = open_tree(SCENE_TREE_PARTIAL, write_scene(IMAGE(SURFACE)));
-    everywhere(submit(session, &in) == INSITU_OK);
-    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
-    everywhere(tree_cells(session) == all);
+    everywhere(submit_input(session, &in) == INSITU_OK);
+    check_reported_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
+    everywhere(count_tree_cells(session) == all);
     everywhere(in.part.cell_count == 0 || strstr(insitu_last_report(session)->left_out, "show nothing in this step"));
     discard_pictures();
     insitu_destroy(&session);
@@ -140,7 +140,7 @@ static void partial_trees_are_of_the_cells_that_show(void **context)
 
 /* Checks the choice of trees. As long as the cells change at every step, trees are partial. When they stop changing,
  * the accumulated extra cost of partial trees reaches the cost of a full tree, which is then built and kept. */
-static void standing_cells_get_a_full_tree(void **context)
+static void static_cells_get_a_full_tree(void **context)
 {
     (void)context;
     session_input in;
@@ -150,21 +150,21 @@ static void standing_cells_get_a_full_tree(void **context)
     insitu_session *session = open_tree(SCENE_TREE_AUTO, write_scene(IMAGE(PEAKS)));
     int64_t cycle = 0;
     for (; cycle < 3; cycle++) {
-        everywhere(submit(session, &in) == INSITU_OK);
-        reported_everywhere(session, insitu_step(session, cycle, 0), INSITU_OK, "");
-        everywhere(tree_cells(session) < all);
+        everywhere(submit_input(session, &in) == INSITU_OK);
+        check_reported_everywhere(session, insitu_step(session, cycle, 0), INSITU_OK, "");
+        everywhere(count_tree_cells(session) < all);
     }
     in.mesh.changed = INSITU_CHANGED_NOTHING;
-    while (tree_cells(session) < all && cycle < 1000) {
-        change_values(&in, 1e-6);
-        everywhere(submit(session, &in) == INSITU_OK);
-        reported_everywhere(session, insitu_step(session, cycle++, 0), INSITU_OK, "");
+    while (count_tree_cells(session) < all && cycle < 1000) {
+        shift_values(&in, 1e-6);
+        everywhere(submit_input(session, &in) == INSITU_OK);
+        check_reported_everywhere(session, insitu_step(session, cycle++, 0), INSITU_OK, "");
         discard_pictures();
     }
-    everywhere(tree_cells(session) == all);
-    change_values(&in, 1e-6);
-    everywhere(submit(session, &in) == INSITU_OK);
-    reported_everywhere(session, insitu_step(session, cycle, 0), INSITU_OK, "");
+    everywhere(count_tree_cells(session) == all);
+    shift_values(&in, 1e-6);
+    everywhere(submit_input(session, &in) == INSITU_OK);
+    check_reported_everywhere(session, insitu_step(session, cycle, 0), INSITU_OK, "");
     everywhere(insitu_last_report(session)->build_ms == 0 &&
                (insitu_last_report(session)->refit_ms > 0 || in.part.cell_count == 0));
     discard_pictures();
@@ -173,7 +173,7 @@ static void standing_cells_get_a_full_tree(void **context)
 }
 
 /* Checks that full trees are built if nearly all cells are visible, since a partial tree would save nothing. */
-static void full_trees_are_built_where_most_cells_show(void **context)
+static void full_trees_are_built_if_most_cells_are_visible(void **context)
 {
     (void)context;
     session_input in;
@@ -183,9 +183,9 @@ static void full_trees_are_built_where_most_cells_show(void **context)
     insitu_session *session =
         open_tree(SCENE_TREE_AUTO,
                   write_scene(IMAGE("      - volume: {field: f, range: [-4, 4], opacity: [[0, 0.1], [1, 0.5]]}\n")));
-    everywhere(submit(session, &in) == INSITU_OK);
-    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
-    everywhere(tree_cells(session) == all && !session->meshes.items[0]->is_partial);
+    everywhere(submit_input(session, &in) == INSITU_OK);
+    check_reported_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
+    everywhere(count_tree_cells(session) == all && !session->meshes.items[0]->is_partial);
     discard_pictures();
     insitu_destroy(&session);
     input_free(&in);
@@ -193,7 +193,7 @@ static void full_trees_are_built_where_most_cells_show(void **context)
 
 /* Returns the cost of traversing the tree, which is higher for a tree along a space-filling curve than for one by the
  * surface area heuristic. */
-static double tree_cost(const insitu_session *session)
+static double compute_tree_cost(const insitu_session *session)
 {
     return mmbvh_cost(&session->meshes.items[0]->tree, &(mmbvh_options){.threads = 1});
 }
@@ -211,18 +211,19 @@ static void trees_of_one_step_are_built_fast(void **context)
     static const bool is_anew[] = {true, true, true, false, true}, is_fast[] = {false, true, true, true, false};
     for (int step = 0; step < 5; step++) {
         in.mesh.changed = step ? INSITU_CHANGED_NOTHING : INSITU_CHANGED_ALL;
-        everywhere(submit(still, &in) == INSITU_OK);
+        everywhere(submit_input(still, &in) == INSITU_OK);
         in.mesh.changed = is_anew[step] ? INSITU_CHANGED_ALL : INSITU_CHANGED_NOTHING;
-        everywhere(submit(moving, &in) == INSITU_OK);
-        step_both(still, moving, step);
-        everywhere(in.part.cell_count < 100 || (tree_cost(moving) != tree_cost(still)) == is_fast[step]);
+        everywhere(submit_input(moving, &in) == INSITU_OK);
+        step_and_compare(still, moving, step);
+        everywhere(in.part.cell_count < 100 ||
+                   (compute_tree_cost(moving) != compute_tree_cost(still)) == is_fast[step]);
     }
     insitu_destroy(&still);
     insitu_destroy(&moving);
     input_free(&in);
 }
 
-static void sway(session_input *in, double by)
+static void move_vertices_periodically(session_input *in, double by)
 {
     for (int64_t i = 0; i < in->part.vertex_count; i++) {
         double *p = in->part.coordinates + 3 * i;
@@ -248,14 +249,14 @@ static void compare_moving(const char *images, test_mesh_kind kind)
     bool was_partial = false;
     input_create(&in, kind, 9, TEST_BLOCK, own_rank, rank_count);
     for (int i = 0; i < (int)(sizeof steps / sizeof steps[0]); i++) {
-        sway(&in, steps[i].sway);
-        change_values(&in, steps[i].change);
+        move_vertices_periodically(&in, steps[i].sway);
+        shift_values(&in, steps[i].change);
         in.mesh.changed = INSITU_CHANGED_ALL;
         in.field.changed = INSITU_CHANGED_VALUES;
-        everywhere(submit(anew, &in) == INSITU_OK);
+        everywhere(submit_input(anew, &in) == INSITU_OK);
         if (i) in.mesh.changed = steps[i].sway != 0 ? INSITU_CHANGED_GEOMETRY : INSITU_CHANGED_NOTHING;
-        everywhere(submit(kept, &in) == INSITU_OK);
-        step_both(anew, kept, 3 * i + 2 + i % 2);
+        everywhere(submit_input(kept, &in) == INSITU_OK);
+        step_and_compare(anew, kept, 3 * i + 2 + i % 2);
         was_partial = was_partial || kept->meshes.items[0]->are_bounds_partial;
         everywhere(!kept->meshes.items[0]->are_bounds_partial || steps[i].is_partial);
     }
@@ -265,13 +266,13 @@ static void compare_moving(const char *images, test_mesh_kind kind)
     input_free(&in);
 }
 
-static void moving_vertices_are_drawn_as_by_new_trees(void **context)
+static void moving_vertices_draw_same_picture_as_new_trees(void **context)
 {
     static const char *const images[] = {IMAGE(SURFACE), IMAGE(SURFACES VOLUME), IMAGE(STEPPED)};
     (void)context;
     for (size_t i = 0; i < sizeof images / sizeof images[0]; i++)
         for (size_t kind = 0; kind < sizeof kinds / sizeof kinds[0]; kind++)
-            if (test_is_whole() || (i + kind) % 3 == 0) compare_moving(images[i], kinds[kind]);
+            if (test_is_long_run() || (i + kind) % 3 == 0) compare_moving(images[i], kinds[kind]);
 }
 
 /* Checks that bounds refitted for one image are not used for another. The visible cells differ from step to step
@@ -279,7 +280,7 @@ static void moving_vertices_are_drawn_as_by_new_trees(void **context)
  * the camera looks at the position of b's surface at cycle 9: with the bounds from a step that drew only a, it would be
  * below the picture. */
 #define CAMERA "    camera: {position: [2.3, 0, 0.56], focal: [0, 0, 0.56], up: [0, 0, 1], angle: 1.7}\n"
-static void bounds_of_one_image_do_not_serve_another(void **context)
+static void bounds_of_one_image_are_not_used_for_another(void **context)
 {
     const char *scene = write_scene("images:\n"
                                     "  - name: a\n    size: [40, 30]\n    every: 2\n    layers:\n" TROUGHS
@@ -296,11 +297,11 @@ static void bounds_of_one_image_do_not_serve_another(void **context)
         const bool is_moved = i == 1 || i == 2;
         for (int64_t v = 0; v < in.part.vertex_count; v++) in.part.coordinates[3 * v + 2] += is_moved ? 0.12 : 0;
         in.mesh.changed = INSITU_CHANGED_ALL;
-        everywhere(submit(anew, &in) == INSITU_OK);
+        everywhere(submit_input(anew, &in) == INSITU_OK);
         if (i) in.mesh.changed = is_moved ? INSITU_CHANGED_GEOMETRY : INSITU_CHANGED_NOTHING;
-        everywhere(submit(kept, &in) == INSITU_OK);
+        everywhere(submit_input(kept, &in) == INSITU_OK);
         if (i != 1)
-            step_both(anew, kept, cycles[i]);
+            step_and_compare(anew, kept, cycles[i]);
         else
             everywhere(insitu_step(anew, 3, 0) == INSITU_OK && insitu_step(kept, 3, 0) == INSITU_OK);
     }
@@ -311,12 +312,12 @@ static void bounds_of_one_image_do_not_serve_another(void **context)
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(partial_trees_draw_what_full_ones_do),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(partial_trees_draw_same_picture_as_full_trees),
                                        cmocka_unit_test(trees_of_one_step_are_built_fast),
-                                       cmocka_unit_test(partial_trees_are_of_the_cells_that_show),
-                                       cmocka_unit_test(standing_cells_get_a_full_tree),
-                                       cmocka_unit_test(full_trees_are_built_where_most_cells_show),
-                                       cmocka_unit_test(moving_vertices_are_drawn_as_by_new_trees),
-                                       cmocka_unit_test(bounds_of_one_image_do_not_serve_another)};
+                                       cmocka_unit_test(partial_trees_contain_the_visible_cells),
+                                       cmocka_unit_test(static_cells_get_a_full_tree),
+                                       cmocka_unit_test(full_trees_are_built_if_most_cells_are_visible),
+                                       cmocka_unit_test(moving_vertices_draw_same_picture_as_new_trees),
+                                       cmocka_unit_test(bounds_of_one_image_are_not_used_for_another)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -23,7 +23,7 @@ static const char scene_text[] =
 
 /* Returns the index, in the given order, of VTK's n-th vertex, from its position in the unit cell and the direction
  * around a face. */
-static int place_in(insitu_vertex_order order, int type, int n)
+static int find_vertex_position(insitu_vertex_order order, int type, int n)
 {
     const int x = n % 4 == 1 || n % 4 == 2, y = n % 4 / 2, z = n / 4;
     const bool has_quads = type == INSITU_HEX || type == INSITU_QUAD || (type == INSITU_PYRAMID && n < 4);
@@ -40,7 +40,7 @@ static void reorder_cells(test_mesh *part, insitu_vertex_order order)
         const int64_t count = part->offsets[cell + 1] - part->offsets[cell];
         if (part->types[cell] == INSITU_POLYHEDRON) continue;
         memcpy(held, first, (size_t)count * sizeof *first);
-        for (int n = 0; n < count; n++) first[place_in(order, part->types[cell], n)] = held[n];
+        for (int n = 0; n < count; n++) first[find_vertex_position(order, part->types[cell], n)] = held[n];
     }
 }
 
@@ -65,7 +65,7 @@ static void free_moved(moved *m)
     *m = (moved){0};
 }
 
-static void put(const moved *m, bool is_narrow, int64_t i, int64_t value)
+static void store_index(const moved *m, bool is_narrow, int64_t i, int64_t value)
 {
     if (is_narrow)
         ((int32_t *)m->connectivity)[i] = (int32_t)value;
@@ -82,9 +82,9 @@ static void move_connectivity(session_input *in, layout how, moved *m)
     const int64_t corners = part->cell_count ? part->offsets[1] - part->offsets[0] : 1, row = has_rows ? ROW : corners;
     m->connectivity = malloc((size_t)(part->cell_count * row + 1) * 8);
     assert_non_null(m->connectivity);
-    for (int64_t i = 0; i < part->cell_count * row; i++) put(m, is_narrow, i, -1000000);
+    for (int64_t i = 0; i < part->cell_count * row; i++) store_index(m, is_narrow, i, -1000000);
     for (int64_t i = 0; i < part->connectivity_count; i++)
-        put(m, is_narrow, i / corners * row + i % corners, part->connectivity[i] + in->mesh.index_base);
+        store_index(m, is_narrow, i / corners * row + i % corners, part->connectivity[i] + in->mesh.index_base);
     in->mesh.cell_type = type_of_kind[in->kind];
     in->mesh.cell_types = in->mesh.offsets = in->mesh.ghosts = (insitu_array){0};
     in->mesh.connectivity = (insitu_array){m->connectivity, is_narrow ? INSITU_INT32 : INSITU_INT64, 0};
@@ -133,10 +133,10 @@ static drawing step_and_catch(insitu_session *session, int cycle)
     return out;
 }
 
-static drawing draw(const session_input *in)
+static drawing draw_input(const session_input *in)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
-    const insitu_status status = submit(session, in);
+    const insitu_status status = submit_input(session, in);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     everywhere(status == INSITU_OK);
     drawing out = step_and_catch(session, 0);
@@ -144,7 +144,7 @@ static drawing draw(const session_input *in)
     return out;
 }
 
-static bool are_same(const drawing *a, const drawing *b)
+static bool are_same_drawings(const drawing *a, const drawing *b)
 {
     bool same = true;
     for (int i = 0; i < PICTURES && own_rank == 0; i++)
@@ -165,11 +165,11 @@ static bool has_reordered(const test_mesh *part, insitu_vertex_order order)
     for (int64_t cell = 0; cell < part->cell_count; cell++)
         for (int n = 0; n < part->offsets[cell + 1] - part->offsets[cell] && part->types[cell] != INSITU_POLYHEDRON;
              n++)
-            turned = turned || place_in(order, part->types[cell], n) != n;
+            turned = turned || find_vertex_position(order, part->types[cell], n) != n;
     return turned;
 }
 
-static void check(test_mesh_kind kind, insitu_vertex_order order, layout how, int base)
+static void check_order_and_layout(test_mesh_kind kind, insitu_vertex_order order, layout how, int base)
 {
     session_input plain = {0}, in = {0};
     input_create(&plain, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
@@ -179,9 +179,9 @@ static void check(test_mesh_kind kind, insitu_vertex_order order, layout how, in
     in.mesh.index_base = base;
     moved plain_arrays = move_arrays(&plain, how >= NARROW ? NARROW : how == ROWS ? PACKED : how);
     moved arrays = move_arrays(&in, how);
-    drawing expected = draw(&plain), drawn = draw(&in);
+    drawing expected = draw_input(&plain), drawn = draw_input(&in);
     const bool is_copied = in.part.cell_count && (in.mesh.connectivity_row || has_reordered(&in.part, order));
-    everywhere(are_same(&expected, &drawn));
+    everywhere(are_same_drawings(&expected, &drawn));
     everywhere(drawn.copied == expected.copied + is_copied * 4 * (in.part.connectivity_count + 1));
     everywhere(drawn.gives_reason == is_copied && !drawn.is_warned);
     free_drawing(&expected);
@@ -197,29 +197,29 @@ static void every_order_and_layout_draws_the_same(void **state)
     (void)state;
     for (int order = INSITU_ORDER_VTK; order <= INSITU_ORDER_DMPLEX; order++) {
         for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
-            check(kind, (insitu_vertex_order)order, WITH_TYPES, 0);
+            check_order_and_layout(kind, (insitu_vertex_order)order, WITH_TYPES, 0);
         for (test_mesh_kind kind = TEST_TETS; kind <= TEST_PYRAMIDS; kind++)
             for (layout how = PACKED; how < LAYOUTS; how++)
-                check(kind, (insitu_vertex_order)order, how, how == ROWS || how == NARROW);
+                check_order_and_layout(kind, (insitu_vertex_order)order, how, how == ROWS || how == NARROW);
     }
 }
 
 /* Checks hexes of which half are given by their faces: these are recognised as hexes, next to those in another
  * order. */
-static void recognised_cells_go_with_any_order(void **state)
+static void recognised_cells_work_with_any_order(void **state)
 {
     (void)state;
     session_input in = {0};
     input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
     test_mesh_to_polyhedra(&in.part, 0.5);
     input_describe(&in);
-    drawing expected = draw(&in);
+    drawing expected = draw_input(&in);
     reorder_cells(&in.part, INSITU_ORDER_LEXICOGRAPHIC);
     in.mesh.vertex_order = INSITU_ORDER_LEXICOGRAPHIC;
-    drawing drawn = draw(&in);
-    everywhere(are_same(&expected, &drawn) && expected.copied == drawn.copied);
+    drawing drawn = draw_input(&in);
+    everywhere(are_same_drawings(&expected, &drawn) && expected.copied == drawn.copied);
     in.mesh.keep_polyhedra = 1;
-    drawing kept = draw(&in);
+    drawing kept = draw_input(&in);
     everywhere(kept.copied < drawn.copied && kept.gives_reason);
     free_drawing(&kept);
     free_drawing(&expected);
@@ -237,18 +237,18 @@ static void quads_are_shells_in_any_order(void **state)
     in.mesh.cell_type = INSITU_QUAD;
     in.mesh.cell_types = in.mesh.offsets = (insitu_array){0};
     in.mesh.connectivity_row = 8;
-    drawn[0] = draw(&in);
+    drawn[0] = draw_input(&in);
     for (int64_t cell = 0; cell < in.part.cell_count; cell++) {
         int64_t *quad = in.part.connectivity + 8 * cell, held = quad[2];
         quad[2] = quad[3], quad[3] = held;
     }
     in.mesh.vertex_order = INSITU_ORDER_LEXICOGRAPHIC;
-    drawn[1] = draw(&in);
-    everywhere(are_same(&drawn[0], &drawn[1]));
+    drawn[1] = draw_input(&in);
+    everywhere(are_same_drawings(&drawn[0], &drawn[1]));
     in.mesh.vertex_order = INSITU_ORDER_VTK;
     free_drawing(&drawn[1]);
-    drawn[1] = draw(&in);
-    everywhere(own_rank != 0 || !are_same(&drawn[0], &drawn[1]));
+    drawn[1] = draw_input(&in);
+    everywhere(own_rank != 0 || !are_same_drawings(&drawn[0], &drawn[1]));
     free_drawing(&drawn[0]);
     free_drawing(&drawn[1]);
     input_free(&in);
@@ -256,26 +256,26 @@ static void quads_are_shells_in_any_order(void **state)
 
 /* Checks a wrong order and its correction: the wrong order gives a warning; with the correct one the cells are drawn,
  * whatever the caller states about changes. A mesh that moves keeps its copy. */
-static void the_order_may_be_set_right(void **state)
+static void wrong_order_can_be_corrected(void **state)
 {
     (void)state;
     session_input in = {0};
     input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
-    drawing expected = draw(&in);
+    drawing expected = draw_input(&in);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
     reorder_cells(&in.part, INSITU_ORDER_LEXICOGRAPHIC);
     for (int step = 0; step < 3; step++) {
         in.mesh.changed = step == 2 ? INSITU_CHANGED_GEOMETRY : INSITU_CHANGED_NOTHING;
         in.mesh.vertex_order = step ? INSITU_ORDER_LEXICOGRAPHIC : INSITU_ORDER_VTK;
-        everywhere(submit(session, &in) == INSITU_OK);
+        everywhere(submit_input(session, &in) == INSITU_OK);
         drawing drawn = step_and_catch(session, step);
         everywhere(drawn.is_warned == (step == 0));
-        everywhere(own_rank != 0 || are_same(&expected, &drawn) == (step > 0));
+        everywhere(own_rank != 0 || are_same_drawings(&expected, &drawn) == (step > 0));
         free_drawing(&drawn);
     }
     insitu_destroy(&session);
     reorder_cells(&in.part, INSITU_ORDER_LEXICOGRAPHIC); /* back to the wrong order */
-    drawing drawn = draw(&in);
+    drawing drawn = draw_input(&in);
     everywhere(drawn.is_warned);
     free_drawing(&drawn);
     free_drawing(&expected);
@@ -286,100 +286,108 @@ static void the_order_may_be_set_right(void **state)
 
 static moved corrupted;
 
-static void in_rows(session_input *in)
+static void use_rows(session_input *in)
 {
     free_moved(&corrupted);
     corrupted = move_arrays(in, ROWS);
 }
-static void unknown_order(session_input *in)
+static void set_unknown_order(session_input *in)
 {
     in->mesh.vertex_order = (insitu_vertex_order)6;
 }
-static void negative_row(session_input *in)
+static void set_negative_row(session_input *in)
 {
-    in_rows(in);
+    use_rows(in);
     in->mesh.connectivity_row = -8;
 }
-static void short_row(session_input *in)
+static void set_short_row(session_input *in)
 {
-    in_rows(in);
+    use_rows(in);
     in->mesh.connectivity_row = 7;
 }
-static void huge_row(session_input *in)
+static void set_huge_row(session_input *in)
 {
-    in_rows(in);
+    use_rows(in);
     in->mesh.connectivity_row = INT64_MAX;
 }
-static void missing_entry(session_input *in)
+static void remove_last_entry(session_input *in)
 {
-    in_rows(in);
+    use_rows(in);
     in->mesh.connectivity_count--;
 }
-static void no_entries(session_input *in)
+static void remove_entries(session_input *in)
 {
-    in_rows(in);
+    use_rows(in);
     in->mesh.connectivity_count = 4;
 }
-static void rows_and_offsets(session_input *in)
+static void set_rows_and_offsets(session_input *in)
 {
     in->mesh.cell_types.data = NULL;
     in->mesh.cell_type = INSITU_HEX;
     in->mesh.connectivity_row = 8;
 }
-static void rows_and_types(session_input *in)
+static void set_rows_and_types(session_input *in)
 {
     in->mesh.offsets.data = NULL;
     in->mesh.connectivity_row = 8;
 }
-static void vertex_in_row(session_input *in)
+static void set_large_vertex_in_row(session_input *in)
 {
-    in_rows(in);
+    use_rows(in);
     in->mesh.vertex_order = INSITU_ORDER_LEXICOGRAPHIC;
     ((int64_t *)corrupted.connectivity)[3 * ROW + 2] = -5;
 }
 /* If it were truncated to 4 bytes, it would be a valid index. */
-static void far_vertex_in_row(session_input *in)
+static void set_far_vertex_in_row(session_input *in)
 {
-    in_rows(in);
+    use_rows(in);
     ((int64_t *)corrupted.connectivity)[ROW + 1] = ((int64_t)1 << 32) + 1;
 }
-static void vertex_before_one(session_input *in)
+static void set_vertex_before_one(session_input *in)
 {
     in->mesh.index_base = 1;
-    in_rows(in);
+    use_rows(in);
     ((int64_t *)corrupted.connectivity)[ROW + 7] = 0;
 }
-static void offsets_in_order(session_input *in)
+static void set_offsets_with_order(session_input *in)
 {
     in->mesh.vertex_order = INSITU_ORDER_LEXICOGRAPHIC;
     in->part.offsets[2]++;
 }
-static void far_offsets_in_order(session_input *in)
+static void set_far_offsets(session_input *in)
 {
     in->mesh.vertex_order = INSITU_ORDER_LEXICOGRAPHIC;
     in->part.offsets[1] = INT64_MAX - 3;
 }
-static void type_in_order(session_input *in)
+static void set_type_without_order(session_input *in)
 {
     in->mesh.vertex_order = INSITU_ORDER_LEXICOGRAPHIC;
     in->part.types[1] = 99;
 }
 
 static const corrupted_case cases[] = {
-    {"order", unknown_order, INSITU_ERROR_ARGUMENT, true, {"vertex_order is 6, expected 0 (VTK's), 1 (lexicographic)"}},
-    {"row -8", negative_row, INSITU_ERROR_MESH, true, {"connectivity_row is -8, a cell has 8 vertices"}},
-    {"row 7", short_row, INSITU_ERROR_MESH, true, {"connectivity_row is 7, a cell has 8 vertices"}},
-    {"huge row", huge_row, INSITU_ERROR_MESH, true, {"too few for ", "in rows of 9223372036854775807"}},
-    {"one less", missing_entry, INSITU_ERROR_MESH, true, {"too few for ", "cells of 8 vertices in rows of 27"}},
-    {"four", no_entries, INSITU_ERROR_MESH, true, {"connectivity_count is 4, too few for "}},
-    {"offsets", rows_and_offsets, INSITU_ERROR_MESH, true, {"connectivity_row is 8 and offsets are given"}},
-    {"types", rows_and_types, INSITU_ERROR_MESH, true, {"cell types are given without offsets"}},
-    {"vertex", vertex_in_row, INSITU_ERROR_MESH, false, {"cell 3 (hex): vertex index -5 is outside 0.."}},
-    {"far", far_vertex_in_row, INSITU_ERROR_MESH, false, {"cell 1 (hex): vertex index 4294967297 is outside 0.."}},
-    {"0 of 1", vertex_before_one, INSITU_ERROR_MESH, false, {"cell 1 (hex): vertex index 0 is outside 1..", "is 1)"}},
-    {"bad offsets", offsets_in_order, INSITU_ERROR_MESH, false, {"cell 1 (hex): offsets "}},
-    {"far offsets", far_offsets_in_order, INSITU_ERROR_MESH, false, {"cell 0 (hex): offsets "}},
-    {"bad type", type_in_order, INSITU_ERROR_MESH, false, {"cell 1: unknown cell type 99"}},
+    {"order",
+     set_unknown_order,
+     INSITU_ERROR_ARGUMENT,
+     true,
+     {"vertex_order is 6, expected 0 (VTK's), 1 (lexicographic)"}},
+    {"row -8", set_negative_row, INSITU_ERROR_MESH, true, {"connectivity_row is -8, a cell has 8 vertices"}},
+    {"row 7", set_short_row, INSITU_ERROR_MESH, true, {"connectivity_row is 7, a cell has 8 vertices"}},
+    {"huge row", set_huge_row, INSITU_ERROR_MESH, true, {"too few for ", "in rows of 9223372036854775807"}},
+    {"one less", remove_last_entry, INSITU_ERROR_MESH, true, {"too few for ", "cells of 8 vertices in rows of 27"}},
+    {"four", remove_entries, INSITU_ERROR_MESH, true, {"connectivity_count is 4, too few for "}},
+    {"offsets", set_rows_and_offsets, INSITU_ERROR_MESH, true, {"connectivity_row is 8 and offsets are given"}},
+    {"types", set_rows_and_types, INSITU_ERROR_MESH, true, {"cell types are given without offsets"}},
+    {"vertex", set_large_vertex_in_row, INSITU_ERROR_MESH, false, {"cell 3 (hex): vertex index -5 is outside 0.."}},
+    {"far", set_far_vertex_in_row, INSITU_ERROR_MESH, false, {"cell 1 (hex): vertex index 4294967297 is outside 0.."}},
+    {"0 of 1",
+     set_vertex_before_one,
+     INSITU_ERROR_MESH,
+     false,
+     {"cell 1 (hex): vertex index 0 is outside 1..", "is 1)"}},
+    {"bad offsets", set_offsets_with_order, INSITU_ERROR_MESH, false, {"cell 1 (hex): offsets "}},
+    {"far offsets", set_far_offsets, INSITU_ERROR_MESH, false, {"cell 0 (hex): offsets "}},
+    {"bad type", set_type_without_order, INSITU_ERROR_MESH, false, {"cell 1: unknown cell type 99"}},
 };
 
 static void wrong_input_is_reported_on_all_ranks(void **state)
@@ -387,7 +395,7 @@ static void wrong_input_is_reported_on_all_ranks(void **state)
     (void)state;
     session_input in = {0};
     input_create(&in, TEST_HEXES, 3, TEST_RANDOM, own_rank, rank_count);
-    all_are_reported(&in, cases, sizeof cases / sizeof cases[0]);
+    check_all_faults_are_reported(&in, cases, sizeof cases / sizeof cases[0]);
     input_free(&in);
     free_moved(&corrupted);
 }
@@ -395,8 +403,8 @@ static void wrong_input_is_reported_on_all_ranks(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_order_and_layout_draws_the_same), cmocka_unit_test(recognised_cells_go_with_any_order),
-        cmocka_unit_test(quads_are_shells_in_any_order), cmocka_unit_test(the_order_may_be_set_right),
+        cmocka_unit_test(every_order_and_layout_draws_the_same), cmocka_unit_test(recognised_cells_work_with_any_order),
+        cmocka_unit_test(quads_are_shells_in_any_order), cmocka_unit_test(wrong_order_can_be_corrected),
         cmocka_unit_test(wrong_input_is_reported_on_all_ranks)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -28,8 +28,8 @@ static void create_input(void)
 static insitu_session *open_and_draw(void)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
-    everywhere(submit(session, &input) == INSITU_OK);
-    step_is_good(session, 0);
+    everywhere(submit_input(session, &input) == INSITU_OK);
+    check_step_succeeds(session, 0);
     return session;
 }
 
@@ -61,7 +61,7 @@ static const moved_array moved_arrays[] = {
     {"faces", offsetof(insitu_mesh, face_connectivity), 8, 0, {.index = (int64_t)1 << 40}, "1099511627776"},
 };
 
-static int64_t element_count(const insitu_mesh *mesh, size_t place)
+static int64_t get_element_count(const insitu_mesh *mesh, size_t place)
 {
     if (place == offsetof(insitu_mesh, cell_types)) return mesh->cell_count;
     if (place == offsetof(insitu_mesh, connectivity)) return mesh->connectivity_count;
@@ -75,7 +75,7 @@ static int64_t element_count(const insitu_mesh *mesh, size_t place)
 static char *copy_elsewhere(insitu_mesh *mesh, const moved_array *moved)
 {
     insitu_array *array = (insitu_array *)((char *)mesh + moved->place);
-    const size_t bytes = (size_t)element_count(mesh, moved->place) * moved->bytes;
+    const size_t bytes = (size_t)get_element_count(mesh, moved->place) * moved->bytes;
     const size_t tail = moved->bytes == 24 ? 16 : 0;
     char *copy = malloc(bytes);
     assert_non_null(copy);
@@ -84,7 +84,7 @@ static char *copy_elsewhere(insitu_mesh *mesh, const moved_array *moved)
     return copy;
 }
 
-static void corrupted_arrays_elsewhere_are_reported(void **context)
+static void corrupted_reallocated_arrays_are_reported(void **context)
 {
     (void)context;
     for (size_t i = 0; i < sizeof moved_arrays / sizeof moved_arrays[0]; i++) {
@@ -96,7 +96,7 @@ static void corrupted_arrays_elsewhere_are_reported(void **context)
         memcpy(copy + (size_t)moved->at * moved->bytes, &moved->value, moved->bytes == 1 ? 1 : 8);
         everywhere(insitu_set_mesh(session, "m", &mesh) == INSITU_OK);
         const insitu_status status = insitu_step(session, 1, 0);
-        reported_everywhere(session, status, INSITU_ERROR_MESH, "rank 0: mesh \"m\": cell", moved->words);
+        check_reported_everywhere(session, status, INSITU_ERROR_MESH, "rank 0: mesh \"m\": cell", moved->words);
         insitu_destroy(&session);
         free(copy);
     }
@@ -105,14 +105,14 @@ static void corrupted_arrays_elsewhere_are_reported(void **context)
 /* ---- other pictures ------------------------------------------------------------------------------------------- */
 
 /* Checks that the picture of the session's next step equals that of a session which gets everything as it now is. */
-static void next_picture_is(insitu_session *session, const session_input *now, insitu_session *fresh)
+static void check_next_picture(insitu_session *session, const session_input *now, insitu_session *fresh)
 {
     const size_t pixels = (size_t)48 * 36;
     caught_picture first = {0};
-    step_is_good(session, 1);
+    check_step_succeeds(session, 1);
     if (own_rank == 0) first = caught[0], caught_count = 0;
-    everywhere(submit(fresh, now) == INSITU_OK);
-    step_is_good(fresh, 0);
+    everywhere(submit_input(fresh, now) == INSITU_OK);
+    check_step_succeeds(fresh, 0);
     everywhere(own_rank != 0 || !memcmp(first.rgba, caught[0].rgba, 4 * pixels * sizeof(float)));
     free(first.rgba);
     free(first.depth);
@@ -127,12 +127,12 @@ static void check_picture(const session_input *now, bool is_field)
     unchanged.mesh.changed = unchanged.field.changed = INSITU_CHANGED_NOTHING;
     everywhere((is_field ? insitu_set_field(session, "m", &unchanged.field)
                          : insitu_set_mesh(session, "m", &unchanged.mesh)) == INSITU_OK);
-    next_picture_is(session, now, fresh);
+    check_next_picture(session, now, fresh);
     insitu_destroy(&session);
     insitu_destroy(&fresh);
 }
 
-static void vertices_elsewhere_are_drawn_there(void **context)
+static void reallocated_vertices_are_drawn_at_new_positions(void **context)
 {
     (void)context;
     session_input now = input;
@@ -146,7 +146,7 @@ static void vertices_elsewhere_are_drawn_there(void **context)
     free(moved);
 }
 
-static void cells_elsewhere_are_drawn_with_their_fields(void **context)
+static void reallocated_cells_are_drawn_with_their_fields(void **context)
 {
     (void)context;
     session_input now = input;
@@ -158,7 +158,7 @@ static void cells_elsewhere_are_drawn_with_their_fields(void **context)
     free(ghosts);
 }
 
-static void values_elsewhere_are_drawn(void **context)
+static void reallocated_values_are_drawn(void **context)
 {
     (void)context;
     session_input now = input;
@@ -182,7 +182,7 @@ static void invert_values(void)
 
 /* Checks values that change in place but are stated to be unchanged or are not set again: they are drawn as they are,
  * with a warning. */
-static void values_that_change_without_a_word_are_reported(void **context)
+static void undeclared_value_changes_are_reported(void **context)
 {
     (void)context;
     static const char words[] = "mesh \"m\": field \"f\" has other values than in the last picture";
@@ -192,20 +192,20 @@ static void values_that_change_without_a_word_are_reported(void **context)
         insitu_field unchanged = input.field;
         unchanged.changed = INSITU_CHANGED_NOTHING;
         everywhere(!is_set || insitu_set_field(session, "m", &unchanged) == INSITU_OK);
-        next_picture_is(session, &input, fresh);
+        check_next_picture(session, &input, fresh);
         everywhere(strstr(insitu_last_report(session)->warnings, words) != NULL);
-        step_is_good(session, 2);
+        check_step_succeeds(session, 2);
         everywhere(!*insitu_last_report(session)->warnings);
         invert_values();
         everywhere(insitu_set_field(session, "m", &input.field) == INSITU_OK);
-        next_picture_is(session, &input, fresh);
+        check_next_picture(session, &input, fresh);
         everywhere(!*insitu_last_report(session)->warnings);
         insitu_destroy(&session);
         insitu_destroy(&fresh);
     }
 }
 
-static int begin_tests(void **state)
+static int set_up_test_group(void **state)
 {
     (void)state;
     create_input();
@@ -213,7 +213,7 @@ static int begin_tests(void **state)
     return 0;
 }
 
-static int end_tests(void **state)
+static int tear_down_test_group(void **state)
 {
     (void)state;
     input_free(&input);
@@ -223,11 +223,11 @@ static int end_tests(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(corrupted_arrays_elsewhere_are_reported),
-        cmocka_unit_test(vertices_elsewhere_are_drawn_there),
-        cmocka_unit_test(cells_elsewhere_are_drawn_with_their_fields),
-        cmocka_unit_test(values_elsewhere_are_drawn),
-        cmocka_unit_test(values_that_change_without_a_word_are_reported),
+        cmocka_unit_test(corrupted_reallocated_arrays_are_reported),
+        cmocka_unit_test(reallocated_vertices_are_drawn_at_new_positions),
+        cmocka_unit_test(reallocated_cells_are_drawn_with_their_fields),
+        cmocka_unit_test(reallocated_values_are_drawn),
+        cmocka_unit_test(undeclared_value_changes_are_reported),
     };
-    return run_session_tests(argc, argv, tests, begin_tests, end_tests);
+    return run_session_tests(argc, argv, tests, set_up_test_group, tear_down_test_group);
 }

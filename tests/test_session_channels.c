@@ -14,7 +14,7 @@ enum { SIDE = 3, WIDTH = 48, HEIGHT = 36, PIXELS = WIDTH * HEIGHT };
 enum { NX, NY, NZ, VALUE, LAYER, SURFACE, CHANNELS };
 
 /* The layers: 0 is a volume, 1 two planes of a slice, 2 two transparent isosurfaces, none of which f colours, and 3 an
- * isosurface that f colours. test_linear() is 0.3 x - 0.7 y + 0.5 z + 0.1. */
+ * isosurface that f colours. test_linear_field() is 0.3 x - 0.7 y + 0.5 z + 0.1. */
 #define SCENE(more)                                                                                                    \
     "images:\n  - name: a\n    size: [48, 36]\n    background: [0, 0, 0, 0]\n"                                         \
     "    camera: {position: [3, 2.2, 4], focal: [0, 0, 0], angle: 40}\n" more "    layers:\n"                          \
@@ -39,16 +39,16 @@ static const plane planes[] = {{{1, 0, 0}, -0.4, 1, 0, false, 0},
                                {{0.3, -0.7, 0.5}, -0.4, 3, 0, false, 0}};
 enum { PLANES = sizeof planes / sizeof *planes };
 
-static double dot(const double a[3], const double b[3])
+static double dot_product(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
 /* Computes the depth at which the pixel's ray meets the plane inside the cube; returns false if it does not. close is
  * set if rounding decides. */
-static bool meet(const plane *p, const double base[3], const double direction[3], double *depth, bool *close)
+static bool intersect_plane(const plane *p, const double base[3], const double direction[3], double *depth, bool *close)
 {
-    *depth = (p->distance - dot(p->normal, base)) / dot(p->normal, direction);
+    *depth = (p->distance - dot_product(p->normal, base)) / dot_product(p->normal, direction);
     bool is_within = true;
     for (int a = 0; a < 3; a++) {
         const double place = fabs(base[a] + *depth * direction[a]);
@@ -68,14 +68,14 @@ static bool is_as_expected(const caught_picture *picture, int pixel, const plane
     if (!p)
         return own[NX] == 0 && own[NY] == 0 && own[NZ] == 0 && isnan(own[VALUE]) && own[LAYER] == -1 &&
                own[SURFACE] == -1;
-    const double length = sqrt(dot(p->normal, p->normal)) * (dot(p->normal, direction) > 0 ? -1 : 1);
+    const double length = sqrt(dot_product(p->normal, p->normal)) * (dot_product(p->normal, direction) > 0 ? -1 : 1);
     bool is_well = own[LAYER] == p->layer && own[SURFACE] == p->surface;
     for (int a = 0; a < 3; a++) is_well = is_well && fabs(own[NX + a] - p->normal[a] / length) < 1e-5;
     return is_well && (p->has_isovalue ? own[VALUE] == (double)(float)p->isovalue
-                                       : fabs(own[VALUE] - test_linear(place)) < 1.5e-5);
+                                       : fabs(own[VALUE] - test_linear_field(place)) < 1.5e-5);
 }
 
-static bool is_right(const caught_picture *picture)
+static bool is_channel_picture_exact(const caught_picture *picture)
 {
     int hits[PLANES] = {0};
     render_camera camera;
@@ -88,7 +88,7 @@ static bool is_right(const caught_picture *picture)
         render_camera_ray(&camera, pixel % WIDTH, pixel / WIDTH, base, direction);
         for (int i = 0; i < PLANES; i++) {
             double depth;
-            if (!meet(&planes[i], base, direction, &depth, &is_close) || depth > nearest + 1e-4) continue;
+            if (!intersect_plane(&planes[i], base, direction, &depth, &is_close) || depth > nearest + 1e-4) continue;
             is_close = is_close || fabs(depth - nearest) < 1e-4;
             nearest = depth;
             seen = &planes[i];
@@ -99,7 +99,7 @@ static bool is_right(const caught_picture *picture)
         if (is_as_expected(picture, pixel, seen, place, direction)) continue;
         fprintf(stderr, "pixel %d, plane %d:", pixel, seen ? (int)(seen - planes) : -1);
         for (int c = 0; c < CHANNELS; c++) fprintf(stderr, " %.9g", (double)picture->data[c * PIXELS + pixel]);
-        fprintf(stderr, "; the field there is %.9g\n", test_linear(place));
+        fprintf(stderr, "; the field there is %.9g\n", test_linear_field(place));
         return false;
     }
     for (int i = 0; i < PLANES; i++)
@@ -107,22 +107,23 @@ static bool is_right(const caught_picture *picture)
     return true;
 }
 
-static void compare(test_mesh_kind kind, const char *text)
+static void compare_channels(test_mesh_kind kind, const char *text)
 {
     session_input whole = {0}, part = {0};
     const char *scene = write_scene(text);
-    test_mesh_lattice(kind, SIDE, 0.2, test_linear, &whole.part);
+    test_mesh_make_lattice(kind, SIDE, 0.2, test_linear_field, &whole.part);
     input_describe(&whole);
     int *owners = test_calloc((size_t)whole.part.cell_count, sizeof *owners);
-    test_partition(&whole.part, TEST_RANDOM, SIDE, rank_count, owners);
-    test_mesh_part(&whole.part, owners, own_rank, &part.part);
+    test_partition_cells(&whole.part, TEST_RANDOM, SIDE, rank_count, owners);
+    test_mesh_extract_part(&whole.part, owners, own_rank, &part.part);
     test_free(owners);
     input_describe(&part);
     caught_picture ours = draw_scene(MPI_COMM_WORLD, scene, &part), alone = {0};
     bool is_well = true;
     if (own_rank == 0) {
         alone = draw_scene(MPI_COMM_SELF, scene, &whole);
-        is_well = alone.channel_count == CHANNELS && is_right(&alone) && ours.channel_count == CHANNELS &&
+        is_well = alone.channel_count == CHANNELS && is_channel_picture_exact(&alone) &&
+                  ours.channel_count == CHANNELS &&
                   memcmp(ours.data, alone.data, CHANNELS * PIXELS * sizeof(float)) == 0;
         if (!is_well) fprintf(stderr, "%s\n", test_mesh_kind_name(kind));
     }
@@ -136,13 +137,13 @@ static void compare(test_mesh_kind kind, const char *text)
 static void data_are_those_of_the_nearest_surface(void **state)
 {
     (void)state;
-    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) compare(kind, SCENE(""));
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) compare_channels(kind, SCENE(""));
 }
 
 static void samples_do_not_change_the_data(void **state)
 {
     (void)state;
-    compare(TEST_HEXES, SCENE("    antialias: 4\n"));
+    compare_channels(TEST_HEXES, SCENE("    antialias: 4\n"));
 }
 
 int main(int argc, char **argv)

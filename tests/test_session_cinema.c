@@ -55,7 +55,7 @@ static void run_steps(const char *scene, const session_input *in, int first, int
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
     discard_pictures();
     for (int cycle = first; cycle < end; cycle++) {
-        assert_int_equal(submit(session, in), INSITU_OK);
+        assert_int_equal(submit_input(session, in), INSITU_OK);
         set_second_field(session, in, values);
         const insitu_status status = insitu_step(session, cycle, 0.5 * cycle);
         if (status) fprintf(stderr, "%s\n", insitu_error(session));
@@ -87,7 +87,7 @@ static void expect_script(const char *table, char text[MOST])
     snprintf(text + size, MOST - size, "]);\n");
 }
 
-static bool is_page_there(void)
+static bool page_exists(void)
 {
     static char page[MOST];
     read_file("out/a.cdb/index.html", MOST, page);
@@ -107,10 +107,10 @@ static bool is_table(int first, int end)
     static char script[MOST];
     expect_script(expected, script);
     read_file("out/a.cdb/data.js", MOST, found);
-    return strcmp(found, script) == 0 && is_page_there();
+    return strcmp(found, script) == 0 && page_exists();
 }
 
-static void tables_have_a_line_a_picture(void **state)
+static void tables_have_one_line_per_picture(void **state)
 {
     (void)state;
     session_input in = {0};
@@ -150,7 +150,7 @@ static void tables_of_several_images_have_all_columns(void **state)
 
 /* ---- restarts -------------------------------------------------------------------------------------------------- */
 
-static void runs_that_begin_again_go_on_with_the_table(void **state)
+static void restarted_runs_continue_the_table(void **state)
 {
     (void)state;
     static char text[MOST];
@@ -162,7 +162,7 @@ static void runs_that_begin_again_go_on_with_the_table(void **state)
     everywhere(is_table(0, 7));
     read_file("out/a.cdb/data.csv", MOST, text);
     if (own_rank == 0) text[strlen(text) - 9] = '\0'; /* truncates the last line */
-    put_file("out/a.cdb/data.csv", text);
+    write_text_file("out/a.cdb/data.csv", text);
     run_steps(swept, &in, 7, 9);
     expect_table(0, 9, text);
     static char found[MOST];
@@ -182,7 +182,7 @@ static void runs_that_begin_again_go_on_with_the_table(void **state)
 
 /* Checks that lines between the session's first cycle and its first picture, which come from an earlier run, are
  * removed. */
-static void lines_go_from_the_first_step_on(void **state)
+static void table_lines_begin_at_the_first_step(void **state)
 {
     (void)state;
     session_input in = {0};
@@ -203,7 +203,7 @@ static void lines_go_from_the_first_step_on(void **state)
 }
 
 /* Checks a simulation that goes back in time, and one that draws a cycle twice. */
-static void steps_that_go_back_drop_what_was_after(void **state)
+static void earlier_cycle_removes_later_table_lines(void **state)
 {
     (void)state;
     session_input in = {0};
@@ -213,7 +213,7 @@ static void steps_that_go_back_drop_what_was_after(void **state)
     static const int cycles[] = {0, 2, 4, 6, 2, 2};
     for (int i = 0; i < 6; i++) {
         discard_pictures();
-        assert_int_equal(submit(session, &in), INSITU_OK);
+        assert_int_equal(submit_input(session, &in), INSITU_OK);
         everywhere(insitu_step(session, cycles[i], 0.5 * cycles[i]) == INSITU_OK);
         everywhere(is_table(0, cycles[i] + 1));
     }
@@ -231,19 +231,20 @@ static void tables_that_cannot_be_written_are_reported_and_written_later(void **
     remove_files();
     if (own_rank == 0) mkdir("out/a.cdb/data.csv", 0777);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(swept));
-    assert_int_equal(submit(session, &in), INSITU_OK);
+    assert_int_equal(submit_input(session, &in), INSITU_OK);
     discard_pictures();
-    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "cinema: out/a.cdb/data.csv",
-                        "cannot be");
+    check_reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "cinema: out/a.cdb/data.csv",
+                              "cannot be");
     everywhere(caught_count == (own_rank == 0 ? 8 : 0));
     if (own_rank == 0) rmdir("out/a.cdb/data.csv");
-    put_file("out/a.cdb/data.csv", "a,b\n1,2\n");
-    reported_everywhere(session, insitu_step(session, 2, 1), INSITU_ERROR_IO, "out/a.cdb/data.csv", "other columns",
-                        "\"cycle,time,phi,theta,isovalue,FILE\"");
+    write_text_file("out/a.cdb/data.csv", "a,b\n1,2\n");
+    check_reported_everywhere(session, insitu_step(session, 2, 1), INSITU_ERROR_IO, "out/a.cdb/data.csv",
+                              "other columns", "\"cycle,time,phi,theta,isovalue,FILE\"");
     remove_files();
     if (own_rank == 0) mkdir("out/a.cdb/data.js", 0777);
     discard_pictures();
-    reported_everywhere(session, insitu_step(session, 4, 2), INSITU_ERROR_IO, "cinema: out/a.cdb/data.js", "written");
+    check_reported_everywhere(session, insitu_step(session, 4, 2), INSITU_ERROR_IO, "cinema: out/a.cdb/data.js",
+                              "written");
     if (own_rank == 0) rmdir("out/a.cdb/data.js");
     everywhere(insitu_step(session, 6, 3) == INSITU_OK);
     everywhere(is_table(4, 7)); /* the lines that could not be written at cycle 4 are included */
@@ -251,7 +252,7 @@ static void tables_that_cannot_be_written_are_reported_and_written_later(void **
     input_free(&in);
 }
 
-static void pictures_that_cannot_be_written_have_no_line(void **state)
+static void unwritable_pictures_have_no_table_line(void **state)
 {
     (void)state;
     static char text[MOST];
@@ -259,10 +260,11 @@ static void pictures_that_cannot_be_written_have_no_line(void **state)
     make_input(&in);
     remove_files();
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(swept));
-    assert_int_equal(submit(session, &in), INSITU_OK);
+    assert_int_equal(submit_input(session, &in), INSITU_OK);
     discard_pictures();
     unwritable = "_002_";
-    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "image \"a\"", "a_000000_002_0.25.png");
+    check_reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "image \"a\"",
+                              "a_000000_002_0.25.png");
     unwritable = NULL;
     read_file("out/a.cdb/data.csv", MOST, text);
     everywhere(own_rank != 0 || (!strstr(text, "_002_") && strstr(text, "_003_-0.5.png\n")));
@@ -273,7 +275,7 @@ static void pictures_that_cannot_be_written_have_no_line(void **state)
 
 /* Checks that the table has only whole lines of whole steps, whichever allocation of rank 0 fails, and that it is
  * continued afterwards. */
-static void tables_stay_whole_where_memory_runs_out(void **state)
+static void tables_stay_complete_if_memory_runs_out(void **state)
 {
     (void)state;
     static char text[MOST];
@@ -281,7 +283,7 @@ static void tables_stay_whole_where_memory_runs_out(void **state)
     make_input(&in);
     remove_files();
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(swept));
-    assert_int_equal(submit(session, &in), INSITU_OK);
+    assert_int_equal(submit_input(session, &in), INSITU_OK);
     int cycle = 0, failures = 0;
     for (int n = 1; n < 1500; n += 7, cycle += 2) {
         discard_pictures();
@@ -342,7 +344,7 @@ static void reports_have_warnings_and_edits(void **state)
     const char *scene = write_scene(SCENE("parameters: {a: 0.5, b: -2e+300}\n", "f"));
     char expected[4096];
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
-    assert_int_equal(submit(session, &in), INSITU_OK);
+    assert_int_equal(submit_input(session, &in), INSITU_OK);
     everywhere(insitu_step(session, 0, -0.25) == INSITU_OK);
     const char *warning = insitu_last_report(session)->warnings;
     everywhere(strncmp(warning, "image \"a\": the isosurface", 24) == 0 && !strpbrk(warning, "\n\\"));
@@ -378,8 +380,8 @@ static void reports_have_warnings_and_edits(void **state)
                (strstr(text, "\"error\": \"") && strstr(text, ".yaml:2: images[0]: the key \\\"nmae\\\" is unknown") &&
                 strstr(text, "\"a\": 0.5") && !strstr(text, "last edit was not taken")));
     write_scene(SCENE("", "g"));
-    assert_int_equal(submit(session, &in), INSITU_OK);
-    reported_everywhere(session, insitu_step(session, 2, 0), INSITU_ERROR_FIELD, "\"g\"");
+    assert_int_equal(submit_input(session, &in), INSITU_OK);
+    check_reported_everywhere(session, insitu_step(session, 2, 0), INSITU_ERROR_FIELD, "\"g\"");
     read_file(news, MOST, text);
     everywhere(own_rank != 0 || (strstr(text, "\"error\": null}") && strstr(text, "\"g\\\"") &&
                                  strstr(text, "\"parameters\": {}") && strstr(text, "the scene file was edited")));
@@ -396,7 +398,7 @@ typedef struct picture_set {
     caught_picture items[MAX_CAUGHT];
 } picture_set;
 
-static void keep_pictures(picture_set *set)
+static void take_picture_set(picture_set *set)
 {
     set->count = caught_count;
     memcpy(set->items, caught, sizeof caught);
@@ -409,53 +411,53 @@ static void free_pictures(picture_set *set)
 }
 
 /* Checks that two scenes draw the same pictures in the same order, to the bit, and that not all pictures are equal. */
-static void draws_as(const char *one, const char *other, int cycle, int count)
+static void check_scenes_draw_same(const char *one, const char *other, int cycle, int count)
 {
     picture_set set;
     session_input in = {0};
     make_input(&in);
     run_steps(one, &in, cycle, cycle + 1);
-    keep_pictures(&set);
+    take_picture_set(&set);
     run_steps(other, &in, cycle, cycle + 1);
     bool is_same = caught_count == set.count && (own_rank != 0 || set.count == count), differ = count == 1;
     for (int i = 0; i < caught_count && is_same; i++) {
-        is_same = same_pictures(&set.items[i], &caught[i]);
-        differ = differ || !same_pictures(&caught[0], &caught[i]);
+        is_same = are_same_pictures(&set.items[i], &caught[i]);
+        differ = differ || !are_same_pictures(&caught[0], &caught[i]);
     }
     everywhere(is_same && (differ || own_rank != 0));
     free_pictures(&set);
     input_free(&in);
 }
 
-static void sweeps_draw_what_each_image_alone_would(void **state)
+static void sweeps_draw_same_pictures_as_single_images(void **state)
 {
     (void)state;
-    draws_as(
+    check_scenes_draw_same(
         "images:\n" IMAGE("a", "    sweep: {isovalues: true}\n",
                           "{isosurface: {field: f, values: [0.25, -0.5], colours: [[1, 0, 0], [0, 0, 1]]}}",
                           "{path: \"{isovalue}.png\"}"),
         "images:\n" IMAGE("a", "", "{isosurface: {field: f, values: [0.25], colours: [[1, 0, 0]]}}", "{path: a.png}")
             IMAGE("b", "", "{isosurface: {field: f, values: [-0.5], colours: [[0, 0, 1]]}}", "{path: b.png}"),
         0, 2);
-    draws_as("images:\n" IMAGE("a", "    sweep: {fields: [f, g]}\n", SLICE, "{path: \"{field}.png\"}"),
-             "images:\n" IMAGE("a", "", SLICE, "{path: a.png}")
-                 IMAGE("b", "", "{slice: {field: g, planes: [{normal: [0, 0, 1]}]}}", "{path: b.png}"),
-             0, 2);
+    check_scenes_draw_same("images:\n" IMAGE("a", "    sweep: {fields: [f, g]}\n", SLICE, "{path: \"{field}.png\"}"),
+                           "images:\n" IMAGE("a", "", SLICE, "{path: a.png}")
+                               IMAGE("b", "", "{slice: {field: g, planes: [{normal: [0, 0, 1]}]}}", "{path: b.png}"),
+                           0, 2);
 }
 
 /* Compares orbits with single cameras. The sines and cosines of the directions are exact, or are the same doubles. */
-static void orbits_draw_what_each_camera_alone_would(void **state)
+static void orbits_draw_same_pictures_as_single_cameras(void **state)
 {
     (void)state;
 #define FROM(name, direction, up)                                                                                      \
     IMAGE(name, "    camera: {automatic: {direction: " direction "}, up: " up "}\n", SURFACE, "{path: " name ".png}")
-    draws_as(
+    check_scenes_draw_same(
         "images:\n" IMAGE("a", "    camera: {orbit: {views: 1, elevation: 0}}\n", SURFACE, "{path: \"{view}.png\"}")
             IMAGE("b", "    camera: {orbit: {views: 1, elevation: 0, axis: [0, 0, 5]}}\n", SURFACE, "{path: b.png}"),
         "images:\n" FROM("a", "[0, 0, 1]", "[0, 1, 0]") FROM("b", "[1, 0, 0]", "[0, 0, 1]"), 0, 2);
 }
 
-static void paths_draw_what_a_camera_there_would(void **state)
+static void paths_draw_same_pictures_as_single_cameras(void **state)
 {
     (void)state;
 #define PATH                                                                                                           \
@@ -463,9 +465,12 @@ static void paths_draw_what_a_camera_there_would(void **state)
     "{cycle: 10, position: [2, 3, 4], focal: [0, 1, 0]}]}\n"
 #define STANDS(position, focal) "    camera: {position: " position ", focal: " focal "}\n"
     static const char path[] = "images:\n" IMAGE("a", PATH, SURFACE, "{path: \"{cycle}.png\"}");
-    draws_as(path, "images:\n" IMAGE("a", STANDS("[4, 1, 2]", "[0, 0, 0]"), SURFACE, "{path: a.png}"), 0, 1);
-    draws_as(path, "images:\n" IMAGE("a", STANDS("[3, 2, 3]", "[0, 0.5, 0]"), SURFACE, "{path: a.png}"), 5, 1);
-    draws_as(path, "images:\n" IMAGE("a", STANDS("[2, 3, 4]", "[0, 1, 0]"), SURFACE, "{path: a.png}"), 70, 1);
+    check_scenes_draw_same(path, "images:\n" IMAGE("a", STANDS("[4, 1, 2]", "[0, 0, 0]"), SURFACE, "{path: a.png}"), 0,
+                           1);
+    check_scenes_draw_same(path, "images:\n" IMAGE("a", STANDS("[3, 2, 3]", "[0, 0.5, 0]"), SURFACE, "{path: a.png}"),
+                           5, 1);
+    check_scenes_draw_same(path, "images:\n" IMAGE("a", STANDS("[2, 3, 4]", "[0, 1, 0]"), SURFACE, "{path: a.png}"), 70,
+                           1);
 }
 
 /* Checks that a condition and once apply to all pictures of an image: a step draws all or none of them. */
@@ -485,8 +490,8 @@ static void conditions_hold_for_all_pictures_of_an_image(void **state)
     for (int cycle = 0; cycle < 4; cycle++) {
         discard_pictures();
         for (int64_t v = 0; v < in.part.vertex_count; v++)
-            in.part.values[v] = (cycle == 1 || cycle == 2 ? 100 : 1) * test_linear(in.part.coordinates + 3 * v);
-        assert_int_equal(submit(session, &in), INSITU_OK);
+            in.part.values[v] = (cycle == 1 || cycle == 2 ? 100 : 1) * test_linear_field(in.part.coordinates + 3 * v);
+        assert_int_equal(submit_input(session, &in), INSITU_OK);
         everywhere(insitu_step(session, cycle, cycle) == INSITU_OK);
         everywhere(insitu_last_report(session)->images == drawn[cycle]);
         everywhere(own_rank != 0 || caught_count == drawn[cycle]);
@@ -509,7 +514,7 @@ static void warnings_of_swept_isovalues_are_reported_once(void **state)
                          "{isosurface: {field: f, values: [0.25, 1e6, 2e6]}}", "{path: \"a{view}{isovalue}.png\"}")));
     for (int cycle = 0; cycle < 3; cycle++) {
         discard_pictures();
-        assert_int_equal(submit(session, &in), INSITU_OK);
+        assert_int_equal(submit_input(session, &in), INSITU_OK);
         everywhere(insitu_step(session, cycle, cycle) == INSITU_OK);
         const char *warnings = insitu_last_report(session)->warnings;
         everywhere((strstr(warnings, "at 1e+06 is empty") != NULL) == (cycle == 0));
@@ -519,27 +524,27 @@ static void warnings_of_swept_isovalues_are_reported_once(void **state)
     input_free(&in);
 }
 
-static int begin_tests(void **state)
+static int set_up_test_group(void **state)
 {
     (void)state;
-    return enter_folder("cinema") ? 0 : 1;
+    return enter_test_folder("cinema") ? 0 : 1;
 }
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(tables_have_a_line_a_picture),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(tables_have_one_line_per_picture),
                                        cmocka_unit_test(tables_of_several_images_have_all_columns),
-                                       cmocka_unit_test(runs_that_begin_again_go_on_with_the_table),
-                                       cmocka_unit_test(lines_go_from_the_first_step_on),
-                                       cmocka_unit_test(steps_that_go_back_drop_what_was_after),
+                                       cmocka_unit_test(restarted_runs_continue_the_table),
+                                       cmocka_unit_test(table_lines_begin_at_the_first_step),
+                                       cmocka_unit_test(earlier_cycle_removes_later_table_lines),
                                        cmocka_unit_test(tables_that_cannot_be_written_are_reported_and_written_later),
-                                       cmocka_unit_test(pictures_that_cannot_be_written_have_no_line),
-                                       cmocka_unit_test(tables_stay_whole_where_memory_runs_out),
+                                       cmocka_unit_test(unwritable_pictures_have_no_table_line),
+                                       cmocka_unit_test(tables_stay_complete_if_memory_runs_out),
                                        cmocka_unit_test(reports_have_warnings_and_edits),
-                                       cmocka_unit_test(sweeps_draw_what_each_image_alone_would),
-                                       cmocka_unit_test(orbits_draw_what_each_camera_alone_would),
-                                       cmocka_unit_test(paths_draw_what_a_camera_there_would),
+                                       cmocka_unit_test(sweeps_draw_same_pictures_as_single_images),
+                                       cmocka_unit_test(orbits_draw_same_pictures_as_single_cameras),
+                                       cmocka_unit_test(paths_draw_same_pictures_as_single_cameras),
                                        cmocka_unit_test(conditions_hold_for_all_pictures_of_an_image),
                                        cmocka_unit_test(warnings_of_swept_isovalues_are_reported_once)};
-    return run_session_tests(argc, argv, tests, begin_tests, NULL);
+    return run_session_tests(argc, argv, tests, set_up_test_group, NULL);
 }

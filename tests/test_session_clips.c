@@ -50,29 +50,29 @@ enum { REGIONS = sizeof regions / sizeof *regions };
 
 static const half_space cube[] = {{{1, 0, 0}, 1},  {{-1, 0, 0}, 1}, {{0, 1, 0}, 1},
                                   {{0, -1, 0}, 1}, {{0, 0, 1}, 1},  {{0, 0, -1}, 1}};
-/* The isosurface 0.2 of test_linear(), 0.3 x - 0.7 y + 0.5 z + 0.1. */
+/* The isosurface 0.2 of test_linear_field(), 0.3 x - 0.7 y + 0.5 z + 0.1. */
 static const half_space linear = {{0.3, -0.7, 0.5}, 0.1};
 
-static double dot(const double a[3], const double b[3])
+static double dot_product(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-static double meet(const ray *r, const half_space *plane)
+static double intersect_half_space(const ray *r, const half_space *plane)
 {
-    return (plane->distance - dot(plane->normal, r->base)) / dot(plane->normal, r->direction);
+    return (plane->distance - dot_product(plane->normal, r->base)) / dot_product(plane->normal, r->direction);
 }
 
 typedef struct interval {
     double begin, end;
 } interval;
 
-static interval cut(const ray *r, const half_space *planes, size_t count)
+static interval clip_interval(const ray *r, const half_space *planes, size_t count)
 {
     interval out = {0, INFINITY};
     for (size_t i = 0; i < count; i++) {
-        const double depth = meet(r, &planes[i]);
-        if (dot(planes[i].normal, r->direction) > 0)
+        const double depth = intersect_half_space(r, &planes[i]);
+        if (dot_product(planes[i].normal, r->direction) > 0)
             out.end = fmin(out.end, depth);
         else
             out.begin = fmax(out.begin, depth);
@@ -84,71 +84,71 @@ static interval intersect_ball(const ray *r, double radius)
 {
     double from[3];
     for (int a = 0; a < 3; a++) from[a] = ball[a] - r->base[a];
-    const double square = dot(r->direction, r->direction), nearest = dot(from, r->direction) / square;
-    const double left = (radius * radius - dot(from, from)) / square + nearest * nearest;
+    const double square = dot_product(r->direction, r->direction), nearest = dot_product(from, r->direction) / square;
+    const double left = (radius * radius - dot_product(from, from)) / square + nearest * nearest;
     return left > 0 ? (interval){nearest - sqrt(left), nearest + sqrt(left)} : (interval){INFINITY, -INFINITY};
 }
 
-static interval intersect_both(interval a, interval b)
+static interval intersect_intervals(interval a, interval b)
 {
     return (interval){fmax(a.begin, b.begin), fmin(a.end, b.end)};
 }
 
-static interval visible_interval(const region *g, const ray *r)
+static interval compute_visible_interval(const region *g, const ray *r)
 {
-    const interval within = cut(r, g->planes, g->plane_count);
-    return g->radius > 0 && !g->is_outside ? intersect_both(within, intersect_ball(r, g->radius)) : within;
+    const interval within = clip_interval(r, g->planes, g->plane_count);
+    return g->radius > 0 && !g->is_outside ? intersect_intervals(within, intersect_ball(r, g->radius)) : within;
 }
 
-static interval hole_interval(const region *g, const ray *r)
+static interval compute_hole_interval(const region *g, const ray *r)
 {
     if (g->is_outside) return intersect_ball(r, g->radius);
-    return g->hole_count ? cut(r, g->hole, g->hole_count) : (interval){INFINITY, -INFINITY};
+    return g->hole_count ? clip_interval(r, g->hole, g->hole_count) : (interval){INFINITY, -INFINITY};
 }
 
-static interval cube_range(const ray *r)
+static interval intersect_ray_with_cube(const ray *r)
 {
-    return cut(r, cube, 6);
+    return clip_interval(r, cube, 6);
 }
 
 /* ---- the expected pictures ----------------------------------------------------------------------------------- */
 
 enum { MOST = 3 };
 
-static bool is_at(double depth, interval s)
+static bool is_near_interval_end(double depth, interval s)
 {
     return fabs(depth - s.begin) < 1e-4 || fabs(depth - s.end) < 1e-4;
 }
 
 /* Keeps the depths of crossings inside the region, in order; returns their number, or -1 if rounding decides. */
-static int keep(const region *g, const ray *r, const double *depths, int count, double out[MOST])
+static int select_visible_depths(const region *g, const ray *r, const double *depths, int count, double out[MOST])
 {
-    const interval within = visible_interval(g, r), hole = hole_interval(g, r);
+    const interval within = compute_visible_interval(g, r), hole = compute_hole_interval(g, r);
     int kept = 0;
     for (int i = 0; i < count; i++) {
-        if (is_at(depths[i], within) || is_at(depths[i], hole)) return -1;
+        if (is_near_interval_end(depths[i], within) || is_near_interval_end(depths[i], hole)) return -1;
         if (depths[i] < within.begin || depths[i] > within.end) continue;
         if (depths[i] < hole.begin || depths[i] > hole.end) out[kept++] = depths[i];
     }
     return kept;
 }
 
-static int see_cube(const region *g, const ray *r, double out[MOST])
+static int find_visible_cube_faces(const region *g, const ray *r, double out[MOST])
 {
-    const interval s = cube_range(r);
+    const interval s = intersect_ray_with_cube(r);
     if (fabs(s.end - s.begin) < 1e-4) return -1;
     if (s.end < s.begin) return 0;
     const double depths[2] = {s.begin, s.end};
-    return keep(g, r, depths, 2, out);
+    return select_visible_depths(g, r, depths, 2, out);
 }
 
-static int see_plane(const region *g, const ray *r, double out[MOST])
+static int find_visible_plane_hits(const region *g, const ray *r, double out[MOST])
 {
-    const interval s = cube_range(r);
-    const double depth = meet(r, &linear);
-    if (is_at(depth, s)) return -1;
+    const interval s = intersect_ray_with_cube(r);
+    const double depth = intersect_half_space(r, &linear);
+    if (is_near_interval_end(depth, s)) return -1;
     if (!(depth > s.begin && depth < s.end)) return 0;
-    return keep(g, r, &depth, 1, out);
+    return select_visible_depths(g, r, &depth, 1, out);
 }
 
 typedef int see_function(const region *g, const ray *r, double out[MOST]);
@@ -158,7 +158,7 @@ static bool has_surfaces(const caught_picture *picture, const region *g, see_fun
 {
     int hits = 0, behind = 0;
     for (int pixel = 0; pixel < PIXELS; pixel++) {
-        const ray r = ray_of(pixel);
+        const ray r = make_pixel_ray(pixel);
         double depths[MOST];
         const int count = see(g, &r, depths);
         if (count < 0) continue;
@@ -176,7 +176,7 @@ static bool has_surfaces(const caught_picture *picture, const region *g, see_fun
     return hits > PIXELS / 60 && behind > PIXELS / 80;
 }
 
-static double length_of(interval s)
+static double interval_length(interval s)
 {
     return fmax(s.end - s.begin, 0);
 }
@@ -187,10 +187,11 @@ static bool has_medium(const caught_picture *picture, const region *g, double me
 {
     int hits = 0;
     for (int pixel = 0; pixel < PIXELS; pixel++) {
-        const ray r = ray_of(pixel);
-        const interval within = intersect_both(cube_range(&r), visible_interval(g, &r));
-        const double length = (length_of(within) - length_of(intersect_both(within, hole_interval(g, &r)))) *
-                              sqrt(dot(r.direction, r.direction));
+        const ray r = make_pixel_ray(pixel);
+        const interval within = intersect_intervals(intersect_ray_with_cube(&r), compute_visible_interval(g, &r));
+        const double length =
+            (interval_length(within) - interval_length(intersect_intervals(within, compute_hole_interval(g, &r)))) *
+            sqrt(dot_product(r.direction, r.direction));
         const double alpha = 1 - pow(0.5, media * length), own = (double)picture->rgba[4 * pixel + 3];
         hits += alpha > 0.1;
         if (fabs(own - alpha) < tolerance) continue;
@@ -202,19 +203,19 @@ static bool has_medium(const caught_picture *picture, const region *g, double me
 
 static bool is_clear_cube(const caught_picture *p, const region *g)
 {
-    return has_surfaces(p, g, see_cube, 0.5);
+    return has_surfaces(p, g, find_visible_cube_faces, 0.5);
 }
 static bool is_cube(const caught_picture *p, const region *g)
 {
-    return has_surfaces(p, g, see_cube, 1);
+    return has_surfaces(p, g, find_visible_cube_faces, 1);
 }
 static bool is_plane(const caught_picture *p, const region *g)
 {
-    return has_surfaces(p, g, see_plane, 1);
+    return has_surfaces(p, g, find_visible_plane_hits, 1);
 }
 static bool is_clear_plane(const caught_picture *p, const region *g)
 {
-    return has_surfaces(p, g, see_plane, 0.25);
+    return has_surfaces(p, g, find_visible_plane_hits, 0.25);
 }
 /* The length of a ray that grazes the ball has an error of about the square root of the ball's error: 0.004 for
  * 4e-6. */
@@ -268,7 +269,7 @@ enum { CASES = sizeof cases / sizeof *cases };
 /* Where the clip is defined: for the image, for the layers, or for the layers next to one that is not clipped. */
 typedef enum clip_place { OF_IMAGE, OF_LAYERS, BESIDE_A_WHOLE, PLACES } clip_place;
 
-static const char *scene_of(const clip_case *c, const region *g, clip_place place)
+static const char *write_clip_scene(const clip_case *c, const region *g, clip_place place)
 {
     char text[2048], filled[2048], own[256] = "", all[256] = "";
     const char *outputs = strstr(c->scene, "    outputs");
@@ -286,22 +287,23 @@ static const char *scene_of(const clip_case *c, const region *g, clip_place plac
     return write_scene(filled);
 }
 
-static double difference(const caught_picture *a, const caught_picture *b)
+static double largest_difference(const caught_picture *a, const caught_picture *b)
 {
     double worst = 0;
-    for (int i = 0; i < 4 * PIXELS; i++) worst = test_worse(worst, fabs((double)a->rgba[i] - (double)b->rgba[i]));
+    for (int i = 0; i < 4 * PIXELS; i++)
+        worst = test_larger_error(worst, fabs((double)a->rgba[i] - (double)b->rgba[i]));
     return memcmp(a->depth, b->depth, PIXELS * sizeof(float)) == 0 ? worst : (double)INFINITY;
 }
 
-static void verify(test_mesh_kind kind, const clip_case *c, const region *g, clip_place place,
-                   const session_input inputs[2])
+static void verify_case(test_mesh_kind kind, const clip_case *c, const region *g, clip_place place,
+                        const session_input inputs[2])
 {
-    const char *scene = scene_of(c, g, place);
+    const char *scene = write_clip_scene(c, g, place);
     caught_picture ours = draw_scene(MPI_COMM_WORLD, scene, &inputs[1]), alone = {0};
     bool is_well = true;
     if (own_rank == 0) {
         alone = draw_scene(MPI_COMM_SELF, scene, &inputs[0]);
-        const double off = difference(&ours, &alone);
+        const double off = largest_difference(&ours, &alone);
         is_well = c->is_right(&alone, g) && off <= c->tolerance;
         if (!is_well)
             fprintf(stderr, "%s, %s, clip %s of %d: ranks are off by %g\n", test_mesh_kind_name(kind), c->name, g->text,
@@ -319,7 +321,7 @@ static void verify_all(test_mesh_kind kind, const session_input inputs[2])
     for (int i = 0; i < CASES; i++)
         for (int turn = 0; turn < 2; turn++) {
             const int pair = (2 * (int)kind + turn + i) % (REGIONS * PLACES);
-            verify(kind, &cases[i], &regions[pair / PLACES], (clip_place)(pair % PLACES), inputs);
+            verify_case(kind, &cases[i], &regions[pair / PLACES], (clip_place)(pair % PLACES), inputs);
         }
 }
 
@@ -329,7 +331,7 @@ static void layers_are_clipped(void **state)
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         session_input inputs[2]; /* the whole mesh, and this rank's part */
         memset(inputs, 0, sizeof inputs);
-        test_mesh_lattice(kind, SIDE, 0.2, test_linear, &inputs[0].part);
+        test_mesh_make_lattice(kind, SIDE, 0.2, test_linear_field, &inputs[0].part);
         input_describe(&inputs[0]);
         extract_own_cells(&inputs[0].part, TEST_RANDOM, SIDE, kind % 2, &inputs[1].part);
         input_describe(&inputs[1]);
@@ -340,7 +342,7 @@ static void layers_are_clipped(void **state)
 }
 
 /* Checks that a slice in a clipping plane is visible as a whole, and in front of everything else. */
-static void slices_in_the_clipping_plane_are_seen(void **state)
+static void slices_in_the_clipping_plane_are_visible(void **state)
 {
     (void)state;
     static const clip_case slice = {
@@ -348,13 +350,13 @@ static void slices_in_the_clipping_plane_are_seen(void **state)
                              "      - surface: {}\n")};
     session_input in = {0};
     input_create(&in, TEST_MIXED, SIDE, TEST_RANDOM, own_rank, rank_count);
-    caught_picture picture = draw_scene(MPI_COMM_WORLD, scene_of(&slice, &regions[0], OF_IMAGE), &in);
+    caught_picture picture = draw_scene(MPI_COMM_WORLD, write_clip_scene(&slice, &regions[0], OF_IMAGE), &in);
     int hits = 0;
     bool is_well = true;
     for (int pixel = 0; pixel < PIXELS && own_rank == 0; pixel++) {
-        const ray r = ray_of(pixel);
-        const interval s = cube_range(&r), box = cut(&r, clips + 1, 4);
-        const double depth = meet(&r, &clips[0]);
+        const ray r = make_pixel_ray(pixel);
+        const interval s = intersect_ray_with_cube(&r), box = clip_interval(&r, clips + 1, 4);
+        const double depth = intersect_half_space(&r, &clips[0]);
         if (!(depth > fmax(s.begin, box.begin) + 1e-4 && depth < fmin(s.end, box.end) - 1e-4)) continue;
         hits++;
         is_well = is_well && fabs((double)picture.depth[pixel] - depth) < 1.5e-5;
@@ -368,7 +370,7 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(layers_are_clipped),
-        cmocka_unit_test(slices_in_the_clipping_plane_are_seen),
+        cmocka_unit_test(slices_in_the_clipping_plane_are_visible),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -97,7 +97,7 @@ static const counted_scene scenes[] = {
     {"differences", "      - isosurface: {field: f, values: [0.1], normals: differences}\n", 10},
 };
 
-static const char *scene_of(const counted_scene *s)
+static const char *write_counted_scene(const counted_scene *s)
 {
     char text[600];
     snprintf(text, sizeof text,
@@ -114,13 +114,13 @@ static void count_steps(const counted_scene *s)
 {
     session_input in;
     input_create(&in, TEST_HEXES, 6, TEST_BLOCK, own_rank, rank_count);
-    insitu_session *session = open_session(MPI_COMM_WORLD, scene_of(s));
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_counted_scene(s));
     insitu_field cells = in.field;
     double *values = calloc((size_t)in.part.cell_count + 1, sizeof *values);
     assert_non_null(values);
-    for (int64_t i = 0; i < in.part.cell_count; i++) values[i] = test_uniform_in((uint64_t)i, 4, -1, 1);
+    for (int64_t i = 0; i < in.part.cell_count; i++) values[i] = test_uniform_between((uint64_t)i, 4, -1, 1);
     cells.name = "c", cells.centring = INSITU_CELL, cells.count = in.part.cell_count, cells.values.data = values;
-    everywhere(submit(session, &in) == INSITU_OK);
+    everywhere(submit_input(session, &in) == INSITU_OK);
     everywhere(insitu_set_field(session, "m", &cells) == INSITU_OK);
     for (int cycle = 0; cycle < 2; cycle++) everywhere(insitu_step(session, cycle, cycle) == INSITU_OK);
     everywhere(insitu_set_field(session, "m", &in.field) == INSITU_OK);
@@ -142,7 +142,7 @@ static void count_steps(const counted_scene *s)
     discard_pictures();
 }
 
-static void a_step_waits_few_times(void **state)
+static void step_makes_few_collective_calls(void **state)
 {
     (void)state;
     session_writes_behind = true;
@@ -167,8 +167,8 @@ static void schedules_change_no_bit_and_are_reported(void **context)
                  "      - isosurface: {field: f, values: [-0.2, 0.1], opacity: 0.5}\n"
                  "    outputs: [{path: a.exr}]\n");
         insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(text));
-        everywhere(submit(session, &in) == INSITU_OK);
-        reported_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
+        everywhere(submit_input(session, &in) == INSITU_OK);
+        check_reported_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
         const insitu_report *report = insitu_last_report(session);
         int64_t sent = 0;
         MPI_Allreduce(&report->bytes_sent, &sent, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
@@ -186,7 +186,7 @@ static void schedules_change_no_bit_and_are_reported(void **context)
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(a_step_waits_few_times),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(step_makes_few_collective_calls),
                                        cmocka_unit_test(schedules_change_no_bit_and_are_reported)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

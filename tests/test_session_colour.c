@@ -17,7 +17,7 @@ static char folder[512], image_name[32];
 static session_input block, distributed;
 
 /* Returns a scene with a coloured surface and a volume, each with its keys. */
-static const char *scene_with(const char *surface_keys, const char *volume_keys)
+static const char *make_scene(const char *surface_keys, const char *volume_keys)
 {
     static char text[2048];
     snprintf(
@@ -32,15 +32,15 @@ static const char *scene_with(const char *surface_keys, const char *volume_keys)
 
 static caught_picture draw_step(insitu_session *session, int cycle)
 {
-    step_is_good(session, cycle);
+    check_step_succeeds(session, cycle);
     const caught_picture picture = pop_caught_picture();
     return picture;
 }
 
-static caught_picture draw(const session_input *in, const char *surface_keys, const char *volume_keys)
+static caught_picture draw_with_keys(const session_input *in, const char *surface_keys, const char *volume_keys)
 {
-    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_with(surface_keys, volume_keys)));
-    everywhere(submit(session, in) == INSITU_OK);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(make_scene(surface_keys, volume_keys)));
+    everywhere(submit_input(session, in) == INSITU_OK);
     const caught_picture picture = draw_step(session, 0);
     insitu_destroy(&session);
     return picture;
@@ -52,7 +52,7 @@ static void assert_alike(caught_picture *a, caught_picture *b, double allowed)
 {
     double worst = 0;
     for (int i = 0; own_rank == 0 && i < 4 * a->width * a->height; i++)
-        worst = test_worse(worst, fabs((double)a->rgba[i] - (double)b->rgba[i]));
+        worst = test_larger_error(worst, fabs((double)a->rgba[i] - (double)b->rgba[i]));
     if (worst > allowed) fprintf(stderr, "pictures differ by %g\n", worst);
     everywhere(worst <= allowed);
     free(a->rgba), free(a->depth), free(b->rgba), free(b->depth);
@@ -72,10 +72,10 @@ typedef struct truth {
     double *middles; /* middle of the range of each cell's values, sorted */
 } truth;
 
-static truth find_truth(void)
+static truth compute_exact_ranges(void)
 {
     test_mesh mesh;
-    test_mesh_lattice(kind, SIDE, 0.2, test_wave, &mesh);
+    test_mesh_make_lattice(kind, SIDE, 0.2, test_wave_field, &mesh);
     truth t = {INFINITY, -INFINITY, INFINITY, mesh.cell_count, 0, malloc((size_t)mesh.cell_count * sizeof(double))};
     assert_non_null(t.middles);
     for (int64_t c = 0; c < mesh.cell_count; c++) {
@@ -97,7 +97,7 @@ static truth find_truth(void)
 
 /* Returns the percentile by the nearest rank: the least value such that percent of the values, without the first
  * `skipped`, are at most as large. */
-static double percentile(const truth *t, int64_t skipped, double percent)
+static double compute_percentile(const truth *t, int64_t skipped, double percent)
 {
     const int64_t count = t->count - skipped, rank = (int64_t)ceil(percent / 100 * (double)count);
     return t->middles[skipped + (rank > 0 ? rank - 1 : 0)];
@@ -108,26 +108,27 @@ static void check_source(const char *keys, const char *scale, double low, double
     char fixed[256], by_source[256];
     snprintf(fixed, sizeof fixed, "%s, range: [%.17g, %.17g]", scale, low, high);
     snprintf(by_source, sizeof by_source, "%s, range: %s", scale, keys);
-    caught_picture truth = draw(&block, "", fixed), found = draw(&block, "", by_source);
+    caught_picture truth = draw_with_keys(&block, "", fixed), found = draw_with_keys(&block, "", by_source);
     assert_alike(&found, &truth, 0);
-    truth = draw(&block, "", fixed), found = draw(&distributed, "", by_source);
+    truth = draw_with_keys(&block, "", fixed), found = draw_with_keys(&distributed, "", by_source);
     assert_alike(&found, &truth, 1e-6);
 }
 
-static void ranges_are_those_of_brute_force(void **state)
+static void ranges_match_brute_force(void **state)
 {
     (void)state;
-    truth t = find_truth();
+    truth t = compute_exact_ranges();
     const double size = fmax(fabs(t.least), fabs(t.most));
     const int64_t negative = t.count - t.positive;
     check_source("data", "", t.least, t.most);
     check_source("symmetric", "", -size, size);
     check_source("symmetric", ", scale: symlog, threshold: 0.1", -size, size);
     check_source("data", ", scale: log", t.least_positive, t.most);
-    check_source("{percentile: [0, 100]}", "", percentile(&t, 0, 0), percentile(&t, 0, 100));
-    check_source("{percentile: [2, 98]}", "", percentile(&t, 0, 2), percentile(&t, 0, 98));
-    check_source("{percentile: [37.5, 50]}", "", percentile(&t, 0, 37.5), percentile(&t, 0, 50));
-    check_source("{percentile: [5, 95]}", ", scale: log", percentile(&t, negative, 5), percentile(&t, negative, 95));
+    check_source("{percentile: [0, 100]}", "", compute_percentile(&t, 0, 0), compute_percentile(&t, 0, 100));
+    check_source("{percentile: [2, 98]}", "", compute_percentile(&t, 0, 2), compute_percentile(&t, 0, 98));
+    check_source("{percentile: [37.5, 50]}", "", compute_percentile(&t, 0, 37.5), compute_percentile(&t, 0, 50));
+    check_source("{percentile: [5, 95]}", ", scale: log", compute_percentile(&t, negative, 5),
+                 compute_percentile(&t, negative, 95));
     free(t.middles);
 }
 
@@ -138,7 +139,7 @@ static void scale_values(session_input *in, double factor)
     for (int64_t v = 0; v < in->part.vertex_count; v++) in->part.values[v] *= factor;
 }
 
-static const char *ranges_file(void)
+static const char *make_ranges_file_name(void)
 {
     static char path[600];
     snprintf(path, sizeof path, "%s/%s.ranges", folder, image_name);
@@ -147,25 +148,26 @@ static const char *ranges_file(void)
 
 static void remove_ranges(void)
 {
-    if (own_rank == 0) unlink(ranges_file());
+    if (own_rank == 0) unlink(make_ranges_file_name());
     MPI_Barrier(MPI_COMM_WORLD);
 }
 
-static void ranges_over_a_run_widen_and_outlive_it(void **state)
+static void ranges_over_a_run_widen_and_persist(void **state)
 {
     (void)state;
-    truth t = find_truth();
+    truth t = compute_exact_ranges();
     char widest[128];
     const char *run = ", range: run";
     snprintf(widest, sizeof widest, ", range: [%.17g, %.17g]", 2 * t.least, 2 * t.most);
     free(t.middles);
     remove_ranges();
-    caught_picture plain = draw(&distributed, "", ""), by_data = draw(&distributed, "", ", range: data");
-    caught_picture fixed = draw(&distributed, "", widest);
-    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_with(run, run)));
+    caught_picture plain = draw_with_keys(&distributed, "", ""),
+                   by_data = draw_with_keys(&distributed, "", ", range: data");
+    caught_picture fixed = draw_with_keys(&distributed, "", widest);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(make_scene(run, run)));
     for (int cycle = 0; cycle < 3; cycle++) {
         if (cycle) scale_values(&distributed, cycle == 1 ? 2 : 0.5);
-        everywhere(submit(session, &distributed) == INSITU_OK);
+        everywhere(submit_input(session, &distributed) == INSITU_OK);
         caught_picture picture = draw_step(session, cycle);
         if (cycle == 0)
             assert_alike(&picture, &by_data, 0);
@@ -173,16 +175,16 @@ static void ranges_over_a_run_widen_and_outlive_it(void **state)
             free(picture.rgba), free(picture.depth);
     }
     insitu_destroy(&session);
-    everywhere(own_rank != 0 || access(ranges_file(), R_OK) == 0);
+    everywhere(own_rank != 0 || access(make_ranges_file_name(), R_OK) == 0);
     /* Another session continues the range. Only volumes are compared, since another field colours the surface. */
-    caught_picture again = draw(&distributed, "", run);
+    caught_picture again = draw_with_keys(&distributed, "", run);
     assert_alike(&again, &fixed, 0);
     /* There is no range for another field yet. */
-    caught_picture other = draw(&distributed, "", ", component: magnitude, range: run"), fresh;
-    fresh = draw(&distributed, "", ", component: magnitude");
+    caught_picture other = draw_with_keys(&distributed, "", ", component: magnitude, range: run"), fresh;
+    fresh = draw_with_keys(&distributed, "", ", component: magnitude");
     assert_alike(&other, &fresh, 0);
     remove_ranges();
-    caught_picture anew = draw(&distributed, "", run);
+    caught_picture anew = draw_with_keys(&distributed, "", run);
     assert_alike(&anew, &plain, 0);
     remove_ranges();
 }
@@ -209,10 +211,10 @@ static void every_kind_of_layer_has_a_range_over_a_run(void **state)
                      "    outputs: [{path: \"%s/a.exr\"}]\n",
                      image_name, layer, folder);
             insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(text));
-            everywhere(submit(session, &block) == INSITU_OK);
+            everywhere(submit_input(session, &block) == INSITU_OK);
             pictures[is_run] = draw_step(session, 0);
             insitu_destroy(&session);
-            FILE *file = own_rank == 0 ? fopen(ranges_file(), "r") : NULL;
+            FILE *file = own_rank == 0 ? fopen(make_ranges_file_name(), "r") : NULL;
             everywhere(own_rank != 0 || (file != NULL) == is_run);
             while (file && fgets(line, sizeof line, file) && line[0] == '#') line[0] = '\0';
             everywhere(!file || strncmp(line, layers[i][0], strlen(layers[i][0])) == 0);
@@ -228,16 +230,16 @@ static void broken_file_of_ranges_is_reported_on_all_ranks(void **state)
     (void)state;
     static const char *const lines[] = {"volume 0 -2 3 1 f", "volume 0 -2 nan 1 f", "volume 0 -2 1 f", "whatever"};
     for (int i = 0; i < 4; i++) {
-        FILE *file = own_rank == 0 ? fopen(ranges_file(), "w") : NULL;
+        FILE *file = own_rank == 0 ? fopen(make_ranges_file_name(), "w") : NULL;
         if (file) fprintf(file, "# kept\nvolume 7 -2 0 1 f\n%s\n", lines[i]);
         if (file) fclose(file);
-        insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_with("", ", range: run")));
-        everywhere(submit(session, &block) == INSITU_OK);
+        insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(make_scene("", ", range: run")));
+        everywhere(submit_input(session, &block) == INSITU_OK);
         const insitu_status status = insitu_step(session, 0, 0);
-        reported_everywhere(session, status, INSITU_ERROR_SCENE, image_name, ".ranges:3: is no range",
-                            "delete the file to begin anew");
+        check_reported_everywhere(session, status, INSITU_ERROR_SCENE, image_name, ".ranges:3: is no range",
+                                  "delete the file to begin anew");
         remove_ranges();
-        step_is_good(session, 1);
+        check_step_succeeds(session, 1);
         discard_pictures();
         insitu_destroy(&session);
         remove_ranges();
@@ -246,7 +248,7 @@ static void broken_file_of_ranges_is_reported_on_all_ranks(void **state)
 
 /* ---- tables of volumes ---- */
 
-static void table_colour(const render_transfer *t, double value, double colour[3])
+static void interpolate_table_colour(const render_transfer *t, double value, double colour[3])
 {
     const double from = render_scaled(t->scale, t->threshold, t->low),
                  to = render_scaled(t->scale, t->threshold, t->high);
@@ -262,7 +264,7 @@ static void table_colour(const render_transfer *t, double value, double colour[3
 static void assert_colour(const render_transfer *t, double value, const float expected[3])
 {
     double colour[3];
-    table_colour(t, value, colour);
+    interpolate_table_colour(t, value, colour);
     for (int c = 0; c < 3; c++)
         if (!(fabs(colour[c] - (double)expected[c]) <= 1e-6))
             fail_msg("value %g, channel %d: %g, expected %g", value, c, colour[c], (double)expected[c]);
@@ -309,7 +311,7 @@ static void volumes_have_bands_and_colours_outside(void **state)
 }
 
 /* Checks control points of the opacity on a logarithmic scale: the renderer interpolates linearly along the scale. */
-static void points_of_the_opacity_are_where_the_scale_has_them(void **state)
+static void opacity_points_follow_the_scale(void **state)
 {
     (void)state;
     const scene_opacity_point points[3] = {{0, 0}, {0.25, 1}, {1, 0.5F}};
@@ -337,14 +339,15 @@ static void write_map(const char *text)
     everywhere(own_rank != 0 || (file && fputs(text, file) >= 0 && fclose(file) == 0));
 }
 
-static void maps_from_files_are_every_ranks(void **state)
+static void maps_from_files_reach_every_rank(void **state)
 {
     (void)state;
     char keys[128];
     write_map("[{\"Name\": \"a\", \"RGBPoints\": [0, 0, 0, 1, 5, 1, 1, 0, 10, 1, 0, 0]}]");
     snprintf(keys, sizeof keys, ", map: {file: %s.json}", image_name);
     const char *list = ", map: {colours: [[0, 0, 1], [1, 1, 0], [1, 0, 0]]}";
-    caught_picture by_file = draw(&distributed, keys, keys), by_list = draw(&distributed, list, list);
+    caught_picture by_file = draw_with_keys(&distributed, keys, keys),
+                   by_list = draw_with_keys(&distributed, list, list);
     assert_alike(&by_file, &by_list, 0);
 }
 
@@ -354,17 +357,17 @@ static void missing_and_broken_maps_are_reported_on_all_ranks(void **state)
     char keys[128];
     insitu_session *session = NULL;
     insitu_status status =
-        insitu_create(MPI_COMM_WORLD, write_scene(scene_with("", ", map: {file: absent.json}")), &session);
+        insitu_create(MPI_COMM_WORLD, write_scene(make_scene("", ", map: {file: absent.json}")), &session);
     everywhere(status == INSITU_ERROR_SCENE && !session && strstr(insitu_error(NULL), "volume.map.file: ") &&
                strstr(insitu_error(NULL), "absent.json: cannot be read: No such file"));
     write_map("[{\"Name\": \"a\",\n\"RGBPoints\": [0, 0, 0, 1, 5]}]");
     snprintf(keys, sizeof keys, ", map: {file: %s.json}", image_name);
-    status = insitu_create(MPI_COMM_WORLD, write_scene(scene_with(keys, "")), &session);
+    status = insitu_create(MPI_COMM_WORLD, write_scene(make_scene(keys, "")), &session);
     everywhere(status == INSITU_ERROR_SCENE && !session && strstr(insitu_error(NULL), "colour_by.map.file: ") &&
                strstr(insitu_error(NULL), ".json:2: RGBPoints: expected"));
 }
 
-static int begin_tests(void **state)
+static int set_up_test_group(void **state)
 {
     (void)state;
     const char *scene = write_scene("");
@@ -375,7 +378,7 @@ static int begin_tests(void **state)
     return 0;
 }
 
-static int end_tests(void **state)
+static int tear_down_test_group(void **state)
 {
     (void)state;
     input_free(&block);
@@ -386,14 +389,14 @@ static int end_tests(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(ranges_are_those_of_brute_force),
-        cmocka_unit_test(ranges_over_a_run_widen_and_outlive_it),
+        cmocka_unit_test(ranges_match_brute_force),
+        cmocka_unit_test(ranges_over_a_run_widen_and_persist),
         cmocka_unit_test(every_kind_of_layer_has_a_range_over_a_run),
         cmocka_unit_test(volumes_have_bands_and_colours_outside),
-        cmocka_unit_test(points_of_the_opacity_are_where_the_scale_has_them),
+        cmocka_unit_test(opacity_points_follow_the_scale),
         cmocka_unit_test(broken_file_of_ranges_is_reported_on_all_ranks),
-        cmocka_unit_test(maps_from_files_are_every_ranks),
+        cmocka_unit_test(maps_from_files_reach_every_rank),
         cmocka_unit_test(missing_and_broken_maps_are_reported_on_all_ranks),
     };
-    return run_session_tests(argc, argv, tests, begin_tests, end_tests);
+    return run_session_tests(argc, argv, tests, set_up_test_group, tear_down_test_group);
 }

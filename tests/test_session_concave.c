@@ -20,7 +20,7 @@ enum { SIZE = 240, PIXELS = SIZE * SIZE, TILES = 9, MOST_CORNERS = 64, MOST_ENTR
 #define UNLIT "material: {ambient: 1, diffuse: 0, specular: 0}"
 #define BY_FIELD "colour_by: {field: f, map: grey, range: [-2, 2]}, " UNLIT
 
-static void place_of(int pixel, double out[2])
+static void compute_pixel_position(int pixel, double out[2])
 {
     out[0] = (pixel % SIZE + 0.5) / 100 - 1.2;
     out[1] = 1.2 - (pixel / SIZE + 0.5) / 100;
@@ -34,7 +34,7 @@ typedef struct tile {
     double corners[MOST_CORNERS][2];
 } tile;
 
-static void add(tile *t, double x, double y)
+static void add_corner(tile *t, double x, double y)
 {
     t->corners[t->count][0] = x;
     t->corners[t->count++][1] = y;
@@ -43,18 +43,18 @@ static void add(tile *t, double x, double y)
 static void make_comb(tile *t)
 {
     for (int i = 0; i < 6; i++) {
-        add(t, i / 6., 0.3);
-        add(t, (i + 0.5) / 6, 1 - 0.05 * (i % 3));
+        add_corner(t, i / 6., 0.3);
+        add_corner(t, (i + 0.5) / 6, 1 - 0.05 * (i % 3));
     }
-    add(t, 1, 0.3);
-    for (int i = 6; i >= 0; i--) add(t, i / 6., 0); /* collinear corners */
+    add_corner(t, 1, 0.3);
+    for (int i = 6; i >= 0; i--) add_corner(t, i / 6., 0); /* collinear corners */
 }
 
 static void make_star(tile *t)
 {
     for (int i = 0; i < 40; i++) {
         const double angle = 2 * acos(-1) * i / 40, radius = i % 2 ? 0.5 : 0.15 + 0.1 * test_uniform((uint64_t)i, 3);
-        add(t, 0.5 + radius * cos(angle), 0.5 + radius * sin(angle));
+        add_corner(t, 0.5 + radius * cos(angle), 0.5 + radius * sin(angle));
     }
 }
 
@@ -72,15 +72,15 @@ static void make_tiles(tile tiles[TILES])
     memset(tiles, 0, TILES * sizeof *tiles);
     for (int i = 0; i < TILES; i++) tiles[i].type = INSITU_POLYGON;
     tiles[1].type = INSITU_QUAD;
-    for (int i = 0; i < 8; i++) add(&tiles[0], u[i][0], u[i][1]);
-    for (int i = 0; i < 4; i++) add(&tiles[1], dart[i][0], dart[i][1]);
-    for (int i = 0; i < 4; i++) add(&tiles[2], dart[(i + 1) % 4][1], dart[(i + 1) % 4][0]);
+    for (int i = 0; i < 8; i++) add_corner(&tiles[0], u[i][0], u[i][1]);
+    for (int i = 0; i < 4; i++) add_corner(&tiles[1], dart[i][0], dart[i][1]);
+    for (int i = 0; i < 4; i++) add_corner(&tiles[2], dart[(i + 1) % 4][1], dart[(i + 1) % 4][0]);
     make_comb(&tiles[3]);
-    for (int i = 0; i < 10; i++) add(&tiles[4], ring[i][0], ring[i][1]);
-    for (int i = 0; i < 11; i++) add(&tiles[5], untidy[i][0], untidy[i][1]);
+    for (int i = 0; i < 10; i++) add_corner(&tiles[4], ring[i][0], ring[i][1]);
+    for (int i = 0; i < 11; i++) add_corner(&tiles[5], untidy[i][0], untidy[i][1]);
     make_star(&tiles[6]);
-    for (int i = 0; i < 5; i++) add(&tiles[7], convex[i][0], convex[i][1]);
-    for (int i = 7; i >= 0; i--) add(&tiles[8], u[i][1], 1 - u[i][0]);
+    for (int i = 0; i < 5; i++) add_corner(&tiles[7], convex[i][0], convex[i][1]);
+    for (int i = 7; i >= 0; i--) add_corner(&tiles[8], u[i][1], 1 - u[i][0]);
     for (int i = 0; i < TILES; i++)
         for (int k = 0; k < tiles[i].count; k++) {
             tiles[i].corners[k][0] = 0.7 * tiles[i].corners[k][0] + 0.75 * (i % 3) - 1.1;
@@ -109,7 +109,7 @@ static void make_shells(const tile tiles[TILES], int rank, int ranks, shells *ou
             place[0] = from[0];
             place[1] = from[1];
             place[2] = 0.3 * from[0] + 0.2 * from[1];
-            out->values[out->vertex_count] = test_linear(place);
+            out->values[out->vertex_count] = test_linear_field(place);
             out->connectivity[out->vertex_count] = out->vertex_count;
             out->vertex_count++;
         }
@@ -117,7 +117,7 @@ static void make_shells(const tile tiles[TILES], int rank, int ranks, shells *ou
     }
 }
 
-static caught_picture draw(MPI_Comm comm, const char *scene, const shells *s)
+static caught_picture draw_shells(MPI_Comm comm, const char *scene, const shells *s)
 {
     insitu_session *session = open_session(comm, scene);
     insitu_mesh mesh;
@@ -148,7 +148,7 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const shells *s)
 /* ---- the expected pictures ------------------------------------------------------------------------------------ */
 
 /* Returns how often the loop winds around the point, and computes the point's distance from the loop. */
-static int winding(const tile *t, const double at[2], double *distance)
+static int compute_winding_number(const tile *t, const double at[2], double *distance)
 {
     int turns = 0;
     for (int i = 0; i < t->count; i++) {
@@ -169,15 +169,15 @@ typedef struct truth {
     double depth, value;
 } truth;
 
-static truth truth_at(const tile tiles[TILES], int pixel)
+static truth compute_expected_pixel(const tile tiles[TILES], int pixel)
 {
     truth out = {.margin = INFINITY};
     double at[3];
-    place_of(pixel, at);
+    compute_pixel_position(pixel, at);
     at[2] = 0.3 * at[0] + 0.2 * at[1];
-    for (int i = 0; i < TILES; i++) out.is_hit = winding(&tiles[i], at, &out.margin) != 0 || out.is_hit;
+    for (int i = 0; i < TILES; i++) out.is_hit = compute_winding_number(&tiles[i], at, &out.margin) != 0 || out.is_hit;
     out.depth = 5 - at[2];
-    out.value = test_linear(at);
+    out.value = test_linear_field(at);
     return out;
 }
 
@@ -228,10 +228,10 @@ static bool is_correct(const tile tiles[TILES], const caught_picture *picture, v
 {
     int hits = 0;
     for (int pixel = 0; pixel < PIXELS; pixel++) {
-        const truth t = truth_at(tiles, pixel);
+        const truth t = compute_expected_pixel(tiles, pixel);
         const float *rgba = picture->rgba + 4 * (ptrdiff_t)pixel;
         double at[2];
-        place_of(pixel, at);
+        compute_pixel_position(pixel, at);
         hits += rgba[3] > 0;
         if (verify(&t, at, rgba, picture->depth[pixel])) continue;
         fprintf(stderr, "%s: (%g, %g): opacity %g, grey %g, depth %g; hit %d, %g from an edge, depth %g\n", what, at[0],
@@ -241,12 +241,12 @@ static bool is_correct(const tile tiles[TILES], const caught_picture *picture, v
     return hits > PIXELS / 10;
 }
 
-static bool are_one(const caught_picture *a, const caught_picture *b, const char *what)
+static bool are_same_pictures_but_edges(const caught_picture *a, const caught_picture *b, const char *what)
 {
-    if (same_pictures(a, b)) return true;
+    if (are_same_pictures(a, b)) return true;
     for (int pixel = 0, reported = 0; pixel < PIXELS && reported < 5; pixel++) {
         double at[2];
-        place_of(pixel, at);
+        compute_pixel_position(pixel, at);
         if (memcmp(a->rgba + 4 * (ptrdiff_t)pixel, b->rgba + 4 * (ptrdiff_t)pixel, 4 * sizeof(float)) == 0 &&
             a->depth[pixel] == b->depth[pixel])
             continue;
@@ -258,7 +258,7 @@ static bool are_one(const caught_picture *a, const caught_picture *b, const char
     return false;
 }
 
-static void concave_shells_are_what_they_are(void **state)
+static void concave_shells_match_their_outline(void **state)
 {
     (void)state;
     static const struct {
@@ -277,12 +277,12 @@ static void concave_shells_are_what_they_are(void **state)
     make_shells(tiles, own_rank, rank_count, &part);
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         const char *scene = write_scene(cases[i].scene);
-        caught_picture ours = draw(MPI_COMM_WORLD, scene, &part), alone = {0};
+        caught_picture ours = draw_shells(MPI_COMM_WORLD, scene, &part), alone = {0};
         bool is_good = true;
         if (own_rank == 0) {
-            alone = draw(MPI_COMM_SELF, scene, &whole);
-            is_good =
-                is_correct(tiles, &alone, cases[i].verify, cases[i].what) && are_one(&ours, &alone, cases[i].what);
+            alone = draw_shells(MPI_COMM_SELF, scene, &whole);
+            is_good = is_correct(tiles, &alone, cases[i].verify, cases[i].what) &&
+                      are_same_pictures_but_edges(&ours, &alone, cases[i].what);
         }
         everywhere(is_good);
         free_caught(&ours);
@@ -294,7 +294,7 @@ static void concave_shells_are_what_they_are(void **state)
 
 /* Checks upright prisms from z = -0.4 to 0.45 whose top is shifted by 0.1 along y: the top must be visible in its
  * polygon, and nothing may be nearer. */
-static void concave_prisms_have_their_tops(void **state)
+static void tops_of_concave_prisms_match_their_outline(void **state)
 {
     (void)state;
     const char *scene = write_scene(IMAGE("", BY_FIELD));
@@ -302,23 +302,23 @@ static void concave_prisms_have_their_tops(void **state)
         for (uint64_t turn = 0; turn < 4; turn++) {
             session_input in = {0};
             tile top = {0};
-            test_mesh_polyhedron((test_polyhedron_shape)shape, test_linear, &in.part);
+            test_mesh_make_polyhedron((test_polyhedron_shape)shape, test_linear_field, &in.part);
             const int around = (int)in.part.vertex_count / 2;
             for (int i = 0; i < around; i++)
-                add(&top, in.part.coordinates[3 * (around + i)], in.part.coordinates[3 * (around + i) + 1]);
+                add_corner(&top, in.part.coordinates[3 * (around + i)], in.part.coordinates[3 * (around + i) + 1]);
             if (turn) test_mesh_reorder_vertices(&in.part, turn);
             input_describe(&in);
             bool is_good = true;
             if (own_rank == 0) {
-                insitu_session *session = open_drawn(MPI_COMM_SELF, scene, &in);
+                insitu_session *session = open_session_and_draw(MPI_COMM_SELF, scene, &in);
                 caught_picture picture = pop_caught_picture();
                 for (int pixel = 0; pixel < PIXELS && is_good; pixel++) {
                     double at[3] = {0, 0, 0.45}, margin = INFINITY;
-                    place_of(pixel, at);
-                    const bool is_top = winding(&top, at, &margin) != 0;
+                    compute_pixel_position(pixel, at);
+                    const bool is_top = compute_winding_number(&top, at, &margin) != 0;
                     const float *rgba = picture.rgba + 4 * (ptrdiff_t)pixel;
                     const double depth = (double)picture.depth[pixel];
-                    const double grey = (double)colour_linear_from_srgb((float)((test_linear(at) + 2) / 4));
+                    const double grey = (double)colour_linear_from_srgb((float)((test_linear_field(at) + 2) / 4));
                     if (margin < 1e-3) continue;
                     is_good = is_top
                                   ? rgba[3] == 1 && fabs(depth - 4.55) < 1.5e-5 && fabs((double)rgba[0] - grey) < 1e-4
@@ -337,7 +337,7 @@ static void concave_prisms_have_their_tops(void **state)
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(concave_shells_are_what_they_are),
-                                       cmocka_unit_test(concave_prisms_have_their_tops)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(concave_shells_match_their_outline),
+                                       cmocka_unit_test(tops_of_concave_prisms_match_their_outline)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

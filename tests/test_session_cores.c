@@ -30,7 +30,7 @@ static void check_shares(const binding *ranks, int rank_count, const int *expect
 }
 
 /* Checks the share of ranks with the same binding. */
-static void check_alike(binding one, int rank_count, int expected)
+static void check_equal_shares(binding one, int rank_count, int expected)
 {
     binding ranks[MOST_RANKS];
     int shares[MOST_RANKS];
@@ -41,20 +41,20 @@ static void check_alike(binding one, int rank_count, int expected)
     check_shares(ranks, rank_count, shares);
 }
 
-static void ranks_share_what_they_may_run_on(void **context)
+static void ranks_divide_the_cores_of_their_affinity_mask(void **context)
 {
     (void)context;
-    check_alike((binding){0, 64}, 1, 64);
-    check_alike((binding){0, 64}, 8, 8);
-    check_alike((binding){0, 64}, 7, 9);
-    check_alike((binding){0, 2}, 8, 1);
-    check_alike((binding){40, 12}, 3, 4); /* the cores of a container */
+    check_equal_shares((binding){0, 64}, 1, 64);
+    check_equal_shares((binding){0, 64}, 8, 8);
+    check_equal_shares((binding){0, 64}, 7, 9);
+    check_equal_shares((binding){0, 2}, 8, 1);
+    check_equal_shares((binding){40, 12}, 3, 4); /* the cores of a container */
     check_shares((const binding[]){{0, 32}, {32, 32}, {0, 32}, {32, 32}}, 4, (const int[]){16, 16, 16, 16});
     check_shares((const binding[]){{0, 4}, {4, 4}, {8, 4}}, 3, (const int[]){4, 4, 4});
     check_shares((const binding[]){{0, 1}, {0, 4}}, 2, (const int[]){1, 3});
 }
 
-static void ranks_of_this_node_share_its_cores(void **context)
+static void ranks_of_one_node_divide_its_cores(void **context)
 {
     (void)context;
     int ranks = 1;
@@ -67,8 +67,8 @@ int main(int argc, char **argv)
 {
     MPI_Init(&argc, &argv);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(ranks_share_what_they_may_run_on),
-        cmocka_unit_test(ranks_of_this_node_share_its_cores),
+        cmocka_unit_test(ranks_divide_the_cores_of_their_affinity_mask),
+        cmocka_unit_test(ranks_of_one_node_divide_its_cores),
     };
     const int failed = cmocka_run_group_tests(tests, NULL, NULL);
     MPI_Finalize();

@@ -51,14 +51,14 @@ typedef struct values {
     int64_t *connectivity, *ids, *doubled_ids;
 } values;
 
-static double *numbers(int64_t count)
+static double *allocate_numbers(int64_t count)
 {
     double *out = malloc((size_t)(count + 1) * sizeof *out);
     assert_non_null(out);
     return out;
 }
 
-static int64_t *integers(int64_t count)
+static int64_t *allocate_integers(int64_t count)
 {
     int64_t *out = malloc((size_t)(count + 1) * sizeof *out);
     assert_non_null(out);
@@ -66,7 +66,7 @@ static int64_t *integers(int64_t count)
 }
 
 /* Returns a number that depends only on the cell, not on its rank. */
-static double own_of(const test_mesh *part, int64_t cell)
+static double compute_cell_number(const test_mesh *part, int64_t cell)
 {
     double sum = 0;
     for (int64_t i = part->offsets[cell]; i < part->offsets[cell + 1]; i++)
@@ -74,21 +74,21 @@ static double own_of(const test_mesh *part, int64_t cell)
     return 0.3 * sin(20 * sum);
 }
 
-static int64_t corner_place(const form *of, const test_mesh *part, int64_t cell, int64_t corner)
+static int64_t find_corner_index(const form *of, const test_mesh *part, int64_t cell, int64_t corner)
 {
     return of->is_in_rows ? cell * ROW + corner - part->offsets[cell] : corner;
 }
 
-static void fill(values *v, const form *of, const test_mesh *part, double scale)
+static void fill_values(values *v, const form *of, const test_mesh *part, double scale)
 {
     for (int64_t i = 0; i < v->distributed_count; i++) v->distributed[i] = (double)NAN;
     for (int64_t i = 0; i < part->vertex_count; i++) v->at_vertices[i] = scale * part->values[i];
     for (int64_t cell = 0; cell < part->cell_count; cell++) {
-        v->at_cells[cell] = own_of(part, cell);
+        v->at_cells[cell] = compute_cell_number(part, cell);
         for (int64_t i = part->offsets[cell]; i < part->offsets[cell + 1]; i++) {
-            const int64_t place = corner_place(of, part, cell, i),
+            const int64_t place = find_corner_index(of, part, cell, i),
                           at = of->is_by_index ? v->distributed_count - 1 - i : place;
-            v->at_corners[i] = scale * (part->values[part->connectivity[i]] + own_of(part, cell));
+            v->at_corners[i] = scale * (part->values[part->connectivity[i]] + compute_cell_number(part, cell));
             v->gathered[i] = v->at_vertices[part->connectivity[i]];
             v->distributed[at] = v->at_corners[i];
             if (of->is_by_index) v->index[place] = at;
@@ -96,7 +96,7 @@ static void fill(values *v, const form *of, const test_mesh *part, double scale)
     }
 }
 
-static void double_vertices(values *v, const test_mesh *part)
+static void duplicate_vertices(values *v, const test_mesh *part)
 {
     for (int64_t i = 0; i < part->vertex_count; i++) v->ids[i] = 7 * i;
     for (int64_t i = 0; i < v->corners; i++) {
@@ -110,21 +110,21 @@ static values make_values(const form *of, const test_mesh *part)
 {
     const int64_t corners = part->connectivity_count, places = of->is_in_rows ? part->cell_count * ROW : corners;
     values v = {.corners = corners,
-                .at_vertices = numbers(part->vertex_count),
-                .at_corners = numbers(corners),
-                .at_cells = numbers(part->cell_count),
-                .gathered = numbers(corners),
-                .distributed = numbers(places + corners),
-                .index = integers(places),
+                .at_vertices = allocate_numbers(part->vertex_count),
+                .at_corners = allocate_numbers(corners),
+                .at_cells = allocate_numbers(part->cell_count),
+                .gathered = allocate_numbers(corners),
+                .distributed = allocate_numbers(places + corners),
+                .index = allocate_integers(places),
                 .distributed_count = places + (of->is_by_index ? 5 : 0),
-                .coordinates = numbers(3 * corners)};
-    v.connectivity = integers(corners);
-    v.ids = integers(part->vertex_count);
-    v.doubled_ids = integers(corners);
+                .coordinates = allocate_numbers(3 * corners)};
+    v.connectivity = allocate_integers(corners);
+    v.ids = allocate_integers(part->vertex_count);
+    v.doubled_ids = allocate_integers(corners);
     /* entries after the corners of a row, which must not be read */
     for (int64_t i = 0; i < places; i++) v.index[i] = -1;
-    fill(&v, of, part, 1);
-    double_vertices(&v, part);
+    fill_values(&v, of, part, 1);
+    duplicate_vertices(&v, part);
     return v;
 }
 
@@ -145,18 +145,18 @@ static void sort_hex_vertices(test_mesh *part)
     }
 }
 
-static insitu_cell_type type_of(test_mesh_kind kind)
+static insitu_cell_type get_cell_type(test_mesh_kind kind)
 {
     static const insitu_cell_type types[] = {INSITU_TET, INSITU_HEX, INSITU_WEDGE, INSITU_PYRAMID};
     return types[kind];
 }
 
-static insitu_mesh shape_mesh(const session_input *in, const values *v, const form *of, bool is_doubled)
+static insitu_mesh describe_mesh(const session_input *in, const values *v, const form *of, bool is_doubled)
 {
     insitu_mesh mesh = in->mesh;
     if (of->is_in_rows) {
         mesh.offsets = mesh.cell_types = (insitu_array){0};
-        mesh.cell_type = type_of(in->kind);
+        mesh.cell_type = get_cell_type(in->kind);
     }
     if (of->is_lexicographic) mesh.vertex_order = INSITU_ORDER_LEXICOGRAPHIC;
     if (of->has_ids) mesh.vertex_ids = (insitu_array){is_doubled ? v->doubled_ids : v->ids, INSITU_INT64, 0};
@@ -222,15 +222,15 @@ static void scale_coordinates(session_input *in, values *v, double scale)
 }
 
 /* Draws the mesh unchanged, with other values, and with other coordinates. */
-static drawing draw(session_input *in, values *v, const form *of, bool is_doubled)
+static drawing draw_form(session_input *in, values *v, const form *of, bool is_doubled)
 {
     drawing out = {.copied = 0};
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(discontinuous_scene));
     for (int step = 0; step < STEPS; step++) {
-        insitu_mesh mesh = shape_mesh(in, v, of, is_doubled);
+        insitu_mesh mesh = describe_mesh(in, v, of, is_doubled);
         mesh.changed = step ? INSITU_CHANGED_GEOMETRY : INSITU_CHANGED_ALL;
         if (step == 1) mesh.changed = INSITU_CHANGED_NOTHING;
-        if (step == 1) fill(v, of, &in->part, 0.5);
+        if (step == 1) fill_values(v, of, &in->part, 0.5);
         if (step == 2) scale_coordinates(in, v, 0.5);
         everywhere(insitu_set_mesh(session, "m", &mesh) == INSITU_OK);
         if (step < 2) set_fields(session, in, v, of, is_doubled);
@@ -239,17 +239,17 @@ static drawing draw(session_input *in, values *v, const form *of, bool is_double
     out.copied = insitu_last_report(session)->bytes_copied;
     insitu_destroy(&session);
     scale_coordinates(in, v, 2);
-    fill(v, of, &in->part, 1);
+    fill_values(v, of, &in->part, 1);
     return out;
 }
 
-static void compare(drawing *a, drawing *b, int steps)
+static void compare_drawings(drawing *a, drawing *b, int steps)
 {
     bool same = true, differ = own_rank != 0;
     for (int step = 0; step < steps && own_rank == 0; step++)
         for (int i = 0; i < PICTURES; i++) {
-            same = same && same_pictures(&a->pictures[step][i], &b->pictures[step][i]);
-            differ = differ || steps == 1 || !same_pictures(&a->pictures[0][i], &a->pictures[step][i]);
+            same = same && are_same_pictures(&a->pictures[step][i], &b->pictures[step][i]);
+            differ = differ || steps == 1 || !are_same_pictures(&a->pictures[0][i], &a->pictures[step][i]);
             free(b->pictures[step][i].rgba), free(b->pictures[step][i].depth);
         }
     for (int step = 0; step < steps && own_rank == 0; step++)
@@ -258,18 +258,18 @@ static void compare(drawing *a, drawing *b, int steps)
     everywhere(differ);
 }
 
-static void check(test_mesh_kind kind, const form *of)
+static void check_form(test_mesh_kind kind, const form *of)
 {
     session_input in = {0};
     input_create(&in, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
     if (of->has_ids && rank_count > 1) return input_free(&in); /* the ids are unique only within one rank */
     if (of->is_lexicographic) sort_hex_vertices(&in.part);
     values v = make_values(of, &in.part);
-    drawing doubled = draw(&in, &v, of, true), discontinuous = draw(&in, &v, of, false);
+    drawing doubled = draw_form(&in, &v, of, true), discontinuous = draw_form(&in, &v, of, false);
     /* for each corner: coordinates, an index, and g; also f if it cannot be read in place */
     const int64_t tuples = 3 * 8 + 4 + 8 + (of->is_by_index || of->is_in_rows ? 8 : 0);
     everywhere(discontinuous.copied == doubled.copied + tuples * v.corners);
-    compare(&doubled, &discontinuous, STEPS);
+    compare_drawings(&doubled, &discontinuous, STEPS);
     free_values(&v);
     input_free(&in);
 }
@@ -279,23 +279,24 @@ static void corner_fields_match_duplicated_vertices(void **state)
     (void)state;
     static const form forms[] = {{0}, {.is_by_index = true}, {.has_ids = true}};
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
-        for (size_t i = 0; i < sizeof forms / sizeof forms[0] && kind != TEST_POLYHEDRA; i++) check(kind, &forms[i]);
+        for (size_t i = 0; i < sizeof forms / sizeof forms[0] && kind != TEST_POLYHEDRA; i++)
+            check_form(kind, &forms[i]);
 }
 
-static void corners_in_rows_and_other_orders_are_plain_ones(void **state)
+static void corners_in_rows_and_other_orders_match_plain_corners(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = TEST_TETS; kind <= TEST_PYRAMIDS; kind++) {
-        check(kind, &(form){.is_in_rows = true});
-        check(kind, &(form){.is_in_rows = true, .is_by_index = true});
+        check_form(kind, &(form){.is_in_rows = true});
+        check_form(kind, &(form){.is_in_rows = true, .is_by_index = true});
     }
-    check(TEST_HEXES, &(form){.is_lexicographic = true});
-    check(TEST_HEXES, &(form){.is_lexicographic = true, .is_in_rows = true, .is_by_index = true});
+    check_form(TEST_HEXES, &(form){.is_lexicographic = true});
+    check_form(TEST_HEXES, &(form){.is_lexicographic = true, .is_in_rows = true, .is_by_index = true});
 }
 
 /* ---- means ---------------------------------------------------------------------------------------------------- */
 
-static int by_size(const void *a, const void *b)
+static int compare_magnitudes(const void *a, const void *b)
 {
     const double x = *(const double *)a, y = *(const double *)b;
     return (x > y) - (x < y);
@@ -303,16 +304,16 @@ static int by_size(const void *a, const void *b)
 
 /* Returns the mean over all corners of the whole mesh at one position, summed by increasing size, as means of cells
  * are. */
-static double mean_at(const test_mesh *whole, const double at[3])
+static double compute_corner_mean(const test_mesh *whole, const double at[3])
 {
     double found[256], sum = 0;
     int count = 0;
     for (int64_t cell = 0; cell < whole->cell_count; cell++)
         for (int64_t i = whole->offsets[cell]; i < whole->offsets[cell + 1]; i++)
             if (memcmp(whole->coordinates + 3 * whole->connectivity[i], at, 3 * sizeof *at) == 0 && count < 256)
-                found[count++] = whole->values[whole->connectivity[i]] + own_of(whole, cell);
+                found[count++] = whole->values[whole->connectivity[i]] + compute_cell_number(whole, cell);
     assert_true(count > 0 && count < 256);
-    qsort(found, (size_t)count, sizeof *found, by_size);
+    qsort(found, (size_t)count, sizeof *found, compare_magnitudes);
     for (int i = 0; i < count; i++) sum += found[i];
     return sum / count;
 }
@@ -333,12 +334,12 @@ static void joined_corners_have_their_means(void **state)
             everywhere(insitu_set_mesh(session, "m", &in.mesh) == INSITU_OK);
             set_fields(session, &in, &v, &plain, false);
             for (int64_t i = 0; i < in.part.vertex_count && !is_joined; i++)
-                v.at_vertices[i] = mean_at(&whole.part, in.part.coordinates + 3 * i);
+                v.at_vertices[i] = compute_corner_mean(&whole.part, in.part.coordinates + 3 * i);
             if (!is_joined) set_field(session, "f", INSITU_VERTEX, in.part.vertex_count, v.at_vertices, NULL, &v);
             step_and_catch(session, 0, drawn[is_joined].pictures[0]);
             insitu_destroy(&session);
         }
-        compare(&drawn[0], &drawn[1], 1);
+        compare_drawings(&drawn[0], &drawn[1], 1);
         free_values(&v);
         input_free(&in);
         input_free(&whole);
@@ -347,45 +348,45 @@ static void joined_corners_have_their_means(void **state)
 
 /* ---- errors --------------------------------------------------------------------------------------------------- */
 
-static void too_few(session_input *in)
+static void set_too_few_values(session_input *in)
 {
     in->field.centring = INSITU_CORNER;
     in->field.count = in->part.connectivity_count - 1;
 }
-static void of_owned_cells(session_input *in)
+static void use_owned_cells(session_input *in)
 {
     in->field.centring = INSITU_CORNER;
     in->mesh.cell_types = (insitu_array){0};
     in->mesh.cell_type = INSITU_POLYHEDRON;
 }
-static void in_short_rows(session_input *in)
+static void set_short_rows(session_input *in)
 {
     in->field.centring = INSITU_CORNER;
     in->mesh.cell_types = in->mesh.offsets = (insitu_array){0};
     in->mesh.cell_type = INSITU_HEX;
     in->field.corner_row = 7;
 }
-static void in_rows_of_offsets(session_input *in)
+static void use_rows_with_offsets(session_input *in)
 {
     in->field.centring = INSITU_CORNER;
     in->field.corner_row = 8;
 }
-static void in_rows_of_vertices(session_input *in)
+static void use_rows_of_vertices(session_input *in)
 {
     in->field.corner_row = 8;
 }
-static void unknown_centring(session_input *in)
+static void set_unknown_centring(session_input *in)
 {
     in->field.centring = (insitu_centring)3;
 }
 
 static const corrupted_case cases[] = {
-    {"few", too_few, INSITU_ERROR_FIELD, true, {"field \"f\": has ", "corners of cells"}},
-    {"polyhedra", of_owned_cells, INSITU_ERROR_FIELD, true, {"the mesh has polyhedra, whose corners have no order"}},
-    {"short", in_short_rows, INSITU_ERROR_FIELD, true, {"corner_row is 7, a cell has 8 vertices"}},
-    {"offsets", in_rows_of_offsets, INSITU_ERROR_FIELD, true, {"corner_row is 8 and the mesh has offsets"}},
-    {"vertices", in_rows_of_vertices, INSITU_ERROR_ARGUMENT, true, {"corner_row is 8, and its centring 0"}},
-    {"centring", unknown_centring, INSITU_ERROR_ARGUMENT, true, {"unknown centring 3"}},
+    {"few", set_too_few_values, INSITU_ERROR_FIELD, true, {"field \"f\": has ", "corners of cells"}},
+    {"polyhedra", use_owned_cells, INSITU_ERROR_FIELD, true, {"the mesh has polyhedra, whose corners have no order"}},
+    {"short", set_short_rows, INSITU_ERROR_FIELD, true, {"corner_row is 7, a cell has 8 vertices"}},
+    {"offsets", use_rows_with_offsets, INSITU_ERROR_FIELD, true, {"corner_row is 8 and the mesh has offsets"}},
+    {"vertices", use_rows_of_vertices, INSITU_ERROR_ARGUMENT, true, {"corner_row is 8, and its centring 0"}},
+    {"centring", set_unknown_centring, INSITU_ERROR_ARGUMENT, true, {"unknown centring 3"}},
 };
 
 static void wrong_input_is_reported_on_all_ranks(void **state)
@@ -393,7 +394,7 @@ static void wrong_input_is_reported_on_all_ranks(void **state)
     (void)state;
     session_input in = {0};
     input_create(&in, TEST_HEXES, 3, TEST_RANDOM, own_rank, rank_count);
-    all_are_reported(&in, cases, sizeof cases / sizeof cases[0]);
+    check_all_faults_are_reported(&in, cases, sizeof cases / sizeof cases[0]);
     input_free(&in);
 }
 
@@ -411,10 +412,10 @@ static void wrong_array_contents_are_reported_on_all_ranks(void **state)
     const int64_t good = v.index[9];
     if (own_rank == rank_count - 1) v.index[9] = v.distributed_count;
     for (int step = 0; step < 2; step++)
-        reported_everywhere(session, insitu_step(session, step, 0), INSITU_ERROR_FIELD, "the index of corner 9 is ",
-                            "outside 0..");
+        check_reported_everywhere(session, insitu_step(session, step, 0), INSITU_ERROR_FIELD,
+                                  "the index of corner 9 is ", "outside 0..");
     v.index[9] = good;
-    step_is_good(session, 2);
+    check_step_succeeds(session, 2);
     insitu_destroy(&session);
     free_values(&v);
     input_free(&in);
@@ -425,8 +426,8 @@ static void wrong_array_contents_are_reported_on_all_ranks(void **state)
     assert_non_null(zeros);
     everywhere(insitu_set_mesh(session, "m", &in.mesh) == INSITU_OK);
     set_field(session, "f", INSITU_CORNER, in.part.connectivity_count, zeros, NULL, NULL);
-    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "is a polyhedron, whose corners",
-                        "cell ");
+    check_reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "is a polyhedron, whose corners",
+                              "cell ");
     insitu_destroy(&session);
     free(zeros);
     input_free(&in);
@@ -435,7 +436,7 @@ static void wrong_array_contents_are_reported_on_all_ranks(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(corner_fields_match_duplicated_vertices),
-                                       cmocka_unit_test(corners_in_rows_and_other_orders_are_plain_ones),
+                                       cmocka_unit_test(corners_in_rows_and_other_orders_match_plain_corners),
                                        cmocka_unit_test(joined_corners_have_their_means),
                                        cmocka_unit_test(wrong_input_is_reported_on_all_ranks),
                                        cmocka_unit_test(wrong_array_contents_are_reported_on_all_ranks)};

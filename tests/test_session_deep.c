@@ -51,7 +51,7 @@ enum { CASES = sizeof cases / sizeof *cases, ANTIALIASED = 1 };
  * another product in compositing, and the deep picture's A is a difference: four roundings. For mixed segments the flat
  * picture multiplies the transmittance of a run of them as one number: two more. The background takes a product and a
  * sum. */
-static double bound_of(int64_t samples)
+static double compute_error_bound(int64_t samples)
 {
     return ldexp((double)(6 * samples + 2), -24);
 }
@@ -67,14 +67,16 @@ static bool is_in_order(const insitu_deep_sample *samples, int64_t count)
 }
 
 /* Returns how far the flat pixel is from the samples blended over the background. */
-static double distance(const insitu_deep_sample *samples, int64_t count, const double behind[4], const float *flat)
+static double distance_from_flattened(const insitu_deep_sample *samples, int64_t count, const double behind[4],
+                                      const float *flat)
 {
     double rgba[4] = {0, 0, 0, 0}, worst = 0;
     for (int64_t i = 0; i < count; i++) {
         const double through = 1 - rgba[3];
         for (int c = 0; c < 4; c++) rgba[c] += through * (double)samples[i].rgba[c];
     }
-    for (int c = 0; c < 4; c++) worst = test_worse(worst, fabs(rgba[c] + (1 - rgba[3]) * behind[c] - (double)flat[c]));
+    for (int c = 0; c < 4; c++)
+        worst = test_larger_error(worst, fabs(rgba[c] + (1 - rgba[3]) * behind[c] - (double)flat[c]));
     return worst;
 }
 
@@ -86,9 +88,9 @@ static bool is_the_flat_picture(const caught_picture *deep, const caught_picture
     for (int p = 0; p < PIXELS; p++) {
         const insitu_deep_sample *samples = deep->samples + deep->first[p];
         const int64_t count = deep->first[p + 1] - deep->first[p];
-        const double off = distance(samples, count, linear_background, flat->rgba + 4 * p);
+        const double off = distance_from_flattened(samples, count, linear_background, flat->rgba + 4 * p);
         shown += count;
-        if (is_in_order(samples, count) && off <= bound_of(count)) continue;
+        if (is_in_order(samples, count) && off <= compute_error_bound(count)) continue;
         fprintf(stderr, "%s, %d ranks, pixel %d of %d samples: off by %g\n", name, rank_count, p, (int)count, off);
         return false;
     }
@@ -116,10 +118,10 @@ typedef struct two_pictures {
     caught_picture flat, deep;
 } two_pictures;
 
-static two_pictures draw(MPI_Comm comm, const char *scene, const session_input *in)
+static two_pictures draw_flat_and_deep(MPI_Comm comm, const char *scene, const session_input *in)
 {
     two_pictures out = {0};
-    insitu_session *session = open_drawn(comm, scene, in);
+    insitu_session *session = open_session_and_draw(comm, scene, in);
     if (own_rank == 0) {
         assert_int_equal(caught_count, 2);
         out = (two_pictures){caught[0], caught[1]};
@@ -138,22 +140,22 @@ static void free_pictures(two_pictures *pictures)
 static bool verify_case(const deep_case *c, const session_input *whole, const session_input *part)
 {
     const char *scene = write_scene(c->scene);
-    two_pictures ours = draw(MPI_COMM_WORLD, scene, part), alone = {0};
+    two_pictures ours = draw_flat_and_deep(MPI_COMM_WORLD, scene, part), alone = {0};
     if (own_rank != 0) return true;
-    alone = draw(MPI_COMM_SELF, scene, whole);
+    alone = draw_flat_and_deep(MPI_COMM_SELF, scene, whole);
     const bool is_averaged = c == &cases[ANTIALIASED];
     bool is_well = is_averaged || is_the_flat_picture(&ours.deep, &ours.flat, c->name);
     is_well = is_well && (is_averaged || is_the_flat_picture(&alone.deep, &alone.flat, c->name));
     if (is_well && c->is_of_surfaces)
-        is_well = has_depths(&ours.deep, &ours.flat) && same_pictures(&ours.deep, &alone.deep);
+        is_well = has_depths(&ours.deep, &ours.flat) && are_same_pictures(&ours.deep, &alone.deep);
     if (is_well && c->is_reproducible)
-        is_well = is_the_same_flat(&ours.flat, &alone.flat) && same_pictures(&ours.deep, &alone.deep);
+        is_well = is_the_same_flat(&ours.flat, &alone.flat) && are_same_pictures(&ours.deep, &alone.deep);
     free_pictures(&ours);
     free_pictures(&alone);
     return is_well;
 }
 
-static void verify(test_mesh_kind kind, test_partition_kind distributed)
+static void verify_deep_pictures(test_mesh_kind kind, test_partition_kind distributed)
 {
     session_input whole = {0}, part = {0};
     input_create(&whole, kind, SIDE, distributed, 0, 1);
@@ -167,17 +169,17 @@ static void verify(test_mesh_kind kind, test_partition_kind distributed)
     input_free(&whole);
 }
 
-static void deep_pictures_are_the_flat_ones(void **state)
+static void deep_pictures_match_flat_pictures(void **state)
 {
     (void)state;
-    verify(TEST_TETS, TEST_BLOCK);
-    verify(TEST_HEXES, TEST_CHECKERBOARD);
-    verify(TEST_POLYHEDRA, TEST_RANDOM);
-    verify(TEST_MIXED, TEST_RANDOM);
+    verify_deep_pictures(TEST_TETS, TEST_BLOCK);
+    verify_deep_pictures(TEST_HEXES, TEST_CHECKERBOARD);
+    verify_deep_pictures(TEST_POLYHEDRA, TEST_RANDOM);
+    verify_deep_pictures(TEST_MIXED, TEST_RANDOM);
 }
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(deep_pictures_are_the_flat_ones)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(deep_pictures_match_flat_pictures)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -28,7 +28,7 @@ typedef struct vector_field {
     insitu_field field;
 } vector_field;
 
-static void place_of(const test_mesh *mesh, insitu_centring centring, int64_t at, double place[3])
+static void compute_value_position(const test_mesh *mesh, insitu_centring centring, int64_t at, double place[3])
 {
     if (centring == INSITU_VERTEX) {
         memcpy(place, mesh->coordinates + 3 * at, 3 * sizeof *place);
@@ -50,7 +50,7 @@ static void make_vector(const test_mesh *mesh, vector_function *f, insitu_centri
     assert_non_null(out->values);
     for (int64_t i = 0; i < count; i++) {
         double place[3], value[3];
-        place_of(mesh, centring, i, place);
+        compute_value_position(mesh, centring, i, place);
         f(place, value);
         for (int a = 0; a < 3; a++)
             if (is_wide)
@@ -67,27 +67,28 @@ static void make_vector(const test_mesh *mesh, vector_function *f, insitu_centri
     out->field.component_stride_bytes = size;
 }
 
-static insitu_session *begin(MPI_Comm comm, const char *scene, const session_input *in, const vector_field *u)
+static insitu_session *open_session_with_velocity(MPI_Comm comm, const char *scene, const session_input *in,
+                                                  const vector_field *u)
 {
     insitu_session *session = NULL;
     insitu_status status = insitu_create_from_text(comm, scene, &session);
     if (status) fprintf(stderr, "%s\n", insitu_error(NULL));
     assert_int_equal(status, INSITU_OK);
-    assert_int_equal(submit(session, in), INSITU_OK);
+    assert_int_equal(submit_input(session, in), INSITU_OK);
     if (u) assert_int_equal(insitu_set_field(session, "m", &u->field), INSITU_OK);
     return session;
 }
 
 static insitu_session *open_stepped(MPI_Comm comm, const char *scene, const session_input *in, const vector_field *u)
 {
-    insitu_session *session = begin(comm, scene, in, u);
+    insitu_session *session = open_session_with_velocity(comm, scene, in, u);
     const insitu_status status = insitu_step(session, 0, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     assert_int_equal(status, INSITU_OK);
     return session;
 }
 
-static const session_field *derived_field(const insitu_session *session, const char *mesh_name, const char *name)
+static const session_field *find_derived_field(const insitu_session *session, const char *mesh_name, const char *name)
 {
     const session_mesh *mesh = session_find_mesh(&session->meshes, mesh_name);
     const int index = session_find_field(mesh, name);
@@ -95,11 +96,11 @@ static const session_field *derived_field(const insitu_session *session, const c
     return &mesh->fields[index];
 }
 
-static double value_of(const insitu_session *session, const char *name, int component, int64_t at)
+static double get_derived_value(const insitu_session *session, const char *name, int component, int64_t at)
 {
     const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
-    derived_field(session, "m", name);
-    const grid_field values = session_given_field(mesh, session_find_field(mesh, name), component);
+    find_derived_field(session, "m", name);
+    const grid_field values = session_caller_field(mesh, session_find_field(mesh, name), component);
     return grid_field_value(&values, at);
 }
 
@@ -107,20 +108,20 @@ static double value_of(const insitu_session *session, const char *name, int comp
 
 static const double slopes[3][3] = {{0.3, -1.1, 0.7}, {0.9, 0.2, -0.4}, {-0.6, 0.5, 1.3}};
 
-static void linear(const double p[3], double out[3])
+static void linear_velocity(const double p[3], double out[3])
 {
     for (int c = 0; c < 3; c++) out[c] = slopes[c][0] * p[0] + slopes[c][1] * p[1] + slopes[c][2] * p[2] + 2 - c;
 }
 
 /* Returns det(M - x), whose middle root is found by bisection between the extremes of its derivative. */
-static double determinant_less(const double m[3][3], double x)
+static double shifted_determinant(const double m[3][3], double x)
 {
     const double a = m[0][0] - x, b = m[1][1] - x, c = m[2][2] - x;
     return a * (b * c - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * c - m[1][2] * m[2][0]) +
            m[0][2] * (m[1][0] * m[2][1] - b * m[2][0]);
 }
 
-static double middle_root(const double m[3][3])
+static double find_middle_eigenvalue(const double m[3][3])
 {
     const double trace = m[0][0] + m[1][1] + m[2][2];
     const double second = m[0][0] * m[1][1] + m[0][0] * m[2][2] + m[1][1] * m[2][2] - m[0][1] * m[1][0] -
@@ -129,7 +130,7 @@ static double middle_root(const double m[3][3])
     double low = trace / 3 - half, high = trace / 3 + half; /* the determinant increases between them */
     for (int i = 0; i < 200; i++) {
         const double middle = 0.5 * (low + high);
-        if (determinant_less(m, middle) < 0)
+        if (shifted_determinant(m, middle) < 0)
             low = middle;
         else
             high = middle;
@@ -159,7 +160,7 @@ static void find_tensors(double *q, double *lambda2, double *strain)
             for (int j = 0; j < 3; j++) m[i][k] += s[i][j] * s[j][k] + w[i][j] * w[j][k];
     *q = (of_w - of_s) / 2;
     *strain = sqrt(2 * of_s);
-    *lambda2 = middle_root((const double(*)[3])m);
+    *lambda2 = find_middle_eigenvalue((const double(*)[3])m);
 }
 
 #define ALL_KINDS                                                                                                      \
@@ -168,7 +169,7 @@ static void find_tensors(double *q, double *lambda2, double *strain)
     "q: {q_criterion: u}, l: {lambda2: u}, s: {strain_rate: [u.x, u.y, u.z]}, all: \"g.x + mag(g) + gm + gz + d + "    \
     "w.x + wm + wx + q + l + s\""
 
-static double worst_of_linear(const insitu_session *session, const test_mesh *mesh)
+static double find_largest_linear_error(const insitu_session *session, const test_mesh *mesh)
 {
     double q, lambda2, strain, worst = 0;
     find_tensors(&q, &lambda2, &strain);
@@ -194,8 +195,8 @@ static double worst_of_linear(const insitu_session *session, const test_mesh *me
     };
     for (size_t i = 0; i < sizeof expected / sizeof *expected; i++)
         for (int64_t v = 0; v < mesh->vertex_count; v++) {
-            const double found = value_of(session, expected[i].name, expected[i].component, v);
-            worst = test_worse(worst, fabs(found - expected[i].value));
+            const double found = get_derived_value(session, expected[i].name, expected[i].component, v);
+            worst = test_larger_error(worst, fabs(found - expected[i].value));
         }
     return worst;
 }
@@ -208,15 +209,15 @@ static void linear_velocities_are_exact(void **state)
     for (int kind = 0; kind < 2 * TEST_KIND_COUNT; kind++) {
         session_input in = {0};
         if (kind == TEST_KIND_COUNT + TEST_POLYHEDRA) continue; /* these cells are polyhedra already */
-        test_mesh_lattice((test_mesh_kind)(kind % TEST_KIND_COUNT), SIDE, 0.2, test_wave, &in.part);
+        test_mesh_make_lattice((test_mesh_kind)(kind % TEST_KIND_COUNT), SIDE, 0.2, test_wave_field, &in.part);
         if (kind >= TEST_KIND_COUNT) test_mesh_to_polyhedra(&in.part, kind == TEST_KIND_COUNT + TEST_MIXED ? 0.5 : 1);
         input_describe(&in);
         in.mesh.keep_polyhedra = 1;
         for (int is_wide = 0; is_wide < 2; is_wide++) {
             vector_field u;
-            make_vector(&in.part, linear, INSITU_VERTEX, is_wide, "u", &u);
+            make_vector(&in.part, linear_velocity, INSITU_VERTEX, is_wide, "u", &u);
             insitu_session *session = open_stepped(MPI_COMM_SELF, SCENE(ALL_KINDS, "all"), &in, &u);
-            const double worst = worst_of_linear(session, &in.part);
+            const double worst = find_largest_linear_error(session, &in.part);
             if (!(worst < (is_wide ? 1e-9 : 1e-5)))
                 fprintf(stderr, "%s%s, %d bytes: %g\n", test_mesh_kind_name((test_mesh_kind)(kind % TEST_KIND_COUNT)),
                         kind >= TEST_KIND_COUNT ? " as polyhedra" : "", is_wide ? 8 : 4, worst);
@@ -230,7 +231,7 @@ static void linear_velocities_are_exact(void **state)
 
 /* ---- expressions ------------------------------------------------------------------------------------------------ */
 
-static void swirl(const double p[3], double out[3])
+static void swirl_velocity(const double p[3], double out[3])
 {
     out[0] = sin(3 * p[2]) + cos(2 * p[1]) + 0.2;
     out[1] = sin(2 * p[0]) + 1.5 * cos(3 * p[2]);
@@ -254,7 +255,7 @@ static void find_expressions(const double u[3], double out[6])
     out[5] = u[1];
 }
 
-static void expressions_are_those_of_c(void **state)
+static void expressions_match_c_arithmetic(void **state)
 {
     (void)state;
     static const char *const names[] = {"a", "b", "c", "d", "e", "h", "all"};
@@ -262,7 +263,7 @@ static void expressions_are_those_of_c(void **state)
     input_create(&in, TEST_HEXES, SIDE, TEST_BLOCK, 0, 1);
     for (insitu_centring centring = INSITU_VERTEX; centring <= INSITU_CELL; centring++) {
         vector_field u;
-        make_vector(&in.part, swirl, centring, true, "u", &u);
+        make_vector(&in.part, swirl_velocity, centring, true, "u", &u);
         insitu_session *session = open_stepped(MPI_COMM_SELF, SCENE(EXPRESSIONS, "all"), &in, &u);
         double worst = 0;
         for (int64_t i = 0; i < u.field.count; i++) {
@@ -270,11 +271,11 @@ static void expressions_are_those_of_c(void **state)
             find_expressions((const double *)u.values + 4 * i, expected);
             for (int k = 0; k < 6; k++) expected[6] += expected[k];
             for (int k = 0; k < 7; k++)
-                worst = test_worse(worst,
-                                   fabs(value_of(session, names[k], 0, i) - expected[k]) / fmax(1, fabs(expected[k])));
+                worst = test_larger_error(worst, fabs(get_derived_value(session, names[k], 0, i) - expected[k]) /
+                                                     fmax(1, fabs(expected[k])));
         }
         everywhere(worst < 1e-13);
-        assert_int_equal(derived_field(session, "m", "all")->given.centring, centring);
+        assert_int_equal(find_derived_field(session, "m", "all")->given.centring, centring);
         insitu_destroy(&session);
         free(u.values);
     }
@@ -304,10 +305,10 @@ static bool *find_used(const insitu_session *session, const char *mesh)
     return used;
 }
 
-static bool has_same_bits(const insitu_session *parts, const char *mesh, const insitu_session *alone,
-                          const test_mesh *part, const test_mesh *whole, const char *name)
+static bool check_same_bits(const insitu_session *parts, const char *mesh, const insitu_session *alone,
+                            const test_mesh *part, const test_mesh *whole, const char *name)
 {
-    const session_field *a = derived_field(parts, mesh, name), *b = derived_field(alone, "m", name);
+    const session_field *a = find_derived_field(parts, mesh, name), *b = find_derived_field(alone, "m", name);
     const int64_t size = a->values.stride;
     bool *used = find_used(parts, mesh), is_same = a->values.stride == b->values.stride;
     for (int64_t v = 0; v < part->vertex_count && is_same; v++) {
@@ -325,7 +326,7 @@ static bool has_same_bits(const insitu_session *parts, const char *mesh, const i
 
 /* Checks that threads, ranks, the numbering of vertices and cells, the order of a cell's vertices, and ghosts do not
  * change the results. */
-static void partitions_do_not_show(void **state)
+static void derived_fields_do_not_depend_on_the_partition(void **state)
 {
     (void)state;
     static const char *const names[] = {"q", "w", "l", "mixed"};
@@ -334,23 +335,23 @@ static void partitions_do_not_show(void **state)
         for (test_partition_kind distributed = TEST_BLOCK; distributed <= TEST_RANDOM; distributed++) {
             session_input whole = {0}, in = {0};
             vector_field u, c, whole_u, whole_c;
-            test_mesh_lattice((test_mesh_kind)kind, SIDE, 0.2, test_wave, &whole.part);
+            test_mesh_make_lattice((test_mesh_kind)kind, SIDE, 0.2, test_wave_field, &whole.part);
             input_describe(&whole);
             extract_own_cells(&whole.part, distributed, SIDE, kind == TEST_HEXES, &in.part);
             if (kind != TEST_POLYHEDRA) test_mesh_reorder_vertices(&in.part, (uint64_t)own_rank + 3);
             input_describe(&in);
-            make_vector(&in.part, swirl, INSITU_VERTEX, kind % 2 == 0, "u", &u);
-            make_vector(&whole.part, swirl, INSITU_VERTEX, kind % 2 == 0, "u", &whole_u);
-            make_vector(&in.part, linear, INSITU_VERTEX, true, "c", &c);
-            make_vector(&whole.part, linear, INSITU_VERTEX, true, "c", &whole_c);
-            insitu_session *parts = begin(MPI_COMM_WORLD, scene, &in, &u);
+            make_vector(&in.part, swirl_velocity, INSITU_VERTEX, kind % 2 == 0, "u", &u);
+            make_vector(&whole.part, swirl_velocity, INSITU_VERTEX, kind % 2 == 0, "u", &whole_u);
+            make_vector(&in.part, linear_velocity, INSITU_VERTEX, true, "c", &c);
+            make_vector(&whole.part, linear_velocity, INSITU_VERTEX, true, "c", &whole_c);
+            insitu_session *parts = open_session_with_velocity(MPI_COMM_WORLD, scene, &in, &u);
             assert_int_equal(insitu_set_field(parts, "m", &c.field), INSITU_OK);
-            insitu_session *alone = begin(MPI_COMM_SELF, two_threads, &whole, &whole_u);
+            insitu_session *alone = open_session_with_velocity(MPI_COMM_SELF, two_threads, &whole, &whole_u);
             assert_int_equal(insitu_set_field(alone, "m", &whole_c.field), INSITU_OK);
             everywhere(insitu_step(parts, 0, 0) == INSITU_OK);
             everywhere(insitu_step(alone, 0, 0) == INSITU_OK);
             for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-                everywhere(has_same_bits(parts, "m", alone, &in.part, &whole.part, names[i]));
+                everywhere(check_same_bits(parts, "m", alone, &in.part, &whole.part, names[i]));
             insitu_destroy(&parts);
             insitu_destroy(&alone);
             free(u.values);
@@ -366,7 +367,7 @@ static void partitions_do_not_show(void **state)
 
 /* Checks that blocks of one mesh, on any ranks, give the same fields as the whole mesh: gradients at a block's border
  * use both sides. */
-static void blocks_show_no_seam(void **state)
+static void derived_fields_have_no_seam_between_blocks(void **state)
 {
     (void)state;
     static const char *const meshes[] = {"m", "n"};
@@ -374,24 +375,24 @@ static void blocks_show_no_seam(void **state)
     for (test_partition_kind distributed = TEST_BLOCK; distributed <= TEST_RANDOM; distributed++) {
         session_input whole = {0}, parts[2] = {0};
         vector_field whole_u, u[2];
-        test_mesh_lattice(TEST_MIXED, SIDE, 0.2, test_wave, &whole.part);
+        test_mesh_make_lattice(TEST_MIXED, SIDE, 0.2, test_wave_field, &whole.part);
         input_describe(&whole);
-        make_vector(&whole.part, swirl, INSITU_VERTEX, true, "u", &whole_u);
+        make_vector(&whole.part, swirl_velocity, INSITU_VERTEX, true, "u", &whole_u);
         insitu_session *alone = open_stepped(MPI_COMM_SELF, scene, &whole, &whole_u), *session = NULL;
         int *owners = calloc((size_t)whole.part.cell_count, sizeof *owners);
         assert_non_null(owners);
-        test_partition(&whole.part, distributed, SIDE, 2 * rank_count, owners);
+        test_partition_cells(&whole.part, distributed, SIDE, 2 * rank_count, owners);
         assert_int_equal(insitu_create_from_text(MPI_COMM_WORLD, scene, &session), INSITU_OK);
         for (int i = 0; i < 2; i++) {
-            test_mesh_part(&whole.part, owners, 2 * own_rank + i, &parts[i].part);
+            test_mesh_extract_part(&whole.part, owners, 2 * own_rank + i, &parts[i].part);
             input_describe(&parts[i]);
-            make_vector(&parts[i].part, swirl, INSITU_VERTEX, true, "u", &u[i]);
+            make_vector(&parts[i].part, swirl_velocity, INSITU_VERTEX, true, "u", &u[i]);
             assert_int_equal(insitu_set_mesh(session, meshes[i], &parts[i].mesh), INSITU_OK);
             assert_int_equal(insitu_set_field(session, meshes[i], &u[i].field), INSITU_OK);
         }
         everywhere(insitu_step(session, 0, 0) == INSITU_OK);
         for (int i = 0; i < 2; i++) {
-            everywhere(has_same_bits(session, meshes[i], alone, &parts[i].part, &whole.part, "q"));
+            everywhere(check_same_bits(session, meshes[i], alone, &parts[i].part, &whole.part, "q"));
             free(u[i].values);
         }
         insitu_destroy(&session);
@@ -409,7 +410,7 @@ enum { SHEET = 4 };
 
 /* Checks a sheet on the plane z = 0.3 x + 0.2 y, of quads and, in every second square, triangles: its gradients are
  * those in space without the component normal to the sheet. */
-static void gradients_of_shells_lie_in_them(void **state)
+static void gradients_of_shells_are_tangential(void **state)
 {
     (void)state;
     enum { ROW = SHEET + 1 };
@@ -421,7 +422,7 @@ static void gradients_of_shells_lie_in_them(void **state)
         p[0] = 0.2 * (v % ROW) + 0.05 * test_uniform((uint64_t)v, 3);
         p[1] = 0.3 * (double)(v / ROW) + 0.05 * test_uniform((uint64_t)v, 4);
         p[2] = 0.3 * p[0] + 0.2 * p[1];
-        linear(p, u + 3 * (ptrdiff_t)v);
+        linear_velocity(p, u + 3 * (ptrdiff_t)v);
     }
     for (int i = 0; i < SHEET * SHEET; i++) {
         const int at = i / SHEET * ROW + i % SHEET, quad[4] = {at, at + 1, at + ROW + 1, at + ROW};
@@ -461,14 +462,14 @@ static void gradients_of_shells_lie_in_them(void **state)
     double worst = 0;
     for (int v = 0; v < ROW * ROW; v++)
         for (int k = 0; k < 3; k++)
-            worst = test_worse(worst, fabs(value_of(session, "g", k, v) - (g[k] - across * normal[k])));
+            worst = test_larger_error(worst, fabs(get_derived_value(session, "g", k, v) - (g[k] - across * normal[k])));
     everywhere(worst < 1e-12);
     insitu_destroy(&session);
 }
 
 /* Checks velocities at cells and corners. Those at cells are first averaged at the vertices, which is exact in a
  * lattice except at its border; those at corners are exact. */
-static void velocities_of_cells_and_corners_are_taken(void **state)
+static void velocities_at_cells_and_corners_are_supported(void **state)
 {
     (void)state;
     enum { LONG = 6 };
@@ -477,14 +478,14 @@ static void velocities_of_cells_and_corners_are_taken(void **state)
         vector_field u;
         double worst = 0;
         int64_t count = 0;
-        test_mesh_lattice(TEST_HEXES, LONG, 0, test_wave, &in.part);
+        test_mesh_make_lattice(TEST_HEXES, LONG, 0, test_wave_field, &in.part);
         input_describe(&in);
-        make_vector(&in.part, linear, INSITU_CELL, true, "u", &u);
+        make_vector(&in.part, linear_velocity, INSITU_CELL, true, "u", &u);
         if (is_of_corners) {
             double *values = calloc((size_t)in.part.connectivity_count * 4, sizeof *values);
             assert_non_null(values);
             for (int64_t i = 0; i < in.part.connectivity_count; i++)
-                linear(in.part.coordinates + 3 * in.part.connectivity[i], values + 4 * i);
+                linear_velocity(in.part.coordinates + 3 * in.part.connectivity[i], values + 4 * i);
             free(u.values);
             u.values = values;
             u.field.values.data = values;
@@ -498,9 +499,10 @@ static void velocities_of_cells_and_corners_are_taken(void **state)
             grid_vertex(&mesh->cells, v, p);
             if (!is_of_corners && fmax(fabs(p[0]), fmax(fabs(p[1]), fabs(p[2]))) > 0.5) continue;
             count++;
-            worst = test_worse(worst, fabs(value_of(session, "w", 1, v) - (slopes[0][2] - slopes[2][0])));
             worst =
-                test_worse(worst, fabs(value_of(session, "a", 0, v) - (slopes[0][2] - slopes[2][0] + test_wave(p))));
+                test_larger_error(worst, fabs(get_derived_value(session, "w", 1, v) - (slopes[0][2] - slopes[2][0])));
+            worst = test_larger_error(worst, fabs(get_derived_value(session, "a", 0, v) -
+                                                  (slopes[0][2] - slopes[2][0] + test_wave_field(p))));
         }
         everywhere(worst < 1e-12 && count >= 27);
         insitu_destroy(&session);
@@ -511,67 +513,68 @@ static void velocities_of_cells_and_corners_are_taken(void **state)
 
 /* ---- what changes ------------------------------------------------------------------------------------------------ */
 
-static int64_t version_of(const insitu_session *session, const char *name)
+static int64_t get_field_version(const insitu_session *session, const char *name)
 {
-    return derived_field(session, "m", name)->version;
+    return find_derived_field(session, "m", name)->version;
 }
 
-static void step_again(insitu_session *session, vector_field *u, unsigned changed, int cycle)
+static void set_field_and_step(insitu_session *session, vector_field *u, unsigned changed, int cycle)
 {
     u->field.changed = changed;
     assert_int_equal(insitu_set_field(session, "m", &u->field), INSITU_OK);
     everywhere(insitu_step(session, cycle, 0) == INSITU_OK);
 }
 
-static void what_stays_is_not_made_again(void **state)
+static void unchanged_derived_fields_are_not_recomputed(void **state)
 {
     (void)state;
     session_input in = {0};
     vector_field u;
     input_create(&in, TEST_HEXES, SIDE, TEST_BLOCK, own_rank, rank_count);
-    make_vector(&in.part, linear, INSITU_VERTEX, true, "u", &u);
+    make_vector(&in.part, linear_velocity, INSITU_VERTEX, true, "u", &u);
     insitu_session *session =
         open_stepped(MPI_COMM_WORLD, SCENE("d: {divergence: u}, x: u.x + 0, e: d + x", "e"), &in, &u);
     const double trace = slopes[0][0] + slopes[1][1] + slopes[2][2];
-    const int64_t of_d = version_of(session, "d"), of_x = version_of(session, "x"), of_e = version_of(session, "e");
-    step_again(session, &u, INSITU_CHANGED_NOTHING, 1);
-    everywhere(version_of(session, "d") == of_d && version_of(session, "x") == of_x &&
-               version_of(session, "e") == of_e);
+    const int64_t of_d = get_field_version(session, "d"), of_x = get_field_version(session, "x"),
+                  of_e = get_field_version(session, "e");
+    set_field_and_step(session, &u, INSITU_CHANGED_NOTHING, 1);
+    everywhere(get_field_version(session, "d") == of_d && get_field_version(session, "x") == of_x &&
+               get_field_version(session, "e") == of_e);
     for (int64_t i = 0; i < 4 * u.field.count; i++) ((double *)u.values)[i] *= 2;
-    step_again(session, &u, INSITU_CHANGED_VALUES, 2);
-    everywhere(version_of(session, "d") > of_d && version_of(session, "e") > of_e);
-    everywhere(in.part.cell_count == 0 || fabs(value_of(session, "d", 0, 0) - 2 * trace) < 1e-9);
+    set_field_and_step(session, &u, INSITU_CHANGED_VALUES, 2);
+    everywhere(get_field_version(session, "d") > of_d && get_field_version(session, "e") > of_e);
+    everywhere(in.part.cell_count == 0 || fabs(get_derived_value(session, "d", 0, 0) - 2 * trace) < 1e-9);
     /* A mesh twice as long has half the slopes; a field that depends only on values is not computed again. */
-    const int64_t before = version_of(session, "x");
+    const int64_t before = get_field_version(session, "x");
     for (int64_t i = 0; i < 3 * in.part.vertex_count; i++) in.part.coordinates[i] *= 2;
     in.mesh.changed = INSITU_CHANGED_GEOMETRY;
     assert_int_equal(insitu_set_mesh(session, "m", &in.mesh), INSITU_OK);
-    step_again(session, &u, INSITU_CHANGED_NOTHING, 3);
-    everywhere(version_of(session, "x") == before);
-    everywhere(in.part.cell_count == 0 || fabs(value_of(session, "d", 0, 0) - trace) < 1e-9);
+    set_field_and_step(session, &u, INSITU_CHANGED_NOTHING, 3);
+    everywhere(get_field_version(session, "x") == before);
+    everywhere(in.part.cell_count == 0 || fabs(get_derived_value(session, "d", 0, 0) - trace) < 1e-9);
     insitu_destroy(&session);
     free(u.values);
     input_free(&in);
 }
 
 /* Checks that an edited scene has its own derived fields, even if their names are those of the previous scene. */
-static void an_edited_scene_has_its_own(void **state)
+static void edited_scene_computes_its_own_derived_fields(void **state)
 {
     (void)state;
     session_input in = {0};
     vector_field u;
     input_create(&in, TEST_TETS, SIDE, TEST_BLOCK, own_rank, rank_count);
-    make_vector(&in.part, linear, INSITU_VERTEX, true, "u", &u);
+    make_vector(&in.part, linear_velocity, INSITU_VERTEX, true, "u", &u);
     insitu_session *session =
         open_session(MPI_COMM_WORLD, write_scene(SCENE("a: u.x + 0, b: {gradient: a}, c: b.y + f", "c")));
-    assert_int_equal(submit(session, &in), INSITU_OK);
-    step_again(session, &u, INSITU_CHANGED_ALL, 0);
-    everywhere(in.part.cell_count == 0 || fabs(value_of(session, "b", 1, 0) - slopes[0][1]) < 1e-9);
+    assert_int_equal(submit_input(session, &in), INSITU_OK);
+    set_field_and_step(session, &u, INSITU_CHANGED_ALL, 0);
+    everywhere(in.part.cell_count == 0 || fabs(get_derived_value(session, "b", 1, 0) - slopes[0][1]) < 1e-9);
     write_scene(SCENE("longer: u.z + 0, a: {gradient: longer, component: y}, c: a - longer", "c"));
-    step_again(session, &u, INSITU_CHANGED_NOTHING, 1);
+    set_field_and_step(session, &u, INSITU_CHANGED_NOTHING, 1);
     const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
     everywhere(session_find_field(mesh, "b") < 0);
-    everywhere(in.part.cell_count == 0 || fabs(value_of(session, "a", 0, 0) - slopes[2][1]) < 1e-9);
+    everywhere(in.part.cell_count == 0 || fabs(get_derived_value(session, "a", 0, 0) - slopes[2][1]) < 1e-9);
     insitu_destroy(&session);
     free(u.values);
     input_free(&in);
@@ -606,8 +609,8 @@ static void wrong_input_is_reported_on_all_ranks(void **state)
     session_input in = {0};
     vector_field u, velocity;
     input_create(&in, TEST_HEXES, SIDE, TEST_BLOCK, own_rank, rank_count);
-    make_vector(&in.part, swirl, INSITU_VERTEX, true, "u", &u);
-    make_vector(&in.part, swirl, INSITU_VERTEX, true, "velocity", &velocity);
+    make_vector(&in.part, swirl_velocity, INSITU_VERTEX, true, "u", &u);
+    make_vector(&in.part, swirl_velocity, INSITU_VERTEX, true, "velocity", &velocity);
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
         char scene[1000];
         const bool is_right = !*wrong[i].words[0];
@@ -615,7 +618,7 @@ static void wrong_input_is_reported_on_all_ranks(void **state)
                  "fields: {%s}\nimages:\n  - {name: a, size: [8, 6], layers: [{slice: {field: q}}], outputs: [{path: "
                  "a.png}]}\n  - {name: b, size: [8, 6], layers: [{slice: {field: f}}], outputs: [{path: b.png}]}\n",
                  wrong[i].fields);
-        insitu_session *session = begin(MPI_COMM_WORLD, scene, &in, &u);
+        insitu_session *session = open_session_with_velocity(MPI_COMM_WORLD, scene, &in, &u);
         assert_int_equal(insitu_set_field(session, "m", &velocity.field), INSITU_OK);
         for (int cycle = 0; cycle < 2; cycle++) {
             discard_pictures();
@@ -623,8 +626,8 @@ static void wrong_input_is_reported_on_all_ranks(void **state)
             if (is_right)
                 everywhere(status == INSITU_OK);
             else
-                reported_everywhere(session, status, INSITU_ERROR_FIELD, ":1: ", wrong[i].words[0], wrong[i].words[1],
-                                    wrong[i].words[2]);
+                check_reported_everywhere(session, status, INSITU_ERROR_FIELD, ":1: ", wrong[i].words[0],
+                                          wrong[i].words[1], wrong[i].words[2]);
             everywhere(own_rank != 0 || caught_count == (is_right ? 2 : 1));
         }
         insitu_destroy(&session);
@@ -636,22 +639,22 @@ static void wrong_input_is_reported_on_all_ranks(void **state)
 
 /* Checks a name that the simulation uses too, one that is similar to a derived field's, and a field whose components
  * differ on one rank. */
-static void clashes_are_reported_on_all_ranks(void **state)
+static void name_conflicts_are_reported_on_all_ranks(void **state)
 {
     (void)state;
     session_input in = {0};
     vector_field u;
     input_create(&in, TEST_HEXES, SIDE, TEST_BLOCK, own_rank, rank_count);
-    make_vector(&in.part, swirl, INSITU_VERTEX, true, "u", &u);
-    insitu_session *session = begin(MPI_COMM_WORLD, SCENE("f: u.x + 1", "f"), &in, &u);
+    make_vector(&in.part, swirl_velocity, INSITU_VERTEX, true, "u", &u);
+    insitu_session *session = open_session_with_velocity(MPI_COMM_WORLD, SCENE("f: u.x + 1", "f"), &in, &u);
     insitu_status status = insitu_step(session, 0, 0);
-    reported_everywhere(session, status, INSITU_ERROR_FIELD,
-                        ":1: fields.f: mesh \"m\" has a field of this name already", "expected another name");
+    check_reported_everywhere(session, status, INSITU_ERROR_FIELD,
+                              ":1: fields.f: mesh \"m\" has a field of this name already", "expected another name");
     insitu_destroy(&session);
-    session = begin(MPI_COMM_WORLD, SCENE("speed: mag(u)", "sped"), &in, &u);
+    session = open_session_with_velocity(MPI_COMM_WORLD, SCENE("speed: mag(u)", "sped"), &in, &u);
     status = insitu_step(session, 0, 0);
-    reported_everywhere(session, status, INSITU_ERROR_FIELD, "no mesh has the field \"sped\" (did you mean speed?)",
-                        "there are: ");
+    check_reported_everywhere(session, status, INSITU_ERROR_FIELD,
+                              "no mesh has the field \"sped\" (did you mean speed?)", "there are: ");
     insitu_destroy(&session);
     /* The simulation may set the field later. */
     session = open_stepped(MPI_COMM_WORLD, SCENE("late: u.x + 1", "late"), &in, &u);
@@ -659,16 +662,16 @@ static void clashes_are_reported_on_all_ranks(void **state)
     late.name = "late";
     assert_int_equal(insitu_set_field(session, "m", &late), INSITU_OK);
     status = insitu_step(session, 1, 0);
-    reported_everywhere(session, status, INSITU_ERROR_FIELD,
-                        "fields.late: mesh \"m\" has a field of this name already");
+    check_reported_everywhere(session, status, INSITU_ERROR_FIELD,
+                              "fields.late: mesh \"m\" has a field of this name already");
     insitu_destroy(&session);
     if (rank_count > 1) {
-        session = begin(MPI_COMM_WORLD, SCENE("q: {q_criterion: u}", "q"), &in, NULL);
+        session = open_session_with_velocity(MPI_COMM_WORLD, SCENE("q: {q_criterion: u}", "q"), &in, NULL);
         if (own_rank == rank_count - 1) u.field.component_count = 2;
         assert_int_equal(insitu_set_field(session, "m", &u.field), INSITU_OK);
         status = insitu_step(session, 0, 0);
-        reported_everywhere(session, status, INSITU_ERROR_FIELD, "fields.q.q_criterion: rank ", "field \"u\"",
-                            "another centring or number of components");
+        check_reported_everywhere(session, status, INSITU_ERROR_FIELD, "fields.q.q_criterion: rank ", "field \"u\"",
+                                  "another centring or number of components");
         insitu_destroy(&session);
     }
     free(u.values);
@@ -679,15 +682,15 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(linear_velocities_are_exact),
-        cmocka_unit_test(expressions_are_those_of_c),
-        cmocka_unit_test(partitions_do_not_show),
-        cmocka_unit_test(blocks_show_no_seam),
-        cmocka_unit_test(gradients_of_shells_lie_in_them),
-        cmocka_unit_test(velocities_of_cells_and_corners_are_taken),
-        cmocka_unit_test(what_stays_is_not_made_again),
-        cmocka_unit_test(an_edited_scene_has_its_own),
+        cmocka_unit_test(expressions_match_c_arithmetic),
+        cmocka_unit_test(derived_fields_do_not_depend_on_the_partition),
+        cmocka_unit_test(derived_fields_have_no_seam_between_blocks),
+        cmocka_unit_test(gradients_of_shells_are_tangential),
+        cmocka_unit_test(velocities_at_cells_and_corners_are_supported),
+        cmocka_unit_test(unchanged_derived_fields_are_not_recomputed),
+        cmocka_unit_test(edited_scene_computes_its_own_derived_fields),
         cmocka_unit_test(wrong_input_is_reported_on_all_ranks),
-        cmocka_unit_test(clashes_are_reported_on_all_ranks),
+        cmocka_unit_test(name_conflicts_are_reported_on_all_ranks),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

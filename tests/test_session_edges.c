@@ -21,7 +21,7 @@ enum { SIDE = 3, WIDTH = 240, HEIGHT = 180, PIXELS = WIDTH * HEIGHT, MOST_CORNER
 #define EYE "position: [3, 2.2, 4], focal: [0, 0, 0], angle: 40"
 #define FLAT "position: [3, 2.2, 4], focal: [0, 0, 0], projection: orthographic, height: 4"
 
-static render_camera camera_of(bool is_flat)
+static render_camera make_camera(bool is_flat)
 {
     render_camera out;
     render_camera_look_at(&out, (const double[]){3, 2.2, 4}, (const double[]){0, 0, 0}, (const double[]){0, 1, 0}, 40,
@@ -31,7 +31,7 @@ static render_camera camera_of(bool is_flat)
     return out;
 }
 
-static double dot(const double a[3], const double b[3])
+static double dot_product(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
@@ -71,13 +71,13 @@ static body make_body(const grid *g, bool is_cube)
     return out;
 }
 
-static void cross(const double a[3], const double b[3], double out[3])
+static void cross_product(const double a[3], const double b[3], double out[3])
 {
     for (int i = 0; i < 3; i++) out[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
 }
 
 /* Returns the depth at which a ray meets a convex face; infinity if it misses the face. */
-static double meet(const polygon *face, const double base[3], const double direction[3])
+static double intersect_face(const polygon *face, const double base[3], const double direction[3])
 {
     double u[3], v[3], normal[3], from[3], at[3];
     for (int a = 0; a < 3; a++) {
@@ -85,8 +85,8 @@ static double meet(const polygon *face, const double base[3], const double direc
         v[a] = face->corners[2][a] - face->corners[0][a];
         from[a] = face->corners[0][a] - base[a];
     }
-    cross(u, v, normal);
-    const double depth = dot(from, normal) / dot(direction, normal);
+    cross_product(u, v, normal);
+    const double depth = dot_product(from, normal) / dot_product(direction, normal);
     for (int a = 0; a < 3; a++) at[a] = base[a] + depth * direction[a];
     for (int i = 0; i < face->count; i++) {
         double side[3], turned[3];
@@ -94,20 +94,21 @@ static double meet(const polygon *face, const double base[3], const double direc
             side[a] = face->corners[(i + 1) % face->count][a] - face->corners[i][a];
             from[a] = at[a] - face->corners[i][a];
         }
-        cross(side, from, turned);
-        if (dot(turned, normal) < 0) return INFINITY;
+        cross_product(side, from, turned);
+        if (dot_product(turned, normal) < 0) return INFINITY;
     }
     return depth;
 }
 
 /* Projects a point into the picture, in pixels; returns its depth. */
-static double project(const render_camera *c, const double point[3], double out[2])
+static double project_point(const render_camera *c, const double point[3], double out[2])
 {
     double from[3];
     for (int a = 0; a < 3; a++) from[a] = point[a] - c->eye[a];
-    const double depth = dot(from, c->forward), pixel = 2 * c->half_height / HEIGHT * (c->is_orthographic ? 1 : depth);
-    out[0] = dot(from, c->right) / pixel + 0.5 * WIDTH;
-    out[1] = 0.5 * HEIGHT - dot(from, c->up) / pixel;
+    const double depth = dot_product(from, c->forward),
+                 pixel = 2 * c->half_height / HEIGHT * (c->is_orthographic ? 1 : depth);
+    out[0] = dot_product(from, c->right) / pixel + 0.5 * WIDTH;
+    out[1] = 0.5 * HEIGHT - dot_product(from, c->up) / pixel;
     return depth;
 }
 
@@ -119,8 +120,8 @@ static void bound_distance(const render_camera *c, const polygon *face, const do
     bounds[0] = bounds[1] = INFINITY;
     for (int i = 0; i < face->count; i++) {
         double a[2], b[2], depths[2];
-        depths[0] = project(c, face->corners[i], a);
-        depths[1] = project(c, face->corners[(i + 1) % face->count], b);
+        depths[0] = project_point(c, face->corners[i], a);
+        depths[1] = project_point(c, face->corners[(i + 1) % face->count], b);
         const double e[2] = {b[0] - a[0], b[1] - a[1]};
         const double along = ((pixel[0] - a[0]) * e[0] + (pixel[1] - a[1]) * e[1]) / (e[0] * e[0] + e[1] * e[1]);
         const double s = fmin(fmax(along, 0), 1);
@@ -139,7 +140,7 @@ static bool is_pixel(const render_camera *c, const body *b, const caught_picture
     const polygon *face = NULL;
     render_camera_ray(c, pixel % WIDTH, pixel / WIDTH, base, direction);
     for (int i = 0; i < b->count; i++) {
-        const double depth = meet(&b->faces[i], base, direction);
+        const double depth = intersect_face(&b->faces[i], base, direction);
         if (depth >= nearest) continue;
         nearest = depth;
         face = &b->faces[i];
@@ -156,9 +157,9 @@ static bool is_pixel(const render_camera *c, const body *b, const caught_picture
     return false;
 }
 
-static bool is_truth(const caught_picture *picture, const body *b, bool is_flat)
+static bool is_exact_picture(const caught_picture *picture, const body *b, bool is_flat)
 {
-    const render_camera c = camera_of(is_flat);
+    const render_camera c = make_camera(is_flat);
     bool has_line = false, is_well = true;
     for (int pixel = 0; pixel < PIXELS && is_well; pixel++) is_well = is_pixel(&c, b, picture, pixel, &has_line);
     return is_well && has_line;
@@ -167,37 +168,37 @@ static bool is_truth(const caught_picture *picture, const body *b, bool is_flat)
 /* ---- pictures ------------------------------------------------------------------------------------------------ */
 
 /* Draws a picture; also makes the body if b is not NULL. */
-static caught_picture draw(MPI_Comm comm, const char *scene, const session_input *in, body *b)
+static caught_picture draw_edges(MPI_Comm comm, const char *scene, const session_input *in, body *b)
 {
-    insitu_session *session = open_drawn(comm, scene, in);
+    insitu_session *session = open_session_and_draw(comm, scene, in);
     if (b) *b = make_body(&session_find_mesh(&session->meshes, "m")->cells, in->part.cell_count > 1);
     const caught_picture picture = pop_caught_picture();
     insitu_destroy(&session);
     return picture;
 }
 
-static void check_truth(const session_input *in, bool is_flat)
+static void check_against_exact(const session_input *in, bool is_flat)
 {
     const char *scene = write_scene(is_flat ? IMAGE("[240, 180]", FLAT, "") : IMAGE("[240, 180]", EYE, ""));
     bool is_well = true;
     if (own_rank == 0) {
         body b = {0};
-        caught_picture picture = draw(MPI_COMM_SELF, scene, in, &b);
-        is_well = is_truth(&picture, &b, is_flat);
+        caught_picture picture = draw_edges(MPI_COMM_SELF, scene, in, &b);
+        is_well = is_exact_picture(&picture, &b, is_flat);
         free_caught(&picture);
         test_free(b.faces);
     }
     everywhere(is_well);
 }
 
-static void lines_are_where_edges_are(void **state)
+static void lines_are_drawn_along_edges(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         session_input whole = {0};
-        test_mesh_lattice(kind, SIDE, 0, test_linear, &whole.part);
+        test_mesh_make_lattice(kind, SIDE, 0, test_linear_field, &whole.part);
         input_describe(&whole);
-        check_truth(&whole, kind % 2);
+        check_against_exact(&whole, kind % 2);
         input_free(&whole);
     }
 }
@@ -225,7 +226,7 @@ static void faces_of_many_corners_have_no_other_lines(void **state)
             all[f] = f;
         }
         session_input in = {0};
-        test_mesh_lattice(TEST_HEXES, 1, 0, test_linear, &in.part);
+        test_mesh_make_lattice(TEST_HEXES, 1, 0, test_linear_field, &in.part);
         input_describe(&in);
         double values[12] = {0};
         insitu_mesh_defaults(&in.mesh);
@@ -242,7 +243,7 @@ static void faces_of_many_corners_have_no_other_lines(void **state)
         in.mesh.face_connectivity = (insitu_array){faces, INSITU_INT64, 0};
         in.field.count = 12;
         in.field.values = (insitu_array){values, INSITU_FLOAT64, 0};
-        check_truth(&in, turn % 2);
+        check_against_exact(&in, turn % 2);
         input_free(&in);
     }
 }
@@ -255,13 +256,13 @@ static void any_ranks_draw_one_picture(void **state)
         session_input whole = {0}, part = {0};
         caught_picture alone = {0};
         input_create(&whole, kind, SIDE, TEST_BLOCK, 0, 1);
-        if (own_rank == 0) alone = draw(MPI_COMM_SELF, scene, &whole, NULL);
+        if (own_rank == 0) alone = draw_edges(MPI_COMM_SELF, scene, &whole, NULL);
         input_create(&part, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
         test_mesh_reorder_vertices(&part.part, 3 + (uint64_t)own_rank);
-        test_mesh_shuffle(&part.part, 7 + (uint64_t)own_rank);
+        test_mesh_shuffle_cells(&part.part, 7 + (uint64_t)own_rank);
         input_describe(&part);
-        caught_picture picture = draw(MPI_COMM_WORLD, scene, &part, NULL);
-        everywhere(own_rank != 0 || same_pictures(&picture, &alone));
+        caught_picture picture = draw_edges(MPI_COMM_WORLD, scene, &part, NULL);
+        everywhere(own_rank != 0 || are_same_pictures(&picture, &alone));
         free_caught(&picture);
         free_caught(&alone);
         input_free(&part);
@@ -275,11 +276,11 @@ static void lines_fade_on_small_faces(void **state)
     (void)state;
     session_input in = {0};
     const char *scene = write_scene(IMAGE("[24, 18]", EYE, ""));
-    test_mesh_lattice(TEST_HEXES, 24, 0, test_linear, &in.part);
+    test_mesh_make_lattice(TEST_HEXES, 24, 0, test_linear_field, &in.part);
     input_describe(&in);
     bool is_well = true;
     if (own_rank == 0) {
-        caught_picture picture = draw(MPI_COMM_SELF, scene, &in, NULL);
+        caught_picture picture = draw_edges(MPI_COMM_SELF, scene, &in, NULL);
         for (int i = 0; i < 24 * 18; i++) is_well = is_well && picture.rgba[4 * i] == picture.rgba[4 * i + 3];
         free_caught(&picture);
     }
@@ -306,7 +307,7 @@ static bool is_closed_along(const session_input *in, int axis, int side, const c
              "    layers:\n      - surface: {opacity: 0.5, material: {ambient: 1, diffuse: 0, specular: 0}%s}\n"
              "    outputs: [{path: a.exr}]\n",
              eye[0], eye[1], eye[2], axis == 1 ? "[0, 0, 1]" : "[0, 1, 0]", edges);
-    caught_picture picture = draw(MPI_COMM_WORLD, write_scene(text), in, NULL);
+    caught_picture picture = draw_edges(MPI_COMM_WORLD, write_scene(text), in, NULL);
     int holes = 0;
     for (int i = 0; own_rank == 0 && i < ACROSS * ACROSS; i++) {
         const int x = i % ACROSS, y = i / ACROSS;
@@ -321,10 +322,10 @@ static bool is_closed_along(const session_input *in, int axis, int side, const c
 static void make_exact_part(test_mesh_kind kind, session_input *in)
 {
     test_mesh whole;
-    test_mesh_lattice(kind, 4, 0, test_linear, &whole);
+    test_mesh_make_lattice(kind, 4, 0, test_linear_field, &whole);
     int *owners = test_calloc((size_t)whole.cell_count, sizeof *owners);
-    test_partition(&whole, TEST_RANDOM, 4, rank_count, owners);
-    test_mesh_part(&whole, owners, own_rank, &in->part);
+    test_partition_cells(&whole, TEST_RANDOM, 4, rank_count, owners);
+    test_mesh_extract_part(&whole, owners, own_rank, &in->part);
     test_free(owners);
     test_mesh_free(&whole);
     input_describe(in);
@@ -348,7 +349,7 @@ static void rays_through_edges_hit_one_face(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(lines_are_where_edges_are), cmocka_unit_test(faces_of_many_corners_have_no_other_lines),
+        cmocka_unit_test(lines_are_drawn_along_edges), cmocka_unit_test(faces_of_many_corners_have_no_other_lines),
         cmocka_unit_test(any_ranks_draw_one_picture), cmocka_unit_test(lines_fade_on_small_faces),
         cmocka_unit_test(rays_through_edges_hit_one_face)};
     return run_session_tests(argc, argv, tests, NULL, NULL);

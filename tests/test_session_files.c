@@ -22,7 +22,7 @@ static session_input input;
 
 static char under_way[200];
 
-static void stop_late(int signal_number)
+static void stop_on_timeout(int signal_number)
 {
     static const char words[] = " took longer than 20 s\n";
     (void)signal_number;
@@ -30,10 +30,10 @@ static void stop_late(int signal_number)
     _exit(1);
 }
 
-static void begin(const char *what, const char *plant, const char *when)
+static void start_time_limit(const char *what, const char *plant, const char *when)
 {
     snprintf(under_way, sizeof under_way, "%s, %s, %s", what, plant, when);
-    signal(SIGALRM, stop_late);
+    signal(SIGALRM, stop_on_timeout);
     alarm(SECONDS);
 }
 
@@ -56,7 +56,7 @@ static const char *const plant_names[] = {"pipe",           "folder",         "s
                                           "huge file",      "link to device", "link to pipe",
                                           "link to itself", "dangling link",  "link to file"};
 
-static void put_socket(const char *path)
+static void make_socket(const char *path)
 {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     const int file = socket(AF_UNIX, SOCK_STREAM, 0);
@@ -67,7 +67,7 @@ static void put_socket(const char *path)
 
 /* Puts the obstacle at the path, on rank 0. The file itself, if there is one, is renamed to "victim", to which a link
  * may lead. */
-static void put_plant(plant p, const char *path)
+static void place_obstacle(plant p, const char *path)
 {
     unlink("victim");
     if (rename(path, "victim") != 0) assert_int_equal(access(path, F_OK), -1);
@@ -79,7 +79,7 @@ static void put_plant(plant p, const char *path)
     switch (p) {
     case PIPE: assert_int_equal(mkfifo(path, 0600), 0); break;
     case FOLDER: assert_int_equal(mkdir(path, 0700), 0); break;
-    case SOCKET: put_socket(path); break;
+    case SOCKET: make_socket(path); break;
     case HUGE_FILE: {
         const int file = open(path, O_WRONLY | O_CREAT, 0600);
         assert_true(file >= 0 && ftruncate(file, (off_t)3 << 30) == 0 && close(file) == 0);
@@ -96,13 +96,13 @@ static void put_plant(plant p, const char *path)
     }
 }
 
-static void remove_plant(const char *path)
+static void remove_obstacle(const char *path)
 {
     if (unlink(path) != 0) rmdir(path);
 }
 
 /* Removes any file or directory of this name. */
-static void forget(const char *name)
+static void remove_recursively(const char *name)
 {
     char command[100];
     snprintf(command, sizeof command, "rm -rf %s", name);
@@ -123,15 +123,15 @@ static void check_read(const char *what, const char *path)
 {
     for (plant p = 0; p < PLANT_COUNT; p++) {
         insitu_session *session = NULL;
-        begin(what, plant_names[p], "at the beginning");
-        if (own_rank == 0) put_plant(p, path);
+        start_time_limit(what, plant_names[p], "at the beginning");
+        if (own_rank == 0) place_obstacle(p, path);
         const insitu_status status = insitu_create(MPI_COMM_WORLD, "scene.yaml", &session);
         if (refusals[p])
-            reported_everywhere(NULL, status, INSITU_ERROR_SCENE, path, refusals[p]);
+            check_reported_everywhere(NULL, status, INSITU_ERROR_SCENE, path, refusals[p]);
         else
             everywhere(status == INSITU_OK);
         insitu_destroy(&session);
-        if (own_rank == 0) remove_plant(path), assert_int_equal(rename("victim", path), 0);
+        if (own_rank == 0) remove_obstacle(path), assert_int_equal(rename("victim", path), 0);
     }
 }
 
@@ -140,7 +140,7 @@ static void scenes_are_regular_files(void **state)
     (void)state;
     char text[512];
     snprintf(text, sizeof text, IMAGE, SURFACE, "path: a.png");
-    put_file("scene.yaml", text);
+    write_text_file("scene.yaml", text);
     check_read("scene", "scene.yaml");
 }
 
@@ -150,8 +150,8 @@ static void colour_maps_are_regular_files(void **state)
     char text[512];
     snprintf(text, sizeof text, IMAGE, "slice: {field: f, planes: [{normal: [0, 0, 1]}], map: {file: map.json}}",
              "path: a.png");
-    put_file("scene.yaml", text);
-    put_file("map.json", "[{\"Name\": \"m\", \"RGBPoints\": [0, 0, 0, 0, 1, 1, 1, 1]}]");
+    write_text_file("scene.yaml", text);
+    write_text_file("map.json", "[{\"Name\": \"m\", \"RGBPoints\": [0, 0, 0, 0, 1, 1, 1, 1]}]");
     check_read("colour map", "map.json");
 }
 
@@ -184,12 +184,12 @@ static void name_scenes(const char *folder)
 }
 
 /* Makes a step whose values are larger than the last one's, so that ranges widen. */
-static insitu_status step(insitu_session *session, int cycle)
+static insitu_status step_with_larger_values(insitu_session *session, int cycle)
 {
-    input_renew(&input);
+    input_restore(&input);
     for (int64_t v = 0; v < input.part.vertex_count; v++) input.part.values[v] *= 1 + cycle;
     discard_pictures();
-    everywhere(submit(session, &input) == INSITU_OK);
+    everywhere(submit_input(session, &input) == INSITU_OK);
     return insitu_step(session, cycle, cycle);
 }
 
@@ -206,32 +206,32 @@ static void assert_written(const own_file *file)
 
 /* Returns the text of the expected error, or NULL. A pipe, a directory and a socket are refused at any step; a huge
  * file only if it is read. Links are replaced when the file is next written. */
-static const char *refusal_of(const own_file *file, plant p, bool is_later)
+static const char *get_expected_refusal(const own_file *file, plant p, bool is_later)
 {
     if (p == HUGE_FILE) return is_later ? NULL : "has more than";
     (void)file;
     return p < HUGE_FILE ? (p == FOLDER ? "directory" : refusals[p]) : NULL;
 }
 
-static void plant_in_run(const own_file *file, plant p, bool is_later)
+static void run_with_obstacle(const own_file *file, plant p, bool is_later)
 {
     static char before[MOST], after[MOST];
-    begin(file->name, plant_names[p], is_later ? "between two steps" : "before the first step");
-    forget("own.cdb");
+    start_time_limit(file->name, plant_names[p], is_later ? "between two steps" : "before the first step");
+    remove_recursively("own.cdb");
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(file->scene));
-    everywhere(step(session, 0) == INSITU_OK);
+    everywhere(step_with_larger_values(session, 0) == INSITU_OK);
     if (!is_later) insitu_destroy(&session);
-    if (own_rank == 0) put_plant(p, file->path);
+    if (own_rank == 0) place_obstacle(p, file->path);
     MPI_Barrier(MPI_COMM_WORLD);
     if (!is_later) session = open_session(MPI_COMM_WORLD, write_scene(file->scene));
     read_file("victim", MOST, before);
-    const char *refusal = refusal_of(file, p, is_later);
-    insitu_status status = step(session, 1);
+    const char *refusal = get_expected_refusal(file, p, is_later);
+    insitu_status status = step_with_larger_values(session, 1);
     if (refusal) {
-        reported_everywhere(session, status, INSITU_ERROR_IO, file->path, refusal);
-        if (own_rank == 0) remove_plant(file->path);
+        check_reported_everywhere(session, status, INSITU_ERROR_IO, file->path, refusal);
+        if (own_rank == 0) remove_obstacle(file->path);
         MPI_Barrier(MPI_COMM_WORLD);
-        status = step(session, 2);
+        status = step_with_larger_values(session, 2);
     }
     if (status) fprintf(stderr, "%s: %s\n", under_way, insitu_error(session));
     everywhere(status == INSITU_OK);
@@ -244,13 +244,13 @@ static void plant_in_run(const own_file *file, plant p, bool is_later)
     insitu_destroy(&session);
 }
 
-static void plants_are_refused_or_replaced(void **state)
+static void obstacles_at_file_paths_are_refused_or_replaced(void **state)
 {
     (void)state;
     name_scenes("own.cdb");
     for (int i = 0; i < OWN_COUNT; i++)
         for (plant p = 0; p < PLANT_COUNT; p++)
-            for (int is_later = 0; is_later < 2; is_later++) plant_in_run(&own_files[i], p, is_later);
+            for (int is_later = 0; is_later < 2; is_later++) run_with_obstacle(&own_files[i], p, is_later);
 }
 
 /* Checks that a link to the ranges of another run is read before it is replaced. */
@@ -259,15 +259,15 @@ static void linked_ranges_are_read(void **state)
     (void)state;
     char text[MOST];
     name_scenes("own.cdb");
-    begin("ranges", "link to file", "of another run");
-    forget("own.cdb");
+    start_time_limit("ranges", "link to file", "of another run");
+    remove_recursively("own.cdb");
     if (own_rank == 0) {
         assert_int_equal(mkdir("own.cdb", 0700), 0);
-        put_plant(LINK_TO_FILE, own_files[1].path);
+        place_obstacle(LINK_TO_FILE, own_files[1].path);
     }
-    put_file("victim", "surface 0 -2 -100 0.5 f\n");
+    write_text_file("victim", "surface 0 -2 -100 0.5 f\n");
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(own_files[1].scene));
-    everywhere(step(session, 0) == INSITU_OK);
+    everywhere(step_with_larger_values(session, 0) == INSITU_OK);
     assert_written(&own_files[1]);
     read_file(own_files[1].path, MOST, text);
     everywhere(own_rank != 0 || strstr(text, " -100 "));
@@ -278,17 +278,17 @@ static void linked_ranges_are_read(void **state)
 
 /* ---- directories ----------------------------------------------------------------------------------------------- */
 
-static void missing_folders_are_made(void **state)
+static void missing_folders_are_created(void **state)
 {
     (void)state;
     name_scenes("own.cdb");
     for (int i = 0; i < OWN_COUNT; i++) {
-        begin(own_files[i].name, "no folder", "at every step");
-        forget("own.cdb");
+        start_time_limit(own_files[i].name, "no folder", "at every step");
+        remove_recursively("own.cdb");
         insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(own_files[i].scene));
         for (int cycle = 0; cycle < 3; cycle++) {
-            forget("own.cdb");
-            const insitu_status status = step(session, cycle);
+            remove_recursively("own.cdb");
+            const insitu_status status = step_with_larger_values(session, cycle);
             if (status) fprintf(stderr, "%s: %s\n", under_way, insitu_error(session));
             everywhere(status == INSITU_OK);
             assert_written(&own_files[i]);
@@ -300,7 +300,7 @@ static void missing_folders_are_made(void **state)
 
 /* Checks directories that cannot be created: inside a regular file, and, for users without root's rights, inside a
  * directory without write permission. */
-static void folders_that_cannot_be_made_are_reported(void **state)
+static void folders_that_cannot_be_created_are_reported(void **state)
 {
     (void)state;
     struct folder {
@@ -308,30 +308,30 @@ static void folders_that_cannot_be_made_are_reported(void **state)
     } folders[] = {{"blocked/in.cdb", "Not a directory"},
                    {"/proc/in.cdb", "No such file"},
                    {"closed/in.cdb", "Permission denied"}};
-    put_file("blocked", "a file");
+    write_text_file("blocked", "a file");
     if (own_rank == 0) rmdir("closed/in.cdb"), rmdir("closed"), mkdir("closed", 0500);
     for (int f = 0; f < (geteuid() ? 3 : 2); f++)
         for (int i = 0; i < OWN_COUNT; i++) {
-            begin(own_files[i].name, folders[f].name, folders[f].reason);
+            start_time_limit(own_files[i].name, folders[f].name, folders[f].reason);
             name_scenes(folders[f].name);
             insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(own_files[i].scene));
             for (int cycle = 0; cycle < 2; cycle++)
-                reported_everywhere(session, step(session, cycle), INSITU_ERROR_IO, folders[f].name,
-                                    strrchr(own_files[i].path, '/'), folders[f].reason);
+                check_reported_everywhere(session, step_with_larger_values(session, cycle), INSITU_ERROR_IO,
+                                          folders[f].name, strrchr(own_files[i].path, '/'), folders[f].reason);
             insitu_destroy(&session);
         }
 }
 
-static int begin_tests(void **state)
+static int set_up_test_group(void **state)
 {
     (void)state;
-    if (!enter_folder("files")) return 1;
-    forget("scene.yaml map.json own.cdb pipe victim blocked"); /* files that an interrupted test leaves */
+    if (!enter_test_folder("files")) return 1;
+    remove_recursively("scene.yaml map.json own.cdb pipe victim blocked"); /* files that an interrupted test leaves */
     input_create(&input, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
     return 0;
 }
 
-static int end_tests(void **state)
+static int tear_down_test_group(void **state)
 {
     (void)state;
     input_free(&input);
@@ -341,9 +341,12 @@ static int end_tests(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(scenes_are_regular_files),       cmocka_unit_test(colour_maps_are_regular_files),
-        cmocka_unit_test(plants_are_refused_or_replaced), cmocka_unit_test(linked_ranges_are_read),
-        cmocka_unit_test(missing_folders_are_made),       cmocka_unit_test(folders_that_cannot_be_made_are_reported),
+        cmocka_unit_test(scenes_are_regular_files),
+        cmocka_unit_test(colour_maps_are_regular_files),
+        cmocka_unit_test(obstacles_at_file_paths_are_refused_or_replaced),
+        cmocka_unit_test(linked_ranges_are_read),
+        cmocka_unit_test(missing_folders_are_created),
+        cmocka_unit_test(folders_that_cannot_be_created_are_reported),
     };
-    return run_session_tests(argc, argv, tests, begin_tests, end_tests);
+    return run_session_tests(argc, argv, tests, set_up_test_group, tear_down_test_group);
 }

@@ -30,7 +30,7 @@ typedef struct maker {
     unsigned changed;
 } maker;
 
-static insitu_status make(void *data, insitu_field *field)
+static insitu_status fill_field(void *data, insitu_field *field)
 {
     maker *m = data;
     int one = 1, ranks = 0;
@@ -53,13 +53,13 @@ static maker make_maker(const session_input *in, double scale)
     return (maker){.in = in, .values = values, .scale = scale, .changed = INSITU_CHANGED_ALL};
 }
 
-static insitu_field describe(const char *name, maker *m, bool is_filled)
+static insitu_field describe_field(const char *name, maker *m, bool is_filled)
 {
     insitu_field field;
     insitu_field_defaults(&field);
     field.name = name;
     if (is_filled) {
-        field.fill = make;
+        field.fill = fill_field;
         field.fill_data = m;
         return field;
     }
@@ -74,7 +74,7 @@ typedef struct album {
     float *pixels;
 } album;
 
-static void keep(album *out)
+static void append_caught_pictures(album *out)
 {
     out->pixels = realloc(out->pixels, (size_t)(out->count + caught_count + 1) * PIXELS * 4 * sizeof(float));
     assert_non_null(out->pixels);
@@ -83,7 +83,7 @@ static void keep(album *out)
 }
 
 /* Draws pictures with values that change at each step. */
-static album draw(const session_input *in, bool is_filled)
+static album draw_steps(const session_input *in, bool is_filled)
 {
     static const char *const names[] = {"f", "g", "h"};
     album out = {0};
@@ -93,7 +93,7 @@ static album draw(const session_input *in, bool is_filled)
     for (int i = 0; i < 3; i++) {
         const int k = own_rank % 2 ? 2 - i : i; /* ranks set the fields in different orders */
         makers[k] = make_maker(in, k + 1);
-        const insitu_field field = describe(names[k], &makers[k], is_filled);
+        const insitu_field field = describe_field(names[k], &makers[k], is_filled);
         everywhere(insitu_set_field(session, "m", &field) == INSITU_OK);
     }
     for (int step = 0; step < STEPS; step++) {
@@ -103,7 +103,7 @@ static album draw(const session_input *in, bool is_filled)
             makers[k].calls = 0;
             for (int64_t i = 0; i < in->part.vertex_count && !is_filled; i++)
                 makers[k].values[i] = makers[k].scale * in->part.values[i];
-            const insitu_field field = describe(names[k], &makers[k], is_filled);
+            const insitu_field field = describe_field(names[k], &makers[k], is_filled);
             if (!is_filled) everywhere(insitu_set_field(session, "m", &field) == INSITU_OK);
         }
         discard_pictures();
@@ -111,19 +111,19 @@ static album draw(const session_input *in, bool is_filled)
         if (status) fprintf(stderr, "%s\n", insitu_error(session));
         everywhere(status == INSITU_OK);
         for (int k = 0; k < 3; k++) everywhere(makers[k].calls == (is_filled ? needs[k] : 0));
-        if (own_rank == 0) keep(&out);
+        if (own_rank == 0) append_caught_pictures(&out);
     }
     insitu_destroy(&session);
     for (int k = 0; k < 3; k++) free(makers[k].values);
     return out;
 }
 
-static void what_a_function_makes_is_drawn_and_nothing_else_made(void **state)
+static void fill_functions_are_called_only_for_drawn_fields(void **state)
 {
     (void)state;
     session_input in = {0};
     input_create(&in, TEST_MIXED, SIDE, TEST_RANDOM, own_rank, rank_count);
-    album given = draw(&in, false), filled = draw(&in, true);
+    album given = draw_steps(&in, false), filled = draw_steps(&in, true);
     const size_t bytes = (size_t)given.count * PIXELS * 4 * sizeof(float);
     everywhere(own_rank != 0 || given.count == 7 + 4 + 5);
     everywhere(given.count == filled.count && (bytes == 0 || memcmp(given.pixels, filled.pixels, bytes) == 0));
@@ -136,19 +136,19 @@ static void what_a_function_makes_is_drawn_and_nothing_else_made(void **state)
 
 /* ---- errors --------------------------------------------------------------------------------------------------- */
 
-static void too_few(insitu_field *field)
+static void set_too_few_values(insitu_field *field)
 {
     field->count--;
 }
-static void no_values(insitu_field *field)
+static void remove_values(insitu_field *field)
 {
     field->values.data = NULL;
 }
-static void other_components(insitu_field *field)
+static void set_other_components(insitu_field *field)
 {
     field->component_count = 2;
 }
-static void other_centring(insitu_field *field)
+static void set_other_centring(insitu_field *field)
 {
     field->centring = INSITU_CELL;
 }
@@ -161,16 +161,16 @@ static void errors_are_reported_on_all_ranks(void **state)
         void (*corrupt)(insitu_field *field);
         const char *words;
     } cases[] = {{INSITU_ERROR_IO, NULL, "field \"f\": its fill returned 5 (INSITU_ERROR_IO)"},
-                 {INSITU_OK, too_few, "field \"f\": has "},
-                 {INSITU_OK, no_values, "field \"f\": values are not given"},
-                 {INSITU_OK, other_components, "field \"f\": its fill made centring 0 of 0, and 2 components of 1"},
-                 {INSITU_OK, other_centring, "field \"f\": its fill made centring 1 of 0"}};
+                 {INSITU_OK, set_too_few_values, "field \"f\": has "},
+                 {INSITU_OK, remove_values, "field \"f\": values are not given"},
+                 {INSITU_OK, set_other_components, "field \"f\": its fill made centring 0 of 0, and 2 components of 1"},
+                 {INSITU_OK, set_other_centring, "field \"f\": its fill made centring 1 of 0"}};
     static const char text[] = "statistics: [{field: f, path: filled.csv}]\nimages:\n" IMAGE(
         "a", "1", "{isosurface: {field: f, values: [0.1], colour_by: {field: g}}}");
     session_input in = {0};
     input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
     maker f = make_maker(&in, 1), g = make_maker(&in, 2);
-    const insitu_field fields[] = {describe("f", &f, true), describe("g", &g, true)};
+    const insitu_field fields[] = {describe_field("f", &f, true), describe_field("g", &g, true)};
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(text));
     everywhere(insitu_set_mesh(session, "m", &in.mesh) == INSITU_OK);
     for (int i = 0; i < 2; i++) everywhere(insitu_set_field(session, "m", &fields[i]) == INSITU_OK);
@@ -178,16 +178,16 @@ static void errors_are_reported_on_all_ranks(void **state)
         f.calls = g.calls = 0;
         if (own_rank == rank_count - 1) f.status = cases[i].status, f.corrupt = cases[i].corrupt;
         discard_pictures();
-        reported_everywhere(session, insitu_step(session, 2 * i, 0), INSITU_ERROR_FIELD, cases[i].words, "rank ");
+        check_reported_everywhere(session, insitu_step(session, 2 * i, 0), INSITU_ERROR_FIELD, cases[i].words, "rank ");
         everywhere(caught_count == 0 && f.calls == 1 && g.calls == 1);
         f.status = INSITU_OK;
         f.corrupt = NULL;
-        step_is_good(session, 2 * i + 1);
+        check_step_succeeds(session, 2 * i + 1);
     }
     insitu_field both = fields[0];
     both.values = (insitu_array){f.values, INSITU_FLOAT64, 0};
     everywhere(insitu_set_field(session, "m", &both) == INSITU_ERROR_FIELD);
-    reported_everywhere(session, insitu_step(session, 20, 0), INSITU_ERROR_FIELD, "values and fill are given");
+    check_reported_everywhere(session, insitu_step(session, 20, 0), INSITU_ERROR_FIELD, "values and fill are given");
     insitu_destroy(&session);
     free(f.values);
     free(g.values);
@@ -212,7 +212,7 @@ typedef struct caller {
 static bool is_refused(caller *c)
 {
     insitu_session *session = c->session;
-    insitu_field another = describe("another", &c->values, false);
+    insitu_field another = describe_field("another", &c->values, false);
     int count = 7;
     switch (c->call) {
     case 0: return insitu_set_mesh(session, "m", &c->values.in->mesh) == INSITU_ERROR_ARGUMENT;
@@ -231,10 +231,10 @@ static insitu_status make_and_call(void *data, insitu_field *field)
 {
     caller *c = data;
     if (c->call >= 0) c->is_refused = is_refused(c) && strstr(insitu_error(c->session), calls[c->call]);
-    return make(&c->values, field);
+    return fill_field(&c->values, field);
 }
 
-static void calls_of_a_fill_are_refused(void **state)
+static void library_calls_in_a_fill_function_are_refused(void **state)
 {
     (void)state;
     static const char text[] = "statistics: [{field: f, path: filled.csv}]\nimages:\n" IMAGE(
@@ -243,7 +243,7 @@ static void calls_of_a_fill_are_refused(void **state)
     input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
     caller f = {.values = make_maker(&in, 1), .call = -1};
     maker g = make_maker(&in, 2);
-    insitu_field fields[] = {describe("f", &f.values, true), describe("g", &g, true)};
+    insitu_field fields[] = {describe_field("f", &f.values, true), describe_field("g", &g, true)};
     fields[0].fill = make_and_call;
     fields[0].fill_data = &f;
     f.session = open_session(MPI_COMM_WORLD, write_scene(text));
@@ -256,10 +256,10 @@ static void calls_of_a_fill_are_refused(void **state)
         f.call = calls_now ? i % CALLS : -1;
         f.is_refused = false;
         discard_pictures();
-        reported_everywhere(f.session, insitu_step(f.session, 2 * i, 0), INSITU_ERROR_ARGUMENT, words, "rank ");
+        check_reported_everywhere(f.session, insitu_step(f.session, 2 * i, 0), INSITU_ERROR_ARGUMENT, words, "rank ");
         everywhere(f.is_refused == calls_now && caught_count == 0 && insitu_last_report(f.session)->cycle == 2 * i);
         f.call = -1;
-        step_is_good(f.session, 2 * i + 1);
+        check_step_succeeds(f.session, 2 * i + 1);
     }
     insitu_destroy(&f.session);
     free(f.values.values);
@@ -269,8 +269,8 @@ static void calls_of_a_fill_are_refused(void **state)
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(what_a_function_makes_is_drawn_and_nothing_else_made),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(fill_functions_are_called_only_for_drawn_fields),
                                        cmocka_unit_test(errors_are_reported_on_all_ranks),
-                                       cmocka_unit_test(calls_of_a_fill_are_refused)};
+                                       cmocka_unit_test(library_calls_in_a_fill_function_are_refused)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

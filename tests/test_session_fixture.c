@@ -59,7 +59,7 @@ void read_file(const char *path, size_t size, char *text)
     fclose(file);
 }
 
-void put_file(const char *path, const char *text)
+void write_text_file(const char *path, const char *text)
 {
     if (own_rank != 0) return;
     FILE *file = fopen(path, "w");
@@ -103,7 +103,8 @@ insitu_session *open_session(MPI_Comm comm, const char *scene)
     return session;
 }
 
-insitu_session *open_mesh(MPI_Comm comm, const char *text, const insitu_mesh *mesh, const insitu_field *field)
+insitu_session *open_session_with_mesh(MPI_Comm comm, const char *text, const insitu_mesh *mesh,
+                                       const insitu_field *field)
 {
     insitu_session *session = open_session(comm, write_scene(text));
     assert_int_equal(insitu_set_mesh(session, "m", mesh), INSITU_OK);
@@ -146,17 +147,17 @@ void input_create(session_input *in, test_mesh_kind kind, int side, test_partiti
     in->distributed = distributed;
     in->rank = rank;
     in->count = count;
-    test_mesh_lattice(kind, side, 0.2, test_wave, &whole);
+    test_mesh_make_lattice(kind, side, 0.2, test_wave_field, &whole);
     int *owners = calloc((size_t)whole.cell_count, sizeof *owners);
     assert_non_null(owners);
-    test_partition(&whole, distributed, side, count, owners);
-    test_mesh_part(&whole, owners, rank, &in->part);
+    test_partition_cells(&whole, distributed, side, count, owners);
+    test_mesh_extract_part(&whole, owners, rank, &in->part);
     free(owners);
     test_mesh_free(&whole);
     input_describe(in);
 }
 
-void input_renew(session_input *in)
+void input_restore(session_input *in)
 {
     input_free(in);
     input_create(in, in->kind, in->side, in->distributed, in->rank, in->count);
@@ -167,41 +168,41 @@ void input_free(session_input *in)
     test_mesh_free(&in->part);
 }
 
-insitu_status submit(insitu_session *session, const session_input *in)
+insitu_status submit_input(insitu_session *session, const session_input *in)
 {
     const insitu_status status = insitu_set_mesh(session, "m", &in->mesh);
     return status ? status : insitu_set_field(session, "m", &in->field);
 }
 
-void step_is_good(insitu_session *session, int cycle)
+void check_step_succeeds(insitu_session *session, int cycle)
 {
     discard_pictures();
     const insitu_status status = insitu_step(session, cycle, 0);
-    reported_everywhere(session, status, INSITU_OK, "");
+    check_reported_everywhere(session, status, INSITU_OK, "");
     everywhere(insitu_last_report(session)->images == 1);
     everywhere(caught_count == (own_rank == 0));
 }
 
-void corrupted_is_reported_on_all_ranks(insitu_session *session, session_input *in, const corrupted_case *c)
+void check_fault_is_reported(insitu_session *session, session_input *in, const corrupted_case *c)
 {
     const int bad_rank = rank_count - 1;
     const bool is_bad = own_rank == bad_rank;
     char rank_words[32];
     snprintf(rank_words, sizeof rank_words, "rank %d: ", bad_rank);
     if (is_bad) c->corrupt(in);
-    const insitu_status at_once = submit(session, in);
+    const insitu_status at_once = submit_input(session, in);
     everywhere(at_once == (is_bad && c->at_once ? c->status : INSITU_OK));
     everywhere(!is_bad || !c->at_once || strstr(insitu_error(session), c->words[0]) != NULL);
     for (int again = 0; again < 2; again++) { /* the error remains until it is corrected */
         discard_pictures();
         const insitu_status status = insitu_step(session, 1, 0);
-        reported_everywhere(session, status, c->status, rank_words, "mesh \"m\"", c->words[0],
-                            c->words[1] ? c->words[1] : "");
+        check_reported_everywhere(session, status, c->status, rank_words, "mesh \"m\"", c->words[0],
+                                  c->words[1] ? c->words[1] : "");
         everywhere(insitu_last_report(session)->images == 0 && caught_count == 0);
     }
-    input_renew(in);
-    everywhere(submit(session, in) == INSITU_OK);
-    step_is_good(session, 2);
+    input_restore(in);
+    everywhere(submit_input(session, in) == INSITU_OK);
+    check_step_succeeds(session, 2);
 }
 
 void extract_own_cells(const test_mesh *whole, test_partition_kind distributed, int side, bool with_ghosts,
@@ -209,8 +210,8 @@ void extract_own_cells(const test_mesh *whole, test_partition_kind distributed, 
 {
     int *owners = test_calloc((size_t)whole->cell_count, sizeof *owners);
     int *all = test_calloc((size_t)whole->cell_count, sizeof *all);
-    test_partition(whole, distributed, side, rank_count, owners);
-    test_mesh_part(whole, with_ghosts ? all : owners, with_ghosts ? 0 : own_rank, out);
+    test_partition_cells(whole, distributed, side, rank_count, owners);
+    test_mesh_extract_part(whole, with_ghosts ? all : owners, with_ghosts ? 0 : own_rank, out);
     for (int64_t cell = 0; cell < out->cell_count && with_ghosts; cell++) out->ghosts[cell] = owners[cell] != own_rank;
     test_free(owners);
     test_free(all);
@@ -219,14 +220,14 @@ void extract_own_cells(const test_mesh *whole, test_partition_kind distributed, 
 const char error_scene[] = "images:\n  - name: a\n    size: [24, 16]\n    layers:\n      - volume: {field: f}\n"
                            "    outputs: [{path: a.exr}]\n";
 
-void all_are_reported(session_input *in, const corrupted_case *cases, size_t count)
+void check_all_faults_are_reported(session_input *in, const corrupted_case *cases, size_t count)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(error_scene));
-    for (size_t i = 0; i < count; i++) corrupted_is_reported_on_all_ranks(session, in, &cases[i]);
+    for (size_t i = 0; i < count; i++) check_fault_is_reported(session, in, &cases[i]);
     insitu_destroy(&session);
 }
 
-double mean_of(const double *values, int count)
+double compute_mean(const double *values, int count)
 {
     double sum = 0, rest = 0; /* Knuth's two-sum: both together have twice the precision */
     for (int i = 0; i < count; i++) {
@@ -237,7 +238,7 @@ double mean_of(const double *values, int count)
     return count ? (sum + rest) / count : NAN;
 }
 
-bool enter_folder(const char *name)
+bool enter_test_folder(const char *name)
 {
     char path[512];
     snprintf(path, sizeof path, "%s/%s_np%d", folder, name, rank_count);
@@ -274,20 +275,20 @@ caught_picture pop_caught_picture(void)
 static void draw_ok(insitu_session *session, const session_input *in)
 {
     discard_pictures();
-    assert_int_equal(submit(session, in), INSITU_OK);
+    assert_int_equal(submit_input(session, in), INSITU_OK);
     const insitu_status status = insitu_step(session, 0, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     assert_int_equal(status, INSITU_OK);
 }
 
-insitu_session *open_drawn(MPI_Comm comm, const char *scene, const session_input *in)
+insitu_session *open_session_and_draw(MPI_Comm comm, const char *scene, const session_input *in)
 {
     insitu_session *session = open_session(comm, scene);
     draw_ok(session, in);
     return session;
 }
 
-caught_picture draw_once(insitu_session **session, const session_input *in)
+caught_picture submit_and_draw(insitu_session **session, const session_input *in)
 {
     draw_ok(*session, in);
     const caught_picture picture = pop_caught_picture();
@@ -298,27 +299,27 @@ caught_picture draw_once(insitu_session **session, const session_input *in)
 caught_picture draw_scene(MPI_Comm comm, const char *scene, const session_input *in)
 {
     insitu_session *session = open_session(comm, scene);
-    return draw_once(&session, in);
+    return submit_and_draw(&session, in);
 }
 
 /* Compares two arrays; either may be missing, but then in both pictures. */
-static bool same_bytes(const void *a, const void *b, size_t bytes)
+static bool are_same_bytes(const void *a, const void *b, size_t bytes)
 {
     return a && b ? memcmp(a, b, bytes) == 0 : a == b;
 }
 
-bool same_pictures(const caught_picture *a, const caught_picture *b)
+bool are_same_pictures(const caught_picture *a, const caught_picture *b)
 {
     const size_t pixels = (size_t)a->width * (size_t)a->height;
     if (a->width != b->width || a->height != b->height || a->channel_count != b->channel_count) return false;
-    if (!same_bytes(a->rgba, b->rgba, 4 * pixels * sizeof(float))) return false;
-    if (!same_bytes(a->depth, b->depth, pixels * sizeof(float))) return false;
-    if (!same_bytes(a->data, b->data, (size_t)a->channel_count * pixels * sizeof(float))) return false;
-    if (!same_bytes(a->first, b->first, (pixels + 1) * sizeof *a->first)) return false;
-    return same_bytes(a->samples, b->samples, a->first ? (size_t)a->first[pixels] * sizeof *a->samples : 0);
+    if (!are_same_bytes(a->rgba, b->rgba, 4 * pixels * sizeof(float))) return false;
+    if (!are_same_bytes(a->depth, b->depth, pixels * sizeof(float))) return false;
+    if (!are_same_bytes(a->data, b->data, (size_t)a->channel_count * pixels * sizeof(float))) return false;
+    if (!are_same_bytes(a->first, b->first, (pixels + 1) * sizeof *a->first)) return false;
+    return are_same_bytes(a->samples, b->samples, a->first ? (size_t)a->first[pixels] * sizeof *a->samples : 0);
 }
 
-drawn take_drawn(void)
+drawn take_caught_pictures(void)
 {
     drawn out = {0};
     for (; out.count < caught_count; out.count++) {
@@ -329,32 +330,32 @@ drawn take_drawn(void)
     return out;
 }
 
-void free_drawn(drawn *d)
+void free_picture_set(drawn *d)
 {
     for (int i = 0; i < d->count; i++) free_caught(&d->pictures[i]);
     *d = (drawn){0};
 }
 
-bool same_drawn(const drawn *a, const drawn *b)
+bool are_same_picture_sets(const drawn *a, const drawn *b)
 {
     bool is_same = a->count == b->count;
     for (int i = 0; i < a->count && is_same; i++) {
-        is_same = same_pictures(&a->pictures[i], &b->pictures[i]);
+        is_same = are_same_pictures(&a->pictures[i], &b->pictures[i]);
         if (!is_same) fprintf(stderr, "picture %d differs\n", i);
     }
     return is_same;
 }
 
-drawn step_drawn(insitu_session *session, int cycle)
+drawn step_and_take_pictures(insitu_session *session, int cycle)
 {
     discard_pictures();
     const insitu_status status = insitu_step(session, cycle, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     everywhere(status == INSITU_OK);
-    return take_drawn();
+    return take_caught_pictures();
 }
 
-double last_number(const char *text, int column)
+double read_last_number(const char *text, int column)
 {
     const char *line = text, *end;
     while ((end = strchr(line, '\n')) && end[1]) line = end + 1;
@@ -362,11 +363,11 @@ double last_number(const char *text, int column)
     return line ? strtod(line, NULL) : NAN;
 }
 
-double colour_difference(const caught_picture *a, const caught_picture *b)
+double largest_colour_difference(const caught_picture *a, const caught_picture *b)
 {
     double worst = a->width == b->width && a->height == b->height ? 0 : (double)INFINITY;
     for (int i = 0; i < 4 * a->width * a->height && worst < (double)INFINITY; i++)
-        worst = test_worse(worst, fabs((double)a->rgba[i] - (double)b->rgba[i]));
+        worst = test_larger_error(worst, fabs((double)a->rgba[i] - (double)b->rgba[i]));
     return worst;
 }
 
@@ -390,7 +391,7 @@ double session_load_image_library(void)
 }
 
 /* Copies a deep picture; returns false if memory runs out. */
-static bool catch_deep(const insitu_deep *deep, size_t pixels, caught_picture *out)
+static bool copy_deep_picture(const insitu_deep *deep, size_t pixels, caught_picture *out)
 {
     int64_t count = 0;
     for (size_t p = 0; p < pixels; p++) count += deep->counts[p];
@@ -407,7 +408,7 @@ static bool catch_deep(const insitu_deep *deep, size_t pixels, caught_picture *o
     return true;
 }
 
-static bool catch_pixels(const insitu_image *image, size_t pixels, caught_picture *out)
+static bool copy_pixels(const insitu_image *image, size_t pixels, caught_picture *out)
 {
     out->rgba = malloc(pixels * 4 * sizeof(float));
     if (image->depth) out->depth = malloc(pixels * sizeof(float));
@@ -419,10 +420,10 @@ static bool catch_pixels(const insitu_image *image, size_t pixels, caught_pictur
     for (int c = 0; c < image->channel_count; c++)
         for (size_t p = 0; p < pixels; p++)
             out->data[pixels * (size_t)c + p] = image->channels[c].values[p * (size_t)image->channels[c].stride];
-    return !image->deep || catch_deep(image->deep, pixels, out);
+    return !image->deep || copy_deep_picture(image->deep, pixels, out);
 }
 
-static void catch_bars(const insitu_decorations *decorations, char *out, size_t size)
+static void copy_bars(const insitu_decorations *decorations, char *out, size_t size)
 {
     for (int i = 0; i < decorations->bar_count; i++) {
         const insitu_colour_bar *bar = &decorations->bars[i];
@@ -433,7 +434,7 @@ static void catch_bars(const insitu_decorations *decorations, char *out, size_t 
     }
 }
 
-static void catch_covered(const insitu_decorations *decorations, placed_picture *out)
+static void copy_covered_areas(const insitu_decorations *decorations, placed_picture *out)
 {
     for (int i = 0; i < decorations->covered_count && i < 4; i++)
         out->covered[out->covered_count++] = decorations->covered[i];
@@ -448,8 +449,8 @@ insitu_status session_place_image(const insitu_image *image, const insitu_place 
             .x = place->x, .y = place->y, .width = image->width, .height = image->height, .of_width = place->width};
         if (image->decorations) p->size = image->decorations->size * image->height;
         if (image->decorations) memcpy(p->colour, image->decorations->colour, sizeof p->colour);
-        if (image->decorations) catch_bars(image->decorations, p->bars, sizeof p->bars);
-        if (image->decorations) catch_covered(image->decorations, p);
+        if (image->decorations) copy_bars(image->decorations, p->bars, sizeof p->bars);
+        if (image->decorations) copy_covered_areas(image->decorations, p);
     }
     for (int y = 0; y < image->height; y++)
         memcpy(place->rgba + 4 * ((ptrdiff_t)(place->y + y) * place->width + place->x),
@@ -468,8 +469,8 @@ insitu_status session_write_image(const insitu_image *image, insitu_image_format
     const size_t pixels = (size_t)image->width * (size_t)image->height;
     caught_picture picture = {.width = image->width, .height = image->height, .held = base_memory_held()};
     snprintf(picture.path, sizeof picture.path, "%s", path);
-    if (image->decorations) catch_bars(image->decorations, picture.bars, sizeof picture.bars);
-    if (!catch_pixels(image, pixels, &picture)) {
+    if (image->decorations) copy_bars(image->decorations, picture.bars, sizeof picture.bars);
+    if (!copy_pixels(image, pixels, &picture)) {
         free_caught(&picture);
         return base_fail(error, INSITU_ERROR_MEMORY, "%s: no memory to catch it", path);
     }

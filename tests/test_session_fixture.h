@@ -23,7 +23,7 @@ void assert_everywhere(bool is_well, const char *what, const char *file, int lin
 
 /* Checks that every rank has the expected status and the same message, and that the message contains all the given
  * words (NULL words are skipped). */
-#define reported_everywhere(session, status, expected, ...)                                                            \
+#define check_reported_everywhere(session, status, expected, ...)                                                      \
     assert_reported((session), (status), (expected), (const char *const[]){__VA_ARGS__, NULL}, __FILE__, __LINE__)
 void assert_reported(const insitu_session *session, insitu_status status, insitu_status expected,
                      const char *const *words, const char *file, int line);
@@ -31,17 +31,17 @@ void assert_reported(const insitu_session *session, insitu_status status, insitu
 /* Returns the values' sum, rounded once, divided by their number; NAN if there are none. The compensated sum is off by
  * less than 2^-85 of the largest of 100 values, so that the result has the bits of the exact sum unless that is this
  * close to a tie. */
-double mean_of(const double *values, int count);
+double compute_mean(const double *values, int count);
 
 /* Changes to a directory named by `name` and the number of ranks, inside the directory for scene files, so that each
  * number of ranks has its own files. */
-bool enter_folder(const char *name);
+bool enter_test_folder(const char *name);
 
 /* Reads rank 0's file into size bytes of text, which is empty on other ranks and if there is no file. */
 void read_file(const char *path, size_t size, char *text);
 
 /* Writes the file on rank 0. */
-void put_file(const char *path, const char *text);
+void write_text_file(const char *path, const char *text);
 
 /* Runs an array of tests between MPI_Init and MPI_Finalize; argv[1] is a directory for scene files. begin and end,
  * unless NULL, are called before and after the tests, when the ranks and the directory are set. Returns main's
@@ -57,7 +57,8 @@ const char *write_scene(const char *text);
 insitu_session *open_session(MPI_Comm comm, const char *scene);
 
 /* Opens a session with the text of a scene, and sets mesh "m" with its field. */
-insitu_session *open_mesh(MPI_Comm comm, const char *text, const insitu_mesh *mesh, const insitu_field *field);
+insitu_session *open_session_with_mesh(MPI_Comm comm, const char *text, const insitu_mesh *mesh,
+                                       const insitu_field *field);
 
 /* A rank's part of a mesh, and its description; the arrays belong to the test_mesh, and tests may corrupt them. */
 typedef struct session_input {
@@ -78,7 +79,7 @@ void input_create(session_input *in, test_mesh_kind kind, int side, test_partiti
 /* Describes the part again after it was corrupted. */
 void input_describe(session_input *in);
 /* Restores the input to its state after input_create(). */
-void input_renew(session_input *in);
+void input_restore(session_input *in);
 void input_free(session_input *in);
 
 /* Makes the mesh of this rank's cells; with ghosts: of all cells, of which those of other ranks are ghosts. */
@@ -86,10 +87,10 @@ void extract_own_cells(const test_mesh *whole, test_partition_kind distributed, 
                        test_mesh *out);
 
 /* Sets the mesh "m" and its field; returns the first status that is not OK. */
-insitu_status submit(insitu_session *session, const session_input *in);
+insitu_status submit_input(insitu_session *session, const session_input *in);
 
 /* Checks that a step succeeds on every rank and draws its one picture. */
-void step_is_good(insitu_session *session, int cycle);
+void check_step_succeeds(insitu_session *session, int cycle);
 
 typedef void corrupt_function(session_input *in);
 
@@ -104,12 +105,12 @@ typedef struct corrupted_case {
 
 /* Corrupts the input on the last rank only. Checks that at every step all ranks get the same message, with the rank and
  * the words of the case, that no picture is drawn, and that after the input is restored the next step draws. */
-void corrupted_is_reported_on_all_ranks(insitu_session *session, session_input *in, const corrupted_case *c);
+void check_fault_is_reported(insitu_session *session, session_input *in, const corrupted_case *c);
 
-/* A scene with one small picture of "f", for the error cases; all_are_reported() checks each case in a session of this
- * scene. */
+/* A scene with one small picture of "f", for the error cases; check_all_faults_are_reported() checks each case in a
+ * session of this scene. */
 extern const char error_scene[];
-void all_are_reported(session_input *in, const corrupted_case *cases, size_t count);
+void check_all_faults_are_reported(session_input *in, const corrupted_case *cases, size_t count);
 
 /* A picture intercepted on rank 0 since the last discard_pictures(). */
 typedef struct caught_picture {
@@ -135,16 +136,16 @@ void free_caught(caught_picture *picture);
 caught_picture pop_caught_picture(void);
 
 /* Opens a session, passes the input, and makes a step, which must succeed. */
-insitu_session *open_drawn(MPI_Comm comm, const char *scene, const session_input *in);
+insitu_session *open_session_and_draw(MPI_Comm comm, const char *scene, const session_input *in);
 
 /* Passes the input, makes a step, which must succeed, returns its picture, and destroys the session. */
-caught_picture draw_once(insitu_session **session, const session_input *in);
+caught_picture submit_and_draw(insitu_session **session, const session_input *in);
 
-/* Opens a session of the scene file and draws one picture as draw_once() does. */
+/* Opens a session of the scene file and draws one picture as submit_and_draw() does. */
 caught_picture draw_scene(MPI_Comm comm, const char *scene, const session_input *in);
 
 /* Returns whether everything that was intercepted has the same bits, except for the path. */
-bool same_pictures(const caught_picture *a, const caught_picture *b);
+bool are_same_pictures(const caught_picture *a, const caught_picture *b);
 
 /* All pictures of a step. */
 enum { MOST_DRAWN = 8 };
@@ -154,19 +155,19 @@ typedef struct drawn {
 } drawn;
 
 /* Returns the pictures intercepted on rank 0, which the caller then owns; on other ranks none. */
-drawn take_drawn(void);
-void free_drawn(drawn *d);
+drawn take_caught_pictures(void);
+void free_picture_set(drawn *d);
 /* Returns whether all pictures have the same bits, and reports the first that does not. */
-bool same_drawn(const drawn *a, const drawn *b);
+bool are_same_picture_sets(const drawn *a, const drawn *b);
 /* Makes a step, which must succeed on all ranks, and returns its pictures. */
-drawn step_drawn(insitu_session *session, int cycle);
+drawn step_and_take_pictures(insitu_session *session, int cycle);
 
 /* Returns the number in this column, counted from 0, of the last line of a table whose columns are separated by commas;
  * NAN if there is none. */
-double last_number(const char *text, int column);
+double read_last_number(const char *text, int column);
 
 /* Returns the largest difference of a colour or the opacity; infinite if the pictures have different sizes. */
-double colour_difference(const caught_picture *a, const caught_picture *b);
+double largest_colour_difference(const caught_picture *a, const caught_picture *b);
 
 /* Paths that contain this text cannot be written; NULL: all paths can be written. */
 extern const char *unwritable;

@@ -18,7 +18,7 @@ enum { TRAPS = FE_DIVBYZERO | FE_INVALID | FE_OVERFLOW, THREADS = 3 };
 /* Volatile, so that the optimizer does not move or remove the divisions. */
 static volatile double zero = 0;
 
-static void divide_by_zero_on(int threads)
+static void divide_by_zero_on_threads(int threads)
 {
 #pragma omp parallel num_threads(threads)
     {
@@ -62,7 +62,7 @@ static void count_enabled(int threads, int *armed, int *flagged)
     *flagged = flags;
 }
 
-static void traps_are_off_inside_and_on_again_after(void **state)
+static void floating_point_traps_are_disabled_inside(void **state)
 {
     (void)state;
     session_guard guard;
@@ -71,7 +71,7 @@ static void traps_are_off_inside_and_on_again_after(void **state)
 #pragma omp parallel num_threads(THREADS)
     enable_traps(); /* for OpenMP libraries whose workers keep their own settings */
     session_guard_begin(&guard);
-    divide_by_zero_on(THREADS); /* without the guard, this terminates the process */
+    divide_by_zero_on_threads(THREADS); /* without the guard, this terminates the process */
     session_guard_end(&guard);
     count_enabled(THREADS, &armed, &flagged);
     assert_int_equal(armed, THREADS);
@@ -79,7 +79,7 @@ static void traps_are_off_inside_and_on_again_after(void **state)
 }
 
 /* Checks a team with more threads than any team before. */
-static void threads_first_needed_inside_are_as_the_callers_own(void **state)
+static void threads_started_inside_inherit_the_callers_settings(void **state)
 {
     (void)state;
     session_guard guard;
@@ -89,7 +89,7 @@ static void threads_first_needed_inside_are_as_the_callers_own(void **state)
     enable_traps();
     session_guard_begin(&guard);
     start_threads(&guard, 2 * THREADS);
-    divide_by_zero_on(2 * THREADS);
+    divide_by_zero_on_threads(2 * THREADS);
     session_guard_end(&guard);
     count_enabled(2 * THREADS, &armed, &flagged);
     assert_int_equal(armed, 2 * THREADS);
@@ -97,7 +97,7 @@ static void threads_first_needed_inside_are_as_the_callers_own(void **state)
 }
 
 /* Checks that the rounding mode of a worker is restored between regions, and is to nearest inside them. */
-static void workers_have_their_own_between_regions(void **state)
+static void workers_restore_their_settings_between_regions(void **state)
 {
     (void)state;
     session_guard guard;
@@ -137,7 +137,7 @@ static void rounding_is_to_nearest_inside(void **state)
 
 /* Checks the size of teams: OpenMP may choose any size if the caller has enabled that; all teams of a step have the
  * same size. */
-static void teams_are_of_one_size_inside(void **state)
+static void thread_teams_have_one_size_inside(void **state)
 {
     (void)state;
     for (int is_dynamic = 0; is_dynamic < 2; is_dynamic++) {
@@ -154,11 +154,11 @@ static void teams_are_of_one_size_inside(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(traps_are_off_inside_and_on_again_after),
-        cmocka_unit_test(threads_first_needed_inside_are_as_the_callers_own),
-        cmocka_unit_test(workers_have_their_own_between_regions),
+        cmocka_unit_test(floating_point_traps_are_disabled_inside),
+        cmocka_unit_test(threads_started_inside_inherit_the_callers_settings),
+        cmocka_unit_test(workers_restore_their_settings_between_regions),
         cmocka_unit_test(rounding_is_to_nearest_inside),
-        cmocka_unit_test(teams_are_of_one_size_inside),
+        cmocka_unit_test(thread_teams_have_one_size_inside),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -67,7 +67,7 @@ static void part_free(part *p)
     free(p->ghosts);
 }
 
-static void place_of(const amr *a, int level, const double at[3], double out[3])
+static void compute_vertex_position(const amr *a, int level, const double at[3], double out[3])
 {
     memcpy(out, at, 3 * sizeof *out);
     if (a->shape == TURNED || a->shape == ROUGH) { /* rotates, so that no coordinate is exact */
@@ -89,7 +89,7 @@ typedef struct cutting {
     int places[6][8];
 } cutting;
 
-static const cutting *cutting_of(insitu_cell_type type)
+static const cutting *get_cutting(insitu_cell_type type)
 {
     static const cutting tets = {
         6, 4, {{0, 1, 3, 7}, {0, 1, 5, 7}, {0, 2, 3, 7}, {0, 2, 6, 7}, {0, 4, 5, 7}, {0, 4, 6, 7}}};
@@ -99,13 +99,13 @@ static const cutting *cutting_of(insitu_cell_type type)
 }
 
 /* Returns the number of the vertex at a position in the finest lattice. */
-static int64_t vertex_at(const amr *a, part *p, int level, const int at[3])
+static int64_t find_or_add_vertex(const amr *a, part *p, int level, const int at[3])
 {
     const int64_t index = at[0] + LINE * (at[1] + LINE * (int64_t)at[2]);
     if (p->vertices[index] < 0) {
         double flat[3];
         for (int axis = 0; axis < 3; axis++) flat[axis] = 2.0 * at[axis] / (SIDE * a->cuts * a->cuts) - 1;
-        place_of(a, level, flat, p->coordinates + 3 * p->vertex_count);
+        compute_vertex_position(a, level, flat, p->coordinates + 3 * p->vertex_count);
         p->vertices[index] = p->vertex_count++;
     }
     return p->vertices[index];
@@ -113,15 +113,15 @@ static int64_t vertex_at(const amr *a, part *p, int level, const int at[3])
 
 static void add_cube(const amr *a, part *p, int level, const int at[3], int width, bool is_ghost)
 {
-    const cutting *cut = cutting_of(a->type);
+    const cutting *cut = get_cutting(a->type);
     for (int cell = 0; cell < cut->cells; cell++, p->cell_count++) {
         double middle[3] = {0, 0, 0};
         for (int i = 0; i < cut->corners; i++) {
             const int corner = cut->places[cell][i];
             const int64_t vertex =
-                vertex_at(a, p, level,
-                          (const int[]){at[0] + (corner & 1) * width, at[1] + (corner >> 1 & 1) * width,
-                                        at[2] + (corner >> 2) * width});
+                find_or_add_vertex(a, p, level,
+                                   (const int[]){at[0] + (corner & 1) * width, at[1] + (corner >> 1 & 1) * width,
+                                                 at[2] + (corner >> 2) * width});
             for (int axis = 0; axis < 3; axis++) middle[axis] += p->coordinates[3 * vertex + axis] / cut->corners;
             p->connectivity[cut->corners * p->cell_count + i] = vertex;
         }
@@ -165,7 +165,7 @@ static void make_parts(const amr *a, part *parts)
 
 static void set_part(insitu_session *session, const char *name, const part *p)
 {
-    const int corners = cutting_of(p->type)->corners;
+    const int corners = get_cutting(p->type)->corners;
     insitu_mesh mesh;
     insitu_field field;
     insitu_mesh_defaults(&mesh);
@@ -185,7 +185,7 @@ static void set_part(insitu_session *session, const char *name, const part *p)
     assert_int_equal(insitu_set_field(session, name, &field), INSITU_OK);
 }
 
-static caught_picture take_step(insitu_session *session)
+static caught_picture step_and_take_picture(insitu_session *session)
 {
     discard_pictures();
     const insitu_status status = insitu_step(session, 0, 0);
@@ -194,14 +194,14 @@ static caught_picture take_step(insitu_session *session)
     return pop_caught_picture();
 }
 
-static caught_picture draw(MPI_Comm comm, const char *scene, const amr *a)
+static caught_picture draw_amr(MPI_Comm comm, const char *scene, const amr *a)
 {
     static const char *const names[LEVELS] = {"m/0", "m/1", "m/2"};
     part parts[LEVELS];
     insitu_session *session = open_session(comm, scene);
     make_parts(a, parts);
     for (int level = 0; level < (a->is_by_level ? LEVELS : 1); level++) set_part(session, names[level], &parts[level]);
-    const caught_picture picture = take_step(session);
+    const caught_picture picture = step_and_take_picture(session);
     insitu_destroy(&session);
     for (int level = 0; level < (a->is_by_level ? LEVELS : 1); level++) part_free(&parts[level]);
     return picture;
@@ -221,23 +221,23 @@ static int count_slits(const caught_picture *picture)
     return slits;
 }
 
-static void check(int cuts, amr_shape shape, insitu_cell_type type)
+static void check_surface_continues(int cuts, amr_shape shape, insitu_cell_type type)
 {
     const char *scene = write_scene(scene_text);
     const amr whole = {cuts, shape, type, shape == ROUGH, 0, 1};
     caught_picture alone = {0};
-    if (own_rank == 0) alone = draw(MPI_COMM_SELF, scene, &whole);
+    if (own_rank == 0) alone = draw_amr(MPI_COMM_SELF, scene, &whole);
     for (int by_level = shape == ROUGH || rank_count == 1; by_level < 2; by_level++) {
         const amr own = {cuts, shape, type, by_level, own_rank, rank_count};
-        caught_picture ours = draw(MPI_COMM_WORLD, scene, &own);
+        caught_picture ours = draw_amr(MPI_COMM_WORLD, scene, &own);
         bool is_well = true;
         if (own_rank == 0) {
             const int slits = count_slits(&alone), parted = count_slits(&ours);
-            is_well = slits == 0 && parted == 0 && same_pictures(&ours, &alone);
+            is_well = slits == 0 && parted == 0 && are_same_pictures(&ours, &alone);
             if (!is_well)
                 fprintf(stderr, "%d to 1, shape %d, type %d%s: %d pixels torn, %d on ranks; %s\n", cuts, (int)shape,
                         (int)type, by_level ? ", a mesh a level" : "", slits, parted,
-                        same_pictures(&ours, &alone) ? "the same" : "another picture");
+                        are_same_pictures(&ours, &alone) ? "the same" : "another picture");
         }
         everywhere(is_well);
         free_caught(&ours);
@@ -248,9 +248,9 @@ static void check(int cuts, amr_shape shape, insitu_cell_type type)
 static void cell_values_continue_across_hanging_nodes(void **state)
 {
     (void)state;
-    for (amr_shape shape = PLAIN; shape < SHAPES; shape++) check(2, shape, INSITU_HEX);
-    check(4, TURNED, INSITU_HEX);
-    check(4, BENT, INSITU_HEX);
+    for (amr_shape shape = PLAIN; shape < SHAPES; shape++) check_surface_continues(2, shape, INSITU_HEX);
+    check_surface_continues(4, TURNED, INSITU_HEX);
+    check_surface_continues(4, BENT, INSITU_HEX);
 }
 
 /* Checks cells with triangles in shapes with plane faces: triangles are flat, so that hanging vertices of bent shapes
@@ -258,8 +258,8 @@ static void cell_values_continue_across_hanging_nodes(void **state)
 static void cell_values_continue_across_triangles(void **state)
 {
     (void)state;
-    check(2, TURNED, INSITU_TET);
-    check(4, PLAIN, INSITU_WEDGE);
+    check_surface_continues(2, TURNED, INSITU_TET);
+    check_surface_continues(4, PLAIN, INSITU_WEDGE);
 }
 
 /* ---- which meshes are one -------------------------------------------------------------------------------------- */
@@ -286,7 +286,7 @@ static void make_box(const box *b, int rank, int ranks, part *p)
         const int at[3] = {i % b->counts[0], i / b->counts[0] % b->counts[1], i / b->counts[0] / b->counts[1]};
         if (i % ranks != rank) continue;
         for (int corner = 0; corner < 8; corner++) {
-            const int bits = cutting_of(INSITU_HEX)->places[0][corner];
+            const int bits = get_cutting(INSITU_HEX)->places[0][corner];
             p->connectivity[8 * p->cell_count + corner] =
                 at[0] + (bits & 1) + lines[0] * (at[1] + (bits >> 1 & 1) + (int64_t)lines[1] * (at[2] + (bits >> 2)));
         }
@@ -295,7 +295,7 @@ static void make_box(const box *b, int rank, int ranks, part *p)
     }
 }
 
-static int count_covered(const caught_picture *picture)
+static int count_covered_pixels(const caught_picture *picture)
 {
     int count = 0;
     for (int pixel = 0; pixel < PIXELS && own_rank == 0; pixel++) count += picture->rgba[4 * pixel + 3] > 0;
@@ -315,7 +315,7 @@ static caught_picture draw_boxes(const char *layers, const box *boxes, int count
         make_box(&boxes[i], own_rank, rank_count, &parts[i]);
         if (i == 0 || own_rank < givers) set_part(session, names[i], &parts[i]);
     }
-    const caught_picture picture = take_step(session);
+    const caught_picture picture = step_and_take_picture(session);
     insitu_destroy(&session);
     for (int i = 0; i < count; i++) part_free(&parts[i]);
     return picture;
@@ -323,7 +323,7 @@ static caught_picture draw_boxes(const char *layers, const box *boxes, int count
 
 /* Checks two materials, each with one value: if one layer shows both, the field increases from one to the other between
  * them; if each has its own layer, there is no value between. */
-static void a_layer_makes_meshes_one(void **state)
+static void layer_of_two_meshes_is_continuous(void **state)
 {
     static const box boxes[] = {{{-1, -1, -1}, {1, 1, 0}, {2, 2, 2}, 0, 0}, {{-1, -1, 0}, {1, 1, 1}, {2, 2, 2}, 1, 1}};
     (void)state;
@@ -334,9 +334,9 @@ static void a_layer_makes_meshes_one(void **state)
     caught_picture both = draw_boxes("      - isosurface: {field: f, mesh: [a, b], values: [0.25]}\n"
                                      "      - isosurface: {field: f, mesh: b, values: [0.25]}\n",
                                      boxes, 2, rank_count);
-    everywhere(own_rank != 0 || count_covered(&one) == PIXELS);
-    everywhere(count_covered(&apart) == 0);
-    everywhere(own_rank != 0 || same_pictures(&one, &both));
+    everywhere(own_rank != 0 || count_covered_pixels(&one) == PIXELS);
+    everywhere(count_covered_pixels(&apart) == 0);
+    everywhere(own_rank != 0 || are_same_pictures(&one, &both));
     free_caught(&one);
     free_caught(&apart);
     free_caught(&both);
@@ -344,22 +344,22 @@ static void a_layer_makes_meshes_one(void **state)
 
 /* Checks a fine mesh that overlaps a coarse one along a wall: its vertices on the wall lie on faces of the coarse
  * cells, which have the same orientation, and do not hang on them. No two vertices have the same position. */
-static void vertices_on_a_common_wall_do_not_hang(void **state)
+static void vertices_on_a_shared_boundary_are_not_hanging(void **state)
 {
     static const box boxes[] = {{{-0.7, -0.7, 0}, {0.7, 0.7, 0.6}, {5, 5, 3}, 1, 0},
                                 {{-1, -1, 0}, {1, 1, 1}, {2, 2, 2}, 0, 0}};
     (void)state;
     caught_picture alone = draw_boxes("      - isosurface: {field: f, values: [0.75]}\n", boxes, 1, 0);
     caught_picture both = draw_boxes("      - isosurface: {field: f, values: [0.75]}\n", boxes, 2, rank_count);
-    everywhere(own_rank != 0 || count_covered(&alone) > PIXELS / 3);
-    everywhere(own_rank != 0 || same_pictures(&alone, &both));
+    everywhere(own_rank != 0 || count_covered_pixels(&alone) > PIXELS / 3);
+    everywhere(own_rank != 0 || are_same_pictures(&alone, &both));
     free_caught(&alone);
     free_caught(&both);
 }
 
 /* Checks that the values of one mesh, and its part on the last rank, may appear and disappear: the other mesh's means
  * equal those of a new session. */
-static void means_follow_the_other_mesh(void **state)
+static void means_include_values_of_the_adjacent_mesh(void **state)
 {
     static const char layers[] = "      - isosurface: {field: f, values: [0.25]}\n";
     static const box low = {{-1, -1, -1}, {1, 1, 0}, {2, 2, 2}, 0, 0}, high = {{-1, -1, 0}, {1, 1, 1}, {2, 2, 2}, 1, 1},
@@ -380,8 +380,8 @@ static void means_follow_the_other_mesh(void **state)
         for (int64_t i = 0; i < b.cell_count; i++) b.values[i] = step ? 2 : 1;
         if (step < 2) set_part(session, "b", &b);
         if (step == 2 && own_rank == rank_count - 1) assert_int_equal(insitu_set_mesh(session, "b", NULL), INSITU_OK);
-        caught_picture picture = take_step(session);
-        everywhere(own_rank != 0 || same_pictures(&expected[step], &picture));
+        caught_picture picture = step_and_take_picture(session);
+        everywhere(own_rank != 0 || are_same_pictures(&expected[step], &picture));
         free_caught(&picture);
     }
     insitu_destroy(&session);
@@ -392,9 +392,10 @@ static void means_follow_the_other_mesh(void **state)
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(cell_values_continue_across_hanging_nodes),
-        cmocka_unit_test(cell_values_continue_across_triangles), cmocka_unit_test(a_layer_makes_meshes_one),
-        cmocka_unit_test(vertices_on_a_common_wall_do_not_hang), cmocka_unit_test(means_follow_the_other_mesh)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(cell_values_continue_across_hanging_nodes),
+                                       cmocka_unit_test(cell_values_continue_across_triangles),
+                                       cmocka_unit_test(layer_of_two_meshes_is_continuous),
+                                       cmocka_unit_test(vertices_on_a_shared_boundary_are_not_hanging),
+                                       cmocka_unit_test(means_include_values_of_the_adjacent_mesh)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

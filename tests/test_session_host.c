@@ -73,7 +73,7 @@ VISIBLE int pthread_create(pthread_t *thread, const pthread_attr_t *attributes, 
 }
 
 /* Allows the given number of additional threads. */
-static void allow_threads(int more)
+static void allow_additional_threads(int more)
 {
     atomic_store(&most_threads, atomic_load(&live_threads) + more);
 }
@@ -96,7 +96,7 @@ static void end_threads(void)
 static bool gives_smaller_teams;
 static unsigned team_turn;
 
-static unsigned team_given(unsigned asked)
+static unsigned limit_team_size(unsigned asked)
 {
     if (!gives_smaller_teams || asked < 2 || omp_get_level() > 0) return asked;
     team_turn = team_turn * 1664525 + 1013904223;
@@ -111,7 +111,7 @@ VISIBLE void GOMP_parallel(void (*body)(void *), void *data, unsigned threads, u
 {
     parallel_function *real = NULL;
     *(void **)&real = dlsym(RTLD_NEXT, "GOMP_parallel");
-    real(body, data, team_given(threads), flags);
+    real(body, data, limit_team_size(threads), flags);
 }
 
 VISIBLE void GOMP_parallel_loop_nonmonotonic_dynamic(void (*body)(void *), void *data, unsigned threads, long begin,
@@ -121,7 +121,7 @@ VISIBLE void GOMP_parallel_loop_nonmonotonic_dynamic(void (*body)(void *), void 
 {
     loop_function *real = NULL;
     *(void **)&real = dlsym(RTLD_NEXT, "GOMP_parallel_loop_nonmonotonic_dynamic");
-    real(body, data, team_given(threads), begin, end, step, chunk, flags);
+    real(body, data, limit_team_size(threads), begin, end, step, chunk, flags);
 }
 
 /* ---- a session ------------------------------------------------------------------------------------------------ */
@@ -129,7 +129,7 @@ VISIBLE void GOMP_parallel_loop_nonmonotonic_dynamic(void (*body)(void *), void 
 static session_input input;
 static caught_picture expected; /* drawn by one thread */
 
-static const char *scene_by(int threads)
+static const char *write_scene_with_threads(int threads)
 {
     char text[1024];
     snprintf(text, sizeof text,
@@ -146,10 +146,10 @@ static const char *scene_by(int threads)
     return write_scene(text);
 }
 
-static insitu_session *open_by(int threads)
+static insitu_session *open_session_with_threads(int threads)
 {
-    insitu_session *session = open_session(MPI_COMM_WORLD, scene_by(threads));
-    everywhere(submit(session, &input) == INSITU_OK);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene_with_threads(threads));
+    everywhere(submit_input(session, &input) == INSITU_OK);
     return session;
 }
 
@@ -157,7 +157,7 @@ static insitu_session *open_by(int threads)
 static void step_draws_the_same(insitu_session *session, int cycle)
 {
     const size_t pixels = (size_t)120 * 90;
-    step_is_good(session, cycle);
+    check_step_succeeds(session, cycle);
     const bool is_first = own_rank == 0 && !expected.rgba;
     if (is_first) {
         expected = caught[0];
@@ -168,7 +168,7 @@ static void step_draws_the_same(insitu_session *session, int cycle)
                 !memcmp(expected.depth, caught[0].depth, pixels * sizeof(float))));
 }
 
-static bool warns_of(const insitu_session *session, const char *words)
+static bool has_warning(const insitu_session *session, const char *words)
 {
     return strstr(insitu_last_report(session)->warnings, words) != NULL;
 }
@@ -184,29 +184,29 @@ static int begin_test(void **context)
 
 /* ---- threads -------------------------------------------------------------------------------------------------- */
 
-static void one_thread_draws(void **context)
+static void one_thread_draws_the_picture(void **context)
 {
     (void)context;
-    insitu_session *session = open_by(1);
+    insitu_session *session = open_session_with_threads(1);
     step_draws_the_same(session, 0);
     everywhere(!*insitu_last_report(session)->warnings);
     insitu_destroy(&session);
 }
 
-static void threads_are_at_most_the_cores(void **context)
+static void thread_count_is_at_most_core_count(void **context)
 {
     (void)context;
     cores = 3;
-    allow_threads(3 - 1 + 4); /* the session tries to start the missing threads and four spare ones */
-    insitu_session *session = open_by(1024);
+    allow_additional_threads(3 - 1 + 4); /* the session tries to start the missing threads and four spare ones */
+    insitu_session *session = open_session_with_threads(1024);
     step_draws_the_same(session, 0);
-    everywhere(
-        warns_of(session, "the scene asks for 1024 threads, at most 3 are used: this rank may run on no more cores"));
-    everywhere(!warns_of(session, "can be started"));
+    everywhere(has_warning(session,
+                           "the scene asks for 1024 threads, at most 3 are used: this rank may run on no more cores"));
+    everywhere(!has_warning(session, "can be started"));
     insitu_destroy(&session);
 }
 
-static void threads_that_cannot_be_started_are_done_without(void **context)
+static void step_succeeds_without_threads_that_fail_to_start(void **context)
 {
     (void)context;
     static const struct {
@@ -216,31 +216,31 @@ static void threads_that_cannot_be_started_are_done_without(void **context)
                  {5, "2 of 8 threads"}, {9, "6 of 8 threads"}, {10, "7 of 8 threads"}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         end_threads();
-        allow_threads(cases[i].allowed);
-        insitu_session *session = open_by(8);
+        allow_additional_threads(cases[i].allowed);
+        insitu_session *session = open_session_with_threads(8);
         step_draws_the_same(session, 0);
-        everywhere(warns_of(session, cases[i].words));
-        everywhere(warns_of(session, "are used: no more can be started"));
+        everywhere(has_warning(session, cases[i].words));
+        everywhere(has_warning(session, "are used: no more can be started"));
         for (int cycle = 1; cycle < 4; cycle++) step_draws_the_same(session, cycle);
-        allow_threads(30);
+        allow_additional_threads(30);
         step_draws_the_same(session, 4);
         everywhere(!*insitu_last_report(session)->warnings);
         insitu_destroy(&session);
     }
 }
 
-static void an_edit_of_the_scene_starts_no_more_than_can_be(void **context)
+static void scene_edit_starts_at_most_the_possible_threads(void **context)
 {
     (void)context;
     cores = 2;
-    insitu_session *session = open_by(2);
+    insitu_session *session = open_session_with_threads(2);
     step_draws_the_same(session, 0);
     cores = 64;
-    allow_threads(20);
-    scene_by(4096);
+    allow_additional_threads(20);
+    write_scene_with_threads(4096);
     step_draws_the_same(session, 1);
-    everywhere(warns_of(session, "the scene asks for 4096 threads, at most 64 are used"));
-    everywhere(warns_of(session, "18 of 64 threads are used: no more can be started"));
+    everywhere(has_warning(session, "the scene asks for 4096 threads, at most 64 are used"));
+    everywhere(has_warning(session, "18 of 64 threads are used: no more can be started"));
     for (int cycle = 2; cycle < 5; cycle++) step_draws_the_same(session, cycle);
     insitu_destroy(&session);
 }
@@ -248,10 +248,10 @@ static void an_edit_of_the_scene_starts_no_more_than_can_be(void **context)
 static void threads_that_ended_are_tried_again(void **context)
 {
     (void)context;
-    insitu_session *session = open_by(8);
+    insitu_session *session = open_session_with_threads(8);
     step_draws_the_same(session, 0);
     end_threads();
-    allow_threads(5);
+    allow_additional_threads(5);
     step_draws_the_same(session, 1);
     insitu_destroy(&session);
 }
@@ -269,11 +269,11 @@ static void a_step_opens_few_regions(void **context)
                  "threads: 2\nimages:\n  - {name: a, size: [120, 90], layers: [%s], outputs: [{path: a.png}]}\n",
                  layers[i]);
         insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(text));
-        everywhere(submit(session, &input) == INSITU_OK);
+        everywhere(submit_input(session, &input) == INSITU_OK);
         for (int cycle = 0; cycle < 6; cycle++) {
             const int64_t before = region_count();
             everywhere(insitu_set_field(session, "m", &input.field) == INSITU_OK);
-            step_is_good(session, cycle);
+            check_step_succeeds(session, cycle);
             const int64_t regions = region_count() - before;
             everywhere(cycle < 4 || (regions > 0 && regions <= (rank_count == 1 ? 3 : 6)));
         }
@@ -281,14 +281,14 @@ static void a_step_opens_few_regions(void **context)
     }
 }
 
-static void fewer_threads_draw_the_same(void **context)
+static void fewer_threads_draw_the_same_picture(void **context)
 {
     (void)context;
     cores = 5;
     gives_smaller_teams = true;
-    insitu_session *session = open_by(5);
+    insitu_session *session = open_session_with_threads(5);
     for (int cycle = 0; cycle < 30; cycle++) {
-        everywhere(submit(session, &input) == INSITU_OK);
+        everywhere(submit_input(session, &input) == INSITU_OK);
         input.mesh.changed = cycle % 3 == 0 ? INSITU_CHANGED_ALL : cycle % 3 == 1 ? INSITU_CHANGED_GEOMETRY : 0;
         step_draws_the_same(session, cycle);
     }
@@ -296,10 +296,10 @@ static void fewer_threads_draw_the_same(void **context)
     insitu_destroy(&session);
 }
 
-static void teams_of_any_size_are_the_callers_own_affair(void **context)
+static void team_size_of_the_caller_is_not_changed(void **context)
 {
     (void)context;
-    insitu_session *session = open_by(4);
+    insitu_session *session = open_session_with_threads(4);
     omp_set_dynamic(1);
     step_draws_the_same(session, 0);
     everywhere(omp_get_dynamic());
@@ -313,13 +313,13 @@ static void a_parallel_region_of_the_caller_gets_one_thread(void **context)
 {
     (void)context;
     omp_set_max_active_levels(2);
-    insitu_session *session = open_by(4);
+    insitu_session *session = open_session_with_threads(4);
 #pragma omp parallel num_threads(2)
 #pragma omp master
     {
-        allow_threads(0);
+        allow_additional_threads(0);
         step_draws_the_same(session, 0);
-        everywhere(warns_of(session, "within a parallel region"));
+        everywhere(has_warning(session, "within a parallel region"));
     }
     insitu_destroy(&session);
     omp_set_max_active_levels(1);
@@ -335,11 +335,11 @@ static const char too_large[] = "images:\n"
                                 "    layers: [isosurface: {field: f, values: [1]}]\n"
                                 "    outputs: [path: a.png]\n";
 
-static void a_number_too_large_for_a_scene_is_no_trap(void **context)
+static void oversized_number_in_a_scene_raises_no_trap(void **context)
 {
     (void)context;
-    insitu_session *session = NULL, *open = open_by(2);
-    step_is_good(open, 0);
+    insitu_session *session = NULL, *open = open_session_with_threads(2);
+    check_step_succeeds(open, 0);
     const char *path = write_scene(too_large);
     feclearexcept(FE_ALL_EXCEPT);
     feenableexcept(TRAPS);
@@ -349,11 +349,11 @@ static void a_number_too_large_for_a_scene_is_no_trap(void **context)
     const bool is_as_before = fegetexcept() == TRAPS && fetestexcept(FE_ALL_EXCEPT) == 0;
     fedisableexcept(FE_ALL_EXCEPT);
     everywhere(is_refused && is_as_before);
-    everywhere(stepped == INSITU_OK && warns_of(open, "1e999"));
+    everywhere(stepped == INSITU_OK && has_warning(open, "1e999"));
     insitu_destroy(&open);
 }
 
-static int begin_tests(void **state)
+static int set_up_test_group(void **state)
 {
     (void)state;
     other_threads = atomic_load(&live_threads);
@@ -363,7 +363,7 @@ static int begin_tests(void **state)
     return 0;
 }
 
-static int end_tests(void **state)
+static int tear_down_test_group(void **state)
 {
     (void)state;
     input_free(&input);
@@ -375,16 +375,16 @@ static int end_tests(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(one_thread_draws, begin_test),
-        cmocka_unit_test_setup(threads_are_at_most_the_cores, begin_test),
-        cmocka_unit_test_setup(threads_that_cannot_be_started_are_done_without, begin_test),
-        cmocka_unit_test_setup(an_edit_of_the_scene_starts_no_more_than_can_be, begin_test),
+        cmocka_unit_test_setup(one_thread_draws_the_picture, begin_test),
+        cmocka_unit_test_setup(thread_count_is_at_most_core_count, begin_test),
+        cmocka_unit_test_setup(step_succeeds_without_threads_that_fail_to_start, begin_test),
+        cmocka_unit_test_setup(scene_edit_starts_at_most_the_possible_threads, begin_test),
         cmocka_unit_test_setup(threads_that_ended_are_tried_again, begin_test),
         cmocka_unit_test_setup(a_step_opens_few_regions, begin_test),
-        cmocka_unit_test_setup(fewer_threads_draw_the_same, begin_test),
-        cmocka_unit_test_setup(teams_of_any_size_are_the_callers_own_affair, begin_test),
+        cmocka_unit_test_setup(fewer_threads_draw_the_same_picture, begin_test),
+        cmocka_unit_test_setup(team_size_of_the_caller_is_not_changed, begin_test),
         cmocka_unit_test_setup(a_parallel_region_of_the_caller_gets_one_thread, begin_test),
-        cmocka_unit_test_setup(a_number_too_large_for_a_scene_is_no_trap, begin_test),
+        cmocka_unit_test_setup(oversized_number_in_a_scene_raises_no_trap, begin_test),
     };
-    return run_session_tests(argc, argv, tests, begin_tests, end_tests);
+    return run_session_tests(argc, argv, tests, set_up_test_group, tear_down_test_group);
 }

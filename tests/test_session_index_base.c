@@ -20,19 +20,19 @@ static const char scene_text[] =
     "    outputs: [{path: c.exr}]\n";
 enum { PICTURES = 3 };
 
-static void add_to(int64_t *indices, int64_t count, int64_t base)
+static void add_base_to_indices(int64_t *indices, int64_t count, int64_t base)
 {
     for (int64_t i = 0; i < count; i++) indices[i] += base;
 }
 
 /* Makes all indices of the part begin at 1: connectivity and offsets, and for polyhedra also faces. */
-static void count_from_one(session_input *in)
+static void make_indices_one_based(session_input *in)
 {
     test_mesh *part = &in->part;
-    add_to(part->connectivity, part->connectivity_count, 1);
-    add_to(part->offsets, part->cell_count + 1, 1);
-    if (part->face_count) add_to(part->face_offsets, part->face_count + 1, 1);
-    add_to(part->face_connectivity, part->face_connectivity_count, 1);
+    add_base_to_indices(part->connectivity, part->connectivity_count, 1);
+    add_base_to_indices(part->offsets, part->cell_count + 1, 1);
+    if (part->face_count) add_base_to_indices(part->face_offsets, part->face_count + 1, 1);
+    add_base_to_indices(part->face_connectivity, part->face_connectivity_count, 1);
     in->mesh.index_base = 1;
 }
 
@@ -66,11 +66,11 @@ static void free_narrow(narrow_arrays *n)
     test_free(n->connectivity);
 }
 
-static void draw(const char *scene, const session_input *in, caught_picture out[PICTURES])
+static void draw_pictures(const char *scene, const session_input *in, caught_picture out[PICTURES])
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
     discard_pictures();
-    everywhere(submit(session, in) == INSITU_OK);
+    everywhere(submit_input(session, in) == INSITU_OK);
     const insitu_status status = insitu_step(session, 0, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     everywhere(status == INSITU_OK);
@@ -79,7 +79,7 @@ static void draw(const char *scene, const session_input *in, caught_picture out[
     insitu_destroy(&session);
 }
 
-static void check(test_mesh_kind kind, bool is_narrow)
+static void check_index_base(test_mesh_kind kind, bool is_narrow)
 {
     session_input from_zero = {0}, from_one = {0};
     narrow_arrays narrow[2];
@@ -87,13 +87,13 @@ static void check(test_mesh_kind kind, bool is_narrow)
     const char *scene = write_scene(scene_text);
     input_create(&from_zero, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
     input_create(&from_one, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
-    count_from_one(&from_one);
+    make_indices_one_based(&from_one);
     if (is_narrow) {
         narrow[0] = make_narrow(&from_zero);
         narrow[1] = make_narrow(&from_one);
     }
-    draw(scene, &from_zero, pictures[0]);
-    draw(scene, &from_one, pictures[1]);
+    draw_pictures(scene, &from_zero, pictures[0]);
+    draw_pictures(scene, &from_one, pictures[1]);
     bool are_same = true;
     for (int i = 0; i < PICTURES && own_rank == 0; i++) {
         are_same = are_same && memcmp(pictures[0][i].rgba, pictures[1][i].rgba, PIXELS * 4 * sizeof(float)) == 0 &&
@@ -106,44 +106,46 @@ static void check(test_mesh_kind kind, bool is_narrow)
     input_free(&from_one);
 }
 
-static void pictures_are_those_from_zero(void **state)
+static void one_based_indices_draw_same_pictures_as_zero_based(void **state)
 {
     (void)state;
-    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) check(kind, false);
-    check(TEST_TETS, true);
-    check(TEST_HEXES, true);
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) check_index_base(kind, false);
+    check_index_base(TEST_TETS, true);
+    check_index_base(TEST_HEXES, true);
 }
 
 /* Checks errors of which each is on the last rank only. */
-static void errors_count_from_one_too(void **state)
+static void errors_report_one_based_indices(void **state)
 {
     (void)state;
     session_input in = {0};
     const bool is_last = own_rank == rank_count - 1;
     input_create(&in, TEST_HEXES, SIDE, TEST_BLOCK, own_rank, rank_count);
-    count_from_one(&in);
+    make_indices_one_based(&in);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
     if (is_last) in.part.connectivity[3] = 0;
-    submit(session, &in);
-    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_MESH, "vertex index 0 is outside 1..",
-                        "index_base is 1");
+    submit_input(session, &in);
+    check_reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_MESH, "vertex index 0 is outside 1..",
+                              "index_base is 1");
     if (is_last) in.part.connectivity[3] = in.part.vertex_count + 1;
-    submit(session, &in);
-    reported_everywhere(session, insitu_step(session, 1, 0), INSITU_ERROR_MESH, "is outside 1..");
+    submit_input(session, &in);
+    check_reported_everywhere(session, insitu_step(session, 1, 0), INSITU_ERROR_MESH, "is outside 1..");
     if (is_last) in.part.connectivity[3] = in.part.vertex_count;
     if (is_last) in.part.offsets[in.part.cell_count]--;
-    submit(session, &in);
-    reported_everywhere(session, insitu_step(session, 2, 0), INSITU_ERROR_MESH, "offsets");
+    submit_input(session, &in);
+    check_reported_everywhere(session, insitu_step(session, 2, 0), INSITU_ERROR_MESH, "offsets");
     if (is_last) in.part.offsets[in.part.cell_count]++;
     in.mesh.index_base = is_last ? 2 : 1;
     everywhere((insitu_set_mesh(session, "m", &in.mesh) == INSITU_ERROR_ARGUMENT) == is_last);
-    reported_everywhere(session, insitu_step(session, 3, 0), INSITU_ERROR_ARGUMENT, "index_base is 2, expected 0 or 1");
+    check_reported_everywhere(session, insitu_step(session, 3, 0), INSITU_ERROR_ARGUMENT,
+                              "index_base is 2, expected 0 or 1");
     insitu_destroy(&session);
     input_free(&in);
 }
 
 /* Checks errors of which each is a single wrong entry in the last rank's connectivity. */
-static void wrong_indices_are_reported(insitu_session *session, const session_input *in, int32_t *place, int64_t cell)
+static void check_wrong_indices_are_reported(insitu_session *session, const session_input *in, int32_t *place,
+                                             int64_t cell)
 {
     const int32_t wrong[] = {0, (int32_t)in->part.vertex_count + 1, -1, INT32_MIN, INT32_MAX}, good = *place;
     char word[64];
@@ -151,12 +153,12 @@ static void wrong_indices_are_reported(insitu_session *session, const session_in
     MPI_Bcast(word, sizeof word, MPI_CHAR, rank_count - 1, MPI_COMM_WORLD);
     for (int i = 0; i < (int)(sizeof wrong / sizeof *wrong); i++) {
         if (own_rank == rank_count - 1) *place = wrong[i];
-        submit(session, in);
-        reported_everywhere(session, insitu_step(session, i, 0), INSITU_ERROR_MESH, word, "vertex index ",
-                            " is outside 1..");
+        submit_input(session, in);
+        check_reported_everywhere(session, insitu_step(session, i, 0), INSITU_ERROR_MESH, word, "vertex index ",
+                                  " is outside 1..");
     }
     *place = good;
-    submit(session, in);
+    submit_input(session, in);
     everywhere(insitu_step(session, 9, 0) == INSITU_OK);
 }
 
@@ -167,12 +169,12 @@ static void errors_of_many_cells_are_reported(void **state)
     for (test_mesh_kind kind = TEST_TETS; kind <= TEST_HEXES; kind++) {
         session_input in = {0};
         input_create(&in, kind, 2 * SIDE, TEST_RANDOM, own_rank, rank_count);
-        count_from_one(&in);
+        make_indices_one_based(&in);
         narrow_arrays narrow = make_narrow(&in);
         insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
         const int64_t count = kind == TEST_TETS ? 4 : 8, cells[] = {in.part.cell_count / 2, in.part.cell_count - 1};
         for (int i = 0; i < 2; i++)
-            wrong_indices_are_reported(session, &in, &narrow.connectivity[count * cells[i] + i], cells[i]);
+            check_wrong_indices_are_reported(session, &in, &narrow.connectivity[count * cells[i] + i], cells[i]);
         insitu_destroy(&session);
         free_narrow(&narrow);
         input_free(&in);
@@ -181,8 +183,8 @@ static void errors_of_many_cells_are_reported(void **state)
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(pictures_are_those_from_zero),
-                                       cmocka_unit_test(errors_count_from_one_too),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(one_based_indices_draw_same_pictures_as_zero_based),
+                                       cmocka_unit_test(errors_report_one_based_indices),
                                        cmocka_unit_test(errors_of_many_cells_are_reported)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

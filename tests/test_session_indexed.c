@@ -41,13 +41,13 @@ typedef struct twice {
     char *plain, *shuffled, *index;
 } twice;
 
-static double value_at(const session_input *in, const form *of, int64_t place, int component)
+static double compute_value(const session_input *in, const form *of, int64_t place, int component)
 {
-    const double own = of->at_cells ? test_uniform_in((uint64_t)place + 1, 5, -1, 1) : in->part.values[place];
+    const double own = of->at_cells ? test_uniform_between((uint64_t)place + 1, 5, -1, 1) : in->part.values[place];
     return component ? own * component - 0.2 : own;
 }
 
-static void put_number(const form *of, char *array, int64_t i, double value)
+static void set_number(const form *of, char *array, int64_t i, double value)
 {
     if (of->is_narrow)
         ((float *)(void *)array)[i] = (float)value;
@@ -55,7 +55,7 @@ static void put_number(const form *of, char *array, int64_t i, double value)
         ((double *)(void *)array)[i] = value;
 }
 
-static void put_index(const form *of, char *array, int64_t i, int64_t value)
+static void set_index(const form *of, char *array, int64_t i, int64_t value)
 {
     if (of->is_narrow)
         ((int32_t *)(void *)array)[2 * i] = (int32_t)value, ((int32_t *)(void *)array)[2 * i + 1] = -7;
@@ -63,17 +63,17 @@ static void put_index(const form *of, char *array, int64_t i, int64_t value)
         ((int64_t *)(void *)array)[i] = value;
 }
 
-static void fill(twice *t, const session_input *in, double scale)
+static void fill_values(twice *t, const session_input *in, double scale)
 {
     const form *of = &t->of;
-    for (int64_t i = 0; i < t->count * of->components; i++) put_number(of, t->shuffled, i, (double)NAN);
+    for (int64_t i = 0; i < t->count * of->components; i++) set_number(of, t->shuffled, i, (double)NAN);
     for (int64_t i = 0; i < t->places; i++) {
         const int64_t at = t->count - 1 - 2 * i - i % 2; /* backwards, with gaps: injective */
-        put_index(of, t->index, i, at + of->base);
+        set_index(of, t->index, i, at + of->base);
         for (int c = 0; c < of->components; c++) {
-            const double value = scale * value_at(in, of, i, c);
-            put_number(of, t->plain, i * of->components + c, value);
-            put_number(of, t->shuffled, at * of->components + c, value);
+            const double value = scale * compute_value(in, of, i, c);
+            set_number(of, t->plain, i * of->components + c, value);
+            set_number(of, t->shuffled, at * of->components + c, value);
         }
     }
 }
@@ -85,7 +85,7 @@ static twice make_twice(const session_input *in, const form *of)
     twice t = {
         *of, places, count, malloc(tuple * (size_t)count), malloc(tuple * (size_t)count), malloc(8 * (size_t)count)};
     assert_true(t.plain && t.shuffled && t.index);
-    fill(&t, in, 1);
+    fill_values(&t, in, 1);
     return t;
 }
 
@@ -94,7 +94,7 @@ static void free_twice(twice *t)
     free(t->plain), free(t->shuffled), free(t->index);
 }
 
-static insitu_field describe(const twice *t, bool is_by_index)
+static insitu_field describe_field(const twice *t, bool is_by_index)
 {
     insitu_field field;
     insitu_field_defaults(&field);
@@ -116,7 +116,7 @@ typedef struct drawing {
     bool gives_reason;
 } drawing;
 
-static void count_from_one(session_input *in)
+static void make_indices_one_based(session_input *in)
 {
     test_mesh *part = &in->part;
     for (int64_t i = 0; i < part->connectivity_count; i++) part->connectivity[i]++;
@@ -138,14 +138,14 @@ static void step_and_catch(insitu_session *session, int cycle, caught_picture ou
 }
 
 /* Draws the values as they are, halved in the same arrays, set as unchanged, and restored. */
-static drawing draw(const session_input *in, twice *t, bool is_by_index)
+static drawing draw_fields(const session_input *in, twice *t, bool is_by_index)
 {
     drawing out = {.copied = 0};
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(t->of.base ? conditional_scene : scene_text));
-    insitu_field field = describe(t, is_by_index);
+    insitu_field field = describe_field(t, is_by_index);
     everywhere(insitu_set_mesh(session, "m", &in->mesh) == INSITU_OK);
     for (int step = 0; step < STEPS; step++) {
-        fill(t, in, step % 3 ? 0.5 : 1);
+        fill_values(t, in, step % 3 ? 0.5 : 1);
         field.changed = step == 2 ? INSITU_CHANGED_NOTHING : INSITU_CHANGED_VALUES;
         const insitu_status status = insitu_set_field(session, "m", &field);
         if (status) fprintf(stderr, "%s\n", insitu_error(session));
@@ -160,13 +160,13 @@ static drawing draw(const session_input *in, twice *t, bool is_by_index)
     return out;
 }
 
-static void compare(drawing *a, drawing *b)
+static void compare_drawings(drawing *a, drawing *b)
 {
     bool same = true, differ = own_rank != 0;
     for (int step = 0; step < STEPS && own_rank == 0; step++)
         for (int i = 0; i < PICTURES; i++) {
-            same = same && same_pictures(&a->pictures[step][i], &b->pictures[step][i]);
-            differ = differ || !same_pictures(&a->pictures[0][i], &a->pictures[step][i]);
+            same = same && are_same_pictures(&a->pictures[step][i], &b->pictures[step][i]);
+            differ = differ || !are_same_pictures(&a->pictures[0][i], &a->pictures[step][i]);
         }
     everywhere(same);
     everywhere(differ); /* the picture of the second step differs from the first */
@@ -177,43 +177,43 @@ static void compare(drawing *a, drawing *b)
         }
 }
 
-static void check(test_mesh_kind kind, const form *of)
+static void check_form(test_mesh_kind kind, const form *of)
 {
     session_input in = {0};
     input_create(&in, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
-    if (of->base) count_from_one(&in);
+    if (of->base) make_indices_one_based(&in);
     twice t = make_twice(&in, of);
-    drawing plain = draw(&in, &t, false), indexed = draw(&in, &t, true);
+    drawing plain = draw_fields(&in, &t, false), indexed = draw_fields(&in, &t, true);
     const int64_t size = of->is_narrow ? 4 : 8, tuples = size * of->components;
     everywhere(indexed.copied == plain.copied + t.places * tuples);
     everywhere(indexed.borrowed == plain.borrowed + (t.count - t.places) * tuples + t.places * size);
     everywhere(indexed.gives_reason && !plain.gives_reason);
-    compare(&plain, &indexed);
+    compare_drawings(&plain, &indexed);
     free_twice(&t);
     input_free(&in);
 }
 
-static void an_index_draws_what_values_in_order_draw(void **state)
+static void indexed_values_draw_same_picture_as_ordered_values(void **state)
 {
     (void)state;
     static const form forms[] = {{false, false, 1, 0}, {false, true, 1, 1},  {true, false, 1, 1},
                                  {true, true, 1, 0},   {false, false, 3, 0}, {true, true, 2, 0}};
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
-        for (size_t i = 0; i < sizeof forms / sizeof forms[0]; i++) check(kind, &forms[i]);
+        for (size_t i = 0; i < sizeof forms / sizeof forms[0]; i++) check_form(kind, &forms[i]);
 }
 
 /* Checks that a field which no scene uses is neither copied nor checked. */
-static void an_index_that_nobody_needs_is_left_alone(void **state)
+static void unused_index_is_not_read(void **state)
 {
     (void)state;
     session_input in = {0};
     input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
     twice t = make_twice(&in, &(form){false, false, 1, 0});
-    insitu_field other = describe(&t, true);
+    insitu_field other = describe_field(&t, true);
     other.name = "other";
     ((int64_t *)(void *)t.index)[0] = -9;
-    everywhere(submit(session, &in) == INSITU_OK);
+    everywhere(submit_input(session, &in) == INSITU_OK);
     everywhere(insitu_step(session, 0, 0) == INSITU_OK);
     const int64_t copied = insitu_last_report(session)->bytes_copied;
     everywhere(insitu_set_field(session, "m", &other) == INSITU_OK);
@@ -229,7 +229,7 @@ static void an_index_that_nobody_needs_is_left_alone(void **state)
 
 static int64_t *corrupted;
 
-static void by_index(session_input *in)
+static void use_indexed_field(session_input *in)
 {
     free(corrupted);
     corrupted = malloc((size_t)(in->part.vertex_count + in->part.cell_count) * sizeof *corrupted);
@@ -237,76 +237,88 @@ static void by_index(session_input *in)
     for (int64_t i = 0; i < in->part.vertex_count + in->part.cell_count; i++) corrupted[i] = i;
     in->field.index = (insitu_array){corrupted, INSITU_INT64, 0};
 }
-static void index_large(session_input *in)
+static void set_large_index(session_input *in)
 {
-    by_index(in);
+    use_indexed_field(in);
     corrupted[7] = in->part.vertex_count;
     corrupted[9] = -1; /* the first error is reported */
 }
-static void index_far(session_input *in)
+static void set_far_index(session_input *in)
 {
-    by_index(in);
+    use_indexed_field(in);
     corrupted[2] = INT64_MAX;
 }
-static void index_negative(session_input *in)
+static void set_negative_index(session_input *in)
 {
-    by_index(in);
+    use_indexed_field(in);
     corrupted[3] = -1;
 }
-static void index_before_one(session_input *in)
+static void set_index_before_one(session_input *in)
 {
-    by_index(in);
-    count_from_one(in);
+    use_indexed_field(in);
+    make_indices_one_based(in);
     for (int64_t i = 1; i < in->part.vertex_count; i++) corrupted[i]++;
 }
-static void fewer_values(session_input *in)
+static void set_fewer_values(session_input *in)
 {
-    by_index(in);
+    use_indexed_field(in);
     in->field.count = 5;
 }
-static void no_values(session_input *in)
+static void remove_values(session_input *in)
 {
-    by_index(in);
+    use_indexed_field(in);
     in->field.count = 0;
 }
-static void negative_values(session_input *in)
+static void set_negative_value_count(session_input *in)
 {
-    by_index(in);
+    use_indexed_field(in);
     in->field.count = -2;
 }
-static void values_are_null(session_input *in)
+static void set_null_values(session_input *in)
 {
-    by_index(in);
+    use_indexed_field(in);
     in->field.values.data = NULL;
 }
-static void float_index(session_input *in)
+static void set_float_index(session_input *in)
 {
-    by_index(in);
+    use_indexed_field(in);
     in->field.index.type = INSITU_FLOAT64;
 }
-static void odd_stride(session_input *in)
+static void set_odd_stride(session_input *in)
 {
-    by_index(in);
+    use_indexed_field(in);
     in->field.index.stride_bytes = 12;
 }
-static void type_alone(session_input *in)
+static void set_type_alone(session_input *in)
 {
     in->field.index.type = INSITU_INT32;
     in->field.count++;
 }
 
 static const corrupted_case cases[] = {
-    {"large", index_large, INSITU_ERROR_FIELD, false, {"field \"f\": the index of vertex 7 is ", "outside 0.."}},
-    {"far", index_far, INSITU_ERROR_FIELD, false, {"the index of vertex 2 is 9223372036854775807, outside 0.."}},
-    {"-1", index_negative, INSITU_ERROR_FIELD, false, {"the index of vertex 3 is -1, outside 0..", "index_base is 0"}},
-    {"0 of 1", index_before_one, INSITU_ERROR_FIELD, false, {"index of vertex 1 is 0, outside 1..", "index_base is 1"}},
-    {"fewer", fewer_values, INSITU_ERROR_FIELD, false, {"the index of vertex 5 is 5, outside 0..4"}},
-    {"none", no_values, INSITU_ERROR_FIELD, false, {"the index of vertex 0 is 0, outside 0..-1"}},
-    {"negative", negative_values, INSITU_ERROR_FIELD, true, {"field \"f\": has -2 values"}},
-    {"NULL", values_are_null, INSITU_ERROR_FIELD, true, {"values are not given"}},
-    {"float", float_index, INSITU_ERROR_ARGUMENT, true, {"entries of index are of element type 2, not int32 or int64"}},
-    {"stride", odd_stride, INSITU_ERROR_FIELD, true, {"entries of index have a stride of 12 bytes"}},
-    {"type alone", type_alone, INSITU_ERROR_FIELD, true, {"values, the mesh has "}},
+    {"large", set_large_index, INSITU_ERROR_FIELD, false, {"field \"f\": the index of vertex 7 is ", "outside 0.."}},
+    {"far", set_far_index, INSITU_ERROR_FIELD, false, {"the index of vertex 2 is 9223372036854775807, outside 0.."}},
+    {"-1",
+     set_negative_index,
+     INSITU_ERROR_FIELD,
+     false,
+     {"the index of vertex 3 is -1, outside 0..", "index_base is 0"}},
+    {"0 of 1",
+     set_index_before_one,
+     INSITU_ERROR_FIELD,
+     false,
+     {"index of vertex 1 is 0, outside 1..", "index_base is 1"}},
+    {"fewer", set_fewer_values, INSITU_ERROR_FIELD, false, {"the index of vertex 5 is 5, outside 0..4"}},
+    {"none", remove_values, INSITU_ERROR_FIELD, false, {"the index of vertex 0 is 0, outside 0..-1"}},
+    {"negative", set_negative_value_count, INSITU_ERROR_FIELD, true, {"field \"f\": has -2 values"}},
+    {"NULL", set_null_values, INSITU_ERROR_FIELD, true, {"values are not given"}},
+    {"float",
+     set_float_index,
+     INSITU_ERROR_ARGUMENT,
+     true,
+     {"entries of index are of element type 2, not int32 or int64"}},
+    {"stride", set_odd_stride, INSITU_ERROR_FIELD, true, {"entries of index have a stride of 12 bytes"}},
+    {"type alone", set_type_alone, INSITU_ERROR_FIELD, true, {"values, the mesh has "}},
 };
 
 static void wrong_input_is_reported_on_all_ranks(void **state)
@@ -314,27 +326,27 @@ static void wrong_input_is_reported_on_all_ranks(void **state)
     (void)state;
     session_input in = {0};
     input_create(&in, TEST_HEXES, 3, TEST_RANDOM, own_rank, rank_count);
-    all_are_reported(&in, cases, sizeof cases / sizeof cases[0]);
+    check_all_faults_are_reported(&in, cases, sizeof cases / sizeof cases[0]);
     input_free(&in);
     free(corrupted);
 }
 
 /* Checks fields at cells. The centring is the same on all ranks, so this error cannot be on the last one only. */
-static void cells_are_reported_too(void **state)
+static void wrong_indices_of_cell_fields_are_reported(void **state)
 {
     (void)state;
     session_input in = {0};
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(error_scene));
     input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
-    by_index(&in);
+    use_indexed_field(&in);
     in.field.centring = INSITU_CELL;
     if (own_rank == rank_count - 1) corrupted[in.part.cell_count - 1] = 1000000;
-    everywhere(submit(session, &in) == INSITU_OK);
+    everywhere(submit_input(session, &in) == INSITU_OK);
     for (int step = 0; step < 2; step++)
-        reported_everywhere(session, insitu_step(session, step, 0), INSITU_ERROR_FIELD,
-                            "mesh \"m\": field \"f\": the index of cell ", " is 1000000, outside 0..");
+        check_reported_everywhere(session, insitu_step(session, step, 0), INSITU_ERROR_FIELD,
+                                  "mesh \"m\": field \"f\": the index of cell ", " is 1000000, outside 0..");
     corrupted[in.part.cell_count - 1] = 0;
-    step_is_good(session, 2); /* corrected in place, since nothing was copied */
+    check_step_succeeds(session, 2); /* corrected in place, since nothing was copied */
     insitu_destroy(&session);
     input_free(&in);
     free(corrupted);
@@ -349,7 +361,7 @@ static void ranks_without_vertices_have_values(void **state)
     session_input in = {0};
     double vector[4] = {1, 2, 3, 4};
     input_create(&in, TEST_HEXES, SIDE, TEST_BLOCK, own_rank, 1);
-    by_index(&in);
+    use_indexed_field(&in);
     if (own_rank) {
         in.mesh.vertex_count = in.mesh.cell_count = in.mesh.connectivity_count = 0;
         in.mesh.offsets = in.mesh.cell_types = in.mesh.ghosts = (insitu_array){0};
@@ -358,8 +370,8 @@ static void ranks_without_vertices_have_values(void **state)
         in.field.index.data = NULL;
     }
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(error_scene));
-    everywhere(submit(session, &in) == INSITU_OK);
-    step_is_good(session, 0);
+    everywhere(submit_input(session, &in) == INSITU_OK);
+    check_step_succeeds(session, 0);
     insitu_destroy(&session);
     input_free(&in);
     free(corrupted);
@@ -368,10 +380,10 @@ static void ranks_without_vertices_have_values(void **state)
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(an_index_draws_what_values_in_order_draw),
-                                       cmocka_unit_test(an_index_that_nobody_needs_is_left_alone),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(indexed_values_draw_same_picture_as_ordered_values),
+                                       cmocka_unit_test(unused_index_is_not_read),
                                        cmocka_unit_test(ranks_without_vertices_have_values),
-                                       cmocka_unit_test(cells_are_reported_too),
+                                       cmocka_unit_test(wrong_indices_of_cell_fields_are_reported),
                                        cmocka_unit_test(wrong_input_is_reported_on_all_ranks)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

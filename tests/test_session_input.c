@@ -19,89 +19,89 @@ static session_input input;
 
 /* ---- corrupted meshes ---------------------------------------------------------------------------------------- */
 
-static void index_too_large(session_input *in)
+static void set_large_index(session_input *in)
 {
     in->part.connectivity[8 * 2 + 3] = in->part.vertex_count + 12;
 }
-static void index_negative(session_input *in)
+static void set_negative_index(session_input *in)
 {
     in->part.connectivity[8 * 1 + 7] = -3;
 }
-static void index_bad_in_two(session_input *in)
+static void set_two_bad_indices(session_input *in)
 {
     in->part.connectivity[8 * 3] = -1;
     in->part.connectivity[8 * 1] = -9;
 }
-static void coordinate_nan(session_input *in)
+static void set_nan_coordinate(session_input *in)
 {
     in->part.coordinates[3 * in->part.connectivity[0] + 1] = NAN;
 }
-static void coordinate_infinite(session_input *in)
+static void set_infinite_coordinate(session_input *in)
 {
     in->part.coordinates[3 * in->part.connectivity[0]] = INFINITY;
 }
-static void offsets_fall(session_input *in)
+static void set_decreasing_offsets(session_input *in)
 {
     in->part.offsets[2] = 3;
 }
-static void offsets_far(session_input *in)
+static void set_far_offsets(session_input *in)
 {
     in->part.offsets[1] = 1 << 30;
 }
-static void offsets_wrong_step(session_input *in)
+static void set_offsets_with_wrong_step(session_input *in)
 {
     in->part.offsets[1] = 7;
 }
-static void offsets_end_early(session_input *in)
+static void shorten_offsets(session_input *in)
 {
     in->mesh.connectivity_count += 8;
 }
-static void type_unknown(session_input *in)
+static void set_unknown_type(session_input *in)
 {
     in->part.types[1] = 11;
 }
-static void type_too_wide(session_input *in)
+static void set_wide_types(session_input *in)
 {
     static int64_t types[64];
     for (int64_t cell = 0; cell < in->part.cell_count; cell++) types[cell] = INSITU_HEX;
     types[2] = (1LL << 32) + INSITU_HEX;
     in->mesh.cell_types = (insitu_array){types, INSITU_INT64, 0};
 }
-static void type_negative(session_input *in)
+static void set_negative_type(session_input *in)
 {
     static int64_t types[64];
     for (int64_t cell = 0; cell < in->part.cell_count; cell++) types[cell] = INSITU_HEX;
     types[0] = -(1LL << 40);
     in->mesh.cell_types = (insitu_array){types, INSITU_INT64, 0};
 }
-static void coordinate_far(session_input *in)
+static void set_far_coordinate(session_input *in)
 {
     for (int64_t i = 0; i < 3 * in->part.vertex_count; i++) in->part.coordinates[i] *= 1e300;
 }
-static void types_without_offsets(session_input *in)
+static void remove_offsets(session_input *in)
 {
     in->mesh.offsets.data = NULL;
 }
-static void one_type_unknown(session_input *in)
+static void set_unknown_single_type(session_input *in)
 {
     in->mesh.cell_types.data = NULL;
     in->mesh.cell_type = (insitu_cell_type)41;
 }
-static void one_type_wrong_count(session_input *in)
+static void set_single_type_with_wrong_count(session_input *in)
 {
     in->mesh.cell_types.data = in->mesh.offsets.data = NULL;
     in->mesh.cell_type = INSITU_WEDGE;
 }
-static void no_coordinates(session_input *in)
+static void remove_coordinates(session_input *in)
 {
     in->mesh.coordinates[2].data = NULL;
 }
-static void no_coordinates_of_hexes(session_input *in)
+static void remove_coordinates_of_hexes(session_input *in)
 {
     in->mesh.cell_types.data = in->mesh.offsets.data = NULL;
-    no_coordinates(in);
+    remove_coordinates(in);
 }
-static void no_connectivity(session_input *in)
+static void remove_connectivity(session_input *in)
 {
     in->mesh.connectivity.data = NULL;
 }
@@ -109,118 +109,125 @@ static void count_negative(session_input *in)
 {
     in->mesh.vertex_count = -1;
 }
-static void cells_too_many(session_input *in)
+static void set_too_many_cells(session_input *in)
 {
     in->mesh.cell_count = 4294967295;
 }
-static void float_indices(session_input *in)
+static void set_float_indices(session_input *in)
 {
     in->mesh.connectivity.type = INSITU_FLOAT64;
 }
-static void coordinates_of_no_type(session_input *in)
+static void set_coordinates_without_type(session_input *in)
 {
     in->mesh.coordinates[0].type = (insitu_type)11;
 }
-static void type_of_no_array(session_input *in)
+static void set_unknown_array_type(session_input *in)
 {
     in->mesh.offsets.type = (insitu_type)77;
 }
-static void ghosts_real(session_input *in)
+static void set_float_ghosts(session_input *in)
 {
     in->mesh.ghosts.type = INSITU_FLOAT32;
 }
-static void changed_unknown(session_input *in)
+static void set_unknown_change_flag(session_input *in)
 {
     in->mesh.changed = 64;
 }
 
 /* ---- corrupted fields ---------------------------------------------------------------------------------------- */
 
-static void values_too_few(session_input *in)
+static void set_too_few_values(session_input *in)
 {
     in->field.count--;
 }
-static void values_not_given(session_input *in)
+static void remove_values(session_input *in)
 {
     in->field.values.data = NULL;
 }
-static void values_of_no_type(session_input *in)
+static void set_values_without_type(session_input *in)
 {
     in->field.values.type = (insitu_type)0;
 }
-static void centring_unknown(session_input *in)
+static void set_unknown_centring(session_input *in)
 {
     in->field.centring = (insitu_centring)5;
 }
-static void centring_other(session_input *in)
+static void set_other_centring(session_input *in)
 {
     in->field.centring = INSITU_CELL;
 }
-static void no_components(session_input *in)
+static void set_zero_components(session_input *in)
 {
     in->field.component_count = 0;
 }
-static void field_without_name(session_input *in)
+static void remove_field_name(session_input *in)
 {
     in->field.name = NULL;
 }
 
 static const corrupted_case cases[] = {
-    {"index too large", index_too_large, INSITU_ERROR_MESH, false, {"cell 2 (hex): vertex index ", " is outside 0.."}},
-    {"index negative", index_negative, INSITU_ERROR_MESH, false, {"cell 1 (hex): vertex index -3 is outside 0.."}},
-    {"lowest cell", index_bad_in_two, INSITU_ERROR_MESH, false, {"cell 1 (hex): vertex index -9"}},
-    {"NaN", coordinate_nan, INSITU_ERROR_MESH, false, {"cell 0 (hex): vertex ", "coordinate that is not finite"}},
-    {"infinite", coordinate_infinite, INSITU_ERROR_MESH, false, {"cell 0 (hex)", "not finite: (inf"}},
-    {"offsets fall", offsets_fall, INSITU_ERROR_MESH, false, {"cell 1 (hex): offsets fall from 8 to 3"}},
-    {"offsets far", offsets_far, INSITU_ERROR_MESH, false, {"cell 0 (hex): offsets 0 and 1073741824 are outside 0.."}},
+    {"index too large", set_large_index, INSITU_ERROR_MESH, false, {"cell 2 (hex): vertex index ", " is outside 0.."}},
+    {"index negative", set_negative_index, INSITU_ERROR_MESH, false, {"cell 1 (hex): vertex index -3 is outside 0.."}},
+    {"lowest cell", set_two_bad_indices, INSITU_ERROR_MESH, false, {"cell 1 (hex): vertex index -9"}},
+    {"NaN", set_nan_coordinate, INSITU_ERROR_MESH, false, {"cell 0 (hex): vertex ", "coordinate that is not finite"}},
+    {"infinite", set_infinite_coordinate, INSITU_ERROR_MESH, false, {"cell 0 (hex)", "not finite: (inf"}},
+    {"offsets fall", set_decreasing_offsets, INSITU_ERROR_MESH, false, {"cell 1 (hex): offsets fall from 8 to 3"}},
+    {"offsets far",
+     set_far_offsets,
+     INSITU_ERROR_MESH,
+     false,
+     {"cell 0 (hex): offsets 0 and 1073741824 are outside 0.."}},
     {"offsets step",
-     offsets_wrong_step,
+     set_offsets_with_wrong_step,
      INSITU_ERROR_MESH,
      false,
      {"cell 0 (hex): offsets 0 and 7 do not lie 8 apart"}},
-    {"last offset", offsets_end_early, INSITU_ERROR_MESH, false, {"the last offset is ", "not connectivity_count"}},
-    {"unknown type", type_unknown, INSITU_ERROR_MESH, false, {"cell 1: unknown cell type 11"}},
-    {"type of 33 bits", type_too_wide, INSITU_ERROR_MESH, false, {"cell 2: unknown cell type 4294967308"}},
-    {"type below 32 bits", type_negative, INSITU_ERROR_MESH, false, {"cell 0: unknown cell type -1099511627776"}},
+    {"last offset", shorten_offsets, INSITU_ERROR_MESH, false, {"the last offset is ", "not connectivity_count"}},
+    {"unknown type", set_unknown_type, INSITU_ERROR_MESH, false, {"cell 1: unknown cell type 11"}},
+    {"type of 33 bits", set_wide_types, INSITU_ERROR_MESH, false, {"cell 2: unknown cell type 4294967308"}},
+    {"type below 32 bits", set_negative_type, INSITU_ERROR_MESH, false, {"cell 0: unknown cell type -1099511627776"}},
     {"far coordinate",
-     coordinate_far,
+     set_far_coordinate,
      INSITU_ERROR_MESH,
      false,
      {"cell 0 (hex): vertex ", "coordinates of at most 1e+100 are supported"}},
-    {"types alone", types_without_offsets, INSITU_ERROR_MESH, true, {"cell types are given without offsets"}},
-    {"one unknown type", one_type_unknown, INSITU_ERROR_MESH, true, {"unknown cell_type 41"}},
-    {"one type's count", one_type_wrong_count, INSITU_ERROR_MESH, true, {"connectivity_count is ", "of 6 vertices"}},
-    {"no coordinates", no_coordinates_of_hexes, INSITU_ERROR_MESH, true, {"z coordinates are not given"}},
+    {"types alone", remove_offsets, INSITU_ERROR_MESH, true, {"cell types are given without offsets"}},
+    {"one unknown type", set_unknown_single_type, INSITU_ERROR_MESH, true, {"unknown cell_type 41"}},
+    {"one type's count",
+     set_single_type_with_wrong_count,
+     INSITU_ERROR_MESH,
+     true,
+     {"connectivity_count is ", "of 6 vertices"}},
+    {"no coordinates", remove_coordinates_of_hexes, INSITU_ERROR_MESH, true, {"z coordinates are not given"}},
     {"no coordinates of mixed cells",
-     no_coordinates,
+     remove_coordinates,
      INSITU_ERROR_MESH,
      false,
      {"z coordinates are not given, but cell 0 (hex) needs them"}},
-    {"no connectivity", no_connectivity, INSITU_ERROR_MESH, true, {"connectivity indices are not given"}},
+    {"no connectivity", remove_connectivity, INSITU_ERROR_MESH, true, {"connectivity indices are not given"}},
     {"negative count", count_negative, INSITU_ERROR_ARGUMENT, true, {"vertex_count is -1"}},
-    {"too many cells", cells_too_many, INSITU_ERROR_ARGUMENT, true, {"cell_count is 4294967295"}},
-    {"float indices", float_indices, INSITU_ERROR_ARGUMENT, true, {"connectivity indices", "not an integer type"}},
+    {"too many cells", set_too_many_cells, INSITU_ERROR_ARGUMENT, true, {"cell_count is 4294967295"}},
+    {"float indices", set_float_indices, INSITU_ERROR_ARGUMENT, true, {"connectivity indices", "not an integer type"}},
     {"no numbers",
-     coordinates_of_no_type,
+     set_coordinates_without_type,
      INSITU_ERROR_ARGUMENT,
      true,
      {"x coordinates", "float32, float64 or an integer"}},
-    {"no such type", type_of_no_array, INSITU_ERROR_ARGUMENT, true, {"offsets are of element type 77"}},
-    {"real ghosts", ghosts_real, INSITU_ERROR_ARGUMENT, true, {"ghost flags", "not an integer type"}},
-    {"unknown bits", changed_unknown, INSITU_ERROR_ARGUMENT, true, {"changed is 64"}},
-    {"too few values", values_too_few, INSITU_ERROR_FIELD, true, {"field \"f\": has ", " values, the mesh has "}},
-    {"no values", values_not_given, INSITU_ERROR_FIELD, true, {"field \"f\": values are not given"}},
-    {"no numbers", values_of_no_type, INSITU_ERROR_ARGUMENT, true, {"field \"f\": values", "float32, float64"}},
-    {"unknown centring", centring_unknown, INSITU_ERROR_ARGUMENT, true, {"field \"f\": unknown centring 5"}},
-    {"other centring", centring_other, INSITU_ERROR_FIELD, true, {"field \"f\": has ", " cells"}},
-    {"no components", no_components, INSITU_ERROR_ARGUMENT, true, {"field \"f\": component_count is 0"}},
+    {"no such type", set_unknown_array_type, INSITU_ERROR_ARGUMENT, true, {"offsets are of element type 77"}},
+    {"real ghosts", set_float_ghosts, INSITU_ERROR_ARGUMENT, true, {"ghost flags", "not an integer type"}},
+    {"unknown bits", set_unknown_change_flag, INSITU_ERROR_ARGUMENT, true, {"changed is 64"}},
+    {"too few values", set_too_few_values, INSITU_ERROR_FIELD, true, {"field \"f\": has ", " values, the mesh has "}},
+    {"no values", remove_values, INSITU_ERROR_FIELD, true, {"field \"f\": values are not given"}},
+    {"no numbers", set_values_without_type, INSITU_ERROR_ARGUMENT, true, {"field \"f\": values", "float32, float64"}},
+    {"unknown centring", set_unknown_centring, INSITU_ERROR_ARGUMENT, true, {"field \"f\": unknown centring 5"}},
+    {"other centring", set_other_centring, INSITU_ERROR_FIELD, true, {"field \"f\": has ", " cells"}},
+    {"no components", set_zero_components, INSITU_ERROR_ARGUMENT, true, {"field \"f\": component_count is 0"}},
 };
 
 static void corrupted_input_is_reported_on_all_ranks(void **context)
 {
     (void)context;
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++)
-        corrupted_is_reported_on_all_ranks(session, &input, &cases[i]);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) check_fault_is_reported(session, &input, &cases[i]);
 }
 
 static void call_without_a_mesh_is_reported_once(void **context)
@@ -229,22 +236,22 @@ static void call_without_a_mesh_is_reported_once(void **context)
     const bool is_bad = own_rank == 0;
     everywhere(!is_bad || insitu_set_field(session, "nowhere", &input.field) == INSITU_ERROR_FIELD);
     insitu_status status = insitu_step(session, 3, 0);
-    reported_everywhere(session, status, INSITU_ERROR_FIELD, "rank 0: ", "\"nowhere\" is not set");
-    step_is_good(session, 4);
+    check_reported_everywhere(session, status, INSITU_ERROR_FIELD, "rank 0: ", "\"nowhere\" is not set");
+    check_step_succeeds(session, 4);
     everywhere(!is_bad || insitu_set_mesh(session, NULL, &input.mesh) == INSITU_ERROR_ARGUMENT);
     status = insitu_step(session, 5, 0);
-    reported_everywhere(session, status, INSITU_ERROR_ARGUMENT, "rank 0: ", "no name");
-    step_is_good(session, 6);
-    if (is_bad) field_without_name(&input);
+    check_reported_everywhere(session, status, INSITU_ERROR_ARGUMENT, "rank 0: ", "no name");
+    check_step_succeeds(session, 6);
+    if (is_bad) remove_field_name(&input);
     everywhere(!is_bad || insitu_set_field(session, "m", &input.field) == INSITU_ERROR_ARGUMENT);
     status = insitu_step(session, 7, 0);
-    reported_everywhere(session, status, INSITU_ERROR_ARGUMENT, "rank 0: ", "without a name");
-    input_renew(&input);
-    everywhere(submit(session, &input) == INSITU_OK);
-    step_is_good(session, 8);
+    check_reported_everywhere(session, status, INSITU_ERROR_ARGUMENT, "rank 0: ", "without a name");
+    input_restore(&input);
+    everywhere(submit_input(session, &input) == INSITU_OK);
+    check_step_succeeds(session, 8);
 }
 
-static void field_missing_on_one_rank_names_it(void **context)
+static void field_missing_on_one_rank_is_reported_with_the_rank(void **context)
 {
     (void)context;
     if (rank_count < 2) return;
@@ -253,27 +260,28 @@ static void field_missing_on_one_rank_names_it(void **context)
     everywhere(insitu_set_mesh(session, "m", &input.mesh) == INSITU_OK);
     everywhere(own_rank == rank_count - 1 || insitu_set_field(session, "m", &input.field) == INSITU_OK);
     insitu_status status = insitu_step(session, 9, 0);
-    reported_everywhere(session, status, INSITU_ERROR_FIELD, words);
-    everywhere(submit(session, &input) == INSITU_OK);
-    step_is_good(session, 10);
+    check_reported_everywhere(session, status, INSITU_ERROR_FIELD, words);
+    everywhere(submit_input(session, &input) == INSITU_OK);
+    check_step_succeeds(session, 10);
 }
 
 static void field_of_two_centrings_is_refused(void **context)
 {
     (void)context;
     if (rank_count < 2) return;
-    everywhere(submit(session, &input) == INSITU_OK);
+    everywhere(submit_input(session, &input) == INSITU_OK);
     insitu_field other = input.field;
     other.centring = INSITU_CELL;
     other.count = input.part.cell_count; /* fewer than the vertices: the array is long enough */
     everywhere(own_rank != 1 || insitu_set_field(session, "m", &other) == INSITU_OK);
     const insitu_status status = insitu_step(session, 11, 0);
-    reported_everywhere(session, status, INSITU_ERROR_FIELD, "rank 1: mesh \"m\": field \"f\"", "another centring");
-    everywhere(submit(session, &input) == INSITU_OK);
-    step_is_good(session, 12);
+    check_reported_everywhere(session, status, INSITU_ERROR_FIELD, "rank 1: mesh \"m\": field \"f\"",
+                              "another centring");
+    everywhere(submit_input(session, &input) == INSITU_OK);
+    check_step_succeeds(session, 12);
 }
 
-static void nan_where_no_drawn_cell_is_is_fine(void **context)
+static void nan_outside_drawn_cells_is_accepted(void **context)
 {
     (void)context;
     /* Adds to the mesh one vertex that no cell uses. */
@@ -287,10 +295,10 @@ static void nan_where_no_drawn_cell_is_is_fine(void **context)
     more.field.count++;
     insitu_mesh_interleaved(&more.mesh, coordinates, INSITU_FLOAT64);
     more.field.values.data = values;
-    everywhere(submit(session, &more) == INSITU_OK);
-    step_is_good(session, 13);
+    everywhere(submit_input(session, &more) == INSITU_OK);
+    check_step_succeeds(session, 13);
     everywhere(insitu_last_report(session)->cells_unusable == 0);
-    everywhere(submit(session, &input) == INSITU_OK);
+    everywhere(submit_input(session, &input) == INSITU_OK);
     test_free(coordinates);
     test_free(values);
 }
@@ -306,32 +314,32 @@ static void value_that_is_not_finite_is_counted(void **context)
         for (int v = 0; v < 8; v++) is_hit = is_hit || isnan(input.part.values[input.part.connectivity[8 * cell + v]]);
         expected += is_hit;
     }
-    everywhere(submit(session, &input) == INSITU_OK);
-    step_is_good(session, 14);
+    everywhere(submit_input(session, &input) == INSITU_OK);
+    check_step_succeeds(session, 14);
     const insitu_report *report = insitu_last_report(session);
     everywhere(report->cells_unusable == expected);
     everywhere(!is_bad || strstr(report->warnings, "values of field \"f\" are not finite"));
-    input_renew(&input);
-    everywhere(submit(session, &input) == INSITU_OK);
+    input_restore(&input);
+    everywhere(submit_input(session, &input) == INSITU_OK);
 }
 
 /* Displaces every vertex: cells are folded, and some of their points have no coordinates in the cell. */
 static void inverse_maps_that_fail_are_counted(void **context)
 {
     (void)context;
-    step_is_good(session, 15);
+    check_step_succeeds(session, 15);
     everywhere(insitu_last_report(session)->map_failures == 0);
     for (int64_t i = 0; i < 3 * input.part.vertex_count; i++)
         input.part.coordinates[i] = 2 * test_uniform((uint64_t)i, 21 + (uint64_t)own_rank) - 1;
-    everywhere(submit(session, &input) == INSITU_OK);
-    step_is_good(session, 16);
+    everywhere(submit_input(session, &input) == INSITU_OK);
+    check_step_succeeds(session, 16);
     everywhere(insitu_last_report(session)->map_failures > 0);
-    input_renew(&input);
-    everywhere(submit(session, &input) == INSITU_OK);
+    input_restore(&input);
+    everywhere(submit_input(session, &input) == INSITU_OK);
 }
 
 /* Changes the mesh to cells of one type, with indices of 4 bytes instead of 8. */
-static void make_plain(session_input *in)
+static void make_single_type(session_input *in)
 {
     char *indices = (char *)in->part.connectivity;
     for (int64_t i = 0; i < in->part.connectivity_count; i++) {
@@ -344,7 +352,7 @@ static void make_plain(session_input *in)
 }
 
 /* Checks the message for cells of one type, which are checked several at once. */
-static void bad_cell_of_a_mesh_of_one_type_is_named(void **context)
+static void invalid_cell_of_a_single_type_mesh_is_reported(void **context)
 {
     (void)context;
     int64_t cells = input.part.cell_count; /* number of rank 0's cells */
@@ -353,16 +361,16 @@ static void bad_cell_of_a_mesh_of_one_type_is_named(void **context)
         char words[64];
         snprintf(words, sizeof words, "rank 0: mesh \"m\": cell %d (hex): vertex index ", cell);
         if (own_rank == 0) input.part.connectivity[8 * cell + cell % 8] = cell % 2 ? -1 : input.part.vertex_count;
-        make_plain(&input);
-        everywhere(submit(session, &input) == INSITU_OK);
-        reported_everywhere(session, insitu_step(session, 17 + cell, 0), INSITU_ERROR_MESH, words);
-        input_renew(&input);
-        make_plain(&input);
-        everywhere(submit(session, &input) == INSITU_OK);
-        step_is_good(session, 18 + cell);
-        input_renew(&input);
+        make_single_type(&input);
+        everywhere(submit_input(session, &input) == INSITU_OK);
+        check_reported_everywhere(session, insitu_step(session, 17 + cell, 0), INSITU_ERROR_MESH, words);
+        input_restore(&input);
+        make_single_type(&input);
+        everywhere(submit_input(session, &input) == INSITU_OK);
+        check_step_succeeds(session, 18 + cell);
+        input_restore(&input);
     }
-    everywhere(submit(session, &input) == INSITU_OK);
+    everywhere(submit_input(session, &input) == INSITU_OK);
 }
 
 /* ---- cells without volume ------------------------------------------------------------------------------------ */
@@ -384,16 +392,16 @@ static const signed char flat_corners[FLAT_TYPES][8][3] = {
     {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}},
 };
 
-static flatness flatness_of(int cell)
+static flatness get_flatness(int cell)
 {
     return (flatness)(cell < TILTED ? cell % (OBLIQUE + 1) : cell % FLATNESS_COUNT);
 }
 
 /* Returns a coordinate. Along x and y they are multiples of 2^-40, along z of 2^-16, which are exact in float: sums are
  * exact, and flat cells are flat to the bit. */
-static double flat_coordinate(int type, int cell, int corner, int axis)
+static double compute_flat_coordinate(int type, int cell, int corner, int axis)
 {
-    const flatness how = flatness_of(cell);
+    const flatness how = get_flatness(cell);
     const double unit = axis == 2 ? 0x1p-16 : 0x1p-40;
     double v[4];
     for (int i = 0; i < 4; i++)
@@ -419,7 +427,8 @@ static void flat_cells_are_counted(void **context)
     for (int type = 0; type < FLAT_TYPES; type++) {
         const int corners = flat_corner_count[type], count = corners * FLAT_CELLS;
         for (int i = 0; i < count; i++) {
-            for (int axis = 0; axis < 3; axis++) xyz[i][axis] = flat_coordinate(type, i / corners, i % corners, axis);
+            for (int axis = 0; axis < 3; axis++)
+                xyz[i][axis] = compute_flat_coordinate(type, i / corners, i % corners, axis);
             narrow_z[i] = (float)xyz[i][2];
             indices[i] = i;
         }
@@ -429,7 +438,7 @@ static void flat_cells_are_counted(void **context)
             session_input flat = input;
             const int cells = layout == 3 ? 8 : FLAT_CELLS;
             int64_t expected = 0;
-            for (int cell = 0; cell < cells; cell++) expected += flatness_of(cell) >= OBLIQUE;
+            for (int cell = 0; cell < cells; cell++) expected += get_flatness(cell) >= OBLIQUE;
             insitu_mesh_defaults(&flat.mesh);
             flat.mesh.vertex_count = flat.field.count = count;
             flat.mesh.cell_count = cells;
@@ -441,34 +450,34 @@ static void flat_cells_are_counted(void **context)
             if (layout == 1) flat.mesh.offsets = (insitu_array){offsets, INSITU_INT32, 0};
             if (layout == 2) flat.mesh.coordinates[2] = (insitu_array){narrow_z, INSITU_FLOAT32, 0};
             flat.field.values = (insitu_array){values, INSITU_FLOAT64, 0};
-            everywhere(submit(session, &flat) == INSITU_OK);
-            step_is_good(session, 40 + 4 * type + layout);
+            everywhere(submit_input(session, &flat) == INSITU_OK);
+            check_step_succeeds(session, 40 + 4 * type + layout);
             everywhere(insitu_last_report(session)->cells_flat == expected);
         }
     }
-    everywhere(submit(session, &input) == INSITU_OK);
-    step_is_good(session, 60);
+    everywhere(submit_input(session, &input) == INSITU_OK);
+    check_step_succeeds(session, 60);
     everywhere(insitu_last_report(session)->cells_flat == 0);
 }
 
 /* Checks that the message of a failed step remains until the next step, unless a call fails in between, whose message
  * replaces it. */
-static void message_stays_until_the_next_step(void **context)
+static void error_message_persists_until_the_next_step(void **context)
 {
     (void)context;
     const int64_t right = input.part.connectivity[0];
     input.part.connectivity[0] = -1;
-    everywhere(submit(session, &input) == INSITU_OK);
-    reported_everywhere(session, insitu_step(session, 70, 0), INSITU_ERROR_MESH, "vertex index -1");
+    everywhere(submit_input(session, &input) == INSITU_OK);
+    check_reported_everywhere(session, insitu_step(session, 70, 0), INSITU_ERROR_MESH, "vertex index -1");
     input.part.connectivity[0] = right;
-    everywhere(submit(session, &input) == INSITU_OK);
+    everywhere(submit_input(session, &input) == INSITU_OK);
     everywhere(insitu_keep_pictures(session, 0) == INSITU_OK);
     everywhere(insitu_last_report(session)->cycle == 70 && strstr(insitu_error(session), "vertex index -1"));
     everywhere(insitu_set_field(session, "none", &input.field) == INSITU_ERROR_FIELD);
     everywhere(strstr(insitu_error(session), "its mesh \"none\" is not set") != NULL);
-    reported_everywhere(session, insitu_step(session, 71, 0), INSITU_ERROR_FIELD,
-                        "rank 0: ", "its mesh \"none\" is not set");
-    step_is_good(session, 72);
+    check_reported_everywhere(session, insitu_step(session, 71, 0), INSITU_ERROR_FIELD,
+                              "rank 0: ", "its mesh \"none\" is not set");
+    check_step_succeeds(session, 72);
     everywhere(*insitu_error(session) == '\0');
 }
 
@@ -496,7 +505,7 @@ static void fill_fails(session_input *in)
     in->field.values.data = NULL;
     in->field.count = 0;
 }
-static void index_is_wrong(session_input *in)
+static void check_wrong_index_is_reported(session_input *in)
 {
     in->field.index = in->mesh.connectivity; /* as many values as the mesh has vertices, but the last one is missing */
     in->field.count = 1;
@@ -517,13 +526,13 @@ static void step_draws(const char *names, insitu_status expected, const char *wo
     char drawn[8] = "";
     discard_pictures();
     const insitu_status status = insitu_step(session, 1, 0);
-    reported_everywhere(session, status, expected, words);
+    check_reported_everywhere(session, status, expected, words);
     for (int i = 0; i < caught_count && i < 7; i++) drawn[i] = caught[i].path[0];
     if (own_rank == 0 && strcmp(drawn, names) != 0) fprintf(stderr, "drawn: %s, expected: %s\n", drawn, names);
     everywhere(own_rank != 0 || strcmp(drawn, names) == 0);
 }
 
-static void images_that_need_nothing_wrong_are_drawn(void **context)
+static void images_without_corrupted_input_are_drawn(void **context)
 {
     (void)context;
     static const struct {
@@ -532,25 +541,25 @@ static void images_that_need_nothing_wrong_are_drawn(void **context)
         const char *drawn, *words;
     } cases[] = {
         {mesh_is_no_mesh, INSITU_ERROR_ARGUMENT, "fm", "mesh \"n\": cell_count is -1"},
-        {index_too_large, INSITU_ERROR_MESH, "fm", "mesh \"n\": cell 2 (hex): vertex index"},
-        {coordinate_nan, INSITU_ERROR_MESH, "fm", "coordinate that is not finite"},
-        {values_too_few, INSITU_ERROR_FIELD, "fms", "mesh \"n\": field \"g\": "},
+        {set_large_index, INSITU_ERROR_MESH, "fm", "mesh \"n\": cell 2 (hex): vertex index"},
+        {set_nan_coordinate, INSITU_ERROR_MESH, "fm", "coordinate that is not finite"},
+        {set_too_few_values, INSITU_ERROR_FIELD, "fms", "mesh \"n\": field \"g\": "},
         {fill_fails, INSITU_ERROR_FIELD, "fms", "mesh \"n\": field \"g\": its fill returned"},
-        {index_is_wrong, INSITU_ERROR_FIELD, "fms", "mesh \"n\": field \"g\": the index of vertex"},
+        {check_wrong_index_is_reported, INSITU_ERROR_FIELD, "fms", "mesh \"n\": field \"g\": the index of vertex"},
     };
     insitu_session *const before = session;
     session = open_session(MPI_COMM_WORLD, write_scene(several));
     session_input other;
-    input_renew(&input);
+    input_restore(&input);
     input_create(&other, TEST_HEXES, 4, TEST_RANDOM, own_rank, rank_count);
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        everywhere(submit(session, &input) == INSITU_OK);
+        everywhere(submit_input(session, &input) == INSITU_OK);
         submit_other(&other);
         step_draws("fgms", INSITU_OK, "");
         if (own_rank == rank_count - 1) cases[i].corrupt(&other);
         submit_other(&other);
         for (int again = 0; again < 2; again++) step_draws(cases[i].drawn, cases[i].status, cases[i].words);
-        input_renew(&other);
+        input_restore(&other);
         submit_other(&other);
         step_draws("fgms", INSITU_OK, "");
         everywhere(insitu_set_field(session, "none", &input.field) == INSITU_ERROR_FIELD);
@@ -561,7 +570,7 @@ static void images_that_need_nothing_wrong_are_drawn(void **context)
     session = before;
 }
 
-static int begin_tests(void **state)
+static int set_up_test_group(void **state)
 {
     (void)state;
     session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
@@ -569,7 +578,7 @@ static int begin_tests(void **state)
     return 0;
 }
 
-static int end_tests(void **state)
+static int tear_down_test_group(void **state)
 {
     (void)state;
     insitu_destroy(&session);
@@ -582,15 +591,15 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(corrupted_input_is_reported_on_all_ranks),
         cmocka_unit_test(call_without_a_mesh_is_reported_once),
-        cmocka_unit_test(field_missing_on_one_rank_names_it),
+        cmocka_unit_test(field_missing_on_one_rank_is_reported_with_the_rank),
         cmocka_unit_test(field_of_two_centrings_is_refused),
-        cmocka_unit_test(nan_where_no_drawn_cell_is_is_fine),
+        cmocka_unit_test(nan_outside_drawn_cells_is_accepted),
         cmocka_unit_test(value_that_is_not_finite_is_counted),
         cmocka_unit_test(inverse_maps_that_fail_are_counted),
-        cmocka_unit_test(bad_cell_of_a_mesh_of_one_type_is_named),
+        cmocka_unit_test(invalid_cell_of_a_single_type_mesh_is_reported),
         cmocka_unit_test(flat_cells_are_counted),
-        cmocka_unit_test(message_stays_until_the_next_step),
-        cmocka_unit_test(images_that_need_nothing_wrong_are_drawn),
+        cmocka_unit_test(error_message_persists_until_the_next_step),
+        cmocka_unit_test(images_without_corrupted_input_are_drawn),
     };
-    return run_session_tests(argc, argv, tests, begin_tests, end_tests);
+    return run_session_tests(argc, argv, tests, set_up_test_group, tear_down_test_group);
 }

@@ -17,7 +17,7 @@ static const char *const layers[] = {
     "volume: {field: f, opacity: [[0, 0.2], [1, 0.9]]}\n    sampling: {max_error: 0.01}",
 };
 
-static const char *scene_of(const char *layer)
+static const char *write_layer_scene(const char *layer)
 {
     char text[1024];
     snprintf(text, sizeof text,
@@ -37,7 +37,8 @@ static caught_picture draw_alone(const char *scene, test_mesh_kind kind)
         input_create(&whole, kind, 5, TEST_BLOCK, 0, 1);
         insitu_session *session = open_session(MPI_COMM_SELF, scene);
         discard_pictures();
-        is_drawn = submit(session, &whole) == INSITU_OK && insitu_step(session, 0, 0) == INSITU_OK && caught_count == 1;
+        is_drawn =
+            submit_input(session, &whole) == INSITU_OK && insitu_step(session, 0, 0) == INSITU_OK && caught_count == 1;
         picture = caught[0];
         caught_count = 0;
         insitu_destroy(&session);
@@ -47,15 +48,15 @@ static caught_picture draw_alone(const char *scene, test_mesh_kind kind)
     return picture;
 }
 
-static void check(test_mesh_kind kind, int layer)
+static void check_mixed_isas(test_mesh_kind kind, int layer)
 {
-    const char *scene = scene_of(layers[layer]);
+    const char *scene = write_layer_scene(layers[layer]);
     caught_picture alone = draw_alone(scene, kind);
     session_input part;
     input_create(&part, kind, 5, TEST_RANDOM, own_rank, rank_count);
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
-    everywhere(submit(session, &part) == INSITU_OK);
-    step_is_good(session, 0);
+    everywhere(submit_input(session, &part) == INSITU_OK);
+    check_step_succeeds(session, 0);
     const char *warnings = insitu_last_report(session)->warnings;
     everywhere(!strstr(warnings, "overlap"));
     everywhere(strstr(warnings, "kernels are plain, the best that all ranks have: rank 0 has no better") != NULL);
@@ -63,22 +64,22 @@ static void check(test_mesh_kind kind, int layer)
     const bool is_same = own_rank != 0 || (!memcmp(alone.rgba, caught[0].rgba, sizeof(float) * 4 * WIDTH * HEIGHT) &&
                                            !memcmp(alone.depth, caught[0].depth, sizeof(float) * WIDTH * HEIGHT));
     everywhere(is_same || layer > 0);
-    everywhere(own_rank != 0 || colour_difference(&alone, &caught[0]) <= 1e-6);
+    everywhere(own_rank != 0 || largest_colour_difference(&alone, &caught[0]) <= 1e-6);
     insitu_destroy(&session);
     input_free(&part);
     free(alone.rgba);
     free(alone.depth);
 }
 
-static void ranks_of_several_instruction_sets_draw_what_the_lowest_draws(void **context)
+static void ranks_of_mixed_instruction_sets_use_the_lowest(void **context)
 {
     (void)context;
     for (int kind = 0; kind < TEST_KIND_COUNT; kind++)
         for (int layer = 0; layer < (int)(sizeof layers / sizeof layers[0]); layer++)
-            check((test_mesh_kind)kind, layer);
+            check_mixed_isas((test_mesh_kind)kind, layer);
 }
 
-static int begin_tests(void **state)
+static int set_up_test_group(void **state)
 {
     (void)state;
     /* none is not a set: the best one is used, and a warning is given on all ranks */
@@ -90,7 +91,7 @@ static int begin_tests(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(ranks_of_several_instruction_sets_draw_what_the_lowest_draws),
+        cmocka_unit_test(ranks_of_mixed_instruction_sets_use_the_lowest),
     };
-    return run_session_tests(argc, argv, tests, begin_tests, NULL);
+    return run_session_tests(argc, argv, tests, set_up_test_group, NULL);
 }

@@ -22,7 +22,7 @@ enum { SIDE = 7 /* cells for a block and part of another, but no multiple of eig
 /* The fraction of the volume of a cell's box that is rounding error, as session_tally.c derives it. */
 static const double rounding_share = 0x1p-46;
 
-static test_layout layout_of(int i)
+static test_layout choose_layout(int i)
 {
     return (test_layout){
         .wide_coordinates = i & 1, .wide_indices = i & 2, .is_interleaved = i & 4, .with_types = i & 8};
@@ -32,7 +32,7 @@ static test_layout layout_of(int i)
 
 /* Finds the neighbours of a corner of a prism, or of a pyramid's base: the next and the previous one around, and the
  * one above or below; in right-handed order. */
-static void neighbours_of(int type, int corner, int out[3])
+static void find_corner_neighbours(int type, int corner, int out[3])
 {
     const int around = type == GRID_WEDGE ? 3 : 4;
     const int level = corner / around, at = corner % around;
@@ -42,7 +42,7 @@ static void neighbours_of(int type, int corner, int out[3])
     out[2] = type == GRID_PYRAMID ? 4 : (1 - level) * around + at;
 }
 
-static long double determinant_at(long double p[][3], int corner, const int to[3])
+static long double compute_corner_determinant(long double p[][3], int corner, const int to[3])
 {
     long double e[3][3];
     for (int k = 0; k < 3; k++)
@@ -53,16 +53,16 @@ static long double determinant_at(long double p[][3], int corner, const int to[3
 
 /* Returns the mean over the corners of the volume that a cell with this corner and parallel edges would have: 6 tets
  * make such a hex, 3 a wedge, and a pyramid is a third of the prism over its base. */
-static long double volume_of(int type, long double p[][3])
+static long double compute_mean_corner_volume(int type, long double p[][3])
 {
-    if (type == GRID_TET) return determinant_at(p, 0, (const int[]){1, 2, 3}) / 6;
+    if (type == GRID_TET) return compute_corner_determinant(p, 0, (const int[]){1, 2, 3}) / 6;
     const int corners = type == GRID_HEX ? 8 : type == GRID_WEDGE ? 6 : 4;
     const long double share = type == GRID_HEX ? 1 : type == GRID_WEDGE ? 0.5L : 1 / 3.0L;
     long double sum = 0;
     for (int corner = 0; corner < corners; corner++) {
         int to[3];
-        neighbours_of(type, corner, to);
-        sum += determinant_at(p, corner, to);
+        find_corner_neighbours(type, corner, to);
+        sum += compute_corner_determinant(p, corner, to);
     }
     return share * sum / corners;
 }
@@ -91,7 +91,7 @@ static void add_cell(const grid *g, int64_t cell, truth *t)
         t->upper[axis] = fmax(high, t->upper[axis]);
         box *= (long double)high - (long double)low;
     }
-    const long double volume = volume_of(grid_cell_type(g, cell), p), size = fabsl(volume);
+    const long double volume = compute_mean_corner_volume(grid_cell_type(g, cell), p), size = fabsl(volume);
     assert_true(size > (long double)rounding_share * box); /* so large that its sign is certain */
     t->least = size < t->least ? size : t->least;
     t->sizes += cbrtl(size);
@@ -99,7 +99,7 @@ static void add_cell(const grid *g, int64_t cell, truth *t)
     t->box = box > t->box ? box : t->box;
 }
 
-static truth truth_of(const grid *g, int64_t first, int64_t count)
+static truth compute_sums_by_brute_force(const grid *g, int64_t first, int64_t count)
 {
     const double inf = (double)INFINITY;
     truth t = {{inf, inf, inf}, {-inf, -inf, -inf}, inf, 0, 0, 0};
@@ -123,12 +123,12 @@ static void assert_sums(const lane_sums *sums, const truth *t, int64_t count)
 
 /* Makes a view in which some cells are mirrored, so that they are inverted; coordinates in double are far from the
  * origin. */
-static test_view view_of(test_mesh_kind kind, test_layout layout, int64_t base)
+static test_view make_view(test_mesh_kind kind, test_layout layout, int64_t base)
 {
     test_mesh mesh;
     test_view view;
-    test_mesh_lattice(kind, SIDE, 0.2, test_wave, &mesh);
-    test_mesh_mirror(&mesh, true);
+    test_mesh_make_lattice(kind, SIDE, 0.2, test_wave_field, &mesh);
+    test_mesh_mirror_cells(&mesh, true);
     if (layout.wide_coordinates) test_mesh_transform(&mesh, 1, (const double[]){5e5, -3, 0.01});
     for (int64_t i = 0; i < mesh.connectivity_count; i++) mesh.connectivity[i] += base;
     test_view_create(&mesh, layout, &view);
@@ -137,7 +137,7 @@ static test_view view_of(test_mesh_kind kind, test_layout layout, int64_t base)
     return view;
 }
 
-static lane_sums sums_of(cpu_isa isa, const lane_cells *cells, int64_t *taken, int64_t *alone)
+static lane_sums compute_lane_sums(cpu_isa isa, const lane_cells *cells, int64_t *taken, int64_t *alone)
 {
     lane_sums sums;
     memset(&sums, 0, sizeof sums);
@@ -149,11 +149,11 @@ static void assert_run(const grid *g, int64_t first, int64_t count)
 {
     const int vertices = grid_type_vertices(g->cell_type);
     const lane_cells cells = {g, g->cell_type, first, count, first * vertices};
-    const truth t = truth_of(g, first, count - count % LANES);
+    const truth t = compute_sums_by_brute_force(g, first, count - count % LANES);
     lane_sums plain;
     for (cpu_isa isa = CPU_PLAIN; isa <= cpu_best_isa(); isa++) {
         int64_t taken, alone;
-        const lane_sums sums = sums_of(isa, &cells, &taken, &alone);
+        const lane_sums sums = compute_lane_sums(isa, &cells, &taken, &alone);
         assert_int_equal(taken, count - count % LANES);
         assert_int_equal(alone, count % LANES);
         if (isa == CPU_PLAIN) plain = sums;
@@ -162,14 +162,14 @@ static void assert_run(const grid *g, int64_t first, int64_t count)
     }
 }
 
-static void sums_are_those_of_cells_alone(void **state)
+static void sums_in_lanes_match_single_cells(void **state)
 {
     (void)state;
     const int64_t counts[] = {0, 1, 7, 8, 9, 40, 301};
     for (test_mesh_kind kind = TEST_TETS; kind <= TEST_PYRAMIDS; kind++)
         /* the range of cells is an argument of the lanes' code, so that layouts with offsets need no test */
         for (int i = 0; i < LAYOUTS / 2; i++) {
-            test_view view = view_of(kind, layout_of(i), i & 1);
+            test_view view = make_view(kind, choose_layout(i), i & 1);
             view.cells.ghosts = NULL;
             for (size_t k = 0; k < sizeof counts / sizeof *counts; k++) assert_run(&view.cells, (int64_t)k, counts[k]);
             assert_run(&view.cells, 0, view.cells.cell_count);
@@ -178,11 +178,11 @@ static void sums_are_those_of_cells_alone(void **state)
 }
 
 /* Checks connectivity with other numbers between its entries. */
-static void strided_connectivity_is_the_same(void **state)
+static void strided_connectivity_gives_the_same_sums(void **state)
 {
     (void)state;
     for (int wide = 0; wide < 2; wide++) {
-        test_view view = view_of(TEST_WEDGES, (test_layout){.wide_indices = wide}, 0);
+        test_view view = make_view(TEST_WEDGES, (test_layout){.wide_indices = wide}, 0);
         grid *g = &view.cells;
         const int64_t count = 6 * g->cell_count, size = wide ? 8 : 4;
         char *spread = calloc((size_t)count, (size_t)(3 * size));
@@ -217,36 +217,36 @@ static void make_infinite(grid *g, int64_t cell)
     ((float *)(uintptr_t)g->coordinates[1].data)[vertex] = INFINITY;
 }
 
-static void make_no_number(grid *g, int64_t cell)
+static void make_nan(grid *g, int64_t cell)
 {
     const int32_t vertex = ((const int32_t *)(const void *)g->connectivity.data)[4 * cell];
     ((float *)(uintptr_t)g->coordinates[2].data)[vertex] = NAN;
 }
 
-static void make_stray(grid *g, int64_t cell)
+static void make_stray_index(grid *g, int64_t cell)
 {
     ((int32_t *)(uintptr_t)g->connectivity.data)[4 * cell + 1] = (int32_t)g->vertex_count;
 }
 
-static void unusual_cells_are_left_alone(void **state)
+static void unusual_cells_are_excluded_from_lanes(void **state)
 {
     (void)state;
-    void (*const make[])(grid *, int64_t) = {make_ghost, make_flat, make_infinite, make_no_number, make_stray};
+    void (*const make[])(grid *, int64_t) = {make_ghost, make_flat, make_infinite, make_nan, make_stray_index};
     const int64_t places[] = {0, 3, 8, 511, 512, 700, 2047};
     for (size_t m = 0; m < sizeof make / sizeof *make; m++)
         for (size_t i = 0; i < sizeof places / sizeof *places; i++) {
-            test_view view = view_of(TEST_TETS, (test_layout){0}, 0);
+            test_view view = make_view(TEST_TETS, (test_layout){0}, 0);
             const int64_t place = places[i];
             make[m](&view.cells, place);
             const lane_cells cells = {&view.cells, GRID_TET, 0, view.cells.cell_count, 0};
             for (cpu_isa isa = CPU_PLAIN; isa <= cpu_best_isa(); isa++) {
                 int64_t taken, alone, again, none;
-                const lane_sums sums = sums_of(isa, &cells, &taken, &alone);
+                const lane_sums sums = compute_lane_sums(isa, &cells, &taken, &alone);
                 assert_true(taken <= place && taken % LANES == 0); /* earlier cells may use the changed vertex too */
                 assert_true(alone > 0 && taken + alone <= cells.count);
-                if (make[m] == make_ghost || make[m] == make_stray) assert_true(taken + alone > place);
+                if (make[m] == make_ghost || make[m] == make_stray_index) assert_true(taken + alone > place);
                 const lane_cells before = {&view.cells, GRID_TET, 0, taken, 0};
-                const lane_sums expected = sums_of(isa, &before, &again, &none);
+                const lane_sums expected = compute_lane_sums(isa, &before, &again, &none);
                 assert_int_equal(again, taken);
                 assert_true(sums.size_sum == expected.size_sum && sums.inverted_count == expected.inverted_count);
                 assert_true(sums.least == expected.least);
@@ -261,7 +261,7 @@ typedef struct guarded {
     size_t page, inner;
 } guarded;
 
-static guarded guarded_create(size_t bytes)
+static guarded allocate_guarded(size_t bytes)
 {
     guarded out = {.page = (size_t)sysconf(_SC_PAGESIZE)};
     out.inner = (bytes + out.page - 1) / out.page * out.page;
@@ -282,7 +282,7 @@ static void assert_not_followed(const grid *g, void *index, int64_t cell, int64_
     const lane_cells cells = {g, GRID_HEX, 0, g->cell_count, 0};
     for (cpu_isa isa = CPU_PLAIN; isa <= cpu_best_isa(); isa++) {
         int64_t taken, alone;
-        sums_of(isa, &cells, &taken, &alone);
+        compute_lane_sums(isa, &cells, &taken, &alone);
         assert_true(taken <= cell && taken + alone > cell);
     }
     if (wide)
@@ -291,18 +291,18 @@ static void assert_not_followed(const grid *g, void *index, int64_t cell, int64_
         *(int32_t *)index = (int32_t)good;
 }
 
-static void wrong_indices_are_not_followed(void **state)
+static void wrong_indices_are_not_dereferenced(void **state)
 {
     (void)state;
     for (int i = 0; i < 16; i++) { /* bits: the widths, the index base, and the end at which the numbers are */
         const int64_t base = i >> 2 & 1;
-        test_view view = view_of(TEST_HEXES, layout_of(i & 3), base);
+        test_view view = make_view(TEST_HEXES, choose_layout(i & 3), base);
         grid *g = &view.cells;
         g->ghosts = NULL;
         const size_t size = g->coordinates[0].is_wide ? 8 : 4, bytes = size * (size_t)g->vertex_count;
         guarded memory[3];
         for (int axis = 0; axis < 3; axis++) {
-            memory[axis] = guarded_create(bytes);
+            memory[axis] = allocate_guarded(bytes);
             char *to = memory[axis].pages + memory[axis].page + (i & 8 ? memory[axis].inner - bytes : 0);
             memcpy(to, g->coordinates[axis].data, bytes);
             g->coordinates[axis].data = to;
@@ -322,13 +322,13 @@ static void wrong_indices_are_not_followed(void **state)
 
 /* ---- several cells ------------------------------------------------------------------------------------------- */
 
-static void runs_are_cells_one_by_one(void **state)
+static void volumes_in_lanes_match_single_cells(void **state)
 {
     (void)state;
     const test_mesh_kind kinds[] = {TEST_TETS, TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS, TEST_MIXED};
     for (size_t k = 0; k < sizeof kinds / sizeof *kinds; k++)
         for (int i = 0; i < LAYOUTS; i++) {
-            test_view view = view_of(kinds[k], layout_of(i), 0);
+            test_view view = make_view(kinds[k], choose_layout(i), 0);
             for (int64_t cell = 0; cell < view.cells.cell_count; cell += cell < 40 ? 1 : 57)
                 make_ghost(&view.cells, cell);
             session_mesh mesh = {.cells = view.cells};
@@ -354,8 +354,8 @@ static void runs_are_cells_one_by_one(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(sums_are_those_of_cells_alone), cmocka_unit_test(strided_connectivity_is_the_same),
-        cmocka_unit_test(unusual_cells_are_left_alone), cmocka_unit_test(wrong_indices_are_not_followed),
-        cmocka_unit_test(runs_are_cells_one_by_one)};
+        cmocka_unit_test(sums_in_lanes_match_single_cells), cmocka_unit_test(strided_connectivity_gives_the_same_sums),
+        cmocka_unit_test(unusual_cells_are_excluded_from_lanes), cmocka_unit_test(wrong_indices_are_not_dereferenced),
+        cmocka_unit_test(volumes_in_lanes_match_single_cells)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

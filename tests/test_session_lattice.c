@@ -47,7 +47,7 @@ typedef struct block {
     insitu_lattice lattice;
 } block;
 
-static double place_along(place_form form, int axis, int64_t index)
+static double compute_axis_coordinate(place_form form, int axis, int64_t index)
 {
     const double uniform = origin[axis] + spacing[axis] * (double)index;
     if (form == UNIFORM) return uniform;
@@ -55,9 +55,9 @@ static double place_along(place_form form, int axis, int64_t index)
     return form == RECTILINEAR_FLOAT ? (double)(float)bent : bent;
 }
 
-static void place_of(place_form form, const int64_t index[3], double out[3])
+static void compute_position(place_form form, const int64_t index[3], double out[3])
 {
-    for (int axis = 0; axis < 3; axis++) out[axis] = place_along(form, axis, index[axis]);
+    for (int axis = 0; axis < 3; axis++) out[axis] = compute_axis_coordinate(form, axis, index[axis]);
     if (form != CURVILINEAR && form != CURVILINEAR_FLOAT) return;
     const double x = out[0], y = out[1], z = out[2];
     out[0] = x + 0.05 * sin(3 * y + z);
@@ -78,14 +78,14 @@ static void set_strides(array_order order, const int64_t counts[3], int64_t stri
     *length = reach;
 }
 
-static void *room(int64_t count, size_t size)
+static void *allocate_zeroed(int64_t count, size_t size)
 {
     void *out = calloc((size_t)count + 1, size);
     assert_non_null(out);
     return out;
 }
 
-static int64_t number_of(const int64_t strides[3], int64_t i, int64_t j, int64_t k)
+static int64_t compute_strided_index(const int64_t strides[3], int64_t i, int64_t j, int64_t k)
 {
     return i * strides[0] + j * strides[1] + k * strides[2];
 }
@@ -99,9 +99,9 @@ static void fill_vertices(block *b)
         for (int64_t j = 0; j <= b->cells[1]; j++)
             for (int64_t i = 0; i <= b->cells[0]; i++) {
                 const int64_t at[3] = {b->first[0] + i, b->first[1] + j, b->first[2] + k};
-                const int64_t v = number_of(b->vertex_strides, i, j, k);
+                const int64_t v = compute_strided_index(b->vertex_strides, i, j, k);
                 double place[3];
-                place_of(b->form, at, place);
+                compute_position(b->form, at, place);
                 for (int axis = 0; axis < 3; axis++) {
                     b->places[axis][v] = place[axis];
                     b->narrow[axis][v] = (float)place[axis];
@@ -110,12 +110,12 @@ static void fill_vertices(block *b)
             }
     for (int axis = 0; axis < 3; axis++)
         for (int64_t n = 0; n <= b->cells[axis]; n++) {
-            b->axes[axis][n] = place_along(b->form, axis, b->first[axis] + n);
+            b->axes[axis][n] = compute_axis_coordinate(b->form, axis, b->first[axis] + n);
             b->narrow_axes[axis][n] = (float)b->axes[axis][n];
         }
 }
 
-static bool is_own(const block *b, const int64_t at[3])
+static bool is_own_cell(const block *b, const int64_t at[3])
 {
     for (int axis = 0; axis < 3; axis++)
         if (at[axis] < b->own_first[axis] || at[axis] >= b->own_end[axis]) return false;
@@ -133,8 +133,8 @@ static void add_hex(block *b, int64_t i, int64_t j, int64_t k)
                                      {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
     for (int n = 0; n < 8; n++)
         b->hexes[8 * b->hex_count + n] =
-            number_of(b->vertex_strides, i + corner[n][0], j + corner[n][1], k + corner[n][2]);
-    b->hex_values[b->hex_count++] = b->c[number_of(b->cell_strides, i, j, k)];
+            compute_strided_index(b->vertex_strides, i + corner[n][0], j + corner[n][1], k + corner[n][2]);
+    b->hex_values[b->hex_count++] = b->c[compute_strided_index(b->cell_strides, i, j, k)];
 }
 
 static void fill_cells(block *b, bool blanking)
@@ -143,11 +143,11 @@ static void fill_cells(block *b, bool blanking)
     for (int64_t k = 0; k < b->cells[2]; k++)
         for (int64_t j = 0; j < b->cells[1]; j++)
             for (int64_t i = 0; i < b->cells[0]; i++) {
-                const int64_t own[3] = {i, j, k}, c = number_of(b->cell_strides, i, j, k);
+                const int64_t own[3] = {i, j, k}, c = compute_strided_index(b->cell_strides, i, j, k);
                 const int64_t at[3] = {b->first[0] + i, b->first[1] + j, b->first[2] + k};
                 b->c[c] = 0.5 + 0.5 * cos(0.9 * (double)at[0] + 0.3 * (double)(at[1] * at[2]));
                 b->ghosts[c] = blanking && is_blanked(at);
-                if (is_own(b, own) && !b->ghosts[c]) add_hex(b, i, j, k);
+                if (is_own_cell(b, own) && !b->ghosts[c]) add_hex(b, i, j, k);
             }
 }
 
@@ -169,17 +169,17 @@ static void make_block(block *b, place_form form, array_order order, bool layers
     set_strides(order, vertices, b->vertex_strides, &b->vertex_count);
     set_strides(order, b->cells, b->cell_strides, &b->cell_count);
     for (int axis = 0; axis < 3; axis++) {
-        b->places[axis] = room(b->vertex_count, sizeof(double));
-        b->narrow[axis] = room(b->vertex_count, sizeof(float));
-        b->axes[axis] = room(b->cells[axis] + 1, sizeof(double));
-        b->narrow_axes[axis] = room(b->cells[axis] + 1, sizeof(float));
+        b->places[axis] = allocate_zeroed(b->vertex_count, sizeof(double));
+        b->narrow[axis] = allocate_zeroed(b->vertex_count, sizeof(float));
+        b->axes[axis] = allocate_zeroed(b->cells[axis] + 1, sizeof(double));
+        b->narrow_axes[axis] = allocate_zeroed(b->cells[axis] + 1, sizeof(float));
     }
-    b->f = room(b->vertex_count, sizeof(double));
-    b->c = room(b->cell_count, sizeof(double));
-    b->ghosts = room(b->cell_count, 1);
-    b->wide_ghosts = room(b->cell_count, sizeof(int32_t));
-    b->hexes = room(8 * b->cell_count, sizeof(int64_t));
-    b->hex_values = room(b->cell_count, sizeof(double));
+    b->f = allocate_zeroed(b->vertex_count, sizeof(double));
+    b->c = allocate_zeroed(b->cell_count, sizeof(double));
+    b->ghosts = allocate_zeroed(b->cell_count, 1);
+    b->wide_ghosts = allocate_zeroed(b->cell_count, sizeof(int32_t));
+    b->hexes = allocate_zeroed(8 * b->cell_count, sizeof(int64_t));
+    b->hex_values = allocate_zeroed(b->cell_count, sizeof(double));
     fill_vertices(b);
     fill_cells(b, blanking);
     for (int64_t cell = 0; cell < b->cell_count; cell++)
@@ -218,7 +218,7 @@ static void free_block(block *b)
     free(b->hex_values);
 }
 
-static void give_places(const block *b, insitu_mesh *mesh)
+static void set_positions(const block *b, insitu_mesh *mesh)
 {
     const bool is_float = b->form == CURVILINEAR_FLOAT;
     for (int axis = 0; axis < 3; axis++)
@@ -248,7 +248,7 @@ static bool set_lattice(insitu_session *session, const block *b, bool blanking)
     mesh.vertex_count = b->vertex_count;
     mesh.cell_count = b->cell_count;
     mesh.lattice = &b->lattice;
-    if (b->form >= CURVILINEAR) give_places(b, &mesh);
+    if (b->form >= CURVILINEAR) set_positions(b, &mesh);
     if (blanking)
         mesh.ghosts =
             b->form % 2 ? (insitu_array){b->wide_ghosts, INSITU_INT32, 0} : (insitu_array){b->ghosts, INSITU_UINT8, 0};
@@ -264,12 +264,12 @@ static bool set_hexes(insitu_session *session, const block *b)
     mesh.cell_count = b->hex_count;
     mesh.connectivity_count = 8 * b->hex_count;
     mesh.connectivity = (insitu_array){b->hexes, INSITU_INT64, 0};
-    give_places(b, &mesh);
+    set_positions(b, &mesh);
     return insitu_set_mesh(session, "m", &mesh) == INSITU_OK && set_fields(session, b, b->hex_values, b->hex_count);
 }
 
 /* Returns a scene with the first `count` images: trees contain only cells that they show. */
-static const char *some_images(int count)
+static const char *make_scene_of_images(int count)
 {
     static char text[4096];
     int at = snprintf(text, sizeof text, "statistics:\n  - {field: c, path: numbers.csv}\nimages:\n");
@@ -287,7 +287,7 @@ static bool is_same(const caught_picture *a, const caught_picture *b)
     return !a->depth || memcmp(a->depth, b->depth, pixels * sizeof(float)) == 0;
 }
 
-static int covered(const caught_picture *p)
+static int count_covered_pixels(const caught_picture *p)
 {
     int count = 0;
     for (int i = 0; i < p->width * p->height; i++) count += p->rgba[4 * i + 3] > 0;
@@ -296,7 +296,7 @@ static int covered(const caught_picture *p)
 
 /* Returns the bytes that a lattice copies: a number for each index along each axis, unless vertices have
  * coordinates. */
-static int64_t bytes_of_axes(const block *b)
+static int64_t compute_copied_axis_bytes(const block *b)
 {
     int64_t bytes = 0;
     for (int axis = 0; axis < 3 && b->form < CURVILINEAR; axis++)
@@ -305,7 +305,7 @@ static int64_t bytes_of_axes(const block *b)
 }
 
 /* Compares the pictures of hexes, which are drawn first, with those of the lattice. */
-static void compare(place_form form, array_order order, bool layers, bool blanking, int count)
+static void compare_with_hexes(place_form form, array_order order, bool layers, bool blanking, int count)
 {
     block b;
     insitu_report reports[2];
@@ -314,7 +314,7 @@ static void compare(place_form form, array_order order, bool layers, bool blanki
     discard_pictures();
     for (int lattice = 0; lattice < 2; lattice++) {
         if (!own_rank) remove("numbers.csv");
-        insitu_session *session = open_session(MPI_COMM_WORLD, some_images(count));
+        insitu_session *session = open_session(MPI_COMM_WORLD, make_scene_of_images(count));
         everywhere(lattice ? set_lattice(session, &b, blanking) : set_hexes(session, &b));
         const insitu_status status = insitu_step(session, 0, 0);
         if (status) fprintf(stderr, "%s\n", insitu_error(session));
@@ -329,14 +329,14 @@ static void compare(place_form form, array_order order, bool layers, bool blanki
         if (!is_same(&caught[i], &caught[count + i]))
             fprintf(stderr, "form %d, order %d, layers %d, blanking %d: %s\n", form, order, layers, blanking,
                     images[i]);
-        assert_true(covered(&caught[i]) > 50);
+        assert_true(count_covered_pixels(&caught[i]) > 50);
         assert_true(is_same(&caught[i], &caught[count + i]));
     }
     everywhere(strcmp(statistics[0], statistics[1]) == 0);
     everywhere(strcmp(left_out[0], left_out[1]) == 0); /* the message with the number of cells that trees leave out */
     everywhere(count > 1 || strstr(left_out[1], "cells show nothing"));
     /* the first image shows the values as they are passed, so that no bytes are allocated per cell or vertex */
-    everywhere(count > 1 || reports[1].bytes_copied == bytes_of_axes(&b));
+    everywhere(count > 1 || reports[1].bytes_copied == compute_copied_axis_bytes(&b));
     const int64_t own =
         (b.own_end[0] - b.own_first[0]) * (b.own_end[1] - b.own_first[1]) * (b.own_end[2] - b.own_first[2]);
     everywhere(reports[1].cells == b.cells[0] * b.cells[1] * b.cells[2]);
@@ -345,13 +345,14 @@ static void compare(place_form form, array_order order, bool layers, bool blanki
     free_block(&b);
 }
 
-static void lattices_are_their_hexes(void **state)
+static void lattices_draw_same_picture_as_hexes(void **state)
 {
     (void)state;
     for (int form = 0; form < FORMS; form++)
         for (int order = 0; order < ORDERS; order++)
             for (int count = 1; count <= IMAGES; count += IMAGES - 1)
-                compare((place_form)form, (array_order)order, (form + order) % 2, (form + order) % 3 == 0, count);
+                compare_with_hexes((place_form)form, (array_order)order, (form + order) % 2, (form + order) % 3 == 0,
+                                   count);
 }
 
 /* ---- quads ------------------------------------------------------------------------------------------------------ */
@@ -409,21 +410,21 @@ static caught_picture draw_sheet(int flat, bool is_lattice, bool is_uniform)
     return pop_caught_picture();
 }
 
-static void sheets_across_any_axis_are_their_quads(void **state)
+static void flat_lattices_draw_same_picture_as_quads(void **state)
 {
     (void)state;
     for (int flat = 0; flat < 3; flat++)
         for (int is_uniform = 0; is_uniform < 2; is_uniform++) {
             discard_pictures();
             caught_picture quads = draw_sheet(flat, false, is_uniform), lattice = draw_sheet(flat, true, is_uniform);
-            everywhere(own_rank || (is_same(&quads, &lattice) && covered(&quads) > 50));
+            everywhere(own_rank || (is_same(&quads, &lattice) && count_covered_pixels(&quads) > 50));
             free_caught(&quads);
             free_caught(&lattice);
         }
 }
 
 /* Checks that a cube whose three axes point downwards, so that all its cells are left-handed, causes no warning. */
-static void left_handed_blocks_are_no_warning(void **state)
+static void left_handed_blocks_give_no_warning(void **state)
 {
     (void)state;
     enum { SIDE = 4, VERTICES = (SIDE + 1) * (SIDE + 1) * (SIDE + 1) };
@@ -451,16 +452,16 @@ static void left_handed_blocks_are_no_warning(void **state)
     discard_pictures();
 }
 
-static int begin_tests(void **state)
+static int set_up_test_group(void **state)
 {
     (void)state;
-    return enter_folder("lattice") ? 0 : 1;
+    return enter_test_folder("lattice") ? 0 : 1;
 }
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(lattices_are_their_hexes),
-                                       cmocka_unit_test(sheets_across_any_axis_are_their_quads),
-                                       cmocka_unit_test(left_handed_blocks_are_no_warning)};
-    return run_session_tests(argc, argv, tests, begin_tests, NULL);
+    const struct CMUnitTest tests[] = {cmocka_unit_test(lattices_draw_same_picture_as_hexes),
+                                       cmocka_unit_test(flat_lattices_draw_same_picture_as_quads),
+                                       cmocka_unit_test(left_handed_blocks_give_no_warning)};
+    return run_session_tests(argc, argv, tests, set_up_test_group, NULL);
 }

@@ -28,7 +28,7 @@ typedef struct block {
     unsigned char ghosts[CELLS];
 } block;
 
-static insitu_array doubles(const double *data)
+static insitu_array make_double_array(const double *data)
 {
     return (insitu_array){data, INSITU_FLOAT64, 0};
 }
@@ -79,7 +79,7 @@ static void make_rectilinear(block *b)
 {
     for (int axis = 0; axis < 3; axis++) {
         b->lattice.spacing[axis] = 0;
-        b->lattice.axes[axis] = doubles(b->axes[axis]);
+        b->lattice.axes[axis] = make_double_array(b->axes[axis]);
         b->mesh.coordinates[axis] = (insitu_array){0};
     }
 }
@@ -89,7 +89,7 @@ static void make_curvilinear(block *b)
     for (int axis = 0; axis < 3; axis++) {
         b->lattice.spacing[axis] = 0;
         b->lattice.axes[axis] = (insitu_array){0};
-        b->mesh.coordinates[axis] = doubles(b->places[axis]);
+        b->mesh.coordinates[axis] = make_double_array(b->places[axis]);
     }
 }
 
@@ -115,12 +115,12 @@ static block *make_block(void)
     insitu_field_defaults(&b->f);
     b->f.name = "f";
     b->f.count = VERTICES;
-    b->f.values = doubles(b->f_values);
+    b->f.values = make_double_array(b->f_values);
     b->c = b->f;
     b->c.name = "c";
     b->c.centring = INSITU_CELL;
     b->c.count = CELLS;
-    b->c.values = doubles(b->c_values);
+    b->c.values = make_double_array(b->c_values);
     return b;
 }
 
@@ -182,9 +182,9 @@ SPOIL(axis_missing, (make_rectilinear(b), b->lattice.axes[1].data = NULL))
 SPOIL(axis_nan, (make_rectilinear(b), b->axes[2][3] = (double)NAN))
 SPOIL(axis_of_no_type, (make_rectilinear(b), b->lattice.axes[0].type = (insitu_type)77))
 SPOIL(axis_stride, (make_rectilinear(b), b->lattice.axes[0].stride_bytes = (int64_t)1 << 60))
-SPOIL(spacing_and_axes, b->lattice.axes[0] = doubles(b->axes[0]))
-SPOIL(coordinates_and_spacing, b->mesh.coordinates[2] = doubles(b->places[2]))
-SPOIL(coordinates_and_axes, (make_rectilinear(b), b->mesh.coordinates[0] = doubles(b->places[0])))
+SPOIL(spacing_and_axes, b->lattice.axes[0] = make_double_array(b->axes[0]))
+SPOIL(coordinates_and_spacing, b->mesh.coordinates[2] = make_double_array(b->places[2]))
+SPOIL(coordinates_and_axes, (make_rectilinear(b), b->mesh.coordinates[0] = make_double_array(b->places[0])))
 SPOIL(coordinate_missing, (make_curvilinear(b), b->mesh.coordinates[1].data = NULL))
 SPOIL(coordinate_nan, (make_curvilinear(b), b->places[1][57] = (double)NAN))
 SPOIL(connectivity_too,
@@ -200,7 +200,8 @@ SPOIL(few_cells, b->mesh.cell_count = CELLS - 1)
 SPOIL(few_vertices, b->mesh.vertex_count = VERTICES - 1)
 SPOIL(no_vertices, b->mesh.vertex_count = 0)
 SPOIL(most_cells, b->mesh.cell_count = 4294967295)
-SPOIL(corner_field, (b->f.centring = INSITU_CORNER, b->f.count = 8 * CELLS, b->f.values = doubles(b->f_values)))
+SPOIL(corner_field,
+      (b->f.centring = INSITU_CORNER, b->f.count = 8 * CELLS, b->f.values = make_double_array(b->f_values)))
 SPOIL(field_short, b->f.count = VERTICES - 1)
 SPOIL(cell_field_short, b->c.count = CELLS - 1)
 
@@ -276,7 +277,7 @@ static void expect_report(insitu_session *session, const wrong_block *wrong, int
     for (int i = 0; i < 2; i++) {
         const insitu_status status = insitu_step(session, cycle + i, 0);
         if (status != wrong->status) fprintf(stderr, "%s: %s\n", wrong->name, insitu_error(session));
-        reported_everywhere(session, status, wrong->status, rank, wrong->words);
+        check_reported_everywhere(session, status, wrong->status, rank, wrong->words);
     }
     free(b);
 }
@@ -330,7 +331,7 @@ static void drop_interior(block *b)
     memset(b->lattice.interior_end, 0, sizeof b->lattice.interior_end);
 }
 
-static void blank(block *b, int of)
+static void blank_every_nth(block *b, int of)
 {
     for (int c = 0; c < CELLS; c++) b->ghosts[c] = c % of == 0;
     b->mesh.ghosts = (insitu_array){b->ghosts, INSITU_UINT8, 0};
@@ -344,8 +345,8 @@ SPOIL(mirror, (b->lattice.spacing[1] = -1, b->lattice.first[1] = -NJ))
 SPOIL(mirror_back, (b->lattice.spacing[1] = 1, b->lattice.first[1] = 0))
 SPOIL(move_axis, b->axes[2][NK] += 0.5)
 SPOIL(move_vertices, for (int v = 0; v < VERTICES; v++) b->places[2][v] *= 1.25)
-SPOIL(blank_some, blank(b, 7))
-SPOIL(blank_others, blank(b, 5))
+SPOIL(blank_some, blank_every_nth(b, 7))
+SPOIL(blank_others, blank_every_nth(b, 5))
 SPOIL(blank_none, b->mesh.ghosts = (insitu_array){0})
 SPOIL(make_lattice_again, {
     b->mesh.lattice = &b->lattice;
@@ -397,7 +398,7 @@ static const change changes[] = {
     {CHANGE(shorter_rows, INSITU_CHANGED_NOTHING, true)},
 };
 
-static bool draw(insitu_session *session, int cycle, caught_picture *out)
+static bool step_and_take_picture(insitu_session *session, int cycle, caught_picture *out)
 {
     discard_pictures();
     const insitu_status status = insitu_step(session, cycle, 0);
@@ -407,7 +408,7 @@ static bool draw(insitu_session *session, int cycle, caught_picture *out)
     return true;
 }
 
-static void changed_blocks_are_drawn_as_new_ones(void **state)
+static void changed_blocks_draw_same_picture_as_new_blocks(void **state)
 {
     (void)state;
     block *b = make_block();
@@ -423,11 +424,11 @@ static void changed_blocks_are_drawn_as_new_ones(void **state)
         b->mesh.changed = i ? c->changed : INSITU_CHANGED_ALL;
         const bool is_set = c->sets_fields || i == 0;
         everywhere((is_set ? set_block(session, b) : insitu_set_mesh(session, "m", &b->mesh)) == INSITU_OK);
-        draw(session, (int)i, &found);
+        step_and_take_picture(session, (int)i, &found);
         everywhere(b->mesh.lattice != NULL || strstr(insitu_last_report(session)->copied_why, "lattice") == NULL);
         b->mesh.changed = INSITU_CHANGED_ALL;
         everywhere(insitu_set_mesh(twin, "m", NULL) == INSITU_OK && set_block(twin, b) == INSITU_OK);
-        draw(twin, (int)i, &truth);
+        step_and_take_picture(twin, (int)i, &truth);
         if (!own_rank && !is_same(&found, &truth)) fprintf(stderr, "%s: another picture\n", c->name);
         everywhere(own_rank || is_same(&found, &truth));
         if (!own_rank && is_same(&found, &before) != shows_nothing) fprintf(stderr, "%s: changes\n", c->name);
@@ -445,6 +446,6 @@ static void changed_blocks_are_drawn_as_new_ones(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(wrong_blocks_are_reported_on_all_ranks),
-                                       cmocka_unit_test(changed_blocks_are_drawn_as_new_ones)};
+                                       cmocka_unit_test(changed_blocks_draw_same_picture_as_new_blocks)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -26,38 +26,38 @@ enum { MESHES = TEST_KIND_COUNT + 1 };
 
 static void make_mesh(int kind, test_mesh *out)
 {
-    test_mesh_lattice(kind < TEST_KIND_COUNT ? (test_mesh_kind)kind : TEST_MIXED, SIDE, 0.1, test_wave, out);
+    test_mesh_make_lattice(kind < TEST_KIND_COUNT ? (test_mesh_kind)kind : TEST_MIXED, SIDE, 0.1, test_wave_field, out);
     if (kind == TEST_KIND_COUNT) test_mesh_to_polyhedra(out, 1);
 }
 
 static void extract_rank_cells(test_mesh *whole, session_input *out)
 {
     int *owners = test_calloc((size_t)whole->cell_count + 1, sizeof *owners);
-    test_partition(whole, TEST_RANDOM, SIDE, rank_count, owners);
-    test_mesh_part(whole, owners, own_rank, &out->part);
+    test_partition_cells(whole, TEST_RANDOM, SIDE, rank_count, owners);
+    test_mesh_extract_part(whole, owners, own_rank, &out->part);
     test_free(owners);
     input_describe(out);
 }
 
-static void draw(insitu_session *session, const session_input *in, int cycle, caught_picture *out)
+static void draw_step(insitu_session *session, const session_input *in, int cycle, caught_picture *out)
 {
     discard_pictures();
-    everywhere(submit(session, in) == INSITU_OK);
-    reported_everywhere(session, insitu_step(session, cycle, 0), INSITU_OK, "");
+    everywhere(submit_input(session, in) == INSITU_OK);
+    check_reported_everywhere(session, insitu_step(session, cycle, 0), INSITU_OK, "");
     if (own_rank != 0) return;
     *out = caught[0];
     caught_count = 0;
 }
 
 /* Returns whether all channels differ by at most the bound, and the picture is not empty. */
-static bool are_same(const caught_picture *a, const caught_picture *b, double bound)
+static bool are_same_within_bound(const caught_picture *a, const caught_picture *b, double bound)
 {
     int shown = 0;
     double worst = 0;
     if (own_rank != 0) return true;
     for (int i = 1; i < WIDTH * HEIGHT; i++) shown += memcmp(a->rgba, a->rgba + 4 * i, 4 * sizeof *a->rgba) != 0;
     for (int i = 0; i < 4 * WIDTH * HEIGHT; i++)
-        worst = test_worse(worst, fabs((double)a->rgba[i] - (double)b->rgba[i]));
+        worst = test_larger_error(worst, fabs((double)a->rgba[i] - (double)b->rgba[i]));
     if (shown <= WIDTH * HEIGHT / 60 || worst > bound) fprintf(stderr, "%d pixels shown, off by %g\n", shown, worst);
     return shown > WIDTH * HEIGHT / 60 && worst <= bound &&
            !memcmp(a->depth, b->depth, sizeof *a->depth * WIDTH * HEIGHT);
@@ -74,7 +74,7 @@ static void free_picture(caught_picture *picture)
 
 /* Returns the cell's value: computed from its corners' positions in the wave; for a polyhedron, from one vertex of each
  * face. */
-static double cell_value(const test_mesh *part, int64_t cell)
+static double compute_cell_value(const test_mesh *part, int64_t cell)
 {
     double sum = 0;
     for (int64_t i = part->offsets[cell]; i < part->offsets[cell + 1]; i++) {
@@ -85,7 +85,7 @@ static double cell_value(const test_mesh *part, int64_t cell)
     return sum / (double)(part->offsets[cell + 1] - part->offsets[cell]);
 }
 
-static bool value_is_missing(int64_t cell)
+static bool is_value_missing(int64_t cell)
 {
     return test_uniform((uint64_t)(cell + 100 * own_rank), 8) < 0.3;
 }
@@ -104,17 +104,17 @@ static void verify_lacking(int kind, const char *scene)
     in.field.count = in.part.cell_count;
     in.field.values = (insitu_array){values, INSITU_FLOAT64, 0};
     for (int64_t cell = 0; cell < in.part.cell_count; cell++) {
-        values[cell] = value_is_missing(cell) ? (double)NAN : cell_value(&in.part, cell);
-        lacking_count += value_is_missing(cell);
+        values[cell] = is_value_missing(cell) ? (double)NAN : compute_cell_value(&in.part, cell);
+        lacking_count += is_value_missing(cell);
     }
-    draw(session, &in, 0, &lacking);
+    draw_step(session, &in, 0, &lacking);
     everywhere(insitu_last_report(session)->cells_unusable == lacking_count);
     for (int64_t cell = 0; cell < in.part.cell_count; cell++) {
-        values[cell] = value_is_missing(cell) ? 1e3 : values[cell];
-        in.part.ghosts[cell] = value_is_missing(cell);
+        values[cell] = is_value_missing(cell) ? 1e3 : values[cell];
+        in.part.ghosts[cell] = is_value_missing(cell);
     }
-    draw(session, &in, 1, &ghosts);
-    everywhere(are_same(&lacking, &ghosts, scene == volume_scene ? 5e-7 : 0));
+    draw_step(session, &in, 1, &ghosts);
+    everywhere(are_same_within_bound(&lacking, &ghosts, scene == volume_scene ? 5e-7 : 0));
     free_picture(&lacking);
     free_picture(&ghosts);
     insitu_destroy(&session);
@@ -123,7 +123,7 @@ static void verify_lacking(int kind, const char *scene)
     test_mesh_free(&whole);
 }
 
-static void cells_without_a_value_of_their_own_are_not_there(void **context)
+static void cells_without_a_value_are_not_drawn(void **context)
 {
     (void)context;
     for (int kind = 0; kind < MESHES; kind++)
@@ -132,7 +132,7 @@ static void cells_without_a_value_of_their_own_are_not_there(void **context)
 
 /* Checks cells that lose their value while the means at vertices stay the same: of cells with equal values some lose
  * theirs, and others get theirs back. */
-static void cells_that_lose_their_value_are_gone_at_the_next_step(void **context)
+static void cells_that_lose_their_value_disappear_at_the_next_step(void **context)
 {
     (void)context;
     session_input in = {0};
@@ -154,7 +154,7 @@ static void cells_that_lose_their_value_are_gone_at_the_next_step(void **context
             values[cell] = lacks ? (double)NAN : 2;
             lacking += lacks;
         }
-        draw(session, &in, step, &picture);
+        draw_step(session, &in, step, &picture);
         everywhere(insitu_last_report(session)->cells_unusable == lacking);
         free_picture(&picture);
     }
@@ -168,7 +168,7 @@ static void cells_that_lose_their_value_are_gone_at_the_next_step(void **context
 
 /* Computes the position of vertex i of a flat cell: hexes and wedges have a possibly bent face as front and as back;
  * tets and pyramids are in the plane of the first three corners. */
-static void flat_place(int type, double corners[4][3], int i, double place[3])
+static void compute_flat_position(int type, double corners[4][3], int i, double place[3])
 {
     static const double in_plane[5][2] = {{0, 0}, {0.5, 0}, {0.5, 0.5}, {0, 0.5}, {0.2, 0.1}};
     const int tet[4] = {0, 1, 3, 4};
@@ -189,7 +189,7 @@ static void add_flat_cell(test_mesh *mesh, int type, double corners[4][3])
     int64_t vertices[GRID_MAX_CELL_VERTICES];
     for (int i = 0; i < count; i++) {
         double place[3];
-        flat_place(type, corners, i, place);
+        compute_flat_position(type, corners, i, place);
         vertices[i] = test_mesh_add_vertex(mesh, place);
         mesh->values[vertices[i]] = 2 * i < count ? -1 : 1;
     }
@@ -221,7 +221,7 @@ static void verify_flat(bool as_polyhedra, const char *scene)
     session_input bare = {0}, more = {0};
     test_mesh whole;
     caught_picture without = {0}, with = {0};
-    test_mesh_lattice(TEST_HEXES, SIDE, as_polyhedra ? 0 : 0.1, test_wave, &whole);
+    test_mesh_make_lattice(TEST_HEXES, SIDE, as_polyhedra ? 0 : 0.1, test_wave_field, &whole);
     extract_rank_cells(&whole, &bare);
     extract_rank_cells(&whole, &more);
     const int64_t flat = more.part.cell_count;
@@ -230,11 +230,11 @@ static void verify_flat(bool as_polyhedra, const char *scene)
     input_describe(&bare);
     input_describe(&more);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
-    draw(session, &bare, 0, &without);
+    draw_step(session, &bare, 0, &without);
     everywhere(insitu_last_report(session)->cells_flat == 0);
-    draw(session, &more, 1, &with);
+    draw_step(session, &more, 1, &with);
     everywhere(insitu_last_report(session)->cells_flat == flat);
-    everywhere(are_same(&without, &with, 0));
+    everywhere(are_same_within_bound(&without, &with, 0));
     free_picture(&without);
     free_picture(&with);
     insitu_destroy(&session);
@@ -252,16 +252,16 @@ static void flat_cells_between_differing_fields_change_no_pixel(void **context)
 
 /* Checks vertices that move while the arrays stay the same: hexes are flat at one step and have a volume at the
  * next. */
-static void cells_that_rise_from_flatness_are_drawn(void **context)
+static void flat_cells_that_gain_volume_are_drawn(void **context)
 {
     (void)context;
     session_input in = {0};
     test_mesh whole;
     caught_picture fresh = {0}, risen = {0};
-    test_mesh_lattice(TEST_HEXES, SIDE, 0.1, test_wave, &whole);
+    test_mesh_make_lattice(TEST_HEXES, SIDE, 0.1, test_wave_field, &whole);
     extract_rank_cells(&whole, &in);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(surface_scene));
-    draw(session, &in, 0, &fresh);
+    draw_step(session, &in, 0, &fresh);
     double *heights = test_calloc((size_t)in.part.vertex_count + 1, sizeof *heights);
     for (int64_t v = 0; v < in.part.vertex_count; v++) {
         heights[v] = in.part.coordinates[3 * v + 2];
@@ -269,10 +269,10 @@ static void cells_that_rise_from_flatness_are_drawn(void **context)
     }
     in.mesh.changed = INSITU_CHANGED_GEOMETRY;
     caught_picture flat = {0};
-    draw(session, &in, 1, &flat);
+    draw_step(session, &in, 1, &flat);
     for (int64_t v = 0; v < in.part.vertex_count; v++) in.part.coordinates[3 * v + 2] = heights[v];
-    draw(session, &in, 2, &risen);
-    everywhere(are_same(&fresh, &risen, 0));
+    draw_step(session, &in, 2, &risen);
+    everywhere(are_same_within_bound(&fresh, &risen, 0));
     free_picture(&fresh);
     free_picture(&flat);
     free_picture(&risen);
@@ -285,10 +285,10 @@ static void cells_that_rise_from_flatness_are_drawn(void **context)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(cells_without_a_value_of_their_own_are_not_there),
-        cmocka_unit_test(cells_that_lose_their_value_are_gone_at_the_next_step),
+        cmocka_unit_test(cells_without_a_value_are_not_drawn),
+        cmocka_unit_test(cells_that_lose_their_value_disappear_at_the_next_step),
         cmocka_unit_test(flat_cells_between_differing_fields_change_no_pixel),
-        cmocka_unit_test(cells_that_rise_from_flatness_are_drawn),
+        cmocka_unit_test(flat_cells_that_gain_volume_are_drawn),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -75,7 +75,7 @@ static void make_levels(levels *l)
     for (int i = 0; i < 4; i++) add_halves(l, 1 + i / 2, fine[l->grid][i][0], fine[l->grid][i][1], (i + l->grid) % 3);
 }
 
-static int owner_of(const levels *l, int block)
+static int get_block_owner(const levels *l, int block)
 {
     if (l->is_by_level) return l->boxes[block].level % l->ranks;
     return (int)(test_uniform((uint64_t)(block + 100 * l->grid), 8) * l->ranks);
@@ -84,33 +84,33 @@ static int owner_of(const levels *l, int block)
 /* ---- brute force, on the lattice of the finest level's cells, in integers
  * ----------------------------------------- */
 
-static int finest(const levels *l)
+static int get_finest_level(const levels *l)
 {
     return l->refinement[LEVELS - 1];
 }
 
 /* Returns the distance from the middle of the domain, [-1, 1]^3; the coordinates are doubled, so that middles of cells
  * are integers. */
-static double distance_at(const levels *l, const int twice[3])
+static double compute_distance(const levels *l, const int twice[3])
 {
     double square = 0;
     for (int axis = 0; axis < 3; axis++) {
-        const double x = twice[axis] / (double)(SIDE * finest(l)) - 1;
+        const double x = twice[axis] / (double)(SIDE * get_finest_level(l)) - 1;
         square += x * x;
     }
     return sqrt(square);
 }
 
 /* Returns the finest level of a box that contains the point with these doubled coordinates; -1: none. */
-static int level_at(const levels *l, const int twice[3])
+static int find_level(const levels *l, const int twice[3])
 {
     int level = -1;
     for (int i = 0; i < l->count; i++) {
         const box *b = &l->boxes[i];
         bool is_in = b->level > level;
         for (int axis = 0; axis < 3; axis++)
-            is_in =
-                is_in && 2 * b->lower[axis] * finest(l) < twice[axis] && twice[axis] < 2 * b->upper[axis] * finest(l);
+            is_in = is_in && 2 * b->lower[axis] * get_finest_level(l) < twice[axis] &&
+                    twice[axis] < 2 * b->upper[axis] * get_finest_level(l);
         if (is_in) level = b->level;
     }
     return level;
@@ -118,16 +118,16 @@ static int level_at(const levels *l, const int twice[3])
 
 /* Finds the cell of a level, by its lowest corner, that touches the vertex in the direction given by the bits; returns
  * false if there is no drawn cell of that level. */
-static bool cell_beside(const levels *l, int level, const int vertex[3], int bits, int lower[3])
+static bool find_adjacent_cell(const levels *l, int level, const int vertex[3], int bits, int lower[3])
 {
-    const int width = finest(l) / l->refinement[level];
+    const int width = get_finest_level(l) / l->refinement[level];
     int middle[3];
     for (int axis = 0; axis < 3; axis++) {
         const int up = bits >> axis & 1, rest = vertex[axis] % width;
         lower[axis] = rest ? vertex[axis] - rest : vertex[axis] - (up ? 0 : width);
         middle[axis] = 2 * lower[axis] + width;
     }
-    return level_at(l, middle) == level;
+    return find_level(l, middle) == level;
 }
 
 static bool is_corner(const int vertex[3], const int lower[3], int width)
@@ -137,16 +137,16 @@ static bool is_corner(const int vertex[3], const int lower[3], int width)
     return true;
 }
 
-static double mean_around(const levels *l, const int vertex[3])
+static double compute_cell_mean(const levels *l, const int vertex[3])
 {
     double sum = 0;
     int count = 0;
     for (int bits = 0; bits < 8; bits++)
         for (int level = 0; level < LEVELS; level++) {
-            const int width = finest(l) / l->refinement[level];
+            const int width = get_finest_level(l) / l->refinement[level];
             int lower[3];
-            if (!cell_beside(l, level, vertex, bits, lower) || !is_corner(vertex, lower, width)) continue;
-            sum += distance_at(l, (const int[]){2 * lower[0] + width, 2 * lower[1] + width, 2 * lower[2] + width});
+            if (!find_adjacent_cell(l, level, vertex, bits, lower) || !is_corner(vertex, lower, width)) continue;
+            sum += compute_distance(l, (const int[]){2 * lower[0] + width, 2 * lower[1] + width, 2 * lower[2] + width});
             count++;
         }
     return sum / count;
@@ -154,23 +154,24 @@ static double mean_around(const levels *l, const int vertex[3])
 
 /* Finds the largest drawn cell that has the vertex on its border, but not as a corner; returns false if there is
  * none. */
-static bool hangs(const levels *l, const int vertex[3], int *width, int lower[3])
+static bool find_hanging_cell(const levels *l, const int vertex[3], int *width, int lower[3])
 {
     for (int level = 0; level < LEVELS; level++)
         for (int bits = 0; bits < 8; bits++) {
-            *width = finest(l) / l->refinement[level];
-            if (cell_beside(l, level, vertex, bits, lower) && !is_corner(vertex, lower, *width)) return true;
+            *width = get_finest_level(l) / l->refinement[level];
+            if (find_adjacent_cell(l, level, vertex, bits, lower) && !is_corner(vertex, lower, *width)) return true;
         }
     return false;
 }
 
 /* Returns the value at a vertex: that interpolated in the cell on which it hangs, else the vertex's own. */
-static double value_at(const levels *l, const int vertex[3])
+static double compute_expected_value(const levels *l, const int vertex[3])
 {
     const int twice[3] = {2 * vertex[0], 2 * vertex[1], 2 * vertex[2]};
     int width, lower[3];
     double value = 0;
-    if (!hangs(l, vertex, &width, lower)) return l->is_of_cells ? mean_around(l, vertex) : distance_at(l, twice);
+    if (!find_hanging_cell(l, vertex, &width, lower))
+        return l->is_of_cells ? compute_cell_mean(l, vertex) : compute_distance(l, twice);
     for (int corner = 0; corner < 8; corner++) {
         double weight = 1;
         int at[3];
@@ -179,7 +180,7 @@ static double value_at(const levels *l, const int vertex[3])
             weight *= corner >> axis & 1 ? share : 1 - share;
             at[axis] = lower[axis] + (corner >> axis & 1) * width;
         }
-        if (weight > 0) value += weight * value_at(l, at);
+        if (weight > 0) value += weight * compute_expected_value(l, at);
     }
     return value;
 }
@@ -187,10 +188,10 @@ static double value_at(const levels *l, const int vertex[3])
 /* Returns the allowed error of the library's value at a vertex. Interpolated values are sums of at most 64 products of
  * weights and values below 2, of up to three levels, with less than 200 roundings of 2. A vertex that does not hang has
  * the same value in all blocks, whose mean is exact. */
-static double error_at(const levels *l, const int vertex[3])
+static double compute_allowed_error(const levels *l, const int vertex[3])
 {
     int width, lower[3];
-    return l->is_of_cells || hangs(l, vertex, &width, lower) ? 1e-13 : 0;
+    return l->is_of_cells || find_hanging_cell(l, vertex, &width, lower) ? 1e-13 : 0;
 }
 
 /* ---- blocks ------------------------------------------------------------------------------------------------------ */
@@ -206,7 +207,7 @@ typedef enum layer_kind { NO_LAYER, OUTSIDE_INTERIOR, FLAGGED } layer_kind;
 
 /* Returns the kind of a block's ghost layer, which is one cell wide. Finer blocks cover the cells below their flagged
  * cells, so that only blocks of the coarsest level have flagged layers. */
-static layer_kind layer_of(const levels *l, int number)
+static layer_kind get_ghost_layer(const levels *l, int number)
 {
     const layer_kind kind = (layer_kind)(number % 3);
     return !l->has_layers || (kind == FLAGGED && l->boxes[number].level) ? NO_LAYER : kind;
@@ -231,7 +232,7 @@ static void make_flags(block *b)
 }
 
 /* Makes the coordinates of the uniform block, increased by a fraction of them. */
-static void make_places(block *b, double off)
+static void make_coordinates(block *b, double off)
 {
     const insitu_lattice *l = &b->lattice;
     const int64_t wide[2] = {l->cells[0] + 1, l->cells[1] + 1};
@@ -249,8 +250,8 @@ static void make_places(block *b, double off)
 static void make_block(const levels *l, int number, block *out)
 {
     const box *b = &l->boxes[number];
-    const layer_kind kind = layer_of(l, number);
-    const int of = l->refinement[b->level], step = finest(l) / of, layer = kind != NO_LAYER;
+    const layer_kind kind = get_ghost_layer(l, number);
+    const int of = l->refinement[b->level], step = get_finest_level(l) / of, layer = kind != NO_LAYER;
     *out = (block){.vertex_count = 1, .cell_count = 1};
     for (int axis = 0; axis < 3; axis++) {
         out->lattice.cells[axis] = (b->upper[axis] - b->lower[axis]) * of + 2 * layer;
@@ -275,10 +276,10 @@ static void make_block(const levels *l, int number, block *out)
         int twice[3];
         for (int axis = 0; axis < 3; axis++)
             twice[axis] = 2 * ((int)out->lattice.first[axis] + at[axis]) * step + (l->is_of_cells ? step : 0);
-        out->values[i] = is_inner(out, layer, at, more) ? distance_at(l, twice) : -40;
+        out->values[i] = is_inner(out, layer, at, more) ? compute_distance(l, twice) : -40;
     }
     if (kind == FLAGGED) make_flags(out);
-    if (l->is_mixed && number % 2) make_places(out, l->off);
+    if (l->is_mixed && number % 2) make_coordinates(out, l->off);
 }
 
 static bool set_block(insitu_session *session, int number, const levels *l, const block *b, bool is_new)
@@ -306,7 +307,7 @@ static void make_blocks(const levels *l, block blocks[MOST_BLOCKS])
 {
     for (int i = 0; i < l->count; i++) {
         blocks[i] = (block){.values = NULL};
-        if (owner_of(l, i) == l->rank) make_block(l, i, &blocks[i]);
+        if (get_block_owner(l, i) == l->rank) make_block(l, i, &blocks[i]);
     }
 }
 
@@ -330,13 +331,13 @@ static bool submit_levels(insitu_session *session, const levels *l, const block 
 /* ---- results ----------------------------------------------------------------------------------------------------- */
 
 /* Compares the drawn values with brute force. */
-static bool are_values_true(const insitu_session *session, const levels *l)
+static bool check_vertex_values(const insitu_session *session, const levels *l)
 {
     const session_parts parts = session_find_parts(&session->meshes, "m");
     for (int i = 0; i < parts.count; i++) {
         const session_mesh *part = parts.items[i];
         const box *b = &l->boxes[part->block];
-        const int step = finest(l) / l->refinement[b->level];
+        const int step = get_finest_level(l) / l->refinement[b->level];
         const int wide[2] = {(int)part->given.lattice->cells[0] + 1, (int)part->given.lattice->cells[1] + 1};
         const double *values = part->scalar_count == 1 ? part->scalars[0].vertex_values : NULL;
         if (!values && part->drawn_count) return false;
@@ -350,8 +351,8 @@ static bool are_values_true(const insitu_session *session, const levels *l)
                 int vertex[3];
                 for (int axis = 0; axis < 3; axis++)
                     vertex[axis] = ((int)part->given.lattice->first[axis] + index[axis]) * step;
-                const double expected = value_at(l, vertex);
-                if (fabs(values[v] - expected) <= error_at(l, vertex)) continue;
+                const double expected = compute_expected_value(l, vertex);
+                if (fabs(values[v] - expected) <= compute_allowed_error(l, vertex)) continue;
                 fprintf(stderr, "block %d, level %d, vertex %d %d %d of the finest: %.17g, expected %.17g\n",
                         (int)part->block, b->level, vertex[0], vertex[1], vertex[2], values[v], expected);
                 return false;
@@ -361,17 +362,18 @@ static bool are_values_true(const insitu_session *session, const levels *l)
     return true;
 }
 
-static int64_t count_covered(const levels *l, const box *b)
+static int64_t count_covered_pixels(const levels *l, const box *b)
 {
-    const int of = l->refinement[b->level], step = finest(l) / of;
+    const int of = l->refinement[b->level], step = get_finest_level(l) / of;
     const int wide[3] = {(b->upper[0] - b->lower[0]) * of, (b->upper[1] - b->lower[1]) * of,
                          (b->upper[2] - b->lower[2]) * of};
     int64_t count = 0;
     for (int cell = 0; cell < wide[0] * wide[1] * wide[2]; cell++) {
         const int at[3] = {cell % wide[0], cell / wide[0] % wide[1], cell / wide[0] / wide[1]};
         int twice[3];
-        for (int axis = 0; axis < 3; axis++) twice[axis] = 2 * (b->lower[axis] * finest(l) + at[axis] * step) + step;
-        count += level_at(l, twice) > b->level;
+        for (int axis = 0; axis < 3; axis++)
+            twice[axis] = 2 * (b->lower[axis] * get_finest_level(l) + at[axis] * step) + step;
+        count += find_level(l, twice) > b->level;
     }
     return count;
 }
@@ -387,8 +389,8 @@ static int64_t count_ghosts(const levels *l)
             inner *= wide;
             all *= wide + 2;
         }
-        count += count_covered(l, &l->boxes[i]);
-        if (layer_of(l, i) != NO_LAYER) count += all - inner;
+        count += count_covered_pixels(l, &l->boxes[i]);
+        if (get_ghost_layer(l, i) != NO_LAYER) count += all - inner;
     }
     return count;
 }
@@ -407,7 +409,7 @@ static int count_slits(const caught_picture *picture)
     return slits;
 }
 
-static caught_picture take_step(insitu_session *session, int cycle)
+static caught_picture step_and_take_picture(insitu_session *session, int cycle)
 {
     discard_pictures();
     const insitu_status status = insitu_step(session, cycle, cycle);
@@ -417,22 +419,22 @@ static caught_picture take_step(insitu_session *session, int cycle)
 }
 
 /* Draws the levels in a new session. */
-static caught_picture draw(MPI_Comm comm, const char *scene, const levels *l, bool *is_true)
+static caught_picture draw_levels(MPI_Comm comm, const char *scene, const levels *l, bool *is_true)
 {
     block blocks[MOST_BLOCKS];
     insitu_session *session = open_session(comm, scene);
     make_blocks(l, blocks);
     assert_true(submit_levels(session, l, blocks));
-    const caught_picture picture = take_step(session, 0);
+    const caught_picture picture = step_and_take_picture(session, 0);
     int64_t ghosts = insitu_last_report(session)->cells_ghost;
     MPI_Allreduce(MPI_IN_PLACE, &ghosts, 1, MPI_INT64_T, MPI_SUM, comm);
-    *is_true = are_values_true(session, l) && ghosts == count_ghosts(l);
+    *is_true = check_vertex_values(session, l) && ghosts == count_ghosts(l);
     insitu_destroy(&session);
     free_blocks(l, blocks);
     return picture;
 }
 
-static void check(levels l)
+static void check_levels(levels l)
 {
     const char *scene = write_scene(scene_text);
     bool is_true = true, is_alone_true = true, is_well = true;
@@ -444,14 +446,14 @@ static void check(levels l)
     make_levels(&whole);
     l.rank = own_rank;
     l.ranks = rank_count;
-    if (own_rank == 0) alone = draw(MPI_COMM_SELF, scene, &whole, &is_alone_true);
-    caught_picture ours = draw(MPI_COMM_WORLD, scene, &l, &is_true);
+    if (own_rank == 0) alone = draw_levels(MPI_COMM_SELF, scene, &whole, &is_alone_true);
+    caught_picture ours = draw_levels(MPI_COMM_WORLD, scene, &l, &is_true);
     if (own_rank == 0) {
-        is_well = count_slits(&alone) == 0 && same_pictures(&ours, &alone);
+        is_well = count_slits(&alone) == 0 && are_same_pictures(&ours, &alone);
         if (!is_well)
             fprintf(stderr, "levels of %d, %d, grid %d%s: %d pixels torn; %s\n", l.refinement[1], l.refinement[2],
                     l.grid, l.is_of_cells ? ", values of cells" : "", count_slits(&alone),
-                    same_pictures(&ours, &alone) ? "the same" : "another picture on ranks");
+                    are_same_pictures(&ours, &alone) ? "the same" : "another picture on ranks");
     }
     free_caught(&ours);
     free_caught(&alone);
@@ -469,7 +471,7 @@ static void a_sphere_continues_across_levels(void **state)
     (void)state;
     for (int i = 0; i < 4; i++)
         for (int of_cells = 0; of_cells < 2; of_cells++) {
-            if (!test_is_whole() && (of_cells != i % 2 || i / 2 != (rank_count > 1))) continue;
+            if (!test_is_long_run() && (of_cells != i % 2 || i / 2 != (rank_count > 1))) continue;
             levels l = {.grid = i % GRIDS,
                         .is_of_cells = of_cells,
                         .is_by_level = i == 1,
@@ -477,7 +479,7 @@ static void a_sphere_continues_across_levels(void **state)
                         .is_mixed = i > 1,
                         .off = i == 3 ? DBL_EPSILON : 0};
             memcpy(l.refinement, refinements[i], sizeof l.refinement);
-            check(l);
+            check_levels(l);
         }
 }
 
@@ -488,7 +490,7 @@ static const char walls_text[] =
 
 /* Checks that a transparent surface of levels equals that of one block of the domain: its planes are the same up to
  * rounding, on which no colour depends, and a wall between levels would be visible in it. */
-static void outer_surfaces_have_no_wall_between_levels(void **state)
+static void outer_surfaces_have_no_faces_between_levels(void **state)
 {
     static const int domain[2][3] = {{0, 0, 0}, {SIDE, SIDE, SIDE}};
     const char *scene = write_scene(walls_text);
@@ -503,16 +505,16 @@ static void outer_surfaces_have_no_wall_between_levels(void **state)
         insitu_session *session = open_session(MPI_COMM_WORLD, scene);
         make_blocks(&l, blocks);
         everywhere(submit_levels(session, &l, blocks));
-        caught_picture ours = take_step(session, 0);
+        caught_picture ours = step_and_take_picture(session, 0);
         insitu_destroy(&session);
         free_blocks(&l, blocks);
         session = open_session(MPI_COMM_WORLD, scene);
         make_blocks(&plain, blocks);
         everywhere(submit_levels(session, &plain, blocks));
-        caught_picture expected = take_step(session, 0);
+        caught_picture expected = step_and_take_picture(session, 0);
         insitu_destroy(&session);
         free_blocks(&plain, blocks);
-        everywhere(own_rank || colour_difference(&ours, &expected) < 1e-5);
+        everywhere(own_rank || largest_colour_difference(&ours, &expected) < 1e-5);
         free_caught(&ours);
         free_caught(&expected);
     }
@@ -520,7 +522,7 @@ static void outer_surfaces_have_no_wall_between_levels(void **state)
 
 /* Checks blocks that change: at every step some blocks of another grid of levels replace those of the last one, on
  * other ranks. */
-static void levels_come_and_go(void **state)
+static void levels_are_added_and_removed(void **state)
 {
     const char *scene = write_scene(scene_text);
     levels last = {.refinement = {1, 2, 4}, .rank = own_rank, .ranks = rank_count};
@@ -543,13 +545,13 @@ static void levels_come_and_go(void **state)
         free_blocks(&last, held);
         memcpy(held, blocks, sizeof held);
         last = l;
-        caught_picture ours = take_step(session, cycle);
-        everywhere(are_values_true(session, &l));
+        caught_picture ours = step_and_take_picture(session, cycle);
+        everywhere(check_vertex_values(session, &l));
         whole = l;
         whole.rank = 0;
         whole.ranks = 1;
-        if (own_rank == 0) alone = draw(MPI_COMM_SELF, scene, &whole, &is_true);
-        everywhere(is_true && (own_rank || same_pictures(&ours, &alone)));
+        if (own_rank == 0) alone = draw_levels(MPI_COMM_SELF, scene, &whole, &is_true);
+        everywhere(is_true && (own_rank || are_same_pictures(&ours, &alone)));
         free_caught(&ours);
         free_caught(&alone);
     }
@@ -559,7 +561,7 @@ static void levels_come_and_go(void **state)
 
 /* Checks the removal of a block of the finest level: blocks whose covered cells stay the same are not made again, and
  * keep their trees. */
-static void blocks_beside_a_change_stay(void **state)
+static void blocks_adjacent_to_a_change_are_kept(void **state)
 {
     levels l = {.refinement = {1, 2, 4}, .rank = own_rank, .ranks = rank_count}, rest;
     block blocks[MOST_BLOCKS];
@@ -573,18 +575,18 @@ static void blocks_beside_a_change_stay(void **state)
     rest = l;
     rest.count = gone;
     everywhere(submit_levels(session, &l, blocks));
-    caught_picture picture = take_step(session, 0);
+    caught_picture picture = step_and_take_picture(session, 0);
     free_caught(&picture);
     for (int i = 0; i < gone; i++)
         if (blocks[i].values) stamps[i] = session_find_block(&session->meshes, "m", i)->cells_stamp;
     everywhere(!blocks[gone].values || !insitu_set_block(session, "m", gone, NULL));
-    picture = take_step(session, 1);
+    picture = step_and_take_picture(session, 1);
     free_caught(&picture);
     bool is_well = true;
     for (int i = 0; i < gone; i++) {
         if (!blocks[i].values) continue;
         const session_mesh *part = session_find_block(&session->meshes, "m", i);
-        const bool is_uncovered = count_covered(&rest, &l.boxes[i]) < count_covered(&l, &l.boxes[i]);
+        const bool is_uncovered = count_covered_pixels(&rest, &l.boxes[i]) < count_covered_pixels(&l, &l.boxes[i]);
         is_well = is_well && (part->cells_stamp != stamps[i]) == is_uncovered;
         renewed += is_uncovered;
         kept += !is_uncovered;
@@ -606,12 +608,12 @@ static void blocks_that_do_not_fit_are_reported(void **state)
     for (int i = 0; i < l.count; i++)
         if (blocks[i].values && l.boxes[i].level == 2) blocks[i].lattice.first[1]++;
     everywhere(submit_levels(session, &l, blocks));
-    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_MESH, "mesh \"m[", "refinement along j is 4",
-                        "begin and end at borders of coarser cells");
+    check_reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_MESH, "mesh \"m[",
+                              "refinement along j is 4", "begin and end at borders of coarser cells");
     for (int i = 0; i < l.count; i++)
         if (blocks[i].values && l.boxes[i].level == 2) blocks[i].lattice.first[1]--;
     everywhere(submit_levels(session, &l, blocks));
-    caught_picture picture = take_step(session, 1);
+    caught_picture picture = step_and_take_picture(session, 1);
     everywhere(own_rank || count_slits(&picture) == 0);
     free_caught(&picture);
     blocks[0].lattice.refinement[2] = 0;
@@ -620,8 +622,8 @@ static void blocks_that_do_not_fit_are_reported(void **state)
     } else {
         everywhere(true);
     }
-    reported_everywhere(session, insitu_step(session, 2, 2), INSITU_ERROR_MESH,
-                        "mesh \"m[0]\": lattice: refinement along k is 0, expected 1..1048576");
+    check_reported_everywhere(session, insitu_step(session, 2, 2), INSITU_ERROR_MESH,
+                              "mesh \"m[0]\": lattice: refinement along k is 0, expected 1..1048576");
     insitu_destroy(&session);
     free_blocks(&l, blocks);
 }
@@ -657,7 +659,7 @@ static int count_holes(const caught_picture *picture)
 
 /* Checks that the finest block may begin in the middle of a cell of the coarsest level if the level between covers that
  * cell. Without the level between it is an error. */
-static void levels_between_let_finer_ones_begin_within_a_cell(void **state)
+static void intermediate_levels_allow_finer_levels_within_a_cell(void **state)
 {
     static const int of[3] = {1, 2, 4}, first[3] = {0, 2, 6}, cells[3] = {4, 4, 4};
     const levels l = {.rank = own_rank, .ranks = rank_count};
@@ -673,33 +675,33 @@ static void levels_between_let_finer_ones_begin_within_a_cell(void **state)
         }
         everywhere(is_set);
         if (has_middle) {
-            caught_picture picture = take_step(session, 0);
+            caught_picture picture = step_and_take_picture(session, 0);
             int64_t ghosts = insitu_last_report(session)->cells_ghost;
             MPI_Allreduce(MPI_IN_PLACE, &ghosts, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
             everywhere(ghosts == 8 + 8 && (own_rank || count_holes(&picture) == 0));
             free_caught(&picture);
         } else {
-            reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_MESH, "mesh \"m[0]\"", "block 2 of",
-                                "covers part of a cell");
+            check_reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_MESH, "mesh \"m[0]\"",
+                                      "block 2 of", "covers part of a cell");
         }
         insitu_destroy(&session);
         for (int i = 0; i < 3; i++) free(blocks[i].values);
     }
 }
 
-static int begin_tests(void **state)
+static int set_up_test_group(void **state)
 {
     (void)state;
-    return enter_folder("levels") ? 0 : 1;
+    return enter_test_folder("levels") ? 0 : 1;
 }
 
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(a_sphere_continues_across_levels),
-                                       cmocka_unit_test(outer_surfaces_have_no_wall_between_levels),
-                                       cmocka_unit_test(levels_come_and_go),
-                                       cmocka_unit_test(blocks_beside_a_change_stay),
+                                       cmocka_unit_test(outer_surfaces_have_no_faces_between_levels),
+                                       cmocka_unit_test(levels_are_added_and_removed),
+                                       cmocka_unit_test(blocks_adjacent_to_a_change_are_kept),
                                        cmocka_unit_test(blocks_that_do_not_fit_are_reported),
-                                       cmocka_unit_test(levels_between_let_finer_ones_begin_within_a_cell)};
-    return run_session_tests(argc, argv, tests, begin_tests, NULL);
+                                       cmocka_unit_test(intermediate_levels_allow_finer_levels_within_a_cell)};
+    return run_session_tests(argc, argv, tests, set_up_test_group, NULL);
 }

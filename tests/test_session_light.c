@@ -23,14 +23,14 @@ static const double eye[3] = {3, 2.2, 4};
 
 /* ---- pictures ------------------------------------------------------------------------------------------------ */
 
-static caught_picture draw(MPI_Comm comm, const char *scene, const session_input *in)
+static caught_picture draw_lit_scene(MPI_Comm comm, const char *scene, const session_input *in)
 {
     insitu_session *session = NULL;
     assert_int_equal(insitu_create_from_text(comm, scene, &session), INSITU_OK);
-    return draw_once(&session, in);
+    return submit_and_draw(&session, in);
 }
 
-static void camera_ray(int pixel, double base[3], double direction[3])
+static void make_camera_ray(int pixel, double base[3], double direction[3])
 {
     render_camera camera;
     render_camera_look_at(&camera, eye, (const double[]){0, 0, 0}, (const double[]){0, 1, 0}, 40, WIDTH, HEIGHT);
@@ -38,14 +38,14 @@ static void camera_ray(int pixel, double base[3], double direction[3])
 }
 
 /* Computes the position on the pixel's ray at the depth. */
-static void place_at(int pixel, double depth, double out[3])
+static void compute_ray_position(int pixel, double depth, double out[3])
 {
     double base[3], direction[3];
-    camera_ray(pixel, base, direction);
+    make_camera_ray(pixel, base, direction);
     for (int a = 0; a < 3; a++) out[a] = base[a] + depth * direction[a];
 }
 
-static void normal_at(const caught_picture *picture, int pixel, double out[3])
+static void decode_normal(const caught_picture *picture, int pixel, double out[3])
 {
     for (int a = 0; a < 3; a++) out[a] = (double)picture->data[a * PIXELS + pixel];
 }
@@ -55,11 +55,11 @@ static void make_jittered(session_input *in, test_mesh_kind kind, double jitter,
                           test_partition_kind distributed, int rank, int count)
 {
     test_mesh whole;
-    test_mesh_lattice(kind, SIDE, jitter, f, &whole);
+    test_mesh_make_lattice(kind, SIDE, jitter, f, &whole);
     int *owners = calloc((size_t)whole.cell_count, sizeof *owners);
     assert_non_null(owners);
-    test_partition(&whole, distributed, SIDE, count, owners);
-    test_mesh_part(&whole, owners, rank, &in->part);
+    test_partition_cells(&whole, distributed, SIDE, count, owners);
+    test_mesh_extract_part(&whole, owners, rank, &in->part);
     free(owners);
     test_mesh_free(&whole);
     input_describe(in);
@@ -85,10 +85,10 @@ static const double to_light[3] = {2. / 7, 6. / 7, 3. / 7};
 #define LIGHT(more) "    lights: [{direction: [2, 6, 3], in: world" more "}]\n"
 
 /* Returns 1 in the light, 0 in the shadow, -1 if rounding decides or the floor is invisible. */
-static int floor_light(int pixel, double depth)
+static int compute_floor_light(int pixel, double depth)
 {
     double place[3], across = 0;
-    place_at(pixel, depth, place);
+    compute_ray_position(pixel, depth, place);
     if (fabs(place[1] + 0.5) > 1e-5) return -1;
     const double rise = 0.75 / to_light[1];
     const double at[2] = {place[0] + rise * to_light[0] - 0.1, place[2] + rise * to_light[2] + 0.2};
@@ -108,7 +108,7 @@ static tally verify_floor(const caught_picture *shadowed, const caught_picture *
     const double full = 0.2 + 0.8 * to_light[1];
     for (int p = 0; p < PIXELS; p++) {
         const double depth = (double)shadowed->depth[p];
-        const int light = isfinite(depth) ? floor_light(p, depth) : -1;
+        const int light = isfinite(depth) ? compute_floor_light(p, depth) : -1;
         if (light < 0) continue;
         out.lit += light;
         out.dark += !light;
@@ -125,8 +125,9 @@ static tally draw_floor(test_mesh_kind kind, const char *scene, const char *lit_
 {
     session_input in = {0};
     tally out = {0};
-    make_part(&in, kind, test_linear, TEST_RANDOM, own_rank, rank_count);
-    caught_picture shadowed = draw(MPI_COMM_WORLD, scene, &in), lit = draw(MPI_COMM_WORLD, lit_scene, &in);
+    make_part(&in, kind, test_linear_field, TEST_RANDOM, own_rank, rank_count);
+    caught_picture shadowed = draw_lit_scene(MPI_COMM_WORLD, scene, &in),
+                   lit = draw_lit_scene(MPI_COMM_WORLD, lit_scene, &in);
     if (own_rank == 0) out = verify_floor(&shadowed, &lit);
     free_caught(&shadowed);
     free_caught(&lit);
@@ -134,7 +135,7 @@ static tally draw_floor(test_mesh_kind kind, const char *scene, const char *lit_
     return out;
 }
 
-static void disks_throw_ellipses(void **context)
+static void shadows_of_disks_are_ellipses(void **context)
 {
     (void)context;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
@@ -172,9 +173,9 @@ static void transparent_layers_cast_no_shadow(void **context)
     for (size_t i = 0; i < sizeof scenes / sizeof *scenes; i++) {
         session_input in = {0};
         double worst = 0;
-        make_part(&in, TEST_MIXED, test_linear, TEST_RANDOM, own_rank, rank_count);
-        caught_picture shadowed = draw(MPI_COMM_WORLD, scenes[i][0], &in),
-                       lit = draw(MPI_COMM_WORLD, scenes[i][1], &in);
+        make_part(&in, TEST_MIXED, test_linear_field, TEST_RANDOM, own_rank, rank_count);
+        caught_picture shadowed = draw_lit_scene(MPI_COMM_WORLD, scenes[i][0], &in),
+                       lit = draw_lit_scene(MPI_COMM_WORLD, scenes[i][1], &in);
         for (int k = 0; k < 4 * PIXELS && own_rank == 0; k++)
             worst = fmax(worst, fabs((double)shadowed.rgba[k] - (double)lit.rgba[k]));
         free_caught(&shadowed);
@@ -202,7 +203,7 @@ typedef struct corner {
 static const corner slices = {{{{0, 0.8, 0.6}, -0.4}, {{0.8, -0.36, 0.48}, -0.3}}, 0};
 static const double radius = 0.4;
 
-static double above(const corner *c, int plane, const double place[3])
+static double signed_distance_above_plane(const corner *c, int plane, const double place[3])
 {
     const double *n = c->planes[plane].normal;
     return n[0] * place[0] + n[1] * place[1] + n[2] * place[2] - c->planes[plane].distance;
@@ -210,11 +211,12 @@ static double above(const corner *c, int plane, const double place[3])
 
 /* Returns whether the ray meets a plane within the radius: 1, 0, or -1 if rounding or the corner's least distance
  * decides. */
-static int corner_blocks(const corner *c, const double from[3], const double d[3])
+static int is_blocked_by_corner(const corner *c, const double from[3], const double d[3])
 {
     for (int i = 0; i < 2; i++) {
         const double ahead[3] = {from[0] + d[0], from[1] + d[1], from[2] + d[2]};
-        const double height = above(c, i, from), way = height / (height - above(c, i, ahead));
+        const double height = signed_distance_above_plane(c, i, from),
+                     way = height / (height - signed_distance_above_plane(c, i, ahead));
         double most = 0;
         if (fabs(height) < 1e-5) continue; /* the ray begins on this plane */
         if (fabs(way - radius) < 1e-4) return -1;
@@ -240,11 +242,11 @@ static sky verify_sky(const corner *c, const caught_picture *drawn, const caught
         double place[3], n[3], d[3];
         int open = 0, undecided_rays = 0;
         if (!isfinite(drawn->depth[p])) continue;
-        place_at(p, (double)drawn->depth[p], place);
-        normal_at(drawn, p, n);
+        compute_ray_position(p, (double)drawn->depth[p], place);
+        decode_normal(drawn, p, n);
         for (int k = 0; k < SAMPLES; k++) {
-            test_hemisphere((uint32_t)p, WIDTH, SAMPLES, k, n, d);
-            const int blocked = corner_blocks(c, place, d);
+            test_hemisphere_direction((uint32_t)p, WIDTH, SAMPLES, k, n, d);
+            const int blocked = is_blocked_by_corner(c, place, d);
             open += blocked == 0;
             undecided_rays += blocked < 0;
         }
@@ -260,7 +262,7 @@ static sky verify_sky(const corner *c, const caught_picture *drawn, const caught
     return out;
 }
 
-static void corners_are_as_dark_as_disk_segments(void **context)
+static void ambient_occlusion_of_corners_matches_disk_segments(void **context)
 {
 #define CORNER                                                                                                         \
     "      - slice: {field: f, map: {colours: [[0.5, 0.5, 0.5], [1, 1, 1]]}, planes:\n"                                \
@@ -269,10 +271,10 @@ static void corners_are_as_dark_as_disk_segments(void **context)
     (void)context;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         session_input in = {0};
-        make_part(&in, kind, test_linear, TEST_RANDOM, own_rank, rank_count);
-        caught_picture drawn =
-            draw(MPI_COMM_WORLD, IMAGE(DARK "    ambient_occlusion: {samples: 16, radius: 0.4}\n", CORNER), &in);
-        caught_picture plain = draw(MPI_COMM_WORLD, IMAGE(DARK, CORNER), &in);
+        make_part(&in, kind, test_linear_field, TEST_RANDOM, own_rank, rank_count);
+        caught_picture drawn = draw_lit_scene(
+            MPI_COMM_WORLD, IMAGE(DARK "    ambient_occlusion: {samples: 16, radius: 0.4}\n", CORNER), &in);
+        caught_picture plain = draw_lit_scene(MPI_COMM_WORLD, IMAGE(DARK, CORNER), &in);
         bool is_right = true;
         if (own_rank == 0) {
             const sky s = verify_sky(&slices, &drawn, &plain);
@@ -281,9 +283,11 @@ static void corners_are_as_dark_as_disk_segments(void **context)
             for (int p = 0; p < PIXELS; p++) {
                 double at[3];
                 if (!isfinite(drawn.depth[p])) continue;
-                place_at(p, (double)drawn.depth[p], at);
+                compute_ray_position(p, (double)drawn.depth[p], at);
                 /* The angle is measured from the plane on which the position is not. */
-                const double ratio = fmax(fabs(above(&slices, 0, at)), fabs(above(&slices, 1, at))) / radius;
+                const double ratio = fmax(fabs(signed_distance_above_plane(&slices, 0, at)),
+                                          fabs(signed_distance_above_plane(&slices, 1, at))) /
+                                     radius;
                 expected += ratio < 1 ? 1 - (acos(ratio) - ratio * sqrt(1 - ratio * ratio)) / acos(-1.0) : 1;
                 count++;
             }
@@ -316,7 +320,7 @@ static double valley_field(const double p[3])
 /* Checks valleys. Cells are up to half a unit wide. A surface of an isosurface nearer than a fifth of its cell need not
  * hide anything (session_layers.c), but everything farther must: so also in the pixels counted as near, in which the
  * other side is just beyond that distance. */
-static void valleys_are_dark_to_the_ground(void **context)
+static void ambient_occlusion_darkens_valleys(void **context)
 {
     static const double root = 0.70710678118654752;
     const corner valley = {{{{-root, 0, root}, -0.3 * root}, {{root, 0, root}, -0.3 * root}}, 0.2 * 2.0 / SIDE};
@@ -325,9 +329,9 @@ static void valleys_are_dark_to_the_ground(void **context)
         session_input in = {0};
         if (kind == TEST_POLYHEDRA) continue; /* some polyhedra have parts on both sides of the bottom */
         make_jittered(&in, kind, 0, valley_field, TEST_RANDOM, own_rank, rank_count);
-        caught_picture drawn =
-            draw(MPI_COMM_WORLD, IMAGE(DARK "    ambient_occlusion: {samples: 16, radius: 0.4}\n", VALLEY), &in);
-        caught_picture plain = draw(MPI_COMM_WORLD, IMAGE(DARK, VALLEY), &in);
+        caught_picture drawn = draw_lit_scene(
+            MPI_COMM_WORLD, IMAGE(DARK "    ambient_occlusion: {samples: 16, radius: 0.4}\n", VALLEY), &in);
+        caught_picture plain = draw_lit_scene(MPI_COMM_WORLD, IMAGE(DARK, VALLEY), &in);
         bool is_right = true;
         if (own_rank == 0) {
             const sky s = verify_sky(&valley, &drawn, &plain);
@@ -335,8 +339,9 @@ static void valleys_are_dark_to_the_ground(void **context)
             for (int p = 0; p < PIXELS; p++) {
                 double at[3];
                 if (!isfinite(drawn.depth[p])) continue;
-                place_at(p, (double)drawn.depth[p], at);
-                const double height = fmax(above(&valley, 0, at), above(&valley, 1, at));
+                compute_ray_position(p, (double)drawn.depth[p], at);
+                const double height =
+                    fmax(signed_distance_above_plane(&valley, 0, at), signed_distance_above_plane(&valley, 1, at));
                 near += height > valley.least && height < 2 * valley.least;
             }
             is_right = s.wrong == 0 && s.pixels > 200 && near > 12 && s.undecided_rays < s.pixels / 10;
@@ -365,10 +370,11 @@ static void valleys_are_dark_to_the_ground(void **context)
           "      - isosurface: {field: f, values: [0.3]}\n"                                                            \
           "      - volume: {field: f, opacity: [[0, 0], [1, 0.4]]}\n")
 
-static double difference(const caught_picture *a, const caught_picture *b)
+static double largest_difference(const caught_picture *a, const caught_picture *b)
 {
     double worst = 0;
-    for (int i = 0; i < 4 * PIXELS; i++) worst = test_worse(worst, fabs((double)a->rgba[i] - (double)b->rgba[i]));
+    for (int i = 0; i < 4 * PIXELS; i++)
+        worst = test_larger_error(worst, fabs((double)a->rgba[i] - (double)b->rgba[i]));
     for (int i = 0; i < PIXELS; i++)
         if (memcmp(&a->depth[i], &b->depth[i], sizeof *a->depth) != 0) return INFINITY;
     return worst;
@@ -380,10 +386,10 @@ static void verify_partition(const char *scene, const session_input *whole, cons
                              const char *what)
 {
     double off = 0;
-    caught_picture distributed = draw(MPI_COMM_WORLD, scene, part);
+    caught_picture distributed = draw_lit_scene(MPI_COMM_WORLD, scene, part);
     if (own_rank == 0) {
-        caught_picture alone = draw(MPI_COMM_SELF, scene, whole);
-        off = difference(&distributed, &alone);
+        caught_picture alone = draw_lit_scene(MPI_COMM_SELF, scene, whole);
+        off = largest_difference(&distributed, &alone);
         free_caught(&alone);
     }
     free_caught(&distributed);
@@ -399,8 +405,8 @@ static void lit_pictures_are_the_same_on_any_partition(void **context)
             session_input whole = {0}, part = {0};
             /* In random partitions the last rank has no cells. */
             const int count = distributed == TEST_RANDOM && rank_count > 1 ? rank_count - 1 : rank_count;
-            make_part(&whole, kind, test_wave, TEST_BLOCK, 0, 1);
-            make_part(&part, kind, test_wave, distributed, own_rank, count);
+            make_part(&whole, kind, test_wave_field, TEST_BLOCK, 0, 1);
+            make_part(&part, kind, test_wave_field, distributed, own_rank, count);
             verify_partition(EVERYTHING, &whole, &part, 0, test_mesh_kind_name(kind));
             if (distributed == TEST_CHECKERBOARD)
                 verify_partition(WITH_VOLUME, &whole, &part, 1e-6, test_mesh_kind_name(kind));
@@ -410,15 +416,15 @@ static void lit_pictures_are_the_same_on_any_partition(void **context)
 }
 
 /* Checks that ghosts cast no shadow: every rank has all cells, of which those of other ranks are ghosts. */
-static void ghost_cells_cast_nothing(void **context)
+static void ghost_cells_cast_no_shadow(void **context)
 {
     session_input whole = {0}, part = {0};
     (void)context;
-    make_part(&whole, TEST_HEXES, test_wave, TEST_BLOCK, 0, 1);
-    make_part(&part, TEST_HEXES, test_wave, TEST_BLOCK, 0, 1);
+    make_part(&whole, TEST_HEXES, test_wave_field, TEST_BLOCK, 0, 1);
+    make_part(&part, TEST_HEXES, test_wave_field, TEST_BLOCK, 0, 1);
     int *owners = calloc((size_t)part.part.cell_count, sizeof *owners);
     assert_non_null(owners);
-    test_partition(&part.part, TEST_RANDOM, SIDE, rank_count, owners);
+    test_partition_cells(&part.part, TEST_RANDOM, SIDE, rank_count, owners);
     for (int64_t cell = 0; cell < part.part.cell_count; cell++) part.part.ghosts[cell] = owners[cell] != own_rank;
     free(owners);
     input_describe(&part);
@@ -430,12 +436,12 @@ static void ghost_cells_cast_nothing(void **context)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(disks_throw_ellipses),
+        cmocka_unit_test(shadows_of_disks_are_ellipses),
         cmocka_unit_test(transparent_layers_cast_no_shadow),
-        cmocka_unit_test(corners_are_as_dark_as_disk_segments),
-        cmocka_unit_test(valleys_are_dark_to_the_ground),
+        cmocka_unit_test(ambient_occlusion_of_corners_matches_disk_segments),
+        cmocka_unit_test(ambient_occlusion_darkens_valleys),
         cmocka_unit_test(lit_pictures_are_the_same_on_any_partition),
-        cmocka_unit_test(ghost_cells_cast_nothing),
+        cmocka_unit_test(ghost_cells_cast_no_shadow),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -34,7 +34,7 @@ static const struct lines_case {
 enum { CASES = sizeof cases / sizeof *cases };
 
 /* Returns values at cells: the mean of x and y of the first four vertices of each cell. */
-static double *cell_values(const test_mesh *mesh)
+static double *make_cell_values(const test_mesh *mesh)
 {
     double *values = malloc((size_t)(mesh->cell_count + 1) * sizeof *values);
     assert_non_null(values);
@@ -49,10 +49,10 @@ static double *cell_values(const test_mesh *mesh)
     return values;
 }
 
-static caught_picture draw(MPI_Comm comm, const char *scene, const session_input *in)
+static caught_picture draw_lines(MPI_Comm comm, const char *scene, const session_input *in)
 {
     insitu_session *session = open_session(comm, scene);
-    double *values = cell_values(&in->part);
+    double *values = make_cell_values(&in->part);
     insitu_field field;
     insitu_field_defaults(&field);
     field.name = "c";
@@ -60,7 +60,7 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const session_input
     field.count = in->part.cell_count;
     field.values = (insitu_array){values, INSITU_FLOAT64, 0};
     discard_pictures();
-    assert_int_equal(submit(session, in), INSITU_OK);
+    assert_int_equal(submit_input(session, in), INSITU_OK);
     if (in->part.cell_count) assert_int_equal(insitu_set_field(session, "m", &field), INSITU_OK);
     const insitu_status status = insitu_step(session, 0, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
@@ -72,7 +72,7 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const session_input
 }
 
 /* Counts the pixels in which two pictures differ. */
-static int count_differing(const caught_picture *a, const caught_picture *b)
+static int count_differing_pixels(const caught_picture *a, const caught_picture *b)
 {
     int count = 0;
     for (int p = 0; p < WIDTH * HEIGHT; p++) count += memcmp(a->rgba + 4 * p, b->rgba + 4 * p, 4 * sizeof(float)) != 0;
@@ -89,17 +89,17 @@ static void lines_are_the_same_on_all_ranks(void **state)
             input_create(&part, kinds[k], SIDE, TEST_RANDOM, own_rank, rank_count);
             input_create(&whole, kinds[k], SIDE, TEST_BLOCK, 0, 1);
             const char *scene = write_scene(cases[i].with);
-            caught_picture ours = draw(MPI_COMM_WORLD, scene, &part), alone = {0}, without = {0};
+            caught_picture ours = draw_lines(MPI_COMM_WORLD, scene, &part), alone = {0}, without = {0};
             bool is_well = true;
-            if (own_rank == 0) alone = draw(MPI_COMM_SELF, scene, &whole);
+            if (own_rank == 0) alone = draw_lines(MPI_COMM_SELF, scene, &whole);
             scene = write_scene(cases[i].without);
             if (own_rank == 0) {
-                without = draw(MPI_COMM_SELF, scene, &whole);
-                const int lines = count_differing(&alone, &without);
-                is_well = same_pictures(&ours, &alone) && lines > 40 && lines < WIDTH * HEIGHT / 2;
+                without = draw_lines(MPI_COMM_SELF, scene, &whole);
+                const int lines = count_differing_pixels(&alone, &without);
+                is_well = are_same_pictures(&ours, &alone) && lines > 40 && lines < WIDTH * HEIGHT / 2;
                 if (!is_well)
                     fprintf(stderr, "case %d, %s: %d pixels with lines, %d differ\n", i, test_mesh_kind_name(kinds[k]),
-                            lines, count_differing(&ours, &alone));
+                            lines, count_differing_pixels(&ours, &alone));
             }
             everywhere(is_well);
             free_caught(&ours);
@@ -114,21 +114,22 @@ static void lines_are_the_same_on_all_ranks(void **state)
 
 /* Returns the fraction of a pixel that a line of a value covers on the front of the cube, z = 1, seen from the front:
  * the field is linear, and a pixel is `size` wide. */
-static double front_share(double x, double y, double size, double level)
+static double compute_front_coverage(double x, double y, double size, double level)
 {
     const double at[3] = {x, y, 1}, right[3] = {x + 1, y, 1}, up[3] = {x, y + 1, 1};
-    const double value = test_linear(at), slope = hypot(test_linear(right) - value, test_linear(up) - value);
+    const double value = test_linear_field(at),
+                 slope = hypot(test_linear_field(right) - value, test_linear_field(up) - value);
     return fmin(fmax(1.25 - fabs(value - level) / (slope * size), 0), 1);
 }
 
 /* Compares the coverage. Values in float are off by 1e-7, and the field changes by 0.04 from one pixel to the next. */
-static bool are_on_front(const caught_picture *picture)
+static bool are_lines_exact_on_front(const caught_picture *picture)
 {
     const double size = 2.4 / HEIGHT;
     int hits = 0;
     for (int p = 0; p < WIDTH * HEIGHT; p++) {
         const double x = (p % WIDTH + 0.5 - WIDTH / 2.0) * size, y = (HEIGHT / 2.0 - p / WIDTH - 0.5) * size;
-        const double share = front_share(x, y, size, 0.1) + front_share(x, y, size, 0.9);
+        const double share = compute_front_coverage(x, y, size, 0.1) + compute_front_coverage(x, y, size, 0.9);
         if (fmax(fabs(x), fabs(y)) > 1) continue;
         hits += share > 0;
         if (fabs((double)picture->rgba[4 * p] - share) < 1e-4) continue;
@@ -138,7 +139,7 @@ static bool are_on_front(const caught_picture *picture)
     return hits > 100;
 }
 
-static void lines_on_outer_surfaces_are_in_their_places(void **state)
+static void lines_on_outer_surfaces_are_at_exact_positions(void **state)
 {
     (void)state;
     const char *scene =
@@ -151,9 +152,10 @@ static void lines_on_outer_surfaces_are_in_their_places(void **state)
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         session_input in;
         input_create(&in, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
-        for (int64_t v = 0; v < in.part.vertex_count; v++) in.part.values[v] = test_linear(in.part.coordinates + 3 * v);
-        caught_picture picture = draw(MPI_COMM_WORLD, scene, &in);
-        const bool is_well = own_rank != 0 || are_on_front(&picture);
+        for (int64_t v = 0; v < in.part.vertex_count; v++)
+            in.part.values[v] = test_linear_field(in.part.coordinates + 3 * v);
+        caught_picture picture = draw_lines(MPI_COMM_WORLD, scene, &in);
+        const bool is_well = own_rank != 0 || are_lines_exact_on_front(&picture);
         if (!is_well) fprintf(stderr, "%s\n", test_mesh_kind_name(kind));
         everywhere(is_well);
         free_caught(&picture);
@@ -172,7 +174,7 @@ static void meshes_without_the_field_are_reported(void **state)
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
     test_mesh other;
     insitu_mesh mesh;
-    test_mesh_lattice(TEST_HEXES, 1, 0, test_linear, &other);
+    test_mesh_make_lattice(TEST_HEXES, 1, 0, test_linear_field, &other);
     describe_part(&other, &mesh);
     insitu_field field;
     insitu_field_defaults(&field);
@@ -180,7 +182,7 @@ static void meshes_without_the_field_are_reported(void **state)
     field.count = other.vertex_count;
     field.values = (insitu_array){other.values, INSITU_FLOAT64, 0};
     discard_pictures();
-    assert_int_equal(submit(session, &in), INSITU_OK);
+    assert_int_equal(submit_input(session, &in), INSITU_OK);
     if (own_rank == 0) {
         assert_int_equal(insitu_set_mesh(session, "n", &mesh), INSITU_OK);
         assert_int_equal(insitu_set_field(session, "n", &field), INSITU_OK);
@@ -197,7 +199,7 @@ static void meshes_without_the_field_are_reported(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(lines_are_the_same_on_all_ranks),
-                                       cmocka_unit_test(lines_on_outer_surfaces_are_in_their_places),
+                                       cmocka_unit_test(lines_on_outer_surfaces_are_at_exact_positions),
                                        cmocka_unit_test(meshes_without_the_field_are_reported)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -46,7 +46,7 @@ static void row_free(row_of_cubes *row)
 
 /* Writes the cube's name. Names of neighbours differ in their first digit, so that sorting by name changes their
  * order. */
-static void name_of(int i, char name[32])
+static void make_cube_name(int i, char name[32])
 {
     snprintf(name, 32, "%d%03d rank %d", i % 10, i / 10, own_rank);
 }
@@ -54,7 +54,7 @@ static void name_of(int i, char name[32])
 static void set_cube(insitu_session *session, bool is_block, int i, const insitu_mesh *mesh)
 {
     char name[32];
-    name_of(i, name);
+    make_cube_name(i, name);
     assert_int_equal(is_block ? insitu_set_block(session, "m", i, mesh) : insitu_set_mesh(session, name, mesh),
                      INSITU_OK);
 }
@@ -62,7 +62,7 @@ static void set_cube(insitu_session *session, bool is_block, int i, const insitu
 static void set_values(insitu_session *session, bool is_block, int i, const insitu_field *field)
 {
     char name[32];
-    name_of(i, name);
+    make_cube_name(i, name);
     assert_int_equal(is_block ? insitu_set_block_field(session, "m", i, field) : insitu_set_field(session, name, field),
                      INSITU_OK);
 }
@@ -95,7 +95,7 @@ static void set_fields(insitu_session *session, bool are_blocks, const row_of_cu
     }
 }
 
-static double cpu_seconds(void)
+static double read_cpu_seconds(void)
 {
     struct timespec now;
     clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
@@ -104,18 +104,18 @@ static double cpu_seconds(void)
 
 /* Measures the CPU seconds of the first step, including its set calls, and the least CPU seconds of later steps with
    new values. `count` is the number of cubes of all ranks together. */
-static void measure(bool are_blocks, int count, double *first, double *later)
+static void measure_steps(bool are_blocks, int count, double *first, double *later)
 {
     row_of_cubes row;
     row_create(&row, count / rank_count);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
     *first = *later = 1e9;
     for (int step = 0; step < STEPS; step++) {
-        const double start = cpu_seconds();
+        const double start = read_cpu_seconds();
         if (step == 0) set_cubes(session, are_blocks, &row);
         set_fields(session, are_blocks, &row, step);
         everywhere(insitu_step(session, step, step) == INSITU_OK);
-        const double seconds = cpu_seconds() - start;
+        const double seconds = read_cpu_seconds() - start;
         if (step == 0) *first = seconds;
         if (step > 0 && seconds < *later) *later = seconds;
     }
@@ -129,8 +129,8 @@ static bool is_linear(bool are_blocks)
 {
     const double most = 8 * sqrt(8);
     double few_first, few, many_first, many;
-    measure(are_blocks, FEW, &few_first, &few);
-    measure(are_blocks, MANY, &many_first, &many);
+    measure_steps(are_blocks, FEW, &few_first, &few);
+    measure_steps(are_blocks, MANY, &many_first, &many);
     int is_within = many < most * few && many_first < most * few_first;
     MPI_Allreduce(MPI_IN_PLACE, &is_within, 1, MPI_INT, MPI_MIN, MPI_COMM_WORLD);
     return is_within;

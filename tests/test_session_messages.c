@@ -25,7 +25,7 @@ static const char plain[] = IMAGE("[24, 16]", "", SURFACE, "");
 
 /* ---- changes made to meshes ----------------------------------------------------------------------------------- */
 
-static void exchange(int64_t *a, int64_t *b)
+static void swap_integers(int64_t *a, int64_t *b)
 {
     const int64_t held = *a;
     *a = *b;
@@ -33,50 +33,51 @@ static void exchange(int64_t *a, int64_t *b)
 }
 
 /* Numbers the vertices of quads row by row: VTK's vertex 2 becomes the fourth vertex, and VTK's vertex 6 the last. */
-static void number_by_rows(session_input *in)
+static void reorder_quads_by_rows(session_input *in)
 {
     for (int64_t cell = 0; cell < in->part.cell_count; cell++) {
         int64_t *vertices = in->part.connectivity + in->part.offsets[cell];
-        exchange(&vertices[2], &vertices[3]);
-        if (in->part.types[cell] == INSITU_HEX) exchange(&vertices[6], &vertices[7]);
+        swap_integers(&vertices[2], &vertices[3]);
+        if (in->part.types[cell] == INSITU_HEX) swap_integers(&vertices[6], &vertices[7]);
     }
 }
 
 /* Removes the jitter, so that the volumes of cells numbered by rows are exactly 0. */
-static void straighten(session_input *in)
+static void remove_jitter(session_input *in)
 {
     for (int64_t i = 0; i < 3 * in->part.vertex_count; i++)
         in->part.coordinates[i] = round((in->part.coordinates[i] + 1) * SIDE / 2) * 2 / SIDE - 1;
 }
 
-static void straighten_by_rows(session_input *in)
+static void remove_jitter_and_reorder(session_input *in)
 {
-    straighten(in);
-    number_by_rows(in);
+    remove_jitter(in);
+    reorder_quads_by_rows(in);
 }
 
-static void flatten(session_input *in)
+static void flatten_cells(session_input *in)
 {
     for (int64_t v = 0; v < in->part.vertex_count; v++) in->part.coordinates[3 * v + 2] = 0;
 }
 
-static void mirror(session_input *in)
+static void mirror_cells(session_input *in)
 {
-    test_mesh_mirror(&in->part, false);
+    test_mesh_mirror_cells(&in->part, false);
 }
 
 /* Mirrors a third of the tets and marks another third as ghosts. */
-static void mirror_some(session_input *in)
+static void mirror_some_cells(session_input *in)
 {
     for (int64_t cell = 0; cell < in->part.cell_count; cell++) {
         in->part.ghosts[cell] = cell % 6 > 3;
-        if (cell % 6 < 2 && cell % 4) exchange(&in->part.connectivity[4 * cell], &in->part.connectivity[4 * cell + 1]);
+        if (cell % 6 < 2 && cell % 4)
+            swap_integers(&in->part.connectivity[4 * cell], &in->part.connectivity[4 * cell + 1]);
     }
 }
 
 static double cell_value;
 
-static void centre_on_cells(session_input *in)
+static void make_cell_field(session_input *in)
 {
     for (int64_t i = 0; i < in->part.vertex_count; i++) in->part.values[i] = cell_value;
     in->field.centring = INSITU_CELL;
@@ -172,24 +173,32 @@ static const struct warning_case {
     {"hexes by rows",
      plain,
      TEST_HEXES,
-     number_by_rows,
+     reorder_quads_by_rows,
      {"mesh \"m\": ", "lexicographic order", "INSITU_ORDER_LEXICOGRAPHIC"}},
     {"straight hexes by rows",
      plain,
      TEST_HEXES,
-     straighten_by_rows,
+     remove_jitter_and_reorder,
      {"lexicographic order", "little of them is seen"}},
-    {"pyramids by rows", plain, TEST_PYRAMIDS, number_by_rows, {"mesh \"m\": ", "lexicographic order"}},
-    {"flat tets", plain, TEST_TETS, flatten, {"mesh \"m\": 384 of 384 cells have no volume", "the order of their"}},
-    {"mirrored hexes", plain, TEST_HEXES, mirror, {"mesh \"m\": 64 of 64 cells are left-handed", "the order of their"}},
-    {"mirrored tets", plain, TEST_TETS, mirror, {"mesh \"m\": 384 of 384 cells are left-handed"}},
+    {"pyramids by rows", plain, TEST_PYRAMIDS, reorder_quads_by_rows, {"mesh \"m\": ", "lexicographic order"}},
+    {"flat tets",
+     plain,
+     TEST_TETS,
+     flatten_cells,
+     {"mesh \"m\": 384 of 384 cells have no volume", "the order of their"}},
+    {"mirrored hexes",
+     plain,
+     TEST_HEXES,
+     mirror_cells,
+     {"mesh \"m\": 64 of 64 cells are left-handed", "the order of their"}},
+    {"mirrored tets", plain, TEST_TETS, mirror_cells, {"mesh \"m\": 384 of 384 cells are left-handed"}},
     {"good tets", plain, TEST_TETS, NULL, {NULL}},
     {"good hexes", plain, TEST_HEXES, NULL, {NULL}},
     {"good wedges", plain, TEST_WEDGES, NULL, {NULL}},
     {"pyramids, half of them left-handed", plain, TEST_PYRAMIDS, NULL, {NULL}},
     {"good mixed cells", plain, TEST_MIXED, NULL, {NULL}},
     {"good polyhedra", plain, TEST_POLYHEDRA, NULL, {NULL}},
-    {"some tets mirrored, some ghosts", plain, TEST_TETS, mirror_some, {NULL}},
+    {"some tets mirrored, some ghosts", plain, TEST_TETS, mirror_some_cells, {NULL}},
     {"an isovalue too high",
      IMAGE("[24, 16]", "", "{isosurface: {field: f, values: [0.1, 7e5]}}", ""),
      TEST_HEXES,
@@ -208,7 +217,7 @@ static const struct warning_case {
     {"cells of another value",
      plain,
      TEST_HEXES,
-     centre_on_cells,
+     make_cell_field,
      {"\"f\" at 0.1 is empty: the field goes from 5 to 5"}},
     {"an isovalue that is the least",
      plain,
@@ -400,8 +409,8 @@ static void check_warning(const struct warning_case *c)
     input_create(&in, c->kind, SIDE, TEST_RANDOM, own_rank, rank_count);
     if (c->corrupt) c->corrupt(&in);
     for (int cycle = 0; cycle < 2; cycle++) {
-        everywhere(submit(session, &in) == INSITU_OK);
-        step_is_good(session, cycle);
+        everywhere(submit_input(session, &in) == INSITU_OK);
+        check_step_succeeds(session, cycle);
         everywhere(is_warned(session, cycle == 0 ? c->words : none));
         everywhere(is_reported_alike(insitu_last_report(session)->warnings));
     }
@@ -418,7 +427,7 @@ static void likely_mistakes_are_reported_once(void **context)
 
 /* Checks that a warning is given once, is not repeated in the next step, and is given again if its cause disappears and
  * then returns, or if the scene is edited. */
-static void warnings_come_back_with_what_they_are_about(void **context)
+static void warnings_recur_with_their_causes(void **context)
 {
     (void)context;
     static const bool is_bad[] = {true, true, false, true, true}, is_reported[] = {true, false, false, true, false};
@@ -432,12 +441,12 @@ static void warnings_come_back_with_what_they_are_about(void **context)
     for (int cycle = 0; cycle < 5; cycle++) {
         session_input now = in;
         if (is_bad[cycle]) now.field.values.data = values;
-        everywhere(submit(session, &now) == INSITU_OK);
-        step_is_good(session, cycle);
+        everywhere(submit_input(session, &now) == INSITU_OK);
+        check_step_succeeds(session, cycle);
         everywhere(is_warned(session, is_reported[cycle] ? words : none));
     }
     write_scene(IMAGE("[32, 16]", "", SURFACE, ""));
-    step_is_good(session, 5);
+    check_step_succeeds(session, 5);
     const char *warnings = insitu_last_report(session)->warnings;
     everywhere(strstr(warnings, "the scene file was edited") && strstr(warnings, words[0]));
     insitu_destroy(&session);
@@ -445,7 +454,7 @@ static void warnings_come_back_with_what_they_are_about(void **context)
     test_free(values);
 }
 
-static bool reads(insitu_session *session, const char *name, double expected)
+static bool is_parameter_value(insitu_session *session, const char *name, double expected)
 {
     double value = -77;
     return insitu_parameter(session, name, &value) == INSITU_OK && fabs(value - expected) <= 0;
@@ -453,7 +462,7 @@ static bool reads(insitu_session *session, const char *name, double expected)
 
 /* Checks that insitu_parameter() leaves the value unchanged for a name that the scene does not define, and that its
  * error lists the names that the scene defines. */
-static bool lacks(insitu_session *session, const char *name, const char *words)
+static bool is_parameter_undefined(insitu_session *session, const char *name, const char *words)
 {
     double value = -77;
     return insitu_parameter(session, name, &value) == INSITU_ERROR_ARGUMENT && fabs(value + 77) <= 0 &&
@@ -470,28 +479,30 @@ static void parameters_change_with_the_scene_on_all_ranks(void **context)
         MPI_COMM_WORLD, write_scene(IMAGE("[24, 16]", "", SURFACE, "") "parameters: {inflow: 2.5, outflw: 1}\n"));
     session_input in;
     input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
-    everywhere(reads(session, "inflow", 2.5)); /* before the first step */
-    everywhere(lacks(session, "outflow", "\"outflow\" is no parameter of ") &&
-               lacks(session, "outflow", " (did you mean \"outflw\"?), expected one of inflow, outflw"));
+    everywhere(is_parameter_value(session, "inflow", 2.5)); /* before the first step */
+    everywhere(
+        is_parameter_undefined(session, "outflow", "\"outflow\" is no parameter of ") &&
+        is_parameter_undefined(session, "outflow", " (did you mean \"outflw\"?), expected one of inflow, outflw"));
     everywhere(insitu_parameter(session, NULL, &(double){0}) == INSITU_ERROR_ARGUMENT &&
                insitu_parameter(session, "inflow", NULL) == INSITU_ERROR_ARGUMENT &&
                strcmp(insitu_error(session), "insitu_parameter: value is NULL") == 0);
     everywhere(insitu_parameter(NULL, "inflow", &(double){0}) == INSITU_ERROR_ARGUMENT);
-    everywhere(submit(session, &in) == INSITU_OK);
-    step_is_good(session, 0);
+    everywhere(submit_input(session, &in) == INSITU_OK);
+    check_step_succeeds(session, 0);
     everywhere(is_warned(session, none)); /* not yet, as the simulation may still read the parameter */
-    step_is_good(session, 1);
+    check_step_succeeds(session, 1);
     everywhere(is_warned(session, unread));
     for (int i = 0; i < 3; i++) {
         snprintf(text, sizeof text, "%sparameters: {outflow: 0, inflow: %d}\n", plain, 10 + i);
-        write_scene(i == 1 ? "images: 7\n" : text);         /* an invalid edit changes no parameter */
-        everywhere(reads(session, "inflow", i ? 10 : 2.5)); /* parameters change only in a step */
-        step_is_good(session, 2 + i);
-        everywhere(reads(session, "inflow", i == 2 ? 12 : 10) && reads(session, "outflow", 0));
+        write_scene(i == 1 ? "images: 7\n" : text);                      /* an invalid edit changes no parameter */
+        everywhere(is_parameter_value(session, "inflow", i ? 10 : 2.5)); /* parameters change only in a step */
+        check_step_succeeds(session, 2 + i);
+        everywhere(is_parameter_value(session, "inflow", i == 2 ? 12 : 10) &&
+                   is_parameter_value(session, "outflow", 0));
     }
     write_scene(plain);
-    step_is_good(session, 5);
-    everywhere(lacks(session, "inflow", ": it has no parameters"));
+    check_step_succeeds(session, 5);
+    everywhere(is_parameter_undefined(session, "inflow", ": it has no parameters"));
     insitu_destroy(&session);
     input_free(&in);
 }
@@ -518,8 +529,8 @@ static void meshes_with_ids_among_others_are_reported(void **context)
         everywhere(insitu_set_mesh(session, "n", &in.mesh) == INSITU_OK);
         everywhere(insitu_set_field(session, "n", &in.field) == INSITU_OK);
         if (cases[i].has_ids) in.mesh.vertex_ids = (insitu_array){ids, INSITU_INT64, 0};
-        everywhere(submit(session, &in) == INSITU_OK);
-        step_is_good(session, 0);
+        everywhere(submit_input(session, &in) == INSITU_OK);
+        check_step_succeeds(session, 0);
         everywhere(is_warned(session, cases[i].words));
         insitu_destroy(&session);
         input_free(&in);
@@ -542,9 +553,9 @@ static void faults_of_words_are_reported_at_once(void **context)
         insitu_session *session =
             open_session(MPI_COMM_WORLD,
                          write_scene(has_words ? IMAGE_OF_PNG("    decorations: {title: Words}\n") : IMAGE_OF_PNG("")));
-        everywhere(submit(session, &in) == INSITU_OK);
+        everywhere(submit_input(session, &in) == INSITU_OK);
         for (int cycle = 0; cycle < 2; cycle++) {
-            step_is_good(session, cycle);
+            check_step_succeeds(session, cycle);
             const char *warnings = insitu_last_report(session)->warnings;
             everywhere(is_reported && cycle == 0 ? strstr(warnings, "image \"a\": no font was found") &&
                                                        strstr(warnings, "image \"a\": no glyphs for U+6E29") &&
@@ -575,17 +586,17 @@ static const struct {
      {"would take some ", "samples at a step of 0.0001"}},
 };
 
-static void pictures_that_would_take_hours_are_refused(void **context)
+static void oversized_pictures_are_refused(void **context)
 {
     (void)context;
     session_input in;
     input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
     for (size_t i = 0; i < sizeof refused / sizeof refused[0]; i++) {
         insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(refused[i].scene));
-        everywhere(submit(session, &in) == INSITU_OK);
+        everywhere(submit_input(session, &in) == INSITU_OK);
         const insitu_status status = insitu_step(session, 0, 0);
-        reported_everywhere(session, status, INSITU_ERROR_SCENE, refused[i].words[0], refused[i].words[1],
-                            refused[i].words[2] ? refused[i].words[2] : "");
+        check_reported_everywhere(session, status, INSITU_ERROR_SCENE, refused[i].words[0], refused[i].words[1],
+                                  refused[i].words[2] ? refused[i].words[2] : "");
         insitu_destroy(&session);
     }
     input_free(&in);
@@ -598,20 +609,21 @@ static void control_characters_are_escaped(void **context)
     (void)context;
     insitu_session *session = NULL;
     insitu_status status = insitu_create(MPI_COMM_WORLD, "/no\nwhere/\x1b[31mred\x7f.yaml", &session);
-    reported_everywhere(NULL, status, INSITU_ERROR_SCENE, "/no\\x0awhere/\\x1b[31mred\\x7f.yaml: cannot be read");
+    check_reported_everywhere(NULL, status, INSITU_ERROR_SCENE, "/no\\x0awhere/\\x1b[31mred\\x7f.yaml: cannot be read");
     session = open_session(MPI_COMM_WORLD, write_scene(plain));
     insitu_field field;
     insitu_field_defaults(&field);
     field.name = "p\x9b\xc2\x9b\tq\xc3\xa9";
     everywhere(insitu_set_field(session, "no\rmesh", &field) == INSITU_ERROR_FIELD);
     status = insitu_step(session, 0, 0);
-    reported_everywhere(session, status, INSITU_ERROR_FIELD, "field \"p\x9b\\x9b\\x09q\xc3\xa9\"", "\"no\\x0dmesh\"");
+    check_reported_everywhere(session, status, INSITU_ERROR_FIELD, "field \"p\x9b\\x9b\\x09q\xc3\xa9\"",
+                              "\"no\\x0dmesh\"");
     session_input in;
     input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
-    everywhere(submit(session, &in) == INSITU_OK);
+    everywhere(submit_input(session, &in) == INSITU_OK);
     in.field.name = "two\nlines";
     everywhere(insitu_set_field(session, "m", &in.field) == INSITU_OK);
-    step_is_good(session, 1);
+    check_step_succeeds(session, 1);
     everywhere(strstr(insitu_last_report(session)->left_out, "field \"two\\x0alines\" is in no picture") != NULL);
     insitu_destroy(&session);
     input_free(&in);
@@ -621,9 +633,9 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(likely_mistakes_are_reported_once),
-        cmocka_unit_test(warnings_come_back_with_what_they_are_about),
+        cmocka_unit_test(warnings_recur_with_their_causes),
         cmocka_unit_test(meshes_with_ids_among_others_are_reported),
-        cmocka_unit_test(pictures_that_would_take_hours_are_refused),
+        cmocka_unit_test(oversized_pictures_are_refused),
         cmocka_unit_test(control_characters_are_escaped),
         cmocka_unit_test(parameters_change_with_the_scene_on_all_ranks),
         cmocka_unit_test(faults_of_words_are_reported_at_once),

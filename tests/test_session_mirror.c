@@ -79,7 +79,7 @@ static void mirror_along_axes(const insitu_mesh *mesh, int axes, const mirror *b
 }
 
 /* Ids of vertices that are not in the mirror planes are others. */
-static void renumber(const insitu_mesh *mesh, int axes, const mirror *by, mirror_image *out)
+static void renumber_vertices(const insitu_mesh *mesh, int axes, const mirror *by, mirror_image *out)
 {
     out->ids = test_calloc((size_t)mesh->vertex_count + 1, sizeof *out->ids);
     for (int64_t v = 0; v < mesh->vertex_count; v++) {
@@ -103,7 +103,7 @@ static void make_image(const insitu_mesh *mesh, int axes, const mirror *by, mirr
         mirror_along_axes(mesh, axes, by, out);
     else
         mirror_by_vertex(mesh, axes, by, out);
-    if (mesh->vertex_ids.data) renumber(mesh, axes, by, out);
+    if (mesh->vertex_ids.data) renumber_vertices(mesh, axes, by, out);
 }
 
 static void free_image(mirror_image *i)
@@ -119,8 +119,8 @@ static void free_image(mirror_image *i)
 
 /* Hands a mesh and its images over as blocks with these fields, the first of them with this number. Returns how many.
  */
-static int hand_over_blocks(insitu_session *session, int first, const insitu_mesh *mesh, const mirror *by,
-                            const insitu_field *fields, int count, mirror_image images[MOST_IMAGES])
+static int set_mirrored_blocks(insitu_session *session, int first, const insitu_mesh *mesh, const mirror *by,
+                               const insitu_field *fields, int count, mirror_image images[MOST_IMAGES])
 {
     int block = first;
     for (int axes = 0; axes < 8; axes++) {
@@ -145,15 +145,15 @@ static drawn draw_blocks(const char *scene, const insitu_mesh *mesh, const mirro
 {
     mirror_image images[MOST_IMAGES];
     insitu_session *session = open_text(MPI_COMM_WORLD, "", scene);
-    hand_over_blocks(session, 0, mesh, by, fields, count, images);
-    drawn out = step_drawn(session, 0);
+    set_mirrored_blocks(session, 0, mesh, by, fields, count, images);
+    drawn out = step_and_take_pictures(session, 0);
     insitu_destroy(&session);
     free_images(by, images);
     return out;
 }
 
-static void expect_mirrored_with(const char *keys, const insitu_mesh *mesh, const insitu_field *f, const mirror *by,
-                                 const char *what)
+static void expect_mirrored_by(const char *keys, const insitu_mesh *mesh, const insitu_field *f, const mirror *by,
+                               const char *what)
 {
     char text[MOST_TEXT];
     snprintf(text, sizeof text, "%s%s", keys, all_layers);
@@ -164,26 +164,26 @@ static void expect_mirrored_with(const char *keys, const insitu_mesh *mesh, cons
 
 static void expect_mirrored(const insitu_mesh *mesh, const insitu_field *f, const mirror *by, const char *what)
 {
-    expect_mirrored_with("", mesh, f, by, what);
+    expect_mirrored_by("", mesh, f, by, what);
 }
 
 static void forms_draw_their_images(void **state)
 {
     (void)state;
     for (mesh_form form = 0; form < MESH_FORM_COUNT; form++)
-        for (int with_corners = 0; with_corners <= formed_has_corners(form); with_corners++) {
+        for (int with_corners = 0; with_corners <= formed_mesh_has_corners(form); with_corners++) {
             const char *scene = with_corners ? formed_corner_scene : formed_scene;
             const mirror *by = &mirrors[form % 2];
             formed_mesh m;
-            formed_create(form, SIDE, own_rank, rank_count, &m);
+            formed_mesh_create(form, SIDE, own_rank, rank_count, &m);
             drawn a = draw_formed(open_text(MPI_COMM_WORLD, by->text, scene), &m, &m.mesh, with_corners, NULL);
             drawn b = draw_blocks(scene, &m.mesh, by, m.fields, with_corners ? FORMED_FIELDS : FORMED_D);
             expect_same(&a, &b, mesh_form_name(form));
-            formed_free(&m);
+            formed_mesh_free(&m);
         }
 }
 
-static void all_planes_have_their_images(void **state)
+static void all_mirror_planes_draw_images(void **state)
 {
     (void)state;
     session_input in;
@@ -197,9 +197,9 @@ static void cells_of_higher_order_draw_their_images(void **state)
     (void)state;
     for (int k = 0; k < order_kind_count; k += 4) {
         order_mesh m;
-        order_mesh_create(&order_kinds[k], 2, 0.1, test_wave, own_rank, rank_count, &m);
+        order_mesh_create(&order_kinds[k], 2, 0.1, test_wave_field, own_rank, rank_count, &m);
         expect_mirrored(&m.mesh, &m.field, &mirrors[0], order_kinds[k].name);
-        expect_mirrored_with("finer_pieces: 2\n", &m.mesh, &m.field, &mirrors[0], order_kinds[k].name);
+        expect_mirrored_by("finer_pieces: 2\n", &m.mesh, &m.field, &mirrors[0], order_kinds[k].name);
         order_mesh_free(&m);
     }
 }
@@ -233,12 +233,12 @@ static void blocks_draw_their_images(void **state)
             for (int i = 0, number = 0; i < 2; i++) {
                 make_block(form, 2 * own_rank + i, &b[i]);
                 if (by_hand)
-                    number += hand_over_blocks(session, number, &b[i].mesh, by, &b[i].field, 1, images[i]);
+                    number += set_mirrored_blocks(session, number, &b[i].mesh, by, &b[i].field, 1, images[i]);
                 else
                     everywhere(insitu_set_block(session, "m", i, &b[i].mesh) == INSITU_OK &&
                                insitu_set_block_field(session, "m", i, &b[i].field) == INSITU_OK);
             }
-            pictures[by_hand] = step_drawn(session, 0);
+            pictures[by_hand] = step_and_take_pictures(session, 0);
             insitu_destroy(&session);
             for (int i = 0; by_hand && i < 2; i++) free_images(by, images[i]);
         }
@@ -268,7 +268,7 @@ static void make_level(bool is_fine, bool is_mirrored, double values[125], insit
         double place[3];
         for (int axis = 0; axis < 3; axis++) place[axis] = l->origin[axis] + l->spacing[axis] * at[axis];
         const int to = is_mirrored ? v - at[0] + 4 - at[0] : v;
-        values[to] = test_wave(place);
+        values[to] = test_wave_field(place);
     }
     insitu_mesh_defaults(mesh);
     mesh->lattice = l;
@@ -298,7 +298,7 @@ static void levels_draw_their_images(void **state)
             everywhere(insitu_set_block(session, "m", i, &mesh[i]) == INSITU_OK &&
                        insitu_set_block_field(session, "m", i, &f[i]) == INSITU_OK);
         }
-        pictures[by_hand] = step_drawn(session, 0);
+        pictures[by_hand] = step_and_take_pictures(session, 0);
         insitu_destroy(&session);
     }
     expect_same(&pictures[0], &pictures[1], "levels of refinement");
@@ -316,7 +316,7 @@ static void any_partition_draws_one_picture(void **state)
         const char *text = mirrors[1].text;
         drawn a = draw_mesh(open_text(MPI_COMM_WORLD, text, surface_layers), &part.mesh, &part.field, NULL);
         drawn b = draw_mesh(open_text(MPI_COMM_SELF, text, surface_layers), &whole.mesh, &whole.field, NULL);
-        if (own_rank != 0) free_drawn(&b);
+        if (own_rank != 0) free_picture_set(&b);
         expect_same(&a, &b, test_partition_kind_name(kind));
         input_free(&part);
         input_free(&whole);
@@ -324,13 +324,13 @@ static void any_partition_draws_one_picture(void **state)
 }
 
 /* Returns the derived values at the vertices of this rank's part. */
-static double *values_of(const insitu_session *session, const char *name, int64_t count)
+static double *get_derived_values(const insitu_session *session, const char *name, int64_t count)
 {
     const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
     double *out = test_calloc((size_t)count + 1, sizeof *out);
     const int index = session_find_field(mesh, name);
     assert_true(index >= 0 && mesh->fields[index].is_derived);
-    const grid_field values = session_given_field(mesh, index, 0);
+    const grid_field values = session_caller_field(mesh, index, 0);
     for (int64_t v = 0; v < count; v++) out[v] = grid_field_value(&values, v);
     return out;
 }
@@ -347,20 +347,20 @@ static void derived_fields_are_those_of_the_source(void **state)
     char before[MOST_TEXT];
     snprintf(before, sizeof before, "%sfields: {g: {gradient: f, component: x}, h: f * f}\n", mirrors[0].text);
     insitu_session *session = open_text(MPI_COMM_WORLD, before, scene);
-    everywhere(submit(session, &in) == INSITU_OK);
+    everywhere(submit_input(session, &in) == INSITU_OK);
     for (int cycle = 0; cycle < 2; cycle++) {
         for (int64_t v = 0; v < in.part.vertex_count; v++) in.part.values[v] *= cycle ? 1.5 : 1;
         everywhere(insitu_set_field(session, "m", &in.field) == INSITU_OK);
-        drawn a = step_drawn(session, cycle);
-        double *values[2] = {values_of(session, "g", in.part.vertex_count),
-                             values_of(session, "h", in.part.vertex_count)};
+        drawn a = step_and_take_pictures(session, cycle);
+        double *values[2] = {get_derived_values(session, "g", in.part.vertex_count),
+                             get_derived_values(session, "h", in.part.vertex_count)};
         insitu_session *alone = open_text(MPI_COMM_WORLD, before + strlen(mirrors[0].text), scene);
-        everywhere(submit(alone, &in) == INSITU_OK);
-        drawn of_alone = step_drawn(alone, cycle);
-        double *expected = values_of(alone, "g", in.part.vertex_count);
+        everywhere(submit_input(alone, &in) == INSITU_OK);
+        drawn of_alone = step_and_take_pictures(alone, cycle);
+        double *expected = get_derived_values(alone, "g", in.part.vertex_count);
         everywhere(memcmp(values[0], expected, (size_t)in.part.vertex_count * sizeof *expected) == 0);
         insitu_destroy(&alone);
-        free_drawn(&of_alone);
+        free_picture_set(&of_alone);
         test_free(expected);
         insitu_field fields[2] = {in.field, in.field};
         for (int i = 0; i < 2; i++) {
@@ -386,14 +386,14 @@ static void expect_step(insitu_session *session, insitu_session *blocks, const s
     insitu_mesh mesh = in->mesh;
     insitu_field f = in->field;
     mesh.changed = f.changed = INSITU_CHANGED_ALL;
-    hand_over_blocks(blocks, 0, &mesh, by, &f, 1, images);
-    drawn a = step_drawn(session, cycle);
-    drawn b = step_drawn(blocks, cycle);
+    set_mirrored_blocks(blocks, 0, &mesh, by, &f, 1, images);
+    drawn a = step_and_take_pictures(session, cycle);
+    drawn b = step_and_take_pictures(blocks, cycle);
     expect_same(&a, &b, what);
     free_images(by, images);
 }
 
-static void steps_follow_what_changes(void **state)
+static void mirrored_images_follow_changes(void **state)
 {
     (void)state;
     session_input in;
@@ -401,14 +401,14 @@ static void steps_follow_what_changes(void **state)
     input_create(&in, TEST_MIXED, SIDE, TEST_BLOCK, own_rank, rank_count);
     insitu_session *session = open_text(MPI_COMM_WORLD, by->text, all_layers);
     insitu_session *blocks = open_text(MPI_COMM_WORLD, "", all_layers);
-    everywhere(submit(session, &in) == INSITU_OK);
+    everywhere(submit_input(session, &in) == INSITU_OK);
     expect_step(session, blocks, &in, by, 0, "the first step");
     const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
     const session_mesh *its_image = session_find_image(&session->meshes, mesh, 1);
     const int64_t stamp = its_image->coordinates_stamp;
 
     in.mesh.changed = in.field.changed = INSITU_CHANGED_NOTHING;
-    everywhere(submit(session, &in) == INSITU_OK);
+    everywhere(submit_input(session, &in) == INSITU_OK);
     expect_step(session, blocks, &in, by, 1, "nothing new");
     everywhere(session_find_image(&session->meshes, mesh, 1) == its_image && its_image->coordinates_stamp == stamp);
 
@@ -432,11 +432,11 @@ static void steps_follow_what_changes(void **state)
 
     in.part.ghosts[0] = 1;
     in.mesh.changed = in.field.changed = INSITU_CHANGED_ALL;
-    everywhere(submit(session, &in) == INSITU_OK);
+    everywhere(submit_input(session, &in) == INSITU_OK);
     expect_step(session, blocks, &in, by, 5, "a ghost");
 
     everywhere(insitu_set_mesh(session, "m", NULL) == INSITU_OK && session->meshes.count == 0);
-    everywhere(submit(session, &in) == INSITU_OK);
+    everywhere(submit_input(session, &in) == INSITU_OK);
     expect_step(session, blocks, &in, by, 6, "the mesh removed and set again");
     insitu_destroy(&session);
     insitu_destroy(&blocks);
@@ -454,7 +454,7 @@ static void edits_of_the_scene_mirror_and_unmirror(void **state)
     input_create(&in, TEST_MIXED, SIDE, TEST_BLOCK, own_rank, rank_count);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(all_layers));
     insitu_session *blocks = open_text(MPI_COMM_WORLD, "", all_layers);
-    everywhere(submit(session, &in) == INSITU_OK);
+    everywhere(submit_input(session, &in) == INSITU_OK);
     for (int i = 0; i < 6; i++) {
         const mirror *by = order[i] < 0 ? &none : &mirrors[order[i]];
         snprintf(text, sizeof text, "%s# %d\n%s", by->text, i, all_layers);
@@ -467,7 +467,7 @@ static void edits_of_the_scene_mirror_and_unmirror(void **state)
     input_free(&in);
 }
 
-static void faults_are_those_of_the_given_mesh(void **state)
+static void errors_name_the_source_mesh(void **state)
 {
     (void)state;
     session_input in;
@@ -478,10 +478,10 @@ static void faults_are_those_of_the_given_mesh(void **state)
     for (int cycle = 0; cycle < 2; cycle++) {
         const double good = in.part.coordinates[4];
         if (own_rank == rank_count - 1) in.part.coordinates[4] = (double)NAN;
-        everywhere(submit(session, &in) == INSITU_OK);
+        everywhere(submit_input(session, &in) == INSITU_OK);
         insitu_status status = insitu_step(session, cycle, 0);
-        reported_everywhere(session, status, INSITU_ERROR_MESH, "mesh \"m\": cell",
-                            "vertex 1 has a coordinate that is not");
+        check_reported_everywhere(session, status, INSITU_ERROR_MESH, "mesh \"m\": cell",
+                                  "vertex 1 has a coordinate that is not");
         in.part.coordinates[4] = good;
         if (cycle) continue;
         everywhere(insitu_set_mesh(session, "m", &in.mesh) == INSITU_OK);
@@ -491,7 +491,7 @@ static void faults_are_those_of_the_given_mesh(void **state)
         wrong.count--;
         everywhere(insitu_set_field(session, "m", &wrong) == INSITU_ERROR_FIELD);
         status = insitu_step(session, cycle, 0);
-        reported_everywhere(session, status, INSITU_ERROR_FIELD, "mesh \"m\": field \"f\"");
+        check_reported_everywhere(session, status, INSITU_ERROR_FIELD, "mesh \"m\": field \"f\"");
         everywhere(insitu_set_field(session, "m", &in.field) == INSITU_OK);
         expect_step(session, blocks, &in, by, cycle, "a mended field");
     }
@@ -535,7 +535,7 @@ static void warped_meshes_are_mirrored_after_the_warp(void **state)
     input_free(&in);
 }
 
-static void filled_fields_are_made_once(void **state)
+static void fill_functions_are_called_once(void **state)
 {
     (void)state;
     session_input in;
@@ -562,7 +562,7 @@ static void filled_fields_are_made_once(void **state)
 
 /* ---- numbers and warnings ---------------------------------------------------------------------------------------- */
 
-static void numbers_are_of_the_given_cells(void **state)
+static void counts_include_only_source_cells(void **state)
 {
     (void)state;
     static char text[MOST_TEXT];
@@ -572,8 +572,8 @@ static void numbers_are_of_the_given_cells(void **state)
     insitu_session *session =
         open_text(MPI_COMM_WORLD, mirrors[2].text,
                   "statistics: [{field: f, path: mirror.csv}]\nimages:\n" LAYERS("a", "[{surface: {}}]"));
-    everywhere(submit(session, &in) == INSITU_OK);
-    drawn a = step_drawn(session, 0);
+    everywhere(submit_input(session, &in) == INSITU_OK);
+    drawn a = step_and_take_pictures(session, 0);
     const insitu_report *report = insitu_last_report(session);
     char words[100];
     snprintf(words, sizeof words, "coordinates of its mirror images: %lld bytes",
@@ -583,26 +583,27 @@ static void numbers_are_of_the_given_cells(void **state)
     everywhere(*report->warnings == '\0');
     insitu_destroy(&session);
     read_file("mirror.csv", sizeof text, text);
-    everywhere(own_rank != 0 || (fabs(last_number(text, 3) - 8) <= 1e-8 && fabs(last_number(text, 2) - 27) <= 0));
-    free_drawn(&a);
+    everywhere(own_rank != 0 ||
+               (fabs(read_last_number(text, 3) - 8) <= 1e-8 && fabs(read_last_number(text, 2) - 27) <= 0));
+    free_picture_set(&a);
     input_free(&in);
 }
 
-static void what_is_hardly_meant_is_warned_of(void **state)
+static void unlikely_mirror_planes_give_a_warning(void **state)
 {
     (void)state;
     session_input in;
     input_create(&in, TEST_TETS, SIDE, TEST_BLOCK, own_rank, rank_count);
     insitu_session *session =
         open_text(MPI_COMM_WORLD, "meshes:\n  m: {mirror: {y: 0.5}}\n  plate: {mirror: z}\n", surface_layers);
-    everywhere(submit(session, &in) == INSITU_OK);
-    drawn a = step_drawn(session, 0);
+    everywhere(submit_input(session, &in) == INSITU_OK);
+    drawn a = step_and_take_pictures(session, 0);
     const char *warnings = insitu_last_report(session)->warnings;
     everywhere(strstr(warnings,
                       "meshes.m (line 2 of the scene): the mesh lies on both sides of its mirror plane y = 0.5, "
                       "from -1 to 1") != NULL);
     everywhere(strstr(warnings, "meshes.plate (line 3 of the scene): no mesh has this name") != NULL);
-    free_drawn(&a);
+    free_picture_set(&a);
     insitu_destroy(&session);
     input_free(&in);
 }
@@ -611,20 +612,20 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(forms_draw_their_images),
-        cmocka_unit_test(all_planes_have_their_images),
+        cmocka_unit_test(all_mirror_planes_draw_images),
         cmocka_unit_test(cells_of_higher_order_draw_their_images),
         cmocka_unit_test(planes_and_lattices_draw_their_images),
         cmocka_unit_test(blocks_draw_their_images),
         cmocka_unit_test(levels_draw_their_images),
         cmocka_unit_test(any_partition_draws_one_picture),
         cmocka_unit_test(derived_fields_are_those_of_the_source),
-        cmocka_unit_test(steps_follow_what_changes),
+        cmocka_unit_test(mirrored_images_follow_changes),
         cmocka_unit_test(edits_of_the_scene_mirror_and_unmirror),
-        cmocka_unit_test(faults_are_those_of_the_given_mesh),
+        cmocka_unit_test(errors_name_the_source_mesh),
         cmocka_unit_test(warped_meshes_are_mirrored_after_the_warp),
-        cmocka_unit_test(filled_fields_are_made_once),
-        cmocka_unit_test(numbers_are_of_the_given_cells),
-        cmocka_unit_test(what_is_hardly_meant_is_warned_of),
+        cmocka_unit_test(fill_functions_are_called_once),
+        cmocka_unit_test(counts_include_only_source_cells),
+        cmocka_unit_test(unlikely_mirror_planes_give_a_warning),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -18,7 +18,7 @@ static const char scene[] = "images:\n"
                             "    layers: [{slice: {field: f}}]\n"
                             "    outputs: [{path: c.png}, {path: \"all_{cycle}.png\", grid: [3, 2]}]\n";
 
-static const caught_picture *find(const char *path)
+static const caught_picture *find_picture(const char *path)
 {
     for (int i = 0; i < caught_count; i++)
         if (strcmp(caught[i].path, path) == 0) return &caught[i];
@@ -43,18 +43,18 @@ static bool is_montage(int cycle, bool with_c)
 {
     char path[32];
     snprintf(path, sizeof path, "all_%d.png", cycle);
-    const caught_picture *whole = find(path);
+    const caught_picture *whole = find_picture(path);
     const char *const names[COLUMNS * ROWS] = {"a.png", "b0.png", "b1.png", with_c ? "c.png" : "-", "-", "-"};
     if (caught_count != (with_c ? 5 : 4) || !whole) return false;
     if (whole->width != COLUMNS * WIDTH || whole->height != ROWS * HEIGHT) return false;
     for (int cell = 0; cell < COLUMNS * ROWS; cell++) {
-        const caught_picture *picture = find(names[cell]);
+        const caught_picture *picture = find_picture(names[cell]);
         if ((*names[cell] != '-') != (picture != NULL) || !is_in_cell(whole, cell, picture)) return false;
     }
     return true;
 }
 
-static void cells_have_the_pictures_of_a_step(void **state)
+static void montage_cells_contain_the_pictures_of_a_step(void **state)
 {
     (void)state;
     session_input in;
@@ -62,7 +62,7 @@ static void cells_have_the_pictures_of_a_step(void **state)
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
     for (int cycle = 0; cycle < 3; cycle++) {
         discard_pictures();
-        assert_int_equal(submit(session, &in), INSITU_OK);
+        assert_int_equal(submit_input(session, &in), INSITU_OK);
         assert_int_equal(insitu_step(session, cycle, 0), INSITU_OK);
         everywhere(!strstr(insitu_last_report(session)->warnings, "all_"));
         everywhere(own_rank != 0 || is_montage(cycle, cycle % 2 == 0));
@@ -79,12 +79,12 @@ static void files_that_cannot_be_written_are_reported(void **state)
     input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
     discard_pictures();
-    assert_int_equal(submit(session, &in), INSITU_OK);
+    assert_int_equal(submit_input(session, &in), INSITU_OK);
     unwritable = "all_0";
     const insitu_status status = insitu_step(session, 0, 0);
     unwritable = NULL;
-    reported_everywhere(session, status, INSITU_ERROR_IO, "all_0.png: cannot be written");
-    everywhere(own_rank != 0 || (caught_count == 4 && find("a.png") && find("c.png")));
+    check_reported_everywhere(session, status, INSITU_ERROR_IO, "all_0.png: cannot be written");
+    everywhere(own_rank != 0 || (caught_count == 4 && find_picture("a.png") && find_picture("c.png")));
     insitu_destroy(&session);
     input_free(&in);
     discard_pictures();
@@ -107,7 +107,7 @@ static void write_bars(char text[2048], const char *side, const char *high)
 /* Width of the strip with the shared colour bar: 9 times the height of letters, rounded up. */
 enum { STRIP = 22 };
 
-static bool are_placed(const char *side, bool is_shared)
+static bool check_insets_placed(const char *side, bool is_shared)
 {
     const int left = strcmp(side, "left") == 0 ? STRIP : 0;
     bool is_well = caught_count == 1 && placed_count == (is_shared ? 3 : 2) && caught[0].width == 2 * WIDTH + STRIP;
@@ -138,12 +138,12 @@ static void alike_colour_bars_are_drawn_once(void **state)
         assert_int_equal(status, INSITU_OK);
         for (int cycle = 0; cycle < 2; cycle++) {
             discard_pictures();
-            assert_int_equal(submit(session, &in), INSITU_OK);
+            assert_int_equal(submit_input(session, &in), INSITU_OK);
             assert_int_equal(insitu_step(session, cycle, 0), INSITU_OK);
-            everywhere(own_rank != 0 || are_placed(sides[i % 2], is_shared));
-            const char *told =
+            everywhere(own_rank != 0 || check_insets_placed(sides[i % 2], is_shared));
+            const char *warning =
                 strstr(insitu_last_report(session)->warnings, "all.png: the pictures in it have different");
-            everywhere((told != NULL) == (!is_shared && cycle == 0)); /* the warning is given once */
+            everywhere((warning != NULL) == (!is_shared && cycle == 0)); /* the warning is given once */
         }
         insitu_destroy(&session);
     }
@@ -176,7 +176,7 @@ typedef struct inset_place {
 } inset_place;
 
 /* Returns the pixel that an inset or its frame has at a position; NULL if the position is outside of them. */
-static const float *inset_pixel(const inset_place *inset, int x, int y)
+static const float *get_inset_pixel(const inset_place *inset, int x, int y)
 {
     static const float grey[4] = {0.2140F, 0.2140F, 0.2140F, 1};
     const caught_picture *p = inset->picture;
@@ -189,15 +189,15 @@ static const float *inset_pixel(const inset_place *inset, int x, int y)
 /* Checks the montage with insets on rank 0 after a step. `with_d` states whether the fourth image was due. */
 static bool has_insets(bool with_d)
 {
-    const caught_picture *whole = find("whole.png"), *cells[2] = {find("a.png"), find("b.png")};
-    const inset_place insets[2] = {{find("c.png"), 2 * WIDTH - 10 - MARGIN, MARGIN},
-                                   {find("d.png"), MARGIN, HEIGHT - 20 - MARGIN}};
+    const caught_picture *whole = find_picture("whole.png"), *cells[2] = {find_picture("a.png"), find_picture("b.png")};
+    const inset_place insets[2] = {{find_picture("c.png"), 2 * WIDTH - 10 - MARGIN, MARGIN},
+                                   {find_picture("d.png"), MARGIN, HEIGHT - 20 - MARGIN}};
     if (!whole || !cells[0] || !cells[1] || !insets[0].picture || (insets[1].picture != NULL) != with_d) return false;
     bool is_well = whole->width == 2 * WIDTH && whole->height == HEIGHT;
     for (int y = 0; y < HEIGHT && is_well; y++)
         for (int x = 0; x < 2 * WIDTH; x++) {
-            const float *expected = inset_pixel(&insets[0], x, y);
-            if (!expected) expected = inset_pixel(&insets[1], x, y);
+            const float *expected = get_inset_pixel(&insets[0], x, y);
+            if (!expected) expected = get_inset_pixel(&insets[1], x, y);
             if (!expected) expected = cells[x / WIDTH]->rgba + 4 * ((ptrdiff_t)y * WIDTH + x % WIDTH);
             is_well = is_well && memcmp(whole->rgba + 4 * ((ptrdiff_t)y * 2 * WIDTH + x), expected, 16) == 0;
         }
@@ -212,7 +212,7 @@ static bool is_covered(const placed_picture *panel, int x, int y, int width, int
 
 /* Checks the areas that decorations must avoid, on rank 0. For the second panel this is the rectangle of the inset and
  * its frame; the first panel has no inset over it and thus no such area. */
-static bool keeps_clear(void)
+static bool check_avoided_areas(void)
 {
     return placed_count >= 2 && placed[0].covered_count == 0 &&
            is_covered(&placed[1], WIDTH - 10 - MARGIN - FRAME, MARGIN - FRAME, 10 + 2 * FRAME, 8 + 2 * FRAME);
@@ -226,10 +226,10 @@ static void insets_cover_corners(void **state)
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(inset_scene));
     for (int cycle = 0; cycle < 2; cycle++) {
         discard_pictures();
-        assert_int_equal(submit(session, &in), INSITU_OK);
+        assert_int_equal(submit_input(session, &in), INSITU_OK);
         assert_int_equal(insitu_step(session, cycle, 0), INSITU_OK);
         everywhere(!strstr(insitu_last_report(session)->warnings, "overwr") || cycle > 0);
-        everywhere(own_rank != 0 || (has_insets(cycle % 2 == 0) && keeps_clear()));
+        everywhere(own_rank != 0 || (has_insets(cycle % 2 == 0) && check_avoided_areas()));
     }
     insitu_destroy(&session);
     input_free(&in);
@@ -254,7 +254,7 @@ static void write_insets_beside_bars(char text[2048], const char *side)
 
 /* Checks on rank 0 that insets are drawn after the panels and over them, but not over the strip with the shared colour
  * bar. The inset whose colour bar is the strip's must have no colour bar of its own. */
-static bool are_beside_bars(const char *side)
+static bool check_insets_beside_bars(const char *side)
 {
     const int left = strcmp(side, "left") == 0 ? STRIP : 0;
     const placed_picture *const strip = &placed[2], *const same = &placed[3], *const other = &placed[4];
@@ -278,9 +278,9 @@ static void insets_lie_beside_shared_bars(void **state)
         write_insets_beside_bars(text, sides[i]);
         assert_int_equal(insitu_create_from_text(MPI_COMM_WORLD, text, &session), INSITU_OK);
         discard_pictures();
-        assert_int_equal(submit(session, &in), INSITU_OK);
+        assert_int_equal(submit_input(session, &in), INSITU_OK);
         assert_int_equal(insitu_step(session, 0, 0), INSITU_OK);
-        everywhere(own_rank != 0 || are_beside_bars(sides[i]));
+        everywhere(own_rank != 0 || check_insets_beside_bars(sides[i]));
         everywhere(!strstr(insitu_last_report(session)->warnings, "different"));
         insitu_destroy(&session);
     }
@@ -291,7 +291,7 @@ static void insets_lie_beside_shared_bars(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(cells_have_the_pictures_of_a_step),
+        cmocka_unit_test(montage_cells_contain_the_pictures_of_a_step),
         cmocka_unit_test(files_that_cannot_be_written_are_reported), cmocka_unit_test(insets_cover_corners),
         cmocka_unit_test(insets_lie_beside_shared_bars), cmocka_unit_test(alike_colour_bars_are_drawn_once)};
     return run_session_tests(argc, argv, tests, NULL, NULL);

@@ -73,7 +73,7 @@ static const char *const layers[] = {
     "volume: {field: f, %s, opacity: [[0, 0.9], [1, 0.9]], unit_distance: 0.05}",
 };
 
-static const char *scene_of(int layer, const char *keys)
+static const char *make_layer_scene(int layer, const char *keys)
 {
     static char text[1024];
     char filled[512];
@@ -88,20 +88,20 @@ static const char *scene_of(int layer, const char *keys)
     return text;
 }
 
-static double srgb_of(double linear)
+static double convert_linear_to_srgb(double linear)
 {
     return linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1 / 2.4) - 0.055;
 }
 
-static double linear_of(double srgb)
+static double convert_srgb_to_linear(double srgb)
 {
     return srgb <= 0.04045 ? srgb / 12.92 : pow((srgb + 0.055) / 1.055, 2.4);
 }
 
 /* Returns the largest error of a picture's colours, from 0 to 1, in sRGB or in linear light. The expected colours are
  * the closed form's: the colour map interpolates linearly in sRGB. */
-static double colours_are_off(const caught_picture *picture, bool is_linear, double (*place)(double value), double low,
-                              double high)
+static double measure_colour_error(const caught_picture *picture, bool is_linear, double (*place)(double value),
+                                   double low, double high)
 {
     double worst = 0;
     for (int i = 0; own_rank == 0 && i < SIZE * SIZE; i++) {
@@ -109,18 +109,19 @@ static double colours_are_off(const caught_picture *picture, bool is_linear, dou
         const double expected = (place(value) - place(low)) / (place(high) - place(low));
         const float *pixel = picture->rgba + 4 * (size_t)i;
         const double found = (double)pixel[1] / (double)pixel[3];
-        const double off = is_linear ? found - linear_of(expected) : srgb_of(found) - expected;
-        worst = test_worse(worst, pixel[3] > 0.9F ? fabs(off) : 9);
+        const double off =
+            is_linear ? found - convert_srgb_to_linear(expected) : convert_linear_to_srgb(found) - expected;
+        worst = test_larger_error(worst, pixel[3] > 0.9F ? fabs(off) : 9);
     }
     return worst;
 }
 
-static double by_value(double value)
+static double linear_position(double value)
 {
     return value;
 }
 
-static double by_log(double value)
+static double logarithmic_position(double value)
 {
     return log(value);
 }
@@ -133,29 +134,29 @@ typedef struct narrow_case {
 } narrow_case;
 
 static const narrow_case cases[] = {
-    {101325, 101325.01, false, "", by_value},
-    {0, 1e-5, false, "", by_value},
-    {1e5, 1e5 + 1e-3, false, "", by_value},
-    {1e8, 1e8 + 1e-2, false, "", by_value},
-    {1e8, 1e8 + 1e-3, false, "", by_value},
-    {-1e8, -1e8 + 1e-2, false, "", by_value},
-    {1, 1 + 1e-11, false, "", by_value},
-    {0, 1e-5, true, "", by_value},
-    {1e5, 1e5 + 8, true, "", by_value},
-    {1e8, 1e8 + 8192, true, "", by_value},
-    {1, 1 + 1e-4, true, "", by_value},
-    {1e5, 1e5 + 1e-3, false, "scale: log, ", by_log},
-    {1e8, 1e8 + 1, false, "scale: log, ", by_log},
-    {1e5, 1.002e5, false, "scale: log, ", by_log},
-    {1e5, 1.0009e5, false, "scale: log, ", by_log},
-    {1e5, 1e5 + 8, true, "scale: log, ", by_log},
-    {1e5, 1e5 + 1e-3, false, "scale: symlog, threshold: 1, ", by_log},
-    {1e8, 1e8 + 1, false, "scale: symlog, threshold: 1, ", by_log},
+    {101325, 101325.01, false, "", linear_position},
+    {0, 1e-5, false, "", linear_position},
+    {1e5, 1e5 + 1e-3, false, "", linear_position},
+    {1e8, 1e8 + 1e-2, false, "", linear_position},
+    {1e8, 1e8 + 1e-3, false, "", linear_position},
+    {-1e8, -1e8 + 1e-2, false, "", linear_position},
+    {1, 1 + 1e-11, false, "", linear_position},
+    {0, 1e-5, true, "", linear_position},
+    {1e5, 1e5 + 8, true, "", linear_position},
+    {1e8, 1e8 + 8192, true, "", linear_position},
+    {1, 1 + 1e-4, true, "", linear_position},
+    {1e5, 1e5 + 1e-3, false, "scale: log, ", logarithmic_position},
+    {1e8, 1e8 + 1, false, "scale: log, ", logarithmic_position},
+    {1e5, 1.002e5, false, "scale: log, ", logarithmic_position},
+    {1e5, 1.0009e5, false, "scale: log, ", logarithmic_position},
+    {1e5, 1e5 + 8, true, "scale: log, ", logarithmic_position},
+    {1e5, 1e5 + 1e-3, false, "scale: symlog, threshold: 1, ", logarithmic_position},
+    {1e8, 1e8 + 1, false, "scale: symlog, threshold: 1, ", logarithmic_position},
 };
 
 /* Returns the error allowed to a picture: the rounding of values at vertices; 2e-3 for the colour map's table and for
  * float32 intermediates, as sRGB is steep at dark colours; and 2e-4 for scales that are approximated as linear. */
-static double allowed_of(const narrow_case *c)
+static double compute_allowed_error(const narrow_case *c)
 {
     const double larger = fmax(fabs(c->low), fabs(c->high));
     return (c->is_single ? 6e-8 : 1.2e-16) * larger / (c->high - c->low) + 2e-3 + (*c->scale ? 2e-4 : 0);
@@ -170,15 +171,15 @@ static void check_case(const narrow_case *c, int layer, bool is_given)
     else
         snprintf(keys, sizeof keys, "%srange: data", c->scale);
     ramp_create(&r, SIDE, c->low, c->high, c->is_single);
-    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_of(layer, keys)));
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(make_layer_scene(layer, keys)));
     discard_pictures();
     ramp_submit(&r, session);
     everywhere(insitu_step(session, 0, 0) == INSITU_OK);
     everywhere(!strstr(insitu_last_report(session)->warnings, "too near"));
     caught_picture picture = pop_caught_picture();
     const bool is_volume = layer == 3; /* integrated to max_error, in linear light */
-    const double allowed = allowed_of(c) + (is_volume ? 0.01 : 0);
-    const double off = colours_are_off(&picture, is_volume, c->place, c->low, c->high);
+    const double allowed = compute_allowed_error(c) + (is_volume ? 0.01 : 0);
+    const double off = measure_colour_error(&picture, is_volume, c->place, c->low, c->high);
     if (!(off <= allowed)) fprintf(stderr, "layer %d, %s: off by %g\n", layer, keys, off);
     everywhere(off <= allowed);
     free_caught(&picture);
@@ -186,7 +187,7 @@ static void check_case(const narrow_case *c, int layer, bool is_given)
     ramp_free(&r);
 }
 
-static void narrow_ranges_are_closed_forms(void **state)
+static void pictures_of_narrow_ranges_match_closed_forms(void **state)
 {
     (void)state;
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
@@ -203,7 +204,7 @@ static int compare_doubles(const void *left, const void *right)
 }
 
 /* Returns the sorted middles of the value ranges of all cells of all ranks. */
-static double *sorted_middles(const narrow_case *c, int64_t *count)
+static double *collect_sorted_middles(const narrow_case *c, int64_t *count)
 {
     ramp whole;
     session_input *in = &whole.in;
@@ -230,7 +231,7 @@ static caught_picture draw_range(const ramp *r, int layer, const char *scale, co
 {
     char keys[256];
     snprintf(keys, sizeof keys, "%srange: %s", scale, range);
-    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_of(layer, keys)));
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(make_layer_scene(layer, keys)));
     discard_pictures();
     ramp_submit(r, session);
     everywhere(insitu_step(session, 0, 0) == INSITU_OK);
@@ -243,12 +244,13 @@ static caught_picture draw_range(const ramp *r, int layer, const char *scale, co
 static void check_percentiles(const ramp *r, int layer, const char *scale, const int percents[2], double low,
                               double high)
 {
-    char by_percentile[64], by_value[64];
+    char by_percentile[64], linear_position[64];
     snprintf(by_percentile, sizeof by_percentile, "{percentile: [%d, %d]}", percents[0], percents[1]);
-    snprintf(by_value, sizeof by_value, "[%.17g, %.17g]", low, high);
-    caught_picture found = draw_range(r, layer, scale, by_percentile), truth = draw_range(r, layer, scale, by_value);
+    snprintf(linear_position, sizeof linear_position, "[%.17g, %.17g]", low, high);
+    caught_picture found = draw_range(r, layer, scale, by_percentile),
+                   truth = draw_range(r, layer, scale, linear_position);
     const bool is_same = own_rank != 0 || memcmp(found.rgba, truth.rgba, 4 * SIZE * SIZE * sizeof *found.rgba) == 0;
-    if (!is_same) fprintf(stderr, "layer %d: %s is not %s\n", layer, by_percentile, by_value);
+    if (!is_same) fprintf(stderr, "layer %d: %s is not %s\n", layer, by_percentile, linear_position);
     everywhere(is_same);
     free_caught(&found);
     free_caught(&truth);
@@ -262,7 +264,7 @@ static void percentiles_are_those_of_doubles(void **state)
         const narrow_case *c = &cases[i];
         const int *p = percents[i % 3];
         int64_t count;
-        double *middles = sorted_middles(c, &count);
+        double *middles = collect_sorted_middles(c, &count);
         const int64_t low = (int64_t)ceil(p[0] / 100.0 * (double)count);
         const int64_t high = (int64_t)ceil(p[1] / 100.0 * (double)count);
         ramp r;
@@ -274,7 +276,7 @@ static void percentiles_are_those_of_doubles(void **state)
 }
 
 /* The mesh has 10,368 cells. More than two fifths of them have the lower value, and as many the higher one. */
-static void percentiles_are_right_among_many_equal_values(void **state)
+static void percentiles_are_exact_for_many_equal_values(void **state)
 {
     (void)state;
     const double low = 1e5, high = 1e5 + 1e-3;
@@ -332,7 +334,7 @@ static void values_too_near_are_reported(void **state)
             ramp r;
             snprintf(keys, sizeof keys, "range: %s", near[i].range);
             ramp_create(&r, SIDE, near[i].low, near[i].high, false);
-            insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_of(layer, keys)));
+            insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(make_layer_scene(layer, keys)));
             for (int cycle = 0; cycle < 2; cycle++) {
                 ramp_submit(&r, session);
                 everywhere(insitu_step(session, cycle, 0) == INSITU_OK);
@@ -361,7 +363,7 @@ static void statistics_distinguish_narrow_fields(void **state)
         ramp_create(&r, SIDE, low, high, false);
         if (own_rank == 0) unlink("narrow.csv");
         snprintf(scene, sizeof scene, "%sstatistics: [{field: f, path: narrow.csv, histogram: {bins: 4%s}}]\n",
-                 scene_of(1, "range: data"), is_given ? ", range: [100000000, 100000000.01]" : "");
+                 make_layer_scene(1, "range: data"), is_given ? ", range: [100000000, 100000000.01]" : "");
         insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
         ramp_submit(&r, session);
         everywhere(insitu_step(session, 0, 0) == INSITU_OK);
@@ -382,19 +384,19 @@ static void statistics_distinguish_narrow_fields(void **state)
     }
 }
 
-static int begin_tests(void **state)
+static int set_up_test_group(void **state)
 {
     (void)state;
-    return enter_folder("narrow") ? 0 : 1;
+    return enter_test_folder("narrow") ? 0 : 1;
 }
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(narrow_ranges_are_closed_forms),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(pictures_of_narrow_ranges_match_closed_forms),
                                        cmocka_unit_test(percentiles_are_those_of_doubles),
-                                       cmocka_unit_test(percentiles_are_right_among_many_equal_values),
+                                       cmocka_unit_test(percentiles_are_exact_for_many_equal_values),
                                        cmocka_unit_test(constant_fields_have_one_tick),
                                        cmocka_unit_test(values_too_near_are_reported),
                                        cmocka_unit_test(statistics_distinguish_narrow_fields)};
-    return run_session_tests(argc, argv, tests, begin_tests, NULL);
+    return run_session_tests(argc, argv, tests, set_up_test_group, NULL);
 }

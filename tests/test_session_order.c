@@ -43,7 +43,7 @@ static const char cell_scene[] =
 
 /* ---- drawing ---------------------------------------------------------------------------------------------------- */
 
-static bool step_ok(insitu_session *session, int cycle)
+static bool step_succeeds(insitu_session *session, int cycle)
 {
     discard_pictures();
     const insitu_status status = insitu_step(session, cycle, 0);
@@ -52,15 +52,15 @@ static bool step_ok(insitu_session *session, int cycle)
 }
 
 /* more: a second field, or NULL. */
-static drawn draw(MPI_Comm comm, const char *scene, const order_mesh *mesh, const insitu_field *more,
-                  insitu_report *report)
+static drawn draw_mesh(MPI_Comm comm, const char *scene, const order_mesh *mesh, const insitu_field *more,
+                       insitu_report *report)
 {
-    insitu_session *session = open_mesh(comm, scene, &mesh->mesh, &mesh->field);
+    insitu_session *session = open_session_with_mesh(comm, scene, &mesh->mesh, &mesh->field);
     if (more) assert_int_equal(insitu_set_field(session, "m", more), INSITU_OK);
-    const bool is_well = step_ok(session, 0);
+    const bool is_well = step_succeeds(session, 0);
     if (report) *report = *insitu_last_report(session);
     assert_true(is_well);
-    const drawn out = take_drawn();
+    const drawn out = take_caught_pictures();
     insitu_destroy(&session);
     return out;
 }
@@ -70,7 +70,7 @@ static const double rounding = 1e-5;
 
 /* Returns whether the first pictures have the same hits, but for the rounding of places: these are relative to the
  * middle of the cells that are drawn, which is another one if some are ghosts. */
-static bool same_depths(const drawn *a, const drawn *b)
+static bool are_same_depths(const drawn *a, const drawn *b)
 {
     bool is_same = true;
     for (int i = 0; own_rank == 0 && i < PIXELS; i++) {
@@ -80,7 +80,7 @@ static bool same_depths(const drawn *a, const drawn *b)
     return is_same;
 }
 
-static void pixel_place(int pixel, double out[2])
+static void compute_pixel_position(int pixel, double out[2])
 {
     const double size = VIEW_HEIGHT / HEIGHT;
     out[0] = (pixel % WIDTH + 0.5 - WIDTH / 2.0) * size;
@@ -89,18 +89,18 @@ static void pixel_place(int pixel, double out[2])
 
 /* ---- planes ----------------------------------------------------------------------------------------------------- */
 
-static double linear(const double p[3])
+static double linear_field(const double p[3])
 {
     return p[2] + 0.3 * p[0] + 0.2 * p[1];
 }
 
 /* The pixels whose depth is wrong: a hit where none should be, or the other way round, or at another place. */
-static int count_wrong(const caught_picture *picture, bool is_face)
+static int count_wrong_pixels(const caught_picture *picture, bool is_face)
 {
     int wrong = 0;
     for (int pixel = 0; pixel < PIXELS; pixel++) {
         double at[2];
-        pixel_place(pixel, at);
+        compute_pixel_position(pixel, at);
         const bool is_in = fabs(at[0]) < 1 && fabs(at[1]) < 1;
         const double z = is_face ? 1 : 0.1 - 0.3 * at[0] - 0.2 * at[1], depth = (double)picture->depth[pixel];
         wrong += is_in ? !(fabs(depth - (EYE - z)) < rounding) : isfinite(depth);
@@ -114,23 +114,23 @@ static void planes_have_no_gap(void **state)
     for (int k = 0; k < order_kind_count; k++) {
         order_mesh part, whole;
         insitu_report report;
-        order_mesh_create(&order_kinds[k], 2, 0, linear, own_rank, rank_count, &part);
-        drawn all = draw(MPI_COMM_WORLD, plane_scene, &part, NULL, &report);
+        order_mesh_create(&order_kinds[k], 2, 0, linear_field, own_rank, rank_count, &part);
+        drawn all = draw_mesh(MPI_COMM_WORLD, plane_scene, &part, NULL, &report);
         everywhere(report.cells == part.cell_count && report.cells_inverted == 0 && report.cells_flat == 0);
-        order_mesh_create(&order_kinds[k], 2, 0, linear, 0, 1, &whole);
-        drawn alone = draw(MPI_COMM_SELF, plane_scene, &whole, NULL, NULL);
+        order_mesh_create(&order_kinds[k], 2, 0, linear_field, 0, 1, &whole);
+        drawn alone = draw_mesh(MPI_COMM_SELF, plane_scene, &whole, NULL, NULL);
         int wrong[3] = {0};
         bool is_same = true;
         for (int i = 0; own_rank == 0 && i < 3; i++) {
-            wrong[i] = count_wrong(&all.pictures[i], i == 2);
-            is_same = is_same && same_pictures(&all.pictures[i], &alone.pictures[i]);
+            wrong[i] = count_wrong_pixels(&all.pictures[i], i == 2);
+            is_same = is_same && are_same_pictures(&all.pictures[i], &alone.pictures[i]);
         }
         if (wrong[0] || wrong[1] || wrong[2])
             fprintf(stderr, "%s: %d, %d, %d pixels are wrong\n", order_kinds[k].name, wrong[0], wrong[1], wrong[2]);
         everywhere(!wrong[0] && !wrong[1] && !wrong[2]);
         everywhere(is_same);
-        free_drawn(&all);
-        free_drawn(&alone);
+        free_picture_set(&all);
+        free_picture_set(&alone);
         order_mesh_free(&part);
         order_mesh_free(&whole);
     }
@@ -139,39 +139,39 @@ static void planes_have_no_gap(void **state)
 /* ---- the order of the error -------------------------------------------------------------------------------------- */
 
 /* The largest distance along rays within 0.4 of the axis, where the sphere faces the eye. */
-static double sphere_error(const order_kind *kind, int side, double bend)
+static double measure_sphere_error(const order_kind *kind, int side, double bend)
 {
     order_mesh mesh;
-    order_mesh_create(kind, side, bend, order_sphere, own_rank, rank_count, &mesh);
-    drawn d = draw(MPI_COMM_WORLD, sphere_scene, &mesh, NULL, NULL);
+    order_mesh_create(kind, side, bend, order_sphere_field, own_rank, rank_count, &mesh);
+    drawn d = draw_mesh(MPI_COMM_WORLD, sphere_scene, &mesh, NULL, NULL);
     double worst = 0;
     for (int pixel = 0; own_rank == 0 && pixel < PIXELS; pixel++) {
         double at[2];
-        pixel_place(pixel, at);
+        compute_pixel_position(pixel, at);
         const double square = at[0] * at[0] + at[1] * at[1];
         if (square > 0.16) continue;
         const double error = fabs((double)d.pictures[0].depth[pixel] - (EYE - sqrt(0.5 - square)));
         worst = error > worst || !isfinite(error) ? error : worst;
     }
     MPI_Bcast(&worst, 1, MPI_DOUBLE, 0, MPI_COMM_WORLD);
-    free_drawn(&d);
+    free_picture_set(&d);
     order_mesh_free(&mesh);
     return worst;
 }
 
 /* An interpolant's error is a constant times the square of the spacing, plus less: the constant hardly changes between
  * cells of this size. Rays sample its largest places, so the ratio of two maxima is near 4. */
-static void error_falls_by_four(void **state)
+static void error_falls_by_a_factor_of_four(void **state)
 {
     (void)state;
     /* By default on one rank only: the other cases compare the pictures of several ranks with those of one. */
-    if (rank_count > 1 && !test_is_whole()) return;
+    if (rank_count > 1 && !test_is_long_run()) return;
     for (int k = 0; k < order_kind_count; k++)
         for (int is_bent = 0; is_bent < 2; is_bent++) {
             if (order_kinds[k].order == 4) continue; /* the finer mesh would take long */
             const int side = order_kinds[k].order == 1 ? 6 : order_kinds[k].order == 3 ? 2 : 3;
-            const double coarse = sphere_error(&order_kinds[k], side, is_bent ? 0.08 : 0);
-            const double fine = sphere_error(&order_kinds[k], 2 * side, is_bent ? 0.08 : 0);
+            const double coarse = measure_sphere_error(&order_kinds[k], side, is_bent ? 0.08 : 0);
+            const double fine = measure_sphere_error(&order_kinds[k], 2 * side, is_bent ? 0.08 : 0);
             if (own_rank == 0)
                 printf("%s%s: error %.2g, with nodes twice as dense %.2g: %.2f\n", order_kinds[k].name,
                        is_bent ? ", bent" : "", coarse, fine, coarse / fine);
@@ -182,7 +182,7 @@ static void error_falls_by_four(void **state)
 /* ---- hexes are the linear ones between their nodes --------------------------------------------------------------- */
 
 /* Vertices of each cell's own, without connectivity. */
-static order_mesh own_nodes(const order_mesh *of, int p)
+static order_mesh duplicate_nodes_per_cell(const order_mesh *of, int p)
 {
     order_mesh out = *of;
     const int64_t count = of->cell_count * of->nodes;
@@ -202,28 +202,28 @@ static order_mesh own_nodes(const order_mesh *of, int p)
 }
 
 /* Surfaces to the bit; samples of volumes are blended in the order of cells, whose numbers are the same. */
-static void hexes_are_those_between_their_nodes(void **state)
+static void hexes_match_linear_hexes_between_nodes(void **state)
 {
     (void)state;
     for (int p = 1; p <= 4; p++) {
         const order_kind kind = {"hex", INSITU_LAGRANGE_HEX, INSITU_ORDER_LEXICOGRAPHIC, p};
         order_mesh mesh;
-        order_mesh_create(&kind, 2, 0.1, order_wavy, own_rank, rank_count, &mesh);
-        order_mesh cut = order_mesh_linear_hexes(&mesh, p), own = own_nodes(&mesh, p);
+        order_mesh_create(&kind, 2, 0.1, order_wave_field, own_rank, rank_count, &mesh);
+        order_mesh cut = order_mesh_make_linear_hexes(&mesh, p), own = duplicate_nodes_per_cell(&mesh, p);
         /* The threshold of picture 2 shows whole cells, which linear ones do not know. */
-        drawn high = draw(MPI_COMM_WORLD, linear_scene, &mesh, NULL, NULL);
-        drawn low = draw(MPI_COMM_WORLD, linear_scene, &cut, NULL, NULL);
-        drawn listed = draw(MPI_COMM_WORLD, all_scene, &mesh, NULL, NULL);
-        drawn implied = draw(MPI_COMM_WORLD, all_scene, &own, NULL, NULL);
+        drawn high = draw_mesh(MPI_COMM_WORLD, linear_scene, &mesh, NULL, NULL);
+        drawn low = draw_mesh(MPI_COMM_WORLD, linear_scene, &cut, NULL, NULL);
+        drawn listed = draw_mesh(MPI_COMM_WORLD, all_scene, &mesh, NULL, NULL);
+        drawn implied = draw_mesh(MPI_COMM_WORLD, all_scene, &own, NULL, NULL);
         bool is_same = true;
         for (int i = 0; own_rank == 0 && i < high.count; i++)
-            is_same = is_same && (i == 2 || same_pictures(&high.pictures[i], &low.pictures[i]));
+            is_same = is_same && (i == 2 || are_same_pictures(&high.pictures[i], &low.pictures[i]));
         everywhere(is_same);
-        everywhere(same_drawn(&listed, &implied));
-        free_drawn(&listed);
-        free_drawn(&high);
-        free_drawn(&low);
-        free_drawn(&implied);
+        everywhere(are_same_picture_sets(&listed, &implied));
+        free_picture_set(&listed);
+        free_picture_set(&high);
+        free_picture_set(&low);
+        free_picture_set(&implied);
         free(cut.connectivity);
         free(own.coordinates);
         free(own.values);
@@ -235,13 +235,13 @@ static void hexes_are_those_between_their_nodes(void **state)
 
 /* Cells with values of 0 and 1 in turn; a threshold on them draws what the mesh of those with 1 alone does, and so do
  * ghosts in place of the others. */
-static void values_in_cells_are_the_callers(void **state)
+static void cell_values_match_the_callers_cells(void **state)
 {
     (void)state;
     for (int k = 0; k < order_kind_count; k++) {
         order_mesh mesh;
         insitu_report report;
-        order_mesh_create(&order_kinds[k], 2, 0.05, order_wavy, own_rank, rank_count, &mesh);
+        order_mesh_create(&order_kinds[k], 2, 0.05, order_wave_field, own_rank, rank_count, &mesh);
         double *values = malloc((size_t)(mesh.cell_count + 1) * sizeof *values);
         unsigned char *ghosts = malloc((size_t)mesh.cell_count + 1);
         int64_t ghost_count = 0;
@@ -255,13 +255,13 @@ static void values_in_cells_are_the_callers(void **state)
         c.centring = INSITU_CELL;
         c.count = mesh.cell_count;
         c.values = (insitu_array){values, INSITU_FLOAT64, 0};
-        drawn threshold = draw(MPI_COMM_WORLD, cell_scene, &mesh, &c, NULL);
+        drawn threshold = draw_mesh(MPI_COMM_WORLD, cell_scene, &mesh, &c, NULL);
         mesh.mesh.ghosts = (insitu_array){ghosts, INSITU_UINT8, 0};
-        drawn hidden = draw(MPI_COMM_WORLD, cell_scene, &mesh, &c, &report);
+        drawn hidden = draw_mesh(MPI_COMM_WORLD, cell_scene, &mesh, &c, &report);
         everywhere(report.cells == mesh.cell_count && report.cells_ghost == ghost_count);
-        everywhere(same_depths(&threshold, &hidden)); /* colours range over other cells */
-        free_drawn(&threshold);
-        free_drawn(&hidden);
+        everywhere(are_same_depths(&threshold, &hidden)); /* colours range over other cells */
+        free_picture_set(&threshold);
+        free_picture_set(&hidden);
         free(values);
         free(ghosts);
         order_mesh_free(&mesh);
@@ -276,16 +276,16 @@ static void thresholds_show_whole_cells(void **state)
     const char *plain = "images:\n" IMAGE("a", "surface: {colour_by: {field: f}}");
     for (int k = 0; k < order_kind_count; k++) {
         order_mesh mesh;
-        order_mesh_create(&order_kinds[k], 2, 0.05, order_wavy, own_rank, rank_count, &mesh);
+        order_mesh_create(&order_kinds[k], 2, 0.05, order_wave_field, own_rank, rank_count, &mesh);
         unsigned char *ghosts = calloc((size_t)mesh.cell_count + 1, 1);
         for (int64_t i = 0; i < mesh.cell_count * mesh.nodes; i++)
             ghosts[i / mesh.nodes] |= mesh.values[mesh.connectivity[i]] < -0.3;
-        drawn threshold = draw(MPI_COMM_WORLD, scene, &mesh, NULL, NULL);
+        drawn threshold = draw_mesh(MPI_COMM_WORLD, scene, &mesh, NULL, NULL);
         mesh.mesh.ghosts = (insitu_array){ghosts, INSITU_UINT8, 0};
-        drawn hidden = draw(MPI_COMM_WORLD, plain, &mesh, NULL, NULL);
-        everywhere(same_depths(&threshold, &hidden));
-        free_drawn(&threshold);
-        free_drawn(&hidden);
+        drawn hidden = draw_mesh(MPI_COMM_WORLD, plain, &mesh, NULL, NULL);
+        everywhere(are_same_depths(&threshold, &hidden));
+        free_picture_set(&threshold);
+        free_picture_set(&hidden);
         free(ghosts);
         order_mesh_free(&mesh);
     }
@@ -294,26 +294,26 @@ static void thresholds_show_whole_cells(void **state)
 /* ---- corners ----------------------------------------------------------------------------------------------------- */
 
 /* A field with a value at each node of each cell draws what vertices of each cell's own do. */
-static void corner_fields_are_the_cells_own(void **state)
+static void corner_fields_are_discontinuous_between_cells(void **state)
 {
     (void)state;
     for (int p = 2; p <= 3; p++)
         for (int has_offsets = 0; has_offsets < 2; has_offsets++) {
             const order_kind kind = {"hex", INSITU_LAGRANGE_HEX, INSITU_ORDER_LEXICOGRAPHIC, p};
             order_mesh mesh;
-            order_mesh_create(&kind, 2, 0.1, order_wavy, own_rank, rank_count, &mesh);
-            order_mesh own = own_nodes(&mesh, p);
+            order_mesh_create(&kind, 2, 0.1, order_wave_field, own_rank, rank_count, &mesh);
+            order_mesh own = duplicate_nodes_per_cell(&mesh, p);
             int64_t *offsets = malloc((size_t)(mesh.cell_count + 1) * sizeof *offsets);
             for (int64_t cell = 0; cell <= mesh.cell_count; cell++) offsets[cell] = cell * mesh.nodes;
             for (int64_t i = 0; i < own.vertex_count; i++) own.values[i] += 0.1 * sin((double)(i / mesh.nodes));
             if (has_offsets) mesh.mesh.offsets = (insitu_array){offsets, INSITU_INT64, 0};
             mesh.field = own.field;
             mesh.field.centring = INSITU_CORNER;
-            drawn discontinuous = draw(MPI_COMM_WORLD, all_scene, &mesh, NULL, NULL);
-            drawn doubled = draw(MPI_COMM_WORLD, all_scene, &own, NULL, NULL);
-            everywhere(same_drawn(&discontinuous, &doubled));
-            free_drawn(&discontinuous);
-            free_drawn(&doubled);
+            drawn discontinuous = draw_mesh(MPI_COMM_WORLD, all_scene, &mesh, NULL, NULL);
+            drawn doubled = draw_mesh(MPI_COMM_WORLD, all_scene, &own, NULL, NULL);
+            everywhere(are_same_picture_sets(&discontinuous, &doubled));
+            free_picture_set(&discontinuous);
+            free_picture_set(&doubled);
             free(offsets);
             free(own.coordinates);
             free(own.values);
@@ -339,17 +339,17 @@ static void rotate_nodes(order_mesh *mesh)
 static drawn draw_rotated(const order_kind *kind, unsigned changed)
 {
     order_mesh mesh;
-    order_mesh_create(kind, 2, 0, order_wavy, own_rank, rank_count, &mesh);
+    order_mesh_create(kind, 2, 0, order_wave_field, own_rank, rank_count, &mesh);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(all_scene));
     assert_int_equal(insitu_set_mesh(session, "m", &mesh.mesh), INSITU_OK);
     assert_int_equal(insitu_set_field(session, "m", &mesh.field), INSITU_OK);
-    everywhere(step_ok(session, 0));
+    everywhere(step_succeeds(session, 0));
     rotate_nodes(&mesh);
     mesh.mesh.changed = changed;
     assert_int_equal(insitu_set_mesh(session, "m", &mesh.mesh), INSITU_OK);
     if (changed == INSITU_CHANGED_ALL) assert_int_equal(insitu_set_field(session, "m", &mesh.field), INSITU_OK);
-    everywhere(step_ok(session, 1));
-    const drawn out = take_drawn();
+    everywhere(step_succeeds(session, 1));
+    const drawn out = take_caught_pictures();
     insitu_destroy(&session);
     order_mesh_free(&mesh);
     return out;
@@ -357,7 +357,7 @@ static drawn draw_rotated(const order_kind *kind, unsigned changed)
 
 /* Serendipity cells are cut anew as their nodes move; others keep their pieces. Both draw the surfaces that a mesh does
  * which is new. */
-static void moved_nodes_draw_as_new_ones(void **state)
+static void moved_nodes_draw_same_picture_as_new_mesh(void **state)
 {
     (void)state;
     for (int k = 0; k < order_kind_count; k++) {
@@ -365,10 +365,10 @@ static void moved_nodes_draw_as_new_ones(void **state)
         drawn anew = draw_rotated(&order_kinds[k], INSITU_CHANGED_ALL);
         bool is_same = moved.count == anew.count;
         for (int i = 0; own_rank == 0 && i < 3; i++)
-            is_same = is_same && same_pictures(&moved.pictures[i], &anew.pictures[i]);
+            is_same = is_same && are_same_pictures(&moved.pictures[i], &anew.pictures[i]);
         everywhere(is_same);
-        free_drawn(&moved);
-        free_drawn(&anew);
+        free_picture_set(&moved);
+        free_picture_set(&anew);
     }
 }
 
@@ -376,12 +376,12 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(planes_have_no_gap),
-        cmocka_unit_test(error_falls_by_four),
-        cmocka_unit_test(hexes_are_those_between_their_nodes),
-        cmocka_unit_test(values_in_cells_are_the_callers),
+        cmocka_unit_test(error_falls_by_a_factor_of_four),
+        cmocka_unit_test(hexes_match_linear_hexes_between_nodes),
+        cmocka_unit_test(cell_values_match_the_callers_cells),
         cmocka_unit_test(thresholds_show_whole_cells),
-        cmocka_unit_test(corner_fields_are_the_cells_own),
-        cmocka_unit_test(moved_nodes_draw_as_new_ones),
+        cmocka_unit_test(corner_fields_are_discontinuous_between_cells),
+        cmocka_unit_test(moved_nodes_draw_same_picture_as_new_mesh),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -25,24 +25,24 @@ enum { SIDE = 240, PIXELS = SIDE * SIDE };
 #define LINED(width) FINER_LINED("1", width)
 
 /* more: a second field, or NULL. The caller owns the session. */
-static insitu_session *draw(const char *scene, const order_mesh *mesh, const insitu_field *more)
+static insitu_session *open_session_and_step(const char *scene, const order_mesh *mesh, const insitu_field *more)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
     everywhere(insitu_set_mesh(session, "m", &mesh->mesh) == INSITU_OK &&
                insitu_set_field(session, "m", &mesh->field) == INSITU_OK &&
                (!more || insitu_set_field(session, "m", more) == INSITU_OK));
-    step_is_good(session, 0);
+    check_step_succeeds(session, 0);
     return session;
 }
 
 static caught_picture draw_picture(const char *scene, const order_mesh *mesh, const insitu_field *more)
 {
-    insitu_session *session = draw(scene, mesh, more);
+    insitu_session *session = open_session_and_step(scene, mesh, more);
     insitu_destroy(&session);
     return pop_caught_picture();
 }
 
-static insitu_field cell_field(const char *name, insitu_centring centring, const double *values, int64_t count)
+static insitu_field describe_cell_field(const char *name, insitu_centring centring, const double *values, int64_t count)
 {
     insitu_field out;
     insitu_field_defaults(&out);
@@ -55,14 +55,14 @@ static insitu_field cell_field(const char *name, insitu_centring centring, const
 
 /* ---- edges ------------------------------------------------------------------------------------------------------- */
 
-static void pixel_place(int pixel, double out[2])
+static void compute_pixel_position(int pixel, double out[2])
 {
     out[0] = (pixel % SIDE + 0.5) / 100 - 1.2;
     out[1] = 1.2 - (pixel / SIDE + 0.5) / 100;
 }
 
 /* The squared distance from the point to a segment. */
-static double segment_distance(const double at[2], const double a[2], const double b[2])
+static double squared_distance_from_segment(const double at[2], const double a[2], const double b[2])
 {
     const double e[2] = {b[0] - a[0], b[1] - a[1]}, d[2] = {at[0] - a[0], at[1] - a[1]};
     const double s = fmin(fmax((d[0] * e[0] + d[1] * e[1]) / (e[0] * e[0] + e[1] * e[1]), 0), 1);
@@ -83,7 +83,8 @@ typedef struct edge_form {
 } edge_form;
 
 /* Computes a point of an edge: that of the polynomial through its nodes, which are equispaced until they are bent. */
-static void edge_point(const edge_form *form, const double from[2], const double to[2], double at, double out[2])
+static void compute_edge_point(const edge_form *form, const double from[2], const double to[2], double at,
+                               double out[2])
 {
     out[0] = out[1] = 0;
     for (int node = 0; node <= form->order; node++) {
@@ -92,7 +93,7 @@ static void edge_point(const edge_form *form, const double from[2], const double
         double weight = 1;
         for (int other = 0; other <= form->order; other++)
             if (other != node) weight *= (form->order * at - other) / (node - other);
-        for (int axis = 0; axis < 2; axis++) out[axis] += weight * order_mesh_moved(form->bend, point, axis);
+        for (int axis = 0; axis < 2; axis++) out[axis] += weight * order_mesh_make_moved(form->bend, point, axis);
     }
 }
 
@@ -101,7 +102,7 @@ static void add_edge(edge_list *list, const double from[2], const double to[2], 
     const int count = form->order * form->parts;
     for (int i = 0; i < count; i++, list->count++)
         for (int end = 0; end < 2; end++)
-            edge_point(form, from, to, (double)(i + end) / count, list->ends[list->count][end]);
+            compute_edge_point(form, from, to, (double)(i + end) / count, list->ends[list->count][end]);
 }
 
 static bool has_diagonals(const order_kind *kind)
@@ -124,15 +125,15 @@ static void list_edges(const order_kind *kind, double bend, int parts, edge_list
 
 /* The pixels that are not black by as much as a line covers them; fade: of all lines. The library computes places in
  * float, which are wrong by less than a thousandth of a pixel here. */
-static int count_wrong(const caught_picture *picture, const edge_list *edges, double width, double fade)
+static int count_wrong_pixels(const caught_picture *picture, const edge_list *edges, double width, double fade)
 {
     int wrong = 0;
     for (int pixel = 0; pixel < PIXELS; pixel++) {
         double at[2], nearest = INFINITY;
-        pixel_place(pixel, at);
+        compute_pixel_position(pixel, at);
         if (fabs(at[0]) > 1 || fabs(at[1]) > 1) continue;
         for (int i = 0; i < edges->count; i++)
-            nearest = fmin(nearest, segment_distance(at, edges->ends[i][0], edges->ends[i][1]));
+            nearest = fmin(nearest, squared_distance_from_segment(at, edges->ends[i][0], edges->ends[i][1]));
         const double covered = fmin(fmax(0.5 * (width + 1) - 100 * sqrt(nearest), 0), 1);
         wrong += !(fabs((double)picture->rgba[4 * pixel] - (1 - fade * covered)) < 1e-3);
     }
@@ -143,10 +144,10 @@ static void check_edges(const order_kind *kind, double bend, int parts, const ch
 {
     order_mesh mesh;
     edge_list edges;
-    order_mesh_create(kind, 2, bend, order_wavy, own_rank, rank_count, &mesh);
+    order_mesh_create(kind, 2, bend, order_wave_field, own_rank, rank_count, &mesh);
     list_edges(kind, bend, parts, &edges);
     caught_picture picture = draw_picture(scene, &mesh, NULL);
-    const int wrong = own_rank ? 0 : count_wrong(&picture, &edges, width, fade);
+    const int wrong = own_rank ? 0 : count_wrong_pixels(&picture, &edges, width, fade);
     if (wrong)
         fprintf(stderr, "%s, bend %g, %d pieces, width %g: %d pixels are wrong\n", kind->name, bend, parts, width,
                 wrong);
@@ -183,7 +184,7 @@ static void cells_of_several_orders_share_a_mesh(void **state)
     edge_list edges;
     unsigned char types[8];
     int64_t offsets[9] = {0}, wrong = 0;
-    order_mesh_create(&kind, 2, 0, order_plane, own_rank, rank_count, &mesh);
+    order_mesh_create(&kind, 2, 0, order_plane_field, own_rank, rank_count, &mesh);
     for (int64_t cell = 0; cell < mesh.cell_count; cell++) {
         const int at = (int)(cell * rank_count + own_rank) % 3;
         types[cell] = kinds[at].type;
@@ -196,7 +197,7 @@ static void cells_of_several_orders_share_a_mesh(void **state)
     mesh.mesh.connectivity_count = offsets[mesh.cell_count];
     list_edges(&kind, 0, 1, &edges);
     caught_picture lined = draw_picture(LINED("3"), &mesh, NULL);
-    everywhere(own_rank || count_wrong(&lined, &edges, 3, 1) == 0);
+    everywhere(own_rank || count_wrong_pixels(&lined, &edges, 3, 1) == 0);
     caught_picture flat = draw_picture(NUMBERED("isosurface: {field: f, values: [0.1]}"), &mesh, NULL);
     const double length = sqrt(1 + 0.3 * 0.3 + 0.2 * 0.2), normal[3] = {0.3 / length, 0.2 / length, 1 / length};
     for (int pixel = 0; own_rank == 0 && pixel < PIXELS; pixel++)
@@ -226,7 +227,7 @@ static void shells_have_edges_of_their_own(void **state)
                     const double v = is_loose ? at8[n][1] / 2. : (double)(n / (p + 1)) / p;
                     const double point[3] = {cell % 2 - 1 + u, cell / 2 - 1 + v, 1};
                     for (int axis = 0; axis < 3; axis++)
-                        coordinates[3 * mesh.vertex_count + axis] = order_mesh_moved(0.1, point, axis);
+                        coordinates[3 * mesh.vertex_count + axis] = order_mesh_make_moved(0.1, point, axis);
                     mesh.vertex_count++;
                 }
             int32_t connectivity[100];
@@ -239,12 +240,12 @@ static void shells_have_edges_of_their_own(void **state)
             mesh.mesh.vertex_order = is_loose ? INSITU_ORDER_VTK : INSITU_ORDER_LEXICOGRAPHIC;
             mesh.mesh.connectivity = (insitu_array){connectivity, INSITU_INT32, 0};
             mesh.mesh.order = is_loose ? 0 : p;
-            mesh.field = cell_field("f", INSITU_VERTEX, values, mesh.vertex_count);
+            mesh.field = describe_cell_field("f", INSITU_VERTEX, values, mesh.vertex_count);
             const order_kind kind = {"quad", mesh.mesh.cell_type, mesh.mesh.vertex_order, p};
             edge_list edges;
             list_edges(&kind, 0.1, 1, &edges);
             caught_picture picture = draw_picture(LINED("3"), &mesh, NULL);
-            everywhere(own_rank || count_wrong(&picture, &edges, 3, 1) == 0);
+            everywhere(own_rank || count_wrong_pixels(&picture, &edges, 3, 1) == 0);
             free_caught(&picture);
         }
 }
@@ -265,14 +266,14 @@ static void cells_that_cannot_be_shown_count_once(void **state)
     for (int k = 0; k < order_kind_count; k++) {
         order_mesh mesh;
         int64_t expected = 0;
-        order_mesh_create(&order_kinds[k], 2, 0, order_wavy, own_rank, rank_count, &mesh);
+        order_mesh_create(&order_kinds[k], 2, 0, order_wave_field, own_rank, rank_count, &mesh);
         for (int64_t v = 0; v < mesh.vertex_count; v++) {
             const double *at = mesh.coordinates + 3 * v;
             if (fabs(at[0] - 1. / order_kinds[k].order) + fabs(at[1]) + fabs(at[2]) > 1e-9) continue;
             mesh.values[v] = NAN;
             for (int64_t cell = 0; cell < mesh.cell_count; cell++) expected += has_node(&mesh, cell, v);
         }
-        insitu_session *session = draw(IMAGE("isosurface: {field: f, values: [0.1]}"), &mesh, NULL);
+        insitu_session *session = open_session_and_step(IMAGE("isosurface: {field: f, values: [0.1]}"), &mesh, NULL);
         everywhere(insitu_last_report(session)->cells_unusable == expected);
         char words[64];
         int64_t all = expected;
@@ -292,7 +293,7 @@ static void cells_that_show_nothing_count_once(void **state)
     int reported = 0;
     for (int k = 0; k < order_kind_count; k++) {
         order_mesh mesh;
-        order_mesh_create(&order_kinds[k], 2, 0, order_plane, own_rank, rank_count, &mesh);
+        order_mesh_create(&order_kinds[k], 2, 0, order_plane_field, own_rank, rank_count, &mesh);
         long long left = 0, of = 0, expected = mesh.cell_count;
         for (int64_t cell = 0; cell < mesh.cell_count; cell++) {
             double low = INFINITY, high = -INFINITY;
@@ -302,7 +303,7 @@ static void cells_that_show_nothing_count_once(void **state)
             }
             expected -= low <= 1.4 && 1.4 <= high;
         }
-        insitu_session *session = draw(IMAGE("isosurface: {field: f, values: [1.4]}"), &mesh, NULL);
+        insitu_session *session = open_session_and_step(IMAGE("isosurface: {field: f, values: [1.4]}"), &mesh, NULL);
         const char *text = strstr(insitu_last_report(session)->left_out, "mesh \"m\": ");
         const bool is_reported = text && sscanf(text, "mesh \"m\": %lld of %lld cells show nothing", &left, &of) == 2;
         everywhere(!is_reported || (left == expected && of == mesh.cell_count));
@@ -321,11 +322,11 @@ static void statistics_count_cells_once(void **state)
     for (int k = 0; k < order_kind_count; k++) {
         order_mesh mesh;
         char text[4096];
-        order_mesh_create(&order_kinds[k], 2, 0, order_wavy, own_rank, rank_count, &mesh);
+        order_mesh_create(&order_kinds[k], 2, 0, order_wave_field, own_rank, rank_count, &mesh);
         int64_t cells = mesh.cell_count;
         MPI_Allreduce(MPI_IN_PLACE, &cells, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
         if (!own_rank) remove("cells.csv");
-        insitu_session *session = draw(scene, &mesh, NULL);
+        insitu_session *session = open_session_and_step(scene, &mesh, NULL);
         insitu_destroy(&session);
         discard_pictures();
         read_file("cells.csv", sizeof text, text);
@@ -340,13 +341,13 @@ static void statistics_count_cells_once(void **state)
 
 /* ---- means at nodes ---------------------------------------------------------------------------------------------- */
 
-static double value_of_cell(int64_t cell)
+static double compute_cell_value(int64_t cell)
 {
     return sin(1.7 * (double)cell);
 }
 
 /* The mean, at each vertex of the whole mesh, over the cells that have it, each once. */
-static double *mean_values(const order_mesh *whole)
+static double *compute_vertex_means(const order_mesh *whole)
 {
     enum { MOST = 64 };
     double *values = malloc((size_t)whole->vertex_count * MOST * sizeof *values);
@@ -354,16 +355,16 @@ static double *mean_values(const order_mesh *whole)
     int *counts = calloc((size_t)whole->vertex_count, sizeof *counts);
     for (int64_t i = 0; i < whole->cell_count * whole->nodes; i++) {
         const int64_t v = whole->connectivity[i];
-        if (counts[v] < MOST) values[v * MOST + counts[v]++] = value_of_cell(i / whole->nodes);
+        if (counts[v] < MOST) values[v * MOST + counts[v]++] = compute_cell_value(i / whole->nodes);
     }
-    for (int64_t v = 0; v < whole->vertex_count; v++) means[v] = mean_of(values + v * MOST, counts[v]);
+    for (int64_t v = 0; v < whole->vertex_count; v++) means[v] = compute_mean(values + v * MOST, counts[v]);
     free(values);
     free(counts);
     return means;
 }
 
 /* The means at the part's vertices, which are found in the whole by their bits. */
-static double *own_means(const order_mesh *part, const order_mesh *whole, const double *means)
+static double *find_means_of_part(const order_mesh *part, const order_mesh *whole, const double *means)
 {
     double *out = malloc((size_t)(part->vertex_count + 1) * sizeof *out);
     for (int64_t v = 0; v < part->vertex_count; v++) {
@@ -374,7 +375,7 @@ static double *own_means(const order_mesh *part, const order_mesh *whole, const 
     return out;
 }
 
-static bool same_depths(const caught_picture *a, const caught_picture *b)
+static bool are_same_depths(const caught_picture *a, const caught_picture *b)
 {
     return own_rank || memcmp(a->depth, b->depth, PIXELS * sizeof *a->depth) == 0;
 }
@@ -385,24 +386,24 @@ static void cell_values_count_once(void **state)
     (void)state;
     for (int k = 0; k < order_kind_count; k++) {
         order_mesh part, whole;
-        order_mesh_create(&order_kinds[k], 2, 0.05, order_wavy, own_rank, rank_count, &part);
-        order_mesh_create(&order_kinds[k], 2, 0.05, order_wavy, 0, 1, &whole);
+        order_mesh_create(&order_kinds[k], 2, 0.05, order_wave_field, own_rank, rank_count, &part);
+        order_mesh_create(&order_kinds[k], 2, 0.05, order_wave_field, 0, 1, &whole);
         const int64_t corners = part.cell_count * part.nodes;
-        double *means = mean_values(&whole), *at_vertices = own_means(&part, &whole, means);
+        double *means = compute_vertex_means(&whole), *at_vertices = find_means_of_part(&part, &whole, means);
         double *of_cells = malloc((size_t)(part.cell_count + 1) * sizeof *of_cells);
         double *at_corners = malloc((size_t)(corners + 1) * sizeof *at_corners);
         for (int64_t cell = 0; cell < part.cell_count; cell++)
-            of_cells[cell] = value_of_cell(cell * rank_count + own_rank);
+            of_cells[cell] = compute_cell_value(cell * rank_count + own_rank);
         for (int64_t i = 0; i < corners; i++) at_corners[i] = of_cells[i / part.nodes];
-        const insitu_field v = cell_field("v", INSITU_VERTEX, at_vertices, part.vertex_count);
-        const insitu_field c = cell_field("c", INSITU_CELL, of_cells, part.cell_count);
-        const insitu_field d = cell_field("d", INSITU_CORNER, at_corners, corners);
+        const insitu_field v = describe_cell_field("v", INSITU_VERTEX, at_vertices, part.vertex_count);
+        const insitu_field c = describe_cell_field("c", INSITU_CELL, of_cells, part.cell_count);
+        const insitu_field d = describe_cell_field("d", INSITU_CORNER, at_corners, corners);
         caught_picture truth = draw_picture(IMAGE("isosurface: {field: v, values: [0.1]}"), &part, &v);
         caught_picture cells = draw_picture(IMAGE("isosurface: {field: c, values: [0.1]}"), &part, &c);
         caught_picture averaged =
             draw_picture(IMAGE("isosurface: {field: d, values: [0.1], interpolate: vertex}"), &part, &d);
-        everywhere(same_depths(&truth, &cells));
-        everywhere(same_depths(&truth, &averaged));
+        everywhere(are_same_depths(&truth, &cells));
+        everywhere(are_same_depths(&truth, &averaged));
         free_caught(&truth);
         free_caught(&cells);
         free_caught(&averaged);
@@ -417,28 +418,28 @@ static void cell_values_count_once(void **state)
 
 /* Normals of surfaces of means come from the pieces, as the means are not values of the cells' polynomial: the picture
  * is that of linear hexes between the nodes, of the means as values of vertices. */
-static void normals_of_means_are_those_of_pieces(void **state)
+static void normals_of_cell_means_match_those_of_pieces(void **state)
 {
     (void)state;
     for (int p = 2; p <= 3; p++) {
         const order_kind kind = {"hex", INSITU_LAGRANGE_HEX, INSITU_ORDER_LEXICOGRAPHIC, p};
         order_mesh part, whole;
-        order_mesh_create(&kind, 2, 0.05, order_wavy, own_rank, rank_count, &part);
-        order_mesh_create(&kind, 2, 0.05, order_wavy, 0, 1, &whole);
-        order_mesh cut = order_mesh_linear_hexes(&part, p);
-        double *means = mean_values(&whole), *at_vertices = own_means(&part, &whole, means);
+        order_mesh_create(&kind, 2, 0.05, order_wave_field, own_rank, rank_count, &part);
+        order_mesh_create(&kind, 2, 0.05, order_wave_field, 0, 1, &whole);
+        order_mesh cut = order_mesh_make_linear_hexes(&part, p);
+        double *means = compute_vertex_means(&whole), *at_vertices = find_means_of_part(&part, &whole, means);
         double *of_cells = malloc((size_t)(part.cell_count + 1) * sizeof *of_cells);
         for (int64_t cell = 0; cell < part.cell_count; cell++)
-            of_cells[cell] = value_of_cell(cell * rank_count + own_rank);
-        const insitu_field v = cell_field("v", INSITU_VERTEX, at_vertices, part.vertex_count);
-        const insitu_field c = cell_field("c", INSITU_CELL, of_cells, part.cell_count);
+            of_cells[cell] = compute_cell_value(cell * rank_count + own_rank);
+        const insitu_field v = describe_cell_field("v", INSITU_VERTEX, at_vertices, part.vertex_count);
+        const insitu_field c = describe_cell_field("c", INSITU_CELL, of_cells, part.cell_count);
         static const char *const scenes[2][2] = {
             {IMAGE("isosurface: {field: v, values: [0.1]}"), IMAGE("isosurface: {field: c, values: [0.1]}")},
             {IMAGE("isosurface: {field: v, values: [0.1], normals: vertex}"),
              IMAGE("isosurface: {field: c, values: [0.1], normals: vertex}")}};
         for (int i = 0; i < 2; i++) {
             caught_picture truth = draw_picture(scenes[i][0], &cut, &v), cells = draw_picture(scenes[i][1], &part, &c);
-            everywhere(own_rank || same_pictures(&truth, &cells));
+            everywhere(own_rank || are_same_pictures(&truth, &cells));
             free_caught(&truth);
             free_caught(&cells);
         }
@@ -451,10 +452,10 @@ static void normals_of_means_are_those_of_pieces(void **state)
     }
 }
 
-static int begin_tests(void **state)
+static int set_up_test_group(void **state)
 {
     (void)state;
-    return enter_folder("order_cells") ? 0 : 1;
+    return enter_test_folder("order_cells") ? 0 : 1;
 }
 
 int main(int argc, char **argv)
@@ -467,7 +468,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(cells_that_show_nothing_count_once),
         cmocka_unit_test(statistics_count_cells_once),
         cmocka_unit_test(cell_values_count_once),
-        cmocka_unit_test(normals_of_means_are_those_of_pieces),
+        cmocka_unit_test(normals_of_cell_means_match_those_of_pieces),
     };
-    return run_session_tests(argc, argv, tests, begin_tests, NULL);
+    return run_session_tests(argc, argv, tests, set_up_test_group, NULL);
 }

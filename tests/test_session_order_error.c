@@ -34,7 +34,7 @@ static bool is_measured(const order_kind *kind)
     return kind->order > 1;
 }
 
-static bool is_of_other_layout(const order_kind *kind)
+static bool has_other_layout(const order_kind *kind)
 {
     return strstr(kind->name, "gmsh") || strstr(kind->name, "exodus") || strstr(kind->name, "old");
 }
@@ -46,16 +46,16 @@ static const order_kind hex_4 = {"hex 4", INSITU_LAGRANGE_HEX, INSITU_ORDER_LEXI
 /* ---- drawing ----------------------------------------------------------------------------------------------------- */
 
 /* What a step draws, and what its report tells of pieces and warns of. */
-typedef struct told {
+typedef struct drawn_report {
     drawn pictures;
     char pieces[512], warnings[2048];
     int count;    /* number of pieces */
     double bound; /* in pixels; infinite if there is none */
-} told;
+} drawn_report;
 
-static told step_told(insitu_session *session, int cycle)
+static drawn_report step_and_report(insitu_session *session, int cycle)
 {
-    told out = {.pictures = step_drawn(session, cycle), .bound = INFINITY};
+    drawn_report out = {.pictures = step_and_take_pictures(session, cycle), .bound = INFINITY};
     const insitu_report *report = insitu_last_report(session);
     snprintf(out.pieces, sizeof out.pieces, "%s", report->pieces);
     snprintf(out.warnings, sizeof out.warnings, "%s", report->warnings);
@@ -65,30 +65,30 @@ static told step_told(insitu_session *session, int cycle)
     return out;
 }
 
-static told draw(MPI_Comm comm, const char *scene, const order_mesh *mesh)
+static drawn_report draw_and_report(MPI_Comm comm, const char *scene, const order_mesh *mesh)
 {
-    insitu_session *session = open_mesh(comm, scene, &mesh->mesh, &mesh->field);
-    told out = step_told(session, 0);
+    insitu_session *session = open_session_with_mesh(comm, scene, &mesh->mesh, &mesh->field);
+    drawn_report out = step_and_report(session, 0);
     insitu_destroy(&session);
     return out;
 }
 
-/* Draws, and returns what is told of the pieces alone. */
-static told tell(const char *scene, const order_mesh *mesh)
+/* Draws, and returns what the report says about the pieces. */
+static drawn_report draw_and_report_pieces(const char *scene, const order_mesh *mesh)
 {
-    told out = draw(MPI_COMM_WORLD, scene, mesh);
-    free_drawn(&out.pictures);
+    drawn_report out = draw_and_report(MPI_COMM_WORLD, scene, mesh);
+    free_picture_set(&out.pictures);
     return out;
 }
 
 /* Returns whether the pieces are drawn as that fixed number of them, on rank 0. */
-static bool is_drawn_as(const told *of, int count, const char *images, const order_mesh *mesh)
+static bool is_drawn_as(const drawn_report *of, int count, const char *images, const order_mesh *mesh)
 {
     char scene[4096];
     snprintf(scene, sizeof scene, "finer_pieces: %d\nimages:\n%s", count, images);
-    told fixed = draw(MPI_COMM_WORLD, scene, mesh);
-    const bool is_same = own_rank != 0 || same_drawn(&of->pictures, &fixed.pictures);
-    free_drawn(&fixed.pictures);
+    drawn_report fixed = draw_and_report(MPI_COMM_WORLD, scene, mesh);
+    const bool is_same = own_rank != 0 || are_same_picture_sets(&of->pictures, &fixed.pictures);
+    free_picture_set(&fixed.pictures);
     return is_same;
 }
 
@@ -107,7 +107,7 @@ static sphere_hits find_hits(const caught_picture *picture, double bound)
     for (int pixel = 0; pixel < PIXELS; pixel++) {
         const double x = (pixel % WIDTH + 0.5 - WIDTH / 2.0) * PIXEL, y = (HEIGHT / 2.0 - pixel / WIDTH - 0.5) * PIXEL;
         const double depth = (double)picture->depth[pixel], place[3] = {x, y, EYE - depth}, off = hypot(x, y);
-        if (isfinite(depth)) out.farthest = fmax(out.farthest, fabs(sqrt(order_sphere(place)) - radius) / PIXEL);
+        if (isfinite(depth)) out.farthest = fmax(out.farthest, fabs(sqrt(order_sphere_field(place)) - radius) / PIXEL);
         out.missed += !isfinite(depth) && off < radius - bound * PIXEL;
         out.beyond += isfinite(depth) && off > radius + bound * PIXEL;
     }
@@ -119,14 +119,14 @@ static void check_sphere(const char *name, const order_mesh *mesh, double allowe
 {
     char scene[1024];
     snprintf(scene, sizeof scene, "surface_error: %g\nimages:\n%s", allowed, SPHERE);
-    told of = draw(MPI_COMM_WORLD, scene, mesh);
+    drawn_report of = draw_and_report(MPI_COMM_WORLD, scene, mesh);
     const double bound = of.bound + 1e-4;
     sphere_hits hits = {0, 0, 0};
     if (own_rank == 0) hits = find_hits(&of.pictures.pictures[0], bound);
     if (own_rank == 0) printf("%s: %s; the farthest hit by %.3f\n", name, of.pieces, hits.farthest);
     everywhere(of.bound <= allowed && of.count > 1 && strstr(of.pieces, ", of which 0 have no bound") != NULL);
     everywhere(hits.farthest <= bound && hits.missed == 0 && hits.beyond == 0);
-    free_drawn(&of.pictures);
+    free_picture_set(&of.pictures);
 }
 
 static void spheres_are_within_the_stated_error(void **state)
@@ -134,9 +134,9 @@ static void spheres_are_within_the_stated_error(void **state)
     (void)state;
     for (int k = 0; k < order_kind_count; k++) {
         order_mesh mesh;
-        if (!is_measured(&order_kinds[k]) || (!test_is_whole() && is_of_other_layout(&order_kinds[k]))) continue;
-        order_mesh_create(&order_kinds[k], order_kinds[k].order > 2 ? 2 : 4, 0, order_sphere, own_rank, rank_count,
-                          &mesh);
+        if (!is_measured(&order_kinds[k]) || (!test_is_long_run() && has_other_layout(&order_kinds[k]))) continue;
+        order_mesh_create(&order_kinds[k], order_kinds[k].order > 2 ? 2 : 4, 0, order_sphere_field, own_rank,
+                          rank_count, &mesh);
         check_sphere(order_kinds[k].name, &mesh, 0.5);
         order_mesh_free(&mesh);
     }
@@ -147,12 +147,12 @@ static void lobatto_points_are_recognised(void **state)
     (void)state;
     const double of4[5] = {0, 0.5 - 0.5 * sqrt(3. / 7), 0.5, 0.5 + 0.5 * sqrt(3. / 7), 1};
     order_mesh mesh;
-    order_mesh_create(&hex_4, 2, 0, order_sphere, own_rank, rank_count, &mesh);
+    order_mesh_create(&hex_4, 2, 0, order_sphere_field, own_rank, rank_count, &mesh);
     for (int64_t i = 0; i < 3 * mesh.vertex_count; i++) {
         const int at = (int)lround((mesh.coordinates[i] + 1) * 4);
         mesh.coordinates[i] = at / 4 - 1 + of4[at % 4];
     }
-    for (int64_t v = 0; v < mesh.vertex_count; v++) mesh.values[v] = order_sphere(mesh.coordinates + 3 * v);
+    for (int64_t v = 0; v < mesh.vertex_count; v++) mesh.values[v] = order_sphere_field(mesh.coordinates + 3 * v);
     check_sphere("hex 4, Gauss-Lobatto", &mesh, 0.5);
     order_mesh_free(&mesh);
 }
@@ -188,7 +188,7 @@ static hex_values evaluate_hex(const order_mesh *mesh, int64_t cell, const doubl
 }
 
 /* Computes the way in reference coordinates that leads so far in space, to first order. */
-static void find_way(const hex_values *of, const double shift[3], double out[3])
+static void solve_for_shift(const hex_values *of, const double shift[3], double out[3])
 {
     double dual[3][3], determinant = 0;
     for (int a = 0; a < 3; a++)
@@ -209,7 +209,7 @@ static bool find_in_cell(const order_mesh *mesh, int64_t cell, const double plac
         const hex_values of = evaluate_hex(mesh, cell, at);
         double shift[3], way[3];
         for (int x = 0; x < 3; x++) shift[x] = place[x] - of.value[x];
-        find_way(&of, shift, way);
+        solve_for_shift(&of, shift, way);
         for (int a = 0; a < 3; a++) at[a] += way[a];
     }
     bool is_in = true;
@@ -218,7 +218,7 @@ static bool find_in_cell(const order_mesh *mesh, int64_t cell, const double plac
 }
 
 /* Returns the distance of a place from the polynomial's isosurface, along the gradient, in pixels. */
-static double distance_from(const order_mesh *mesh, double isovalue, const double place[3])
+static double distance_from_isosurface(const order_mesh *mesh, double isovalue, const double place[3])
 {
     double nearest = INFINITY;
     for (int64_t cell = 0; cell < mesh->cell_count; cell++) {
@@ -229,16 +229,16 @@ static double distance_from(const order_mesh *mesh, double isovalue, const doubl
             double gradient[3] = {0}, shift[3], way[3], square = 0;
             for (int x = 0; x < 3; x++) { /* the way along each axis of space, and the field's change on it */
                 const double unit[3] = {x == 0, x == 1, x == 2};
-                find_way(&of, unit, way);
+                solve_for_shift(&of, unit, way);
                 for (int a = 0; a < 3; a++) gradient[x] += of.slopes[a][3] * way[a];
             }
             for (int x = 0; x < 3; x++) square += gradient[x] * gradient[x];
             for (int x = 0; x < 3; x++) shift[x] = gradient[x] * (isovalue - of.value[3]) / square;
-            find_way(&of, shift, way);
+            solve_for_shift(&of, shift, way);
             for (int a = 0; a < 3; a++) at[a] += way[a];
         }
         const double d[3] = {of.value[0] - place[0], of.value[1] - place[1], of.value[2] - place[2]};
-        if (fabs(of.value[3] - isovalue) < 1e-9) nearest = fmin(nearest, sqrt(order_sphere(d)) / PIXEL);
+        if (fabs(of.value[3] - isovalue) < 1e-9) nearest = fmin(nearest, sqrt(order_sphere_field(d)) / PIXEL);
     }
     return nearest;
 }
@@ -249,23 +249,23 @@ static void bent_cells_are_within_the_stated_error(void **state)
     (void)state;
     const order_kind kind = {"hex 2", INSITU_LAGRANGE_HEX, INSITU_ORDER_LEXICOGRAPHIC, 2};
     order_mesh part, whole;
-    order_mesh_create(&kind, 3, 0.1, order_wavy, own_rank, rank_count, &part);
-    order_mesh_create(&kind, 3, 0.1, order_wavy, 0, 1, &whole);
-    told of = draw(MPI_COMM_WORLD, WITHIN("0.5") IMAGE("a", "[384, 288]", FRONT, ISO("0.2")), &part);
+    order_mesh_create(&kind, 3, 0.1, order_wave_field, own_rank, rank_count, &part);
+    order_mesh_create(&kind, 3, 0.1, order_wave_field, 0, 1, &whole);
+    drawn_report of = draw_and_report(MPI_COMM_WORLD, WITHIN("0.5") IMAGE("a", "[384, 288]", FRONT, ISO("0.2")), &part);
     double farthest = 0;
     int hits = 0;
-    for (int pixel = 0; pixel < PIXELS && own_rank == 0; pixel += test_effort(7, 1)) {
+    for (int pixel = 0; pixel < PIXELS && own_rank == 0; pixel += test_case_count(7, 1)) {
         const double depth = (double)of.pictures.pictures[0].depth[pixel];
         if (!isfinite(depth)) continue;
         const double place[3] = {(pixel % WIDTH + 0.5 - WIDTH / 2.0) * PIXEL,
                                  (HEIGHT / 2.0 - pixel / WIDTH - 0.5) * PIXEL, EYE - depth};
-        farthest = fmax(farthest, distance_from(&whole, 0.2, place));
+        farthest = fmax(farthest, distance_from_isosurface(&whole, 0.2, place));
         hits++;
     }
     if (own_rank == 0) printf("bent hexes: %s; the farthest of %d hits by %.3f\n", of.pieces, hits, farthest);
     everywhere(of.count > 1 && of.bound <= 0.5);
     everywhere(own_rank || (hits > 1000 && farthest <= of.bound + 1e-4));
-    free_drawn(&of.pictures);
+    free_picture_set(&of.pictures);
     order_mesh_free(&part);
     order_mesh_free(&whole);
 }
@@ -278,14 +278,16 @@ static void pieces_follow_the_error_and_the_camera(void **state)
 {
     (void)state;
     order_mesh mesh;
-    order_mesh_create(&hex_27, 2, 0, order_sphere, own_rank, rank_count, &mesh);
+    order_mesh_create(&hex_27, 2, 0, order_sphere_field, own_rank, rank_count, &mesh);
     const char *near = "{position: [0, 0, 2.5], focal: [0, 0, 0], up: [0, 1, 0]}";
     const char *far = "{position: [0, 0, 10], focal: [0, 0, 0], up: [0, 1, 0]}";
     char scene[2][1024];
     for (int i = 0; i < 2; i++)
         snprintf(scene[i], sizeof scene[i], WITHIN("1") IMAGE("a", "[96, 72]", "%s", ISO("0.5")), i ? far : near);
-    const told coarse = tell(WITHIN("2") SMALL(ISO("0.5")), &mesh), fine = tell(WITHIN("0.5") SMALL(ISO("0.5")), &mesh);
-    const told from_near = tell(scene[0], &mesh), from_far = tell(scene[1], &mesh);
+    const drawn_report coarse = draw_and_report_pieces(WITHIN("2") SMALL(ISO("0.5")), &mesh),
+                       fine = draw_and_report_pieces(WITHIN("0.5") SMALL(ISO("0.5")), &mesh);
+    const drawn_report from_near = draw_and_report_pieces(scene[0], &mesh),
+                       from_far = draw_and_report_pieces(scene[1], &mesh);
     if (own_rank == 0)
         printf("%d and %d pieces by the error, %d and %d by the camera\n", coarse.count, fine.count, from_far.count,
                from_near.count);
@@ -293,9 +295,9 @@ static void pieces_follow_the_error_and_the_camera(void **state)
     everywhere(from_near.count > from_far.count && from_near.bound <= 1 && from_far.bound <= 1);
     const char *away = "{position: [0, 0, 5], focal: [0, 0, 9], up: [0, 1, 0]}";
     snprintf(scene[0], sizeof scene[0], WITHIN("0.4") IMAGE("a", "[96, 72]", "%s", ISO("0.5")), away);
-    everywhere(tell(scene[0], &mesh).count == 1);                      /* no camera sees it */
-    everywhere(tell(WITHIN("0.4") SMALL(ISO("9")), &mesh).count == 1); /* no cell has it */
-    everywhere(tell(FINER("3") SMALL(ISO("0.5")), &mesh).pieces[0] == '\0');
+    everywhere(draw_and_report_pieces(scene[0], &mesh).count == 1);                      /* no camera sees it */
+    everywhere(draw_and_report_pieces(WITHIN("0.4") SMALL(ISO("9")), &mesh).count == 1); /* no cell has it */
+    everywhere(draw_and_report_pieces(FINER("3") SMALL(ISO("0.5")), &mesh).pieces[0] == '\0');
     order_mesh_free(&mesh);
 }
 
@@ -305,17 +307,17 @@ static void pieces_are_drawn_as_a_fixed_number(void **state)
     static const order_kind *const kinds[] = {&hex_27, &hex_20};
     for (int k = 0; k < 2; k++) {
         order_mesh mesh;
-        order_mesh_create(kinds[k], 2, 0.05, order_wavy, own_rank, rank_count, &mesh);
-        told of = draw(MPI_COMM_WORLD, WITHIN("0.7") ALL, &mesh);
+        order_mesh_create(kinds[k], 2, 0.05, order_wave_field, own_rank, rank_count, &mesh);
+        drawn_report of = draw_and_report(MPI_COMM_WORLD, WITHIN("0.7") ALL, &mesh);
         everywhere(of.count > 1 && is_drawn_as(&of, of.count, ALL, &mesh));
-        free_drawn(&of.pictures);
+        free_picture_set(&of.pictures);
         order_mesh_free(&mesh);
     }
 }
 
 /* Numbers and pictures are the same, with automatic cameras too. */
 /* The field is at most -0.06 at nodes, but up to 0.05 more between them. */
-static double ridge(const double p[3])
+static double ridge_field(const double p[3])
 {
     return -(p[0] - 0.5) * (p[0] - 0.5) - 0.05 * p[2];
 }
@@ -324,13 +326,13 @@ static void surfaces_between_nodes_are_found(void **state)
 {
     (void)state;
     order_mesh mesh;
-    order_mesh_create(&hex_27, 1, 0, ridge, own_rank, rank_count, &mesh);
-    told of = draw(MPI_COMM_WORLD, WITHIN("0.25") SMALL(ISO("-0.01")), &mesh);
+    order_mesh_create(&hex_27, 1, 0, ridge_field, own_rank, rank_count, &mesh);
+    drawn_report of = draw_and_report(MPI_COMM_WORLD, WITHIN("0.25") SMALL(ISO("-0.01")), &mesh);
     int hits = 0;
     for (int pixel = 0; pixel < 96 * 72 && own_rank == 0; pixel++)
         hits += isfinite((double)of.pictures.pictures[0].depth[pixel]);
     everywhere(of.count > 2 && (own_rank || hits > 0));
-    free_drawn(&of.pictures);
+    free_picture_set(&of.pictures);
     order_mesh_free(&mesh);
 }
 
@@ -347,14 +349,14 @@ static void other_descriptions_have_the_same_pieces(void **state)
 {
     (void)state;
     order_mesh mesh;
-    order_mesh_create(&hex_20, 2, 0.05, order_wavy, own_rank, rank_count, &mesh);
+    order_mesh_create(&hex_20, 2, 0.05, order_wave_field, own_rank, rank_count, &mesh);
     const int64_t entries = mesh.cell_count * mesh.nodes;
     int64_t *index = malloc(((size_t)mesh.vertex_count + 1) * sizeof *index);
     double *corners = malloc(((size_t)entries + 1) * sizeof *corners);
     for (int64_t v = 0; v < mesh.vertex_count; v++) index[v] = v;
     for (int64_t i = 0; i < entries; i++) corners[i] = mesh.values[mesh.connectivity[i]];
     const insitu_array values = mesh.field.values;
-    told plain = draw(MPI_COMM_WORLD, WITHIN("1") ALL, &mesh);
+    drawn_report plain = draw_and_report(MPI_COMM_WORLD, WITHIN("1") ALL, &mesh);
     for (int other = 0; other < 3; other++) {
         order_mesh changed = mesh;
         if (other == 0) changed.field.index = (insitu_array){index, INSITU_INT64, 0};
@@ -364,28 +366,28 @@ static void other_descriptions_have_the_same_pieces(void **state)
         if (other == 2) changed.field.values = (insitu_array){0};
         if (other == 2) changed.field.fill = fill_values;
         if (other == 2) changed.field.fill_data = (void *)&values;
-        told of = draw(MPI_COMM_WORLD, WITHIN("1") ALL, &changed);
+        drawn_report of = draw_and_report(MPI_COMM_WORLD, WITHIN("1") ALL, &changed);
         if (strcmp(of.pieces, plain.pieces)) fprintf(stderr, "description %d: %s\n", other, of.pieces);
         everywhere(strcmp(of.pieces, plain.pieces) == 0 && plain.count > 1);
-        everywhere(own_rank || same_drawn(&of.pictures, &plain.pictures));
-        free_drawn(&of.pictures);
+        everywhere(own_rank || are_same_picture_sets(&of.pictures, &plain.pictures));
+        free_picture_set(&of.pictures);
     }
-    free_drawn(&plain.pictures);
+    free_picture_set(&plain.pictures);
     order_mesh_free(&mesh);
     free(index);
     free(corners);
 }
 
-static void fields_without_a_bound_are_told(void **state)
+static void fields_without_an_error_bound_are_reported(void **state)
 {
     (void)state;
     order_mesh mesh;
-    order_mesh_create(&hex_27, 2, 0.05, order_wavy, own_rank, rank_count, &mesh);
-    const told of =
-        tell("surface_error: 0.5\nfields: {g: 2 * f}\nimages:\n" SMALL("isosurface: {field: g, values: [0.1]}"), &mesh);
+    order_mesh_create(&hex_27, 2, 0.05, order_wave_field, own_rank, rank_count, &mesh);
+    const drawn_report of = draw_and_report_pieces(
+        "surface_error: 0.5\nfields: {g: 2 * f}\nimages:\n" SMALL("isosurface: {field: g, values: [0.1]}"), &mesh);
     everywhere(strstr(of.warnings, "surface_error does not hold for the isosurface of \"g\" on mesh \"m\"") != NULL);
     everywhere(of.bound <= 0.5 && !strstr(of.pieces, "cells")); /* positions are bounded nevertheless */
-    const told plain = tell(WITHIN("0.5") SMALL(ISO("0.1")), &mesh);
+    const drawn_report plain = draw_and_report_pieces(WITHIN("0.5") SMALL(ISO("0.1")), &mesh);
     everywhere(!strstr(plain.warnings, "surface_error"));
     order_mesh_free(&mesh);
 }
@@ -398,24 +400,26 @@ static void defaults_are_within_a_quarter_of_a_pixel(void **state)
 {
     (void)state;
     order_mesh mesh;
-    order_mesh_create(&hex_27, 2, 0.05, order_wavy, own_rank, rank_count, &mesh);
-    told of = draw(MPI_COMM_WORLD, "images:\n" SMALL(ISO("0.1")), &mesh);
-    told asked = draw(MPI_COMM_WORLD, WITHIN("0.25") SMALL(ISO("0.1")), &mesh);
+    order_mesh_create(&hex_27, 2, 0.05, order_wave_field, own_rank, rank_count, &mesh);
+    drawn_report of = draw_and_report(MPI_COMM_WORLD, "images:\n" SMALL(ISO("0.1")), &mesh);
+    drawn_report asked = draw_and_report(MPI_COMM_WORLD, WITHIN("0.25") SMALL(ISO("0.1")), &mesh);
     everywhere(of.count > 2 && of.bound <= 0.25 && strcmp(of.pieces, asked.pieces) == 0);
-    everywhere(own_rank || same_drawn(&of.pictures, &asked.pictures));
-    free_drawn(&of.pictures);
-    const told all = tell("images:\n" WITH_SURFACE, &mesh), all_asked = tell(WITHIN("0.25") WITH_SURFACE, &mesh);
+    everywhere(own_rank || are_same_picture_sets(&of.pictures, &asked.pictures));
+    free_picture_set(&of.pictures);
+    const drawn_report all = draw_and_report_pieces("images:\n" WITH_SURFACE, &mesh),
+                       all_asked = draw_and_report_pieces(WITHIN("0.25") WITH_SURFACE, &mesh);
     everywhere(all.count == 2 && all.bound > 0.25 && all_asked.count == asked.count);
     static const char *const counting[] = {"statistics: [{field: f, path: f.csv}]\nimages:\n" SMALL(ISO("0.1")),
                                            "images:\n" SMALL(ISO("0.1")) "    when: {field: f, above: 0}\n"};
     for (int i = 0; i < 2; i++) {
-        told counted = draw(MPI_COMM_WORLD, counting[i], &mesh);
+        drawn_report counted = draw_and_report(MPI_COMM_WORLD, counting[i], &mesh);
         everywhere(strcmp(counted.pieces, asked.pieces) == 0);
-        everywhere(own_rank || same_drawn(&counted.pictures, &asked.pictures));
-        free_drawn(&counted.pictures);
+        everywhere(own_rank || are_same_picture_sets(&counted.pictures, &asked.pictures));
+        free_picture_set(&counted.pictures);
     }
-    free_drawn(&asked.pictures);
-    const told derived = tell("fields: {g: 2 * f}\nimages:\n" SMALL("isosurface: {field: g, values: [0.1]}"), &mesh);
+    free_picture_set(&asked.pictures);
+    const drawn_report derived =
+        draw_and_report_pieces("fields: {g: 2 * f}\nimages:\n" SMALL("isosurface: {field: g, values: [0.1]}"), &mesh);
     everywhere(!all.warnings[0] && !derived.warnings[0]);
     order_mesh_free(&mesh);
 }
@@ -427,13 +431,14 @@ static void serendipity_cells_are_completed(void **state)
     (void)state;
     const char *scene = "images:\n" SMALL("surface: {colour_by: {field: f}}");
     order_mesh few, many;
-    order_mesh_create(&hex_20, 2, 0, order_sphere, own_rank, rank_count, &few);
-    order_mesh_create(&hex_27, 2, 0, order_sphere, own_rank, rank_count, &many);
-    told of = draw(MPI_COMM_WORLD, scene, &few), like = draw(MPI_COMM_WORLD, scene, &many);
+    order_mesh_create(&hex_20, 2, 0, order_sphere_field, own_rank, rank_count, &few);
+    order_mesh_create(&hex_27, 2, 0, order_sphere_field, own_rank, rank_count, &many);
+    drawn_report of = draw_and_report(MPI_COMM_WORLD, scene, &few),
+                 like = draw_and_report(MPI_COMM_WORLD, scene, &many);
     everywhere(of.count == 1 && of.bound == 0 && strcmp(of.pieces, like.pieces) == 0);
-    everywhere(own_rank || colour_difference(&of.pictures.pictures[0], &like.pictures.pictures[0]) <= 1e-6);
-    free_drawn(&of.pictures);
-    free_drawn(&like.pictures);
+    everywhere(own_rank || largest_colour_difference(&of.pictures.pictures[0], &like.pictures.pictures[0]) <= 1e-6);
+    free_picture_set(&of.pictures);
+    free_picture_set(&like.pictures);
     order_mesh_free(&few);
     order_mesh_free(&many);
 }
@@ -445,29 +450,30 @@ static void linear_meshes_are_not_affected(void **state)
     input_create(&in, TEST_HEXES, 5, TEST_RANDOM, own_rank, rank_count);
     caught_picture plain = draw_scene(MPI_COMM_WORLD, write_scene("images:\n" SMALL(ISO("0.5"))), &in);
     caught_picture other = draw_scene(MPI_COMM_WORLD, write_scene(WITHIN("0.1") SMALL(ISO("0.5"))), &in);
-    everywhere(own_rank || same_pictures(&plain, &other));
+    everywhere(own_rank || are_same_pictures(&plain, &other));
     free_caught(&plain);
     free_caught(&other);
     input_free(&in);
 }
 
-static void the_number_is_in_the_database(void **state)
+static void piece_count_is_in_the_database(void **state)
 {
     (void)state;
     static const char news[] = "pieces.cdb/report.json";
     static char text[8192];
     order_mesh mesh;
-    order_mesh_create(&hex_27, 2, 0, order_sphere, own_rank, rank_count, &mesh);
-    told of = draw(MPI_COMM_WORLD,
-                   WITHIN("1") "  - name: a\n    size: [96, 72]\n    camera: " FRONT
-                               "\n    layers: [" ISO("0.5") "]\n    outputs: [{cinema: pieces.cdb}]\n",
-                   &mesh);
+    order_mesh_create(&hex_27, 2, 0, order_sphere_field, own_rank, rank_count, &mesh);
+    drawn_report of =
+        draw_and_report(MPI_COMM_WORLD,
+                        WITHIN("1") "  - name: a\n    size: [96, 72]\n    camera: " FRONT
+                                    "\n    layers: [" ISO("0.5") "]\n    outputs: [{cinema: pieces.cdb}]\n",
+                        &mesh);
     read_file(news, sizeof text, text);
     const char *at = strstr(text, "\"pieces\": \"mesh \\\"m\\\": ");
     int count = 0;
     if (at) sscanf(at, "\"pieces\": \"mesh \\\"m\\\": %d pieces", &count);
     everywhere(own_rank || (count > 1 && count == of.count));
-    free_drawn(&of.pictures);
+    free_picture_set(&of.pictures);
     order_mesh_free(&mesh);
 }
 
@@ -481,23 +487,23 @@ static void check_change(int change)
     static const char *const scenes[CHANGES] = {WITHIN("1") ALL, WITHIN("1") ALL, WITHIN("0.3") ALL, FINER("2") ALL,
                                                 "images:\n" ALL};
     order_mesh mesh;
-    order_mesh_create(&hex_27, 2, 0.05, order_wavy, own_rank, rank_count, &mesh);
-    insitu_session *session = open_mesh(MPI_COMM_WORLD, WITHIN("1") ALL, &mesh.mesh, &mesh.field);
-    told first = step_told(session, 0);
+    order_mesh_create(&hex_27, 2, 0.05, order_wave_field, own_rank, rank_count, &mesh);
+    insitu_session *session = open_session_with_mesh(MPI_COMM_WORLD, WITHIN("1") ALL, &mesh.mesh, &mesh.field);
+    drawn_report first = step_and_report(session, 0);
     for (int64_t v = 0; v < mesh.vertex_count && change == VALUES; v++)
-        mesh.values[v] = order_plane(mesh.coordinates + 3 * v);
+        mesh.values[v] = order_plane_field(mesh.coordinates + 3 * v);
     for (int64_t i = 0; i < 3 * mesh.vertex_count && change == NODES; i++) mesh.coordinates[i] *= 0.3;
     if (change == NODES) mesh.mesh.changed = INSITU_CHANGED_GEOMETRY;
     if (change == NODES) assert_int_equal(insitu_set_mesh(session, "m", &mesh.mesh), INSITU_OK);
     if (change == VALUES) assert_int_equal(insitu_set_field(session, "m", &mesh.field), INSITU_OK);
     if (change >= TIGHTER) write_scene(scenes[change]);
-    told then = step_told(session, 1), fresh = draw(MPI_COMM_WORLD, scenes[change], &mesh);
+    drawn_report then = step_and_report(session, 1), fresh = draw_and_report(MPI_COMM_WORLD, scenes[change], &mesh);
     if (own_rank == 0) printf("change %d: %s; then %s\n", change, first.pieces, then.pieces);
     everywhere(strcmp(then.pieces, fresh.pieces) == 0 && (then.count != first.count || change == NODES));
-    everywhere(own_rank || same_drawn(&then.pictures, &fresh.pictures));
-    free_drawn(&first.pictures);
-    free_drawn(&then.pictures);
-    free_drawn(&fresh.pictures);
+    everywhere(own_rank || are_same_picture_sets(&then.pictures, &fresh.pictures));
+    free_picture_set(&first.pictures);
+    free_picture_set(&then.pictures);
+    free_picture_set(&fresh.pictures);
     insitu_destroy(&session);
     order_mesh_free(&mesh);
 }
@@ -511,7 +517,7 @@ static void changes_are_drawn(void **state)
 /* ---- limits ------------------------------------------------------------------------------------------------------ */
 
 /* 8 hexes of order 2: with n pieces, (2 n)^3 pieces of 36 bytes, and (2 n + 1)^3 nodes of 24 bytes and a value of 8. */
-static double mebibytes(int n)
+static double compute_piece_mebibytes(int n)
 {
     return 8 * (36 * pow(2 * n, 3) + 32 * pow(2 * n + 1, 3)) / 1048576;
 }
@@ -521,46 +527,47 @@ static void memory_is_limited(void **state)
     (void)state;
     order_mesh mesh;
     char scene[1024], words[200];
-    order_mesh_create(&hex_27, 2, 0, order_sphere, own_rank, rank_count, &mesh);
-    const told free_told = tell(WITHIN("0.3") SMALL(ISO("0.5")), &mesh);
+    order_mesh_create(&hex_27, 2, 0, order_sphere_field, own_rank, rank_count, &mesh);
+    const drawn_report free_told = draw_and_report_pieces(WITHIN("0.3") SMALL(ISO("0.5")), &mesh);
     everywhere(free_told.count > 2 && !strstr(free_told.warnings, "finer_memory"));
     for (int fixed = 0; fixed < 2; fixed++) {
         const int wanted = fixed ? 5 : free_told.count;
         snprintf(scene, sizeof scene, "%s\nfiner_memory: %.9g\nimages:\n" SMALL(ISO("0.5")),
-                 fixed ? "finer_pieces: 5" : "surface_error: 0.3", mebibytes(2) * 1.000001);
-        told of = draw(MPI_COMM_WORLD, scene, &mesh);
+                 fixed ? "finer_pieces: 5" : "surface_error: 0.3", compute_piece_mebibytes(2) * 1.000001);
+        drawn_report of = draw_and_report(MPI_COMM_WORLD, scene, &mesh);
         snprintf(words, sizeof words,
                  "2 instead of %d pieces between two nodes: all finer pieces would take %.1f MiB on all ranks", wanted,
-                 mebibytes(wanted));
+                 compute_piece_mebibytes(wanted));
         everywhere(strstr(of.warnings, words) != NULL && is_drawn_as(&of, 2, SMALL(ISO("0.5")), &mesh));
         everywhere(fixed || (of.count == 2 && of.bound > 0.3));
-        free_drawn(&of.pictures);
+        free_picture_set(&of.pictures);
     }
     snprintf(scene, sizeof scene, "finer_pieces: 2\nfiner_memory: %.9g\nimages:\n" SMALL(ISO("0.5")),
-             mebibytes(2) * 0.999999);
-    everywhere(strstr(tell(scene, &mesh).warnings, "1 instead of 2 pieces between two nodes") != NULL);
+             compute_piece_mebibytes(2) * 0.999999);
+    everywhere(strstr(draw_and_report_pieces(scene, &mesh).warnings, "1 instead of 2 pieces between two nodes") !=
+               NULL);
     order_mesh_free(&mesh);
 }
 
-static void an_error_that_is_not_met_is_told(void **state)
+static void unmet_error_bound_is_reported(void **state)
 {
     (void)state;
     const order_kind pyramid = {"pyramid 7", INSITU_LAGRANGE_PYRAMID, INSITU_ORDER_LEXICOGRAPHIC, 7};
     order_mesh mesh;
-    order_mesh_create(&hex_27, 2, 0, order_sphere, own_rank, rank_count, &mesh);
-    const told of = tell(WITHIN("0.01") SMALL(ISO("0.5")), &mesh);
+    order_mesh_create(&hex_27, 2, 0, order_sphere_field, own_rank, rank_count, &mesh);
+    const drawn_report of = draw_and_report_pieces(WITHIN("0.01") SMALL(ISO("0.5")), &mesh);
     everywhere(of.count == 8 && of.bound > 0.01 && strstr(of.warnings, "8 pieces between two nodes are the most"));
     order_mesh_free(&mesh);
-    order_mesh_create(&pyramid, 2, 0, order_sphere, own_rank, rank_count, &mesh);
-    const told pyramids = tell(WITHIN("0.01") SMALL(ISO("0.5")), &mesh);
+    order_mesh_create(&pyramid, 2, 0, order_sphere_field, own_rank, rank_count, &mesh);
+    const drawn_report pyramids = draw_and_report_pieces(WITHIN("0.01") SMALL(ISO("0.5")), &mesh);
     everywhere(strstr(pyramids.warnings, "surface_error has no effect on it") != NULL);
     order_mesh_free(&mesh);
 }
 
-static int begin(void **state)
+static int enter_test_group_folder(void **state)
 {
     (void)state;
-    return enter_folder("order_error") ? 0 : 1;
+    return enter_test_folder("order_error") ? 0 : 1;
 }
 
 int main(int argc, char **argv)
@@ -573,14 +580,14 @@ int main(int argc, char **argv)
         cmocka_unit_test(pieces_are_drawn_as_a_fixed_number),
         cmocka_unit_test(surfaces_between_nodes_are_found),
         cmocka_unit_test(other_descriptions_have_the_same_pieces),
-        cmocka_unit_test(fields_without_a_bound_are_told),
+        cmocka_unit_test(fields_without_an_error_bound_are_reported),
         cmocka_unit_test(defaults_are_within_a_quarter_of_a_pixel),
         cmocka_unit_test(serendipity_cells_are_completed),
         cmocka_unit_test(linear_meshes_are_not_affected),
-        cmocka_unit_test(the_number_is_in_the_database),
+        cmocka_unit_test(piece_count_is_in_the_database),
         cmocka_unit_test(changes_are_drawn),
         cmocka_unit_test(memory_is_limited),
-        cmocka_unit_test(an_error_that_is_not_met_is_told),
+        cmocka_unit_test(unmet_error_bound_is_reported),
     };
-    return run_session_tests(argc, argv, tests, begin, NULL);
+    return run_session_tests(argc, argv, tests, enter_test_group_folder, NULL);
 }

@@ -8,7 +8,7 @@
 #include "test_mesh_order.h"
 #include "test_session_fixture.h"
 
-static double value_of(const double p[3])
+static double evaluate_field(const double p[3])
 {
     return p[0] + p[1] * p[2];
 }
@@ -108,14 +108,14 @@ SPOIL(no_z, in->mesh.coordinates[2] = (insitu_array){0})
 SPOIL(field_of_cells, (in->field.centring = INSITU_CELL))
 SPOIL(field_of_corners, (in->field.centring = INSITU_CORNER))
 
-static void corner_row_short(input *in)
+static void set_short_corner_row(input *in)
 {
     in->field.centring = INSITU_CORNER;
     in->field.count = 100000;
     in->field.corner_row = 26;
 }
 
-static void patches(input *in)
+static void set_patches(input *in)
 {
     static const insitu_patch patch = {0};
     in->field.centring = INSITU_CELL;
@@ -178,25 +178,25 @@ static const fault faults[] = {
     {4, no_z, MESH, false, true, "z coordinates"},
     {0, field_of_cells, FIELD, true, true, "the mesh has 8 cells"},
     {0, field_of_corners, FIELD, true, true, "the mesh has 160 corners of cells"},
-    {1, corner_row_short, FIELD, true, true, "corner_row is 26, a cell has 27 vertices"},
-    {0, patches, FIELD, true, true, "has patches, and the mesh has cells of higher order"},
+    {1, set_short_corner_row, FIELD, true, true, "corner_row is 26, a cell has 27 vertices"},
+    {0, set_patches, FIELD, true, true, "has patches, and the mesh has cells of higher order"},
 };
 
-static void begin(const order_kind *kind, order_mesh *whole, input *in)
+static void create_input(const order_kind *kind, order_mesh *whole, input *in)
 {
-    order_mesh_create(kind, 2, 0, value_of, 0, 1, whole);
+    order_mesh_create(kind, 2, 0, evaluate_field, 0, 1, whole);
     *in = (input){.whole = whole, .mesh = whole->mesh, .field = whole->field};
 }
 
-static void draws_when_right(insitu_session *session, const order_kind *kind)
+static void check_valid_input_draws(insitu_session *session, const order_kind *kind)
 {
     order_mesh whole;
     input in;
-    begin(kind, &whole, &in);
+    create_input(kind, &whole, &in);
     in.mesh.changed = INSITU_CHANGED_ALL;
     everywhere(insitu_set_mesh(session, "m", &in.mesh) == INSITU_OK);
     everywhere(insitu_set_field(session, "m", &in.field) == INSITU_OK);
-    step_is_good(session, 2);
+    check_step_succeeds(session, 2);
     order_mesh_free(&whole);
 }
 
@@ -205,7 +205,7 @@ static void is_reported(insitu_session *session, const fault *f)
     const bool is_bad = own_rank == rank_count - 1;
     order_mesh whole;
     input in;
-    begin(&kinds[f->kind], &whole, &in);
+    create_input(&kinds[f->kind], &whole, &in);
     if (is_bad) f->corrupt(&in);
     const insitu_status of_mesh = insitu_set_mesh(session, "m", &in.mesh);
     insitu_status at_once = of_mesh;
@@ -219,10 +219,10 @@ static void is_reported(insitu_session *session, const fault *f)
         discard_pictures();
         const insitu_status status = insitu_step(session, 1, 0);
         if (!strstr(insitu_error(session), f->words)) fprintf(stderr, "%s: %s\n", f->words, insitu_error(session));
-        reported_everywhere(session, status, f->status, "mesh \"m\"", f->words);
+        check_reported_everywhere(session, status, f->status, "mesh \"m\"", f->words);
         everywhere(caught_count == 0);
     }
-    draws_when_right(session, &kinds[f->kind]);
+    check_valid_input_draws(session, &kinds[f->kind]);
     order_mesh_free(&whole);
 }
 

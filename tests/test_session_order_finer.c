@@ -29,17 +29,17 @@ enum { WIDTH = 96, HEIGHT = 72, PIXELS = WIDTH * HEIGHT };
 
 /* ---- drawing ----------------------------------------------------------------------------------------------------- */
 
-static drawn draw(const char *scene, const order_mesh *mesh)
+static drawn draw_mesh(const char *scene, const order_mesh *mesh)
 {
-    insitu_session *session = open_mesh(MPI_COMM_WORLD, scene, &mesh->mesh, &mesh->field);
-    drawn out = step_drawn(session, 0);
+    insitu_session *session = open_session_with_mesh(MPI_COMM_WORLD, scene, &mesh->mesh, &mesh->field);
+    drawn out = step_and_take_pictures(session, 0);
     insitu_destroy(&session);
     return out;
 }
 
 /* ---- the sphere -------------------------------------------------------------------------------------------------- */
 
-static void pixel_place(int pixel, double out[2])
+static void compute_pixel_position(int pixel, double out[2])
 {
     out[0] = (pixel % WIDTH + 0.5 - WIDTH / 2.0) * VIEW_HEIGHT / HEIGHT;
     out[1] = (HEIGHT / 2.0 - pixel / WIDTH - 0.5) * VIEW_HEIGHT / HEIGHT;
@@ -47,13 +47,13 @@ static void pixel_place(int pixel, double out[2])
 
 /* The root of the mean square of the hits' distances from the sphere, as differences of depth within a radius of 0.6;
  * infinite if a ray has no hit. */
-static double sphere_error(const caught_picture *picture)
+static double measure_sphere_error(const caught_picture *picture)
 {
     double sum = 0;
     int count = 0;
     for (int pixel = 0; pixel < PIXELS; pixel++) {
         double at[2];
-        pixel_place(pixel, at);
+        compute_pixel_position(pixel, at);
         const double square = at[0] * at[0] + at[1] * at[1];
         if (square > 0.36) continue;
         sum += pow((double)picture->depth[pixel] - (EYE - sqrt(0.5 - square)), 2);
@@ -63,16 +63,16 @@ static double sphere_error(const caught_picture *picture)
 }
 
 /* The largest distance between a hit's unit normal and the sphere's. */
-static double normal_error(const caught_picture *picture)
+static double measure_normal_error(const caught_picture *picture)
 {
     double worst = 0;
     for (int pixel = 0; pixel < PIXELS; pixel++) {
         double at[3], square = 0;
-        pixel_place(pixel, at);
+        compute_pixel_position(pixel, at);
         if (at[0] * at[0] + at[1] * at[1] > 0.25) continue;
         at[2] = EYE - (double)picture->depth[pixel];
         for (int a = 0; a < 3; a++)
-            square += pow((double)picture->data[a * PIXELS + pixel] - at[a] / sqrt(order_sphere(at)), 2);
+            square += pow((double)picture->data[a * PIXELS + pixel] - at[a] / sqrt(order_sphere_field(at)), 2);
         worst = fmax(worst, sqrt(square));
     }
     return worst;
@@ -80,12 +80,12 @@ static double normal_error(const caught_picture *picture)
 
 static double draw_sphere(const char *scene, const order_mesh *mesh, double *normals)
 {
-    drawn pictures = draw(scene, mesh);
+    drawn pictures = draw_mesh(scene, mesh);
     double errors[2] = {0, 0};
-    if (own_rank == 0) errors[0] = sphere_error(&pictures.pictures[0]);
-    if (own_rank == 0) errors[1] = normal_error(&pictures.pictures[0]);
+    if (own_rank == 0) errors[0] = measure_sphere_error(&pictures.pictures[0]);
+    if (own_rank == 0) errors[1] = measure_normal_error(&pictures.pictures[0]);
     MPI_Bcast(errors, 2, MPI_DOUBLE, 0, MPI_COMM_WORLD);
-    free_drawn(&pictures);
+    free_picture_set(&pictures);
     *normals = errors[1];
     return errors[0];
 }
@@ -111,7 +111,7 @@ static void error_falls_with_the_square(void **state)
     for (int k = 0; k < order_kind_count; k++) {
         order_mesh mesh;
         if (order_kinds[k].order == 1) continue;
-        order_mesh_create(&order_kinds[k], 2, 0, order_sphere, own_rank, rank_count, &mesh);
+        order_mesh_create(&order_kinds[k], 2, 0, order_sphere_field, own_rank, rank_count, &mesh);
         check_sphere(order_kinds[k].name, &mesh);
         order_mesh_free(&mesh);
     }
@@ -126,18 +126,18 @@ static void lobatto_points_are_recognised(void **state)
     (void)state;
     const double of4[5] = {0, 0.5 - 0.5 * sqrt(3. / 7), 0.5, 0.5 + 0.5 * sqrt(3. / 7), 1};
     order_mesh mesh;
-    order_mesh_create(&hex_4, 2, 0, order_sphere, own_rank, rank_count, &mesh);
+    order_mesh_create(&hex_4, 2, 0, order_sphere_field, own_rank, rank_count, &mesh);
     for (int64_t i = 0; i < 3 * mesh.vertex_count; i++) {
         const int at = (int)lround((mesh.coordinates[i] + 1) * 4);
         mesh.coordinates[i] = at / 4 - 1 + of4[at % 4];
     }
-    for (int64_t v = 0; v < mesh.vertex_count; v++) mesh.values[v] = order_sphere(mesh.coordinates + 3 * v);
+    for (int64_t v = 0; v < mesh.vertex_count; v++) mesh.values[v] = order_sphere_field(mesh.coordinates + 3 * v);
     check_sphere("hex 4, Gauss-Lobatto", &mesh);
     order_mesh_free(&mesh);
 }
 
 /* The nodes of a cube are at -1, 0 and 1. The field is -0.25 at two of them and 0 between these, up to 0.05. */
-static double ridge(const double p[3])
+static double ridge_field(const double p[3])
 {
     return -(p[0] - 0.5) * (p[0] - 0.5);
 }
@@ -151,13 +151,13 @@ static void surfaces_between_nodes_are_drawn(void **state)
     for (int i = 0; i < 2; i++) {
         order_mesh mesh;
         int hits = 0;
-        order_mesh_create(&kind, 1, 0, ridge, own_rank, rank_count, &mesh);
+        order_mesh_create(&kind, 1, 0, ridge_field, own_rank, rank_count, &mesh);
         for (int64_t v = 0; v < mesh.vertex_count; v++) mesh.values[v] -= 0.05 * mesh.coordinates[3 * v + 2];
-        drawn pictures = draw(scenes[i], &mesh);
+        drawn pictures = draw_mesh(scenes[i], &mesh);
         for (int pixel = 0; pixel < PIXELS && own_rank == 0; pixel++)
             hits += isfinite((double)pictures.pictures[0].depth[pixel]);
         everywhere(own_rank || (i == 0 ? hits == 0 : hits > 0));
-        free_drawn(&pictures);
+        free_picture_set(&pictures);
         order_mesh_free(&mesh);
     }
 }
@@ -173,7 +173,8 @@ typedef struct gap_view {
 
 static gap_view make_view(bool is_oblique)
 {
-    const int half = test_effort(32, 128); /* pixels from the middle, which is that of a pixel, to a face of the cube */
+    const int half =
+        test_case_count(32, 128); /* pixels from the middle, which is that of a pixel, to a face of the cube */
     gap_view out = {2 * half + 9, 1. / half, {0, 0, -1}, {1, 0, 0}, {0, 1, 0}};
     if (!is_oblique) return out;
     const double length = hypot(3, 12);
@@ -208,7 +209,7 @@ static drawn draw_layers(const gap_view *view, const char *const *layers, int co
                        "    layers:\n      - %s\n    outputs: [{path: a%d.exr}]\n",
                        i, view->size, view->size, -EYE * f[0], -EYE * f[1], -EYE * f[2], view->size * view->pixel,
                        layers[i], i);
-    return draw(scene, mesh);
+    return draw_mesh(scene, mesh);
 }
 
 /* A ray's part in a cube. */
@@ -299,8 +300,8 @@ static void check_gaps(const char *name, const order_mesh *mesh, gap_tally talli
                 fprintf(stderr, "%s, %s: %lld rays of \"%s\" are wrong\n", name, is_oblique ? "oblique" : "front",
                         (long long)(t->wrong - before), layers[i]);
         }
-        free_drawn(&all[0]);
-        free_drawn(&all[1]);
+        free_picture_set(&all[0]);
+        free_picture_set(&all[1]);
     }
 }
 
@@ -331,8 +332,8 @@ static void check_mixed_gaps(double bend, gap_tally tallies[3])
     order_mesh hexes, wedges, out;
     unsigned char types[MOST];
     int64_t offsets[MOST + 1] = {0};
-    order_mesh_create(&hex, 2, bend, order_plane, own_rank, rank_count, &hexes);
-    order_mesh_create(&wedge, 2, bend, order_plane, own_rank, rank_count, &wedges);
+    order_mesh_create(&hex, 2, bend, order_plane_field, own_rank, rank_count, &hexes);
+    order_mesh_create(&wedge, 2, bend, order_plane_field, own_rank, rank_count, &wedges);
     out = (order_mesh){.mesh = hexes.mesh, .field = hexes.field};
     out.coordinates = malloc((size_t)(hexes.vertex_count + wedges.vertex_count + 1) * 3 * sizeof(double));
     out.values = malloc((size_t)(hexes.vertex_count + wedges.vertex_count + 1) * sizeof(double));
@@ -370,8 +371,8 @@ static void rays_cross_pieces_once(void **state)
     for (int bent = 0; bent < 2; bent++) {
         for (int k = 0; k < order_kind_count; k++) {
             order_mesh mesh;
-            if (!test_is_whole() && !is_of_usual_gaps(order_kinds[k].name)) continue;
-            order_mesh_create(&order_kinds[k], 2, bent * 0.07, order_plane, own_rank, rank_count, &mesh);
+            if (!test_is_long_run() && !is_of_usual_gaps(order_kinds[k].name)) continue;
+            order_mesh_create(&order_kinds[k], 2, bent * 0.07, order_plane_field, own_rank, rank_count, &mesh);
             check_gaps(order_kinds[k].name, &mesh, all);
             order_mesh_free(&mesh);
         }
@@ -397,7 +398,7 @@ static void linear_meshes_are_not_affected(void **state)
     input_create(&in, TEST_HEXES, 5, TEST_RANDOM, own_rank, rank_count);
     caught_picture plain = draw_scene(MPI_COMM_WORLD, write_scene("images:\n" SPHERE), &in);
     caught_picture finer = draw_scene(MPI_COMM_WORLD, write_scene(FINER("4") SPHERE), &in);
-    everywhere(own_rank || same_pictures(&plain, &finer));
+    everywhere(own_rank || are_same_pictures(&plain, &finer));
     free_caught(&plain);
     free_caught(&finer);
     input_free(&in);
@@ -408,13 +409,13 @@ static void other_descriptions_draw_the_same(void **state)
 {
     (void)state;
     order_mesh mesh;
-    order_mesh_create(&hex_20, 2, 0.07, order_wavy, own_rank, rank_count, &mesh);
+    order_mesh_create(&hex_20, 2, 0.07, order_wave_field, own_rank, rank_count, &mesh);
     const int64_t entries = mesh.cell_count * mesh.nodes;
     int64_t *ids = malloc(((size_t)mesh.vertex_count + 1) * sizeof *ids);
     double *corners = malloc(((size_t)entries + 1) * sizeof *corners);
     for (int64_t v = 0; v < mesh.vertex_count; v++) ids[v] = v;
     for (int64_t i = 0; i < entries; i++) corners[i] = mesh.values[mesh.connectivity[i]];
-    drawn plain = draw(FINER("2") ALL, &mesh);
+    drawn plain = draw_mesh(FINER("2") ALL, &mesh);
     for (int other = 0; other < 3; other++) {
         order_mesh changed = mesh;
         const insitu_array list = {ids, INSITU_INT64, 0};
@@ -423,28 +424,28 @@ static void other_descriptions_draw_the_same(void **state)
         if (other == 2) changed.field.centring = INSITU_CORNER;
         if (other == 2) changed.field.count = entries;
         if (other == 2) changed.field.values = (insitu_array){corners, INSITU_FLOAT64, 0};
-        drawn pictures = draw(FINER("2") ALL, &changed);
-        everywhere(own_rank || same_drawn(&plain, &pictures));
-        free_drawn(&pictures);
+        drawn pictures = draw_mesh(FINER("2") ALL, &changed);
+        everywhere(own_rank || are_same_picture_sets(&plain, &pictures));
+        free_picture_set(&pictures);
     }
-    free_drawn(&plain);
+    free_picture_set(&plain);
     order_mesh_free(&mesh);
     free(ids);
     free(corners);
 }
 
-static void an_index_out_of_range_is_told(void **state)
+static void out_of_range_index_is_reported(void **state)
 {
     (void)state;
     order_mesh mesh;
-    order_mesh_create(&hex_20, 2, 0, order_wavy, own_rank, rank_count, &mesh);
+    order_mesh_create(&hex_20, 2, 0, order_wave_field, own_rank, rank_count, &mesh);
     int64_t *index = malloc((size_t)mesh.vertex_count * sizeof *index);
     for (int64_t v = 0; v < mesh.vertex_count; v++) index[v] = v;
     index[3] = mesh.vertex_count;
     mesh.field.index = (insitu_array){index, INSITU_INT64, 0};
-    insitu_session *session = open_mesh(MPI_COMM_WORLD, FINER("2") SPHERE, &mesh.mesh, &mesh.field);
-    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "field \"f\"",
-                        "the index of vertex 3");
+    insitu_session *session = open_session_with_mesh(MPI_COMM_WORLD, FINER("2") SPHERE, &mesh.mesh, &mesh.field);
+    check_reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "field \"f\"",
+                              "the index of vertex 3");
     insitu_destroy(&session);
     order_mesh_free(&mesh);
     free(index);
@@ -455,13 +456,13 @@ static void cells_are_counted_as_the_caller_gave_them(void **state)
 {
     (void)state;
     order_mesh mesh;
-    order_mesh_create(&hex_20, 2, 0.05, order_wavy, own_rank, rank_count, &mesh);
-    insitu_session *session = open_mesh(MPI_COMM_WORLD, FINER("3") SPHERE, &mesh.mesh, &mesh.field);
-    drawn pictures = step_drawn(session, 0);
+    order_mesh_create(&hex_20, 2, 0.05, order_wave_field, own_rank, rank_count, &mesh);
+    insitu_session *session = open_session_with_mesh(MPI_COMM_WORLD, FINER("3") SPHERE, &mesh.mesh, &mesh.field);
+    drawn pictures = step_and_take_pictures(session, 0);
     const insitu_report *report = insitu_last_report(session);
     everywhere(report->cells == mesh.cell_count && report->cells_inverted == 0 && report->cells_flat == 0);
     everywhere(mesh.cell_count == 0 || strstr(report->copied_why, "with 3 pieces between two nodes") != NULL);
-    free_drawn(&pictures);
+    free_picture_set(&pictures);
     insitu_destroy(&session);
     order_mesh_free(&mesh);
 }
@@ -472,8 +473,8 @@ static void mixed_cells_draw_the_same(void **state)
     (void)state;
     const order_kind kind = {"hex 27", INSITU_TRIQUADRATIC_HEX, INSITU_ORDER_VTK, 2};
     order_mesh mesh;
-    order_mesh_create(&kind, 2, 0.07, order_wavy, own_rank, rank_count, &mesh);
-    drawn plain = draw(FINER("3") ALL, &mesh);
+    order_mesh_create(&kind, 2, 0.07, order_wave_field, own_rank, rank_count, &mesh);
+    drawn plain = draw_mesh(FINER("3") ALL, &mesh);
     int64_t offsets[65];
     unsigned char types[64];
     for (int64_t cell = 0; cell < mesh.cell_count; cell++)
@@ -481,10 +482,10 @@ static void mixed_cells_draw_the_same(void **state)
     for (int64_t cell = 0; cell <= mesh.cell_count; cell++) offsets[cell] = cell * mesh.nodes;
     mesh.mesh.offsets = (insitu_array){offsets, INSITU_INT64, 0};
     mesh.mesh.cell_types = (insitu_array){types, INSITU_UINT8, 0};
-    drawn mixed = draw(FINER("3") ALL, &mesh);
-    everywhere(own_rank || same_drawn(&plain, &mixed));
-    free_drawn(&plain);
-    free_drawn(&mixed);
+    drawn mixed = draw_mesh(FINER("3") ALL, &mesh);
+    everywhere(own_rank || are_same_picture_sets(&plain, &mixed));
+    free_picture_set(&plain);
+    free_picture_set(&mixed);
     order_mesh_free(&mesh);
 }
 
@@ -498,10 +499,10 @@ static void mixed_cells_draw_the_same(void **state)
 /* One more picture, for which all cells are refined. */
 #define WHOLE IMAGE("z", "volume: {field: f}")
 
-static drawn draw_few(const char *scene, const order_mesh *mesh, int64_t *bytes)
+static drawn draw_and_count_bytes(const char *scene, const order_mesh *mesh, int64_t *bytes)
 {
-    insitu_session *session = open_mesh(MPI_COMM_WORLD, scene, &mesh->mesh, &mesh->field);
-    drawn out = step_drawn(session, 0);
+    insitu_session *session = open_session_with_mesh(MPI_COMM_WORLD, scene, &mesh->mesh, &mesh->field);
+    drawn out = step_and_take_pictures(session, 0);
     *bytes = insitu_last_report(session)->bytes_copied;
     MPI_Allreduce(MPI_IN_PLACE, bytes, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
     insitu_destroy(&session);
@@ -519,9 +520,9 @@ static void other_cells_are_not_refined(void **state)
         order_mesh mesh;
         int64_t bytes[2];
         if (kind->order == 1 || kind->order > 3) continue;
-        order_mesh_create(kind, 4, 0.05, order_sphere, own_rank, rank_count, &mesh);
-        drawn few = draw_few(FINER("4") FEW, &mesh, &bytes[0]);
-        drawn all = draw_few(FINER("4") FEW WHOLE, &mesh, &bytes[1]);
+        order_mesh_create(kind, 4, 0.05, order_sphere_field, own_rank, rank_count, &mesh);
+        drawn few = draw_and_count_bytes(FINER("4") FEW, &mesh, &bytes[0]);
+        drawn all = draw_and_count_bytes(FINER("4") FEW WHOLE, &mesh, &bytes[1]);
         bool are_same = true;
         int hits[2] = {0, 0};
         for (int i = 0; i < 2 && own_rank == 0; i++)
@@ -535,8 +536,8 @@ static void other_cells_are_not_refined(void **state)
                    (double)bytes[1] / 1048576, hits[0], hits[1]);
         everywhere(own_rank || (are_same && hits[0] > 20 && hits[1] > 20));
         everywhere(bytes[0] < bytes[1] / 3);
-        free_drawn(&few);
-        free_drawn(&all);
+        free_picture_set(&few);
+        free_picture_set(&all);
         order_mesh_free(&mesh);
     }
 }
@@ -545,12 +546,12 @@ static void other_cells_are_not_refined(void **state)
 static int64_t count_pieces(const char *scene, const order_mesh *mesh)
 {
     long long count = 0;
-    insitu_session *session = open_mesh(MPI_COMM_WORLD, scene, &mesh->mesh, &mesh->field);
-    drawn pictures = step_drawn(session, 0);
+    insitu_session *session = open_session_with_mesh(MPI_COMM_WORLD, scene, &mesh->mesh, &mesh->field);
+    drawn pictures = step_and_take_pictures(session, 0);
     const char *end = strstr(insitu_last_report(session)->copied_why, " linear pieces of its cells");
     while (end && end > insitu_last_report(session)->copied_why && end[-1] >= '0' && end[-1] <= '9') end--;
     if (end) sscanf(end, "%lld", &count);
-    free_drawn(&pictures);
+    free_picture_set(&pictures);
     insitu_destroy(&session);
     int64_t all = count;
     MPI_Allreduce(MPI_IN_PLACE, &all, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
@@ -566,8 +567,8 @@ static void pieces_that_nothing_crosses_are_not_made(void **state)
     IMAGE("a", "isosurface: {field: f, values: [0.5]}")                                                                \
     IMAGE("b", "slice: {field: f, planes: [{normal: [1, 2, 3]}]}")
     order_mesh mesh;
-    order_mesh_create(&(order_kind){"hex 27", INSITU_TRIQUADRATIC_HEX, INSITU_ORDER_VTK, 2}, 2, 0.05, order_sphere,
-                      own_rank, rank_count, &mesh);
+    order_mesh_create(&(order_kind){"hex 27", INSITU_TRIQUADRATIC_HEX, INSITU_ORDER_VTK, 2}, 2, 0.05,
+                      order_sphere_field, own_rank, rank_count, &mesh);
     const int64_t four = count_pieces(FINER("4") BOTH, &mesh), eight = count_pieces(FINER("8") BOTH, &mesh);
     const int64_t all = count_pieces(FINER("8") BOTH WHOLE, &mesh);
     if (own_rank == 0)
@@ -584,9 +585,9 @@ enum { VALUES, NODES, SCENE, COARSE, CHANGES };
 static void check_change(int change)
 {
     order_mesh mesh;
-    order_mesh_create(&hex_20, 2, 0.05, order_wavy, own_rank, rank_count, &mesh);
-    insitu_session *session = open_mesh(MPI_COMM_WORLD, FINER("2") ALL, &mesh.mesh, &mesh.field);
-    drawn first = step_drawn(session, 0);
+    order_mesh_create(&hex_20, 2, 0.05, order_wave_field, own_rank, rank_count, &mesh);
+    insitu_session *session = open_session_with_mesh(MPI_COMM_WORLD, FINER("2") ALL, &mesh.mesh, &mesh.field);
+    drawn first = step_and_take_pictures(session, 0);
     const char *scene = change == SCENE ? FINER("3") ALL : change == COARSE ? FINER("1") ALL : FINER("2") ALL;
     for (int64_t v = 0; v < mesh.vertex_count && change == VALUES; v++) mesh.values[v] *= 0.9;
     for (int64_t i = 0; i < 3 * mesh.vertex_count && change == NODES; i++) mesh.coordinates[i] *= 0.8;
@@ -594,12 +595,12 @@ static void check_change(int change)
     if (change == NODES) assert_int_equal(insitu_set_mesh(session, "m", &mesh.mesh), INSITU_OK);
     if (change == VALUES) assert_int_equal(insitu_set_field(session, "m", &mesh.field), INSITU_OK);
     if (change >= SCENE) write_scene(scene);
-    drawn pictures = step_drawn(session, 1), fresh = draw(scene, &mesh);
-    if (own_rank == 0 && !same_drawn(&pictures, &fresh)) fprintf(stderr, "change %d is not drawn\n", change);
-    everywhere(own_rank || (same_drawn(&pictures, &fresh) && !same_drawn(&pictures, &first)));
-    free_drawn(&first);
-    free_drawn(&pictures);
-    free_drawn(&fresh);
+    drawn pictures = step_and_take_pictures(session, 1), fresh = draw_mesh(scene, &mesh);
+    if (own_rank == 0 && !are_same_picture_sets(&pictures, &fresh)) fprintf(stderr, "change %d is not drawn\n", change);
+    everywhere(own_rank || (are_same_picture_sets(&pictures, &fresh) && !are_same_picture_sets(&pictures, &first)));
+    free_picture_set(&first);
+    free_picture_set(&pictures);
+    free_picture_set(&fresh);
     insitu_destroy(&session);
     order_mesh_free(&mesh);
 }
@@ -615,19 +616,19 @@ static void changes_are_drawn(void **state)
 static void check_warning(const order_kind *kind, const char *scene, const char *as, const char *words)
 {
     order_mesh mesh;
-    order_mesh_create(kind, 2, 0, order_sphere, own_rank, rank_count, &mesh);
-    insitu_session *session = open_mesh(MPI_COMM_WORLD, scene, &mesh.mesh, &mesh.field);
-    drawn pictures = step_drawn(session, 0);
+    order_mesh_create(kind, 2, 0, order_sphere_field, own_rank, rank_count, &mesh);
+    insitu_session *session = open_session_with_mesh(MPI_COMM_WORLD, scene, &mesh.mesh, &mesh.field);
+    drawn pictures = step_and_take_pictures(session, 0);
     everywhere(strstr(insitu_last_report(session)->warnings, words) != NULL);
     insitu_destroy(&session);
-    drawn expected = draw(as, &mesh);
-    everywhere(own_rank || same_drawn(&pictures, &expected));
-    free_drawn(&pictures);
-    free_drawn(&expected);
+    drawn expected = draw_mesh(as, &mesh);
+    everywhere(own_rank || are_same_picture_sets(&pictures, &expected));
+    free_picture_set(&pictures);
+    free_picture_set(&expected);
     order_mesh_free(&mesh);
 }
 
-static void limits_are_told(void **state)
+static void exceeded_limits_are_reported(void **state)
 {
     (void)state;
     const order_kind pyramid = {"pyramid 7", INSITU_LAGRANGE_PYRAMID, INSITU_ORDER_LEXICOGRAPHIC, 7};
@@ -645,13 +646,13 @@ int main(int argc, char **argv)
         cmocka_unit_test(rays_cross_pieces_once),
         cmocka_unit_test(linear_meshes_are_not_affected),
         cmocka_unit_test(other_descriptions_draw_the_same),
-        cmocka_unit_test(an_index_out_of_range_is_told),
+        cmocka_unit_test(out_of_range_index_is_reported),
         cmocka_unit_test(cells_are_counted_as_the_caller_gave_them),
         cmocka_unit_test(mixed_cells_draw_the_same),
         cmocka_unit_test(other_cells_are_not_refined),
         cmocka_unit_test(pieces_that_nothing_crosses_are_not_made),
         cmocka_unit_test(changes_are_drawn),
-        cmocka_unit_test(limits_are_told),
+        cmocka_unit_test(exceeded_limits_are_reported),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

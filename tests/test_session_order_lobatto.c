@@ -33,7 +33,7 @@ static const char scene[] =
     "height: 3.2}\n"
     "    layers: [isosurface: {field: f, values: [0.1]}]\n    outputs: [{path: a.exr, data: true}]\n";
 
-static double value_at(const double p[3])
+static double evaluate_field(const double p[3])
 {
     return p[2] + 0.4 * sin(2.8 * p[0] + 0.4) * cos(2.5 * p[1]) + 0.2 * p[0] * p[1] * p[2];
 }
@@ -51,7 +51,7 @@ typedef struct lobatto_mesh {
 } lobatto_mesh;
 
 /* Computes Legendre's polynomial of order p and its first two derivatives. */
-static void legendre(int p, double x, double out[3])
+static void evaluate_legendre(int p, double x, double out[3])
 {
     double before = 1, at = x;
     for (int n = 2; n <= p; n++) {
@@ -71,7 +71,7 @@ static void find_points(lobatto_mesh *m)
     for (int i = 0; i <= p; i++) {
         double x = -cos(M_PI * i / p), of[3];
         for (int turn = 0; turn < 50 && i > 0 && i < p; turn++) {
-            legendre(p, x, of);
+            evaluate_legendre(p, x, of);
             x -= of[1] / of[2];
         }
         m->points[i] = i == 0 ? 0 : i == p ? 1 : 0.5 + 0.5 * x;
@@ -83,9 +83,9 @@ static void find_points(lobatto_mesh *m)
     }
 }
 
-static void bend_point(const double point[3], double out[3])
+static void bend_position(const double point[3], double out[3])
 {
-    for (int axis = 0; axis < 3; axis++) out[axis] = order_mesh_moved(BEND, point, axis);
+    for (int axis = 0; axis < 3; axis++) out[axis] = order_mesh_make_moved(BEND, point, axis);
 }
 
 static void place_nodes(const lobatto_mesh *m, int cell)
@@ -95,12 +95,12 @@ static void place_nodes(const lobatto_mesh *m, int cell)
         const int at[3] = {node % n, node / n % n, node / n / n};
         double point[3];
         for (int a = 0; a < 3; a++) point[a] = -1 + 2 * (cube[a] + m->points[at[a]]) / m->side;
-        bend_point(point, m->nodes[cell][node]);
-        m->nodes[cell][node][3] = value_at(m->nodes[cell][node]);
+        bend_position(point, m->nodes[cell][node]);
+        m->nodes[cell][node][3] = evaluate_field(m->nodes[cell][node]);
     }
 }
 
-static bool is_own(int cell)
+static bool is_own_cell(int cell)
 {
     return (int)(test_uniform((uint64_t)cell, 17) * rank_count) == own_rank;
 }
@@ -117,11 +117,11 @@ static void make_mesh(int order, int side, lobatto_mesh *m)
     insitu_field_defaults(&m->field);
     for (int cell = 0; cell < count; cell++) {
         place_nodes(m, cell);
-        for (int node = 0; node < nodes && is_own(cell); node++, m->mesh.vertex_count++) {
+        for (int node = 0; node < nodes && is_own_cell(cell); node++, m->mesh.vertex_count++) {
             memcpy(m->coordinates + 3 * m->mesh.vertex_count, m->nodes[cell][node], 3 * sizeof(double));
             m->values[m->mesh.vertex_count] = m->nodes[cell][node][3];
         }
-        m->mesh.cell_count += is_own(cell);
+        m->mesh.cell_count += is_own_cell(cell);
     }
     insitu_mesh_interleaved(&m->mesh, m->coordinates, INSITU_FLOAT64);
     m->mesh.cell_type = INSITU_LAGRANGE_HEX;
@@ -147,7 +147,8 @@ typedef struct cell_values {
 } cell_values;
 
 /* Computes the Lagrange polynomials and their derivatives. */
-static void weigh(const lobatto_mesh *m, double x, double weights[MOST_ORDER + 1], double derived[MOST_ORDER + 1])
+static void compute_lagrange_weights(const lobatto_mesh *m, double x, double weights[MOST_ORDER + 1],
+                                     double derived[MOST_ORDER + 1])
 {
     for (int i = 0; i <= m->order; i++) {
         weights[i] = m->scales[i];
@@ -160,12 +161,12 @@ static void weigh(const lobatto_mesh *m, double x, double weights[MOST_ORDER + 1
     }
 }
 
-static void evaluate(const lobatto_mesh *m, int cell, const double at[3], cell_values *out)
+static void evaluate_cell(const lobatto_mesh *m, int cell, const double at[3], cell_values *out)
 {
     const int n = m->order + 1;
     const double(*node)[4] = (const double(*)[4])m->nodes[cell];
     double w[3][MOST_ORDER + 1], d[3][MOST_ORDER + 1];
-    for (int a = 0; a < 3; a++) weigh(m, at[a], w[a], d[a]);
+    for (int a = 0; a < 3; a++) compute_lagrange_weights(m, at[a], w[a], d[a]);
     memset(out, 0, sizeof *out);
     for (int k = 0; k < n; k++) {
         double plane[3][4] = {{0}}; /* the value, and the derivatives along two axes */
@@ -193,7 +194,7 @@ static void evaluate(const lobatto_mesh *m, int cell, const double at[3], cell_v
 
 /* Computes the inverse of the derivatives of the position: dual[a][x] is the derivative of reference coordinate a along
  * axis x of space. */
-static void invert(const cell_values *of, double dual[3][3])
+static void invert_jacobian(const cell_values *of, double dual[3][3])
 {
     double determinant = 0;
     for (int a = 0; a < 3; a++)
@@ -214,10 +215,10 @@ typedef struct cell_point {
     double gradient[3], distance; /* in space; the distance from the isosurface to first order, with the field's sign */
 } cell_point;
 
-static void derive(cell_point *p)
+static void compute_derivatives(cell_point *p)
 {
     double dual[3][3], square = 0;
-    invert(&p->of, dual);
+    invert_jacobian(&p->of, dual);
     for (int x = 0; x < 3; x++) {
         p->gradient[x] = 0;
         for (int a = 0; a < 3; a++) p->gradient[x] += p->of.slopes[a][3] * dual[a][x];
@@ -231,23 +232,23 @@ static void find_in_cell(const lobatto_mesh *m, const double position[3], cell_p
 {
     for (int turn = 0; turn < 20; turn++) {
         double dual[3][3], rest = 0;
-        evaluate(m, p->cell, p->at, &p->of);
-        invert(&p->of, dual);
+        evaluate_cell(m, p->cell, p->at, &p->of);
+        invert_jacobian(&p->of, dual);
         for (int x = 0; x < 3; x++) rest = fmax(rest, fabs(position[x] - p->of.value[x]));
         if (rest < 1e-10) break;
         for (int a = 0; a < 3; a++)
             for (int x = 0; x < 3; x++) p->at[a] += dual[a][x] * (position[x] - p->of.value[x]);
     }
-    derive(p);
+    compute_derivatives(p);
 }
 
 /* Computes the point that is moved to a position, with the bend of exact sines: a first guess for polynomials. */
-static void unbend(const double position[3], double out[3])
+static void unbend_position(const double position[3], double out[3])
 {
     memcpy(out, position, 3 * sizeof *out);
     for (int turn = 0; turn < 12; turn++) {
         double moved[3];
-        bend_point(out, moved);
+        bend_position(out, moved);
         for (int a = 0; a < 3; a++) out[a] += position[a] - moved[a];
     }
 }
@@ -257,7 +258,7 @@ static bool find_point(const lobatto_mesh *m, const double position[3], cell_poi
 {
     double point[3];
     int cube[3];
-    unbend(position, point);
+    unbend_position(position, point);
     for (int turn = 0; turn < 3; turn++) {
         bool is_in = true;
         for (int a = 0; a < 3; a++) {
@@ -283,12 +284,12 @@ static double surface_distance(const lobatto_mesh *m, const double position[3], 
     cell_point p = *from;
     for (int turn = 0; turn < 20 && fabs(p.distance) > 1e-10; turn++) {
         double dual[3][3], square = 0;
-        invert(&p.of, dual);
+        invert_jacobian(&p.of, dual);
         for (int x = 0; x < 3; x++) square += p.gradient[x] * p.gradient[x];
         for (int a = 0; a < 3; a++)
             for (int x = 0; x < 3; x++) p.at[a] -= dual[a][x] * p.gradient[x] * p.distance / sqrt(square);
-        evaluate(m, p.cell, p.at, &p.of);
-        derive(&p);
+        evaluate_cell(m, p.cell, p.at, &p.of);
+        compute_derivatives(&p);
     }
     double square = 0;
     for (int x = 0; x < 3; x++) square += pow(p.of.value[x] - position[x], 2);
@@ -371,7 +372,7 @@ static ray_tally check_rays(const lobatto_mesh *m, const caught_picture *picture
     float *depth = malloc(PIXELS * sizeof *depth);
     if (own_rank == 0) memcpy(depth, picture->depth, PIXELS * sizeof *depth);
     MPI_Bcast(depth, PIXELS, MPI_FLOAT, 0, MPI_COMM_WORLD);
-    const int step = test_effort(97, 1);
+    const int step = test_case_count(97, 1);
     for (int n = own_rank; n * step < PIXELS; n += rank_count)
         check_ray(m, n * step, (double)depth[n * step], bound, &t);
     MPI_Allreduce(MPI_IN_PLACE, &t.rays, 3, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
@@ -391,8 +392,8 @@ static void check_order(int order, int side)
     double bound = INFINITY;
     int count = 0;
     make_mesh(order, side, &m);
-    insitu_session *session = open_mesh(MPI_COMM_WORLD, scene, &m.mesh, &m.field);
-    step_is_good(session, 0);
+    insitu_session *session = open_session_with_mesh(MPI_COMM_WORLD, scene, &m.mesh, &m.field);
+    check_step_succeeds(session, 0);
     snprintf(pieces, sizeof pieces, "%s", insitu_last_report(session)->pieces);
     insitu_destroy(&session);
     caught_picture picture = pop_caught_picture();
@@ -406,7 +407,7 @@ static void check_order(int order, int side)
             "surface by %.4f at most\n",
             order, pieces, (long long)t.rays, (long long)t.hits, t.farthest, t.farthest / bound, t.deepest);
     everywhere(count > 1 && bound <= 0.25 && strstr(pieces, ", of which 0 have no bound") != NULL);
-    everywhere(t.wrong == 0 && t.rays > test_effort(1000, 100000) && t.hits > t.rays / 3);
+    everywhere(t.wrong == 0 && t.rays > test_case_count(1000, 100000) && t.hits > t.rays / 3);
     everywhere(t.farthest <= bound + ROUNDING && t.deepest <= bound + ROUNDING);
     free_caught(&picture);
     free_mesh(&m);
@@ -424,10 +425,10 @@ static void hits_of_order_7_are_within_the_bound(void **state)
     check_order(7, 3);
 }
 
-static int begin(void **state)
+static int enter_test_group_folder(void **state)
 {
     (void)state;
-    return enter_folder("order_lobatto") ? 0 : 1;
+    return enter_test_folder("order_lobatto") ? 0 : 1;
 }
 
 int main(int argc, char **argv)
@@ -436,5 +437,5 @@ int main(int argc, char **argv)
         cmocka_unit_test(hits_of_order_4_are_within_the_bound),
         cmocka_unit_test(hits_of_order_7_are_within_the_bound),
     };
-    return run_session_tests(argc, argv, tests, begin, NULL);
+    return run_session_tests(argc, argv, tests, enter_test_group_folder, NULL);
 }

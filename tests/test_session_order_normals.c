@@ -20,9 +20,9 @@ enum { WIDTH = 96, HEIGHT = 72, PIXELS = WIDTH * HEIGHT };
 
 static const char sphere_scene[] = SCENE("isosurface: {field: f, values: [0.5]}");
 
-static caught_picture draw(MPI_Comm comm, const char *scene, const order_mesh *mesh)
+static caught_picture draw_mesh(MPI_Comm comm, const char *scene, const order_mesh *mesh)
 {
-    insitu_session *session = open_mesh(comm, scene, &mesh->mesh, &mesh->field);
+    insitu_session *session = open_session_with_mesh(comm, scene, &mesh->mesh, &mesh->field);
     discard_pictures();
     const insitu_status status = insitu_step(session, 0, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
@@ -38,7 +38,7 @@ static bool is_of_order_two(const order_kind *kind)
 
 /* The largest distance between a hit's unit normal and the field's gradient at the hit, divided by its length; pixels
  * within 0.5 of the axis, where the sphere faces the eye. Infinite if a pixel has no hit. */
-static double worst_normal(const caught_picture *picture)
+static double find_largest_normal_error(const caught_picture *picture)
 {
     double worst = 0;
     for (int pixel = 0; pixel < PIXELS; pixel++) {
@@ -49,18 +49,18 @@ static double worst_normal(const caught_picture *picture)
         if (!isfinite(depth)) return INFINITY;
         double square = 0;
         for (int a = 0; a < 3; a++)
-            square += pow((double)picture->data[a * PIXELS + pixel] - at[a] / sqrt(order_sphere(at)), 2);
+            square += pow((double)picture->data[a * PIXELS + pixel] - at[a] / sqrt(order_sphere_field(at)), 2);
         worst = fmax(worst, sqrt(square));
     }
     return worst;
 }
 
-static double sphere_normal_error(const order_kind *kind, int side, double bend, const char *scene)
+static double measure_sphere_normal_error(const order_kind *kind, int side, double bend, const char *scene)
 {
     order_mesh mesh;
-    order_mesh_create(kind, side, bend, order_sphere, own_rank, rank_count, &mesh);
-    caught_picture picture = draw(MPI_COMM_WORLD, scene, &mesh);
-    double worst = own_rank ? 0 : worst_normal(&picture);
+    order_mesh_create(kind, side, bend, order_sphere_field, own_rank, rank_count, &mesh);
+    caught_picture picture = draw_mesh(MPI_COMM_WORLD, scene, &mesh);
+    double worst = own_rank ? 0 : find_largest_normal_error(&picture);
     MPI_Bcast(&worst, 1, MPI_DOUBLE, 0, MPI_COMM_WORLD);
     free_caught(&picture);
     order_mesh_free(&mesh);
@@ -74,7 +74,7 @@ static void normals_of_a_sphere_are_exact(void **state)
     (void)state;
     for (int k = 0; k < order_kind_count; k++) {
         if (!is_of_order_two(&order_kinds[k])) continue;
-        const double error = sphere_normal_error(&order_kinds[k], 2, 0, sphere_scene);
+        const double error = measure_sphere_normal_error(&order_kinds[k], 2, 0, sphere_scene);
         if (own_rank == 0) printf("%s: normals are off by %.2g\n", order_kinds[k].name, error);
         everywhere(error < 2e-5);
     }
@@ -86,14 +86,14 @@ static void normals_of_a_sphere_are_exact(void **state)
 static void normals_in_bent_cells_are_of_second_order(void **state)
 {
     (void)state;
-    if (rank_count > 1 && !test_is_whole()) return;
+    if (rank_count > 1 && !test_is_long_run()) return;
     for (int k = 0; k < order_kind_count; k++) {
         const order_kind *kind = &order_kinds[k];
         const bool is_permuted = kind->layout != INSITU_ORDER_VTK && kind->layout != INSITU_ORDER_LEXICOGRAPHIC;
         if (!is_of_order_two(kind) || kind->order == 4 || is_permuted) continue;
         const int side = kind->order == 3 ? 3 : 6;
-        const double coarse = sphere_normal_error(kind, side, 0.08, sphere_scene);
-        const double fine = sphere_normal_error(kind, 4 * side, 0.08, sphere_scene);
+        const double coarse = measure_sphere_normal_error(kind, side, 0.08, sphere_scene);
+        const double fine = measure_sphere_normal_error(kind, 4 * side, 0.08, sphere_scene);
         if (own_rank == 0) printf("%s, bent: %.2g, %.2g: %.2f\n", kind->name, coarse, fine, coarse / fine);
         everywhere(fine < 2e-3 && coarse / fine > 8);
     }
@@ -102,7 +102,7 @@ static void normals_in_bent_cells_are_of_second_order(void **state)
 /* ---- outer faces ------------------------------------------------------------------------------------------------- */
 
 /* Moves nodes along z by h = 0.3 x^2 + 0.2 x y, so that the face z = 1 of the cube becomes z = 1 + h. */
-static void bend_faces(order_mesh *mesh)
+static void bend_top_face(order_mesh *mesh)
 {
     for (int64_t v = 0; v < mesh->vertex_count; v++) {
         double *p = mesh->coordinates + 3 * v;
@@ -112,7 +112,7 @@ static void bend_faces(order_mesh *mesh)
 
 /* Returns the largest distance of a unit normal in the picture from that of the face. Infinite if the face has a gap.
  */
-static double worst_face_normal(const caught_picture *picture)
+static double find_largest_face_normal_error(const caught_picture *picture)
 {
     double worst = 0;
     for (int pixel = 0; pixel < PIXELS; pixel++) {
@@ -142,11 +142,11 @@ static void normals_of_curved_faces_are_exact(void **state)
             order_mesh mesh;
             char scene[1024];
             if (!is_of_order_two(&order_kinds[k])) continue;
-            order_mesh_create(&order_kinds[k], 2, 0, order_sphere, own_rank, rank_count, &mesh);
-            bend_faces(&mesh);
+            order_mesh_create(&order_kinds[k], 2, 0, order_sphere_field, own_rank, rank_count, &mesh);
+            bend_top_face(&mesh);
             snprintf(scene, sizeof scene, "%s%s", pieces[i], SCENE("surface: {}"));
-            caught_picture picture = draw(MPI_COMM_WORLD, scene, &mesh);
-            const double worst = own_rank ? 0 : worst_face_normal(&picture);
+            caught_picture picture = draw_mesh(MPI_COMM_WORLD, scene, &mesh);
+            const double worst = own_rank ? 0 : find_largest_face_normal_error(&picture);
             if (worst > 2e-6) printf("%s, \"%s\": normals are off by %.2g\n", order_kinds[k].name, scene, worst);
             everywhere(worst <= 2e-6);
             free_caught(&picture);
@@ -164,8 +164,8 @@ static void derived_gradients_are_exact(void **state)
     for (int k = 0; k < order_kind_count; k++) {
         if (!is_of_order_two(&order_kinds[k])) continue;
         order_mesh mesh;
-        order_mesh_create(&order_kinds[k], 2, 0, order_sphere, own_rank, rank_count, &mesh);
-        caught_picture picture = draw(MPI_COMM_WORLD, scene, &mesh);
+        order_mesh_create(&order_kinds[k], 2, 0, order_sphere_field, own_rank, rank_count, &mesh);
+        caught_picture picture = draw_mesh(MPI_COMM_WORLD, scene, &mesh);
         int wrong = 0;
         for (int pixel = 0; own_rank == 0 && pixel < PIXELS; pixel++) {
             const double x = (pixel % WIDTH + 0.5 - WIDTH / 2.0) * VIEW_HEIGHT / HEIGHT;
@@ -181,14 +181,14 @@ static void derived_gradients_are_exact(void **state)
 /* ---- Gauss-Lobatto points ---------------------------------------------------------------------------------------- */
 
 /* Moves the nodes of cubes of order 4, of which two are along each axis, to Gauss-Lobatto points. */
-static void place_lobatto(order_mesh *mesh)
+static void move_nodes_to_lobatto_points(order_mesh *mesh)
 {
     const double of4[5] = {0, 0.5 - 0.5 * sqrt(3. / 7), 0.5, 0.5 + 0.5 * sqrt(3. / 7), 1};
     for (int64_t i = 0; i < 3 * mesh->vertex_count; i++) {
         const int at = (int)lround((mesh->coordinates[i] + 1) * 4);
         mesh->coordinates[i] = at / 4 - 1 + of4[at % 4];
     }
-    for (int64_t v = 0; v < mesh->vertex_count; v++) mesh->values[v] = order_sphere(mesh->coordinates + 3 * v);
+    for (int64_t v = 0; v < mesh->vertex_count; v++) mesh->values[v] = order_sphere_field(mesh->coordinates + 3 * v);
 }
 
 static void normals_between_lobatto_points_are_exact(void **state)
@@ -196,10 +196,10 @@ static void normals_between_lobatto_points_are_exact(void **state)
     (void)state;
     const order_kind kind = {"hex", INSITU_LAGRANGE_HEX, INSITU_ORDER_LEXICOGRAPHIC, 4};
     order_mesh mesh;
-    order_mesh_create(&kind, 2, 0, order_sphere, own_rank, rank_count, &mesh);
-    place_lobatto(&mesh);
-    caught_picture picture = draw(MPI_COMM_WORLD, sphere_scene, &mesh);
-    everywhere(own_rank || worst_normal(&picture) < 2e-5);
+    order_mesh_create(&kind, 2, 0, order_sphere_field, own_rank, rank_count, &mesh);
+    move_nodes_to_lobatto_points(&mesh);
+    caught_picture picture = draw_mesh(MPI_COMM_WORLD, sphere_scene, &mesh);
+    everywhere(own_rank || find_largest_normal_error(&picture) < 2e-5);
     free_caught(&picture);
     order_mesh_free(&mesh);
 }
@@ -212,11 +212,11 @@ static void normals_are_the_same_on_any_ranks(void **state)
     const char *scene = SCENE("isosurface: {field: f, values: [0.1, 0.4], opacity: 0.6}");
     for (int k = 0; k < order_kind_count; k++) {
         order_mesh part, whole;
-        order_mesh_create(&order_kinds[k], 2, 0.07, order_wavy, own_rank, rank_count, &part);
-        order_mesh_create(&order_kinds[k], 2, 0.07, order_wavy, 0, 1, &whole);
-        caught_picture all = draw(MPI_COMM_WORLD, scene, &part);
-        caught_picture alone = draw(MPI_COMM_SELF, scene, &whole);
-        everywhere(own_rank || same_pictures(&all, &alone));
+        order_mesh_create(&order_kinds[k], 2, 0.07, order_wave_field, own_rank, rank_count, &part);
+        order_mesh_create(&order_kinds[k], 2, 0.07, order_wave_field, 0, 1, &whole);
+        caught_picture all = draw_mesh(MPI_COMM_WORLD, scene, &part);
+        caught_picture alone = draw_mesh(MPI_COMM_SELF, scene, &whole);
+        everywhere(own_rank || are_same_pictures(&all, &alone));
         free_caught(&all);
         free_caught(&alone);
         order_mesh_free(&part);
@@ -230,10 +230,11 @@ static void vertex_normals_are_the_default(void **state)
     (void)state;
     const order_kind kind = {"hex", INSITU_QUADRATIC_HEX, INSITU_ORDER_VTK, 2};
     order_mesh mesh;
-    order_mesh_create(&kind, 2, 0.07, order_wavy, own_rank, rank_count, &mesh);
-    caught_picture plain = draw(MPI_COMM_WORLD, SCENE("isosurface: {field: f, values: [0.1]}"), &mesh);
-    caught_picture asked = draw(MPI_COMM_WORLD, SCENE("isosurface: {field: f, values: [0.1], normals: vertex}"), &mesh);
-    everywhere(own_rank || same_pictures(&plain, &asked));
+    order_mesh_create(&kind, 2, 0.07, order_wave_field, own_rank, rank_count, &mesh);
+    caught_picture plain = draw_mesh(MPI_COMM_WORLD, SCENE("isosurface: {field: f, values: [0.1]}"), &mesh);
+    caught_picture asked =
+        draw_mesh(MPI_COMM_WORLD, SCENE("isosurface: {field: f, values: [0.1], normals: vertex}"), &mesh);
+    everywhere(own_rank || are_same_pictures(&plain, &asked));
     free_caught(&plain);
     free_caught(&asked);
     order_mesh_free(&mesh);
@@ -244,16 +245,16 @@ static void vertex_normals_are_the_default(void **state)
 /* If a value of a cell is not finite, other pieces of it are drawn, with normals from differences along their edges.
  * These are one-sided on the border of the cube: there the gradient along z is 1.5 instead of 2, and on the surface at
  * most 0.21 off in a length of 1.41. Without them, normals would be up to 0.7 off. */
-static void pieces_beside_lost_values_have_normals(void **state)
+static void pieces_adjacent_to_missing_values_have_normals(void **state)
 {
     (void)state;
     const order_kind kind = {"hex", INSITU_LAGRANGE_HEX, INSITU_ORDER_LEXICOGRAPHIC, 4};
     order_mesh mesh;
-    order_mesh_create(&kind, 1, 0, order_sphere, own_rank, rank_count, &mesh);
+    order_mesh_create(&kind, 1, 0, order_sphere_field, own_rank, rank_count, &mesh);
     for (int64_t v = 0; v < mesh.vertex_count; v++)
         if (mesh.coordinates[3 * v] > 0.9 && mesh.coordinates[3 * v + 1] > 0.9) mesh.values[v] = NAN;
-    caught_picture picture = draw(MPI_COMM_WORLD, sphere_scene, &mesh);
-    const double error = own_rank ? 0 : worst_normal(&picture);
+    caught_picture picture = draw_mesh(MPI_COMM_WORLD, sphere_scene, &mesh);
+    const double error = own_rank ? 0 : find_largest_normal_error(&picture);
     if (own_rank == 0) printf("beside lost values normals are off by %.2g\n", error);
     everywhere(error < 0.15);
     free_caught(&picture);
@@ -270,7 +271,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(normals_between_lobatto_points_are_exact),
         cmocka_unit_test(normals_are_the_same_on_any_ranks),
         cmocka_unit_test(vertex_normals_are_the_default),
-        cmocka_unit_test(pieces_beside_lost_values_have_normals),
+        cmocka_unit_test(pieces_adjacent_to_missing_values_have_normals),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

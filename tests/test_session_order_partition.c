@@ -38,7 +38,7 @@ static bool is_usual(const order_kind *kind)
 }
 
 /* Leaves the cells of the rank, in reverse. */
-static void deal_at_random(order_mesh *mesh, uint64_t seed)
+static void keep_random_cells(order_mesh *mesh, uint64_t seed)
 {
     const size_t row = (size_t)mesh->nodes;
     int64_t *own = malloc((size_t)(mesh->cell_count + 1) * row * sizeof *own), count = 0;
@@ -53,7 +53,7 @@ static void deal_at_random(order_mesh *mesh, uint64_t seed)
 }
 
 /* The scene file has been written. pieces: what the report says of them. */
-static drawn draw(MPI_Comm comm, const char *file, const order_mesh *mesh, char pieces[512])
+static drawn draw_and_report(MPI_Comm comm, const char *file, const order_mesh *mesh, char pieces[512])
 {
     insitu_session *session = open_session(comm, file);
     assert_int_equal(insitu_set_mesh(session, "m", &mesh->mesh), INSITU_OK);
@@ -62,32 +62,33 @@ static drawn draw(MPI_Comm comm, const char *file, const order_mesh *mesh, char 
     if (insitu_step(session, 0, 0)) fail_msg("%s", insitu_error(session));
     snprintf(pieces, 512, "%s", insitu_last_report(session)->pieces);
     insitu_destroy(&session);
-    return take_drawn();
+    return take_caught_pictures();
 }
 
 /* Volumes that are not reproducible are blended in float, each rank's part first. */
 static bool is_same_picture(int scene, int picture, const drawn *all, const drawn *alone)
 {
     const caught_picture *one = &all->pictures[picture], *other = &alone->pictures[picture];
-    if (scene == VOLUME_SCENE && picture == VOLUME) return colour_difference(one, other) <= 1e-6;
-    return same_pictures(one, other);
+    if (scene == VOLUME_SCENE && picture == VOLUME) return largest_colour_difference(one, other) <= 1e-6;
+    return are_same_pictures(one, other);
 }
 
-static bool is_same_alone(const order_kind *kind, int scene, const order_mesh *whole, const order_mesh *part)
+static bool draws_same_as_rank_0_alone(const order_kind *kind, int scene, const order_mesh *whole,
+                                       const order_mesh *part)
 {
     char pieces[2][512];
     const char *file = write_scene(scenes[scene]);
-    drawn all = draw(MPI_COMM_WORLD, file, part, pieces[0]);
+    drawn all = draw_and_report(MPI_COMM_WORLD, file, part, pieces[0]);
     if (own_rank != 0) return true;
-    drawn alone = draw(MPI_COMM_SELF, file, whole, pieces[1]);
+    drawn alone = draw_and_report(MPI_COMM_SELF, file, whole, pieces[1]);
     bool are_same = strcmp(pieces[0], pieces[1]) == 0 && all.count == alone.count && all.count > 1;
     if (!are_same) fprintf(stderr, "%s: %s; alone: %s\n", kind->name, pieces[0], pieces[1]);
     for (int i = 0; are_same && i < all.count; i++) {
         are_same = is_same_picture(scene, i, &all, &alone);
         if (!are_same) fprintf(stderr, "%s, scene %d: picture %d depends on ranks\n", kind->name, scene, i);
     }
-    free_drawn(&all);
-    free_drawn(&alone);
+    free_picture_set(&all);
+    free_picture_set(&alone);
     return are_same;
 }
 
@@ -97,26 +98,26 @@ static void pictures_are_the_same_on_any_ranks(void **state)
     bool are_all_same = true;
     for (int k = 0; k < order_kind_count; k++) {
         order_mesh part, whole;
-        if (!is_usual(&order_kinds[k]) && (!test_is_whole() || rank_count > 7)) continue; /* many ranks take long */
-        order_mesh_create(&order_kinds[k], 2, 0.07, order_wavy, 0, 1, &part);
-        order_mesh_create(&order_kinds[k], 2, 0.07, order_wavy, 0, 1, &whole);
-        deal_at_random(&part, (uint64_t)k);
+        if (!is_usual(&order_kinds[k]) && (!test_is_long_run() || rank_count > 7)) continue; /* many ranks take long */
+        order_mesh_create(&order_kinds[k], 2, 0.07, order_wave_field, 0, 1, &part);
+        order_mesh_create(&order_kinds[k], 2, 0.07, order_wave_field, 0, 1, &whole);
+        keep_random_cells(&part, (uint64_t)k);
         for (int scene = 0; scene < SCENES; scene++)
-            are_all_same = is_same_alone(&order_kinds[k], scene, &whole, &part) && are_all_same;
+            are_all_same = draws_same_as_rank_0_alone(&order_kinds[k], scene, &whole, &part) && are_all_same;
         order_mesh_free(&part);
         order_mesh_free(&whole);
     }
     everywhere(are_all_same);
 }
 
-static int begin(void **state)
+static int enter_test_group_folder(void **state)
 {
     (void)state;
-    return enter_folder("order_partition") ? 0 : 1;
+    return enter_test_folder("order_partition") ? 0 : 1;
 }
 
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(pictures_are_the_same_on_any_ranks)};
-    return run_session_tests(argc, argv, tests, begin, NULL);
+    return run_session_tests(argc, argv, tests, enter_test_group_folder, NULL);
 }

@@ -27,31 +27,31 @@ typedef struct subject {
 
 /* ---- vectors ----------------------------------------------------------------------------------------------------- */
 
-static double dot(const double a[3], const double b[3])
+static double dot_product(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-static void cross(const double a[3], const double b[3], double out[3])
+static void cross_product(const double a[3], const double b[3], double out[3])
 {
     for (int x = 0; x < 3; x++) out[x] = a[(x + 1) % 3] * b[(x + 2) % 3] - a[(x + 2) % 3] * b[(x + 1) % 3];
 }
 
 static void make_unit(double a[3])
 {
-    const double length = sqrt(dot(a, a));
+    const double length = sqrt(dot_product(a, a));
     for (int x = 0; x < 3; x++) a[x] /= length;
 }
 
 /* Solves three equations by Cramer's rule. Returns false if they have no single solution. */
-static bool solve(const double columns[3][3], const double right[3], double out[3])
+static bool solve_linear_system(const double columns[3][3], const double right[3], double out[3])
 {
     double product[3];
-    cross(columns[1], columns[2], product);
-    const double determinant = dot(columns[0], product);
+    cross_product(columns[1], columns[2], product);
+    const double determinant = dot_product(columns[0], product);
     for (int i = 0; i < 3; i++) {
-        cross(columns[(i + 1) % 3], columns[(i + 2) % 3], product);
-        out[i] = dot(right, product) / determinant;
+        cross_product(columns[(i + 1) % 3], columns[(i + 2) % 3], product);
+        out[i] = dot_product(right, product) / determinant;
     }
     return determinant != 0;
 }
@@ -60,19 +60,19 @@ static void place_camera(subject *s)
 {
     for (int x = 0; x < 3; x++) s->forward[x] = s->focal[x] - s->eye[x];
     make_unit(s->forward);
-    cross(s->forward, s->up, s->right);
+    cross_product(s->forward, s->up, s->right);
     make_unit(s->right);
-    cross(s->right, s->forward, s->above);
+    cross_product(s->right, s->forward, s->above);
 }
 
 /* Computes a place in camera coordinates: in pixels from the left and the top, and its depth in scene units. */
-static void look_at(const subject *s, const double place[3], double out[3])
+static void transform_to_camera(const subject *s, const double place[3], double out[3])
 {
     double to[3];
     for (int x = 0; x < 3; x++) to[x] = place[x] - s->eye[x];
-    out[0] = WIDTH / 2.0 + dot(to, s->right) * HEIGHT / s->height;
-    out[1] = HEIGHT / 2.0 - dot(to, s->above) * HEIGHT / s->height;
-    out[2] = dot(to, s->forward);
+    out[0] = WIDTH / 2.0 + dot_product(to, s->right) * HEIGHT / s->height;
+    out[1] = HEIGHT / 2.0 - dot_product(to, s->above) * HEIGHT / s->height;
+    out[2] = dot_product(to, s->forward);
 }
 
 /* ---- polynomials ------------------------------------------------------------------------------------------------- */
@@ -81,7 +81,7 @@ static void look_at(const subject *s, const double place[3], double out[3])
 static const int ends[NODES][2] = {{0, 0}, {1, 1}, {2, 2}, {3, 3}, {0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};
 
 /* Computes the polynomials of a cell at barycentric coordinates. nodes: position in camera coordinates, and value. */
-static void evaluate(const double nodes[NODES][4], const double at[4], double out[4])
+static void evaluate_cell(const double nodes[NODES][4], const double at[4], double out[4])
 {
     for (int f = 0; f < 4; f++) out[f] = 0;
     for (int n = 0; n < NODES; n++) {
@@ -92,7 +92,7 @@ static void evaluate(const double nodes[NODES][4], const double at[4], double ou
 }
 
 /* Computes the derivatives from corner 0 to the others. */
-static void derive(const double nodes[NODES][4], const double at[4], double out[3][4])
+static void compute_derivatives(const double nodes[NODES][4], const double at[4], double out[3][4])
 {
     double of[4][4] = {{0}};
     for (int n = 0; n < NODES; n++) {
@@ -110,7 +110,7 @@ static void read_cell(const subject *s, int64_t cell, double nodes[NODES][4])
 {
     for (int n = 0; n < NODES; n++) {
         const int64_t vertex = s->cells.connectivity[cell * NODES + n];
-        look_at(s, s->cells.coordinates + 3 * vertex, nodes[n]);
+        transform_to_camera(s, s->cells.coordinates + 3 * vertex, nodes[n]);
         nodes[n][3] = s->cells.values[vertex];
     }
 }
@@ -132,8 +132,8 @@ static bool is_straight(const double nodes[NODES][4])
 typedef void pixel_function(const subject *s, const double nodes[NODES][4], const double guess[4], int pixel,
                             double *depths);
 
-static void visit_pixels(const subject *s, const double nodes[NODES][4], const double (*places)[4], int count,
-                         const double guess[4], pixel_function *visit, double *depths)
+static void for_each_pixel(const subject *s, const double nodes[NODES][4], const double (*places)[4], int count,
+                           const double guess[4], pixel_function *visit, double *depths)
 {
     double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
     for (int n = 0; n < count; n++)
@@ -148,7 +148,7 @@ static void visit_pixels(const subject *s, const double nodes[NODES][4], const d
 
 /* Finds the first root of a quadratic polynomial, given by its values at 0, 1/2 and 1, from 0 to 1; INFINITY: none. On
  * faces all of whose nodes have the isovalue, rounding does not hide it. */
-static double first_root(double left, double middle, double right)
+static double find_first_root(double left, double middle, double right)
 {
     const double a = 2 * (left + right - 2 * middle), b = 4 * middle - 3 * left - right, c = left;
     const double inner = b * b - 4 * a * c;
@@ -161,8 +161,8 @@ static double first_root(double left, double middle, double right)
     return first;
 }
 
-static void hit_straight(const subject *s, const double nodes[NODES][4], const double guess[4], int pixel,
-                         double *depths)
+static void intersect_straight_cell(const subject *s, const double nodes[NODES][4], const double guess[4], int pixel,
+                                    double *depths)
 {
     double columns[3][3], to[3], start[4], slope[4] = {0}, enter = -INFINITY, leave = INFINITY, values[3];
     (void)guess;
@@ -171,8 +171,8 @@ static void hit_straight(const subject *s, const double nodes[NODES][4], const d
     for (int x = 0; x < 3; x++) to[x] = -nodes[0][x];
     to[0] += pixel % WIDTH + 0.5;
     to[1] += pixel / WIDTH + 0.5;
-    if (!solve((const double(*)[3])columns, to, start + 1)) return;
-    solve((const double(*)[3])columns, (const double[]){0, 0, 1}, slope + 1);
+    if (!solve_linear_system((const double(*)[3])columns, to, start + 1)) return;
+    solve_linear_system((const double(*)[3])columns, (const double[]){0, 0, 1}, slope + 1);
     start[0] = 1 - start[1] - start[2] - start[3];
     slope[0] = -slope[1] - slope[2] - slope[3];
     for (int c = 0; c < 4; c++) {
@@ -185,25 +185,26 @@ static void hit_straight(const subject *s, const double nodes[NODES][4], const d
     for (int n = 0; n < 3; n++) {
         double at[4], out[4];
         for (int c = 0; c < 4; c++) at[c] = start[c] + (enter + 0.5 * n * (leave - enter)) * slope[c];
-        evaluate(nodes, at, out);
+        evaluate_cell(nodes, at, out);
         values[n] = out[3] - s->isovalue;
     }
-    depths[pixel] = fmin(depths[pixel], enter + (leave - enter) * first_root(values[0], values[1], values[2]));
+    depths[pixel] = fmin(depths[pixel], enter + (leave - enter) * find_first_root(values[0], values[1], values[2]));
 }
 
 /* Newton's method from a guess near by. A hit outside the cell is one of another cell. */
-static void hit_bent(const subject *s, const double nodes[NODES][4], const double guess[4], int pixel, double *depths)
+static void intersect_by_newton(const subject *s, const double nodes[NODES][4], const double guess[4], int pixel,
+                                double *depths)
 {
     double at[4], out[4], slopes[3][4], way[3], rest = INFINITY;
     memcpy(at, guess, sizeof at);
     for (int turn = 0; turn < 12; turn++) {
-        evaluate(nodes, at, out);
-        derive(nodes, at, slopes);
+        evaluate_cell(nodes, at, out);
+        compute_derivatives(nodes, at, slopes);
         const double wanted[3] = {pixel % WIDTH + 0.5 - out[0], pixel / WIDTH + 0.5 - out[1], s->isovalue - out[3]};
         double columns[3][3];
         for (int c = 0; c < 3; c++)
             memcpy(columns[c], (const double[]){slopes[c][0], slopes[c][1], slopes[c][3]}, sizeof columns[c]);
-        if (!solve((const double(*)[3])columns, wanted, way)) return;
+        if (!solve_linear_system((const double(*)[3])columns, wanted, way)) return;
         rest = fabs(wanted[0]) + fabs(wanted[1]);
         for (int c = 0; c < 3; c++) at[c + 1] += way[c];
         at[0] = 1 - at[1] - at[2] - at[3];
@@ -217,15 +218,15 @@ static void hit_bent(const subject *s, const double nodes[NODES][4], const doubl
 enum { BOXES = 2 * SMALL };
 typedef double value_lattice[BOXES + 1][BOXES + 1][BOXES + 1];
 
-static void place_small(const int at[3], double out[4])
+static void compute_box_corner(const int at[3], double out[4])
 {
     for (int c = 0; c < 3; c++) out[c + 1] = (double)at[c] / BOXES;
     out[0] = 1 - out[1] - out[2] - out[3];
 }
 
 /* Looks for hits in a small box, half of which may be outside the cell. */
-static void hit_small(const subject *s, const double nodes[NODES][4], value_lattice values, const int first[3],
-                      double *depths)
+static void intersect_box(const subject *s, const double nodes[NODES][4], value_lattice values, const int first[3],
+                          double *depths)
 {
     double places[8][4], middle[4], low = INFINITY, high = -INFINITY;
     for (int n = 0; n < 8; n++) {
@@ -237,31 +238,31 @@ static void hit_small(const subject *s, const double nodes[NODES][4], value_latt
     if (low - more > s->isovalue || high + more < s->isovalue) return;
     for (int n = 0; n < 8; n++) {
         double at[4];
-        place_small((const int[]){first[0] + (n & 1), first[1] + (n >> 1 & 1), first[2] + (n >> 2)}, at);
-        evaluate(nodes, at, places[n]);
+        compute_box_corner((const int[]){first[0] + (n & 1), first[1] + (n >> 1 & 1), first[2] + (n >> 2)}, at);
+        evaluate_cell(nodes, at, places[n]);
     }
-    place_small(first, middle);
+    compute_box_corner(first, middle);
     for (int c = 1; c < 4; c++) middle[c] += 0.5 / BOXES;
     middle[0] = 1 - middle[1] - middle[2] - middle[3];
-    visit_pixels(s, nodes, (const double(*)[4])places, 8, middle, hit_bent, depths);
+    for_each_pixel(s, nodes, (const double(*)[4])places, 8, middle, intersect_by_newton, depths);
 }
 
-static void hit_all_small(const subject *s, const double nodes[NODES][4], value_lattice values, double *depths)
+static void intersect_all_boxes(const subject *s, const double nodes[NODES][4], value_lattice values, double *depths)
 {
     for (int n = 0; n < (BOXES + 1) * (BOXES + 1) * (BOXES + 1); n++) {
         const int at[3] = {n % (BOXES + 1), n / (BOXES + 1) % (BOXES + 1), n / (BOXES + 1) / (BOXES + 1)};
         double place[4], out[4];
         if (at[0] + at[1] + at[2] > BOXES + 2) continue;
-        place_small(at, place);
-        evaluate(nodes, place, out);
+        compute_box_corner(at, place);
+        evaluate_cell(nodes, place, out);
         values[at[0]][at[1]][at[2]] = out[3];
     }
     for (int k = 0; k < BOXES; k++)
         for (int j = 0; j + k < BOXES; j++)
-            for (int i = 0; i + j + k < BOXES; i++) hit_small(s, nodes, values, (const int[]){i, j, k}, depths);
+            for (int i = 0; i + j + k < BOXES; i++) intersect_box(s, nodes, values, (const int[]){i, j, k}, depths);
 }
 
-static double *true_depths(const subject *s)
+static double *compute_exact_depths(const subject *s)
 {
     double *depths = malloc(PIXELS * sizeof *depths);
     value_lattice *values = malloc(sizeof *values);
@@ -270,10 +271,11 @@ static double *true_depths(const subject *s)
         double nodes[NODES][4];
         read_cell(s, cell, nodes);
         if (is_straight((const double(*)[4])nodes)) {
-            visit_pixels(s, (const double(*)[4])nodes, (const double(*)[4])nodes, NODES, NULL, hit_straight, depths);
+            for_each_pixel(s, (const double(*)[4])nodes, (const double(*)[4])nodes, NODES, NULL,
+                           intersect_straight_cell, depths);
             continue;
         }
-        hit_all_small(s, (const double(*)[4])nodes, *values, depths);
+        intersect_all_boxes(s, (const double(*)[4])nodes, *values, depths);
     }
     free(values);
     return depths;
@@ -287,7 +289,7 @@ static int compare_numbers(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-static void draw_part(const subject *s, const char *pieces, caught_picture *out, char told[512])
+static void draw_part(const subject *s, const char *pieces, caught_picture *out, char report[512])
 {
     const data_cells *c = &s->cells;
     char scene[1024];
@@ -314,9 +316,9 @@ static void draw_part(const subject *s, const char *pieces, caught_picture *out,
              "    layers: [isosurface: {field: f, values: [%.17g]}]\n    outputs: [{path: a.exr, data: true}]\n",
              pieces, WIDTH, HEIGHT, s->eye[0], s->eye[1], s->eye[2], s->focal[0], s->focal[1], s->focal[2], s->up[0],
              s->up[1], s->up[2], s->height, s->isovalue);
-    insitu_session *session = open_mesh(MPI_COMM_WORLD, scene, &mesh, &field);
-    step_is_good(session, 0);
-    snprintf(told, 512, "%s", insitu_last_report(session)->pieces);
+    insitu_session *session = open_session_with_mesh(MPI_COMM_WORLD, scene, &mesh, &field);
+    check_step_succeeds(session, 0);
+    snprintf(report, 512, "%s", insitu_last_report(session)->pieces);
     insitu_destroy(&session);
     *out = pop_caught_picture();
     free(own);
@@ -328,7 +330,7 @@ typedef struct difference {
     double median, most; /* distances along rays, in pixels; `most` is exceeded by 1 in 1000 */
 } difference;
 
-static difference compare(const subject *s, const float *drawn, const double *depths)
+static difference compare_picture(const subject *s, const float *drawn, const double *depths)
 {
     difference out = {0, 0, 0, 0};
     double *distances = malloc(PIXELS * sizeof *distances);
@@ -352,16 +354,16 @@ static void check_subject(subject *s)
     static const char *const pieces[] = {"", "finer_pieces: 1\n"};
     double *depths = NULL;
     place_camera(s);
-    if (own_rank == 0) depths = true_depths(s);
+    if (own_rank == 0) depths = compute_exact_depths(s);
     for (int i = 0; i < 2; i++) {
         caught_picture picture;
         difference d = {0, 0, 0, 0};
-        char told[512];
-        draw_part(s, pieces[i], &picture, told);
-        if (own_rank == 0) d = compare(s, picture.depth, depths);
+        char report[512];
+        draw_part(s, pieces[i], &picture, report);
+        if (own_rank == 0) d = compare_picture(s, picture.depth, depths);
         if (own_rank == 0)
             printf("%s: %d hits, %d missed; median %.4f pixels, 1 in 1000 above %.3f; %s\n", s->name, d.hits, d.missed,
-                   d.median, d.most, told);
+                   d.median, d.most, report);
         const bool is_good = d.missed <= 0.001 * d.hits && d.median <= 0.1;
         everywhere(own_rank || (d.hits > 1000 && is_good == (i == 0)));
         free_caught(&picture);
@@ -369,7 +371,7 @@ static void check_subject(subject *s)
     free(depths);
 }
 
-static void straight_tets_are_their_polynomials(void **state)
+static void straight_tets_match_their_polynomials(void **state)
 {
     (void)state;
     char path[1024];
@@ -382,25 +384,25 @@ static void straight_tets_are_their_polynomials(void **state)
     const char *folder = getenv("INSITU_TEST_DATA");
     if (!folder) skip();
     snprintf(path, sizeof path, "%s/cylinder_quadratic.vtu", folder);
-    everywhere(data_cells_read(path, "velocity_norm", &s.cells) && s.cells.nodes == NODES);
+    everywhere(data_cells_read_file(path, "velocity_norm", &s.cells) && s.cells.nodes == NODES);
     check_subject(&s);
     free(s.cells.coordinates);
     free(s.cells.values);
     free(s.cells.connectivity);
 }
 
-static double wave(const double p[3])
+static double wave_field(const double p[3])
 {
     return p[0] * p[0] + 0.6 * p[1] * p[1] - 0.5 * p[2] + 0.3 * sin(2 * p[1] + p[2]);
 }
 
 /* A bracket: a block that is bent by a quarter of a circle, so that the edges of its cells are curved. */
-static void bent_tets_are_their_polynomials(void **state)
+static void bent_tets_match_their_polynomials(void **state)
 {
     (void)state;
     const order_kind kind = {"tet 2", INSITU_QUADRATIC_TET, INSITU_ORDER_VTK, 2};
     order_mesh mesh;
-    order_mesh_create(&kind, 4, 0, wave, 0, 1, &mesh);
+    order_mesh_create(&kind, 4, 0, wave_field, 0, 1, &mesh);
     for (int64_t v = 0; v < mesh.vertex_count; v++) {
         double *at = mesh.coordinates + 3 * v;
         const double radius = 1.5 + 0.5 * at[0], angle = 0.7853981633974483 * at[1];
@@ -422,8 +424,8 @@ static void bent_tets_are_their_polynomials(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(straight_tets_are_their_polynomials),
-        cmocka_unit_test(bent_tets_are_their_polynomials),
+        cmocka_unit_test(straight_tets_match_their_polynomials),
+        cmocka_unit_test(bent_tets_match_their_polynomials),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -25,10 +25,11 @@ static const order_kind hex_27 = {"hex 27", INSITU_TRIQUADRATIC_HEX, INSITU_ORDE
 static const order_kind tet_10 = {"tet 10", INSITU_QUADRATIC_TET, INSITU_ORDER_VTK, 2};
 
 /* Writes the statistics of one step, and reads them on rank 0. */
-static void count(const char *scene, const insitu_mesh *mesh, const insitu_field *field, char text[MOST])
+static void write_and_read_statistics(const char *scene, const insitu_mesh *mesh, const insitu_field *field,
+                                      char text[MOST])
 {
     if (own_rank == 0) remove("s.csv");
-    insitu_session *session = open_mesh(MPI_COMM_WORLD, scene, mesh, field);
+    insitu_session *session = open_session_with_mesh(MPI_COMM_WORLD, scene, mesh, field);
     const insitu_status status = insitu_step(session, 0, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     everywhere(status == INSITU_OK);
@@ -38,9 +39,9 @@ static void count(const char *scene, const insitu_mesh *mesh, const insitu_field
 }
 
 /* Nine digits are written. */
-static bool is_near(const char *text, int column, double expected)
+static bool is_nearly_equal(const char *text, int column, double expected)
 {
-    const double number = last_number(text, column);
+    const double number = read_last_number(text, column);
     if (own_rank || fabs(number - expected) <= 1e-8 * fmax(1, fabs(expected))) return true;
     fprintf(stderr, "column %d: %.9g, expected %.9g\n", column, number, expected);
     return false;
@@ -49,7 +50,7 @@ static bool is_near(const char *text, int column, double expected)
 /* The usual run does every third kind of cells, among them tets, hexes, wedges and pyramids. */
 static bool is_left_out(int kind)
 {
-    return !test_is_whole() && kind % 3 != 1;
+    return !test_is_long_run() && kind % 3 != 1;
 }
 
 static bool is_same(const char *a, const char *b)
@@ -63,7 +64,7 @@ static bool is_same(const char *a, const char *b)
 
 /* Maps the cube to x + b x^2 + b y^2, y + b z^2, z + b x^2, which every cell of order 2 contains. The determinant of
  * its Jacobian is 1 + 2 b x + 8 b^3 x y z. */
-static void bend(double b, double place[3])
+static void bend_position(double b, double place[3])
 {
     const double x = place[0], y = place[1], z = place[2];
     place[0] = x + b * (x * x + y * y);
@@ -73,20 +74,20 @@ static void bend(double b, double place[3])
 
 /* A function of the place before it is moved. Over the cube from -1 to 1, the mean of x + y z with the determinant as
  * weight is 2 b / 3, and that of its square 4/9 + 16 b^3 / 27. */
-static double bent_value(const double p[3])
+static double bent_field(const double p[3])
 {
     return p[0] + p[1] * p[2];
 }
 
 static void bend_mesh(double b, order_mesh *mesh)
 {
-    for (int64_t v = 0; v < mesh->vertex_count; v++) bend(b, mesh->coordinates + 3 * v);
+    for (int64_t v = 0; v < mesh->vertex_count; v++) bend_position(b, mesh->coordinates + 3 * v);
 }
 
 static bool has_moments(const char *text, double mean, double of_square)
 {
-    return is_near(text, VOLUME, 8) && is_near(text, MEAN, mean) &&
-           is_near(text, DEVIATION, sqrt(of_square - mean * mean));
+    return is_nearly_equal(text, VOLUME, 8) && is_nearly_equal(text, MEAN, mean) &&
+           is_nearly_equal(text, DEVIATION, sqrt(of_square - mean * mean));
 }
 
 static void bent_cells_have_the_moments_of_their_polynomials(void **state)
@@ -98,12 +99,12 @@ static void bent_cells_have_the_moments_of_their_polynomials(void **state)
             const double b = way ? 0.2 : 0;
             order_mesh mesh;
             if (order_kinds[k].order == 1) continue;
-            order_mesh_create(&order_kinds[k], 2, 0, bent_value, own_rank, rank_count, &mesh);
+            order_mesh_create(&order_kinds[k], 2, 0, bent_field, own_rank, rank_count, &mesh);
             bend_mesh(b, &mesh);
-            count(OF_F FAR, &mesh.mesh, &mesh.field, text);
+            write_and_read_statistics(OF_F FAR, &mesh.mesh, &mesh.field, text);
             const bool is_good = has_moments(text, 2 * b / 3, 4. / 9 + 16 * b * b * b / 27);
             if (!is_good) fprintf(stderr, "%s\n", order_kinds[k].name);
-            everywhere(is_good && is_near(text, LEAST, -2) && is_near(text, MOST_VALUE, 2));
+            everywhere(is_good && is_nearly_equal(text, LEAST, -2) && is_nearly_equal(text, MOST_VALUE, 2));
             order_mesh_free(&mesh);
         }
 }
@@ -115,7 +116,7 @@ static void cell_values_have_the_volumes_of_bent_cells(void **state)
     static char text[MOST];
     const double b = 0.2;
     order_mesh mesh;
-    order_mesh_create(&hex_20, 2, 0, bent_value, own_rank, rank_count, &mesh);
+    order_mesh_create(&hex_20, 2, 0, bent_field, own_rank, rank_count, &mesh);
     double *values = calloc((size_t)mesh.cell_count + 1, sizeof *values);
     for (int64_t cell = 0; cell < mesh.cell_count; cell++)
         values[cell] = mesh.coordinates[3 * mesh.connectivity[cell * mesh.nodes + 1]] > 0;
@@ -124,7 +125,7 @@ static void cell_values_have_the_volumes_of_bent_cells(void **state)
     field.values.data = values;
     field.count = mesh.cell_count;
     field.centring = INSITU_CELL;
-    count(OF_F FAR, &mesh.mesh, &field, text);
+    write_and_read_statistics(OF_F FAR, &mesh.mesh, &field, text);
     everywhere(has_moments(text, (1 + b) / 2, (1 + b) / 2));
     free(values);
     order_mesh_free(&mesh);
@@ -132,12 +133,12 @@ static void cell_values_have_the_volumes_of_bent_cells(void **state)
 
 /* Each cube of side 1 has three times its number, and a slope of 1 along x around it, whose variance is 1/12. The
  * numbers 0 to 7 have the variance 63/12. */
-static void values_at_corners_are_each_cells_own(void **state)
+static void corner_values_count_per_cell(void **state)
 {
     (void)state;
     static char text[MOST];
     order_mesh mesh;
-    order_mesh_create(&hex_20, 2, 0, bent_value, own_rank, rank_count, &mesh);
+    order_mesh_create(&hex_20, 2, 0, bent_field, own_rank, rank_count, &mesh);
     const int64_t entries = mesh.cell_count * mesh.nodes;
     double *values = calloc((size_t)entries + 1, sizeof *values);
     for (int64_t i = 0; i < entries; i++) {
@@ -149,7 +150,7 @@ static void values_at_corners_are_each_cells_own(void **state)
     field.count = entries;
     field.centring = INSITU_CORNER;
     for (int way = 0; way < 2; way++) {
-        count(way ? OF_F "finer_pieces: 3\n" FAR : OF_F FAR, &mesh.mesh, &field, text);
+        write_and_read_statistics(way ? OF_F "finer_pieces: 3\n" FAR : OF_F FAR, &mesh.mesh, &field, text);
         everywhere(has_moments(text, 10.5, 10.5 * 10.5 + 9 * 63. / 12 + 1. / 12));
     }
     free(values);
@@ -176,7 +177,7 @@ static void make_lobatto(int p, int power, double b, order_mesh *out)
                 place[a] = (cell >> a & 1) - 0.5 + 0.5 * on;
             }
             out->values[out->vertex_count] = pow(place[0], power);
-            bend(b, place);
+            bend_position(b, place);
         }
     insitu_mesh_defaults(&out->mesh);
     insitu_mesh_interleaved(&out->mesh, out->coordinates, INSITU_FLOAT64);
@@ -199,9 +200,9 @@ static void nodes_at_lobatto_points_are_recognised(void **state)
         const int p = way % 2 ? 7 : 4, power = way % 2 ? 6 : 4;
         order_mesh mesh;
         make_lobatto(p, power, way / 2 ? 0.2 : 0, &mesh);
-        count(OF_F "finer_pieces: 1\n" FAR, &mesh.mesh, &mesh.field, text);
+        write_and_read_statistics(OF_F "finer_pieces: 1\n" FAR, &mesh.mesh, &mesh.field, text);
         everywhere(has_moments(text, 1. / (power + 1), 1. / (2 * power + 1)));
-        count(OF_F "finer_pieces: 2\n" FAR, &mesh.mesh, &mesh.field, finer);
+        write_and_read_statistics(OF_F "finer_pieces: 2\n" FAR, &mesh.mesh, &mesh.field, finer);
         everywhere(is_same(text, finer));
         order_mesh_free(&mesh);
     }
@@ -222,14 +223,14 @@ static void numbers_do_not_depend_on_pieces_and_cameras(void **state)
     for (int k = 0; k < order_kind_count; k++) {
         order_mesh mesh;
         if (is_left_out(k)) continue;
-        order_mesh_create(&order_kinds[k], 3, 0.05, order_wavy, own_rank, rank_count, &mesh);
-        count(scenes[0], &mesh.mesh, &mesh.field, first);
+        order_mesh_create(&order_kinds[k], 3, 0.05, order_wave_field, own_rank, rank_count, &mesh);
+        write_and_read_statistics(scenes[0], &mesh.mesh, &mesh.field, first);
         for (size_t i = 1; i < sizeof scenes / sizeof *scenes; i++) {
-            count(scenes[i], &mesh.mesh, &mesh.field, text);
+            write_and_read_statistics(scenes[i], &mesh.mesh, &mesh.field, text);
             everywhere(is_same(first, text));
         }
         double sum = 0;
-        for (int bin = 0; bin < 7; bin++) sum += last_number(first, FIRST_BIN + bin);
+        for (int bin = 0; bin < 7; bin++) sum += read_last_number(first, FIRST_BIN + bin);
         everywhere(own_rank || fabs(sum - 1) < 1e-8);
         order_mesh_free(&mesh);
     }
@@ -247,13 +248,13 @@ static void numbers_of_derived_fields_do_not_depend_on_pieces(void **state)
     static char text[MOST], first[MOST];
     for (int k = 0; k < 6; k++) {
         order_mesh mesh;
-        order_mesh_create(kinds[k / 2], 3, 0.05, order_wavy, own_rank, rank_count, &mesh);
-        count(scenes[k % 2][0], &mesh.mesh, &mesh.field, first);
+        order_mesh_create(kinds[k / 2], 3, 0.05, order_wave_field, own_rank, rank_count, &mesh);
+        write_and_read_statistics(scenes[k % 2][0], &mesh.mesh, &mesh.field, first);
         for (int i = 1; i < 3; i++) {
-            count(scenes[k % 2][i], &mesh.mesh, &mesh.field, text);
+            write_and_read_statistics(scenes[k % 2][i], &mesh.mesh, &mesh.field, text);
             bool is_good = true;
             for (int column = CELLS; column <= DEVIATION; column++)
-                is_good = is_near(text, column, last_number(first, column)) && is_good;
+                is_good = is_nearly_equal(text, column, read_last_number(first, column)) && is_good;
             everywhere(is_good);
         }
         order_mesh_free(&mesh);
@@ -267,10 +268,11 @@ static void numbers_are_the_same_on_any_ranks(void **state)
     for (int k = 0; k < order_kind_count; k++) {
         order_mesh part, whole;
         if (is_left_out(k)) continue;
-        order_mesh_create(&order_kinds[k], 3, 0.05, order_wavy, own_rank, rank_count, &part);
-        order_mesh_create(&order_kinds[k], 3, 0.05, order_wavy, own_rank ? MOST : 0, own_rank ? 2 * MOST : 1, &whole);
-        count(BINS NEAR, &part.mesh, &part.field, text);
-        count(BINS NEAR, &whole.mesh, &whole.field, all);
+        order_mesh_create(&order_kinds[k], 3, 0.05, order_wave_field, own_rank, rank_count, &part);
+        order_mesh_create(&order_kinds[k], 3, 0.05, order_wave_field, own_rank ? MOST : 0, own_rank ? 2 * MOST : 1,
+                          &whole);
+        write_and_read_statistics(BINS NEAR, &part.mesh, &part.field, text);
+        write_and_read_statistics(BINS NEAR, &whole.mesh, &whole.field, all);
         everywhere(is_same(text, all));
         order_mesh_free(&part);
         order_mesh_free(&whole);
@@ -299,7 +301,7 @@ static void mix_types(const order_mesh *mesh, int quadratic, int ranks, int64_t 
 }
 
 /* Linear cells count as in meshes of linear cells, which the parts of most ranks are. */
-static void linear_cells_count_as_elsewhere(void **state)
+static void linear_cells_count_as_in_linear_meshes(void **state)
 {
     (void)state;
     static const char *const scenes[] = {BINS FAR, BINS "finer_pieces: 3\n" FAR};
@@ -309,12 +311,12 @@ static void linear_cells_count_as_elsewhere(void **state)
     for (int i = 0; i < 2; i++) {
         order_mesh part, whole;
         insitu_mesh mesh;
-        order_mesh_create(&hex_27, 3, 0.05, order_wavy, own_rank, rank_count, &part);
-        order_mesh_create(&hex_27, 3, 0.05, order_wavy, own_rank ? MOST : 0, own_rank ? 2 * MOST : 1, &whole);
+        order_mesh_create(&hex_27, 3, 0.05, order_wave_field, own_rank, rank_count, &part);
+        order_mesh_create(&hex_27, 3, 0.05, order_wave_field, own_rank ? MOST : 0, own_rank ? 2 * MOST : 1, &whole);
         mix_types(&part, 5 * rank_count, rank_count, offsets, types, connectivity, &mesh);
-        count(scenes[i], &mesh, &part.field, text);
+        write_and_read_statistics(scenes[i], &mesh, &part.field, text);
         mix_types(&whole, 5 * rank_count, 1, offsets, types, connectivity, &mesh);
-        count(scenes[i], &mesh, &whole.field, all);
+        write_and_read_statistics(scenes[i], &mesh, &whole.field, all);
         everywhere(is_same(text, all));
         order_mesh_free(&part);
         order_mesh_free(&whole);
@@ -323,7 +325,7 @@ static void linear_cells_count_as_elsewhere(void **state)
 
 /* ---- shells ------------------------------------------------------------------------------------------------------ */
 
-static double height(double x, double y)
+static double height_function(double x, double y)
 {
     return 0.3 * x * x + 0.2 * x * y - 0.2 * y * y;
 }
@@ -359,7 +361,7 @@ static void bent_shells_have_their_areas(void **state)
     integrate_graph(expected);
     for (int v = 0; v < 25; v++) {
         const double x = -1 + 0.5 * (v % 5), y = -1 + 0.5 * (v / 5); /* NOLINT */
-        memcpy(coordinates[v], (const double[3]){x, y, height(x, y)}, sizeof coordinates[v]);
+        memcpy(coordinates[v], (const double[3]){x, y, height_function(x, y)}, sizeof coordinates[v]);
         values[v] = x * x;
     }
     for (int of = 0; of < 2; of++) {
@@ -384,12 +386,12 @@ static void bent_shells_have_their_areas(void **state)
         field.name = "f";
         field.values = (insitu_array){values, INSITU_FLOAT64, 0};
         field.count = 25;
-        count(OF_F "finer_pieces: 1\n" NEAR, &mesh, &field, text);
+        write_and_read_statistics(OF_F "finer_pieces: 1\n" NEAR, &mesh, &field, text);
         const double mean = expected[1] / expected[0];
         everywhere(own_rank || strstr(text, ",area,"));
-        everywhere(is_near(text, VOLUME, expected[0]) && is_near(text, MEAN, mean) &&
-                   is_near(text, DEVIATION, sqrt(expected[2] / expected[0] - mean * mean)));
-        count(OF_F "finer_pieces: 4\n" NEAR, &mesh, &field, finer);
+        everywhere(is_nearly_equal(text, VOLUME, expected[0]) && is_nearly_equal(text, MEAN, mean) &&
+                   is_nearly_equal(text, DEVIATION, sqrt(expected[2] / expected[0] - mean * mean)));
+        write_and_read_statistics(OF_F "finer_pieces: 4\n" NEAR, &mesh, &field, finer);
         everywhere(is_same(text, finer));
     }
 }
@@ -403,14 +405,15 @@ static void bins_have_the_volumes_of_the_points_in_them(void **state)
     (void)state;
     static char text[MOST];
     order_mesh mesh;
-    order_mesh_create(&hex_27, 2, 0, order_plane, own_rank, rank_count, &mesh);
+    order_mesh_create(&hex_27, 2, 0, order_plane_field, own_rank, rank_count, &mesh);
     for (int64_t v = 0; v < mesh.vertex_count; v++) mesh.values[v] = mesh.coordinates[3 * v];
-    count("statistics: [{field: f, path: s.csv, histogram: {bins: 4}}]\n" FAR, &mesh.mesh, &mesh.field, text);
-    for (int bin = 0; bin < 4; bin++) everywhere(is_near(text, FIRST_BIN + bin, 0.25));
+    write_and_read_statistics("statistics: [{field: f, path: s.csv, histogram: {bins: 4}}]\n" FAR, &mesh.mesh,
+                              &mesh.field, text);
+    for (int bin = 0; bin < 4; bin++) everywhere(is_nearly_equal(text, FIRST_BIN + bin, 0.25));
     /* values above 0.5 are in no bin */
-    count("statistics: [{field: f, path: s.csv, histogram: {bins: 3, range: [-1, 0.5]}}]\n" FAR, &mesh.mesh,
-          &mesh.field, text);
-    for (int bin = 0; bin < 3; bin++) everywhere(is_near(text, FIRST_BIN + bin, 0.25));
+    write_and_read_statistics("statistics: [{field: f, path: s.csv, histogram: {bins: 3, range: [-1, 0.5]}}]\n" FAR,
+                              &mesh.mesh, &mesh.field, text);
+    for (int bin = 0; bin < 3; bin++) everywhere(is_nearly_equal(text, FIRST_BIN + bin, 0.25));
     order_mesh_free(&mesh);
 }
 
@@ -444,8 +447,8 @@ static drawn draw_slice(const char *pieces, const char *range, const order_mesh 
              "finer_pieces: %s\nimages:\n  - name: a\n    size: [48, 36]\n    layers: [{slice: {field: f, range: %s, "
              "planes: [{normal: [1, 2, 3]}]}}]\n    outputs: [{path: a.png}]\n",
              pieces, range);
-    insitu_session *session = open_mesh(MPI_COMM_WORLD, scene, &mesh->mesh, &mesh->field);
-    drawn out = step_drawn(session, 0);
+    insitu_session *session = open_session_with_mesh(MPI_COMM_WORLD, scene, &mesh->mesh, &mesh->field);
+    drawn out = step_and_take_pictures(session, 0);
     insitu_destroy(&session);
     return out;
 }
@@ -461,49 +464,49 @@ static void percentiles_count_the_callers_cells(void **state)
         order_mesh part, whole;
         double values[2];
         char range[64];
-        order_mesh_create(kind, 3, 0.05, order_wavy, own_rank, rank_count, &part);
-        order_mesh_create(kind, 3, 0.05, order_wavy, 0, 1, &whole);
+        order_mesh_create(kind, 3, 0.05, order_wave_field, own_rank, rank_count, &part);
+        order_mesh_create(kind, 3, 0.05, order_wave_field, 0, 1, &whole);
         find_percentiles(&whole, percents, values);
         snprintf(range, sizeof range, "[%.17g, %.17g]", values[0], values[1]);
         drawn by_values = draw_slice(pieces[i % 2], range, &part);
         drawn by_percentiles = draw_slice(pieces[i % 2], "{percentile: [20, 70]}", &part);
-        everywhere(own_rank || same_drawn(&by_values, &by_percentiles));
-        free_drawn(&by_values);
-        free_drawn(&by_percentiles);
+        everywhere(own_rank || are_same_picture_sets(&by_values, &by_percentiles));
+        free_picture_set(&by_values);
+        free_picture_set(&by_percentiles);
         order_mesh_free(&part);
         order_mesh_free(&whole);
     }
 }
 
 /* A value at one node that is not finite leaves out its cell; the others have 7 of the 8 units of volume. */
-static void cells_with_lost_values_do_not_count(void **state)
+static void cells_with_missing_values_do_not_count(void **state)
 {
     (void)state;
     static char text[MOST];
     static const char *const scenes[] = {OF_F "finer_pieces: 1\n" FAR, OF_F "finer_pieces: 2\n" FAR};
     for (int i = 0; i < 2; i++) {
         order_mesh mesh;
-        order_mesh_create(&hex_27, 2, 0, order_plane, own_rank, rank_count, &mesh);
+        order_mesh_create(&hex_27, 2, 0, order_plane_field, own_rank, rank_count, &mesh);
         for (int64_t v = 0; v < mesh.vertex_count; v++) {
             const double *at = mesh.coordinates + 3 * v;
             if (fabs(at[0] + 0.5) + fabs(at[1] + 0.5) + fabs(at[2] + 0.5) < 1e-9) mesh.values[v] = NAN;
         }
-        count(scenes[i], &mesh.mesh, &mesh.field, text);
-        everywhere(is_near(text, CELLS, 7) && is_near(text, VOLUME, 7));
+        write_and_read_statistics(scenes[i], &mesh.mesh, &mesh.field, text);
+        everywhere(is_nearly_equal(text, CELLS, 7) && is_nearly_equal(text, VOLUME, 7));
         order_mesh_free(&mesh);
     }
 }
 
 /* Cells in a mirror are inside out. Their volumes are positive, and their means are those of the others. */
-static void cells_inside_out_have_their_volumes(void **state)
+static void inverted_cells_have_exact_volumes(void **state)
 {
     (void)state;
     static char text[MOST], mirrored[MOST];
     order_mesh mesh;
-    order_mesh_create(&tet_10, 2, 0.05, order_wavy, own_rank, rank_count, &mesh);
-    count(OF_F FAR, &mesh.mesh, &mesh.field, text);
+    order_mesh_create(&tet_10, 2, 0.05, order_wave_field, own_rank, rank_count, &mesh);
+    write_and_read_statistics(OF_F FAR, &mesh.mesh, &mesh.field, text);
     for (int64_t v = 0; v < mesh.vertex_count; v++) mesh.coordinates[3 * v] *= -1;
-    count(OF_F FAR, &mesh.mesh, &mesh.field, mirrored);
+    write_and_read_statistics(OF_F FAR, &mesh.mesh, &mesh.field, mirrored);
     everywhere(is_same(text, mirrored));
     order_mesh_free(&mesh);
 }
@@ -514,17 +517,17 @@ static void large_values_do_not_overflow(void **state)
     (void)state;
     static char text[MOST];
     order_mesh mesh;
-    order_mesh_create(&hex_20, 2, 0, bent_value, own_rank, rank_count, &mesh);
+    order_mesh_create(&hex_20, 2, 0, bent_field, own_rank, rank_count, &mesh);
     for (int64_t v = 0; v < mesh.vertex_count; v++) mesh.values[v] *= 0x1p1000;
-    count(OF_F FAR, &mesh.mesh, &mesh.field, text);
-    everywhere(own_rank || fabs(last_number(text, DEVIATION) * 0x1p-1000 - 2. / 3) < 1e-8);
+    write_and_read_statistics(OF_F FAR, &mesh.mesh, &mesh.field, text);
+    everywhere(own_rank || fabs(read_last_number(text, DEVIATION) * 0x1p-1000 - 2. / 3) < 1e-8);
     order_mesh_free(&mesh);
 }
 
-static int begin_tests(void **state)
+static int set_up_test_group(void **state)
 {
     (void)state;
-    return enter_folder("order_statistics") ? 0 : 1;
+    return enter_test_folder("order_statistics") ? 0 : 1;
 }
 
 int main(int argc, char **argv)
@@ -532,18 +535,18 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(bent_cells_have_the_moments_of_their_polynomials),
         cmocka_unit_test(cell_values_have_the_volumes_of_bent_cells),
-        cmocka_unit_test(values_at_corners_are_each_cells_own),
+        cmocka_unit_test(corner_values_count_per_cell),
         cmocka_unit_test(nodes_at_lobatto_points_are_recognised),
         cmocka_unit_test(numbers_do_not_depend_on_pieces_and_cameras),
         cmocka_unit_test(numbers_of_derived_fields_do_not_depend_on_pieces),
         cmocka_unit_test(numbers_are_the_same_on_any_ranks),
-        cmocka_unit_test(linear_cells_count_as_elsewhere),
+        cmocka_unit_test(linear_cells_count_as_in_linear_meshes),
         cmocka_unit_test(bent_shells_have_their_areas),
         cmocka_unit_test(bins_have_the_volumes_of_the_points_in_them),
         cmocka_unit_test(percentiles_count_the_callers_cells),
-        cmocka_unit_test(cells_with_lost_values_do_not_count),
-        cmocka_unit_test(cells_inside_out_have_their_volumes),
+        cmocka_unit_test(cells_with_missing_values_do_not_count),
+        cmocka_unit_test(inverted_cells_have_exact_volumes),
         cmocka_unit_test(large_values_do_not_overflow),
     };
-    return run_session_tests(argc, argv, tests, begin_tests, NULL);
+    return run_session_tests(argc, argv, tests, set_up_test_group, NULL);
 }

@@ -31,20 +31,20 @@ static const transfer transfers[] = {
 
 typedef double field_function(const double point[3], int order, int side);
 
-static double squared_distance(const double point[3], int order, int side)
+static double squared_distance_field(const double point[3], int order, int side)
 {
     (void)order;
     (void)side;
-    return order_sphere(point);
+    return order_sphere_field(point);
 }
 
-static double waves(const double p[3])
+static double wave_product_field(const double p[3])
 {
     return 1.25 + sin(4 * p[0]) * cos(3 * p[1]) + 0.2 * p[2];
 }
 
 /* Interpolates sin(4 x + phase) between the equispaced nodes of `side` cells in [-1, 1]. */
-static double interpolated_wave(double frequency, double phase, double x, int order, int side)
+static double interpolate_wave(double frequency, double phase, double x, int order, int side)
 {
     const double along = fmin(fmax((x + 1) / 2 * side, 0), side - 1e-12), cell = floor(along);
     const double at = (along - cell) * order;
@@ -58,20 +58,20 @@ static double interpolated_wave(double frequency, double phase, double x, int or
     return sum;
 }
 
-static double interpolated_waves(const double p[3], int order, int side)
+static double interpolated_wave_field(const double p[3], int order, int side)
 {
     const double quarter = 1.57079632679489662;
     return 1.25 + 0.2 * p[2] +
-           interpolated_wave(4, 0, p[0], order, side) * interpolated_wave(3, quarter, p[1], order, side);
+           interpolate_wave(4, 0, p[0], order, side) * interpolate_wave(3, quarter, p[1], order, side);
 }
 
 /* Colours of a list are interpolated in sRGB (docs/colour.md). */
-static double linear_from_srgb(double v)
+static double convert_srgb_to_linear(double v)
 {
     return v <= 0.04045 ? v / 12.92 : pow((v + 0.055) / 1.055, 2.4);
 }
 
-static double opacity_at(const transfer *of, double position)
+static double interpolate_opacity(const transfer *of, double position)
 {
     int i = 0;
     while (i < of->count && of->positions[i] <= position) i++;
@@ -82,7 +82,7 @@ static double opacity_at(const transfer *of, double position)
 
 /* Integrates along the ray of a pixel, from the front of the cube to its back. With 400 steps of 0.005 by the midpoint
  * rule, results differ by less than 2e-4 from those with 4000. */
-static void integrate(const transfer *of, field_function *field, int order, int side, int pixel, double light[3])
+static void integrate_ray(const transfer *of, field_function *field, int order, int side, int pixel, double light[3])
 {
     const double size = VIEW_HEIGHT / HEIGHT;
     double point[3] = {(pixel % WIDTH + 0.5 - WIDTH / 2.0) * size, (HEIGHT / 2.0 - pixel / WIDTH - 0.5) * size, 0};
@@ -92,15 +92,15 @@ static void integrate(const transfer *of, field_function *field, int order, int 
     for (int step = 0; step < STEPS; step++) {
         point[2] = 1 - (step + 0.5) * 2 / STEPS;
         const double position = (field(point, order, side) - of->low) / (of->high - of->low);
-        const double through = pow(1 - opacity_at(of, position), 2.0 / STEPS / 0.5);
+        const double through = pow(1 - interpolate_opacity(of, position), 2.0 / STEPS / 0.5);
         const double along = 2 * fmin(fmax(position, 0), 1);
         const double colour[3] = {fmax(0, 1 - along), 1 - fabs(along - 1), fmax(0, along - 1)};
-        for (int c = 0; c < 3; c++) light[c] += transmittance * (1 - through) * linear_from_srgb(colour[c]);
+        for (int c = 0; c < 3; c++) light[c] += transmittance * (1 - through) * convert_srgb_to_linear(colour[c]);
         transmittance *= through;
     }
 }
 
-static int compare(const void *a, const void *b)
+static int compare_doubles(const void *a, const void *b)
 {
     const double x = *(const double *)a, y = *(const double *)b;
     return (x > y) - (x < y);
@@ -109,7 +109,7 @@ static int compare(const void *a, const void *b)
 /* Returns the largest of 99.9 % of the pixels' errors, which are sorted. */
 static double find_largest(double errors[PIXELS])
 {
-    qsort(errors, PIXELS, sizeof *errors, compare);
+    qsort(errors, PIXELS, sizeof *errors, compare_doubles);
     return errors[PIXELS * 999 / 1000];
 }
 
@@ -121,7 +121,7 @@ static double find_error(const caught_picture *picture, const transfer *of, fiel
     for (int pixel = 0; pixel < PIXELS; pixel++) {
         double light[3];
         errors[pixel] = 0;
-        integrate(of, field, order, side, pixel, light);
+        integrate_ray(of, field, order, side, pixel, light);
         for (int c = 0; c < 3; c++)
             errors[pixel] = fmax(errors[pixel], fabs(light[c] - (double)picture->rgba[4 * pixel + c]));
     }
@@ -159,10 +159,10 @@ static drawn_volume draw_volume(MPI_Comm comm, const transfer *of, const char *p
         "opacity: %s, unit_distance: 0.5}\n"
         "    sampling: {max_error: %s}\n    outputs: [{path: a.exr, data: true}]\n",
         pieces, WIDTH, HEIGHT, VIEW_HEIGHT, of->low, of->high, of->text, max_error);
-    insitu_session *session = open_mesh(comm, scene, &mesh->mesh, &mesh->field);
-    drawn_volume out = {.pictures = step_drawn(session, 0)};
-    const char *told = insitu_last_report(session)->pieces, *estimate = strstr(told, "pixels of volumes within ");
-    sscanf(told, "mesh \"m\": %d piece", &out.count);
+    insitu_session *session = open_session_with_mesh(comm, scene, &mesh->mesh, &mesh->field);
+    drawn_volume out = {.pictures = step_and_take_pictures(session, 0)};
+    const char *report = insitu_last_report(session)->pieces, *estimate = strstr(report, "pixels of volumes within ");
+    sscanf(report, "mesh \"m\": %d piece", &out.count);
     if (estimate) sscanf(estimate, "pixels of volumes within %lf", &out.estimate);
     insitu_destroy(&session);
     return out;
@@ -177,12 +177,16 @@ typedef struct volume_case {
 } volume_case;
 
 static const volume_case cases[] = {
-    {{"tet 2", INSITU_QUADRATIC_TET, INSITU_ORDER_VTK, 2}, 2, order_sphere, squared_distance, false},
-    {{"tet 2", INSITU_QUADRATIC_TET, INSITU_ORDER_VTK, 2}, 6, order_sphere, squared_distance, true},
-    {{"wedge 18", INSITU_BIQUADRATIC_WEDGE, INSITU_ORDER_VTK, 2}, 3, order_sphere, squared_distance, false},
-    {{"hex 20", INSITU_QUADRATIC_HEX, INSITU_ORDER_VTK, 2}, 3, order_sphere, squared_distance, true},
-    {{"hex 27", INSITU_TRIQUADRATIC_HEX, INSITU_ORDER_VTK, 2}, 4, waves, interpolated_waves, false},
-    {{"hex 4", INSITU_LAGRANGE_HEX, INSITU_ORDER_LEXICOGRAPHIC, 4}, 2, waves, interpolated_waves, false},
+    {{"tet 2", INSITU_QUADRATIC_TET, INSITU_ORDER_VTK, 2}, 2, order_sphere_field, squared_distance_field, false},
+    {{"tet 2", INSITU_QUADRATIC_TET, INSITU_ORDER_VTK, 2}, 6, order_sphere_field, squared_distance_field, true},
+    {{"wedge 18", INSITU_BIQUADRATIC_WEDGE, INSITU_ORDER_VTK, 2}, 3, order_sphere_field, squared_distance_field, false},
+    {{"hex 20", INSITU_QUADRATIC_HEX, INSITU_ORDER_VTK, 2}, 3, order_sphere_field, squared_distance_field, true},
+    {{"hex 27", INSITU_TRIQUADRATIC_HEX, INSITU_ORDER_VTK, 2}, 4, wave_product_field, interpolated_wave_field, false},
+    {{"hex 4", INSITU_LAGRANGE_HEX, INSITU_ORDER_LEXICOGRAPHIC, 4},
+     2,
+     wave_product_field,
+     interpolated_wave_field,
+     false},
 };
 
 /* The estimate is the same on any ranks, and 1 piece would not suffice. */
@@ -202,9 +206,9 @@ static void check_case(const volume_case *of, const transfer *with)
                chosen.estimate * chosen.count * chosen.count);
     everywhere(chosen.count == alone.count && chosen.estimate == alone.estimate);
     everywhere(own_rank || (error <= 0.01 && coarse > 0.01));
-    free_drawn(&chosen.pictures);
-    free_drawn(&alone.pictures);
-    free_drawn(&one.pictures);
+    free_picture_set(&chosen.pictures);
+    free_picture_set(&alone.pictures);
+    free_picture_set(&one.pictures);
     order_mesh_free(&mesh);
     order_mesh_free(&whole);
 }
@@ -214,26 +218,26 @@ static void volumes_are_within_max_error(void **state)
     (void)state;
     for (size_t k = 0; k < sizeof cases / sizeof *cases; k++)
         for (size_t t = 0; t < sizeof transfers / sizeof *transfers; t++)
-            if (cases[k].is_usual || test_is_whole()) check_case(&cases[k], &transfers[t]);
+            if (cases[k].is_usual || test_is_long_run()) check_case(&cases[k], &transfers[t]);
 }
 
 /* Bent cells have no closed form. 8 pieces are off by a small part of what the chosen ones are off by. */
 static void volumes_of_bent_cells_are_within_max_error(void **state)
 {
     (void)state;
-    for (int k = 0; k < (test_is_whole() ? 3 : 1); k++) {
+    for (int k = 0; k < (test_is_long_run() ? 3 : 1); k++) {
         const order_kind *kind = &cases[k == 0 ? 4 : k == 1 ? 0 : 2].kind;
         order_mesh mesh;
         double most = 0;
-        order_mesh_create(kind, 3, 0.1, order_wavy, own_rank, rank_count, &mesh);
+        order_mesh_create(kind, 3, 0.1, order_wave_field, own_rank, rank_count, &mesh);
         drawn_volume chosen = draw_volume(MPI_COMM_WORLD, &transfers[0], "", "0.01", &mesh);
         drawn_volume finest = draw_volume(MPI_COMM_WORLD, &transfers[0], "finer_pieces: 8\n", "0.01", &mesh);
         if (own_rank == 0) most = find_difference(&chosen.pictures.pictures[0], &finest.pictures.pictures[0]);
         if (own_rank == 0)
             printf("bent %s: %d pieces, off by %.2g, estimate %.2g\n", kind->name, chosen.count, most, chosen.estimate);
         everywhere(chosen.count > 1 && chosen.count < 8 && most <= 0.01);
-        free_drawn(&chosen.pictures);
-        free_drawn(&finest.pictures);
+        free_picture_set(&chosen.pictures);
+        free_picture_set(&finest.pictures);
         order_mesh_free(&mesh);
     }
 }
@@ -243,17 +247,17 @@ static void exact_volumes_have_one_piece(void **state)
 {
     (void)state;
     order_mesh mesh;
-    order_mesh_create(&cases[1].kind, 2, 0, order_plane, own_rank, rank_count, &mesh);
+    order_mesh_create(&cases[1].kind, 2, 0, order_plane_field, own_rank, rank_count, &mesh);
     drawn_volume plain = draw_volume(MPI_COMM_WORLD, &transfers[0], "", "0.0001", &mesh);
     everywhere(plain.count == 1 && plain.estimate < 1e-6);
-    free_drawn(&plain.pictures);
+    free_picture_set(&plain.pictures);
     order_mesh_free(&mesh);
 }
 
-static int begin(void **state)
+static int enter_test_group_folder(void **state)
 {
     (void)state;
-    return enter_folder("order_volumes") ? 0 : 1;
+    return enter_test_folder("order_volumes") ? 0 : 1;
 }
 
 int main(int argc, char **argv)
@@ -263,5 +267,5 @@ int main(int argc, char **argv)
         cmocka_unit_test(volumes_of_bent_cells_are_within_max_error),
         cmocka_unit_test(exact_volumes_have_one_piece),
     };
-    return run_session_tests(argc, argv, tests, begin, NULL);
+    return run_session_tests(argc, argv, tests, enter_test_group_folder, NULL);
 }

@@ -38,7 +38,7 @@ static const overwrite_case cases[] = {
 
 static void check_step(insitu_session *session, int cycle, const char *const *words)
 {
-    everywhere(submit(session, &input) == INSITU_OK);
+    everywhere(submit_input(session, &input) == INSITU_OK);
     everywhere(insitu_step(session, cycle, 0.4 * cycle) == INSITU_OK);
     discard_pictures();
     const char *warnings = insitu_last_report(session)->warnings;
@@ -71,15 +71,15 @@ static void repeated_steps_are_not_reported(void **state)
     insitu_destroy(&session);
 }
 
-static int begin_tests(void **state)
+static int set_up_test_group(void **state)
 {
     (void)state;
-    if (!enter_folder("overwrites")) return 1;
+    if (!enter_test_folder("overwrites")) return 1;
     input_create(&input, TEST_HEXES, 2, TEST_RANDOM, own_rank, rank_count);
     return 0;
 }
 
-static int end_tests(void **state)
+static int tear_down_test_group(void **state)
 {
     (void)state;
     input_free(&input);
@@ -90,5 +90,5 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(overwritten_pictures_are_reported),
                                        cmocka_unit_test(repeated_steps_are_not_reported)};
-    return run_session_tests(argc, argv, tests, begin_tests, end_tests);
+    return run_session_tests(argc, argv, tests, set_up_test_group, tear_down_test_group);
 }

@@ -45,11 +45,11 @@ static void step_and_catch(insitu_session *session, int cycle, drawing *out)
     caught_count = 0;
 }
 
-static drawing draw(const char *scene, const session_input *in)
+static drawing draw_input(const char *scene, const session_input *in)
 {
     drawing out;
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
-    const insitu_status status = submit(session, in);
+    const insitu_status status = submit_input(session, in);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     everywhere(status == INSITU_OK);
     step_and_catch(session, 0, &out);
@@ -57,7 +57,7 @@ static drawing draw(const char *scene, const session_input *in)
     return out;
 }
 
-static bool are_same(const drawing *a, const drawing *b)
+static bool are_same_drawings(const drawing *a, const drawing *b)
 {
     bool same = true;
     for (int i = 0; i < PICTURES && own_rank == 0; i++) {
@@ -71,7 +71,7 @@ static bool are_same(const drawing *a, const drawing *b)
     return same;
 }
 
-static bool shows_something(const drawing *d)
+static bool has_visible_pixels(const drawing *d)
 {
     bool shows = own_rank != 0;
     for (int i = 0; i < 4 * PIXELS && !shows; i++) shows = d->pictures[0].rgba[i] > 0.01f;
@@ -101,7 +101,7 @@ static void create_polyhedra(session_input *in, test_mesh_kind kind, double shar
 
 /* Exchanges owner and neighbour of some boundary faces, which CGNS permits: a 0 on either side means that there is no
  * cell. */
-static void exchange_sides(owned *faces, int64_t count)
+static void swap_owner_and_neighbour(owned *faces, int64_t count)
 {
     for (int64_t face = 0; face < count; face += 2) {
         int32_t *pair = faces->pairs + 2 * face;
@@ -117,16 +117,16 @@ static void check_forms(test_mesh_kind kind, int keep_polyhedra)
     const char *scene = write_scene(scene_text);
     create_polyhedra(&plain, kind, 1);
     plain.mesh.keep_polyhedra = keep_polyhedra;
-    drawing expected = draw(scene, &plain);
-    everywhere(shows_something(&expected));
+    drawing expected = draw_input(scene, &plain);
+    everywhere(has_visible_pixels(&expected));
     for (int base = 0; base < 2; base++) {
         owned faces = make_owned(&plain.part, base);
         for (form which = base ? FORM_PAIRS : 0; which < FORM_COUNT; which++) {
             session_input in = plain;
-            if (base && which == FORM_LISTS) exchange_sides(&faces, plain.part.face_count);
+            if (base && which == FORM_LISTS) swap_owner_and_neighbour(&faces, plain.part.face_count);
             describe_owned(&faces, which, base, &in.mesh);
-            drawing drawn = draw(scene, &in);
-            everywhere(are_same(&expected, &drawn));
+            drawing drawn = draw_input(scene, &in);
+            everywhere(are_same_drawings(&expected, &drawn));
             everywhere(drawn.recognised == expected.recognised);
             everywhere(drawn.copied > expected.copied || !keep_polyhedra);
             free_drawing(&drawn);
@@ -137,7 +137,7 @@ static void check_forms(test_mesh_kind kind, int keep_polyhedra)
     input_free(&plain);
 }
 
-static void owner_and_neighbour_are_the_plain_form(void **state)
+static void owner_neighbour_form_draws_same_picture_as_plain_form(void **state)
 {
     (void)state;
     check_forms(TEST_POLYHEDRA, 1);
@@ -148,7 +148,7 @@ static void owner_and_neighbour_are_the_plain_form(void **state)
 
 /* ---- recognised cells ------------------------------------------------------------------------------------------- */
 
-static void polyhedra_are_the_cells_that_they_are(void **state)
+static void polyhedra_are_recognised_as_typed_cells(void **state)
 {
     (void)state;
     static const test_mesh_kind kinds[] = {TEST_TETS, TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS, TEST_MIXED};
@@ -156,21 +156,21 @@ static void polyhedra_are_the_cells_that_they_are(void **state)
     for (size_t k = 0; k < sizeof kinds / sizeof kinds[0]; k++) {
         session_input cells = {0};
         input_create(&cells, kinds[k], SIDE, TEST_RANDOM, own_rank, rank_count);
-        drawing expected = draw(scene, &cells);
+        drawing expected = draw_input(scene, &cells);
         for (int half = 0; half < 2; half++) {
             session_input in = {0};
             create_polyhedra(&in, kinds[k], half ? 0.5 : 1);
             int64_t polyhedra = 0;
             for (int64_t c = 0; c < in.part.cell_count; c++) polyhedra += in.part.types[c] == INSITU_POLYHEDRON;
-            drawing drawn = draw(scene, &in);
-            everywhere(are_same(&expected, &drawn));
+            drawing drawn = draw_input(scene, &in);
+            everywhere(are_same_drawings(&expected, &drawn));
             everywhere(drawn.recognised == polyhedra && drawn.copied > expected.copied);
             everywhere(drawn.inverted == 0 || half); /* cells that were not polyhedra may be left-handed */
             free_drawing(&drawn);
             in.mesh.keep_polyhedra = 1;
-            drawn = draw(scene, &in);
+            drawn = draw_input(scene, &in);
             everywhere(drawn.recognised == 0 && drawn.copied == expected.copied);
-            everywhere(kinds[k] != TEST_HEXES || half || own_rank != 0 || !are_same(&expected, &drawn));
+            everywhere(kinds[k] != TEST_HEXES || half || own_rank != 0 || !are_same_drawings(&expected, &drawn));
             free_drawing(&drawn);
             input_free(&in);
         }
@@ -225,7 +225,7 @@ static void mix_cells(const test_mesh *hexes, const test_mesh *polyhedra, const 
                                (const int[]){0, 1, 2, 3, 4, 5, 6, 7});
 }
 
-static void hexes_among_polyhedra_are_hexes(void **state)
+static void hexes_among_polyhedra_are_recognised(void **state)
 {
     (void)state;
     session_input hexes = {0}, whole = {0}, cut = {0}, mixed = {0};
@@ -238,19 +238,19 @@ static void hexes_among_polyhedra_are_hexes(void **state)
     input_describe(&cut);
     input_describe(&mixed);
     mixed.mesh.keep_polyhedra = 1;
-    drawing expected = draw(scene, &mixed), drawn = draw(scene, &cut);
+    drawing expected = draw_input(scene, &mixed), drawn = draw_input(scene, &cut);
     int64_t kept = 0;
     for (int64_t cell = 0; cell < hexes.part.cell_count; cell++) kept += is_cut[cell];
     everywhere(drawn.recognised == hexes.part.cell_count - kept);
     everywhere(sum_over_ranks(kept) > 0 && sum_over_ranks(drawn.recognised) > 0);
-    everywhere(are_same(&expected, &drawn));
+    everywhere(are_same_drawings(&expected, &drawn));
     free_drawing(&drawn);
     owned faces = make_owned(&cut.part, 1);
     for (form which = FORM_PAIRS; which < FORM_COUNT; which++) {
         session_input in = cut;
         describe_owned(&faces, which, 1, &in.mesh);
-        drawn = draw(scene, &in);
-        everywhere(are_same(&expected, &drawn));
+        drawn = draw_input(scene, &in);
+        everywhere(are_same_drawings(&expected, &drawn));
         free_drawing(&drawn);
     }
     free_owned(&faces);
@@ -279,7 +279,7 @@ static void make_orange(test_mesh *out)
 }
 
 /* Checks that a polyhedron of six quads that is not a hex stays a polyhedron. Only rank 0 has it. */
-static void six_quads_that_are_no_hex_stay(void **state)
+static void six_quads_that_form_no_hex_stay_a_polyhedron(void **state)
 {
     (void)state;
     session_input in = {0};
@@ -290,11 +290,11 @@ static void six_quads_that_are_no_hex_stay(void **state)
         input_create(&in, TEST_HEXES, 1, TEST_BLOCK, 0, 2); /* the first of two parts, which has no cell */
     everywhere(in.part.cell_count == (own_rank == 0));
     input_describe(&in);
-    drawing drawn = draw(scene, &in);
+    drawing drawn = draw_input(scene, &in);
     everywhere(drawn.recognised == 0);
     in.mesh.keep_polyhedra = 1;
-    drawing kept = draw(scene, &in);
-    everywhere(shows_something(&kept) && are_same(&kept, &drawn));
+    drawing kept = draw_input(scene, &in);
+    everywhere(has_visible_pixels(&kept) && are_same_drawings(&kept, &drawn));
     free_drawing(&drawn);
     free_drawing(&kept);
     input_free(&in);
@@ -314,9 +314,9 @@ static void hexes_with_a_crossed_face_are_reported(void **state)
         int64_t *v = has_it ? in.part.face_connectivity + 4 * i : (int64_t[]){0, 0, 0};
         const int64_t first = v[1], second = v[2];
         v[1] = second, v[2] = first;
-        submit(session, &in);
-        reported_everywhere(session, insitu_step(session, i, 0), INSITU_ERROR_MESH,
-                            "mesh \"m\": cell 0 (polyhedron): ", "the surface is not closed");
+        submit_input(session, &in);
+        check_reported_everywhere(session, insitu_step(session, i, 0), INSITU_ERROR_MESH,
+                                  "mesh \"m\": cell 0 (polyhedron): ", "the surface is not closed");
         v[1] = first, v[2] = second;
     }
     insitu_destroy(&session);
@@ -329,7 +329,7 @@ static drawing draw_moved(const char *scene, session_input *in)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
     drawing before, after;
-    everywhere(submit(session, in) == INSITU_OK);
+    everywhere(submit_input(session, in) == INSITU_OK);
     step_and_catch(session, 0, &before);
     for (int64_t i = 0; i < 3 * in->part.vertex_count; i++)
         in->part.coordinates[i] = 0.7 * in->part.coordinates[i] + 0.1;
@@ -346,7 +346,7 @@ static drawing draw_moved(const char *scene, session_input *in)
 
 /* Checks that a mesh with new coordinates reuses the cells recognised in its faces without reading the faces again:
  * they are overwritten before the second step. */
-static void moved_cells_are_the_same_cells(void **state)
+static void moved_cells_match_cells_at_new_positions(void **state)
 {
     (void)state;
     session_input hexes = {0}, in = {0};
@@ -354,7 +354,7 @@ static void moved_cells_are_the_same_cells(void **state)
     input_create(&hexes, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
     create_polyhedra(&in, TEST_HEXES, 1);
     drawing expected = draw_moved(scene, &hexes), moved = draw_moved(scene, &in);
-    everywhere(are_same(&expected, &moved));
+    everywhere(are_same_drawings(&expected, &moved));
     everywhere(moved.recognised == in.part.cell_count && moved.copied == 0);
     free_drawing(&moved);
     free_drawing(&expected);
@@ -372,19 +372,19 @@ static void memory_that_runs_out_is_reported(void **state)
     create_polyhedra(&in, TEST_MIXED, 1);
     owned faces = make_owned(&in.part, 1);
     describe_owned(&faces, FORM_LISTS, 1, &in.mesh);
-    drawing expected = draw(scene, &in), drawn;
+    drawing expected = draw_input(scene, &in), drawn;
     const int64_t held = base_memory_held();
     int reported = 0;
     for (int n = 1; n <= 12; n++) {
         insitu_session *s = open_session(MPI_COMM_WORLD, scene);
-        everywhere(submit(s, &in) == INSITU_OK);
+        everywhere(submit_input(s, &in) == INSITU_OK);
         base_memory_fail_nth(own_rank == rank_count - 1 ? n : 0);
         const insitu_status status = insitu_step(s, 0, 0);
         base_memory_fail_nth(0);
-        if (status) reported_everywhere(s, status, INSITU_ERROR_MEMORY, "no memory");
+        if (status) check_reported_everywhere(s, status, INSITU_ERROR_MEMORY, "no memory");
         reported += status != INSITU_OK && strstr(insitu_error(s), "mesh \"m\"") != NULL;
         step_and_catch(s, 1, &drawn);
-        everywhere(are_same(&expected, &drawn) && drawn.recognised == expected.recognised);
+        everywhere(are_same_drawings(&expected, &drawn) && drawn.recognised == expected.recognised);
         free_drawing(&drawn);
         insitu_destroy(&s);
         everywhere(base_memory_held() == held);
@@ -398,12 +398,12 @@ static void memory_that_runs_out_is_reported(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(owner_and_neighbour_are_the_plain_form),
-        cmocka_unit_test(polyhedra_are_the_cells_that_they_are),
-        cmocka_unit_test(hexes_among_polyhedra_are_hexes),
-        cmocka_unit_test(six_quads_that_are_no_hex_stay),
+        cmocka_unit_test(owner_neighbour_form_draws_same_picture_as_plain_form),
+        cmocka_unit_test(polyhedra_are_recognised_as_typed_cells),
+        cmocka_unit_test(hexes_among_polyhedra_are_recognised),
+        cmocka_unit_test(six_quads_that_form_no_hex_stay_a_polyhedron),
         cmocka_unit_test(hexes_with_a_crossed_face_are_reported),
-        cmocka_unit_test(moved_cells_are_the_same_cells),
+        cmocka_unit_test(moved_cells_match_cells_at_new_positions),
         cmocka_unit_test(memory_that_runs_out_is_reported),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);

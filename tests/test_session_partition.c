@@ -60,7 +60,8 @@ static void add_flat_hexes(test_mesh *mesh)
         int64_t vertices[8];
         for (int i = 0; i < 8; i++) {
             const uint64_t index = (uint64_t)(16 * cell + 2 * i);
-            const double x = test_uniform_in(index, 3, -1, 1) / 2, y = test_uniform_in(index + 1, 3, -1, 1) / 2;
+            const double x = test_uniform_between(index, 3, -1, 1) / 2,
+                         y = test_uniform_between(index + 1, 3, -1, 1) / 2;
             vertices[i] = test_mesh_add_vertex(mesh, (const double[]){x, y, 0.1 * x - 0.7 * y});
             mesh->values[vertices[i]] = 0.25;
         }
@@ -73,10 +74,10 @@ static void add_flat_hexes(test_mesh *mesh)
 static void make_mesh(mesh_kind kind, test_mesh *out)
 {
     if (kind == HONEYCOMB) {
-        test_mesh_honeycomb(SIDE, 0.2, test_wave, out);
+        test_mesh_make_honeycomb(SIDE, 0.2, test_wave_field, out);
         return;
     }
-    test_mesh_lattice(kind == WARPED_MIXED ? TEST_MIXED : TEST_HEXES, SIDE, 0.2, test_wave, out);
+    test_mesh_make_lattice(kind == WARPED_MIXED ? TEST_MIXED : TEST_HEXES, SIDE, 0.2, test_wave_field, out);
     if (kind == WARPED_POLYHEDRA || kind == WARPED_MIXED) test_mesh_to_polyhedra(out, kind == WARPED_MIXED ? 0.5 : 1);
     if (kind == FLAT_AMONG_HEXES) add_flat_hexes(out);
 }
@@ -85,22 +86,22 @@ static void make_mesh(mesh_kind kind, test_mesh *out)
 static void extract_rank_cells(const test_mesh *whole, session_input *out)
 {
     int *owners = test_calloc((size_t)whole->cell_count, sizeof *owners);
-    test_partition(whole, TEST_RANDOM, SIDE, rank_count, owners);
-    test_mesh_part(whole, owners, own_rank, &out->part);
+    test_partition_cells(whole, TEST_RANDOM, SIDE, rank_count, owners);
+    test_mesh_extract_part(whole, owners, own_rank, &out->part);
     test_free(owners);
     test_mesh_reorder_vertices(&out->part, 11 + (uint64_t)own_rank);
-    test_mesh_shuffle(&out->part, 77 + (uint64_t)own_rank);
+    test_mesh_shuffle_cells(&out->part, 77 + (uint64_t)own_rank);
     input_describe(out);
 }
 
 /* ---- pictures ------------------------------------------------------------------------------------------------ */
 
 /* Draws the scene and returns the size of cells. On rank 0, *out becomes the picture, which the caller frees. */
-static double draw(MPI_Comm comm, const char *scene, const session_input *in, caught_picture *out)
+static double draw_and_get_cell_size(MPI_Comm comm, const char *scene, const session_input *in, caught_picture *out)
 {
     insitu_session *session = open_session(comm, scene);
     discard_pictures();
-    assert_int_equal(submit(session, in), INSITU_OK);
+    assert_int_equal(submit_input(session, in), INSITU_OK);
     assert_int_equal(insitu_step(session, 0, 0), INSITU_OK);
     const double size = session->space.extent.cell_size;
     if (own_rank == 0) {
@@ -115,10 +116,10 @@ static bool is_one_picture(const scene_case *scene, const char *file, mesh_kind 
                            const session_input *part)
 {
     caught_picture ours = {0}, alone = {0};
-    const double size = draw(MPI_COMM_WORLD, file, part, &ours);
+    const double size = draw_and_get_cell_size(MPI_COMM_WORLD, file, part, &ours);
     if (own_rank != 0) return true;
-    const double alone_size = draw(MPI_COMM_SELF, file, whole, &alone);
-    const double off = colour_difference(&ours, &alone);
+    const double alone_size = draw_and_get_cell_size(MPI_COMM_SELF, file, whole, &alone);
+    const double off = largest_colour_difference(&ours, &alone);
     const bool is_one = off <= 1e-6 && size == alone_size;
     if (!is_one)
         fprintf(stderr, "%s, %s, %d ranks: off by %.3g; cells of size %.17g and %.17g\n", mesh_names[kind], scene->name,
@@ -128,7 +129,7 @@ static bool is_one_picture(const scene_case *scene, const char *file, mesh_kind 
     return is_one;
 }
 
-static void verify(mesh_kind kind)
+static void verify_kind(mesh_kind kind)
 {
     session_input whole = {0}, part = {0};
     bool is_one = true;
@@ -145,16 +146,16 @@ static void verify(mesh_kind kind)
 /* ---- error of the default ------------------------------------------------------------------------------------ */
 
 /* Returns whether the default picture, whose error is at most 0.01, agrees with one whose error is at most 1e-4. */
-static bool is_near(const char *layers, const session_input *in)
+static bool is_nearly_equal(const char *layers, const session_input *in)
 {
     char text[1024];
     caught_picture standard = {0}, fine = {0};
     snprintf(text, sizeof text, IMAGE("%s", "%s"), layers, "");
-    draw(MPI_COMM_WORLD, write_scene(text), in, &standard);
+    draw_and_get_cell_size(MPI_COMM_WORLD, write_scene(text), in, &standard);
     snprintf(text, sizeof text, IMAGE("%s", "%s"), layers, "    sampling: {max_error: 1e-4}\n");
-    draw(MPI_COMM_WORLD, write_scene(text), in, &fine);
+    draw_and_get_cell_size(MPI_COMM_WORLD, write_scene(text), in, &fine);
     if (own_rank != 0) return true;
-    const double off = colour_difference(&standard, &fine);
+    const double off = largest_colour_difference(&standard, &fine);
     if (off > 0.01 + 1e-4) fprintf(stderr, "off by %.3g: %s", off, layers);
     free_caught(&standard);
     free_caught(&fine);
@@ -170,7 +171,7 @@ static void default_volumes_are_off_by_a_hundredth_at_most(void **context)
             session_input whole = {0}, part = {0};
             make_mesh(kind, &whole.part);
             extract_rank_cells(&whole.part, &part);
-            everywhere(is_near(layers[i], &part));
+            everywhere(is_nearly_equal(layers[i], &part));
             input_free(&part);
             test_mesh_free(&whole.part);
         }
@@ -181,32 +182,32 @@ static void default_volumes_are_off_by_a_hundredth_at_most(void **context)
 static void default_volumes_of_honeycombs_give_one_picture(void **context)
 {
     (void)context;
-    verify(HONEYCOMB);
+    verify_kind(HONEYCOMB);
 }
 
 static void default_volumes_of_warped_polyhedra_give_one_picture(void **context)
 {
     (void)context;
-    verify(WARPED_POLYHEDRA);
+    verify_kind(WARPED_POLYHEDRA);
 }
 
 static void default_volumes_of_polyhedra_among_others_give_one_picture(void **context)
 {
     (void)context;
-    verify(WARPED_MIXED);
+    verify_kind(WARPED_MIXED);
 }
 
 static void default_volumes_of_hexes_give_one_picture(void **context)
 {
     (void)context;
-    verify(HEXES);
+    verify_kind(HEXES);
 }
 
 /* Tests only scenes with samples: to max_error, pixels in which flat cells overlap others agree only to max_error. */
 static void flat_cells_do_not_change_the_default_step(void **context)
 {
     (void)context;
-    verify(FLAT_AMONG_HEXES);
+    verify_kind(FLAT_AMONG_HEXES);
 }
 
 int main(int argc, char **argv)

@@ -38,7 +38,7 @@ static void find_quads(void)
 
 /* Creates a whole mesh on each rank, so that each rank has interior and boundary faces. The ranks' meshes lie side by
  * side. */
-static void create(void)
+static void create_input(void)
 {
     input_create(&input, TEST_HEXES, SIDE, TEST_BLOCK, 0, 1);
     test_mesh_to_polyhedra(&input.part, 1);
@@ -53,7 +53,7 @@ static void create(void)
 }
 
 /* Describes a mesh by owners, with index_base 1, and a patch by the number of its first face. */
-static void describe(void)
+static void describe_mesh_and_patch(void)
 {
     input_describe(&input);
     describe_owned(&faces, FORM_LISTS, 1, &input.mesh);
@@ -68,7 +68,7 @@ static void describe(void)
     input.field.patch_count = 2;
 }
 
-static void by_numbers(int64_t second)
+static void set_patch_by_numbers(int64_t second)
 {
     numbers[1] = second;
     patches[0].count = 2;
@@ -77,7 +77,7 @@ static void by_numbers(int64_t second)
 
 /* Sets a patch by vertices on a mesh without owners, whose cells are polyhedra or hexes. Mesh and patch have index_base
  * 0. */
-static void by_vertices(const int64_t *vertices, int64_t count)
+static void set_patch_by_vertices(const int64_t *vertices, int64_t count)
 {
     input_describe(&input);
     patches[1] = (insitu_patch){.count = count,
@@ -95,124 +95,124 @@ static void by_vertices(const int64_t *vertices, int64_t count)
 
 /* ---- faults ------------------------------------------------------------------------------------------------------ */
 
-static void number_large(void)
+static void set_large_face_number(void)
 {
-    by_numbers(1000000);
+    set_patch_by_numbers(1000000);
 }
-static void number_zero(void)
+static void set_zero_face_number(void)
 {
-    by_numbers(0);
+    set_patch_by_numbers(0);
 }
-static void number_inner(void)
+static void set_inner_face_number(void)
 {
-    by_numbers(inner);
+    set_patch_by_numbers(inner);
 }
-static void number_twice(void)
+static void repeat_face_number(void)
 {
-    by_numbers(outer);
+    set_patch_by_numbers(outer);
 }
-static void range_large(void)
+static void set_large_face_range(void)
 {
     patches[0].first_face = input.part.face_count - 2;
 }
-static void range_zero(void)
+static void set_zero_face_range(void)
 {
     patches[0].first_face = 0;
 }
-static void range_inner(void)
+static void set_inner_face_range(void)
 {
     patches[0].first_face = inner;
 }
-static void vertices_inner(void)
+static void set_vertices_of_inner_face(void)
 {
-    by_vertices(inner_quad, 1);
+    set_patch_by_vertices(inner_quad, 1);
 }
-static void vertices_none(void)
+static void set_vertices_of_no_face(void)
 {
-    by_vertices(no_quad, 1);
+    set_patch_by_vertices(no_quad, 1);
 }
-static void vertices_twice(void)
+static void repeat_face_by_vertices(void)
 {
-    by_vertices(twice, 2);
+    set_patch_by_vertices(twice, 2);
 }
-static void vertex_large(void)
+static void set_large_vertex(void)
 {
-    by_vertices(twice, 2);
+    set_patch_by_vertices(twice, 2);
     twice[5] = input.part.vertex_count;
 }
-static void vertices_two(void)
+static void set_face_of_two_vertices(void)
 {
     static const int64_t offsets[] = {0, 2};
-    by_vertices(outer_quad, 1);
+    set_patch_by_vertices(outer_quad, 1);
     patches[1].offsets = (insitu_array){offsets, INSITU_INT64, 0};
 }
-static void vertices_beyond(void)
+static void set_vertices_beyond_array(void)
 {
     static const int64_t offsets[] = {0, 7};
-    by_vertices(outer_quad, 1);
+    set_patch_by_vertices(outer_quad, 1);
     patches[1].offsets = (insitu_array){offsets, INSITU_INT64, 0};
 }
-static void vertices_uneven(void)
+static void set_unequal_vertex_counts(void)
 {
-    by_vertices(twice, 2);
+    set_patch_by_vertices(twice, 2);
     patches[1].connectivity_count = 7;
 }
-static void offsets_alone(void)
+static void set_offsets_alone(void)
 {
     patches[0].offsets = (insitu_array){numbers, INSITU_INT64, 0};
 }
-static void patch_given_twice(void)
+static void repeat_patch(void)
 {
-    by_vertices(outer_quad, 1);
+    set_patch_by_vertices(outer_quad, 1);
     patches[1].faces = (insitu_array){numbers, INSITU_INT64, 0};
 }
-static void numbers_of_floats(void)
+static void set_float_face_numbers(void)
 {
-    by_numbers(outer + 1);
+    set_patch_by_numbers(outer + 1);
     patches[0].faces.type = INSITU_FLOAT32;
 }
-static void no_values(void)
+static void remove_values(void)
 {
     patches[0].values.data = NULL;
 }
-static void bytes_for_values(void)
+static void set_byte_values(void)
 {
     patches[0].values.type = INSITU_UINT8;
 }
-static void narrow_stride(void)
+static void set_narrow_stride(void)
 {
     patches[0].values.stride_bytes = 12;
 }
-static void component_stride(void)
+static void set_component_stride(void)
 {
     patches[0].component_stride_bytes = 3;
 }
-static void negative_count(void)
+static void set_negative_count(void)
 {
     patches[0].count = -1;
 }
-static void no_table(void)
+static void remove_table(void)
 {
     input.field.patches = NULL;
 }
-static void negative_table(void)
+static void set_negative_table_count(void)
 {
     input.field.patch_count = -2;
 }
-static void at_vertices(void)
+static void make_vertex_field(void)
 {
     input.field.centring = INSITU_VERTEX;
     input.field.count = input.part.vertex_count;
 }
-static insitu_status fill(void *data, insitu_field *field)
+static insitu_status fill_patch_field(void *data, insitu_field *field)
 {
     (void)data, (void)field;
     return INSITU_OK;
 }
-static void with_fill(void)
+static void set_fill_function(void)
 {
     input.field.values.data = NULL;
-    input.field.fill = fill;
+    input.field.fill = fill_patch_field;
 }
 
 typedef struct fault {
@@ -223,35 +223,44 @@ typedef struct fault {
 } fault;
 
 static const fault faults[] = {
-    {number_large, INSITU_ERROR_FIELD, false, {"patch 0: face 1000000 is outside 1..", "index_base is 1"}},
-    {number_zero, INSITU_ERROR_FIELD, false, {"patch 0: face 0 is outside 1.."}},
-    {number_inner, INSITU_ERROR_FIELD, false, {"patch 0: face 1 is between two cells, not on the boundary"}},
-    {number_twice, INSITU_ERROR_FIELD, false, {"patch 0: face ", " is given twice"}},
-    {range_large, INSITU_ERROR_FIELD, true, {"patch 0: has 5 faces from ", ", outside 1.."}},
-    {range_zero, INSITU_ERROR_FIELD, true, {"patch 0: has 5 faces from 0 on, outside 1.."}},
-    {range_inner, INSITU_ERROR_FIELD, false, {"patch 0: face 1 is between two cells"}},
-    {vertices_inner, INSITU_ERROR_FIELD, false, {"patch 1: its face 0 is between two cells, not on the boundary"}},
-    {vertices_none, INSITU_ERROR_FIELD, false, {"patch 1: its face 0 is no face of a cell"}},
-    {vertices_twice, INSITU_ERROR_FIELD, false, {"patch 1: its face 0 is given twice"}},
-    {vertex_large,
+    {set_large_face_number, INSITU_ERROR_FIELD, false, {"patch 0: face 1000000 is outside 1..", "index_base is 1"}},
+    {set_zero_face_number, INSITU_ERROR_FIELD, false, {"patch 0: face 0 is outside 1.."}},
+    {set_inner_face_number, INSITU_ERROR_FIELD, false, {"patch 0: face 1 is between two cells, not on the boundary"}},
+    {repeat_face_number, INSITU_ERROR_FIELD, false, {"patch 0: face ", " is given twice"}},
+    {set_large_face_range, INSITU_ERROR_FIELD, true, {"patch 0: has 5 faces from ", ", outside 1.."}},
+    {set_zero_face_range, INSITU_ERROR_FIELD, true, {"patch 0: has 5 faces from 0 on, outside 1.."}},
+    {set_inner_face_range, INSITU_ERROR_FIELD, false, {"patch 0: face 1 is between two cells"}},
+    {set_vertices_of_inner_face,
+     INSITU_ERROR_FIELD,
+     false,
+     {"patch 1: its face 0 is between two cells, not on the boundary"}},
+    {set_vertices_of_no_face, INSITU_ERROR_FIELD, false, {"patch 1: its face 0 is no face of a cell"}},
+    {repeat_face_by_vertices, INSITU_ERROR_FIELD, false, {"patch 1: its face 0 is given twice"}},
+    {set_large_vertex,
      INSITU_ERROR_FIELD,
      false,
      {"patch 1: its face 1 has a vertex index outside 0..", "index_base is 0"}},
-    {vertices_two, INSITU_ERROR_FIELD, false, {"patch 1: its face 0 has fewer than three vertices"}},
-    {vertices_beyond, INSITU_ERROR_FIELD, false, {"patch 1: its face 0 has vertices beyond the connectivity"}},
-    {vertices_uneven, INSITU_ERROR_FIELD, true, {"patch 1: has 7 connectivity indices, no multiple of its 2 faces"}},
-    {offsets_alone, INSITU_ERROR_FIELD, true, {"patch 0: offsets are given without connectivity"}},
-    {patch_given_twice, INSITU_ERROR_FIELD, true, {"patch 1: faces and connectivity are given"}},
-    {numbers_of_floats, INSITU_ERROR_ARGUMENT, true, {"patch 0: faces are of element type 1, not int32 or int64"}},
-    {no_values, INSITU_ERROR_FIELD, true, {"patch 0: values are not given"}},
-    {bytes_for_values, INSITU_ERROR_ARGUMENT, true, {"patch 0: values are of element type 5, not float32, float64"}},
-    {narrow_stride, INSITU_ERROR_FIELD, true, {"patch 0: values have a stride of 12 bytes"}},
-    {component_stride, INSITU_ERROR_FIELD, true, {"patch 0: components of values have a stride of 3 bytes"}},
-    {negative_count, INSITU_ERROR_ARGUMENT, true, {"patch 0: has -1 faces"}},
-    {no_table, INSITU_ERROR_ARGUMENT, true, {"patch_count is 2, and patches are not given"}},
-    {negative_table, INSITU_ERROR_ARGUMENT, true, {"patch_count is -2"}},
-    {at_vertices, INSITU_ERROR_ARGUMENT, true, {"has patches, and its centring 0 is not cells (1)"}},
-    {with_fill, INSITU_ERROR_FIELD, true, {"patches and fill are given"}},
+    {set_face_of_two_vertices, INSITU_ERROR_FIELD, false, {"patch 1: its face 0 has fewer than three vertices"}},
+    {set_vertices_beyond_array,
+     INSITU_ERROR_FIELD,
+     false,
+     {"patch 1: its face 0 has vertices beyond the connectivity"}},
+    {set_unequal_vertex_counts,
+     INSITU_ERROR_FIELD,
+     true,
+     {"patch 1: has 7 connectivity indices, no multiple of its 2 faces"}},
+    {set_offsets_alone, INSITU_ERROR_FIELD, true, {"patch 0: offsets are given without connectivity"}},
+    {repeat_patch, INSITU_ERROR_FIELD, true, {"patch 1: faces and connectivity are given"}},
+    {set_float_face_numbers, INSITU_ERROR_ARGUMENT, true, {"patch 0: faces are of element type 1, not int32 or int64"}},
+    {remove_values, INSITU_ERROR_FIELD, true, {"patch 0: values are not given"}},
+    {set_byte_values, INSITU_ERROR_ARGUMENT, true, {"patch 0: values are of element type 5, not float32, float64"}},
+    {set_narrow_stride, INSITU_ERROR_FIELD, true, {"patch 0: values have a stride of 12 bytes"}},
+    {set_component_stride, INSITU_ERROR_FIELD, true, {"patch 0: components of values have a stride of 3 bytes"}},
+    {set_negative_count, INSITU_ERROR_ARGUMENT, true, {"patch 0: has -1 faces"}},
+    {remove_table, INSITU_ERROR_ARGUMENT, true, {"patch_count is 2, and patches are not given"}},
+    {set_negative_table_count, INSITU_ERROR_ARGUMENT, true, {"patch_count is -2"}},
+    {make_vertex_field, INSITU_ERROR_ARGUMENT, true, {"has patches, and its centring 0 is not cells (1)"}},
+    {set_fill_function, INSITU_ERROR_FIELD, true, {"patches and fill are given"}},
 };
 
 static void check_fault(insitu_session *session, const fault *c, int cycle)
@@ -259,20 +268,20 @@ static void check_fault(insitu_session *session, const fault *c, int cycle)
     const bool is_last = own_rank == rank_count - 1;
     char rank[64];
     snprintf(rank, sizeof rank, "rank %d: mesh \"m\": field \"f\"", rank_count - 1);
-    create();
-    describe();
+    create_input();
+    describe_mesh_and_patch();
     if (is_last) c->corrupt();
     discard_pictures();
-    const insitu_status at_once = submit(session, &input);
+    const insitu_status at_once = submit_input(session, &input);
     everywhere(at_once == (is_last && c->at_once ? c->status : INSITU_OK));
     const insitu_status status = insitu_step(session, cycle, 0);
-    reported_everywhere(session, status, c->status, rank, c->words[0], c->words[1]);
+    check_reported_everywhere(session, status, c->status, rank, c->words[0], c->words[1]);
     everywhere(caught_count == 0);
     input_free(&input);
-    create();
-    describe();
-    everywhere(submit(session, &input) == INSITU_OK);
-    step_is_good(session, cycle + 1);
+    create_input();
+    describe_mesh_and_patch();
+    everywhere(submit_input(session, &input) == INSITU_OK);
+    check_step_succeeds(session, cycle + 1);
     input_free(&input);
 }
 
@@ -286,7 +295,7 @@ static void wrong_input_is_reported_on_all_ranks(void **state)
 }
 
 /* Checks that a patch given by the numbers of faces is refused for hexes, whose faces have no numbers. */
-static void hexes_want_vertices(void **state)
+static void patches_of_hexes_require_vertices(void **state)
 {
     (void)state;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
@@ -297,9 +306,9 @@ static void hexes_want_vertices(void **state)
     input.field.values = (insitu_array){cell_values, INSITU_FLOAT64, 0};
     input.field.patches = patches;
     input.field.patch_count = 1;
-    everywhere(submit(session, &input) == INSITU_ERROR_FIELD);
-    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD,
-                        "patch 0: names faces by their numbers", "the mesh has none");
+    everywhere(submit_input(session, &input) == INSITU_ERROR_FIELD);
+    check_reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD,
+                              "patch 0: names faces by their numbers", "the mesh has none");
     insitu_destroy(&session);
     input_free(&input);
 }
@@ -307,6 +316,6 @@ static void hexes_want_vertices(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(wrong_input_is_reported_on_all_ranks),
-                                       cmocka_unit_test(hexes_want_vertices)};
+                                       cmocka_unit_test(patches_of_hexes_require_vertices)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -28,16 +28,16 @@ static int *owners;
 /* ---- expected means --------------------------------------------------------------------------------------------- */
 
 /* Returns a pseudorandom number. Numbers differ by many orders of magnitude, so that the order of a sum matters. */
-static double scattered(double at, uint64_t seed)
+static double make_scattered_number(double at, uint64_t seed)
 {
     uint64_t bits;
     memcpy(&bits, &at, sizeof bits);
     return test_uniform(bits, seed) * pow(10, floor(6 * test_uniform(bits, seed + 1)) - 3);
 }
 
-static double cell_value(int64_t cell)
+static double compute_cell_value(int64_t cell)
 {
-    return cell % 17 == 3 ? NAN : scattered((double)cell, 5);
+    return cell % 17 == 3 ? NAN : make_scattered_number((double)cell, 5);
 }
 
 typedef struct boundary_face {
@@ -64,9 +64,9 @@ static bool is_on_wall(const double (*points)[3], int64_t count, boundary_face *
     return wall >= 0;
 }
 
-static double face_value(const boundary_face *face)
+static double compute_face_value(const boundary_face *face)
 {
-    const double value = scattered(face->centre[0] + 8 * face->centre[1] + 64 * face->centre[2], 9);
+    const double value = make_scattered_number(face->centre[0] + 8 * face->centre[1] + 64 * face->centre[2], 9);
     if (value < 0.002) return NAN;
     return face->patch == 1 ? (double)(float)value : value; /* patch 1 is given as float32 */
 }
@@ -86,7 +86,7 @@ static bool is_among(const double (*points)[3], int count, const double position
 
 /* Returns the mean of the values on boundary faces around a vertex or, without any, of the values of the cells around
  * it. Each cell of the whole mesh has its own faces, so an interior face is visited twice. */
-static double expected_at(const grid *all, const double position[3])
+static double compute_expected_mean(const grid *all, const double position[3])
 {
     double cells[256], faces[256];
     int cell_count = 0, face_count = 0;
@@ -101,11 +101,11 @@ static double expected_at(const grid *all, const double position[3])
             if (!is_among((const double(*)[3])points, count, position)) continue;
             is_at = true;
             if (!is_on_wall((const double(*)[3])points, count, &face) || face.patch >= PATCHES) continue;
-            if (isfinite(face_value(&face))) faces[face_count++] = face_value(&face);
+            if (isfinite(compute_face_value(&face))) faces[face_count++] = compute_face_value(&face);
         }
-        if (is_at && isfinite(cell_value(cell))) cells[cell_count++] = cell_value(cell);
+        if (is_at && isfinite(compute_cell_value(cell))) cells[cell_count++] = compute_cell_value(cell);
     }
-    return face_count ? mean_of(faces, face_count) : mean_of(cells, cell_count);
+    return face_count ? compute_mean(faces, face_count) : compute_mean(cells, cell_count);
 }
 
 /* ---- input ----------------------------------------------------------------------------------------------------- */
@@ -156,7 +156,7 @@ static void list_by_cells(part_input *in, const grid *g)
             offsets[at + 1] = offsets[at] + count;
             if (g->connectivity.data && of_cell.table == NULL)
                 in->numbers[face.patch][at] = grid_array_index(&g->connectivity, of_cell.first + f);
-            add_value(in, face.patch, grid_is_ghost(g, cell) ? RUBBISH : face_value(&face));
+            add_value(in, face.patch, grid_is_ghost(g, cell) ? RUBBISH : compute_face_value(&face));
         }
     }
 }
@@ -172,11 +172,11 @@ static void list_by_owned(part_input *in)
             memcpy(points[i], in->part.coordinates + 3 * in->faces.vertices[first + i], sizeof points[i]);
         if (!is_on_wall((const double(*)[3])points, count, &face) || face.patch >= PATCHES) continue;
         in->numbers[face.patch][in->counts[face.patch]] = f;
-        add_value(in, face.patch, in->part.ghosts[in->faces.owner[f]] ? RUBBISH : face_value(&face));
+        add_value(in, face.patch, in->part.ghosts[in->faces.owner[f]] ? RUBBISH : compute_face_value(&face));
     }
 }
 
-static insitu_array values_of(const part_input *in, int patch, int64_t first)
+static insitu_array make_patch_values(const part_input *in, int patch, int64_t first)
 {
     if (patch == 1) return (insitu_array){in->narrow[patch] + first, INSITU_FLOAT32, 0};
     return (insitu_array){in->wide[patch] + 2 * first, INSITU_FLOAT64, 2 * sizeof(double)};
@@ -194,7 +194,7 @@ static void describe_patches(part_input *in, telling how)
     in->field.patch_count = 0;
     for (int p = 0; p < PATCHES; p++) {
         const int64_t count = in->counts[p];
-        insitu_patch patch = {.count = count, .values = values_of(in, p, 0)};
+        insitu_patch patch = {.count = count, .values = make_patch_values(in, p, 0)};
         for (int64_t i = 0; i < count; i++) in->numbers[p][i] += base;
         patch.faces = (insitu_array){in->numbers[p], INSITU_INT64, 0};
         if (how == BY_VERTICES) {
@@ -205,11 +205,12 @@ static void describe_patches(part_input *in, telling how)
         }
         if (how != BY_RANGES) add_patch(in, patch);
         for (int64_t i = 0; i < count && how == BY_RANGES; i++)
-            add_patch(in, (insitu_patch){.count = 1, .first_face = in->numbers[p][i], .values = values_of(in, p, i)});
+            add_patch(
+                in, (insitu_patch){.count = 1, .first_face = in->numbers[p][i], .values = make_patch_values(in, p, i)});
     }
 }
 
-static void describe(part_input *in)
+static void describe_input(part_input *in)
 {
     describe_part(&in->part, &in->mesh);
     insitu_field_defaults(&in->field);
@@ -225,15 +226,15 @@ static void part_create(part_input *in, int rank, bool with_ghosts)
 {
     int *all = test_calloc((size_t)whole.cell_count, sizeof *all);
     memset(in, 0, sizeof *in);
-    test_mesh_part(&whole, with_ghosts ? all : owners, with_ghosts ? 0 : rank, &in->part);
+    test_mesh_extract_part(&whole, with_ghosts ? all : owners, with_ghosts ? 0 : rank, &in->part);
     test_free(all);
     in->values = test_calloc((size_t)in->part.cell_count + 1, sizeof *in->values);
     for (int64_t cell = 0, at = 0; cell < whole.cell_count; cell++) {
         if (!with_ghosts && owners[cell] != rank) continue;
         in->part.ghosts[at] = owners[cell] != rank;
-        in->values[at++] = owners[cell] != rank ? RUBBISH : cell_value(cell);
+        in->values[at++] = owners[cell] != rank ? RUBBISH : compute_cell_value(cell);
     }
-    describe(in);
+    describe_input(in);
 }
 
 static void part_free(part_input *in)
@@ -246,7 +247,7 @@ static void part_free(part_input *in)
 /* ---- checks --------------------------------------------------------------------------------------------------------
  */
 
-static const session_scalar *means_of(const session_mesh *mesh)
+static const session_scalar *get_vertex_means(const session_mesh *mesh)
 {
     for (int i = 0; mesh && i < mesh->scalar_count; i++)
         if (mesh->scalars[i].vertex_values) return &mesh->scalars[i];
@@ -256,7 +257,7 @@ static const session_scalar *means_of(const session_mesh *mesh)
 static bool are_means_right(const insitu_session *session)
 {
     const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
-    const session_scalar *scalar = means_of(mesh);
+    const session_scalar *scalar = get_vertex_means(mesh);
     test_view view;
     bool is_right = scalar != NULL;
     test_view_create(&whole, (test_layout){true, true, true, false, true}, &view);
@@ -269,7 +270,7 @@ static bool are_means_right(const insitu_session *session)
     for (int64_t v = 0; is_right && v < mesh->cells.vertex_count; v++) {
         double position[3];
         grid_vertex(&mesh->cells, v, position);
-        const double expected = is_drawn[v] ? expected_at(&view.cells, position) : NAN,
+        const double expected = is_drawn[v] ? compute_expected_mean(&view.cells, position) : NAN,
                      found = scalar->vertex_values[v];
         if ((isnan(expected) && isnan(found)) || memcmp(&expected, &found, sizeof found) == 0) continue;
         fprintf(stderr, "vertex %lld at %g %g %g: %.17g, expected %.17g\n", (long long)v, position[0], position[1],
@@ -281,7 +282,7 @@ static bool are_means_right(const insitu_session *session)
     return is_right;
 }
 
-static insitu_status draw(insitu_session *session, const part_input *in, int cycle)
+static insitu_status draw_step(insitu_session *session, const part_input *in, int cycle)
 {
     discard_pictures();
     insitu_status status = insitu_set_mesh(session, "m", &in->mesh);
@@ -292,7 +293,7 @@ static insitu_status draw(insitu_session *session, const part_input *in, int cyc
     return status ? status : stepped;
 }
 
-static void part_lists(part_input *in)
+static void make_part_lists(part_input *in)
 {
     test_view view;
     test_view_create(&in->part, (test_layout){true, true, true, false, true}, &view);
@@ -303,14 +304,14 @@ static void part_lists(part_input *in)
 }
 
 /* Makes the whole mesh. If `polyhedra`, all cells become polyhedra. */
-static void make_whole(test_mesh_kind kind, bool polyhedra)
+static void make_whole_mesh(test_mesh_kind kind, bool polyhedra)
 {
-    test_mesh_lattice(kind, SIDE, 0.2, test_wave, &whole);
+    test_mesh_make_lattice(kind, SIDE, 0.2, test_wave_field, &whole);
     if (polyhedra && kind != TEST_POLYHEDRA) test_mesh_to_polyhedra(&whole, 1);
     owners = test_calloc((size_t)whole.cell_count, sizeof *owners);
 }
 
-static void free_whole(void)
+static void free_whole_mesh(void)
 {
     test_free(owners);
     test_mesh_free(&whole);
@@ -318,29 +319,29 @@ static void free_whole(void)
 
 static void check_cells(test_mesh_kind kind, bool polyhedra, telling how)
 {
-    make_whole(kind, polyhedra);
+    make_whole_mesh(kind, polyhedra);
     for (int variant = 0; variant < 2 * TEST_PARTITION_COUNT; variant++) {
         insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
-        test_partition(&whole, (test_partition_kind)(variant / 2), SIDE, rank_count, owners);
+        test_partition_cells(&whole, (test_partition_kind)(variant / 2), SIDE, rank_count, owners);
         part_create(&input, own_rank, variant % 2);
-        part_lists(&input);
+        make_part_lists(&input);
         describe_patches(&input, how);
-        everywhere(draw(session, &input, 0) == INSITU_OK);
+        everywhere(draw_step(session, &input, 0) == INSITU_OK);
         everywhere(are_means_right(session));
         insitu_destroy(&session);
         part_free(&input);
     }
-    free_whole();
+    free_whole_mesh();
 }
 
-static void cells_take_faces_by_vertices(void **state)
+static void typed_cells_accept_patches_by_vertices(void **state)
 {
     (void)state;
     check_cells(TEST_HEXES, false, BY_VERTICES);
     check_cells(TEST_MIXED, false, BY_VERTICES);
 }
 
-static void polyhedra_take_faces_by_numbers_and_vertices(void **state)
+static void polyhedra_accept_patches_by_numbers_and_vertices(void **state)
 {
     (void)state;
     check_cells(TEST_POLYHEDRA, false, BY_NUMBERS);
@@ -348,35 +349,35 @@ static void polyhedra_take_faces_by_numbers_and_vertices(void **state)
     check_cells(TEST_HEXES, true, BY_VERTICES);
 }
 
-static void owners_take_faces_by_numbers_and_ranges(void **state)
+static void owner_meshes_accept_patches_by_numbers_and_ranges(void **state)
 {
     (void)state;
     for (int variant = 0; variant < 2 * FORM_COUNT * 2; variant++) {
         const int base = variant / 4 == FORM_WIDE ? 0 : variant / 2 % 2;
-        make_whole(variant % 4 == 3 ? TEST_POLYHEDRA : TEST_MIXED, true);
+        make_whole_mesh(variant % 4 == 3 ? TEST_POLYHEDRA : TEST_MIXED, true);
         insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
-        test_partition(&whole, TEST_RANDOM, SIDE, rank_count, owners);
+        test_partition_cells(&whole, TEST_RANDOM, SIDE, rank_count, owners);
         part_create(&input, own_rank, variant == 5);
         input.faces = make_owned(&input.part, base);
         describe_owned(&input.faces, (form)(variant / 4), base, &input.mesh);
         list_by_owned(&input);
         describe_patches(&input, variant % 2 ? BY_NUMBERS : BY_RANGES);
-        everywhere(draw(session, &input, 0) == INSITU_OK);
+        everywhere(draw_step(session, &input, 0) == INSITU_OK);
         everywhere(are_means_right(session));
         insitu_destroy(&session);
         part_free(&input);
-        free_whole();
+        free_whole_mesh();
     }
 }
 
-static void meshes_with_corner_fields_take_them(void **state)
+static void meshes_with_corner_fields_accept_patches(void **state)
 {
     (void)state;
-    make_whole(TEST_HEXES, false);
+    make_whole_mesh(TEST_HEXES, false);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(corner_scene));
-    test_partition(&whole, TEST_CHECKERBOARD, SIDE, rank_count, owners);
+    test_partition_cells(&whole, TEST_CHECKERBOARD, SIDE, rank_count, owners);
     part_create(&input, own_rank, false);
-    part_lists(&input);
+    make_part_lists(&input);
     describe_patches(&input, BY_VERTICES);
     insitu_field g;
     insitu_field_defaults(&g);
@@ -393,10 +394,10 @@ static void meshes_with_corner_fields_take_them(void **state)
     insitu_destroy(&session);
     test_free(corners);
     part_free(&input);
-    free_whole();
+    free_whole_mesh();
 }
 
-static insitu_status fill(void *data, insitu_field *field)
+static insitu_status fill_patch_field(void *data, insitu_field *field)
 {
     const insitu_field *given = data;
     field->count = given->count;
@@ -411,25 +412,25 @@ static insitu_status fill(void *data, insitu_field *field)
 static void means_follow_values_on_the_boundary(void **state)
 {
     (void)state;
-    make_whole(TEST_MIXED, false);
+    make_whole_mesh(TEST_MIXED, false);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
-    test_partition(&whole, TEST_RANDOM, SIDE, rank_count, owners);
+    test_partition_cells(&whole, TEST_RANDOM, SIDE, rank_count, owners);
     part_create(&input, own_rank, false);
-    part_lists(&input);
+    make_part_lists(&input);
     describe_patches(&input, BY_VERTICES);
     const insitu_array right = input.patches[0].values;
     const double *other = test_calloc((size_t)input.counts[0] + 1, sizeof *other);
     input.patches[0].values = (insitu_array){other, INSITU_FLOAT64, 0};
-    everywhere(draw(session, &input, 0) == INSITU_OK);
+    everywhere(draw_step(session, &input, 0) == INSITU_OK);
     everywhere(own_rank != 0 || rank_count > 1 || !are_means_right(session));
     input.patches[0].values = right;
     input.mesh.changed = input.field.changed = INSITU_CHANGED_NOTHING;
-    everywhere(draw(session, &input, 1) == INSITU_OK);
+    everywhere(draw_step(session, &input, 1) == INSITU_OK);
     everywhere(are_means_right(session));
     insitu_field filled = input.field, given = input.field;
     filled.values.data = NULL;
     filled.patch_count = 0;
-    filled.fill = fill;
+    filled.fill = fill_patch_field;
     filled.fill_data = &given;
     for (int cycle = 2; cycle < 4; cycle++) {
         everywhere(insitu_set_field(session, "m", &filled) == INSITU_OK);
@@ -439,7 +440,7 @@ static void means_follow_values_on_the_boundary(void **state)
     insitu_destroy(&session);
     test_free((void *)(uintptr_t)other);
     part_free(&input);
-    free_whole();
+    free_whole_mesh();
 }
 
 /* ---- a linear field ---------------------------------------------------------------------------------------------- */
@@ -451,10 +452,10 @@ static void linear_fields_are_exact_amid_walls(void **state)
 {
     (void)state;
     const double h = 2.0 / SIDE, shifts[4] = {0, 0, h / 4, h / 3};
-    test_mesh_lattice(TEST_HEXES, SIDE, 0, test_linear, &whole);
+    test_mesh_make_lattice(TEST_HEXES, SIDE, 0, test_linear_field, &whole);
     owners = test_calloc((size_t)whole.cell_count, sizeof *owners);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
-    test_partition(&whole, TEST_RANDOM, SIDE, rank_count, owners);
+    test_partition_cells(&whole, TEST_RANDOM, SIDE, rank_count, owners);
     part_create(&input, own_rank, false);
     test_view view;
     test_view_create(&input.part, (test_layout){true, true, true, false, true}, &view);
@@ -468,16 +469,16 @@ static void linear_fields_are_exact_amid_walls(void **state)
             if (!is_on_wall((const double(*)[3])points, count, &face)) continue;
             const int64_t at = input.counts[0];
             for (int i = 0; i < 4; i++) input.vertices[0][4 * at + i] = session_face_vertex(&loop, i);
-            add_value(&input, 0, test_linear(face.centre));
+            add_value(&input, 0, test_linear_field(face.centre));
         }
     }
     test_view_free(&view);
     add_patch(&input, (insitu_patch){.count = input.counts[0],
                                      .connectivity_count = 4 * input.counts[0],
                                      .connectivity = {input.vertices[0], INSITU_INT64, 0},
-                                     .values = values_of(&input, 0, 0)});
-    everywhere(draw(session, &input, 0) == INSITU_OK);
-    const session_scalar *scalar = means_of(session_find_mesh(&session->meshes, "m"));
+                                     .values = make_patch_values(&input, 0, 0)});
+    everywhere(draw_step(session, &input, 0) == INSITU_OK);
+    const session_scalar *scalar = get_vertex_means(session_find_mesh(&session->meshes, "m"));
     bool is_right = scalar != NULL;
     int amid = 0, edges = 0;
     for (int64_t v = 0; is_right && v < input.part.vertex_count; v++) {
@@ -491,24 +492,24 @@ static void linear_fields_are_exact_amid_walls(void **state)
         }
         amid += walls == 1;
         edges += walls > 1;
-        is_right = fabs(scalar->vertex_values[v] - test_linear(place)) <= 4e-15;
+        is_right = fabs(scalar->vertex_values[v] - test_linear_field(place)) <= 4e-15;
         if (!is_right)
-            fprintf(stderr, "%d walls: %.17g, not %.17g\n", walls, scalar->vertex_values[v], test_linear(place));
+            fprintf(stderr, "%d walls: %.17g, not %.17g\n", walls, scalar->vertex_values[v], test_linear_field(place));
     }
     everywhere(is_right);
     everywhere(amid > 0 && edges > 0);
     insitu_destroy(&session);
     part_free(&input);
-    free_whole();
+    free_whole_mesh();
 }
 
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(cells_take_faces_by_vertices),
-        cmocka_unit_test(polyhedra_take_faces_by_numbers_and_vertices),
-        cmocka_unit_test(owners_take_faces_by_numbers_and_ranges),
-        cmocka_unit_test(meshes_with_corner_fields_take_them),
+        cmocka_unit_test(typed_cells_accept_patches_by_vertices),
+        cmocka_unit_test(polyhedra_accept_patches_by_numbers_and_vertices),
+        cmocka_unit_test(owner_meshes_accept_patches_by_numbers_and_ranges),
+        cmocka_unit_test(meshes_with_corner_fields_accept_patches),
         cmocka_unit_test(means_follow_values_on_the_boundary),
         cmocka_unit_test(linear_fields_are_exact_amid_walls),
     };

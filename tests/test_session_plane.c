@@ -31,13 +31,13 @@ typedef struct plate {
     int connectivity[MAX_ENTRIES], offsets[MAX_CELLS + 1];
 } plate;
 
-static double linear(double x, double y)
+static double linear_field(double x, double y)
 {
     return 2 * x - y;
 }
 
 /* Returns the cell value of a square of the lattice; both of its triangles have this value. */
-static double value_of_square(int i, int j)
+static double compute_square_value(int i, int j)
 {
     return (3 * i + 5 * j) % 7 - 1;
 }
@@ -55,10 +55,10 @@ static void add_square(plate *p, int i, int j)
     const int a = j * (NX + 1) + i, b = a + NX + 1;
     const int quad[4] = {a, a + 1, b + 1, b}, lower[3] = {a, a + 1, b + 1}, upper[3] = {b + 1, b, a};
     if (p->kind != TRIANGLES) {
-        add_cell(p, value_of_square(i, j), 4, quad);
+        add_cell(p, compute_square_value(i, j), 4, quad);
     } else {
-        add_cell(p, value_of_square(i, j), 3, lower);
-        add_cell(p, value_of_square(i, j), 3, upper);
+        add_cell(p, compute_square_value(i, j), 3, lower);
+        add_cell(p, compute_square_value(i, j), 3, upper);
     }
 }
 
@@ -70,7 +70,7 @@ static void make_plate(plate_kind kind, int rank, int ranks, plate *out)
         const double x = right * (n % (NX + 1)) / NX, y = top * (n / (NX + 1)) / NY;
         out->xy[2 * n] = x;
         out->xy[2 * n + 1] = y;
-        out->f[n] = linear(x, y);
+        out->f[n] = linear_field(x, y);
         out->v[3 * n] = 0.6 * out->f[n];
         out->v[3 * n + 2] = 0.8 * out->f[n];
     }
@@ -79,7 +79,7 @@ static void make_plate(plate_kind kind, int rank, int ranks, plate *out)
             if ((i * NY + j) % ranks == rank) add_square(out, i, j);
 }
 
-static insitu_mesh describe(const plate *p, bool with_z)
+static insitu_mesh describe_plate(const plate *p, bool with_z)
 {
     static const insitu_cell_type types[] = {INSITU_QUAD, INSITU_TRIANGLE, INSITU_POLYGON};
     insitu_mesh mesh;
@@ -109,10 +109,10 @@ static void set_field(insitu_session *session, const char *name, insitu_centring
     assert_int_equal(insitu_set_field(session, "plate", &field), INSITU_OK);
 }
 
-static insitu_session *open_with(MPI_Comm comm, const char *scene, const plate *p, bool with_z)
+static insitu_session *open_session_with_plate(MPI_Comm comm, const char *scene, const plate *p, bool with_z)
 {
     insitu_session *session = open_session(comm, scene);
-    const insitu_mesh mesh = describe(p, with_z);
+    const insitu_mesh mesh = describe_plate(p, with_z);
     discard_pictures();
     assert_int_equal(insitu_set_mesh(session, "plate", &mesh), INSITU_OK);
     set_field(session, "f", INSITU_VERTEX, MAX_VERTICES, 1, p->f);
@@ -124,9 +124,9 @@ static insitu_session *open_with(MPI_Comm comm, const char *scene, const plate *
     return session;
 }
 
-static caught_picture draw(MPI_Comm comm, const char *scene, const plate *p, bool with_z)
+static caught_picture draw_plate(MPI_Comm comm, const char *scene, const plate *p, bool with_z)
 {
-    insitu_session *session = open_with(comm, scene, p, with_z);
+    insitu_session *session = open_session_with_plate(comm, scene, p, with_z);
     if (insitu_last_report(session)->warnings[0]) fail_msg("warnings: %s", insitu_last_report(session)->warnings);
     const caught_picture picture = pop_caught_picture();
     insitu_destroy(&session);
@@ -137,7 +137,7 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const plate *p, boo
 
 /* Computes the plate's position at the centre of a pixel. The plate is as large as fits into 0.95 of the frame's width
    and of its height. */
-static void place_of(int pixel, double *x, double *y)
+static void compute_pixel_position(int pixel, double *x, double *y)
 {
     const double half = fmax(top / 2, right / 2 * HEIGHT / WIDTH) / 0.95, size = 2 * half / HEIGHT;
     *x = right / 2 + (pixel % WIDTH + 0.5 - WIDTH / 2.0) * size;
@@ -151,7 +151,7 @@ static bool is_near_edge(double at, double size, int cells)
 }
 
 /* Converts linear light to the sRGB code of a PNG, before it is rounded. */
-static double srgb_code(float light)
+static double encode_srgb(float light)
 {
     const double c = (double)light;
     return 255 * (c <= 0.0031308 ? 12.92 * c : 1.055 * pow(c, 1 / 2.4) - 0.055);
@@ -165,23 +165,24 @@ static bool is_map(const caught_picture *picture, bool is_of_cells)
     int hits = 0;
     for (int pixel = 0; pixel < PIXELS; pixel++) {
         double x, y;
-        place_of(pixel, &x, &y);
+        compute_pixel_position(pixel, &x, &y);
         const float *own = picture->rgba + 4 * (ptrdiff_t)pixel;
         if (is_near_edge(x, right, NX) || is_near_edge(y, top, NY)) continue;
         const bool is_hit = x > 0 && x < right && y > 0 && y < top;
-        const double value = is_of_cells ? value_of_square((int)(x / right * NX), (int)(y / top * NY)) : linear(x, y);
+        const double value =
+            is_of_cells ? compute_square_value((int)(x / right * NX), (int)(y / top * NY)) : linear_field(x, y);
         const double code = 255 * (value + 2) / 8;
         bool is_well = own[3] == (is_hit ? 1 : 0);
-        for (int k = 0; k < 3 && is_hit; k++) is_well = is_well && fabs(srgb_code(own[k]) - code) <= 1;
+        for (int k = 0; k < 3 && is_hit; k++) is_well = is_well && fabs(encode_srgb(own[k]) - code) <= 1;
         hits += is_hit;
         if (is_well) continue;
-        fprintf(stderr, "pixel %d at (%g, %g): %g, expected %g\n", pixel, x, y, srgb_code(own[0]), is_hit ? code : 0);
+        fprintf(stderr, "pixel %d at (%g, %g): %g, expected %g\n", pixel, x, y, encode_srgb(own[0]), is_hit ? code : 0);
         return false;
     }
     return hits > PIXELS / 3;
 }
 
-static bool are_same(const caught_picture *a, const caught_picture *b)
+static bool are_equal_pictures(const caught_picture *a, const caught_picture *b)
 {
     return memcmp(a->rgba, b->rgba, 4 * PIXELS * sizeof(float)) == 0 &&
            memcmp(a->depth, b->depth, PIXELS * sizeof(float)) == 0;
@@ -198,11 +199,11 @@ static void pictures_are_the_colour_map_of_the_field(void **state)
             plate part, whole;
             make_plate(kind, own_rank, rank_count, &part);
             make_plate(kind, 0, 1, &whole);
-            caught_picture ours = draw(MPI_COMM_WORLD, scene, &part, of_cells), alone = {0};
+            caught_picture ours = draw_plate(MPI_COMM_WORLD, scene, &part, of_cells), alone = {0};
             bool is_well = true;
             if (own_rank == 0) {
-                alone = draw(MPI_COMM_SELF, scene, &whole, !of_cells);
-                is_well = is_map(&ours, of_cells) && are_same(&ours, &alone);
+                alone = draw_plate(MPI_COMM_SELF, scene, &whole, !of_cells);
+                is_well = is_map(&ours, of_cells) && are_equal_pictures(&ours, &alone);
             }
             everywhere(is_well);
             free_caught(&ours);
@@ -212,7 +213,7 @@ static void pictures_are_the_colour_map_of_the_field(void **state)
 
 /* Checks that what the scene specifies overrides the defaults of plane runs: a direction from behind, an explicit
  * camera, a light and a material each change the picture. */
-static void what_the_scene_says_comes_first(void **state)
+static void scene_keys_override_defaults(void **state)
 {
     (void)state;
     static const char *const scenes[] = {
@@ -222,10 +223,10 @@ static void what_the_scene_says_comes_first(void **state)
         IMAGE("", "{surface: {colour_by: {field: f, map: grey, range: [-2, 6]}, material: {}}}")};
     plate part;
     make_plate(QUADS, own_rank, rank_count, &part);
-    caught_picture plain = draw(MPI_COMM_WORLD, write_scene(IMAGE("", MAP_OF("f"))), &part, false);
+    caught_picture plain = draw_plate(MPI_COMM_WORLD, write_scene(IMAGE("", MAP_OF("f"))), &part, false);
     for (size_t i = 0; i < sizeof scenes / sizeof *scenes; i++) {
-        caught_picture other = draw(MPI_COMM_WORLD, write_scene(scenes[i]), &part, false);
-        everywhere(own_rank != 0 || !are_same(&plain, &other));
+        caught_picture other = draw_plate(MPI_COMM_WORLD, write_scene(scenes[i]), &part, false);
+        everywhere(own_rank != 0 || !are_equal_pictures(&plain, &other));
         free_caught(&other);
     }
     free_caught(&plain);
@@ -241,7 +242,7 @@ static void layers_that_show_nothing_are_reported(void **state)
     plate part;
     make_plate(QUADS, own_rank, rank_count, &part);
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        insitu_session *session = open_with(MPI_COMM_WORLD, write_scene(cases[i].scene), &part, false);
+        insitu_session *session = open_session_with_plate(MPI_COMM_WORLD, write_scene(cases[i].scene), &part, false);
         const char *warnings = insitu_last_report(session)->warnings;
         everywhere(strstr(warnings, cases[i].word) && strstr(warnings, "surface: {colour_by: {field: f}}"));
         insitu_destroy(&session);
@@ -253,8 +254,8 @@ static void layers_that_show_nothing_are_reported(void **state)
 #define LINES "{isosurface: {field: f, values: [3, 1], colours: [[1, 0, 0], [0, 1, 0]]}}"
 
 /* Returns the share of a pixel that the contour line of a level covers. The line is 1.5 pixels wide and lies within a
- * field with the slope of linear(). The coverage is that of a box of one pixel across the line. */
-static double line_share(double value, double level)
+ * field with the slope of linear_field(). The coverage is that of a box of one pixel across the line. */
+static double compute_line_coverage(double value, double level)
 {
     const double half = fmax(top / 2, right / 2 * HEIGHT / WIDTH) / 0.95, size = 2 * half / HEIGHT;
     return fmin(fmax(1.25 - fabs(value - level) / (sqrt(5) * size), 0), 1);
@@ -263,22 +264,23 @@ static double line_share(double value, double level)
 /* Returns whether the picture has the two contour lines, red at 3 and green at 1, over the grey map if on_grey. Float32
  * values up to 8 are off by 1e-6, which is 4e-6 of a pixel of 0.094; the light of a pixel is proportional to the share
  * covered by the line. */
-static bool are_lines(const caught_picture *picture, bool on_grey)
+static bool check_contour_lines(const caught_picture *picture, bool on_grey)
 {
     int hits = 0;
     for (int pixel = 0; pixel < PIXELS; pixel++) {
         double x, y;
-        place_of(pixel, &x, &y);
+        compute_pixel_position(pixel, &x, &y);
         const float *own = picture->rgba + 4 * (ptrdiff_t)pixel;
         if (is_near_edge(x, right, NX) || is_near_edge(y, top, NY)) continue;
         const bool is_in = x > 0 && x < right && y > 0 && y < top;
-        const double red = is_in ? line_share(linear(x, y), 3) : 0, green = is_in ? line_share(linear(x, y), 1) : 0;
-        const double code = 255 * (linear(x, y) + 2) / 8, share = red + green;
+        const double red = is_in ? compute_line_coverage(linear_field(x, y), 3) : 0,
+                     green = is_in ? compute_line_coverage(linear_field(x, y), 1) : 0;
+        const double code = 255 * (linear_field(x, y) + 2) / 8, share = red + green;
         bool is_well = fabs((double)own[3] - (on_grey ? is_in : share)) < 1e-4;
         is_well = is_well && (share == 0 || on_grey || fabs((double)own[0] - red) < 1e-4);
         is_well = is_well && (share == 0 || on_grey || fabs((double)own[1] - green) < 1e-4);
         is_well = is_well && (share < 0.9999 || fabs((double)own[0] - red) < 1e-4);
-        is_well = is_well && (share > 0 || !is_in || !on_grey || fabs(srgb_code(own[2]) - code) <= 1);
+        is_well = is_well && (share > 0 || !is_in || !on_grey || fabs(encode_srgb(own[2]) - code) <= 1);
         hits += share > 0;
         if (is_well) continue;
         fprintf(stderr, "pixel %d at (%g, %g): %g %g %g %g, expected %g of red, %g of green\n", pixel, x, y,
@@ -301,11 +303,11 @@ static void isosurfaces_are_contour_lines(void **state)
             make_plate(kind, own_rank, rank_count, &part);
             make_plate(kind, 0, 1, &whole);
             const char *scene = write_scene(scenes[i]);
-            caught_picture ours = draw(MPI_COMM_WORLD, scene, &part, false), alone = {0};
+            caught_picture ours = draw_plate(MPI_COMM_WORLD, scene, &part, false), alone = {0};
             bool is_well = true;
             if (own_rank == 0) {
-                alone = draw(MPI_COMM_SELF, scene, &whole, true);
-                is_well = are_lines(&ours, i > 0) && are_same(&ours, &alone);
+                alone = draw_plate(MPI_COMM_SELF, scene, &whole, true);
+                is_well = check_contour_lines(&ours, i > 0) && are_equal_pictures(&ours, &alone);
             }
             everywhere(is_well);
             free_caught(&ours);
@@ -315,14 +317,14 @@ static void isosurfaces_are_contour_lines(void **state)
 
 /* Returns the share of the pixel that the strip about the hyperbola x y = level covers. It samples points of the pixel
  * and estimates each point's distance from the curve along the field's gradient. */
-static double hyperbola_share(int pixel, double level)
+static double compute_hyperbola_coverage(int pixel, double level)
 {
     enum { POINTS = 16 };
     const double half = fmax(top / 2, right / 2 * HEIGHT / WIDTH) / 0.95, size = 2 * half / HEIGHT;
     int inside = 0;
     for (int i = 0; i < POINTS * POINTS; i++) {
         double x, y;
-        place_of(pixel, &x, &y);
+        compute_pixel_position(pixel, &x, &y);
         x += ((i % POINTS + 0.5) / POINTS - 0.5) * size;
         y += ((i / POINTS + 0.5) / POINTS - 0.5) * size;
         double px = x, py = y;
@@ -339,23 +341,23 @@ static double hyperbola_share(int pixel, double level)
 /* Quads represent the field x y exactly. The drawn lines have a ramp of one pixel in all directions. Their root mean
  * square error must be within 0.02 of the covered share, and their total light within a hundredth of width times
  * length. */
-static void curved_lines_cover_what_strips_do(void **state)
+static void coverage_of_curved_lines_matches_strips(void **state)
 {
     (void)state;
     const char *scene = write_scene(IMAGE("", "{isosurface: {field: f, values: [1, 3]}}"));
     plate part;
     make_plate(QUADS, own_rank, rank_count, &part);
     for (int n = 0; n < MAX_VERTICES; n++) part.f[n] = part.xy[2 * n] * part.xy[2 * n + 1];
-    caught_picture picture = draw(MPI_COMM_WORLD, scene, &part, false);
+    caught_picture picture = draw_plate(MPI_COMM_WORLD, scene, &part, false);
     double squares = 0, drawn = 0, exact = 0;
     int count = 0;
     for (int pixel = 0; pixel < PIXELS && own_rank == 0; pixel++) {
         const double border = 0.1; /* more than two pixels wide */
         double x, y;
-        place_of(pixel, &x, &y);
+        compute_pixel_position(pixel, &x, &y);
         if (x < border || x > right - border || y < border || y > top - border) continue;
         const double is = (double)picture.rgba[4 * (ptrdiff_t)pixel + 3];
-        const double share = hyperbola_share(pixel, 1) + hyperbola_share(pixel, 3);
+        const double share = compute_hyperbola_coverage(pixel, 1) + compute_hyperbola_coverage(pixel, 3);
         if (share == 0 && is == 0) continue;
         squares += (is - share) * (is - share);
         drawn += is;
@@ -376,24 +378,24 @@ static void lines_beyond_the_field_are_reported(void **state)
     plate part;
     make_plate(TRIANGLES, own_rank, rank_count, &part);
     const char *scene = write_scene(IMAGE("", "{isosurface: {field: f, values: [1, 20]}}"));
-    insitu_session *session = open_with(MPI_COMM_WORLD, scene, &part, false);
+    insitu_session *session = open_session_with_plate(MPI_COMM_WORLD, scene, &part, false);
     const char *warnings = insitu_last_report(session)->warnings;
     everywhere(strstr(warnings, "the isosurface of \"f\" at 20 is empty: the field goes from -2 to 6") &&
                !strstr(warnings, "at 1 is empty"));
     insitu_destroy(&session);
 }
 
-static void solids_need_z(void **state)
+static void solid_cells_require_z_coordinates(void **state)
 {
     (void)state;
     plate part;
     make_plate(QUADS, own_rank, rank_count, &part);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(IMAGE("", MAP_OF("f"))));
-    insitu_mesh mesh = describe(&part, false);
+    insitu_mesh mesh = describe_plate(&part, false);
     mesh.cell_type = INSITU_TET; /* tets have as many vertices as quads */
     assert_int_equal(insitu_set_mesh(session, "plate", &mesh), INSITU_ERROR_MESH);
     everywhere(strstr(insitu_error(session), "z coordinates are not given") != NULL);
-    mesh = describe(&part, false);
+    mesh = describe_plate(&part, false);
     mesh.coordinates[1].data = NULL;
     assert_int_equal(insitu_set_mesh(session, "plate", &mesh), INSITU_ERROR_MESH);
     everywhere(strstr(insitu_error(session), "y coordinates are not given") != NULL);
@@ -409,7 +411,7 @@ static void solids_need_z(void **state)
                                                                      "}\n    outputs: [{path: a.png}]\n"
 #define SURFACE_OF(keys) "      - surface: {colour_by: {" keys ", range: [0, 1]}}\n"
 
-static void bars_say_what_they_show(void **state)
+static void colour_bars_state_the_field_and_range(void **state)
 {
     (void)state;
     static const struct {
@@ -422,7 +424,7 @@ static void bars_say_what_they_show(void **state)
     plate part;
     make_plate(QUADS, own_rank, rank_count, &part);
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        caught_picture picture = draw(MPI_COMM_WORLD, write_scene(cases[i].scene), &part, false);
+        caught_picture picture = draw_plate(MPI_COMM_WORLD, write_scene(cases[i].scene), &part, false);
         const bool is_well = own_rank != 0 || strcmp(picture.bars, cases[i].bars) == 0;
         if (!is_well) fprintf(stderr, "%sexpected\n%s", picture.bars, cases[i].bars);
         everywhere(is_well);
@@ -435,14 +437,14 @@ static void bars_say_what_they_show(void **state)
 enum { MOST = 1 << 12 };
 
 /* Returns a number of the file's second line. */
-static double number_at(const char *text, int column)
+static double read_number(const char *text, int column)
 {
     const char *at = strchr(text, '\n');
     for (; column > 0 && at; column--) at = strchr(at + 1, ',');
     return at ? strtod(at + 1, NULL) : NAN;
 }
 
-static bool is_near(double a, double b)
+static bool is_nearly_equal(double a, double b)
 {
     if (fabs(a - b) <= 1e-8 * fmax(1, fabs(b))) return true; /* numbers are written with nine digits */
     fprintf(stderr, "%.9g, expected %.9g\n", a, b);
@@ -450,13 +452,15 @@ static bool is_near(double a, double b)
 }
 
 /* Checks a linear field's statistics: its mean is the value at the plate's centre, and its extremes are at corners. */
-static bool are_of_plate(const char *text, plate_kind kind)
+static bool check_plate_statistics(const char *text, plate_kind kind)
 {
     enum { CELLS = 2, AREA, LEAST, GREATEST, MEAN };
     return strncmp(text, "cycle,time,cells,area,minimum,", 30) == 0 &&
-           number_at(text, CELLS) == (kind == TRIANGLES ? 2 : 1) * NX * NY && is_near(number_at(text, AREA), 6) &&
-           is_near(number_at(text, LEAST), linear(0, top)) && is_near(number_at(text, GREATEST), linear(right, 0)) &&
-           is_near(number_at(text, MEAN), linear(right / 2, top / 2));
+           read_number(text, CELLS) == (kind == TRIANGLES ? 2 : 1) * NX * NY &&
+           is_nearly_equal(read_number(text, AREA), 6) &&
+           is_nearly_equal(read_number(text, LEAST), linear_field(0, top)) &&
+           is_nearly_equal(read_number(text, GREATEST), linear_field(right, 0)) &&
+           is_nearly_equal(read_number(text, MEAN), linear_field(right / 2, top / 2));
 }
 
 static void statistics_weigh_shells_by_area(void **state)
@@ -468,22 +472,22 @@ static void statistics_weigh_shells_by_area(void **state)
         make_plate(kind, own_rank, rank_count, &part);
         make_plate(kind, 0, 1, &whole);
         if (own_rank == 0) unlink("parts.csv"), unlink("whole.csv");
-        insitu_session *session =
-            open_with(MPI_COMM_WORLD, write_scene(NEVER "statistics: [{field: f, path: parts.csv}]\n"), &part, false);
+        insitu_session *session = open_session_with_plate(
+            MPI_COMM_WORLD, write_scene(NEVER "statistics: [{field: f, path: parts.csv}]\n"), &part, false);
         insitu_destroy(&session);
         const char *scene = write_scene(NEVER "statistics: [{field: f, path: whole.csv}]\n");
         if (own_rank == 0) {
-            session = open_with(MPI_COMM_SELF, scene, &whole, true);
+            session = open_session_with_plate(MPI_COMM_SELF, scene, &whole, true);
             insitu_destroy(&session);
         }
         read_file("parts.csv", MOST, text);
         read_file("whole.csv", MOST, alone);
-        everywhere(own_rank != 0 || (are_of_plate(text, kind) && strcmp(text, alone) == 0));
+        everywhere(own_rank != 0 || (check_plate_statistics(text, kind) && strcmp(text, alone) == 0));
     }
 }
 
 /* Returns the width of a column of quads. The last column is seven times as wide as each of the others. */
-static double column_width(int i)
+static double compute_column_width(int i)
 {
     return i == NX - 1 ? 1.75 : 0.25;
 }
@@ -493,8 +497,8 @@ static void widen_column(plate *p)
 {
     for (int n = 0; n < MAX_VERTICES; n++) {
         const int i = n % (NX + 1);
-        p->xy[2 * n] = i == NX ? right : column_width(0) * i;
-        p->f[n] = linear(p->xy[2 * n], p->xy[2 * n + 1]);
+        p->xy[2 * n] = i == NX ? right : compute_column_width(0) * i;
+        p->f[n] = linear_field(p->xy[2 * n], p->xy[2 * n + 1]);
     }
 }
 
@@ -512,20 +516,20 @@ static void conditions_weigh_shells_by_area(void **state)
     make_plate(QUADS, own_rank, rank_count, &part);
     widen_column(&part);
     for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
-        insitu_session *session = open_with(MPI_COMM_WORLD, write_scene(cases[k].when), &part, false);
+        insitu_session *session = open_session_with_plate(MPI_COMM_WORLD, write_scene(cases[k].when), &part, false);
         everywhere(insitu_last_report(session)->images == cases[k].images);
         insitu_destroy(&session);
     }
 }
 
 /* Returns the least value such that squares with at most this value cover the given percentage of the area. */
-static int percentile_by_area(double percent)
+static int compute_percentile_by_area(double percent)
 {
     enum { LEAST = -1, GREATEST = 5 };
     for (int value = LEAST; value < GREATEST; value++) {
         double area = 0;
         for (int n = 0; n < NX * NY; n++)
-            if (value_of_square(n % NX, n / NX) <= value) area += column_width(n % NX) * top / NY;
+            if (compute_square_value(n % NX, n / NX) <= value) area += compute_column_width(n % NX) * top / NY;
         if (area >= percent / 100 * right * top) return value;
     }
     return GREATEST;
@@ -543,13 +547,13 @@ static void percentiles_weigh_shells_by_area(void **state)
             snprintf(by_area, sizeof by_area,
                      IMAGE("", "{surface: {colour_by: {field: c, range: {percentile: [%d, %d]}}}}"), p[0], p[1]);
             snprintf(fixed, sizeof fixed, IMAGE("", "{surface: {colour_by: {field: c, range: [%d, %d]}}}"),
-                     percentile_by_area(p[0]), percentile_by_area(p[1]));
+                     compute_percentile_by_area(p[0]), compute_percentile_by_area(p[1]));
             plate part;
             make_plate(kind, own_rank, rank_count, &part);
             widen_column(&part);
-            caught_picture found = draw(MPI_COMM_WORLD, write_scene(by_area), &part, false);
-            caught_picture truth = draw(MPI_COMM_WORLD, write_scene(fixed), &part, false);
-            everywhere(own_rank != 0 || are_same(&found, &truth));
+            caught_picture found = draw_plate(MPI_COMM_WORLD, write_scene(by_area), &part, false);
+            caught_picture truth = draw_plate(MPI_COMM_WORLD, write_scene(fixed), &part, false);
+            everywhere(own_rank != 0 || are_equal_pictures(&found, &truth));
             free_caught(&found);
             free_caught(&truth);
         }
@@ -594,9 +598,9 @@ static void shells_beside_solids_do_not_count(void **state)
     everywhere(status == INSITU_OK);
     insitu_destroy(&session);
     read_file("mixed.csv", MOST, text);
-    everywhere(own_rank != 0 ||
-               (strstr(text, ",volume,") && number_at(text, 2) == 1 && is_near(number_at(text, 3), 1.0 / 6) &&
-                number_at(text, 5) == 3 && is_near(number_at(text, 6), 1.5)));
+    everywhere(own_rank != 0 || (strstr(text, ",volume,") && read_number(text, 2) == 1 &&
+                                 is_nearly_equal(read_number(text, 3), 1.0 / 6) && read_number(text, 5) == 3 &&
+                                 is_nearly_equal(read_number(text, 6), 1.5)));
     caught_picture picture = pop_caught_picture();
     const bool is_of_tet = own_rank != 0 || strcmp(picture.bars, "f: 1.5\n") == 0;
     if (!is_of_tet) fprintf(stderr, "%s", picture.bars);
@@ -606,25 +610,25 @@ static void shells_beside_solids_do_not_count(void **state)
 
 /* ---- main ------------------------------------------------------------------------------------------------------ */
 
-static int begin_tests(void **state)
+static int set_up_test_group(void **state)
 {
     (void)state;
-    return enter_folder("plane") ? 0 : 1;
+    return enter_test_folder("plane") ? 0 : 1;
 }
 
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(pictures_are_the_colour_map_of_the_field),
-                                       cmocka_unit_test(what_the_scene_says_comes_first),
+                                       cmocka_unit_test(scene_keys_override_defaults),
                                        cmocka_unit_test(layers_that_show_nothing_are_reported),
                                        cmocka_unit_test(isosurfaces_are_contour_lines),
-                                       cmocka_unit_test(curved_lines_cover_what_strips_do),
+                                       cmocka_unit_test(coverage_of_curved_lines_matches_strips),
                                        cmocka_unit_test(lines_beyond_the_field_are_reported),
-                                       cmocka_unit_test(bars_say_what_they_show),
-                                       cmocka_unit_test(solids_need_z),
+                                       cmocka_unit_test(colour_bars_state_the_field_and_range),
+                                       cmocka_unit_test(solid_cells_require_z_coordinates),
                                        cmocka_unit_test(statistics_weigh_shells_by_area),
                                        cmocka_unit_test(conditions_weigh_shells_by_area),
                                        cmocka_unit_test(percentiles_weigh_shells_by_area),
                                        cmocka_unit_test(shells_beside_solids_do_not_count)};
-    return run_session_tests(argc, argv, tests, begin_tests, NULL);
+    return run_session_tests(argc, argv, tests, set_up_test_group, NULL);
 }

@@ -47,14 +47,14 @@ static int *owners;
 
 /* Returns the value of a cell of the whole mesh. Values differ by many orders of magnitude, so that the order of a sum
  * matters. */
-static double cell_value(int64_t cell)
+static double compute_cell_value(int64_t cell)
 {
     const double u = test_uniform((uint64_t)cell, 5);
     return cell % 17 == 3 ? NAN : u * pow(10, floor(6 * test_uniform((uint64_t)cell, 6)) - 3);
 }
 
 /* Returns the mean over all cells that have a vertex at this position. */
-static double expected_at(const double position[3])
+static double compute_expected_mean(const double position[3])
 {
     double values[256];
     int count = 0;
@@ -64,9 +64,9 @@ static double expected_at(const double position[3])
             const double *p = whole.coordinates + 3 * whole.connectivity[i];
             is_at = is_at || (p[0] == position[0] && p[1] == position[1] && p[2] == position[2]);
         }
-        if (is_at && isfinite(cell_value(cell))) values[count++] = cell_value(cell);
+        if (is_at && isfinite(compute_cell_value(cell))) values[count++] = compute_cell_value(cell);
     }
-    return mean_of(values, count);
+    return compute_mean(values, count);
 }
 
 typedef struct part_input {
@@ -77,14 +77,14 @@ typedef struct part_input {
     insitu_field field;
 } part_input;
 
-static int64_t whole_vertex(const double position[3])
+static int64_t find_whole_vertex(const double position[3])
 {
     for (int64_t v = 0; v < whole.vertex_count; v++)
         if (memcmp(whole.coordinates + 3 * v, position, 3 * sizeof(double)) == 0) return v;
     return -1;
 }
 
-static void describe(part_input *in)
+static void describe_input(part_input *in)
 {
     describe_part(&in->part, &in->mesh);
     insitu_field_defaults(&in->field);
@@ -99,7 +99,7 @@ static void describe(part_input *in)
 static void part_create(part_input *in, int rank, bool with_ghosts)
 {
     int *all = test_calloc((size_t)whole.cell_count, sizeof *all);
-    test_mesh_part(&whole, with_ghosts ? all : owners, with_ghosts ? 0 : rank, &in->part);
+    test_mesh_extract_part(&whole, with_ghosts ? all : owners, with_ghosts ? 0 : rank, &in->part);
     test_free(all);
     in->values = test_calloc((size_t)in->part.cell_count + 1, sizeof *in->values);
     in->ids = test_calloc((size_t)in->part.vertex_count + 1, sizeof *in->ids);
@@ -107,11 +107,11 @@ static void part_create(part_input *in, int rank, bool with_ghosts)
         if (!with_ghosts && owners[cell] != rank) continue;
         const bool is_ghost = owners[cell] != rank;
         in->part.ghosts[at] = is_ghost;
-        in->values[at++] = is_ghost ? 1e6 : cell_value(cell);
+        in->values[at++] = is_ghost ? 1e6 : compute_cell_value(cell);
     }
     for (int64_t v = 0; v < in->part.vertex_count; v++)
-        in->ids[v] = 7 * whole_vertex(in->part.coordinates + 3 * v) - 100;
-    describe(in);
+        in->ids[v] = 7 * find_whole_vertex(in->part.coordinates + 3 * v) - 100;
+    describe_input(in);
 }
 
 static void part_free(part_input *in)
@@ -131,7 +131,7 @@ static bool are_means_right(const insitu_session *session, const part_input *in)
         for (int64_t cell = 0; cell < in->part.cell_count; cell++)
             for (int64_t i = in->part.offsets[cell]; i < in->part.offsets[cell + 1]; i++)
                 is_drawn = is_drawn || (in->part.connectivity[i] == v && !in->part.ghosts[cell]);
-        const double expected = is_drawn ? expected_at(in->part.coordinates + 3 * v) : NAN;
+        const double expected = is_drawn ? compute_expected_mean(in->part.coordinates + 3 * v) : NAN;
         if (isnan(expected) && isnan(means[v])) continue;
         if (memcmp(&expected, &means[v], sizeof expected) != 0) {
             fprintf(stderr, "vertex %lld: %.17g, expected %.17g\n", (long long)v, means[v], expected);
@@ -141,7 +141,7 @@ static bool are_means_right(const insitu_session *session, const part_input *in)
     return true;
 }
 
-static insitu_status draw(insitu_session *session, const part_input *in, int cycle)
+static insitu_status draw_step(insitu_session *session, const part_input *in, int cycle)
 {
     discard_pictures();
     insitu_status status = INSITU_OK;
@@ -161,12 +161,12 @@ static void means_equal_a_search_over_all_cells(void **context)
     (void)context;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(surface_scene));
     for (int distributed = 0; distributed < TEST_PARTITION_COUNT; distributed++) {
-        test_partition(&whole, (test_partition_kind)distributed, SIDE, rank_count, owners);
+        test_partition_cells(&whole, (test_partition_kind)distributed, SIDE, rank_count, owners);
         for (int v = 0; v < VARIANT_COUNT; v++) {
             part_input in;
             part_create(&in, own_rank, v == WITH_GHOSTS);
             if (v == BY_IDS) in.mesh.vertex_ids = (insitu_array){in.ids, INSITU_INT64, 0};
-            everywhere(draw(session, &in, v) == INSITU_OK);
+            everywhere(draw_step(session, &in, v) == INSITU_OK);
             everywhere(are_means_right(session, &in));
             const insitu_report *report = insitu_last_report(session);
             everywhere(report->bytes_copied == in.part.vertex_count * (int64_t)sizeof(double));
@@ -179,11 +179,11 @@ static void means_equal_a_search_over_all_cells(void **context)
 }
 
 /* Checks that duplicate vertices within a rank are treated as one vertex, like duplicates on two ranks. */
-static void doubled_vertices_are_one(void **context)
+static void duplicated_vertices_are_merged(void **context)
 {
     (void)context;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(surface_scene));
-    test_partition(&whole, TEST_RANDOM, SIDE, rank_count, owners);
+    test_partition_cells(&whole, TEST_RANDOM, SIDE, rank_count, owners);
     part_input in;
     part_create(&in, own_rank, false);
     const int64_t count = in.part.connectivity_count;
@@ -197,8 +197,8 @@ static void doubled_vertices_are_one(void **context)
     free(in.part.coordinates);
     in.part.coordinates = coordinates;
     in.part.vertex_count = count;
-    describe(&in);
-    everywhere(draw(session, &in, 0) == INSITU_OK);
+    describe_input(&in);
+    everywhere(draw_step(session, &in, 0) == INSITU_OK);
     everywhere(are_means_right(session, &in));
     insitu_destroy(&session);
     part_free(&in);
@@ -206,7 +206,7 @@ static void doubled_vertices_are_one(void **context)
 
 /* Two adjacent hexes have equal vertices but share none. When the second hex moves away, the groups of equal vertices
  * must be found again. */
-static void means_follow_cells_that_part(void **context)
+static void means_follow_separated_cells(void **context)
 {
     (void)context;
     static const double values[2] = {1, 3};
@@ -252,20 +252,20 @@ static void means_follow_values_that_changed_on_one_rank(void **context)
 {
     (void)context;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(surface_scene));
-    test_partition(&whole, TEST_CHECKERBOARD, SIDE, rank_count, owners);
+    test_partition_cells(&whole, TEST_CHECKERBOARD, SIDE, rank_count, owners);
     part_input in;
     part_create(&in, own_rank, false);
     double *right = test_calloc((size_t)in.part.cell_count + 1, sizeof *right);
     memcpy(right, in.values, (size_t)in.part.cell_count * sizeof *right);
     for (int64_t cell = 0; cell < in.part.cell_count && own_rank == 0; cell++) in.values[cell] = 3;
-    everywhere(draw(session, &in, 0) == INSITU_OK);
+    everywhere(draw_step(session, &in, 0) == INSITU_OK);
     memcpy(in.values, right, (size_t)in.part.cell_count * sizeof *right);
     in.mesh.changed = INSITU_CHANGED_NOTHING;
     in.field.changed = own_rank == 0 ? INSITU_CHANGED_VALUES : INSITU_CHANGED_NOTHING;
-    everywhere(draw(session, &in, 1) == INSITU_OK);
+    everywhere(draw_step(session, &in, 1) == INSITU_OK);
     everywhere(are_means_right(session, &in));
     in.field.changed = INSITU_CHANGED_NOTHING;
-    everywhere(draw(session, &in, 2) == INSITU_OK);
+    everywhere(draw_step(session, &in, 2) == INSITU_OK);
     everywhere(insitu_last_report(session)->refit_ms == 0);
     insitu_destroy(&session);
     part_free(&in);
@@ -285,15 +285,15 @@ static void compare_with_alone(const char *scene, double bound)
         part_create(&all, 0, false);
         if (own_rank == 0) {
             insitu_session *session = open_session(MPI_COMM_SELF, name);
-            draw(session, &all, 0);
+            draw_step(session, &all, 0);
             if (caught_count == 1) alone = caught[0];
             caught_count = 0;
             insitu_destroy(&session);
         }
-        test_partition(&whole, (test_partition_kind)distributed, SIDE, rank_count, owners);
+        test_partition_cells(&whole, (test_partition_kind)distributed, SIDE, rank_count, owners);
         part_create(&in, own_rank, false);
         insitu_session *session = open_session(MPI_COMM_WORLD, name);
-        everywhere(draw(session, in.part.cell_count ? &in : NULL, 0) == INSITU_OK);
+        everywhere(draw_step(session, in.part.cell_count ? &in : NULL, 0) == INSITU_OK);
         insitu_destroy(&session);
         bool is_same = own_rank != 0 || (caught_count == 1 && alone.rgba && alone.depth);
         double worst = 0;
@@ -302,7 +302,7 @@ static void compare_with_alone(const char *scene, double bound)
             is_same = memcmp(&alone.depth[i], &caught[0].depth[i], sizeof(float)) == 0;
             covered += isfinite(alone.depth[i]);
             for (int c = 0; c < 4; c++)
-                worst = test_worse(worst, fabs((double)(alone.rgba[4 * i + c] - caught[0].rgba[4 * i + c])));
+                worst = test_larger_error(worst, fabs((double)(alone.rgba[4 * i + c] - caught[0].rgba[4 * i + c])));
         }
         everywhere(is_same);
         everywhere(worst <= bound);
@@ -314,19 +314,19 @@ static void compare_with_alone(const char *scene, double bound)
     }
 }
 
-static void surfaces_of_distributed_cells_are_those_of_one_rank(void **context)
+static void surfaces_do_not_depend_on_the_partition(void **context)
 {
     (void)context;
     compare_with_alone(surface_scene, 0);
 }
 
-static void volumes_of_distributed_cells_are_those_of_one_rank(void **context)
+static void volumes_do_not_depend_on_the_partition(void **context)
 {
     (void)context;
     compare_with_alone(mixed_scene, 1e-6);
 }
 
-static void smooth_volumes_of_distributed_cells_are_those_of_one_rank(void **context)
+static void smooth_volumes_do_not_depend_on_the_partition(void **context)
 {
     (void)context;
     compare_with_alone(SMOOTH("c", AT_VERTICES, "samples"), 1e-6);
@@ -346,7 +346,7 @@ static caught_picture draw_smooth(const char *scene, const part_input *in, const
     everywhere(insitu_set_mesh(session, "m", &in->mesh) == INSITU_OK);
     everywhere(insitu_set_field(session, "m", &in->field) == INSITU_OK);
     everywhere(insitu_set_field(session, "m", &v) == INSITU_OK);
-    everywhere(draw(session, NULL, 0) == INSITU_OK);
+    everywhere(draw_step(session, NULL, 0) == INSITU_OK);
     const caught_picture picture = pop_caught_picture();
     insitu_destroy(&session);
     return picture;
@@ -354,7 +354,7 @@ static caught_picture draw_smooth(const char *scene, const part_input *in, const
 
 /* Checks that `interpolate: vertex` draws a cell field by the means at its vertices, and that the default draws cell
  * values. The vertex field v cannot mark cells without a finite value of their own, so these cells are ghosts. */
-static void smooth_layers_are_those_of_the_means(void **context)
+static void smooth_layers_match_vertex_means(void **context)
 {
     (void)context;
     static const char *const scenes[2][4] = {
@@ -364,33 +364,33 @@ static void smooth_layers_are_those_of_the_means(void **context)
          SMOOTH("c", ", interpolate: cell", "segments")},
     };
     part_input in;
-    test_partition(&whole, TEST_RANDOM, SIDE, rank_count, owners);
+    test_partition_cells(&whole, TEST_RANDOM, SIDE, rank_count, owners);
     part_create(&in, own_rank, false);
     for (int64_t cell = 0; cell < in.part.cell_count; cell++)
         if (!isfinite(in.values[cell])) in.part.ghosts[cell] = 1;
     double *means = test_calloc((size_t)in.part.vertex_count + 1, sizeof *means);
-    for (int64_t v = 0; v < in.part.vertex_count; v++) means[v] = expected_at(in.part.coordinates + 3 * v);
+    for (int64_t v = 0; v < in.part.vertex_count; v++) means[v] = compute_expected_mean(in.part.coordinates + 3 * v);
     for (int method = 0; method < 2; method++) {
         caught_picture pictures[4];
         for (int i = 0; i < 4; i++) pictures[i] = draw_smooth(scenes[method][i], &in, means);
-        everywhere(same_pictures(&pictures[0], &pictures[1]));
-        everywhere(same_pictures(&pictures[2], &pictures[3]));
-        everywhere(own_rank != 0 || !same_pictures(&pictures[0], &pictures[2]));
+        everywhere(are_same_pictures(&pictures[0], &pictures[1]));
+        everywhere(are_same_pictures(&pictures[2], &pictures[3]));
+        everywhere(own_rank != 0 || !are_same_pictures(&pictures[0], &pictures[2]));
         for (int i = 0; i < 4; i++) free(pictures[i].rgba), free(pictures[i].depth);
     }
     part_free(&in);
     test_free(means);
 }
 
-static int begin_tests(void **state)
+static int set_up_test_group(void **state)
 {
     (void)state;
-    test_mesh_lattice(TEST_MIXED, SIDE, 0.2, test_wave, &whole);
+    test_mesh_make_lattice(TEST_MIXED, SIDE, 0.2, test_wave_field, &whole);
     owners = calloc((size_t)whole.cell_count, sizeof *owners);
     return 0;
 }
 
-static int end_tests(void **state)
+static int tear_down_test_group(void **state)
 {
     (void)state;
     free(owners);
@@ -402,13 +402,13 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(means_equal_a_search_over_all_cells),
-        cmocka_unit_test(means_follow_cells_that_part),
-        cmocka_unit_test(doubled_vertices_are_one),
+        cmocka_unit_test(means_follow_separated_cells),
+        cmocka_unit_test(duplicated_vertices_are_merged),
         cmocka_unit_test(means_follow_values_that_changed_on_one_rank),
-        cmocka_unit_test(surfaces_of_distributed_cells_are_those_of_one_rank),
-        cmocka_unit_test(volumes_of_distributed_cells_are_those_of_one_rank),
-        cmocka_unit_test(smooth_volumes_of_distributed_cells_are_those_of_one_rank),
-        cmocka_unit_test(smooth_layers_are_those_of_the_means),
+        cmocka_unit_test(surfaces_do_not_depend_on_the_partition),
+        cmocka_unit_test(volumes_do_not_depend_on_the_partition),
+        cmocka_unit_test(smooth_volumes_do_not_depend_on_the_partition),
+        cmocka_unit_test(smooth_layers_match_vertex_means),
     };
-    return run_session_tests(argc, argv, tests, begin_tests, end_tests);
+    return run_session_tests(argc, argv, tests, set_up_test_group, tear_down_test_group);
 }

@@ -37,7 +37,8 @@ static bool has_sea(void)
     return rank_count == 1 || own_rank < rank_count - 1;
 }
 
-static insitu_status set_named(insitu_session *session, const char *mesh, const session_input *in, const char *name)
+static insitu_status set_field_with_name(insitu_session *session, const char *mesh, const session_input *in,
+                                         const char *name)
 {
     insitu_field field = in->field;
     field.name = name;
@@ -48,20 +49,20 @@ static insitu_session *open_regions(const char *scene)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
     insitu_status status = insitu_set_mesh(session, "air", &air.mesh);
-    if (!status) status = set_named(session, "air", &air, "f");
-    if (!status) status = set_named(session, "air", &air, "t");
+    if (!status) status = set_field_with_name(session, "air", &air, "f");
+    if (!status) status = set_field_with_name(session, "air", &air, "t");
     if (!status && has_sea()) status = insitu_set_mesh(session, "sea/0", &sea.mesh);
-    if (!status && has_sea()) status = set_named(session, "sea/0", &sea, "f");
-    if (!status && has_sea()) status = set_named(session, "sea/0", &sea, "s");
+    if (!status && has_sea()) status = set_field_with_name(session, "sea/0", &sea, "f");
+    if (!status && has_sea()) status = set_field_with_name(session, "sea/0", &sea, "s");
     everywhere(status == INSITU_OK);
     return session;
 }
 
 /* Draws a scene and checks its warnings. Returns the picture on rank 0. */
-static caught_picture draw(const char *scene, const char *warning)
+static caught_picture draw_and_check_warnings(const char *scene, const char *warning)
 {
     insitu_session *session = open_regions(scene);
-    step_is_good(session, 0);
+    check_step_succeeds(session, 0);
     const char *warnings = insitu_last_report(session)->warnings;
     if (warning ? !strstr(warnings, warning) : *warnings) fprintf(stderr, "warnings: %s\n", warnings);
     everywhere(warning ? strstr(warnings, warning) != NULL : !*warnings);
@@ -76,7 +77,7 @@ static bool has_colour(const caught_picture *picture, int p)
 }
 
 /* Counts on rank 0 the covered pixels of the left half, which shows only the air, and of the right half. */
-static void count_covered(const caught_picture *picture, int counts[2])
+static void count_covered_pixels(const caught_picture *picture, int counts[2])
 {
     counts[0] = counts[1] = 0;
     for (int p = 0; own_rank == 0 && p < WIDTH * HEIGHT; p++) counts[p % WIDTH >= WIDTH / 2] += has_colour(picture, p);
@@ -84,12 +85,12 @@ static void count_covered(const caught_picture *picture, int counts[2])
 
 static void assert_same(const char *scene, const char *warning, const char *other)
 {
-    caught_picture a = draw(scene, warning), b = draw(other, NULL);
+    caught_picture a = draw_and_check_warnings(scene, warning), b = draw_and_check_warnings(other, NULL);
     bool is_same = true;
     for (int i = 0; own_rank == 0 && i < WIDTH * HEIGHT * 4; i++) is_same = is_same && a.rgba[i] == b.rgba[i];
     for (int i = 0; own_rank == 0 && i < WIDTH * HEIGHT; i++) is_same = is_same && a.depth[i] == b.depth[i];
     int counts[2];
-    count_covered(&a, counts);
+    count_covered_pixels(&a, counts);
     everywhere(own_rank != 0 || counts[0] + counts[1] > 100);
     everywhere(is_same);
     free_caught(&a);
@@ -103,7 +104,7 @@ static void assert_same(const char *scene, const char *warning, const char *othe
 
 /* Checks that a layer that names no mesh is drawn on all meshes that have its field, and that a layer that names a mesh
  * or a pattern is drawn on the meshes that match. */
-static void layers_are_on_the_meshes_that_have_the_field(void **context)
+static void layers_draw_only_meshes_with_the_field(void **context)
 {
     (void)context;
     static const struct {
@@ -124,9 +125,9 @@ static void layers_are_on_the_meshes_that_have_the_field(void **context)
         {FRONT_IMAGE("      - volume: {field: f, mesh: [air, sea/0]}\n"), {true, true}},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        caught_picture picture = draw(cases[i].scene, NULL);
+        caught_picture picture = draw_and_check_warnings(cases[i].scene, NULL);
         int counts[2];
-        count_covered(&picture, counts);
+        count_covered_pixels(&picture, counts);
         if (own_rank == 0) fprintf(stderr, "case %zu: %d and %d pixels\n", i, counts[0], counts[1]);
         everywhere(own_rank != 0 || ((counts[0] > 50) == cases[i].is_on[0] && (counts[1] > 50) == cases[i].is_on[1]));
         free_caught(&picture);
@@ -134,7 +135,7 @@ static void layers_are_on_the_meshes_that_have_the_field(void **context)
 }
 
 /* Checks that two layers, one on each region, draw the same picture as one layer on both regions. */
-static void regions_apart_are_regions_together(void **context)
+static void separate_meshes_draw_same_picture_as_one_mesh(void **context)
 {
     (void)context;
     assert_same(IMAGE("      - isosurface: {field: f, values: [0.1], colours: [[1, 0, 0]]}\n"), NULL,
@@ -180,7 +181,7 @@ static void colours_that_are_not_numbers_are_grey(void **context)
             field.name = "t";
             field.values.data = nothing;
             everywhere(insitu_set_field(session, "air", &field) == INSITU_OK);
-            step_is_good(session, 0);
+            check_step_succeeds(session, 0);
             if (own_rank == 0) pictures[i] = caught[0];
             caught_count = 0;
             insitu_destroy(&session);
@@ -206,15 +207,15 @@ static void warning_of_grey_is_reported_once(void **context)
             everywhere(insitu_set_mesh(session, "sea/0", &sea.mesh) == INSITU_OK);
         else
             everywhere(true);
-        everywhere(!has_sea() || set_named(session, "sea/0", &sea, "f") == INSITU_OK);
-        everywhere(!has_sea() || !has_t[cycle] || set_named(session, "sea/0", &sea, "t") == INSITU_OK);
-        step_is_good(session, cycle);
+        everywhere(!has_sea() || set_field_with_name(session, "sea/0", &sea, "f") == INSITU_OK);
+        everywhere(!has_sea() || !has_t[cycle] || set_field_with_name(session, "sea/0", &sea, "t") == INSITU_OK);
+        check_step_succeeds(session, cycle);
         everywhere((strstr(insitu_last_report(session)->warnings, "is grey") != NULL) == is_reported[cycle]);
     }
     insitu_destroy(&session);
 }
 
-static void fields_that_no_rank_has_are_refused(void **context)
+static void fields_missing_on_all_ranks_are_refused(void **context)
 {
     (void)context;
     static const struct {
@@ -242,20 +243,20 @@ static void fields_that_no_rank_has_are_refused(void **context)
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         insitu_session *session = open_regions(cases[i].scene);
         const insitu_status status = insitu_step(session, 0, 0);
-        reported_everywhere(session, status, cases[i].status, cases[i].words[0],
-                            cases[i].words[1] ? cases[i].words[1] : "");
+        check_reported_everywhere(session, status, cases[i].status, cases[i].words[0],
+                                  cases[i].words[1] ? cases[i].words[1] : "");
         insitu_destroy(&session);
     }
 }
 
-static int begin_tests(void **state)
+static int set_up_test_group(void **state)
 {
     (void)state;
     regions_create();
     return 0;
 }
 
-static int end_tests(void **state)
+static int tear_down_test_group(void **state)
 {
     (void)state;
     regions_free();
@@ -265,12 +266,12 @@ static int end_tests(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(layers_are_on_the_meshes_that_have_the_field),
-        cmocka_unit_test(regions_apart_are_regions_together),
+        cmocka_unit_test(layers_draw_only_meshes_with_the_field),
+        cmocka_unit_test(separate_meshes_draw_same_picture_as_one_mesh),
         cmocka_unit_test(surfaces_without_the_colour_field_are_grey),
         cmocka_unit_test(colours_that_are_not_numbers_are_grey),
         cmocka_unit_test(warning_of_grey_is_reported_once),
-        cmocka_unit_test(fields_that_no_rank_has_are_refused),
+        cmocka_unit_test(fields_missing_on_all_ranks_are_refused),
     };
-    return run_session_tests(argc, argv, tests, begin_tests, end_tests);
+    return run_session_tests(argc, argv, tests, set_up_test_group, tear_down_test_group);
 }

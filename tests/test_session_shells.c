@@ -35,7 +35,7 @@ static int add_vertex(shell_mesh *m, double x, double y, double z)
     place[0] = x;
     place[1] = y;
     place[2] = z;
-    m->values[m->vertex_count] = test_linear(place);
+    m->values[m->vertex_count] = test_linear_field(place);
     return m->vertex_count++;
 }
 
@@ -125,7 +125,7 @@ static void extract_rank_cells(const shell_mesh *whole, bool with_ghosts, shell_
     }
 }
 
-static insitu_mesh describe(const shell_mesh *m)
+static insitu_mesh describe_shells(const shell_mesh *m)
 {
     insitu_mesh mesh;
     insitu_mesh_defaults(&mesh);
@@ -157,10 +157,10 @@ static insitu_status set_field(insitu_session *session, const char *name, insitu
     return insitu_set_field(session, "m", &field);
 }
 
-static insitu_session *open_with(MPI_Comm comm, const char *scene, const shell_mesh *m)
+static insitu_session *open_session_with_shells(MPI_Comm comm, const char *scene, const shell_mesh *m)
 {
     insitu_session *session = open_session(comm, scene);
-    const insitu_mesh mesh = describe(m);
+    const insitu_mesh mesh = describe_shells(m);
     discard_pictures();
     assert_int_equal(insitu_set_mesh(session, "m", &mesh), INSITU_OK);
     assert_int_equal(set_field(session, "f", INSITU_VERTEX, m->vertex_count, m->values), INSITU_OK);
@@ -171,9 +171,9 @@ static insitu_session *open_with(MPI_Comm comm, const char *scene, const shell_m
     return session;
 }
 
-static caught_picture draw(MPI_Comm comm, const char *scene, const shell_mesh *m)
+static caught_picture draw_shells(MPI_Comm comm, const char *scene, const shell_mesh *m)
 {
-    insitu_session *session = open_with(comm, scene, m);
+    insitu_session *session = open_session_with_shells(comm, scene, m);
     if (insitu_last_report(session)->warnings[0]) fail_msg("warnings: %s", insitu_last_report(session)->warnings);
     const caught_picture picture = pop_caught_picture();
     insitu_destroy(&session);
@@ -186,7 +186,7 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const shell_mesh *m
 static double intersect_sheet(int pixel, double place[3])
 {
     static const double normal[3] = {0.3, 0.2, -1};
-    const ray r = ray_of(pixel);
+    const ray r = make_pixel_ray(pixel);
     double along = 0, left = 0;
     for (int a = 0; a < 3; a++) {
         along += normal[a] * r.direction[a];
@@ -206,7 +206,7 @@ static bool is_sheet(const caught_picture *picture)
         const double depth = intersect_sheet(pixel, place), reach = fmax(fabs(place[0]), fabs(place[1]));
         const float *own = picture->rgba + 4 * (ptrdiff_t)pixel;
         if (fabs(reach - 1) < 1e-4) continue;
-        const double grey = (double)colour_linear_from_srgb((float)((test_linear(place) + 2) / 4));
+        const double grey = (double)colour_linear_from_srgb((float)((test_linear_field(place) + 2) / 4));
         const bool is_hit = reach < 1;
         hits += is_hit;
         if (is_hit ? own[3] == 1 && fabs((double)picture->depth[pixel] - depth) < 1.5e-5 &&
@@ -229,11 +229,11 @@ static void sheets_are_planes_on_any_ranks(void **state)
             shell_mesh whole, part;
             make_sheet(kind, &whole);
             extract_rank_cells(&whole, with_ghosts, &part);
-            caught_picture ours = draw(MPI_COMM_WORLD, scene, &part), alone = {0};
+            caught_picture ours = draw_shells(MPI_COMM_WORLD, scene, &part), alone = {0};
             bool is_well = true;
             if (own_rank == 0) {
-                alone = draw(MPI_COMM_SELF, scene, &whole);
-                is_well = is_sheet(&alone) && same_pictures(&ours, &alone);
+                alone = draw_shells(MPI_COMM_SELF, scene, &whole);
+                is_well = is_sheet(&alone) && are_same_pictures(&ours, &alone);
             }
             everywhere(is_well);
             free_caught(&ours);
@@ -242,14 +242,14 @@ static void sheets_are_planes_on_any_ranks(void **state)
 }
 
 /* Of the 12 shells, 4 replace outer faces of the block, which has 24. */
-static void shells_take_the_place_of_faces(void **state)
+static void shells_replace_coincident_faces(void **state)
 {
     (void)state;
     shell_mesh whole, part;
     make_block(true, &whole);
     extract_rank_cells(&whole, false, &part);
-    insitu_session *session =
-        open_with(MPI_COMM_WORLD, write_scene(IMAGE("      - surface: {colour_by: {field: c}}\n")), &part);
+    insitu_session *session = open_session_with_shells(
+        MPI_COMM_WORLD, write_scene(IMAGE("      - surface: {colour_by: {field: c}}\n")), &part);
     const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
     const session_outer *outer = mesh->outers[0];
     int64_t counts[4] = {outer->face_count, 0, insitu_last_report(session)->cells_shell,
@@ -260,7 +260,7 @@ static void shells_take_the_place_of_faces(void **state)
     insitu_destroy(&session);
 }
 
-static void other_layers_pass_shells_over(void **state)
+static void other_layers_skip_shells(void **state)
 {
     (void)state;
     static const char *const scenes[] = {
@@ -273,14 +273,14 @@ static void other_layers_pass_shells_over(void **state)
         make_block(true, &whole);
         make_block(false, &without);
         extract_rank_cells(&whole, false, &part);
-        caught_picture ours = draw(MPI_COMM_WORLD, scene, &part), alone = {0}, bare = {0};
+        caught_picture ours = draw_shells(MPI_COMM_WORLD, scene, &part), alone = {0}, bare = {0};
         bool is_well = true;
         if (own_rank == 0) {
-            alone = draw(MPI_COMM_SELF, scene, &whole);
-            bare = draw(MPI_COMM_SELF, scene, &without);
+            alone = draw_shells(MPI_COMM_SELF, scene, &whole);
+            bare = draw_shells(MPI_COMM_SELF, scene, &without);
             int hits = 0;
             for (int pixel = 0; pixel < PIXELS; pixel++) hits += bare.rgba[4 * pixel + 3] > 0;
-            is_well = hits > PIXELS / 20 && same_pictures(&alone, &bare);
+            is_well = hits > PIXELS / 20 && are_same_pictures(&alone, &bare);
             for (int k = 0; k < 4 * PIXELS; k++)
                 is_well = is_well && fabs((double)alone.rgba[k] - (double)ours.rgba[k]) <= 1e-6;
         }
@@ -296,11 +296,11 @@ static void other_layers_pass_shells_over(void **state)
 static void is_reported(const shell_mesh *m, const char *const words[2])
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(IMAGE(SURFACE)));
-    const insitu_mesh mesh = describe(m);
+    const insitu_mesh mesh = describe_shells(m);
     insitu_set_mesh(session, "m", &mesh);
     set_field(session, "f", INSITU_VERTEX, m->vertex_count, m->values);
     const insitu_status status = insitu_step(session, 0, 0);
-    reported_everywhere(session, status, INSITU_ERROR_MESH, words[0], words[1]);
+    check_reported_everywhere(session, status, INSITU_ERROR_MESH, words[0], words[1]);
     insitu_destroy(&session);
 }
 
@@ -330,8 +330,8 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(sheets_are_planes_on_any_ranks),
-        cmocka_unit_test(shells_take_the_place_of_faces),
-        cmocka_unit_test(other_layers_pass_shells_over),
+        cmocka_unit_test(shells_replace_coincident_faces),
+        cmocka_unit_test(other_layers_skip_shells),
         cmocka_unit_test(bad_shells_are_reported),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);

@@ -24,7 +24,7 @@ typedef struct plane {
 } plane;
 
 /* Returns the depth at which the ray intersects the plane, and stores the position in at. */
-static double meet(const ray *r, const plane *p, double at[3])
+static double intersect_plane(const ray *r, const plane *p, double at[3])
 {
     double along = 0, from = p->distance;
     for (int a = 0; a < 3; a++) {
@@ -35,12 +35,12 @@ static double meet(const ray *r, const plane *p, double at[3])
     return from / along;
 }
 
-static double outside_by(const double at[3])
+static double distance_outside_cube(const double at[3])
 {
     return fmax(fabs(at[0]), fmax(fabs(at[1]), fabs(at[2]))) - 1;
 }
 
-static void table_colour(double value, double out[3])
+static void get_table_colour(double value, double out[3])
 {
     int count = 0;
     const float *table = colour_map_table("turbo", &count);
@@ -54,9 +54,9 @@ static void table_colour(double value, double out[3])
 
 /* ---- pictures ------------------------------------------------------------------------------------------------ */
 
-static caught_picture draw(MPI_Comm comm, const char *scene, const session_input *in, const char *warning)
+static caught_picture draw_slices(MPI_Comm comm, const char *scene, const session_input *in, const char *warning)
 {
-    insitu_session *session = open_drawn(comm, scene, in);
+    insitu_session *session = open_session_and_draw(comm, scene, in);
     const char *warnings = insitu_last_report(session)->warnings;
     if (warning ? !strstr(warnings, warning) : *warnings) fail_msg("warnings: %s", warnings);
     const caught_picture picture = pop_caught_picture();
@@ -68,17 +68,17 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const session_input
  * may hit or miss. Depths near 5 are off by roundings of single precision times the inverse cosine of the angle of
  * incidence, at most 10 here. Colours are off by the depth error times the field's slope, 1 in 3.2, and the colour
  * table's slope, at most 12. */
-static bool is_truth(const caught_picture *picture, const plane *planes, int count)
+static bool check_planes(const caught_picture *picture, const plane *planes, int count)
 {
     const double depth_error = 10 * 5 * 3e-7, colour_error = depth_error / 3.2 * 12;
     int hits = 0;
     for (int pixel = 0; pixel < WIDTH * HEIGHT; pixel++) {
-        const ray r = ray_of(pixel);
+        const ray r = make_pixel_ray(pixel);
         double nearest = INFINITY, where[3] = {0}, colour[3];
         bool is_near_border = false;
         for (int i = 0; i < count; i++) {
             double at[3];
-            const double depth = meet(&r, &planes[i], at), outside = outside_by(at);
+            const double depth = intersect_plane(&r, &planes[i], at), outside = distance_outside_cube(at);
             is_near_border = is_near_border || fabs(outside) < 1e-4;
             if (outside < 0 && depth < nearest) {
                 nearest = depth;
@@ -93,9 +93,9 @@ static bool is_truth(const caught_picture *picture, const plane *planes, int cou
         }
         if (isinf(nearest)) continue;
         hits++;
-        table_colour(test_linear(where), colour);
+        get_table_colour(test_linear_field(where), colour);
         double off = 0;
-        for (int c = 0; c < 3; c++) off = test_worse(off, fabs((double)rgba[c] - colour[c]));
+        for (int c = 0; c < 3; c++) off = test_larger_error(off, fabs((double)rgba[c] - colour[c]));
         if (fabs((double)picture->depth[pixel] - nearest) > depth_error || off > colour_error) {
             fprintf(stderr, "pixel %d: depth %.9g, expected %.9g; colour off by %g\n", pixel,
                     (double)picture->depth[pixel], nearest, off);
@@ -107,9 +107,9 @@ static bool is_truth(const caught_picture *picture, const plane *planes, int cou
 
 /* ---- inputs -------------------------------------------------------------------------------------------------- */
 
-static void make_whole(test_mesh_kind kind, double jitter, session_input *out)
+static void make_whole_mesh(test_mesh_kind kind, double jitter, session_input *out)
 {
-    test_mesh_lattice(kind, SIDE, jitter, test_linear, &out->part);
+    test_mesh_make_lattice(kind, SIDE, jitter, test_linear_field, &out->part);
     input_describe(out);
 }
 
@@ -118,7 +118,7 @@ static void extract_rank_cells(const session_input *whole, test_partition_kind d
                                session_input *out)
 {
     extract_own_cells(&whole->part, distributed, SIDE, with_ghosts, &out->part);
-    test_mesh_shuffle(&out->part, 7 + (uint64_t)own_rank);
+    test_mesh_shuffle_cells(&out->part, 7 + (uint64_t)own_rank);
     input_describe(out);
 }
 
@@ -129,7 +129,7 @@ static const plane three[3] = {{{1. / 3, 2. / 3, -2. / 3}, -0.4}, {{1, 1, 4}, 0.
 
 /* Planes given by `count` are spread evenly over the cube's extent along the normal, which is from -sqrt(3) to sqrt(3)
  * along the diagonal. */
-static void planes_in_numbers_are_true(void **state)
+static void several_planes_are_exact(void **state)
 {
     (void)state;
     static const char scene[] = IMAGE(
@@ -143,34 +143,34 @@ static void planes_in_numbers_are_true(void **state)
     session_input whole = {0};
     bool is_well = true;
     assert_true(fabs(2 * n - 2. / 3 * sqrt(3)) < 1e-15);
-    make_whole(TEST_HEXES, 0, &whole);
+    make_whole_mesh(TEST_HEXES, 0, &whole);
     const char *file = write_scene(scene);
     if (own_rank == 0) {
-        caught_picture picture = draw(MPI_COMM_SELF, file, &whole, NULL);
-        is_well = is_truth(&picture, planes, 5);
+        caught_picture picture = draw_slices(MPI_COMM_SELF, file, &whole, NULL);
+        is_well = check_planes(&picture, planes, 5);
         free_caught(&picture);
     }
     everywhere(is_well);
     input_free(&whole);
 }
 
-static void planes_give_the_picture_of(test_mesh_kind kind)
+static void check_planes_in_mesh(test_mesh_kind kind)
 {
     session_input whole = {0};
     caught_picture alone = {0};
     bool is_well = true;
-    make_whole(kind, 0.2, &whole);
+    make_whole_mesh(kind, 0.2, &whole);
     const char *scene = write_scene(three_planes);
     if (own_rank == 0) {
-        alone = draw(MPI_COMM_SELF, scene, &whole, NULL);
-        is_well = is_truth(&alone, three, 3);
+        alone = draw_slices(MPI_COMM_SELF, scene, &whole, NULL);
+        is_well = check_planes(&alone, three, 3);
     }
     everywhere(is_well);
     for (int way = 0; way < 3; way++) {
         session_input part = {0};
         extract_rank_cells(&whole, way == 1 ? TEST_BLOCK : TEST_RANDOM, way == 2, &part);
-        caught_picture picture = draw(MPI_COMM_WORLD, scene, &part, NULL);
-        everywhere(own_rank != 0 || same_pictures(&picture, &alone));
+        caught_picture picture = draw_slices(MPI_COMM_WORLD, scene, &part, NULL);
+        everywhere(own_rank != 0 || are_same_pictures(&picture, &alone));
         free_caught(&picture);
         input_free(&part);
     }
@@ -178,10 +178,10 @@ static void planes_give_the_picture_of(test_mesh_kind kind)
     input_free(&whole);
 }
 
-static void planes_are_true_and_the_same_on_any_ranks(void **state)
+static void planes_are_exact_on_any_ranks(void **state)
 {
     (void)state;
-    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) planes_give_the_picture_of(kind);
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) check_planes_in_mesh(kind);
 }
 
 /* ---- many ---------------------------------------------------------------------------------------------------- */
@@ -189,27 +189,27 @@ static void planes_are_true_and_the_same_on_any_ranks(void **state)
 enum { MANY_VALUES = 40, MANY_PLANES = 24 };
 
 /* Returns the isovalues in descending order, as those of a layer need not be sorted. */
-static double many_value(int i)
+static double get_isovalue(int i)
 {
     return 1.2207 - 0.0613 * i;
 }
 
-static double many_distance(int i)
+static double get_plane_distance(int i)
 {
     return -0.93 + 0.0817 * i;
 }
 
 /* Writes a scene with the maximum number of isovalues and planes of an image, each of opacity 0.05. */
-static const char *write_many(void)
+static const char *write_scene_of_many_surfaces(void)
 {
     char text[8192];
     int at = snprintf(text, sizeof text, "%s      - isosurface: {field: f, opacity: 0.05, values: [", IMAGE_BEGIN(""));
     for (int i = 0; i < MANY_VALUES; i++)
-        at += snprintf(text + at, sizeof text - (size_t)at, "%s%.4f", i ? ", " : "", many_value(i));
+        at += snprintf(text + at, sizeof text - (size_t)at, "%s%.4f", i ? ", " : "", get_isovalue(i));
     at += snprintf(text + at, sizeof text - (size_t)at, "]}\n      - slice: {field: f, opacity: 0.05, planes: [");
     for (int i = 0; i < MANY_PLANES; i++)
         at += snprintf(text + at, sizeof text - (size_t)at, "%s{normal: [1, 0, 0], offset: %.4f}", i ? ", " : "",
-                       many_distance(i));
+                       get_plane_distance(i));
     snprintf(text + at, sizeof text - (size_t)at, "]}\n" IMAGE_END);
     return write_scene(text);
 }
@@ -217,19 +217,19 @@ static const char *write_many(void)
 /* Checks that each surface is crossed by some ray, and that each crossing leaves 0.95 of the light behind it. The
  * isosurfaces of a linear field are planes. Each of at most 64 products is rounded to single precision: 64 × 2^-23 <
  * 1e-5. */
-static bool has_many(const caught_picture *picture)
+static bool check_all_surfaces_crossed(const caught_picture *picture)
 {
     bool is_crossed[MANY_VALUES + MANY_PLANES] = {false};
     for (int pixel = 0; pixel < PIXELS; pixel++) {
-        const ray r = ray_of(pixel);
+        const ray r = make_pixel_ray(pixel);
         int crossings = 0;
         bool is_near_border = false;
         for (int i = 0; i < MANY_VALUES + MANY_PLANES; i++) {
-            const plane p = i < MANY_VALUES ? (plane){{0.3, -0.7, 0.5}, many_value(i) - 0.1}
-                                            : (plane){{1, 0, 0}, many_distance(i - MANY_VALUES)};
+            const plane p = i < MANY_VALUES ? (plane){{0.3, -0.7, 0.5}, get_isovalue(i) - 0.1}
+                                            : (plane){{1, 0, 0}, get_plane_distance(i - MANY_VALUES)};
             double at[3];
-            meet(&r, &p, at);
-            const double outside = outside_by(at);
+            intersect_plane(&r, &p, at);
+            const double outside = distance_outside_cube(at);
             is_near_border = is_near_border || fabs(outside) < 1e-4;
             crossings += outside < 0;
             is_crossed[i] = is_crossed[i] || outside < -1e-4;
@@ -250,13 +250,13 @@ static bool has_many(const caught_picture *picture)
 static void many_isovalues_and_planes_are_all_drawn(void **state)
 {
     (void)state;
-    const char *scene = write_many();
+    const char *scene = write_scene_of_many_surfaces();
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         session_input whole = {0}, part = {0};
-        make_whole(kind, 0.2, &whole);
+        make_whole_mesh(kind, 0.2, &whole);
         extract_rank_cells(&whole, TEST_RANDOM, false, &part);
-        caught_picture picture = draw(MPI_COMM_WORLD, scene, &part, NULL);
-        everywhere(own_rank != 0 || has_many(&picture));
+        caught_picture picture = draw_slices(MPI_COMM_WORLD, scene, &part, NULL);
+        everywhere(own_rank != 0 || check_all_surfaces_crossed(&picture));
         free_caught(&picture);
         input_free(&part);
         input_free(&whole);
@@ -267,14 +267,14 @@ static void many_isovalues_and_planes_are_all_drawn(void **state)
 
 /* Checks that every ray that intersects the plane within the cube crosses the slice exactly once: the opacity is
  * 0.5. */
-static bool is_once(const caught_picture *picture, const plane *p)
+static bool is_drawn_once(const caught_picture *picture, const plane *p)
 {
     int hits = 0;
     for (int pixel = 0; pixel < WIDTH * HEIGHT; pixel++) {
-        const ray r = ray_of(pixel);
+        const ray r = make_pixel_ray(pixel);
         double at[3];
-        meet(&r, p, at);
-        const double outside = outside_by((const double[3]){
+        intersect_plane(&r, p, at);
+        const double outside = distance_outside_cube((const double[3]){
             p->normal[0] != 0 ? 0 : at[0], p->normal[1] != 0 ? 0 : at[1], p->normal[2] != 0 ? 0 : at[2]});
         const float opacity = picture->rgba[4 * pixel + 3];
         if (fabs(outside) < 1e-5) continue;
@@ -289,10 +289,10 @@ static bool is_once(const caught_picture *picture, const plane *p)
 static void draw_in_faces(test_mesh_kind kind, const char *scene, const plane *p)
 {
     session_input whole = {0}, part = {0};
-    make_whole(kind, 0, &whole);
+    make_whole_mesh(kind, 0, &whole);
     extract_rank_cells(&whole, TEST_RANDOM, false, &part);
-    caught_picture picture = draw(MPI_COMM_WORLD, write_scene(scene), &part, NULL);
-    everywhere(own_rank != 0 || is_once(&picture, p));
+    caught_picture picture = draw_slices(MPI_COMM_WORLD, write_scene(scene), &part, NULL);
+    everywhere(own_rank != 0 || is_drawn_once(&picture, p));
     free_caught(&picture);
     input_free(&part);
     input_free(&whole);
@@ -320,13 +320,14 @@ static void planes_on_the_border_are_drawn(void **state)
     }
 }
 
-static void planes_beside_the_data_are_warned_of(void **state)
+static void planes_outside_the_data_give_a_warning(void **state)
 {
     (void)state;
     session_input part = {0};
     input_create(&part, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
-    caught_picture picture = draw(MPI_COMM_WORLD, write_scene(IMAGE(SLICE("", "{normal: [0, 0, 2], offset: 1.5}"))),
-                                  &part, "a plane of its slices meets no cell: cells are -2.5 to -0.5 from it");
+    caught_picture picture =
+        draw_slices(MPI_COMM_WORLD, write_scene(IMAGE(SLICE("", "{normal: [0, 0, 2], offset: 1.5}"))), &part,
+                    "a plane of its slices meets no cell: cells are -2.5 to -0.5 from it");
     free_caught(&picture);
     input_free(&part);
 }
@@ -338,16 +339,16 @@ static bool has_colours_of_cells(const caught_picture *picture)
 {
     int hits = 0;
     for (int pixel = 0; pixel < WIDTH * HEIGHT; pixel++) {
-        const ray r = ray_of(pixel);
+        const ray r = make_pixel_ray(pixel);
         double at[3], expected[3], off = 0;
-        meet(&r, &(plane){{0, 0, 1}, 0.1}, at);
+        intersect_plane(&r, &(plane){{0, 0, 1}, 0.1}, at);
         const double x = (at[0] + 1) / 2 * SIDE, y = (at[1] + 1) / 2 * SIDE;
-        if (outside_by(at) > -1e-4 || fabs(x - rint(x)) < 1e-4 || fabs(y - rint(y)) < 1e-4) continue;
+        if (distance_outside_cube(at) > -1e-4 || fabs(x - rint(x)) < 1e-4 || fabs(y - rint(y)) < 1e-4) continue;
         const int cell = (int)x + SIDE * (int)y;
-        table_colour(-1.5 + 0.2 * cell, expected);
+        get_table_colour(-1.5 + 0.2 * cell, expected);
         for (int c = 0; c < 3; c++) {
             const double wanted = cell == 5 ? (double)RENDER_NO_COLOUR : expected[c];
-            off = test_worse(off, fabs((double)picture->rgba[4 * pixel + c] - wanted));
+            off = test_larger_error(off, fabs((double)picture->rgba[4 * pixel + c] - wanted));
         }
         hits++;
         if (off > 1e-5) {
@@ -358,11 +359,11 @@ static bool has_colours_of_cells(const caught_picture *picture)
     return hits > 100;
 }
 
-static void cells_have_their_values_and_no_number_is_grey(void **state)
+static void cell_values_are_drawn_and_nan_is_grey(void **state)
 {
     (void)state;
     session_input whole = {0}, part = {0};
-    make_whole(TEST_HEXES, 0, &whole);
+    make_whole_mesh(TEST_HEXES, 0, &whole);
     extract_rank_cells(&whole, TEST_RANDOM, false, &part);
     double *values = test_calloc((size_t)part.part.cell_count + 1, sizeof *values);
     for (int64_t cell = 0; cell < part.part.cell_count; cell++) {
@@ -376,8 +377,8 @@ static void cells_have_their_values_and_no_number_is_grey(void **state)
     part.field.centring = INSITU_CELL;
     part.field.count = part.part.cell_count;
     part.field.values.data = values;
-    caught_picture picture =
-        draw(MPI_COMM_WORLD, write_scene(IMAGE(SLICE("", "{normal: [0, 0, 1], point: [0, 0, 0.1]}"))), &part, NULL);
+    caught_picture picture = draw_slices(
+        MPI_COMM_WORLD, write_scene(IMAGE(SLICE("", "{normal: [0, 0, 1], point: [0, 0, 0.1]}"))), &part, NULL);
     everywhere(own_rank != 0 || has_colours_of_cells(&picture));
     free_caught(&picture);
     test_free(values);
@@ -387,7 +388,7 @@ static void cells_have_their_values_and_no_number_is_grey(void **state)
 
 /* ---- recomputation ------------------------------------------------------------------------------------------- */
 
-static session_scalar *distances_of(const insitu_session *session)
+static session_scalar *find_distance_field(const insitu_session *session)
 {
     const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
     for (int i = 0; i < mesh->scalar_count; i++)
@@ -397,7 +398,7 @@ static session_scalar *distances_of(const insitu_session *session)
 
 /* Checks that two images of one plane share the distances of vertices, that new values do not cause them to be
  * recomputed but new coordinates do, and that a plane through the centre of the data moves with the data. */
-static void distances_go_with_the_geometry(void **state)
+static void distances_follow_the_geometry(void **state)
 {
     (void)state;
     session_input part = {0};
@@ -405,23 +406,23 @@ static void distances_go_with_the_geometry(void **state)
     insitu_session *session = open_session(
         MPI_COMM_WORLD, write_scene(IMAGE(SLICE("", "{normal: [0, 0, 1]}") SLICE("", "{normal: [0, 0, 1]}"))));
     part.mesh.changed = 0;
-    everywhere(submit(session, &part) == INSITU_OK);
-    step_is_good(session, 0);
+    everywhere(submit_input(session, &part) == INSITU_OK);
+    check_step_succeeds(session, 0);
     const bool has_cells = part.part.cell_count > 0;
     const int64_t bytes = insitu_last_report(session)->bytes_copied;
     everywhere(bytes == part.part.vertex_count * (int64_t)sizeof(float));
-    if (has_cells) distances_of(session)->distances[0] = 77;
+    if (has_cells) find_distance_field(session)->distances[0] = 77;
     for (int64_t v = 0; v < part.part.vertex_count; v++) part.part.values[v] += 1;
     everywhere(insitu_set_field(session, "m", &part.field) == INSITU_OK);
-    step_is_good(session, 1);
-    everywhere(!has_cells || distances_of(session)->distances[0] == 77);
+    check_step_succeeds(session, 1);
+    everywhere(!has_cells || find_distance_field(session)->distances[0] == 77);
     for (int64_t v = 0; v < part.part.vertex_count; v++) part.part.coordinates[3 * v + 2] += 3;
     part.mesh.changed = INSITU_CHANGED_GEOMETRY;
     everywhere(insitu_set_mesh(session, "m", &part.mesh) == INSITU_OK);
-    step_is_good(session, 2);
+    check_step_succeeds(session, 2);
     bool is_right = true;
     for (int64_t v = 0; v < part.part.vertex_count && is_right; v++)
-        is_right = distances_of(session)->distances[v] == (float)(part.part.coordinates[3 * v + 2] - 3);
+        is_right = find_distance_field(session)->distances[v] == (float)(part.part.coordinates[3 * v + 2] - 3);
     everywhere(is_right);
     insitu_destroy(&session);
     input_free(&part);
@@ -430,14 +431,14 @@ static void distances_go_with_the_geometry(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(planes_are_true_and_the_same_on_any_ranks),
-        cmocka_unit_test(planes_in_numbers_are_true),
+        cmocka_unit_test(planes_are_exact_on_any_ranks),
+        cmocka_unit_test(several_planes_are_exact),
         cmocka_unit_test(many_isovalues_and_planes_are_all_drawn),
         cmocka_unit_test(planes_in_faces_are_drawn_once),
         cmocka_unit_test(planes_on_the_border_are_drawn),
-        cmocka_unit_test(planes_beside_the_data_are_warned_of),
-        cmocka_unit_test(cells_have_their_values_and_no_number_is_grey),
-        cmocka_unit_test(distances_go_with_the_geometry),
+        cmocka_unit_test(planes_outside_the_data_give_a_warning),
+        cmocka_unit_test(cell_values_are_drawn_and_nan_is_grey),
+        cmocka_unit_test(distances_follow_the_geometry),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -22,7 +22,7 @@ enum { NX, NY, NZ, VALUE, LAYER, SURFACE, CHANNELS };
 
 /* ---- gradients at vertices, by Gaussian elimination ------------------------------------------------------------ */
 
-static void *zeros(int64_t count, size_t size)
+static void *allocate_zeroed(int64_t count, size_t size)
 {
     void *out = calloc((size_t)count, size);
     assert_non_null(out);
@@ -35,7 +35,7 @@ typedef struct gradients {
 } gradients;
 
 /* Solves the 3 × 3 system in x, whose last column is the right-hand side. Returns false if the system is singular. */
-static bool eliminate(double x[3][4], double *determinant)
+static bool eliminate_gauss(double x[3][4], double *determinant)
 {
     *determinant = 1;
     for (int c = 0; c < 3; c++) {
@@ -65,39 +65,41 @@ static void add_corner(gradients *g, int64_t vertex, const double corner[4], con
         for (int k = 0; k < 4; k++) x[i][k] = ends[i][k] - corner[k];
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++) squares += x[i][k] * x[i][k];
-    if (!eliminate(x, &determinant)) return;
+    if (!eliminate_gauss(x, &determinant)) return;
     const double weight = fabs(determinant) / pow(squares, 2);
     for (int k = 0; k < 3; k++) g->sum[vertex][k] += weight * x[k][3];
     g->sum[vertex][3] += weight;
 }
 
-static void node_of(const test_mesh *mesh, int64_t vertex, double out[4])
+static void get_vertex_and_value(const test_mesh *mesh, int64_t vertex, double out[4])
 {
     memcpy(out, mesh->coordinates + 3 * vertex, 3 * sizeof *out);
     out[3] = mesh->values[vertex];
 }
 
-static void add_ends(gradients *g, const test_mesh *mesh, const int64_t *cell, int corner, int a, int b, int c)
+static void add_corner_gradient(gradients *g, const test_mesh *mesh, const int64_t *cell, int corner, int a, int b,
+                                int c)
 {
     double at[4], ends[3][4];
-    node_of(mesh, cell[corner], at);
-    node_of(mesh, cell[a], ends[0]);
-    node_of(mesh, cell[b], ends[1]);
-    node_of(mesh, cell[c], ends[2]);
+    get_vertex_and_value(mesh, cell[corner], at);
+    get_vertex_and_value(mesh, cell[a], ends[0]);
+    get_vertex_and_value(mesh, cell[b], ends[1]);
+    get_vertex_and_value(mesh, cell[c], ends[2]);
     add_corner(g, cell[corner], at, (const double(*)[4])ends);
 }
 
-static void add_plain_cell(gradients *g, const test_mesh *mesh, int type, const int64_t *cell)
+static void add_cell_gradients(gradients *g, const test_mesh *mesh, int type, const int64_t *cell)
 {
     static const int around[8] = {0, 1, 3, 2, 4, 5, 7, 6}; /* maps a hex's vertices to three bits, and back */
     for (int i = 0; i < 8 && type == INSITU_HEX; i++)
-        add_ends(g, mesh, cell, i, around[around[i] ^ 1], around[around[i] ^ 2], around[around[i] ^ 4]);
-    for (int i = 0; i < 4 && type == INSITU_TET; i++) add_ends(g, mesh, cell, i, (i + 1) % 4, (i + 2) % 4, (i + 3) % 4);
+        add_corner_gradient(g, mesh, cell, i, around[around[i] ^ 1], around[around[i] ^ 2], around[around[i] ^ 4]);
+    for (int i = 0; i < 4 && type == INSITU_TET; i++)
+        add_corner_gradient(g, mesh, cell, i, (i + 1) % 4, (i + 2) % 4, (i + 3) % 4);
     for (int i = 0; i < 6 && type == INSITU_WEDGE; i++)
-        add_ends(g, mesh, cell, i, i / 3 * 3 + (i + 1) % 3, i / 3 * 3 + (i + 2) % 3, (i + 3) % 6);
+        add_corner_gradient(g, mesh, cell, i, i / 3 * 3 + (i + 1) % 3, i / 3 * 3 + (i + 2) % 3, (i + 3) % 6);
     for (int i = 0; i < 4 && type == INSITU_PYRAMID; i++) {
-        add_ends(g, mesh, cell, i, (i + 1) % 4, (i + 3) % 4, 4);
-        add_ends(g, mesh, cell, 4, i, (i + 1) % 4, (i + 2) % 4);
+        add_corner_gradient(g, mesh, cell, i, (i + 1) % 4, (i + 3) % 4, 4);
+        add_corner_gradient(g, mesh, cell, 4, i, (i + 1) % 4, (i + 2) % 4);
     }
 }
 
@@ -116,16 +118,16 @@ static void add_polyhedron(gradients *g, const test_mesh *mesh, const int64_t *f
         }
     for (int i = 0; i < count; i++) {
         double node[4];
-        node_of(mesh, known[i], node);
+        get_vertex_and_value(mesh, known[i], node);
         for (int k = 0; k < 4; k++) centre[k] += node[k] / count;
     }
     for (int64_t f = 0; f < face_count; f++) {
         const int64_t first = mesh->face_offsets[faces[f]], corners = mesh->face_offsets[faces[f] + 1] - first;
         for (int64_t i = 0; i < corners; i++) {
             double at[4], ends[3][4];
-            node_of(mesh, mesh->face_connectivity[first + i], at);
-            node_of(mesh, mesh->face_connectivity[first + (i + 1) % corners], ends[0]);
-            node_of(mesh, mesh->face_connectivity[first + (i + corners - 1) % corners], ends[1]);
+            get_vertex_and_value(mesh, mesh->face_connectivity[first + i], at);
+            get_vertex_and_value(mesh, mesh->face_connectivity[first + (i + 1) % corners], ends[0]);
+            get_vertex_and_value(mesh, mesh->face_connectivity[first + (i + corners - 1) % corners], ends[1]);
             memcpy(ends[2], centre, sizeof centre);
             add_corner(g, mesh->face_connectivity[first + i], at, (const double(*)[4])ends);
         }
@@ -134,14 +136,14 @@ static void add_polyhedron(gradients *g, const test_mesh *mesh, const int64_t *f
 
 static void solve_gradients(const test_mesh *mesh, gradients *g)
 {
-    g->sum = zeros(mesh->vertex_count, sizeof *g->sum);
-    for (int k = 0; k < 3; k++) g->component[k] = zeros(mesh->vertex_count, sizeof *g->component[k]);
+    g->sum = allocate_zeroed(mesh->vertex_count, sizeof *g->sum);
+    for (int k = 0; k < 3; k++) g->component[k] = allocate_zeroed(mesh->vertex_count, sizeof *g->component[k]);
     for (int64_t cell = 0; cell < mesh->cell_count; cell++) {
         const int64_t *const entries = mesh->connectivity + mesh->offsets[cell];
         if (mesh->types[cell] == INSITU_POLYHEDRON)
             add_polyhedron(g, mesh, entries, mesh->offsets[cell + 1] - mesh->offsets[cell]);
         else
-            add_plain_cell(g, mesh, mesh->types[cell], entries);
+            add_cell_gradients(g, mesh, mesh->types[cell], entries);
     }
     for (int64_t v = 0; v < mesh->vertex_count; v++)
         for (int k = 0; k < 3; k++) g->component[k][v] = g->sum[v][k] / g->sum[v][3];
@@ -156,13 +158,13 @@ static void gradients_free(gradients *g)
 /* ---- pictures -------------------------------------------------------------------------------------------------- */
 
 /* Draws the scene. If g is not NULL, the whole mesh also gets the fields "gx", "gy" and "gz". */
-static caught_picture draw(MPI_Comm comm, const char *scene, const session_input *in, const gradients *g)
+static caught_picture draw_with_gradients(MPI_Comm comm, const char *scene, const session_input *in, const gradients *g)
 {
     static const char *const names[] = {"gx", "gy", "gz"};
     insitu_session *session = NULL;
     discard_pictures();
     insitu_status status = insitu_create_from_text(comm, scene, &session);
-    if (!status) status = submit(session, in);
+    if (!status) status = submit_input(session, in);
     for (int k = 0; k < 3 && g && !status; k++) {
         insitu_field field;
         insitu_field_defaults(&field);
@@ -181,7 +183,7 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const session_input
 
 /* ---- meshes ---------------------------------------------------------------------------------------------------- */
 
-static double swirl(const double p[3])
+static double swirl_field(const double p[3])
 {
     return sin(2.1 * p[0] + 0.3) * cos(1.7 * p[1]) + 0.4 * p[2] * p[2] - 0.3 * p[0] * p[2] + 0.2 * p[1];
 }
@@ -205,7 +207,7 @@ static const mesh_case cases[] = {
 };
 enum { CASES = sizeof cases / sizeof *cases };
 
-static void describe(session_input *in)
+static void describe_input(session_input *in)
 {
     input_describe(in);
     in->mesh.keep_polyhedra = 1;
@@ -214,9 +216,9 @@ static void describe(session_input *in)
 static void whole_create(const mesh_case *c, test_function *f, session_input *whole)
 {
     *whole = (session_input){0};
-    test_mesh_lattice(c->kind, SIDE, 0.2, f, &whole->part);
+    test_mesh_make_lattice(c->kind, SIDE, 0.2, f, &whole->part);
     if (c->as_polyhedra > 0) test_mesh_to_polyhedra(&whole->part, c->as_polyhedra);
-    describe(whole);
+    describe_input(whole);
 }
 
 /* ---- normals --------------------------------------------------------------------------------------------------- */
@@ -224,8 +226,8 @@ static void whole_create(const mesh_case *c, test_function *f, session_input *wh
 /* Returns the largest sine of the angle between the drawn and the expected normal over all pixels with a surface. The
  * expected normal is `gradient` or, if it is NULL, the values of the three pictures. far gets the number of pixels in
  * which the sine exceeds 3e-4. */
-static double worst_angle(const caught_picture *picture, const caught_picture *expected, const double *gradient,
-                          int *pixels, int *far)
+static double find_largest_angle(const caught_picture *picture, const caught_picture *expected, const double *gradient,
+                                 int *pixels, int *far)
 {
     double worst = 0;
     *pixels = *far = 0;
@@ -242,7 +244,7 @@ static double worst_angle(const caught_picture *picture, const caught_picture *e
             const double c = n[(k + 1) % 3] * g[(k + 2) % 3] - n[(k + 2) % 3] * g[(k + 1) % 3];
             cross += c * c;
         }
-        worst = test_worse(worst, sqrt(cross / length));
+        worst = test_larger_error(worst, sqrt(cross / length));
         *far += !(sqrt(cross / length) <= 3e-4);
     }
     return worst;
@@ -264,11 +266,11 @@ static void normals_are_the_interpolated_gradients(void **state)
         caught_picture expected[3];
         int pixels, far;
         if (cases[c].as_polyhedra > 0) continue;
-        whole_create(&cases[c], swirl, &whole);
+        whole_create(&cases[c], swirl_field, &whole);
         solve_gradients(&whole.part, &g);
-        caught_picture smooth = draw(MPI_COMM_SELF, SCENE(SMOOTH("")), &whole, NULL);
-        for (int k = 0; k < 3; k++) expected[k] = draw(MPI_COMM_SELF, scenes[k], &whole, &g);
-        const double worst = worst_angle(&smooth, expected, NULL, &pixels, &far);
+        caught_picture smooth = draw_with_gradients(MPI_COMM_SELF, SCENE(SMOOTH("")), &whole, NULL);
+        for (int k = 0; k < 3; k++) expected[k] = draw_with_gradients(MPI_COMM_SELF, scenes[k], &whole, &g);
+        const double worst = find_largest_angle(&smooth, expected, NULL, &pixels, &far);
         printf("%s: %d pixels, normals within %.2g of the interpolated gradients, %d beyond 3e-4\n", cases[c].name,
                pixels, worst, far);
         assert_true(pixels > 300 && far <= (cases[c].kind == TEST_POLYHEDRA ? pixels / 10 : 0));
@@ -288,9 +290,9 @@ static void a_linear_field_has_its_gradient(void **state)
     for (int c = 0; c < CASES && own_rank == 0; c++) {
         session_input whole;
         int pixels, far;
-        whole_create(&cases[c], test_linear, &whole);
-        caught_picture smooth = draw(MPI_COMM_SELF, SCENE(SMOOTH("")), &whole, NULL);
-        const double worst = worst_angle(&smooth, NULL, gradient, &pixels, &far);
+        whole_create(&cases[c], test_linear_field, &whole);
+        caught_picture smooth = draw_with_gradients(MPI_COMM_SELF, SCENE(SMOOTH("")), &whole, NULL);
+        const double worst = find_largest_angle(&smooth, NULL, gradient, &pixels, &far);
         if (!(worst < 1e-6)) fprintf(stderr, "%s: off by %g\n", cases[c].name, worst);
         assert_true(pixels > 300 && worst < 1e-6);
         free_caught(&smooth);
@@ -308,7 +310,7 @@ static void swirl_gradient(const double p[3], double out[3])
 }
 
 /* Returns the mean angle in degrees between the drawn normals and the gradient of the function itself. */
-static double mean_angle(test_mesh_kind kind, int side, const char *scene)
+static double measure_mean_angle(test_mesh_kind kind, int side, const char *scene)
 {
     render_camera camera;
     session_input whole = {0};
@@ -316,9 +318,9 @@ static double mean_angle(test_mesh_kind kind, int side, const char *scene)
     int count = 0;
     render_camera_look_at(&camera, (const double[]){3, 2.2, 4}, (const double[]){0, 0, 0}, (const double[]){0, 1, 0},
                           40, WIDTH, HEIGHT);
-    test_mesh_lattice(kind, side, 0.2, swirl, &whole.part);
-    describe(&whole);
-    caught_picture picture = draw(MPI_COMM_SELF, scene, &whole, NULL);
+    test_mesh_make_lattice(kind, side, 0.2, swirl_field, &whole.part);
+    describe_input(&whole);
+    caught_picture picture = draw_with_gradients(MPI_COMM_SELF, scene, &whole, NULL);
     for (int i = 0; i < PIXELS; i++) {
         double base[3], direction[3], place[3], g[3], dot = 0, length = 0;
         if (picture.data[LAYER * PIXELS + i] < 0) continue;
@@ -340,7 +342,7 @@ static double mean_angle(test_mesh_kind kind, int side, const char *scene)
 /* The error of gradients in cells is of first order in the cells' size. At vertices the errors of first order cancel,
  * except at the boundary and because of the jitter. So errors at vertices must be smaller, and halving the cells' size
  * must more than halve them. */
-static void normals_come_nearer_to_the_truth(void **state)
+static void smooth_normals_are_nearer_to_the_exact_gradient(void **state)
 {
     static const test_mesh_kind kinds[] = {TEST_TETS, TEST_HEXES, TEST_POLYHEDRA};
     static const char *const names[] = {"gradient", "vertex"};
@@ -349,7 +351,7 @@ static void normals_come_nearer_to_the_truth(void **state)
     for (int k = 0; k < 3 && own_rank == 0; k++) {
         double off[2][2];
         for (int n = 0; n < 2; n++) {
-            for (int fine = 0; fine < 2; fine++) off[n][fine] = mean_angle(kinds[k], fine ? 24 : 12, scenes[n]);
+            for (int fine = 0; fine < 2; fine++) off[n][fine] = measure_mean_angle(kinds[k], fine ? 24 : 12, scenes[n]);
             printf("%s: normals by %s are off by %.3f degrees on 12^3 cubes, %.3f on 24^3\n",
                    test_mesh_kind_name(kinds[k]), names[n], off[n][0], off[n][1]);
         }
@@ -363,27 +365,28 @@ static void normals_come_nearer_to_the_truth(void **state)
  * other ranks are ghosts. */
 static void part_create(const test_mesh *whole, test_partition_kind distributed, bool with_ghosts, session_input *out)
 {
-    int *owners = zeros(whole->cell_count, sizeof *owners);
-    int *all = zeros(whole->cell_count, sizeof *all);
+    int *owners = allocate_zeroed(whole->cell_count, sizeof *owners);
+    int *all = allocate_zeroed(whole->cell_count, sizeof *all);
     *out = (session_input){0};
-    test_partition(whole, distributed, SIDE, rank_count, owners);
-    test_mesh_part(whole, with_ghosts ? all : owners, with_ghosts ? 0 : own_rank, &out->part);
+    test_partition_cells(whole, distributed, SIDE, rank_count, owners);
+    test_mesh_extract_part(whole, with_ghosts ? all : owners, with_ghosts ? 0 : own_rank, &out->part);
     for (int64_t cell = 0; cell < out->part.cell_count && with_ghosts; cell++)
         out->part.ghosts[cell] = owners[cell] != own_rank;
     if (!with_ghosts) test_mesh_reorder_vertices(&out->part, 77 + (uint64_t)own_rank);
     free(owners);
     free(all);
-    describe(out);
+    describe_input(out);
 }
 
 /* Checks that all ranks draw the picture that rank 0 draws alone. Only rank 0's whole is used. */
-static void same_as_alone(const char *name, const char *scene, const session_input *whole, const session_input *part)
+static void check_same_as_rank_0_alone(const char *name, const char *scene, const session_input *whole,
+                                       const session_input *part)
 {
-    caught_picture ours = draw(MPI_COMM_WORLD, scene, part, NULL), alone = {0};
+    caught_picture ours = draw_with_gradients(MPI_COMM_WORLD, scene, part, NULL), alone = {0};
     bool is_well = true;
     if (own_rank == 0) {
-        alone = draw(MPI_COMM_SELF, scene, whole, NULL);
-        is_well = same_pictures(&ours, &alone);
+        alone = draw_with_gradients(MPI_COMM_SELF, scene, whole, NULL);
+        is_well = are_same_pictures(&ours, &alone);
         if (!is_well) fprintf(stderr, "%s: not the same on %d ranks\n", name, rank_count);
     }
     everywhere(is_well);
@@ -397,30 +400,30 @@ static void any_partition_has_the_same_bits(void **state)
     for (int c = 0; c < CASES; c++)
         for (test_partition_kind distributed = 0; distributed < TEST_PARTITION_COUNT; distributed++) {
             session_input whole, part;
-            whole_create(&cases[c], swirl, &whole);
+            whole_create(&cases[c], swirl_field, &whole);
             part_create(&whole.part, distributed, false, &part);
-            same_as_alone(cases[c].name, SCENE(SMOOTH("")), &whole, &part);
-            same_as_alone(cases[c].name, SCENE(SMOOTH(", opacity: 0.4")), &whole, &part);
+            check_same_as_rank_0_alone(cases[c].name, SCENE(SMOOTH("")), &whole, &part);
+            check_same_as_rank_0_alone(cases[c].name, SCENE(SMOOTH(", opacity: 0.4")), &whole, &part);
             input_free(&part);
             part_create(&whole.part, distributed, true, &part);
-            same_as_alone(cases[c].name, SCENE(SMOOTH("")), &whole, &part);
+            check_same_as_rank_0_alone(cases[c].name, SCENE(SMOOTH("")), &whole, &part);
             input_free(&part);
             input_free(&whole);
         }
 }
 
 /* Joins the tets of both halves without merging their equal vertices. */
-static void join(const test_mesh halves[2], test_mesh *out)
+static void concatenate_halves(const test_mesh halves[2], test_mesh *out)
 {
     *out = (test_mesh){.vertex_count = halves[0].vertex_count + halves[1].vertex_count,
                        .cell_count = halves[0].cell_count + halves[1].cell_count,
                        .connectivity_count = halves[0].connectivity_count + halves[1].connectivity_count};
-    out->coordinates = zeros(out->vertex_count * 3, sizeof *out->coordinates);
-    out->values = zeros(out->vertex_count, sizeof *out->values);
-    out->connectivity = zeros(out->connectivity_count, sizeof *out->connectivity);
-    out->offsets = zeros(out->cell_count + 1, sizeof *out->offsets);
-    out->types = zeros(out->cell_count, 1);
-    out->ghosts = zeros(out->cell_count, 1);
+    out->coordinates = allocate_zeroed(out->vertex_count * 3, sizeof *out->coordinates);
+    out->values = allocate_zeroed(out->vertex_count, sizeof *out->values);
+    out->connectivity = allocate_zeroed(out->connectivity_count, sizeof *out->connectivity);
+    out->offsets = allocate_zeroed(out->cell_count + 1, sizeof *out->offsets);
+    out->types = allocate_zeroed(out->cell_count, 1);
+    out->ghosts = allocate_zeroed(out->cell_count, 1);
     for (int i = 0; i < 2; i++) {
         const test_mesh *half = &halves[i];
         const int64_t first = i ? halves[0].vertex_count : 0, at = i ? halves[0].connectivity_count : 0;
@@ -434,21 +437,21 @@ static void join(const test_mesh halves[2], test_mesh *out)
 }
 
 /* Draws a mesh with a crack on one rank: the cells on the two sides of a plane have separate, equal vertices there. */
-static void doubled_vertices_are_one(void **state)
+static void duplicated_vertices_are_merged(void **state)
 {
     session_input whole, cracked = {0};
     test_mesh halves[2];
     (void)state;
     if (own_rank > 0) return;
-    whole_create(&cases[0], swirl, &whole);
-    int *owners = zeros(whole.part.cell_count, sizeof *owners);
-    test_partition(&whole.part, TEST_BLOCK, SIDE, 2, owners);
-    for (int i = 0; i < 2; i++) test_mesh_part(&whole.part, owners, i, &halves[i]);
-    join(halves, &cracked.part);
-    describe(&cracked);
-    caught_picture one = draw(MPI_COMM_SELF, SCENE(SMOOTH("")), &whole, NULL);
-    caught_picture two = draw(MPI_COMM_SELF, SCENE(SMOOTH("")), &cracked, NULL);
-    assert_true(cracked.part.vertex_count > whole.part.vertex_count && same_pictures(&one, &two));
+    whole_create(&cases[0], swirl_field, &whole);
+    int *owners = allocate_zeroed(whole.part.cell_count, sizeof *owners);
+    test_partition_cells(&whole.part, TEST_BLOCK, SIDE, 2, owners);
+    for (int i = 0; i < 2; i++) test_mesh_extract_part(&whole.part, owners, i, &halves[i]);
+    concatenate_halves(halves, &cracked.part);
+    describe_input(&cracked);
+    caught_picture one = draw_with_gradients(MPI_COMM_SELF, SCENE(SMOOTH("")), &whole, NULL);
+    caught_picture two = draw_with_gradients(MPI_COMM_SELF, SCENE(SMOOTH("")), &cracked, NULL);
+    assert_true(cracked.part.vertex_count > whole.part.vertex_count && are_same_pictures(&one, &two));
     free_caught(&one);
     free_caught(&two);
     for (int i = 0; i < 2; i++) test_mesh_free(&halves[i]);
@@ -459,17 +462,17 @@ static void doubled_vertices_are_one(void **state)
 
 /* Checks that cells with values that are not finite are not drawn and do not contribute to the gradients at their
  * vertices. */
-static void rubbish_gives_nothing(void **state)
+static void unusable_cells_contribute_no_gradient(void **state)
 {
     (void)state;
     session_input whole, part;
-    whole_create(&cases[4], swirl, &whole);
+    whole_create(&cases[4], swirl_field, &whole);
     whole.part.values[whole.part.vertex_count / 2] = NAN;
     whole.part.values[whole.part.vertex_count / 3] = INFINITY;
     part_create(&whole.part, TEST_RANDOM, false, &part);
-    same_as_alone("values that are not finite", SCENE(SMOOTH("")), &whole, &part);
+    check_same_as_rank_0_alone("values that are not finite", SCENE(SMOOTH("")), &whole, &part);
     if (own_rank == 0) {
-        caught_picture picture = draw(MPI_COMM_SELF, SCENE(SMOOTH("")), &whole, NULL);
+        caught_picture picture = draw_with_gradients(MPI_COMM_SELF, SCENE(SMOOTH("")), &whole, NULL);
         for (int i = 0; i < 3 * PIXELS; i++) assert_true(isfinite(picture.data[i]));
         free_caught(&picture);
     }
@@ -482,10 +485,10 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(normals_are_the_interpolated_gradients),
         cmocka_unit_test(a_linear_field_has_its_gradient),
-        cmocka_unit_test(normals_come_nearer_to_the_truth),
+        cmocka_unit_test(smooth_normals_are_nearer_to_the_exact_gradient),
         cmocka_unit_test(any_partition_has_the_same_bits),
-        cmocka_unit_test(doubled_vertices_are_one),
-        cmocka_unit_test(rubbish_gives_nothing),
+        cmocka_unit_test(duplicated_vertices_are_merged),
+        cmocka_unit_test(unusable_cells_contribute_no_gradient),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -42,7 +42,7 @@ static const space_case cases[] = {
 };
 enum { CASES = sizeof cases / sizeof *cases };
 
-static void scene_text(const space_case *c, double scale, const double offset[3], char *out, size_t size)
+static void make_scene_text(const space_case *c, double scale, const double offset[3], char *out, size_t size)
 {
     static const double eye[3] = {2.5, 1.5, 3}, focal[3] = {0.125, 0, -0.0625};
     char layer[256], sampling[128];
@@ -59,29 +59,29 @@ static void scene_text(const space_case *c, double scale, const double offset[3]
 static void create_input(const space_case *c, double scale, const double offset[3], session_input *in)
 {
     test_mesh whole;
-    test_mesh_lattice(c->kind, 4, 0.1, test_wave, &whole);
+    test_mesh_make_lattice(c->kind, 4, 0.1, test_wave_field, &whole);
     if (c->as_polyhedra) test_mesh_to_polyhedra(&whole, 0.6);
     for (int64_t i = 0; i < 3 * whole.vertex_count; i++)
         whole.coordinates[i] = ldexp(rint(ldexp(whole.coordinates[i], 24)), -24);
     int *owners = calloc((size_t)whole.cell_count, sizeof *owners);
     assert_non_null(owners);
-    test_partition(&whole, TEST_RANDOM, 4, rank_count, owners);
+    test_partition_cells(&whole, TEST_RANDOM, 4, rank_count, owners);
     test_mesh_transform(&whole, scale, offset);
-    test_mesh_part(&whole, owners, own_rank, &in->part);
+    test_mesh_extract_part(&whole, owners, own_rank, &in->part);
     free(owners);
     test_mesh_free(&whole);
     input_describe(in);
 }
 
-static void draw(const space_case *c, double scale, const double offset[3], caught_picture *out)
+static void draw_case(const space_case *c, double scale, const double offset[3], caught_picture *out)
 {
     char text[2048];
     session_input in;
-    scene_text(c, scale, offset, text, sizeof text);
+    make_scene_text(c, scale, offset, text, sizeof text);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(text));
     create_input(c, scale, offset, &in);
-    everywhere(submit(session, &in) == INSITU_OK);
-    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
+    everywhere(submit_input(session, &in) == INSITU_OK);
+    check_reported_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
     everywhere(caught_count == (own_rank == 0));
     if (own_rank == 0) *out = caught[0];
     caught_count = 0;
@@ -89,25 +89,25 @@ static void draw(const space_case *c, double scale, const double offset[3], caug
     input_free(&in);
 }
 
-static int drawn_pixels(const caught_picture *p)
+static int count_drawn_pixels(const caught_picture *p)
 {
     int count = 0;
     for (int i = 1; i < WIDTH * HEIGHT; i++) count += memcmp(p->rgba, p->rgba + 4 * i, 4 * sizeof(float)) != 0;
     return count;
 }
 
-static void pictures_are_the_same(double scale, const double offset[3])
+static void check_pictures_are_same(double scale, const double offset[3])
 {
     static const double nowhere[3] = {0, 0, 0};
     bool is_same = true;
     for (int i = 0; i < CASES; i++) {
         caught_picture here = {0}, there = {0};
-        draw(&cases[i], 1, nowhere, &here);
-        draw(&cases[i], scale, offset, &there);
+        draw_case(&cases[i], 1, nowhere, &here);
+        draw_case(&cases[i], scale, offset, &there);
         if (own_rank == 0) {
-            const double off = colour_difference(&here, &there);
+            const double off = largest_colour_difference(&here, &there);
             printf("%s, times %g: off by %.2g\n", cases[i].name, scale, off);
-            is_same = is_same && off <= cases[i].allowed && drawn_pixels(&here) > WIDTH * HEIGHT / 4;
+            is_same = is_same && off <= cases[i].allowed && count_drawn_pixels(&here) > WIDTH * HEIGHT / 4;
             free(here.rgba), free(here.depth), free(there.rgba), free(there.depth);
         }
     }
@@ -117,25 +117,25 @@ static void pictures_are_the_same(double scale, const double offset[3])
 static void exact_offsets_change_no_pixel(void **context)
 {
     (void)context;
-    pictures_are_the_same(1, (const double[]){5e5, 5.8e6, 0});
+    check_pictures_are_same(1, (const double[]){5e5, 5.8e6, 0});
 }
 
-static void scenes_a_million_times_smaller_look_the_same(void **context)
+static void scaling_by_a_millionth_changes_no_picture(void **context)
 {
     (void)context;
-    pictures_are_the_same(1e-6, (const double[]){0, 0, 0});
+    check_pictures_are_same(1e-6, (const double[]){0, 0, 0});
 }
 
-static void scenes_a_million_times_larger_look_the_same(void **context)
+static void scaling_by_a_million_changes_no_picture(void **context)
 {
     (void)context;
-    pictures_are_the_same(1e6, (const double[]){0, 0, 0});
+    check_pictures_are_same(1e6, (const double[]){0, 0, 0});
 }
 
 /* ---- depth --------------------------------------------------------------------------------------------------- */
 
 /* The field is z, which cells of all types represent exactly, so isosurfaces are planes across the cube. */
-static double height(const double position[3])
+static double height_field(const double position[3])
 {
     return position[2];
 }
@@ -158,34 +158,34 @@ static const struct {
      {-0.9}},
 };
 
-static double dot(const double a[3], const double b[3])
+static double dot_product(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-static void cross(const double a[3], const double b[3], double out[3])
+static void cross_product(const double a[3], const double b[3], double out[3])
 {
     for (int i = 0; i < 3; i++) out[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
 }
 
-static void to_length_1(double v[3])
+static void normalize_vector(double v[3])
 {
-    const double length = sqrt(dot(v, v));
+    const double length = sqrt(dot_product(v, v));
     for (int i = 0; i < 3; i++) v[i] /= length;
 }
 
 static const double eye[3] = {0.9, 1.2, 4}, focal[3] = {0.1, -0.2, 0.1}, camera_angle = 35;
 
 /* Computes the direction of pixel p, with a component of 1 along the camera's axis. */
-static void pixel_direction(int p, double out[3])
+static void compute_pixel_direction(int p, double out[3])
 {
     const double up[3] = {0, 1, 0}, pixel = 2 * tan(camera_angle * 3.14159265358979323846 / 360) / HEIGHT;
     double forward[3], right[3], above[3];
     for (int i = 0; i < 3; i++) forward[i] = focal[i] - eye[i];
-    to_length_1(forward);
-    cross(forward, up, right);
-    to_length_1(right);
-    cross(right, forward, above);
+    normalize_vector(forward);
+    cross_product(forward, up, right);
+    normalize_vector(right);
+    cross_product(right, forward, above);
     const double x = (p % WIDTH + 0.5 - 0.5 * WIDTH) * pixel, y = (0.5 * HEIGHT - p / WIDTH - 0.5) * pixel;
     for (int i = 0; i < 3; i++) out[i] = forward[i] + x * right[i] + y * above[i];
 }
@@ -205,7 +205,7 @@ static double plane_depth(const double direction[3], double plane)
 static bool is_depth(const caught_picture *picture, int p, int count, const double planes[2])
 {
     double direction[3], expected = INFINITY;
-    pixel_direction(p, direction);
+    compute_pixel_direction(p, direction);
     for (int i = 0; i < count; i++) expected = fmin(expected, plane_depth(direction, planes[i]));
     const double found = (double)picture->depth[p];
     if (expected == 0) return true;
@@ -214,7 +214,7 @@ static bool is_depth(const caught_picture *picture, int p, int count, const doub
 
 /* Checks that the depth in an EXR is that of the nearest isosurface along the camera's axis, regardless of its opacity
  * and even behind a volume, and infinite in pixels without an isosurface. */
-static void depth_is_of_the_nearest_surface(void **context)
+static void depth_is_that_of_the_nearest_surface(void **context)
 {
     (void)context;
     for (size_t n = 0; n < sizeof depths / sizeof depths[0]; n++) {
@@ -226,9 +226,9 @@ static void depth_is_of_the_nearest_surface(void **context)
                  WIDTH, HEIGHT, eye[0], eye[1], eye[2], focal[0], focal[1], focal[2], camera_angle, depths[n].layers);
         insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
         input_create(&in, TEST_MIXED, 4, TEST_RANDOM, own_rank, rank_count);
-        test_mesh_set_values(&in.part, height);
-        everywhere(submit(session, &in) == INSITU_OK);
-        step_is_good(session, 0);
+        test_mesh_set_values(&in.part, height_field);
+        everywhere(submit_input(session, &in) == INSITU_OK);
+        check_step_succeeds(session, 0);
         int wrong = 0, finite = 0;
         for (int p = 0; own_rank == 0 && p < WIDTH * HEIGHT; p++) {
             wrong += !is_depth(&caught[0], p, depths[n].count, depths[n].planes);
@@ -245,10 +245,10 @@ static void depth_is_of_the_nearest_surface(void **context)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(depth_is_of_the_nearest_surface),
+        cmocka_unit_test(depth_is_that_of_the_nearest_surface),
         cmocka_unit_test(exact_offsets_change_no_pixel),
-        cmocka_unit_test(scenes_a_million_times_smaller_look_the_same),
-        cmocka_unit_test(scenes_a_million_times_larger_look_the_same),
+        cmocka_unit_test(scaling_by_a_millionth_changes_no_picture),
+        cmocka_unit_test(scaling_by_a_million_changes_no_picture),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -32,7 +32,7 @@ static __attribute__((noinline)) void paint_stack(volatile unsigned char **top)
 }
 
 /* Returns the largest distance below top at which the pattern was overwritten. */
-static __attribute__((noinline)) int taken_stack(volatile unsigned char *top)
+static __attribute__((noinline)) int measure_painted_stack(volatile unsigned char *top)
 {
     int taken = PAINTED - 1;
     while (taken > NEAR && top[-taken] == PAINT) taken--;
@@ -41,17 +41,17 @@ static __attribute__((noinline)) int taken_stack(volatile unsigned char *top)
 
 static volatile unsigned char *tops[2];
 
-static void paint_both(void)
+static void paint_stacks_of_threads(void)
 {
 #pragma omp parallel num_threads(2)
     paint_stack(&tops[omp_get_thread_num()]);
 }
 
-static void look_at_both(int most[2])
+static void measure_stacks_of_threads(int most[2])
 {
 #pragma omp parallel num_threads(2)
     {
-        const int me = omp_get_thread_num(), taken = taken_stack(tops[me]);
+        const int me = omp_get_thread_num(), taken = measure_painted_stack(tops[me]);
         if (taken > most[me]) most[me] = taken;
     }
 }
@@ -68,7 +68,7 @@ static const char *const layers[] = {
 
 enum { LAYERS = sizeof layers / sizeof layers[0] };
 
-static const char *scene_of(const char *layer)
+static const char *write_layer_scene(const char *layer)
 {
     char text[1024];
     snprintf(text, sizeof text,
@@ -78,34 +78,34 @@ static const char *scene_of(const char *layer)
     return write_scene(text);
 }
 
-static void measure(const session_input *in, const char *layer, int most[2])
+static void measure_stack_of_layer(const session_input *in, const char *layer, int most[2])
 {
-    insitu_session *session = open_session(MPI_COMM_WORLD, scene_of(layer));
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_layer_scene(layer));
     for (int cycle = 0; cycle < 2; cycle++) {
         insitu_mesh mesh = in->mesh;
         mesh.changed = cycle == 1 ? INSITU_CHANGED_GEOMETRY : INSITU_CHANGED_ALL;
         everywhere(insitu_set_mesh(session, "m", &mesh) == INSITU_OK);
         everywhere(insitu_set_field(session, "m", &in->field) == INSITU_OK);
-        paint_both();
-        step_is_good(session, cycle);
-        look_at_both(most);
+        paint_stacks_of_threads();
+        check_step_succeeds(session, cycle);
+        measure_stacks_of_threads(most);
     }
     insitu_destroy(&session);
 }
 
-static void steps_take_less_than_they_are_checked_for(void **context)
+static void steps_use_less_stack_than_checked(void **context)
 {
     (void)context;
     int most[2] = {0, 0};
     for (int kind = 0; kind < TEST_KIND_COUNT; kind++) {
         session_input in;
         input_create(&in, (test_mesh_kind)kind, 3, TEST_BLOCK, 0, 1);
-        for (int layer = 0; layer < LAYERS; layer++) measure(&in, layers[layer], most);
+        for (int layer = 0; layer < LAYERS; layer++) measure_stack_of_layer(&in, layers[layer], most);
         input_free(&in);
     }
     session_input in; /* enough cells to build the tree in parallel branches */
     input_create(&in, TEST_TETS, 15, TEST_BLOCK, 0, 1);
-    measure(&in, layers[0], most);
+    measure_stack_of_layer(&in, layers[0], most);
     input_free(&in);
     printf("%s: of %d kB the calling thread takes %d, of %d kB a worker %d\n", render_isa(), SESSION_CALLER_STACK >> 10,
            most[0] >> 10, SESSION_WORKER_STACK >> 10, most[1] >> 10);
@@ -119,12 +119,12 @@ static void small_stacks_are_reported(void **context)
     (void)context;
     session_input in;
     input_create(&in, TEST_MIXED, 5, TEST_BLOCK, own_rank, rank_count);
-    insitu_session *session = open_session(MPI_COMM_WORLD, scene_of(layers[0]));
-    everywhere(submit(session, &in) == INSITU_OK);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_layer_scene(layers[0]));
+    everywhere(submit_input(session, &in) == INSITU_OK);
     for (int cycle = 0; cycle < 2; cycle++) {
         const insitu_status status = insitu_step(session, cycle, 0);
-        reported_everywhere(session, status, INSITU_ERROR_ARGUMENT, "rank 0: OpenMP's threads have ",
-                            "of stack left, a step needs 256 kB: expected stacks of ", "(OMP_STACKSIZE=");
+        check_reported_everywhere(session, status, INSITU_ERROR_ARGUMENT, "rank 0: OpenMP's threads have ",
+                                  "of stack left, a step needs 256 kB: expected stacks of ", "(OMP_STACKSIZE=");
         const char *figure = strstr(insitu_error(session), "OMP_STACKSIZE=");
         const long reported = figure ? strtol(figure + strlen("OMP_STACKSIZE="), NULL, 10) : 0;
         everywhere(reported > SESSION_WORKER_STACK >> 10 && reported <= MOST_TOLD);
@@ -139,16 +139,16 @@ static void suggested_stacks_suffice(void **context)
     (void)context;
     session_input in;
     input_create(&in, TEST_MIXED, 5, TEST_BLOCK, own_rank, rank_count);
-    insitu_session *session = open_session(MPI_COMM_WORLD, scene_of(layers[0]));
-    everywhere(submit(session, &in) == INSITU_OK);
-    step_is_good(session, 0);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_layer_scene(layers[0]));
+    everywhere(submit_input(session, &in) == INSITU_OK);
+    check_step_succeeds(session, 0);
     insitu_destroy(&session);
     input_free(&in);
 }
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest usual[] = {cmocka_unit_test(steps_take_less_than_they_are_checked_for)};
+    const struct CMUnitTest usual[] = {cmocka_unit_test(steps_use_less_stack_than_checked)};
     const struct CMUnitTest small[] = {cmocka_unit_test(small_stacks_are_reported)};
     const struct CMUnitTest reported[] = {cmocka_unit_test(suggested_stacks_suffice)};
     if (getenv("TOLD_STACKS")) return run_session_tests(argc, argv, reported, NULL, NULL);

@@ -24,17 +24,17 @@ enum { SIDE = 4, MOST = 1 << 16 };
 static void make_part(test_mesh_kind kind, double jitter, bool is_cell_centred, session_input *out)
 {
     test_mesh whole;
-    test_mesh_lattice(kind, SIDE, jitter, test_linear, &whole);
+    test_mesh_make_lattice(kind, SIDE, jitter, test_linear_field, &whole);
     int *owners = test_calloc((size_t)whole.cell_count, sizeof *owners);
-    test_partition(&whole, TEST_RANDOM, SIDE, rank_count, owners);
-    test_mesh_part(&whole, owners, own_rank, &out->part);
+    test_partition_cells(&whole, TEST_RANDOM, SIDE, rank_count, owners);
+    test_mesh_extract_part(&whole, owners, own_rank, &out->part);
     if (is_cell_centred) {
         int64_t count = 0;
         free(out->part.values);
         out->part.values = calloc((size_t)whole.cell_count, sizeof(double));
         assert_non_null(out->part.values);
         for (int64_t cell = 0; cell < whole.cell_count; cell++)
-            if (owners[cell] == own_rank) out->part.values[count++] = test_uniform_in((uint64_t)cell, 5, -3, 7);
+            if (owners[cell] == own_rank) out->part.values[count++] = test_uniform_between((uint64_t)cell, 5, -3, 7);
     }
     input_describe(out);
     if (is_cell_centred) {
@@ -46,7 +46,7 @@ static void make_part(test_mesh_kind kind, double jitter, bool is_cell_centred, 
 }
 
 /* Returns a column of the file's last line as a number. */
-static double number_at(const char *text, int column)
+static double read_last_line_number(const char *text, int column)
 {
     const char *line = text, *end;
     while ((end = strchr(line, '\n')) && end[1]) line = end + 1;
@@ -61,7 +61,7 @@ static void run_steps(const char *scene, const session_input *in, int first, int
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
     discard_pictures();
     for (int cycle = first; cycle < end; cycle++) {
-        assert_int_equal(submit(session, in), INSITU_OK);
+        assert_int_equal(submit_input(session, in), INSITU_OK);
         const insitu_status status = insitu_step(session, cycle, 0.5 * cycle);
         if (status) fprintf(stderr, "%s\n", insitu_error(session));
         everywhere(status == INSITU_OK);
@@ -71,7 +71,7 @@ static void run_steps(const char *scene, const session_input *in, int first, int
 
 /* ---- numbers --------------------------------------------------------------------------------------------------- */
 
-static bool is_near(double a, double b)
+static bool is_nearly_equal(double a, double b)
 {
     if (fabs(a - b) <= 1e-8 * fmax(1, fabs(b))) return true; /* numbers are written with nine digits */
     fprintf(stderr, "%.9g, expected %.9g\n", a, b);
@@ -81,7 +81,7 @@ static bool is_near(double a, double b)
 /* Checks a linear field over the cube from -1 to 1: its mean is the value at the centre, and its extremes are at
  * corners. The polyhedra are cubes here, so the mean of their vertices is their centre. Mixed lattices are exempt from
  * the exact mean: their pyramids are not in pairs, so the means of the vertices are not the centres. */
-static void numbers_of_linear_fields_are_closed_forms(void **state)
+static void statistics_of_linear_fields_match_closed_forms(void **state)
 {
     (void)state;
     static char text[MOST];
@@ -93,9 +93,10 @@ static void numbers_of_linear_fields_are_closed_forms(void **state)
         if (own_rank == 0) unlink("linear.csv");
         run_steps(NEVER "statistics: [{field: f, path: linear.csv}]\n", &in, 0, 1);
         read_file("linear.csv", MOST, text);
-        everywhere(own_rank != 0 || (is_near(number_at(text, VOLUME), 8) && is_near(number_at(text, LEAST), -1.4) &&
-                                     is_near(number_at(text, MOST_VALUE), 1.6) &&
-                                     (kind == TEST_MIXED || is_near(number_at(text, MEAN), 0.1))));
+        everywhere(own_rank != 0 || (is_nearly_equal(read_last_line_number(text, VOLUME), 8) &&
+                                     is_nearly_equal(read_last_line_number(text, LEAST), -1.4) &&
+                                     is_nearly_equal(read_last_line_number(text, MOST_VALUE), 1.6) &&
+                                     (kind == TEST_MIXED || is_nearly_equal(read_last_line_number(text, MEAN), 0.1))));
         input_free(&in);
     }
 }
@@ -117,14 +118,14 @@ static void bent_and_concave_cells_fill_their_cube(void **state)
             if (own_rank == 0) unlink("bent.csv");
             run_steps(NEVER "statistics: [{field: f, path: bent.csv}]\n", &in, 0, 1);
             read_file("bent.csv", MOST, text);
-            everywhere(own_rank != 0 || is_near(number_at(text, VOLUME), 8));
+            everywhere(own_rank != 0 || is_nearly_equal(read_last_line_number(text, VOLUME), 8));
             input_free(&in);
         }
 }
 
 /* Compares the statistics of equal cubes of known values with sums computed here. Bins range from -2 to 6, so that some
  * cells are in no bin. */
-static void numbers_of_cells_are_sums(void **state)
+static void cell_counts_are_sums_over_ranks(void **state)
 {
     (void)state;
     enum { COUNT = SIDE * SIDE * SIDE, BINS = 5 };
@@ -132,23 +133,28 @@ static void numbers_of_cells_are_sums(void **state)
     session_input in = {0};
     double sum = 0, squares = 0, least = 7, most = -3, bins[BINS] = {0};
     for (int cell = 0; cell < COUNT; cell++) {
-        const double value = test_uniform_in((uint64_t)cell, 5, -3, 7);
+        const double value = test_uniform_between((uint64_t)cell, 5, -3, 7);
         sum += value / COUNT;
         least = fmin(least, value);
         most = fmax(most, value);
         if (value >= -2 && value <= 6) bins[(int)fmin((value + 2) / 8 * BINS, BINS - 1)] += 1.0 / COUNT;
     }
-    for (int cell = 0; cell < COUNT; cell++) squares += pow(test_uniform_in((uint64_t)cell, 5, -3, 7) - sum, 2) / COUNT;
+    for (int cell = 0; cell < COUNT; cell++)
+        squares += pow(test_uniform_between((uint64_t)cell, 5, -3, 7) - sum, 2) / COUNT;
     make_part(TEST_HEXES, 0, true, &in);
     if (own_rank == 0) unlink("folder/cells.csv"), rmdir("folder");
     run_steps(NEVER "statistics: [{field: f, path: folder/cells.csv, histogram: {bins: 5, range: [-2, 6]}}]\n", &in, 0,
               1);
     read_file("folder/cells.csv", MOST, text);
-    bool is_well = number_at(text, CELLS) == COUNT && is_near(number_at(text, VOLUME), 8);
-    is_well = is_well && is_near(number_at(text, LEAST), least) && is_near(number_at(text, MOST_VALUE), most);
-    is_well = is_well && is_near(number_at(text, MEAN), sum) && is_near(number_at(text, DEVIATION), sqrt(squares));
-    is_well = is_well && number_at(text, LOW) == -2 && number_at(text, HIGH) == 6;
-    for (int bin = 0; bin < BINS; bin++) is_well = is_well && is_near(number_at(text, FIRST_BIN + bin), bins[bin]);
+    bool is_well =
+        read_last_line_number(text, CELLS) == COUNT && is_nearly_equal(read_last_line_number(text, VOLUME), 8);
+    is_well = is_well && is_nearly_equal(read_last_line_number(text, LEAST), least) &&
+              is_nearly_equal(read_last_line_number(text, MOST_VALUE), most);
+    is_well = is_well && is_nearly_equal(read_last_line_number(text, MEAN), sum) &&
+              is_nearly_equal(read_last_line_number(text, DEVIATION), sqrt(squares));
+    is_well = is_well && read_last_line_number(text, LOW) == -2 && read_last_line_number(text, HIGH) == 6;
+    for (int bin = 0; bin < BINS; bin++)
+        is_well = is_well && is_nearly_equal(read_last_line_number(text, FIRST_BIN + bin), bins[bin]);
     everywhere(own_rank != 0 || is_well);
     input_free(&in);
 }
@@ -171,7 +177,7 @@ static void files_do_not_depend_on_the_partition(void **state)
                 rank_count = 1;
                 make_part(kind, 0.2, way == 1, &whole);
                 insitu_session *session = open_session(MPI_COMM_SELF, scene);
-                assert_int_equal(submit(session, &whole), INSITU_OK);
+                assert_int_equal(submit_input(session, &whole), INSITU_OK);
                 assert_int_equal(insitu_step(session, 0, 0), INSITU_OK);
                 insitu_destroy(&session);
                 input_free(&whole);
@@ -186,7 +192,7 @@ static void files_do_not_depend_on_the_partition(void **state)
 
 /* ---- files ----------------------------------------------------------------------------------------------------- */
 
-static void runs_that_begin_again_go_on_with_the_file(void **state)
+static void restarted_runs_continue_the_file(void **state)
 {
     (void)state;
     static char first[MOST], text[MOST];
@@ -196,12 +202,12 @@ static void runs_that_begin_again_go_on_with_the_file(void **state)
     if (own_rank == 0) unlink("runs.csv");
     run_steps(scene, &in, 0, 7);
     read_file("runs.csv", MOST, first);
-    everywhere(own_rank != 0 || (number_at(first, 0) == 6 && number_at(first, 1) == 3));
+    everywhere(own_rank != 0 || (read_last_line_number(first, 0) == 6 && read_last_line_number(first, 1) == 3));
     run_steps(scene, &in, 3, 7);
     read_file("runs.csv", MOST, text);
     everywhere(own_rank != 0 || strcmp(first, text) == 0);
     if (own_rank == 0) first[strlen(first) - 20] = '\0'; /* the last line is incomplete */
-    put_file("runs.csv", first);
+    write_text_file("runs.csv", first);
     run_steps(scene, &in, 6, 7);
     read_file("runs.csv", MOST, first);
     everywhere(own_rank != 0 || strcmp(first, text) == 0);
@@ -215,27 +221,27 @@ static void files_that_cannot_be_written_are_reported(void **state)
     static char text[MOST];
     session_input in = {0};
     make_part(TEST_TETS, 0.1, false, &in);
-    put_file("other.csv", "a,b\n1,2\n");
+    write_text_file("other.csv", "a,b\n1,2\n");
     insitu_session *session =
         open_session(MPI_COMM_WORLD, write_scene(PICTURE("") "statistics: [{field: f, path: other.csv}]\n"));
     discard_pictures();
-    assert_int_equal(submit(session, &in), INSITU_OK);
-    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "other.csv", "other columns",
-                        "cycle,time");
+    assert_int_equal(submit_input(session, &in), INSITU_OK);
+    check_reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "other.csv", "other columns",
+                              "cycle,time");
     everywhere(caught_count == (own_rank == 0));
     read_file("other.csv", MOST, text);
     everywhere(own_rank != 0 || strcmp(text, "a,b\n1,2\n") == 0);
     insitu_destroy(&session);
     session = open_session(MPI_COMM_WORLD, write_scene(PICTURE("") "statistics: [{field: g, path: g.csv}]\n"));
-    assert_int_equal(submit(session, &in), INSITU_OK);
-    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "\"g\"", "there are", "f");
+    assert_int_equal(submit_input(session, &in), INSITU_OK);
+    check_reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "\"g\"", "there are", "f");
     everywhere(caught_count == 2 * (own_rank == 0));
     insitu_destroy(&session);
     input_free(&in);
 }
 
 /* Checks that statistics and conditions of a missing field do not prevent those of other fields from being found. */
-static void others_of_a_missing_field_are_found(void **state)
+static void other_fields_are_found_if_a_field_is_missing(void **state)
 {
     (void)state;
     static char text[MOST];
@@ -251,8 +257,8 @@ static void others_of_a_missing_field_are_found(void **state)
                                                                    "statistics: [{field: g, path: g.csv}, {field: f, "
                                                                    "path: there.csv}]\n"));
     discard_pictures();
-    assert_int_equal(submit(session, &in), INSITU_OK);
-    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "\"g\"", "there are", "f");
+    assert_int_equal(submit_input(session, &in), INSITU_OK);
+    check_reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "\"g\"", "there are", "f");
     everywhere(caught_count == (own_rank == 0) && insitu_last_report(session)->images == 1);
     insitu_destroy(&session);
     read_file("there.csv", MOST, text);
@@ -264,7 +270,7 @@ static void others_of_a_missing_field_are_found(void **state)
 /* ---- conditions ------------------------------------------------------------------------------------------------ */
 
 /* Sets a field whose maximum is the cycle, and returns the cycles from 0 to 9 at which a picture was drawn, as bits. */
-static unsigned cycles_drawn(const char *scene)
+static unsigned find_cycles_drawn(const char *scene)
 {
     unsigned drawn = 0;
     session_input in = {0};
@@ -272,9 +278,9 @@ static unsigned cycles_drawn(const char *scene)
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
     for (int cycle = 0; cycle < 10; cycle++) {
         for (int64_t v = 0; v < in.part.vertex_count; v++)
-            in.part.values[v] = cycle / 1.6 * test_linear(in.part.coordinates + 3 * v);
+            in.part.values[v] = cycle / 1.6 * test_linear_field(in.part.coordinates + 3 * v);
         discard_pictures();
-        assert_int_equal(submit(session, &in), INSITU_OK);
+        assert_int_equal(submit_input(session, &in), INSITU_OK);
         const insitu_status status = insitu_step(session, cycle, cycle);
         if (status) fprintf(stderr, "%s\n", insitu_error(session));
         everywhere(status == INSITU_OK);
@@ -286,33 +292,33 @@ static unsigned cycles_drawn(const char *scene)
     return drawn;
 }
 
-static void conditions_hold_images_back(void **state)
+static void conditions_suppress_images(void **state)
 {
     (void)state;
-    everywhere(cycles_drawn(PICTURE("    when: {field: f, above: 5.5}\n")) == 0x3c0);
-    everywhere(cycles_drawn(PICTURE("    when: {field: f, above: 5.5, below: 8.5}\n")) == 0x1c0);
-    everywhere(cycles_drawn(PICTURE("    when: {field: f, of: minimum, above: -2}\n")) == 0x7);
-    everywhere(cycles_drawn(PICTURE("    when: {field: f, of: mean, below: 0.2}\n")) == 0xf);
-    everywhere(cycles_drawn(PICTURE("    every: 2\n    when: {field: f, above: 2.5}\n")) == 0x150);
-    everywhere(cycles_drawn(PICTURE("    once: true\n    when: {field: f, above: 5.5}\n")) == 0x40);
-    everywhere(cycles_drawn(PICTURE("    once: true\n")) == 0x1);
+    everywhere(find_cycles_drawn(PICTURE("    when: {field: f, above: 5.5}\n")) == 0x3c0);
+    everywhere(find_cycles_drawn(PICTURE("    when: {field: f, above: 5.5, below: 8.5}\n")) == 0x1c0);
+    everywhere(find_cycles_drawn(PICTURE("    when: {field: f, of: minimum, above: -2}\n")) == 0x7);
+    everywhere(find_cycles_drawn(PICTURE("    when: {field: f, of: mean, below: 0.2}\n")) == 0xf);
+    everywhere(find_cycles_drawn(PICTURE("    every: 2\n    when: {field: f, above: 2.5}\n")) == 0x150);
+    everywhere(find_cycles_drawn(PICTURE("    once: true\n    when: {field: f, above: 5.5}\n")) == 0x40);
+    everywhere(find_cycles_drawn(PICTURE("    once: true\n")) == 0x1);
 }
 
-static int begin_tests(void **state)
+static int set_up_test_group(void **state)
 {
     (void)state;
-    return enter_folder("statistics") ? 0 : 1;
+    return enter_test_folder("statistics") ? 0 : 1;
 }
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(numbers_of_linear_fields_are_closed_forms),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(statistics_of_linear_fields_match_closed_forms),
                                        cmocka_unit_test(bent_and_concave_cells_fill_their_cube),
-                                       cmocka_unit_test(numbers_of_cells_are_sums),
+                                       cmocka_unit_test(cell_counts_are_sums_over_ranks),
                                        cmocka_unit_test(files_do_not_depend_on_the_partition),
-                                       cmocka_unit_test(runs_that_begin_again_go_on_with_the_file),
+                                       cmocka_unit_test(restarted_runs_continue_the_file),
                                        cmocka_unit_test(files_that_cannot_be_written_are_reported),
-                                       cmocka_unit_test(others_of_a_missing_field_are_found),
-                                       cmocka_unit_test(conditions_hold_images_back)};
-    return run_session_tests(argc, argv, tests, begin_tests, NULL);
+                                       cmocka_unit_test(other_fields_are_found_if_a_field_is_missing),
+                                       cmocka_unit_test(conditions_suppress_images)};
+    return run_session_tests(argc, argv, tests, set_up_test_group, NULL);
 }

@@ -18,9 +18,9 @@ enum { SIDE = 3 };
 
 /* ---- inputs -------------------------------------------------------------------------------------------------- */
 
-static void make_whole(test_mesh_kind kind, session_input *out)
+static void make_whole_mesh(test_mesh_kind kind, session_input *out)
 {
-    test_mesh_lattice(kind, SIDE, 0.2, test_linear, &out->part);
+    test_mesh_make_lattice(kind, SIDE, 0.2, test_linear_field, &out->part);
     input_describe(out);
 }
 
@@ -31,21 +31,21 @@ static void extract_rank_cells(const session_input *whole, test_partition_kind d
 {
     extract_own_cells(&whole->part, distributed, SIDE, with_ghosts, &out->part);
     if (!with_ghosts) test_mesh_reorder_vertices(&out->part, 3 + (uint64_t)own_rank);
-    test_mesh_shuffle(&out->part, 7 + (uint64_t)own_rank);
+    test_mesh_shuffle_cells(&out->part, 7 + (uint64_t)own_rank);
     input_describe(out);
 }
 
-static insitu_session *open_with(MPI_Comm comm, const char *scene, const session_input *in)
+static insitu_session *open_session_with_input(MPI_Comm comm, const char *scene, const session_input *in)
 {
-    insitu_session *session = open_drawn(comm, scene, in);
+    insitu_session *session = open_session_and_draw(comm, scene, in);
     const char *warnings = insitu_last_report(session)->warnings;
     if (*warnings && !strstr(warnings, "left-handed")) fail_msg("warnings: %s", warnings);
     return session;
 }
 
-static caught_picture draw(MPI_Comm comm, const char *scene, const session_input *in)
+static caught_picture draw_input(MPI_Comm comm, const char *scene, const session_input *in)
 {
-    insitu_session *session = open_with(comm, scene, in);
+    insitu_session *session = open_session_with_input(comm, scene, in);
     const caught_picture picture = pop_caught_picture();
     insitu_destroy(&session);
     return picture;
@@ -53,7 +53,7 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const session_input
 
 /* ---- faces --------------------------------------------------------------------------------------------------- */
 
-static double area_of(const double *a, const double *b, const double *c)
+static double triangle_area(const double *a, const double *b, const double *c)
 {
     double u[3], v[3], sum = 0;
     for (int i = 0; i < 3; i++) u[i] = b[i] - a[i], v[i] = c[i] - a[i];
@@ -65,7 +65,7 @@ static double area_of(const double *a, const double *b, const double *c)
 }
 
 /* Returns the area of this rank's outer faces; NaN if one of them is not on the boundary of the cube. */
-static double outer_area(const insitu_session *session)
+static double compute_outer_area(const insitu_session *session)
 {
     const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
     const session_outer *outer = mesh->outers[0];
@@ -82,33 +82,33 @@ static double outer_area(const insitu_session *session)
             is_on_border = is_on_border || is_on;
         }
         if (!is_on_border) return NAN;
-        sum += area_of(p[0], p[1], p[2]) + (corners == 4 ? area_of(p[0], p[2], p[3]) : 0);
+        sum += triangle_area(p[0], p[1], p[2]) + (corners == 4 ? triangle_area(p[0], p[2], p[3]) : 0);
     }
     return sum;
 }
 
-static double whole_area(const session_input *in)
+static double compute_whole_area(const session_input *in)
 {
-    insitu_session *session = open_with(MPI_COMM_WORLD, write_scene(IMAGE("      - surface: {}\n")), in);
-    double area = outer_area(session);
+    insitu_session *session = open_session_with_input(MPI_COMM_WORLD, write_scene(IMAGE("      - surface: {}\n")), in);
+    double area = compute_outer_area(session);
     MPI_Allreduce(MPI_IN_PLACE, &area, 1, MPI_DOUBLE, MPI_SUM, MPI_COMM_WORLD);
     insitu_destroy(&session);
     return area;
 }
 
 /* The cube has six squares of area 4. A sum of some hundred areas is off by less than 1e-12. */
-static void outer_faces_are_the_cube_s(void **state)
+static void outer_faces_match_the_cube(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
         for (int way = 0; way < 4; way++) {
             session_input whole = {0}, part = {0};
-            make_whole(kind, &whole);
+            make_whole_mesh(kind, &whole);
             extract_rank_cells(&whole, way == 1 ? TEST_BLOCK : TEST_RANDOM, way == 2, &part);
             if (way == 3 && kind != TEST_POLYHEDRA)
                 test_mesh_to_polyhedra(&part.part, 0.5); /* half of the cells, mixed with the others */
             input_describe(&part);
-            const double area = whole_area(&part);
+            const double area = compute_whole_area(&part);
             if (!(fabs(area - 24) < 1e-12))
                 fprintf(stderr, "%s, %d: area %.17g\n", test_mesh_kind_name(kind), way, area);
             everywhere(fabs(area - 24) < 1e-12);
@@ -129,17 +129,17 @@ static int64_t *make_ids(const session_input *whole, const session_input *part, 
 
 /* Checks that vertex ids that are the same on all ranks do not change the outer faces, and that with ids of each rank's
  * own each rank's whole boundary is outer. */
-static void faces_are_one_by_ids(void **state)
+static void vertex_ids_identify_shared_faces(void **state)
 {
     (void)state;
     session_input whole = {0}, part = {0};
-    make_whole(TEST_HEXES, &whole);
+    make_whole_mesh(TEST_HEXES, &whole);
     extract_rank_cells(&whole, TEST_BLOCK, false, &part);
     int64_t *shared = make_ids(&whole, &part, 7, -100), *own = make_ids(&whole, &part, rank_count, own_rank);
     part.mesh.vertex_ids = (insitu_array){shared, INSITU_INT64, 0};
-    everywhere(fabs(whole_area(&part) - 24) < 1e-12);
+    everywhere(fabs(compute_whole_area(&part) - 24) < 1e-12);
     part.mesh.vertex_ids = (insitu_array){own, INSITU_INT64, 0};
-    const double area = whole_area(&part);
+    const double area = compute_whole_area(&part);
     everywhere(rank_count == 1 ? fabs(area - 24) < 1e-12 : isnan(area));
     test_free(shared);
     test_free(own);
@@ -174,7 +174,7 @@ static bool is_cube(const caught_picture *picture, float opacity)
 {
     int hits = 0;
     for (int pixel = 0; pixel < PIXELS; pixel++) {
-        const ray r = ray_of(pixel);
+        const ray r = make_pixel_ray(pixel);
         double depths[2], margin;
         const bool is_hit = cross_cube(&r, depths, &margin);
         if (margin < 1e-4) continue;
@@ -193,11 +193,11 @@ static bool is_cube(const caught_picture *picture, float opacity)
 static bool has_linear_colours(const caught_picture *picture, const caught_picture *other)
 {
     for (int pixel = 0; pixel < PIXELS; pixel++) {
-        const ray r = ray_of(pixel);
+        const ray r = make_pixel_ray(pixel);
         double depths[2], margin, at[3];
         if (!cross_cube(&r, depths, &margin) || margin < 1e-4) continue;
         for (int a = 0; a < 3; a++) at[a] = r.base[a] + depths[0] * r.direction[a];
-        const double grey = (test_linear(at) + 2) / 4;
+        const double grey = (test_linear_field(at) + 2) / 4;
         const double light = grey <= 0.04045 ? grey / 12.92 : pow((grey + 0.055) / 1.055, 2.4);
         if (fabs((double)picture->rgba[4 * pixel] - light) < 1e-4) continue;
         fprintf(stderr, "pixel %d: %g, expected %g\n", pixel, (double)picture->rgba[4 * pixel], light);
@@ -206,32 +206,32 @@ static bool has_linear_colours(const caught_picture *picture, const caught_pictu
     return memcmp(picture->depth, other->depth, PIXELS * sizeof(float)) == 0;
 }
 
-static bool are_same(const caught_picture *a, const caught_picture *b)
+static bool are_equal_pictures(const caught_picture *a, const caught_picture *b)
 {
     return memcmp(a->rgba, b->rgba, 4 * PIXELS * sizeof(float)) == 0 &&
            memcmp(a->depth, b->depth, PIXELS * sizeof(float)) == 0;
 }
 
 /* Surfaces of opacity 1/2 are crossed twice by every ray, so their opacity is 3/4. */
-static void cube_is_one_picture_of(test_mesh_kind kind)
+static void check_cube_picture(test_mesh_kind kind)
 {
     session_input whole = {0};
     caught_picture alone = {0}, clear = {0};
     bool is_well = true;
-    make_whole(kind, &whole);
+    make_whole_mesh(kind, &whole);
     const char *scene = write_scene(IMAGE(COLOURED("")));
-    if (own_rank == 0) alone = draw(MPI_COMM_SELF, scene, &whole);
+    if (own_rank == 0) alone = draw_input(MPI_COMM_SELF, scene, &whole);
     scene = write_scene(IMAGE(COLOURED(", opacity: 0.5")));
     if (own_rank == 0) {
-        clear = draw(MPI_COMM_SELF, scene, &whole);
+        clear = draw_input(MPI_COMM_SELF, scene, &whole);
         is_well = is_cube(&alone, 1) && is_cube(&clear, 0.75F) && has_linear_colours(&alone, &clear);
     }
     everywhere(is_well);
     for (int way = 0; way < 3; way++) {
         session_input part = {0};
         extract_rank_cells(&whole, way == 1 ? TEST_BLOCK : TEST_RANDOM, way == 2, &part);
-        caught_picture picture = draw(MPI_COMM_WORLD, scene, &part);
-        everywhere(own_rank != 0 || are_same(&picture, &clear));
+        caught_picture picture = draw_input(MPI_COMM_WORLD, scene, &part);
+        everywhere(own_rank != 0 || are_equal_pictures(&picture, &clear));
         free_caught(&picture);
         input_free(&part);
     }
@@ -240,10 +240,10 @@ static void cube_is_one_picture_of(test_mesh_kind kind)
     input_free(&whole);
 }
 
-static void cubes_are_true_and_the_same_on_any_ranks(void **state)
+static void cube_surfaces_are_exact_on_any_ranks(void **state)
 {
     (void)state;
-    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) cube_is_one_picture_of(kind);
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) check_cube_picture(kind);
 }
 
 /* ---- warped faces -------------------------------------------------------------------------------------------- */
@@ -252,17 +252,17 @@ static void cubes_are_true_and_the_same_on_any_ranks(void **state)
  * finds the intersection of the ray and the patch itself in STEPS steps. */
 enum { FINE = 16, STEPS = 6 };
 
-static void cross(const double a[3], const double b[3], double out[3])
+static void cross_product(const double a[3], const double b[3], double out[3])
 {
     for (int i = 0; i < 3; i++) out[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
 }
 
-static double dot(const double a[3], const double b[3])
+static double dot_product(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-static void patch_point(const double *const p[4], double u, double v, double out[3])
+static void evaluate_patch(const double *const p[4], double u, double v, double out[3])
 {
     for (int a = 0; a < 3; a++)
         out[a] = (1 - v) * ((1 - u) * p[0][a] + u * p[1][a]) + v * ((1 - u) * p[3][a] + u * p[2][a]);
@@ -272,9 +272,9 @@ static bool intersects_triangle(const ray *r, const double *a, const double *b, 
 {
     double u[3], v[3], w[3], p[3], q[3];
     for (int i = 0; i < 3; i++) u[i] = b[i] - a[i], v[i] = c[i] - a[i], w[i] = r->base[i] - a[i];
-    cross(r->direction, v, p);
-    cross(w, u, q);
-    const double det = dot(u, p), s = dot(w, p) / det, t = dot(r->direction, q) / det;
+    cross_product(r->direction, v, p);
+    cross_product(w, u, q);
+    const double det = dot_product(u, p), s = dot_product(w, p) / det, t = dot_product(r->direction, q) / det;
     return s >= 0 && t >= 0 && s + t <= 1;
 }
 
@@ -283,25 +283,25 @@ typedef struct patch_hit {
     double depth, slant;
 } patch_hit;
 
-static patch_hit polish(const ray *r, const double *const p[4], double u, double v)
+static patch_hit refine_patch_hit(const ray *r, const double *const p[4], double u, double v)
 {
     patch_hit out = {INFINITY, 1};
     for (int step = 0; step < STEPS; step++) {
         double at[3], du[3], dv[3], normal[3], left[3], a[3], b[3];
-        patch_point(p, u, v, at);
+        evaluate_patch(p, u, v, at);
         for (int i = 0; i < 3; i++) {
             du[i] = (1 - v) * (p[1][i] - p[0][i]) + v * (p[2][i] - p[3][i]);
             dv[i] = (1 - u) * (p[3][i] - p[0][i]) + u * (p[2][i] - p[1][i]);
             left[i] = r->base[i] - at[i];
         }
-        cross(du, dv, normal);
-        cross(r->direction, dv, a);
-        cross(du, r->direction, b);
-        const double det = dot(normal, r->direction);
-        out.depth = -dot(normal, left) / det;
-        out.slant = fabs(det) / sqrt(dot(normal, normal) * dot(r->direction, r->direction));
-        u -= dot(left, a) / -dot(du, a);
-        v -= dot(left, b) / -dot(dv, b);
+        cross_product(du, dv, normal);
+        cross_product(r->direction, dv, a);
+        cross_product(du, r->direction, b);
+        const double det = dot_product(normal, r->direction);
+        out.depth = -dot_product(normal, left) / det;
+        out.slant = fabs(det) / sqrt(dot_product(normal, normal) * dot_product(r->direction, r->direction));
+        u -= dot_product(left, a) / -dot_product(du, a);
+        v -= dot_product(left, b) / -dot_product(dv, b);
     }
     return out;
 }
@@ -312,9 +312,9 @@ static void intersect_patch(const ray *r, const double *const p[4], patch_hit *n
         for (int j = 0; j < FINE; j++) {
             double q[4][3];
             for (int k = 0; k < 4; k++)
-                patch_point(p, (double)(i + (k == 1 || k == 2)) / FINE, (double)(j + k / 2) / FINE, q[k]);
+                evaluate_patch(p, (double)(i + (k == 1 || k == 2)) / FINE, (double)(j + k / 2) / FINE, q[k]);
             if (!intersects_triangle(r, q[0], q[1], q[2]) && !intersects_triangle(r, q[0], q[2], q[3])) continue;
-            const patch_hit hit = polish(r, p, (i + 0.5) / FINE, (j + 0.5) / FINE);
+            const patch_hit hit = refine_patch_hit(r, p, (i + 0.5) / FINE, (j + 0.5) / FINE);
             if (hit.depth < nearest->depth) *nearest = hit;
         }
 }
@@ -328,7 +328,7 @@ static bool is_hex(const caught_picture *picture, const double *places)
     patch_hit *truth = test_calloc(PIXELS, sizeof *truth);
     int hits = 0, wrong = 0, edge = 0;
     for (int pixel = 0; pixel < PIXELS; pixel++) {
-        const ray r = ray_of(pixel);
+        const ray r = make_pixel_ray(pixel);
         truth[pixel] = (patch_hit){INFINITY, 1};
         for (int face = 0; face < 6; face++) {
             const double *p[4];
@@ -365,16 +365,16 @@ static void warped_faces_are_bilinear_patches(void **state)
     assert_true(file && fputs(folder, file) >= 0 && fclose(file) == 0);
     for (uint64_t seed = 1; seed <= 6; seed++) {
         session_input in = {0};
-        test_mesh_single(TEST_UNIT_HEX, test_linear, &in.part);
+        test_mesh_make_single_cell(TEST_UNIT_HEX, test_linear_field, &in.part);
         for (int64_t i = 0; i < 24; i++) {
-            const double moved = test_uniform_in((uint64_t)i, seed, -0.25, 0.25);
+            const double moved = test_uniform_between((uint64_t)i, seed, -0.25, 0.25);
             in.part.coordinates[i] = 1.5 * (in.part.coordinates[i] - 0.5 + moved);
         }
         if (seed % 2) test_mesh_to_polyhedra(&in.part, 1);
         input_describe(&in);
         double places[24];
         memcpy(places, in.part.coordinates, sizeof places);
-        caught_picture picture = draw(MPI_COMM_SELF, scene, &in);
+        caught_picture picture = draw_input(MPI_COMM_SELF, scene, &in);
         assert_true(is_hex(&picture, places));
         free_caught(&picture);
         input_free(&in);
@@ -388,16 +388,16 @@ static void faces_are_found_once_for_the_cells(void **state)
 {
     (void)state;
     session_input whole = {0}, part = {0};
-    make_whole(TEST_MIXED, &whole);
+    make_whole_mesh(TEST_MIXED, &whole);
     extract_rank_cells(&whole, TEST_BLOCK, false, &part);
-    insitu_session *session = open_with(MPI_COMM_WORLD, write_scene(IMAGE(COLOURED(""))), &part);
+    insitu_session *session = open_session_with_input(MPI_COMM_WORLD, write_scene(IMAGE(COLOURED(""))), &part);
     const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
     const session_face *faces = mesh->outers[0]->faces;
     everywhere(insitu_last_report(session)->bytes_copied >= mesh->outers[0]->bytes && mesh->tree.node_count == 0);
     for (int64_t v = 0; v < part.part.vertex_count; v++) part.part.coordinates[3 * v + 1] *= 2;
     part.mesh.changed = INSITU_CHANGED_GEOMETRY;
     everywhere(insitu_set_mesh(session, "m", &part.mesh) == INSITU_OK);
-    step_is_good(session, 1);
+    check_step_succeeds(session, 1);
     everywhere(mesh->outers[0]->faces == faces);
     double highest = 0;
     for (int64_t v = 0; v < mesh->outers[0]->mesh->cells.vertex_count; v++)
@@ -405,9 +405,9 @@ static void faces_are_found_once_for_the_cells(void **state)
     MPI_Allreduce(MPI_IN_PLACE, &highest, 1, MPI_DOUBLE, MPI_MAX, MPI_COMM_WORLD);
     everywhere(highest == 2);
     part.mesh.changed = INSITU_CHANGED_ALL;
-    everywhere(submit(session, &part) == INSITU_OK);
+    everywhere(submit_input(session, &part) == INSITU_OK);
     everywhere(mesh->outer_count == 0);
-    step_is_good(session, 2);
+    check_step_succeeds(session, 2);
     everywhere(mesh->outers[0]->are_faces_known);
     insitu_destroy(&session);
     input_free(&part);
@@ -461,9 +461,9 @@ static void rays_along_the_diagonals_of_polygons_hit(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(outer_faces_are_the_cube_s),
-        cmocka_unit_test(faces_are_one_by_ids),
-        cmocka_unit_test(cubes_are_true_and_the_same_on_any_ranks),
+        cmocka_unit_test(outer_faces_match_the_cube),
+        cmocka_unit_test(vertex_ids_identify_shared_faces),
+        cmocka_unit_test(cube_surfaces_are_exact_on_any_ranks),
         cmocka_unit_test(warped_faces_are_bilinear_patches),
         cmocka_unit_test(faces_are_found_once_for_the_cells),
         cmocka_unit_test(rays_along_the_diagonals_of_polygons_hit),

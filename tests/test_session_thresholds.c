@@ -24,20 +24,20 @@ enum { SIDE = 3, PIXELS = 48 * 36 };
 
 /* Mixes the bits of a hash. A face's hash is the sum of the mixed hashes of its corners' positions, so it does not
  * depend on their order. */
-static uint64_t mix(uint64_t h)
+static uint64_t mix_bits(uint64_t h)
 {
     h = (h ^ h >> 30) * 0xbf58476d1ce4e5b9u;
     h = (h ^ h >> 27) * 0x94d049bb133111ebu;
     return h ^ h >> 31;
 }
 
-static uint64_t hash_place(const double place[3])
+static uint64_t hash_position(const double place[3])
 {
     uint64_t out = 0;
     for (int a = 0; a < 3; a++) {
         uint64_t bits;
         memcpy(&bits, &place[a], sizeof bits);
-        out = mix(out + mix(bits + 0x9e3779b97f4a7c15u));
+        out = mix_bits(out + mix_bits(bits + 0x9e3779b97f4a7c15u));
     }
     return out;
 }
@@ -50,10 +50,10 @@ typedef struct face_set {
 static void add_face(face_set *set, uint64_t face)
 {
     set->count++;
-    set->sum += mix(face);
+    set->sum += mix_bits(face);
 }
 
-static bool is_within(const test_mesh *mesh, const grid *g, int64_t cell, bool is_cell_centred)
+static bool is_value_within_bounds(const test_mesh *mesh, const grid *g, int64_t cell, bool is_cell_centred)
 {
     grid_walk walk = grid_walk_cell(g, cell);
     int64_t vertex;
@@ -64,20 +64,20 @@ static bool is_within(const test_mesh *mesh, const grid *g, int64_t cell, bool i
 }
 
 /* Finds the faces that exactly one of the cells within the bounds has, by comparing each face with each other face. */
-static face_set find_truth(const test_mesh *mesh, const grid *g, bool is_cell_centred)
+static face_set find_faces_by_brute_force(const test_mesh *mesh, const grid *g, bool is_cell_centred)
 {
     face_set out = {0};
     int64_t count = 0;
     uint64_t *faces = test_calloc((size_t)g->cell_count * 40, sizeof *faces);
     for (int64_t cell = 0; cell < g->cell_count; cell++) {
-        if (!is_within(mesh, g, cell, is_cell_centred)) continue;
+        if (!is_value_within_bounds(mesh, g, cell, is_cell_centred)) continue;
         const session_cell_faces of = session_faces_of_cell(g, cell);
         for (int64_t f = 0; f < of.count; f++) {
             const session_face_loop loop = session_face_of(&of, f);
             double place[3];
             for (int64_t i = 0; i < loop.size; i++) {
                 grid_vertex(g, session_face_vertex(&loop, i), place);
-                faces[count] += hash_place(place);
+                faces[count] += hash_position(place);
             }
             count++;
         }
@@ -93,7 +93,7 @@ static face_set find_truth(const test_mesh *mesh, const grid *g, bool is_cell_ce
 
 /* Finds the faces that this rank draws, and sums them over all ranks. Faces are stored as pyramids and tets, whose last
  * vertex is the apex. */
-static face_set find_drawn(const insitu_session *session)
+static face_set find_drawn_faces(const insitu_session *session)
 {
     face_set out = {0};
     const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
@@ -101,7 +101,7 @@ static face_set find_drawn(const insitu_session *session)
     for (int64_t cell = 0; cell < outer->mesh->cells.cell_count; cell++) {
         uint64_t face = 0;
         for (int64_t i = outer->offsets[cell]; i < outer->offsets[cell + 1] - 1; i++)
-            face += hash_place(outer->coordinates + 3 * outer->connectivity[i]);
+            face += hash_position(outer->coordinates + 3 * outer->connectivity[i]);
         add_face(&out, face);
     }
     MPI_Allreduce(MPI_IN_PLACE, &out, 2, MPI_UINT64_T, MPI_SUM, MPI_COMM_WORLD);
@@ -133,25 +133,26 @@ static void set_values(session_input *in, bool is_cell_centred, double step)
     in->field.count = count;
 }
 
-static face_set truth_of(const char *scene, const session_input *whole, bool is_cell_centred)
+static face_set compute_face_set(const char *scene, const session_input *whole, bool is_cell_centred)
 {
     face_set out = {0};
     if (own_rank == 0) {
-        insitu_session *session = open_drawn(MPI_COMM_SELF, scene, whole);
-        out = find_truth(&whole->part, &session_find_mesh(&session->meshes, "m")->cells, is_cell_centred);
+        insitu_session *session = open_session_and_draw(MPI_COMM_SELF, scene, whole);
+        out =
+            find_faces_by_brute_force(&whole->part, &session_find_mesh(&session->meshes, "m")->cells, is_cell_centred);
         insitu_destroy(&session);
     }
     MPI_Bcast(&out, 2, MPI_UINT64_T, 0, MPI_COMM_WORLD);
     return out;
 }
 
-static bool are_same(const caught_picture *a, const caught_picture *b)
+static bool are_equal_pictures(const caught_picture *a, const caught_picture *b)
 {
     return memcmp(a->rgba, b->rgba, 4 * PIXELS * sizeof(float)) == 0 &&
            memcmp(a->depth, b->depth, PIXELS * sizeof(float)) == 0;
 }
 
-static void keep(caught_picture *out)
+static void take_caught_picture(caught_picture *out)
 {
     *out = (caught_picture){0};
     if (own_rank == 0) *out = caught[0];
@@ -159,31 +160,31 @@ static void keep(caught_picture *out)
 }
 
 /* Checks the faces and pictures of two steps with different values. */
-static void check(test_mesh_kind kind, bool is_cell_centred, bool with_ghosts)
+static void check_threshold(test_mesh_kind kind, bool is_cell_centred, bool with_ghosts)
 {
     session_input whole = {0}, part = {0};
     insitu_session *session = NULL;
     const char *scene = write_scene(IMAGE("field: f, from: -0.6, to: 0.9"));
-    test_mesh_lattice(kind, SIDE, 0.2, test_linear, &whole.part);
+    test_mesh_make_lattice(kind, SIDE, 0.2, test_linear_field, &whole.part);
     extract_own_cells(&whole.part, TEST_RANDOM, SIDE, with_ghosts, &part.part);
     for (int step = 0; step < 2; step++) {
         caught_picture alone = {0}, picture;
         set_values(&whole, is_cell_centred, step);
-        const face_set truth = truth_of(scene, &whole, is_cell_centred);
-        keep(&alone);
+        const face_set truth = compute_face_set(scene, &whole, is_cell_centred);
+        take_caught_picture(&alone);
         set_values(&part, is_cell_centred, step);
         part.mesh.changed = step ? 0 : INSITU_CHANGED_ALL;
         if (step == 0) session = open_session(MPI_COMM_WORLD, scene);
         discard_pictures();
-        assert_int_equal(submit(session, &part), INSITU_OK);
+        assert_int_equal(submit_input(session, &part), INSITU_OK);
         everywhere(insitu_step(session, step, step) == INSITU_OK);
-        const face_set drawn = find_drawn(session);
+        const face_set drawn = find_drawn_faces(session);
         if ((!truth.count || drawn.sum != truth.sum) && own_rank == 0)
             fprintf(stderr, "%s, step %d, cells %d: %d faces, expected %d\n", test_mesh_kind_name(kind), step,
                     is_cell_centred, (int)drawn.count, (int)truth.count);
         everywhere(truth.count > 0 && drawn.count == truth.count && drawn.sum == truth.sum);
-        keep(&picture);
-        everywhere(own_rank != 0 || are_same(&picture, &alone));
+        take_caught_picture(&picture);
+        everywhere(own_rank != 0 || are_equal_pictures(&picture, &alone));
         free_caught(&picture);
         free_caught(&alone);
     }
@@ -192,15 +193,15 @@ static void check(test_mesh_kind kind, bool is_cell_centred, bool with_ghosts)
     input_free(&whole);
 }
 
-static void faces_are_those_around_the_cells_within(void **state)
+static void faces_enclose_the_cells_within_bounds(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
-        for (int way = 0; way < 3; way++) check(kind, way == 1, way == 2);
+        for (int way = 0; way < 3; way++) check_threshold(kind, way == 1, way == 2);
 }
 
 /* Checks thresholds that all cells or no cells are within, and a mesh without the field. */
-static void bounds_may_show_all_or_nothing(void **state)
+static void bounds_can_select_all_or_no_cells(void **state)
 {
     (void)state;
     static const char *const scenes[] = {IMAGE("field: f, from: -1e30"), IMAGE("field: f, to: -1e30"),
@@ -208,23 +209,23 @@ static void bounds_may_show_all_or_nothing(void **state)
     session_input part = {0};
     input_create(&part, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
     for (int i = 0; i < 2; i++) {
-        insitu_session *session = open_drawn(MPI_COMM_WORLD, write_scene(scenes[i]), &part);
-        everywhere(find_drawn(session).count == (i ? 0 : 6 * SIDE * SIDE));
+        insitu_session *session = open_session_and_draw(MPI_COMM_WORLD, write_scene(scenes[i]), &part);
+        everywhere(find_drawn_faces(session).count == (i ? 0 : 6 * SIDE * SIDE));
         caught_picture picture;
-        keep(&picture);
+        take_caught_picture(&picture);
         free_caught(&picture);
         insitu_destroy(&session);
     }
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scenes[2]));
-    assert_int_equal(submit(session, &part), INSITU_OK);
-    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "\"g\"");
+    assert_int_equal(submit_input(session, &part), INSITU_OK);
+    check_reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "\"g\"");
     insitu_destroy(&session);
     input_free(&part);
 }
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(faces_are_those_around_the_cells_within),
-                                       cmocka_unit_test(bounds_may_show_all_or_nothing)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(faces_enclose_the_cells_within_bounds),
+                                       cmocka_unit_test(bounds_can_select_all_or_no_cells)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -14,11 +14,11 @@
 
 static insitu_report totals; /* fragments: sum over all ranks; bytes_peak: maximum over all ranks */
 
-static void draw(const char *text, int side)
+static void draw_and_count_passes(const char *text, int side)
 {
     session_input in;
     input_create(&in, TEST_TETS, side, TEST_BLOCK, own_rank, rank_count);
-    insitu_session *session = open_drawn(MPI_COMM_WORLD, write_scene(text), &in);
+    insitu_session *session = open_session_and_draw(MPI_COMM_WORLD, write_scene(text), &in);
     totals = *insitu_last_report(session);
     const int64_t own[3] = {totals.turns, -totals.turns, totals.bytes_peak};
     int64_t most[3];
@@ -34,7 +34,7 @@ static void draw(const char *text, int side)
 static void one_volume_needs_no_further_pass(void **context)
 {
     (void)context;
-    draw(IMAGE(64, 48, THIN), 4);
+    draw_and_count_passes(IMAGE(64, 48, THIN), 4);
     everywhere(totals.turns == 0);
 }
 
@@ -42,7 +42,7 @@ static void one_volume_needs_no_further_pass(void **context)
 static void two_volumes_take_a_further_pass(void **context)
 {
     (void)context;
-    draw(IMAGE(40, 30, THIN DENSE), 4);
+    draw_and_count_passes(IMAGE(40, 30, THIN DENSE), 4);
     everywhere(totals.turns == 1);
 }
 
@@ -52,8 +52,8 @@ static void many_fragments_take_few_passes(void **context)
 {
     (void)context;
     enum { LEAST_FRAGMENTS = 58900000, MOST_TURNS = 8 };
-    if (!test_is_whole()) skip();
-    draw(IMAGE(960, 540, THIN DENSE), 48);
+    if (!test_is_long_run()) skip();
+    draw_and_count_passes(IMAGE(960, 540, THIN DENSE), 48);
     if (own_rank == 0)
         fprintf(stderr, "%lld fragments in %d turns, %lld MB at most on a rank\n", (long long)totals.fragments,
                 totals.turns, (long long)(totals.bytes_peak / 1000000));

@@ -50,12 +50,12 @@ static const char scene[] = "images:\n"
 static void *rooms[MOST_ROOMS];
 static int room_count;
 
-static void free_rooms(void)
+static void free_memory_blocks(void)
 {
     while (room_count) free(rooms[--room_count]);
 }
 
-static double number_at(const insitu_array *a, int64_t i)
+static double read_number(const insitu_array *a, int64_t i)
 {
     if (a->type == INSITU_UINT8) return ((const unsigned char *)a->data)[i];
     if (a->type == INSITU_INT64) return (double)((const int64_t *)a->data)[i];
@@ -70,7 +70,7 @@ static double number_at(const insitu_array *a, int64_t i)
     }
 
 /* Stores a number as the given type; returns false if the type cannot represent it. */
-static bool put(char *out, insitu_type type, double value)
+static bool store_number(char *out, insitu_type type, double value)
 {
     switch (type) {
     case INSITU_FLOAT32: PUT(float)
@@ -97,7 +97,7 @@ static bool put(char *out, insitu_type type, double value)
     return false;
 }
 
-static int64_t size_of(insitu_type type)
+static int64_t get_type_size(insitu_type type)
 {
     static const int sizes[] = {0, 4, 8, 4, 8, 1, 1, 2, 2, 4, 8};
     return sizes[type];
@@ -105,20 +105,21 @@ static int64_t size_of(insitu_type type)
 
 /* Stores an array of float64, int64 or uint8 in another layout; returns false if the layout's type cannot represent the
  * numbers. */
-static bool lay_out(insitu_array *a, int64_t count, const layout *as)
+static bool convert_array(insitu_array *a, int64_t count, const layout *as)
 {
-    const int64_t stride = size_of(as->type) + as->gap;
+    const int64_t stride = get_type_size(as->type) + as->gap;
     if (!a->data) return true;
     char *room = malloc((size_t)(count * stride + as->shift + 16)); /* malloc aligns this to 16 bytes */
     assert_true(room && room_count < MOST_ROOMS);
     rooms[room_count++] = room;
     bool fits = true;
-    for (int64_t i = 0; i < count && fits; i++) fits = put(room + as->shift + i * stride, as->type, number_at(a, i));
+    for (int64_t i = 0; i < count && fits; i++)
+        fits = store_number(room + as->shift + i * stride, as->type, read_number(a, i));
     *a = (insitu_array){room + as->shift, as->type, as->gap ? stride : 0};
     return fits;
 }
 
-static bool agree(bool here)
+static bool all_ranks_agree(bool here)
 {
     int all = here;
     MPI_Allreduce(MPI_IN_PLACE, &all, 1, MPI_INT, MPI_MIN, MPI_COMM_WORLD);
@@ -126,7 +127,7 @@ static bool agree(bool here)
 }
 
 /* Creates an input whose coordinates and values are integers, so that every type can represent them. */
-static void create(session_input *in, test_mesh_kind kind)
+static void create_integer_input(session_input *in, test_mesh_kind kind)
 {
     input_create(in, kind, SIDE, TEST_BLOCK, own_rank, rank_count);
     for (int64_t i = 0; i < 3 * in->part.vertex_count; i++)
@@ -137,10 +138,10 @@ static void create(session_input *in, test_mesh_kind kind)
 }
 
 /* Draws the input. Returns its picture and the number of bytes that the step copied. */
-static caught_picture draw(const char *path, const session_input *in, int64_t *copied)
+static caught_picture draw_and_count_copies(const char *path, const session_input *in, int64_t *copied)
 {
     discard_pictures();
-    insitu_session *session = open_drawn(MPI_COMM_WORLD, path, in);
+    insitu_session *session = open_session_and_draw(MPI_COMM_WORLD, path, in);
     *copied = insitu_last_report(session)->bytes_copied;
     everywhere(in->part.cell_count == 0 || insitu_last_report(session)->bytes_borrowed > 0);
     insitu_destroy(&session);
@@ -149,27 +150,27 @@ static caught_picture draw(const char *path, const session_input *in, int64_t *c
 
 /* Draws the input and compares the picture with the true one. If is_in_place, no more bytes may be copied than for the
  * true picture. */
-static void same(const char *path, const session_input *in, const caught_picture *truth, int64_t copied,
-                 bool is_in_place)
+static void check_same_picture(const char *path, const session_input *in, const caught_picture *truth, int64_t copied,
+                               bool is_in_place)
 {
     int64_t own;
-    caught_picture picture = draw(path, in, &own);
-    const bool is_same = own_rank || same_pictures(&picture, truth);
+    caught_picture picture = draw_and_count_copies(path, in, &own);
+    const bool is_same = own_rank || are_same_pictures(&picture, truth);
     everywhere(is_same);
     everywhere(is_in_place ? own <= copied : own > 0 || own == copied);
     free_caught(&picture);
 }
 
-static bool lay_out_cells(insitu_mesh *m, const layout *as)
+static bool convert_cells(insitu_mesh *m, const layout *as)
 {
     const int64_t end = m->open_offsets ? 0 : 1;
-    bool fits = lay_out(&m->connectivity, m->connectivity_count, as);
-    fits = lay_out(&m->offsets, m->cell_count + end, as) && fits;
-    fits = lay_out(&m->face_offsets, m->face_count + end, as) && fits;
-    return lay_out(&m->face_connectivity, m->face_connectivity_count, as) && fits;
+    bool fits = convert_array(&m->connectivity, m->connectivity_count, as);
+    fits = convert_array(&m->offsets, m->cell_count + end, as) && fits;
+    fits = convert_array(&m->face_offsets, m->face_count + end, as) && fits;
+    return convert_array(&m->face_connectivity, m->face_connectivity_count, as) && fits;
 }
 
-static void cells_of_any_type_are_the_same(void **state)
+static void index_type_changes_no_picture(void **state)
 {
     (void)state;
     static const test_mesh_kind kinds[] = {TEST_HEXES, TEST_MIXED, TEST_POLYHEDRA};
@@ -178,16 +179,16 @@ static void cells_of_any_type_are_the_same(void **state)
     for (int k = 0; k < 3; k++) {
         session_input in;
         int64_t copied;
-        create(&in, kinds[k]);
-        caught_picture truth = draw(path, &in, &copied);
+        create_integer_input(&in, kinds[k]);
+        caught_picture truth = draw_and_count_copies(path, &in, &copied);
         for (int i = 0; i < 2 * INDEX_LAYOUTS; i++) {
             const layout *as = &index_layouts[i / 2];
             input_describe(&in);
             in.mesh.open_offsets = i % 2;
-            const bool fits = agree(lay_out_cells(&in.mesh, as));
-            if (fits) same(path, &in, &truth, copied, as->is_in_place);
+            const bool fits = all_ranks_agree(convert_cells(&in.mesh, as));
+            if (fits) check_same_picture(path, &in, &truth, copied, as->is_in_place);
             drawn += fits;
-            free_rooms();
+            free_memory_blocks();
         }
         free_caught(&truth);
         input_free(&in);
@@ -196,82 +197,82 @@ static void cells_of_any_type_are_the_same(void **state)
 }
 
 /* Gives cell types by VTK's numbers and by other numbers with a map, and flags whose lowest byte is 0. */
-static void types_and_flags_of_any_type_are_the_same(void **state)
+static void type_of_types_and_flags_changes_no_picture(void **state)
 {
     (void)state;
     static int map[60];
     const char *path = write_scene(scene);
     session_input in;
     int64_t copied;
-    create(&in, TEST_MIXED);
-    caught_picture truth = draw(path, &in, &copied);
+    create_integer_input(&in, TEST_MIXED);
+    caught_picture truth = draw_and_count_copies(path, &in, &copied);
     for (int type = 0; type < 60; type++) map[type] = (type + 25) % 60;
     for (int i = 0; i < 2 * INDEX_LAYOUTS; i++) {
         const layout *as = &index_layouts[i / 2];
         double flag = as->type == INSITU_INT8 || as->type == INSITU_UINT8 ? 1 : 256;
         input_describe(&in);
-        lay_out(&in.mesh.ghosts, in.mesh.cell_count, as);
+        convert_array(&in.mesh.ghosts, in.mesh.cell_count, as);
         for (int64_t c = 0; c < in.mesh.cell_count; c++) {
-            char *to = (char *)(uintptr_t)in.mesh.ghosts.data + c * (size_of(as->type) + as->gap);
-            put(to, as->type, in.part.ghosts[c] ? flag : 0);
+            char *to = (char *)(uintptr_t)in.mesh.ghosts.data + c * (get_type_size(as->type) + as->gap);
+            store_number(to, as->type, in.part.ghosts[c] ? flag : 0);
             /* Applies the inverse of the map, which adds 25 modulo 60. */
             if (i % 2) in.part.types[c] = (unsigned char)((in.part.types[c] + 35) % 60);
         }
         if (i % 2) in.mesh.cell_type_map = map;
         if (i % 2) in.mesh.cell_type_map_count = 60;
-        everywhere(lay_out(&in.mesh.cell_types, in.mesh.cell_count, as));
-        same(path, &in, &truth, copied, false);
+        everywhere(convert_array(&in.mesh.cell_types, in.mesh.cell_count, as));
+        check_same_picture(path, &in, &truth, copied, false);
         for (int64_t c = 0; c < in.mesh.cell_count && i % 2; c++)
             in.part.types[c] = (unsigned char)map[in.part.types[c]];
-        free_rooms();
+        free_memory_blocks();
     }
     free_caught(&truth);
     input_free(&in);
 }
 
-static void lay_out_places(session_input *in, const layout *as)
+static void convert_coordinates(session_input *in, const layout *as)
 {
     static double apart[3][4096];
     for (int axis = 0; axis < 3; axis++) {
         for (int64_t v = 0; v < in->mesh.vertex_count; v++) apart[axis][v] = in->part.coordinates[3 * v + axis];
         in->mesh.coordinates[axis] = (insitu_array){apart[axis], INSITU_FLOAT64, 0};
-        everywhere(lay_out(&in->mesh.coordinates[axis], in->mesh.vertex_count, as));
+        everywhere(convert_array(&in->mesh.coordinates[axis], in->mesh.vertex_count, as));
     }
 }
 
-static void coordinates_of_any_type_are_the_same(void **state)
+static void coordinate_type_changes_no_picture(void **state)
 {
     (void)state;
     const char *path = write_scene(scene);
     session_input in;
     int64_t copied;
-    create(&in, TEST_MIXED);
-    caught_picture truth = draw(path, &in, &copied);
+    create_integer_input(&in, TEST_MIXED);
+    caught_picture truth = draw_and_count_copies(path, &in, &copied);
     for (int i = 0; i < NUMBER_LAYOUTS; i++) {
         input_describe(&in);
-        lay_out_places(&in, &number_layouts[i]);
-        same(path, &in, &truth, copied, number_layouts[i].is_in_place);
-        free_rooms();
+        convert_coordinates(&in, &number_layouts[i]);
+        check_same_picture(path, &in, &truth, copied, number_layouts[i].is_in_place);
+        free_memory_blocks();
     }
     free_caught(&truth);
     input_free(&in);
 }
 
 /* Checks that values of any type are read in place. */
-static void values_of_any_type_are_the_same(void **state)
+static void value_type_changes_no_picture(void **state)
 {
     (void)state;
     const char *path = write_scene(scene);
     session_input in;
     int64_t copied;
     for (int k = 0; k < 2; k++) {
-        create(&in, k ? TEST_TETS : TEST_MIXED);
-        caught_picture truth = draw(path, &in, &copied);
+        create_integer_input(&in, k ? TEST_TETS : TEST_MIXED);
+        caught_picture truth = draw_and_count_copies(path, &in, &copied);
         for (int i = 0; i < NUMBER_LAYOUTS; i++) {
             input_describe(&in);
-            everywhere(lay_out(&in.field.values, in.field.count, &number_layouts[i]));
-            same(path, &in, &truth, copied, true);
-            free_rooms();
+            everywhere(convert_array(&in.field.values, in.field.count, &number_layouts[i]));
+            check_same_picture(path, &in, &truth, copied, true);
+            free_memory_blocks();
         }
         free_caught(&truth);
         input_free(&in);
@@ -315,24 +316,24 @@ static void make_field(vector_form form, insitu_centring centring, session_input
         const int64_t at = by_index ? count - 1 - i : i;
         numbers[i] = (double)at;
         for (int c = 0; c < COMPONENTS; c++)
-            tuples[3 * at + c] = one[c][at] = rint(test_uniform_in((uint64_t)(3 * i + c), 11, -40, 40));
+            tuples[3 * at + c] = one[c][at] = rint(test_uniform_between((uint64_t)(3 * i + c), 11, -40, 40));
     }
     if (form == APART || form == APART_BY_INDEX) {
         for (int c = 0; c < COMPONENTS; c++) {
             components[c] = (insitu_array){one[c], INSITU_FLOAT64, 0};
-            lay_out(&components[c], count, &apart[c]);
+            convert_array(&components[c], count, &apart[c]);
         }
         in->field.components = components;
     } else {
         in->field.values = (insitu_array){tuples, INSITU_FLOAT64, 0};
-        lay_out(&in->field.values, COMPONENTS * count, form == UNALIGNED_TUPLES ? &packed : &aligned);
+        convert_array(&in->field.values, COMPONENTS * count, form == UNALIGNED_TUPLES ? &packed : &aligned);
     }
     static const layout index = {INSITU_INT64, 0, 0, true};
     if (by_index) in->field.index = (insitu_array){numbers, INSITU_FLOAT64, 0};
-    if (by_index) lay_out(&in->field.index, count, &index);
+    if (by_index) convert_array(&in->field.index, count, &index);
 }
 
-static void components_apart_are_the_same(void **state)
+static void separate_components_draw_the_same_picture(void **state)
 {
     (void)state;
     const char *path = write_scene(vector_scene);
@@ -340,23 +341,23 @@ static void components_apart_are_the_same(void **state)
         session_input in;
         int64_t copied;
         const insitu_centring centring = k % 2 ? INSITU_CELL : INSITU_VERTEX;
-        create(&in, k / 2 ? TEST_POLYHEDRA : TEST_MIXED);
+        create_integer_input(&in, k / 2 ? TEST_POLYHEDRA : TEST_MIXED);
         make_field(TUPLES, centring, &in);
-        caught_picture truth = draw(path, &in, &copied);
+        caught_picture truth = draw_and_count_copies(path, &in, &copied);
         for (vector_form form = APART; form < VECTOR_FORMS; form++) {
             make_field(form, centring, &in);
-            same(path, &in, &truth, copied, form == APART || form == UNALIGNED_TUPLES);
-            free_rooms();
+            check_same_picture(path, &in, &truth, copied, form == APART || form == UNALIGNED_TUPLES);
+            free_memory_blocks();
         }
         free_caught(&truth);
         input_free(&in);
-        free_rooms();
+        free_memory_blocks();
     }
 }
 
 /* Checks that a field that is set again, unchanged or without need, is read correctly, whether its tables of components
  * are reused or created again. */
-static void components_may_be_set_again(void **state)
+static void components_can_be_set_again(void **state)
 {
     (void)state;
     static const char recentred[] = "images:\n"
@@ -366,9 +367,9 @@ static void components_may_be_set_again(void **state)
                                     "      - isosurface: {field: f, component: magnitude, values: [30]}\n"
                                     "    outputs: [{path: a.png}]\n";
     session_input in;
-    create(&in, TEST_MIXED);
+    create_integer_input(&in, TEST_MIXED);
     make_field(APART, INSITU_CELL, &in);
-    insitu_session *session = open_drawn(MPI_COMM_WORLD, write_scene(recentred), &in);
+    insitu_session *session = open_session_and_draw(MPI_COMM_WORLD, write_scene(recentred), &in);
     caught_picture first = pop_caught_picture();
     for (int step = 1; step < 4; step++) {
         insitu_array again[COMPONENTS];
@@ -376,23 +377,23 @@ static void components_may_be_set_again(void **state)
         in.mesh.changed = INSITU_CHANGED_NOTHING;
         in.field.changed = step == 2 ? INSITU_CHANGED_VALUES : INSITU_CHANGED_NOTHING;
         in.field.components = again;
-        everywhere(submit(session, &in) == INSITU_OK);
+        everywhere(submit_input(session, &in) == INSITU_OK);
         memset(again, 0, sizeof again);
-        step_is_good(session, step);
+        check_step_succeeds(session, step);
         caught_picture picture = pop_caught_picture();
-        const bool is_same = own_rank || same_pictures(&picture, &first);
+        const bool is_same = own_rank || are_same_pictures(&picture, &first);
         everywhere(is_same);
         free_caught(&picture);
     }
     free_caught(&first);
     insitu_destroy(&session);
-    free_rooms();
+    free_memory_blocks();
     input_free(&in);
 }
 
 /* Checks that a session whose arrays change between layouts, and then get new coordinates, draws the same pictures as a
  * session that always has float64. */
-static void forms_may_change_from_step_to_step(void **state)
+static void forms_can_change_between_steps(void **state)
 {
     (void)state;
     static const layout forms[] = {{INSITU_INT8, 0, 0, false},
@@ -402,7 +403,7 @@ static void forms_may_change_from_step_to_step(void **state)
                                    {INSITU_INT8, 1, 1, false}};
     const char *path = write_scene(scene);
     session_input in;
-    create(&in, TEST_MIXED);
+    create_integer_input(&in, TEST_MIXED);
     insitu_session *session = open_session(MPI_COMM_WORLD, path), *plain = open_session(MPI_COMM_WORLD, path);
     for (int step = 0; step < 10; step++) {
         for (int64_t i = 0; i < in.part.vertex_count && step == 5; i++) in.part.coordinates[3 * i] += 3;
@@ -410,20 +411,20 @@ static void forms_may_change_from_step_to_step(void **state)
         for (int k = 0; k < 2; k++) {
             input_describe(&in);
             in.mesh.changed = INSITU_CHANGED_GEOMETRY;
-            if (k) lay_out_places(&in, &forms[step % 5]);
-            if (k) everywhere(lay_out(&in.field.values, in.field.count, &forms[step % 5]));
-            everywhere(submit(k ? session : plain, &in) == INSITU_OK);
-            step_is_good(k ? session : plain, step);
+            if (k) convert_coordinates(&in, &forms[step % 5]);
+            if (k) everywhere(convert_array(&in.field.values, in.field.count, &forms[step % 5]));
+            everywhere(submit_input(k ? session : plain, &in) == INSITU_OK);
+            check_step_succeeds(k ? session : plain, step);
             pictures[k] = pop_caught_picture();
         }
-        const bool is_same = own_rank || same_pictures(&pictures[0], &pictures[1]);
+        const bool is_same = own_rank || are_same_pictures(&pictures[0], &pictures[1]);
         everywhere(is_same);
         for (int k = 0; k < 2; k++) free_caught(&pictures[k]);
-        if (room_count > MOST_ROOMS - 8) free_rooms(); /* a session reads arrays until its next step */
+        if (room_count > MOST_ROOMS - 8) free_memory_blocks(); /* a session reads arrays until its next step */
     }
     insitu_destroy(&session);
     insitu_destroy(&plain);
-    free_rooms();
+    free_memory_blocks();
     input_free(&in);
 }
 
@@ -431,36 +432,36 @@ static void forms_may_change_from_step_to_step(void **state)
 
 static const int short_map[] = {0, INSITU_TET, INSITU_HEX};
 
-static void numbers_without_type(session_input *in)
+static void remove_value_type(session_input *in)
 {
     for (int64_t i = 0; i < in->part.cell_count; i++) in->part.types[i] = (unsigned char)(i == 3 ? 7 : 2);
     in->mesh.cell_type_map = short_map;
     in->mesh.cell_type_map_count = 3;
 }
 
-static void no_map(session_input *in)
+static void remove_type_map(session_input *in)
 {
     in->mesh.cell_type_map_count = 3;
 }
 
-static void offsets_half_open(session_input *in)
+static void set_half_open_offsets(session_input *in)
 {
     in->mesh.open_offsets = 2;
 }
 
-static void last_cell_too_long(session_input *in)
+static void lengthen_last_cell(session_input *in)
 {
     in->mesh.open_offsets = 1;
     in->mesh.connectivity_count++;
 }
 
-static void values_twice(session_input *in)
+static void set_values_twice(session_input *in)
 {
     components[0] = in->field.values;
     in->field.components = components;
 }
 
-static void no_component(session_input *in)
+static void remove_component(session_input *in)
 {
     components[0] = in->field.values;
     components[1] = components[2] = (insitu_array){NULL, INSITU_FLOAT64, 0};
@@ -469,21 +470,29 @@ static void no_component(session_input *in)
     in->field.components = components;
 }
 
-static void component_of_no_type(session_input *in)
+static void set_component_without_type(session_input *in)
 {
-    no_component(in);
+    remove_component(in);
     components[1] = components[0];
     components[1].type = (insitu_type)77;
 }
 
 static const corrupted_case faults[] = {
-    {"no type", numbers_without_type, INSITU_ERROR_MESH, false, {"cell 3", "type 7"}},
-    {"no map", no_map, INSITU_ERROR_ARGUMENT, true, {"cell_type_map_count is 3, and cell_type_map is not given"}},
-    {"open", offsets_half_open, INSITU_ERROR_ARGUMENT, true, {"open_offsets is 2, expected 0 or 1"}},
-    {"long", last_cell_too_long, INSITU_ERROR_MESH, false, {"offsets", "do not lie 8 apart"}},
-    {"twice", values_twice, INSITU_ERROR_FIELD, true, {"values and components are given"}},
-    {"no component", no_component, INSITU_ERROR_FIELD, true, {"component 1: values are not given"}},
-    {"no type", component_of_no_type, INSITU_ERROR_ARGUMENT, true, {"component 1: values are of element type 77"}},
+    {"no type", remove_value_type, INSITU_ERROR_MESH, false, {"cell 3", "type 7"}},
+    {"no map",
+     remove_type_map,
+     INSITU_ERROR_ARGUMENT,
+     true,
+     {"cell_type_map_count is 3, and cell_type_map is not given"}},
+    {"open", set_half_open_offsets, INSITU_ERROR_ARGUMENT, true, {"open_offsets is 2, expected 0 or 1"}},
+    {"long", lengthen_last_cell, INSITU_ERROR_MESH, false, {"offsets", "do not lie 8 apart"}},
+    {"twice", set_values_twice, INSITU_ERROR_FIELD, true, {"values and components are given"}},
+    {"no component", remove_component, INSITU_ERROR_FIELD, true, {"component 1: values are not given"}},
+    {"no type",
+     set_component_without_type,
+     INSITU_ERROR_ARGUMENT,
+     true,
+     {"component 1: values are of element type 77"}},
 };
 
 static void faults_are_reported_on_all_ranks(void **state)
@@ -491,20 +500,20 @@ static void faults_are_reported_on_all_ranks(void **state)
     (void)state;
     session_input in;
     input_create(&in, TEST_HEXES, 4, TEST_BLOCK, own_rank, rank_count);
-    all_are_reported(&in, faults, sizeof faults / sizeof faults[0]);
+    check_all_faults_are_reported(&in, faults, sizeof faults / sizeof faults[0]);
     input_free(&in);
 }
 
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(cells_of_any_type_are_the_same),
-        cmocka_unit_test(types_and_flags_of_any_type_are_the_same),
-        cmocka_unit_test(coordinates_of_any_type_are_the_same),
-        cmocka_unit_test(values_of_any_type_are_the_same),
-        cmocka_unit_test(components_apart_are_the_same),
-        cmocka_unit_test(components_may_be_set_again),
-        cmocka_unit_test(forms_may_change_from_step_to_step),
+        cmocka_unit_test(index_type_changes_no_picture),
+        cmocka_unit_test(type_of_types_and_flags_changes_no_picture),
+        cmocka_unit_test(coordinate_type_changes_no_picture),
+        cmocka_unit_test(value_type_changes_no_picture),
+        cmocka_unit_test(separate_components_draw_the_same_picture),
+        cmocka_unit_test(components_can_be_set_again),
+        cmocka_unit_test(forms_can_change_between_steps),
         cmocka_unit_test(faults_are_reported_on_all_ranks),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);

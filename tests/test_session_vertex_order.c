@@ -14,7 +14,7 @@ static const char scene[] = "images:\n  - name: a\n    size: [12, 8]\n    layers
 static const char *const names[ORDERS] = {"INSITU_ORDER_VTK", "INSITU_ORDER_LEXICOGRAPHIC", "INSITU_ORDER_DMPLEX"};
 
 /* Returns the position of VTK's n-th vertex in another order, as docs/finite_elements.md defines it. */
-static int place_in(insitu_vertex_order order, int type, int n)
+static int find_vertex_position(insitu_vertex_order order, int type, int n)
 {
     static const int lexicographic[] = {0, 1, 3, 2, 4, 5, 7, 6}, hex[] = {0, 3, 2, 1, 4, 5, 6, 7};
     static const int wedge[] = {0, 2, 1, 3, 4, 5};
@@ -24,18 +24,18 @@ static int place_in(insitu_vertex_order order, int type, int n)
     return order == INSITU_ORDER_DMPLEX && type == INSITU_WEDGE ? wedge[n] : n;
 }
 
-static void bring_into(test_mesh *part, insitu_vertex_order order)
+static void reorder_vertices(test_mesh *part, insitu_vertex_order order)
 {
     for (int64_t cell = 0; cell < part->cell_count; cell++) {
         int64_t *first = part->connectivity + part->offsets[cell], held[8];
         const int64_t count = part->offsets[cell + 1] - part->offsets[cell];
         memcpy(held, first, (size_t)count * sizeof *first);
-        for (int n = 0; n < count; n++) first[place_in(order, part->types[cell], n)] = held[n];
+        for (int n = 0; n < count; n++) first[find_vertex_position(order, part->types[cell], n)] = held[n];
     }
 }
 
 /* Returns whether the two orders differ for the cells of this kind. */
-static bool differ(test_mesh_kind kind, int a, int b)
+static bool orders_differ(test_mesh_kind kind, int a, int b)
 {
     if (a == b || kind == TEST_MIXED) return a != b;
     if (kind == TEST_HEXES) return true;
@@ -45,38 +45,38 @@ static bool differ(test_mesh_kind kind, int a, int b)
 
 /* Checks that one warning with these words is given. If words is NULL, checks that no warning about the vertex order is
  * given; a warning about left-handed cells is then allowed. */
-static void expect(insitu_session *session, const session_input *in, const char *words, const char *what)
+static void expect_warning(insitu_session *session, const session_input *in, const char *words, const char *what)
 {
-    everywhere(submit(session, in) == INSITU_OK);
-    step_is_good(session, 0);
+    everywhere(submit_input(session, in) == INSITU_OK);
+    check_step_succeeds(session, 0);
     const char *text = insitu_last_report(session)->warnings;
     const bool is_well = words ? strstr(text, words) && !strchr(text, '\n') : !strstr(text, "vertex_order");
     if (!is_well) fprintf(stderr, "%s: %s: %s\n", what, words ? words : "no warning", text);
     everywhere(is_well);
 }
 
-static void check(test_mesh_kind kind, insitu_vertex_order stand, insitu_vertex_order said, double jitter,
-                  bool mirrored)
+static void check_order_warning(test_mesh_kind kind, insitu_vertex_order stand, insitu_vertex_order said, double jitter,
+                                bool mirrored)
 {
     char what[96];
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
     session_input in = {0};
     test_mesh whole;
-    test_mesh_lattice(kind, SIDE, jitter, test_wave, &whole);
-    if (mirrored) test_mesh_mirror(&whole, false);
-    bring_into(&whole, stand);
+    test_mesh_make_lattice(kind, SIDE, jitter, test_wave_field, &whole);
+    if (mirrored) test_mesh_mirror_cells(&whole, false);
+    reorder_vertices(&whole, stand);
     extract_own_cells(&whole, TEST_RANDOM, SIDE, false, &in.part);
     test_mesh_free(&whole);
     input_describe(&in);
     in.mesh.vertex_order = said;
     snprintf(what, sizeof what, "%s in order %d read in %d, jitter %g%s", test_mesh_kind_name(kind), (int)stand,
              (int)said, jitter, mirrored ? ", mirrored" : "");
-    expect(session, &in, differ(kind, (int)stand, (int)said) ? names[stand] : NULL, what);
+    expect_warning(session, &in, orders_differ(kind, (int)stand, (int)said) ? names[stand] : NULL, what);
     insitu_destroy(&session);
     input_free(&in);
 }
 
-static void order_that_fits_is_named(void **state)
+static void fitting_vertex_order_is_suggested(void **state)
 {
     (void)state;
     static const test_mesh_kind kinds[] = {TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS, TEST_MIXED};
@@ -87,9 +87,9 @@ static void order_that_fits_is_named(void **state)
                 for (int j = 0; j < 3; j++)
                     for (int mirrored = 0; mirrored < 2; mirrored++)
                         /* If the actual order equals VTK's for this kind, the warning names VTK's. */
-                        if (stand == INSITU_ORDER_VTK || differ(kinds[k], INSITU_ORDER_VTK, stand))
-                            check(kinds[k], (insitu_vertex_order)stand, (insitu_vertex_order)said, jitters[j],
-                                  mirrored);
+                        if (stand == INSITU_ORDER_VTK || orders_differ(kinds[k], INSITU_ORDER_VTK, stand))
+                            check_order_warning(kinds[k], (insitu_vertex_order)stand, (insitu_vertex_order)said,
+                                                jitters[j], mirrored);
 }
 
 /* Exchanges two opposite vertices of each hex, so that the cells are wrong in every order. */
@@ -99,13 +99,13 @@ static void twisted_cells_are_reported(void **state)
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
     session_input in = {0};
     input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
-    expect(session, &in, NULL, "good hexes");
+    expect_warning(session, &in, NULL, "good hexes");
     for (int64_t cell = 0; cell < in.part.cell_count; cell++) {
         int64_t *v = in.part.connectivity + 8 * cell, held = v[0];
         v[0] = v[6];
         v[6] = held;
     }
-    expect(session, &in, "no vertex_order would mend that", "hexes with two vertices exchanged");
+    expect_warning(session, &in, "no vertex_order would mend that", "hexes with two vertices exchanged");
     insitu_destroy(&session);
     input_free(&in);
 }
@@ -122,7 +122,7 @@ static void few_cells_are_not_reported(void **state)
         v[1] = v[3];
         v[3] = held;
     }
-    expect(session, &in, NULL, "a third of the hexes in DMPlex's order");
+    expect_warning(session, &in, NULL, "a third of the hexes in DMPlex's order");
     insitu_destroy(&session);
     input_free(&in);
 }
@@ -130,7 +130,7 @@ static void few_cells_are_not_reported(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(order_that_fits_is_named),
+        cmocka_unit_test(fitting_vertex_order_is_suggested),
         cmocka_unit_test(twisted_cells_are_reported),
         cmocka_unit_test(few_cells_are_not_reported),
     };

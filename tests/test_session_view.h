@@ -20,7 +20,7 @@ typedef struct ray {
 } ray;
 
 /* Returns the ray through the pixel's centre. */
-static inline ray ray_of(int pixel)
+static inline ray make_pixel_ray(int pixel)
 {
     render_camera camera;
     ray out;

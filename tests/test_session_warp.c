@@ -20,7 +20,7 @@ static const double scale = 0.3;
 
 /* ---- displacements and moved coordinates ------------------------------------------------------------------------ */
 
-static void displace(const double p[3], double out[3])
+static void compute_displacement(const double p[3], double out[3])
 {
     out[0] = 0.3 * sin(2 * p[1] + p[2]) + 0.1 * p[0];
     out[1] = 0.25 * cos(3 * p[2] - p[0]);
@@ -44,7 +44,7 @@ static void make_field(const insitu_mesh *mesh, int components, warped *out)
     for (int64_t v = 0; v < mesh->vertex_count; v++) {
         double place[3], u[3];
         place_of(mesh, v, place);
-        displace(place, u);
+        compute_displacement(place, u);
         memcpy(out->u + components * v, u, (size_t)components * sizeof *u);
     }
     insitu_field_defaults(&out->field);
@@ -104,22 +104,22 @@ static void forms_draw_their_moved_meshes(void **state)
 {
     (void)state;
     for (mesh_form form = 0; form < MESH_FORM_COUNT; form++)
-        for (int with_corners = 0; with_corners <= formed_has_corners(form); with_corners++) {
+        for (int with_corners = 0; with_corners <= formed_mesh_has_corners(form); with_corners++) {
             const char *scene = with_corners ? formed_corner_scene : formed_scene;
             formed_mesh m;
             warped w;
-            formed_create(form, SIDE, own_rank, rank_count, &m);
+            formed_mesh_create(form, SIDE, own_rank, rank_count, &m);
             make_warped(&m.mesh, 3, &w);
             drawn a = draw_formed(open_text(MPI_COMM_WORLD, WARP, scene), &m, &m.mesh, with_corners, &w.field);
             drawn b = draw_formed(open_text(MPI_COMM_WORLD, "", scene), &m, &w.moved, with_corners, NULL);
             expect_same(&a, &b, mesh_form_name(form));
             free_warped(&w);
-            formed_free(&m);
+            formed_mesh_free(&m);
         }
 }
 
-static void expect_moved_with(const char *keys, const insitu_mesh *mesh, const insitu_field *f, int components,
-                              const char *what)
+static void expect_moved_by_components(const char *keys, const insitu_mesh *mesh, const insitu_field *f, int components,
+                                       const char *what)
 {
     warped w;
     char text[256];
@@ -133,7 +133,7 @@ static void expect_moved_with(const char *keys, const insitu_mesh *mesh, const i
 
 static void expect_moved(const insitu_mesh *mesh, const insitu_field *f, int components, const char *what)
 {
-    expect_moved_with("", mesh, f, components, what);
+    expect_moved_by_components("", mesh, f, components, what);
 }
 
 static void cells_of_higher_order_draw_their_moved_nodes(void **state)
@@ -141,16 +141,16 @@ static void cells_of_higher_order_draw_their_moved_nodes(void **state)
     (void)state;
     for (int k = 0; k < order_kind_count; k += 3) {
         order_mesh m;
-        order_mesh_create(&order_kinds[k], 2, 0.1, test_wave, own_rank, rank_count, &m);
+        order_mesh_create(&order_kinds[k], 2, 0.1, test_wave_field, own_rank, rank_count, &m);
         expect_moved(&m.mesh, &m.field, 3, order_kinds[k].name);
-        expect_moved_with("finer_pieces: 2\n", &m.mesh, &m.field, 3, order_kinds[k].name);
+        expect_moved_by_components("finer_pieces: 2\n", &m.mesh, &m.field, 3, order_kinds[k].name);
         order_mesh_free(&m);
     }
 }
 
 /* Finer pieces are made of the moved nodes, and again if the displacements change, the scene's warp goes and comes, or
  * nodes move. The plain session is handed the moved nodes anew in each step. */
-static void finer_pieces_follow_the_warp(void **state)
+static void refined_pieces_follow_the_warp(void **state)
 {
     (void)state;
     static const double factors[] = {0.3, 0.3, 0.6, 0, 0.3, 0.3};
@@ -158,7 +158,7 @@ static void finer_pieces_follow_the_warp(void **state)
     char text[MOST_TEXT];
     order_mesh m;
     warped w;
-    order_mesh_create(&hex, 2, 0.1, test_wave, own_rank, rank_count, &m);
+    order_mesh_create(&hex, 2, 0.1, test_wave_field, own_rank, rank_count, &m);
     make_field(&m.mesh, 3, &w);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(all_layers));
     insitu_session *plain = open_text(MPI_COMM_WORLD, "finer_pieces: 2\n", all_layers);
@@ -175,12 +175,12 @@ static void finer_pieces_follow_the_warp(void **state)
         everywhere(insitu_set_field(session, "m", &w.field) == INSITU_OK);
         move_mesh(&m.mesh, factors[i], &w);
         w.moved.changed = INSITU_CHANGED_ALL;
-        drawn a = step_drawn(session, i);
+        drawn a = step_and_take_pictures(session, i);
         everywhere(strstr(insitu_last_report(session)->copied_why, "with 2 pieces") != NULL || m.cell_count == 0);
         m.field.changed = INSITU_CHANGED_ALL;
         everywhere(insitu_set_mesh(plain, "m", &w.moved) == INSITU_OK);
         everywhere(insitu_set_field(plain, "m", &m.field) == INSITU_OK);
-        drawn b = step_drawn(plain, i);
+        drawn b = step_and_take_pictures(plain, i);
         expect_same(&a, &b, "a step");
     }
     insitu_destroy(&plain);
@@ -190,7 +190,7 @@ static void finer_pieces_follow_the_warp(void **state)
 }
 
 /* Lagrange hexes without connectivity, each with nodes of its own. */
-static void nodes_of_each_cells_own_are_moved(void **state)
+static void unshared_nodes_are_moved(void **state)
 {
     (void)state;
     enum { ORDER = 2, NODES = 27, CELLS = 3 };
@@ -200,7 +200,7 @@ static void nodes_of_each_cells_own_are_moved(void **state)
         places[n][0] = 0.5 * (node % 3) + cell;
         places[n][1] = 0.5 * (node / 3 % 3);
         places[n][2] = 0.5 * (node / 9);
-        values[n] = test_wave(places[n]);
+        values[n] = test_wave_field(places[n]);
     }
     insitu_mesh mesh;
     insitu_field f;
@@ -220,7 +220,7 @@ static void nodes_of_each_cells_own_are_moved(void **state)
 
 /* ---- planes --------------------------------------------------------------------------------------------------- */
 
-static void planes_move_by_two_or_three_components(void **state)
+static void flat_meshes_move_by_two_or_three_components(void **state)
 {
     (void)state;
     for (int is_wide = 0; is_wide < 2; is_wide++)
@@ -263,7 +263,7 @@ static void blocks_draw_their_moved_vertices(void **state)
                 everywhere(insitu_set_block_field(session, "m", i, &b[i].field) == INSITU_OK);
                 everywhere(insitu_set_block_field(session, "m", i, &w[i].field) == INSITU_OK);
             }
-            pictures[is_moved] = step_drawn(session, 0);
+            pictures[is_moved] = step_and_take_pictures(session, 0);
             insitu_destroy(&session);
             for (int i = 0; i < 2; i++) free_warped(&w[i]);
         }
@@ -276,7 +276,7 @@ static void blocks_draw_their_moved_vertices(void **state)
 typedef enum layout { TUPLES, FLOATS, APART, BY_INDEX, FILLED, LAYOUTS } layout;
 
 /* Whole numbers, so that all types hold them; in arrays of `room`. */
-static void lay_out(layout as, warped *w, void *room, int64_t *index, filled_values *values)
+static void store_displacements(layout as, warped *w, void *room, int64_t *index, filled_values *values)
 {
     static insitu_array apart[3];
     const int64_t count = w->field.count;
@@ -328,7 +328,7 @@ static void displacements_are_read_in_any_layout(void **state)
         for (size_t i = 0; i < 3 * count; i++) w.u[i] = round(2 * w.u[i] / scale / 3);
         move_mesh(&in.mesh, scale, &w);
         insitu_field u = w.field;
-        lay_out(as, &w, room, index, &values);
+        store_displacements(as, &w, room, index, &values);
         drawn a;
         if (as == FILLED) {
             w.field.values = (insitu_array){0};
@@ -378,7 +378,7 @@ typedef struct stamps {
     int64_t cells, coordinates;
 } stamps;
 
-static stamps stamps_of(const insitu_session *session)
+static stamps get_stamps(const insitu_session *session)
 {
     const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
     return (stamps){mesh->cells_stamp, mesh->coordinates_stamp};
@@ -393,8 +393,8 @@ static void expect_step(insitu_session *session, insitu_session *plain, const se
     w->moved.changed = cycle ? INSITU_CHANGED_GEOMETRY : INSITU_CHANGED_ALL;
     f.changed = INSITU_CHANGED_ALL;
     everywhere(insitu_set_mesh(plain, "m", &w->moved) == INSITU_OK && insitu_set_field(plain, "m", &f) == INSITU_OK);
-    drawn a = step_drawn(session, cycle);
-    drawn b = step_drawn(plain, cycle);
+    drawn a = step_and_take_pictures(session, cycle);
+    drawn b = step_and_take_pictures(plain, cycle);
     expect_same(&a, &b, what);
 }
 
@@ -407,26 +407,26 @@ static void steps_compute_only_what_has_changed(void **state)
     make_field(&in.mesh, 3, &w);
     insitu_session *session = open_text(MPI_COMM_WORLD, WARP, all_layers);
     insitu_session *plain = open_text(MPI_COMM_WORLD, "", all_layers);
-    everywhere(submit(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
+    everywhere(submit_input(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
     expect_step(session, plain, &in, scale, &w, 0, "the first step");
-    const stamps first = stamps_of(session);
+    const stamps first = get_stamps(session);
 
     in.mesh.changed = in.field.changed = INSITU_CHANGED_NOTHING;
-    everywhere(submit(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
+    everywhere(submit_input(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
     expect_step(session, plain, &in, scale, &w, 1, "the same values again");
-    everywhere(stamps_of(session).coordinates == first.coordinates);
+    everywhere(get_stamps(session).coordinates == first.coordinates);
 
     everywhere(insitu_set_mesh(session, "m", &in.mesh) == INSITU_OK);
     expect_step(session, plain, &in, scale, &w, 2, "the same mesh again");
-    everywhere(stamps_of(session).coordinates == first.coordinates);
+    everywhere(get_stamps(session).coordinates == first.coordinates);
 
     if (own_rank == rank_count - 1) /* the others learn of it */
         for (int64_t i = 0; i < 3 * in.part.vertex_count; i++) w.u[i] *= 1.5;
     everywhere(insitu_set_field(session, "m", &w.field) == INSITU_OK);
     const int64_t before = insitu_last_report(session)->bytes_copied;
     expect_step(session, plain, &in, scale, &w, 3, "other values on the last rank");
-    everywhere((stamps_of(session).coordinates != first.coordinates) == (own_rank == rank_count - 1));
-    everywhere(stamps_of(session).cells == first.cells && insitu_last_report(session)->bytes_copied == before);
+    everywhere((get_stamps(session).coordinates != first.coordinates) == (own_rank == rank_count - 1));
+    everywhere(get_stamps(session).cells == first.cells && insitu_last_report(session)->bytes_copied == before);
     everywhere(insitu_last_report(session)->refit_ms > 0 || own_rank != rank_count - 1);
 
     in.mesh.changed = INSITU_CHANGED_GEOMETRY;
@@ -435,7 +435,7 @@ static void steps_compute_only_what_has_changed(void **state)
     expect_step(session, plain, &in, scale, &w, 4, "other coordinates");
 
     in.mesh.changed = in.field.changed = INSITU_CHANGED_ALL;
-    everywhere(submit(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
+    everywhere(submit_input(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
     expect_step(session, plain, &in, scale, &w, 5, "everything anew");
     insitu_destroy(&session);
     insitu_destroy(&plain);
@@ -453,7 +453,7 @@ static void edits_of_the_scene_warp_and_unwarp(void **state)
     make_field(&in.mesh, 3, &w);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(all_layers));
     insitu_session *plain = open_text(MPI_COMM_WORLD, "", all_layers);
-    everywhere(submit(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
+    everywhere(submit_input(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
     static const double factors[] = {0, 0.3, -0.2, 0, 0.3};
     for (int i = 0; i < 5; i++) {
         snprintf(text, sizeof text, "meshes: {m: {warp: {field: u, scale: %g}}}\n%s", factors[i], all_layers);
@@ -480,15 +480,15 @@ static void copies_and_gradients_are_reported(void **state)
         open_text(MPI_COMM_WORLD, WARP,
                   "fields: {g: {gradient: f, component: x}}\nimages:\n" LAYERS("a", "[{surface: {colour_by: {field: "
                                                                                     "g}}}]"));
-    everywhere(submit(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
-    drawn a = step_drawn(session, 0);
+    everywhere(submit_input(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
+    drawn a = step_and_take_pictures(session, 0);
     const insitu_report *report = insitu_last_report(session);
     snprintf(words, sizeof words, "where the scene's warp moves them: %lld bytes",
              (long long)(24 * in.part.vertex_count));
     everywhere(strstr(report->copied_why, words) != NULL);
     everywhere(strstr(report->warnings, "derived field \"g\", are those of the warped mesh") != NULL);
     everywhere(!strstr(report->left_out, "\"u\""));
-    free_drawn(&a);
+    free_picture_set(&a);
     insitu_destroy(&session);
     free_warped(&w);
     input_free(&in);
@@ -513,11 +513,11 @@ static void statistics_are_of_the_warped_mesh(void **state)
     insitu_session *session = open_text(MPI_COMM_WORLD, WARP,
                                         "statistics: [{field: f, path: warp.csv}]\nimages:\n" LAYERS(
                                             "a", "[{surface: {}}]\n    when: {field: f, above: 1e30}"));
-    everywhere(submit(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
+    everywhere(submit_input(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
     everywhere(insitu_step(session, 0, 0) == INSITU_OK);
     insitu_destroy(&session);
     read_file("warp.csv", sizeof text, text);
-    everywhere(own_rank != 0 || fabs(last_number(text, 3) - 8 * 1.3) <= 1e-8); /* nine digits are written */
+    everywhere(own_rank != 0 || fabs(read_last_number(text, 3) - 8 * 1.3) <= 1e-8); /* nine digits are written */
     free_warped(&w);
     input_free(&in);
 }
@@ -530,49 +530,49 @@ typedef struct fault {
     const char *words[2];
 } fault;
 
-static void in_cells(insitu_field *u, insitu_mesh *mesh)
+static void make_cell_field(insitu_field *u, insitu_mesh *mesh)
 {
     u->centring = INSITU_CELL;
     u->count = mesh->cell_count;
 }
 
-static void at_corners(insitu_field *u, insitu_mesh *mesh)
+static void make_corner_field(insitu_field *u, insitu_mesh *mesh)
 {
     u->centring = INSITU_CORNER;
     u->count = mesh->connectivity_count;
 }
 
-static void of_one(insitu_field *u, insitu_mesh *mesh)
+static void set_one_component(insitu_field *u, insitu_mesh *mesh)
 {
     (void)mesh;
     u->component_count = 1;
 }
 
-static void of_two(insitu_field *u, insitu_mesh *mesh)
+static void set_two_components(insitu_field *u, insitu_mesh *mesh)
 {
     (void)mesh;
     u->component_count = 2;
 }
 
-static void of_four(insitu_field *u, insitu_mesh *mesh)
+static void set_four_components(insitu_field *u, insitu_mesh *mesh)
 {
     (void)mesh;
     u->component_count = 4;
 }
 
-static void renamed(insitu_field *u, insitu_mesh *mesh)
+static void rename_field(insitu_field *u, insitu_mesh *mesh)
 {
     (void)mesh;
     u->name = "v";
 }
 
-static void not_a_number(insitu_field *u, insitu_mesh *mesh)
+static void set_nan_component(insitu_field *u, insitu_mesh *mesh)
 {
     (void)mesh;
     ((double *)(uintptr_t)u->values.data)[4] = (double)NAN;
 }
 
-static void by_bad_index(insitu_field *u, insitu_mesh *mesh)
+static void set_bad_index(insitu_field *u, insitu_mesh *mesh)
 {
     static int32_t index[1 << 12];
     assert_true(mesh->vertex_count <= 1 << 12);
@@ -583,24 +583,32 @@ static void by_bad_index(insitu_field *u, insitu_mesh *mesh)
 
 static const fault faults[] = {
     {"{field: u}",
-     in_cells,
+     make_cell_field,
      {"scene text:1: meshes.m.warp.field: field \"u\" of mesh \"m\" has values at cells",
       "expected values at vertices"}},
     {"{field: u}",
-     at_corners,
+     make_corner_field,
      {"meshes.m.warp.field: field \"u\" of mesh \"m\" has values at corners of cells", "expected values at vertices"}},
-    {"{field: u}", of_one, {"meshes.m.warp.field: field \"u\" of mesh \"m\" has 1 component, expected 3", ""}},
-    {"{field: u}", of_two, {"meshes.m.warp.field: field \"u\" of mesh \"m\" has 2 components, expected 3", ""}},
-    {"{field: u}", of_four, {"meshes.m.warp.field: field \"u\" of mesh \"m\" has 4 components, expected 3", ""}},
-    {"{field: u}", renamed, {"meshes.m.warp.field: mesh \"m\" has no field \"u\", expected one at its vertices", ""}},
-    {"{field: u}", by_bad_index, {"mesh \"m\": field \"u\": the index of vertex 2 is 1048576, outside 0..", ""}},
-    {"{field: u}", not_a_number, {"has a coordinate that is not finite", "the scene's warp moves its vertices"}},
+    {"{field: u}",
+     set_one_component,
+     {"meshes.m.warp.field: field \"u\" of mesh \"m\" has 1 component, expected 3", ""}},
+    {"{field: u}",
+     set_two_components,
+     {"meshes.m.warp.field: field \"u\" of mesh \"m\" has 2 components, expected 3", ""}},
+    {"{field: u}",
+     set_four_components,
+     {"meshes.m.warp.field: field \"u\" of mesh \"m\" has 4 components, expected 3", ""}},
+    {"{field: u}",
+     rename_field,
+     {"meshes.m.warp.field: mesh \"m\" has no field \"u\", expected one at its vertices", ""}},
+    {"{field: u}", set_bad_index, {"mesh \"m\": field \"u\": the index of vertex 2 is 1048576, outside 0..", ""}},
+    {"{field: u}", set_nan_component, {"has a coordinate that is not finite", "the scene's warp moves its vertices"}},
     {"{field: g}",
      NULL,
      {"scene text:1: meshes.m.warp.field: \"g\" is derived by the scene, expected a field that the", ""}},
 };
 
-static void faults_are_told_with_line_and_key(void **state)
+static void errors_are_reported_with_line_and_key(void **state)
 {
     (void)state;
     session_input in;
@@ -621,18 +629,18 @@ static void faults_are_told_with_line_and_key(void **state)
         u.values.data = values;
         if (own_rank == rank_count - 1 && faults[i].spoil) faults[i].spoil(&u, &in.mesh);
         for (int cycle = 0; cycle < 2; cycle++) { /* told in each step until it is mended */
-            everywhere(submit(session, &in) == INSITU_OK && insitu_set_field(session, "m", &u) == INSITU_OK);
+            everywhere(submit_input(session, &in) == INSITU_OK && insitu_set_field(session, "m", &u) == INSITU_OK);
             discard_pictures();
             const insitu_status status = insitu_step(session, cycle, 0);
             everywhere(status != INSITU_OK && caught_count == 0);
-            reported_everywhere(session, status, status, faults[i].words[0], faults[i].words[1]);
+            check_reported_everywhere(session, status, status, faults[i].words[0], faults[i].words[1]);
         }
         const insitu_field good = w.field;
-        everywhere(submit(session, &in) == INSITU_OK && insitu_set_field(session, "m", &good) == INSITU_OK);
+        everywhere(submit_input(session, &in) == INSITU_OK && insitu_set_field(session, "m", &good) == INSITU_OK);
         if (faults[i].spoil) {
-            drawn a = step_drawn(session, 2);
+            drawn a = step_and_take_pictures(session, 2);
             everywhere(own_rank != 0 || a.count == 2);
-            free_drawn(&a);
+            free_picture_set(&a);
         }
         insitu_destroy(&session);
         free_warped(&w);
@@ -641,7 +649,7 @@ static void faults_are_told_with_line_and_key(void **state)
     input_free(&in);
 }
 
-static void names_of_no_mesh_are_warned_of(void **state)
+static void unknown_mesh_names_give_a_warning(void **state)
 {
     (void)state;
     char text[MOST_TEXT];
@@ -650,10 +658,10 @@ static void names_of_no_mesh_are_warned_of(void **state)
     input_create(&in, TEST_TETS, SIDE, TEST_BLOCK, own_rank, rank_count);
     snprintf(text, sizeof text, "%s\nmeshes:\n  plate: {warp: u}\n", surface_layers);
     assert_int_equal(insitu_create_from_text(MPI_COMM_WORLD, text, &session), INSITU_OK);
-    everywhere(submit(session, &in) == INSITU_OK);
-    drawn a = step_drawn(session, 0);
+    everywhere(submit_input(session, &in) == INSITU_OK);
+    drawn a = step_and_take_pictures(session, 0);
     everywhere(strstr(insitu_last_report(session)->warnings, "meshes.plate (line ") != NULL);
-    free_drawn(&a);
+    free_picture_set(&a);
     insitu_destroy(&session);
     input_free(&in);
 }
@@ -663,9 +671,9 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(forms_draw_their_moved_meshes),
         cmocka_unit_test(cells_of_higher_order_draw_their_moved_nodes),
-        cmocka_unit_test(finer_pieces_follow_the_warp),
-        cmocka_unit_test(nodes_of_each_cells_own_are_moved),
-        cmocka_unit_test(planes_move_by_two_or_three_components),
+        cmocka_unit_test(refined_pieces_follow_the_warp),
+        cmocka_unit_test(unshared_nodes_are_moved),
+        cmocka_unit_test(flat_meshes_move_by_two_or_three_components),
         cmocka_unit_test(lattices_draw_their_moved_vertices),
         cmocka_unit_test(blocks_draw_their_moved_vertices),
         cmocka_unit_test(displacements_are_read_in_any_layout),
@@ -674,8 +682,8 @@ int main(int argc, char **argv)
         cmocka_unit_test(edits_of_the_scene_warp_and_unwarp),
         cmocka_unit_test(copies_and_gradients_are_reported),
         cmocka_unit_test(statistics_are_of_the_warped_mesh),
-        cmocka_unit_test(faults_are_told_with_line_and_key),
-        cmocka_unit_test(names_of_no_mesh_are_warned_of),
+        cmocka_unit_test(errors_are_reported_with_line_and_key),
+        cmocka_unit_test(unknown_mesh_names_give_a_warning),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -40,17 +40,17 @@ static void set_gate(bool closed)
     pthread_mutex_unlock(&mutex);
 }
 
-static void pass_slowly(void)
+static void wait_before_picture(void)
 {
     usleep(20000);
 }
 
-static insitu_session *open_behind(const char *scene, const session_input *in, void (*gate)(void))
+static insitu_session *open_session_with_gate(const char *scene, const session_input *in, void (*gate)(void))
 {
     before_writing = gate;
     session_writes_behind = true;
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
-    everywhere(submit(session, in) == INSITU_OK);
+    everywhere(submit_input(session, in) == INSITU_OK);
     return session;
 }
 
@@ -64,7 +64,7 @@ static void make_input(session_input *in)
     input_create(in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
 }
 
-static bool are_same(const caught_picture *a, const caught_picture *b)
+static bool are_equal_pictures(const caught_picture *a, const caught_picture *b)
 {
     const size_t pixels = (size_t)a->width * (size_t)a->height;
     return a->width == b->width && a->height == b->height && strcmp(a->path, b->path) == 0 &&
@@ -73,10 +73,10 @@ static bool are_same(const caught_picture *a, const caught_picture *b)
 }
 
 /* Returns whether 2 × count pictures were caught, of which the first half equals the second half. */
-static bool are_halves_same(int count)
+static bool are_picture_halves_equal(int count)
 {
     bool is_same = caught_count == 2 * count;
-    for (int i = 0; i < count && is_same; i++) is_same = are_same(&caught[i], &caught[count + i]);
+    for (int i = 0; i < count && is_same; i++) is_same = are_equal_pictures(&caught[i], &caught[count + i]);
     return is_same;
 }
 
@@ -88,25 +88,25 @@ static void pictures_are_those_written_in_the_step(void **state)
     make_input(&in);
     const char *scene = write_scene(SCENE("writing: step\n", "[16, 12]"));
     for (int behind = 0; behind < 2; behind++) {
-        insitu_session *session = open_behind(scene, &in, NULL);
+        insitu_session *session = open_session_with_gate(scene, &in, NULL);
         for (int cycle = 0; cycle < STEPS; cycle++) everywhere(insitu_step(session, cycle, 0.5) == INSITU_OK);
         everywhere(behind || own_rank || caught_count == WRITTEN);
         everywhere(insitu_destroy(&session) == INSITU_OK);
         scene = write_scene(SCENE("", "[16, 12]"));
     }
-    everywhere(own_rank ? caught_count == 0 : are_halves_same(WRITTEN));
+    everywhere(own_rank ? caught_count == 0 : are_picture_halves_equal(WRITTEN));
     input_free(&in);
 }
 
 /* Checks that steps end while no picture is written. The report counts the pending pictures, and insitu_destroy()
  * reports all pictures that could not be written. */
-static void simulation_goes_on_while_pictures_wait(void **state)
+static void simulation_continues_while_pictures_are_pending(void **state)
 {
     (void)state;
     session_input in;
     make_input(&in);
     set_gate(true);
-    insitu_session *session = open_behind(write_scene(SCENE("", "[16, 12]")), &in, wait_at_gate);
+    insitu_session *session = open_session_with_gate(write_scene(SCENE("", "[16, 12]")), &in, wait_at_gate);
     for (int cycle = 0; cycle < 4; cycle++) {
         everywhere(insitu_step(session, cycle, 0.5) == INSITU_OK);
         const insitu_report *report = insitu_last_report(session);
@@ -116,8 +116,8 @@ static void simulation_goes_on_while_pictures_wait(void **state)
     everywhere(caught_count == 0);
     unwritable = "b";
     set_gate(false);
-    reported_everywhere(NULL, insitu_destroy(&session), INSITU_ERROR_IO, "cycle 0: image \"b\": b0.exr",
-                        "(and 3 more like it)");
+    check_reported_everywhere(NULL, insitu_destroy(&session), INSITU_ERROR_IO, "cycle 0: image \"b\": b0.exr",
+                              "(and 3 more like it)");
     everywhere(caught_count == (own_rank ? 0 : 4));
     input_free(&in);
 }
@@ -139,7 +139,7 @@ static void pending_pictures_are_bounded(void **state)
     pthread_t opener;
     make_input(&in);
     set_gate(true);
-    insitu_session *session = open_behind(write_scene(scene), &in, wait_at_gate);
+    insitu_session *session = open_session_with_gate(write_scene(scene), &in, wait_at_gate);
     for (int cycle = 0; cycle < 8; cycle++) {
         const bool opens = cycle == 4;
         if (opens) assert_int_equal(pthread_create(&opener, NULL, open_gate_later, NULL), 0);
@@ -169,14 +169,14 @@ static void wait_for_passed(int count)
     pthread_mutex_unlock(&mutex);
 }
 
-static void failure_is_reported_by_a_later_step_or_the_end(void **state)
+static void write_failure_is_reported_by_a_later_step_or_destroy(void **state)
 {
     (void)state;
     session_input in;
     make_input(&in);
     passed = 0;
     unwritable = "2.png";
-    insitu_session *session = open_behind(write_scene(SCENE("", "[16, 12]")), &in, wait_at_gate);
+    insitu_session *session = open_session_with_gate(write_scene(SCENE("", "[16, 12]")), &in, wait_at_gate);
     everywhere(insitu_step(session, 2, 0.5) == INSITU_OK);
     wait_for_passed(3);
     /* The writer thread's progress determines which step returns the error: the last picture has passed the gate, but
@@ -187,34 +187,34 @@ static void failure_is_reported_by_a_later_step_or_the_end(void **state)
         usleep(status ? 0 : 1000);
         discard_pictures();
     }
-    reported_everywhere(session, status, INSITU_ERROR_IO, "cycle 2: image \"a\": a2.png: cannot be written");
+    check_reported_everywhere(session, status, INSITU_ERROR_IO, "cycle 2: image \"a\": a2.png: cannot be written");
     everywhere(insitu_last_report(session)->images == 1); /* the picture that is due is still drawn */
     everywhere(insitu_step(session, 1001, 0.5) == INSITU_OK);
     everywhere(insitu_step(session, 1002, 0.5) == INSITU_OK);
     status = insitu_destroy(&session);
-    reported_everywhere(NULL, status, INSITU_ERROR_IO, "cycle 1002: image \"a\": a1002.png");
+    check_reported_everywhere(NULL, status, INSITU_ERROR_IO, "cycle 1002: image \"a\": a1002.png");
     everywhere(!session);
     input_free(&in);
 }
 
 /* Checks that an error of the step is returned first, and that the error of a picture is returned later and not
  * lost. */
-static void failure_waits_for_an_error_of_the_step(void **state)
+static void write_failure_is_reported_after_a_step_error(void **state)
 {
     (void)state;
     session_input in;
     make_input(&in);
     unwritable = "a0.exr";
-    insitu_session *session = open_behind(write_scene(SCENE("", "[16, 12]")), &in, NULL);
+    insitu_session *session = open_session_with_gate(write_scene(SCENE("", "[16, 12]")), &in, NULL);
     everywhere(insitu_step(session, 0, 0.5) == INSITU_OK);
     insitu_mesh bad = in.mesh;
     bad.vertex_count = -1;
     for (int cycle = 1; cycle < 4; cycle++) {
         (void)insitu_set_mesh(session, "m", &bad);
-        reported_everywhere(session, insitu_step(session, cycle, 0.5), INSITU_ERROR_ARGUMENT, "vertex_count");
+        check_reported_everywhere(session, insitu_step(session, cycle, 0.5), INSITU_ERROR_ARGUMENT, "vertex_count");
         usleep(10000);
     }
-    everywhere(submit(session, &in) == INSITU_OK);
+    everywhere(submit_input(session, &in) == INSITU_OK);
     const insitu_status status = insitu_step(session, 4, 0.5);
     const insitu_status last = insitu_destroy(&session);
     everywhere((status == INSITU_ERROR_IO) != (last == INSITU_ERROR_IO));
@@ -227,7 +227,7 @@ static void scene_is_kept_until_its_pictures_are_written(void **state)
     (void)state;
     session_input in;
     make_input(&in);
-    insitu_session *session = open_behind(write_scene(SCENE("", "[16, 12]")), &in, pass_slowly);
+    insitu_session *session = open_session_with_gate(write_scene(SCENE("", "[16, 12]")), &in, wait_before_picture);
     everywhere(insitu_step(session, 0, 0.5) == INSITU_OK);
     everywhere(insitu_step(session, 2, 0.5) == INSITU_OK);
     write_scene("images:\n  - {name: other, size: [4, 4], layers: [{isosurface: {field: f, values: [0.25]}}], "
@@ -243,7 +243,7 @@ static void scene_is_kept_until_its_pictures_are_written(void **state)
     input_free(&in);
 }
 
-static int lines_of(const char *path)
+static int count_lines(const char *path)
 {
     int lines = 0;
     FILE *file = fopen(path, "r");
@@ -252,7 +252,7 @@ static int lines_of(const char *path)
     return lines;
 }
 
-static void tables_follow_their_pictures(void **state)
+static void tables_are_written_after_their_pictures(void **state)
 {
     (void)state;
     static const char table[] = "writer.cdb/data.csv";
@@ -260,15 +260,15 @@ static void tables_follow_their_pictures(void **state)
     make_input(&in);
     if (own_rank == 0) unlink(table);
     set_gate(true);
-    insitu_session *session =
-        open_behind(write_scene("images:\n  - {name: a, size: [4, 4], layers: [{isosurface: {field: f, values: "
-                                "[0.25]}}], outputs: [{cinema: writer.cdb}]}\n"),
-                    &in, wait_at_gate);
+    insitu_session *session = open_session_with_gate(
+        write_scene("images:\n  - {name: a, size: [4, 4], layers: [{isosurface: {field: f, values: "
+                    "[0.25]}}], outputs: [{cinema: writer.cdb}]}\n"),
+        &in, wait_at_gate);
     for (int cycle = 0; cycle < 3; cycle++) everywhere(insitu_step(session, cycle, 0.5) == INSITU_OK);
-    everywhere(own_rank || lines_of(table) == 0);
+    everywhere(own_rank || count_lines(table) == 0);
     set_gate(false);
     everywhere(insitu_destroy(&session) == INSITU_OK);
-    everywhere(own_rank || lines_of(table) == 1 + 3);
+    everywhere(own_rank || count_lines(table) == 1 + 3);
     input_free(&in);
 }
 
@@ -281,7 +281,7 @@ static void image_library_is_loaded_before_the_first_step(void **state)
     session_input in;
     make_input(&in);
     library_loaded = (library_loading){.ms = 1e6};
-    insitu_session *session = open_behind(write_scene(SCENE("", "[16, 12]")), &in, NULL);
+    insitu_session *session = open_session_with_gate(write_scene(SCENE("", "[16, 12]")), &in, NULL);
     const int wanted = own_rank == 0;
     everywhere(library_loaded.count == wanted && (!wanted || pthread_equal(library_loaded.by, pthread_self())));
     everywhere(insitu_step(session, 0, 0.5) == INSITU_OK);
@@ -297,12 +297,12 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(pictures_are_those_written_in_the_step),
-        cmocka_unit_test(simulation_goes_on_while_pictures_wait),
+        cmocka_unit_test(simulation_continues_while_pictures_are_pending),
         cmocka_unit_test(pending_pictures_are_bounded),
-        cmocka_unit_test(failure_is_reported_by_a_later_step_or_the_end),
-        cmocka_unit_test(failure_waits_for_an_error_of_the_step),
+        cmocka_unit_test(write_failure_is_reported_by_a_later_step_or_destroy),
+        cmocka_unit_test(write_failure_is_reported_after_a_step_error),
         cmocka_unit_test(scene_is_kept_until_its_pictures_are_written),
-        cmocka_unit_test(tables_follow_their_pictures),
+        cmocka_unit_test(tables_are_written_after_their_pictures),
         cmocka_unit_test(image_library_is_loaded_before_the_first_step),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);

@@ -21,12 +21,12 @@ typedef struct dice {
     uint64_t seed, next;
 } dice;
 
-static int64_t roll(dice *d, int64_t sides)
+static int64_t draw_random(dice *d, int64_t sides)
 {
     return (int64_t)(test_hash(d->next++, d->seed) % (uint64_t)sides);
 }
 
-#define PICK(d, list) (list)[roll((d), (int64_t)(sizeof(list) / sizeof(list)[0]))]
+#define PICK(d, list) (list)[draw_random((d), (int64_t)(sizeof(list) / sizeof(list)[0]))]
 
 /* ---- arrays ---------------------------------------------------------------------------------------------------- */
 
@@ -75,23 +75,23 @@ static int list_arrays(formed_mesh *m, const formed_mesh *right, input_array *ou
     return count;
 }
 
-static int64_t size_of(insitu_type type)
+static int64_t get_type_size(insitu_type type)
 {
     return type == INSITU_UINT8 ? 1 : type == INSITU_FLOAT32 || type == INSITU_INT32 ? 4 : 8;
 }
 
-static void put_index(const input_array *a, int64_t i, int64_t value)
+static void store_index(const input_array *a, int64_t i, int64_t value)
 {
-    const int64_t size = size_of(a->truth.type);
+    const int64_t size = get_type_size(a->truth.type);
     char *p = (char *)(uintptr_t)a->truth.data + i * (a->truth.stride_bytes ? a->truth.stride_bytes : size);
     const int32_t narrow = (int32_t)value;
     const unsigned char byte = (unsigned char)value;
     memcpy(p, size == 8 ? (const void *)&value : size == 4 ? (const void *)&narrow : &byte, (size_t)size);
 }
 
-static void put_number(const input_array *a, int64_t i, double value)
+static void store_number(const input_array *a, int64_t i, double value)
 {
-    const int64_t size = size_of(a->truth.type);
+    const int64_t size = get_type_size(a->truth.type);
     char *p = (char *)(uintptr_t)a->truth.data + i * (a->truth.stride_bytes ? a->truth.stride_bytes : size);
     const float narrow = (float)value;
     memcpy(p, size == 8 ? (const void *)&value : &narrow, (size_t)size);
@@ -102,13 +102,13 @@ static void corrupt_elements(const input_array *a, dice *d)
 {
     const int64_t indices[] = {-1, 0, 1, -7, INT32_MIN, INT32_MAX, INT64_MIN, INT64_MAX, (int64_t)1 << 40, a->count};
     const double numbers[] = {NAN, INFINITY, -INFINITY, 1e200, -1e300, 1e30, 0, -0.0, 1e-310, 7};
-    for (int64_t n = roll(d, 3); n >= 0; n--) {
-        const int64_t at = roll(d, a->count), index = PICK(d, indices), shift = roll(d, 4);
+    for (int64_t n = draw_random(d, 3); n >= 0; n--) {
+        const int64_t at = draw_random(d, a->count), index = PICK(d, indices), shift = draw_random(d, 4);
         const double number = PICK(d, numbers);
         if (a->are_indices)
-            put_index(a, at, shift ? index : roll(d, a->count));
+            store_index(a, at, shift ? index : draw_random(d, a->count));
         else if (!a->is_table)
-            put_number(a, at, number);
+            store_number(a, at, number);
     }
 }
 
@@ -116,7 +116,7 @@ static void corrupt_stride(const input_array *a, dice *d)
 {
     static const int64_t wild[] = {
         (int64_t)1 << 60, (int64_t)1 << 62, INT64_MIN, INT64_MAX, -((int64_t)1 << 50), 1, 3, 0};
-    const int64_t stride = PICK(d, wild), size = size_of(a->truth.type);
+    const int64_t stride = PICK(d, wild), size = get_type_size(a->truth.type);
     a->array->stride_bytes = stride == 3 && size < stride ? size : stride; /* stays within the array's memory */
 }
 
@@ -125,16 +125,17 @@ static void corrupt_type(const input_array *a, dice *d)
 {
     static const int types[] = {INSITU_FLOAT32, INSITU_FLOAT64, INSITU_INT32, INSITU_INT64, INSITU_UINT8, 0, -1, 77};
     const int type = PICK(d, types);
-    if (a->is_table || (type >= 1 && type <= 5 && size_of((insitu_type)type) > size_of(a->truth.type))) return;
+    if (a->is_table || (type >= 1 && type <= 5 && get_type_size((insitu_type)type) > get_type_size(a->truth.type)))
+        return;
     a->array->type = (insitu_type)type;
 }
 
 /* Copies the array's memory to an address that is not a multiple of its elements' size. */
-static void unalign(const input_array *a)
+static void unalign_array(const input_array *a)
 {
     static char copies[ARRAYS][1 << 14];
     static int next;
-    const int64_t size = size_of(a->truth.type), stride = a->truth.stride_bytes ? a->truth.stride_bytes : size;
+    const int64_t size = get_type_size(a->truth.type), stride = a->truth.stride_bytes ? a->truth.stride_bytes : size;
     const int64_t bytes = (a->count - 1) * stride + size;
     if (size == 1 || stride < 0 || bytes >= (int64_t)sizeof copies[0]) return;
     char *copy = copies[next++ % ARRAYS];
@@ -146,22 +147,22 @@ static void corrupt_array(formed_mesh *m, const formed_mesh *right, dice *d)
     input_array arrays[ARRAYS];
     const int count = list_arrays(m, right, arrays);
     if (!count) return;
-    const input_array *a = &arrays[roll(d, count)];
-    switch (roll(d, 6)) {
+    const input_array *a = &arrays[draw_random(d, count)];
+    switch (draw_random(d, 6)) {
     case 0: a->array->data = NULL; return;
     case 1: corrupt_stride(a, d); return;
     case 2: corrupt_type(a, d); return;
-    case 3: unalign(a); return;
+    case 3: unalign_array(a); return;
     default: corrupt_elements(a, d);
     }
 }
 
 /* ---- counts and choices ---------------------------------------------------------------------------------------- */
 
-static int64_t other_count(int64_t count, dice *d)
+static int64_t choose_other_count(int64_t count, dice *d)
 {
     static const int64_t huge[] = {INT64_MAX, INT64_MIN, -1, ((int64_t)1 << 58) - 1, (int64_t)1 << 62, 0};
-    return roll(d, 2) ? PICK(d, huge) : roll(d, count > 0 ? count : 1);
+    return draw_random(d, 2) ? PICK(d, huge) : draw_random(d, count > 0 ? count : 1);
 }
 
 static void corrupt_count(formed_mesh *m, dice *d)
@@ -180,8 +181,8 @@ static void corrupt_count(formed_mesh *m, dice *d)
                                &m->patch.count,
                                &m->patch.connectivity_count};
     int64_t *count = PICK(d, counts);
-    *count = other_count(*count, d);
-    if (roll(d, 2)) formed_fit_fields(m);
+    *count = choose_other_count(*count, d);
+    if (draw_random(d, 2)) formed_mesh_resize_fields(m);
 }
 
 static void corrupt_choice(formed_mesh *m, dice *d)
@@ -190,49 +191,49 @@ static void corrupt_choice(formed_mesh *m, dice *d)
     static const int64_t rows[] = {-1, 0, 3, 6, 9, 12, (int64_t)1 << 60, INT64_MIN, INT64_MAX};
     static const int64_t component_strides[] = {0, 3, 6, (int64_t)1 << 60, INT64_MIN, INT64_MAX};
     insitu_mesh *a = &m->mesh;
-    insitu_field *field = &m->fields[roll(d, FORMED_FIELDS)];
-    switch (roll(d, 11)) {
-    case 0: a->index_base = (int)roll(d, 4) - 1; return;
-    case 1: a->vertex_order = (insitu_vertex_order)roll(d, 4); return;
-    case 2: a->keep_polyhedra = (int)roll(d, 3); return;
+    insitu_field *field = &m->fields[draw_random(d, FORMED_FIELDS)];
+    switch (draw_random(d, 11)) {
+    case 0: a->index_base = (int)draw_random(d, 4) - 1; return;
+    case 1: a->vertex_order = (insitu_vertex_order)draw_random(d, 4); return;
+    case 2: a->keep_polyhedra = (int)draw_random(d, 3); return;
     case 3: a->cell_type = (insitu_cell_type)PICK(d, types); return;
-    case 4: a->changed = (unsigned)roll(d, 9); return;
+    case 4: a->changed = (unsigned)draw_random(d, 9); return;
     case 5: a->connectivity_row = PICK(d, rows); return;
     case 6: field->corner_row = PICK(d, rows); return;
-    case 7: field->centring = (insitu_centring)(roll(d, field->index.data ? 2 : 5) - 1); return;
-    case 8: field->component_count = (int)roll(d, 3) - 1; return;
+    case 7: field->centring = (insitu_centring)(draw_random(d, field->index.data ? 2 : 5) - 1); return;
+    case 8: field->component_count = (int)draw_random(d, 3) - 1; return;
     case 9: field->component_stride_bytes = PICK(d, component_strides); return;
     default: m->patch.first_face = PICK(d, rows);
     }
 }
 
 /* Removes this rank's cells, a field, or names. */
-static void leave_out(formed_mesh *m, dice *d)
+static void remove_items(formed_mesh *m, dice *d)
 {
-    insitu_field *field = &m->fields[roll(d, FORMED_FIELDS)];
-    switch (roll(d, 6)) {
+    insitu_field *field = &m->fields[draw_random(d, FORMED_FIELDS)];
+    switch (draw_random(d, 6)) {
     case 0:
         insitu_mesh_defaults(&m->mesh);
-        formed_fit_fields(m);
+        formed_mesh_resize_fields(m);
         return;
     case 1: field->name = NULL; return;
     case 2: field->name = ""; return;
-    case 3: field->patch_count = (int)roll(d, 3) - 1; return;
+    case 3: field->patch_count = (int)draw_random(d, 3) - 1; return;
     case 4: field->patches = NULL; return;
     default: field->values.data = field->index.data = NULL;
     }
 }
 
 /* Corrupts the input in one random way if is_mine. The random numbers of a fault do not depend on the rank's input. */
-static void corrupt(formed_mesh *m, const formed_mesh *right, uint64_t number, int fault, bool is_mine)
+static void corrupt_input(formed_mesh *m, const formed_mesh *right, uint64_t number, int fault, bool is_mine)
 {
     dice d = {number, 1000 * (uint64_t)(fault + 1)};
-    const int64_t kind = roll(&d, 8);
+    const int64_t kind = draw_random(&d, 8);
     if (!is_mine) return;
     if (kind < 4) corrupt_array(m, right, &d);
     if (kind == 4 || kind == 5) corrupt_count(m, &d);
     if (kind == 6) corrupt_choice(m, &d);
-    if (kind == 7) leave_out(m, &d);
+    if (kind == 7) remove_items(m, &d);
 }
 
 /* ---- cases ----------------------------------------------------------------------------------------------------- */
@@ -247,7 +248,7 @@ typedef struct bench {
 
 /* Counts the pixels that differ from the first step's by more than 0.02. Rounding may differ, since a refused mesh may
  * change the origin. */
-static int count_differing(const bench *b)
+static int count_differing_pixels(const bench *b)
 {
     int count = 0;
     for (int i = 0; i < caught_count && i < b->pictures; i++)
@@ -260,45 +261,45 @@ static int count_differing(const bench *b)
     return count;
 }
 
-static void draw_right(bench *b, bool is_first, int number)
+static void draw_valid_input(bench *b, bool is_first, int number)
 {
     discard_pictures();
-    const insitu_status set = formed_submit(b->session, &b->mesh, b->has_corner_fields);
+    const insitu_status set = formed_mesh_submit(b->session, &b->mesh, b->has_corner_fields);
     const insitu_status status = insitu_step(b->session, b->cycle++, 0);
     if (set || status) fprintf(stderr, "case %d: not healed: %s\n", number, insitu_error(b->session));
     everywhere(set == INSITU_OK && status == INSITU_OK);
     everywhere(insitu_last_report(b->session)->images == b->pictures && caught_count == (own_rank ? 0 : b->pictures));
     for (int i = 0; i < caught_count && is_first; i++) memcpy(b->truth[i], caught[i].rgba, sizeof b->truth[i]);
-    const int differing = count_differing(b);
+    const int differing = count_differing_pixels(b);
     if (differing > 4) fprintf(stderr, "case %d: %d pixels are others\n", number, differing);
     everywhere(differing <= 4);
 }
 
-static void open_bench(bench *b, mesh_form form, bool has_corner_fields)
+static void create_bench(bench *b, mesh_form form, bool has_corner_fields)
 {
-    *b = (bench){.has_corner_fields = has_corner_fields && formed_has_corners(form)};
+    *b = (bench){.has_corner_fields = has_corner_fields && formed_mesh_has_corners(form)};
     b->session = open_session(MPI_COMM_WORLD, write_scene(b->has_corner_fields ? formed_corner_scene : formed_scene));
     b->pictures = b->has_corner_fields ? FORMED_CORNER_PICTURES : FORMED_PICTURES;
-    formed_create(form, SIDE, own_rank, rank_count, &b->mesh);
-    draw_right(b, true, -1);
+    formed_mesh_create(form, SIDE, own_rank, rank_count, &b->mesh);
+    draw_valid_input(b, true, -1);
 }
 
-static void close_bench(bench *b)
+static void destroy_bench(bench *b)
 {
     insitu_destroy(&b->session);
-    formed_free(&b->mesh);
+    formed_mesh_free(&b->mesh);
 }
 
 /* Draws a corrupted input. Returns whether the step failed. */
-static bool draw_wrong(bench *b, int number)
+static bool draw_corrupted_input(bench *b, int number)
 {
     dice d = {(uint64_t)number, 0};
-    const int64_t faults = 1 + roll(&d, FAULTS), where = roll(&d, rank_count + 2);
+    const int64_t faults = 1 + draw_random(&d, FAULTS), where = draw_random(&d, rank_count + 2);
     const bool is_mine = where >= rank_count || where == own_rank;
     const formed_mesh right = b->mesh;
-    for (int fault = 0; fault < faults; fault++) corrupt(&b->mesh, &right, (uint64_t)number, fault, is_mine);
+    for (int fault = 0; fault < faults; fault++) corrupt_input(&b->mesh, &right, (uint64_t)number, fault, is_mine);
     discard_pictures();
-    const insitu_status set = formed_submit(b->session, &b->mesh, b->has_corner_fields);
+    const insitu_status set = formed_mesh_submit(b->session, &b->mesh, b->has_corner_fields);
     const insitu_status status = insitu_step(b->session, b->cycle++, 0);
     const int images = insitu_last_report(b->session)->images;
     const bool is_well = status ? *insitu_error(b->session) != '\0' : !set && images == b->pictures;
@@ -306,7 +307,7 @@ static bool draw_wrong(bench *b, int number)
         fprintf(stderr, "case %d: set %d, step %d, %d images: %s\n", number, (int)set, (int)status, images,
                 insitu_error(b->session));
     everywhere(is_well);
-    reported_everywhere(b->session, status, status, "");
+    check_reported_everywhere(b->session, status, status, "");
     return status != INSITU_OK;
 }
 
@@ -317,21 +318,21 @@ static int run_cases(mesh_form form, bool has_corner_fields, int first, int end)
     const char *only = getenv("INSITU_TEST_CASE");
     bench b;
     int failed = 0;
-    open_bench(&b, form, has_corner_fields);
+    create_bench(&b, form, has_corner_fields);
     for (int number = first; number < end; number++) {
         if (only && number != atoi(only)) continue;
-        failed += draw_wrong(&b, number);
-        formed_renew(&b.mesh);
-        draw_right(&b, false, number);
+        failed += draw_corrupted_input(&b, number);
+        formed_mesh_restore(&b.mesh);
+        draw_valid_input(&b, false, number);
     }
-    close_bench(&b);
+    destroy_bench(&b);
     return failed;
 }
 
-static void any_mistake_is_an_error_or_a_picture(void **state)
+static void any_corrupted_input_gives_an_error_or_a_picture(void **state)
 {
     (void)state;
-    const int each = test_effort(CASES, ALL_CASES) / (2 * MESH_FORM_COUNT) + 1, all = 2 * MESH_FORM_COUNT * each;
+    const int each = test_case_count(CASES, ALL_CASES) / (2 * MESH_FORM_COUNT) + 1, all = 2 * MESH_FORM_COUNT * each;
     int failed = 0;
     for (int i = 0; i < 2 * MESH_FORM_COUNT; i++)
         failed += run_cases((mesh_form)(i / 2), i % 2, i * each, (i + 1) * each);
@@ -343,7 +344,7 @@ static void any_mistake_is_an_error_or_a_picture(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(any_mistake_is_an_error_or_a_picture),
+        cmocka_unit_test(any_corrupted_input_gives_an_error_or_a_picture),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -9,7 +9,7 @@
 
 enum { SIDE = 3, COUNTS = 6 };
 
-static void counts_of(insitu_mesh *mesh, int64_t *counts[COUNTS])
+static void list_mesh_counts(insitu_mesh *mesh, int64_t *counts[COUNTS])
 {
     int64_t *const all[COUNTS] = {&mesh->vertex_count,
                                   &mesh->cell_count,
@@ -35,7 +35,7 @@ static void drop_arrays(insitu_mesh *mesh, unsigned mask)
 }
 
 /* Returns whether the mesh is valid because it has no cells and no contradictory arrays. */
-static bool is_empty_and_right(const insitu_mesh *mesh)
+static bool is_valid_empty_mesh(const insitu_mesh *mesh)
 {
     return mesh->cell_count == 0 && mesh->neighbour_count <= mesh->face_count &&
            !(mesh->face_sizes.data && !mesh->face_lists.data) && !(mesh->neighbour.data && !mesh->owner.data) &&
@@ -49,14 +49,14 @@ static void draw_with_zeros(insitu_session *session, formed_mesh *m, bool is_dis
     const insitu_mesh right = m->mesh;
     const insitu_field right_fields[FORMED_FIELDS] = {m->fields[0], m->fields[1], m->fields[2], m->fields[3]};
     int64_t *counts[COUNTS];
-    counts_of(&m->mesh, counts);
+    list_mesh_counts(&m->mesh, counts);
     for (int c = 0; c < COUNTS && is_mine; c++)
         if (mask >> c & 1) *counts[c] = 0;
     if (is_mine && !with_arrays) drop_arrays(&m->mesh, mask);
-    formed_fit_fields(m);
-    const bool is_right = !is_mine || is_empty_and_right(&m->mesh);
+    formed_mesh_resize_fields(m);
+    const bool is_right = !is_mine || is_valid_empty_mesh(&m->mesh);
     discard_pictures();
-    const insitu_status set = formed_submit(session, m, is_discontinuous);
+    const insitu_status set = formed_mesh_submit(session, m, is_discontinuous);
     const insitu_status status = insitu_step(session, 1, 0);
     if ((set && !status) || (is_right && status))
         fprintf(stderr, "%s mask %u %s: %s\n", mesh_form_name(m->form), mask, with_arrays ? "arrays" : "none",
@@ -65,7 +65,7 @@ static void draw_with_zeros(insitu_session *session, formed_mesh *m, bool is_dis
     MPI_Allreduce(MPI_IN_PLACE, &all_right, 1, MPI_INT, MPI_LAND, MPI_COMM_WORLD);
     everywhere(!all_right || status == INSITU_OK);
     everywhere(!set || status);
-    reported_everywhere(session, status, status, status ? "mesh \"m\"" : "");
+    check_reported_everywhere(session, status, status, status ? "mesh \"m\"" : "");
     m->mesh = right;
     memcpy(m->fields, right_fields, sizeof right_fields);
 }
@@ -73,11 +73,11 @@ static void draw_with_zeros(insitu_session *session, formed_mesh *m, bool is_dis
 static void check_form(mesh_form form, bool is_discontinuous)
 {
     formed_mesh m;
-    formed_create(form, SIDE, own_rank, rank_count, &m);
+    formed_mesh_create(form, SIDE, own_rank, rank_count, &m);
     insitu_session *session =
         open_session(MPI_COMM_WORLD, write_scene(is_discontinuous ? formed_corner_scene : formed_scene));
     int64_t *counts[COUNTS];
-    counts_of(&m.mesh, counts);
+    list_mesh_counts(&m.mesh, counts);
     unsigned given = 0;
     for (int c = 0; c < COUNTS; c++) given |= (unsigned)(*counts[c] > 0) << c;
     MPI_Allreduce(MPI_IN_PLACE, &given, 1, MPI_UNSIGNED, MPI_BOR, MPI_COMM_WORLD);
@@ -87,32 +87,32 @@ static void check_form(mesh_form form, bool is_discontinuous)
             draw_with_zeros(session, &m, is_discontinuous, mask, way & 1, way & 2 || own_rank == rank_count - 1);
     }
     discard_pictures();
-    everywhere(formed_submit(session, &m, is_discontinuous) == INSITU_OK);
+    everywhere(formed_mesh_submit(session, &m, is_discontinuous) == INSITU_OK);
     const insitu_status status = insitu_step(session, 2, 0);
-    reported_everywhere(session, status, INSITU_OK, "");
+    check_reported_everywhere(session, status, INSITU_OK, "");
     everywhere(insitu_last_report(session)->images == (is_discontinuous ? FORMED_CORNER_PICTURES : FORMED_PICTURES));
     insitu_destroy(&session);
-    formed_free(&m);
+    formed_mesh_free(&m);
 }
 
-static void any_counts_are_an_error_or_a_picture(void **state)
+static void zero_counts_give_an_error_or_a_picture(void **state)
 {
     (void)state;
     for (mesh_form form = 0; form < MESH_FORM_COUNT; form++) check_form(form, false);
 }
 
-static void and_for_meshes_with_corner_fields(void **state)
+static void zero_counts_with_corner_fields_give_an_error_or_a_picture(void **state)
 {
     (void)state;
     for (mesh_form form = 0; form < MESH_FORM_COUNT; form++)
-        if (formed_has_corners(form)) check_form(form, true);
+        if (formed_mesh_has_corners(form)) check_form(form, true);
 }
 
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(any_counts_are_an_error_or_a_picture),
-        cmocka_unit_test(and_for_meshes_with_corner_fields),
+        cmocka_unit_test(zero_counts_give_an_error_or_a_picture),
+        cmocka_unit_test(zero_counts_with_corner_fields_give_an_error_or_a_picture),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

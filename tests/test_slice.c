@@ -17,7 +17,7 @@ enum { SIDE = 4, WIDTH = 33, HEIGHT = 29 };
 static const double through = 0;
 static const double normal[3] = {0.36, -0.48, 0.8};
 
-static double distance(const double position[3])
+static double signed_distance(const double position[3])
 {
     return normal[0] * position[0] + normal[1] * position[1] + normal[2] * position[2] - 0.1;
 }
@@ -32,9 +32,9 @@ static void assert_on_plane(const render_fixture *f, const drawn_frame *drawn, c
         const fragment *item = &drawn->list.items[i];
         double base[3], direction[3], at[3];
         render_camera_ray(&f->job.camera, (int)(item->pixel % WIDTH), (int)(item->pixel / WIDTH), base, direction);
-        for (int a = 0; a < 3; a++) at[a] = base[a] + fixture_depth(f, item->t_in) * direction[a];
-        if (!(fabs(distance(at)) < 1e-5))
-            fail_msg("%s: pixel %lld: %g from the plane", what, (long long)item->pixel, distance(at));
+        for (int a = 0; a < 3; a++) at[a] = base[a] + fixture_scene_depth(f, item->t_in) * direction[a];
+        if (!(fabs(signed_distance(at)) < 1e-5))
+            fail_msg("%s: pixel %lld: %g from the plane", what, (long long)item->pixel, signed_distance(at));
         hits++;
     }
     assert_true(hits > 100);
@@ -46,9 +46,9 @@ static void check_kind(test_mesh_kind kind)
     test_view colours;
     render_fixture f;
     drawn_frame drawn;
-    test_mesh_lattice(kind, SIDE, JITTER, test_wave, &mesh);
+    test_mesh_make_lattice(kind, SIDE, JITTER, test_wave_field, &mesh);
     test_view_create(&mesh, (test_layout){.wide_coordinates = true, .wide_values = true}, &colours);
-    fixture_create_lattice(&f, kind, SIDE, JITTER, distance);
+    fixture_create_lattice(&f, kind, SIDE, JITTER, signed_distance);
     fixture_set_camera(&f, CAMERA_OUTSIDE, WIDTH, HEIGHT);
     fixture_set_volume(&f, 0.3); /* the volume's colour map also colours the surface */
     f.job.volume_count = 0;
@@ -56,16 +56,16 @@ static void check_kind(test_mesh_kind kind)
     f.surfaces[0].colour_field = (render_field){&colours.field, f.ranges};
     f.surfaces[0].colour_map = &f.transfer;
     f.surfaces[0].material = (render_material){.ambient = 1, .shininess = 1};
-    fixture_compare(&f, &fixture_usual_bounds, test_mesh_kind_name(kind));
+    fixture_compare_with_reference(&f, &fixture_usual_bounds, test_mesh_kind_name(kind));
     fixture_draw(&f, &drawn);
     assert_on_plane(&f, &drawn, test_mesh_kind_name(kind));
-    drawn_free(&drawn);
+    drawn_frame_free(&drawn);
     test_view_free(&colours);
     test_mesh_free(&mesh);
     fixture_free(&f);
 }
 
-static void slices_of_warped_cells_match_the_reference_s(void **state)
+static void slices_of_warped_cells_match_the_reference(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) check_kind(kind);
@@ -74,7 +74,7 @@ static void slices_of_warped_cells_match_the_reference_s(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(slices_of_warped_cells_match_the_reference_s),
+        cmocka_unit_test(slices_of_warped_cells_match_the_reference),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

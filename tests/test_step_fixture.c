@@ -28,7 +28,7 @@ void step_set_function(render_fixture *f, step_function *function, double at, do
                                     .unit_distance = unit};
 }
 
-void step_begin(render_fixture *f, const test_mesh *mesh, fixture_camera camera, int side)
+void step_fixture_create(render_fixture *f, const test_mesh *mesh, fixture_camera camera, int side)
 {
     fixture_create(f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
                    (const double[]){0, 0, 0});
@@ -37,7 +37,7 @@ void step_begin(render_fixture *f, const test_mesh *mesh, fixture_camera camera,
     f->job.integration = RENDER_SEGMENTS;
 }
 
-double *step_truth(const render_fixture *f, int every, double tolerance)
+double *step_compute_reference(const render_fixture *f, int every, double tolerance)
 {
     const int side = f->job.camera.width;
     double *truth = malloc((size_t)(side * side) * 4 * sizeof *truth);
@@ -49,39 +49,39 @@ double *step_truth(const render_fixture *f, int every, double tolerance)
     return truth;
 }
 
-static double step_worst(const drawn_frame *drawn, const double *truth, int every)
+static double step_largest_error(const drawn_frame *drawn, const double *truth, int every)
 {
     double worst = 0;
     for (int p = 0; p < drawn->picture.width * drawn->picture.height; p += every)
         for (int c = 0; c < 4; c++)
-            worst = test_worse(worst, fabs((double)drawn->picture.rgba[4 * p + c] - truth[4 * p + c]));
+            worst = test_larger_error(worst, fabs((double)drawn->picture.rgba[4 * p + c] - truth[4 * p + c]));
     return worst;
 }
 
-double step_worst_of_sets(const render_fixture *f, const double *truth, int every)
+double step_largest_error_of_isas(const render_fixture *f, const double *truth, int every)
 {
     double worst = 0;
-    for (int set = 0; set < fixture_set_count(); set++) {
+    for (int set = 0; set < fixture_isa_count(); set++) {
         drawn_frame drawn;
-        fixture_use_set(set);
+        fixture_select_isa(set);
         fixture_draw(f, &drawn);
-        worst = test_worse(worst, step_worst(&drawn, truth, every));
-        drawn_free(&drawn);
+        worst = test_larger_error(worst, step_largest_error(&drawn, truth, every));
+        drawn_frame_free(&drawn);
     }
     return worst;
 }
 
-void step_verify(render_fixture *f, int every, double tolerance, double worst[3])
+void step_measure_errors(render_fixture *f, int every, double tolerance, double worst[3])
 {
-    double *truth = step_truth(f, every, tolerance);
+    double *truth = step_compute_reference(f, every, tolerance);
     for (int i = 0; i < 3; i++) {
         f->job.max_error = pow(10, -2 - i);
-        worst[i] = test_worse(worst[i], step_worst_of_sets(f, truth, every));
+        worst[i] = test_larger_error(worst[i], step_largest_error_of_isas(f, truth, every));
     }
     free(truth);
 }
 
-void step_assert_kept(const double worst[3], const char *what)
+void step_assert_errors_within_bounds(const double worst[3], const char *what)
 {
     fprintf(stderr, "%s: %.2g, %.2g, %.2g\n", what, worst[0], worst[1], worst[2]);
     for (int i = 0; i < 3; i++) assert_true(worst[i] <= pow(10, -2 - i));
@@ -90,16 +90,16 @@ void step_assert_kept(const double worst[3], const char *what)
 void step_make_hex(test_mesh *mesh)
 {
     static const double values[8] = {0, 1, 0.2, 0.9, 0.8, 0.1, 1, 0};
-    test_mesh_single(TEST_UNIT_HEX, test_linear, mesh);
+    test_mesh_make_single_cell(TEST_UNIT_HEX, test_linear_field, mesh);
     for (int i = 0; i < 24; i++) mesh->coordinates[i] *= 2;
     memcpy(mesh->values, values, sizeof values);
 }
 
 void step_make_cell(test_cell_shape shape, uint64_t seed, test_mesh *mesh)
 {
-    test_mesh_single(shape, test_linear, mesh);
+    test_mesh_make_single_cell(shape, test_linear_field, mesh);
     for (uint64_t i = 0; i < 3 * (uint64_t)mesh->vertex_count; i++)
-        mesh->coordinates[i] = 1.8 * (mesh->coordinates[i] + test_uniform_in(i, 100 * seed + 1, -0.12, 0.12));
+        mesh->coordinates[i] = 1.8 * (mesh->coordinates[i] + test_uniform_between(i, 100 * seed + 1, -0.12, 0.12));
     for (uint64_t i = 0; i < (uint64_t)mesh->vertex_count; i++)
-        mesh->values[i] = test_uniform_in(i, 100 * seed + 2, 0, 1);
+        mesh->values[i] = test_uniform_between(i, 100 * seed + 2, 0, 1);
 }

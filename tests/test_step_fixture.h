@@ -17,17 +17,17 @@ typedef struct step_function {
 void step_set_function(render_fixture *f, step_function *function, double at, double width, double unit);
 
 /* Sets up the mesh as a volume drawn by segments, in a picture of side × side pixels. */
-void step_begin(render_fixture *f, const test_mesh *mesh, fixture_camera camera, int side);
+void step_fixture_create(render_fixture *f, const test_mesh *mesh, fixture_camera camera, int side);
 
 /* Returns the exact colours of every `every`-th pixel, side × side × 4 numbers; other pixels are not set. `tolerance`
  * is that of the integral. */
-double *step_truth(const render_fixture *f, int every, double tolerance);
+double *step_compute_reference(const render_fixture *f, int every, double tolerance);
 /* Draws the picture with every instruction set. Returns the largest difference from the exact colours. */
-double step_worst_of_sets(const render_fixture *f, const double *truth, int every);
+double step_largest_error_of_isas(const render_fixture *f, const double *truth, int every);
 
 /* Finds, for each requested error from 1e-2 to 1e-4, the largest error over all instruction sets. */
-void step_verify(render_fixture *f, int every, double tolerance, double worst[3]);
-void step_assert_kept(const double worst[3], const char *what);
+void step_measure_errors(render_fixture *f, int every, double tolerance, double worst[3]);
+void step_assert_errors_within_bounds(const double worst[3], const char *what);
 
 /* Makes a hex whose field hardly reaches 0.6. */
 void step_make_hex(test_mesh *mesh);

@@ -18,7 +18,7 @@ static int64_t allocation;
 
 /* Returns the distance between the allocations that are tried. Each case begins at a different allocation. The distance
  * is larger on several ranks, as their steps take longer. */
-static int stride(void)
+static int get_allocation_stride(void)
 {
     return given_stride ? given_stride : rank_count > 1 ? 193 : 97;
 }
@@ -95,7 +95,7 @@ static void scenery_create(scenery *s, const memory_case *of)
         const int64_t cells = s->inputs[i].part.cell_count;
         s->cell_values[i] = calloc((size_t)cells + 1, sizeof(double));
         assert_non_null(s->cell_values[i]);
-        for (int64_t k = 0; k < cells; k++) s->cell_values[i][k] = test_uniform_in((uint64_t)k, 3, -1, 1);
+        for (int64_t k = 0; k < cells; k++) s->cell_values[i][k] = test_uniform_between((uint64_t)k, 3, -1, 1);
     }
 }
 
@@ -151,14 +151,14 @@ static void free_pictures(picture_set *set)
 }
 
 /* Returns whether each caught picture is in the set. Only rank 0 has pictures. */
-static bool are_of(const picture_set *set)
+static bool are_pictures_in_set(const picture_set *set)
 {
     bool are_all = true;
     for (int i = 0; i < caught_count; i++) {
         bool is_one = false;
         for (int k = 0; k < set->count; k++)
-            is_one = is_one ||
-                     (same_pictures(&caught[i], &set->pictures[k]) && !strcmp(caught[i].path, set->pictures[k].path));
+            is_one = is_one || (are_same_pictures(&caught[i], &set->pictures[k]) &&
+                                !strcmp(caught[i].path, set->pictures[k].path));
         are_all = are_all && is_one;
     }
     return are_all;
@@ -176,8 +176,8 @@ static void step_draws(insitu_session *session, const picture_set *expected)
 {
     discard_pictures();
     const insitu_status status = insitu_step(session, 1, 0);
-    reported_everywhere(session, status, INSITU_OK, "");
-    at_allocation(own_rank != 0 || (are_of(expected) && caught_count == expected->count));
+    check_reported_everywhere(session, status, INSITU_OK, "");
+    at_allocation(own_rank != 0 || (are_pictures_in_set(expected) && caught_count == expected->count));
 }
 
 static insitu_session *open_and_draw(const char *scene, const scenery *s, picture_set *out)
@@ -186,7 +186,7 @@ static insitu_session *open_and_draw(const char *scene, const scenery *s, pictur
     everywhere(submit_scenery(session, s) == INSITU_OK);
     discard_pictures();
     const insitu_status status = insitu_step(session, 1, 0);
-    reported_everywhere(session, status, INSITU_OK, "");
+    check_reported_everywhere(session, status, INSITU_OK, "");
     *out = pop_pictures();
     return session;
 }
@@ -216,11 +216,11 @@ static bool stop_failing(const failure *f)
 static void check_reported(const insitu_session *session, insitu_status status)
 {
     if (status == INSITU_OK || status == INSITU_ERROR_FIELD) {
-        reported_everywhere(session, status, status, "");
+        check_reported_everywhere(session, status, status, "");
         return;
     }
     if (status != INSITU_ERROR_MEMORY) fprintf(stderr, "allocation %lld: ", (long long)allocation);
-    reported_everywhere(session, status, INSITU_ERROR_MEMORY, "memory");
+    check_reported_everywhere(session, status, INSITU_ERROR_MEMORY, "memory");
 }
 
 static void run_failures(bool (*fails_cleanly)(const scenery *s, const failure *f, void *state), const scenery *s,
@@ -228,7 +228,7 @@ static void run_failures(bool (*fails_cleanly)(const scenery *s, const failure *
 {
     for (int with_all = 0; with_all < (rank_count > 1 ? 2 : 1); with_all++) {
         failure f = {.n = first, .is_armed = with_all || own_rank == rank_count - 1};
-        for (allocation = f.n; !fails_cleanly(s, &f, state); allocation = f.n) f.n += stride();
+        for (allocation = f.n; !fails_cleanly(s, &f, state); allocation = f.n) f.n += get_allocation_stride();
         if (own_rank == 0) fprintf(stderr, "%s: to allocation %lld\n", s->of->name, (long long)f.n);
     }
 }
@@ -250,7 +250,7 @@ static bool set_and_step_fail_cleanly(const scenery *s, const failure *f, void *
     const insitu_status status = insitu_step(t->session, 1, 0);
     const bool is_over = stop_failing(f);
     check_reported(t->session, status);
-    at_allocation(own_rank != 0 || are_of(&t->expected));
+    at_allocation(own_rank != 0 || are_pictures_in_set(&t->expected));
     at_allocation(own_rank != 0 || status != INSITU_OK || caught_count == t->expected.count);
     int is_set = set == INSITU_OK;
     MPI_Allreduce(MPI_IN_PLACE, &is_set, 1, MPI_INT, MPI_LAND, MPI_COMM_WORLD);
@@ -260,7 +260,7 @@ static bool set_and_step_fail_cleanly(const scenery *s, const failure *f, void *
     return is_over;
 }
 
-static void failing_step_is_the_same_picture_or_an_error(void **context)
+static void failed_allocation_in_a_step_gives_same_picture_or_error(void **context)
 {
     (void)context;
     if (!heap_can_fail()) skip();
@@ -269,7 +269,7 @@ static void failing_step_is_the_same_picture_or_an_error(void **context)
         step_state t;
         scenery_create(&s, &cases[i]);
         t.session = open_and_draw(full_scene, &s, &t.expected);
-        run_failures(set_and_step_fail_cleanly, &s, 1 + i % stride(), &t);
+        run_failures(set_and_step_fail_cleanly, &s, 1 + i % get_allocation_stride(), &t);
         insitu_destroy(&t.session);
         free_pictures(&t.expected);
         scenery_free(&s);
@@ -287,7 +287,7 @@ static bool first_step_fails_cleanly(const scenery *s, const failure *f, void *s
     return is_over;
 }
 
-static void failing_first_step_is_the_same_picture_or_an_error(void **context)
+static void failed_allocation_in_first_step_gives_same_picture_or_error(void **context)
 {
     (void)context;
     if (!heap_can_fail()) skip();
@@ -297,7 +297,7 @@ static void failing_first_step_is_the_same_picture_or_an_error(void **context)
         scenery_create(&s, &cases[i]);
         t.session = open_and_draw(full_scene, &s, &t.expected);
         insitu_destroy(&t.session);
-        run_failures(first_step_fails_cleanly, &s, 1 + i % stride(), &t);
+        run_failures(first_step_fails_cleanly, &s, 1 + i % get_allocation_stride(), &t);
         free_pictures(&t.expected);
         scenery_free(&s);
     }
@@ -325,7 +325,7 @@ static bool creation_fails_cleanly(const scenery *s, const failure *f, void *sta
     return is_over;
 }
 
-static void failing_creation_opens_the_session_or_none(void **context)
+static void failed_allocation_in_creation_opens_a_session_or_none(void **context)
 {
     (void)context;
     if (!heap_can_fail()) skip();
@@ -353,8 +353,8 @@ static void next_step_draws(insitu_session *session, const picture_set *expected
     discard_pictures();
     const insitu_status status = insitu_step(session, 1, 0);
     const char *words = status ? "cycle 1: cinema: memory.cdb/report.json: cannot be written" : "";
-    reported_everywhere(session, status, status ? INSITU_ERROR_MEMORY : INSITU_OK, words);
-    at_allocation(own_rank != 0 || (are_of(expected) && caught_count == expected->count));
+    check_reported_everywhere(session, status, status ? INSITU_ERROR_MEMORY : INSITU_OK, words);
+    at_allocation(own_rank != 0 || (are_pictures_in_set(expected) && caught_count == expected->count));
     if (status) step_draws(session, expected);
 }
 
@@ -370,15 +370,15 @@ static bool edit_fails_cleanly(const scenery *s, const failure *f, void *state)
     const insitu_status status = insitu_step(session, 1, 0);
     const bool is_over = stop_failing(f);
     check_reported(session, status);
-    const bool is_taken = are_of(&t->after);
-    at_allocation(own_rank != 0 || is_taken || are_of(&t->before));
+    const bool is_taken = are_pictures_in_set(&t->after);
+    at_allocation(own_rank != 0 || is_taken || are_pictures_in_set(&t->before));
     at_allocation(own_rank != 0 || is_taken || status != INSITU_OK || *insitu_last_report(session)->warnings);
     next_step_draws(session, &t->after);
     insitu_destroy(&session);
     return is_over;
 }
 
-static void failing_edit_is_reported_and_taken_later(void **context)
+static void failed_allocation_in_an_edit_is_reported_and_retried(void **context)
 {
     (void)context;
     if (!heap_can_fail()) skip();
@@ -419,7 +419,7 @@ static bool has_many_lines(const char *path)
 
 /* Checks that a file has either the whole new text or its previous contents; in the latter case the error must be about
  * memory. */
-static void failing_texts_are_whole_or_not_written(void **context)
+static void failed_allocation_writes_complete_texts_or_none(void **context)
 {
     (void)context;
     static const char path[] = "text.csv", before[] = "before\n";
@@ -428,7 +428,7 @@ static void failing_texts_are_whole_or_not_written(void **context)
     if (!heap_can_fail()) skip();
     for (int64_t n = 1, asked = n; asked >= n && own_rank == 0; n++) {
         file_failure failure;
-        put_file(path, before);
+        write_text_file(path, before);
         heap_start_failing(n, false);
         const bool is_written = text_file_replace(path, write_many_lines, NULL, &failure);
         asked = heap_stop_failing();
@@ -443,11 +443,11 @@ int main(int argc, char **argv)
 {
     given_stride = argc > 2 ? atoi(argv[2]) : 0;
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(failing_step_is_the_same_picture_or_an_error),
-        cmocka_unit_test(failing_first_step_is_the_same_picture_or_an_error),
-        cmocka_unit_test(failing_creation_opens_the_session_or_none),
-        cmocka_unit_test(failing_edit_is_reported_and_taken_later),
-        cmocka_unit_test(failing_texts_are_whole_or_not_written),
+        cmocka_unit_test(failed_allocation_in_a_step_gives_same_picture_or_error),
+        cmocka_unit_test(failed_allocation_in_first_step_gives_same_picture_or_error),
+        cmocka_unit_test(failed_allocation_in_creation_opens_a_session_or_none),
+        cmocka_unit_test(failed_allocation_in_an_edit_is_reported_and_retried),
+        cmocka_unit_test(failed_allocation_writes_complete_texts_or_none),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

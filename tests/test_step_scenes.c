@@ -25,28 +25,28 @@ static void verify_lattice(test_mesh_kind kind, fixture_camera camera, double un
     test_mesh mesh;
     double worst[3] = {0};
     char what[80];
-    test_mesh_lattice(kind, CELLS, 0.2, test_wave, &mesh);
-    step_begin(&f, &mesh, camera, LATTICE_SIDE);
+    test_mesh_make_lattice(kind, CELLS, 0.2, test_wave_field, &mesh);
+    step_fixture_create(&f, &mesh, camera, LATTICE_SIDE);
     f.transfer.opacity_count = POINTS;
     f.transfer.opacity_values = values;
     f.transfer.opacities = opacities;
     f.transfer.unit_distance = unit;
-    step_verify(&f, 1, 1e-7, worst);
+    step_measure_errors(&f, 1, 1e-7, worst);
     snprintf(what, sizeof what, "steps in a lattice of %s, unit distance %g, %s", test_mesh_kind_name(kind), unit,
              fixture_camera_name(camera));
-    step_assert_kept(worst, what);
+    step_assert_errors_within_bounds(worst, what);
     fixture_free(&f);
     test_mesh_free(&mesh);
 }
 
 /* Usually draws each kind of cell with only one of the cameras, since all combinations take long. */
-static void lattices_of_curved_cells(void **state)
+static void lattices_of_curved_cells_keep_max_error(void **state)
 {
     static const test_mesh_kind kinds[4] = {TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS, TEST_MIXED};
     (void)state;
     for (int k = 0; k < 4; k++)
         for (fixture_camera camera = 0; camera <= CAMERA_INSIDE; camera++)
-            if (test_is_whole() || (int)camera == (k + 1) % 3)
+            if (test_is_long_run() || (int)camera == (k + 1) % 3)
                 verify_lattice(kinds[k], camera, (k + (int)camera) % 2 ? 0.3 : 0.02);
 }
 
@@ -63,7 +63,7 @@ static double verify_mixed(const test_mesh *mesh, fixture_camera camera, double 
     static const float level_opacity = 0.3f;
     render_fixture f;
     step_function function = {.opacities = {0.02f, 0.02f, 0.9f, 0.9f}};
-    step_begin(&f, mesh, camera, MIXED_SIDE);
+    step_fixture_create(&f, mesh, camera, MIXED_SIDE);
     step_set_function(&f, &function, 0.6, 0, unit);
     f.transfer.colours = colours;
     render_transfer level = f.transfer;
@@ -76,14 +76,14 @@ static double verify_mixed(const test_mesh *mesh, fixture_camera camera, double 
     f.job.volumes = volumes;
     f.job.volume_count = 2;
     f.job.separate_samples = true;
-    double *truth = step_truth(&f, 1, 1e-7);
-    const double worst = step_worst_of_sets(&f, truth, 1);
+    double *truth = step_compute_reference(&f, 1, 1e-7);
+    const double worst = step_largest_error_of_isas(&f, truth, 1);
     free(truth);
     fixture_free(&f);
     return worst;
 }
 
-static void mixed_volumes_by_step(void **state)
+static void mixed_volumes_with_steps_keep_max_error(void **state)
 {
     enum { SEEDS = 4 };
     const double bound = (2 + 1) * 0.4 * RENDER_MIXING_ERROR;
@@ -96,7 +96,7 @@ static void mixed_volumes_by_step(void **state)
                 step_make_hex(&mesh);
             else
                 step_make_cell(step_shapes[kind], 16 * seed + (uint64_t)kind, &mesh);
-            worst = test_worse(
+            worst = test_larger_error(
                 worst, verify_mixed(&mesh, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, seed / 2 % 2 ? 0.2 : 0.02));
             test_mesh_free(&mesh);
         }
@@ -109,8 +109,8 @@ static void mixed_volumes_by_step(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(lattices_of_curved_cells),
-        cmocka_unit_test(mixed_volumes_by_step),
+        cmocka_unit_test(lattices_of_curved_cells_keep_max_error),
+        cmocka_unit_test(mixed_volumes_with_steps_keep_max_error),
     };
     if (argc > 1) cmocka_set_test_filter(argv[1]);
     return cmocka_run_group_tests(tests, NULL, NULL);

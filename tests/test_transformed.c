@@ -6,7 +6,7 @@
 
 enum { MOST_TEXT = 1 << 13 };
 
-static double number_of(const insitu_array *array, int64_t i)
+static double read_number(const insitu_array *array, int64_t i)
 {
     const int64_t size = array->type == INSITU_FLOAT64 ? 8 : 4;
     const char *at = (const char *)array->data + i * (array->stride_bytes ? array->stride_bytes : size);
@@ -16,7 +16,7 @@ static double number_of(const insitu_array *array, int64_t i)
     return memcpy(&narrow, at, sizeof narrow), (double)narrow;
 }
 
-void place_of(const insitu_mesh *mesh, int64_t vertex, double out[3])
+void compute_vertex_position(const insitu_mesh *mesh, int64_t vertex, double out[3])
 {
     const insitu_lattice *l = mesh->lattice;
     const bool has_axes = l && !mesh->coordinates[0].data;
@@ -25,14 +25,14 @@ void place_of(const insitu_mesh *mesh, int64_t vertex, double out[3])
         int64_t at = vertex;
         for (int a = 0; has_axes && a < axis; a++) at /= l->cells[a] + 1;
         if (has_axes) at %= l->cells[axis] + 1;
-        out[axis] = !has_axes               ? given->data ? number_of(given, vertex) : 0
-                    : l->axes[axis].data    ? number_of(&l->axes[axis], at)
+        out[axis] = !has_axes               ? given->data ? read_number(given, vertex) : 0
+                    : l->axes[axis].data    ? read_number(&l->axes[axis], at)
                     : l->spacing[axis] != 0 ? l->origin[axis] + l->spacing[axis] * (double)(l->first[axis] + at)
                                             : 0;
     }
 }
 
-insitu_status give_values(void *filled, insitu_field *field)
+insitu_status copy_filled_values(void *filled, insitu_field *field)
 {
     filled_values *f = filled;
     int one = 1, ranks = 0;
@@ -45,11 +45,11 @@ insitu_status give_values(void *filled, insitu_field *field)
 
 void expect_same(drawn *a, drawn *b, const char *what)
 {
-    const bool is_same = same_drawn(a, b), has_any = own_rank != 0 || a->count > 0;
+    const bool is_same = are_same_picture_sets(a, b), has_any = own_rank != 0 || a->count > 0;
     if (!is_same || !has_any) fprintf(stderr, "%s\n", what);
     everywhere(is_same && has_any);
-    free_drawn(a);
-    free_drawn(b);
+    free_picture_set(a);
+    free_picture_set(b);
 }
 
 insitu_session *open_text(MPI_Comm comm, const char *before, const char *scene)
@@ -75,7 +75,7 @@ drawn draw_mesh(insitu_session *session, const insitu_mesh *mesh, const insitu_f
     everywhere(insitu_set_mesh(session, "m", mesh) == INSITU_OK);
     everywhere(insitu_set_field(session, "m", f) == INSITU_OK);
     if (u) everywhere(insitu_set_field(session, "m", u) == INSITU_OK);
-    drawn out = step_drawn(session, 0);
+    drawn out = step_and_take_pictures(session, 0);
     insitu_destroy(&session);
     return out;
 }
@@ -85,9 +85,9 @@ drawn draw_formed(insitu_session *session, const formed_mesh *m, const insitu_me
 {
     formed_mesh own = *m;
     own.mesh = *mesh;
-    everywhere(formed_submit(session, &own, with_corners) == INSITU_OK);
+    everywhere(formed_mesh_submit(session, &own, with_corners) == INSITU_OK);
     if (u) everywhere(insitu_set_field(session, "m", u) == INSITU_OK);
-    drawn out = step_drawn(session, 0);
+    drawn out = step_and_take_pictures(session, 0);
     insitu_destroy(&session);
     return out;
 }
@@ -97,7 +97,7 @@ void make_plane(bool is_wide, plane *out)
     for (int v = 0; v < 16; v++) {
         const double place[3] = {0.25 * (v % 4), 0.25 * (v / 4 + 3 * own_rank), 0};
         for (int a = 0; a < 2; a++) out->narrow[v][a] = (float)(out->wide[v][a] = place[a]);
-        out->values[v] = test_wave(place);
+        out->values[v] = test_wave_field(place);
     }
     for (int q = 0; q < 9; q++) {
         const int first = q % 3 + 4 * (q / 3), corners[4] = {first, first + 1, first + 5, first + 4};
@@ -164,8 +164,8 @@ void make_block(lattice_form form, int number, block *out)
         out->mesh.coordinates[axis] = (insitu_array){out->places[axis], INSITU_FLOAT64, 0};
     for (int64_t v = 0; v < out->mesh.vertex_count; v++) {
         double place[3];
-        place_of(&out->mesh, v, place);
-        out->values[v] = test_wave(place);
+        compute_vertex_position(&out->mesh, v, place);
+        out->values[v] = test_wave_field(place);
     }
     insitu_field_defaults(&out->field);
     out->field.name = "f";

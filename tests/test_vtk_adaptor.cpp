@@ -64,7 +64,7 @@ void add_cell(vtkUnstructuredGrid *grid, int type, const std::vector<point> &poi
     grid->InsertNextCell(type, static_cast<vtkIdType>(ids.size()), ids.data());
 }
 
-std::vector<point> prism(int sides)
+std::vector<point> make_prism_points(int sides)
 {
     std::vector<point> p;
     for (int layer = 0; layer < 2; layer++)
@@ -81,7 +81,7 @@ const std::vector<point> corner = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
 const std::vector<point> roof = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}};
 const std::vector<point> pyramid = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0.5, 0.5, 1}};
 
-int64_t integer_at(const insitu_array &a, int64_t i)
+int64_t read_integer(const insitu_array &a, int64_t i)
 {
     switch (a.type) {
     case INSITU_UINT8: return static_cast<const uint8_t *>(a.data)[i];
@@ -90,7 +90,7 @@ int64_t integer_at(const insitu_array &a, int64_t i)
     }
 }
 
-point vertex(const insitu_mesh &m, int64_t i)
+point get_vertex(const insitu_mesh &m, int64_t i)
 {
     point p;
     for (size_t c = 0; c < 3; c++) {
@@ -101,7 +101,7 @@ point vertex(const insitu_mesh &m, int64_t i)
     return p;
 }
 
-double tet_volume(const point &a, const point &b, const point &c, const point &d)
+double compute_tet_volume(const point &a, const point &b, const point &c, const point &d)
 {
     auto minus = [](const point &p, const point &q) { return point{p[0] - q[0], p[1] - q[1], p[2] - q[2]}; };
     const point u = minus(b, a), v = minus(c, a), w = minus(d, a);
@@ -113,20 +113,20 @@ double tet_volume(const point &a, const point &b, const point &c, const point &d
 /* Returns the signed volume of cell i, as a sum of tets; it is exact except for rounding if faces are flat. Vertices
  * are in VTK's order: a hex's lower quad is counterclockwise if seen from above. Wedges occur in both orientations, so
  * the magnitude of their volume is used. */
-double cell_volume(const insitu_mesh &m, int64_t i)
+double compute_cell_volume(const insitu_mesh &m, int64_t i)
 {
-    const int64_t begin = m.offsets.data ? integer_at(m.offsets, i) : 0;
-    auto v = [&](int64_t k) { return vertex(m, integer_at(m.connectivity, begin + k)); };
-    switch (integer_at(m.cell_types, i)) {
-    case INSITU_TET: return tet_volume(v(0), v(1), v(2), v(3));
-    case INSITU_PYRAMID: return tet_volume(v(0), v(1), v(2), v(4)) + tet_volume(v(0), v(2), v(3), v(4));
+    const int64_t begin = m.offsets.data ? read_integer(m.offsets, i) : 0;
+    auto v = [&](int64_t k) { return get_vertex(m, read_integer(m.connectivity, begin + k)); };
+    switch (read_integer(m.cell_types, i)) {
+    case INSITU_TET: return compute_tet_volume(v(0), v(1), v(2), v(3));
+    case INSITU_PYRAMID: return compute_tet_volume(v(0), v(1), v(2), v(4)) + compute_tet_volume(v(0), v(2), v(3), v(4));
     case INSITU_WEDGE:
-        return std::fabs(tet_volume(v(0), v(1), v(2), v(3)) + tet_volume(v(1), v(2), v(3), v(4)) +
-                         tet_volume(v(2), v(3), v(4), v(5)));
+        return std::fabs(compute_tet_volume(v(0), v(1), v(2), v(3)) + compute_tet_volume(v(1), v(2), v(3), v(4)) +
+                         compute_tet_volume(v(2), v(3), v(4), v(5)));
     default:
-        return tet_volume(v(0), v(1), v(3), v(4)) + tet_volume(v(1), v(2), v(3), v(6)) +
-               tet_volume(v(1), v(6), v(4), v(5)) + tet_volume(v(3), v(4), v(6), v(7)) +
-               tet_volume(v(1), v(3), v(4), v(6));
+        return compute_tet_volume(v(0), v(1), v(3), v(4)) + compute_tet_volume(v(1), v(2), v(3), v(6)) +
+               compute_tet_volume(v(1), v(6), v(4), v(5)) + compute_tet_volume(v(3), v(4), v(6), v(7)) +
+               compute_tet_volume(v(1), v(3), v(4), v(6));
     }
 }
 
@@ -207,7 +207,7 @@ void one_type_of_32_bits_is_borrowed_without_types(void **)
     assert_int_equal(f.report.bytes_copied, 0);
 }
 
-void components_apart_are_borrowed(void **)
+void separate_components_are_borrowed(void **)
 {
     vtkNew<vtkUnstructuredGrid> grid;
     add_cell(grid, VTK_TETRA, corner);
@@ -275,8 +275,8 @@ void other_value_types_are_copied_and_declared(void **)
     fixture f;
     assert_int_equal(f.set(grid), INSITU_OK);
     for (int i = 0; i < 4; i++) {
-        assert_int_equal(integer_at(f.mesh().fields.at("s").values, i), -300 + i);
-        assert_int_equal(integer_at(f.mesh().fields.at("b").values, i), 250 + i);
+        assert_int_equal(read_integer(f.mesh().fields.at("s").values, i), -300 + i);
+        assert_int_equal(read_integer(f.mesh().fields.at("b").values, i), 250 + i);
     }
     assert_ptr_equal(f.mesh().fields.at("ids").values.data, ids->GetPointer(0));
     assert_int_equal(f.mesh().fields.at("ids").values.type, INSITU_INT64);
@@ -295,7 +295,7 @@ void integer_points_become_doubles(void **)
     grid->GetPoints()->SetData(xyz);
     fixture f;
     assert_int_equal(f.set(grid), INSITU_OK);
-    for (size_t i = 0; i < 8; i++) assert_true(vertex(f.mesh().mesh, static_cast<int64_t>(i)) == cube[i]);
+    for (size_t i = 0; i < 8; i++) assert_true(get_vertex(f.mesh().mesh, static_cast<int64_t>(i)) == cube[i]);
     assert_int_equal(f.report.bytes_copied, 8 * 3 * 8);
 }
 
@@ -316,34 +316,34 @@ void voxel_becomes_a_right_handed_hexahedron(void **)
     fixture f;
     assert_int_equal(f.set(grid), INSITU_OK);
     assert_int_equal(f.report.cells, 2);
-    assert_int_equal(integer_at(f.mesh().mesh.cell_types, 0), INSITU_HEX);
-    assert_true(std::fabs(cell_volume(f.mesh().mesh, 0) - 6) < rounding);
-    assert_true(std::fabs(cell_volume(f.mesh().mesh, 1) - 1.0 / 6) < rounding);
+    assert_int_equal(read_integer(f.mesh().mesh.cell_types, 0), INSITU_HEX);
+    assert_true(std::fabs(compute_cell_volume(f.mesh().mesh, 0) - 6) < rounding);
+    assert_true(std::fabs(compute_cell_volume(f.mesh().mesh, 1) - 1.0 / 6) < rounding);
     assert_ptr_equal(f.mesh().fields.at("id").values.data, id->GetPointer(0));
     assert_int_equal(f.report.bytes_copied, 2 + 3 * 8 + 12 * 8);
     assert_non_null(strstr(f.report.copied_why, "voxels and pixels reordered"));
 }
 
 /* Returns the sorted points of a face. */
-std::vector<int64_t> face_points(const insitu_mesh &m, int64_t face)
+std::vector<int64_t> list_face_points(const insitu_mesh &m, int64_t face)
 {
     std::vector<int64_t> points;
-    for (int64_t i = integer_at(m.face_offsets, face); i < integer_at(m.face_offsets, face + 1); i++)
-        points.push_back(integer_at(m.face_connectivity, i));
+    for (int64_t i = read_integer(m.face_offsets, face); i < read_integer(m.face_offsets, face + 1); i++)
+        points.push_back(read_integer(m.face_connectivity, i));
     std::sort(points.begin(), points.end());
     return points;
 }
 
-int64_t cell_size(const insitu_mesh &m, int64_t cell)
+int64_t count_cell_vertices(const insitu_mesh &m, int64_t cell)
 {
-    return integer_at(m.offsets, cell + 1) - integer_at(m.offsets, cell);
+    return read_integer(m.offsets, cell + 1) - read_integer(m.offsets, cell);
 }
 
 void prisms_are_polyhedra_of_their_faces(void **)
 {
     vtkNew<vtkUnstructuredGrid> grid;
-    add_cell(grid, VTK_PENTAGONAL_PRISM, prism(5));
-    add_cell(grid, VTK_HEXAGONAL_PRISM, prism(6));
+    add_cell(grid, VTK_PENTAGONAL_PRISM, make_prism_points(5));
+    add_cell(grid, VTK_HEXAGONAL_PRISM, make_prism_points(6));
     vtkNew<vtkFloatArray> value;
     value->SetName("c");
     value->SetNumberOfComponents(2);
@@ -357,15 +357,15 @@ void prisms_are_polyhedra_of_their_faces(void **)
     assert_int_equal(f.report.cells_split, 0);
     for (int sides = 5, first = 0; sides <= 6; first += 2 * sides, sides++) {
         const int64_t cell = sides - 5;
-        assert_int_equal(integer_at(m.cell_types, cell), INSITU_POLYHEDRON);
-        assert_int_equal(cell_size(m, cell), sides + 2);
+        assert_int_equal(read_integer(m.cell_types, cell), INSITU_POLYHEDRON);
+        assert_int_equal(count_cell_vertices(m, cell), sides + 2);
         std::map<std::pair<int64_t, int64_t>, int> edges;
-        for (int64_t i = integer_at(m.offsets, cell); i < integer_at(m.offsets, cell + 1); i++) {
-            const int64_t face = integer_at(m.connectivity, i), begin = integer_at(m.face_offsets, face);
-            const int64_t size = integer_at(m.face_offsets, face + 1) - begin;
+        for (int64_t i = read_integer(m.offsets, cell); i < read_integer(m.offsets, cell + 1); i++) {
+            const int64_t face = read_integer(m.connectivity, i), begin = read_integer(m.face_offsets, face);
+            const int64_t size = read_integer(m.face_offsets, face + 1) - begin;
             for (int64_t k = 0; k < size; k++) {
-                const int64_t a = integer_at(m.face_connectivity, begin + k);
-                const int64_t b = integer_at(m.face_connectivity, begin + (k + 1) % size);
+                const int64_t a = read_integer(m.face_connectivity, begin + k);
+                const int64_t b = read_integer(m.face_connectivity, begin + (k + 1) % size);
                 assert_true(a >= first && a < first + 2 * sides);
                 edges[std::minmax(a, b)]++;
             }
@@ -377,7 +377,7 @@ void prisms_are_polyhedra_of_their_faces(void **)
     assert_non_null(strstr(f.report.copied_why, "faces of polyhedra and prisms shared"));
 }
 
-void bezier_cells_are_their_corners_with_a_warning(void **)
+void bezier_cells_are_drawn_as_linear_cells_with_a_warning(void **)
 {
     std::vector<point> p = corner;
     for (int i = 0; i < 6; i++) p.push_back({0.5, 0.5, 0.1 * i});
@@ -386,7 +386,7 @@ void bezier_cells_are_their_corners_with_a_warning(void **)
     fixture f;
     assert_int_equal(f.set(grid), INSITU_OK);
     assert_int_equal(f.report.cells_linear, 1);
-    for (int i = 0; i < 4; i++) assert_int_equal(integer_at(f.mesh().mesh.connectivity, i), i);
+    for (int i = 0; i < 4; i++) assert_int_equal(read_integer(f.mesh().mesh.connectivity, i), i);
     assert_int_equal(f.mesh().mesh.connectivity_count, 4);
     assert_non_null(strstr(f.report.cells_why, "1 higher-order cells"));
 }
@@ -414,13 +414,13 @@ void cells_of_higher_order_are_submitted(void **)
         assert_true((f.report.bytes_copied == 0) == is_borrowed);
         assert_int_equal(mesh.connectivity_count, 3 * c.nodes);
         assert_true(is_borrowed ? mesh.cell_type == c.known && !mesh.offsets.data
-                                : integer_at(mesh.cell_types, 2) == c.known);
+                                : read_integer(mesh.cell_types, 2) == c.known);
         for (int i = 0; i < 3 * c.nodes; i++)
-            assert_int_equal(integer_at(mesh.connectivity, i), i / c.nodes * c.points + i % c.nodes);
+            assert_int_equal(read_integer(mesh.connectivity, i), i / c.nodes * c.points + i % c.nodes);
     }
 }
 
-void other_cells_of_higher_order_are_their_corners(void **)
+void other_high_order_cells_are_drawn_as_linear_cells(void **)
 {
     const struct {
         int type, points, linear;
@@ -436,13 +436,13 @@ void other_cells_of_higher_order_are_their_corners(void **)
         add_cell(grid, c.type, points);
         fixture f;
         assert_int_equal(f.set(grid), INSITU_OK);
-        assert_int_equal(integer_at(f.mesh().mesh.cell_types, 0), c.linear);
-        assert_true(std::fabs(cell_volume(f.mesh().mesh, 0) - volume) < rounding);
+        assert_int_equal(read_integer(f.mesh().mesh.cell_types, 0), c.linear);
+        assert_true(std::fabs(compute_cell_volume(f.mesh().mesh, 0) - volume) < rounding);
         assert_int_equal(f.report.cells_linear, 1);
     }
 }
 
-void lines_are_left_out_and_fields_follow(void **)
+void line_cells_are_skipped_with_their_values(void **)
 {
     vtkNew<vtkUnstructuredGrid> grid;
     add_cell(grid, VTK_VERTEX, {{0, 0, 0}});
@@ -459,8 +459,8 @@ void lines_are_left_out_and_fields_follow(void **)
     assert_int_equal(f.report.cells_flat, 2);
     const auto *c = static_cast<const double *>(f.mesh().fields.at("c").values.data);
     assert_true(c[0] == 1 && c[1] == 3);
-    assert_true(std::fabs(cell_volume(f.mesh().mesh, 0) - 1.0 / 6) < rounding);
-    assert_true(std::fabs(cell_volume(f.mesh().mesh, 1) - 1.0 / 3) < rounding);
+    assert_true(std::fabs(compute_cell_volume(f.mesh().mesh, 0) - 1.0 / 6) < rounding);
+    assert_true(std::fabs(compute_cell_volume(f.mesh().mesh, 1) - 1.0 / 3) < rounding);
     assert_non_null(strstr(f.report.cells_why, "2 points and lines"));
 }
 
@@ -486,12 +486,12 @@ void shells_are_submitted(void **)
         assert_int_equal(mesh.cell_count, has_pixel ? 6 : 4);
         assert_true((f.report.bytes_copied > 0) == has_pixel);
         for (int i = 0; i < mesh.cell_count; i++) {
-            assert_int_equal(integer_at(mesh.cell_types, i), types[i]);
-            assert_int_equal(integer_at(mesh.offsets, i + 1), ends[i]);
+            assert_int_equal(read_integer(mesh.cell_types, i), types[i]);
+            assert_int_equal(read_integer(mesh.offsets, i + 1), ends[i]);
         }
         if (!has_pixel) continue;
-        const int64_t first = integer_at(mesh.connectivity, 16), turned[] = {0, 1, 3, 2};
-        for (int i = 0; i < 4; i++) assert_int_equal(integer_at(mesh.connectivity, 16 + i), first + turned[i]);
+        const int64_t first = read_integer(mesh.connectivity, 16), turned[] = {0, 1, 3, 2};
+        for (int i = 0; i < 4; i++) assert_int_equal(read_integer(mesh.connectivity, 16 + i), first + turned[i]);
         assert_int_equal(f.report.cells_linear, 1);
     }
 }
@@ -525,11 +525,11 @@ void polyhedra_share_their_faces(void **)
     assert_int_equal(m.face_count, 7);
     assert_int_equal(m.connectivity_count, 8);
     std::set<int64_t> first, shared;
-    for (int64_t i = 0; i < 4; i++) first.insert(integer_at(m.connectivity, i));
+    for (int64_t i = 0; i < 4; i++) first.insert(read_integer(m.connectivity, i));
     for (int64_t i = 4; i < 8; i++)
-        if (first.count(integer_at(m.connectivity, i))) shared.insert(integer_at(m.connectivity, i));
+        if (first.count(read_integer(m.connectivity, i))) shared.insert(read_integer(m.connectivity, i));
     assert_int_equal(shared.size(), 1);
-    assert_true(face_points(m, *shared.begin()) == (std::vector<int64_t>{1, 2, 3}));
+    assert_true(list_face_points(m, *shared.begin()) == (std::vector<int64_t>{1, 2, 3}));
     assert_int_equal(f.report.bytes_copied, 2 + 3 * 8 + 8 * 8 + 8 * 8 + 21 * 8);
 }
 
@@ -542,7 +542,7 @@ void polyhedra_without_faces_are_warned_about(void **)
     fixture f;
     assert_int_equal(f.set(grid), INSITU_OK);
     assert_int_equal(f.report.cells, 1);
-    assert_int_equal(integer_at(f.mesh().mesh.connectivity, 0), 4);
+    assert_int_equal(read_integer(f.mesh().mesh.connectivity, 0), 4);
     assert_non_null(strstr(f.report.cells_why, "1 cells of type 42"));
 }
 
@@ -562,7 +562,7 @@ void ghost_flags_that_hide_are_submitted(void **)
     ghosts->SetValue(3, vtkDataSetAttributes::EXTERIORCELL);
     assert_int_equal(f.set(grid), INSITU_OK);
     const int64_t expected[4] = {0, 1, 1, 0};
-    for (int i = 0; i < 4; i++) assert_int_equal(integer_at(f.mesh().mesh.ghosts, i), expected[i]);
+    for (int i = 0; i < 4; i++) assert_int_equal(read_integer(f.mesh().mesh.ghosts, i), expected[i]);
     assert_int_equal(f.report.bytes_copied, 4);
 
     ghosts->Fill(vtkDataSetAttributes::LOWCONNECTIVITYCELL);
@@ -592,18 +592,18 @@ void ghost_flags_of_other_types_and_names_hide_cells_too(void **)
         assert_non_null(f.mesh().mesh.ghosts.data);
         for (int i = 0; i < 4; i++) {
             const bool is_hidden = (has_own && own[i] != 0) || (has_zones && zones[i] != 0);
-            assert_int_equal(integer_at(f.mesh().mesh.ghosts, i) != 0, is_hidden);
+            assert_int_equal(read_integer(f.mesh().mesh.ghosts, i) != 0, is_hidden);
         }
         assert_true(f.mesh().fields.empty());
     }
 }
 
-void ghost_flags_follow_cells_left_out(void **)
+void ghost_flags_follow_skipped_cells(void **)
 {
     vtkNew<vtkUnstructuredGrid> grid;
     add_cell(grid, VTK_TETRA, corner);
     add_cell(grid, VTK_LINE, {corner.begin(), corner.begin() + 2});
-    add_cell(grid, VTK_HEXAGONAL_PRISM, prism(6));
+    add_cell(grid, VTK_HEXAGONAL_PRISM, make_prism_points(6));
     vtkNew<vtkUnsignedCharArray> ghosts;
     ghosts->SetName(vtkDataSetAttributes::GhostArrayName());
     for (const unsigned char flag : std::initializer_list<unsigned char>{0, 0, 1}) ghosts->InsertNextValue(flag);
@@ -612,12 +612,12 @@ void ghost_flags_follow_cells_left_out(void **)
     assert_int_equal(f.set(grid), INSITU_OK);
     const int64_t expected[2] = {0, 1};
     assert_int_equal(f.mesh().mesh.cell_count, 2);
-    for (int i = 0; i < 2; i++) assert_int_equal(integer_at(f.mesh().mesh.ghosts, i), expected[i]);
+    for (int i = 0; i < 2; i++) assert_int_equal(read_integer(f.mesh().mesh.ghosts, i), expected[i]);
 }
 
 /* Returns a lattice's coordinate along an axis at the n-th vertex along that axis, if coordinates are not given by
  * vertex. */
-double place_along(const insitu_lattice &l, int axis, int64_t n)
+double compute_axis_coordinate(const insitu_lattice &l, int axis, int64_t n)
 {
     const insitu_array &a = l.axes[axis];
     if (!a.data) return l.origin[axis] + l.spacing[axis] * static_cast<double>(l.first[axis] + n);
@@ -669,7 +669,7 @@ void structured_grids_are_hexahedra(void **)
             const int64_t index[3] = {i % 3, i / 3 % 4, i / 12};
             data->GetPoint(i, at);
             for (int a = 0; a < 3 && data != curvilinear.Get(); a++)
-                assert_true(place_along(*lattice, a, index[a]) == at[a]); // equal to the bit
+                assert_true(compute_axis_coordinate(*lattice, a, index[a]) == at[a]); // equal to the bit
         }
         assert_ptr_equal(f.mesh().fields.at("f").values.data, values->GetPointer(0));
         assert_int_equal(f.report.bytes_copied, 0);
@@ -702,7 +702,7 @@ void flat_hidden_and_turned_images_are_lattices(void **)
     image->GetPointData()->AddArray(flags); // point (2, 1, 1): hides the four cells around it with i = 1
     fixture f;
     assert_int_equal(f.set(image), INSITU_OK);
-    for (int i = 0; i < 8; i++) assert_int_equal(integer_at(f.mesh().mesh.ghosts, i) != 0, i % 2);
+    for (int i = 0; i < 8; i++) assert_int_equal(read_integer(f.mesh().mesh.ghosts, i) != 0, i % 2);
     assert_int_equal(f.report.bytes_copied, 8);
     image->GetPointData()->Initialize();
     image->SetDirectionMatrix(0, 1, 0, -1, 0, 0, 0, 0, 1);
@@ -711,7 +711,7 @@ void flat_hidden_and_turned_images_are_lattices(void **)
     for (vtkIdType i = 0; i < 27; i++) {
         double at[3];
         image->GetPoint(i, at);
-        assert_true(vertex(f.mesh().mesh, i) == (point{at[0], at[1], at[2]}));
+        assert_true(get_vertex(f.mesh().mesh, i) == (point{at[0], at[1], at[2]}));
     }
 }
 
@@ -733,20 +733,20 @@ void polygons_are_shells(void **)
     const insitu_mesh &mesh = f.mesh().mesh;
     const int types[] = {INSITU_TRIANGLE, INSITU_QUAD, INSITU_POLYGON};
     assert_int_equal(mesh.cell_count, 3);
-    for (int i = 0; i < 3; i++) assert_int_equal(integer_at(mesh.cell_types, i), types[i]);
+    for (int i = 0; i < 3; i++) assert_int_equal(read_integer(mesh.cell_types, i), types[i]);
     assert_int_equal(f.report.cells_flat, 1);
 
     data->SetLines(nullptr); // then connectivity is passed in place, and only cell types are copied
     assert_int_equal(f.set(data), INSITU_OK);
     assert_int_equal(f.mesh().mesh.cell_count, 3);
-    for (int i = 0; i < 3; i++) assert_int_equal(integer_at(f.mesh().mesh.cell_types, i), types[i]);
+    for (int i = 0; i < 3; i++) assert_int_equal(read_integer(f.mesh().mesh.cell_types, i), types[i]);
     const vtkDataArray *listed = polygons->GetConnectivityArray();
     assert_ptr_equal(f.mesh().mesh.connectivity.data, const_cast<vtkDataArray *>(listed)->GetVoidPointer(0));
     assert_ptr_equal(f.mesh().mesh.coordinates[0].data, points->GetVoidPointer(0));
     assert_int_equal(f.report.bytes_copied, 3);
 }
 
-void leaves_of_composites_are_meshes_and_go_when_they_are_gone(void **)
+void leaves_of_composites_are_meshes_until_removed(void **)
 {
     vtkNew<vtkUnstructuredGrid> a, b;
     add_cell(a, VTK_TETRA, corner);
@@ -793,7 +793,7 @@ void leaves_of_composites_are_meshes_and_go_when_they_are_gone(void **)
     assert_true(f.session.meshes.empty());
 }
 
-vtkSmartPointer<vtkImageData> image_with(const std::vector<const char *> &fields, int layers = 1)
+vtkSmartPointer<vtkImageData> make_image(const std::vector<const char *> &fields, int layers = 1)
 {
     auto image = vtkSmartPointer<vtkImageData>::New();
     image->SetDimensions(3, 3, layers + 1);
@@ -814,9 +814,9 @@ void structured_leaves_with_the_same_fields_are_blocks_of_one_mesh(void **)
     for (size_t i = 0; i < 40; i++) many[i] = (names[i] = "a field with a long name " + std::to_string(i)).c_str();
     const std::vector<const char *> fewer(many.begin(), many.end() - 1);
     vtkNew<vtkMultiBlockDataSet> blocks;
-    const std::vector<vtkSmartPointer<vtkImageData>> leaves = {image_with({"b", "a"}), image_with({"a"}),
-                                                               image_with({"a", "b"}), image_with({"a", "b"}, 0),
-                                                               image_with(many),       image_with(fewer)};
+    const std::vector<vtkSmartPointer<vtkImageData>> leaves = {make_image({"b", "a"}), make_image({"a"}),
+                                                               make_image({"a", "b"}), make_image({"a", "b"}, 0),
+                                                               make_image(many),       make_image(fewer)};
     for (size_t i = 0; i < leaves.size(); i++) blocks->SetBlock(static_cast<unsigned>(i), leaves[i]);
     fixture f;
     assert_int_equal(f.set(blocks), INSITU_OK);
@@ -851,7 +851,7 @@ void arrays_outlive_the_data_set(void **)
         grid->GetPointData()->AddArray(value);
         assert_int_equal(f.set(grid), INSITU_OK);
     }
-    for (size_t i = 0; i < 8; i++) assert_true(vertex(f.mesh().mesh, static_cast<int64_t>(i)) == cube[i]);
+    for (size_t i = 0; i < 8; i++) assert_true(get_vertex(f.mesh().mesh, static_cast<int64_t>(i)) == cube[i]);
     const insitu_field &v = f.mesh().fields.begin()->second;
     for (int i = 0; i < 8; i++) assert_true(static_cast<const float *>(v.values.data)[i] == static_cast<float>(i));
 }
@@ -908,7 +908,7 @@ void malformed_data_is_refused(void **)
     assert_non_null(strstr(insitu_vtk_error(f.adaptor), "vtkTable"));
 }
 
-void empty_grid_is_no_mesh(void **)
+void empty_grid_submits_no_mesh(void **)
 {
     vtkNew<vtkUnstructuredGrid> grid;
     fixture f;
@@ -944,30 +944,30 @@ int main()
     const CMUnitTest tests[] = {
         cmocka_unit_test(plain_grid_is_borrowed),
         cmocka_unit_test(one_type_of_32_bits_is_borrowed_without_types),
-        cmocka_unit_test(components_apart_are_borrowed),
+        cmocka_unit_test(separate_components_are_borrowed),
         cmocka_unit_test(other_value_types_are_copied_and_declared),
         cmocka_unit_test(integer_points_become_doubles),
         cmocka_unit_test(voxel_becomes_a_right_handed_hexahedron),
         cmocka_unit_test(prisms_are_polyhedra_of_their_faces),
-        cmocka_unit_test(bezier_cells_are_their_corners_with_a_warning),
+        cmocka_unit_test(bezier_cells_are_drawn_as_linear_cells_with_a_warning),
         cmocka_unit_test(cells_of_higher_order_are_submitted),
-        cmocka_unit_test(other_cells_of_higher_order_are_their_corners),
-        cmocka_unit_test(lines_are_left_out_and_fields_follow),
+        cmocka_unit_test(other_high_order_cells_are_drawn_as_linear_cells),
+        cmocka_unit_test(line_cells_are_skipped_with_their_values),
         cmocka_unit_test(shells_are_submitted),
         cmocka_unit_test(polyhedra_share_their_faces),
         cmocka_unit_test(polyhedra_without_faces_are_warned_about),
         cmocka_unit_test(ghost_flags_that_hide_are_submitted),
         cmocka_unit_test(ghost_flags_of_other_types_and_names_hide_cells_too),
-        cmocka_unit_test(ghost_flags_follow_cells_left_out),
+        cmocka_unit_test(ghost_flags_follow_skipped_cells),
         cmocka_unit_test(flat_hidden_and_turned_images_are_lattices),
         cmocka_unit_test(structured_grids_are_hexahedra),
         cmocka_unit_test(polygons_are_shells),
-        cmocka_unit_test(leaves_of_composites_are_meshes_and_go_when_they_are_gone),
+        cmocka_unit_test(leaves_of_composites_are_meshes_until_removed),
         cmocka_unit_test(structured_leaves_with_the_same_fields_are_blocks_of_one_mesh),
         cmocka_unit_test(arrays_outlive_the_data_set),
         cmocka_unit_test(one_name_at_points_and_cells_warns),
         cmocka_unit_test(malformed_data_is_refused),
-        cmocka_unit_test(empty_grid_is_no_mesh),
+        cmocka_unit_test(empty_grid_submits_no_mesh),
         cmocka_unit_test(errors_of_the_session_are_passed_on),
     };
     return cmocka_run_group_tests(tests, nullptr, nullptr);

@@ -47,7 +47,7 @@ const std::vector<block> blocks = {{0, {0, 0, 0}, {4, 6, 4}, 1},   {0, {4, 0, 0}
                                    {0, {-2, 0, 0}, {2, 6, 4}, 1},  {1, {4, 2, 2}, {6, 4, 4}, 2},
                                    {1, {-4, 4, 0}, {2, 6, 4}, 2},  {1, {-2, 4, 0}, {4, 2, 2}, 2},
                                    {2, {16, 12, 8}, {12, 8, 8}, 8}};
-vtkSmartPointer<vtkUniformGrid> grid_of(const block &b, bool is_flat = false)
+vtkSmartPointer<vtkUniformGrid> make_uniform_grid(const block &b, bool is_flat = false)
 {
     auto grid = vtkSmartPointer<vtkUniformGrid>::New();
     double at[3], h[3];
@@ -86,7 +86,8 @@ vtkSmartPointer<vtkOverlappingAMR> make_amr(given what, bool is_flat = false, he
         if (is_flat) low[2] = 0, high[2] = -1;
         amr->SetAMRBox(b.level, number[b.level], vtkAMRBox(low.data(), high.data()));
         const unsigned at = number[b.level]++;
-        if (grids == held::all || (b.level != 1 && b.low[0] != 0)) amr->SetDataSet(b.level, at, grid_of(b, is_flat));
+        if (grids == held::all || (b.level != 1 && b.low[0] != 0))
+            amr->SetDataSet(b.level, at, make_uniform_grid(b, is_flat));
     }
     return amr;
 }
@@ -107,17 +108,17 @@ bool is_covered(const block &b, const std::array<int, 3> &cell, bool is_flat)
     return false;
 }
 
-std::string name_of(size_t n)
+std::string make_block_name(size_t n)
 {
     return "m[" + std::to_string(n) + "]";
 }
 
 /* Compares the lattice of each block with the block's position in its level. */
-void check(const fixture &f, bool is_flat = false)
+void check_block_lattices(const fixture &f, bool is_flat = false)
 {
     for (size_t n = 0; n < blocks.size(); n++) {
         const block &b = blocks[n];
-        const auto found = f.session.meshes.find(name_of(n));
+        const auto found = f.session.meshes.find(make_block_name(n));
         if (found == f.session.meshes.end()) continue;
         const insitu_mesh &mesh = found->second.mesh;
         const insitu_lattice &l = *mesh.lattice;
@@ -144,7 +145,7 @@ void grids_are_blocks_of_levels_by_spacings_or_ratios(void **)
         assert_int_equal(f.report.meshes, blocks.size());
         assert_int_equal(f.session.meshes.size(), blocks.size());
         assert_string_equal(f.report.warnings, "");
-        check(f);
+        check_block_lattices(f);
         for (const auto &[name, mesh] : f.session.meshes) assert_null(mesh.mesh.ghosts.data);
         assert_int_equal(f.report.bytes_copied, 0);
         for (unsigned i = 0; i < 3; i++) assert_null(amr->GetDataSet(0, i)->GetCellGhostArray()); // input is unchanged
@@ -162,9 +163,9 @@ void refined_cells_that_vtk_has_flagged_are_ghosts_too(void **)
     assert_non_null(amr->GetDataSet(0, 0)->GetCellGhostArray());
     fixture f;
     assert_int_equal(f.set(amr), INSITU_OK);
-    check(f);
+    check_block_lattices(f);
     const block &b = blocks[0];
-    const auto *ghosts = static_cast<const uint8_t *>(f.session.meshes.at(name_of(0)).mesh.ghosts.data);
+    const auto *ghosts = static_cast<const uint8_t *>(f.session.meshes.at(make_block_name(0)).mesh.ghosts.data);
     for (int i = 0; i < b.cells[0] * b.cells[1] * b.cells[2]; i++) {
         const int x = i % b.cells[0], y = i / b.cells[0] % b.cells[1], z = i / b.cells[0] / b.cells[1];
         assert_int_equal(ghosts[i] != 0, is_covered(b, {x, y, z}, false));
@@ -177,9 +178,9 @@ void grids_keep_their_numbers_on_ranks_without_others(void **)
     fixture f;
     assert_int_equal(f.set(amr), INSITU_OK);
     assert_int_equal(f.report.meshes, 3);
-    assert_int_equal(f.session.meshes.count(name_of(1)), 1);
-    assert_int_equal(f.session.meshes.count(name_of(6)), 1);
-    check(f);
+    assert_int_equal(f.session.meshes.count(make_block_name(1)), 1);
+    assert_int_equal(f.session.meshes.count(make_block_name(6)), 1);
+    check_block_lattices(f);
 }
 
 void hidden_cells_stay_hidden(void **)
@@ -190,8 +191,8 @@ void hidden_cells_stay_hidden(void **)
     amr->GetDataSet(2, 0)->BlankPoint(0);
     fixture f;
     assert_int_equal(f.set(amr), INSITU_OK);
-    const auto *coarse = static_cast<const uint8_t *>(f.session.meshes.at(name_of(0)).mesh.ghosts.data);
-    const auto *fine = static_cast<const uint8_t *>(f.session.meshes.at(name_of(6)).mesh.ghosts.data);
+    const auto *coarse = static_cast<const uint8_t *>(f.session.meshes.at(make_block_name(0)).mesh.ghosts.data);
+    const auto *fine = static_cast<const uint8_t *>(f.session.meshes.at(make_block_name(6)).mesh.ghosts.data);
     assert_true(coarse[0] && !coarse[1]);
     assert_true(fine[0] && !fine[1]);
     int64_t hidden = 0;
@@ -199,20 +200,20 @@ void hidden_cells_stay_hidden(void **)
     assert_int_equal(hidden, 1);
 }
 
-void flat_amr_is_quads(void **)
+void flat_amr_submits_quads(void **)
 {
     const auto amr = make_amr(given::spacings, true);
     fixture f;
     assert_int_equal(f.set(amr), INSITU_OK);
-    assert_int_equal(f.session.meshes.at(name_of(0)).mesh.cell_type, INSITU_QUAD);
+    assert_int_equal(f.session.meshes.at(make_block_name(0)).mesh.cell_type, INSITU_QUAD);
     assert_int_equal(f.report.cells_flat + f.report.cells_not_drawn, 0);
     assert_string_equal(f.report.warnings, "");
-    check(f, true);
+    check_block_lattices(f, true);
 }
 
 bool is_on_level(const fixture &f, size_t n)
 {
-    return f.session.meshes.at(name_of(n)).mesh.lattice->refinement[0] != 0;
+    return f.session.meshes.at(make_block_name(n)).mesh.lattice->refinement[0] != 0;
 }
 
 void boxes_that_do_not_fit_are_reported(void **)
@@ -237,7 +238,7 @@ void boxes_within_cells_make_no_levels(void **)
     assert_int_equal(f.set(amr), INSITU_OK);
     for (size_t n = 0; n < blocks.size(); n++) {
         assert_false(is_on_level(f, n));
-        assert_non_null(strstr(f.report.warnings, ("mesh '" + name_of(n) + "': the AMR's boxes").c_str()));
+        assert_non_null(strstr(f.report.warnings, ("mesh '" + make_block_name(n) + "': the AMR's boxes").c_str()));
     }
     amr = make_amr(given::spacings);
     amr->GetDataSet(1, 1)->SetOrigin(0, 0, 0);
@@ -250,8 +251,8 @@ void levels_that_do_not_overlap_are_drawn_whole(void **)
     vtkNew<vtkNonOverlappingAMR> amr;
     const int counts[2] = {1, 1};
     amr->Initialize(2, counts);
-    amr->SetDataSet(0, 0, grid_of(blocks[0]));
-    amr->SetDataSet(1, 0, grid_of(blocks[3]));
+    amr->SetDataSet(0, 0, make_uniform_grid(blocks[0]));
+    amr->SetDataSet(1, 0, make_uniform_grid(blocks[3]));
     amr->GetDataSet(1, 0)->BlankCell(5);
     fixture f;
     assert_int_equal(f.set(amr), INSITU_OK);
@@ -270,7 +271,7 @@ int main()
         cmocka_unit_test(refined_cells_that_vtk_has_flagged_are_ghosts_too),
         cmocka_unit_test(grids_keep_their_numbers_on_ranks_without_others),
         cmocka_unit_test(hidden_cells_stay_hidden),
-        cmocka_unit_test(flat_amr_is_quads),
+        cmocka_unit_test(flat_amr_submits_quads),
         cmocka_unit_test(boxes_that_do_not_fit_are_reported),
         cmocka_unit_test(boxes_within_cells_make_no_levels),
         cmocka_unit_test(levels_that_do_not_overlap_are_drawn_whole),

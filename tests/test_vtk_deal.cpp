@@ -36,7 +36,7 @@ namespace
 
 /* Returns n × n × n hexahedra, whose coordinates are multiples of 1/3, so that float cannot represent them. Cell data
  * "id" counts from `first`; point data is "x". */
-vtkSmartPointer<vtkUnstructuredGrid> lattice(int n, int first, double shift)
+vtkSmartPointer<vtkUnstructuredGrid> make_lattice(int n, int first, double shift)
 {
     auto grid = vtkSmartPointer<vtkUnstructuredGrid>::New();
     vtkNew<vtkPoints> points;
@@ -65,7 +65,7 @@ vtkSmartPointer<vtkUnstructuredGrid> lattice(int n, int first, double shift)
 
 using corners = std::vector<double>; // coordinates x, y, z of each vertex of a cell
 
-void collect(vtkUnstructuredGrid *grid, std::map<int, corners> &found)
+void collect_cells(vtkUnstructuredGrid *grid, std::map<int, corners> &found)
 {
     auto *id = vtkIntArray::SafeDownCast(grid->GetCellData()->GetArray("id"));
     auto *x = vtkDoubleArray::SafeDownCast(grid->GetPointData()->GetArray("x"));
@@ -91,14 +91,14 @@ void collect_all(vtkDataObject *data, std::map<int, corners> &found)
 {
     if (!data) return;
     if (auto *grid = vtkUnstructuredGrid::SafeDownCast(data)) {
-        collect(grid, found);
+        collect_cells(grid, found);
         return;
     }
     auto *composite = vtkCompositeDataSet::SafeDownCast(data);
     assert_non_null(composite);
     const auto it = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
     for (it->InitTraversal(); !it->IsDoneWithTraversal(); it->GoToNextItem())
-        collect(vtkUnstructuredGrid::SafeDownCast(it->GetCurrentDataObject()), found);
+        collect_cells(vtkUnstructuredGrid::SafeDownCast(it->GetCurrentDataObject()), found);
 }
 
 void expect_each_cell_once(vtkDataObject *data)
@@ -115,21 +115,21 @@ void expect_each_cell_once(vtkDataObject *data)
 
 void grid_is_distributed_each_cell_once(void **)
 {
-    expect_each_cell_once(lattice(4, 0, 0));
+    expect_each_cell_once(make_lattice(4, 0, 0));
 }
 
 void composite_is_distributed_each_cell_once(void **)
 {
     vtkNew<vtkMultiBlockDataSet> blocks;
-    blocks->SetBlock(0, lattice(3, 0, 0));
+    blocks->SetBlock(0, make_lattice(3, 0, 0));
     blocks->SetBlock(1, nullptr);
-    blocks->SetBlock(2, lattice(2, 1000, 5));
+    blocks->SetBlock(2, make_lattice(2, 1000, 5));
     expect_each_cell_once(blocks);
 }
 
 void more_ranks_than_cells_leaves_some_without(void **)
 {
-    const auto grid = lattice(1, 0, 0);
+    const auto grid = make_lattice(1, 0, 0);
     int with = 0;
     for (int rank = 0; rank < 5; rank++) with += distribute_cells(grid, partition::block, rank, 5) != nullptr;
     assert_int_equal(with, 1);
@@ -139,7 +139,7 @@ void more_ranks_than_cells_leaves_some_without(void **)
  * 4 ranks differs by less than 5 standard deviations: sqrt(4096 · 1/4 · 3/4) · 5 = 139. */
 void parts_are_balanced(void **)
 {
-    const auto grid = lattice(16, 0, 0);
+    const auto grid = make_lattice(16, 0, 0);
     for (int rank = 0; rank < 4; rank++) {
         auto cells = [&](partition how) {
             return vtkUnstructuredGrid::SafeDownCast(distribute_cells(grid, how, rank, 4))->GetNumberOfCells();
@@ -149,11 +149,11 @@ void parts_are_balanced(void **)
     }
 }
 
-void leaves_keep_their_numbers(void **)
+void leaves_keep_their_numbers_on_all_ranks(void **)
 {
     vtkNew<vtkMultiBlockDataSet> blocks;
-    blocks->SetBlock(0, lattice(2, 0, 0));
-    blocks->SetBlock(1, lattice(2, 100, 5));
+    blocks->SetBlock(0, make_lattice(2, 0, 0));
+    blocks->SetBlock(1, make_lattice(2, 100, 5));
     const auto distributed = distribute_cells(blocks, partition::block, 1, 2);
     auto *last = vtkMultiBlockDataSet::SafeDownCast(distributed);
     assert_int_equal(last->GetNumberOfBlocks(), 2);
@@ -178,7 +178,7 @@ int main()
         cmocka_unit_test(composite_is_distributed_each_cell_once),
         cmocka_unit_test(more_ranks_than_cells_leaves_some_without),
         cmocka_unit_test(parts_are_balanced),
-        cmocka_unit_test(leaves_keep_their_numbers),
+        cmocka_unit_test(leaves_keep_their_numbers_on_all_ranks),
         cmocka_unit_test(names_of_partitions_are_known),
     };
     return cmocka_run_group_tests(tests, nullptr, nullptr);

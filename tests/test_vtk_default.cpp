@@ -60,10 +60,10 @@ picture read_picture(const std::string &name)
     return p;
 }
 
-picture draw(const std::string &arguments, const std::string &name, int ranks = 1)
+picture draw_default(const std::string &arguments, const std::string &name, int ranks = 1)
 {
-    const std::string start = ranks > 1 ? shell_word(mpiexec) + " -n " + std::to_string(ranks) + " " : "";
-    const run_result r = run_in(folder, start + shell_word(tool) + " --size 240x160 " + arguments);
+    const std::string start = ranks > 1 ? quote_for_shell(mpiexec) + " -n " + std::to_string(ranks) + " " : "";
+    const run_result r = run_in_folder(folder, start + quote_for_shell(tool) + " --size 240x160 " + arguments);
     if (r.status != 0) print_error("%s\n%s%s", arguments.c_str(), r.out.c_str(), r.err.c_str());
     assert_int_equal(r.status, 0);
     return read_picture(name);
@@ -133,15 +133,15 @@ void a_solid_with_a_dark_outside_is_cut_open(void **)
     write_lattice("hot.vtu", -1, [](auto &at) {
         return std::fmin(1, std::fmax(0, 2 - 2 * (at[0] * at[0] + at[1] * at[1] + at[2] * at[2])));
     });
-    assert_true(count_near(draw("hot.vtu", "hot_0000.png", 3), viridis_high) > 10);
-    assert_int_equal(count_near(draw("--whole hot.vtu", "hot_0000.png"), viridis_high), 0);
+    assert_true(count_near(draw_default("hot.vtu", "hot_0000.png", 3), viridis_high) > 10);
+    assert_int_equal(count_near(draw_default("--whole hot.vtu", "hot_0000.png"), viridis_high), 0);
 }
 
 /* The cube's edge that is nearest to the eye extends downwards from the picture's centre; a cut would remove it. */
 void a_solid_whose_outside_shows_the_field_is_drawn_whole(void **)
 {
     write_lattice("shown.vtu", -1, [](auto &at) { return at[0] + 2 * at[2]; });
-    const picture p = draw("shown.vtu", "shown_0000.png");
+    const picture p = draw_default("shown.vtu", "shown_0000.png");
     const colour background = p.at(0, height - 1);
     for (int y = 80; y < 140; y++) assert_false(is_near(p.at(112, y), background));
 }
@@ -153,7 +153,7 @@ void flat_meshes_are_seen_from_the_front_in_the_colours_of_the_map(void **)
     write_lattice("x.vtu", 0, [](auto &at) { return at[1]; });
     write_lattice("y.vtu", 1, [](auto &at) { return at[0]; });
     for (const std::string name : {"x", "y"}) {
-        const picture p = draw(name + ".vtu", name + "_0000.png");
+        const picture p = draw_default(name + ".vtu", name + "_0000.png");
         std::vector<int> middles;
         for (int x = 0; x < bar; x++)
             if (is_near(p.at(x, height / 2), viridis_middle)) middles.push_back(x);
@@ -172,18 +172,18 @@ void faults_of_words_are_reported_in_a_run_of_one_step(void **)
     write_lattice("words.vtu", 2, [](auto &at) { return at[0]; });
     write_file(folder + "/words.yaml", "images:\n  - {name: w, size: [120, 80], layers: [{surface: {}}], decorations: "
                                        "{size: 0.2, title: \"\u6e29\", axes: true}, outputs: [{path: w.png}]}\n");
-    for (const std::string &start : {std::string(), shell_word(mpiexec) + " -n 3 "}) {
-        const run_result r = run_in(folder, start + shell_word(tool) + " words.yaml words.vtu");
+    for (const std::string &start : {std::string(), quote_for_shell(mpiexec) + " -n 3 "}) {
+        const run_result r = run_in_folder(folder, start + quote_for_shell(tool) + " words.yaml words.vtu");
         if (r.status != 0) fail_msg("%s", r.err.c_str());
         for (const char *words : {"warning: image \"w\": the font", "no glyphs for U+6E29",
                                   "warning: image \"w\": no room in 120 x 80 pixels for the axes, which is left out"})
-            if (!r.says(words)) fail_msg("no \"%s\" in %s", words, r.err.c_str());
+            if (!r.contains_text(words)) fail_msg("no \"%s\" in %s", words, r.err.c_str());
     }
 }
 
-int begin(void **)
+int set_up_test_group(void **)
 {
-    folder = fresh_folder("vtk_default");
+    folder = make_empty_folder("vtk_default");
     return 0;
 }
 
@@ -200,5 +200,5 @@ int main(int argc, char **argv)
         cmocka_unit_test(flat_meshes_are_seen_from_the_front_in_the_colours_of_the_map),
         cmocka_unit_test(faults_of_words_are_reported_in_a_run_of_one_step),
     };
-    return cmocka_run_group_tests(tests, begin, nullptr);
+    return cmocka_run_group_tests(tests, set_up_test_group, nullptr);
 }

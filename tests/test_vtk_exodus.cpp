@@ -69,7 +69,7 @@ const division triangles = {"TRI", {{0, 1, 2}, {0, 2, 3}}};
 
 /* Returns the cube as two adjacent boxes. The nodes of each cell beyond its corners are separate nodes, all at the
  * cell's centre. */
-body divide(const division &how, int nodes_per_cell, double first_x)
+body divide_cube(const division &how, int nodes_per_cell, double first_x)
 {
     body b;
     const int offsets[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
@@ -100,7 +100,7 @@ struct block {
     body content;
 };
 
-void put(int status)
+void require_success(int status)
 {
     if (status < 0) throw std::runtime_error("the Exodus library cannot write");
 }
@@ -111,7 +111,7 @@ void write_exodus(const std::string &path, const std::vector<block> &blocks, boo
 {
     int word = 8, io_word = 8;
     const int file = ex_create(path.c_str(), EX_CLOBBER, &word, &io_word);
-    put(file);
+    require_success(file);
     std::vector<double> x[3], f;
     int64_t cell_count = 0;
     for (const block &b : blocks) {
@@ -122,8 +122,8 @@ void write_exodus(const std::string &path, const std::vector<block> &blocks, boo
         }
     }
     const auto nodes = static_cast<int64_t>(f.size());
-    put(ex_put_init(file, "cube", 3, nodes, cell_count, static_cast<int64_t>(blocks.size()), 0, 0));
-    put(ex_put_coord(file, x[0].data(), x[1].data(), x[2].data()));
+    require_success(ex_put_init(file, "cube", 3, nodes, cell_count, static_cast<int64_t>(blocks.size()), 0, 0));
+    require_success(ex_put_coord(file, x[0].data(), x[1].data(), x[2].data()));
     int first = 1;
     for (size_t i = 0; i < blocks.size(); i++) {
         const body &b = blocks[i].content;
@@ -131,32 +131,34 @@ void write_exodus(const std::string &path, const std::vector<block> &blocks, boo
         for (const node_list &cell : b.cells)
             for (const int node : cell) list.push_back(first + node);
         const auto id = static_cast<ex_entity_id>(90 - 10 * i);
-        put(ex_put_block(file, EX_ELEM_BLOCK, id, blocks[i].type.c_str(), static_cast<int64_t>(b.cells.size()),
-                         static_cast<int64_t>(b.cells[0].size()), 0, 0, 0));
-        put(ex_put_conn(file, EX_ELEM_BLOCK, id, list.data(), nullptr, nullptr));
+        require_success(ex_put_block(file, EX_ELEM_BLOCK, id, blocks[i].type.c_str(),
+                                     static_cast<int64_t>(b.cells.size()), static_cast<int64_t>(b.cells[0].size()), 0,
+                                     0, 0));
+        require_success(ex_put_conn(file, EX_ELEM_BLOCK, id, list.data(), nullptr, nullptr));
         first += static_cast<int>(b.nodes.size());
     }
     const char *const names[] = {"f", "disp_x", "disp_y", "disp_z"};
     const int fields = is_moved ? 4 : 1;
-    put(ex_put_variable_param(file, EX_NODAL, fields));
-    for (int i = 0; i < fields; i++) put(ex_put_variable_name(file, EX_NODAL, i + 1, names[i]));
-    put(ex_put_variable_param(file, EX_ELEM_BLOCK, 1));
-    put(ex_put_variable_name(file, EX_ELEM_BLOCK, 1, "number"));
+    require_success(ex_put_variable_param(file, EX_NODAL, fields));
+    for (int i = 0; i < fields; i++) require_success(ex_put_variable_name(file, EX_NODAL, i + 1, names[i]));
+    require_success(ex_put_variable_param(file, EX_ELEM_BLOCK, 1));
+    require_success(ex_put_variable_name(file, EX_ELEM_BLOCK, 1, "number"));
     for (int step = 1; step <= 2; step++) {
         const double time = step;
-        put(ex_put_time(file, step, &time));
-        put(ex_put_var(file, step, EX_NODAL, 1, 1, nodes, f.data()));
+        require_success(ex_put_time(file, step, &time));
+        require_success(ex_put_var(file, step, EX_NODAL, 1, 1, nodes, f.data()));
         const std::vector<double> none(f.size());
-        for (int i = 1; i < fields; i++) put(ex_put_var(file, step, EX_NODAL, i + 1, 1, nodes, none.data()));
+        for (int i = 1; i < fields; i++)
+            require_success(ex_put_var(file, step, EX_NODAL, i + 1, 1, nodes, none.data()));
         for (double &value : f) value *= 2;
         for (size_t i = 0; i < blocks.size(); i++) {
             std::vector<double> numbers;
             for (size_t c = 0; c < blocks[i].content.cells.size(); c++) numbers.push_back(static_cast<double>(c));
-            put(ex_put_var(file, step, EX_ELEM_BLOCK, 1, static_cast<ex_entity_id>(90 - 10 * i),
-                           static_cast<int64_t>(numbers.size()), numbers.data()));
+            require_success(ex_put_var(file, step, EX_ELEM_BLOCK, 1, static_cast<ex_entity_id>(90 - 10 * i),
+                                       static_cast<int64_t>(numbers.size()), numbers.data()));
         }
     }
-    put(ex_close(file));
+    require_success(ex_close(file));
 }
 
 /* The size of the cells (volume, or area of flat cells), and the integral of f over them. */
@@ -165,17 +167,17 @@ struct sums {
     vtkIdType cells = 0, points = 0;
 };
 
-place minus(const place &a, const place &b)
+place subtract_points(const place &a, const place &b)
 {
     return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
 }
 
-place cross(const place &a, const place &b)
+place cross_product(const place &a, const place &b)
 {
     return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
-double dot(const place &a, const place &b)
+double dot_product(const place &a, const place &b)
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
@@ -190,8 +192,9 @@ void add_simplex(vtkUnstructuredGrid *grid, const std::vector<vtkIdType> &nodes,
         grid->GetPoint(nodes[i], at[i].data());
         mean += f->GetComponent(nodes[i], 0) / static_cast<double>(nodes.size());
     }
-    const place normal = cross(minus(at[1], at[0]), minus(at[2], at[0]));
-    const double size = at.size() == 4 ? dot(normal, minus(at[3], at[0])) / 6 : std::sqrt(dot(normal, normal)) / 2;
+    const place normal = cross_product(subtract_points(at[1], at[0]), subtract_points(at[2], at[0]));
+    const double size = at.size() == 4 ? dot_product(normal, subtract_points(at[3], at[0])) / 6
+                                       : std::sqrt(dot_product(normal, normal)) / 2;
     all.size += size;
     all.integral += size * mean;
 }
@@ -238,7 +241,7 @@ void add_cell(vtkUnstructuredGrid *grid, vtkIdType cell, sums &all)
     all.cells++;
 }
 
-sums sums_of(const std::string &path, size_t step, int piece = 0, int pieces = 1)
+sums compute_file_sums(const std::string &path, size_t step, int piece = 0, int pieces = 1)
 {
     const auto file = open_data_file(path);
     const auto data = grids_of(file->read(step, piece, pieces), path);
@@ -266,11 +269,11 @@ int check_kind(const division &how, const std::string &type, int nodes, double m
 {
     const std::string name = type + " of " + std::to_string(nodes) + " nodes";
     const std::string path = folder + "/" + type + std::to_string(nodes) + ".e";
-    const body b = divide(how, nodes, 0);
+    const body b = divide_cube(how, nodes, 0);
     write_exodus(path, {{type, b}});
     try {
         for (size_t step = 0; step < 2; step++) {
-            const sums got = sums_of(path, step);
+            const sums got = compute_file_sums(path, step);
             const double factor = step == 0 ? 1 : 2;
             if (is_near(got.size, 1) && is_near(got.integral, factor * mean) &&
                 got.cells == static_cast<vtkIdType>(b.cells.size()))
@@ -307,7 +310,7 @@ void elements_of_surfaces_have_their_corners(void **)
     assert_int_equal(wrong, 0);
 }
 
-void names_of_types_are_taken_as_codes_write_them(void **)
+void element_type_names_of_common_codes_are_accepted(void **)
 {
     int wrong = 0;
     for (const char *name : {"TET8", "tet", "tetra"}) wrong += check_kind(tets, name, 8, 1.5);
@@ -319,15 +322,15 @@ void names_of_types_are_taken_as_codes_write_them(void **)
 
 /* Checks that adjacent blocks of several types keep their own cells and values, even if VTK alone would read only some
  * of them correctly. */
-void blocks_of_many_kinds_stand_side_by_side(void **)
+void blocks_of_many_kinds_are_read_together(void **)
 {
     const std::string path = folder + "/many.e";
-    write_exodus(path, {{"HEX8", divide(hexes, 8, 0)},
-                        {"TETRA14", divide(tets, 14, 1)},
-                        {"WEDGE12", divide(wedges, 12, 2)},
-                        {"HEX27", divide(hexes, 27, 3)},
-                        {"PYRAMID14", divide(pyramids, 14, 4)}});
-    const sums got = sums_of(path, 0);
+    write_exodus(path, {{"HEX8", divide_cube(hexes, 8, 0)},
+                        {"TETRA14", divide_cube(tets, 14, 1)},
+                        {"WEDGE12", divide_cube(wedges, 12, 2)},
+                        {"HEX27", divide_cube(hexes, 27, 3)},
+                        {"PYRAMID14", divide_cube(pyramids, 14, 4)}});
+    const sums got = compute_file_sums(path, 0);
     assert_true(is_near(got.size, 5));
     assert_true(is_near(got.integral, 1.5 + 2.5 + 3.5 + 4.5 + 5.5));
 }
@@ -335,9 +338,9 @@ void blocks_of_many_kinds_stand_side_by_side(void **)
 void expect_refusal(const std::string &type, int nodes)
 {
     const std::string path = folder + "/refused.e", count = std::to_string(nodes) + " nodes";
-    write_exodus(path, {{"HEX8", divide(hexes, 8, 0)}, {type, divide(tets, nodes, 1)}});
+    write_exodus(path, {{"HEX8", divide_cube(hexes, 8, 0)}, {type, divide_cube(tets, nodes, 1)}});
     try {
-        sums_of(path, 0);
+        compute_file_sums(path, 0);
     } catch (const std::exception &e) {
         const std::string what = e.what();
         if (what.find(path) == 0 && what.find("block 80") != std::string::npos &&
@@ -356,10 +359,10 @@ void elements_that_cannot_be_read_are_refused_by_name(void **)
     expect_refusal("PYRAMID", 4);
 }
 
-std::string why_refused(const std::string &path)
+std::string get_refusal(const std::string &path)
 {
     try {
-        (void)sums_of(path, 0);
+        (void)compute_file_sums(path, 0);
     } catch (const std::exception &e) {
         return e.what();
     }
@@ -372,14 +375,14 @@ void files_of_a_parallel_run_are_pieces(void **)
 {
     const std::string start = folder + "/run.e-s002.12.";
     for (int p = 0; p < 12; p++)
-        write_exodus(start + (p < 10 ? "0" : "") + std::to_string(p), {{"HEX8", divide(hexes, 8, p)}});
-    const sums all = sums_of(start + "07", 1);
+        write_exodus(start + (p < 10 ? "0" : "") + std::to_string(p), {{"HEX8", divide_cube(hexes, 8, p)}});
+    const sums all = compute_file_sums(start + "07", 1);
     assert_true(is_near(all.size, 12));
     assert_true(std::fabs(all.integral - 2 * (12 * 1.5 + 66)) < 1e-10); /* a sum of some hundred terms */
     assert_int_equal(open_data_file(start + "00")->pieces(0), 12);
-    for (int piece = 0; piece < 3; piece++) assert_true(is_near(sums_of(start + "00", 0, piece, 3).size, 4));
+    for (int piece = 0; piece < 3; piece++) assert_true(is_near(compute_file_sums(start + "00", 0, piece, 3).size, 4));
     assert_int_equal(std::remove((start + "03").c_str()), 0);
-    const std::string why = why_refused(start + "07");
+    const std::string why = get_refusal(start + "07");
     if (why.find("run.e-s002.12.03: No such file") != std::string::npos && why.find("12 pieces") != std::string::npos)
         return;
     print_error("%s\n", why.c_str());
@@ -389,27 +392,27 @@ void files_of_a_parallel_run_are_pieces(void **)
 void files_of_meshes_that_change_are_read(void **)
 {
     const std::string path = folder + "/changing.e-s002";
-    write_exodus(path, {{"HEX8", divide(hexes, 8, 0)}});
-    assert_true(is_near(sums_of(path, 0).size, 1));
-    assert_true(why_refused(folder + "/changing.e-t002").find("No such file") != std::string::npos);
+    write_exodus(path, {{"HEX8", divide_cube(hexes, 8, 0)}});
+    assert_true(is_near(compute_file_sums(path, 0).size, 1));
+    assert_true(get_refusal(folder + "/changing.e-t002").find("No such file") != std::string::npos);
 }
 
 void a_displacement_that_is_applied_is_reported(void **)
 {
     const std::string path = folder + "/moved.e";
-    write_exodus(path, {{"HEX8", divide(hexes, 8, 0)}}, true);
+    write_exodus(path, {{"HEX8", divide_cube(hexes, 8, 0)}}, true);
     const std::string reported = open_data_file(path)->take_warnings();
     if (reported.find("moved.e: points are moved by the displacement \"disp_\"") == std::string::npos) {
         print_error("%s\n", reported.c_str());
         assert_true(false);
     }
-    write_exodus(path, {{"HEX8", divide(hexes, 8, 0)}});
+    write_exodus(path, {{"HEX8", divide_cube(hexes, 8, 0)}});
     assert_string_equal(open_data_file(path)->take_warnings().c_str(), "");
 }
 
-int begin(void **)
+int set_up_test_group(void **)
 {
-    folder = fresh_folder("vtk_exodus");
+    folder = make_empty_folder("vtk_exodus");
     catch_vtk_messages();
     return 0;
 }
@@ -421,12 +424,12 @@ int main()
     const CMUnitTest tests[] = {
         cmocka_unit_test(every_kind_of_element_has_its_corners),
         cmocka_unit_test(elements_of_surfaces_have_their_corners),
-        cmocka_unit_test(names_of_types_are_taken_as_codes_write_them),
-        cmocka_unit_test(blocks_of_many_kinds_stand_side_by_side),
+        cmocka_unit_test(element_type_names_of_common_codes_are_accepted),
+        cmocka_unit_test(blocks_of_many_kinds_are_read_together),
         cmocka_unit_test(elements_that_cannot_be_read_are_refused_by_name),
         cmocka_unit_test(files_of_a_parallel_run_are_pieces),
         cmocka_unit_test(files_of_meshes_that_change_are_read),
         cmocka_unit_test(a_displacement_that_is_applied_is_reported),
     };
-    return cmocka_run_group_tests(tests, begin, nullptr);
+    return cmocka_run_group_tests(tests, set_up_test_group, nullptr);
 }

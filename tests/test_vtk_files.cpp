@@ -56,14 +56,14 @@ int random_cuts = 40; // number of random truncations of each file, in addition 
 
 int write_all(void **)
 {
-    folder = fresh_folder("vtk_files");
+    folder = make_empty_folder("vtk_files");
     samples = write_samples(folder);
     catch_vtk_messages();
     return 0;
 }
 
 /* Returns the only grid with cells in data. */
-vtkSmartPointer<vtkUnstructuredGrid> only_grid(vtkDataObject *data)
+vtkSmartPointer<vtkUnstructuredGrid> find_only_grid(vtkDataObject *data)
 {
     if (auto *grid = vtkUnstructuredGrid::SafeDownCast(data)) return grid;
     auto *composite = vtkCompositeDataSet::SafeDownCast(data);
@@ -82,11 +82,11 @@ vtkSmartPointer<vtkUnstructuredGrid> only_grid(vtkDataObject *data)
 vtkSmartPointer<vtkUnstructuredGrid> read_grid(const std::string &name)
 {
     const std::string path = folder + "/" + name;
-    return only_grid(grids_of(open_data_file(path)->read(0, 0, 1), path));
+    return find_only_grid(grids_of(open_data_file(path)->read(0, 0, 1), path));
 }
 
 /* Returns what differs between the cells of two grids, or "". */
-std::string differing_cells(vtkUnstructuredGrid *a, vtkUnstructuredGrid *b)
+std::string describe_cell_difference(vtkUnstructuredGrid *a, vtkUnstructuredGrid *b)
 {
     if (a->GetNumberOfPoints() != b->GetNumberOfPoints()) return "number of points";
     if (a->GetNumberOfCells() != b->GetNumberOfCells()) return "number of cells";
@@ -114,7 +114,8 @@ std::string differing_cells(vtkUnstructuredGrid *a, vtkUnstructuredGrid *b)
 
 /* Returns what differs between two arrays of one name, or "". If an array is missing, no picture can draw wrong values
  * of it. */
-std::string differing_values(vtkDataSetAttributes *a, vtkDataSetAttributes *b, const std::string &name, bool must_exist)
+std::string describe_value_difference(vtkDataSetAttributes *a, vtkDataSetAttributes *b, const std::string &name,
+                                      bool must_exist)
 {
     vtkDataArray *x = a->GetArray(name.c_str()), *y = b->GetArray(name.c_str());
     if (!y) return "";
@@ -125,12 +126,12 @@ std::string differing_values(vtkDataSetAttributes *a, vtkDataSetAttributes *b, c
     return "";
 }
 
-std::string difference(vtkUnstructuredGrid *a, vtkUnstructuredGrid *b, bool must_exist)
+std::string describe_difference(vtkUnstructuredGrid *a, vtkUnstructuredGrid *b, bool must_exist)
 {
-    std::string where = differing_cells(a, b);
-    if (where.empty()) where = differing_values(a->GetPointData(), b->GetPointData(), "x", must_exist);
-    if (where.empty()) where = differing_values(a->GetCellData(), b->GetCellData(), "c", must_exist);
-    if (where.empty()) where = differing_values(a->GetCellData(), b->GetCellData(), "p", must_exist);
+    std::string where = describe_cell_difference(a, b);
+    if (where.empty()) where = describe_value_difference(a->GetPointData(), b->GetPointData(), "x", must_exist);
+    if (where.empty()) where = describe_value_difference(a->GetCellData(), b->GetCellData(), "c", must_exist);
+    if (where.empty()) where = describe_value_difference(a->GetCellData(), b->GetCellData(), "p", must_exist);
     return where;
 }
 
@@ -139,7 +140,7 @@ void every_format_gives_its_cells_and_values(void **)
     for (const sample &s : samples) {
         std::string where;
         try {
-            where = difference(read_grid(s.name), s.expected, true);
+            where = describe_difference(read_grid(s.name), s.expected, true);
         } catch (const std::exception &e) {
             where = e.what();
         }
@@ -150,17 +151,17 @@ void every_format_gives_its_cells_and_values(void **)
 
 /* Returns what is wrong in the contents that were read from a truncated file; "" if they are right or the file was
  * refused. */
-std::string taken_for(const sample &s)
+std::string describe_wrong_contents(const sample &s)
 {
     try {
         const auto grid = read_grid(s.name);
-        return grid ? difference(grid, s.expected, false) : "";
+        return grid ? describe_difference(grid, s.expected, false) : "";
     } catch (const std::runtime_error &) {
         return "";
     }
 }
 
-std::vector<size_t> cuts_of(size_t size, int random_count)
+std::vector<size_t> choose_cut_sizes(size_t size, int random_count)
 {
     std::vector<size_t> cuts = {0, size / 2, size * 9 / 10, size * 95 / 100, size * 99 / 100, size - 2, size - 1};
     uint64_t state = size;
@@ -176,10 +177,10 @@ int count_wrong_cuts(const sample &s, const std::string &file)
 {
     int wrong = 0;
     const std::string whole = read_file(folder + "/" + file);
-    for (const size_t cut : cuts_of(whole.size(), random_cuts)) {
+    for (const size_t cut : choose_cut_sizes(whole.size(), random_cuts)) {
         std::filesystem::remove(folder + "/" + file); /* else HDF5 would use its old contents */
         write_file(folder + "/" + file, whole.substr(0, cut));
-        const std::string where = taken_for(s);
+        const std::string where = describe_wrong_contents(s);
         if (where.empty()) continue;
         print_error("%s with %s cut at %zu of %zu: %s\n", s.name.c_str(), file.c_str(), cut, whole.size(),
                     where.c_str());
@@ -189,7 +190,7 @@ int count_wrong_cuts(const sample &s, const std::string &file)
     return wrong;
 }
 
-void cut_files_are_errors_or_the_same(void **)
+void truncated_files_give_errors_or_the_same_grid(void **)
 {
     int wrong = 0;
     for (const sample &s : samples)
@@ -197,18 +198,18 @@ void cut_files_are_errors_or_the_same(void **)
     assert_int_equal(wrong, 0);
 }
 
-vtkUnsignedCharArray *ghosts_of(vtkDataObject *grid)
+vtkUnsignedCharArray *get_ghost_array(vtkDataObject *grid)
 {
     return vtkUnstructuredGrid::SafeDownCast(grid)->GetCellGhostArray();
 }
 
 void hidden_points_hide_their_cells(void **)
 {
-    const auto data = structured(lattice::curved);
+    const auto data = make_structured_grid(lattice::curved);
     vtkStructuredGrid::SafeDownCast(data)->BlankPoint(0);
     vtkStructuredGrid::SafeDownCast(data)->BlankCell(59);
     const auto grid = grids_of(data, "");
-    for (int i = 0; i < 60; i++) assert_int_equal(ghosts_of(grid)->GetValue(i) != 0, i == 0 || i == 59);
+    for (int i = 0; i < 60; i++) assert_int_equal(get_ghost_array(grid)->GetValue(i) != 0, i == 0 || i == 59);
 }
 
 /* A coarse lattice has 4 × 4 × 4 cells; finer cells cover 2 × 2 × 2 of them. */
@@ -242,14 +243,15 @@ void finer_levels_hide_coarser_cells(void **)
     for (int i = 0; i < 64; i++) {
         auto is_inner = [](int index) { return index == 1 || index == 2; };
         const bool is_hidden = is_inner(i % 4) && is_inner(i / 4 % 4) && is_inner(i / 16);
-        assert_int_equal(ghosts_of(levels->GetBlock(0))->GetValue(i) != 0, is_hidden);
-        assert_int_equal(ghosts_of(levels->GetBlock(1)) ? ghosts_of(levels->GetBlock(1))->GetValue(i) : 0, 0);
+        assert_int_equal(get_ghost_array(levels->GetBlock(0))->GetValue(i) != 0, is_hidden);
+        assert_int_equal(get_ghost_array(levels->GetBlock(1)) ? get_ghost_array(levels->GetBlock(1))->GetValue(i) : 0,
+                         0);
     }
 }
 
 void expect_foam_step(data_file &file, size_t step, double factor)
 {
-    const auto grid = only_grid(grids_of(file.read(step, 0, 1), "case"));
+    const auto grid = find_only_grid(grids_of(file.read(step, 0, 1), "case"));
     assert_int_equal(grid->GetNumberOfCells(), 3);
     assert_int_equal(grid->GetNumberOfPoints(), 12);
     const int types[3] = {VTK_POLYHEDRON, VTK_WEDGE, VTK_WEDGE};
@@ -270,7 +272,7 @@ void foam_case_is_read_with_its_steps(void **)
     expect_foam_step(*file, 1, 2);
 }
 
-void cut_foam_files_are_errors_or_the_same(void **)
+void truncated_foam_files_give_errors_or_the_same_grid(void **)
 {
     write_foam(folder + "/foam");
     const auto whole = read_grid("foam/case.foam");
@@ -283,7 +285,7 @@ void cut_foam_files_are_errors_or_the_same(void **)
 }
 
 /* Returns the message of the error when the file is opened or read, or "" if there is none. */
-std::string why_refused(const std::string &name)
+std::string get_refusal(const std::string &name)
 {
     try {
         (void)open_data_file(folder + "/" + name)->read(0, 0, 1);
@@ -330,7 +332,7 @@ void foam_cases_of_parallel_runs_are_read_by_processors(void **)
     double bounds[6];
     vtkMultiBlockDataSet::SafeDownCast(all)->GetBounds(bounds);
     assert_true(bounds[0] == 0 && bounds[1] == 4);
-    const auto piece = only_grid(grids_of(file->read(1, 1, 2), "dec"));
+    const auto piece = find_only_grid(grids_of(file->read(1, 1, 2), "dec"));
     assert_true(piece->GetBounds()[0] == 2);
     assert_true(piece->GetCellData()->GetArray("p")->GetComponent(2, 0) == 6);
 
@@ -348,31 +350,31 @@ void foam_cases_that_lack_folders_are_refused_by_their_names(void **)
     const std::string parallel = folder + "/lacking";
     for (const int p : {0, 2}) write_foam(parallel + "/processor" + std::to_string(p), 2 * p);
     write_file(parallel + "/dec.foam", "");
-    expect_reported(why_refused("lacking/dec.foam"), "dec.foam: processor1/ is missing, as there is processor2/");
+    expect_reported(get_refusal("lacking/dec.foam"), "dec.foam: processor1/ is missing, as there is processor2/");
     fs::create_directories(parallel + "/processor1");
-    expect_reported(why_refused("lacking/dec.foam"), "dec.foam: processor1/constant/polyMesh/ is missing");
+    expect_reported(get_refusal("lacking/dec.foam"), "dec.foam: processor1/constant/polyMesh/ is missing");
     for (const char *name : {"/processor0", "/processor1", "/processor2"}) fs::remove_all(parallel + name);
     fs::create_directories(parallel + "/processors4");
-    expect_reported(why_refused("lacking/dec.foam"), "processors4/ is of OpenFOAM's collated format");
+    expect_reported(get_refusal("lacking/dec.foam"), "processors4/ is of OpenFOAM's collated format");
 }
 
 /* Checks that a cell's value is that of its hex's position, for any numbering of the boundary's quads. */
 void cgns_cells_are_read_wherever_the_boundary_is_numbered(void **)
 {
-    const auto expected = hexes(lattice::curved);
+    const auto expected = make_hex_grid(lattice::curved);
     for (const cgns_order order :
          {cgns_order::wall_first, cgns_order::wall_between, cgns_order::wall_long, cgns_order::wall_stored}) {
         const std::string name = "order" + std::to_string(static_cast<int>(order)) + ".cgns";
         write_cgns_elements(folder + "/" + name, expected, order);
-        assert_string_equal(why_refused(name).c_str(), "");
-        assert_string_equal(difference(read_grid(name), expected, true).c_str(), "");
+        assert_string_equal(get_refusal(name).c_str(), "");
+        assert_string_equal(describe_difference(read_grid(name), expected, true).c_str(), "");
     }
     write_cgns_elements(folder + "/zones.cgns", expected, cgns_order::wall_first, 60, {"Zone", "Zone 2"});
     const auto both = grids_of(open_data_file(folder + "/zones.cgns")->read(0, 0, 1), "");
     auto *zones = vtkMultiBlockDataSet::SafeDownCast(both);
     assert_int_equal(zones->GetNumberOfBlocks(), 2);
     for (unsigned i = 0; i < 2; i++)
-        assert_string_equal(difference(only_grid(zones->GetBlock(i)), expected, true).c_str(), "");
+        assert_string_equal(describe_difference(find_only_grid(zones->GetBlock(i)), expected, true).c_str(), "");
     write_cgns_elements(folder + "/curved.cgns", expected, cgns_order::curved);
     const auto curved = read_grid("curved.cgns");
     assert_int_equal(curved->GetNumberOfCells(), 60);
@@ -385,19 +387,19 @@ void cgns_cells_are_read_wherever_the_boundary_is_numbered(void **)
 
 void cgns_zones_with_wrong_numbers_are_refused(void **)
 {
-    write_cgns_elements(folder + "/wrong.cgns", hexes(lattice::curved), cgns_order::gap);
-    expect_reported(why_refused("wrong.cgns"),
+    write_cgns_elements(folder + "/wrong.cgns", make_hex_grid(lattice::curved), cgns_order::gap);
+    expect_reported(get_refusal("wrong.cgns"),
                     "wrong.cgns: cannot be read: zone Base/Zone: its section \"Fluid\" has the "
                     "elements 22 to 81, expected them to begin with 21");
-    write_cgns_elements(folder + "/wrong.cgns", hexes(lattice::curved), cgns_order::wall_first, 50);
+    write_cgns_elements(folder + "/wrong.cgns", make_hex_grid(lattice::curved), cgns_order::wall_first, 50);
     const std::string many = "zone Base/Zone: its sections of dimension 3 have 60 elements, expected its 50 cells";
-    expect_reported(why_refused("wrong.cgns"), many);
-    write_cgns_elements(folder + "/wrong.cgns", hexes(lattice::curved), cgns_order::mixed);
-    expect_reported(why_refused("wrong.cgns"), "sections that mix cells and boundary are not read");
+    expect_reported(get_refusal("wrong.cgns"), many);
+    write_cgns_elements(folder + "/wrong.cgns", make_hex_grid(lattice::curved), cgns_order::mixed);
+    expect_reported(get_refusal("wrong.cgns"), "sections that mix cells and boundary are not read");
 }
 
 /* Reads the .vtm of a run that writes a table of residuals in addition to the grid. */
-void tables_beside_grids_are_left_out(void **)
+void tables_among_grids_are_skipped(void **)
 {
     write_file(folder + "/residuals.vtt",
                "<VTKFile type=\"Table\" version=\"1.0\"><Table><Piece NumberOfRows=\"1\"><RowData><DataArray "
@@ -424,8 +426,8 @@ void series_have_the_times_of_their_entries(void **)
     assert_string_equal(file->step_path(0).c_str(), (folder + "/g.vts").c_str());
     const auto both = grids_of(file->read(1, 0, 1), "");
     assert_int_equal(vtkMultiBlockDataSet::SafeDownCast(both)->GetNumberOfBlocks(), 2);
-    const auto second = only_grid(grids_of(file->read(1, 1, 2), ""));
-    assert_string_equal(difference(second, hexes(lattice::image), true).c_str(), "");
+    const auto second = find_only_grid(grids_of(file->read(1, 1, 2), ""));
+    assert_string_equal(describe_difference(second, make_hex_grid(lattice::image), true).c_str(), "");
 }
 
 void expect_refusal(const std::string &name, const std::string &text, const std::string &why)
@@ -441,7 +443,7 @@ void expect_refusal(const std::string &name, const std::string &text, const std:
     assert_true(false);
 }
 
-void wrong_series_are_refused_by_what_is_wrong(void **)
+void wrong_series_are_refused_with_the_reason(void **)
 {
     const std::string head = "<VTKFile type=\"Collection\"><Collection>", tail = "</Collection></VTKFile>\n";
     expect_refusal("a.pvd", head + tail, "names no file");
@@ -461,7 +463,7 @@ void wrong_series_are_refused_by_what_is_wrong(void **)
 }
 
 /* Reads files of grids without cells, as written by VTK and by other programs. */
-void grids_without_cells_are_no_errors(void **)
+void grids_without_cells_are_accepted(void **)
 {
     const std::string head = "<VTKFile type=\"UnstructuredGrid\" version=\"0.1\"><UnstructuredGrid>",
                       tail = "</UnstructuredGrid></VTKFile>\n";
@@ -473,7 +475,8 @@ void grids_without_cells_are_no_errors(void **)
     write_file(folder + "/with_none.pvtu",
                "<VTKFile type=\"PUnstructuredGrid\"><PUnstructuredGrid><Piece "
                "Source=\"none.vtu\"/><Piece Source=\"raw.vtu\"/></PUnstructuredGrid></VTKFile>\n");
-    assert_string_equal(difference(read_grid("with_none.pvtu"), hexes(lattice::curved), true).c_str(), "");
+    assert_string_equal(describe_difference(read_grid("with_none.pvtu"), make_hex_grid(lattice::curved), true).c_str(),
+                        "");
 }
 
 /* In each text file the last value is replaced by a number in Fortran's notation without the exponent's letter. */
@@ -515,7 +518,7 @@ void numbers_without_the_letter_of_their_exponent_are_refused(void **)
         }
 }
 
-void ensight_numbers_without_the_letter_are_refused(void **)
+void ensight_numbers_without_exponent_letter_are_refused(void **)
 {
     const std::string path = folder + "/t.x", whole = read_file(path);
     const size_t last = whole.find_last_of('\n', whole.size() - 2) + 1;
@@ -533,12 +536,12 @@ void ensight_numbers_without_the_letter_are_refused(void **)
     assert_true(false);
 }
 
-std::string ensight_line(const std::string &text)
+std::string pad_ensight_line(const std::string &text)
 {
     return text + std::string(80 - text.size(), ' ');
 }
 
-template <typename Number> std::string bytes_of(const std::vector<Number> &values)
+template <typename Number> std::string concatenate_bytes(const std::vector<Number> &values)
 {
     return {reinterpret_cast<const char *>(values.data()), values.size() * sizeof(Number)};
 }
@@ -549,21 +552,23 @@ void write_ensight_set(int more)
 {
     using floats = std::vector<float>;
     using ints = std::vector<int32_t>;
-    std::string geometry = ensight_line("C Binary"), values = geometry;
+    std::string geometry = pad_ensight_line("C Binary"), values = geometry;
     for (int step = 0; step < 2; step++) {
         const int points = 4 + step * more;
-        const std::string part = ensight_line("part") + bytes_of(ints{1});
-        geometry += ensight_line("BEGIN TIME STEP") + ensight_line("a tet") + ensight_line("or two") +
-                    ensight_line("node id assign") + ensight_line("element id assign") + part + ensight_line("solid") +
-                    ensight_line("coordinates") + bytes_of(ints{points});
+        const std::string part = pad_ensight_line("part") + concatenate_bytes(ints{1});
+        geometry += pad_ensight_line("BEGIN TIME STEP") + pad_ensight_line("a tet") + pad_ensight_line("or two") +
+                    pad_ensight_line("node id assign") + pad_ensight_line("element id assign") + part +
+                    pad_ensight_line("solid") + pad_ensight_line("coordinates") + concatenate_bytes(ints{points});
         const float x = static_cast<float>(step);
         for (const floats &axis : {floats{x, x + 1, x, x, x + 1}, floats{0, 0, 1, 0, 1}, floats{0, 0, 0, 1, 1}})
-            geometry += bytes_of(floats(axis.begin(), axis.begin() + points));
-        geometry += ensight_line("tetra4") + bytes_of(ints{1 + step * more}) + bytes_of(ints{1, 2, 3, 4}) +
-                    (step * more > 0 ? bytes_of(ints{2, 3, 4, 5}) : "") + ensight_line("END TIME STEP");
-        values += ensight_line("BEGIN TIME STEP") + ensight_line("values") + part + ensight_line("coordinates") +
-                  bytes_of(floats(static_cast<size_t>(points), static_cast<float>(step))) +
-                  ensight_line("END TIME STEP");
+            geometry += concatenate_bytes(floats(axis.begin(), axis.begin() + points));
+        geometry += pad_ensight_line("tetra4") + concatenate_bytes(ints{1 + step * more}) +
+                    concatenate_bytes(ints{1, 2, 3, 4}) + (step * more > 0 ? concatenate_bytes(ints{2, 3, 4, 5}) : "") +
+                    pad_ensight_line("END TIME STEP");
+        values += pad_ensight_line("BEGIN TIME STEP") + pad_ensight_line("values") + part +
+                  pad_ensight_line("coordinates") +
+                  concatenate_bytes(floats(static_cast<size_t>(points), static_cast<float>(step))) +
+                  pad_ensight_line("END TIME STEP");
     }
     write_file(folder + "/set.geo", geometry);
     write_file(folder + "/set.f", values);
@@ -572,7 +577,7 @@ void write_ensight_set(int more)
                                      "time values: 0 0.5\nFILE\nfile set: 1\nnumber of steps: 2\n");
 }
 
-std::string why_set_is_refused()
+std::string get_set_refusal()
 {
     try {
         (void)open_data_file(folder + "/set.case");
@@ -588,16 +593,16 @@ void ensight_file_sets_are_read_step_by_step(void **)
     const auto file = open_data_file(folder + "/set.case");
     assert_int_equal(file->times().size(), 2);
     for (size_t step = 0; step < 2; step++) {
-        const auto grid = only_grid(grids_of(file->read(step, 0, 1), "set.case"));
+        const auto grid = find_only_grid(grids_of(file->read(step, 0, 1), "set.case"));
         assert_int_equal(grid->GetNumberOfCells(), 1);
         assert_true(grid->GetBounds()[0] == static_cast<double>(step));
         assert_true(grid->GetPointData()->GetArray("f")->GetComponent(0, 0) == static_cast<double>(step));
     }
     const std::string values = read_file(folder + "/set.f");
     write_file(folder + "/set.f", values.substr(0, values.size() - 100));
-    assert_true(why_set_is_refused().find("set.f: is cut short") != std::string::npos);
+    assert_true(get_set_refusal().find("set.f: is cut short") != std::string::npos);
     write_ensight_set(1);
-    assert_true(why_set_is_refused().find("set.f: has steps of different sizes") != std::string::npos);
+    assert_true(get_set_refusal().find("set.f: has steps of different sizes") != std::string::npos);
 }
 
 /* Writes a cube as a binary file whose values are in `section`, which is what precedes the values. */
@@ -605,14 +610,16 @@ void write_ensight_cube(const std::string &section, const std::string &values)
 {
     using floats = std::vector<float>;
     using ints = std::vector<int32_t>;
-    const std::string part = ensight_line("part") + bytes_of(ints{1});
-    write_file(folder + "/cube.geo",
-               ensight_line("C Binary") + ensight_line("a") + ensight_line("b") + ensight_line("node id assign") +
-                   ensight_line("element id assign") + part + ensight_line("c") + ensight_line("coordinates") +
-                   bytes_of(ints{8}) + bytes_of(floats{0, 1, 1, 0, 0, 1, 1, 0}) +
-                   bytes_of(floats{0, 0, 1, 1, 0, 0, 1, 1}) + bytes_of(floats{0, 0, 0, 0, 1, 1, 1, 1}) +
-                   ensight_line("hexa8") + bytes_of(ints{1, 1, 2, 3, 4, 5, 6, 7, 8}));
-    write_file(folder + "/cube.f", ensight_line("f") + part + ensight_line(section) + values);
+    const std::string part = pad_ensight_line("part") + concatenate_bytes(ints{1});
+    write_file(folder + "/cube.geo", pad_ensight_line("C Binary") + pad_ensight_line("a") + pad_ensight_line("b") +
+                                         pad_ensight_line("node id assign") + pad_ensight_line("element id assign") +
+                                         part + pad_ensight_line("c") + pad_ensight_line("coordinates") +
+                                         concatenate_bytes(ints{8}) +
+                                         concatenate_bytes(floats{0, 1, 1, 0, 0, 1, 1, 0}) +
+                                         concatenate_bytes(floats{0, 0, 1, 1, 0, 0, 1, 1}) +
+                                         concatenate_bytes(floats{0, 0, 0, 0, 1, 1, 1, 1}) + pad_ensight_line("hexa8") +
+                                         concatenate_bytes(ints{1, 1, 2, 3, 4, 5, 6, 7, 8}));
+    write_file(folder + "/cube.f", pad_ensight_line("f") + part + pad_ensight_line(section) + values);
     write_file(folder + "/cube.case", "FORMAT\ntype: ensight gold\nGEOMETRY\nmodel: cube.geo\nVARIABLE\n"
                                       "scalar per node: f cube.f\n");
 }
@@ -620,29 +627,29 @@ void write_ensight_cube(const std::string &section, const std::string &values)
 void ensight_values_that_are_undefined_are_nan(void **)
 {
     const std::vector<float> all = {0, 1, 2, -9, 4, -9, 6, 7};
-    write_ensight_cube("coordinates undef", bytes_of(std::vector<float>{-9}) + bytes_of(all));
+    write_ensight_cube("coordinates undef", concatenate_bytes(std::vector<float>{-9}) + concatenate_bytes(all));
     const auto undefined = read_grid("cube.case");
-    write_ensight_cube("coordinates partial", bytes_of(std::vector<int32_t>{6, 1, 2, 3, 5, 7, 8}) +
-                                                  bytes_of(std::vector<float>{0, 1, 2, 4, 6, 7}));
+    write_ensight_cube("coordinates partial", concatenate_bytes(std::vector<int32_t>{6, 1, 2, 3, 5, 7, 8}) +
+                                                  concatenate_bytes(std::vector<float>{0, 1, 2, 4, 6, 7}));
     const auto partial = read_grid("cube.case");
     for (const auto &grid : {undefined, partial})
         for (vtkIdType i = 0; i < 8; i++) {
             const double value = grid->GetPointData()->GetArray("f")->GetComponent(i, 0);
             assert_true(i == 3 || i == 5 ? std::isnan(value) : value == static_cast<double>(i));
         }
-    write_ensight_cube("coordinates partial", bytes_of(std::vector<int32_t>{9}));
-    expect_reported(why_refused("cube.case"), "cube.f: has 9 values for 8 nodes or elements");
-    write_ensight_cube("coordinates partial", bytes_of(std::vector<int32_t>{2, 1}));
-    expect_reported(why_refused("cube.case"), "cube.f: is cut short");
-    write_ensight_cube("coordinates some", bytes_of(all));
-    expect_reported(why_refused("cube.case"), "cube.f: \"coordinates some\" is not understood");
+    write_ensight_cube("coordinates partial", concatenate_bytes(std::vector<int32_t>{9}));
+    expect_reported(get_refusal("cube.case"), "cube.f: has 9 values for 8 nodes or elements");
+    write_ensight_cube("coordinates partial", concatenate_bytes(std::vector<int32_t>{2, 1}));
+    expect_reported(get_refusal("cube.case"), "cube.f: is cut short");
+    write_ensight_cube("coordinates some", concatenate_bytes(all));
+    expect_reported(get_refusal("cube.case"), "cube.f: \"coordinates some\" is not understood");
 }
 
 void ensight_names_in_quotes_are_refused_with_their_line(void **)
 {
-    write_ensight_cube("coordinates", bytes_of(std::vector<float>(8)));
+    write_ensight_cube("coordinates", concatenate_bytes(std::vector<float>(8)));
     write_file(folder + "/cube.case", "FORMAT\ntype: ensight gold\nGEOMETRY\nmodel: \"my cube.geo\"\n");
-    expect_reported(why_refused("cube.case"), "cube.case: line 4: names in quotes are not read, found \"my cube.geo\"");
+    expect_reported(get_refusal("cube.case"), "cube.case: line 4: names in quotes are not read, found \"my cube.geo\"");
 }
 
 } // namespace
@@ -652,16 +659,16 @@ int main(int argc, char **argv)
     if (argc > 1) random_cuts = std::atoi(argv[1]);
     const CMUnitTest tests[] = {
         cmocka_unit_test(every_format_gives_its_cells_and_values),
-        cmocka_unit_test(cut_files_are_errors_or_the_same),
+        cmocka_unit_test(truncated_files_give_errors_or_the_same_grid),
         cmocka_unit_test(hidden_points_hide_their_cells),
         cmocka_unit_test(finer_levels_hide_coarser_cells),
         cmocka_unit_test(foam_case_is_read_with_its_steps),
-        cmocka_unit_test(cut_foam_files_are_errors_or_the_same),
+        cmocka_unit_test(truncated_foam_files_give_errors_or_the_same_grid),
         cmocka_unit_test(series_have_the_times_of_their_entries),
-        cmocka_unit_test(wrong_series_are_refused_by_what_is_wrong),
-        cmocka_unit_test(grids_without_cells_are_no_errors),
+        cmocka_unit_test(wrong_series_are_refused_with_the_reason),
+        cmocka_unit_test(grids_without_cells_are_accepted),
         cmocka_unit_test(numbers_without_the_letter_of_their_exponent_are_refused),
-        cmocka_unit_test(ensight_numbers_without_the_letter_are_refused),
+        cmocka_unit_test(ensight_numbers_without_exponent_letter_are_refused),
         cmocka_unit_test(ensight_file_sets_are_read_step_by_step),
         cmocka_unit_test(ensight_values_that_are_undefined_are_nan),
         cmocka_unit_test(ensight_names_in_quotes_are_refused_with_their_line),
@@ -669,7 +676,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(foam_cases_that_lack_folders_are_refused_by_their_names),
         cmocka_unit_test(cgns_cells_are_read_wherever_the_boundary_is_numbered),
         cmocka_unit_test(cgns_zones_with_wrong_numbers_are_refused),
-        cmocka_unit_test(tables_beside_grids_are_left_out),
+        cmocka_unit_test(tables_among_grids_are_skipped),
     };
     return cmocka_run_group_tests(tests, write_all, nullptr);
 }

@@ -75,7 +75,7 @@ class writer
     writer(const std::string &name, const std::string &type)
         : file_(H5Fcreate((folder + "/" + name).c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT))
     {
-        group("/VTKHDF");
+        create_group("/VTKHDF");
         const long long version[2] = {2, 0};
         H5LTset_attribute_long_long(file_, "/VTKHDF", "Version", version, 2);
         H5LTset_attribute_string(file_, "/VTKHDF", "Type", type.c_str());
@@ -84,50 +84,50 @@ class writer
     writer(const writer &) = delete;
     writer &operator=(const writer &) = delete;
 
-    void group(const std::string &name)
+    void create_group(const std::string &name)
     {
         H5Gclose(H5Gcreate2(file_, name.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
     }
-    void put(const std::string &name, const numbers &values)
+    void write_dataset(const std::string &name, const numbers &values)
     {
         const hsize_t size = values.size();
         H5LTmake_dataset(file_, ("/VTKHDF/" + name).c_str(), 1, &size, H5T_NATIVE_LLONG, values.data());
     }
-    void put(const std::string &name, const std::vector<double> &values, hsize_t components = 1)
+    void write_dataset(const std::string &name, const std::vector<double> &values, hsize_t components = 1)
     {
         const hsize_t size[2] = {values.size() / components, components};
         H5LTmake_dataset(file_, ("/VTKHDF/" + name).c_str(), components > 1 ? 2 : 1, size, H5T_NATIVE_DOUBLE,
                          values.data());
     }
-    void put(const lists &all)
+    void write_dataset(const lists &all)
     {
-        put("NumberOfPoints", all.point_counts);
-        put("NumberOfCells", all.cell_counts);
-        put("NumberOfConnectivityIds", all.id_counts);
-        put("Points", all.points, 3);
-        put("Connectivity", all.ids);
-        put("Offsets", all.offsets);
+        write_dataset("NumberOfPoints", all.point_counts);
+        write_dataset("NumberOfCells", all.cell_counts);
+        write_dataset("NumberOfConnectivityIds", all.id_counts);
+        write_dataset("Points", all.points, 3);
+        write_dataset("Connectivity", all.ids);
+        write_dataset("Offsets", all.offsets);
         const std::vector<unsigned char> types(all.types.begin(), all.types.end());
         const hsize_t size = types.size();
         H5LTmake_dataset(file_, "/VTKHDF/Types", 1, &size, H5T_NATIVE_UCHAR, types.data());
-        group("/VTKHDF/PointData");
-        group("/VTKHDF/CellData");
-        put("PointData/f", all.f);
-        put("CellData/c", all.c);
+        create_group("/VTKHDF/PointData");
+        create_group("/VTKHDF/CellData");
+        write_dataset("PointData/f", all.f);
+        write_dataset("CellData/c", all.c);
     }
-    void put_steps(const std::vector<double> &times)
+    void write_steps(const std::vector<double> &times)
     {
-        group("/VTKHDF/Steps");
+        create_group("/VTKHDF/Steps");
         const int count = static_cast<int>(times.size());
         H5LTset_attribute_int(file_, "/VTKHDF/Steps", "NSteps", &count, 1);
-        put("Steps/Values", times);
+        write_dataset("Steps/Values", times);
     }
 
   private:
     hid_t file_;
 };
 
-std::string describe(const std::string &path, size_t step)
+std::string describe_step(const std::string &path, size_t step)
 {
     const auto file = open_data_file(path);
     const auto data = grids_of(file->read(step, 0, 1), path);
@@ -154,9 +154,9 @@ std::string describe(const std::string &path, size_t step)
     return text;
 }
 
-void expect(const std::string &name, size_t step, const std::string &expected)
+void expect_step(const std::string &name, size_t step, const std::string &expected)
 {
-    const std::string found = describe(folder + "/" + name, step);
+    const std::string found = describe_step(folder + "/" + name, step);
     if (found == expected) return;
     print_error("%s step %zu: %s\nexpected %s\n", name.c_str(), step, found.c_str(), expected.c_str());
     assert_true(false);
@@ -165,7 +165,7 @@ void expect(const std::string &name, size_t step, const std::string &expected)
 void expect_refusal(const std::string &name, const std::string &why)
 {
     try {
-        (void)describe(folder + "/" + name, 0);
+        (void)describe_step(folder + "/" + name, 0);
     } catch (const std::exception &e) {
         const std::string what = e.what();
         if (what.find(name) != std::string::npos && what.find(why) != std::string::npos) return;
@@ -184,12 +184,12 @@ void parts_of_one_step_are_all_read(void **)
         add_part(all, 0, 2, 0, 0);
         add_part(all, 0, 0, 0, 0);
         add_part(all, 2, 3, 0, 0);
-        w.put(all);
+        w.write_dataset(all);
     }
     const auto file = open_data_file(folder + "/parts.vtkhdf");
     assert_int_equal(file->times().size(), 0);
     assert_int_equal(file->pieces(0), 3);
-    const std::string found = describe(folder + "/parts.vtkhdf", 0);
+    const std::string found = describe_step(folder + "/parts.vtkhdf", 0);
     assert_true(found.find("2 cells x 0..2 z 0..1 f 0..2 c 0..1; ") == 0);
     assert_true(found.find("3 cells x 2..5 z 0..1 f 2..5 c 2..4; ") != std::string::npos);
 }
@@ -205,23 +205,23 @@ void steps_of_a_mesh_that_changes_are_read_one_by_one(void **)
         add_part(all, 0, 0, 1, 1);
         add_part(all, 1, 4, 1, 1);
         add_part(all, 7, 1, 2, 2);
-        w.put(all);
-        w.put_steps({0.5, 0.75, 1.5});
-        w.put("Steps/PartOffsets", numbers{0, 1, 3});
-        w.put("Steps/NumberOfParts", numbers{1, 2, 1});
-        w.put("Steps/PointOffsets", numbers{0, 16, 48});
-        w.put("Steps/CellOffsets", numbers{0, 2, 6});
-        w.put("Steps/ConnectivityIdOffsets", numbers{0, 16, 48});
+        w.write_dataset(all);
+        w.write_steps({0.5, 0.75, 1.5});
+        w.write_dataset("Steps/PartOffsets", numbers{0, 1, 3});
+        w.write_dataset("Steps/NumberOfParts", numbers{1, 2, 1});
+        w.write_dataset("Steps/PointOffsets", numbers{0, 16, 48});
+        w.write_dataset("Steps/CellOffsets", numbers{0, 2, 6});
+        w.write_dataset("Steps/ConnectivityIdOffsets", numbers{0, 16, 48});
     }
     const auto file = open_data_file(folder + "/changing.vtkhdf");
     assert_int_equal(file->times().size(), 3);
     assert_true(file->times()[1] == 0.75);
     assert_int_equal(file->pieces(1), 2);
     assert_true(may_hold_steps(folder + "/changing.vtkhdf"));
-    expect("changing.vtkhdf", 0, "2 cells x 0..2 z 0..1 f 0..2 c 0..1; ");
-    assert_true(describe(folder + "/changing.vtkhdf", 1).find("4 cells x 1..5 z 1..2 f 101..105 c 101..104; ") !=
+    expect_step("changing.vtkhdf", 0, "2 cells x 0..2 z 0..1 f 0..2 c 0..1; ");
+    assert_true(describe_step(folder + "/changing.vtkhdf", 1).find("4 cells x 1..5 z 1..2 f 101..105 c 101..104; ") !=
                 std::string::npos);
-    expect("changing.vtkhdf", 2, "1 cells x 7..8 z 2..3 f 207..208 c 207..207; ");
+    expect_step("changing.vtkhdf", 2, "1 cells x 7..8 z 2..3 f 207..208 c 207..207; ");
 }
 
 /* All steps share one mesh. Only the values change, and each field has its own offsets. */
@@ -234,17 +234,17 @@ void steps_of_values_share_their_mesh(void **)
         add_part(later, 0, 3, 0, 1);
         all.f.insert(all.f.end(), later.f.begin(), later.f.end());
         all.c.insert(all.c.end(), later.c.begin(), later.c.end());
-        w.put(all);
-        w.put_steps({0, 1});
+        w.write_dataset(all);
+        w.write_steps({0, 1});
         for (const char *name : {"PartOffsets", "PointOffsets", "CellOffsets", "ConnectivityIdOffsets"})
-            w.put(std::string("Steps/") + name, numbers{0, 0});
-        w.group("/VTKHDF/Steps/PointDataOffsets");
-        w.group("/VTKHDF/Steps/CellDataOffsets");
-        w.put("Steps/PointDataOffsets/f", numbers{0, 24});
-        w.put("Steps/CellDataOffsets/c", numbers{3, 0});
+            w.write_dataset(std::string("Steps/") + name, numbers{0, 0});
+        w.create_group("/VTKHDF/Steps/PointDataOffsets");
+        w.create_group("/VTKHDF/Steps/CellDataOffsets");
+        w.write_dataset("Steps/PointDataOffsets/f", numbers{0, 24});
+        w.write_dataset("Steps/CellDataOffsets/c", numbers{3, 0});
     }
-    expect("values.vtkhdf", 0, "3 cells x 0..3 z 0..1 f 0..3 c 100..102; ");
-    expect("values.vtkhdf", 1, "3 cells x 0..3 z 0..1 f 100..103 c 0..2; ");
+    expect_step("values.vtkhdf", 0, "3 cells x 0..3 z 0..1 f 0..3 c 100..102; ");
+    expect_step("values.vtkhdf", 1, "3 cells x 0..3 z 0..1 f 100..103 c 0..2; ");
 }
 
 /* The points move from step to step. The cells are those of the first step, although each step has a part of its
@@ -261,17 +261,17 @@ void points_that_move_keep_their_cells(void **)
         all.point_counts.push_back(24);
         all.cell_counts.push_back(3);
         all.id_counts.push_back(24);
-        w.put(all);
-        w.put_steps({0, 1});
-        w.put("Steps/PartOffsets", numbers{0, 1});
-        w.put("Steps/PointOffsets", numbers{0, 24});
-        w.put("Steps/CellOffsets", numbers{0, 0});
-        w.put("Steps/ConnectivityIdOffsets", numbers{0, 0});
+        w.write_dataset(all);
+        w.write_steps({0, 1});
+        w.write_dataset("Steps/PartOffsets", numbers{0, 1});
+        w.write_dataset("Steps/PointOffsets", numbers{0, 24});
+        w.write_dataset("Steps/CellOffsets", numbers{0, 0});
+        w.write_dataset("Steps/ConnectivityIdOffsets", numbers{0, 0});
     }
-    expect("moving.vtkhdf", 1, "3 cells x 5..8 z 1..2 f 105..108 c 0..2; ");
+    expect_step("moving.vtkhdf", 1, "3 cells x 5..8 z 1..2 f 105..108 c 0..2; ");
 }
 
-void what_is_not_read_is_refused_by_its_type(void **)
+void unsupported_types_are_refused_by_name(void **)
 {
     for (const char *type :
          {"PolyData", "PartitionedDataSetCollection", "MultiBlockDataSet", "OverlappingAMR", "HyperTreeGrid"}) {
@@ -282,7 +282,7 @@ void what_is_not_read_is_refused_by_its_type(void **)
     }
     {
         writer w("images.vtkhdf", "ImageData");
-        w.put_steps({0, 1});
+        w.write_steps({0, 1});
     }
     expect_refusal("images.vtkhdf", "images with steps");
     {
@@ -290,7 +290,7 @@ void what_is_not_read_is_refused_by_its_type(void **)
         lists all;
         add_part(all, 0, 2, 0, 0);
         all.points.resize(24);
-        w.put(all);
+        w.write_dataset(all);
     }
     expect_refusal("short.vtkhdf", "/VTKHDF/Points has 8 entries, expected 16 from 0 on");
     {
@@ -298,16 +298,16 @@ void what_is_not_read_is_refused_by_its_type(void **)
         lists all;
         add_part(all, 0, 2, 0, 0);
         all.offsets.back()--;
-        w.put(all);
+        w.write_dataset(all);
     }
     expect_refusal("unfit.vtkhdf", "Offsets of part 0 do not fit");
     write_file(folder + "/none.vtkhdf", "no HDF file");
     expect_refusal("none.vtkhdf", "is no HDF file");
 }
 
-int begin(void **)
+int set_up_test_group(void **)
 {
-    folder = fresh_folder("vtk_hdf");
+    folder = make_empty_folder("vtk_hdf");
     catch_vtk_messages();
     return 0;
 }
@@ -321,7 +321,7 @@ int main()
         cmocka_unit_test(steps_of_a_mesh_that_changes_are_read_one_by_one),
         cmocka_unit_test(steps_of_values_share_their_mesh),
         cmocka_unit_test(points_that_move_keep_their_cells),
-        cmocka_unit_test(what_is_not_read_is_refused_by_its_type),
+        cmocka_unit_test(unsupported_types_are_refused_by_name),
     };
-    return cmocka_run_group_tests(tests, begin, nullptr);
+    return cmocka_run_group_tests(tests, set_up_test_group, nullptr);
 }

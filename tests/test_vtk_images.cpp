@@ -36,7 +36,7 @@ constexpr int width = 96, height = 72;
 constexpr double volume_tolerance = 1e-6;
 
 std::string tool, mpiexec, data_folder;
-run_result last_run; // last_run: the last run of draw()
+run_result last_run; // last_run: the last run of draw_subject()
 
 struct subject {
     std::string name;
@@ -79,14 +79,14 @@ bool is_bitwise(const std::vector<float> &a, const std::vector<float> &b)
     return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
 }
 
-int covered(const picture &p)
+int count_covered_pixels(const picture &p)
 {
     int count = 0;
     for (size_t i = 3; i < p.rgba.size(); i += 4) count += p.rgba[i] > 0;
     return count;
 }
 
-std::string scene_of(const subject &s)
+std::string make_scene(const subject &s)
 {
     auto image = [](const std::string &name, const std::string &layer, const std::string &sampling) {
         return "  - name: " + name + "\n    size: [" + std::to_string(width) + ", " + std::to_string(height) +
@@ -108,26 +108,27 @@ std::string scene_of(const subject &s)
 }
 
 /* Draws into a folder of its own and returns it. If ranks is 0, the program is run without mpiexec. */
-std::string draw(const subject &s, int ranks, const std::string &partition)
+std::string draw_subject(const subject &s, int ranks, const std::string &partition)
 {
-    const std::string folder = fresh_folder("vtk_images/" + s.name + "_" + std::to_string(ranks) + "_" + partition);
-    write_file(folder + "/scene.yaml", scene_of(s));
-    std::string command = ranks > 0 ? shell_word(mpiexec) + " -n " + std::to_string(ranks) + " " : "";
-    command += shell_word(tool) + " --partition " + partition + " scene.yaml";
-    for (const std::string &file : s.files) command += " " + shell_word(data_folder + "/" + file);
-    last_run = run_in(folder, command);
+    const std::string folder =
+        make_empty_folder("vtk_images/" + s.name + "_" + std::to_string(ranks) + "_" + partition);
+    write_file(folder + "/scene.yaml", make_scene(s));
+    std::string command = ranks > 0 ? quote_for_shell(mpiexec) + " -n " + std::to_string(ranks) + " " : "";
+    command += quote_for_shell(tool) + " --partition " + partition + " scene.yaml";
+    for (const std::string &file : s.files) command += " " + quote_for_shell(data_folder + "/" + file);
+    last_run = run_in_folder(folder, command);
     if (last_run.status != 0) print_error("%s\n%s%s", command.c_str(), last_run.out.c_str(), last_run.err.c_str());
     assert_int_equal(last_run.status, 0);
     return folder;
 }
 
-std::string file_of(const std::string &folder, const std::string &image, size_t step)
+std::string make_picture_path(const std::string &folder, const std::string &image, size_t step)
 {
     return folder + "/" + image + "_" + std::to_string(step) + ".exr";
 }
 
 /* Counts the pixels that differ by more than the tolerance in any channel. */
-int differing(const picture &a, const picture &b)
+int count_differing_pixels(const picture &a, const picture &b)
 {
     int count = 0;
     for (size_t i = 0; i < a.rgba.size(); i += 4) {
@@ -144,13 +145,13 @@ int differing(const picture &a, const picture &b)
 void expect_same_pictures(const subject &s, const std::string &alone, const std::string &others)
 {
     for (size_t step = 0; step < s.files.size(); step++) {
-        const picture iso = read_picture(file_of(alone, "iso", step)),
-                      iso2 = read_picture(file_of(others, "iso", step));
+        const picture iso = read_picture(make_picture_path(alone, "iso", step)),
+                      iso2 = read_picture(make_picture_path(others, "iso", step));
         assert_true(is_bitwise(iso.depth, iso2.depth));
         assert_true(is_bitwise(iso.rgba, iso2.rgba));
         for (const std::string &name : s.volumes) {
-            const picture volume = read_picture(file_of(alone, name, step));
-            const int count = differing(volume, read_picture(file_of(others, name, step)));
+            const picture volume = read_picture(make_picture_path(alone, name, step));
+            const int count = count_differing_pixels(volume, read_picture(make_picture_path(others, name, step)));
             if (count > 0)
                 print_error("%s: %s of step %zu: %d pixels differ\n", others.c_str(), name.c_str(), step, count);
             assert_int_equal(count, 0);
@@ -159,43 +160,43 @@ void expect_same_pictures(const subject &s, const std::string &alone, const std:
 }
 
 /* The smallest surface here, that of the notch's stress, covers some 20 pixels. */
-void expect_something_to_see(const subject &s, const std::string &folder)
+void expect_visible_pixels(const subject &s, const std::string &folder)
 {
     const auto step = static_cast<size_t>(s.shown_in);
-    assert_in_range(covered(read_picture(file_of(folder, "iso", step))), 10, width * height);
-    assert_in_range(covered(read_picture(file_of(folder, "volume", step))), 10, width * height);
+    assert_in_range(count_covered_pixels(read_picture(make_picture_path(folder, "iso", step))), 10, width * height);
+    assert_in_range(count_covered_pixels(read_picture(make_picture_path(folder, "volume", step))), 10, width * height);
 }
 
-void draws_the_same_on_ranks(const subject &s)
+void check_draws_same_on_ranks(const subject &s)
 {
-    const std::string alone = draw(s, 0, "block");
-    expect_something_to_see(s, alone);
-    expect_same_pictures(s, alone, draw(s, 3, "random"));
-    if (test_is_whole() || s.name == "mixed") expect_same_pictures(s, alone, draw(s, 3, "block"));
+    const std::string alone = draw_subject(s, 0, "block");
+    expect_visible_pixels(s, alone);
+    expect_same_pictures(s, alone, draw_subject(s, 3, "random"));
+    if (test_is_long_run() || s.name == "mixed") expect_same_pictures(s, alone, draw_subject(s, 3, "block"));
 }
 
-void draws_alone(const subject &s)
+void check_draws_without_mpi(const subject &s)
 {
-    expect_something_to_see(s, draw(s, 0, "block"));
+    expect_visible_pixels(s, draw_subject(s, 0, "block"));
 }
 
 /* Checks that quadratic cells are drawn with all of their nodes. */
-void draws_whole(const subject &s)
+void check_draws_whole_cells(const subject &s)
 {
-    draws_alone(s);
-    assert_false(last_run.says("drawn by their corners"));
+    check_draws_without_mpi(s);
+    assert_false(last_run.contains_text("drawn by their corners"));
 }
 
 void bluntfin_is_the_same_on_ranks(void **)
 {
-    draws_the_same_on_ranks({"bluntfin_hex", {"bluntfin_hex.vtu"}, "Density", 1.2, 0.4, 3.5, 0});
-    draws_the_same_on_ranks({"bluntfin_tet", {"bluntfin_tet.vtu"}, "Density", 1.2, 0.4, 3.5, 0});
+    check_draws_same_on_ranks({"bluntfin_hex", {"bluntfin_hex.vtu"}, "Density", 1.2, 0.4, 3.5, 0});
+    check_draws_same_on_ranks({"bluntfin_tet", {"bluntfin_tet.vtu"}, "Density", 1.2, 0.4, 3.5, 0});
 }
 
 void post_is_the_same_on_ranks(void **)
 {
-    draws_the_same_on_ranks({"post_hex", {"post_hex.vtu"}, "VelocityMagnitude", 0.8, 0, 1.4, 0});
-    draws_the_same_on_ranks({"post_tet", {"post_tet.vtu"}, "VelocityMagnitude", 0.8, 0, 1.4, 0});
+    check_draws_same_on_ranks({"post_hex", {"post_hex.vtu"}, "VelocityMagnitude", 0.8, 0, 1.4, 0});
+    check_draws_same_on_ranks({"post_tet", {"post_tet.vtu"}, "VelocityMagnitude", 0.8, 0, 1.4, 0});
 }
 
 /* The 8,000 cells are distributed at random to seven ranks. */
@@ -203,63 +204,64 @@ void polyhedra_are_the_same_on_seven_ranks(void **)
 {
     const subject s = {
         "voronoi", {"poly_voronoi.vtu"}, "f", 0.2, -1.5, 1.5, 0, {"volume", "segments", "bounded", "both"}};
-    const std::string alone = draw(s, 0, "block");
-    expect_something_to_see(s, alone);
-    expect_same_pictures(s, alone, draw(s, 7, "random"));
+    const std::string alone = draw_subject(s, 0, "block");
+    expect_visible_pixels(s, alone);
+    expect_same_pictures(s, alone, draw_subject(s, 7, "random"));
 }
 
 void disk_is_the_same_on_ranks(void **)
 {
-    draws_the_same_on_ranks({"disk_vtu", {"disk_out_ref.vtu"}, "Temp", 340, 293, 913, 0});
-    draws_the_same_on_ranks({"disk_ex2", {"disk_out_ref.ex2"}, "Temp", 340, 293, 913, 0});
+    check_draws_same_on_ranks({"disk_vtu", {"disk_out_ref.vtu"}, "Temp", 340, 293, 913, 0});
+    check_draws_same_on_ranks({"disk_ex2", {"disk_out_ref.ex2"}, "Temp", 340, 293, 913, 0});
 }
 
 void can_series_is_the_same_on_ranks(void **)
 {
-    draws_the_same_on_ranks({"can", {"can_0.vtu", "can_1.vtu", "can_2.vtu"}, "EQPS_pt", 0.7, 0, 2.7, 2});
+    check_draws_same_on_ranks({"can", {"can_0.vtu", "can_1.vtu", "can_2.vtu"}, "EQPS_pt", 0.7, 0, 2.7, 2});
 }
 
-void cells_of_a_series_show_by_cell_field(void **)
+void series_are_coloured_by_a_cell_field(void **)
 {
-    draws_the_same_on_ranks({"can_cell", {"can_1.vtu"}, "EQPS", 0.35, 0, 1.9, 0});
+    check_draws_same_on_ranks({"can_cell", {"can_1.vtu"}, "EQPS", 0.35, 0, 1.9, 0});
 }
 
 void mixed_lattice_is_the_same_on_ranks(void **)
 {
-    draws_the_same_on_ranks({"mixed", {"mixed_lattice.vtu"}, "f", 0.2, -1.5, 1.5, 0});
+    check_draws_same_on_ranks({"mixed", {"mixed_lattice.vtu"}, "f", 0.2, -1.5, 1.5, 0});
 }
 
 void every_kind_of_cell_is_drawn(void **)
 {
-    draws_whole({"quadratic", {"cylinder_quadratic.vtu"}, "velocity_norm", 0.5, 0, 1, 0});
-    draws_whole({"tiny_tet", {"tiny_QuadraticTetra.vtu"}, "DistanceToCenter", 0.9, 0.3, 1.74, 0});
-    draws_whole({"tiny_wedge", {"tiny_QuadraticWedge.vtu"}, "DistanceToCenter", 0.9, 0.3, 1.74, 0});
-    draws_alone({"wedges", {"mesh_fs8_wedge.vtu"}, "synthetic", 0.2, -2, 1.8, 0});
-    draws_alone({"notch", {"notch_stress.vtu"}, "Nodal Stress-normed", 1500000, 0, 8000000, 0});
-    draws_the_same_on_ranks({"prisms", {"pentahexa.vtu"}, "synthetic", 0.3, -1, 1.6, 0});
+    check_draws_whole_cells({"quadratic", {"cylinder_quadratic.vtu"}, "velocity_norm", 0.5, 0, 1, 0});
+    check_draws_whole_cells({"tiny_tet", {"tiny_QuadraticTetra.vtu"}, "DistanceToCenter", 0.9, 0.3, 1.74, 0});
+    check_draws_whole_cells({"tiny_wedge", {"tiny_QuadraticWedge.vtu"}, "DistanceToCenter", 0.9, 0.3, 1.74, 0});
+    check_draws_without_mpi({"wedges", {"mesh_fs8_wedge.vtu"}, "synthetic", 0.2, -2, 1.8, 0});
+    check_draws_without_mpi({"notch", {"notch_stress.vtu"}, "Nodal Stress-normed", 1500000, 0, 8000000, 0});
+    check_draws_same_on_ranks({"prisms", {"pentahexa.vtu"}, "synthetic", 0.3, -1, 1.6, 0});
 }
 
 void info_counts_the_mixed_lattice(void **)
 {
-    const run_result r = run_in(".", shell_word(tool) + " --info " + shell_word(data_folder + "/mixed_lattice.vtu") +
-                                         " " + shell_word(data_folder + "/disk_out_ref.ex2"));
+    const run_result r =
+        run_in_folder(".", quote_for_shell(tool) + " --info " + quote_for_shell(data_folder + "/mixed_lattice.vtu") +
+                               " " + quote_for_shell(data_folder + "/disk_out_ref.ex2"));
     assert_int_equal(r.status, 0);
     for (const char *text : {"66586 cells", "Tetra                    type 10  50024", "type 12  4394", "type 13  8788",
                              "type 14  3380", "bounds -1 .. 1, -1 .. 1, -1 .. 1", "-1.49928 .. 1.4983",
                              "1 blocks, 7472 cells", "293.15 .. 913.15", "times  1"})
-        assert_true(r.says(text));
+        assert_true(r.contains_text(text));
 }
 
 /* NetCDF would read zeros if the end of a file is missing. */
 void exodus_cut_short_is_refused(void **)
 {
-    const std::string folder = fresh_folder("vtk_cut");
+    const std::string folder = make_empty_folder("vtk_cut");
     const std::string whole = read_file(data_folder + "/disk_out_ref.ex2");
     for (const size_t bytes : {size_t{500}, whole.size() / 2, whole.size() - 100}) {
         write_file(folder + "/cut.ex2", whole.substr(0, bytes));
-        const run_result r = run_in(folder, shell_word(tool) + " --info cut.ex2");
+        const run_result r = run_in_folder(folder, quote_for_shell(tool) + " --info cut.ex2");
         assert_int_equal(r.status, 1);
-        assert_true(r.says("insitu-render: cut.ex2: "));
+        assert_true(r.contains_text("insitu-render: cut.ex2: "));
     }
 }
 
@@ -291,7 +293,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(post_is_the_same_on_ranks),
         cmocka_unit_test(disk_is_the_same_on_ranks),
         cmocka_unit_test(can_series_is_the_same_on_ranks),
-        cmocka_unit_test(cells_of_a_series_show_by_cell_field),
+        cmocka_unit_test(series_are_coloured_by_a_cell_field),
     };
     return cmocka_run_group_tests(tests, nullptr, nullptr);
 }

@@ -92,7 +92,7 @@ vtkSmartPointer<vtkCell> make_cell(const cell_kind &kind)
 
 /* The reference pyramid here has a unit square below its apex (0.5, 0.5, 1). That of VTK's quadratic pyramid is a
  * collapsed cube, and that of the triquadratic one is half as high and begins at 0.5. */
-point pyramid_node(int type, const point &p)
+point map_to_pyramid(int type, const point &p)
 {
     const double height = p[2];
     if (type == VTK_TRIQUADRATIC_PYRAMID) return {p[0], p[1], 2 * height - 1};
@@ -101,7 +101,7 @@ point pyramid_node(int type, const point &p)
 
 /* VTK 9.1 has no class for the pyramids of Lagrange and Bezier: those of order 2 are quadratic ones, and the middle of
  * the base. */
-std::vector<point> reference_nodes(const cell_kind &kind)
+std::vector<point> list_reference_nodes(const cell_kind &kind)
 {
     const bool is_unknown = kind.of == shape::pyramid && kind.order == 2;
     const auto cell = make_cell(is_unknown ? cell_kind{VTK_QUADRATIC_PYRAMID, kind.of, 0} : kind);
@@ -109,7 +109,7 @@ std::vector<point> reference_nodes(const cell_kind &kind)
     std::vector<point> nodes;
     for (vtkIdType i = 0; i < cell->GetNumberOfPoints(); i++) {
         const point node = {all[3 * i], all[3 * i + 1], all[3 * i + 2]};
-        nodes.push_back(kind.of == shape::pyramid ? pyramid_node(kind.type, node) : node);
+        nodes.push_back(kind.of == shape::pyramid ? map_to_pyramid(kind.type, node) : node);
     }
     if (is_unknown) nodes.push_back({0.5, 0.5, 0});
     return nodes;
@@ -121,7 +121,7 @@ struct placing {
     int origin, first, second, third;
 };
 
-std::vector<placing> cells_of_cube(shape of)
+std::vector<placing> list_cells_of_cube(shape of)
 {
     switch (of) {
     case shape::triangle: return {{0, 1, 3, 0}, {0, 3, 2, 0}};
@@ -133,17 +133,17 @@ std::vector<placing> cells_of_cube(shape of)
     }
 }
 
-point corner_of(const std::array<int, 3> &cube, int corner)
+point get_cube_corner(const std::array<int, 3> &cube, int corner)
 {
     point p;
     for (size_t a = 0; a < 3; a++) p[a] = cube[a] - 1 + (corner == 8 ? 0.5 : (corner >> a) & 1);
     return p;
 }
 
-point place(const cell_kind &kind, const std::array<int, 3> &cube, const placing &at, const point &node)
+point map_node_to_cell(const cell_kind &kind, const std::array<int, 3> &cube, const placing &at, const point &node)
 {
-    const point o = corner_of(cube, at.origin), u = corner_of(cube, at.first), v = corner_of(cube, at.second),
-                w = corner_of(cube, at.third);
+    const point o = get_cube_corner(cube, at.origin), u = get_cube_corner(cube, at.first),
+                v = get_cube_corner(cube, at.second), w = get_cube_corner(cube, at.third);
     point p;
     for (size_t a = 0; a < 3; a++) {
         double third = w[a] - o[a];
@@ -160,23 +160,23 @@ bool is_flat(shape of)
 
 using field = std::function<double(const point &)>;
 
-double square(const point &p)
+double squared_height(const point &p)
 {
     return p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
 }
 
-double plane(const point &p)
+double plane_height(const point &p)
 {
     return p[2] + 0.3 * p[0] + 0.2 * p[1];
 }
 
 /* Heights of shells. */
-double bowl(const point &p)
+double bowl_height(const point &p)
 {
     return 0.4 * (p[0] * p[0] + p[1] * p[1]) - 0.3;
 }
 
-double slope(const point &p)
+double sloped_height(const point &p)
 {
     return 0.1 - 0.3 * p[0] - 0.2 * p[1];
 }
@@ -190,15 +190,15 @@ vtkSmartPointer<vtkUnstructuredGrid> make_grid(const cell_kind &kind, const fiel
     vtkNew<vtkPoints> points;
     vtkNew<vtkDoubleArray> values;
     std::map<std::array<long, 3>, vtkIdType> numbers;
-    const std::vector<point> nodes = reference_nodes(kind);
+    const std::vector<point> nodes = list_reference_nodes(kind);
     values->SetName("f");
     points->SetDataTypeToDouble();
     grid->SetPoints(points);
     for (int i = 0; i < (is_flat(kind.of) ? 4 : 8); i++)
-        for (const placing &at : cells_of_cube(kind.of)) {
+        for (const placing &at : list_cells_of_cube(kind.of)) {
             std::vector<vtkIdType> ids;
             for (size_t n = 0; n < nodes.size(); n++) {
-                point p = place(kind, {i % 2, i / 2 % 2, i / 4}, at, nodes[order.empty() ? n : order[n]]);
+                point p = map_node_to_cell(kind, {i % 2, i / 2 % 2, i / 4}, at, nodes[order.empty() ? n : order[n]]);
                 if (is_flat(kind.of)) p[2] = f(p);
                 const std::array<long, 3> key = {std::lround(p[0] * 1e5), std::lround(p[1] * 1e5),
                                                  std::lround(p[2] * 1e5)};
@@ -244,7 +244,7 @@ std::string write_grid(const std::string &name, vtkUnstructuredGrid *grid, forma
 /* ---- pictures ---------------------------------------------------------------------------------------------------- */
 
 /* Draws each file as a step, by one run of the program. */
-run_result draw(const std::string &layer, const std::vector<std::string> &files)
+run_result draw_files(const std::string &layer, const std::vector<std::string> &files)
 {
     write_file(folder + "/scene.yaml",
                "surface_error: 0.25\nimages:\n  - name: a\n    size: [" + std::to_string(width) + ", " +
@@ -252,9 +252,9 @@ run_result draw(const std::string &layer, const std::vector<std::string> &files)
                    "]\n    camera: {position: [0, 0, 5], focal: [0, 0, 0], up: [0, 1, 0], projection: orthographic, "
                    "height: 2.6}\n    layers: [" +
                    layer + "]\n    outputs: [{path: \"a_{cycle}.exr\"}]\n");
-    std::string command = shell_word(tool) + " scene.yaml";
-    for (const std::string &file : files) command += " " + shell_word(file);
-    const run_result r = run_in(folder, command);
+    std::string command = quote_for_shell(tool) + " scene.yaml";
+    for (const std::string &file : files) command += " " + quote_for_shell(file);
+    const run_result r = run_in_folder(folder, command);
     if (r.status != 0) print_error("%s\n%s%s", command.c_str(), r.out.c_str(), r.err.c_str());
     assert_int_equal(r.status, 0);
     return r;
@@ -280,13 +280,13 @@ bool is_on_sphere(double x, double y, double depth)
 {
     const double radius = std::sqrt(0.5), allowed = 0.25 * pixel + rounding, off = std::hypot(x, y);
     if (!std::isfinite(depth)) return off > radius - allowed;
-    return std::fabs(std::sqrt(square({x, y, eye - depth})) - radius) <= allowed;
+    return std::fabs(std::sqrt(squared_height({x, y, eye - depth})) - radius) <= allowed;
 }
 
 bool is_on_plane(double x, double y, double depth)
 {
     if (std::fabs(x) > 1 || std::fabs(y) > 1) return !std::isfinite(depth);
-    return std::fabs(eye - depth - slope({x, y, 0})) <= rounding;
+    return std::fabs(eye - depth - sloped_height({x, y, 0})) <= rounding;
 }
 
 /* A quarter of a pixel across the surface is more along the ray. */
@@ -294,7 +294,7 @@ bool is_in_bowl(double x, double y, double depth)
 {
     if (std::fabs(x) > 1 || std::fabs(y) > 1) return !std::isfinite(depth);
     const double allowed = 0.25 * pixel * std::sqrt(1 + 0.64 * (x * x + y * y)) + rounding;
-    return std::fabs(eye - depth - bowl({x, y, 0})) <= allowed;
+    return std::fabs(eye - depth - bowl_height({x, y, 0})) <= allowed;
 }
 
 /* Tells whether all rays of the step's picture are right, and enough of them have hits. */
@@ -332,7 +332,7 @@ run_result expect_all(const std::vector<cell_kind> &kinds, const field &f, const
         files.push_back(write_grid(name, grid, formats[next++ % 3]));
         files.push_back(write_grid(name, grid, formats[3 + next % 2]));
     }
-    const run_result r = draw(layer, files);
+    const run_result r = draw_files(layer, files);
     expect_pictures(files, is_right);
     return r;
 }
@@ -342,7 +342,7 @@ const std::string flat_isosurface = "isosurface: {field: f, values: [0.1]}";
 const std::string shell = "surface: {colour: [1, 1, 1]}";
 const std::string by_corners = "drawn by their corners";
 
-void solids_are_their_polynomials(void **)
+void solids_match_their_polynomials(void **)
 {
     std::vector<cell_kind> kinds = {
         {VTK_QUADRATIC_TETRA, shape::tet, 0},         {VTK_QUADRATIC_HEXAHEDRON, shape::hex, 0},
@@ -353,7 +353,7 @@ void solids_are_their_polynomials(void **)
         kinds.push_back({VTK_LAGRANGE_HEXAHEDRON, shape::hex, order});
         kinds.push_back({VTK_LAGRANGE_WEDGE, shape::wedge, order});
     }
-    assert_false(expect_all(kinds, square, isosurface, is_on_sphere).says(by_corners));
+    assert_false(expect_all(kinds, squared_height, isosurface, is_on_sphere).contains_text(by_corners));
 }
 
 /* Their polynomials are not known, but that they fill the cube is. */
@@ -362,10 +362,10 @@ void pyramids_have_no_gaps(void **)
     const std::vector<cell_kind> kinds = {{VTK_QUADRATIC_PYRAMID, shape::pyramid, 0},
                                           {VTK_TRIQUADRATIC_PYRAMID, shape::pyramid, 0},
                                           {VTK_LAGRANGE_PYRAMID, shape::pyramid, 2}};
-    assert_false(expect_all(kinds, plane, flat_isosurface, is_on_plane).says(by_corners));
+    assert_false(expect_all(kinds, plane_height, flat_isosurface, is_on_plane).contains_text(by_corners));
 }
 
-void shells_are_their_polynomials(void **)
+void shells_match_their_polynomials(void **)
 {
     std::vector<cell_kind> kinds = {{VTK_QUADRATIC_TRIANGLE, shape::triangle, 0},
                                     {VTK_BIQUADRATIC_TRIANGLE, shape::triangle, 0},
@@ -375,21 +375,21 @@ void shells_are_their_polynomials(void **)
         kinds.push_back({VTK_LAGRANGE_TRIANGLE, shape::triangle, order});
         kinds.push_back({VTK_LAGRANGE_QUADRILATERAL, shape::quad, order});
     }
-    assert_false(expect_all(kinds, bowl, shell, is_in_bowl).says(by_corners));
+    assert_false(expect_all(kinds, bowl_height, shell, is_in_bowl).contains_text(by_corners));
 }
 
 void expect_corners(const std::vector<cell_kind> &kinds, const field &f, const std::string &layer)
 {
     for (const cell_kind &kind : kinds) {
-        const size_t count = (is_flat(kind.of) ? 4 : 8) * cells_of_cube(kind.of).size();
+        const size_t count = (is_flat(kind.of) ? 4 : 8) * list_cells_of_cube(kind.of).size();
         const std::string words = ": " + std::to_string(count) + " higher-order cells " + by_corners;
         const run_result r = expect_all({kind}, f, layer, is_on_plane);
-        if (!r.says(words)) print_error("expected \"%s\":\n%s%s", words.c_str(), r.out.c_str(), r.err.c_str());
-        assert_true(r.says(words));
+        if (!r.contains_text(words)) print_error("expected \"%s\":\n%s%s", words.c_str(), r.out.c_str(), r.err.c_str());
+        assert_true(r.contains_text(words));
     }
 }
 
-void other_cells_are_their_corners_with_warnings(void **)
+void other_cells_are_drawn_as_linear_cells_with_warnings(void **)
 {
     std::vector<cell_kind> solids = {{VTK_QUADRATIC_LINEAR_WEDGE, shape::wedge, 0}},
                            shells = {{VTK_QUADRATIC_LINEAR_QUAD, shape::quad, 0}};
@@ -401,30 +401,30 @@ void other_cells_are_their_corners_with_warnings(void **)
         shells.push_back({VTK_BEZIER_QUADRILATERAL, shape::quad, order});
     }
     solids.push_back({VTK_BEZIER_PYRAMID, shape::pyramid, 2});
-    expect_corners(solids, plane, flat_isosurface);
-    expect_corners(shells, slope, shell);
+    expect_corners(solids, plane_height, flat_isosurface);
+    expect_corners(shells, sloped_height, shell);
 }
 
 /* Beside hexes, which are drawn. */
-void cells_without_a_replacement_are_told(void **)
+void cells_without_a_replacement_are_reported(void **)
 {
-    const auto grid = make_grid({VTK_QUADRATIC_HEXAHEDRON, shape::hex, 0}, square);
+    const auto grid = make_grid({VTK_QUADRATIC_HEXAHEDRON, shape::hex, 0}, squared_height);
     const vtkIdType ids[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9};
     grid->InsertNextCell(VTK_QUADRATIC_POLYGON, 10, ids);
     grid->InsertNextCell(VTK_CONVEX_POINT_SET, 8, ids);
     const std::vector<std::string> files = {write_grid("others", grid, format::appended),
                                             write_grid("others", grid, format::legacy)};
-    const run_result r = draw(isosurface, files);
+    const run_result r = draw_files(isosurface, files);
     expect_pictures(files, is_on_sphere);
-    assert_true(r.says("2 cells left out, of types that cannot be drawn (see --info)"));
-    const run_result info = run_in(folder, shell_word(tool) + " --info " + files[0]);
-    assert_true(info.says("type 36  1\n") && info.says("type 41  1\n"));
+    assert_true(r.contains_text("2 cells left out, of types that cannot be drawn (see --info)"));
+    const run_result info = run_in_folder(folder, quote_for_shell(tool) + " --info " + files[0]);
+    assert_true(info.contains_text("type 36  1\n") && info.contains_text("type 41  1\n"));
 }
 
 /* ---- files from before VTK 9.1 ----------------------------------------------------------------------------------- */
 
 /* Until then the nodes within the vertical edges at corners 2 and 3 were in the other order. */
-std::vector<size_t> old_order(int p)
+std::vector<size_t> make_old_node_order(int p)
 {
     std::vector<size_t> order(static_cast<size_t>((p + 1) * (p + 1) * (p + 1)));
     const size_t r = static_cast<size_t>(p - 1), first = 8 + 10 * r;
@@ -448,7 +448,7 @@ void old_files_have_the_old_order(void **)
 {
     std::vector<std::string> files;
     for (int p = 2; p <= 4; p++) {
-        const auto grid = make_grid({VTK_LAGRANGE_HEXAHEDRON, shape::hex, p}, square, old_order(p));
+        const auto grid = make_grid({VTK_LAGRANGE_HEXAHEDRON, shape::hex, p}, squared_height, make_old_node_order(p));
         const std::string name = "old_" + std::to_string(p);
         for (const format as : {format::appended, format::binary}) {
             files.push_back(write_grid(name, grid, as));
@@ -456,13 +456,13 @@ void old_files_have_the_old_order(void **)
         }
         files.push_back(write_grid(name, grid, format::legacy_4_2));
     }
-    draw(isosurface, files);
+    draw_files(isosurface, files);
     expect_pictures(files, is_on_sphere);
 }
 
 int make_folder(void **)
 {
-    folder = fresh_folder("vtk_order");
+    folder = make_empty_folder("vtk_order");
     return 0;
 }
 
@@ -473,11 +473,11 @@ int main(int argc, char **argv)
     if (argc != 2) return 2;
     tool = argv[1];
     const CMUnitTest tests[] = {
-        cmocka_unit_test(solids_are_their_polynomials),
+        cmocka_unit_test(solids_match_their_polynomials),
         cmocka_unit_test(pyramids_have_no_gaps),
-        cmocka_unit_test(shells_are_their_polynomials),
-        cmocka_unit_test(other_cells_are_their_corners_with_warnings),
-        cmocka_unit_test(cells_without_a_replacement_are_told),
+        cmocka_unit_test(shells_match_their_polynomials),
+        cmocka_unit_test(other_cells_are_drawn_as_linear_cells_with_warnings),
+        cmocka_unit_test(cells_without_a_replacement_are_reported),
         cmocka_unit_test(old_files_have_the_old_order),
     };
     return cmocka_run_group_tests(tests, make_folder, nullptr);

@@ -7,23 +7,23 @@
 
 #include <sys/wait.h>
 
-std::string shell_word(const std::string &word)
+std::string quote_for_shell(const std::string &word)
 {
     std::string q = "'";
     for (const char c : word) q += c == '\'' ? std::string("'\\''") : std::string(1, c);
     return q + "'";
 }
 
-run_result run_in(const std::string &folder, const std::string &command)
+run_result run_in_folder(const std::string &folder, const std::string &command)
 {
     const std::string out = folder + "/.stdout", err = folder + "/.stderr";
-    const std::string all =
-        "cd " + shell_word(folder) + " && { " + command + "; } >" + shell_word(out) + " 2>" + shell_word(err);
+    const std::string all = "cd " + quote_for_shell(folder) + " && { " + command + "; } >" + quote_for_shell(out) +
+                            " 2>" + quote_for_shell(err);
     const int status = std::system(all.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_file(out), read_file(err)};
 }
 
-std::string fresh_folder(const std::string &name)
+std::string make_empty_folder(const std::string &name)
 {
     const std::filesystem::path folder = std::filesystem::current_path() / name;
     std::filesystem::remove_all(folder);

@@ -10,16 +10,16 @@ struct run_result {
     std::string out;
     std::string err;
 
-    bool says(const std::string &text) const { return (out + err).find(text) != std::string::npos; }
+    bool contains_text(const std::string &text) const { return (out + err).find(text) != std::string::npos; }
 };
 
 /* Runs a shell command in folder. Returns its exit status and what it wrote to stdout and stderr. */
-run_result run_in(const std::string &folder, const std::string &command);
+run_result run_in_folder(const std::string &folder, const std::string &command);
 
-std::string shell_word(const std::string &word);
+std::string quote_for_shell(const std::string &word);
 
 /* Returns an empty folder below the working directory; removes its former contents. */
-std::string fresh_folder(const std::string &name);
+std::string make_empty_folder(const std::string &name);
 
 void write_file(const std::string &path, const std::string &text);
 std::string read_file(const std::string &path);

@@ -48,7 +48,7 @@ struct place {
 
 /* Returns the position of a point. All coordinates are multiples of 1/16, so neither the sum of an image's steps nor
  * six decimal digits round them. */
-place place_of(lattice kind, int i, int j, int k)
+place compute_point_position(lattice kind, int i, int j, int k)
 {
     switch (kind) {
     case lattice::image: return {i * 0.25 - 1, j * 0.5 + 0.5, k * 0.25 + 2};
@@ -74,23 +74,23 @@ vtkSmartPointer<vtkPoints> list_points(lattice kind)
     auto points = vtkSmartPointer<vtkPoints>::New();
     points->SetDataType(kind == lattice::curved ? VTK_FLOAT : VTK_DOUBLE);
     for (int n = 0; n < point_count; n++) {
-        const place p = place_of(kind, n % size[0], n / size[0] % size[1], n / (size[0] * size[1]));
+        const place p = compute_point_position(kind, n % size[0], n / size[0] % size[1], n / (size[0] * size[1]));
         points->InsertNextPoint(p.x, p.y, p.z);
     }
     return points;
 }
 
-vtkSmartPointer<vtkDoubleArray> axis(int a)
+vtkSmartPointer<vtkDoubleArray> make_axis_coordinates(int a)
 {
     auto values = vtkSmartPointer<vtkDoubleArray>::New();
     for (int n = 0; n < size[a]; n++) {
-        const place p = place_of(lattice::rectilinear, a == 0 ? n : 0, a == 1 ? n : 0, a == 2 ? n : 0);
+        const place p = compute_point_position(lattice::rectilinear, a == 0 ? n : 0, a == 1 ? n : 0, a == 2 ? n : 0);
         values->InsertNextValue(a == 0 ? p.x : a == 1 ? p.y : p.z);
     }
     return values;
 }
 
-template <typename Writer> void write(const std::string &path, vtkDataObject *data)
+template <typename Writer> void write_data_object(const std::string &path, vtkDataObject *data)
 {
     vtkNew<Writer> writer;
     writer->SetFileName(path.c_str());
@@ -119,7 +119,7 @@ void write_xml(const std::string &path, vtkUnstructuredGrid *grid, int mode, boo
 
 } // namespace
 
-vtkSmartPointer<vtkDataSet> structured(lattice kind)
+vtkSmartPointer<vtkDataSet> make_structured_grid(lattice kind)
 {
     vtkSmartPointer<vtkDataSet> data;
     if (kind == lattice::image) {
@@ -131,9 +131,9 @@ vtkSmartPointer<vtkDataSet> structured(lattice kind)
     } else if (kind == lattice::rectilinear) {
         auto grid = vtkSmartPointer<vtkRectilinearGrid>::New();
         grid->SetDimensions(size);
-        grid->SetXCoordinates(axis(0));
-        grid->SetYCoordinates(axis(1));
-        grid->SetZCoordinates(axis(2));
+        grid->SetXCoordinates(make_axis_coordinates(0));
+        grid->SetYCoordinates(make_axis_coordinates(1));
+        grid->SetZCoordinates(make_axis_coordinates(2));
         data = grid;
     } else {
         auto grid = vtkSmartPointer<vtkStructuredGrid>::New();
@@ -145,7 +145,7 @@ vtkSmartPointer<vtkDataSet> structured(lattice kind)
     return data;
 }
 
-vtkSmartPointer<vtkUnstructuredGrid> hexes(lattice kind)
+vtkSmartPointer<vtkUnstructuredGrid> make_hex_grid(lattice kind)
 {
     auto grid = vtkSmartPointer<vtkUnstructuredGrid>::New();
     grid->SetPoints(list_points(kind));
@@ -161,7 +161,7 @@ vtkSmartPointer<vtkUnstructuredGrid> hexes(lattice kind)
     return grid;
 }
 
-vtkSmartPointer<vtkUnstructuredGrid> cubes(int count, int first, bool is_mixed)
+vtkSmartPointer<vtkUnstructuredGrid> make_cubes(int count, int first, bool is_mixed)
 {
     auto grid = vtkSmartPointer<vtkUnstructuredGrid>::New();
     vtkNew<vtkPoints> points;
@@ -191,7 +191,7 @@ vtkSmartPointer<vtkUnstructuredGrid> cubes(int count, int first, bool is_mixed)
 
 void write_vtu(const std::string &path, vtkUnstructuredGrid *grid)
 {
-    write<vtkXMLUnstructuredGridWriter>(path, grid);
+    write_data_object<vtkXMLUnstructuredGridWriter>(path, grid);
 }
 
 namespace
@@ -238,7 +238,7 @@ void write_ensight(const std::string &folder, vtkUnstructuredGrid *grid)
                                    "scalar per node: x e.0.00000_n.x\nscalar per element: c e.0.00000_c.c\n");
 }
 
-std::vector<std::string> files_like(const std::string &folder, const std::string &start)
+std::vector<std::string> list_files_with_prefix(const std::string &folder, const std::string &start)
 {
     std::vector<std::string> names;
     for (const auto &entry : std::filesystem::directory_iterator(folder)) {
@@ -251,11 +251,11 @@ std::vector<std::string> files_like(const std::string &folder, const std::string
 
 void write_lattices(const std::string &folder)
 {
-    const auto image = structured(lattice::image), axes = structured(lattice::rectilinear),
-               curved = structured(lattice::curved);
-    write<vtkXMLImageDataWriter>(folder + "/g.vti", image);
-    write<vtkXMLRectilinearGridWriter>(folder + "/g.vtr", axes);
-    write<vtkXMLStructuredGridWriter>(folder + "/g.vts", curved);
+    const auto image = make_structured_grid(lattice::image), axes = make_structured_grid(lattice::rectilinear),
+               curved = make_structured_grid(lattice::curved);
+    write_data_object<vtkXMLImageDataWriter>(folder + "/g.vti", image);
+    write_data_object<vtkXMLRectilinearGridWriter>(folder + "/g.vtr", axes);
+    write_data_object<vtkXMLStructuredGridWriter>(folder + "/g.vts", curved);
     write_parallel_lattices(folder);
     for (const bool is_text : {false, true}) {
         const std::string start = folder + (is_text ? "/text_" : "/binary_");
@@ -282,11 +282,11 @@ void write_unstructured(const std::string &folder, vtkUnstructuredGrid *grid)
                "{\"file-series-version\": \"1.0\", \"files\": [{\"name\": \"raw.vtu\", \"time\": 0.5}]}\n");
     vtkNew<vtkMultiBlockDataSet> blocks;
     blocks->SetBlock(0, grid);
-    write<vtkXMLMultiBlockDataWriter>(folder + "/m.vtm", blocks);
+    write_data_object<vtkXMLMultiBlockDataWriter>(folder + "/m.vtm", blocks);
     write_ensight(folder, grid);
 }
 
-vtkSmartPointer<vtkUnstructuredGrid> joined(vtkUnstructuredGrid *first, vtkUnstructuredGrid *second)
+vtkSmartPointer<vtkUnstructuredGrid> join_grids(vtkUnstructuredGrid *first, vtkUnstructuredGrid *second)
 {
     auto all = vtkSmartPointer<vtkUnstructuredGrid>::New();
     vtkNew<vtkPoints> points;
@@ -324,15 +324,15 @@ vtkSmartPointer<vtkUnstructuredGrid> joined(vtkUnstructuredGrid *first, vtkUnstr
 /* The first piece has no polyhedra, the second has hexahedra and polyhedra. */
 vtkSmartPointer<vtkUnstructuredGrid> write_polyhedra(const std::string &folder)
 {
-    write_xml(folder + "/p0.vtu", cubes(2, 0, false), vtkXMLWriter::Appended, true);
-    write_xml(folder + "/p1.vtu", cubes(5, 2, true), vtkXMLWriter::Appended, true);
+    write_xml(folder + "/p0.vtu", make_cubes(2, 0, false), vtkXMLWriter::Appended, true);
+    write_xml(folder + "/p1.vtu", make_cubes(5, 2, true), vtkXMLWriter::Appended, true);
     write_text_pieces(folder + "/p.pvtu", "PUnstructuredGrid", "",
                       "<PPoints><PDataArray type=\"Float32\" NumberOfComponents=\"3\"/></PPoints>",
                       "<Piece Source=\"p0.vtu\"/><Piece Source=\"p1.vtu\"/>");
-    return joined(cubes(2, 0, false), cubes(5, 2, true));
+    return join_grids(make_cubes(2, 0, false), make_cubes(5, 2, true));
 }
 
-std::string lines_of(vtkDataArray *values, int component)
+std::string format_values(vtkDataArray *values, int component)
 {
     std::ostringstream text;
     for (vtkIdType i = 0; i < values->GetNumberOfTuples(); i++) text << values->GetComponent(i, component) << '\n';
@@ -352,17 +352,17 @@ void write_ensight_text(const std::string &folder, vtkUnstructuredGrid *grid)
     }
     vtkDataArray *points = grid->GetPoints()->GetData();
     const std::string part = "part\n         1\n",
-                      coordinates = lines_of(points, 0) + lines_of(points, 1) + lines_of(points, 2);
+                      coordinates = format_values(points, 0) + format_values(points, 1) + format_values(points, 2);
     write_file(folder + "/t.geo", "Hexahedra\nof a lattice\nnode id assign\nelement id assign\n" + part +
                                       "all of them\ncoordinates\n" + std::to_string(point_count) + "\n" + coordinates +
                                       "hexa8\n" + std::to_string(cell_count) + "\n" + cells.str());
-    write_file(folder + "/t.x", "x\n" + part + "coordinates\n" + lines_of(grid->GetPointData()->GetArray("x"), 0));
-    write_file(folder + "/t.c", "c\n" + part + "hexa8\n" + lines_of(grid->GetCellData()->GetArray("c"), 0));
+    write_file(folder + "/t.x", "x\n" + part + "coordinates\n" + format_values(grid->GetPointData()->GetArray("x"), 0));
+    write_file(folder + "/t.c", "c\n" + part + "hexa8\n" + format_values(grid->GetCellData()->GetArray("c"), 0));
     write_file(folder + "/t.case", "FORMAT\ntype: ensight gold\nGEOMETRY\nmodel: t.geo\nVARIABLE\n"
                                    "scalar per node: x t.x\nscalar per element: c t.c\n");
 }
 
-void write_cgns_places(int file, int base, int zone, vtkUnstructuredGrid *grid)
+void write_cgns_coordinates(int file, int base, int zone, vtkUnstructuredGrid *grid)
 {
     int number = 0;
     for (int axis = 0; axis < 3; axis++) {
@@ -393,7 +393,7 @@ void write_cgns(const std::string &path, vtkUnstructuredGrid *grid)
     cg_open(path.c_str(), CG_MODE_WRITE, &file);
     cg_base_write(file, "Base", 3, 3, &base);
     cg_zone_write(file, base, "Zone", sizes, CGNS_ENUMV(Structured), &zone);
-    write_cgns_places(file, base, zone, grid);
+    write_cgns_coordinates(file, base, zone, grid);
     write_cgns_fields(file, base, zone, grid);
     cg_close(file);
 }
@@ -420,8 +420,9 @@ struct section_writer {
         for (int k = 3; k >= 0; k--) nodes.push_back(points[k] + 1);
     }
 
-    /* put_hexes() and put_wall() return the number after that of the last element. */
-    cgsize_t put_hexes(const char *name, cgsize_t number, cgsize_t begin, cgsize_t end, int nodes_each = 8) const
+    /* write_hex_section() and write_wall_section() return the number after that of the last element. */
+    cgsize_t write_hex_section(const char *name, cgsize_t number, cgsize_t begin, cgsize_t end,
+                               int nodes_each = 8) const
     {
         std::vector<cgsize_t> nodes;
         for (cgsize_t i = begin; i < end; i++) add_hex(i, nodes_each, nodes);
@@ -430,7 +431,7 @@ struct section_writer {
                          number + end - begin - 1, 0, nodes.data(), &section);
         return number + end - begin;
     }
-    cgsize_t put_wall(cgsize_t number, int times = 1) const
+    cgsize_t write_wall_section(cgsize_t number, int times = 1) const
     {
         std::vector<cgsize_t> nodes;
         for (cgsize_t i = 0; i < times * quads; i++) add_quad(i % quads, nodes);
@@ -439,7 +440,7 @@ struct section_writer {
                          nodes.data(), &section);
         return number + times * quads;
     }
-    void put_mixed() const
+    void write_mixed_section() const
     {
         std::vector<cgsize_t> nodes, starts = {0};
         for (cgsize_t i = 0; i < cell_count; i++) {
@@ -457,28 +458,28 @@ struct section_writer {
                               starts.data(), &section);
     }
 
-    void put(cgns_order order) const
+    void write_section(cgns_order order) const
     {
         const cgsize_t hexes = cell_count;
         switch (order) {
-        case cgns_order::cells_first: put_wall(put_hexes("Fluid", 1, 0, hexes)); break;
-        case cgns_order::wall_first: put_hexes("Fluid", put_wall(1), 0, hexes); break;
+        case cgns_order::cells_first: write_wall_section(write_hex_section("Fluid", 1, 0, hexes)); break;
+        case cgns_order::wall_first: write_hex_section("Fluid", write_wall_section(1), 0, hexes); break;
         case cgns_order::wall_stored:
-            put_wall(hexes + 1);
-            put_hexes("Fluid", 1, 0, hexes);
+            write_wall_section(hexes + 1);
+            write_hex_section("Fluid", 1, 0, hexes);
             break;
-        case cgns_order::gap: put_hexes("Fluid", put_wall(1) + 1, 0, hexes); break;
+        case cgns_order::gap: write_hex_section("Fluid", write_wall_section(1) + 1, 0, hexes); break;
         case cgns_order::wall_between:
-            put_hexes("Rest", put_wall(put_hexes("Fluid", 1, 0, quads)), quads, hexes);
+            write_hex_section("Rest", write_wall_section(write_hex_section("Fluid", 1, 0, quads)), quads, hexes);
             break;
-        case cgns_order::wall_long: put_hexes("Fluid", put_wall(1, 4), 0, hexes); break;
-        case cgns_order::mixed: put_mixed(); break;
-        case cgns_order::curved: put_hexes("Fluid", put_wall(1), 0, hexes, 27); break;
+        case cgns_order::wall_long: write_hex_section("Fluid", write_wall_section(1, 4), 0, hexes); break;
+        case cgns_order::mixed: write_mixed_section(); break;
+        case cgns_order::curved: write_hex_section("Fluid", write_wall_section(1), 0, hexes, 27); break;
         }
     }
 };
 
-std::string foam_file(const std::string &kind, const std::string &name, const std::string &body)
+std::string make_foam_file(const std::string &kind, const std::string &name, const std::string &body)
 {
     return "FoamFile\n{\n    version 2.0;\n    format ascii;\n    class " + kind + ";\n    object " + name + ";\n}\n" +
            body;
@@ -495,8 +496,8 @@ void write_cgns_elements(const std::string &path, vtkUnstructuredGrid *grid, cgn
     cg_base_write(file, "Base", 3, 3, &base);
     for (const std::string &name : zones) {
         cg_zone_write(file, base, name.c_str(), sizes, CGNS_ENUMV(Unstructured), &zone);
-        write_cgns_places(file, base, zone, grid);
-        section_writer{file, base, zone, grid}.put(order);
+        write_cgns_coordinates(file, base, zone, grid);
+        section_writer{file, base, zone, grid}.write_section(order);
         write_cgns_fields(file, base, zone, grid);
     }
     cg_close(file);
@@ -509,35 +510,40 @@ void write_foam(const std::string &folder, int first)
     for (const char *inside : {"/constant/polyMesh", "/system", "/0", "/0.5"}) fs::create_directories(folder + inside);
     write_file(folder + "/case.foam", "");
     write_file(folder + "/system/controlDict",
-               foam_file("dictionary", "controlDict",
-                         "application none;\nstartFrom startTime;\nstartTime 0;\nstopAt endTime;\nendTime 0.5;\n"
-                         "deltaT 0.5;\nwriteControl timeStep;\nwriteInterval 1;\nwriteFormat ascii;\n"));
+               make_foam_file("dictionary", "controlDict",
+                              "application none;\nstartFrom startTime;\nstartTime 0;\nstopAt endTime;\nendTime 0.5;\n"
+                              "deltaT 0.5;\nwriteControl timeStep;\nwriteInterval 1;\nwriteFormat ascii;\n"));
     std::string points = "12\n(\n";
     for (int x = first; x < first + 3; x++)
         for (const char *yz : {" 0 0)\n", " 1 0)\n", " 1 1)\n", " 0 1)\n"}) points += "(" + std::to_string(x) + yz;
-    write_file(mesh + "points", foam_file("vectorField", "points", points + ")\n"));
+    write_file(mesh + "points", make_foam_file("vectorField", "points", points + ")\n"));
     /* Interior faces are first: the two triangles, then the quad between the wedges. */
-    write_file(mesh + "faces", foam_file("faceList", "faces",
-                                         "14\n(\n3(4 5 6)\n3(4 6 7)\n4(4 8 10 6)\n4(0 3 2 1)\n4(0 1 5 4)\n4(1 2 6 5)\n"
-                                         "4(2 3 7 6)\n4(3 0 4 7)\n4(4 5 9 8)\n4(5 6 10 9)\n3(8 9 10)\n4(6 7 11 10)\n"
-                                         "4(7 4 8 11)\n3(8 10 11)\n)\n"));
-    write_file(mesh + "owner", foam_file("labelList", "owner", "14\n(\n0\n0\n1\n0\n0\n0\n0\n0\n1\n1\n1\n2\n2\n2\n)\n"));
-    write_file(mesh + "neighbour", foam_file("labelList", "neighbour", "3\n(\n1\n2\n2\n)\n"));
-    write_file(mesh + "boundary", foam_file("polyBoundaryMesh", "boundary",
-                                            "1\n(\nwall\n{\n    type wall;\n    nFaces 11;\n    startFace 3;\n}\n)\n"));
+    write_file(mesh + "faces",
+               make_foam_file("faceList", "faces",
+                              "14\n(\n3(4 5 6)\n3(4 6 7)\n4(4 8 10 6)\n4(0 3 2 1)\n4(0 1 5 4)\n4(1 2 6 5)\n"
+                              "4(2 3 7 6)\n4(3 0 4 7)\n4(4 5 9 8)\n4(5 6 10 9)\n3(8 9 10)\n4(6 7 11 10)\n"
+                              "4(7 4 8 11)\n3(8 10 11)\n)\n"));
+    write_file(mesh + "owner",
+               make_foam_file("labelList", "owner", "14\n(\n0\n0\n1\n0\n0\n0\n0\n0\n1\n1\n1\n2\n2\n2\n)\n"));
+    write_file(mesh + "neighbour", make_foam_file("labelList", "neighbour", "3\n(\n1\n2\n2\n)\n"));
+    write_file(mesh + "boundary",
+               make_foam_file("polyBoundaryMesh", "boundary",
+                              "1\n(\nwall\n{\n    type wall;\n    nFaces 11;\n    startFace 3;\n}\n)\n"));
     for (const int step : {0, 1}) {
         std::string values;
         for (int i = 1; i <= 3; i++) values += std::to_string(i << step) + "\n";
         write_file(folder + (step ? "/0.5/p" : "/0/p"),
-                   foam_file("volScalarField", "p",
-                             "dimensions [0 2 -2 0 0 0 0];\ninternalField nonuniform List<scalar>\n3\n(\n" + values +
-                                 ");\nboundaryField\n{\n    wall\n    {\n        type zeroGradient;\n    }\n}\n"));
+                   make_foam_file("volScalarField", "p",
+                                  "dimensions [0 2 -2 0 0 0 0];\ninternalField nonuniform List<scalar>\n3\n(\n" +
+                                      values +
+                                      ");\nboundaryField\n{\n    wall\n    {\n        type zeroGradient;\n    }\n}\n"));
     }
 }
 
 std::vector<sample> write_samples(const std::string &folder)
 {
-    const auto image = hexes(lattice::image), axes = hexes(lattice::rectilinear), curved = hexes(lattice::curved);
+    const auto image = make_hex_grid(lattice::image), axes = make_hex_grid(lattice::rectilinear),
+               curved = make_hex_grid(lattice::curved);
     write_lattices(folder);
     write_unstructured(folder, curved);
     write_ensight_text(folder, curved);
@@ -554,8 +560,8 @@ std::vector<sample> write_samples(const std::string &folder)
                                {"g.pvd", {"g.pvd", "raw.vtu"}, curved},
                                {"g.vtu.series", {"g.vtu.series"}, curved},
                                {"m.vtm", {"m.vtm", "m/m_0.vtu"}, curved},
-                               {"e.case", files_like(folder, "e."), curved},
-                               {"t.case", files_like(folder, "t."), curved},
+                               {"e.case", list_files_with_prefix(folder, "e."), curved},
+                               {"t.case", list_files_with_prefix(folder, "t."), curved},
                                {"g.cgns", {"g.cgns"}, curved},
                                {"elements.cgns", {"elements.cgns"}, curved},
                                {"wall.cgns", {"wall.cgns"}, curved},

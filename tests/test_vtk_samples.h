@@ -16,14 +16,14 @@ class vtkUnstructuredGrid;
 enum class lattice { image, rectilinear, curved };
 
 /* Returns a grid with the point field "x" and the cell field "c", which counts cells. */
-vtkSmartPointer<vtkDataSet> structured(lattice kind);
+vtkSmartPointer<vtkDataSet> make_structured_grid(lattice kind);
 
-/* Returns the grid of structured() as a list of hexahedra, made only from the lattice's indices. */
-vtkSmartPointer<vtkUnstructuredGrid> hexes(lattice kind);
+/* Returns the grid of make_structured_grid() as a list of hexahedra, made only from the lattice's indices. */
+vtkSmartPointer<vtkUnstructuredGrid> make_hex_grid(lattice kind);
 
 /* Returns a row of unit cubes along x, beginning at `first`. If is_mixed, every second cube is a polyhedron, otherwise
  * all cubes are hexahedra. */
-vtkSmartPointer<vtkUnstructuredGrid> cubes(int count, int first, bool is_mixed);
+vtkSmartPointer<vtkUnstructuredGrid> make_cubes(int count, int first, bool is_mixed);
 
 struct sample {
     std::string name;               // name of the file to open, within the folder
@@ -48,8 +48,8 @@ enum class cgns_order {
     gap           // like wall_first, but the hexes' numbers begin one too high
 };
 
-/* Writes hexes() as each of the unstructured zones of a CGNS file. `claimed` is the number of cells that each zone
- * states. */
+/* Writes make_hex_grid() as each of the unstructured zones of a CGNS file. `claimed` is the number of cells that each
+ * zone states. */
 void write_cgns_elements(const std::string &path, vtkUnstructuredGrid *grid, cgns_order order, int claimed = 60,
                          const std::vector<std::string> &zones = {"Zone"});
 

@@ -41,7 +41,7 @@ insitu_status insitu_set_field(insitu_session *session, const char *mesh, const 
 namespace
 {
 
-std::string block_name(const char *mesh, int64_t number)
+std::string make_block_name(const char *mesh, int64_t number)
 {
     return std::string(mesh) + "[" + std::to_string(number) + "]";
 }
@@ -51,13 +51,13 @@ std::string block_name(const char *mesh, int64_t number)
 insitu_status insitu_set_block(insitu_session *session, const char *mesh, int64_t number, const insitu_mesh *block)
 {
     session->meshes.erase(mesh);
-    return insitu_set_mesh(session, block_name(mesh, number).c_str(), block);
+    return insitu_set_mesh(session, make_block_name(mesh, number).c_str(), block);
 }
 
 insitu_status insitu_set_block_field(insitu_session *session, const char *mesh, int64_t number,
                                      const insitu_field *field)
 {
-    return insitu_set_field(session, block_name(mesh, number).c_str(), field);
+    return insitu_set_field(session, make_block_name(mesh, number).c_str(), field);
 }
 
 const char *insitu_error(const insitu_session *)

@@ -55,18 +55,18 @@ std::string tool, mpiexec, folder;
 
 run_result run_tool(int ranks, const std::string &arguments)
 {
-    const std::string start = ranks > 1 ? shell_word(mpiexec) + " -n " + std::to_string(ranks) + " " : "";
-    return run_in(folder, start + shell_word(tool) + " " + arguments);
+    const std::string start = ranks > 1 ? quote_for_shell(mpiexec) + " -n " + std::to_string(ranks) + " " : "";
+    return run_in_folder(folder, start + quote_for_shell(tool) + " " + arguments);
 }
 
 /* Draws a file and returns the picture. */
-std::string draw(int ranks, const std::string &arguments)
+std::string draw_file(int ranks, const std::string &arguments)
 {
     const run_result r = run_tool(ranks, arguments);
-    if (r.status != 0 || r.says("warning"))
+    if (r.status != 0 || r.contains_text("warning"))
         print_error("%s on %d ranks: status %d\n%s%s", arguments.c_str(), ranks, r.status, r.out.c_str(),
                     r.err.c_str());
-    assert_true(r.status == 0 && !r.says("warning"));
+    assert_true(r.status == 0 && !r.contains_text("warning"));
     return read_file(folder + "/a.exr");
 }
 
@@ -77,7 +77,7 @@ void expect_same(const std::string &a, const std::string &b, const std::string &
 }
 
 /* Returns a scene, seen along z from z = 5, whose layers are the same to the bit on any number of ranks. */
-std::string scene(const std::string &field)
+std::string make_scene(const std::string &field)
 {
     return "images:\n  - name: a\n    size: [200, 200]\n    background: [0, 0, 0, 0]\n    camera: {position: [0, 0, "
            "5], "
@@ -88,9 +88,9 @@ std::string scene(const std::string &field)
 
 int write_scenes(void **)
 {
-    folder = fresh_folder("vtk_structured");
-    write_file(folder + "/points.yaml", scene("p"));
-    write_file(folder + "/cells.yaml", scene("c"));
+    folder = make_empty_folder("vtk_structured");
+    write_file(folder + "/points.yaml", make_scene("p"));
+    write_file(folder + "/cells.yaml", make_scene("c"));
     write_file(folder + "/walls.yaml",
                "images:\n  - name: a\n    size: [200, 200]\n    camera: {automatic: {direction: [1, 0.7, 0.9]}}\n"
                "    layers:\n      - surface: {colour_by: {field: c, interpolate: vertex}, opacity: 0.3}\n"
@@ -122,7 +122,7 @@ void add_distances(vtkDataSet *data)
 using sizes = std::array<int, 3>;
 
 /* Returns a grid of [-1, 1]^3 whose indices do not begin at 0. */
-vtkSmartPointer<vtkDataSet> image_of(const sizes &cells)
+vtkSmartPointer<vtkDataSet> make_image_grid(const sizes &cells)
 {
     auto image = vtkSmartPointer<vtkImageData>::New();
     image->SetExtent(-2, cells[0] - 2, 3, cells[1] + 3, 0, cells[2]);
@@ -133,7 +133,7 @@ vtkSmartPointer<vtkDataSet> image_of(const sizes &cells)
     return image;
 }
 
-vtkSmartPointer<vtkDataSet> rectilinear_of(const sizes &cells)
+vtkSmartPointer<vtkDataSet> make_rectilinear_grid(const sizes &cells)
 {
     auto grid = vtkSmartPointer<vtkRectilinearGrid>::New();
     vtkNew<vtkDoubleArray> axes[3];
@@ -147,7 +147,7 @@ vtkSmartPointer<vtkDataSet> rectilinear_of(const sizes &cells)
     return grid;
 }
 
-vtkSmartPointer<vtkDataSet> curvilinear_of(const sizes &cells)
+vtkSmartPointer<vtkDataSet> make_curvilinear_grid(const sizes &cells)
 {
     auto grid = vtkSmartPointer<vtkStructuredGrid>::New();
     vtkNew<vtkPoints> points;
@@ -165,7 +165,7 @@ vtkSmartPointer<vtkDataSet> curvilinear_of(const sizes &cells)
     return grid;
 }
 
-template <typename Writer> void write(const std::string &name, vtkDataObject *data)
+template <typename Writer> void write_data_object(const std::string &name, vtkDataObject *data)
 {
     vtkNew<Writer> writer;
     writer->SetFileName((folder + "/" + name).c_str());
@@ -175,9 +175,9 @@ template <typename Writer> void write(const std::string &name, vtkDataObject *da
 
 void write_grids(const sizes &cells)
 {
-    write<vtkXMLImageDataWriter>("g.vti", image_of(cells));
-    write<vtkXMLRectilinearGridWriter>("g.vtr", rectilinear_of(cells));
-    write<vtkXMLStructuredGridWriter>("g.vts", curvilinear_of(cells));
+    write_data_object<vtkXMLImageDataWriter>("g.vti", make_image_grid(cells));
+    write_data_object<vtkXMLRectilinearGridWriter>("g.vtr", make_rectilinear_grid(cells));
+    write_data_object<vtkXMLStructuredGridWriter>("g.vts", make_curvilinear_grid(cells));
 }
 
 void grids_are_the_same_on_any_ranks(void **)
@@ -185,12 +185,13 @@ void grids_are_the_same_on_any_ranks(void **)
     write_grids({13, 10, 17});
     for (const std::string file : {"g.vti", "g.vtr", "g.vts"})
         for (const std::string yaml : {"points.yaml ", "cells.yaml "}) {
-            if (!test_is_whole() && (file == "g.vtr") != (yaml == "points.yaml ")) continue;
-            const std::string alone = draw(1, yaml + file);
-            for (const int ranks : {2, 3}) expect_same(draw(ranks, yaml + file), alone, file);
+            if (!test_is_long_run() && (file == "g.vtr") != (yaml == "points.yaml ")) continue;
+            const std::string alone = draw_file(1, yaml + file);
+            for (const int ranks : {2, 3}) expect_same(draw_file(ranks, yaml + file), alone, file);
         }
     for (const char *how : {"random", "checkerboard"})
-        expect_same(draw(3, std::string("--partition ") + how + " cells.yaml g.vti"), draw(1, "cells.yaml g.vti"), how);
+        expect_same(draw_file(3, std::string("--partition ") + how + " cells.yaml g.vti"),
+                    draw_file(1, "cells.yaml g.vti"), how);
 }
 
 /* Checks that the ranks together read each cell once, and that each rank's number of cells is near the mean. */
@@ -227,7 +228,7 @@ void ranks_read_parts_of_the_extent(void **)
 /* Writes the grid of an image as four blocks. Two of the blocks meet the others at different indices. */
 void write_blocks(const sizes &cells)
 {
-    const auto whole = image_of(cells);
+    const auto whole = make_image_grid(cells);
     auto *image = vtkImageData::SafeDownCast(whole);
     int e[6];
     image->GetExtent(e);
@@ -243,10 +244,10 @@ void write_blocks(const sizes &cells)
         block->Crop(parts[i]);
         blocks->SetBlock(i, block);
     }
-    write<vtkXMLMultiBlockDataWriter>("b.vtm", blocks);
+    write_data_object<vtkXMLMultiBlockDataWriter>("b.vtm", blocks);
 }
 
-double largest_difference(const std::string &a, const std::string &b)
+double compute_largest_difference(const std::string &a, const std::string &b)
 {
     double most = a.size() == b.size() ? 0 : 1;
     for (size_t i = 0; i < size_t{pixels} * 4 && most < 1; i++) {
@@ -263,14 +264,15 @@ void blocks_have_no_seam(void **)
     write_grids({13, 10, 17});
     write_blocks({13, 10, 17});
     for (const std::string yaml : {"cells.yaml ", "points.yaml "}) {
-        if (!test_is_whole() && yaml == "points.yaml ") continue;
-        const std::string whole = draw(1, yaml + "g.vti");
+        if (!test_is_long_run() && yaml == "points.yaml ") continue;
+        const std::string whole = draw_file(1, yaml + "g.vti");
         for (const int ranks : {1, 3, 5})
-            if (test_is_whole() || ranks < 5) expect_same(draw(ranks, yaml + "b.vtm"), whole, "b.vtm");
-        expect_same(draw(3, "--partition random " + yaml + "b.vtm"), whole, "random");
+            if (test_is_long_run() || ranks < 5) expect_same(draw_file(ranks, yaml + "b.vtm"), whole, "b.vtm");
+        expect_same(draw_file(3, "--partition random " + yaml + "b.vtm"), whole, "random");
     }
-    const std::string walls = draw(1, "walls.yaml g.vti");
-    for (const int ranks : {1, 3}) assert_true(largest_difference(draw(ranks, "walls.yaml b.vtm"), walls) < 1e-5);
+    const std::string walls = draw_file(1, "walls.yaml g.vti");
+    for (const int ranks : {1, 3})
+        assert_true(compute_largest_difference(draw_file(ranks, "walls.yaml b.vtm"), walls) < 1e-5);
 }
 
 /* ---- AMR --------------------------------------------------------------------------------------------------------- */
@@ -318,7 +320,7 @@ void write_amr(const std::array<int, 2> &ratios)
         amr->SetDataSet(b.level, number[b.level]++, grid);
         amr->SetRefinementRatio(b.level, b.level < 2 ? ratios[b.level] : 2);
     }
-    write<vtkXMLUniformGridAMRWriter>("levels.vthb", amr);
+    write_data_object<vtkXMLUniformGridAMRWriter>("levels.vthb", amr);
 }
 
 /* Counts the pixels in which the sphere's front is not visible. The surface in a cell differs from the sphere by at
@@ -344,12 +346,12 @@ void a_sphere_has_no_slits_between_levels(void **)
     for (const std::array<int, 2> &ratios : {std::array<int, 2>{2, 4}, std::array<int, 2>{4, 2}}) {
         write_amr(ratios);
         for (const std::string yaml : {"points.yaml ", "cells.yaml "}) {
-            if (!test_is_whole() && (ratios[0] == 2) != (yaml == "cells.yaml ")) continue;
-            const std::string alone = draw(1, yaml + "levels.vthb");
+            if (!test_is_long_run() && (ratios[0] == 2) != (yaml == "cells.yaml ")) continue;
+            const std::string alone = draw_file(1, yaml + "levels.vthb");
             assert_true(alone.size() == size_t{pixels} * 20);
             assert_int_equal(count_slits(alone), 0);
-            for (const int ranks : {2, 5}) expect_same(draw(ranks, yaml + "levels.vthb"), alone, yaml);
-            expect_same(draw(3, "--partition random " + yaml + "levels.vthb"), alone, "random");
+            for (const int ranks : {2, 5}) expect_same(draw_file(ranks, yaml + "levels.vthb"), alone, yaml);
+            expect_same(draw_file(3, "--partition random " + yaml + "levels.vthb"), alone, "random");
         }
     }
 }

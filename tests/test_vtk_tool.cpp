@@ -51,7 +51,7 @@ const char *const scene = "images:\n"
 
 /* Returns tets along x, beginning at `first`, each with its own points. The point field "x" is the point's x; the cell
  * field "number" counts the tets. */
-vtkSmartPointer<vtkUnstructuredGrid> row_of_tets(int count, int first = 0)
+vtkSmartPointer<vtkUnstructuredGrid> make_row_of_tets(int count, int first = 0)
 {
     auto grid = vtkSmartPointer<vtkUnstructuredGrid>::New();
     vtkNew<vtkPoints> points;
@@ -74,7 +74,7 @@ vtkSmartPointer<vtkUnstructuredGrid> row_of_tets(int count, int first = 0)
     return grid;
 }
 
-std::string path_of(const std::string &name)
+std::string make_path(const std::string &name)
 {
     return folder + "/" + name;
 }
@@ -82,7 +82,7 @@ std::string path_of(const std::string &name)
 void write_vtu(const std::string &name, vtkUnstructuredGrid *grid)
 {
     vtkNew<vtkXMLUnstructuredGridWriter> writer;
-    writer->SetFileName(path_of(name).c_str());
+    writer->SetFileName(make_path(name).c_str());
     writer->SetInputData(grid);
     assert_int_equal(writer->Write(), 1);
 }
@@ -106,23 +106,23 @@ void write_sheet()
     sheet->SetPolys(cells);
     sheet->GetPointData()->AddArray(height);
     vtkNew<vtkXMLPolyDataWriter> writer;
-    writer->SetFileName(path_of("sheet.vtp").c_str());
+    writer->SetFileName(make_path("sheet.vtp").c_str());
     writer->SetInputData(sheet);
     assert_int_equal(writer->Write(), 1);
 }
 
 int make_files(void **)
 {
-    folder = fresh_folder("vtk_tool");
-    write_file(path_of("scene.yaml"), scene);
-    write_vtu("row.vtu", row_of_tets(40));
-    write_vtu("row_2.vtu", row_of_tets(2));
-    write_vtu("row_10.vtu", row_of_tets(10));
-    write_vtu("empty.vtu", row_of_tets(0));
-    const std::string whole = read_file(path_of("row.vtu"));
-    write_file(path_of("cut.vtu"), whole.substr(0, whole.size() / 2));
-    write_file(path_of("notes.txt"), "no data");
-    write_file(path_of("pieces.pvtu"),
+    folder = make_empty_folder("vtk_tool");
+    write_file(make_path("scene.yaml"), scene);
+    write_vtu("row.vtu", make_row_of_tets(40));
+    write_vtu("row_2.vtu", make_row_of_tets(2));
+    write_vtu("row_10.vtu", make_row_of_tets(10));
+    write_vtu("empty.vtu", make_row_of_tets(0));
+    const std::string whole = read_file(make_path("row.vtu"));
+    write_file(make_path("cut.vtu"), whole.substr(0, whole.size() / 2));
+    write_file(make_path("notes.txt"), "no data");
+    write_file(make_path("pieces.pvtu"),
                "<VTKFile type=\"PUnstructuredGrid\" version=\"0.1\"><PUnstructuredGrid GhostLevel=\"0\">"
                "<PPointData><PDataArray type=\"Float32\" Name=\"x\"/></PPointData>"
                "<PCellData><PDataArray type=\"Float32\" Name=\"number\"/></PCellData>"
@@ -131,20 +131,20 @@ int make_files(void **)
                "</PUnstructuredGrid></VTKFile>\n");
 
     vtkNew<vtkUnstructuredGridWriter> legacy;
-    legacy->SetFileName(path_of("row.vtk").c_str());
-    legacy->SetInputData(row_of_tets(5));
+    legacy->SetFileName(make_path("row.vtk").c_str());
+    legacy->SetInputData(make_row_of_tets(5));
     assert_int_equal(legacy->Write(), 1);
 
     vtkNew<vtkMultiBlockDataSet> blocks;
-    blocks->SetBlock(0, row_of_tets(3));
-    blocks->SetBlock(1, row_of_tets(4));
+    blocks->SetBlock(0, make_row_of_tets(3));
+    blocks->SetBlock(1, make_row_of_tets(4));
     vtkNew<vtkXMLMultiBlockDataWriter> writer;
-    writer->SetFileName(path_of("blocks.vtm").c_str());
+    writer->SetFileName(make_path("blocks.vtm").c_str());
     writer->SetInputData(blocks);
     assert_int_equal(writer->Write(), 1);
 
     vtkNew<vtkUnstructuredGrid> flat;
-    flat->SetPoints(row_of_tets(1)->GetPoints());
+    flat->SetPoints(make_row_of_tets(1)->GetPoints());
     const vtkIdType line[] = {0, 1};
     flat->InsertNextCell(VTK_LINE, 2, line);
     write_vtu("flat.vtu", flat);
@@ -154,167 +154,169 @@ int make_files(void **)
 
 run_result run_tool(const std::string &arguments)
 {
-    return run_in(folder, shell_word(tool) + " " + arguments);
+    return run_in_folder(folder, quote_for_shell(tool) + " " + arguments);
 }
 
 run_result run_ranks(int ranks, const std::string &arguments)
 {
-    return run_in(folder,
-                  shell_word(mpiexec) + " -n " + std::to_string(ranks) + " " + shell_word(tool) + " " + arguments);
+    return run_in_folder(folder, quote_for_shell(mpiexec) + " -n " + std::to_string(ranks) + " " +
+                                     quote_for_shell(tool) + " " + arguments);
 }
 
-void expect(const run_result &r, int status, const std::string &text)
+void expect_result(const run_result &r, int status, const std::string &text)
 {
-    if (r.status == status && r.says(text)) return;
+    if (r.status == status && r.contains_text(text)) return;
     print_error("status %d, expected %d with '%s'\n%s%s", r.status, status, text.c_str(), r.out.c_str(), r.err.c_str());
     assert_true(false);
 }
 
-int count_of(const std::string &text, const std::string &what)
+int count_occurrences(const std::string &text, const std::string &what)
 {
     int count = 0;
     for (size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) count++;
     return count;
 }
 
-void help_explains_itself(void **)
+void help_lists_the_options(void **)
 {
     const run_result r = run_tool("--help");
-    expect(r, 0, "usage: insitu-render");
+    expect_result(r, 0, "usage: insitu-render");
     for (const char *option : {"--info", "--steps", "--pieces", "--partition", "--help", ".vtu", ".vtm"})
-        assert_true(r.says(option));
+        assert_true(r.contains_text(option));
     assert_string_equal(r.err.c_str(), "");
 }
 
 void info_lists_what_is_in_a_file(void **)
 {
     const run_result r = run_tool("--info row.vtu");
-    expect(r, 0, "40 cells, 160 points (float)");
-    assert_true(r.says("Tetra"));
-    assert_true(r.says("bounds 0 .. 40, 0 .. 1, 0 .. 1"));
-    assert_true(r.says("point  x "));
-    assert_true(r.says("0 .. 40\n"));
-    assert_true(r.says("cell   number"));
-    assert_true(r.says("0 .. 39\n"));
+    expect_result(r, 0, "40 cells, 160 points (float)");
+    assert_true(r.contains_text("Tetra"));
+    assert_true(r.contains_text("bounds 0 .. 40, 0 .. 1, 0 .. 1"));
+    assert_true(r.contains_text("point  x "));
+    assert_true(r.contains_text("0 .. 40\n"));
+    assert_true(r.contains_text("cell   number"));
+    assert_true(r.contains_text("0 .. 39\n"));
 }
 
 /* VTK 9.1 has other names for these cell types. */
 void info_names_cells_of_higher_order(void **)
 {
     vtkNew<vtkUnstructuredGrid> grid;
-    grid->SetPoints(row_of_tets(1)->GetPoints());
+    grid->SetPoints(make_row_of_tets(1)->GetPoints());
     const vtkIdType ids[] = {0, 1, 2, 3};
     grid->InsertNextCell(VTK_LAGRANGE_TETRAHEDRON, 4, ids);
     grid->InsertNextCell(VTK_BEZIER_TETRAHEDRON, 4, ids);
     write_vtu("orders.vtu", grid);
     const run_result r = run_tool("--info orders.vtu");
-    expect(r, 0, "cells  LagrangeTetrahedron      type 71  1\n");
-    expect(r, 0, "cells  BezierTetrahedron        type 78  1\n");
+    expect_result(r, 0, "cells  LagrangeTetrahedron      type 71  1\n");
+    expect_result(r, 0, "cells  BezierTetrahedron        type 78  1\n");
 }
 
 void info_reads_every_kind(void **)
 {
-    expect(run_tool("--info pieces.pvtu"), 0, "52 cells");
-    expect(run_tool("--info blocks.vtm"), 0, "2 blocks, 7 cells");
-    expect(run_tool("--info row.vtk"), 0, "5 cells");
-    expect(run_ranks(2, "--info row.vtk"), 0, "5 cells");
+    expect_result(run_tool("--info pieces.pvtu"), 0, "52 cells");
+    expect_result(run_tool("--info blocks.vtm"), 0, "2 blocks, 7 cells");
+    expect_result(run_tool("--info row.vtk"), 0, "5 cells");
+    expect_result(run_ranks(2, "--info row.vtk"), 0, "5 cells");
 }
 
 void wrong_files_are_named_with_the_reason(void **)
 {
-    expect(run_tool("scene.yaml missing.vtu"), 1, "insitu-render: missing.vtu: No such file");
-    expect(run_tool("scene.yaml notes.txt"), 1, "insitu-render: notes.txt: unknown ending");
-    expect(run_tool("scene.yaml ."), 1, "is a directory");
-    expect(run_tool("--info cut.vtu"), 1, "insitu-render: cut.vtu: is cut short");
-    expect(run_tool("missing.vtu"), 1, "insitu-render: missing.vtu: No such file");
-    expect(run_tool("missing.vtu row.vtu"), 1, "insitu-render: missing.vtu: No such file");
-    expect(run_tool("notes.txt"), 1, "insitu-render: notes.txt: unknown ending");
-    expect(run_tool("."), 1, "insitu-render: .: is a directory");
-    expect(run_tool("--info missing.vtu"), 1, "insitu-render: missing.vtu: No such file");
+    expect_result(run_tool("scene.yaml missing.vtu"), 1, "insitu-render: missing.vtu: No such file");
+    expect_result(run_tool("scene.yaml notes.txt"), 1, "insitu-render: notes.txt: unknown ending");
+    expect_result(run_tool("scene.yaml ."), 1, "is a directory");
+    expect_result(run_tool("--info cut.vtu"), 1, "insitu-render: cut.vtu: is cut short");
+    expect_result(run_tool("missing.vtu"), 1, "insitu-render: missing.vtu: No such file");
+    expect_result(run_tool("missing.vtu row.vtu"), 1, "insitu-render: missing.vtu: No such file");
+    expect_result(run_tool("notes.txt"), 1, "insitu-render: notes.txt: unknown ending");
+    expect_result(run_tool("."), 1, "insitu-render: .: is a directory");
+    expect_result(run_tool("--info missing.vtu"), 1, "insitu-render: missing.vtu: No such file");
 }
 
 void errors_are_one_line(void **)
 {
     const run_result r = run_tool("--info cut.vtu");
     assert_int_equal(r.status, 1);
-    assert_int_equal(count_of(r.err, "\n"), 1);
+    assert_int_equal(count_occurrences(r.err, "\n"), 1);
     assert_string_equal(r.out.c_str(), "");
 }
 
 void wrong_options_are_named(void **)
 {
-    expect(run_tool("--fast"), 1, "insitu-render: --fast: unknown option; see insitu-render --help");
-    expect(run_tool("--filed x row.vtu"), 1, "--filed: unknown option (did you mean --field?)");
-    expect(run_tool("--step=0 row.vtu"), 1, "--step: unknown option (did you mean --steps?)");
-    expect(run_tool("--output x.png row.vtu"), 1,
-           "--output: unknown option (pictures go where the scene's outputs say");
-    expect(run_tool("-o x.png row.vtu"), 1, "-o: unknown option (pictures go where the scene's outputs say");
-    expect(run_tool("--scene scene.yaml row.vtu"), 1, "--scene: unknown option (the scene is given without an option");
-    expect(run_tool("--ranks 2 row.vtu"), 1, "--ranks: unknown option (ranks are mpirun's");
-    expect(run_tool("--colormap viridis row.vtu"), 1, "unknown option (what is drawn is said by a scene file");
-    expect(run_tool("--size 64x48 scene.yaml row.vtu"), 1, "--size: given with the scene file scene.yaml");
-    expect(run_tool("scene.yaml row.vtu scene.yaml"), 1, "scene.yaml: a second scene file beside scene.yaml");
-    expect(run_tool("--info scene.yaml"), 1, "scene.yaml: is a scene file, expected data");
-    expect(run_tool("--pieces=some scene.yaml row.vtu"), 1, "--pieces = some");
-    expect(run_tool("--steps 3:1 scene.yaml row.vtu"), 1, "the first step is after the last");
-    expect(run_tool("--steps x scene.yaml row.vtu"), 1, "--steps x: expected");
-    expect(run_tool("--steps 4: scene.yaml row.vtu"), 1, "none chosen of 1");
-    expect(run_tool("--partition round scene.yaml row.vtu"), 1, "--partition round: expected");
-    expect(run_tool("--steps"), 1, "--steps: 1 required A:B missing");
-    expect(run_tool(""), 1, "missing");
-    expect(run_tool("scene.yaml"), 1, "data files are missing");
-    expect(run_tool("--size 3 row.vtu"), 1, "--size 3: expected WIDTHxHEIGHT");
-    expect(run_tool("--size 0x9 row.vtu"), 1, "--size 0x9: expected WIDTHxHEIGHT");
-    expect(run_tool("--camera 0,0,0 row.vtu"), 1, "--camera 0,0,0: expected X,Y,Z");
-    expect(run_tool("--field none row.vtu"), 1,
-           "insitu-render: --field none: no mesh has the field \"none\"; there are");
-    expect(run_tool("--size 64x48 --camera 1,2,3 row.vtu"), 0, "1 step, 1 picture");
-    expect(run_tool("row.vtu scene.yaml"), 0, "1 step, 1 picture");
+    expect_result(run_tool("--fast"), 1, "insitu-render: --fast: unknown option; see insitu-render --help");
+    expect_result(run_tool("--filed x row.vtu"), 1, "--filed: unknown option (did you mean --field?)");
+    expect_result(run_tool("--step=0 row.vtu"), 1, "--step: unknown option (did you mean --steps?)");
+    expect_result(run_tool("--output x.png row.vtu"), 1,
+                  "--output: unknown option (pictures go where the scene's outputs say");
+    expect_result(run_tool("-o x.png row.vtu"), 1, "-o: unknown option (pictures go where the scene's outputs say");
+    expect_result(run_tool("--scene scene.yaml row.vtu"), 1,
+                  "--scene: unknown option (the scene is given without an option");
+    expect_result(run_tool("--ranks 2 row.vtu"), 1, "--ranks: unknown option (ranks are mpirun's");
+    expect_result(run_tool("--colormap viridis row.vtu"), 1, "unknown option (what is drawn is said by a scene file");
+    expect_result(run_tool("--size 64x48 scene.yaml row.vtu"), 1, "--size: given with the scene file scene.yaml");
+    expect_result(run_tool("scene.yaml row.vtu scene.yaml"), 1, "scene.yaml: a second scene file beside scene.yaml");
+    expect_result(run_tool("--info scene.yaml"), 1, "scene.yaml: is a scene file, expected data");
+    expect_result(run_tool("--pieces=some scene.yaml row.vtu"), 1, "--pieces = some");
+    expect_result(run_tool("--steps 3:1 scene.yaml row.vtu"), 1, "the first step is after the last");
+    expect_result(run_tool("--steps x scene.yaml row.vtu"), 1, "--steps x: expected");
+    expect_result(run_tool("--steps 4: scene.yaml row.vtu"), 1, "none chosen of 1");
+    expect_result(run_tool("--partition round scene.yaml row.vtu"), 1, "--partition round: expected");
+    expect_result(run_tool("--steps"), 1, "--steps: 1 required A:B missing");
+    expect_result(run_tool(""), 1, "missing");
+    expect_result(run_tool("scene.yaml"), 1, "data files are missing");
+    expect_result(run_tool("--size 3 row.vtu"), 1, "--size 3: expected WIDTHxHEIGHT");
+    expect_result(run_tool("--size 0x9 row.vtu"), 1, "--size 0x9: expected WIDTHxHEIGHT");
+    expect_result(run_tool("--camera 0,0,0 row.vtu"), 1, "--camera 0,0,0: expected X,Y,Z");
+    expect_result(run_tool("--field none row.vtu"), 1,
+                  "insitu-render: --field none: no mesh has the field \"none\"; there are");
+    expect_result(run_tool("--size 64x48 --camera 1,2,3 row.vtu"), 0, "1 step, 1 picture");
+    expect_result(run_tool("row.vtu scene.yaml"), 0, "1 step, 1 picture");
 }
 
 /* Only one rank is given a file that does not exist, so it alone fails while the others continue to collective
  * calls. */
-void one_rank_failing_ends_all(void **)
+void failure_on_one_rank_stops_all_ranks(void **)
 {
-    const std::string start =
-        shell_word(mpiexec) + " -n 2 " + shell_word(tool) + " scene.yaml row.vtu : -n 1 " + shell_word(tool);
-    expect(run_in(folder, start + " scene.yaml missing.vtu"), 1, "insitu-render: missing.vtu: No such file");
+    const std::string start = quote_for_shell(mpiexec) + " -n 2 " + quote_for_shell(tool) +
+                              " scene.yaml row.vtu : -n 1 " + quote_for_shell(tool);
+    expect_result(run_in_folder(folder, start + " scene.yaml missing.vtu"), 1,
+                  "insitu-render: missing.vtu: No such file");
 }
 
-void one_rank_failing_to_read_ends_all(void **)
+void read_failure_on_one_rank_stops_all_ranks(void **)
 {
-    const std::string start =
-        shell_word(mpiexec) + " -n 2 " + shell_word(tool) + " scene.yaml row.vtu : -n 1 " + shell_word(tool);
-    expect(run_in(folder, start + " scene.yaml cut.vtu"), 1, "insitu-render: cut.vtu: is cut short");
-    expect(run_ranks(3, "scene.yaml cut.vtu"), 1, "insitu-render: cut.vtu: is cut short");
+    const std::string start = quote_for_shell(mpiexec) + " -n 2 " + quote_for_shell(tool) +
+                              " scene.yaml row.vtu : -n 1 " + quote_for_shell(tool);
+    expect_result(run_in_folder(folder, start + " scene.yaml cut.vtu"), 1, "insitu-render: cut.vtu: is cut short");
+    expect_result(run_ranks(3, "scene.yaml cut.vtu"), 1, "insitu-render: cut.vtu: is cut short");
 }
 
 void surface_meshes_are_drawn(void **)
 {
-    expect(run_tool("--info sheet.vtp"), 0, "sheet.vtp: vtkPolyData, 17 cells");
-    const std::string two = shell_word(mpiexec) + " -n 2 ", options = " --field height sheet.vtp";
+    expect_result(run_tool("--info sheet.vtp"), 0, "sheet.vtp: vtkPolyData, 17 cells");
+    const std::string two = quote_for_shell(mpiexec) + " -n 2 ", options = " --field height sheet.vtp";
     for (const std::string &start : {std::string(), two}) {
-        expect(run_in(folder, start + shell_word(real_tool) + options), 0, "17 cells");
-        assert_int_equal(read_file(path_of("sheet_0000.png")).compare(1, 3, "PNG"), 0);
-        std::filesystem::remove(path_of("sheet_0000.png"));
+        expect_result(run_in_folder(folder, start + quote_for_shell(real_tool) + options), 0, "17 cells");
+        assert_int_equal(read_file(make_path("sheet_0000.png")).compare(1, 3, "PNG"), 0);
+        std::filesystem::remove(make_path("sheet_0000.png"));
     }
 }
 
 /* Checks the names of pictures drawn without a scene, for files of one name in several folders or with several
  * extensions, and for long names with a common prefix. If a file is drawn again, its pictures must have the same
  * names. */
-void default_pictures_of_two_files_are_two(void **)
+void default_pictures_of_two_files_have_two_names(void **)
 {
     namespace fs = std::filesystem;
-    const fs::path here = path_of("names");
+    const fs::path here = make_path("names");
     const std::string begin(70, 'n');
     const char *const ways[] = {"one/sheet.vtp", "two/sheet.vtp", "sheet.vtp"};
     fs::remove_all(here);
     for (const char *way : {"one", "two", "three"}) fs::create_directories(here / way);
-    for (const char *way : ways) fs::copy_file(path_of("sheet.vtp"), here / way);
-    for (const char *end : {"a.vtp", "b.vtp"}) fs::copy_file(path_of("sheet.vtp"), here / (begin + end));
-    fs::copy_file(path_of("sheet.vtp"), here / "three/row.vtp");
-    fs::copy_file(path_of("row.vtu"), here / "three/row.vtu");
+    for (const char *way : ways) fs::copy_file(make_path("sheet.vtp"), here / way);
+    for (const char *end : {"a.vtp", "b.vtp"}) fs::copy_file(make_path("sheet.vtp"), here / (begin + end));
+    fs::copy_file(make_path("sheet.vtp"), here / "three/row.vtp");
+    fs::copy_file(make_path("row.vtu"), here / "three/row.vtu");
     const auto count = [&] {
         return std::count_if(fs::directory_iterator(here), fs::directory_iterator(),
                              [](const fs::directory_entry &e) { return e.path().extension() == ".png"; });
@@ -323,73 +325,74 @@ void default_pictures_of_two_files_are_two(void **)
     for (const std::string &file : {std::string(ways[0]), std::string(ways[1]), std::string(ways[2]), begin + "a.vtp",
                                     begin + "b.vtp", std::string("three/row.vtp"), std::string("three/row.vtu")}) {
         for (int turn = 0; turn < 2; turn++)
-            expect(run_in(here, shell_word(tool) + " --size 32x24 " + file), 0, "1 picture");
+            expect_result(run_in_folder(here, quote_for_shell(tool) + " --size 32x24 " + file), 0, "1 picture");
         assert_int_equal(count(), ++drawn);
     }
     assert_true(fs::exists(here / "sheet_0000.png"));
 }
 
-void nothing_to_draw_is_an_error(void **)
+void empty_input_is_an_error(void **)
 {
-    expect(run_tool("scene.yaml empty.vtu"), 1, "insitu-render: empty.vtu: no cells to draw");
-    expect(run_tool("scene.yaml flat.vtu"), 1, "flat.vtu: no cells to draw; 1 points and lines");
-    expect(run_ranks(2, "scene.yaml empty.vtu"), 1, "empty.vtu: no cells to draw");
+    expect_result(run_tool("scene.yaml empty.vtu"), 1, "insitu-render: empty.vtu: no cells to draw");
+    expect_result(run_tool("scene.yaml flat.vtu"), 1, "flat.vtu: no cells to draw; 1 points and lines");
+    expect_result(run_ranks(2, "scene.yaml empty.vtu"), 1, "empty.vtu: no cells to draw");
 }
 
 void wrong_scenes_are_errors(void **)
 {
-    expect(run_tool("missing.yaml row.vtu"), 1, "missing.yaml");
-    write_file(path_of("wrong.yaml"), "images:\n  - nmae: a\n");
-    expect(run_tool("wrong.yaml row.vtu"), 1, "nmae");
+    expect_result(run_tool("missing.yaml row.vtu"), 1, "missing.yaml");
+    write_file(make_path("wrong.yaml"), "images:\n  - nmae: a\n");
+    expect_result(run_tool("wrong.yaml row.vtu"), 1, "nmae");
 }
 
 void several_files_are_steps_in_the_order_of_their_numbers(void **)
 {
     const run_result r = run_tool("scene.yaml row_10.vtu row_2.vtu");
-    expect(r, 0, "2 steps, 2 pictures");
+    expect_result(r, 0, "2 steps, 2 pictures");
     assert_true(r.out.find("row_2.vtu  cycle 0") < r.out.find("row_10.vtu  cycle 1"));
-    assert_int_equal(read_file(path_of("a_00.exr")).empty(), 0);
-    assert_int_equal(read_file(path_of("a_01.exr")).empty(), 0);
+    assert_int_equal(read_file(make_path("a_00.exr")).empty(), 0);
+    assert_int_equal(read_file(make_path("a_01.exr")).empty(), 0);
 }
 
 void chosen_steps_keep_their_cycles(void **)
 {
     const run_result r = run_tool("--steps 1 scene.yaml row_2.vtu row_10.vtu");
-    expect(r, 0, "row_10.vtu  cycle 1");
-    assert_int_equal(count_of(r.out, "cycle"), 1);
+    expect_result(r, 0, "row_10.vtu  cycle 1");
+    assert_int_equal(count_occurrences(r.out, "cycle"), 1);
 }
 
-vtkSmartPointer<vtkUnstructuredGrid> row_without_x(int count, int first = 0)
+vtkSmartPointer<vtkUnstructuredGrid> make_row_without_x(int count, int first = 0)
 {
-    auto grid = row_of_tets(count, first);
+    auto grid = make_row_of_tets(count, first);
     grid->GetPointData()->RemoveArray("x");
     return grid;
 }
 
-void a_field_that_begins_later_leaves_out_the_first_steps(void **)
+void steps_before_the_first_value_of_a_field_are_skipped(void **)
 {
-    write_vtu("late_0.vtu", row_without_x(3));
-    write_vtu("late_1.vtu", row_of_tets(3));
-    write_vtu("late_2.vtu", row_of_tets(3));
+    write_vtu("late_0.vtu", make_row_without_x(3));
+    write_vtu("late_1.vtu", make_row_of_tets(3));
+    write_vtu("late_2.vtu", make_row_of_tets(3));
     const run_result r = run_tool("scene.yaml late_0.vtu late_1.vtu late_2.vtu");
-    expect(r, 0, "3 steps, 2 pictures");
-    expect(r, 0, "late_0.vtu: not drawn: scene.yaml:6: no mesh has the field \"x\"");
-    expect(run_tool("scene.yaml late_0.vtu late_0.vtu"), 1, "insitu-render: scene.yaml:6: no mesh has the field");
+    expect_result(r, 0, "3 steps, 2 pictures");
+    expect_result(r, 0, "late_0.vtu: not drawn: scene.yaml:6: no mesh has the field \"x\"");
+    expect_result(run_tool("scene.yaml late_0.vtu late_0.vtu"), 1,
+                  "insitu-render: scene.yaml:6: no mesh has the field");
 }
 
 /* Checks that the default field is one that the first and the last step have, or otherwise one of the last step. */
 void default_field_is_one_that_the_last_step_has(void **)
 {
-    auto with_y = row_without_x(3);
+    auto with_y = make_row_without_x(3);
     with_y->GetCellData()->GetArray("number")->SetName("y");
-    write_vtu("with_x.vtu", row_of_tets(3));
-    write_vtu("without.vtu", row_without_x(3));
+    write_vtu("with_x.vtu", make_row_of_tets(3));
+    write_vtu("without.vtu", make_row_without_x(3));
     write_vtu("with_y.vtu", with_y);
-    expect(run_tool("with_x.vtu without.vtu"), 0, "2 steps, 2 pictures");
+    expect_result(run_tool("with_x.vtu without.vtu"), 0, "2 steps, 2 pictures");
     const run_result later = run_tool("with_y.vtu with_x.vtu with_x.vtu");
-    expect(later, 0, "3 steps, 2 pictures");
-    expect(later, 0, "with_y.vtu: not drawn: no mesh has the field \"x\"; there are");
-    expect(run_tool("with_x.vtu without.vtu with_x.vtu"), 0, "; other steps have it, and --field takes another");
+    expect_result(later, 0, "3 steps, 2 pictures");
+    expect_result(later, 0, "with_y.vtu: not drawn: no mesh has the field \"x\"; there are");
+    expect_result(run_tool("with_x.vtu without.vtu with_x.vtu"), 0, "; other steps have it, and --field takes another");
 }
 
 /* Checks that, without a scene, all steps of a series share the scale of values and the camera: a small step is drawn
@@ -398,7 +401,7 @@ void default_field_is_one_that_the_last_step_has(void **)
 void a_series_has_one_scale_and_one_camera(void **)
 {
     for (const auto &[name, count] : {std::pair{"grow_0.vtu", 2}, {"grow_1.vtu", 9}, {"grow_2.vtu", 2}}) {
-        auto row = row_of_tets(count);
+        auto row = make_row_of_tets(count);
         vtkNew<vtkDoubleArray> time;
         time->SetName("TimeValue");
         time->InsertNextValue(1);
@@ -406,9 +409,9 @@ void a_series_has_one_scale_and_one_camera(void **)
         write_vtu(name, row);
     }
     const auto first_picture = [](const std::string &others, int ranks) {
-        std::filesystem::remove(path_of("grow_0_0000.png"));
-        expect(run_ranks(ranks, "--size 96x64 grow_0.vtu " + others), 0, " pictures");
-        const std::string picture = read_file(path_of("grow_0_0000.png"));
+        std::filesystem::remove(make_path("grow_0_0000.png"));
+        expect_result(run_ranks(ranks, "--size 96x64 grow_0.vtu " + others), 0, " pictures");
+        const std::string picture = read_file(make_path("grow_0_0000.png"));
         assert_false(picture.empty());
         return picture;
     };
@@ -421,7 +424,7 @@ void a_series_has_one_scale_and_one_camera(void **)
  * same on any number of ranks. */
 void pieces_that_differ_are_drawn_the_same_on_any_ranks(void **)
 {
-    auto wide = row_of_tets(4), more = row_of_tets(2, 10);
+    auto wide = make_row_of_tets(4), more = make_row_of_tets(2, 10);
     vtkNew<vtkDoubleArray> x;
     x->DeepCopy(wide->GetPointData()->GetArray("x"));
     x->SetName("x");
@@ -431,9 +434,9 @@ void pieces_that_differ_are_drawn_the_same_on_any_ranks(void **)
     other->SetName("other");
     more->GetPointData()->AddArray(other);
     write_vtu("wide.vtu", wide);
-    write_vtu("none.vtu", row_without_x(6, 4));
+    write_vtu("none.vtu", make_row_without_x(6, 4));
     write_vtu("more.vtu", more);
-    write_file(path_of("differ.pvtu"),
+    write_file(make_path("differ.pvtu"),
                "<VTKFile type=\"PUnstructuredGrid\" version=\"0.1\"><PUnstructuredGrid GhostLevel=\"0\">"
                "<PPointData><PDataArray type=\"Float32\" Name=\"x\"/></PPointData>"
                "<PCellData><PDataArray type=\"Float32\" Name=\"number\"/></PCellData>\n"
@@ -442,24 +445,24 @@ void pieces_that_differ_are_drawn_the_same_on_any_ranks(void **)
     std::string first;
     for (const int ranks : {1, 3}) {
         const run_result r = run_ranks(ranks, "scene.yaml differ.pvtu");
-        expect(r, 0, "1 step, 1 picture");
-        expect(r, 0, "wide.vtu: its field \"x\" is of type Float64, declared as Float32");
-        expect(r, 0, "none.vtu: has no field \"x\"");
-        expect(r, 0, "more.vtu: has a field \"other\"");
-        const std::string picture = read_file(path_of("a_00.exr"));
+        expect_result(r, 0, "1 step, 1 picture");
+        expect_result(r, 0, "wide.vtu: its field \"x\" is of type Float64, declared as Float32");
+        expect_result(r, 0, "none.vtu: has no field \"x\"");
+        expect_result(r, 0, "more.vtu: has a field \"other\"");
+        const std::string picture = read_file(make_path("a_00.exr"));
         if (ranks == 1) first = picture;
         assert_true(picture == first && !picture.empty());
     }
 }
 
 /* Checks that all cells are present for each way of reading and distributing them. */
-void every_way_of_reading_gives_all_cells(void **)
+void every_distribution_mode_reads_all_cells(void **)
 {
     for (const int ranks : {2, 4}) {
-        expect(run_ranks(ranks, "scene.yaml pieces.pvtu"), 0, "  52 cells");
-        expect(run_ranks(ranks, "scene.yaml blocks.vtm"), 0, "  7 cells");
-        expect(run_ranks(ranks, "--partition random scene.yaml row.vtu"), 0, "  40 cells");
-        expect(run_ranks(ranks, "--pieces scene.yaml row.vtu row_2.vtu row_10.vtu"), 0, "  52 cells");
+        expect_result(run_ranks(ranks, "scene.yaml pieces.pvtu"), 0, "  52 cells");
+        expect_result(run_ranks(ranks, "scene.yaml blocks.vtm"), 0, "  7 cells");
+        expect_result(run_ranks(ranks, "--partition random scene.yaml row.vtu"), 0, "  40 cells");
+        expect_result(run_ranks(ranks, "--pieces scene.yaml row.vtu row_2.vtu row_10.vtu"), 0, "  52 cells");
     }
 }
 
@@ -472,26 +475,26 @@ int main(int argc, char **argv)
     tool = argv[2];
     mpiexec = argv[3];
     const CMUnitTest tests[] = {
-        cmocka_unit_test(help_explains_itself),
+        cmocka_unit_test(help_lists_the_options),
         cmocka_unit_test(info_lists_what_is_in_a_file),
         cmocka_unit_test(info_names_cells_of_higher_order),
         cmocka_unit_test(info_reads_every_kind),
         cmocka_unit_test(wrong_files_are_named_with_the_reason),
         cmocka_unit_test(errors_are_one_line),
         cmocka_unit_test(wrong_options_are_named),
-        cmocka_unit_test(one_rank_failing_ends_all),
-        cmocka_unit_test(one_rank_failing_to_read_ends_all),
-        cmocka_unit_test(default_pictures_of_two_files_are_two),
-        cmocka_unit_test(nothing_to_draw_is_an_error),
+        cmocka_unit_test(failure_on_one_rank_stops_all_ranks),
+        cmocka_unit_test(read_failure_on_one_rank_stops_all_ranks),
+        cmocka_unit_test(default_pictures_of_two_files_have_two_names),
+        cmocka_unit_test(empty_input_is_an_error),
         cmocka_unit_test(surface_meshes_are_drawn),
         cmocka_unit_test(wrong_scenes_are_errors),
         cmocka_unit_test(several_files_are_steps_in_the_order_of_their_numbers),
         cmocka_unit_test(chosen_steps_keep_their_cycles),
-        cmocka_unit_test(a_field_that_begins_later_leaves_out_the_first_steps),
+        cmocka_unit_test(steps_before_the_first_value_of_a_field_are_skipped),
         cmocka_unit_test(default_field_is_one_that_the_last_step_has),
         cmocka_unit_test(a_series_has_one_scale_and_one_camera),
         cmocka_unit_test(pieces_that_differ_are_drawn_the_same_on_any_ranks),
-        cmocka_unit_test(every_way_of_reading_gives_all_cells),
+        cmocka_unit_test(every_distribution_mode_reads_all_cells),
     };
     return cmocka_run_group_tests(tests, make_files, nullptr);
 }

@@ -18,7 +18,7 @@ static const char scene_words[] = "images:\n  - {name: a, size: [1280, 720], bac
                                   "[isosurface: {field: x, values: [0.4]}],\n"
                                   "     outputs: [{path: '%s/{cycle}.png'}]}\n";
 
-static insitu_status draw(const char *folder, insitu_session **session)
+static insitu_status draw_two_steps(const char *folder, insitu_session **session)
 {
     static const float corners[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
                                         {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
@@ -47,11 +47,11 @@ static insitu_status draw(const char *folder, insitu_session **session)
 }
 
 /* Runs a simulation, and then ends in the way that `end` names. */
-static int run(const char *end, const char *folder)
+static int run_and_end(const char *end, const char *folder)
 {
     static insitu_session *session; /* static, so that a run that ends without insitu_destroy() has no leak */
     MPI_Init(NULL, NULL);
-    if (draw(folder, &session) != INSITU_OK) {
+    if (draw_two_steps(folder, &session) != INSITU_OK) {
         fprintf(stderr, "%s: %s\n", end, insitu_error(session));
         return 1;
     }
@@ -64,7 +64,7 @@ static int run(const char *end, const char *folder)
 }
 
 /* Returns whether a PNG is complete, from its first bytes to its last chunk. */
-static int is_whole_png(const char *path)
+static int is_complete_png(const char *path)
 {
     static const unsigned char begin[8] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'}, end[4] = {'I', 'E', 'N', 'D'};
     unsigned char first[8], last[8];
@@ -84,13 +84,13 @@ static int count_pictures(const char *folder)
         struct stat found;
         snprintf(path, sizeof path, "%s/%d.png", folder, cycle);
         if (stat(path, &found) != 0) continue;
-        count = count < 0 || !is_whole_png(path) ? -1 : count + 1;
+        count = count < 0 || !is_complete_png(path) ? -1 : count + 1;
         unlink(path);
     }
     return count;
 }
 
-static int status_of(const char *program, const char *end, const char *folder)
+static int get_exit_status(const char *program, const char *end, const char *folder)
 {
     const pid_t child = fork();
     int status = -1;
@@ -105,7 +105,7 @@ static int status_of(const char *program, const char *end, const char *folder)
 int main(int argc, char **argv)
 {
     static const char *const ends[] = {"destroy", "finalize", "return", "exit", "killed"};
-    if (argc == 3 && strchr(argv[2], '/')) return run(argv[1], argv[2]);
+    if (argc == 3 && strchr(argv[2], '/')) return run_and_end(argv[1], argv[2]);
     char folder[2048];
     int failed = 0;
     snprintf(folder, sizeof folder, "%s/writer_end", argc > 1 ? argv[1] : ".");
@@ -113,7 +113,7 @@ int main(int argc, char **argv)
     count_pictures(folder);
     for (int i = 0; i < 5; i++) {
         const int is_killed = strcmp(ends[i], "killed") == 0;
-        const int status = status_of(argv[0], ends[i], folder), count = count_pictures(folder);
+        const int status = get_exit_status(argv[0], ends[i], folder), count = count_pictures(folder);
         const int is_well = is_killed ? WIFSIGNALED(status) && count >= 0 : status == 0 && count == PICTURES;
         /* Open MPI's own handler replaces the status of an exit() without MPI_Finalize(). */
         const int is_exit_well = strcmp(ends[i], "exit") == 0 && WIFEXITED(status) && count == PICTURES;

@@ -12,14 +12,14 @@ typedef enum accuracy_opacity {
     ACCURACY_EXTINCTION /* extinction that is linear between the knots: VTK's mappers of unstructured grids */
 } accuracy_opacity;
 
-typedef struct accuracy_truth accuracy_truth;
+typedef struct accuracy_reference accuracy_reference;
 
 /* Chooses one pixel in each block of block × block pixels. The subject is borrowed, and its tree must have been
  * built. */
-accuracy_truth *accuracy_truth_create(const accuracy_subject *subject, int block);
-void accuracy_truth_free(accuracy_truth *truth);
+accuracy_reference *accuracy_reference_create(const accuracy_subject *subject, int block);
+void accuracy_reference_free(accuracy_reference *truth);
 
-const bench_pixels *accuracy_truth_pixels(const accuracy_truth *truth);
+const bench_pixels *accuracy_reference_pixels(const accuracy_reference *truth);
 
 typedef struct accuracy_error {
     /* Number of chosen pixels whose true value is not empty, except rays through polyhedra that even the reference
@@ -36,7 +36,7 @@ typedef struct accuracy_error {
 } accuracy_error;
 
 /* These compute the error of a picture from its values in the chosen pixels; rgba: count × 4. */
-accuracy_error accuracy_volume_error(const accuracy_truth *truth, accuracy_opacity meaning, const float *rgba);
-accuracy_error accuracy_surface_error(const accuracy_truth *truth, const double *depths);
+accuracy_error accuracy_volume_error(const accuracy_reference *truth, accuracy_opacity meaning, const float *rgba);
+accuracy_error accuracy_surface_error(const accuracy_reference *truth, const double *depths);
 
 #endif

@@ -1,7 +1,7 @@
 /* Computes the true values. The adaptive integral takes only opacities. Extinctions that are linear between the knots
  * are given as a dense table of opacities: between points at a distance of 1/256 of a knot's interval, 1 - exp(-e)
  * differs from its chord by at most (ln 2 / 256)^2 / 8 = 9.2e-7 of opacity. */
-#include "accuracy_truth.h"
+#include "accuracy_reference.h"
 
 #include <stdlib.h>
 
@@ -13,7 +13,7 @@ enum { DENSE = 256, DENSE_POINTS = (ACCURACY_KNOTS - 1) * DENSE + 1 };
  * a channel. */
 static const double tolerance = 1e-10;
 
-struct accuracy_truth {
+struct accuracy_reference {
     const accuracy_subject *subject;
     bench_pixels *pixels;
     int count;
@@ -24,7 +24,7 @@ struct accuracy_truth {
     reference_ray *rays; /* count elements */
 };
 
-static void *must(void *p)
+static void *require_memory(void *p)
 {
     if (!p) abort();
     return p;
@@ -32,16 +32,16 @@ static void *must(void *p)
 
 static const float nothing[4] = {0, 0, 0, 0};
 
-static void trace_surface(accuracy_truth *t)
+static void trace_surface(accuracy_reference *t)
 {
-    accuracy_scene_surface(&t->surface, t->subject);
+    accuracy_scene_create_surface(&t->surface, t->subject);
     t->surface.job.parts = &t->kept;
     t->reference = reference_create(&t->surface.job);
-    t->rays = must(malloc((size_t)t->count * sizeof *t->rays));
+    t->rays = require_memory(malloc((size_t)t->count * sizeof *t->rays));
 #pragma omp parallel for schedule(dynamic)
     for (int i = 0; i < t->count; i++) {
         int x, y;
-        bench_pixels_place(t->pixels, i, &x, &y);
+        bench_pixels_position(t->pixels, i, &x, &y);
         reference_trace(t->reference, x, y, nothing, &t->rays[i]);
     }
 }
@@ -57,13 +57,13 @@ static void make_dense(const accuracy_subject *s, double values[DENSE_POINTS], f
     }
 }
 
-static double *integrate(const accuracy_truth *t, accuracy_opacity meaning)
+static double *integrate_reference(const accuracy_reference *t, accuracy_opacity meaning)
 {
     double values[DENSE_POINTS];
     float opacities[DENSE_POINTS];
-    double *rgba = must(malloc(4 * (size_t)t->count * sizeof *rgba));
+    double *rgba = require_memory(malloc(4 * (size_t)t->count * sizeof *rgba));
     accuracy_scene scene;
-    accuracy_scene_volume(&scene, t->subject);
+    accuracy_scene_create_volume(&scene, t->subject);
     scene.job.parts = &t->kept;
     if (meaning == ACCURACY_EXTINCTION) {
         make_dense(t->subject, values, opacities);
@@ -75,27 +75,27 @@ static double *integrate(const accuracy_truth *t, accuracy_opacity meaning)
 #pragma omp parallel for schedule(dynamic)
     for (int i = 0; i < t->count; i++) {
         int x, y;
-        bench_pixels_place(t->pixels, i, &x, &y);
+        bench_pixels_position(t->pixels, i, &x, &y);
         reference_integral_trace(integral, x, y, nothing, NULL, 0, rgba + 4 * i);
     }
     reference_integral_free(integral);
     return rgba;
 }
 
-accuracy_truth *accuracy_truth_create(const accuracy_subject *subject, int block)
+accuracy_reference *accuracy_reference_create(const accuracy_subject *subject, int block)
 {
-    accuracy_truth *t = must(calloc(1, sizeof *t));
+    accuracy_reference *t = require_memory(calloc(1, sizeof *t));
     t->subject = subject;
     t->pixels = bench_pixels_create(&subject->view.cells, &subject->camera, block);
     t->count = bench_pixels_count(t->pixels);
     t->kept = (render_part){bench_pixels_cells(t->pixels), NULL, NULL};
     trace_surface(t);
-    t->rgba[ACCURACY_OPACITY] = integrate(t, ACCURACY_OPACITY);
-    t->rgba[ACCURACY_EXTINCTION] = integrate(t, ACCURACY_EXTINCTION);
+    t->rgba[ACCURACY_OPACITY] = integrate_reference(t, ACCURACY_OPACITY);
+    t->rgba[ACCURACY_EXTINCTION] = integrate_reference(t, ACCURACY_EXTINCTION);
     return t;
 }
 
-void accuracy_truth_free(accuracy_truth *t)
+void accuracy_reference_free(accuracy_reference *t)
 {
     reference_free(t->reference);
     bench_pixels_destroy(t->pixels);
@@ -105,12 +105,12 @@ void accuracy_truth_free(accuracy_truth *t)
     free(t);
 }
 
-const bench_pixels *accuracy_truth_pixels(const accuracy_truth *t)
+const bench_pixels *accuracy_reference_pixels(const accuracy_reference *t)
 {
     return t->pixels;
 }
 
-accuracy_error accuracy_volume_error(const accuracy_truth *t, accuracy_opacity meaning, const float *rgba)
+accuracy_error accuracy_volume_error(const accuracy_reference *t, accuracy_opacity meaning, const float *rgba)
 {
     const double *truth = t->rgba[meaning];
     accuracy_error e = {0, 0, 0, 0, (double)NAN};
@@ -131,12 +131,12 @@ accuracy_error accuracy_volume_error(const accuracy_truth *t, accuracy_opacity m
 /* Returns whether the true hit is undefined. In a polyhedron, a quad's bilinear patch and the adjacent tets may be on
  * different sides of the isovalue; whether the surface lies between them is a matter of definition. In other cells,
  * hits are compared on ambiguous rays too. */
-static bool is_undefined(const accuracy_truth *t, const reference_ray *ray)
+static bool is_undefined(const accuracy_reference *t, const reference_ray *ray)
 {
     return ray->ambiguous && t->subject->mesh.face_count > 0;
 }
 
-accuracy_error accuracy_surface_error(const accuracy_truth *t, const double *depths)
+accuracy_error accuracy_surface_error(const accuracy_reference *t, const double *depths)
 {
     accuracy_error e = {0, 0, 0, 0, t->subject->mesh.face_count ? (double)NAN : 0};
     double sum = 0;
@@ -157,7 +157,7 @@ accuracy_error accuracy_surface_error(const accuracy_truth *t, const double *dep
         sum += off * off;
         e.max = fmax(e.max, off);
         if (isnan(e.residual)) continue;
-        bench_pixels_place(t->pixels, i, &x, &y);
+        bench_pixels_position(t->pixels, i, &x, &y);
         e.residual = fmax(e.residual, fabs(reference_residual(t->reference, x, y, hit, depths[i], &slope, NULL)));
     }
     if (same) e.rms = sqrt(sum / same);
