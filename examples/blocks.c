@@ -8,7 +8,7 @@ enum { BLOCKS = 8, N = 16, GHOSTS = 2, WIDE = N + 2 * GHOSTS }; /* 2 x 2 x 2 blo
 
 static double density[BLOCKS][WIDE][WIDE][WIDE]; /* [block][k][j][i], with the ghost layers */
 
-static double place(int index, int block_index)
+static double compute_coordinate(int index, int block_index)
 {
     return (index - GHOSTS + 0.5 + N * block_index) / N - 1; /* of a cell's centre: from -1 to 1 */
 }
@@ -18,7 +18,8 @@ static void advance(int block, double time)
     for (int k = 0; k < WIDE; k++)
         for (int j = 0; j < WIDE; j++)
             for (int i = 0; i < WIDE; i++) {
-                const double x = place(i, block % 2), y = place(j, block / 2 % 2), z = place(k, block / 4);
+                const double x = compute_coordinate(i, block % 2), y = compute_coordinate(j, block / 2 % 2),
+                             z = compute_coordinate(k, block / 4);
                 density[block][k][j][i] = 1 / (1 + 4 * (x * x + y * y + z * z) + 2 * cos(5 * x - time) * cos(5 * y));
             }
 }

@@ -13,20 +13,20 @@ enum { NODES_PER_CELL = 27, GHOST_DOFS = 100, DOFS = GHOST_DOFS + NODES };
 static double nodes[NODES][3], solution[DOFS];
 static int cell_nodes[CELLS][NODES_PER_CELL], dof_of_node[NODES];
 
-static int node(int i, int j, int k)
+static int node_index(int i, int j, int k)
 {
     return i + SIDE_X * (j + SIDE_Y * k);
 }
 
 /* The cell's 3 x 3 x 3 nodes, x first, but the eight corners before all others. */
-static void put_cell(int cell)
+static void add_cell(int cell)
 {
     const int i = cell % NX, j = cell / NX % NY, k = cell / NX / NY;
     int corners = 0, others = 8;
     for (int n = 0; n < NODES_PER_CELL; n++) {
         const int x = n % 3, y = n / 3 % 3, z = n / 9;
         const int place = x == 1 || y == 1 || z == 1 ? others++ : corners++;
-        cell_nodes[cell][place] = node(2 * i + x, 2 * j + y, 2 * k + z);
+        cell_nodes[cell][place] = node_index(2 * i + x, 2 * j + y, 2 * k + z);
     }
 }
 
@@ -39,7 +39,7 @@ static void make_mesh(int rank)
         nodes[n][2] = 0.5 * layer;
         dof_of_node[n] = GHOST_DOFS + (int)(7919LL * n % NODES); /* as scattered as a solver's */
     }
-    for (int c = 0; c < CELLS; c++) put_cell(c);
+    for (int c = 0; c < CELLS; c++) add_cell(c);
 }
 
 static void advance(double time)
@@ -48,7 +48,7 @@ static void advance(double time)
         solution[dof_of_node[n]] = cos(0.6 * hypot(hypot(nodes[n][0] - 12, nodes[n][1] - 12), nodes[n][2] - 12) - time);
 }
 
-static void hand_over(insitu_session *session)
+static void set_mesh(insitu_session *session)
 {
     insitu_mesh mesh;
     insitu_mesh_defaults(&mesh);
@@ -76,7 +76,7 @@ int main(int argc, char **argv)
         MPI_Finalize();
         return 1;
     }
-    hand_over(session);
+    set_mesh(session);
 
     insitu_field field;
     insitu_field_defaults(&field);

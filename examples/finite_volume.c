@@ -11,26 +11,26 @@ enum { FACES = (NX + 1) * NY * NZ + NX * (NY + 1) * NZ + NX * NY * (NZ + 1) };
 static double points[POINTS][3], pressure[POINTS];
 static int face_points[FACES][4], face_offsets[FACES + 1], owner[FACES], neighbour[FACES], inner_faces;
 
-static int point(const int at[3])
+static int point_index(const int at[3])
 {
     return at[0] + (NX + 1) * (at[1] + (NY + 1) * at[2]);
 }
 
 /* The face at the lower end of a cell along an axis, between it and the cell before. */
-static void put_face(int face, const int cell[3], int axis)
+static void add_face(int face, const int cell[3], int axis)
 {
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
     for (int n = 0; n < 4; n++) {
         int corner[3] = {cell[0], cell[1], cell[2]};
         corner[u] += n == 1 || n == 2;
         corner[v] += n / 2;
-        face_points[face][n] = point(corner);
+        face_points[face][n] = point_index(corner);
     }
     face_offsets[face + 1] = 4 * (face + 1);
 }
 
 /* All inner faces, or all on the boundary; returns how many there are now. */
-static int put_faces(int count, int are_inner)
+static int add_faces(int count, int are_inner)
 {
     static const int sizes[3] = {NX, NY, NZ}, steps[3] = {1, NX, NX * NY};
     for (int c = 0; c < (NX + 1) * (NY + 1) * (NZ + 1) * 3; c++) {
@@ -39,7 +39,7 @@ static int put_faces(int count, int are_inner)
         const int here = cell[0] + NX * (cell[1] + NY * cell[2]), is_inner = cell[axis] % sizes[axis] != 0;
         if (cell[(axis + 1) % 3] == sizes[(axis + 1) % 3] || cell[(axis + 2) % 3] == sizes[(axis + 2) % 3]) continue;
         if (is_inner != are_inner) continue;
-        put_face(count, cell, axis);
+        add_face(count, cell, axis);
         owner[count] = cell[axis] > 0 ? here - steps[axis] : here;
         if (is_inner) neighbour[count] = here;
         count++;
@@ -47,7 +47,7 @@ static int put_faces(int count, int are_inner)
     return count;
 }
 
-static void hand_over(insitu_session *session)
+static void set_mesh(insitu_session *session)
 {
     insitu_mesh mesh;
     insitu_mesh_defaults(&mesh);
@@ -70,11 +70,11 @@ static void make_mesh(int rank)
     for (int k = 0; k <= NZ; k++)
         for (int j = 0; j <= NY; j++)
             for (int i = 0; i <= NX; i++) {
-                double *p = points[point((const int[]){i, j, k})];
+                double *p = points[point_index((const int[]){i, j, k})];
                 p[0] = i + rank * NX, p[1] = j, p[2] = k;
             }
-    inner_faces = put_faces(0, 1);
-    put_faces(inner_faces, 0);
+    inner_faces = add_faces(0, 1);
+    add_faces(inner_faces, 0);
 }
 
 static void advance(double time)
@@ -96,7 +96,7 @@ int main(int argc, char **argv)
         MPI_Finalize();
         return 1;
     }
-    hand_over(session);
+    set_mesh(session);
 
     insitu_field field;
     insitu_field_defaults(&field);

@@ -109,10 +109,10 @@ struct Simulation {
     {
         GridGenerator::hyper_ball(mesh);
         mesh.refine_global(LEAST_LEVEL);
-        number();
+        distribute_unknowns();
     }
 
-    void number()
+    void distribute_unknowns()
     {
         dofs.distribute_dofs(element);
         owned = dofs.locally_owned_dofs();
@@ -123,22 +123,22 @@ struct Simulation {
         u.reinit(owned, relevant, MPI_COMM_WORLD);
     }
 
-    void take(Values &values)
+    void set_solution(Values &values)
     {
         hanging.distribute(values);
         u.copy_locally_owned_data_from(values);
         u.update_ghost_values();
     }
 
-    void begin()
+    void set_initial_values()
     {
         Values values(owned, relevant, MPI_COMM_WORLD);
         VectorTools::interpolate(dofs, heat, values);
-        take(values);
+        set_solution(values);
     }
 
     /* Finer where the error is, coarser where it is small, but where siblings are on several ranks. */
-    void adapt()
+    void adapt_mesh()
     {
         Vector<float> errors(mesh.n_active_cells());
         KellyErrorEstimator<3>::estimate(dofs, QGauss<2>(element.degree + 1), {}, u, errors);
@@ -154,10 +154,10 @@ struct Simulation {
         mesh.prepare_coarsening_and_refinement();
         transfer.prepare_for_coarsening_and_refinement(u);
         mesh.execute_coarsening_and_refinement();
-        number();
+        distribute_unknowns();
         Values values(owned, relevant, MPI_COMM_WORLD);
         transfer.interpolate(values);
-        take(values);
+        set_solution(values);
     }
 
     /* One step of Crank and Nicolson's. */
@@ -180,14 +180,15 @@ struct Simulation {
         SolverControl control(1000, 1e-10 * right.l2_norm());
         SolverCG<Values>(control).solve(matrix, values, right, jacobi);
         constraints.distribute(values);
-        take(values);
+        set_solution(values);
     }
 
     void assemble(const AffineConstraints<double> &constraints, double time, TrilinosWrappers::SparseMatrix &matrix,
                   Values &right)
     {
         const QGauss<3> points(element.degree + 1);
-        FEValues<3> fe(element, points, update_values | update_gradients | update_quadrature_points | update_JxW_values);
+        FEValues<3> fe(element, points,
+                       update_values | update_gradients | update_quadrature_points | update_JxW_values);
         const unsigned n = element.n_dofs_per_cell();
         FullMatrix<double> cell_matrix(n, n);
         Vector<double> cell_right(n);
@@ -223,28 +224,28 @@ struct Simulation {
         if (insitu_create(MPI_COMM_WORLD, scene, &pictures.session) != INSITU_OK)
             throw std::runtime_error(insitu_error(nullptr));
         for (int i = 0; i < 4; i++) {
-            begin();
-            adapt();
+            set_initial_values();
+            adapt_mesh();
         }
-        begin();
+        set_initial_values();
         for (int cycle = 0; cycle <= STEPS; cycle++) {
             if (cycle > 0) advance(cycle * STEP);
-            if (cycle % ADAPT == 0) adapt();
-            draw(cycle);
+            if (cycle % ADAPT == 0) adapt_mesh();
+            draw_pictures(cycle);
         }
         insitu_destroy(&pictures.session);
     }
 
-    void draw(int cycle)
+    void draw_pictures(int cycle)
     {
         if (cycle % ADAPT == 0) pictures.set_mesh(dofs, u);
         pictures.set_field("u", u.begin(), u.locally_owned_size() + u.get_partitioner()->n_ghost_indices(), 0, true);
         if (insitu_step(pictures.session, cycle, cycle * STEP) != INSITU_OK && is_first)
             std::cerr << insitu_error(pictures.session) << '\n';
-        if (cycle % 10 == 0) tell(cycle);
+        if (cycle % 10 == 0) print_error(cycle);
     }
 
-    void tell(int cycle)
+    void print_error(int cycle)
     {
         Vector<double> errors(mesh.n_active_cells());
         const QIterated<3> points(QTrapezoid<1>(), 2);

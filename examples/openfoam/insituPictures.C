@@ -27,13 +27,16 @@ struct insituPictures : functionObjects::fvMeshFunctionObject {
         : fvMeshFunctionObject(name, time, dict), fields_(dict.get<wordList>("fields"))
     {
         [[gnu::unused]] static const int up = Pstream::parRun() ? 0 : MPI_Init(0, 0) + atexit([] { MPI_Finalize(); });
-        tell(insitu_create(MPI_COMM_WORLD, dict.get<fileName>("scene").c_str(), &session_));
+        report_error(insitu_create(MPI_COMM_WORLD, dict.get<fileName>("scene").c_str(), &session_));
     }
 
     /* An error of the pictures; the simulation goes on. */
-    bool tell(insitu_status status) const { return !status || (Warning << insitu_error(session_) << endl, true); }
+    bool report_error(insitu_status status) const
+    {
+        return !status || (Warning << insitu_error(session_) << endl, true);
+    }
 
-    template<class Type> void setField(const word &name)
+    template <class Type> void setField(const word &name)
     {
         const auto *values = mesh_.findObject<GeometricField<Type, fvPatchField, volMesh>>(name);
         if (!values) return;
@@ -50,7 +53,7 @@ struct insituPictures : functionObjects::fvMeshFunctionObject {
         field.values = {values->cdata(), SCALAR, 0};
         field.patch_count = patches.size();
         field.patches = patches.cdata();
-        tell(insitu_set_field(session_, mesh_.name().c_str(), &field));
+        report_error(insitu_set_field(session_, mesh_.name().c_str(), &field));
     }
 
     bool execute() override
@@ -69,13 +72,13 @@ struct insituPictures : functionObjects::fvMeshFunctionObject {
         mesh.neighbour_count = mesh_.nInternalFaces();
         mesh.neighbour = {mesh_.faceNeighbour().cdata(), LABEL, 0};
         if (!mesh_.topoChanging()) mesh.changed = mesh_.moving() ? INSITU_CHANGED_GEOMETRY : INSITU_CHANGED_NOTHING;
-        tell(insitu_set_mesh(session_, mesh_.name().c_str(), &mesh));
+        report_error(insitu_set_mesh(session_, mesh_.name().c_str(), &mesh));
         for (const word &name : fields_) setField<scalar>(name), setField<vector>(name);
-        return tell(insitu_step(session_, time_.timeIndex(), time_.value()));
+        return report_error(insitu_step(session_, time_.timeIndex(), time_.value()));
     }
 
     bool write() override { return true; }
-    bool end() override { return tell(insitu_destroy(&session_)); }
+    bool end() override { return report_error(insitu_destroy(&session_)); }
 };
 
 defineTypeNameAndDebug(insituPictures, 0);
