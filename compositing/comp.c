@@ -70,7 +70,7 @@ static void choose_owners(composition *c)
 {
     comp_claim *const claims = c->group->claims->items;
     c->owners.count = c->route.owners;
-    comp_route_assign_places(&c->route, claims, c->grid.blocks);
+    comp_route_assign_positions(&c->route, claims, c->grid.blocks);
     comp_claims_balance(claims, c->grid.blocks, c->loads, c->route.owners);
     for (uint32_t b = 0; b < c->grid.blocks; b++)
         c->owners.places[b] = claims[b].priority ? comp_priority_rank(claims[b].priority) : -1;
@@ -111,7 +111,7 @@ static insitu_status merge_owned(composition *c, const comp_messages *held, comp
                                  insitu_status status, base_error *error)
 {
     const double start = MPI_Wtime();
-    const int place = comp_route_place(&c->route, c->transport.rank);
+    const int place = comp_route_position(&c->route, c->transport.rank);
     comp_owned owned = {.traced_strips = &c->strips, .owners = &c->owners, .place = place};
     c->merged.out = place == 0 ? c->out : NULL;
     if (!status && place < c->route.owners) {
@@ -183,7 +183,7 @@ static insitu_status gather_deep(composition *c, insitu_status status, base_erro
 }
 
 /* Composites. *has_overlaps receives a nonzero value on all ranks if any rank found overlaps, and otherwise 0. */
-static insitu_status composite(composition *c, fragment_list *items, int64_t *has_overlaps, base_error *error)
+static insitu_status composite_fragments(composition *c, fragment_list *items, int64_t *has_overlaps, base_error *error)
 {
     comp_statistics *const statistics = c->statistics;
     const MPI_Comm comm = c->group->comm;
@@ -216,7 +216,7 @@ insitu_status comp_composite(const comp_group *group, fragment_list *items, cons
     composition c = make_composition(group, background, out, statistics);
     int64_t none = 0;
     const insitu_status status = begin_composite(&c, items, threads, error);
-    return status ? status : composite(&c, items, &none, error);
+    return status ? status : composite_fragments(&c, items, &none, error);
 }
 
 /* ---- overlaps --------------------------------------------------------------------------------------------------- */
@@ -250,7 +250,7 @@ insitu_status comp_composite_overlaps(const comp_group *group, fragment_list *it
         base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory for a set of %lld pixels",
                   (long long)pixel_count(&c));
     int64_t has_overlaps = 0;
-    status = composite(&c, items, &has_overlaps, error);
+    status = composite_fragments(&c, items, &has_overlaps, error);
     if (!status && has_overlaps) status = share_overlaps(&c, overlaps, error);
     if (!overlaps->pixels) base_free(c.merged.overlaps);
     return status;

@@ -152,7 +152,7 @@ static void mark_all_mixed(merge_scratch *m)
         if (comp_sheet_has(&m->joined, k)) mark_mixed(m, k);
 }
 
-static void put_pixel(comp_sheet *pixels, uint32_t at, const comp_pixel *pixel)
+static void store_pixel(comp_sheet *pixels, uint32_t at, const comp_pixel *pixel)
 {
     uint32_t words[COMP_PIXEL_WORDS];
     memcpy(&words[0], &pixel->depth, sizeof pixel->depth);
@@ -165,7 +165,7 @@ static void blend_listed(const comp_grid *grid, const comp_merge_output *merged,
     for (uint32_t k = next_mixed_pixel(m, 0); k < COMP_STRIP_PIXELS; k = next_mixed_pixel(m, k + 1)) {
         const comp_pixel pixel = comp_pixels_blend(merged, m->listed.items + m->ends[k], m->counts[k],
                                                    comp_grid_pixel(grid, m->joined.strip, k));
-        put_pixel(&m->pixels, k, &pixel);
+        store_pixel(&m->pixels, k, &pixel);
     }
 }
 

@@ -57,7 +57,7 @@ comp_route comp_route_of(comp_schedule schedule, int ranks, comp_nodes nodes, in
     return route;
 }
 
-int comp_route_place(const comp_route *route, int rank)
+int comp_route_position(const comp_route *route, int rank)
 {
     if (!route->nodes.is_cyclic) return rank;
     const int count = route->ranks / route->nodes.ranks;
@@ -78,11 +78,11 @@ int comp_route_stride(const comp_route *route, int round)
     return stride;
 }
 
-void comp_route_assign_places(const comp_route *route, comp_claim *claims, uint32_t blocks)
+void comp_route_assign_positions(const comp_route *route, comp_claim *claims, uint32_t blocks)
 {
     for (uint32_t b = 0; b < blocks; b++) {
         if (!claims[b].priority) continue;
-        const int place = comp_route_place(route, comp_priority_rank(claims[b].priority));
+        const int place = comp_route_position(route, comp_priority_rank(claims[b].priority));
         claims[b].priority =
             comp_priority_with_rank(claims[b].priority, place < route->owners ? place : place - route->owners);
     }

@@ -54,7 +54,7 @@ typedef struct comp_route {
 comp_route comp_route_of(comp_schedule schedule, int ranks, comp_nodes nodes, int radix);
 
 /* Convert a rank to its place, and a place to its rank. */
-int comp_route_place(const comp_route *route, int rank);
+int comp_route_position(const comp_route *route, int rank);
 int comp_route_rank(const comp_route *route, int place);
 
 /* Returns the distance between partners of the round, which is the product of the previous radices. */
@@ -80,7 +80,7 @@ static inline bool comp_route_is_dense(const comp_route *route, int round)
 
 /* Converts the owners in the claims from ranks to places. Ranks beyond the route's owners cannot own blocks; the blocks
  * of such a rank go to its partner. */
-void comp_route_assign_places(const comp_route *route, comp_claim *claims, uint32_t blocks);
+void comp_route_assign_positions(const comp_route *route, comp_claim *claims, uint32_t blocks);
 
 /* Returns "direct", "nodes", "radix" or "binary". */
 const char *comp_schedule_name(comp_schedule schedule);

@@ -31,7 +31,7 @@ static wave_setup make_setup(const wave_options *options, const wave_lattice *la
     return setup;
 }
 
-static void run(const wave_options *options, const wave_mesh *mesh, wave_solver *solver, MPI_Comm comm)
+static void run_simulation(const wave_options *options, const wave_mesh *mesh, wave_solver *solver, MPI_Comm comm)
 {
     wave_report report;
     wave_pictures pictures;
@@ -64,7 +64,7 @@ static int make_and_run(const wave_options *options, MPI_Comm comm, int rank)
              wave_solver_create(&setup, &mesh, comm, &solver);
     MPI_Allreduce(MPI_IN_PLACE, &ok, 1, MPI_INT, MPI_MIN, comm);
     if (ok) {
-        run(options, &mesh, &solver, comm);
+        run_simulation(options, &mesh, &solver, comm);
     } else if (rank == 0) {
         fprintf(stderr, "insitu-wave: a rank ran out of memory, or of 32-bit numbers for its cells\n");
     }

@@ -9,7 +9,7 @@
 #include "wave_geometry.h"
 #include "wave_weights.h"
 
-static void put_real(void *array, int bytes, int64_t at, double value)
+static void store_real(void *array, int bytes, int64_t at, double value)
 {
     if (bytes == 8) {
         ((double *)array)[at] = value;
@@ -37,7 +37,7 @@ static bool make_values(const wave_setup *setup, int64_t count, int components, 
     return out->values != NULL;
 }
 
-static bool allocate(wave_solver *s)
+static bool allocate_state(wave_solver *s)
 {
     const wave_mesh *mesh = s->mesh;
     size_t real = (size_t)s->setup.real_bytes;
@@ -109,12 +109,12 @@ static double measure_own_cells(wave_solver *s, int32_t cell, const wave_cell_ge
     for (int f = 0; f < count; ++f) {
         const double *a = g->area[f];
         double area = sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
-        for (int k = 0; k < 3; ++k) put_real(s->faces, bytes, first + 4 * f + k, area > 0 ? a[k] / area : 0);
-        put_real(s->faces, bytes, first + 4 * f + 3, area);
+        for (int k = 0; k < 3; ++k) store_real(s->faces, bytes, first + 4 * f + k, area > 0 ? a[k] / area : 0);
+        store_real(s->faces, bytes, first + 4 * f + 3, area);
         surface += area;
     }
     s->volume[cell] = g->volume;
-    put_real(s->inverse_volume, bytes, cell, 1 / g->volume);
+    store_real(s->inverse_volume, bytes, cell, 1 / g->volume);
     return 2 * g->volume / (surface * s->setup.medium.speed[s->layers[cell]]);
 }
 
@@ -142,7 +142,7 @@ static bool fill_cells(wave_solver *s, double (*centroid)[3])
     for (int32_t c = 0; c < s->mesh->cells; ++c) {
         measure_cells(s->mesh, c, &g);
         s->layers[c] = wave_medium_layer(&s->setup.medium, g.centroid[2]);
-        put_real(s->speed, s->setup.real_bytes, c, s->setup.medium.speed[s->layers[c]]);
+        store_real(s->speed, s->setup.real_bytes, c, s->setup.medium.speed[s->layers[c]]);
         for (int a = 0; a < 3; ++a) centroid[c][a] = g.centroid[a];
         if (c >= s->mesh->own_cells) continue;
         s->time_step = fmin(s->time_step, measure_own_cells(s, c, &g));
@@ -159,7 +159,7 @@ static bool fill_vertices(wave_solver *s, const double (*centroid)[3])
         wave_lattice_vertex(&s->mesh->partition.lattice, s->mesh->vertex_ids[v], xyz);
         for (int a = 0; a < 3; ++a) {
             int64_t at = v * s->grid.coordinates.stride + a * s->grid.coordinates.component_stride;
-            put_real(s->grid.coordinates.values, bytes, at, xyz[a]);
+            store_real(s->grid.coordinates.values, bytes, at, xyz[a]);
         }
         if (v >= s->mesh->own_vertices || !s->vertex_cell_weights) continue;
         int64_t begin = s->mesh->vertex_cell_offsets[v];
@@ -167,7 +167,7 @@ static bool fill_vertices(wave_solver *s, const double (*centroid)[3])
         double weight[WAVE_AROUND_MAX];
         if (count > WAVE_AROUND_MAX) return false;
         wave_weights_fit(xyz, s->mesh->walls[v], count, s->mesh->vertex_cells + begin, centroid, weight);
-        for (int i = 0; i < count; ++i) put_real(s->vertex_cell_weights, bytes, begin + i, weight[i]);
+        for (int i = 0; i < count; ++i) store_real(s->vertex_cell_weights, bytes, begin + i, weight[i]);
     }
     return true;
 }
@@ -177,7 +177,7 @@ bool wave_solver_create(const wave_setup *setup, const wave_mesh *mesh, MPI_Comm
     *solver = (wave_solver){.setup = *setup, .mesh = mesh, .comm = comm, .time_step = INFINITY};
     solver->kernel = choose_kernel(setup->real_bytes, mesh->index_bytes);
     double(*centroid)[3] = malloc(((size_t)mesh->cells + 1) * sizeof *centroid);
-    bool ok = centroid && allocate(solver);
+    bool ok = centroid && allocate_state(solver);
     if (ok) fill_grid(solver);
     ok = ok && fill_cells(solver, centroid) && fill_vertices(solver, (const double(*)[3])centroid);
     free(centroid);
@@ -207,7 +207,7 @@ void wave_solver_set(wave_solver *s, int32_t cell, const double state[4])
 {
     const wave_values *v = &s->grid.state;
     for (int k = 0; k < 4; ++k) {
-        put_real(v->values, s->setup.real_bytes, cell * v->stride + k * v->component_stride, state[k]);
+        store_real(v->values, s->setup.real_bytes, cell * v->stride + k * v->component_stride, state[k]);
     }
 }
 
@@ -245,7 +245,7 @@ static void apply_source(wave_solver *s)
     for (int32_t i = 0; i < s->source_cell_count; ++i) {
         int64_t at = s->source_cells[i] * s->grid.state.stride;
         double p = get_real(s->grid.state.values, s->setup.real_bytes, at);
-        put_real(s->grid.state.values, s->setup.real_bytes, at, p + amount * s->source_rates[i]);
+        store_real(s->grid.state.values, s->setup.real_bytes, at, p + amount * s->source_rates[i]);
     }
 }
 

@@ -134,7 +134,7 @@ static int64_t end_of_cells(const mmbvh *tree, int64_t node)
     return mmbvh_node_ref(tree, node) + mmbvh_node_count(tree, node);
 }
 
-MMBVH_INLINE sweep_sum run(const sweep *s, int64_t first, int64_t end, const pass_constants pass)
+MMBVH_INLINE sweep_sum refit_nodes(const sweep *s, int64_t first, int64_t end, const pass_constants pass)
 {
     part p;
     p.unusable = p.outside_grid = 0;
@@ -152,8 +152,8 @@ MMBVH_INLINE sweep_sum run(const sweep *s, int64_t first, int64_t end, const pas
     static sweep_sum name(const sweep *s, int64_t first, int64_t end)                                                  \
     {                                                                                                                  \
         return fetch_is_contiguous(&s->source->g->coordinates[0])                                                      \
-                   ? run(s, first, end, (pass_constants){shape, wide_index, false, true})                              \
-                   : run(s, first, end, (pass_constants){shape, wide_index, false, false});                            \
+                   ? refit_nodes(s, first, end, (pass_constants){shape, wide_index, false, true})                      \
+                   : refit_nodes(s, first, end, (pass_constants){shape, wide_index, false, false});                    \
     }
 FETCH_FLOAT_INSTANCES(DEFINE_RUN_BOUNDS, run_bounds)
 
@@ -161,8 +161,8 @@ FETCH_FLOAT_INSTANCES(DEFINE_RUN_BOUNDS, run_bounds)
     static sweep_sum name(const sweep *s, int64_t first, int64_t end)                                                  \
     {                                                                                                                  \
         return fetch_is_contiguous(&s->source->g->coordinates[0]) && fetch_is_contiguous(&s->values)                   \
-                   ? run(s, first, end, (pass_constants){shape, wide_index, true, true})                               \
-                   : run(s, first, end, (pass_constants){shape, wide_index, true, false});                             \
+                   ? refit_nodes(s, first, end, (pass_constants){shape, wide_index, true, true})                       \
+                   : refit_nodes(s, first, end, (pass_constants){shape, wide_index, true, false});                     \
     }
 FETCH_FLOAT_INSTANCES(DEFINE_RUN_BOTH, run_both)
 

@@ -165,7 +165,8 @@ static uint64_t drawn_bits(const grid *g, int64_t first, int64_t count)
 typedef match_result (*const matcher)(const selector *s, int64_t cell, const bool is_packed);
 
 /* Sets the bits of cells of any type. Cells that are not drawn are skipped. */
-MMBVH_INLINE int64_t mark(const selector *s, int64_t begin, int64_t end, matcher match, const bool is_packed)
+MMBVH_INLINE int64_t mark_matching_cells(const selector *s, int64_t begin, int64_t end, matcher match,
+                                         const bool is_packed)
 {
     int64_t unusable = 0;
     for (int64_t first = begin; first < end; first += WORD_CELLS) {
@@ -182,7 +183,7 @@ MMBVH_INLINE int64_t mark(const selector *s, int64_t begin, int64_t end, matcher
     return unusable;
 }
 
-/* As mark(), four cells at a time. All cells must have the same type. */
+/* As mark_matching_cells(), four cells at a time. All cells must have the same type. */
 MMBVH_INLINE int64_t mark_four_at_once(const selector *s, int64_t begin, int64_t end, matcher match,
                                        const pass_constants pass)
 {
@@ -227,8 +228,8 @@ MMBVH_INLINE int64_t mark_four_at_once(const selector *s, int64_t begin, int64_t
                                            (pass_constants){shape, wide_index, wide_number, true})                     \
                        : mark_four_at_once(s, begin, end, name##_find,                                                 \
                                            (pass_constants){shape, wide_index, wide_number, false});                   \
-        return fetch_is_contiguous(&s->values) ? mark(s, begin, end, name##_find, true)                                \
-                                               : mark(s, begin, end, name##_find, false);                              \
+        return fetch_is_contiguous(&s->values) ? mark_matching_cells(s, begin, end, name##_find, true)                 \
+                                               : mark_matching_cells(s, begin, end, name##_find, false);               \
     }
 FETCH_INSTANCES(DEFINE_RUN, mark_vertices)
 
@@ -240,7 +241,7 @@ MMBVH_INLINE match_result match_any(const selector *s, int64_t cell, const bool 
 
 static int64_t mark_any(const selector *s, int64_t begin, int64_t end)
 {
-    return mark(s, begin, end, match_any, false);
+    return mark_matching_cells(s, begin, end, match_any, false);
 }
 
 /* Packs `count` bytes, each 0 or 1, into bits. The bytes up to the next multiple of 8 must be readable and also be 0 or

@@ -109,7 +109,7 @@ static inline size_t packed_bytes(unsigned nibbles, int count)
 }
 
 /* Packs `count` residuals; the lanes behind them must be 0. */
-ROWS_INLINE unsigned char *pack(lanes residuals, unsigned nibbles, int count, unsigned char *out)
+ROWS_INLINE unsigned char *pack_residuals(lanes residuals, unsigned nibbles, int count, unsigned char *out)
 {
     if (nibbles == 8) {
         memcpy(out, &residuals, sizeof residuals);
@@ -133,7 +133,8 @@ ROWS_INLINE unsigned char *pack(lanes residuals, unsigned nibbles, int count, un
 }
 
 /* Unpacks `count` residuals; the lanes behind them are undefined. */
-ROWS_INLINE const unsigned char *unpack(const unsigned char *in, unsigned nibbles, int count, lanes *residuals)
+ROWS_INLINE const unsigned char *unpack_residuals(const unsigned char *in, unsigned nibbles, int count,
+                                                  lanes *residuals)
 {
     if (nibbles == 8) {
         memcpy(residuals, in, sizeof *residuals);
@@ -279,7 +280,8 @@ ROWS_INLINE unsigned char *write_word(const uint32_t *words, const sheet_plan *p
     const uint8_t *nibbles = residuals.nibbles[*kind];
     for (int i = 0; i < plan->rows; i += 2)
         *out++ = (unsigned char)(nibbles[i] | (i + 1 < plan->rows ? nibbles[i + 1] : 0) << 4);
-    for (int i = 0; i < plan->rows; i++) out = pack(residuals.rows[*kind][i], nibbles[i], plan->number[i], out);
+    for (int i = 0; i < plan->rows; i++)
+        out = pack_residuals(residuals.rows[*kind][i], nibbles[i], plan->number[i], out);
     return out;
 }
 
@@ -336,7 +338,7 @@ ROWS_INLINE const unsigned char *read_word(const unsigned char *in, const sheet_
     for (int i = 0; i < plan->rows; i++) {
         const unsigned mask = plan->mask[i];
         lanes residuals, values;
-        in = unpack(in, nibbles[i / 2] >> (i & 1) * 4 & 15, plan->number[i], &residuals);
+        in = unpack_residuals(in, nibbles[i / 2] >> (i & 1) * 4 & 15, plan->number[i], &residuals);
         if (i) {
             if (mask != 0xffff) residuals = expand_lanes(residuals, mask);
             if (plan->fresh[i]) predict_fresh_lanes(plan, i, &f);

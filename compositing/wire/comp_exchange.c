@@ -24,7 +24,7 @@ static insitu_status run_rounds(comp_transport *transport, const comp_route *rou
 insitu_status comp_exchange(comp_transport *transport, const comp_route *route, const comp_strips *strips,
                             const comp_owners *owners, comp_messages *held, insitu_status status, base_error *error)
 {
-    const bool is_owner = comp_route_place(route, transport->rank) < route->owners;
+    const bool is_owner = comp_route_position(route, transport->rank) < route->owners;
     comp_messages out = {NULL, NULL};
     *held = (comp_messages){NULL, NULL};
     if (!status) status = comp_pack(strips, owners, route, transport->rank, &out, held, error);

@@ -122,7 +122,7 @@ static void forward_children(parent_link *link, int children)
 insitu_status comp_gather(comp_transport *transport, const comp_route *route, const comp_canvas *canvas,
                           comp_messages *finished, insitu_status status, base_error *error)
 {
-    const int place = comp_route_place(route, transport->rank);
+    const int place = comp_route_position(route, transport->rank);
     int code = MPI_SUCCESS;
     if (place < route->owners && place > 0) {
         parent_link link = {transport, comp_route_rank(route, comp_gather_parent(route, place)), MPI_SUCCESS};

@@ -248,7 +248,7 @@ static insitu_status run_round(round *r, comp_messages *out)
 insitu_status comp_messages_round(comp_transport *transport, const comp_route *route, int number, comp_messages *out,
                                   comp_messages *in, insitu_status status, base_error *error)
 {
-    const int place = comp_route_place(route, transport->rank), stride = comp_route_stride(route, number);
+    const int place = comp_route_position(route, transport->rank), stride = comp_route_stride(route, number);
     const bool takes_part = place < route->owners;
     const int partners = takes_part ? route->radix[number] - 1 : 0;
     round r = {.transport = transport, .tag = TAG_ROUND + number, .in = in, .status = status, .error = error};
@@ -268,7 +268,7 @@ insitu_status comp_messages_round(comp_transport *transport, const comp_route *r
 insitu_status comp_messages_to_owners(comp_transport *transport, const comp_route *route, comp_messages *out,
                                       comp_messages *in, insitu_status status, base_error *error)
 {
-    const int place = comp_route_place(route, transport->rank);
+    const int place = comp_route_position(route, transport->rank);
     const bool sends_all = place >= route->owners, receives_all = place + route->owners < route->ranks;
     round r = {.transport = transport,
                .tag = TAG_FOLD,

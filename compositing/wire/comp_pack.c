@@ -123,7 +123,7 @@ insitu_status comp_pack(const comp_strips *strips, const comp_owners *owners, co
                         comp_messages *out, comp_messages *kept, base_error *error)
 {
     owner_strips c = {.strips = strips};
-    const bool is_ok = sort_strips(owners, &c) && pack_all(&c, route, comp_route_place(route, rank), out, kept);
+    const bool is_ok = sort_strips(owners, &c) && pack_all(&c, route, comp_route_position(route, rank), out, kept);
     base_free(c.order);
     base_free(c.starts);
     if (is_ok) return INSITU_OK;
@@ -157,7 +157,7 @@ static bool forward_to(const comp_messages *in, const comp_route *route, int rou
 insitu_status comp_forward(const comp_messages *in, const comp_route *route, int round, int rank, comp_messages *out,
                            base_error *error)
 {
-    const int place = comp_route_place(route, rank), stride = comp_route_stride(route, round);
+    const int place = comp_route_position(route, rank), stride = comp_route_stride(route, round);
     const int own = comp_route_digit(route, round, stride, place);
     *out = (comp_messages){NULL, NULL};
     for (int i = 1; i < route->radix[round] && place < route->owners; i++) {

@@ -20,7 +20,7 @@ static void count_bytes(long long bytes)
     }
 }
 
-static int must_fail(void)
+static int should_fail(void)
 {
     atomic_fetch_add(&allocation_count, 1);
     if (atomic_load(&fail_countdown) == 0) return 0;
@@ -31,7 +31,7 @@ static int must_fail(void)
  * within its own memory, so that leak checkers recognize the pointer to it. */
 static void *make_block(size_t bytes, size_t counted)
 {
-    if (must_fail()) return NULL;
+    if (should_fail()) return NULL;
     if (bytes > SIZE_MAX - 2 * header_bytes) return NULL;
     const size_t rounded = bytes ? (bytes + header_bytes - 1) / header_bytes * header_bytes : header_bytes;
     char *raw = aligned_alloc(header_bytes, rounded + header_bytes);

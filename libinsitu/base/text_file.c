@@ -23,7 +23,7 @@ void c_locale_leave(c_locale *numbers)
 /* ---- texts in memory ------------------------------------------------------------------------------------------- */
 
 /* Ensures that there is space for `more` more bytes and a NUL. */
-static bool reserve(text_output *out, size_t more)
+static bool reserve_bytes(text_output *out, size_t more)
 {
     if (out->is_incomplete) return false;
     if (out->size + more < out->capacity) return true;
@@ -38,7 +38,7 @@ static bool reserve(text_output *out, size_t more)
 
 void text_add(text_output *out, const char *bytes, size_t count)
 {
-    if (!reserve(out, count)) return;
+    if (!reserve_bytes(out, count)) return;
     memcpy(out->bytes + out->size, bytes, count);
     out->size += count;
     out->bytes[out->size] = '\0';
@@ -51,7 +51,7 @@ void text_print(text_output *out, const char *format, ...)
     const int length = vsnprintf(NULL, 0, format, arguments);
     va_end(arguments);
     out->is_incomplete = out->is_incomplete || length < 0;
-    if (!reserve(out, length < 0 ? 0 : (size_t)length)) return;
+    if (!reserve_bytes(out, length < 0 ? 0 : (size_t)length)) return;
     va_start(arguments, format);
     vsnprintf(out->bytes + out->size, (size_t)length + 1, format, arguments);
     va_end(arguments);

@@ -66,7 +66,7 @@ static void free_session(insitu_session *session)
     session_catalogue_free(&session->catalogue);
     session_trees_free(&session->trees);
     session_scene_file_free(&session->scene_file);
-    session_drop_kept(&session->kept_pictures);
+    session_free_kept_pictures(&session->kept_pictures);
     session_run_ranges_free(&session->run_ranges);
     session_cinema_free(&session->cinema);
     session_montages_free(&session->montages);
@@ -199,7 +199,7 @@ insitu_status insitu_keep_pictures(insitu_session *session, int keep)
 {
     base_error error = {.status = INSITU_OK};
     if (!session || is_in_fill(session, "insitu_keep_pictures")) return INSITU_ERROR_ARGUMENT;
-    session_drop_kept(&session->kept_pictures);
+    session_free_kept_pictures(&session->kept_pictures);
     int is_on = keep != 0;
     if (session_check_mpi(&error, MPI_Bcast(&is_on, 1, MPI_INT, 0, session->team.comm), "MPI_Bcast") == INSITU_OK)
         session->kept_pictures.is_enabled = is_on;

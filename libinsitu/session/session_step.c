@@ -57,7 +57,7 @@ static void reload_scene(insitu_session *s, session_changes *changes)
     session_overwrites_free(&s->overwrites);
     s->events = (session_events){0};
     s->catalogue.are_meshes_grouped = s->catalogue.are_hashes_known = false;
-    session_forget_warnings(&s->report);
+    session_clear_reported_warnings(&s->report);
     session_text_add(&s->report.warnings, "the scene file was edited: its images are drawn from this step on");
     s->catalogue.are_derived = false;
     for (int i = 0; i < s->meshes.count; i++) {
@@ -204,7 +204,7 @@ static insitu_status update_meshes(insitu_session *s, const session_changes *cha
     if (are_cells_changed) session_check_meshes(&s->meshes, team, &reason);
     if (!refused->status) *refused = reason;
     const bool of_names = changes->are_names_changed || refused->status || s->catalogue.has_faults;
-    if (are_cells_changed) session_forget_homes(&s->catalogue);
+    if (are_cells_changed) session_invalidate_homes(&s->catalogue);
     if (scene->finer_pieces != 1) session_drop_ids(&s->meshes);
     insitu_status status = list_meshes(s, of_names, changes->are_names_shared && !refused->status, error);
     if ((are_cells_changed || of_names) && !status)
@@ -362,7 +362,7 @@ insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
     session_guard_begin(&guard);
     const double start = MPI_Wtime();
     session->error = (base_error){0};
-    session_drop_kept(&session->kept_pictures);
+    session_free_kept_pictures(&session->kept_pictures);
     session_report_begin(&session->report, cycle, time);
     session_changes changes;
     session_writer_collect(&session->writer, &session->report);
@@ -380,7 +380,7 @@ insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
     queue_news(session);
     session_summarize(&session->meshes, &session->trees.parent, &session->writer, session->scene_file.warning,
                       &session->report);
-    session_forget_filled(&session->meshes);
+    session_release_filled_arrays(&session->meshes);
     session->report.public_report.total_ms = milliseconds_since(start);
     session_guard_end(&guard);
     return status;

@@ -4,45 +4,45 @@
  * zero. */
 #include "wave_geometry.h"
 
-static void difference(const double a[3], const double b[3], double out[3])
+static void subtract_vectors(const double a[3], const double b[3], double out[3])
 {
     for (int i = 0; i < 3; ++i) out[i] = a[i] - b[i];
 }
 
-static void cross(const double a[3], const double b[3], double out[3])
+static void cross_product(const double a[3], const double b[3], double out[3])
 {
     out[0] = a[1] * b[2] - a[2] * b[1];
     out[1] = a[2] * b[0] - a[0] * b[2];
     out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-static double dot(const double a[3], const double b[3])
+static double dot_product(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-static double determinant(const double a[3], const double b[3], const double c[3])
+static double determinant3(const double a[3], const double b[3], const double c[3])
 {
     double ab[3];
-    cross(a, b, ab);
-    return dot(ab, c);
+    cross_product(a, b, ab);
+    return dot_product(ab, c);
 }
 
 static void face_area(const double p[4][3], int size, double area[3])
 {
     double a[3], b[3];
-    difference(p[size == 4 ? 2 : 1], p[0], a);
-    difference(p[size == 4 ? 3 : 2], size == 4 ? p[1] : p[0], b);
-    cross(a, b, area);
+    subtract_vectors(p[size == 4 ? 2 : 1], p[0], a);
+    subtract_vectors(p[size == 4 ? 3 : 2], size == 4 ? p[1] : p[0], b);
+    cross_product(a, b, area);
     for (int i = 0; i < 3; ++i) area[i] *= 0.5;
 }
 
 /* Returns the volume of the pyramid between the origin and the face. */
 static double face_volume(const double p[4][3], int size)
 {
-    if (size == 3) return determinant(p[0], p[1], p[2]) / 6;
-    return (determinant(p[0], p[1], p[2]) + determinant(p[0], p[2], p[3]) + determinant(p[0], p[1], p[3]) +
-            determinant(p[1], p[2], p[3])) /
+    if (size == 3) return determinant3(p[0], p[1], p[2]) / 6;
+    return (determinant3(p[0], p[1], p[2]) + determinant3(p[0], p[2], p[3]) + determinant3(p[0], p[1], p[3]) +
+            determinant3(p[1], p[2], p[3])) /
            12;
 }
 
@@ -55,7 +55,7 @@ static void face_points(const wave_cell_shape *shape, int face, const double pos
     for (int i = 1; i < size; ++i) {
         if (id[shape->face[face][i]] < id[shape->face[face][first]]) first = i;
     }
-    for (int i = 0; i < size; ++i) difference(position[shape->face[face][(first + i) % size]], origin, p[i]);
+    for (int i = 0; i < size; ++i) subtract_vectors(position[shape->face[face][(first + i) % size]], origin, p[i]);
 }
 
 void wave_cell_measure(const wave_cell_shape *shape, const double position[8][3], const int64_t id[8],

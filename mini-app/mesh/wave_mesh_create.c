@@ -163,7 +163,7 @@ static bool reserve_cell(mesh_builder *m)
     return true;
 }
 
-static void put_index(const wave_mesh *mesh, void *array, int64_t at, int64_t value)
+static void store_index(const wave_mesh *mesh, void *array, int64_t at, int64_t value)
 {
     if (mesh->index_bytes == 8) {
         ((int64_t *)array)[at] = value;
@@ -198,9 +198,9 @@ static bool add_cell(mesh_builder *m, const wave_cell *c, int64_t id)
     for (int i = 0; i < wave_cell_shape_of(c->type)->vertex_count; ++i) {
         int32_t local;
         if (!add_vertex(m, c->vertex[i], &local)) return false;
-        put_index(mesh, mesh->connectivity, mesh->connectivity_count++, local);
+        store_index(mesh, mesh->connectivity, mesh->connectivity_count++, local);
     }
-    put_index(mesh, mesh->offsets, ++mesh->cells, mesh->connectivity_count);
+    store_index(mesh, mesh->offsets, ++mesh->cells, mesh->connectivity_count);
     return true;
 }
 
@@ -335,7 +335,7 @@ bool wave_mesh_create(const wave_partition *partition, int rank, int index_bytes
     *mesh = (wave_mesh){.partition = *partition, .rank = rank, .index_bytes = index_bytes};
     mesh_builder m = {.mesh = mesh};
     bool ok = find_own_cubes(&m) && reserve_cell(&m);
-    if (ok) put_index(mesh, mesh->offsets, 0, 0);
+    if (ok) store_index(mesh, mesh->offsets, 0, 0);
     ok = ok && make_own_cells(&m) && make_halo_cells(&m) && make_sends(&m);
     wave_map_free(&m.vertex_map);
     free(m.own.items);

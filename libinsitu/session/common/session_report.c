@@ -191,7 +191,7 @@ bool session_is_warned(const session_report *report, const session_warning *warn
     return is_reported_at(report, find_reported(report, key), key);
 }
 
-void session_forget_warnings(session_report *report)
+void session_clear_reported_warnings(session_report *report)
 {
     report->reported_count = 0;
     report->unusable_key = 0;

@@ -101,6 +101,6 @@ void session_warn(session_report *report, const session_warning *warning, bool h
 bool session_is_warned(const session_report *report, const session_warning *warning);
 
 /* Clears the list of reported warnings. Local. */
-void session_forget_warnings(session_report *report);
+void session_clear_reported_warnings(session_report *report);
 
 #endif

@@ -107,7 +107,7 @@ static double bernstein_slope(int order, const int exponents[4], int axis, const
 
 /* Inverts a matrix of count x count by elimination with pivots. The matrix is overwritten; `inverse` must contain the
  * unit matrix and receives the result. */
-static void invert(int count, double *matrix, double *inverse)
+static void invert_matrix(int count, double *matrix, double *inverse)
 {
     for (int c = 0; c < count; c++) {
         int pivot = c;
@@ -136,7 +136,8 @@ static void invert(int count, double *matrix, double *inverse)
 }
 
 /* Multiplies each of `outer` arrays of columns x inner numbers with a matrix of rows x columns. */
-static void multiply(const double *matrix, int rows, int columns, int outer, int inner, const double *in, double *out)
+static void multiply_by_matrix(const double *matrix, int rows, int columns, int outer, int inner, const double *in,
+                               double *out)
 {
     for (int o = 0; o < outer; o++, in += columns * inner)
         for (int r = 0; r < rows; r++, out += inner) {
@@ -152,7 +153,7 @@ static void fill_basis(const node_lists *lists, int axis, bool is_fine, double *
 {
     const int rows = is_fine ? lists->fine_count : lists->count, order = is_fine ? lists->fine_order : lists->order;
     double line[NODES_MOST_ORDER + 1];
-    session_place_nodes(lists->order, lists->is_lobatto, line);
+    session_compute_node_positions(lists->order, lists->is_lobatto, line);
     for (int r = 0; r < rows; r++) {
         const int *node = is_fine ? lists->fine[r] : lists->nodes[r];
         double at[4];
@@ -250,7 +251,7 @@ static bool fill_bernstein(const node_lists *lists, session_bound_factor *out)
     if (is_made) {
         fill_basis(lists, -1, false, spare);
         for (int n = 0; n < count; n++) out->bernstein[n * count + n] = 1;
-        invert(count, spare, out->bernstein);
+        invert_matrix(count, spare, out->bernstein);
         list_differences(lists, out);
     }
     base_free(spare);
@@ -353,7 +354,7 @@ typedef struct bound_job {
     /* tuples at the nodes of the level's lattice, and their derivatives along the axes */
     double *fine, *slopes[3];
     double (*gradients)[3]; /* gradient of the field at these nodes; not finite where the cell is flat */
-    double *work;           /* working memory of apply() */
+    double *work;           /* working memory of multiply_by_matrices() */
     /* bounds of u if the whole cell is one piece (m = 1): length for positions, and for the field */
     double position_bound, value_bound;
 } bound_job;
@@ -378,8 +379,8 @@ static void divide_work(bound_job *job, double *work)
 
 /* Multiplies the tuples, of `size` doubles each, with one matrix for each factor of the reference cell. The matrices
  * lead to the nodes of the level's lattice if is_fine is set, and otherwise to those of the cell. */
-static void apply(const bound_job *job, int size, const double *const matrices[3], bool is_fine, const double *in,
-                  double *out)
+static void multiply_by_matrices(const bound_job *job, int size, const double *const matrices[3], bool is_fine,
+                                 const double *in, double *out)
 {
     const int count = count_factors(job->of->lattice.type);
     int inner = size, outer = 1;
@@ -389,7 +390,7 @@ static void apply(const bound_job *job, int size, const double *const matrices[3
         const int rows = is_fine ? factor->fine_counts[job->level] : factor->node_count;
         double *to = f == count - 1 ? out : job->work + f % 2 * SIZE * job->of->levels[job->level].count;
         outer /= factor->node_count;
-        multiply(matrices[f], rows, factor->node_count, outer, inner, in, to);
+        multiply_by_matrix(matrices[f], rows, factor->node_count, outer, inner, in, to);
         inner *= rows;
         in = to;
     }
@@ -410,7 +411,7 @@ static double largest_q_in_tet(const double b[6])
     double matrix[16] = {0, b[0], b[1], b[2], b[0], 0, b[3], b[4], b[1], b[3], 0, b[5], b[2], b[4], b[5], 0};
     double inverse[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, sum = 0;
     bool is_inside = true;
-    invert(4, matrix, inverse);
+    invert_matrix(4, matrix, inverse);
     for (int c = 0; c < 4; c++) {
         const double at = inverse[4 * c] + inverse[4 * c + 1] + inverse[4 * c + 2] + inverse[4 * c + 3];
         is_inside = is_inside && at >= 0;
@@ -489,11 +490,11 @@ static void find_coefficients(const bound_job *job, int size, const double *tupl
     for (int f = 0; f < count_factors(job->of->lattice.type); f++) matrices[f] = factor_of(job->of, f)->bernstein;
     session_complete_tuples(&job->of->nodes, size, tuples, job->nodes);
     if (job->of->collapse) {
-        multiply(job->of->collapse, job->of->lattice.count, job->of->nodes.complete.count, 1, size, job->nodes,
-                 job->work);
+        multiply_by_matrix(job->of->collapse, job->of->lattice.count, job->of->nodes.complete.count, 1, size,
+                           job->nodes, job->work);
         memcpy(job->nodes, job->work, (size_t)(job->of->lattice.count * size) * sizeof *job->nodes);
     }
-    apply(job, size, matrices, false, job->nodes, job->coefficients);
+    multiply_by_matrices(job, size, matrices, false, job->nodes, job->coefficients);
 }
 
 /* Computes position_bound and value_bound. */
@@ -559,12 +560,12 @@ static void find_gradients(bound_job *job)
     const double *values[3] = {NULL}, *matrices[3];
     int axis = 0;
     for (int f = 0; f < count; f++) values[f] = factor_of(of, f)->values[job->level];
-    apply(job, SIZE, values, true, job->nodes, job->fine);
+    multiply_by_matrices(job, SIZE, values, true, job->nodes, job->fine);
     for (int f = 0; f < count; f++)
         for (int a = 0; a < factor_of(of, f)->dimensions; a++, axis++) {
             memcpy(matrices, values, sizeof matrices);
             matrices[f] = factor_of(of, f)->slopes[job->level][a];
-            apply(job, SIZE, matrices, true, job->nodes, job->slopes[axis]);
+            multiply_by_matrices(job, SIZE, matrices, true, job->nodes, job->slopes[axis]);
         }
     for (int n = 0; n < of->levels[job->level].count; n++) find_gradient(job, n, job->gradients[n]);
 }

@@ -678,7 +678,7 @@ insitu_status session_update_homes(session_catalogue *catalogue, const session_m
     return status;
 }
 
-void session_forget_homes(session_catalogue *catalogue)
+void session_invalidate_homes(session_catalogue *catalogue)
 {
     catalogue->are_hashes_known = false;
 }

@@ -143,7 +143,7 @@ insitu_status session_update_homes(session_catalogue *catalogue, const session_m
                                    const session_team *team, base_error *error);
 /* Marks the homes as unknown. This must be called on all ranks if cells have changed on any rank;
  * session_update_homes() then finds out which meshes have changed. Local. */
-void session_forget_homes(session_catalogue *catalogue);
+void session_invalidate_homes(session_catalogue *catalogue);
 
 /* Returns whether some mesh has cells of higher order on any rank. */
 static inline bool session_catalogue_has_higher_order(const session_catalogue *catalogue)

@@ -5,7 +5,7 @@
 
 #include "region.h"
 
-const signed char *session_vertex_turn(insitu_vertex_order order, int type)
+const signed char *session_vertex_permutation(insitu_vertex_order order, int type)
 {
     static const signed char lexicographic[GRID_MAX_CELL_VERTICES] = {0, 1, 3, 2, 4, 5, 7, 6};
     static const signed char plex_hex[] = {0, 3, 2, 1, 4, 5, 6, 7}, plex_wedge[] = {0, 2, 1, 3, 4, 5};
@@ -22,7 +22,7 @@ bool session_is_reordered(const insitu_mesh *given)
     if (given->cell_types.data) return given->vertex_order != INSITU_ORDER_VTK;
     const int type = (int)given->cell_type;
     const bool has_gaps = given->connectivity_row && given->connectivity_row != grid_type_vertices(type);
-    return has_gaps || session_vertex_turn(given->vertex_order, type);
+    return has_gaps || session_vertex_permutation(given->vertex_order, type);
 }
 
 /* Returns whether a mesh of mixed cells contains a cell whose vertices are in another order than VTK's. */
@@ -30,7 +30,8 @@ static bool has_reordered_cells(const session_mesh *mesh)
 {
     const grid *g = &mesh->cells;
     int64_t cell = 0;
-    while (cell < g->cell_count && !session_vertex_turn(mesh->given.vertex_order, grid_cell_type(g, cell))) cell++;
+    while (cell < g->cell_count && !session_vertex_permutation(mesh->given.vertex_order, grid_cell_type(g, cell)))
+        cell++;
     return cell < g->cell_count;
 }
 
@@ -91,7 +92,7 @@ static bool locate_cell(const grid *g, int64_t cell, int count, int64_t entries,
 static void reorder_cell(const session_mesh *mesh, int64_t cell, int64_t entries, const grid_array *out)
 {
     const int type = grid_cell_type(&mesh->cells, cell), count = grid_type_vertices(type);
-    const signed char *turn = session_vertex_turn(mesh->given.vertex_order, type);
+    const signed char *turn = session_vertex_permutation(mesh->given.vertex_order, type);
     int64_t vertices[GRID_MAX_CELL_VERTICES], first;
     if (!turn || !locate_cell(&mesh->cells, cell, count, entries, &first)) return;
     for (int i = 0; i < count; i++) vertices[i] = grid_array_index(out, first + turn[i]);

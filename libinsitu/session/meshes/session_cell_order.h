@@ -9,7 +9,7 @@ bool session_is_reordered(const insitu_mesh *given);
 
 /* Returns, for each vertex in VTK's order, its position in the other order; NULL if both orders are equal for this type
  * of cell. Each permutation is its own inverse. */
-const signed char *session_vertex_turn(insitu_vertex_order order, int type);
+const signed char *session_vertex_permutation(insitu_vertex_order order, int type);
 
 /* Copies the cells' vertices into the mesh's topology, contiguously and in VTK's order. Bad indices are copied
  * unchanged, and cells with bad offsets keep their order: session_check.c reports both. Local. */

@@ -319,7 +319,7 @@ static const char *type_name(int type)
 /* Returns the name of the type that the caller gave, since a polyhedron may be read as another type. */
 static const char *original_type_name(const session_mesh *mesh, int64_t cell)
 {
-    return type_name(session_given_type(mesh, cell));
+    return type_name(session_caller_type(mesh, cell));
 }
 
 static insitu_status describe_offsets(const session_mesh *mesh, int64_t cell, const fault_details *details,
@@ -359,7 +359,7 @@ static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base
     edge_buffer buffer = {0};
     const cell_fault fault = check_cell(mesh, cell, &buffer, &details);
     free_edge_buffer(&buffer);
-    const long long base = mesh->given.index_base, at = session_given_cell(mesh, cell), vertex = details.vertex + base;
+    const long long base = mesh->given.index_base, at = session_caller_cell(mesh, cell), vertex = details.vertex + base;
     const char *type = original_type_name(mesh, cell);
     switch (fault) {
     case BAD_FACES: return describe_faces(mesh, cell, details.fault_of_faces, &details.faces, error);
@@ -459,7 +459,7 @@ static insitu_status describe_far_cell(const session_mesh *mesh, base_error *err
                     error, INSITU_ERROR_MESH,
                     "mesh \"%s\": cell %lld (%s): vertex %lld is at (%g, %g, %g), coordinates of at most %g "
                     "are supported",
-                    mesh->label, (long long)session_given_cell(mesh, cell), original_type_name(mesh, cell),
+                    mesh->label, (long long)session_caller_cell(mesh, cell), original_type_name(mesh, cell),
                     (long long)vertex + mesh->given.index_base, p[0], p[1], p[2], largest_coordinate);
         }
     }
@@ -478,7 +478,7 @@ static insitu_status check_plane(const session_mesh *mesh, const mesh_tally *tal
         error, INSITU_ERROR_MESH,
         "mesh \"%s\": z coordinates are not given, but cell %lld (%s) needs them: only triangles, quads and "
         "polygons go without",
-        mesh->label, (long long)session_given_cell(mesh, cell), original_type_name(mesh, cell));
+        mesh->label, (long long)session_caller_cell(mesh, cell), original_type_name(mesh, cell));
 }
 
 static bool has_far_coordinates(const mesh_tally *tally)

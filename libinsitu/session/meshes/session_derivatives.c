@@ -52,7 +52,7 @@ static double legendre_slope(int p, double x, double *curvature)
 
 /* Gauss-Lobatto points are the ends and the roots of the derivative of Legendre's polynomial, found by Newton's method
  * from Chebyshev's points. */
-void session_place_nodes(int p, bool is_lobatto, double out[MOST_NODES_OF_LINE])
+void session_compute_node_positions(int p, bool is_lobatto, double out[MOST_NODES_OF_LINE])
 {
     for (int i = 0; i <= p; i++) {
         double x = -cos(acos(-1) * i / p), curvature;
@@ -68,7 +68,7 @@ static void derive_lines(term_list *list, bool is_lobatto)
 {
     const int p = list->order_of_polynomial, parts = list->parts;
     double x[MOST_NODES_OF_LINE] = {0};
-    session_place_nodes(list->of->order, is_lobatto, x);
+    session_compute_node_positions(list->of->order, is_lobatto, x);
     list->out->first_segment = x[1];
     for (int i = 0; i <= list->of->order; i++)
         for (int m = 0; m <= p; m++) {
@@ -216,7 +216,7 @@ static void find_nodes(const session_nodes *of, insitu_vertex_order order, int (
     for (int k = 0; k <= of->order; k++)
         for (int j = 0; j <= of->order; j++)
             for (int i = 0; i <= of->order; i++) {
-                const int n = session_is_node(of, i, j, k) ? session_node_index(of, order, i, j, k) : of->count;
+                const int n = session_has_node(of, i, j, k) ? session_node_index(of, order, i, j, k) : of->count;
                 if (n < of->count) memcpy(nodes_at[n], (const int[]){i, j, k}, sizeof nodes_at[n]);
             }
 }
@@ -287,7 +287,7 @@ bool session_polynomials_create(const session_mesh *mesh, session_polynomials *o
                                  .order = mesh->given.vertex_order};
     session_list_kinds(&out->rows);
     if (mesh->finer.parts) {
-        out->nodal = session_given_rows(&mesh->finer.nodal);
+        out->nodal = session_caller_rows(&mesh->finer.nodal);
         session_list_kinds(&out->nodal);
     }
     out->kinds = base_calloc((size_t)ROWS_MOST_KINDS * 2, sizeof *out->kinds);

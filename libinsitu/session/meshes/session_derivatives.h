@@ -28,7 +28,7 @@ void session_drop_derivatives(session_derivatives *derivatives);
 bool session_has_two_spacings(const session_nodes *of);
 
 /* Computes the positions of the p + 1 nodes of an edge from 0 to 1. */
-void session_place_nodes(int p, bool is_lobatto, double out[NODES_MOST_ORDER + 1]);
+void session_compute_node_positions(int p, bool is_lobatto, double out[NODES_MOST_ORDER + 1]);
 
 /* Finds the directions from a node that a serendipity cell lacks to the nodes around it. Returns their number: 2 at the
  * middle of a face, 3 at that of a hex. */

@@ -35,7 +35,7 @@ static void end_work(finer_work *w)
 
 static bool begin_work(const session_finer *finer, const unsigned char *marks, finer_work *w)
 {
-    *w = (finer_work){.rows = session_given_rows(&finer->nodal), .finer = finer, .marks = marks};
+    *w = (finer_work){.rows = session_caller_rows(&finer->nodal), .finer = finer, .marks = marks};
     session_list_kinds(&w->rows);
     bool is_made = true;
     for (int i = 0; i < w->rows.kind_count && is_made; i++)
@@ -221,7 +221,7 @@ void session_end_finer(session_meshes *meshes)
 static bool has_marks(const session_finer *finer, const session_cell_marks *marks)
 {
     static const session_piece_set all = {NULL, NULL};
-    session_rows rows = session_given_rows(&finer->nodal);
+    session_rows rows = session_caller_rows(&finer->nodal);
     int counts[ROWS_MOST_KINDS];
     bool is_same = true;
     session_list_kinds(&rows);
@@ -413,7 +413,7 @@ void session_count_finer_bytes(const session_mesh *mesh, const unsigned char *ma
                                session_finer_bytes out[FINER_MOST_PARTS + 1])
 {
     const insitu_mesh *nodal = mesh->finer.parts ? &mesh->finer.nodal : &mesh->given;
-    session_rows rows = session_given_rows(nodal);
+    session_rows rows = session_caller_rows(nodal);
     int64_t counts[ROWS_MOST_KINDS][2] = {{0}};
     session_list_kinds(&rows);
     for (int64_t cell = 0; cell < nodal->cell_count; cell++)

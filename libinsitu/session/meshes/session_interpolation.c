@@ -34,7 +34,7 @@ static int find_index(const session_nodes *of, const int at[3])
 static void fill_line_weights(int p, int parts, bool is_lobatto, double *out)
 {
     double x[NODES_MOST_ORDER + 1];
-    session_place_nodes(p, is_lobatto, x);
+    session_compute_node_positions(p, is_lobatto, x);
     for (int r = 0; r <= parts * p; r++)
         for (int i = 0; i <= p; i++) {
             const double at = (double)r / (parts * p);
@@ -207,7 +207,7 @@ static void find_positions(const session_nodes *of, insitu_vertex_order order, s
     for (int k = 0; k <= p; k++)
         for (int j = 0; j <= p; j++)
             for (int i = 0; i <= p; i++)
-                if (session_is_node(of, i, j, k))
+                if (session_has_node(of, i, j, k))
                     out->positions[find_index(&out->complete, (const int[]){i, j, k})] =
                         session_node_index(of, order, i, j, k);
     for (int c = 0; c < shape->corner_count; c++) {
@@ -280,7 +280,8 @@ static void apply_long_row(const double *row, int columns, int inner, const doub
 }
 
 /* Multiplies each of `outer` arrays of columns x inner numbers with a matrix of rows x columns. */
-static void apply(const double *matrix, int rows, int columns, int outer, int inner, const double *in, double *out)
+static void multiply_by_matrix(const double *matrix, int rows, int columns, int outer, int inner, const double *in,
+                               double *out)
 {
     enum { SHORT = 6 };
     for (int o = 0; o < outer; o++, in += columns * inner)
@@ -342,7 +343,7 @@ void session_complete_tuples(const session_interpolation *of, int components, co
             memcpy(out + n * components, tuples + of->positions[n] * components, bytes);
     for (int n = 0; n < 27 && !of->of.is_complete; n++) {
         const int at[3] = {n % 3, n / 3 % 3, n / 9};
-        if (session_is_node(&of->of, at[0], at[1], at[2]) &&
+        if (session_has_node(&of->of, at[0], at[1], at[2]) &&
             of->positions[find_index(&of->complete, at)] >= of->of.count)
             fill_missing(&job, at);
     }
@@ -356,21 +357,23 @@ static void fill_inside(const cell_job *job)
     const int triangle = c * (c + 1) / 2, triangles = r * (r + 1) / 2;
     double *a = job->spare[0], *b = job->spare[1];
     switch (of->of.type) {
-    case GRID_TRIANGLE: apply(of->triangle, triangles, triangle, 1, size, job->lattice, job->out); break;
+    case GRID_TRIANGLE: multiply_by_matrix(of->triangle, triangles, triangle, 1, size, job->lattice, job->out); break;
     case GRID_TET:
-    case GRID_PYRAMID: apply(of->whole, of->fine.count, of->complete.count, 1, size, job->lattice, job->out); break;
+    case GRID_PYRAMID:
+        multiply_by_matrix(of->whole, of->fine.count, of->complete.count, 1, size, job->lattice, job->out);
+        break;
     case GRID_WEDGE:
-        apply(of->triangle, triangles, triangle, c, size, job->lattice, a);
-        apply(of->line, r, c, 1, triangles * size, a, job->out);
+        multiply_by_matrix(of->triangle, triangles, triangle, c, size, job->lattice, a);
+        multiply_by_matrix(of->line, r, c, 1, triangles * size, a, job->out);
         break;
     case GRID_QUAD:
-        apply(of->line, r, c, c, size, job->lattice, a);
-        apply(of->line, r, c, 1, r * size, a, job->out);
+        multiply_by_matrix(of->line, r, c, c, size, job->lattice, a);
+        multiply_by_matrix(of->line, r, c, 1, r * size, a, job->out);
         break;
     default:
-        apply(of->line, r, c, c * c, size, job->lattice, a);
-        apply(of->line, r, c, c, r * size, a, b);
-        apply(of->line, r, c, 1, r * r * size, b, job->out);
+        multiply_by_matrix(of->line, r, c, c * c, size, job->lattice, a);
+        multiply_by_matrix(of->line, r, c, c, r * size, a, b);
+        multiply_by_matrix(of->line, r, c, 1, r * r * size, b, job->out);
     }
 }
 
@@ -412,10 +415,10 @@ static void fill_face(const cell_job *job, const face_axes *axes)
     double *a = job->spare[0], *b = job->spare[1];
     copy_face(&of->complete, axes, size, true, job->lattice, a);
     if (axes->count == 3) {
-        apply(of->triangle, r * (r + 1) / 2, c * (c + 1) / 2, 1, size, a, b);
+        multiply_by_matrix(of->triangle, r * (r + 1) / 2, c * (c + 1) / 2, 1, size, a, b);
     } else {
-        apply(of->line, r, c, axes->count == 4 ? c : 1, size, a, b);
-        if (axes->count == 4) apply(of->line, r, c, 1, r * size, b, a);
+        multiply_by_matrix(of->line, r, c, axes->count == 4 ? c : 1, size, a, b);
+        if (axes->count == 4) multiply_by_matrix(of->line, r, c, 1, r * size, b, a);
     }
     copy_face(&of->fine, axes, size, false, job->out, axes->count == 4 ? a : b);
 }

@@ -135,7 +135,7 @@ void session_drop_tree(session_mesh *mesh)
     }
 }
 
-grid session_given_grid(const insitu_mesh *mesh)
+grid session_caller_grid(const insitu_mesh *mesh)
 {
     grid g = {.vertex_count = mesh->vertex_count, .cell_count = mesh->cell_count, .cell_type = (int)mesh->cell_type};
     for (int axis = 0; axis < 3; axis++) g.coordinates[axis] = session_coordinates(mesh, axis);

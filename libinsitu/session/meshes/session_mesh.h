@@ -429,7 +429,7 @@ grid_array session_index_array(const insitu_mesh *mesh, const insitu_array *arra
 grid_array session_offset_array(const insitu_mesh *mesh, const insitu_array *array, int64_t count, int64_t entries);
 
 /* Returns the cells as the caller's arrays describe them. */
-grid session_given_grid(const insitu_mesh *mesh);
+grid session_caller_grid(const insitu_mesh *mesh);
 
 /* Allocates count + 1 indices, all 0, of 4 bytes if `largest` fits into them, and otherwise of 8 bytes. Returns false
  * if memory runs out; the error then names the mesh and `what`, the purpose of the indices. */
@@ -559,7 +559,7 @@ static inline session_sizes session_sizes_of(const session_mesh *mesh)
 }
 
 /* Returns the caller's cell that contains a cell of `cells`: that cell itself, unless cells are split into pieces. */
-static inline int64_t session_given_cell(const session_mesh *mesh, int64_t cell)
+static inline int64_t session_caller_cell(const session_mesh *mesh, int64_t cell)
 {
     return mesh->topology.is_split ? (int64_t)mesh->topology.parents[cell] : cell;
 }

@@ -359,7 +359,7 @@ static unsigned find_description_changes(const session_mesh *mesh, const insitu_
 /* ---- meshes -------------------------------------------------------------------------------------------------- */
 
 /* Replaces the caller's new description by the finer lattices again, unless these no longer fit it. */
-static void keep_finer(session_mesh *mesh, unsigned changed)
+static void restore_finer_lattices(session_mesh *mesh, unsigned changed)
 {
     if (changed & (INSITU_CHANGED_TOPOLOGY | INSITU_CHANGED_GEOMETRY)) session_drop_finer(&mesh->finer);
     if (!mesh->finer.parts) return;
@@ -377,7 +377,7 @@ void session_store_mesh(session_meshes *meshes, session_mesh *mesh, const insitu
     if (changed & INSITU_CHANGED_GEOMETRY && (mesh->topology.depends_on_coordinates || mesh->finer.parts))
         changed |= INSITU_CHANGED_TOPOLOGY;
     if (session_conform_mesh(mesh, given, changed, error)) return;
-    keep_finer(mesh, changed);
+    restore_finer_lattices(mesh, changed);
     if (drops_fields) {
         session_drop_fields(mesh);
         meshes->are_names_changed = true;

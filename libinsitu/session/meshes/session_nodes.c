@@ -286,7 +286,7 @@ int session_node_index(const session_nodes *of, insitu_vertex_order order, int i
     return session_quadratic_index(of, order, number_vtk_node(of, is_old, i, j, k));
 }
 
-bool session_is_node(const session_nodes *of, int i, int j, int k)
+bool session_has_node(const session_nodes *of, int i, int j, int k)
 {
     const int p = of->order;
     switch (of->type) {

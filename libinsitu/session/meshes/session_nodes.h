@@ -45,7 +45,7 @@ const char *session_order_refused(const session_nodes *of, insitu_vertex_order o
 int session_node_index(const session_nodes *of, insitu_vertex_order order, int i, int j, int k);
 
 /* Returns whether the lattice of the cell's order has a node i, j, k; each of them is from 0 to the order. */
-bool session_is_node(const session_nodes *of, int i, int j, int k);
+bool session_has_node(const session_nodes *of, int i, int j, int k);
 
 /* Returns the position in the row of connectivity of the n-th node in VTK's order, for cells of order 2. */
 int session_quadratic_index(const session_nodes *of, insitu_vertex_order order, int n);

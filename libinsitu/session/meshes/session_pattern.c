@@ -253,7 +253,7 @@ int session_cut_serendipity(const session_pattern *pattern, const int *ranks, in
 
 static bool make_linear(int type, insitu_vertex_order order, session_pattern *out)
 {
-    const signed char *turn = session_vertex_turn(order, type);
+    const signed char *turn = session_vertex_permutation(order, type);
     out->piece_count = 1;
     out->piece_size = grid_type_vertices(type);
     out->types = base_alloc(1);

@@ -50,7 +50,7 @@ static bool begin_work(const session_mesh *mesh, int parts, bool is_lobatto, ses
 {
     const insitu_mesh *nodal = session_nodal_mesh(mesh);
     bool is_made = true;
-    *w = (piece_work){.rows = session_given_rows(nodal), .set = set};
+    *w = (piece_work){.rows = session_caller_rows(nodal), .set = set};
     session_list_kinds(&w->rows);
     for (int i = 0; i < w->rows.kind_count && is_made; i++)
         is_made = make_kind(&w->rows.kinds[i].nodes, nodal->vertex_order, parts, is_lobatto, &w->kinds[i]);
@@ -86,7 +86,7 @@ static void find_pieces_at_nodes(const piece_kind *kind, int parts, bool *is_own
     for (int k = 0; k <= p; k++)
         for (int j = 0; j <= p; j++)
             for (int i = 0; i <= p; i++)
-                if (session_is_node(&kind->nodes.of, i, j, k) &&
+                if (session_has_node(&kind->nodes.of, i, j, k) &&
                     session_node_index(&kind->nodes.of, INSITU_ORDER_VTK, i, j, k) < kind->nodes.of.count)
                     is_own[session_node_index(fine, INSITU_ORDER_LEXICOGRAPHIC, parts * i, parts * j, parts * k)] =
                         true;

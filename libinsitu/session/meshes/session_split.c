@@ -38,7 +38,7 @@ bool session_has_higher_order(const insitu_mesh *given)
 {
     if (given->cell_count == 0 || given->lattice || session_has_owners(given)) return false;
     if (!given->cell_types.data) return session_corner_type((int)given->cell_type) != GRID_NO_TYPE;
-    const grid g = session_given_grid(given);
+    const grid g = session_caller_grid(given);
     int64_t cell = 0;
     while (cell < given->cell_count && session_corner_type(grid_cell_type(&g, cell)) == GRID_NO_TYPE) cell++;
     return cell < given->cell_count;

@@ -28,7 +28,7 @@ void tally_merge(mesh_tally *sum, const mesh_tally *part)
 
 /* ---- volumes and sizes --------------------------------------------------------------------------------------- */
 
-MMBVH_INLINE double determinant(const double u[3], const double v[3], const double w[3])
+MMBVH_INLINE double determinant3(const double u[3], const double v[3], const double w[3])
 {
     return u[0] * (v[1] * w[2] - v[2] * w[1]) + u[1] * (v[2] * w[0] - v[0] * w[2]) + u[2] * (v[0] * w[1] - v[1] * w[0]);
 }
@@ -38,7 +38,7 @@ MMBVH_INLINE double corner_volume(double points[][3], const signed char corner[4
     double edge[3][3];
     for (int k = 0; k < 3; k++)
         for (int axis = 0; axis < 3; axis++) edge[k][axis] = points[corner[k + 1]][axis] - points[corner[0]][axis];
-    return determinant(edge[0], edge[1], edge[2]);
+    return determinant3(edge[0], edge[1], edge[2]);
 }
 
 MMBVH_INLINE double signed_volume(int type, double points[][3])
@@ -431,8 +431,8 @@ static int64_t tally_lattice_cells(const session_mesh *mesh, int64_t begin, int6
     return end;
 }
 
-MMBVH_INLINE int64_t run(const session_mesh *mesh, int64_t begin, int64_t end, mesh_tally *tally,
-                         const fetch_shape shape, const bool wide_index, const bool wide_number)
+MMBVH_INLINE int64_t tally_cells(const session_mesh *mesh, int64_t begin, int64_t end, mesh_tally *tally,
+                                 const fetch_shape shape, const bool wide_index, const bool wide_number)
 {
     mesh_tally t = tally_empty();
     lane_cells alike = {.count = 0};
@@ -461,13 +461,13 @@ MMBVH_INLINE int64_t run(const session_mesh *mesh, int64_t begin, int64_t end, m
 #define DEFINE_RUN(name, shape, wide_index, wide_number)                                                               \
     static int64_t name(const session_mesh *mesh, int64_t begin, int64_t end, mesh_tally *tally)                       \
     {                                                                                                                  \
-        return run(mesh, begin, end, tally, shape, wide_index, wide_number);                                           \
+        return tally_cells(mesh, begin, end, tally, shape, wide_index, wide_number);                                   \
     }
-FETCH_INSTANCES(DEFINE_RUN, run)
+FETCH_INSTANCES(DEFINE_RUN, tally_cells)
 
 tally_run tally_choose(const session_mesh *mesh)
 {
-    static const tally_run table[FETCH_SHAPES][2][2] = FETCH_TABLE(run);
+    static const tally_run table[FETCH_SHAPES][2][2] = FETCH_TABLE(tally_cells);
     const grid *g = &mesh->cells;
     if (g->coordinates[0].axis) return tally_lattice_cells;
     if (!fetch_can_read_boxes(g) || (!g->cell_types && grid_is_shell_type(g->cell_type))) return NULL;

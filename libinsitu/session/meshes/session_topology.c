@@ -35,7 +35,7 @@
 void session_read_topology(session_mesh *mesh)
 {
     session_topology *t = &mesh->topology;
-    grid g = session_given_grid(&mesh->given);
+    grid g = session_caller_grid(&mesh->given);
     if (t->has_own_cells) {
         g.offsets = t->offsets;
         g.connectivity = t->connectivity;
@@ -73,16 +73,16 @@ void session_read_topology(session_mesh *mesh)
     mesh->cells = g;
 }
 
-int session_given_type(const session_mesh *mesh, int64_t cell)
+int session_caller_type(const session_mesh *mesh, int64_t cell)
 {
     if (mesh->cells.lattice) return mesh->cells.cell_type;
-    const grid given = session_given_grid(&mesh->given);
-    return grid_cell_type(&given, session_given_cell(mesh, cell));
+    const grid given = session_caller_grid(&mesh->given);
+    return grid_cell_type(&given, session_caller_cell(mesh, cell));
 }
 
 /* ---- faces' vertices from several lists ------------------------------------------------------------------------ */
 
-session_face_row session_given_face(const insitu_mesh *mesh, int64_t face)
+session_face_row session_caller_face(const insitu_mesh *mesh, int64_t face)
 {
     const bool is_apart = face >= mesh->face_count;
     if (mesh->face_lists.data) {
@@ -124,7 +124,7 @@ static int64_t count_listed_vertices(const session_mesh *mesh, base_error *error
 {
     int64_t total = 0;
     for (int64_t face = 0; face < session_face_count(&mesh->given); face++) {
-        const session_face_row row = session_given_face(&mesh->given, face);
+        const session_face_row row = session_caller_face(&mesh->given, face);
         if (check_row(mesh, face, &row, error)) return -1;
         total += row.size;
         if (total <= INT64_MAX / 64) continue;
@@ -147,7 +147,7 @@ static insitu_status copy_face_lists(session_mesh *mesh, base_error *error)
         !session_make_indices(mesh, "faces' vertices", total, given->vertex_count, &t->face_connectivity, error))
         return error->status;
     for (int64_t face = 0; face < count; face++) {
-        const session_face_row row = session_given_face(given, face);
+        const session_face_row row = session_caller_face(given, face);
         for (int64_t i = 0; i < row.size; i++) {
             const int64_t vertex = grid_array_index(&row.list, row.first + i);
             if (vertex < 0 || vertex >= given->vertex_count)

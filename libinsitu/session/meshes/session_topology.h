@@ -19,7 +19,7 @@ typedef struct session_face_row {
     int64_t limit;       /* number of entries of the list that contains the row */
 } session_face_row;
 
-session_face_row session_given_face(const insitu_mesh *mesh, int64_t face);
+session_face_row session_caller_face(const insitu_mesh *mesh, int64_t face);
 
 /* The caller's arrays that give, for each face, the cell that owns it and the neighbouring cell. */
 typedef struct session_face_sides {
@@ -35,7 +35,7 @@ void session_cells_of_face(const session_face_sides *sides, int64_t face, int64_
 void session_read_topology(session_mesh *mesh);
 
 /* Returns the type that the caller gave the cell, regardless of the type as which it is read. */
-int session_given_type(const session_mesh *mesh, int64_t cell);
+int session_caller_type(const session_mesh *mesh, int64_t cell);
 
 /* Computes what the caller's description of the mesh omits, once per topology: the faces of cells from owner and
  * neighbour; one array of the vertices of all faces, if they are given in several; the vertices of cells in VTK's

@@ -46,7 +46,7 @@ static void order_corners(corner_loop *loop)
     }
 }
 
-static void subtract(const double a[3], const double b[3], double out[3])
+static void subtract_vectors(const double a[3], const double b[3], double out[3])
 {
     for (int axis = 0; axis < 3; axis++) out[axis] = a[axis] - b[axis];
 }
@@ -55,8 +55,8 @@ static void subtract(const double a[3], const double b[3], double out[3])
 static void find_normal(const corner_loop *loop, double out[3])
 {
     double a[3], b[3];
-    subtract(loop->positions[loop->count == 4 ? 2 : 1], loop->positions[0], a);
-    subtract(loop->positions[loop->count - 1], loop->positions[loop->count == 4 ? 1 : 0], b);
+    subtract_vectors(loop->positions[loop->count == 4 ? 2 : 1], loop->positions[0], a);
+    subtract_vectors(loop->positions[loop->count - 1], loop->positions[loop->count == 4 ? 1 : 0], b);
     for (int axis = 0; axis < 3; axis++) {
         const int next = (axis + 1) % 3, last = (axis + 2) % 3;
         out[axis] = a[next] * b[last] - a[last] * b[next];
@@ -67,7 +67,7 @@ static double measure_perimeter(const corner_loop *loop)
 {
     double sum = 0, side[3];
     for (int i = 0; i < loop->count; i++) {
-        subtract(loop->positions[(i + 1) % loop->count], loop->positions[i], side);
+        subtract_vectors(loop->positions[(i + 1) % loop->count], loop->positions[i], side);
         sum += sqrt(vector3_dot(side, side));
     }
     return sum;
@@ -89,7 +89,7 @@ static bool find_apex(const corner_loop *loop, const double inside[3], double ap
     if (!(length > 1e-12 * around * around)) return false;
     for (int i = 0; i < loop->count; i++)
         for (int axis = 0; axis < 3; axis++) middle[axis] += loop->positions[i][axis] / loop->count;
-    subtract(inside, middle, towards);
+    subtract_vectors(inside, middle, towards);
     const bool is_below = vector3_dot(towards, normal) < -side_slack * around * length;
     const double height = 0.5 * around / loop->count * (is_below ? -1 : 1);
     for (int axis = 0; axis < 3; axis++) apex[axis] = middle[axis] + height * normal[axis] / length;
@@ -186,8 +186,8 @@ static void find_corner_normal(outer_work *w, const corner_loop *loop, int corne
     double a[3], b[3];
     if (w->is_curved && session_find_face_normal(&w->curved, w->whole, w->parent, w->face, loop->vertices[corner], out))
         return;
-    subtract(loop->positions[next], loop->positions[corner], a);
-    subtract(loop->positions[last], loop->positions[corner], b);
+    subtract_vectors(loop->positions[next], loop->positions[corner], a);
+    subtract_vectors(loop->positions[last], loop->positions[corner], b);
     vector3_cross(a, b, out);
 }
 
@@ -265,9 +265,9 @@ static bool find_common_apex(const face_polygon *p, double out[3])
     for (int i = 0; i + 2 < p->count; i++) {
         if (!polygon_triangle(p, i, &loop, own)) continue;
         find_normal(&loop, normal);
-        subtract(own, loop.positions[0], height);
+        subtract_vectors(own, loop.positions[0], height);
         const double most = vector3_dot(height, normal);
-        subtract(out, loop.positions[0], height);
+        subtract_vectors(out, loop.positions[0], height);
         if (!(vector3_dot(height, normal) / most > 0.25)) return false;
     }
     return count > 0;
@@ -280,8 +280,8 @@ static void find_polygon_normal(face_polygon *p, const double inside[3])
     double towards[3], middle[3] = {0, 0, 0}, sum[3] = {0, 0, 0};
     for (int i = 0; i + 2 < p->count; i++) {
         double a[3], b[3];
-        subtract(p->positions[p->triangles[i][1]], p->positions[p->triangles[i][0]], a);
-        subtract(p->positions[p->triangles[i][2]], p->positions[p->triangles[i][0]], b);
+        subtract_vectors(p->positions[p->triangles[i][1]], p->positions[p->triangles[i][0]], a);
+        subtract_vectors(p->positions[p->triangles[i][2]], p->positions[p->triangles[i][0]], b);
         for (int axis = 0; axis < 3; axis++) {
             const int next = (axis + 1) % 3, last = (axis + 2) % 3;
             sum[axis] += a[next] * b[last] - a[last] * b[next];
@@ -289,7 +289,7 @@ static void find_polygon_normal(face_polygon *p, const double inside[3])
     }
     for (int i = 0; i < p->count; i++)
         for (int axis = 0; axis < 3; axis++) middle[axis] += p->positions[i][axis] / p->count;
-    subtract(inside, middle, towards);
+    subtract_vectors(inside, middle, towards);
     const double length = sqrt(vector3_dot(sum, sum)), width = sqrt(length), side = vector3_dot(towards, sum);
     int largest = 0;
     for (int axis = 1; axis < 3; axis++)

@@ -91,7 +91,7 @@ static insitu_status find_face(const patch_faces *p, int patch, int64_t i, patch
             given->faces.data ? grid_array_index(&faces, i) : given->first_face - mesh->index_base + i;
         if (number < 0 || number >= session_face_count(mesh))
             return fail_range_at_face(p, patch, i, "is outside", session_face_count(mesh), error);
-        *out = (patch_face){session_given_face(mesh, number), number};
+        *out = (patch_face){session_caller_face(mesh, number), number};
     }
     if (row->size < 3) return fail_at_face(p, patch, i, "has fewer than three vertices", error);
     if (row->first < 0 || row->first > row->limit || row->size > row->limit - row->first)
@@ -109,7 +109,7 @@ static insitu_status read_face(const patch_faces *p, int patch, int64_t i, const
             return fail_range_at_face(p, patch, i, "has a vertex index outside", count, error);
         groups[k] = p->mesh->discontinuous.is_active ? -1 : p->numbers->group_of_vertex[vertex];
         if (groups[k] >= 0) continue;
-        const session_key key = session_given_vertex_key(p->mesh, vertex, p->numbers->by_id);
+        const session_key key = session_caller_vertex_key(p->mesh, vertex, p->numbers->by_id);
         groups[k] = session_keys_find(p->numbers->keys, &key);
     }
     return INSITU_OK;

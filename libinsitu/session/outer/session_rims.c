@@ -69,7 +69,7 @@ static bool make_kind(const session_nodes *of, insitu_vertex_order order, sessio
     for (int k = 0; k <= of->order; k++)
         for (int j = 0; j <= of->order; j++)
             for (int i = 0; i <= of->order; i++) {
-                if (!session_is_node(of, i, j, k)) continue;
+                if (!session_has_node(of, i, j, k)) continue;
                 const int at = session_node_index(of, order, i, j, k);
                 for (int f = 0; f < faces->count && at < of->count; f++)
                     if (is_on_face(of, faces->vertices[f], (const int[]){i, j, k}))

@@ -72,8 +72,8 @@ static insitu_status light_fragments(const session_frame_target *t, const render
     return session_light_fragments(t->comm, job, &frame->occluders, fragments, &rendered->surface_ms, error);
 }
 
-static insitu_status draw(const session_frame_target *t, const render_job *job, image *out, session_frame *frame,
-                          comp_overlaps *overlaps, base_error *error)
+static insitu_status draw_frame(const session_frame_target *t, const render_job *job, image *out, session_frame *frame,
+                                comp_overlaps *overlaps, base_error *error)
 {
     int ranks = 1;
     MPI_Comm_size(t->comm, &ranks);
@@ -259,7 +259,7 @@ static insitu_status redraw_overlaps(const session_frame_target *t, const render
         comp_overlaps found = {0};
         at = select_turn_pixels(out, overlaps->pixels, at, most, second->turn_pixels);
         if (out->deep && out->deep->counts) remove_samples(second->turn_pixels, out);
-        insitu_status status = draw(t, &again, &second->picture, frame, is_sampled ? &found : NULL, error);
+        insitu_status status = draw_frame(t, &again, &second->picture, frame, is_sampled ? &found : NULL, error);
         doubled += found.count;
         base_free(found.pixels);
         if (status) return status;
@@ -312,7 +312,7 @@ insitu_status session_draw_frame(const session_frame_target *t, const render_job
         status = mark_all_pixels(t, out, &overlaps, error);
     } else {
         out->is_folded = job->reproducible && job->volume_count > 0;
-        status = draw(t, job, out, frame, job->volume_count ? &overlaps : NULL, error);
+        status = draw_frame(t, job, out, frame, job->volume_count ? &overlaps : NULL, error);
         out->is_folded = false;
         /* because of rounding, a sample at the common face of two cells may be in both; redraw_overlaps() therefore
          * counts the real overlaps from separate samples */

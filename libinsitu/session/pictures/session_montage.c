@@ -27,14 +27,14 @@ static int64_t count_pixels(const scene_montage *montage)
 }
 
 /* Returns the place of a panel in the montage, whose pixels are rgba. */
-static insitu_place find_place(const scene_montage *of, float *rgba, int panel)
+static insitu_place find_panel_region(const scene_montage *of, float *rgba, int panel)
 {
     const int left = of->are_bars_left ? of->bar_width : 0;
     return (insitu_place){rgba, width_of(of), left + panel % of->columns * of->width, panel / of->columns * of->height};
 }
 
 /* Clips the interval [first, first + length) to [0, end). The length may become negative. */
-static void clip(int end, int *first, int *length)
+static void clip_interval(int end, int *first, int *length)
 {
     const int last = *first + *length < end ? *first + *length : end;
     *first = *first > 0 ? *first : 0;
@@ -43,15 +43,15 @@ static void clip(int end, int *first, int *length)
 
 int session_find_covered(const scene_montage *montage, int panel, insitu_rectangle covered[SCENE_ANCHORS])
 {
-    const insitu_place place = find_place(montage, NULL, panel);
+    const insitu_place place = find_panel_region(montage, NULL, panel);
     const int frame = montage->frame_width;
     int count = 0;
     for (int i = 0; i < SCENE_ANCHORS; i++) {
         const scene_rectangle *inset = &montage->insets[i];
         insitu_rectangle r = {inset->x - frame - place.x, inset->y - frame - place.y, inset->width + 2 * frame,
                               inset->height + 2 * frame};
-        clip(montage->width, &r.x, &r.width);
-        clip(montage->height, &r.y, &r.height);
+        clip_interval(montage->width, &r.x, &r.width);
+        clip_interval(montage->height, &r.y, &r.height);
         if (inset->width && r.width > 0 && r.height > 0) covered[count++] = r;
     }
     return count;
@@ -104,7 +104,7 @@ static size_t row_size(int width)
 static insitu_status keep_panel(const scene_montage *of, session_montage *m, int panel, const insitu_image *picture,
                                 const session_decorations *decorations, base_error *error)
 {
-    const insitu_place place = find_place(of, m->rgba, panel);
+    const insitu_place place = find_panel_region(of, m->rgba, panel);
     m->panels[panel] = session_copy_decorations(decorations);
     if (!m->panels[panel]) return fail_for_memory(of, error);
     for (int y = 0; y < picture->height; y++)
@@ -133,7 +133,7 @@ static insitu_status draw_panel(const scene_montage *of, session_montage *m, int
     insitu_rectangle covered[SCENE_ANCHORS];
     insitu_decorations decorations = {0};
     insitu_image drawn = *picture;
-    const insitu_place place = find_place(of, m->rgba, panel);
+    const insitu_place place = find_panel_region(of, m->rgba, panel);
     if (picture->decorations) {
         decorations = *picture->decorations;
         decorations.covered = covered;
@@ -191,7 +191,7 @@ static insitu_status decorate_panel(const scene_montage *of, session_montage *m,
     insitu_decorations decorations = m->panels[panel]->decorations;
     const insitu_image picture = {
         .width = of->width, .height = of->height, .rgba = buffer, .decorations = &decorations};
-    const insitu_place place = find_place(of, m->rgba, panel);
+    const insitu_place place = find_panel_region(of, m->rgba, panel);
     for (int y = 0; y < of->height; y++)
         memcpy(buffer + 4 * (ptrdiff_t)of->width * y, find_row(&place, y), row_size(of->width));
     if (!has_bars) decorations.bar_count = 0;

@@ -46,7 +46,7 @@ insitu_status session_keep_picture(session_kept_pictures *kept, const scene_imag
     return INSITU_OK;
 }
 
-void session_drop_kept(session_kept_pictures *kept)
+void session_free_kept_pictures(session_kept_pictures *kept)
 {
     for (int i = 0; i < kept->count; i++) base_free((void *)kept->items[i].rgba);
     kept->count = 0;

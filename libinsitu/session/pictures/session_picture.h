@@ -34,6 +34,6 @@ typedef struct session_kept_pictures {
 insitu_status session_keep_picture(session_kept_pictures *kept, const scene_image *image, const struct image *picture,
                                    base_error *error);
 
-void session_drop_kept(session_kept_pictures *kept);
+void session_free_kept_pictures(session_kept_pictures *kept);
 
 #endif

@@ -108,7 +108,7 @@ static bool add_to_part(const session_catalogue_mesh *mesh, session_mesh *part, 
     scalar->component = component;
     scalar->is_recentred = true;
     scalar->mesh_group_name = mesh_group;
-    scalar->original_values = session_given_field(part, index, component);
+    scalar->original_values = session_caller_field(part, index, component);
     return true;
 }
 
@@ -205,7 +205,7 @@ static grid_field input_values(const derive_work *w, const session_catalogue_mes
 {
     const session_scalar *scalar = find_recentred(w, mesh, part, input, component);
     if (scalar) return session_scalar_field(part, scalar);
-    return session_given_field(part, session_find_field(part, w->derived->inputs[input].name), component);
+    return session_caller_field(part, session_find_field(part, w->derived->inputs[input].name), component);
 }
 
 static bool is_wide_input(const session_mesh *part, const scene_field *input)
@@ -256,7 +256,7 @@ static void mark_values_new(const derive_work *w, const session_catalogue_mesh *
     part->fields[index].is_copy_stale = false;
     for (int i = 0; i < part->scalar_count; i++)
         if (part->scalars[i].field == index)
-            part->scalars[i].original_values = session_given_field(part, index, part->scalars[i].component);
+            part->scalars[i].original_values = session_caller_field(part, index, part->scalars[i].component);
 }
 
 /* ---- expressions ------------------------------------------------------------------------------------------------- */

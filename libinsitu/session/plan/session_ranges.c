@@ -257,7 +257,7 @@ static bool find_order_values(const session_meshes *meshes, int threads, const s
         const bool is_own = !scalar->is_recentred && !session_is_distance(scalar);
         const session_order_field own = {.mesh = mesh,
                                          .values = session_scalar_field(mesh, scalar),
-                                         .given = is_own ? session_find_given_nodes(mesh, scalar->field) : -1,
+                                         .given = is_own ? session_find_caller_nodes(mesh, scalar->field) : -1,
                                          .threads = threads};
         session_find_order_values(&own, &of->order_values[i], error);
     }

@@ -298,7 +298,7 @@ static bool list_parts(const session_recentring *item, const session_meshes *mes
         mesh_part *part = &r->parts[i];
         part->scalar = session_find_recentred(mesh, item->field, item->component, item->mesh_group->name);
         if (!part->scalar) continue;
-        part->field = session_given_field(mesh, part->scalar->field, part->scalar->component);
+        part->field = session_caller_field(mesh, part->scalar->field, part->scalar->component);
         part->is_of_vertices = mesh->fields[part->scalar->field].given.centring == INSITU_VERTEX;
     }
     return true;

@@ -57,7 +57,7 @@ static insitu_status refuse_polyhedra(const session_mesh *mesh, base_error *erro
 {
     const bool is_mixed = mesh->given.cell_types.data && !mesh->topology.is_split;
     for (int64_t cell = 0; is_mixed && cell < mesh->given.cell_count; cell++)
-        if (session_given_type(mesh, cell) == GRID_POLYHEDRON)
+        if (session_caller_type(mesh, cell) == GRID_POLYHEDRON)
             return base_fail(error, INSITU_ERROR_FIELD,
                              "mesh \"%s\": a field has values at corners, and cell %lld is a polyhedron, whose corners "
                              "have no order",

@@ -41,7 +41,7 @@ insitu_status session_fill_field(session_meshes *meshes, session_mesh *mesh, int
     if (!status) status = session_store_filled(mesh, index, &filled, error);
     for (int i = 0; i < mesh->scalar_count && !status; i++)
         if (mesh->scalars[i].field == index)
-            mesh->scalars[i].original_values = session_given_field(mesh, index, mesh->scalars[i].component);
+            mesh->scalars[i].original_values = session_caller_field(mesh, index, mesh->scalars[i].component);
     field->fill_problem = *error;
     return status;
 }
@@ -67,7 +67,7 @@ insitu_status session_fill_fields(session_meshes *meshes, const session_catalogu
     return error->status;
 }
 
-void session_forget_filled(const session_meshes *meshes)
+void session_release_filled_arrays(const session_meshes *meshes)
 {
     for (int m = 0; m < meshes->count; m++)
         for (int f = 0; f < meshes->items[m]->field_count; f++) {

@@ -16,6 +16,6 @@ insitu_status session_fill_fields(session_meshes *meshes, const session_catalogu
 insitu_status session_fill_field(session_meshes *meshes, session_mesh *mesh, int index, base_error *error);
 
 /* Ends the step. Afterwards the session does not read the filled arrays any more. */
-void session_forget_filled(const session_meshes *meshes);
+void session_release_filled_arrays(const session_meshes *meshes);
 
 #endif

@@ -200,7 +200,7 @@ static insitu_status update_copy(session_mesh *mesh, int index, int threads, bas
                                                                       : copy_values(mesh, field, threads, error);
     for (int i = 0; i < mesh->scalar_count && !status; i++)
         if (mesh->scalars[i].field == index)
-            mesh->scalars[i].original_values = session_given_field(mesh, index, mesh->scalars[i].component);
+            mesh->scalars[i].original_values = session_caller_field(mesh, index, mesh->scalars[i].component);
     return status;
 }
 

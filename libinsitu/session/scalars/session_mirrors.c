@@ -101,7 +101,7 @@ static void share_derived_field(session_mesh *image, const char *name)
     session_mark_scalars_stale(image, index);
     for (int i = 0; i < image->scalar_count; i++)
         if (image->scalars[i].field == index)
-            image->scalars[i].original_values = session_given_field(image, index, image->scalars[i].component);
+            image->scalars[i].original_values = session_caller_field(image, index, image->scalars[i].component);
 }
 
 void session_share_derived(const session_meshes *meshes, const char *name)

@@ -4,7 +4,7 @@
 
 #include "session_discontinuous.h"
 
-static double given_coordinate(const session_mesh *mesh, int axis, int64_t vertex)
+static double caller_coordinate(const session_mesh *mesh, int axis, int64_t vertex)
 {
     const grid_array coordinates =
         mesh->cells.lattice ? mesh->cells.coordinates[axis] : session_coordinates(&mesh->given, axis);
@@ -18,7 +18,7 @@ static uint64_t find_mirrored_axes(const session_mesh *mesh, int64_t vertex)
     uint64_t axes = 0;
     for (int axis = 0; axis < 3; axis++) {
         if (!(mesh->mirror_axes >> axis & 1)) continue;
-        const double own = given_coordinate(mesh, axis, vertex), other = given_coordinate(mesh->source, axis, vertex);
+        const double own = caller_coordinate(mesh, axis, vertex), other = caller_coordinate(mesh->source, axis, vertex);
         axes |= (uint64_t)(own < other || own > other) << axis;
     }
     return axes;
@@ -46,7 +46,7 @@ session_key session_vertex_key(const session_mesh *mesh, int64_t vertex, bool by
     return key_of_position(mesh->cells.coordinates, vertex);
 }
 
-session_key session_given_vertex_key(const session_mesh *mesh, int64_t vertex, bool by_id)
+session_key session_caller_vertex_key(const session_mesh *mesh, int64_t vertex, bool by_id)
 {
     if (by_id) return key_of_id(mesh, vertex);
     if (mesh->cells.lattice) return key_of_position(mesh->cells.coordinates, vertex);

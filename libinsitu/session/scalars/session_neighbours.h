@@ -10,6 +10,6 @@
 session_key session_vertex_key(const session_mesh *mesh, int64_t vertex, bool by_id);
 /* Returns the key of the vertex with this index in the caller's arrays. In a discontinuous mesh several corners have
  * the same vertex, so that this index differs from the mesh's own. */
-session_key session_given_vertex_key(const session_mesh *mesh, int64_t vertex, bool by_id);
+session_key session_caller_vertex_key(const session_mesh *mesh, int64_t vertex, bool by_id);
 
 #endif

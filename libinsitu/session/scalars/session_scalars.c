@@ -93,7 +93,7 @@ session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field 
                        find_mesh_group_name(mesh, field));
 }
 
-grid_field session_given_field(const session_mesh *mesh, int index, int component)
+grid_field session_caller_field(const session_mesh *mesh, int index, int component)
 {
     const session_field *field = &mesh->fields[index];
     grid_field out = {.values = field->values,
@@ -122,7 +122,7 @@ bool session_find_values(const session_mesh *mesh, const scene_field *field, gri
     const int index = find_field(mesh, field);
     if (index < 0) return false;
     *out =
-        session_given_field(mesh, index, session_resolve_component(field, mesh->fields[index].given.component_count));
+        session_caller_field(mesh, index, session_resolve_component(field, mesh->fields[index].given.component_count));
     return true;
 }
 
@@ -132,7 +132,7 @@ grid_field session_scalar_field(const session_mesh *mesh, const session_scalar *
         return (grid_field){.values = {.data = (const char *)scalar->distances, .stride = (int64_t)sizeof(float)},
                             .component_stride = (int64_t)sizeof(float),
                             .component_count = 1};
-    if (!scalar->is_recentred) return session_given_field(mesh, scalar->field, scalar->component);
+    if (!scalar->is_recentred) return session_caller_field(mesh, scalar->field, scalar->component);
     return (grid_field){
         .values = {.data = (const char *)scalar->vertex_values, .stride = (int64_t)sizeof(double), .is_wide = true},
         .component_stride = (int64_t)sizeof(double),
@@ -166,7 +166,7 @@ bool session_mark_scalar(session_mesh *mesh, const scene_field *field, bool need
         scalar->mesh_group_name = find_mesh_group_name(mesh, field);
     }
     scalar->is_used = true;
-    scalar->original_values = session_given_field(mesh, index, scalar->component);
+    scalar->original_values = session_caller_field(mesh, index, scalar->component);
     scalar->needs_ranges = scalar->needs_ranges || needs_ranges;
     mesh->is_needed = mesh->is_needed || needs_ranges;
     *marked = scalar;

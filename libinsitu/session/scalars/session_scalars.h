@@ -28,7 +28,7 @@ session_scalar *session_find_recentred(const session_mesh *mesh, const char *fie
 
 /* Returns the mesh's field, or a component of it, with the values given by the caller, in the order of the vertices or
  * cells. */
-grid_field session_given_field(const session_mesh *mesh, int field, int component);
+grid_field session_caller_field(const session_mesh *mesh, int field, int component);
 
 /* Returns whether the field's values are read from the session's copy, in the order of the vertices, cells or corners,
  * and not from the caller's arrays. */

@@ -153,7 +153,7 @@ static void add_views(scene *s, int picture_count)
             scene_image *image = &s->images[end + view];
             *image = first;
             image->variant.view = view;
-            if (view) scene_place_view(&image->camera, view);
+            if (view) scene_set_orbit_view(&image->camera, view);
         }
     }
     s->image_count = picture_count;

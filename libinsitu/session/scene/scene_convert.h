@@ -46,7 +46,7 @@ insitu_status scene_convert_path(const scene_document *d, const char *path, cons
                                  scene_camera *out);
 int scene_count_views(const scene_document *d, const char *path, const scene_file_camera *in);
 /* Sets the direction of a camera with an orbit to that of the view with this index. */
-void scene_place_view(scene_camera *camera, int view);
+void scene_set_orbit_view(scene_camera *camera, int view);
 
 /* Converts the path of an output that belongs to a database. */
 insitu_status scene_convert_cinema(const scene_document *d, const char *path, const scene_file_output *in,

@@ -55,7 +55,7 @@ static int make_mapping(rewrite *r)
     return made(r, yaml_document_add_mapping(r->document, NULL, YAML_FLOW_MAPPING_STYLE));
 }
 
-static void append(rewrite *r, int list, int item)
+static void append_item(rewrite *r, int list, int item)
 {
     if (!list || !item || !yaml_document_append_sequence_item(r->document, list, item)) r->has_memory = false;
 }
@@ -73,7 +73,7 @@ static int make_vector(rewrite *r, const double v[3])
     for (int i = 0; i < 3; i++) {
         char text[32];
         snprintf(text, sizeof text, "%.17g", v[i]);
-        append(r, list, make_text(r, text));
+        append_item(r, list, make_text(r, text));
     }
     return list;
 }
@@ -81,7 +81,7 @@ static int make_vector(rewrite *r, const double v[3])
 static int make_list_of(rewrite *r, int item)
 {
     const int list = make_list(r);
-    append(r, list, item);
+    append_item(r, list, item);
     return list;
 }
 
@@ -240,7 +240,7 @@ static void expand_named(rewrite *r, const char *text_key, int *value)
         const int entry = is_mapping || !text_key ? pair.value : make_mapping(r);
         if (!is_mapping && text_key) append_pair(r, entry, text_key, pair.value);
         if (is_mapping || text_key) append_pair(r, entry, "name", pair.key);
-        append(r, list, entry);
+        append_item(r, list, entry);
     }
     *value = list;
 }

@@ -119,7 +119,7 @@ static void fill_block(const session_rule_factor *factor, int first, double *out
 {
     const int slopes = factor->node_count * factor->width;
     double nodes[NODES_MOST_ORDER + 1];
-    if (factor->rule.dimensions == 1) session_place_nodes(factor->order, factor->is_lobatto, nodes);
+    if (factor->rule.dimensions == 1) session_compute_node_positions(factor->order, factor->is_lobatto, nodes);
     for (int n = 0; n < factor->width && first + n < factor->rule.count; n++) {
         const double *at = factor->rule.points[first + n];
         if (factor->rule.dimensions == 1)
@@ -167,14 +167,14 @@ static bool weigh_corners(bool is_lobatto, session_cell_rules *out)
     const session_shape *shape = session_shape_of(of->type);
     const int p = of->order, simplex = (grid_is_shell_type(of->type) ? 2 : AXES) - out->line_count;
     double line[NODES_MOST_ORDER + 1];
-    session_place_nodes(p, is_lobatto, line);
+    session_compute_node_positions(p, is_lobatto, line);
     out->corner_count = shape->corner_count;
     double *weights = base_alloc((size_t)(of->count * shape->corner_count) * sizeof *weights);
     out->corner_weights = weights;
     if (!weights) return false;
     for (int n = 0; n < (p + 1) * (p + 1) * (p + 1); n++) {
         const int at[3] = {n % (p + 1), n / (p + 1) % (p + 1), n / (p + 1) / (p + 1)};
-        if (!session_is_node(of, at[0], at[1], at[2])) continue;
+        if (!session_has_node(of, at[0], at[1], at[2])) continue;
         const int node = session_node_index(of, INSITU_ORDER_LEXICOGRAPHIC, at[0], at[1], at[2]);
         for (int c = 0; c < shape->corner_count; c++) {
             double first = 1, product = 1;
@@ -254,9 +254,10 @@ size_t session_cell_rules_work_size(const session_cell_rules *rules)
 
 /* Multiplies a matrix of node_count x width with the values of one component, or of three components that follow each
  * other, at the nodes. Sums of LANES points stay in registers. */
-static inline __attribute__((always_inline)) void multiply(const double *restrict matrix, int node_count, int width,
-                                                           const double *restrict values, const int components,
-                                                           double (*restrict out)[BLOCK])
+static inline __attribute__((always_inline)) void multiply_by_matrix(const double *restrict matrix, int node_count,
+                                                                     int width, const double *restrict values,
+                                                                     const int components,
+                                                                     double (*restrict out)[BLOCK])
 {
     for (int first = 0; first < width; first += LANES) {
         double sums[3][LANES] = {{0}};
@@ -268,14 +269,15 @@ static inline __attribute__((always_inline)) void multiply(const double *restric
     }
 }
 
-static void multiply_one(const double *matrix, int node_count, int width, const double *values, double (*out)[BLOCK])
+static void multiply_cell_by_matrix(const double *matrix, int node_count, int width, const double *values,
+                                    double (*out)[BLOCK])
 {
-    multiply(matrix, node_count, width, values, 1, out);
+    multiply_by_matrix(matrix, node_count, width, values, 1, out);
 }
 
 static void multiply_three(const double *matrix, int node_count, int width, const double *values, double (*out)[BLOCK])
 {
-    multiply(matrix, node_count, width, values, 3, out);
+    multiply_by_matrix(matrix, node_count, width, values, 3, out);
 }
 
 static double find_measure(double (*slopes)[AXES][BLOCK], int axes, int point)
@@ -299,7 +301,7 @@ static void visit_block(const cell_visit *v, int first, const double *functions,
     double slopes[AXES][AXES][BLOCK], values[1][BLOCK], measures[BLOCK];
     for (int axis = 0; axis < dimensions; axis++)
         multiply_three(functions + (1 + axis) * nodes * width, nodes, width, in, slopes[axis]);
-    multiply_one(functions, nodes, width, in + 3 * nodes, values);
+    multiply_cell_by_matrix(functions, nodes, width, in + 3 * nodes, values);
     /* the slopes along the last line are the first ones that were added to the components */
     for (int line = 0; line < lines; line++)
         multiply_three(functions, nodes, width, in + (SIZE + 3 * line) * nodes, slopes[dimensions + lines - 1 - line]);

@@ -49,7 +49,7 @@ static double component_of(const grid_field *field, const double *tuple)
     return sqrt(sum);
 }
 
-static void read_given_values(const order_pass *p, int64_t cell, int count, double *tuple, double *out)
+static void read_caller_values(const order_pass *p, int64_t cell, int count, double *tuple, double *out)
 {
     const session_node_values *values = p->values;
     const int64_t first = session_row_first(&p->rows, cell);
@@ -72,7 +72,7 @@ static void read_lattice_values(const order_pass *p, const session_interpolation
     const int step = fine.order / of->order, size = of->order + 1;
     for (int n = 0; n < size * size * size; n++) {
         const int at[3] = {n % size, n / size % size, n / size / size};
-        if (!session_is_node(of, at[0], at[1], at[2])) continue;
+        if (!session_has_node(of, at[0], at[1], at[2])) continue;
         const int node = session_node_index(of, INSITU_ORDER_LEXICOGRAPHIC, at[0], at[1], at[2]);
         const int position = nodes->positions[node];
         if (position >= nodes->of.count) continue;
@@ -90,7 +90,7 @@ static void read_values(const order_pass *p, const session_interpolation *nodes,
         const double value = grid_field_value(&p->of->values, session_first_piece(p->of->mesh, cell));
         for (int n = 0; n < count; n++) out[n] = value;
     } else if (p->values) {
-        read_given_values(p, cell, count, tuple, out);
+        read_caller_values(p, cell, count, tuple, out);
     } else if (p->of->mesh->finer.parts) {
         read_lattice_values(p, nodes, cell, out);
     } else {
@@ -308,7 +308,7 @@ static bool begin_pass(order_pass *p)
 {
     const session_mesh *mesh = p->of->mesh;
     bool is_made = true;
-    p->rows = session_given_rows(session_nodal_mesh(mesh));
+    p->rows = session_caller_rows(session_nodal_mesh(mesh));
     p->lattice = session_rows_of(mesh);
     session_list_kinds(&p->rows);
     for (int i = 0; i < p->rows.kind_count && is_made; i++) {
@@ -383,7 +383,7 @@ static insitu_status run_pass(void *of, const session_node_values *values, base_
                      p->of->mesh->label);
 }
 
-int session_find_given_nodes(const session_mesh *mesh, int field)
+int session_find_caller_nodes(const session_mesh *mesh, int field)
 {
     const session_field *of = &mesh->fields[field];
     return mesh->source || of->is_derived || of->given.centring == INSITU_CELL ? -1 : field;

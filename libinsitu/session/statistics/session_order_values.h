@@ -19,7 +19,7 @@ typedef struct session_order_field {
 
 /* Returns the index of a mesh's field if its values at the caller's nodes can be read (session_order_field.given);
  * otherwise -1: it is derived, at cells, or on a mirror image. */
-int session_find_given_nodes(const session_mesh *mesh, int field);
+int session_find_caller_nodes(const session_mesh *mesh, int field);
 
 /* Computes the value of each of the caller's cells. The caller must free *out in any case. Parallel. Local. */
 insitu_status session_find_order_values(const session_order_field *of, session_cell_value **out, base_error *error);

@@ -169,7 +169,7 @@ static session_order_field order_field(const statistics_work *w, int request, in
     const scene_field *field = w->requests[request].field;
     session_order_field out = {.mesh = of, .is_lobatto = w->are_lobatto[mesh], .threads = w->team->threads};
     session_find_values(of, field, &out.values);
-    out.given = session_find_given_nodes(of, session_find_field(of, field->name));
+    out.given = session_find_caller_nodes(of, session_find_field(of, field->name));
     return out;
 }
 

@@ -27,8 +27,8 @@ enum cell_sum { DRAWN, FLAT, INVERTED, SHELLS, SPLIT, OF_TYPES, CELL_SUMS = OF_T
  * whatever the order in which they are read now. */
 static bool fits_order(const session_mesh *mesh, int64_t cell, int type, insitu_vertex_order order)
 {
-    const signed char *read = session_vertex_turn(mesh->given.vertex_order, type);
-    const signed char *other = session_vertex_turn(order, type);
+    const signed char *read = session_vertex_permutation(mesh->given.vertex_order, type);
+    const signed char *other = session_vertex_permutation(order, type);
     double points[GRID_MAX_CELL_VERTICES][3];
     int64_t vertices[GRID_MAX_CELL_VERTICES];
     const int count = grid_cell_vertices(&mesh->cells, cell, vertices);
@@ -46,7 +46,7 @@ static int64_t *find_type_sums(const session_mesh *mesh, int64_t cell, int64_t s
     const int type = grid_cell_type(&mesh->cells, cell);
     int at = 0;
     while (at < JUDGED && judged[at] != type) at++;
-    if (at == JUDGED || grid_is_ghost(&mesh->cells, cell) || session_given_type(mesh, cell) != type) return NULL;
+    if (at == JUDGED || grid_is_ghost(&mesh->cells, cell) || session_caller_type(mesh, cell) != type) return NULL;
     return sums + OF_TYPES + at * TYPE_SUMS;
 }
 

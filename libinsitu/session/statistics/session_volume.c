@@ -18,12 +18,12 @@
 #include "closed_faces.h"
 #include "memory.h"
 
-static double determinant(const double u[3], const double v[3], const double w[3])
+static double determinant3(const double u[3], const double v[3], const double w[3])
 {
     return u[0] * (v[1] * w[2] - v[2] * w[1]) + u[1] * (v[2] * w[0] - v[0] * w[2]) + u[2] * (v[0] * w[1] - v[1] * w[0]);
 }
 
-static void subtract(const double a[3], const double b[3], double out[3])
+static void subtract_vectors(const double a[3], const double b[3], double out[3])
 {
     for (int axis = 0; axis < 3; axis++) out[axis] = a[axis] - b[axis];
 }
@@ -31,10 +31,10 @@ static void subtract(const double a[3], const double b[3], double out[3])
 static double tet_volume(double (*p)[3])
 {
     double u[3], v[3], w[3];
-    subtract(p[1], p[0], u);
-    subtract(p[2], p[0], v);
-    subtract(p[3], p[0], w);
-    return determinant(u, v, w) / 6;
+    subtract_vectors(p[1], p[0], u);
+    subtract_vectors(p[2], p[0], v);
+    subtract_vectors(p[3], p[0], w);
+    return determinant3(u, v, w) / 6;
 }
 
 /* Returns, for each of the eight corners of a hex, the index of the corner of the cell that takes its place. */
@@ -49,13 +49,13 @@ static double hex_volume(double (*p)[3], const signed char *corner)
 {
     static const signed char ends[6][2] = {{6, 1}, {7, 0}, {6, 3}, {2, 0}, {5, 0}, {6, 4}};
     double d[6][3], sums[3][3];
-    for (int i = 0; i < 6; i++) subtract(p[corner[ends[i][0]]], p[corner[ends[i][1]]], d[i]);
+    for (int i = 0; i < 6; i++) subtract_vectors(p[corner[ends[i][0]]], p[corner[ends[i][1]]], d[i]);
     for (int axis = 0; axis < 3; axis++) {
         sums[0][axis] = d[0][axis] + d[1][axis];
         sums[1][axis] = d[2][axis] + d[4][axis];
         sums[2][axis] = d[5][axis] + d[3][axis];
     }
-    return (determinant(sums[0], d[2], d[3]) + determinant(d[1], sums[1], d[5]) + determinant(d[0], d[4], sums[2])) /
+    return (determinant3(sums[0], d[2], d[3]) + determinant3(d[1], sums[1], d[5]) + determinant3(d[0], d[4], sums[2])) /
            12;
 }
 
@@ -93,7 +93,7 @@ static void read_positions(const grid *g, const closed_faces *c, double (*positi
 static double patch_cone_volume(const double (*p)[3], const int v[4])
 {
     const double *a = p[v[0]], *b = p[v[1]], *c = p[v[2]], *d = p[v[3]];
-    return (determinant(a, b, c) + determinant(a, c, d) + determinant(a, b, d) + determinant(b, c, d)) / 2;
+    return (determinant3(a, b, c) + determinant3(a, c, d) + determinant3(a, b, d) + determinant3(b, c, d)) / 2;
 }
 
 static double polyhedron_volume(const grid *g, int64_t cell, volume_buffer *buffer)
@@ -150,7 +150,7 @@ double session_shell_area(const grid *g, int64_t cell)
     while (grid_walk_next(&walk, &vertex)) {
         double place[3], next[3];
         grid_vertex(g, vertex, place);
-        subtract(place, first, next);
+        subtract_vectors(place, first, next);
         for (int a = 0; a < 3; a++) {
             const int b = (a + 1) % 3, c = (a + 2) % 3;
             sum[a] += last[b] * next[c] - last[c] * next[b];

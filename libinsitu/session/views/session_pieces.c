@@ -270,8 +270,8 @@ static insitu_status list_pieces(const session_pieces_basis *basis, const sessio
 /* ---- numbers of pieces ------------------------------------------------------------------------------------------- */
 
 /* Returns the smallest number of pieces with which the errors of surfaces and of volumes are allowed. In meshes all of
- * whose cells are refined, memory and time grow with its cube, so that more than 2 pieces for the error of surfaces must
- * be asked for. */
+ * whose cells are refined, memory and time grow with its cube, so that more than 2 pieces for the error of surfaces
+ * must be asked for. */
 static int find_pieces(const scene *scene, const session_finer_choice *choice, const piece_error *of)
 {
     enum { MOST_UNASKED = 2 };
@@ -314,7 +314,8 @@ static void warn_of_pyramids(const char *mesh, const scene *scene, const session
     session_warn(report, &(session_warning){WARNING_FINER, NULL, mesh, 0}, is_asked && choice->excluded_count > 0,
                  "mesh \"%s\": %lld of its cells are pyramids of an order above %d: %s has no effect on it, and its "
                  "cells are split at their own nodes",
-                 mesh, (long long)choice->excluded_count, INTERPOLATION_MOST_PYRAMID, scene->finer_pieces ? "finer_pieces" : "surface_error");
+                 mesh, (long long)choice->excluded_count, INTERPOLATION_MOST_PYRAMID,
+                 scene->finer_pieces ? "finer_pieces" : "surface_error");
 }
 
 /* ---- memory ------------------------------------------------------------------------------------------------------ */
@@ -361,8 +362,8 @@ static int compare_steps(const void *a, const void *b)
 /* Reduces the numbers of pieces until the pieces of all meshes together take at most `limit` bytes; the mesh whose
  * pieces take most is reduced first. steps: space for FINER_MOST_PARTS steps per mesh. Returns the number of bytes
  * before the reduction. */
-static double take_pieces(int mesh_count, double limit, const piece_error *errors, piece_step *steps,
-                          session_finer_choice *choices)
+static double reduce_pieces(int mesh_count, double limit, const piece_error *errors, piece_step *steps,
+                            session_finer_choice *choices)
 {
     double all = 0;
     int count = 0;
@@ -384,7 +385,8 @@ static double take_pieces(int mesh_count, double limit, const piece_error *error
 static void limit_memory(const scene *scene, const session_catalogue *catalogue, const piece_error *errors,
                          piece_step *steps, session_finer_choice *choices, session_report *report)
 {
-    const double all = take_pieces(catalogue->mesh_count, scene->finer_memory * bytes_per_mib, errors, steps, choices);
+    const double all =
+        reduce_pieces(catalogue->mesh_count, scene->finer_memory * bytes_per_mib, errors, steps, choices);
     for (int m = 0; m < catalogue->mesh_count; m++)
         session_warn(report, &(session_warning){WARNING_FINER, NULL, catalogue->meshes[m].name, 2},
                      choices[m].parts < errors[m].wanted,

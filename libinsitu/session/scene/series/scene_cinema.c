@@ -104,7 +104,7 @@ static void set_database_columns(scene_database *database, const scene_image *im
     database->has_fields = database->has_fields || image->swept_field;
 }
 
-static insitu_status put_output_in_database(const scene_document *d, scene *s, scene_image *image, int index)
+static insitu_status add_output_to_database(const scene_document *d, scene *s, scene_image *image, int index)
 {
     scene_output *output = &image->outputs[index];
     output->database = -1;
@@ -127,6 +127,6 @@ insitu_status scene_find_databases(const scene_document *d, scene *s)
     insitu_status status = INSITU_OK;
     for (int i = 0; i < s->image_count; i++)
         for (int o = 0; o < s->images[i].output_count && !status && s->images[i].variant.view == 0; o++)
-            status = put_output_in_database(d, s, &s->images[i], o);
+            status = add_output_to_database(d, s, &s->images[i], o);
     return status;
 }

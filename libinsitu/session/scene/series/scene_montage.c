@@ -156,7 +156,7 @@ static insitu_status check_inset(const scene_document *d, const char *path, cons
 }
 
 /* Puts an inset over the panels of the montage of this name. */
-static insitu_status put_inset(const scene_document *d, const char *path, scene *s, const scene_image *image,
+static insitu_status add_inset(const scene_document *d, const char *path, scene *s, const scene_image *image,
                                scene_output *output, const char *name)
 {
     const int index = find_montage(s, name);
@@ -176,7 +176,7 @@ static insitu_status put_inset(const scene_document *d, const char *path, scene 
 
 /* Puts a picture, or all views of an orbit, into the next panels of the montage of this name. Takes ownership of the
  * name. */
-static insitu_status put_panels(const scene_document *d, const char *path, scene *s, const scene_image *image,
+static insitu_status add_panels(const scene_document *d, const char *path, scene *s, const scene_image *image,
                                 scene_output *output, char *name)
 {
     const int views =
@@ -194,7 +194,7 @@ static insitu_status put_panels(const scene_document *d, const char *path, scene
     return check_panels(d, path, image, output, m);
 }
 
-static insitu_status put_output_in_montage(const scene_document *d, scene *s, scene_image *image, int index)
+static insitu_status add_output_to_montage(const scene_document *d, scene *s, scene_image *image, int index)
 {
     scene_output *output = &image->outputs[index];
     char path[64];
@@ -203,8 +203,8 @@ static insitu_status put_output_in_montage(const scene_document *d, scene *s, sc
     char *name = name_at_sample(image, output, 0);
     if (!name) return scene_fail_for_memory(d);
     snprintf(path, sizeof path, "images[%d].outputs[%d]", image->variant.source, index);
-    if (!output->is_inset) return put_panels(d, path, s, image, output, name);
-    const insitu_status status = put_inset(d, path, s, image, output, name);
+    if (!output->is_inset) return add_panels(d, path, s, image, output, name);
+    const insitu_status status = add_inset(d, path, s, image, output, name);
     base_free(name);
     return status;
 }
@@ -214,6 +214,6 @@ insitu_status scene_find_montages(const scene_document *d, scene *s)
     insitu_status status = INSITU_OK;
     for (int i = 0; i < s->image_count && !status; i++)
         for (int o = 0; o < s->images[i].output_count && !status; o++)
-            status = put_output_in_montage(d, s, &s->images[i], o);
+            status = add_output_to_montage(d, s, &s->images[i], o);
     return status;
 }

@@ -24,7 +24,7 @@ static void find_perpendiculars(const double axis[3], double first[3], double se
         second[a] = axis[(a + 1) % 3] * first[(a + 2) % 3] - axis[(a + 2) % 3] * first[(a + 1) % 3];
 }
 
-void scene_place_view(scene_camera *camera, int view)
+void scene_set_orbit_view(scene_camera *camera, int view)
 {
     static const double degree = 3.14159265358979323846 / 180;
     const scene_orbit *o = &camera->orbit;
@@ -90,6 +90,6 @@ insitu_status scene_convert_orbit(const scene_document *d, const char *path, con
         return scene_fail_at_key(d, path, "orbit.axis", "has length 0, expected a direction");
     convert_elevations(d, path, orbit);
     memcpy(out->up, orbit->axis, sizeof out->up);
-    scene_place_view(out, 0);
+    scene_set_orbit_view(out, 0);
     return INSITU_OK;
 }
