@@ -465,8 +465,8 @@ typedef struct insitu_report {
     /* bytes sent by this rank to others for pictures: fragments and finished pixels, including those that it passes on;
      * rays of shadows do not count */
     int64_t bytes_sent;
-    /* number of points in cells whose reference coordinates Newton's method did not find; linear interpolation was used
-     * for them */
+    /* number of points in cells for which the iteration to reference coordinates did not converge; linear interpolation
+     * was used there */
     int64_t map_failures;
     int64_t bytes_borrowed; /* size in bytes of the caller's arrays in use */
     int64_t bytes_copied;   /* size in bytes of copies of the caller's data; copied_why has the reasons */
