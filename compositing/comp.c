@@ -1,8 +1,8 @@
 /* Runs the three phases of compositing: ranks send fragments to the owners of their pixels, owners merge them, and
  * owners send finished pixels to rank 0. Before the phases, all ranks agree whether every rank has the memory for them,
  * and which rank owns which block; after the phases, they agree whether all ranks succeeded. A rank that runs out of
- * memory during a phase takes part in the remaining communication, so that no rank waits, and reports the error at the
- * end. Memory is released as soon as its phase ends: at the peak, a rank holds its own fragments and the packed
+ * memory during a phase takes part in the remaining communication, so that no rank waits for it, and reports the error
+ * at the end. Memory is released as soon as its phase ends: at the peak, a rank holds its own fragments and the packed
  * fragments received from other ranks. A single rank merges its list in place, or has no list (comp_tiles.h). */
 #include "comp.h"
 
@@ -49,7 +49,8 @@ static double milliseconds_since(double start)
     return 1e3 * (MPI_Wtime() - start);
 }
 
-/* Expected number of bytes per fragment in a message. In most pictures a hit takes 10 and a volume interval 11. */
+/* Expected number of bytes per fragment in a message. In most pictures a surface hit takes 10 bytes, and a volume
+ * interval 11. */
 static const double expected_bytes = 11;
 
 /* Chooses the route on which messages are sent (comp_route.h). fragments is the maximum number over all ranks; the

@@ -7,12 +7,12 @@
  * fragments in a pixel, or none. The result depends only on the set of fragments, not on ranks, order of arrival or
  * threads.
  *
- * Sorting by t gives the correct picture if fragments do not overlap. Volume fragments that overlap, because cells
- * overlap, can be corrected only by the renderer, which made them: comp_composite_overlaps() returns the pixels that
- * contain such fragments. Volume fragments of length zero are samples. Any number of them may have the same t; each
- * contributes to their common absorption in proportion to its own absorption, in any order. Volume fragments whose
- * intervals overlap are mixed as homogeneous media, which is correct if the intervals are short enough for the media to
- * be homogeneous. */
+ * Sorting by t, the parameter along the ray, gives the correct picture if fragments do not overlap. Volume fragments
+ * that overlap, because cells overlap, can be corrected only by the renderer, which made them:
+ * comp_composite_overlaps() returns the pixels that contain such fragments. Volume fragments of length zero are
+ * samples. Any number of them may have the same t; each contributes to their common absorption in proportion to its
+ * own absorption, in any order. Volume fragments whose intervals overlap are mixed as homogeneous media, which is
+ * correct if the intervals are short enough for the media to be homogeneous. */
 #ifndef COMP_COMP_H
 #define COMP_COMP_H
 
@@ -41,20 +41,20 @@ typedef struct comp_group {
  * or +infinity. Local. The result of this function defines the picture; faster code must give the same result. */
 void comp_merge_pixel(fragment *items, int64_t count, const float background[4], float out_rgba[4], float *out_depth);
 
-/* As comp_merge_pixel(), for volume fragments that ranks have partly folded. Folding combines all volume fragments of
- * an interval of the ray into one (fragment_fold.h); this function completes it. */
+/* Does the same as comp_merge_pixel() for volume fragments that ranks have partly folded. Folding combines all volume
+ * fragments of an interval of the ray into one (fragment_fold.h); this function completes it. */
 void comp_merge_folded_pixel(fragment *items, int64_t count, const float background[4], float out_rgba[4],
                              float *out_depth);
 
-/* Returns whether a pixel's fragments, sorted as by comp_merge_pixel(), overlap in front of the first opaque fragment.
- * Two volume fragments overlap if both contain some t. A volume fragment overlaps a surface if it contains the
- * surface's t, unless it begins there, within the rounding error of a face's depth. A fragment whose end precedes its
- * start, because its length is below rounding, overlaps nothing. Single samples (fragment.h) of two volumes, or of two
- * cells at their common face, do not overlap. Local. */
+/* Returns whether a pixel's fragments, in the order of comp_merge_pixel(), overlap in front of the first opaque
+ * fragment. Two volume fragments overlap if both contain some t. A volume fragment overlaps a surface if it contains
+ * the surface's t, unless the volume fragment begins at that t, within the rounding error of a face's depth. A fragment
+ * whose end precedes its start, because its length is below rounding, overlaps nothing. Single samples (fragment.h) of
+ * two volumes, or of two cells at their common face, do not overlap. Local. */
 bool comp_pixel_overlaps(const fragment *sorted, int64_t count);
 
-/* As comp_pixel_overlaps(), for fragments sorted as by comp_merge_folded_pixel(). Fragments behind the position at
- * which that function stops are ignored. Local. */
+/* Does the same as comp_pixel_overlaps() for fragments in the order of comp_merge_folded_pixel(). Fragments behind the
+ * depth at which comp_merge_folded_pixel() stops are ignored. Local. */
 bool comp_folded_pixel_overlaps(const fragment *sorted, int64_t count);
 
 typedef struct comp_statistics {
@@ -71,13 +71,14 @@ typedef struct comp_statistics {
  * threads is the number of threads of this rank, or 0 for the default of OpenMP. statistics may be NULL. Collective.
  *
  * out->width and out->height must be set on all ranks. Rank 0 must allocate out->rgba and may allocate out->depth; both
- * are filled on rank 0 and ignored on other ranks. out->deep must be given on all ranks or on none. Rank 0's, whose
- * first and counts must be allocated, receives the samples of the pixels that have fragments (comp_deep.h), with t as
- * depth. If out->is_folded, which must be the same on all ranks, pixels are merged by comp_merge_folded_pixel().
+ * are filled on rank 0 and ignored on other ranks. out->deep must be given on all ranks or on none. On rank 0,
+ * out->deep->first and out->deep->counts must be allocated, and out->deep receives the samples of the pixels that have
+ * fragments (comp_deep.h), with t as depth. If out->is_folded, which must be the same on all ranks, pixels are merged
+ * by comp_merge_folded_pixel().
  *
- * The fragment list is always emptied and its memory released. An error on one rank (lack of memory) is an error on all
- * ranks. If *error contains an error before the call, because this rank could not make its fragments, that too becomes
- * an error on all ranks. */
+ * The fragment list is always emptied and its memory released. An error on one rank (lack of memory) is an error on
+ * all ranks. If *error contains an error before the call, because this rank could not make its fragments, this error
+ * is also returned on all ranks. */
 insitu_status comp_composite(const comp_group *group, fragment_list *items, const float background[4], int threads,
                              image *out, comp_statistics *statistics, base_error *error);
 
@@ -88,8 +89,8 @@ typedef struct comp_overlaps {
     unsigned char *pixels;
 } comp_overlaps;
 
-/* As comp_composite(), and also returns the pixels with overlaps, on every rank. If there are any, this performs
- * another reduction, of one bit per pixel. On an error *overlaps is empty. */
+/* Does the same as comp_composite(), and also returns the pixels with overlaps on every rank. If any pixel has
+ * overlaps, another reduction is performed, with one bit per pixel. On an error *overlaps is empty. */
 insitu_status comp_composite_overlaps(const comp_group *group, fragment_list *items, const float background[4],
                                       int threads, image *out, comp_overlaps *overlaps, comp_statistics *statistics,
                                       base_error *error);

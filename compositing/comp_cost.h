@@ -1,8 +1,9 @@
-/* Estimates the fastest schedule by the LogGP model (Alexandrov, Ionescu, Schauser, Scheiman, 1995): each message costs
- * its sender and its receiver an overhead, the network a latency, and each byte a gap.
+/* Estimates the fastest schedule by the LogGP model (Alexandrov, Ionescu, Schauser, Scheiman, 1995): each message takes
+ * an overhead on its sender and its receiver and a latency of the network, and each byte takes a gap.
  *
- * Every schedule packs and unpacks each fragment once. Schedules therefore differ only in their rounds: in the number
- * of messages that a rank sends, and in how often its bytes are sent. In a dense round empty messages count too. */
+ * Every schedule packs and unpacks each fragment once. Schedules therefore differ only in their rounds: in the
+ * number of messages that a rank sends, and in how often its bytes are sent. In a dense round (comp_messages.h)
+ * empty messages count too. */
 #ifndef COMP_COMP_COST_H
 #define COMP_COMP_COST_H
 
@@ -37,8 +38,8 @@ comp_cost comp_cost_of(const comp_route *route, const comp_load *load, const com
 /* Returns the route with the lowest estimated time. */
 comp_route comp_cheapest_route(int ranks, comp_nodes nodes, const comp_load *load, const comp_machine *machine);
 
-/* Returns the number of messages that the rank at this place (comp_route.h) sends in all rounds of a route, if all
- * rounds are dense and no message must be split. */
+/* Returns the number of messages that the rank with this place (its number in comp_route.h) sends in all rounds of a
+ * route, if all rounds are dense and no message must be split. */
 int64_t comp_route_messages(const comp_route *route, int place);
 
 #endif

@@ -1,5 +1,5 @@
-/* Fragments are converted to samples by comp_merge_intervals(), so that deep pictures follow the same rule of blending
- * as others. Rank 0 receives from each owner first the number of samples of each pixel, and then the samples, which it
+/* Fragments are converted to samples by comp_merge_intervals(), so that deep pictures are blended by the same rule as
+ * flat ones. Rank 0 receives from each owner first the number of samples of each pixel, and then the samples, which it
  * stores directly at their final position. */
 #include "comp_deep.h"
 
@@ -106,7 +106,7 @@ static int receive_items(MPI_Comm comm, int rank, int tag, void *items, int64_t 
     return code;
 }
 
-/* Stores, for each of these pixels, where its samples are in out. */
+/* Stores the index of each pixel's first sample in out. */
 static void store_sample_offsets(deep_image *out, const comp_deep_pixel *pixels, int64_t count, int64_t at)
 {
     for (int64_t i = 0; i < count; i++) {

@@ -12,7 +12,7 @@
 #include "image.h"
 
 typedef struct comp_deep_pixel {
-    uint32_t pixel, count; /* pixel index and its number of samples */
+    uint32_t pixel, count; /* index of the pixel, and the number of its samples */
 } comp_deep_pixel;
 
 /* The samples that one thread of an owner has made, pixel after pixel. A zeroed struct is empty. */
@@ -23,7 +23,7 @@ typedef struct comp_deep_list {
     bool lacks_memory; /* set if samples are missing because memory ran out */
 } comp_deep_list;
 
-/* Adds the samples of one pixel. Its fragments must be sorted as by comp_merge_pixel(), or as by
+/* Adds the samples of one pixel. Its fragments must be in the order of comp_merge_pixel(), or of
  * comp_merge_folded_pixel() if is_folded is set. Each sample's z and z_back are set to t. If memory runs out,
  * lacks_memory is set. Local. */
 void comp_deep_add(comp_deep_list *list, fragment *sorted, int64_t count, bool is_folded);

@@ -92,11 +92,11 @@ static uint64_t find_share(const comp_claim *claims, uint32_t blocks, uint64_t *
 }
 
 /* The state of a pass that moves blocks to other owners. Blocks and the ranks that receive them are visited in the same
- * order, so that most blocks stay near their neighbours. A rank loses a block if that brings its load closer to the
- * equal share, and a rank receives a block under the same condition. If no rank meets it, the receiving rank may exceed
- * the share by another eighth of the block's fragments, and so on, until any rank below the share may receive the
- * block. There is such a rank as long as another rank is above the share. No rank loses its last block, so that the
- * ranks to consider are the owners in the list of blocks. */
+ * order, so that most blocks stay near their neighbours. A block is moved if the move brings the loads of the old and
+ * the new owner closer to the equal share. If no rank can receive the block under this condition, the new owner may
+ * exceed the share by an eighth of the block's fragments, then by two eighths, and so on, until any rank below the
+ * share may receive the block. As long as one rank is above the share, another rank is below it. No rank loses its last
+ * block, so that the current owners of blocks are the only possible receivers. */
 typedef struct owner_search {
     const comp_claim *claims;
     uint32_t blocks, next;   /* number of blocks, and index of the claim whose rank is considered next */

@@ -62,7 +62,7 @@ static inline uint32_t comp_grid_strip(const comp_grid *grid, uint32_t pixel)
     return (y >> grid->row_shift) * grid->strips_per_row + x / COMP_LANES;
 }
 
-/* Returns the pixel's index in its strip, row by row. */
+/* Returns the pixel's index in its strip; pixels of a strip are numbered row by row. */
 static inline uint32_t comp_grid_at(const comp_grid *grid, uint32_t pixel)
 {
     const uint32_t y = comp_grid_y(grid, pixel), x = pixel - y * grid->width;
@@ -112,7 +112,7 @@ static inline int32_t comp_priority_with_rank(int32_t priority, int rank)
     return (int32_t)(((uint32_t)priority & ~0xfffffu) | ((uint32_t)rank & 0xfffff));
 }
 
-/* Adds the claim to the combined claim of several ranks. */
+/* Combines the claim with the combined claim of other ranks. */
 static inline void comp_claim_add(const comp_claim *claim, comp_claim *sum)
 {
     const uint32_t fragments = sum->fragments + claim->fragments;

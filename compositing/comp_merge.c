@@ -5,17 +5,17 @@
  * depth determines the order; if a surface and a volume begin at the same depth, the surface is in front, because it is
  * the nearer end of an interval.
  *
- * Samples at the same position have no order: their media are mixed there. Together they absorb 1 - T1 T2 ... Tn, less
- * than the sum of their separate absorptions, and each contributes in proportion to its own. This is computed in
- * double, so that the contributions are as exact as the samples.
+ * Samples at the same position have no order: their media are mixed there. Together they absorb 1 - T1 T2 ... Tn, which
+ * is less than the sum of their separate absorptions. Each sample contributes in proportion to its own absorption. This
+ * is computed in double, so that the contributions are as exact as the samples.
  *
  * Where intervals overlap, their media are mixed. The ray is cut at the start and at the end of every interval. Between
  * two neighbouring cuts, each interval that spans both is treated as a homogeneous medium, and the optical depths and
  * the light of these media are added:
  *
  *     |-- a ------------|            -ln T  = sum of the shares of -ln Ta, -ln Tb ... between the cuts
- *            |-- b -------------|    colour = (1 - T) times the mean of their colours, weighted by these shares
- *     |  a   |  a and b |   b   |
+ *            |-- b -------------|    colour = (1 - T) times the mean of their colours, weighted by these shares of -ln
+ * T |  a   |  a and b |   b   |
  *
  * The renderer makes intervals short enough for this approximation (render/volume/kernel_segments.h). */
 #include "comp_merge.h"
@@ -50,8 +50,8 @@ static void sift_down(fragment *items, int64_t root, int64_t count)
     items[root] = moving;
 }
 
-/* Sorts by heap sort, which needs no memory and no recursion, and takes O(n log n) in the worst case too: some
- * partitions give thousands of fragments in a pixel. */
+/* Sorts by heap sort, which needs no memory and no recursion, and takes O(n log n) in the worst case too, because with
+ * some partitions a pixel has thousands of fragments. */
 static void heap_sort(fragment *items, int64_t count)
 {
     if (count <= insertion_limit) {
@@ -89,7 +89,7 @@ static int64_t count_coincident_samples(const fragment *sorted, int64_t count)
 
 /* The state of a pass over the sorted samples at one position, which determines the samples to blend. If a volume has
  * one sample at the end of a cell and another at the start of a cell, the cells are neighbours whose common face was
- * rounded to two positions: one of the two samples is left out. */
+ * rounded to two positions. One of the two samples is then left out. */
 typedef struct sample_pass {
     uint32_t layer; /* the volume whose samples are counted */
     /* number of samples at the start of their cell that no sample at a cell's end has matched yet */
@@ -124,8 +124,8 @@ static bool are_of_one_volume(const fragment *samples, int64_t count)
  * include. */
 static const float face_error = 4e-6f;
 
-/* Advances *next to the first fragment that does not begin in front of t by more than rounding. Returns the largest end
- * of the volume fragments before it, and `reach` if that is larger. */
+/* Advances *next to the first fragment that does not begin in front of t by more than rounding. Returns the larger of
+ * `reach` and the largest t_out of the volume fragments before *next. */
 static float furthest_end_before(const fragment *sorted, int64_t *next, float t, float reach)
 {
     const float begin = t - face_error * fmaxf(fabsf(t), 1);
@@ -254,7 +254,7 @@ static void emit_interval(const interval_sink *sink, const blend *b, const fragm
     sink->callback(sink->state, &interval);
 }
 
-/* As blend_mixture(), and also passes the mixture to the sink. */
+/* Does the same as blend_mixture(), and also passes the mixture to the sink. */
 static void blend_interval(blend *b, const fragment *items, int64_t count, float from, float to,
                            const interval_sink *sink)
 {
@@ -294,7 +294,7 @@ static int64_t blend_overlapping(blend *b, fragment *sorted, int64_t count, cons
     return end;
 }
 
-/* As blend_sorted(), for a pixel with one fragment, which is the most frequent case. */
+/* Does the same as blend_sorted() for a pixel with one fragment, which is the most frequent case. */
 static void blend_single(const fragment *f, const float background[4], float out_rgba[4], float *out_depth)
 {
     for (int c = 0; c < 3; c++) out_rgba[c] = 0 + f->colour[c] + f->transmittance * background[c];
@@ -339,7 +339,7 @@ static int64_t count_folded(const fragment *sorted, int64_t count)
     return n;
 }
 
-/* Returns whether `next` is invisible behind the fragments blended so far, of which `before` is the last. If `next` is
+/* Returns whether `next` is invisible behind the fragments blended so far; `before` is the last of these. If `next` is
  * in a later interval than `before`, a transmittance of at most FRAGMENT_DARK counts as 0, because ranks may have
  * omitted fragments of later intervals (fragment_fold.h). */
 static bool is_hidden_behind(float transmittance, const fragment *before, const fragment *next)
@@ -403,7 +403,7 @@ void comp_merge_folded_intervals(const fragment *sorted, int64_t count, comp_int
     }
 }
 
-/* Invisible fragments are not tested, because only some partitions produce them. */
+/* Invisible fragments are not tested for overlaps, because their number depends on the partition. */
 bool comp_folded_pixel_overlaps(const fragment *sorted, int64_t count)
 {
     float transmittance = 1;

@@ -3,8 +3,8 @@
  * time, and blended there. Pixels in which several fragments must be blended are called mixed: their fragments are
  * listed and merged by comp_merge_pixel().
  *
- * Fragments behind an opaque surface are dropped, even if volumes in front of the surface arrive later, because merging
- * never uses them. */
+ * Fragments behind an opaque surface are dropped, even if volumes in front of the surface arrive later, because they
+ * are invisible. */
 #include "comp_owned.h"
 
 #include <string.h>
@@ -15,7 +15,7 @@
 
 /* Working memory of a thread; its lists are kept from strip to strip. */
 typedef struct merge_scratch {
-    comp_sheet joined; /* the fragments joined so far, one per pixel */
+    comp_sheet joined; /* sheet of the fragments joined so far, one per pixel */
     comp_sheet other;  /* the sheet that is joined next */
     comp_sheet pixels; /* the finished pixels */
     /* the fragments of mixed pixels except the one in `joined`, and all fragments of mixed pixels; their .pixel is the
@@ -40,7 +40,7 @@ static bool reserve_fragments(fragment_list *list, int64_t count)
 
 /* ---- joined ----------------------------------------------------------------------------------------------------- */
 
-/* Marks the pixel as mixed, and counts its fragment in the sheet. */
+/* Marks the pixel as mixed, and counts the fragment that the sheet contains for the pixel. */
 static void mark_mixed(merge_scratch *m, uint32_t at)
 {
     const unsigned bit = 1u << at % COMP_LANES;
@@ -60,7 +60,7 @@ static bool add_remaining(merge_scratch *m, const fragment *item, uint32_t at)
     return true;
 }
 
-/* Joins a fragment with the one that the sheet already has in its pixel. */
+/* Joins a fragment with the fragment that the sheet already contains for the same pixel. */
 static bool join_second(merge_scratch *m, const fragment *item, uint32_t at)
 {
     const fragment other = comp_sheet_get(&m->joined, at, item->pixel);

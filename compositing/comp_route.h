@@ -1,18 +1,19 @@
 /* Computes the ranks through which a fragment is sent to the owner of its pixel. The functions are plain arithmetic
  * without MPI and memory, so that tests can use any number of ranks.
  *
- * Ranks are numbered by place: the ranks of one node in succession, then those of the next node. The first places are
- * owners; their number is a product of radices. A place is written with one digit per radix, the least significant
- * first. In round i, places that differ only in digit i are partners, and each sends its partners the fragments for
- * owners with the partner's digit. After the last round all fragments are at their owners:
+ * Every rank gets a number called its place, so that the ranks of one node have consecutive places. The ranks with the
+ * first places are the owners of pixels; the number of owners is a product of radices. A place is written with one
+ * digit per radix, the least significant first. In round i, places that differ only in digit i are partners, and each
+ * sends its partners the fragments for owners with the partner's digit. After the last round all fragments are at their
+ * owners:
  *
  *     direct send   one round, of all ranks
  *     by nodes      a round within each node, then one among the ranks that have the same number on their nodes
  *     radix-k       a round within each node, then rounds of at most k
  *     binary swap   rounds of two, whatever the nodes
  *
- * Ranks beyond the owners send all their fragments to a partner before the first round; an owner has at most one such
- * partner. */
+ * Ranks whose places follow those of the owners send all their fragments to a partner before the first round; an
+ * owner has at most one such partner. */
 #ifndef COMP_COMP_ROUTE_H
 #define COMP_COMP_ROUTE_H
 
@@ -57,7 +58,7 @@ comp_route comp_route_of(comp_schedule schedule, int ranks, comp_nodes nodes, in
 int comp_route_position(const comp_route *route, int rank);
 int comp_route_rank(const comp_route *route, int place);
 
-/* Returns the distance between partners of the round, which is the product of the previous radices. */
+/* Returns the distance between partners of the round, which is the product of the radices of earlier rounds. */
 int comp_route_stride(const comp_route *route, int round);
 
 static inline int comp_route_digit(const comp_route *route, int round, int stride, int place)
@@ -78,8 +79,8 @@ static inline bool comp_route_is_dense(const comp_route *route, int round)
     return route->radix[round] <= route->max_dense_ranks;
 }
 
-/* Converts the owners in the claims from ranks to places. Ranks beyond the route's owners cannot own blocks; the blocks
- * of such a rank go to its partner. */
+/* Converts the owners in the claims from ranks to places. Only the first places of a route can own blocks; blocks that
+ * other ranks have claimed are given to the partners of these ranks. */
 void comp_route_assign_positions(const comp_route *route, comp_claim *claims, uint32_t blocks);
 
 /* Returns "direct", "nodes", "radix" or "binary". */

@@ -29,7 +29,7 @@ typedef struct buffer {
 } buffer;
 
 struct comp_tile_scratch {
-    /* array of int64_t with one entry per pixel and one more: the index in `order` of each pixel's first fragment */
+    /* array of int64_t with one entry per pixel and a final one: the index in `order` of each pixel's first fragment */
     buffer starts;
     buffer order;           /* array of int64_t: indices of fragments, sorted by pixel */
     buffer pixel_fragments; /* copies of one pixel's fragments, which are sorted there */

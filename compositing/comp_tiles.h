@@ -26,8 +26,8 @@ insitu_status comp_tiles_begin(comp_tiles *tiles, const float background[4], int
  * overlap. */
 bool comp_tiles_blend(void *tiles, int thread, const pixel_area *area, fragment *items, int64_t count);
 
-/* Ends the tiles. statistics receives the number of fragments taken and the time of the slowest thread; overlaps, which
- * may be NULL, receives the pixels whose fragments overlap. */
+/* Ends the tiles. statistics receives the number of blended fragments and the time of the slowest thread; overlaps,
+ * which may be NULL, receives the pixels whose fragments overlap. */
 void comp_tiles_end(comp_tiles *tiles, comp_overlaps *overlaps, comp_statistics *statistics);
 
 #endif

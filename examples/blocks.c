@@ -1,16 +1,17 @@
-/* A simulation on several uniform blocks a rank, each with ghost layers. mpirun -n 2 blocks blocks.yaml */
+/* A simulation on several uniform blocks per rank. Each block has ghost layers. Run it with: mpirun -n 2 blocks
+ * blocks.yaml */
 #include <insitu/insitu.h>
 
 #include <math.h>
 #include <stdio.h>
 
-enum { BLOCKS = 8, N = 16, GHOSTS = 2, WIDE = N + 2 * GHOSTS }; /* 2 x 2 x 2 blocks of N x N x N cells */
+enum { BLOCKS = 8, N = 16, GHOSTS = 2, WIDE = N + 2 * GHOSTS }; /* 2 x 2 x 2 blocks with N x N x N cells each */
 
-static double density[BLOCKS][WIDE][WIDE][WIDE]; /* [block][k][j][i], with the ghost layers */
+static double density[BLOCKS][WIDE][WIDE][WIDE]; /* indices: block, k, j, i; the ghost layers are included */
 
 static double compute_coordinate(int index, int block_index)
 {
-    return (index - GHOSTS + 0.5 + N * block_index) / N - 1; /* of a cell's centre: from -1 to 1 */
+    return (index - GHOSTS + 0.5 + N * block_index) / N - 1; /* coordinate of the cell's centre, from -1 to 1 */
 }
 
 static void advance(int block, double time)
@@ -30,14 +31,14 @@ static void set_block(insitu_session *session, int block)
         .cells = {WIDE, WIDE, WIDE},
         .interior_first = {GHOSTS, GHOSTS, GHOSTS}, /* ghost layers are not drawn */
         .interior_end = {GHOSTS + N, GHOSTS + N, GHOSTS + N},
-        .origin = {-1, -1, -1}, /* of the whole lattice, the same on all blocks and ranks */
+        .origin = {-1, -1, -1}, /* origin of the whole lattice, which is the same for all blocks and ranks */
         .spacing = {1.0 / N, 1.0 / N, 1.0 / N},
         .first = {N * (block % 2) - GHOSTS, N * (block / 2 % 2) - GHOSTS, N * (block / 4) - GHOSTS}};
     insitu_mesh mesh;
     insitu_mesh_defaults(&mesh);
     mesh.vertex_count = (WIDE + 1) * (WIDE + 1) * (WIDE + 1);
     mesh.cell_count = WIDE * WIDE * WIDE;
-    mesh.lattice = &lattice; /* copied */
+    mesh.lattice = &lattice; /* the description of the lattice is copied */
     mesh.changed = INSITU_CHANGED_NOTHING;
 
     insitu_field field;
@@ -45,10 +46,12 @@ static void set_block(insitu_session *session, int block)
     field.name = "density";
     field.centring = INSITU_CELL;
     field.count = mesh.cell_count;
-    field.values = (insitu_array){.data = density[block], .type = INSITU_FLOAT64}; /* borrowed */
+    field.values =
+        (insitu_array){.data = density[block], .type = INSITU_FLOAT64}; /* the values are borrowed, not copied */
 
     char name[16];
-    snprintf(name, sizeof name, "block%d", block); /* a mesh of its own; layers without `mesh` draw them all */
+    snprintf(name, sizeof name, "block%d",
+             block); /* each block is a separate mesh; layers without `mesh` draw all meshes */
     insitu_set_mesh(session, name, &mesh);
     insitu_set_field(session, name, &field);
 }

@@ -1,6 +1,7 @@
-/* The simulation of six_calls.c as a finite element code would hold it: hexahedra of order 2, 27 nodes in the row of
- * each, the corners first and in lexicographic order, and a vector of degrees of freedom in an order of its own. The
- * pictures are the same to the byte, since the corners are what is drawn. */
+/* The simulation of six_calls.c with the data structures of a finite element code. Each cell is a hexahedron of order 2
+ * whose row of connectivity has 27 nodes, beginning with the corners in lexicographic order. The degrees of freedom are
+ * in a vector in another order. The pictures are bitwise equal to those of six_calls.c, because only the corners are
+ * drawn. */
 #include <insitu/insitu.h>
 
 #include <math.h>
@@ -18,7 +19,7 @@ static int node_index(int i, int j, int k)
     return i + SIDE_X * (j + SIDE_Y * k);
 }
 
-/* The cell's 3 x 3 x 3 nodes, x first, but the eight corners before all others. */
+/* Lists the cell's 3 x 3 x 3 nodes: first the eight corners, then all others; in each group x varies fastest. */
 static void add_cell(int cell)
 {
     const int i = cell % NX, j = cell / NX % NY, k = cell / NX / NY;
@@ -37,7 +38,7 @@ static void make_mesh(int rank)
         nodes[n][0] = 0.5 * (n % SIDE_X) + rank * NX;
         nodes[n][1] = 0.5 * (n / SIDE_X % SIDE_Y);
         nodes[n][2] = 0.5 * layer;
-        dof_of_node[n] = GHOST_DOFS + (int)(7919LL * n % NODES); /* as scattered as a solver's */
+        dof_of_node[n] = GHOST_DOFS + (int)(7919LL * n % NODES); /* scattered numbers, as in a solver */
     }
     for (int c = 0; c < CELLS; c++) add_cell(c);
 }
@@ -58,7 +59,8 @@ static void set_mesh(insitu_session *session)
     mesh.cell_type = INSITU_HEX;
     mesh.connectivity_count = CELLS * NODES_PER_CELL;
     mesh.connectivity = (insitu_array){.data = cell_nodes, .type = INSITU_INT32};
-    mesh.connectivity_row = NODES_PER_CELL; /* from one cell's first corner to the next one's */
+    mesh.connectivity_row =
+        NODES_PER_CELL; /* number of entries from one cell's first corner to that of the next cell */
     mesh.vertex_order = INSITU_ORDER_LEXICOGRAPHIC;
     insitu_set_mesh(session, "slab", &mesh);
 }
@@ -81,9 +83,9 @@ int main(int argc, char **argv)
     insitu_field field;
     insitu_field_defaults(&field);
     field.name = "pressure";
-    field.count = DOFS; /* the vector as it is, ghosts included */
+    field.count = DOFS; /* the complete vector, including ghosts */
     field.values = (insitu_array){.data = solution, .type = INSITU_FLOAT64};
-    field.index = (insitu_array){.data = dof_of_node, .type = INSITU_INT32}; /* one entry a vertex of the mesh */
+    field.index = (insitu_array){.data = dof_of_node, .type = INSITU_INT32}; /* one entry per vertex of the mesh */
     for (int cycle = 0; cycle < 4; cycle++) {
         advance(0.5 * cycle);
         insitu_set_field(session, "slab", &field);

@@ -1,5 +1,6 @@
-/* The simulation of six_calls.c as a finite volume code would hold it: no cells, but faces, each with the cell that
- * owns it and the neighbour beyond, inner faces first. The pictures are the same to the byte. */
+/* The simulation of six_calls.c with the data structures of a finite volume code. There is no list of cells, but a list
+ * of faces, each with the cell that owns it and the neighbour on its other side; inner faces are listed first. The
+ * pictures are bitwise equal to those of six_calls.c. */
 #include <insitu/insitu.h>
 
 #include <math.h>
@@ -16,7 +17,7 @@ static int point_index(const int at[3])
     return at[0] + (NX + 1) * (at[1] + (NY + 1) * at[2]);
 }
 
-/* The face at the lower end of a cell along an axis, between it and the cell before. */
+/* Stores the face at the lower end of a cell along an axis, which lies between this cell and the previous one. */
 static void add_face(int face, const int cell[3], int axis)
 {
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
@@ -29,7 +30,7 @@ static void add_face(int face, const int cell[3], int axis)
     face_offsets[face + 1] = 4 * (face + 1);
 }
 
-/* All inner faces, or all on the boundary; returns how many there are now. */
+/* Stores all inner faces, or all faces on the boundary; returns the total number of faces stored so far. */
 static int add_faces(int count, int are_inner)
 {
     static const int sizes[3] = {NX, NY, NZ}, steps[3] = {1, NX, NX * NY};
@@ -60,7 +61,7 @@ static void set_mesh(insitu_session *session)
     mesh.face_connectivity_count = face_offsets[FACES];
     mesh.face_connectivity = (insitu_array){.data = face_points, .type = INSITU_INT32};
     mesh.owner = (insitu_array){.data = owner, .type = INSITU_INT32};
-    mesh.neighbour_count = inner_faces; /* the others are on the boundary */
+    mesh.neighbour_count = inner_faces; /* the remaining faces are on the boundary */
     mesh.neighbour = (insitu_array){.data = neighbour, .type = INSITU_INT32};
     insitu_set_mesh(session, "slab", &mesh); /* borrowed, not copied */
 }

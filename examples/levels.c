@@ -1,4 +1,4 @@
-/* Three levels of refinement, as boxes of uniform cells. mpirun -n 2 levels levels.yaml */
+/* Three levels of refinement, each a box of uniform cells. Run it with: mpirun -n 2 levels levels.yaml */
 #include <insitu/insitu.h>
 #include <math.h>
 #include <stdio.h>
@@ -21,7 +21,8 @@ static void set_box(insitu_session *session, int b, double time)
 {
     const int r = boxes[b].refinement, *n = boxes[b].cells, *first = boxes[b].first;
     const double h = 0.25 / r;
-    insitu_lattice lattice = {.spacing = {h, h, h}, .refinement = {r, r, r}}; /* origin is {0, 0, 0}, of all levels */
+    insitu_lattice lattice = {.spacing = {h, h, h},
+                              .refinement = {r, r, r}}; /* the origin of all levels is {0, 0, 0} */
     insitu_mesh mesh;
     insitu_field field;
     insitu_mesh_defaults(&mesh);
@@ -30,7 +31,8 @@ static void set_box(insitu_session *session, int b, double time)
     mesh.lattice = &lattice;
     mesh.vertex_count = (n[0] + 1) * (n[1] + 1) * (n[2] + 1);
     mesh.cell_count = field.count = n[0] * n[1] * n[2];
-    mesh.changed = INSITU_CHANGED_NOTHING; /* but for what the description shows */
+    mesh.changed =
+        INSITU_CHANGED_NOTHING; /* changes of the description, such as another `first`, are detected nevertheless */
     for (int i = 0; i < field.count; i++) {
         const int x = first[0] + i % n[0], y = first[1] + i / n[0] % n[1], z = first[2] + i / n[0] / n[1];
         values[b][i] = (float)pulse((x + 0.5) * h, (y + 0.5) * h, (z + 0.5) * h, time);

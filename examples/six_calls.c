@@ -1,4 +1,4 @@
-/* A simulation that draws itself. Here its "mesh" is a slab of hexahedra a rank, and its "physics" one formula. */
+/* A simulation that draws itself. Its "mesh" is a slab of hexahedra per rank, and its "physics" is one formula. */
 #include <insitu/insitu.h>
 
 #include <math.h>
@@ -24,7 +24,7 @@ static void make_mesh(int rank)
             }
     for (int c = 0; c < CELLS; c++) {
         const int i = c % NX, j = c / NX % NY, k = c / NX / NY;
-        for (int n = 0; n < 8; n++) /* VTK's order: the lower quad around, then the upper */
+        for (int n = 0; n < 8; n++) /* VTK's order: the lower quad in cyclic order, then the upper quad */
             hexes[c][n] = vertex(i + (n % 4 == 1 || n % 4 == 2), j + n % 4 / 2, k + n / 4);
     }
 }
@@ -67,9 +67,10 @@ int main(int argc, char **argv)
 
     for (int cycle = 0; cycle < 4; cycle++) {
         advance(0.5 * cycle);
-        insitu_set_field(session, "slab", &field); /* new values, in the same array */
+        insitu_set_field(session, "slab", &field); /* the array is the same and has new values */
         if (insitu_step(session, cycle, 0.5 * cycle) != INSITU_OK && rank == 0)
-            fprintf(stderr, "cycle %d: %s\n", cycle, insitu_error(session)); /* and the simulation goes on */
+            fprintf(stderr, "cycle %d: %s\n", cycle,
+                    insitu_error(session)); /* the simulation continues after an error */
     }
 
     if (insitu_destroy(&session) != INSITU_OK && rank == 0) fprintf(stderr, "%s\n", insitu_error(NULL));

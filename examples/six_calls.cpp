@@ -24,7 +24,7 @@ int main(int argc, char **argv)
             for (int i = 0; i <= nx; i++) xyz.push_back({double(i + rank * nx), double(j), double(k)});
     std::vector<std::array<int, 8>> hexes(nx * ny * nz);
     for (int c = 0; c < nx * ny * nz; c++)
-        for (int n = 0; n < 8; n++) // VTK's order: the lower quad around, then the upper
+        for (int n = 0; n < 8; n++) /* VTK's order: the lower quad in cyclic order, then the upper quad */
             hexes[c][n] = vertex(c % nx + (n % 4 == 1 || n % 4 == 2), c / nx % ny + n % 4 / 2, c / nx / ny + n / 4);
     std::vector<double> pressure(xyz.size());
     insitu_session *session = nullptr;
@@ -50,7 +50,7 @@ int main(int argc, char **argv)
                 const double radius = std::hypot(std::hypot(xyz[v][0] - 12, xyz[v][1] - 12), xyz[v][2] - 12);
                 pressure[v] = std::cos(0.6 * radius - 0.5 * cycle);
             }
-            insitu_set_field(session, "slab", &field); // new values, in the same array
+            insitu_set_field(session, "slab", &field); /* the array is the same and has new values */
             if (insitu_step(session, cycle, 0.5 * cycle) != INSITU_OK)
                 std::fprintf(stderr, "%s\n", insitu_error(session));
         }

@@ -1,6 +1,6 @@
 /* The Blueprint adaptor: it determines which meshes a node contains and what has changed in them, and makes all ranks
- * agree on errors. A session reads borrowed arrays during a step; arrays that the adaptor allocated itself are
- * therefore kept with the known mesh until it is set again. */
+ * agree on errors. A session reads borrowed arrays during a step; therefore the adaptor keeps the arrays that it
+ * allocated for a mesh, in known_mesh, until that mesh is set again. */
 #include "insitu/blueprint.h"
 
 #include <stdio.h>
@@ -17,8 +17,8 @@ typedef struct known_mesh {
     int64_t number;      /* number of the block, or WHOLE_MESH */
     int64_t step_number; /* value of the step counter when the mesh was last set */
     uint64_t name_hash, coordinate_hash, cell_hash, fields_hash;
-    insitu_mesh mesh;       /* as it was passed; mesh.lattice is not valid */
-    insitu_lattice lattice; /* as it was passed, if the mesh is a uniform block */
+    insitu_mesh mesh;       /* description that was passed to the session; mesh.lattice is not valid */
+    insitu_lattice lattice; /* description that was passed to the session, if the mesh is a uniform block */
     uniform_block uniform;
     owned_arrays owned;
 } known_mesh;
@@ -37,8 +37,8 @@ struct insitu_blueprint {
     int64_t cycle, last_cycle;
     bool has_time;
     double time;
-    named_lattices lattices; /* this rank's, when the ranks last agreed */
-    named_lattices common;   /* of the same meshes, on which all ranks agreed */
+    named_lattices lattices; /* lattices of this rank's blocks when the ranks last agreed on lattices */
+    named_lattices common;   /* the lattices on which all ranks agreed, for the same meshes */
     insitu_blueprint_report report;
     char error[NODE_MESSAGE + 64];
 };
@@ -361,7 +361,7 @@ static void remove_meshes_not_set(insitu_blueprint *adaptor)
         if (adaptor->known_meshes[i].step_number != adaptor->step_number) remove_known_mesh(adaptor, i);
 }
 
-/* Lists the lattices of this rank's uniform blocks. If memory runs out, this is the step's error. */
+/* Lists the lattices of this rank's uniform blocks. If memory runs out, stores this as the step's error. */
 static named_lattices list_lattices(insitu_blueprint *adaptor)
 {
     named_lattices list = {NULL, 0};
@@ -375,8 +375,9 @@ static named_lattices list_lattices(insitu_blueprint *adaptor)
     return list;
 }
 
-/* Lets the ranks agree on the lattices of their blocks. `list` is this rank's, and becomes the adaptor's. Collective.
- */
+/* Lets the ranks agree on the lattices of their blocks. `list` contains this rank's lattices; the adaptor takes it
+ * over. Collective.
+ * */
 static insitu_status agree_on_lattices(insitu_blueprint *adaptor, named_lattices *list)
 {
     named_lattices common;
@@ -399,7 +400,7 @@ static bool is_same_place(const insitu_lattice *a, const insitu_lattice *b)
     return is_same;
 }
 
-/* Sets those uniform blocks again that are on another lattice than in the last step. */
+/* Passes uniform blocks to the session again if their common lattice has changed since the last step. */
 static void place_blocks(insitu_blueprint *adaptor)
 {
     for (int i = 0; i < adaptor->known_count; i++) {

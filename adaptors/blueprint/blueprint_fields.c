@@ -1,5 +1,5 @@
 /* Reads fields, including ghost flags. On a lattice all vertex arrays must have the same strides, and so must all cell
- * arrays: those of the topology for vertices, and those of the first element field for cells. */
+ * arrays. The topology states the strides of vertex arrays; the first element field states those of cell arrays. */
 #include "blueprint_hash.h"
 #include "blueprint_mesh.h"
 
@@ -10,12 +10,12 @@
 typedef struct blueprint_field {
     node field_node, values_node;
     bool is_element;
-    int64_t first;      /* index in the array of the tuple of the first vertex or cell */
+    int64_t first;      /* index of the tuple of the first vertex or cell in the array */
     int64_t strides[3]; /* distance in tuples between neighbours along each axis of a lattice */
 } blueprint_field;
 
-/* The bits of vtkGhostType that hide a cell: duplicate, refined, hidden. Other bits only describe the cell. Refined
- * cells are no ghost layer. */
+/* The bits of vtkGhostType that hide a cell: duplicate, refined, hidden. Other bits only describe the cell. A layer of
+ * ghost cells has the bits in VTK_LAYER_BITS. */
 enum { VTK_HIDDEN_BITS = 1 | 8 | 32, VTK_LAYER_BITS = 1 | 32 };
 
 /* ---- which fields ----------------------------------------------------------------------------------------------- */
@@ -216,9 +216,10 @@ static void find_inner_cells(const insitu_array *flags, const int64_t strides[3]
     for (int axis = 0; axis < 3 && end[0] == 0; axis++) first[axis] = end[axis] = counts[axis];
 }
 
-/* Returns which bits the flags of the cells have. The ghost layers around a block of a level, which have a bit of the
- * mask, become those outside of the lattice's interior, and their flags do not count: a block covers the coarser cells
- * below its interior, and must not cover those below its ghost layers. */
+/* Returns the bitwise or of the cells' flags. If the block has a level of refinement, the lattice's interior is first
+ * reduced to exclude the ghost layers, whose flags have a bit of the mask, and only flags in the interior are read.
+ * This is because a block hides the coarser cells below its interior, but must not hide the cells below its ghost
+ * layers. */
 static int64_t read_flag_bits(const insitu_array *flags, int64_t mask, blueprint_mesh *mesh)
 {
     insitu_lattice *l = &mesh->lattice;
@@ -315,7 +316,7 @@ static bool flag_covered_cells(const node *nestset, blueprint_mesh *mesh)
 static bool read_nestsets(const node *domain, const char *topology, blueprint_mesh *mesh)
 {
     node nestsets, nestset;
-    /* of blocks of levels, the session itself finds the covered cells */
+    /* for blocks with levels of refinement, the session itself finds the covered cells */
     if (!mesh->mesh.lattice || mesh->has_level || !node_find(domain, "nestsets", &nestsets)) return true;
     for (int64_t i = 0; i < node_child_count(&nestsets); i++) {
         node_child(&nestsets, i, &nestset);
@@ -341,7 +342,7 @@ bool blueprint_read_ghosts(const node *domain, const char *topology, blueprint_m
 
 /* ---- values ----------------------------------------------------------------------------------------------------- */
 
-/* Describes the field's components in an array, which the caller must free. NULL after an error. */
+/* Describes the field's components in an array, which the caller must free. Returns NULL on an error. */
 static insitu_array *read_values(const blueprint_field *field, const blueprint_mesh *mesh, int *count)
 {
     const int64_t children = node_child_count(&field->values_node);

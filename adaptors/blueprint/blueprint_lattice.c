@@ -4,11 +4,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Positions and spacings that codes compute from the same numbers in different ways differ by some roundings. These are
- * far below this share of a spacing, except for lattices that are too fine for the precision of their coordinates. */
+/* Largest difference between positions that are treated as equal, as a fraction of a spacing. Rounding errors of
+ * positions are far smaller, unless the lattice is too fine for the precision of its coordinates. */
 static const double tolerance = 1e-6;
 
-/* Bounds of insitu_lattice for blocks of levels. */
+/* Largest values that insitu_lattice allows for blocks with levels of refinement. */
 static const double largest_first = 1099511627776, largest_refinement = 1048576;
 
 uniform_block uniform_block_of(const blueprint_mesh *mesh)
@@ -101,11 +101,11 @@ void named_lattices_free(named_lattices *list)
     *list = (named_lattices){NULL, 0};
 }
 
-/* What the ranks exchange. */
+/* The data that the ranks exchange. */
 typedef struct lattice_exchange {
     MPI_Comm comm;
     int ranks;
-    int *bytes, *starts; /* of each rank's items among all */
+    int *bytes, *starts; /* for each rank: number of bytes of its items, and position of the first one */
     named_lattice *all;
 } lattice_exchange;
 
@@ -129,7 +129,7 @@ static bool gather_sizes(lattice_exchange *x, const named_lattices *own, int *to
     return true;
 }
 
-/* Computes for each mesh what all ranks' items combine to, in the order of the ranks. */
+/* Combines the items of all ranks for each mesh, in the order of the ranks. */
 static void merge_all(const named_lattices *own, const named_lattice *all, int count, named_lattices *out)
 {
     for (int i = 0; i < own->count; i++) out->items[i] = (named_lattice){.mesh = own->items[i].mesh};
@@ -168,8 +168,8 @@ bool named_lattices_agree(MPI_Comm comm, const named_lattices *own, named_lattic
 
 /* ---- a block in its lattice ------------------------------------------------------------------------------------- */
 
-/* Moves the origin along an axis to the common one. A block that states its first index must already have this origin,
- * but for roundings. Returns false if the block does not lie on the lattice. */
+/* Moves the origin along an axis to the common one. If a block states its first index, its origin must already equal
+ * the common one, except for rounding. Returns false if the block does not lie on the lattice. */
 static bool place_axis(const uniform_block *block, const common_lattice *common, int axis, insitu_lattice *out)
 {
     const double spacing = block->lattice.spacing[axis];
@@ -181,7 +181,7 @@ static bool place_axis(const uniform_block *block, const common_lattice *common,
     return true;
 }
 
-/* Computes how many cells of the block make one of the coarsest level. Returns false if that is no whole number. */
+/* Computes the number of the block's cells per cell of the coarsest level. Returns false if it is not an integer. */
 static bool refine_axis(double coarsest, double spacing, int64_t *out)
 {
     const double ratio = coarsest / fabs(spacing), whole = nearbyint(ratio);

@@ -1,7 +1,7 @@
 /* The lattice that the uniform blocks of a mesh have in common, on all ranks. Nodes state the position of each block in
- * floating point. But common vertices of blocks are recognized by equal bits of their coordinates, so that all blocks
- * must compute these from one origin (insitu_lattice). Also, a level of refinement is stated as a number; the ratios
- * follow from the spacings of all blocks. */
+ * floating point. However, equal vertices of different blocks are recognized by bitwise equal coordinates, so that all
+ * blocks must compute their coordinates from one origin (insitu_lattice). Nodes state levels of refinement only as
+ * numbers, so that the refinement ratios must be computed from the spacings of all blocks. */
 #ifndef BLUEPRINT_LATTICE_H
 #define BLUEPRINT_LATTICE_H
 
@@ -40,12 +40,13 @@ const common_lattice *named_lattices_find(const named_lattices *list, uint64_t m
 bool named_lattices_are_same(const named_lattices *a, const named_lattices *b);
 void named_lattices_free(named_lattices *list);
 
-/* Combines the lists of all ranks: *out receives the meshes of the own list, with the blocks of all ranks. Returns
- * false on all ranks if memory runs out on one, or if MPI returns an error. Collective. */
+/* Combines the lists of all ranks: *out receives the meshes of this rank's list, each with the lattice that contains
+ * the blocks of all ranks. Returns false on all ranks if memory runs out on one, or if MPI returns an error.
+ * Collective. */
 bool named_lattices_agree(MPI_Comm comm, const named_lattices *own, named_lattices *out);
 
-/* Returns the block as a part of the common lattice. If the block does not fit it, its description stays. *is_level
- * receives whether the block could be given its refinement, or needs none. */
+/* Returns the block's description on the common lattice. If the block does not fit this lattice, the description is
+ * returned unchanged. *is_level is set to false if the block needs a refinement ratio that could not be computed. */
 insitu_lattice uniform_block_place(const uniform_block *block, const common_lattice *common, bool *is_level);
 
 #endif

@@ -70,8 +70,8 @@ bool node_real(const node *parent, const char *path, bool is_required, double *o
  * the array is missing or invalid. */
 bool node_integers(const node *parent, const char *path, int64_t out[3], int *count);
 
-/* Reads the strides of an array in which i varies fastest. Those that are not given are computed from the numbers of
- * elements along each axis, as of an array without padding; parent: NULL if none are given. A count of 0 means 1. */
+/* Reads the strides of an array in which i varies fastest. Missing strides are computed from the numbers of elements
+ * along each axis, as for an array without padding; parent is NULL if all are missing. A count of 0 is treated as 1. */
 void node_strides(const node *parent, const char *path, const int64_t counts[3], int64_t strides[3]);
 
 /* These describe the array of the node, or of the node at the path. They return false and set the error if it is not an

@@ -8,7 +8,7 @@
 
 enum { PARAMETERS = 64 };
 
-/* A parameter of the scene whose value the simulation requested for its results. */
+/* A parameter of the scene whose value the simulation reads from the results of Catalyst. */
 typedef struct requested_parameter {
     char name[NODE_NAME];
     double value;

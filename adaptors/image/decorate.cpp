@@ -1,8 +1,8 @@
 /* Everything is drawn in linear light on premultiplied colours, so that the edges of lines and letters are smooth on
- * any background. Strokes that the picture hides are drawn behind it, the background behind these, and everything else
- * in front. Sizes are proportional to the picture's height: a picture of twice the size looks the same at a higher
- * resolution. Text has a halo in the background's colour, so that it is legible on any picture and hides little of it.
- * layout.cpp computes the positions. */
+ * any background. Strokes with is_behind are drawn behind the picture, the background behind these strokes, and
+ * everything else in front of the picture. Sizes are proportional to the picture's height, so that a picture of twice
+ * the size looks the same at a higher resolution. Text has a halo in the background's colour, so that it is legible on
+ * any picture and hides little of it. layout.cpp computes the positions. */
 #include "decorate.h"
 #include "layout.h"
 #include "typeface.h"
@@ -30,7 +30,7 @@ float *pixel_at(drawing &s, int x, int y)
                         static_cast<std::size_t>(x))];
 }
 
-/* Blends a colour of the given opacity over the pixel, or behind it. */
+/* Blends a colour of the given opacity over the pixel, or behind the pixel. */
 void blend(float *pixel, const float colour[3], double opacity, bool is_behind)
 {
     const double seen = is_behind ? opacity * (1 - std::min(1.0, static_cast<double>(pixel[3]))) : opacity;
@@ -197,7 +197,7 @@ void draw_out_of_range(drawing &s, const insitu_colour_bar &bar, const block &b)
     if (bar.above) fill(s, above, bar.above, 1), draw_frame(s, above);
 }
 
-/* Draws a colour bar with its ticks on the right. The numbers and the label are lines of the block. */
+/* Draws a colour bar with its ticks on the right. The numbers and the label are drawn as lines of the block's text. */
 void draw_bar(drawing &s, const block &b)
 {
     const insitu_colour_bar &bar = s.decorations.bars[b.index];

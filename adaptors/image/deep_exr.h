@@ -6,7 +6,7 @@
 
 #include "insitu/image_output.h"
 
-/* Writes the image's samples to path in the way of write_picture_file(). Throws std::bad_alloc or io_error. */
+/* Writes the image's samples to path as write_picture_file() does. Throws std::bad_alloc or io_error. */
 void write_deep_exr(int width, int height, const insitu_deep &deep, const std::string &path);
 
 #endif

@@ -1,7 +1,7 @@
-/* The parts that other pictures cover come first, because they cannot move. Then text at the top and the bottom is
- * placed, because it depends most on the borders. Colour bars share the remaining height of their side. Every other
- * block takes the free position nearest to its own. Candidate positions align with edges of the blocks already placed,
- * so that their number is small and bounded. */
+/* Decorations are placed one after the other. The first blocks are the areas that other pictures cover, because these
+ * cannot move. Then text at the top and the bottom is placed, because it depends most on the borders. Colour bars share
+ * the remaining height of their side. Every other block gets the free position nearest to its anchor. Candidate
+ * positions align with edges of the blocks already placed, so that their number is small and bounded. */
 #include "layout.h"
 
 #include <algorithm>
@@ -30,8 +30,8 @@ double pixels(double share, int size)
     return std::ceil(share * size);
 }
 
-/* Returns the text sizes to try, from the given one down. None is below the legible minimum, unless the given one
- * is. */
+/* Returns the text sizes to try, in descending order from the given one. No size is below the legible minimum, except a
+ * given one. */
 std::vector<int> sizes_from(double size)
 {
     std::vector<int> out;
@@ -199,7 +199,7 @@ bool place_words(layout_state &s, int index)
 
 /* ---- colour bars ------------------------------------------------------------------------------------------------ */
 
-/* The colour bars of a side with text of one size. All have the width of the widest bar, and leave space for the
+/* The colour bars of a side with text of one size. All bars have the width of the widest one, and leave space for the
  * highest label. */
 struct bar_group {
     std::vector<int> bars;
@@ -275,7 +275,7 @@ block make_bar(const layout_state &s, const bar_group &g, std::size_t n, const a
     return b;
 }
 
-/* Finds the part of a vertical strip's height that other blocks leave free, around the middle of the picture. */
+/* Finds the range of heights in a vertical strip, around the middle of the picture, that other blocks leave free. */
 void free_height(const layout_state &s, double x0, double x1, double &top, double &bottom)
 {
     top = s.y0, bottom = s.y1;
@@ -288,8 +288,8 @@ void free_height(const layout_state &s, double x0, double x1, double &top, doubl
     }
 }
 
-/* Returns the positions of the outer edge of the outermost column to try: the border of the picture, and the sides of
- * covered parts, for a part that takes too much of the height at the border. */
+/* Returns the positions to try for the outer edge of the outermost column of bars: the border of the picture, and the
+ * inner sides of covered areas, in case such an area takes too much of the height at the border. */
 std::vector<double> column_edges(const layout_state &s, const bar_group &g)
 {
     const bool is_at_left = g.anchor == INSITU_LEFT;
@@ -323,7 +323,7 @@ bool fill_column(const layout_state &s, const bar_group &g, std::size_t first, s
 }
 
 /* Places all bars of the group in the smallest number of columns in which they fit beside the edge. Several columns may
- * cover at most half of the picture's width, a single one all of it. */
+ * cover at most half of the picture's width; a single column may cover all of it. */
 bool place_group(layout_state &s, const bar_group &g, double edge)
 {
     const std::size_t count = g.bars.size();
@@ -385,7 +385,8 @@ void place_bars(layout_state &s, insitu_anchor at)
 
 /* ---- covered parts and other decorations ------------------------------------------------------------------------ */
 
-/* Adds blocks for the covered parts, with a gap around each, so that nothing touches the frame of the other picture. */
+/* Adds a block for each area that another picture covers, with a gap around it, so that no decoration touches the frame
+ * of that picture. */
 void place_covered(layout_state &s)
 {
     const double gap = pixels(padding, s.size);
@@ -424,8 +425,8 @@ bool place_axes(layout_state &s)
     return false;
 }
 
-/* Places a label so that the box of its text has the given distance from its point. The label is omitted if the place
- * is occupied. */
+/* Places a label so that the box of its text has the given distance from its point. The label is omitted if this
+ * position is occupied. */
 void place_label(layout_state &s, int index)
 {
     const insitu_label &label = s.decorations.labels[index];

@@ -1,10 +1,10 @@
 /* Computes the positions of decorations in a picture. Only rectangles and lines of text are computed, no pixels; the
  * result depends on the decorations, the picture's size, and the widths of text.
  *
- * The rectangles of blocks have integer coordinates, lie within the picture and do not overlap. The covered parts of
- * the picture are blocks too, so that no decoration is below another picture. Text that is too wide is wrapped, and
- * then made smaller. Colour bars share the height of their side, and then use more columns. Decorations for which there
- * is still not enough space are left out and listed. */
+ * The rectangles of blocks have integer coordinates, lie within the picture and do not overlap. Areas that other
+ * pictures cover are blocks too, so that no decoration is below another picture. Text that is too wide is wrapped,
+ * and then made smaller. Colour bars share the height of their side, and then use more columns. Decorations for
+ * which there is still not enough space are left out and listed. */
 #ifndef ADAPTORS_LAYOUT_H
 #define ADAPTORS_LAYOUT_H
 

@@ -12,8 +12,8 @@ std::atomic<void *> reserve;
 std::atomic<std::new_handler> handler_before;
 std::mutex lock; /* locked while a reserve exists, because there can be only one at a time */
 
-/* Number of bytes left free in addition to the reserve, for allocations that do not use operator new: the loader
- * terminates the process if it has no memory for a thread's variables, and compressors fail. */
+/* Number of bytes left free in addition to the reserve, for allocations that do not use operator new: without memory,
+ * the loader cannot allocate thread-local variables and terminates the process, and compressors fail. */
 enum { SPARE_BYTES = 4 << 20 };
 
 void release_reserve()

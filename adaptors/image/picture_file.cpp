@@ -178,7 +178,7 @@ int open_folder(const std::filesystem::path &folder)
     return number;
 }
 
-/* Throws unless the name is free, a regular file or a link: renaming would replace a pipe or a device by the
+/* Throws unless the name is free, a regular file or a link, because renaming would replace a pipe or a device by the
  * picture. */
 void check_target(int folder, const std::string &name)
 {
@@ -211,8 +211,8 @@ void write_picture_file(const std::string &path, const unsigned char *bytes, std
     const descriptor folder(open_folder(target.parent_path()));
     check_target(folder.number(), name);
     remove_stale_files_once(folder.number());
-    /* Another process that cleans the folder may remove the temporary file as one of a killed run: before the file is
-     * locked, or if locks do not work across nodes. */
+    /* Largest number of attempts to write a picture. Another process may remove the temporary file because it treats
+     * the file as one of a killed run: before the file is locked, or if locks do not work across nodes. */
     enum { TRIES = 8 };
     for (int i = 0; i < TRIES; i++)
         if (try_to_write(folder.number(), name, bytes, size)) return;

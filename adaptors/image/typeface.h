@@ -46,7 +46,7 @@ class typeface
     FT_LibraryRec_ *library_ = nullptr;
     FT_FaceRec_ *face_ = nullptr;
     std::string name_, file_,
-        unreadable_; /* name and file of the font; the first file that could not be read as a font */
+        unreadable_; /* name and path of the font, and path of the first file that could not be read as a font */
     bool is_from_system_ = false;
     mutable std::map<std::pair<int, unsigned>, int> advances_; /* cache of glyph advances, by size and glyph */
     std::set<char32_t> missing_;

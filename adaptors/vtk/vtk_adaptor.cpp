@@ -1,7 +1,7 @@
 /* The public functions of the VTK adaptor. They determine which meshes a data object contains, which arrays these use,
- * and how long the arrays must live. A session reads borrowed arrays during a step. Everything that a mesh uses
- * (references to VTK's arrays, conversions) is therefore kept in one part under the mesh's name, until a new mesh of
- * that name has been set on the session or the mesh has been removed from it. */
+ * and how long the arrays must live. A session reads borrowed arrays during a step. Therefore a mesh_part keeps
+ * everything that one mesh uses (references to VTK's arrays, and conversions), until a new mesh of that name has been
+ * set on the session or the mesh has been removed from the session. */
 #include "insitu/vtk.h"
 
 #include <exception>
@@ -48,7 +48,7 @@ struct mesh_part {
     std::vector<insitu_field> fields;
 };
 
-/* The name of a mesh of the session, and the number of a block or whole_mesh. */
+/* The key of a mesh_part: the name of the mesh, and the number of the block or whole_mesh. */
 using part_key = std::pair<std::string, int64_t>;
 using part_map = std::map<part_key, mesh_part>;
 constexpr int64_t whole_mesh = -1;
@@ -80,7 +80,8 @@ struct insitu_vtk_adaptor {
 namespace
 {
 
-constexpr size_t longest_list = 160; // bytes of the fields' names in a mesh's name, which has at most 255
+constexpr size_t longest_list =
+    160; /* largest length in bytes of the list of field names in a mesh's name, which may have at most 255 bytes */
 
 constexpr unsigned char hiding_bits =
     vtkDataSetAttributes::DUPLICATECELL | vtkDataSetAttributes::HIDDENCELL | vtkDataSetAttributes::REFINEDCELL;
@@ -303,9 +304,9 @@ void set_converted(insitu_vtk_adaptor *adaptor, part_map &parts, const std::stri
     set_leaf(adaptor, parts, name, grid, out);
 }
 
-/* Returns the name of the mesh whose blocks are the structured leaves that have the same fields as this one, and as
- * many dimensions. Leaves with other fields cannot be blocks of the same mesh. The name must not depend on other
- * leaves, because these may be on other ranks. */
+/* Returns the name of the mesh of which this structured leaf becomes a block. Leaves with the same fields and the same
+ * number of dimensions get the same name, because all blocks of a mesh must have the same fields. The name depends only
+ * on this leaf, because the other leaves may be on other ranks. */
 std::string name_of_blocks(const std::string &name, const mesh_part &p)
 {
     std::set<std::string> fields;
@@ -317,11 +318,11 @@ std::string name_of_blocks(const std::string &name, const mesh_part &p)
     return name + (p.mesh.cell_type == INSITU_QUAD ? "/flat blocks" : "/blocks") + list;
 }
 
-/* A composite data set while its leaves are set. */
+/* The state of setting the leaves of a composite data set. */
 struct composite_state {
     vtkCompositeDataSet *data;
     vtkCompositeDataIterator *it;
-    amr_refinements refinements; // of the levels of overlapping AMR
+    amr_refinements refinements; /* refinement of each level of overlapping AMR */
 };
 
 /* Describes the position of a grid of overlapping AMR. */
@@ -397,8 +398,8 @@ void set_data(insitu_vtk_adaptor *adaptor, part_map &parts, const std::string &n
                                                  " is not taken, expected a vtkDataSet or a composite of them"};
 }
 
-/* Removes the parts that an earlier call set and this one did not. A whole mesh of which there are blocks now has been
- * replaced by them, so that nothing must be removed from the session. */
+/* Removes the parts that an earlier call set and this one did not. If a whole mesh has been replaced by blocks of the
+ * same name, nothing must be removed from the session. */
 void remove_parts_not_set(insitu_vtk_adaptor *adaptor, part_map &parts, const std::set<part_key> &keys)
 {
     for (auto it = parts.begin(); it != parts.end();) {

@@ -1,5 +1,6 @@
 /* Every rank has the boxes of all levels, including those whose data are on other ranks. A box is a range of cell
- * indices of its level, counted from a common origin. The session finds from them which cells finer levels cover. */
+ * indices of its level, counted from a common origin. From the boxes, the session finds which cells are covered by
+ * finer levels. */
 #include "vtk_amr.h"
 
 #include <algorithm>
@@ -15,10 +16,10 @@ namespace insitu_vtk
 namespace
 {
 
-/* Numbers that writers compute in different ways differ by some roundings, which are far below this share. */
+/* Relative tolerance for numbers that writers compute in different ways; rounding errors are far below it. */
 constexpr double tolerance = 1e-6;
 
-/* Returns a / b if it is a whole number but for roundings, otherwise 0. */
+/* Returns a / b if the quotient is an integer within rounding, otherwise 0. */
 int64_t whole_ratio(double a, double b)
 {
     if (!(a > 0) || !(b > 0) || !(a / b < 1e6)) return 0;
@@ -26,7 +27,8 @@ int64_t whole_ratio(double a, double b)
     return std::abs(a / b - static_cast<double>(ratio)) <= tolerance * a / b ? ratio : 0;
 }
 
-/* Computes how many cells of the level make one of the level before it along each axis; 0 if it is not known. */
+/* Computes, for each axis, the number of the level's cells along a cell of the next coarser level; 0 if it is
+ * unknown. */
 std::array<int64_t, 3> ratios_to_coarser(vtkAMRInformation *information, unsigned level)
 {
     std::array<int64_t, 3> ratios{};
@@ -41,8 +43,8 @@ std::array<int64_t, 3> ratios_to_coarser(vtkAMRInformation *information, unsigne
     return ratios;
 }
 
-/* Checks whether the box begins and ends at borders of cells of the coarser level. Along an axis without cells, ratios
- * do not matter. */
+/* Checks whether the box begins and ends at borders of cells of the coarser level. Along an axis without cells, the
+ * ratio is ignored. */
 bool fits_coarser_level(const vtkAMRBox &box, const std::array<int64_t, 3> &ratios)
 {
     for (int axis = 0; axis < 3; axis++) {

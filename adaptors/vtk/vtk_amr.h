@@ -13,7 +13,7 @@ class vtkOverlappingAMR;
 namespace insitu_vtk
 {
 
-/* For each level, the number of its cells that make one cell of level 0 along each axis. */
+/* For each level, the number of its cells along one cell of level 0, for each axis. */
 using amr_refinements = std::vector<std::array<int64_t, 3>>;
 
 /* Finds the refinement of each level. Returns an empty list if boxes, spacings or ratios are not set, or if a box
@@ -21,9 +21,9 @@ using amr_refinements = std::vector<std::array<int64_t, 3>>;
  * these data on every rank. */
 amr_refinements find_refinements(vtkOverlappingAMR *amr);
 
-/* Describes the lattice of a grid as a part of its level: the origin is that of the AMR, `first` that of the grid's
- * box, and the refinement is set if there are several levels. Returns false without changes if the box is not that of
- * the grid. */
+/* Describes the lattice of a grid as a part of its level: sets the origin to that of the AMR, `first` to the first
+ * index of the grid's box, and the refinement if there are several levels. Returns false without changes if the box
+ * does not fit the grid. */
 bool place_on_level(vtkOverlappingAMR *amr, const amr_refinements &refinements, unsigned level, unsigned number,
                     insitu_lattice &lattice);
 

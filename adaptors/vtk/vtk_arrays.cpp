@@ -23,7 +23,8 @@ namespace insitu_vtk
 namespace
 {
 
-/* Returns the insitu_type of T. VTK treats long and long long as different types, although both have 64 bits. */
+/* Returns the insitu_type of T. In VTK's interface, long and long long are different types, although both have 64
+ * bits. */
 template <typename T> constexpr insitu_type element_type()
 {
     if constexpr (std::is_integral_v<T>)

@@ -1,11 +1,12 @@
 /* For each VTK cell type that libinsitu draws, a table (cell_conversion) contains the linear cell that represents it,
- * and which of its points are the linear cell's vertices. If all cells of a grid are supported as they are (tets,
- * hexes, wedges, pyramids), VTK's arrays are used unchanged; if a single cell is not, all cells are copied to a new
- * list.
+ * and which of its points are the linear cell's vertices. If all cells of a grid have types that libinsitu reads
+ * directly (tets, hexes, wedges, pyramids), VTK's arrays are used unchanged. If a single cell has another type, all
+ * cells are copied to a new list.
  *
- * A voxel differs from a hexahedron only in the order of its points. Polyhedra and prisms of five and six sides become
- * libinsitu's polyhedra, with a list of their faces (vtk_faces.h). Quadratic and Lagrange cells are libinsitu's too. Of
- * other cells of higher order the corners are the first points, in the order of the linear cell. */
+ * A voxel differs from a hexahedron only in the order of its points. Polyhedra and prisms of five and six sides
+ * become libinsitu's polyhedra, with a list of their faces (vtk_faces.h). Quadratic and Lagrange cells are cell
+ * types of libinsitu too. In other cells of higher order, the first points are the corners, in the order of the
+ * linear cell. */
 #include "vtk_cells.h"
 
 #include "vtk_faces.h"
@@ -29,7 +30,7 @@ enum class conversion_kind { not_drawn, flat, as_it_is, polygon, reordered, face
 
 struct linear_cell {
     uint8_t type;
-    uint8_t vertex_count;            // 0: all points of the cell
+    uint8_t vertex_count;            /* number of vertices; 0: all points of the cell are vertices */
     std::array<uint8_t, 8> vertices; // indices into the cell's points
 };
 
@@ -98,8 +99,8 @@ const conversion_table &cell_conversions()
     return table;
 }
 
-/* Makes the table of the cells of higher order: libinsitu's type, and how many of the first points its cells have. The
- * points on faces and inside that libinsitu's type lacks are left out. */
+/* Makes the table of the cells of higher order: libinsitu's type, and the number of leading points that cells of this
+ * type use. Further points, on faces and inside the cell, are left out. */
 conversion_table make_higher_conversions()
 {
     conversion_table table;
@@ -150,7 +151,8 @@ template <typename Id> struct raw_cells {
     const Id *offsets;
     const Id *connectivity;
     int64_t count;
-    bool are_higher_known; // unless there are polyhedra or polygons beside them, or Lagrange cells of mixed orders
+    bool are_higher_known; /* true if cells of higher order are passed as they are. It is false if the grid also
+                              contains polyhedra or polygons, or Lagrange cells of mixed orders. */
 
     const cell_conversion &conversion_of(int64_t cell) const
     {
@@ -161,7 +163,7 @@ template <typename Id> struct raw_cells {
             return cell_conversions()[types[cell]];
         return higher;
     }
-    /* Returns whether the cell is drawn from VTK's own connectivity. */
+    /* Returns whether the cell is read from VTK's own connectivity without conversion. */
     bool is_as_it_is(int64_t cell, const cell_conversion &r) const
     {
         if (r.kind == conversion_kind::polygon) return size(cell) >= r.needed_points;
@@ -186,7 +188,8 @@ struct new_size {
     bool is_one_to_one = true;
 };
 
-/* The cells with faces, in their order. has[i] is true if VTK's cell i is one of them and all its faces are valid. */
+/* The cells that are converted to polyhedra, in VTK's order. has[i] is true if VTK's cell i is such a cell and all its
+ * faces are valid. */
 struct cells_with_faces {
     face_list faces;
     std::vector<bool> has_faces;
@@ -303,8 +306,8 @@ void convert_cells(vtkUnstructuredGrid *grid, const raw_cells<Id> &raw, const st
                     size.cells + (size.cells + 1) * 8 + size.vertices * static_cast<int64_t>(sizeof(Id)) + face_bytes);
 }
 
-/* Borrows VTK's arrays; all cells must be supported as they are. If all have the same type and size, types and offsets
- * are not needed. */
+/* Borrows VTK's arrays; all cells must have types that libinsitu reads directly. If all have the same type and size,
+ * types and offsets are not needed. */
 template <typename Id>
 void borrow_cells(vtkUnstructuredGrid *grid, const raw_cells<Id> &raw, const std::array<int64_t, 256> &by_type,
                   int64_t connectivity_count, const cells_view &view)

@@ -1,5 +1,5 @@
-/* Converts the cells of a vtkUnstructuredGrid to those that libinsitu draws. VTK's own arrays are used if all cells are
- * supported, otherwise a new list in which cells are reordered, made linear or left out. */
+/* Converts the cells of a vtkUnstructuredGrid to cell types that libinsitu draws. If all cells are supported, VTK's own
+ * arrays are used; otherwise a new list is made, in which cells are reordered, made linear or left out. */
 #ifndef VTK_CELLS_H
 #define VTK_CELLS_H
 

@@ -21,7 +21,7 @@ class face_list
      * cell's faces are incomplete. */
     bool add_cell(vtkUnstructuredGrid *grid, int64_t cell, int type, const int64_t *points);
 
-    /* Returns the faces of the cell that was added as the number-th one, counted from 0. */
+    /* Returns the faces of the cell that was added after `number` other cells. */
     const int64_t *cell_faces(size_t number) const { return cells.data() + cell_starts[number]; }
     int64_t cell_size(size_t number) const { return cell_starts[number + 1] - cell_starts[number]; }
 
@@ -34,7 +34,8 @@ class face_list
     void add_prism(const int64_t *points, int sides);
 
     std::vector<int64_t> starts{0}, face_points,
-        sorted; // offsets of the faces; their points in order around the face, and sorted
+        sorted; /* offsets of the faces; the points of all faces, in order around each face; the same points, sorted
+                   within each face */
     std::unordered_multimap<uint64_t, int64_t> by_points;
     std::vector<int64_t> cell_starts{0}, cells;
 };

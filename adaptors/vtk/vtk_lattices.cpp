@@ -20,7 +20,7 @@ namespace insitu_vtk
 namespace
 {
 
-/* Sets origin, spacing and first index of an image. The coordinate along an axis is spacing * i + origin, where i is
+/* Sets origin, spacing and first index of an image. The coordinate along an axis is spacing * i + origin, with i
  * counted in the whole extent. Returns false if the axes are rotated or a spacing is 0. */
 bool set_uniform(vtkImageData *image, insitu_lattice &lattice)
 {

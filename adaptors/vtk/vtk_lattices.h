@@ -25,8 +25,8 @@ bool cells_of_lattice(vtkDataSet *data, int64_t cells[3]);
 bool view_lattice(vtkDataSet *data, const std::string &what, held_arrays &held, conversion_log &log, insitu_mesh &mesh,
                   insitu_lattice &lattice);
 
-/* Returns the ghost flags of data's cells, in which cells with a hidden point are hidden: VTK's own array if no point
- * is hidden, otherwise a new array without a name. Null if there are no flags. */
+/* Returns the ghost flags of data's cells. Without hidden points, this is VTK's own array; otherwise it is a new array
+ * without a name, in which cells with a hidden point are flagged as hidden. Returns null if there are no flags. */
 vtkSmartPointer<vtkUnsignedCharArray> lattice_flags(vtkDataSet *data, const insitu_lattice &lattice);
 
 } // namespace insitu_vtk

@@ -5,12 +5,13 @@
  * above it or by linear extrapolation from the two values above it, and the residual is stored. Residuals are
  * differences of integers modulo 2^32, so that nothing is rounded and NaN keeps its bits. A row is a vector, so that 16
  * pixels are packed or unpacked at once. All residuals of a row are stored with the same number of nibbles (half
- * bytes), which is what the largest residual needs:
+ * bytes), which is the smallest number that the largest residual fits in:
  *
  *     header | masks of rows with gaps | word 1: first value, nibble counts of rows, residuals | word 2 ...
  *
- * A word with the same value in all pixels is stored once. A word that equals the preceding word in all pixels is not
- * stored; examples are t_out of hits, which equals t_in, and the channels of a grey pixel. */
+ * A word is one of the 32-bit members of a fragment or pixel. A word with the same value in all pixels is stored
+ * once. A word that equals the preceding word in all pixels is not stored; examples are t_out of hits, which equals
+ * t_in, and the channels of a grey pixel. */
 #ifndef COMP_COMP_SHEET_H
 #define COMP_COMP_SHEET_H
 
@@ -111,8 +112,8 @@ const unsigned char *comp_sheet_read_by(cpu_isa isa, const unsigned char *in, in
  * whose fragment of `other` was not added. */
 void comp_sheet_join(comp_sheet *all, const comp_sheet *other, uint16_t left[COMP_ROWS]);
 
-/* Blends each fragment over the background. The result equals that of comp_merge_pixel() for a pixel whose only visible
- * fragment this is. */
+/* Blends each fragment over the background. The result equals that of comp_merge_pixel() for a pixel that has only this
+ * visible fragment. */
 void comp_sheet_finish(const comp_sheet *fragments, const float background[4], comp_sheet *pixels);
 
 /* Stores finished pixels in the picture, and the background in the other pixels of the strip. */

@@ -5,9 +5,9 @@
 
 #include "comp_sheet.h"
 
-/* The rows of a sheet that contain pixels, and how their values are predicted. A compacted sheet holds the pixels of a
- * sheet with many gaps one after the other, row by row. A fresh lane is one that has a pixel in this row but none in
- * the rows above; it is predicted from another lane. */
+/* The rows of a sheet that contain pixels, and how their values are predicted. In a compacted sheet, the pixels of a
+ * sheet with many gaps are stored one after the other, row by row, without the gaps. A fresh lane has a pixel in this
+ * row but none in the rows above, so that its value is predicted from another lane. */
 typedef struct sheet_plan {
     int rows, count;
     bool is_sparse; /* the sheet is compacted before packing; fresh and source are then not set */
@@ -32,7 +32,7 @@ typedef struct comp_sheet_loops {
 
 extern const comp_sheet_loops comp_sheet_plain, comp_sheet_sse42, comp_sheet_avx512;
 
-/* Returns the fastest loops that the instruction set can run. */
+/* Returns the table of the fastest loops that processors with this instruction set can run. */
 const comp_sheet_loops *comp_sheet_loops_of(cpu_isa isa);
 
 #endif

@@ -47,7 +47,8 @@ static void make_plan(const uint16_t masks[COMP_ROWS], sheet_plan *plan)
     if (plan->rows && !plan->is_sparse) find_fresh_lanes(plan);
 }
 
-/* The state of the prediction: for each lane its last value, and the difference of that from the value before. */
+/* The state of the prediction: for each lane its last value, and the difference between the last value and the one
+ * before it. */
 typedef struct prediction {
     lanes last, slope;
 } prediction;
@@ -99,7 +100,7 @@ static inline unsigned nibble_count(uint32_t greatest)
 }
 
 /* Returns the number of bytes of `count` residuals with `nibbles` nibbles each. A residual is stored in up to three
- * arrays: its 2-byte part, its 1-byte part and its half-byte part, of which those exist whose bit is set in `nibbles`.
+ * arrays: its 2-byte part, its 1-byte part and its half-byte part. A part exists if its bit is set in `nibbles`.
  * Residuals of 8 nibbles are stored as they are. In the array of half bytes, lanes i and i + 8 share a byte. */
 static inline size_t packed_bytes(unsigned nibbles, int count)
 {

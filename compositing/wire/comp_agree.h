@@ -10,11 +10,11 @@
 #include "error.h"
 
 /* The buffer in which ranks agree on the owners of blocks, and the MPI operation that adds claims. Both are allocated
- * once per session, because a rank that runs out of memory for a picture must still take part in the agreement on its
+ * once per session, so that a rank that runs out of memory for a picture can still take part in the agreement on its
  * status. */
 typedef struct comp_claims {
     MPI_Op add;
-    comp_claim items[]; /* one claim per block; two more carry the status and the maximum */
+    comp_claim items[]; /* one claim per block, and two more entries that contain the status and the maximum */
 } comp_claims;
 
 /* Allocates a buffer that is large enough for the claims to any picture shared by this number of ranks. Returns NULL if
@@ -26,8 +26,8 @@ void comp_claims_free(comp_claims *claims);
  * *maximum is replaced by its maximum over all ranks; maximum may be NULL. Collective: one reduction. */
 insitu_status comp_agree(MPI_Comm comm, insitu_status own, int64_t *maximum, base_error *error);
 
-/* As comp_agree(), and also adds up the first `count` claims over all ranks in the same reduction. *maximum is limited
- * to INT32_MAX. With more than 2^20 ranks the error message may name a wrong rank. */
+/* Does the same as comp_agree(), and also adds up the first `count` claims over all ranks in the same reduction.
+ * *maximum is limited to INT32_MAX. With more than 2^20 ranks the error message may name a wrong rank. */
 insitu_status comp_agree_claims(MPI_Comm comm, insitu_status own, int64_t *maximum, comp_claims *claims, int count,
                                 base_error *error);
 

@@ -1,6 +1,6 @@
 /* Ranks forward parcels (comp_messages.h) without unpacking them. The owner merges the fragments of a pixel only after
- * it has received all of them: blending rounds, so that merging at intermediate ranks would make the picture depend on
- * the schedule.
+ * it has received all of them: blending has rounding errors, so that pictures would depend on the schedule if
+ * intermediate ranks merged fragments.
  *
  * A rank on which an error occurs takes part in the remaining rounds without sending fragments, so that no rank waits
  * for it, and returns its error at the end. */

@@ -11,7 +11,8 @@
  * children each. Without information about compute nodes each rank is treated as one. */
 enum { COMP_GATHER_FAN = 64 };
 
-/* Return the place to which a place >= 1 sends, and the number of places that send to a place. */
+/* These functions return the place to which the given place (>= 1) sends, and the number of places that send to the
+ * given place. */
 int comp_gather_parent(const comp_route *route, int place);
 int comp_gather_children(const comp_route *route, int place);
 

@@ -78,8 +78,7 @@ void comp_transport_close(comp_transport *transport);
 insitu_status comp_messages_round(comp_transport *transport, const comp_route *route, int round, comp_messages *out,
                                   comp_messages *in, insitu_status status, base_error *error);
 
-/* Sends, before the first round, all fragments of ranks beyond the owners to these ranks' partners, which are
- * owners. */
+/* Sends all fragments of ranks that cannot own pixels to their partners, which are owners, before the first round. */
 insitu_status comp_messages_to_owners(comp_transport *transport, const comp_route *route, comp_messages *out,
                                       comp_messages *in, insitu_status status, base_error *error);
 

@@ -20,7 +20,8 @@ static insitu_status fail_for_memory(base_error *error, const char *what)
 typedef struct owner_strips {
     const comp_strips *strips;
     uint32_t *order;  /* indices of strips, sorted by owner */
-    uint32_t *starts; /* for each owner, the index in `order` of its first strip; then the total */
+    uint32_t *starts; /* for each owner, the index of its first strip in `order`; the last entry is the total number of
+                         strips */
 } owner_strips;
 
 static bool sort_strips(const comp_owners *owners, owner_strips *c)
@@ -59,7 +60,8 @@ static bool pack_sheet(void *state, const comp_sheet *sheet, int count)
     return true;
 }
 
-/* Packs share number `share` of `shares` of the strips with fragments for an owner. Returns false if memory ran out. */
+/* Packs one of `shares` equal parts of the strips with fragments for an owner; `share` is the number of the part.
+ * Returns false if memory ran out. */
 static bool pack_owner(const owner_strips *c, uint32_t owner, int share, int shares, comp_layers *layers,
                        comp_writer *writer)
 {
@@ -134,8 +136,8 @@ insitu_status comp_pack(const comp_strips *strips, const comp_owners *owners, co
 
 /* ---- forwarding ------------------------------------------------------------------------------------------------- */
 
-/* Forwards the parcels for owners whose place has this digit at the round's position. In the digits of earlier rounds
- * the places of these owners equal this rank's place; parcels for other places were sent in those rounds. */
+/* Forwards the parcels for owners whose place has this digit at the round's position. Parcels for places that differ
+ * from this rank's place in a digit of an earlier round have already been sent in that round. */
 static bool forward_to(const comp_messages *in, const comp_route *route, int round, int place, int digit,
                        comp_writer *writer)
 {

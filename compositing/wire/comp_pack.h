@@ -9,12 +9,12 @@
 /* The owners of the blocks of a picture. */
 typedef struct comp_owners {
     int32_t *places; /* place of each block's owner; -1 if no rank has a fragment in the block */
-    int count;       /* number of places that can own blocks */
+    int count;       /* number of owners; they have the first places */
 } comp_owners;
 
 /* Packs this rank's fragments for other owners into messages. *out receives the messages to the partners of the first
- * round, or, on a rank beyond the owners, those to its partner. *kept receives the messages that are sent in later
- * rounds. Both must be empty before the call, and are empty after an error. Local. */
+ * round, or, on a rank that cannot own blocks, the messages to its partner. *kept receives the messages that are sent
+ * in later rounds. Both must be empty before the call, and are empty after an error. Local. */
 insitu_status comp_pack(const comp_strips *strips, const comp_owners *owners, const comp_route *route, int rank,
                         comp_messages *out, comp_messages *kept, base_error *error);
 
@@ -25,7 +25,8 @@ insitu_status comp_forward(const comp_messages *in, const comp_route *route, int
 /* The received sheets of an owner, sorted by strip. They point into the messages. */
 typedef struct comp_received {
     const unsigned char **sheets;
-    uint32_t *starts; /* for each strip, the index in `sheets` of its first sheet; then the total */
+    uint32_t *starts; /* for each strip, the index of its first sheet in `sheets`; the last entry is the total number of
+                         sheets */
 } comp_received;
 
 /* Finds the sheets in `in` that are for this owner. Local; after an error *out is empty. */

@@ -131,7 +131,7 @@ int64_t comp_strips_count(const comp_strips *strips, uint32_t strip)
 
 /* ---- sheets ----------------------------------------------------------------------------------------------------- */
 
-/* Fills a sheet with all fragments of the strip; returns false if a pixel has more than one. */
+/* Fills a sheet with all fragments of the strip; returns false if a pixel has more than one fragment. */
 static bool fill_single(const comp_strips *s, uint32_t strip, comp_sheet *sheet)
 {
     comp_sheet_begin(sheet, strip);
@@ -146,8 +146,8 @@ static bool fill_single(const comp_strips *s, uint32_t strip, comp_sheet *sheet)
     return true;
 }
 
-/* Sorts a pixel's fragments front to back, unless they are very many. The n-th fragments of neighbouring pixels then
- * mostly belong to the same surface, and compress well. */
+/* Sorts a pixel's fragments front to back, unless the pixel has very many. The n-th fragments of neighbouring pixels
+ * then mostly belong to the same surface, and compress well. */
 static void sort_pixel(const fragment **order, uint32_t count)
 {
     if (count > LONGEST_SORTED) return;
@@ -185,7 +185,8 @@ static bool list_pixels(const comp_strips *s, uint32_t strip, comp_layers *layer
     return true;
 }
 
-/* Fills a sheet with the n-th fragment of each pixel that has one; returns their number. */
+/* Fills a sheet with the n-th fragment of each pixel that has at least n + 1 fragments; returns the number of these
+ * pixels. */
 static int fill_layer(const comp_layers *layers, uint32_t n, comp_sheet *sheet, uint32_t strip)
 {
     int count = 0;

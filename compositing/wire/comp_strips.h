@@ -18,7 +18,8 @@ typedef struct comp_strips {
     const comp_grid *grid;
     const fragment *items; /* fragments, borrowed from the fragment list */
     comp_range *ranges;    /* ranges of fragments, sorted by strip */
-    uint32_t *starts;      /* for each strip, the index in `ranges` of its first range; then the total */
+    uint32_t *starts; /* for each strip, the index of its first range in `ranges`; the last entry is the total number of
+                         ranges */
 } comp_strips;
 
 /* Finds the ranges of each strip's fragments. The list and the grid must outlive *out. A fragment whose pixel is not in
@@ -43,9 +44,9 @@ void comp_layers_free(comp_layers *layers);
 /* Callback that receives a sheet with `count` fragments; a return value of false ends the iteration. */
 typedef bool comp_sheet_callback(void *state, const comp_sheet *sheet, int count);
 
-/* Passes a strip's fragments to the callback in sheets: first the nearest fragment of every pixel, then the second of
- * those that have one, and so on. Returns false if memory ran out or the callback returned false. Local; several
- * threads may call it at once. */
+/* Passes a strip's fragments to the callback in sheets: first the nearest fragment of every pixel, then the second
+ * fragment of every pixel that has several, and so on. Returns false if memory ran out or the callback returned false.
+ * Local; several threads may call it at once. */
 bool comp_strips_sheets(const comp_strips *strips, uint32_t strip, comp_layers *layers, comp_sheet_callback *take,
                         void *state);
 

@@ -1,4 +1,5 @@
-/* A plane run: heat on a square of quads a rank, side by side. mpirun -n 2 plate plate.yaml */
+/* A two-dimensional simulation: heat on squares of quads, one per rank, side by side. Run it with: mpirun -n 2 plate
+ * plate.yaml */
 #include <insitu/insitu.h>
 
 #include <stdio.h>

@@ -1,4 +1,4 @@
-/* Two hot spots that turn around each other, in a box of hexahedra a rank. */
+/* Two hot spots that rotate around each other, on a box of hexahedra per rank. */
 #include <insitu/insitu.h>
 
 #include <math.h>
@@ -28,7 +28,7 @@ int main(int argc, char **argv)
     }
     for (int c = 0; c < CELLS; c++) {
         const int low = c % N + SIDE * (c / N % N + SIDE * (c / N / N)), high = low + SIDE * SIDE;
-        const int corners[8] = {low,  low + 1,  low + 1 + SIDE,  low + SIDE, /* the lower quad around */
+        const int corners[8] = {low,  low + 1,  low + 1 + SIDE,  low + SIDE, /* the lower quad in cyclic order */
                                 high, high + 1, high + 1 + SIDE, high + SIDE};
         for (int i = 0; i < 8; i++) hexes[c][i] = corners[i];
     }

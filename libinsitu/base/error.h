@@ -9,7 +9,7 @@
 
 typedef struct base_error {
     insitu_status status;
-    char message[1024]; /* the message; "" while status is INSITU_OK */
+    char message[1024]; /* message of the error; "" if status is INSITU_OK */
 } base_error;
 
 /* Makes the control characters of a text visible, such as ESC as "\\x1b", so that a name in a message cannot control a

@@ -1,10 +1,10 @@
 /* A fragment is an interval of one pixel's ray: render makes fragments, and compositing merges them.
  *
- * A volume fragment covers the samples of one rank between t_in and t_out, both included; a surface fragment has t_in
- * == t_out, the ray parameter of the hit. Fragments of one pixel, from any ranks, do not overlap, so that sorting by
- * t_in and blending front to back gives the picture. If cells overlap, fragments may overlap too. Then all volume
- * fragments of the pixel are single samples, or all are short intervals of one cell each, or the pixel has to be drawn
- * again (comp.h). Colours are linear and premultiplied: over(front, back) = (C1 + T1 C2, T1 T2). */
+ * A volume fragment covers the samples of one rank between t_in and t_out, both included; a surface fragment has
+ * t_in == t_out, the ray parameter of the hit. Fragments of one pixel, from any ranks, do not overlap, so that
+ * sorting by t_in and blending front to back gives the picture. If cells overlap, fragments may overlap too. In this
+ * case the pixel must be drawn again (comp.h), unless all of its volume fragments are single samples, or all are
+ * short intervals of one cell each. Colours are linear and premultiplied: over(front, back) = (C1 + T1 C2, T1 T2). */
 #ifndef BASE_FRAGMENT_H
 #define BASE_FRAGMENT_H
 
@@ -14,9 +14,10 @@
 typedef struct fragment {
     uint32_t pixel; /* number of the pixel, y * width + x, with y = 0 at the top */
     float t_in;     /* the ray's parameter, (depth - depth_origin) * scale (render.h), of the first sample or the hit */
-    float t_out; /* t of the last sample, or slightly before the last cell's end (kernel_segments.h); for a hit t_in */
+    float t_out; /* t of the last sample, or slightly before the last cell's end (kernel_segments.h); for a hit equal to
+                    t_in */
     float colour[3];     /* premultiplied linear RGB */
-    float transmittance; /* 0 for an opaque fragment .. 1 for a clear one */
+    float transmittance; /* from 0 for an opaque fragment to 1 for a transparent one */
     uint32_t kind;       /* kind of the fragment, one of those below */
 } fragment;
 

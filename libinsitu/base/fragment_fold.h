@@ -1,10 +1,10 @@
 /* Blends a volume's fragments in an order that depends only on the ray, so that the bits are the same on any
  * partition. Folding means to blend several fragments into one.
  *
- * "Over" is associative, but its roundings are not. The positions of the fragments therefore determine the order of
- * blending: the ray is cut into intervals of a fixed length in t, these into halves, and so on. The fragments of an
- * interval are folded along the binary tree of its halves, whose leaves are the smallest halves. If surfaces divide
- * an interval, the parts between them are folded separately. An empty half does not change any bit.
+ * The operation "over" is associative, but its rounding errors are not. The positions of the fragments therefore
+ * determine the order of blending: the ray is cut into intervals of a fixed length in t, these into halves, and so on.
+ * The fragments of an interval are folded along the binary tree of its halves, whose leaves are the smallest halves. If
+ * surfaces divide an interval, the parts between them are folded separately. An empty half does not change any bit.
  *
  *     |       |       |   x   |   x   |  x    |       |   x   |       |      ((x (x)) (x))  (x)
  *
@@ -24,9 +24,9 @@
  * the same leaf are folded front to back. */
 enum { FRAGMENT_INTERVALS = 8, FRAGMENT_HALVINGS = 15 };
 
-/* If the transmittance of a rank's own fragments up to the end of an interval is below FRAGMENT_DARK_OF_RANK, the
- * rank may omit all intervals behind it. The pixel omits the intervals behind one at whose end the transmittance is
- * below FRAGMENT_DARK. This limit is larger by more than the sum of possible rounding errors. */
+/* If the transmittance of a rank's own fragments up to the end of an interval is below FRAGMENT_DARK_OF_RANK, the rank
+ * may omit all intervals behind it. When a pixel is merged, blending stops at the end of the first interval at which
+ * the transmittance is below FRAGMENT_DARK. This limit is larger by more than the sum of possible rounding errors. */
 #define FRAGMENT_DARK_OF_RANK 1e-7f
 #define FRAGMENT_DARK 1.01e-7f
 

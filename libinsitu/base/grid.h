@@ -53,8 +53,8 @@ typedef struct grid_axis {
     int axis;
 } grid_axis;
 
-/* Returns the coordinate of vertex n. Numbers that are only padding, which loops over all numbers include, get the last
- * coordinate. */
+/* Returns the coordinate of vertex n. For numbers that are only padding, returns the last coordinate, because loops
+ * over all numbers include these. */
 static inline double grid_axis_coordinate(const grid_axis *axis, int64_t n)
 {
     const int64_t index = grid_index_along(axis->vertices, axis->axis, n);
@@ -85,8 +85,8 @@ typedef struct grid_array {
     /* set if elements must not be read as float or double: they are integers or of an unusual type */
     bool is_integer;
     unsigned char unusual_type; /* one of the values of grid_unusual_type */
-    int64_t base;               /* in an array of indices or offsets, the number that stands for 0 */
-    /* if the last entry of an array of offsets is omitted, the number of the others; else 0 */
+    int64_t base; /* in an array of indices or offsets, the index base, which is subtracted from each element */
+    /* number of entries of an array of offsets whose last entry is omitted; else 0 */
     int64_t implied_end_count;
     int64_t implied_end; /* the omitted last offset, counted from 0 */
     /* if not NULL, coordinates are computed from this axis by vertex number, and there is no data */
@@ -129,9 +129,9 @@ typedef struct grid {
     int ghosts_bytes;             /* size of a flag in ghosts in bytes: 1, 4 or 8 */
 } grid;
 
-/* A scalar per vertex or per cell, taken from a field of one or several components. */
+/* One component, or the magnitude, of a field at vertices or in cells. */
 typedef struct grid_field {
-    grid_array values; /* tuples of components; the stride is that between tuples */
+    grid_array values; /* tuples of components; the stride is the distance from tuple to tuple */
     int64_t component_stride;
     /* for a magnitude whose components are in separate arrays, these arrays; NULL: all components are in `values` */
     const grid_array *component_arrays;
@@ -201,8 +201,8 @@ static inline int64_t grid_offset_end(const grid_array *offsets, int64_t i)
     return i + 1 == offsets->implied_end_count ? offsets->implied_end : grid_array_index(offsets, i + 1);
 }
 
-/* Returns the number of vertices of a cell type; 0 for polyhedra and polygons, whose cells differ in it, and for
- * unknown types. */
+/* Returns the number of vertices of a cell type; 0 for unknown types, and for polyhedra and polygons, which have
+ * different numbers of vertices. */
 static inline int grid_type_vertices(int cell_type)
 {
     switch (cell_type) {

@@ -19,8 +19,8 @@ typedef struct image {
     int width;
     int height;
     float *rgba; /* row-major, height × width × 4, top row first, premultiplied, linear light */
-    /* row-major, height × width: fragment.t_in of the nearest surface hit, +infinity if there is none. NULL: depth was
-     * not requested. */
+    /* row-major, height × width: fragment.t_in of the nearest surface hit; +infinity if the pixel has no surface hit.
+     * NULL: depth was not requested. */
     float *depth;
     deep_image *deep; /* samples of the image, only on rank 0; NULL on every rank if samples were not requested */
     bool is_folded;   /* set if ranks have folded the fragments from which the image is made (fragment_fold.h) */

@@ -43,11 +43,11 @@ int64_t base_memory_held(void);
 int64_t base_memory_peak(void);
 void base_memory_reset_peak(void);
 
-/* For tests: lets the n-th allocation from now on fail (1: the next one) and the following ones succeed; 0: none
- * fails. */
+/* For tests: makes the n-th allocation from this call on fail (1: the next one); later allocations succeed. 0: no
+ * allocation fails. */
 void base_memory_fail_nth(int64_t n);
 
-/* Returns the number of allocations since the process began, for a test that compares two steps. */
+/* Returns the number of allocations since the process began. A test compares it between two steps. */
 int64_t base_memory_allocations(void);
 
 #endif

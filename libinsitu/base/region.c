@@ -3,11 +3,11 @@
  * settings back at the end; each change takes about 50 ns. A thread that OpenMP starts for a region begins with the
  * settings of the thread that opened the region.
  *
- * If all cores are busy when a region begins, the scheduler may wake a worker on the core of the thread that opened the
- * region, and leave it there for tens of milliseconds. For the scheduler, two runnable threads on one core and one
- * thread of another process on the other core are a balanced load. The team then has the speed of one thread or less. A
- * worker on that core therefore moves to another core on which it may run, and immediately afterwards allows the
- * scheduler to move it again. */
+ * If all cores are busy when a region begins, the scheduler may wake a worker on the core of the thread that opened
+ * the region, and leave it there for tens of milliseconds. For the scheduler, two runnable threads on one core and
+ * one thread of another process on the other core are a balanced load. Then all threads together are no faster than
+ * one. A worker on that core therefore moves to another core on which it may run, and immediately afterwards allows
+ * the scheduler to move it again. */
 #define _GNU_SOURCE 1
 #include "region.h"
 

@@ -9,7 +9,7 @@
  *         }
  *
  * with reductions of floating-point numbers on the loop, so that they end before region_leave(). Regions are
- * expensive if another process uses a core: at the end of each region, and at each barrier, the team waits about 4
+ * expensive if another process uses a core: at the end of each region, and at each barrier, all threads wait about 4
  * ms until the thread that has lost its core gets it back. The code therefore has few regions, none without work,
  * and schedules their loops dynamically. */
 #ifndef BASE_REGION_H

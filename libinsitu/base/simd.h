@@ -1,11 +1,11 @@
 /* Types for one vector of floats, one of ints and one of masks, with the operations that kernels need. The same source
- * is compiled once per instruction set: SIMD_AVX512 (16 lanes), SIMD_AVX2 (8), SIMD_SSE42 (4), or none of them, which
- * means plain C with the compiler's generic vectors (4); that is the reference and runs anywhere.
+ * is compiled once per instruction set: SIMD_AVX512 (16 lanes), SIMD_AVX2 (8), SIMD_SSE42 (4), or none of them. Without
+ * a define it is plain C with the compiler's generic vectors (4 lanes), which is the reference and runs on any machine.
  *
  * Arithmetic (+ - * /) and comparison are the compiler's own operations on vector types. All of them are exact in the
  * sense of IEEE and never fused (-ffp-contract=off), so that all instruction sets give the same bits. The exceptions
- * are vf_muladd(), which is fused if the hardware supports that, and vf_diff_of_products(), both of whose forms have an
- * error of at most 1.5 units in the last place.
+ * are vf_muladd(), which is fused if the hardware supports that, and vf_diff_of_products(), which has two
+ * implementations, each with an error of at most 1.5 units in the last place.
  *
  * GNU C has no vector ?: outside C++, hence vf_select(). Masks are 16 bits on AVX-512, and integer lanes of 0 and -1
  * otherwise: always use the vm_* functions. */
@@ -453,7 +453,7 @@ SIMD_INLINE void vf_gather_rows(const float *base, const int32_t index[SIMD_WIDT
     vf_transpose(out);
 }
 
-/* A vector of doubles for half of the lanes of a vf; two of them correspond to one vf. */
+/* A vector of doubles with half as many lanes as a vf, so that two such vectors correspond to one vf. */
 typedef double vd __attribute__((vector_size(SIMD_WIDTH * 4)));
 
 /* Gathers doubles at base + index, in units of float32, for one half of the lanes. */
@@ -600,8 +600,8 @@ SIMD_INLINE vm vm_sign(vi a)
 #endif
 }
 
-/* Return the minimum and maximum of single numbers by the rule of vf_min() and vf_max(): the result is b if either is
- * NaN. fminf() has another rule for NaN and takes more than one instruction. */
+/* Return the minimum and maximum of single numbers by the rule of vf_min() and vf_max(), which return b if either value
+ * is NaN. fminf() is not used, because it treats NaN differently and takes more than one instruction. */
 SIMD_INLINE float simd_min(float a, float b)
 {
     return a < b ? a : b;

@@ -35,8 +35,8 @@ bool text_file_replace(const char *path, text_writer *write, const void *what, f
 /* Appends the output of write() to a file, like file_append(), with numbers in the C locale. */
 bool text_file_append(const char *path, text_writer *write, const void *what, file_failure *failure);
 
-/* Removes all lines except those that start with a whole number below `number`, and moves these to the start of the
- * text. Returns the number of bytes that they take. An incomplete last line is removed. */
+/* Keeps only lines that start with an integer below `number`, and moves them to the start of the text. Returns the
+ * number of bytes of the kept lines. An incomplete last line is removed. */
 size_t text_keep_below(char *text, long long number);
 
 #endif

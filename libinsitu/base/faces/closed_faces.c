@@ -207,8 +207,8 @@ static double tet_volume(const double (*p)[3], const int *v, const double *centr
            d[0][2] * (d[1][0] * d[2][1] - d[1][1] * d[2][0]);
 }
 
-/* Returns whether the ray from p in the negative x direction crosses the triangle. A corner with the same z as p
- * counts as below p. If the projection of the triangle along x is a line, the ray does not cross it. */
+/* Returns whether the ray from p in the negative x direction crosses the triangle. A corner with the same z as p is
+ * treated as lying below p. If the projection of the triangle along x is a line, the ray does not cross it. */
 static bool is_crossed_below(const double *const t[3], const double *p)
 {
     bool inside = false;
@@ -229,8 +229,8 @@ static bool is_crossed_below(const double *const t[3], const double *p)
     return t[0][0] - (n[1] * (p[1] - t[0][1]) + n[2] * (p[2] - t[0][2])) / n[0] < p[0];
 }
 
-/* Returns whether the piece lies inside an odd number of other pieces. The test starts at the piece's smallest vertex,
- * because the piece itself has no points at smaller x. */
+/* Returns whether a connected piece of the surface lies inside an odd number of other pieces. The test ray starts at
+ * the piece's vertex of smallest x, so that the ray cannot cross the piece itself. */
 static bool is_cavity(const closed_faces *c, const double (*positions)[3], int piece)
 {
     int smallest = c->vertex_count;

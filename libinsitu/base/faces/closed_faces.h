@@ -24,7 +24,7 @@ typedef struct closed_triangle {
 /* An edge of the polyhedron, with the sides (see closed_faces) that run along it. */
 typedef struct closed_edge {
     int low, high; /* numbers of the two vertices; low is -1 in an unused entry */
-    int side[2];   /* entries at which the sides along the edge begin; -1: there is none */
+    int side[2];   /* entries at which the sides along the edge begin; -1: there is no such side */
 } closed_edge;
 
 /* The faces of a polyhedron as lists of entries. An entry is a vertex of a face; a side connects an entry with the next
@@ -35,7 +35,7 @@ typedef struct closed_faces {
     int *entry_vertices; /* vertex number of each entry */
     int *face_of;        /* for each entry, the face to which it belongs */
     int64_t *vertices;   /* index in the grid of each numbered vertex */
-    /* 1 or -1 per face: whether it is reversed; after closed_faces_orient_outward(), 1 if the face's vertices run
+    /* -1 for faces that are reversed, otherwise 1; after closed_faces_orient_outward(), 1 if the face's vertices run
      * around the outward normal */
     int *orientation;
     int *piece; /* number of the connected piece to which each face belongs */
@@ -57,9 +57,9 @@ bool closed_faces_count(closed_faces *c, const grid *g, int64_t cell);
  * take. If memory is NULL, only the size is computed. */
 size_t closed_faces_lay_out(closed_faces *c, char *memory);
 
-/* Reads the faces, and numbers the vertices in the order in which they appear. Repeated successive vertices of a face
- * count once: a quad remains a quad even if corners are repeated, and a face whose entries are all the same vertex has
- * no entries left. */
+/* Reads the faces, and numbers the vertices in the order in which they appear. If a face repeats a vertex in
+ * succession, only one entry is stored, so that a quad with repeated corners remains a quad. A face that consists of a
+ * single vertex has no entries. */
 void closed_faces_read(closed_faces *c, const grid *g, int64_t cell);
 
 /* Orients the faces of each piece consistently with the first face in the list. */

@@ -5,8 +5,8 @@
 
 #include "vector3.h"
 
-/* Tolerance for a reversed triangle in the fan, as a share of the polygon's area. A reversed triangle within the
- * tolerance is attributed to rounding of nearly collinear corners: the tolerance is a few roundings of float32
+/* Tolerance for the area of a reversed triangle in the fan, as a fraction of the polygon's area. Smaller reversed
+ * triangles are caused by rounding of nearly collinear corners; the tolerance is a few rounding errors of float32
  * coordinates. */
 static const double fan_slack = 0x1p-20;
 
@@ -173,8 +173,8 @@ static bool are_coincident(const polygon_work *w, int a, int b)
     return p[0] == q[0] && p[1] == q[1] && p[2] == q[2];
 }
 
-/* Corner `again` has the same position as the corner `tip`, whose neighbours are a and c. Returns whether an edge at
- * `again` leads into the angle between the edges at `tip`. */
+/* Returns whether an edge at the corner `again` leads into the angle between the edges at the corner `tip`, which has
+ * the same position. a and c are the neighbours of `tip`. */
 static bool enters_corner(const polygon_work *w, int a, int tip, int c, int again)
 {
     const int ends[2] = {w->previous[again], w->next[again]};

@@ -22,8 +22,8 @@ size_t polygon_work_bytes(int count);
  * direction of the polygon. Triangles of coincident or collinear corners may have no area. */
 void polygon_triangulate(const double (*corners)[3], int count, void *work, int (*triangles)[3]);
 
-/* Returns whether four corners form a quad with exactly one concave corner. A quad that crosses itself has none; all
- * quads except concave ones are cut into a fan. */
+/* Returns whether four corners form a quad with exactly one concave corner. A quad that crosses itself has no concave
+ * corner. Only concave quads are not cut into a fan from the first corner. */
 bool polygon_is_concave_quad(const double (*corners)[3]);
 
 #endif

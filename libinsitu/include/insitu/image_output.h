@@ -51,7 +51,7 @@ typedef struct insitu_colour_bar {
     const char *label;
     const float *colours; /* row-major, colour_count × 3, linear, from the low end on, evenly spaced */
     int colour_count;     /* at least 2, or at least 1 if is_banded */
-    /* set if each colour fills a band, where all bands have equal width; otherwise colours are interpolated linearly */
+    /* true: each colour fills one band, and all bands have equal width; false: colours are interpolated linearly */
     bool is_banded;
     const float *below; /* 3 values, linear: the colour of values below the low end; NULL: the colour of the low end */
     const float *above; /* same as below, for values above the high end */
@@ -64,7 +64,7 @@ typedef struct insitu_colour_bar {
  * one. */
 typedef struct insitu_stroke {
     double from[2], to[2];
-    bool is_behind; /* set if surfaces and volumes in the picture hide the line */
+    bool is_behind; /* true: surfaces and volumes in the picture hide the line */
 } insitu_stroke;
 
 /* Words beside a point of the picture; they are left out if they would overlap others. */
@@ -104,8 +104,8 @@ typedef struct insitu_decorations {
     insitu_scale_bar scale_bar;
     bool has_axes;
     double axes[3][3]; /* the scene's axes in camera coordinates: right, up, towards the eye; unit lengths */
-    /* parts of the picture that other pictures will cover; texts, colour bars, the scale bar and the axes keep clear of
-     * them */
+    /* number of areas of the picture that other pictures will cover; texts, colour bars, the scale bar and the axes are
+     * not drawn there */
     int covered_count;
     const insitu_rectangle *covered;
 } insitu_decorations;
@@ -117,7 +117,7 @@ typedef struct insitu_channel {
     int stride;          /* floats from pixel to pixel, row-major, top row first */
 } insitu_channel;
 
-/* An interval of a pixel's ray, or a surface, for which z_back equals z. */
+/* An interval [z, z_back] of a volume on a pixel's ray, or a surface, for which z_back equals z. */
 typedef struct insitu_deep_sample {
     float rgba[4];   /* linear, premultiplied */
     float z, z_back; /* depths in the units of insitu_image */
@@ -137,7 +137,8 @@ typedef struct insitu_image {
      * along the pixel's ray), in scene units. The surface may have any opacity, and volumes may be in front of it.
      * +infinity if there is no surface. */
     const float *depth;
-    const insitu_decorations *decorations; /* NULL: there are no decorations, and rgba includes the background */
+    const insitu_decorations
+        *decorations; /* NULL: nothing is drawn over the picture, and rgba already includes the background */
     int channel_count;
     const insitu_channel *channels; /* borrowed; ignored if the format has no additional channels */
     const insitu_deep *deep;        /* NULL, or the samples for a deep format, which uses only these and the size */
@@ -153,17 +154,18 @@ typedef insitu_status insitu_image_write_function(const insitu_image *image, ins
 
 INSITU_API insitu_image_write_function insitu_image_write;
 
-/* A place in a larger picture for a smaller one. */
+/* The position in a larger picture at which a smaller one is stored. */
 typedef struct insitu_place {
     float *rgba; /* pixels of the larger picture, in the layout of insitu_image.rgba; they are written */
     int width;   /* width of the larger picture in pixels */
-    /* position in the larger picture of the upper left pixel of the smaller one, which must lie completely inside */
+    /* position of the smaller picture's upper left pixel in the larger picture; the smaller one must lie completely
+     * inside */
     int x, y;
 } insitu_place;
 
-/* Draws the image's decorations over its colours and stores the result in the place. The image itself is not changed.
- * On an error, message (size bytes) describes it, and the place is not changed; otherwise message is empty. Local.
- * Thread-safe. */
+/* Draws the image's decorations over its colours and stores the result in the larger picture. The image itself is not
+ * changed. On an error, message (size bytes) describes it, and the larger picture is not changed; otherwise message is
+ * empty. Local. Thread-safe. */
 typedef insitu_status insitu_image_place_function(const insitu_image *image, const insitu_place *place, char *message,
                                                   size_t size);
 
@@ -171,7 +173,8 @@ INSITU_API insitu_image_place_function insitu_image_place;
 
 /* Reasons why a picture's words are not drawn as they are given. Each text is empty, or one line. */
 typedef struct insitu_word_faults {
-    char font[1024];    /* no font was found, so that words are left out; or OPENIMAGEIO_FONTS names no readable font */
+    char font[1024]; /* no font was found, so that words are left out, or OPENIMAGEIO_FONTS names a font that cannot be
+                        read */
     char letters[1024]; /* the font lacks characters, which are drawn as boxes; or the words are not UTF-8 */
     char room[1024];    /* decorations for which the picture has no space are left out */
 } insitu_word_faults;

@@ -61,11 +61,11 @@ typedef enum insitu_type {
  * each topology or geometry, counted in bytes_copied: coordinates that are integers as float64, integers of 1 or 2
  * bytes as int32, arrays that are not aligned in their own type. */
 typedef struct insitu_array {
-    const void *data; /* first element; NULL: the array is not given */
+    const void *data; /* first element; NULL: there is no array */
     insitu_type type; /* type of one element */
-    /* distance from one element to the next in bytes; 0: the elements are packed, so that it is the size of the type.
-     * If it is negative, the elements are read backwards from data. A stride with which the elements span more than
-     * 2^48 bytes is an error. */
+    /* distance from one element to the next in bytes; 0: the elements are packed, so that the distance is the size of
+     * the type. If it is negative, the elements are read backwards from data. A stride with which the elements span
+     * more than 2^48 bytes is an error. */
     int64_t stride_bytes;
 } insitu_array;
 
@@ -80,17 +80,18 @@ typedef enum insitu_cell_type {
      * the face of another cell is shown instead of that face. An isosurface on a mesh that contains only shells is
      * drawn as its contour lines. If there are also cells with a volume, isosurfaces ignore shells; volumes and slices
      * always ignore them. Statistics weight shells by their area if the field is only on shells, and otherwise ignore
-     * them. If cell values are averaged at a vertex (insitu_centring), those of shells count too. */
+     * them. If cell values are averaged at a vertex (insitu_centring), the values of shells are included. */
     INSITU_TRIANGLE = 5, /* 3 vertices */
-    /* at least 3 vertices around it, whose number is given by offsets. It is drawn as triangles that cover it exactly
-     * once, whether it is convex or not; it should be flat. */
+    /* at least 3 vertices in order around the polygon; their number is given by offsets. The polygon is drawn as
+     * triangles that cover it exactly once, whether it is convex or not; it should be flat. */
     INSITU_POLYGON = 7,
-    INSITU_QUAD = 9, /* 4 vertices around it; it may be warped; a concave quad is drawn as two triangles */
-    /* Cells of higher order. Their vertices, at corners and between them, are called nodes here. Each cell is drawn as
-     * linear pieces between its own nodes, wherever the nodes are: the error falls with the square of the distance
-     * between nodes (docs/high_order.md). Nodes and values at nodes are not copied; the list of pieces is made once per
-     * topology. Numbers of cells, ghost flags, cell values, thresholds and lines along edges refer to the caller's
-     * cells. */
+    INSITU_QUAD =
+        9, /* 4 vertices in order around the quad, which may be warped; a concave quad is drawn as two triangles */
+    /* Cells of higher order. Their vertices, at corners and between them, are called nodes here. Each cell is divided
+     * into linear cells between its nodes, called pieces, at whatever positions the nodes have. The error decreases
+     * with the square of the distance between nodes (docs/high_order.md). Nodes and values at nodes are not copied; the
+     * list of pieces is made once per topology. Numbers of cells, ghost flags, cell values, thresholds and lines along
+     * edges refer to the caller's cells. */
     INSITU_QUADRATIC_TRIANGLE = 22, /* 6 nodes */
     INSITU_QUADRATIC_QUAD = 23,     /* 8 nodes */
     INSITU_QUADRATIC_TET = 24,      /* 10 nodes */
@@ -100,14 +101,15 @@ typedef enum insitu_cell_type {
     INSITU_BIQUADRATIC_QUAD = 28,   /* 9 nodes */
     INSITU_TRIQUADRATIC_HEX = 29,   /* 27 nodes */
     INSITU_BIQUADRATIC_WEDGE = 32,  /* 18 nodes */
-    /* Cells with all nodes of an order p from 1 to 32 (insitu_mesh.order): equispaced, Gauss-Lobatto or any other
-     * nodes, some of which must lie on all faces and edges */
+    /* Cells with all nodes of an order p from 1 to 32 (insitu_mesh.order): equispaced, Gauss-Lobatto or other nodes,
+     * with the nodes of each face and edge on it */
     INSITU_LAGRANGE_TRIANGLE = 69, /* (p + 1)(p + 2) / 2 nodes */
     INSITU_LAGRANGE_QUAD = 70,     /* (p + 1)^2 */
     INSITU_LAGRANGE_TET = 71,      /* (p + 1)(p + 2)(p + 3) / 6 */
     INSITU_LAGRANGE_HEX = 72,      /* (p + 1)^3 */
     INSITU_LAGRANGE_WEDGE = 73,    /* (p + 1)^2 (p + 2) / 2 */
-    INSITU_LAGRANGE_PYRAMID = 74   /* (p + 1)(p + 2)(2 p + 3) / 6; more than 14 only in lexicographic order */
+    INSITU_LAGRANGE_PYRAMID =
+        74 /* (p + 1)(p + 2)(2 p + 3) / 6; more than 14 nodes are allowed only in lexicographic order */
 } insitu_cell_type;
 
 /* The order of a cell's vertices in connectivity. Cell types that an order does not mention are in VTK's order.
@@ -116,27 +118,30 @@ typedef enum insitu_vertex_order {
     /* the order described at insitu_cell_type; also used by CGNS, Exodus II, Gmsh, libMesh, MFEM for linear cells.
      * Nodes of higher order are in the order of VTK 9.1 and later. */
     INSITU_ORDER_VTK = 0,
-    /* vertices of quads, hexes and bases of pyramids are sorted by x first, then y, then z: a quad is VTK's 0 1 3 2.
-     * deal.II, dolfinx, DUNE and p4est use this order. Nodes of higher order are in rows along the first edge, starting
-     * at the first corner, and the rows in layers, as spectral element codes store them. */
+    /* vertices of quads, hexes and bases of pyramids are sorted by x first, then y, then z: a quad lists VTK's vertices
+     * 0 1 3 2. deal.II, dolfinx, DUNE and p4est use this order. The nodes of cells of higher order are stored as in
+     * spectral element codes: row by row, parallel to the first edge and starting at the first corner, and the rows
+     * layer by layer. */
     INSITU_ORDER_LEXICOGRAPHIC = 1,
-    /* hexes are VTK's 0 3 2 1 4 5 6 7 and wedges VTK's 0 2 1 3 4 5: their two ends have opposite orientations. PETSc's
-     * DMPlex uses it. It is defined for linear cells only. */
+    /* hexes list VTK's vertices 0 3 2 1 4 5 6 7, and wedges VTK's 0 2 1 3 4 5, so that their two ends have opposite
+     * orientations. PETSc's DMPlex uses it. It is defined for linear cells only. */
     INSITU_ORDER_DMPLEX = 2,
     /* The next orders differ from INSITU_ORDER_VTK only in the nodes of cells of higher order. */
     INSITU_ORDER_VTK_BEFORE_9_1 = 3, /* the vertical edges at corners 2 and 3 of Lagrange hexes are swapped */
-    INSITU_ORDER_GMSH = 4,           /* up to order 2 */
-    INSITU_ORDER_EXODUS = 5          /* up to order 2; vertical edges come before those of the top */
+    INSITU_ORDER_GMSH = 4,           /* Gmsh's order of nodes; for cells up to order 2 */
+    INSITU_ORDER_EXODUS = 5 /* Exodus II's order of nodes, for cells up to order 2: nodes of vertical edges precede
+                               those of the top's edges */
 } insitu_vertex_order;
 
-/* The parts of a mesh or a field that have changed since it was last set. The safe default is everything. Changes that
- * are visible in the description count even if they are not named here: other counts or another cell_type make another
- * mesh (ALL); arrays at other addresses, of other types or strides are read again, as TOPOLOGY (but fields are kept),
- * GEOMETRY (vertex_ids too) or VALUES. Only the caller can tell whether the same arrays have new contents, and must
- * name such changes. */
+/* The parts of a mesh or a field that have changed since it was last set. The default, everything, is always safe. Some
+ * changes are detected even if the caller does not name them: with other counts or another cell_type, the mesh is
+ * treated as a new one (ALL). An array at another address, or of another type or stride, is read again as if its
+ * TOPOLOGY (but fields are kept), GEOMETRY (including vertex_ids) or VALUES were named. New contents of the same arrays
+ * are not detected, so that the caller must name these changes. */
 enum {
     INSITU_CHANGED_NOTHING = 0,
-    INSITU_CHANGED_TOPOLOGY = 1, /* the cells, their types and faces, or ghost flags; the tree is built again */
+    INSITU_CHANGED_TOPOLOGY = 1, /* the cells, their types and faces, or ghost flags; the bounding volume hierarchy (the
+                                    tree) is built again */
     INSITU_CHANGED_GEOMETRY = 2, /* the coordinates; the tree's bounds are refitted */
     /* a field's values; the tree's ranges are refitted if the values have actually changed */
     INSITU_CHANGED_VALUES = 4,
@@ -145,8 +150,8 @@ enum {
 
 /* A structured block. Its cells are found by three indices i, j, k instead of by connectivity. Vertex and cell arrays
  * are read in place, in C's or Fortran's order, padded or with ghost layers. Cells are hexes, or quads if one of
- * `cells` is 0. The coordinates are either uniform (spacing), rectilinear (axes) or given for each vertex in the mesh's
- * coordinates, which must not be given otherwise. docs/structured.md has examples. */
+ * `cells` is 0. The coordinates are either uniform (spacing), rectilinear (axes) or given for each vertex. Only in the
+ * last case are the mesh's coordinates given. docs/structured.md has examples. */
 typedef struct insitu_lattice {
     /* number of cells along i, j and k, at least 1 each; if one of them is 0, the cells are quads. All are 0 on a rank
      * without cells. */
@@ -154,43 +159,45 @@ typedef struct insitu_lattice {
     /* Distances, in vertices, from one vertex to the next along i, j and k in the vertices' arrays, at least 1 each:
      * the vertex i, j, k has the number i * vertex_strides[0] + j * vertex_strides[1] + k * vertex_strides[2]. Each
      * stride must be larger than the distance that the smaller ones cover, so that no two vertices have the same
-     * number. All 0: the arrays are packed with i fastest, as in Fortran's x(i, j, k) and C's x[k][j][i]. */
+     * number. All 0: the arrays are packed, and i varies fastest, as in Fortran's x(i, j, k) and C's x[k][j][i]. */
     int64_t vertex_strides[3];
-    int64_t cell_strides[3]; /* like vertex_strides, in cells, for the cells' arrays */
+    int64_t cell_strides[3]; /* distances, in cells, from one cell to the next along i, j and k in the cells' arrays;
+                                rules as for vertex_strides */
     /* Ghost layers: the cells with indices from interior_first to interior_end - 1 are drawn, and those outside of this
      * range are ghosts. All 0: all cells are drawn. */
     int64_t interior_first[3], interior_end[3];
     /* Uniform coordinates: vertex n along an axis is at origin + spacing * (first + n), computed in double. first is
      * the index of the block's first vertex in the whole lattice, so that blocks of one lattice have the same origin
      * and spacing, and the coordinates of their common vertices are bitwise equal. This is how equal vertices of
-     * several blocks and ranks are recognized. spacing must not be 0 along the axes that have cells; all 0: the lattice
-     * is not uniform. The magnitude of first is at most 2^53. */
+     * several blocks and ranks are recognized. spacing must not be 0 along the axes that have cells. If all of spacing
+     * is 0, the lattice is not uniform. The magnitude of first is at most 2^53. */
     double origin[3], spacing[3];
     int64_t first[3];
     /* Rectilinear coordinates: cells[a] + 1 coordinates along each axis a, float32, float64 or any integers; not given
-     * if the lattice is uniform. A lattice of quads may lack those of the axis without cells, whose coordinate is then
-     * 0. */
+     * if the lattice is uniform. In a lattice of quads, the array of the axis without cells may be missing; the
+     * coordinate is then 0. */
     insitu_array axes[3];
     /* Levels of refinement: the number of the block's cells that make one cell of the coarsest level along each axis,
      * such as 1, 2 or 8. It is at most 2^20, and is not read along an axis without cells. All 0: the mesh has no
      * levels. first is then the index of the block's first cell among all cells that its level may have; its magnitude
-     * is at most 2^40. A cell that is covered by the inner cells of a finer block of the mesh, on any rank, is not
-     * drawn. Finer blocks must end at borders of the coarser cells that no other block covers. A vertex on a coarser
-     * face or edge gets the value that is interpolated there, even if values are given at vertices. */
+     * is at most 2^40. A cell is not drawn if the interior of a finer block of the mesh, on any rank, covers it. Finer
+     * blocks must end at borders of the coarser cells that no other block covers. A vertex within a face or an edge of
+     * a coarser cell gets the value that is interpolated on that face or edge, even if values are given at vertices. */
     int64_t refinement[3];
 } insitu_lattice;
 
 /* One rank's part of a mesh. All arrays are borrowed until the next insitu_step() returns or the mesh is set again
  * under the same name, whichever is later. They must stay valid that long, and a step reads the values that they hold
- * when it is called. Fill with insitu_mesh_defaults() first. */
+ * when it is called. Call insitu_mesh_defaults() before setting members. */
 typedef struct insitu_mesh {
     int64_t vertex_count; /* number of vertices, >= 0 */
-    /* x, y, z: float32, float64 or any integers, vertex_count each; the magnitude of those of drawn cells is at most
-     * 1e100. Interleaved xyz is three arrays with a stride of 3 elements: see insitu_mesh_interleaved(). Meshes of
-     * triangles, quads and polygons may omit z (no data in coordinates[2]), which is then 0 everywhere. */
+    /* x, y, z: float32, float64 or any integers, vertex_count each; the coordinates of drawn cells have magnitudes of
+     * at most 1e100. Interleaved x y z are described as three arrays with a stride of 3 elements: see
+     * insitu_mesh_interleaved(). For meshes of triangles, quads and polygons, coordinates[2] may be without data; z is
+     * then 0 everywhere. */
     insitu_array coordinates[3];
-    /* optional, int32 or int64, vertex_count: ids that are unique over all ranks, by which the vertices that ranks
-     * share are matched. Without them, vertices with bitwise equal coordinates match. */
+    /* optional, int32 or int64, vertex_count: ids that identify equal vertices of different ranks, and differ for all
+     * other vertices. Without ids, vertices with bitwise equal coordinates are equal. */
     insitu_array vertex_ids;
     int64_t cell_count;         /* number of cells, >= 0, at most 4294967294 */
     insitu_cell_type cell_type; /* type of all cells if cell_types is not given */
@@ -206,11 +213,11 @@ typedef struct insitu_mesh {
     insitu_array offsets;
     /* Faces, which are needed if there are polyhedra. A polyhedron's entries in connectivity are the indices of its
      * faces, counted from index_base, at least 4, in any order. Two polyhedra that share a face refer to the same one.
-     * The faces of a cell must form a closed surface: exactly two of them meet along every edge, once each. (An edge
-     * from a vertex to itself does not count, so that a face may repeat a vertex in succession, or consist of a single
-     * vertex.) A face may have either direction. Faces are not copied, except as described at insitu_array, owner,
-     * face_lists and keep_polyhedra. A frame stores only the polyhedra that it is working on, with about 200 bytes per
-     * vertex of each, and at most 16 MiB per thread. */
+     * The faces of a cell must form a closed surface: every edge belongs to exactly two of the faces, once to each.
+     * (Edges from a vertex to itself are ignored, so that a face may list a vertex several times in succession, or
+     * consist of a single vertex.) A face may have either direction. Faces are not copied, except as described at
+     * insitu_array, owner, face_lists and keep_polyhedra. While pictures are drawn, each thread stores only the
+     * polyhedra that its rays currently cross: about 200 bytes per vertex, and at most 16 MiB per thread. */
     int64_t face_count;
     /* any integers, face_count + 1: the index in face_connectivity at which each face begins; the last entry is missing
      * if open_offsets is 1 */
@@ -222,44 +229,44 @@ typedef struct insitu_mesh {
     insitu_array ghosts; /* optional, any integers, cell_count: cells with a nonzero flag are not drawn.
                             Flags of 2 bytes, and those that are not aligned, are copied, 1 byte each. */
     unsigned changed;    /* INSITU_CHANGED_* bits of TOPOLOGY and GEOMETRY; ALL by default */
-    /* 0 by default, or 1 as in Fortran: the index of the first vertex, face, cell and element in connectivity, offsets,
-     * face_offsets, face_connectivity, face_lists, owner and neighbour */
+    /* 0 by default, or 1 as in Fortran: the number from which all indices in connectivity, offsets, face_offsets,
+     * face_connectivity, face_lists, owner and neighbour are counted */
     int index_base;
     /* Finite-volume codes may give the two cells of each face (docs/finite_volume.md) instead of connectivity, offsets
      * and cell_types, which must then not be given; cell_type is INSITU_POLYHEDRON. The faces' vertices are read in
      * place. Once for each topology the library lists the faces of each cell, in the order of their numbers: 4 bytes
      * per cell and up to 8 per face (twice that if there are more than 2^31 of them), counted in bytes_copied. */
-    /* int32 or int64, face_count: the cell on one side of each face. If index_base is 1, it may be 0, as in CGNS: the
-     * neighbour is then the only cell of the face. */
+    /* int32 or int64, face_count: the cell on one side of each face. If index_base is 1, an owner may be 0, as in CGNS;
+     * then the neighbour is the only cell of the face. */
     insitu_array owner;
     int64_t neighbour_count; /* number of elements in neighbour; at most face_count */
-    /* int32 or int64, neighbour_count: the cell on the other side of each face, which must differ from the owner. Faces
-     * on the boundary, and those to cells of other ranks, have -1 here (or 0 if index_base is 1), or come last, beyond
-     * neighbour_count. */
+    /* int32 or int64, neighbour_count: the cell on the other side of each face, which must differ from the owner. For
+     * faces on the boundary or between ranks, the neighbour is -1 (or 0 if index_base is 1). These faces may also be
+     * numbered last, from neighbour_count on, and have no entry here. */
     insitu_array neighbour;
     /* Each face may have its own list of vertices instead of face_offsets and face_connectivity, which must then not be
      * given. The lists are copied into one array, once for each topology, which is kept as long as polyhedra are drawn
      * from it: 4 bytes per face and 4 for each of its vertices, counted in bytes_copied. */
     insitu_array face_sizes; /* int32 or int64, face_count: number of vertices of each face */
-    /* face_count pointers, each to face_sizes vertex indices, packed, of the type given here: int32 or int64.
-     * stride_bytes is the distance from pointer to pointer; 0: packed */
+    /* face_count pointers. Each points to the packed vertex indices of one face, as many as its face_sizes. type is the
+     * type of the indices: int32 or int64. stride_bytes is the distance from pointer to pointer; 0: packed */
     insitu_array face_lists;
-    /* A polyhedron whose faces form a tet, hex, wedge or pyramid is drawn as that type, whatever direction its faces
-     * have, unless this is 1. The report counts these cells in cells_recognised. The picture differs only inside such
-     * cells: the field is trilinear in a hex, but linear on tets about its centre in a polyhedron. Faces with four
-     * vertices are bilinear patches in both, so that there is no gap to other polyhedra. Set this to 1 for hexes that
-     * are folded or have a corner pushed in. Memory, counted in bytes_copied: 32 bytes per hex, 4 per face of each cell
-     * that is drawn as a polyhedron, and, unless all cells have one type, 5 per cell; twice that if there are more than
-     * 2^31 vertices or faces. */
+    /* If keep_polyhedra is 0, a polyhedron whose faces form a tet, hex, wedge or pyramid is drawn as a cell of that
+     * type, whatever direction its faces have. The report counts these cells in cells_recognised. The picture differs
+     * only inside such cells: the field is trilinear in a hex, but linear on tets about its centre in a polyhedron.
+     * Faces with four vertices are bilinear patches in both, so that there is no gap to other polyhedra. Set
+     * keep_polyhedra to 1 for hexes that are folded or have a corner pushed in. Memory, counted in bytes_copied: 32
+     * bytes per hex, 4 per face of each cell that is drawn as a polyhedron, and, unless all cells have one type, 5 per
+     * cell; twice that if there are more than 2^31 vertices or faces. */
     int keep_polyhedra; /* 0 by default, or 1 */
     /* The order of each cell's vertices in connectivity; it does not apply to polyhedra and polygons. Cells whose order
-     * differs from VTK's, and cells in rows, are copied once for each topology: 4 bytes for each entry of connectivity
-     * that cells use (8 if there are more than 2^31 vertices), counted in bytes_copied. */
+     * differs from VTK's, and cells with a connectivity_row, are copied once for each topology: 4 bytes for each entry
+     * of connectivity that cells use (8 if there are more than 2^31 vertices), counted in bytes_copied. */
     insitu_vertex_order vertex_order; /* INSITU_ORDER_VTK by default */
     /* for cells of one type without offsets: the number of entries of connectivity from the first vertex of a cell to
-     * that of the next, at least the number of its vertices; 0: the cells are packed. It allows cells of higher order
-     * whose vertices are the first nodes of each row. connectivity_count includes the other nodes, but those of the
-     * last cell may be missing. */
+     * that of the next, at least the number of its vertices; 0: the cells are packed. If the number is larger, the
+     * further entries of each cell, such as the other nodes of a cell of higher order, are ignored. connectivity_count
+     * includes them, but they may be missing for the last cell. */
     int64_t connectivity_row;
     /* Optional, instead of connectivity, offsets, cell_types and faces, which must then not be given; cell_type is not
      * read. vertex_count and cell_count are the lengths of the vertices' and the cells' arrays, including padding. The
@@ -276,25 +283,26 @@ typedef struct insitu_mesh {
     int64_t boundary_face_connectivity_count; /* number of elements in boundary_face_connectivity */
     /* int32 or int64: the vertex indices of these faces, counted from index_base */
     insitu_array boundary_face_connectivity;
-    /* int32 or int64, boundary_face_count: the only cell of each face; -1 (or 0 if index_base is 1): there is none, and
-     * the face is ignored */
+    /* int32 or int64, boundary_face_count: the only cell of each face; -1 (or 0 if index_base is 1): the face has no
+     * cell and is ignored */
     insitu_array boundary_owner;
     /* 0 by default. Number of halo cells to which owner and neighbour may refer: they are numbered after the mesh's own
-     * cells. They are not treated as cells, so that a face between a cell and the halo is on the boundary of this
-     * rank's part. */
+     * cells. Halo cells are not drawn: a face between a cell and a halo cell is on the boundary of this rank's part of
+     * the mesh. */
     int64_t halo_cell_count;
     /* 0 by default; 1: offsets and face_offsets lack their last entry, as in Conduit's Blueprint. The last cell ends at
      * the end of connectivity, the last face at the end of face_connectivity. */
     int open_offsets;
-    /* Optional: the meaning of the code's own numbers in cell_types. The number n has the type cell_type_map[n], which
-     * is 0 if n is not a type. The table is copied by the call. The types are also copied, with 1 byte per cell. */
+    /* Optional: the meaning of the code's own numbers in cell_types. The number n stands for the type cell_type_map[n];
+     * an entry of 0 means that no cell has this number. The table is copied by the call. The types are also copied,
+     * with 1 byte per cell. */
     int cell_type_map_count;
     const int *cell_type_map;
     /* The order of all cells if cell_type is one of INSITU_LAGRANGE_*. 0, the default: the order follows from the
      * number of nodes per cell, given by offsets, connectivity_row or connectivity_count / cell_count. If order is
-     * given, connectivity may be absent: then the vertices are the nodes of one cell after the other, and vertex_count
-     * is cell_count times the nodes of a cell, as in spectral element codes that store shared nodes once per cell.
-     * Vertices that are the same node must have bitwise equal coordinates. */
+     * given, connectivity may be absent. In this case the vertices are the nodes of one cell after the other, and
+     * vertex_count is cell_count times the nodes of a cell, as in spectral element codes that store shared nodes once
+     * per cell. Vertices that stand for the same node must have bitwise equal coordinates. */
     int order;
 } insitu_mesh;
 
@@ -302,15 +310,15 @@ typedef struct insitu_mesh {
  * cell values unchanged, unless the scene sets `interpolate: vertex`. In that case, and always for isosurfaces, each
  * vertex gets the mean of its cells' values, over all ranks and without ghosts. Vertices of several meshes at the same
  * position are treated as one vertex if one layer shows the field on these meshes and they have no vertex ids. A vertex
- * that hangs on a triangle or quad of a larger cell gets the value of that face; this also holds for vertices with
- * values of their own on a mesh with levels of refinement (insitu_lattice). A vertex on the boundary gets the mean of
- * the boundary's own values instead, if the field has some (insitu_patch).
+ * that hangs on a triangle or quad of a larger cell gets the value that is interpolated on that face. On a mesh with
+ * levels of refinement (insitu_lattice), hanging vertices get this value even if the field has values at vertices. If
+ * the field has values on the boundary (insitu_patch), a vertex there gets the mean of these values instead.
  *
- * Corner fields may differ from cell to cell at a shared vertex, as in discontinuous Galerkin methods. They have one
- * value for each entry of connectivity that is a vertex of a cell, in the order of the caller's connectivity (see
- * corner_row). Each cell shows its own values, so that an isosurface may have a step between two cells. If the scene
- * sets `interpolate: vertex`, each vertex gets the mean of its corners' values, over all ranks and without ghosts. The
- * connectivity of polyhedra contains faces and no corners, so that a corner field on a mesh with polyhedra is an error.
+ * Corner fields may differ from cell to cell at a shared vertex, as in discontinuous Galerkin methods. A corner field
+ * has one value for each vertex of each cell, in the order of the caller's connectivity (see corner_row). Each cell
+ * shows its own values, so that an isosurface may have a step between two cells. If the scene sets `interpolate:
+ * vertex`, each vertex gets the mean of its corners' values, over all ranks and without ghosts. The connectivity of
+ * polyhedra contains faces and no corners, so that a corner field on a mesh with polyhedra is an error.
  *
  * If the scene uses a corner field of a mesh, the mesh is drawn with each corner as a separate vertex. This takes 12 or
  * 24 bytes per corner for coordinates, 4 for indices (8 if there are more than 2^31), and one tuple per corner for each
@@ -320,22 +328,22 @@ typedef enum insitu_centring { INSITU_VERTEX = 0, INSITU_CELL = 1, INSITU_CORNER
 /* The values of a cell field on faces of the boundary, which finite-volume codes store for each patch.
  *
  * When cell values are averaged at the vertices, a vertex of such faces gets the mean of the faces' values, over all
- * patches and ranks, instead of the mean of its cells: so a wall at which the flow is at rest is drawn at rest. At an
- * edge where two patches meet, the faces of both count. The mean has the same bits for any partition. In the middle of
- * a flat wall of equal faces it is exact, up to rounding, for a field that is linear in space; at edges and corners of
- * the domain no mean is exact, because they lie beyond the centres of all faces. Values that are not finite and faces
- * of ghost cells do not count. Pictures that show cell values unchanged do not use patches.
+ * patches and ranks, instead of the mean of its cells. So a velocity of zero at a wall is drawn as zero. At an edge
+ * between two patches, the faces of both patches are averaged. The mean has the same bits for any partition. In the
+ * middle of a flat wall of equal faces it is exact, up to rounding, for a field that is linear in space; at edges and
+ * corners of the domain no mean is exact, because they lie beyond the centres of all faces. Values that are not finite
+ * and faces of ghost cells do not count. Pictures that show cell values unchanged do not use patches.
  *
  * A patch contains faces between a cell and the outside. Faces between ranks, and others that are coupled in pairs,
- * must not be given, because they have cells on both sides. Faces are given in one of three ways: by first_face, faces
- * or connectivity. A face that two cells of this rank share, that no cell has, or that is given twice is an error,
- * which is returned on all ranks by the step that needs the values. The two sides of a baffle or a crack may have the
- * same vertices: such a face, if given by its vertices, is given once for each of its two cells, and twice if one rank
- * has both. */
+ * must not be given, because they have cells on both sides. Faces are given in one of three ways: by first_face,
+ * faces or connectivity. It is an error if a face belongs to two cells of this rank or to none, or is given twice.
+ * The error is returned on all ranks by the step that needs the values. The two sides of a baffle or a crack may
+ * have the same vertices: such a face, if given by its vertices, is given once for each of its two cells, and twice
+ * if one rank has both. */
 typedef struct insitu_patch {
     int64_t count; /* number of faces, and of tuples of values */
-    /* used if neither faces nor connectivity is given: the patch has the mesh's faces from this number on, counted from
-     * index_base */
+    /* number of the patch's first face, counted from index_base, if neither faces nor connectivity is given: the patch
+     * consists of `count` faces of the mesh, from this number on */
     int64_t first_face;
     /* int32 or int64, count: the numbers of the faces in face_offsets or face_lists, counted from index_base */
     insitu_array faces;
@@ -343,7 +351,7 @@ typedef struct insitu_patch {
      * and allowed for all others. */
     int64_t connectivity_count; /* number of elements in connectivity */
     /* int32 or int64, connectivity_count: vertex indices counted from index_base, in order around each face in either
-     * direction, as many as the cell's face has, including repeated ones */
+     * direction, as many as that face of the cell has, including repeated ones */
     insitu_array connectivity;
     /* int32 or int64, count + 1, counted from index_base: the index in connectivity at which each face begins. Not
      * needed if all faces have the same number of vertices, connectivity_count / count. */
@@ -356,25 +364,25 @@ typedef struct insitu_patch {
 
 struct insitu_field;
 
-/* Computes the values of a field in the steps that need them. *field is as it was set; the function adds values and the
- * members that belong to them (count, component_stride_bytes or components, index, corner_row, patches, changed), but
- * must not change name, centring and component_count. insitu_step() calls it on its caller's thread, at most once per
- * step, and only if a picture, a statistic or a condition of this step needs the field. The arrays are borrowed until
- * the step has returned. All ranks call the fill functions of their fields in the same order: those by which the scene
- * warps meshes by the names of meshes, then the others by the names of meshes and then of fields. So if all ranks set
- * the field with a fill function, it may communicate, on a communicator of the caller's. It must not call the session.
- * Each such call except insitu_error() is refused (the functions that return a status return INSITU_ERROR_ARGUMENT,
- * insitu_last_report() an empty report, and insitu_last_pictures() none) and is an error of the step. A status other
- * than INSITU_OK is also an error of the step. The step returns it on all ranks; the other fill functions are still
- * called. */
+/* Computes the values of a field in the steps that need them. *field contains the members that the caller has set; the
+ * function adds values and the members that describe them (count, component_stride_bytes or components, index,
+ * corner_row, patches, changed), but must not change name, centring and component_count. insitu_step() calls it on its
+ * caller's thread, at most once per step, and only if a picture, a statistic or a condition of this step needs the
+ * field. The arrays are borrowed until the step has returned. All ranks call the fill functions in the same order.
+ * First come fields by which the scene warps meshes, sorted by the names of their meshes; then all other fields, sorted
+ * by the name of the mesh and then of the field. Therefore a fill function that is set on all ranks may communicate, on
+ * the caller's own communicator. It must not call the session. Each call of the session except insitu_error() is
+ * refused and makes the step fail. Refused functions return INSITU_ERROR_ARGUMENT; insitu_last_report() returns an
+ * empty report, and insitu_last_pictures() returns no pictures. A status other than INSITU_OK is also an error of the
+ * step. The step returns it on all ranks; the other fill functions are still called. */
 typedef insitu_status insitu_fill(void *fill_data, struct insitu_field *field);
 
 /* One rank's part of a field. It is borrowed in the same way as a mesh. Call insitu_field_defaults() first. */
 typedef struct insitu_field {
     const char *name;         /* the name by which scenes refer to the field; it is copied */
     insitu_centring centring; /* INSITU_VERTEX by default */
-    /* number of tuples: the mesh's vertex_count or cell_count, or the number of its cells' corners; any number if index
-     * is given */
+    /* number of tuples of values: the mesh's vertex_count or cell_count, or, for corner fields, the number of its
+     * cells' corners. If index is given, any number is allowed. */
     int64_t count;
     /* number of components, >= 1; 1 by default. The scene selects one of them, or the magnitude. */
     int component_count;
@@ -392,9 +400,10 @@ typedef struct insitu_field {
     insitu_array index;
     /* For corner fields on cells of one type without offsets: the number of tuples of values (or entries of index, if
      * that is given) from the first corner of a cell to that of the next, at least the number of its vertices. Further
-     * ones, such as degrees of freedom within edges, faces and cells, are ignored. Values in such rows are copied in
-     * the same way as those with an index. 0: the tuples are packed, as many per cell as it has vertices. Cells with
-     * offsets have connectivity_count corners, at the positions of connectivity's entries, and must have 0 here. */
+     * tuples of a cell, such as degrees of freedom within edges, faces and cells, are ignored. Values with a corner_row
+     * are copied in the same way as values with an index. 0: the tuples are packed, and each cell has as many as it has
+     * vertices. Cells with offsets have connectivity_count corners, at the positions of connectivity's entries, and
+     * must have 0 here. */
     int64_t corner_row;
     /* Optional, instead of values, which must then not be given: the function that computes the values when a step
      * needs them. Each call counts as a change of the values, unless it sets changed to INSITU_CHANGED_NOTHING. */
@@ -409,43 +418,46 @@ typedef struct insitu_field {
     const insitu_array *components;
 } insitu_field;
 
-/* The report of the last step on this rank, unless stated otherwise. Times are wall-clock milliseconds. */
+/* The report of the last step. Members are values of this rank, unless stated otherwise. Times are wall-clock
+ * milliseconds. */
 typedef struct insitu_report {
     int64_t cycle;
     double time;
-    int images;        /* number of images drawn in this step; 0 if none was due */
-    double total_ms;   /* time of the whole insitu_step() */
-    double prepare_ms; /* agreement among ranks, validation, bounds, and recentring of fields */
-    double build_ms;   /* construction of trees */
-    double refit_ms;   /* refitting of trees */
-    double surface_ms; /* tracing of isosurfaces */
-    double volume_ms;  /* tracing of volumes */
-    /* exchange, merging and gathering of fragments, including waiting; on a single rank, the time of its slowest
-     * thread */
+    int images;      /* number of images drawn in this step; 0 if none was due */
+    double total_ms; /* time of the whole insitu_step() */
+    double
+        prepare_ms;  /* time for agreement among ranks, validation, bounds, and averaging of cell values at vertices */
+    double build_ms; /* time for the construction of trees (bounding volume hierarchies) */
+    double refit_ms; /* time for refitting of trees */
+    double surface_ms; /* time for tracing of isosurfaces */
+    double volume_ms;  /* time for tracing of volumes */
+    /* time for exchange, merging and gathering of fragments, including waiting; on a single rank, the time of its
+     * slowest thread */
     double composite_ms;
-    /* on rank 0: writing of the pictures of the step, or passing them to the thread that writes them, including the
-     * wait for space there; and loading the image library, if a scene that was edited has the first pictures */
+    /* on rank 0: time for writing the step's pictures, or for passing them to the thread that writes them, including
+     * the wait for space in its queue. If an edit of the scene requests the run's first pictures, the time includes
+     * loading the image library. */
     double write_ms;
-    /* on rank 0: time that the writing thread took for pictures that it has finished since the last step; in the first
-     * step also the time that insitu_create() took to load the image library */
+    /* on rank 0: time that the writing thread took for the pictures that it finished since the last step. In the first
+     * step it includes the time that insitu_create() took to load the image library. */
     double background_ms;
     /* on rank 0: number of pictures that the writing thread had not yet written when the step ended */
     int pictures_waiting;
-    /* number of turns in which those pixels were drawn in which cells or several volumes overlap; in each turn all
-     * ranks wait for each other. The same on every rank */
+    /* number of times that pixels were traced again, because several cells or volumes overlap in them. In each of these
+     * turns, all ranks wait for each other. The same on every rank */
     int turns;
     int64_t cells;       /* number of cells, including ghosts; mirror images that the scene shows are not counted */
     int64_t cells_ghost; /* number of cells that are not drawn because they are flagged as ghosts */
-    /* number of cells that are not drawn because their own field value or that of a vertex is not finite; of cells of
-     * higher order some pieces are not drawn */
+    /* number of cells that are not drawn because a value of the field in the cell or at its vertices is not finite. For
+     * cells of higher order, only the pieces with such values are not drawn. */
     int64_t cells_unusable;
-    /* number of left-handed cells, by the sign of the sum of the corner volumes; they are drawn correctly
-     * nevertheless */
+    /* number of left-handed cells, whose corner volumes have a negative sum; they are drawn correctly nevertheless */
     int64_t cells_inverted;
-    /* number of cells without volume, which are not drawn: the absolute corner volumes sum to no more than rounding,
-     * 1.4e-14 of the volume of the cell's box; a polyhedron is flat if all its vertices are in a plane */
+    /* number of cells without volume, which are not drawn. A cell counts if the sum of its absolute corner volumes is
+     * at most 1.4e-14 of the volume of its bounding box, which is rounding; a polyhedron counts if all its vertices are
+     * in a plane. */
     int64_t cells_flat;
-    int64_t cells_shell; /* number of triangles, quads and polygons, which layers of outer surfaces show */
+    int64_t cells_shell; /* number of triangles, quads and polygons; layers of outer surfaces show them */
     /* number of polyhedra that are drawn as the tets, hexes, wedges or pyramids that their faces form */
     int64_t cells_recognised;
     int64_t rays;      /* number of primary rays that were traced */
@@ -453,7 +465,8 @@ typedef struct insitu_report {
     /* bytes sent by this rank to others for pictures: fragments and finished pixels, including those that it passes on;
      * rays of shadows do not count */
     int64_t bytes_sent;
-    /* number of inverse maps that did not converge, for which linear interpolation was used instead */
+    /* number of points in cells for which the iteration to reference coordinates did not converge; linear interpolation
+     * was used there */
     int64_t map_failures;
     int64_t bytes_borrowed; /* size in bytes of the caller's arrays in use */
     int64_t bytes_copied;   /* size in bytes of copies of the caller's data; copied_why has the reasons */
@@ -468,12 +481,13 @@ typedef struct insitu_report {
     const char *copied_why; /* "" or a list of what was copied and why; valid until the next step */
     /* "" or a list of data that was left out because the scene does not need it; valid until the next step */
     const char *left_out;
-    /* "" or warnings, one per line; valid until the next step. A warning is given when its condition begins to hold,
-     * and again if it has not held in between. Only the warning that an edit of the scene file is invalid is given at
-     * every step. All are the same on every rank. */
+    /* "" or warnings, one per line; valid until the next step. A warning is reported when its condition becomes true,
+     * and again only after the condition has been false. The warning that an edit of the scene file is invalid is
+     * reported at every step. The warnings are the same on every rank. */
     const char *warnings;
-    /* "" or, unless the scene has finer_pieces, a line for each mesh with cells of higher order that an image shows:
-     * the number of pieces between two nodes, and their bound. The same on every rank; valid until the next step */
+    /* "" or one line for each mesh with cells of higher order that an image shows: the number of pieces between two
+     * nodes, and the bound of their error. It is "" if the scene has finer_pieces. The same on every rank; valid until
+     * the next step */
     const char *pieces;
 } insitu_report;
 
@@ -483,15 +497,15 @@ typedef struct insitu_session insitu_session;
 /* A picture in memory as the last step drew it: with its background, without decorations. */
 typedef struct insitu_picture {
     const char *image; /* name of the image in the scene */
-    int width;         /* pixels */
+    int width;         /* width and height in pixels */
     int height;
     const float *rgba; /* height x width x 4, row-major, the top row first: linear light, premultiplied by opacity */
     /* height x width: distance along the camera's axis from the eye to the nearest surface, opaque or transparent, as
-     * in EXR files; infinite if there is no surface, as with volumes only */
+     * in EXR files; infinite if the pixel shows no surface, even if it shows volumes */
     const float *depth;
 } insitu_picture;
 
-/* Sets the defaults: nothing is given, and everything has changed. Local. */
+/* Sets the defaults: no arrays are given, and `changed` is INSITU_CHANGED_ALL. Local. */
 INSITU_API void insitu_mesh_defaults(insitu_mesh *mesh);
 INSITU_API void insitu_field_defaults(insitu_field *field);
 
@@ -499,9 +513,9 @@ INSITU_API void insitu_field_defaults(insitu_field *field);
  * INSITU_FLOAT64. Local. */
 INSITU_API void insitu_mesh_interleaved(insitu_mesh *mesh, const void *xyz, insitu_type type);
 
-/* Opens a session. Collective over comm, which is duplicated; its error handler is not changed. scene_file, a regular
- * file, is read on rank 0 only, and read again when it changes on disk. On an error *out is NULL on every rank, and
- * insitu_error(NULL) returns the message. MPI must be initialized; MPI_THREAD_SINGLE or FUNNELED suffices. */
+/* Opens a session. Collective over comm, which is duplicated; its error handler is not changed. scene_file must be a
+ * regular file. Only rank 0 reads it, and reads it again when it changes on disk. On an error *out is NULL on every
+ * rank, and insitu_error(NULL) returns the message. MPI must be initialized; MPI_THREAD_SINGLE or FUNNELED suffices. */
 INSITU_API insitu_status insitu_create(MPI_Comm comm, const char *scene_file, insitu_session **out);
 
 /* Opens a session with a scene given as text: YAML as in a scene file, zero-terminated. Collective, and in all other
@@ -515,15 +529,15 @@ INSITU_API insitu_status insitu_create_from_text(MPI_Comm comm, const char *scen
 INSITU_API insitu_status insitu_create_fortran(MPI_Fint comm, const char *scene, int is_text, insitu_session **out);
 
 /* Passes this rank's part of the mesh with this name to the session, as borrowed arrays. Local. Ranks that have no part
- * of the mesh need not call it. Meshes with different names are drawn together; a layer of the scene is drawn on those
- * that have its field, or on those that it names. If a mesh has INSITU_CHANGED_TOPOLOGY, or other counts than before,
- * the fields that were set on it are removed. If mesh is NULL, the mesh is removed. A mesh that is not set again is
- * assumed to be unchanged.
+ * of the mesh need not call it. Meshes with different names are drawn together; a layer of the scene is drawn on the
+ * meshes that it names, or on all meshes that have its field. If mesh->changed contains INSITU_CHANGED_TOPOLOGY, or
+ * counts differ from the last call, the fields that were set on it are removed. If mesh is NULL, the mesh is removed. A
+ * mesh that is not set again is assumed to be unchanged.
  *
- * This call checks counts, types and strides. A step checks the arrays' contents when it first needs them: every cell's
- * vertex indices and type, and the coordinates that cells without a ghost flag use. An error found then is returned on
- * every rank by that insitu_step() and by each later one that draws, until the mesh is set correctly or removed. An
- * error of this call is returned in the same way from the next insitu_step() on. */
+ * This call checks counts, types and strides. A step checks the arrays' contents when it first needs them: every
+ * cell's vertex indices and type, and the coordinates that cells without a ghost flag use. An error found then is
+ * returned on every rank by that insitu_step() and by each later one that draws, until the mesh is set correctly or
+ * removed. If this call itself fails, the steps from the next insitu_step() on return its error in the same way. */
 INSITU_API insitu_status insitu_set_mesh(insitu_session *session, const char *name, const insitu_mesh *mesh);
 
 /* Passes this rank's part of a field to the session. The mesh must have been set. Local. A field that is not set again
@@ -531,13 +545,13 @@ INSITU_API insitu_status insitu_set_mesh(insitu_session *session, const char *na
  * in the report and not drawn. */
 INSITU_API insitu_status insitu_set_field(insitu_session *session, const char *mesh, const insitu_field *field);
 
-/* Passes one of the blocks that this rank's part of a mesh consists of to the session. Its number is chosen by the
- * rank, from 0 on. Each block is a lattice or a list of cells, with its own arrays. Other ranks may have other blocks,
- * or none. All blocks of a mesh are drawn as one mesh: vertices are equal if vertex_ids or, without these, the bits of
- * the coordinates are equal, and no wall is drawn between blocks. Except for blocks without cells, they must have the
- * same fields, each of which is set by insitu_set_block_field(). If block is NULL, the block is removed;
- * insitu_set_mesh() replaces or removes all of them. In all other respects these functions are the same as
- * insitu_set_mesh() and insitu_set_field(); in messages block 17 of mesh "m" is called "m[17]". Local. */
+/* Passes one block of a mesh to the session, if this rank's part of the mesh consists of several blocks. Each rank
+ * numbers its blocks itself, from 0 on. Each block is a lattice or a list of cells, with its own arrays. Ranks may have
+ * different numbers of blocks, or none. All blocks of a mesh are drawn as one mesh: vertices are equal if vertex_ids
+ * or, without these, the bits of the coordinates are equal, and no wall is drawn between blocks. Except for blocks
+ * without cells, they must have the same fields, each of which is set by insitu_set_block_field(). If block is NULL,
+ * the block is removed; insitu_set_mesh() replaces or removes all of them. In all other respects these functions are
+ * the same as insitu_set_mesh() and insitu_set_field(); in messages block 17 of mesh "m" is called "m[17]". Local. */
 INSITU_API insitu_status insitu_set_block(insitu_session *session, const char *mesh, int64_t number,
                                           const insitu_mesh *block);
 INSITU_API insitu_status insitu_set_block_field(insitu_session *session, const char *mesh, int64_t number,
@@ -551,11 +565,11 @@ INSITU_API insitu_status insitu_set_block_field(insitu_session *session, const c
  * Pictures are written by a thread of rank 0 while the simulation continues, unless the scene sets `writing: step`. A
  * picture that could not be written is an error of the next step that has no other error. The thread does not call MPI.
  *
- * A step that draws uses OpenMP threads: as many as the scene requests, but no more than there are cores and than can
- * be started. Within a parallel region of the caller it uses only the calling thread. That thread needs 320 kB of stack
- * below this call, and the others 256 kB below OpenMP's own; less is an error, whose message names the setting to
- * change. During the call, and in insitu_create(), the caller's floating-point traps and rounding modes are disabled on
- * all these threads. */
+ * A step that draws uses OpenMP threads: as many as the scene requests, but no more than the number of cores and the
+ * number of threads that can be started. Within a parallel region of the caller it uses only the calling thread.
+ * That thread needs 320 kB of stack below this call, and the others 256 kB below OpenMP's own; if a stack is
+ * smaller, the step fails, and the message names the setting to change. During the call, and in insitu_create(), the
+ * caller's floating-point traps and rounding modes are disabled on all these threads. */
 INSITU_API insitu_status insitu_step(insitu_session *session, int64_t cycle, double time);
 
 /* Returns the report of the last step. It is valid until the next step, and all zero before the first one. Returns NULL
@@ -571,15 +585,16 @@ INSITU_API const insitu_report *insitu_last_report(const insitu_session *session
 INSITU_API insitu_status insitu_parameter(insitu_session *session, const char *name, double *value);
 
 /* Sets whether rank 0 keeps each step's pictures in memory (keep is not 0), in addition to the files of the scene: 20
- * bytes per pixel of every image drawn in a step. Images without outputs are only drawn while this is on. Off at first.
- * Collective; only rank 0's keep is used. */
+ * bytes per pixel of every image drawn in a step. Images without outputs are only drawn while pictures are kept. By
+ * default pictures are not kept. Collective; only rank 0's keep is used. */
 INSITU_API insitu_status insitu_keep_pictures(insitu_session *session, int keep);
 
-/* Returns the pictures that the last step drew, *count of them, in the order of the scene. The pictures of one image
- * are sorted by the fields and isovalues of its sweep and then by the views of its orbit; all have the image's name. An
- * image that could not be drawn is left out; one whose file could not be written is included. The session owns the
- * pictures, and they are valid until the next step, insitu_keep_pictures() or insitu_destroy(). Returns NULL and sets
- * *count to 0 if there are none: on ranks other than 0, if nothing was due, or if pictures are not kept. Local. */
+/* Returns the pictures that the last step drew, in the order of the scene, and sets *count to their number. The
+ * pictures of one image are sorted by the fields and isovalues of its sweep and then by the views of its orbit; all
+ * have the image's name. An image that could not be drawn is left out; one whose file could not be written is included.
+ * The session owns the pictures, and they are valid until the next step, insitu_keep_pictures() or insitu_destroy().
+ * Returns NULL and sets *count to 0 if there are none: on ranks other than 0, if nothing was due, or if pictures are
+ * not kept. Local. */
 INSITU_API const insitu_picture *insitu_last_pictures(const insitu_session *session, int *count);
 
 /* Returns the message of the most recent failed call on the session since the last insitu_step(), that step included;

@@ -1,4 +1,4 @@
-/* The status that a call returns. It stands apart from insitu.h so that code without MPI can use it. */
+/* The status that a call returns. It has a header of its own so that code without MPI can use it. */
 #ifndef INSITU_STATUS_H
 #define INSITU_STATUS_H
 

@@ -6,7 +6,7 @@
 #include "memory.h"
 #include "text_file.h"
 
-/* maximum size of an existing table to which lines are added; about four million pictures */
+/* maximum size in bytes of an existing table to which lines are added; about four million pictures */
 enum { MOST_BYTES = 1 << 28 };
 
 insitu_status session_fail_database(const scene_database *database, const char *file, const char *what,
@@ -32,7 +32,7 @@ char *session_database_file(const scene_database *database, const char *file)
 
 /* ---- lines ----------------------------------------------------------------------------------------------------- */
 
-/* Ensures that there is space for `more` more bytes and a terminating NUL. Returns false if memory runs out. */
+/* Ensures that the text has space for `more` more bytes and a terminating NUL. Returns false if memory runs out. */
 static bool reserve_text(session_table *t, size_t more)
 {
     if (t->size + more < t->capacity) return true;
@@ -44,7 +44,7 @@ static bool reserve_text(session_table *t, size_t more)
     return true;
 }
 
-/* A line of the table while it is being written. is_complete is set as long as memory has not run out. */
+/* A line of the table while it is being written. is_complete is false if memory has run out. */
 typedef struct table_line {
     session_table *table;
     bool is_complete;
@@ -78,7 +78,7 @@ static void add_text(table_line *line, const char *shield, const char *text, cha
     add_bytes(line, &end, 1);
 }
 
-/* Adds an empty field, which means in Spec D of Cinema databases that there is no value. */
+/* Adds an empty field, which means "no value" in Spec D of Cinema databases. */
 static void add_empty_field(table_line *line)
 {
     add_bytes(line, ",", 1);
@@ -237,7 +237,7 @@ static void write_script_line(text_output *out, const char *line, size_t size)
     }
 }
 
-/* Writes the lines as a list of strings, which is the argument of a function that the page defines. */
+/* Writes data.js: a call of a function of the page, whose argument is the list of the lines as strings. */
 static void write_script(text_output *out, const void *what)
 {
     const session_table *t = what;

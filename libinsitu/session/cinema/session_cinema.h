@@ -1,13 +1,13 @@
-/* Cinema databases of Spec D, which are folders of pictures with three files that the session writes.
+/* Cinema databases of Spec D, which are folders of pictures. The session writes three more files to each folder.
  *
  * data.csv is the table: a line of column names, then one line per picture, with its parameters first and its file
- * last. data.js contains the same lines as a script, because a page that was opened from a disk may load a script but
- * not read a file. index.html is a page that shows the pictures listed in data.js.
+ * last. data.js contains the same lines as a script, because a browser lets a page that was opened from a disk load
+ * scripts, but not read other files. index.html is a page that shows the pictures listed in data.js.
  *
  * A table is kept in memory and written as a whole at the end of each step that adds a line. It is written to a new
  * file that then replaces the old one, so that the file is complete even if the run is killed. A line has about 60
- * bytes and a picture about 100,000, so that writing all lines takes less time than writing the step's pictures until
- * there have been thousands of steps. A new session keeps the lines of cycles before its own first cycle. */
+ * bytes and a picture about 100,000, so that for the first thousands of steps, writing all lines takes less time
+ * than writing the step's pictures. A new session keeps the lines of cycles before its own first cycle. */
 #ifndef SESSION_CINEMA_H
 #define SESSION_CINEMA_H
 
@@ -21,7 +21,7 @@ typedef struct session_table {
     const scene_database *database; /* the database, owned by the scene */
     char *text;                     /* the lines of data.csv that are complete */
     size_t size, capacity;
-    bool has_earlier_lines; /* set if `text` includes the lines of the folder's file from before the session */
+    bool has_earlier_lines; /* true: `text` includes the lines that the folder's file had before this session */
     bool has_lines_of_step; /* set if `text` contains a line of this step */
     bool is_changed;        /* set if the table has changed since the files were written */
     bool has_page;          /* set if this session has written index.html */
@@ -40,7 +40,7 @@ typedef struct session_cinema {
 void session_begin_cinema(session_cinema *cinema, int64_t cycle);
 
 /* Adds a line for a picture that was written for an output with a database. If the run has gone back to an earlier
- * cycle, the lines from this cycle on are removed. Local. */
+ * cycle, the lines of this cycle and later cycles are removed. Local. */
 insitu_status session_record_picture(session_cinema *cinema, const scene *scene, const scene_image *image,
                                      const scene_output *output, const scene_placeholder_values *moment,
                                      base_error *error);
@@ -54,7 +54,8 @@ void session_cinema_free(session_cinema *cinema);
 /* Returns the path of a file of the database. It is allocated by base_alloc(); NULL if memory runs out. */
 char *session_database_file(const scene_database *database, const char *file);
 
-/* Stores an error that says that the file could not be `what` ("read" or "written"), and returns its status. */
+/* Stores an error with the message that the file could not be read or written, and returns its status; `what` is "read"
+ * or "written". */
 insitu_status session_fail_database(const scene_database *database, const char *file, const char *what,
                                     const file_failure *failure, base_error *error);
 

@@ -2,9 +2,9 @@
  * the run, such as insitu-view: the last step's cycle, time and error, the scene's state with the error of its last
  * edit, the scene's parameters, and the last warnings (docs/live.md).
  *
- * Rank 0 composes the text at the end of a step that has warnings or errors, or has drawn pictures. The writing thread
- * writes the file after the step's pictures. It is not written to a database whose folder does not exist, as before the
- * first picture. */
+ * Rank 0 composes the text at the end of a step that has warnings or errors, or has drawn pictures. The writing
+ * thread writes the file after the step's pictures. The file is not written to a database whose folder does not
+ * exist yet, which is the case before its first picture. */
 #ifndef SESSION_NEWS_H
 #define SESSION_NEWS_H
 
@@ -35,7 +35,7 @@ typedef struct session_news_scene {
     const char *path; /* path of the file as given by the caller */
     /* state of the file when it was last read, whether it was accepted or not; NULL: there is no file */
     const struct stat *stamp;
-    const char *pieces;  /* text of `pieces` in the report; NULL: none */
+    const char *pieces;  /* insitu_report.pieces; NULL: the report has no such text */
     const char *refusal; /* reason why the last edit of the scene was refused; NULL: it was accepted */
 } session_news_scene;
 

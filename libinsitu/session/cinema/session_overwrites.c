@@ -38,8 +38,8 @@ static const scene_image *find_image_with_output(const scene *scene, int output)
     return &scene->images[image];
 }
 
-/* Returns the index of the output whose last picture was written to this file, or -1 if there is none. The same output
- * at the same cycle is ignored, because the run has then repeated the step. */
+/* Returns the index of the output whose last picture was written to this file, or -1 if there is none. A picture of the
+ * same output at the same cycle is ignored, because the step was repeated in that case. */
 static int find_last_writer(const session_overwrites *all, uint64_t file, int output, long long cycle)
 {
     for (int i = 0; i < all->count; i++)

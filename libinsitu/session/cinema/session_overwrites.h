@@ -1,7 +1,7 @@
 /* Finds pictures that overwrite earlier pictures of the same run. A scene whose outputs have equal paths is refused
- * when it is read. Here those paths are found that become equal only during the run: a path without {cycle} that is
- * used in several steps, or paths that are equal after their placeholders are replaced. Only paths are compared, so
- * that the result is the same on all ranks. */
+ * when it is read. This module finds paths that become equal only during the run: a path without {cycle} that is used
+ * in several steps, or paths that are equal after their placeholders are replaced. Only paths are compared, so that the
+ * result is the same on all ranks. */
 #ifndef SESSION_OVERWRITES_H
 #define SESSION_OVERWRITES_H
 

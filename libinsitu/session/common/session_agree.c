@@ -1,5 +1,6 @@
-/* A rank that returned early would leave the others blocked in their next collective call. So after each phase of a
- * step, either all ranks end the step or none does. If no error occurred, this costs one reduction of an integer. */
+/* A rank that returned early would leave the others blocked in their next collective call. Therefore, after each phase
+ * of a step, either all ranks end the step, or no rank does. If no error occurred, this costs one reduction of an
+ * integer. */
 #include "session_agree.h"
 
 #include <stdio.h>

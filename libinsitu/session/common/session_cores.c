@@ -1,6 +1,6 @@
 /* Ranks that are not bound to cores share all cores of the node. Ranks that are bound to a socket or a container share
  * its cores, and a rank that is bound to cores of its own does not share them. These cases are distinguished by the
- * sets of cores on which the ranks may run, whatever program has bound them. */
+ * sets of cores on which the ranks may run, no matter which program has bound the ranks. */
 #define _GNU_SOURCE 1
 #include "session_cores.h"
 
@@ -58,7 +58,7 @@ int session_cores_of_rank(MPI_Comm node)
     const bool is_known = find_allowed_cores(own);
     if (MPI_Allreduce(own, all, MOST_CORES, MPI_INT32_T, MPI_SUM, node) == MPI_SUCCESS && is_known)
         return session_share_of_cores(own, all, MOST_CORES);
-    /* a rank that may not run on all cores of the node has been bound to cores of its own */
+    /* a rank that may not run on all cores of the node is assumed to be bound to its own cores */
     const int cores = omp_get_num_procs(), share = cores / ranks;
     if (cores < sysconf(_SC_NPROCESSORS_ONLN)) return cores;
     return share > 1 ? share : 1;

@@ -17,8 +17,8 @@ void session_guard_begin(session_guard *guard);
 void session_guard_end(const session_guard *guard);
 
 /* Between session_guard_suspend() and session_guard_resume(), the calling thread has the caller's own environment.
- * The parallel region in which OpenMP starts threads runs in between, so that the new threads inherit this
- * environment, as if the caller had started them. Both must be called between session_guard_begin() and
+ * OpenMP starts threads in a parallel region between these calls, so that the new threads inherit this environment, as
+ * if the caller had started them. Both functions must be called between session_guard_begin() and
  * session_guard_end(). */
 void session_guard_suspend(const session_guard *guard);
 void session_guard_resume(void);

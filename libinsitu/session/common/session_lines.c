@@ -4,7 +4,7 @@
 
 #include "session_agree.h"
 
-enum { MOST_BYTES = 2048 }; /* maximum length of a warning's line */
+enum { MOST_BYTES = 2048 }; /* maximum length in bytes of the line of a warning */
 
 int session_reporting_word(const session_report *report, const session_team *team)
 {

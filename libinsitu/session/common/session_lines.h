@@ -6,14 +6,15 @@
 #include "session_report.h"
 #include "session_team.h"
 
-/* Returns this rank's operand of a reduction by maximum, from whose result session_reporting_rank() determines the
- * lowest rank that has warnings. Local. */
+/* Returns a number that the ranks reduce by maximum. From the result, session_reporting_rank() determines the lowest
+ * rank that has warnings. Local. */
 int session_reporting_word(const session_report *report, const session_team *team);
-/* Returns the lowest rank that has warnings, given the result of that reduction; -1 if no rank has any. Local. */
+/* Returns the lowest rank that has warnings, from the maximum of session_reporting_word() over all ranks; -1 if no rank
+ * has warnings. Local. */
 int session_reporting_rank(int word, const session_team *team);
 
-/* Adds the warnings of the rank `root`, possibly none, to the reports of all ranks. Warnings of other ranks, which are
- * mostly the same, are dropped. Collective. */
+/* Adds the warnings of the rank `root` to the reports of all ranks. Warnings of other ranks, which mostly have the same
+ * warnings, are dropped. Collective. */
 insitu_status session_share_lines(session_report *report, int root, const session_team *team, base_error *error);
 
 #endif

@@ -3,8 +3,8 @@
  *
  * A warning informs the user that something is drawn as requested but probably not as intended. All warnings are the
  * same on every rank: most are derived from data that all ranks share, the others are sent to all ranks
- * (session_lines.h). A warning is reported in the first step in which its condition holds. It is reported again if the
- * condition has not held in between, or if the scene has been edited. */
+ * (session_lines.h). A warning is reported in the first step in which its condition holds. It is reported again only
+ * if the condition has been false in a step since then, or if the scene has been edited. */
 #ifndef SESSION_REPORT_H
 #define SESSION_REPORT_H
 
@@ -21,7 +21,7 @@ typedef struct session_text {
 } session_text;
 
 typedef struct session_report {
-    insitu_report public_report; /* its texts are set only at the end of a step */
+    insitu_report public_report; /* the report that the caller reads; its texts are set at the end of a step */
     /* texts of the members of insitu_report with these names */
     session_text copied_why, left_out, warnings, pieces;
     /* warnings of this rank alone, until session_share_lines() sends those of one rank to all ranks */
@@ -48,9 +48,10 @@ void session_report_end(session_report *report);
 void session_report_free(session_report *report);
 
 typedef enum session_warning_kind {
-    WARNING_ORDER,       /* the cells' volumes suggest that their vertices are not in VTK's order */
-    WARNING_PIECES,      /* an isosurface is not within surface_error of a polynomial */
-    WARNING_FINER,       /* cells of higher order are split into fewer pieces than the scene requests */
+    WARNING_ORDER,  /* the cells' volumes suggest that their vertices are not in VTK's order */
+    WARNING_PIECES, /* an isosurface of linear pieces may differ from that of the polynomials by more than surface_error
+                     */
+    WARNING_FINER,  /* cells of higher order are split into fewer linear pieces than the scene requests */
     WARNING_ISOVALUE,    /* an isovalue lies outside the range of its field */
     WARNING_TRANSPARENT, /* a volume layer is transparent for all values of its field */
     WARNING_THRESHOLD,   /* no cell is within a threshold */

@@ -22,8 +22,8 @@ insitu_status session_team_create(MPI_Comm comm, session_team *out, base_error *
     return INSITU_OK;
 }
 
-/* Determines whether all nodes have the same number of ranks, and whether ranks are placed node by node or
- * round-robin. The results are stored only if they are the same on all ranks. */
+/* Determines whether all nodes have the same number of ranks, and whether ranks are placed node by node or round-robin.
+ * The results are stored only if all ranks find the same ones. */
 static void find_rank_placement(session_team *team, MPI_Comm node)
 {
     int within = 0, first = team->rank, all[4];

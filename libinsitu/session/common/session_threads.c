@@ -1,12 +1,12 @@
-/* OpenMP's runtimes end the process if they cannot start a thread. Threads are therefore started here first, as a
- * trial: a failure then only reduces their number. The trial starts the threads that the step needs and
- * SPARE_THREADS more, with the stack size that OpenMP would use. They exist until every rank has finished its trial,
- * since the ranks of a node share limits (processes of a user or a container, memory, address space). OpenMP then
- * gets the number that could be started. The spare threads, and some memory, remain available for other purposes.
+/* OpenMP's runtimes end the process if they cannot start a thread. Threads are therefore first started here as a trial,
+ * in which a failure only reduces their number. The trial starts the threads that the step needs and SPARE_THREADS
+ * more, with the stack size that OpenMP would use. They exist until every rank has finished its trial, since the ranks
+ * of a node share limits (processes of a user or a container, memory, address space). OpenMP then gets the number that
+ * could be started. The spare threads, and some memory, remain available for other purposes.
  *
- * OpenMP keeps its threads for later regions. So the trial is repeated only if more threads are needed, or if
- * threads have ended, as GNU's do if a region of the caller uses fewer. A destructor in each thread counts those
- * that end.
+ * OpenMP keeps its threads for later regions. Therefore the trial is repeated only if more threads are needed, or if
+ * threads have ended; GNU's OpenMP ends threads if a region of the caller uses fewer. A destructor in each thread
+ * counts the threads that end.
  *
  * OpenMP has no function that returns the stack size of workers, so it is measured in the workers. */
 #define _GNU_SOURCE 1
@@ -167,8 +167,8 @@ static void join_trial_threads(trial *t)
     base_free(t->spare_memory);
 }
 
-/* Tries to start threads before a rank's first parallel region, if any rank needs more than it has. All ranks try at
- * the same time, since those of a node share its limits. Collective. */
+/* Tries to start threads before a rank's first parallel region, if any rank needs more threads than it has. All ranks
+ * try at the same time, because ranks on a node share its limits. Collective. */
 static insitu_status try_threads(session_threads *threads, int requested, MPI_Comm comm, base_error *error)
 {
     const int living = count_living_threads(threads), lacking = requested - living;
@@ -237,8 +237,8 @@ static thread_stack least_worker_stack(int threads)
     return (thread_stack){left, size};
 }
 
-/* Returns the stack size in kB with which `needed` bytes are free: the bytes in use now, `needed` bytes, and some kB
- * for the operating system. */
+/* Returns the stack size in kB that a thread must have so that `needed` bytes are free: the sum of the bytes in use
+ * now, `needed` bytes, and some kB for the operating system. */
 static long long needed_stack_kilobytes(const thread_stack *stack, int64_t needed)
 {
     enum { SYSTEM_KILOBYTES = 16 };
@@ -268,7 +268,8 @@ static insitu_status check_stacks(session_threads *threads, const session_team *
                   needed_stack_kilobytes(&least, SESSION_WORKER_STACK),
                   needed_stack_kilobytes(&least, SESSION_WORKER_STACK));
     const insitu_status status = session_agree(team->comm, error);
-    if (status) threads->count = 0; /* counts as not tried, so that the next step tries to start threads again */
+    if (status)
+        threads->count = 0; /* marks the threads as not tried, so that the next step tries to start them again */
     return status;
 }
 

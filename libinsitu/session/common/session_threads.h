@@ -11,22 +11,23 @@
 #include "session_report.h"
 #include "session_team.h"
 
-/* Bytes of stack that a step must have free, below insitu_step() on the calling thread and below OpenMP on the others.
- * A step uses less than three quarters of them (measured by test_session_stack.c): on the calling thread 119 kB with
- * plain and SSE4.2 kernels and 142 kB with AVX2, on a worker 99 and 122 kB. The stack frames of AVX-512 kernels are a
- * quarter larger. */
+/* Bytes of stack that a step must have free, below the frame of insitu_step() on the calling thread, and below the
+ * frames of OpenMP on all other threads. A step uses less than three quarters of them (measured by
+ * test_session_stack.c): on the calling thread 119 kB with plain and SSE4.2 kernels and 142 kB with AVX2, on a worker
+ * 99 and 122 kB. The stack frames of AVX-512 kernels are a quarter larger. */
 enum { SESSION_WORKER_STACK = 256 << 10, SESSION_CALLER_STACK = 320 << 10 };
 
-/* The number of threads that exist or that a trial could start, for the thread that made the last call. */
+/* The number of threads that exist, or that could be started in a trial, for the caller's thread that made the last
+ * call. */
 typedef struct session_threads {
     int count; /* number of threads; 0: not tried yet */
     pthread_t caller;
     int64_t ended_count; /* number of threads of any team that had ended when `count` was determined */
 } session_threads;
 
-/* Returns whether this rank requests more threads than it is known to be able to start. scene_threads is the number
- * set in the scene; if it is 0, the rank requests its share of the cores, or OpenMP's maximum if that is lower.
- * Local. */
+/* Returns whether this rank requests more threads than the number that it could start in the last trial. scene_threads
+ * is the number set in the scene; if it is 0, the rank requests its share of the cores, or OpenMP's maximum if that is
+ * lower. Local. */
 bool session_lacks_threads(const session_threads *threads, int scene_threads, int cores);
 
 /* Determines how many threads can be started, and sets team->threads. Warns if there are fewer than requested. If

@@ -1,6 +1,6 @@
 /* The box around the domain is convex and contains all data. An edge between two faces whose inner sides face the eye
- * therefore lies behind all data, and any other edge lies in front of all data or beside it. So edges are drawn
- * correctly without depth, over surfaces as well as volumes. */
+ * therefore lies behind all data, and any other edge lies in front of all data or beside it. Therefore edges are drawn
+ * correctly without depth values, also over volumes. */
 #include "session_decorations.h"
 
 #include <math.h>
@@ -49,8 +49,8 @@ static bool clip_at_near_plane(seen_point *a, seen_point *b, double near)
     return true;
 }
 
-/* Returns whether the eye sees the outer side of the face of the box that is perpendicular to this axis, at its high or
- * low end. */
+/* Returns whether the eye sees the outer side of a face of the box. The face is perpendicular to this axis, at the high
+ * or low end of the box. */
 static bool is_seen_outside(const double lower[3], const double upper[3], const render_camera *c, int axis, bool high)
 {
     if (c->is_orthographic) return high ? c->forward[axis] < 0 : c->forward[axis] > 0;
@@ -299,7 +299,7 @@ static bool is_repeated_bar(const session_decorations *d, int bar)
     return is_found;
 }
 
-/* Input for colour bars. */
+/* The data from which colour bars are computed. */
 typedef struct bar_basis {
     const scene_decorations *scene;
     const session_catalogue *catalogue;

@@ -18,8 +18,8 @@ enum { SESSION_RULER_STROKES = 3 * SESSION_MAX_TICKS, SESSION_RULER_LABELS = 3 *
 typedef struct session_decorations {
     /* all decorations; its pointers refer to members of this struct and to the layers */
     insitu_decorations decorations;
-    insitu_decorations background;         /* decorations that have only a background, for files without decorations */
-    insitu_words words[SESSION_MAX_WORDS]; /* the texts */
+    insitu_decorations background;            /* only the background, for files without other decorations */
+    insitu_words words[SESSION_MAX_WORDS];    /* the texts */
     insitu_colour_bar bars[SESSION_MAX_BARS]; /* the colour bars */
     insitu_tick ticks[SESSION_MAX_BARS][SESSION_MAX_TICKS];
     char labels[SESSION_MAX_BARS][300];          /* label of each colour bar */
@@ -30,7 +30,7 @@ typedef struct session_decorations {
     uint64_t bars_hash; /* hash of the words, colours and numbers of the bars; equal bars have equal hashes */
 } session_decorations;
 
-/* Input for computing decorations. */
+/* The data from which decorations are computed. */
 typedef struct session_decoration_basis {
     const scene_placeholder_values *moment;
     const session_extent *extent;
@@ -55,8 +55,8 @@ void session_free_decorations(session_decorations *decorations);
 int session_box_strokes(const double lower[3], const double upper[3], const render_camera *camera,
                         insitu_stroke strokes[SESSION_BOX_EDGES]);
 
-/* Adds ticks, numbers and names along three edges of the box, one per axis: of the edges on the silhouette, the lowest
- * in the picture. size is the height of texts in pixels. Local. */
+/* Adds ticks, numbers and names along three edges of the box, one per axis. For each axis, the edge on the box's
+ * silhouette that is lowest in the picture is chosen. size is the height of texts in pixels. Local. */
 void session_box_rulers(const double lower[3], const double upper[3], const render_camera *camera, double size,
                         insitu_decorations *out, insitu_stroke *strokes, insitu_label *labels);
 

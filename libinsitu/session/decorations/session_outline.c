@@ -12,8 +12,8 @@ void session_free_outline(session_outline *outline)
     *outline = (session_outline){0};
 }
 
-/* Layout of a box's bounds: x, y, z of the lower corner, then the negated x, y, z of the upper corner. A reduction by
- * minimum therefore computes the union of boxes. */
+/* Number of values of a box's bounds: x, y, z of the lower corner, then the negated x, y, z of the upper corner. With
+ * this sign, a reduction by minimum computes the union of boxes. */
 
 enum { ENDS = 6 };
 
@@ -26,7 +26,7 @@ static void widen_bounds(const session_mesh *mesh, double ends[ENDS])
     }
 }
 
-/* Adds those of the `count` boxes that are not empty to the outline. */
+/* Adds each of the `count` boxes to the outline, unless it is empty. */
 static void add_boxes(const double *ends, int count, session_outline *out)
 {
     for (int i = 0; i < count; i++, ends += ENDS) {

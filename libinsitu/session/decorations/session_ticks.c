@@ -50,7 +50,7 @@ static void shorten_exponent(char *text)
     if (!e) return;
     const bool is_negative = e[1] == '-';
     const size_t zeros = strspn(e + 2, "0");
-    const char *digits = e + 2 + (e[2 + zeros] ? zeros : zeros - 1); /* of an exponent e+00 one zero is kept */
+    const char *digits = e + 2 + (e[2 + zeros] ? zeros : zeros - 1); /* one zero of the exponent e+00 is kept */
     memmove(e + 1 + is_negative, digits, strlen(digits) + 1);
 }
 

@@ -23,8 +23,9 @@ typedef struct session_scale {
  * distinguish neighbours, unless the scale sets the number of digits. Local. */
 int session_make_ticks(const session_scale *scale, int most, insitu_tick ticks[SESSION_MAX_TICKS]);
 
-/* As session_make_ticks(), for a range that is divided into `bands` bands of equal width. If each band contains one
- * integer of a linear range, as for ids, the ticks are in the centres of the bands, or of every n-th band. Local. */
+/* Does the same as session_make_ticks() for a range that is divided into `bands` bands of equal width. If each band
+ * contains one integer of a linear range, as for ids, the ticks are in the centres of the bands, or of every n-th band.
+ * Local. */
 int session_make_band_ticks(const session_scale *scale, int bands, int most, insitu_tick ticks[SESSION_MAX_TICKS]);
 
 /* Computes the single tick of a range whose values are all equal, in its middle. Returns 1. Local. */

@@ -7,7 +7,8 @@
 
 /* The corners of a type of cell, each with its three neighbours in right-handed order. The volume of a cell is computed
  * as follows: for each listed corner, take six times the volume of the tet that it forms with its neighbours, add these
- * up, and divide by volume_factor. The result is exact if opposite edges are parallel, and otherwise a mean. */
+ * up, and divide by volume_factor. The result is exact if opposite edges are parallel; otherwise it is a mean over the
+ * ways to divide the cell into tets. */
 typedef struct cell_corners {
     const signed char (*corners)[4];
     int count;            /* number of listed corners */

@@ -3,9 +3,9 @@
  *
  * A block of cells is processed in two passes. The first reads vertices and computes bounds and volumes, the second
  * computes sizes from the volumes. In a single pass a tet would take 5.8 ns instead of 4.0, because each cube root
- * depends on a volume, and a core does not look far enough ahead to overlap the work on other cells. Volumes are kept
- * as sums over corners and sizes as the cube roots of these sums, so that the results are divided only once, at the
- * end. Numbers are loaded one by one, since gather instructions take 1.6 times as long. */
+ * depends on a volume, and the core's out-of-order window is too small to overlap this work with that on other
+ * cells. Volumes are kept as sums over corners and sizes as the cube roots of these sums, so that the results are
+ * divided only once, at the end. Numbers are loaded one by one, since gather instructions take 1.6 times as long. */
 #include <stdbool.h>
 
 #include "session_corners.h"
@@ -15,7 +15,7 @@
 enum {
     BLOCK_CELLS = 512, /* number of cells of a block, whose volumes fit into the first-level cache */
     PARTS = LANES / LANE_WIDTH,
-    AHEAD = 512 /* prefetch distance in entries of the connectivity; hardware prefetching is too late */
+    AHEAD = 512 /* prefetch distance in entries of the connectivity, because the hardware prefetches too late */
 };
 
 /* Addresses and strides of the mesh's arrays. They are constant during a run of cells. */
@@ -31,8 +31,7 @@ typedef struct lane_source {
     bool wide_index, wide_number;
 } lane_source;
 
-/* Positions of the vertices of LANE_WIDTH cells: in `narrow` if coordinates are floats, in `wide` if they are
- * doubles. */
+/* Positions of the vertices of LANE_WIDTH cells: floats are stored in `narrow`, doubles in `wide`. */
 typedef struct lane_points {
     floats narrow[GRID_MAX_CELL_VERTICES][3];
     doubles wide[GRID_MAX_CELL_VERTICES][3];
@@ -116,7 +115,7 @@ LANE_INLINE int64_t read_index(const lane_source *s, const char *indices, int i)
     return s->wide_index ? ((const int64_t *)(const void *)indices)[i] : ((const int32_t *)(const void *)indices)[i];
 }
 
-/* Returns whether all indices are valid. An index is valid if neither the index nor (last - index) is negative. */
+/* Returns whether all indices are valid, which means that neither the index nor (last - index) is negative. */
 LANE_INLINE bool are_valid_wide_indices(const int64_t *indices, int count, int64_t base, int64_t last)
 {
     int64_t signs = last;
@@ -230,7 +229,7 @@ LANE_INLINE void widen_bounds(const lane_source *s, const lane_points *points, l
 }
 
 /* Computes the volumes (times cell_corners.volume_factor) and the bounds of cells [begin, end), LANES at a time. Stops
- * before the first LANES cells among which is a ghost or an invalid index, and if fewer than LANES cells are left.
+ * before a group of LANES cells that contains a ghost or an invalid index, or if fewer than LANES cells are left.
  * Returns the cell at which it stopped. */
 LANE_INLINE int64_t compute_volumes(const lane_source *s, int64_t begin, int64_t end, lane_bounds *bounds,
                                     double *volumes)

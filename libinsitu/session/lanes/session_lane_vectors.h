@@ -1,6 +1,6 @@
 /* Defines vectors of doubles, and vectors of the same number of floats, for the instruction set for which the including
- * file is compiled; simd.h has no such vectors. Minimum and maximum return `a` if it is less (greater) than `b`, and
- * otherwise `b`, so that a NaN in `a` is ignored. */
+ * file is compiled; simd.h does not have vectors with equal numbers of floats and doubles. The minimum (maximum) of a
+ * and b is `a` if it is less (greater) than `b`, and otherwise `b`, so that a NaN in `a` is ignored. */
 #ifndef SESSION_LANE_VECTORS_H
 #define SESSION_LANE_VECTORS_H
 
@@ -14,7 +14,7 @@
 #if defined(__AVX512F__)
 #define LANE_WIDTH 8
 #else
-#define LANE_WIDTH 4 /* a vector takes two registers on SSE2 */
+#define LANE_WIDTH 4 /* on SSE2, a vector of doubles takes two registers */
 #endif
 
 #define LANE_INLINE static inline __attribute__((always_inline))

@@ -27,10 +27,10 @@ typedef struct lane_sums {
 } lane_sums;
 
 /* Processes cells from the first one on and stores their sums. Returns the number of processed cells, a multiple of
- * eight. *scalar_count receives the number of cells after these that the caller must check one by one: one of them has
- * an index out of range, is a ghost, or has a volume whose cube root cannot be computed here (also if a coordinate is
- * not finite), or fewer than eight cells are left. The stored bounds may include vertices of these cells, unless they
- * are ghosts. */
+ * eight. *scalar_count receives the number of cells after the processed ones that the caller must check one by one.
+ * This is because a cell among them has an index out of range, is a ghost, or has a volume whose cube root cannot be
+ * computed here (also if a coordinate is not finite), or because fewer than eight cells are left. The stored bounds may
+ * include vertices of the cells to check, unless they are ghosts. */
 typedef int64_t lane_run(const lane_cells *cells, lane_sums *sums, int64_t *scalar_count);
 
 /* Returns the function for cells of this type and the layout of the grid's arrays; NULL if there is none for the

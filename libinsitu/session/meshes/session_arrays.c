@@ -31,8 +31,8 @@ static const char *describe_allowed_types(int kind)
     }
 }
 
-/* Upper bound of the size of a process's address space in bytes. Pointers differ by less on any machine that runs this
- * code, and the product of an index and a stride below the bound is far from overflow. */
+/* Upper bound of the size of a process's address space in bytes, on all supported machines. If all elements of an array
+ * lie within it, the product of an index and a stride cannot overflow. */
 static const uint64_t most_bytes = (uint64_t)1 << 48;
 
 /* Checks a stride in bytes. A negative stride is valid: the elements then lie before the first one. A stride of 0 means

@@ -1,9 +1,10 @@
-/* This file bounds how far polynomials differ from their linear pieces.
+/* Computes bounds of the difference between the polynomials in cells of higher order and their linear interpolation in
+ * the smaller cells (pieces) into which these cells are cut.
  *
  * A reference cell is a product of simplices: a hex of three lines, a wedge of a triangle and a line; a tet is a single
  * simplex. In each simplex, polynomials of order p are written in Bernstein form. The second derivative along an edge
  * of the simplex is then a weighted mean of p (p - 1) times the second differences of the coefficients along that edge.
- * So it is at most the largest of these, M.
+ * Therefore its absolute value is at most M, the largest of these in absolute value.
  *
  * A piece is a simplex whose edges are 1 / m of those of the cell. Let u be the difference between the polynomial and
  * its linear interpolation in a piece, l_i the barycentric coordinates in the piece, and e_ij the edge of the cell that
@@ -41,7 +42,7 @@
 
 enum {
     SIZE = 4,            /* number of doubles of a tuple: x, y, z and a value */
-    COARSE = 4,          /* minimum order of the first lattice */
+    COARSE = 4,          /* minimum order of the first, coarsest lattice */
     FINE = 16,           /* maximum order of all further lattices */
     MOST_DIRECTIONS = 7, /* number of directions of the edges of pieces in one simplex */
     TET_SHAPES = 5
@@ -148,7 +149,8 @@ static void multiply_by_matrix(const double *matrix, int rows, int columns, int 
 }
 
 /* Computes the values of all Bernstein polynomials (if axis is negative) or their derivatives along an axis, at the
- * nodes of the cell's lattice or, if is_fine is set, of the finer one. out: a row per node, a column per polynomial. */
+ * nodes of the cell's lattice or, if is_fine is set, of the finer lattice. `out` has one row per node and one column
+ * per polynomial. */
 static void fill_basis(const node_lists *lists, int axis, bool is_fine, double *out)
 {
     const int rows = is_fine ? lists->fine_count : lists->count, order = is_fine ? lists->fine_order : lists->order;
@@ -166,8 +168,8 @@ static void fill_basis(const node_lists *lists, int axis, bool is_fine, double *
     }
 }
 
-/* Adds a second difference of coefficients along a direction. lower: index, in lists->lower, of the node from which it
- * is taken. number: number of the direction. */
+/* Adds a second difference of coefficients along a direction. lower: index in lists->lower of the node at which the
+ * difference is taken. number: number of the direction. */
 static void add_difference(const node_lists *lists, int lower, int number, const int direction[4],
                            session_bound_factor *out)
 {
@@ -353,9 +355,11 @@ typedef struct bound_job {
     double *nodes, *coefficients;
     /* tuples at the nodes of the level's lattice, and their derivatives along the axes */
     double *fine, *slopes[3];
-    double (*gradients)[3]; /* gradient of the field at these nodes; not finite where the cell is flat */
+    double (*gradients)[3]; /* gradient of the field at the nodes of the level's lattice; not finite at nodes where the
+                               cell is flat */
     double *work;           /* working memory of multiply_by_matrices() */
-    /* bounds of u if the whole cell is one piece (m = 1): length for positions, and for the field */
+    /* bounds of u (top of the file) if the whole cell is one piece (m = 1): bound of the length of u for positions, and
+     * bound of |u| for the field */
     double position_bound, value_bound;
 } bound_job;
 
@@ -433,8 +437,8 @@ static double largest_q_in_shape(const double b[6])
     return least > 0 ? fmax(out, largest_q_in_tet(b)) : out;
 }
 
-/* Returns the bound of u in the pieces of a factor, for m = 1. b: B_ij for each direction of edges, in the order of
- * list_differences(). */
+/* Returns the bound of u in the pieces of one factor of the reference cell, for m = 1 (top of the file). b: B_ij for
+ * each direction of edges, in the order of list_differences(). */
 static double bound_factor(int dimensions, const double b[MOST_DIRECTIONS])
 {
     static const signed char tets[TET_SHAPES][6] = {
@@ -656,7 +660,7 @@ static double find_volume(const session_bound *of, const double *tuples)
 }
 
 /* Finds the mean gradient of the field at the nodes of the level's lattice. In straight cells, whose positions differ
- * by rounding only, it is 0, because it is not needed. Elsewhere it may be not finite. */
+ * by rounding only, it is 0, because it is not needed. In other cells it may be not finite. */
 static void find_mean_gradient(bound_job *job, const session_cell_bound *bound, double out[3])
 {
     static const double straight = 1e-6;
@@ -692,8 +696,8 @@ static difference_means find_means(int dimensions, const double *second)
     return out;
 }
 
-/* Returns the means over a cell for one factor. coefficients: of a scalar. inner: number of coefficients from one of
- * the factor to the next. */
+/* Returns the means of u over a cell for one factor of the reference cell. coefficients: Bernstein coefficients of a
+ * scalar. inner: distance, in coefficients, between neighbouring coefficients of the factor. */
 static difference_means find_factor_means(const bound_job *job, const session_bound_factor *factor, int inner,
                                           const double *coefficients)
 {
@@ -720,8 +724,8 @@ static difference_means find_factor_means(const bound_job *job, const session_bo
 
 /* Returns the root mean square of u in the pieces of the cell, for m = 1, as if its second derivatives were those of
  * the coefficients. At a point of space, the field differs by u of the values minus the gradient times u of the
- * positions, to first order. The tets of octahedra are taken to have the shape of the others, and the differences of
- * the factors to be independent. coefficients: working memory of a number for each node. */
+ * positions, to first order. It is assumed that tets from octahedra have the same shape as the other tets, and that the
+ * differences of the factors are independent. coefficients: working memory with one number per node. */
 static double mean_difference(const bound_job *job, const double gradient[3], double *coefficients)
 {
     double mean = 0, variance = 0;

@@ -1,5 +1,5 @@
-/* Computes two bounds for cells of higher order: how far an isosurface of the cells' polynomials is from the isosurface
- * of their linear pieces, and how far positions in both are from each other. */
+/* Computes two bounds for cells of higher order, which are drawn as linear pieces: the distance between the isosurfaces
+ * of the polynomials and of the pieces, and the distance between positions in the curved cell and in its pieces. */
 #ifndef SESSION_BOUND_H
 #define SESSION_BOUND_H
 
@@ -41,10 +41,11 @@ typedef struct session_bound_level {
 
 /* The data from which the bounds of one kind of cell are computed. */
 typedef struct session_bound {
-    session_interpolation nodes; /* the cell's nodes, and all nodes of its order */
-    session_nodes lattice;       /* the same as nodes.complete; a hex for pyramids, which are read as collapsed hexes */
-    double *collapse;            /* for pyramids: matrix from nodes.complete to `lattice`; otherwise NULL */
-    int axis_count;              /* number of axes of the reference cell, 2 or 3 */
+    session_interpolation nodes; /* the cell's nodes, and all nodes of a complete cell of its order */
+    session_nodes
+        lattice; /* same as nodes.complete; for pyramids, which are read as collapsed hexes, the lattice of a hex */
+    double *collapse; /* for pyramids: matrix from nodes.complete to `lattice`; otherwise NULL */
+    int axis_count;   /* number of axes of the reference cell, 2 or 3 */
     int level_count;
     session_bound_level levels[BOUND_MOST_LEVELS]; /* each has twice the order of the one before */
     session_bound_factor line, simplex;
@@ -61,10 +62,11 @@ void session_drop_bound(session_bound *bound);
 typedef struct session_isovalues {
     int count;
     const double *values;
-    double tolerance; /* a cell may be crossed if its range of values extended by this contains an isovalue */
+    double tolerance; /* an isosurface may cross a cell if the cell's range of values, extended by this tolerance on
+                         both sides, contains an isovalue */
 } session_isovalues;
 
-/* Returns whether one of the values is in the interval. */
+/* Returns whether any isovalue is in the interval. */
 bool session_is_any_between(const session_isovalues *isovalues, double low, double high);
 
 /* Returns the number of doubles of working memory that session_may_cross() and session_bound_cell() need. */
@@ -83,18 +85,19 @@ typedef struct session_cell_bound {
      * position is not finite; all other members are then undefined. */
     bool is_crossed;
     double node_distance;  /* distance between neighbouring nodes: the root mean square over the cell's edges */
-    double position_error; /* upper bound of the distance between positions */
-    /* upper bound of the distance between isosurfaces; INFINITY if the gradient may vanish near one */
+    double position_error; /* upper bound of the distance between positions in the cell and in its pieces */
+    /* upper bound of the distance between the isosurfaces of the cell and of its pieces; INFINITY if the gradient may
+     * vanish near the isosurface */
     double surface_error;
-    /* Only without isovalues, and estimates: the root mean square of the difference between values of the field at the
-     * same point of space, in their unit, which may be not finite if the cell is flat; and the cell's volume, which is
-     * 0 for shells. */
+    /* Estimates that are computed only without isovalues. value_error is the root mean square of the difference between
+     * the fields of the cell and of its pieces at the same point of space, in units of the field; it may be not finite
+     * if the cell is flat. volume is the cell's volume, which is 0 for shells. */
     double value_error, volume;
 } session_cell_bound;
 
 /* Computes the bounds of a cell. tuples: x, y, z and the field's value at its nodes, in the order of its row.
  * isovalues: NULL if only the bounds of positions and values are needed. level: the lattice to use, 0 .. level_count -
- * 1; a finer one mostly gives a smaller bound, but takes longer. work: working memory. */
+ * 1; a finer lattice mostly gives a smaller bound, but takes longer. work: working memory. */
 session_cell_bound session_bound_cell(const session_bound *of, const double *tuples, const session_isovalues *isovalues,
                                       int level, double *work);
 

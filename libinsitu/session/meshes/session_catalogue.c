@@ -1,5 +1,6 @@
 /* The catalogue lists the meshes and fields of all ranks. From it every rank determines, without communication and with
- * the same result, whether a picture can be drawn, so that no rank lacks a field in the middle of a collective call.
+ * the same result, whether a picture can be drawn, so that no rank finds in the middle of a collective call that it
+ * lacks a field.
  *
  * A rank's table is a text of lines: "m <has cells> <has ids, + 2: has levels> <name>" begins a mesh, "f <components>
  * <centring> <name>" is a field of it, "e <status> 0 <message>" is the fault of the preceding mesh or field, if it has
@@ -38,7 +39,8 @@ typedef struct part_summary {
     const base_error *problem; /* error of the first part that has one; NULL: no part has an error */
 } part_summary;
 
-/* Summarizes the parts of a mesh. Its vertices have ids if all parts with cells have ids, and there is at least one. */
+/* Summarizes the parts of a mesh. The mesh's vertices have ids if there are parts with cells, and all of these have
+ * ids. */
 static part_summary summarize_parts(const session_parts *parts)
 {
     part_summary out = {.has_ids = true};
@@ -568,9 +570,9 @@ insitu_status session_update_catalogue(session_catalogue *catalogue, session_mes
 /* ---- homes ----------------------------------------------------------------------------------------------------- */
 
 /* Computes hashes of the stamps at which the cells and the coordinates of this rank's parts of a mesh last changed; 0
- * if this rank has no part. The hashes of all ranks are added up. They are mixed, so that changes on two ranks do not
- * cancel in the sum: without mixing, a changed bit could add to the hash of one rank what it subtracts from that of
- * another. */
+ * if this rank has no part. The hashes of all ranks are added up. Bits are mixed first. Without mixing, changes on two
+ * ranks could cancel in the sum, because a changed bit could add to one rank's hash what it subtracts from
+ * another's. */
 static void hash_stamps(const session_parts *parts, int rank, uint64_t hashes[2])
 {
     bool has_any = false;

@@ -1,4 +1,4 @@
-/* The catalogue lists the meshes and fields of all ranks. */
+/* The catalogue: a list of the meshes and fields of all ranks, which is the same on every rank. */
 #ifndef SESSION_CATALOGUE_H
 #define SESSION_CATALOGUE_H
 
@@ -20,7 +20,7 @@ typedef struct session_catalogue_field {
     base_error *fault;  /* error on the lowest rank on which the field has one; NULL: there is none */
 } session_catalogue_field;
 
-/* A vertex that hangs on a face: its value is the weighted sum of the values at the face's corners. */
+/* A vertex that hangs on a face. Its value is the weighted sum of the values at the face's corners. */
 typedef struct session_hanging_vertex {
     int64_t group;      /* index of its group of equal vertices (session_vertex_groups) */
     int64_t corners[4]; /* indices of groups, or of the values received from other ranks */
@@ -28,20 +28,22 @@ typedef struct session_hanging_vertex {
     bool is_received;   /* set if the corners are values received from other ranks, not groups of this rank */
 } session_hanging_vertex;
 
-/* A vertex that coincides with others up to rounding, and the lexicographically least position of all of them. */
+/* A vertex that has the same position as other vertices except for rounding, and the position that represents all of
+ * these vertices. */
 typedef struct session_twin {
     int64_t vertex;     /* index of the vertex in the part */
-    double position[3]; /* lexicographically least position of all vertices that coincide with it */
+    double position[3]; /* lexicographically smallest position of the vertex and all vertices that coincide with it */
 } session_twin;
 
-/* The outer faces of one of this rank's parts of a mesh, on which vertices may hang, and the vertices that may hang;
- * kept while vertices move. */
+/* The outer faces of a part of a mesh on this rank, and their vertices. Vertices may hang on these faces. The data is
+ * kept if only coordinates change. */
 typedef struct session_border {
     /* session_catalogue_mesh.cells_hash at the time when the border was computed; 0: not computed yet */
     uint64_t cells_hash;
     int64_t face_count, vertex_count;
     session_face *faces; /* faces that belong to only one cell, counted over all ranks */
-    int64_t *vertices;   /* vertices of the faces that only one cell of this rank has */
+    int64_t *vertices;   /* vertices of the faces that belong to only one cell on this rank; these vertices may hang on
+                            faces */
     /* number of twins, which are computed again if vertices move (session_hanging.twins_version) */
     int64_t twin_count;
     session_twin *twins; /* twins of the border's vertices, sorted by vertex */
@@ -74,11 +76,12 @@ typedef struct session_vertex_groups {
     /* for each group, the number of corners of drawn cells in all groups before it; count + 1 entries */
     int64_t *corner_starts;
     session_key_table keys; /* keys of the groups; empty unless a mesh has patches, whose vertices are found by key */
-    /* Groups that lie in other ranks' bounding boxes, sorted by their home rank; none if there is only one rank. */
-    int64_t shared_count;     /* number of groups that lie in other ranks' boxes */
+    /* Groups whose positions lie in other ranks' bounding boxes, sorted by the ranks that combine their values (home
+     * ranks, session_homes.h). There are none if there is only one rank. */
+    int64_t shared_count;     /* number of groups whose positions lie in other ranks' boxes */
     int64_t *shared_groups;   /* index of each of these groups */
     session_key *shared_keys; /* key by which each of these groups is found on its home rank */
-    int64_t *shared_counts;   /* for each rank, the number of these groups whose home it is */
+    int64_t *shared_counts;   /* for each rank, the number of shared groups that have this home rank */
 } session_vertex_groups;
 
 typedef struct session_catalogue_mesh {
@@ -131,14 +134,14 @@ typedef struct session_catalogue {
     session_mesh_group **mesh_groups;
 } session_catalogue;
 
-/* Updates the catalogue. is_shared: all ranks have equal names (compared by session_names_hash()), and no mesh or field
- * has an error. Meshes with an error are excluded from the step. Collective. */
+/* Updates the catalogue. is_shared states that all ranks have the same meshes and fields (equal session_names_hash()),
+ * and that none has an error. Meshes with an error are excluded from the step. Collective. */
 insitu_status session_update_catalogue(session_catalogue *catalogue, session_meshes *meshes, const session_team *team,
                                        bool is_shared, base_error *error);
 void session_catalogue_free(session_catalogue *catalogue);
 
-/* Computes the homes of all meshes and mesh groups again whose cells or positions have changed. half_diagonal is that
- * of the scene's bounds. Collective; all ranks return the same status. */
+/* Computes the homes of meshes and mesh groups again if their cells or positions have changed. half_diagonal is that of
+ * the scene's bounds. Collective; all ranks return the same status. */
 insitu_status session_update_homes(session_catalogue *catalogue, const session_meshes *meshes, double half_diagonal,
                                    const session_team *team, base_error *error);
 /* Marks the homes as unknown. This must be called on all ranks if cells have changed on any rank;
@@ -153,8 +156,8 @@ static inline bool session_catalogue_has_higher_order(const session_catalogue *c
     return is_any;
 }
 
-/* Returns the name of the mesh group over which values on this mesh are averaged: the group of the mesh alone if it has
- * vertex ids, and otherwise mesh_group_name, the name stored in the layer's field. */
+/* Returns the name of the mesh group over which values on this mesh are averaged: if the mesh has vertex ids, the group
+ * of this mesh alone; otherwise mesh_group_name, which is the name stored in the layer's field. */
 static inline uint64_t session_mesh_group_name(const session_catalogue_mesh *mesh, uint64_t mesh_group_name)
 {
     return mesh->single_group_name ? mesh->single_group_name : mesh_group_name;

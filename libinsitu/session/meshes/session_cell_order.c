@@ -1,6 +1,6 @@
 /* All other code reads each cell's vertices contiguously, in VTK's order, and kernels process eight such cells at once.
- * If the caller has another order, connectivity is copied, so that these kernels need no further case. Cells whose
- * order is the same in both, such as tets, are not copied. */
+ * If the caller has another order, connectivity is copied, so that these kernels need no further case. Cells that have
+ * the same vertex order in both, such as tets, are not copied. */
 #include "session_cell_order.h"
 
 #include "region.h"
@@ -35,7 +35,7 @@ static bool has_reordered_cells(const session_mesh *mesh)
     return cell < g->cell_count;
 }
 
-/* The entries of the caller's connectivity that belong to cells, and their layout in rows. */
+/* The entries of the caller's connectivity that belong to cells, and their layout in rows, one row per cell. */
 typedef struct cell_rows {
     const grid_array *connectivity;
     int64_t count;       /* number of entries that belong to cells */
@@ -61,8 +61,8 @@ static cell_rows make_cell_rows(const session_mesh *mesh)
     return rows;
 }
 
-/* Returns whether all entries fit into 4 bytes. An entry that does not, although there are few vertices, is an invalid
- * index; entries are then copied with 8 bytes, so that the error message shows its value. */
+/* Returns whether all entries fit into 4 bytes. If there are few vertices but an entry does not fit, the entry is an
+ * invalid index. The entries are then copied with 8 bytes, so that the error message shows this index. */
 static bool fit_in_32_bits(const cell_rows *rows, int threads)
 {
     int64_t least = 0, most = 0;

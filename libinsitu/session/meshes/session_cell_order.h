@@ -7,16 +7,16 @@
 /* Returns whether session_order_cells() must copy any cells. */
 bool session_is_reordered(const insitu_mesh *given);
 
-/* Returns, for each vertex in VTK's order, its position in the other order; NULL if both orders are equal for this type
- * of cell. Each permutation is its own inverse. */
+/* Returns, for each vertex in VTK's order, its position in the given order; NULL if the given order equals VTK's for
+ * this type of cell. Each permutation is its own inverse. */
 const signed char *session_vertex_permutation(insitu_vertex_order order, int type);
 
 /* Copies the cells' vertices into the mesh's topology, contiguously and in VTK's order. Bad indices are copied
- * unchanged, and cells with bad offsets keep their order: session_check.c reports both. Local. */
+ * unchanged, and cells with bad offsets keep their order, because session_check.c reports these errors. Local. */
 insitu_status session_order_cells(session_mesh *mesh, int threads, base_error *error);
 
 /* Permutes the entries of each cell between the caller's order and VTK's; the permutation is the same in both
- * directions. out: that many entries, cell by cell. */
+ * directions. out receives the entries, cell by cell. */
 void session_permute_cells(const session_mesh *mesh, int64_t entries, int threads, const grid_array *out);
 
 #endif

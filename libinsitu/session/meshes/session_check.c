@@ -1,9 +1,10 @@
 /* Validates a mesh before any other code reads it, because the grid's accessors check nothing.
  *
- * The cells are checked in one parallel pass, in blocks. Each thread records its lowest invalid cell, and the lowest of
- * all is reported, so that the result does not depend on the number of threads. The error message is composed
- * afterwards, from a second check of this cell. Coordinates are checked if a drawn cell uses them: vertices that belong
- * to no cell, or only to ghosts, may have any coordinates. Indices are checked for ghosts too. */
+ * The cells are checked in one parallel pass, in blocks. Each thread records its invalid cell with the lowest
+ * number, and the lowest of all threads is reported, so that the result does not depend on the number of threads.
+ * The error message is composed afterwards, from a second check of this cell. Coordinates are checked only if a
+ * drawn cell uses them. Vertices that belong to no cell, or only to ghosts, may have any coordinates. Indices are
+ * checked for ghosts too. */
 #include "session_check.h"
 
 #include <omp.h>
@@ -28,8 +29,8 @@
  * from a vertex to itself bounds nothing and is skipped. */
 
 typedef struct face_edge {
-    int64_t low, high,
-        face; /* an edge's smaller and larger vertex, and a face that has the edge, as numbered in the connectivity */
+    int64_t low, high, face; /* the edge's vertices, smaller number first, and a face that has the edge; numbers are
+                                those in the caller's connectivity */
 } face_edge;
 
 /* A buffer of one thread, enlarged when needed. It must be zero-initialized. */
@@ -316,7 +317,8 @@ static const char *type_name(int type)
     }
 }
 
-/* Returns the name of the type that the caller gave, since a polyhedron may be read as another type. */
+/* Returns the name of the cell's type in the caller's description. The session may read a polyhedron as another
+ * type. */
 static const char *original_type_name(const session_mesh *mesh, int64_t cell)
 {
     return type_name(session_caller_type(mesh, cell));
@@ -351,8 +353,8 @@ static insitu_status describe_offsets(const session_mesh *mesh, int64_t cell, co
 #pragma GCC diagnostic pop
 }
 
-/* Reports the error of a bad cell, which is checked a second time. If it is valid now, memory ran out the first
- * time. */
+/* Reports the error of a bad cell, which is checked a second time. If the second check finds no error, memory ran out
+ * in the first check. */
 static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base_error *error)
 {
     fault_details details = {0};
@@ -415,7 +417,7 @@ static int64_t check_cells(const session_mesh *mesh, int threads, mesh_tally *ta
         for (int64_t begin = 0; begin < count; begin += BLOCK_CELLS) {
             if (first_bad < count) continue;
             const int64_t end = begin + BLOCK_CELLS < count ? begin + BLOCK_CELLS : count;
-            /* The fast check ends at a bad cell, or at a polygon, which it cannot check; the cells after that are
+            /* The fast check ends at a bad cell, or at a polygon, which it cannot check; the cells from there on are
              * checked one by one. */
             int64_t at = run ? run(mesh, begin, end, &mine) : begin;
             if (at < end) at = check_cells_one_by_one(mesh, at, end, &buffer, &mine);
@@ -466,8 +468,8 @@ static insitu_status describe_far_cell(const session_mesh *mesh, base_error *err
     return INSITU_OK;
 }
 
-/* Reports the first drawn cell of a volume type in a mesh without z coordinates, where it would have no volume. Only
- * mixed cells are checked here, because insitu_set_mesh() checks the type of all others. */
+/* Reports the first drawn cell of a volume type in a mesh without z coordinates, in which such a cell has no volume.
+ * Only mixed cells are checked here, because insitu_set_mesh() checks the type of all others. */
 static insitu_status check_plane(const session_mesh *mesh, const mesh_tally *tally, base_error *error)
 {
     const grid *g = &mesh->cells;
@@ -539,7 +541,7 @@ static insitu_status check_cells_of(session_mesh *mesh, int threads, base_error 
     mesh->drawn_count = tally.drawn_count;
     mesh->given_counts = (session_counts){tally.drawn_count, tally.ghost_count, tally.inverted_count, tally.flat_count,
                                           tally.shell_count};
-    /* finer pieces may be those of a part of each cell only */
+    /* if cells are refined, only some of the pieces of each cell may have been made */
     if (mesh->finer.parts)
         mesh->given_counts = mesh->finer.given_counts;
     else if (mesh->topology.is_split)

@@ -6,7 +6,8 @@
 #include "session_team.h"
 
 /* Checks the meshes whose cells or coordinates have changed, computes their bounds and counts, and finds their flat
- * cells. The error of a mesh is stored as its `problem`; *error is the first one of the lowest rank. Collective. */
+ * cells. The error of a mesh is stored as its `problem`; *error receives the first error of the lowest rank that has
+ * one. Collective. */
 insitu_status session_check_meshes(const session_meshes *meshes, const session_team *team, base_error *error);
 
 #endif

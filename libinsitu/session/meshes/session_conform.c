@@ -1,7 +1,7 @@
 /* The code that processes meshes reads coordinates as float32 or float64, indices as int32 or int64, and flags as
- * bytes, int32 or int64, all aligned: its loops are compiled once for each combination of these types. Arrays of other
- * types are converted here, so that no other code has to read them. Unsigned indices are read as signed ones, without a
- * copy, as long as they are below half of their range. */
+ * bytes, int32 or int64, all aligned, because its loops are compiled once for each combination of these types. Arrays
+ * of other types are converted here, so that all other code can rely on these types. Unsigned indices are read as
+ * signed ones, without a copy, as long as they are below half of their range. */
 #include "session_conform.h"
 
 #include <string.h>
@@ -169,9 +169,9 @@ static bool copy_map(const insitu_mesh *original, session_conformed *out)
     return true;
 }
 
-/* If the type of the array with this number cannot be read in place, makes the description refer to a copy of it. If
- * is_kept, the previous description's copy is reused; otherwise a new one is allocated. Returns false if memory runs
- * out. */
+/* Makes the description refer to a copy of the array with this number, if the array cannot be read in place. If
+ * is_kept, the copy of the previous description is reused; otherwise a new one is allocated. Returns false if memory
+ * runs out. */
 static bool refer_to_copy(session_conformed *last, bool is_kept, int number, insitu_mesh *given, session_conformed *out)
 {
     const conform_array of = find_array(given, number);
@@ -211,7 +211,8 @@ insitu_status session_conform_mesh(session_mesh *mesh, const insitu_mesh *origin
     session_drop_conformed(&mesh->conformed);
     mesh->conformed = made;
     mesh->original = *original;
-    mesh->original.cell_type_map = NULL; /* copy_map() has copied the map already */
+    mesh->original.cell_type_map =
+        NULL; /* the description no longer refers to the caller's map, because copy_map() has copied it */
     mesh->given = given;
     mesh->given.cell_type_map = NULL;
     return INSITU_OK;

@@ -1,5 +1,5 @@
-/* Copies those arrays of a mesh that other code cannot read in place: coordinates given as integers, small integers,
- * flags of more than one byte, cell types in the caller's own numbers, and arrays that are not aligned. */
+/* Copies arrays of a mesh that other code cannot read in place. These are coordinates given as integers, small
+ * integers, flags of more than one byte, cell types in the caller's own numbers, and arrays that are not aligned. */
 #ifndef SESSION_CONFORM_H
 #define SESSION_CONFORM_H
 

@@ -1,13 +1,13 @@
-/* Along a line of a hex's lattice the polynomial is that through the values on the line. In a tet or triangle with
- * equispaced nodes, the function that is 1 at node (i, j, k, l) of order p = i + j + k + l and 0 at the others is
+/* Along a line of nodes in a hex's lattice, the polynomial interpolates the values at these nodes. In a tet or triangle
+ * with equispaced nodes, the function that is 1 at node (i, j, k, l) of order p = i + j + k + l and 0 at the others is
  *
  *     B_i(p a) B_j(p b) B_k(p c) B_l(p d),   B_n(t) = t (t - 1) ... (t - n + 1) / n!
  *
  * at the barycentric coordinates a, b, c, d (Silvester 1969). A wedge's polynomial is the product of a triangle's and
  * a line's.
  *
- * In finer lattices (session_finer.h) the polynomials have a lower order than the lattice, and follow from fewer nodes:
- * those on the line, or in the triangle or tet, that are multiples of `parts`. The sums are then short.
+ * In finer lattices (session_finer.h) the polynomials have a lower order than the lattice, and are determined by fewer
+ * nodes: only those whose indices are multiples of `parts`. Therefore the sums have few terms.
  *
  * The polynomials of serendipity cells are those of complete cells of order 2 whose values at the missing nodes follow
  * from the others: at the middle of a face half the sum of the midpoints around it, less a quarter of that of the
@@ -168,7 +168,7 @@ static void add_line(term_list *list, const int at[3], int axis)
 static void add_barycentric(term_list *list, const int b[4], int coordinate, int k, double sign)
 {
     const int p = list->order_of_polynomial, parts = list->parts;
-    int n[4], most[4]; /* above most[m], B_n is 0 */
+    int n[4], most[4]; /* most[m] is the largest n[m] for which B_n is not 0 */
     for (int m = 0; m < 4; m++) most[m] = m != coordinate && b[m] % parts == 0 ? b[m] / parts : p;
     if (list->of->type != GRID_TET) most[2] = 0;
     for (n[2] = 0; n[2] <= most[2]; n[2]++)
@@ -198,7 +198,7 @@ static void add_derivative(term_list *list, const int at[3], int axis)
 
 /* ---- kinds ----------------------------------------------------------------------------------------------------- */
 
-/* Lists the derivatives at all nodes. `nodes_at` has the place in the lattice of each position of the row. */
+/* Lists the derivatives at all nodes. `nodes_at` contains the lattice indices of each node of the row. */
 static void list_terms(term_list *list, const int (*nodes_at)[3])
 {
     session_derivatives *out = list->out;

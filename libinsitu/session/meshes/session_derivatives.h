@@ -5,8 +5,8 @@
 
 #include "session_rows.h"
 
-/* The derivatives of one kind of cell. Those of node n along axis a are the terms from starts[axis_count * n + a] on,
- * up to the next start. */
+/* The derivatives of one kind of cell. The derivative at node n along axis a consists of the terms from
+ * starts[axis_count * n + a] up to the next start. */
 typedef struct session_derivatives {
     int axis_count;       /* 3; 2 for triangles and quads; 0 for pyramids, whose derivatives are not known */
     double first_segment; /* distance between the first two nodes of an edge of length 1 */
@@ -16,8 +16,8 @@ typedef struct session_derivatives {
 } session_derivatives;
 
 /* Finds the derivatives of a kind of cell. is_lobatto: nodes along edges are Gauss-Lobatto points, otherwise they are
- * equispaced. parts: the polynomial's order is that of the nodes divided by this number, so that it is known from every
- * parts-th node along each axis; 1 for serendipity cells. Returns false if memory runs out; the caller must drop *out
+ * equispaced. parts: the order of the nodes divided by that of the polynomial, so that every parts-th node along each
+ * axis determines the polynomial; 1 for serendipity cells. Returns false if memory runs out; the caller must drop *out
  * in any case. */
 bool session_make_derivatives(const session_nodes *of, insitu_vertex_order order, bool is_lobatto, int parts,
                               session_derivatives *out);
@@ -41,11 +41,11 @@ typedef struct session_polynomials {
     const int64_t *first_pieces; /* same as session_topology.first_pieces */
     int64_t cell_count;          /* number of the caller's cells */
     insitu_vertex_order order;
-    /* for each kind, the derivatives for equispaced nodes, then those for Gauss-Lobatto points; if the mesh has finer
-     * lattices, those at the nodes of refined cells, then of others */
+    /* two entries for each kind of cell: derivatives for equispaced nodes and for Gauss-Lobatto points or, if the mesh
+     * has finer lattices, derivatives at the nodes of refined cells and of all other cells */
     session_derivatives *kinds;
-    /* If the mesh has finer lattices: the caller's rows, by whose kinds the derivatives are listed, and for each kind
-     * the number of nodes of refined cells. Otherwise the list of kinds is empty. */
+    /* If the mesh has finer lattices: the rows of the caller's cells, whose kinds number the derivatives, and for each
+     * kind the number of nodes of refined cells. Otherwise the list of kinds is empty. */
     session_rows nodal;
     int64_t refined_counts[ROWS_MOST_KINDS];
 } session_polynomials;
@@ -55,8 +55,8 @@ typedef struct session_polynomials {
 bool session_polynomials_create(const session_mesh *mesh, session_polynomials *out);
 void session_polynomials_free(session_polynomials *polynomials);
 
-/* Returns the derivatives of a cell. positions: those of its nodes, by which equispaced nodes of quads and hexes of
- * order 3 and more are distinguished from Gauss-Lobatto points; `stride` doubles lie between the beginnings of two. */
+/* Returns the derivatives of a cell. positions: positions of the cell's nodes, `stride` doubles apart. In quads and
+ * hexes of order 3 and more, they show whether nodes are equispaced or Gauss-Lobatto points. */
 const session_derivatives *session_derivatives_of(const session_polynomials *polynomials, int64_t cell,
                                                   const double *positions, int stride);
 

@@ -119,15 +119,15 @@ static session_cell_bound bound_cell(const deviation_work *w, const session_boun
 }
 
 /* Returns the largest surface error that is reported for a cell: half the distance between two nodes, plus the error of
- * positions. Half the distance is the error of a linear piece across half a circle from node to node. If a surface
- * bends more, the nodes do not resolve it. */
+ * positions. Half the distance is the error if the exact surface between two nodes is half a circle. If a surface bends
+ * more, the nodes do not resolve it. */
 static double limit_error(const session_cell_bound *bound)
 {
     return 0.5 * bound->node_distance + bound->position_error;
 }
 
-/* Returns a bound of the isosurfaces' error in a cell. Finer lattices are used as long as the bound exceeds `enough` or
- * limit_error(). first: the bounds from the coarsest lattice. */
+/* Returns a bound of the isosurfaces' error in a cell. Successively finer lattices are used while the bound exceeds
+ * `enough` or limit_error(). `first` contains the bounds from the coarsest lattice. */
 static double find_surface_error(const deviation_work *w, const session_bound *of, int64_t cell, double enough,
                                  const session_cell_bound *first, double *buffer)
 {

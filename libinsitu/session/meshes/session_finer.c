@@ -12,7 +12,8 @@
 #include "session_split.h"
 #include "session_topology.h"
 
-/* What the ranks count of a mesh, in session_finer.counts: the blocks whose highest order is each one, and cells. */
+/* Indices in session_finer.counts, which the ranks reduce. The first entries count blocks by their highest order; the
+ * entries named here count cells. */
 enum { LOBATTO = NODES_MOST_ORDER + 1, EQUISPACED, PYRAMIDS, SERENDIPITY, SHELLS };
 _Static_assert((int)SHELLS < (int)SESSION_FINER_COUNTS, "each count has a place");
 
@@ -21,8 +22,9 @@ _Static_assert((int)SHELLS < (int)SESSION_FINER_COUNTS, "each count has a place"
 typedef struct finer_work {
     session_rows rows; /* rows of the caller's cells */
     const session_finer *finer;
-    const unsigned char *marks; /* while lattices are made: set for cells that are refined; NULL: all cells are */
-    /* for each kind of row, with the parts of refined cells, and with one part */
+    const unsigned char *marks; /* while lattices are made: one byte per cell, nonzero if the cell is refined; NULL: all
+                                   cells are refined */
+    /* for each kind of row, the interpolation for refined cells, and that for one part per edge between two nodes */
     session_interpolation kinds[ROWS_MOST_KINDS][2];
     int64_t node_count; /* number of nodes of all finer lattices */
 } finer_work;
@@ -45,7 +47,8 @@ static bool begin_work(const session_finer *finer, const unsigned char *marks, f
     return is_made;
 }
 
-/* Returns whether a cell of finished lattices is refined. count: number of nodes of refined cells of its kind. */
+/* Returns whether a cell is refined, after lattices have been made. count: number of nodes of refined cells of this
+ * cell's kind. */
 static bool is_refined(const session_finer *finer, int count, int64_t cell)
 {
     return !finer->offsets || finer->offsets[cell + 1] - finer->offsets[cell] == count;
@@ -153,7 +156,7 @@ static bool number_nodes(finer_work *w, session_finer *finer)
     return true;
 }
 
-/* Describes the finer cells as a caller would. */
+/* Describes the finer cells by an insitu_mesh, as if the caller had passed them. */
 static void describe_cells(const finer_work *w, session_finer *finer)
 {
     insitu_mesh *fine = &finer->fine;
@@ -193,7 +196,7 @@ static bool make_cells(session_finer *finer, const unsigned char *marks, int thr
     return is_made;
 }
 
-/* Frees what was computed for the nodes that were read so far. */
+/* Frees the data that was computed for the nodes read so far. */
 static void drop_node_data(session_meshes *meshes, session_mesh *mesh)
 {
     session_drop_cell_data(meshes, mesh);
@@ -217,7 +220,7 @@ void session_end_finer(session_meshes *meshes)
     }
 }
 
-/* Returns whether the lattices and their pieces are those of the marks. */
+/* Returns whether the existing lattices and their pieces were made for these marks. */
 static bool has_marks(const session_finer *finer, const session_cell_marks *marks)
 {
     static const session_piece_set all = {NULL, NULL};
@@ -399,8 +402,8 @@ void session_free_choices(session_finer_choice *choices, int count)
     base_free(choices);
 }
 
-/* Adds the bytes of the lattices of so many cells with these parts: vertices and parents of pieces of 4 bytes, and
- * nodes. */
+/* Adds the number of bytes that finer lattices of `count` cells take with this number of parts: 4 bytes for each vertex
+ * and each parent of a piece, and the nodes. */
 static void add_bytes(const session_nodes *nodes, int parts, int64_t cells, session_finer_bytes *out)
 {
     const int64_t m = parts * nodes->order, pieces = grid_is_shell_type(nodes->type) ? m * m : m * m * m;

@@ -1,9 +1,9 @@
 /* Evaluates the polynomials of cells of higher order between their nodes.
  *
  * A cell of order p each of whose edges between two nodes is cut into n parts is read as a cell of order n p whose
- * nodes have the polynomial's values and positions. Cells that are not refined have n = 1. All other code reads these
- * cells in place of the caller's: it splits them into linear pieces, finds their gradients, and counts them by the same
- * numbers. Each cell has its nodes for itself. Nodes on common faces have the same bits in all cells
+ * nodes have the polynomial's values and positions. Cells that are not refined have n = 1. All other code reads
+ * these cells in place of the caller's: it splits them into linear pieces, finds their gradients, and counts them by
+ * the same numbers. Cells do not share nodes. Nodes on common faces have the same bits in all cells
  * (session_interpolation.h), so that they are found by their coordinates. */
 #ifndef SESSION_FINER_H
 #define SESSION_FINER_H
@@ -16,15 +16,15 @@ void session_drop_ids(const session_meshes *meshes);
 
 enum { FINER_MOST_PARTS = 8 };
 
-/* Bytes of finer lattices: of their pieces and nodes, and for each component of a field. */
+/* Size of finer lattices in bytes: of their pieces and nodes, and of the values of one component of a field. */
 typedef struct session_finer_bytes {
     int64_t own, per_component;
 } session_finer_bytes;
 
-/* What is refined of a part of a mesh on this rank. */
+/* The cells that are refined in a part of a mesh on this rank. */
 typedef struct session_cell_marks {
     unsigned char *cells;     /* one byte per cell, which the caller sets if the cell is refined */
-    session_piece_set pieces; /* the pieces of refined cells; empty if `parts` is 1 */
+    session_piece_set pieces; /* the pieces that are made of refined cells; empty if session_finer_choice.parts is 1 */
 } session_cell_marks;
 
 /* The cells of higher order of a mesh on all ranks, and the number of pieces that was chosen for them; the same on
@@ -32,12 +32,14 @@ typedef struct session_cell_marks {
 typedef struct session_finer_choice {
     int order; /* highest order of its cells; 0: no rank has cells of higher order */
     int64_t serendipity_count, shell_count;
-    int64_t excluded_count; /* number of pyramids above INTERPOLATION_MOST_PYRAMID, with which a mesh has 1 piece */
-    bool is_lobatto;        /* set if nodes of hexes and quads are taken as Gauss-Lobatto points */
+    int64_t excluded_count; /* number of pyramids of an order above INTERPOLATION_MOST_PYRAMID; a mesh with such
+                               pyramids cannot have finer lattices */
+    bool is_lobatto;        /* true: nodes of hexes and quads are treated as Gauss-Lobatto points */
     int parts; /* number of parts of each edge between two nodes, 1 .. FINER_MOST_PARTS; it is chosen by the caller */
-    bool is_completed;         /* set by the caller if serendipity cells get all nodes of their order, for 1 part */
-    int mark_count;            /* number of parts of the mesh on this rank; 0: all cells are refined */
-    session_cell_marks *marks; /* for each of these parts */
+    bool is_completed; /* with `parts` = 1: set by the caller if nodes are added to serendipity cells, so that they have
+                          all nodes of their order */
+    int mark_count;    /* number of parts of the mesh on this rank; 0: all cells are refined */
+    session_cell_marks *marks; /* marks for each part of the mesh on this rank */
 } session_finer_choice;
 
 /* Frees the choices of `count` meshes. */
@@ -46,12 +48,12 @@ void session_free_choices(session_finer_choice *choices, int count);
 /* Returns the largest number of parts that is supported for the mesh. */
 int session_most_parts(const session_finer_choice *choice);
 
-/* Counts the cells of higher order of each mesh of the catalogue; `parts` is 1. Meshes must have been checked and
- * listed. Collective; all ranks return the same status. */
+/* Counts the cells of higher order of each mesh of the catalogue, and sets `parts` to 1. Meshes must have been checked
+ * and listed in the catalogue before. Collective; all ranks return the same status. */
 insitu_status session_count_finer(session_meshes *meshes, const session_catalogue *catalogue, MPI_Comm comm,
                                   session_finer_choice *choices, base_error *error);
 
-/* Allocates marks for each part of the mesh, none of which is set. Without marks all cells are refined. Returns false
+/* Allocates marks for each part of the mesh; no cell is marked yet. Without marks all cells are refined. Returns false
  * if memory runs out. Local. */
 bool session_begin_marks(session_finer_choice *choice, const session_parts *parts);
 
@@ -61,24 +63,24 @@ static inline session_cell_marks *session_marks_of(const session_finer_choice *c
     return part < choice->mark_count ? &choice->marks[part] : NULL;
 }
 
-/* Adds the bytes that finer lattices in the marked cells take, and those in other cells, by the number of parts. There
- * are none for 1 part. Local. */
+/* Adds, for each number of parts, the size in bytes of finer lattices in marked cells and in all other cells. The size
+ * is 0 for 1 part. Local. */
 void session_count_finer_bytes(const session_mesh *mesh, const unsigned char *marks,
                                session_finer_bytes out[FINER_MOST_PARTS + 1]);
 
-/* Makes finer lattices in the marked cells with the chosen numbers of parts; for 1 part only if cells are completed, in
- * all cells. Other cells are then
- * split between their own nodes, of which serendipity cells get all. Sets of pieces are moved to the meshes.
- * *are_changed is set if the cells of some mesh change on any rank; these meshes must be checked again. Collective; all
- * ranks return the same status. */
+/* Makes finer lattices in the marked cells with the chosen numbers of parts; if the number is 1, lattices are made only
+ * if is_completed is set, and then in all cells. All other cells are split between their own nodes; serendipity cells
+ * get all nodes of their order. The sets of pieces in the marks are moved to the meshes. *are_changed is set if the
+ * cells of some mesh change on any rank; these meshes must be checked again. Collective; all ranks return the same
+ * status. */
 insitu_status session_make_finer(session_meshes *meshes, const session_catalogue *catalogue,
                                  session_finer_choice *choices, const session_team *team, bool *are_changed,
                                  base_error *error);
 
-/* Reads the caller's cells in place of finer lattices, on one mesh. Local. */
+/* Makes one mesh read the caller's cells again instead of finer lattices. Local. */
 void session_end_finer_mesh(session_meshes *meshes, session_mesh *mesh);
 
-/* The same on all meshes, which also read their vertex ids again. Local. */
+/* Makes all meshes read the caller's cells and vertex ids again. Local. */
 void session_end_finer(session_meshes *meshes);
 
 /* The values at the nodes of the caller's cells. */

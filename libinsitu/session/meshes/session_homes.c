@@ -11,10 +11,10 @@
 
 enum { MOST_SAMPLES = 1024 };
 
-/* The data that each rank sends to all other ranks. */
+/* The data that each rank sends to all other ranks so that they can find homes. */
 typedef struct rank_part {
     session_box box;
-    int64_t first_id; /* first id of this rank's share of the ids */
+    int64_t first_id; /* first id of the range of ids whose home is this rank */
     int64_t has_ids;
 } rank_part;
 
@@ -34,7 +34,7 @@ static int compare_ids(const void *a, const void *b)
 }
 
 /* Returns the r-th of P quantiles of this rank's ids, where r is its rank and P the number of ranks. It is estimated
- * from an evenly spaced sample of the ids. Any sample suffices, because all ranks receive the result. */
+ * from an evenly spaced sample of the ids. The estimate need not be exact, because all ranks use the same result. */
 static int64_t sample_quantile(const session_mesh *mesh, const session_team *team)
 {
     const grid_array ids = session_grid_array(&mesh->given.vertex_ids);

@@ -1,13 +1,13 @@
 /* Determines the home ranks of items that several ranks share, namely vertices and faces on the borders between the
  * ranks' parts of a mesh. The home of an item is a rank near it, which all ranks that have the item can determine
- * without communication. So neither a rank's messages nor the number of ranks to which it sends grow with the number of
- * ranks.
+ * without communication. Therefore neither the size of a rank's messages nor the number of their receivers grows with
+ * the number of ranks.
  *
- * If items are identified by coordinates, which have the same bits on all ranks, the home is one of the ranks in whose
- * box all of the item's vertices lie, selected by the item's hash. If items are identified by global ids, their
- * coordinates may differ in the last bits, so the ids are divided among the ranks instead. Let P be the number of
- * ranks. The ids of rank r start at the r-th of P quantiles of the ids of its own vertices. So they are near its own
- * ids if ranks number their vertices consecutively, and evenly distributed if ids are random. */
+ * If items are identified by coordinates, which have the same bits on all ranks, the home is one of the ranks in
+ * whose box all of the item's vertices lie, selected by the item's hash. If items are identified by global ids,
+ * their coordinates may differ in the last bits, so the ids are divided among the ranks instead. With P ranks, the
+ * range of ids of rank r starts at the r-th of P quantiles of the ids of its own vertices. This range is near the
+ * rank's own ids if ranks number their vertices consecutively, and evenly distributed if ids are random. */
 #ifndef SESSION_HOMES_H
 #define SESSION_HOMES_H
 

@@ -1,4 +1,5 @@
-/* All weights are products of those of a line, a triangle and a tet, which are applied one after the other:
+/* All weights of interpolation are products of the weights of a line, a triangle and a tet, which are applied one after
+ * the other:
  *
  *     hex        line along i, then j, then k
  *     quad       line along i, then j
@@ -8,12 +9,12 @@
  *     triangle   triangle
  *
  * The bits of a sum depend on the order of its terms. So nodes on a face are computed a second time, from the face's
- * nodes alone, in an order that follows from the positions of the face's corners. The origin is the corner that is
- * first in the order of coordinates, and the first axis leads to the corner next to it that comes earlier in that
- * order. Nodes on an edge are then computed from the edge's nodes alone, from the end that is first, and corners are
- * copied. All cells at a face or an edge do the same, on any rank.
+ * nodes alone, in an order that follows from the positions of the face's corners. The origin is the corner with the
+ * lexicographically smallest position, and the first axis leads to that neighbouring corner whose position is smaller.
+ * Then nodes on an edge are computed from the edge's nodes alone, beginning at the end with the smaller position, and
+ * corners are copied. All cells that share a face or an edge compute its nodes in the same way, on all ranks.
  *
- * Each sum is that of differences from its first value, so that a constant is reproduced exactly. */
+ * Each sum adds up differences from its first value, so that a constant is reproduced exactly. */
 #include "session_interpolation.h"
 
 #include <math.h>
@@ -142,7 +143,7 @@ static void solve_rows(int size, int rows, double *a, double *b)
             row[c] = scaled;
         }
     }
-    /* each row of B now holds its products with the upper triangle's inverse; the lower triangle has ones on its
+    /* each row of B has been multiplied by the inverse of the upper triangle; the lower triangle has ones on its
      * diagonal */
     for (int r = 0; r < rows; r++)
         for (int c = size - 1; c >= 0; c--)
@@ -259,7 +260,7 @@ size_t session_interpolation_work_size(const session_interpolation *of, int comp
     return ((size_t)of->complete.count + 2 * (size_t)of->fine.count) * (size_t)components;
 }
 
-/* Computes one row of a product, number by number, so that sums of short tuples stay in registers. */
+/* Computes one row of a product of matrices, number by number, so that sums of short tuples stay in registers. */
 static void apply_row(const double *row, int columns, int inner, const double *in, double *out)
 {
     for (int s = 0; s < inner; s++) {
@@ -270,7 +271,8 @@ static void apply_row(const double *row, int columns, int inner, const double *i
     }
 }
 
-/* As above for long tuples, in an order that suits vectors. Each sum has the same terms in the same order. */
+/* Does the same as apply_row() for long tuples, with loops that the compiler can vectorize. Each sum has the same terms
+ * in the same order. */
 static void apply_long_row(const double *row, int columns, int inner, const double *restrict in, double *restrict out)
 {
     for (int s = 0; s < inner; s++) out[s] = 0;

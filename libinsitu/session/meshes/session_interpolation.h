@@ -11,35 +11,35 @@ typedef struct session_interpolation {
     session_nodes of;       /* the cell's own nodes */
     session_nodes complete; /* all nodes of the lattice of the cell's order */
     session_nodes fine;     /* the nodes of the finer lattice, which are equispaced */
-    int *positions;         /* for each node of `complete`, in lexicographic order, its position in the cell's row; at
-                               least of.count if a serendipity cell lacks it */
-    int corners[8];         /* position of each corner in the cell's row; corners are in VTK's order */
-    double *line;           /* weights on an edge: its fine nodes x its nodes */
-    double *triangle;       /* weights of triangles; NULL if the type of cell has none */
-    double *whole;          /* for tets and pyramids: weights of all fine nodes x all nodes of `complete` */
+    int *positions; /* for each node of `complete`, in lexicographic order, its position in the cell's row; an entry of
+                       at least of.count marks a node that a serendipity cell lacks */
+    int corners[8]; /* position of each corner in the cell's row; corners are in VTK's order */
+    double *line;   /* weights on an edge: a matrix of (fine nodes of the edge) x (nodes of the edge) */
+    double *triangle; /* weights of triangles; NULL if the type of cell has none */
+    double *whole;    /* for tets and pyramids: weights, a matrix of (all fine nodes) x (all nodes of `complete`) */
 } session_interpolation;
 
 /* Largest order of pyramids that can be interpolated, because a matrix of all of their nodes is inverted. */
 enum { INTERPOLATION_MOST_PYRAMID = 6 };
 
 /* Finds the interpolation in a kind of cell to a lattice of order parts * of->order, which must be at most
- * NODES_MOST_ORDER; pyramids have at most the order above. order: that of the nodes in the cell's row. is_lobatto:
- * nodes along the axes of hexes and quads are Gauss-Lobatto points; otherwise they are equispaced. Returns false if
- * memory runs out; the caller must drop *out in any case. */
+ * NODES_MOST_ORDER; pyramids have at most the order INTERPOLATION_MOST_PYRAMID. order: the order in which nodes are
+ * stored in the cell's row. is_lobatto: nodes along the axes of hexes and quads are Gauss-Lobatto points; otherwise
+ * they are equispaced. Returns false if memory runs out; the caller must drop *out in any case. */
 bool session_make_interpolation(const session_nodes *of, insitu_vertex_order order, int parts, bool is_lobatto,
                                 session_interpolation *out);
 void session_drop_interpolation(session_interpolation *interpolation);
 
-/* Finds only what session_complete_tuples() needs; there are no fine nodes and no weights. */
+/* Fills in only the members that session_complete_tuples() needs, without fine nodes and weights. */
 bool session_make_completion(const session_nodes *of, insitu_vertex_order order, session_interpolation *out);
 
-/* Computes the matrix from the values at all nodes of a pyramid of order p to those at the nodes of a hex of order p
- * whose upper face is collapsed to the apex. A pyramid's functions are polynomials of order p along each axis of that
+/* Computes the matrix from the values at all nodes of a pyramid of order p to the values at the nodes of a hex of order
+ * p whose upper face is collapsed to the apex. A pyramid's functions are polynomials of order p along each axis of that
  * hex. Returns NULL if memory runs out; the caller must free the result by base_free(). */
 double *session_make_collapse(int p);
 
-/* Puts tuples at the cell's nodes, in the order of its row, into the order of `complete`, and adds those at nodes that
- * a serendipity cell lacks. */
+/* Puts tuples at the cell's nodes, in the order of its row, into the order of `complete`, and computes the tuples at
+ * nodes that a serendipity cell lacks. */
 void session_complete_tuples(const session_interpolation *of, int components, const double *tuples, double *out);
 
 /* Returns the number of doubles that session_interpolate() needs as working memory. */

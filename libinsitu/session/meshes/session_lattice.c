@@ -1,6 +1,6 @@
 /* A lattice's cells need no connectivity: the number of a vertex is computed from its three indices. Uniform and
  * rectilinear coordinates are stored as a table along each axis. A uniform coordinate is origin + spacing * index with
- * the index in the whole lattice, so that blocks and ranks that share a vertex compute the same bits. */
+ * the index counted in the whole lattice, so that blocks and ranks that share a vertex compute the same bits. */
 #include "session_lattice.h"
 
 #include <math.h>
@@ -76,7 +76,8 @@ static void order_axes(const int64_t strides[3], const int64_t counts[3], int or
     }
 }
 
-/* Checks that the strides nest, and that all count[0] x count[1] x count[2] numbers lie within an array. */
+/* Checks that each stride is at least the extent of the next smaller one (nested strides), and that all count[0] x
+ * count[1] x count[2] elements lie within the array. */
 static insitu_status check_strides(const char *what, const int64_t strides[3], const int64_t counts[3], int64_t length,
                                    base_error *error)
 {
@@ -145,7 +146,7 @@ static insitu_status check_interior(const insitu_lattice *l, base_error *error)
     return INSITU_OK;
 }
 
-/* Some integers above this are not representable as doubles. */
+/* Largest magnitude of `first`, because doubles do not represent all larger integers. */
 static const int64_t largest_first = (int64_t)1 << 53;
 
 /* Limits that keep products of indices and refinements within 2^62. */
@@ -198,7 +199,7 @@ static insitu_status check_axes(const insitu_lattice *l, base_error *error)
     return INSITU_OK;
 }
 
-/* Checks that a mesh with a lattice has no other description of its cells. */
+/* Checks that a mesh with a lattice does not also describe its cells by connectivity or faces. */
 static insitu_status check_others(const insitu_mesh *mesh, base_error *error)
 {
     const struct {
@@ -255,7 +256,7 @@ unsigned session_lattice_changes(const insitu_lattice *a, const insitu_lattice *
         memcmp(a->interior_end, b->interior_end, sizeof a->interior_end) != 0)
         changes |= INSITU_CHANGED_TOPOLOGY;
     const bool is_moved = memcmp(a->first, b->first, sizeof a->first) != 0;
-    /* finer blocks may now cover other cells of this block, or this block other cells of coarser ones */
+    /* the set of covered cells may have changed, in this block and in coarser blocks */
     if (memcmp(a->refinement, b->refinement, sizeof a->refinement) != 0 || (is_moved && !are_all_zero(a->refinement)))
         changes |= INSITU_CHANGED_TOPOLOGY;
     for (int axis = 0; axis < 3; axis++)
@@ -310,7 +311,7 @@ void session_copy_lattice(session_mesh *mesh)
     }
     compute_packed_strides(vertices, packed);
     out->vertex_numbering = make_numbering(are_all_zero(l->vertex_strides) ? packed : l->vertex_strides, vertices);
-    /* the axis without cells comes last, so that the first four corners of a cell form its quad */
+    /* the axis without cells is moved to the end, so that the first four corners of a cell form its quad */
     const int last = l->cells[0] ? l->cells[1] ? 2 : 1 : 0, axes[3] = {last == 0, last == 2 ? 1 : 2, last};
     for (int i = 0; i < 8; i++) {
         out->corner_offsets[i] = 0;

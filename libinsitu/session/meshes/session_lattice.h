@@ -21,7 +21,7 @@ unsigned session_lattice_changes(const insitu_lattice *a, const insitu_lattice *
  * Local. */
 void session_copy_lattice(session_mesh *mesh);
 
-/* Completes the grid of a mesh with a lattice: sets the cell type and the indices and, unless coordinates are given by
+/* Completes the grid of a mesh with a lattice: sets the cell type, the indices and, unless coordinates are given by
  * vertex, the coordinates. */
 void session_read_lattice(session_mesh *mesh, grid *g);
 

@@ -1,4 +1,4 @@
-/* The table of meshes, sorted by name and block, so that all ranks visit theirs in the same order. */
+/* The table of meshes, sorted by name and block, so that all ranks visit their meshes in the same order. */
 #include "session_mesh.h"
 
 #include <stdio.h>
@@ -45,7 +45,7 @@ grid_array session_grid_array(const insitu_array *array)
 
 grid_array session_coordinates(const insitu_mesh *mesh, int axis)
 {
-    static const double zero = 0; /* its first four bytes are also a 0 of type float */
+    static const double zero = 0; /* read as double or as float, because the first four bytes are a float 0 too */
     const insitu_array *given = &mesh->coordinates[axis];
     if (given->data) return session_grid_array(given);
     return (grid_array){.data = (const char *)&zero, .is_wide = session_type_size(mesh->coordinates[0].type) == 8};

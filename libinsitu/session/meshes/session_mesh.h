@@ -24,12 +24,13 @@ typedef struct session_field {
     base_error fill_problem;
     /* set if the session computes the field from other fields, in `copy` (plan/session_derived.h) */
     bool is_derived;
-    bool is_source;       /* set if this step computes a derived field from it */
+    bool is_source;       /* set if this step computes a derived field from this field */
     bool is_displacement; /* set if the scene displaces the mesh's vertices by this field */
     /* hash of the inputs from which a derived field was computed; 0: there are no values yet */
     uint64_t inputs_hash;
     int64_t version;          /* number of times that the values are known to have changed */
-    int64_t source_version;   /* on a mirror image: `version` of the source's field from which the values were taken */
+    int64_t source_version;   /* on a mirror image: `version` that the field of the source mesh had when the values were
+                                 copied from it */
     bool has_borrowed_copy;   /* set if `copy` is owned by the field of a mirror image's source */
     insitu_patch *patches;    /* copy of the table given.patches, owned by the session */
     insitu_array *components; /* copy of the table given.components, owned by the session */
@@ -57,7 +58,8 @@ typedef struct session_extremes {
 typedef struct session_plane {
     double normal[3]; /* unit normal of the plane */
     double point[3];  /* a point on the plane */
-    /* set if the point is at `offset` along the normal from the centre of the data's bounds, and follows the centre */
+    /* true: the point is not fixed, but at the distance `offset` along the normal from the centre of the data's
+     * bounds */
     bool is_central;
     double offset; /* distance along the normal from the centre of the data's bounds to the point */
     /* additional shift along the normal, as a fraction (-1 .. 1) of half the data's extent */
@@ -77,8 +79,8 @@ typedef struct session_scalar {
     /* set if an image of this step needs ranges of its values in the tree; scalars that only give colours need none */
     bool needs_ranges;
     bool needs_all_cells; /* set if an image of this step may show any cell, whatever its values are */
-    /* Intervals of the values that this step's images show, unless needs_all_cells is set. Only cells whose values
-     * intersect an interval are needed. */
+    /* Intervals of values that this step's images show; not used if needs_all_cells is set. Images need only cells
+     * whose range of values intersects an interval. */
     int interval_count;
     mmbvh_interval *intervals;
     session_plane plane; /* the plane from which distances are computed */
@@ -94,7 +96,7 @@ typedef struct session_scalar {
     bool are_values_stale;    /* set if recentred values must be computed again */
     bool may_have_changed;    /* set if the caller has set the field again, so that the values may have changed */
     bool has_checksum;        /* set if the checksums below have been computed */
-    uint64_t checksum;        /* checksum of all values of the last picture */
+    uint64_t checksum;        /* checksum of all values at the last picture */
     uint64_t sample_checksum; /* checksum of a few of the values */
     int64_t version;          /* number of times that a checksum has shown that the values have changed */
     bool has_own_ranges;      /* set if ranges are stored in node_ranges, and not in the tree's nodes */
@@ -144,8 +146,8 @@ typedef struct session_outer {
     int64_t bytes;
 } session_outer;
 
-/* Arrays owned by the session that are read in place of the caller's (session_topology.h). They are computed once per
- * topology. insitu_report lists them as copies. */
+/* Arrays owned by the session that are read instead of the caller's arrays (session_topology.h). They are computed once
+ * per topology. insitu_report lists them as copies. */
 typedef struct session_topology {
     /* set if the arrays match the current cells, even if nothing had to be computed */
     bool is_made;
@@ -161,8 +163,9 @@ typedef struct session_topology {
     int64_t cell_bytes, face_bytes;
     int64_t polyhedron_count; /* number of polyhedra that the caller gave */
     int64_t recognised_count; /* number of these polyhedra that are read as tets, hexes, wedges or pyramids */
-    /* Cells of higher order are read as linear pieces (session_split.h); the pieces of a cell are consecutive. */
-    bool is_split;               /* set if cells are split; if not set, the members below are empty */
+    /* Cells of higher order are read as several linear cells, called pieces (session_split.h); the pieces of a cell are
+     * consecutive. */
+    bool is_split;               /* true: cells are split into pieces; false: the members below are empty */
     bool depends_on_coordinates; /* set if the pieces depend on the coordinates */
     int64_t cell_count;          /* number of pieces into which the cells are split */
     uint32_t *parents;           /* for each piece, the caller's cell */
@@ -187,7 +190,7 @@ typedef struct session_discontinuous {
     int64_t bytes;
 } session_discontinuous;
 
-/* Bounds and sizes of the drawn cells of a mesh (members of session_mesh with these names). */
+/* Bounds and sizes of the drawn cells of a mesh (see the members of session_mesh with the same names). */
 typedef struct session_sizes {
     double lower[3], upper[3];
     int64_t drawn_count, flat_count;
@@ -199,10 +202,10 @@ typedef struct session_counts {
     int64_t drawn_count, ghost_count, inverted_count, flat_count, shell_count;
 } session_counts;
 
-/* The pieces that are made of each cell of a mesh. */
+/* The linear pieces that are made of each cell of higher order. */
 typedef struct session_piece_set {
-    /* for each cell and at the end, the index of the first of its words in `bits`; a cell without words has all of its
-     * pieces. NULL: all cells have all of their pieces */
+    /* for each cell, the index of its first word in `bits`; a final entry marks the end. For a cell without words, all
+     * pieces are made. NULL: all pieces of all cells are made */
     int64_t *first_words;
     uint64_t *bits; /* one bit per piece of a cell, in the order of the cell's pattern; set if the piece is made */
 } session_piece_set;
@@ -215,15 +218,15 @@ typedef struct session_finer {
     bool is_counted; /* set if `counts` are those of the current cells */
     int64_t counts[SESSION_FINER_COUNTS];
     int parts; /* number of parts of each edge between two nodes; 0: session_mesh.given is the caller's mesh */
-    /* what the mesh has without finer lattices */
+    /* the sizes of the mesh without finer lattices */
     session_sizes sizes;
     session_counts given_counts;
     session_piece_set pieces;
-    bool is_lobatto;     /* set if nodes of hexes and quads are taken as Gauss-Lobatto points */
+    bool is_lobatto;     /* true: nodes of hexes and quads are treated as Gauss-Lobatto points */
     insitu_mesh nodal;   /* the caller's mesh with copies in place of the arrays that cannot be read in place */
     insitu_mesh fine;    /* same as session_mesh.given: cells with separate nodes in lexicographic order */
-    double *coordinates; /* 3 per node */
-    int64_t *offsets;    /* NULL if all cells have the same type and order */
+    double *coordinates; /* 3 coordinates per node of the finer lattices */
+    int64_t *offsets;    /* offsets of the finer cells; NULL if all cells have the same type and order */
     unsigned char *types;
     int64_t bytes;
 } session_finer;
@@ -242,9 +245,9 @@ typedef struct session_lattice {
 typedef struct session_warp {
     bool is_applied;             /* set if the moved coordinates are read */
     bool is_stale;               /* set if the caller's coordinates may have changed since they were moved */
-    uint64_t key;                /* hash that identifies the displacements by which they were moved */
+    uint64_t key;                /* hash of the displacements by which the coordinates were moved */
     char *coordinate_memory;     /* memory of the moved coordinates (session_own_coordinates.h) */
-    insitu_array coordinates[3]; /* the moved coordinates; no data along an axis if they are the caller's */
+    insitu_array coordinates[3]; /* the moved coordinates; an axis has no data if its coordinates are the caller's */
     insitu_array unmoved[3];     /* values of session_mesh.given before the vertices were moved */
     /* the caller's lattice without its coordinates along the axes, because moved coordinates are given by vertex */
     insitu_lattice lattice;
@@ -252,16 +255,17 @@ typedef struct session_warp {
     base_error problem; /* the reason why the vertices could not be moved; the check of the mesh returns it */
 } session_warp;
 
-/* Coordinates of a mirror image (session_mirror.h). insitu_report lists those that are computed as a copy. */
+/* Coordinates of a mirror image (session_mirror.h). insitu_report lists computed coordinates as a copy. */
 typedef struct session_mirrored {
     /* for each axis along which the image is mirrored, the coordinate of its mirror plane */
     double planes[3];
     char *coordinate_memory;     /* memory of the mirrored coordinates (session_own_coordinates.h) */
-    insitu_array coordinates[3]; /* the mirrored coordinates; no data along an axis if they are those of the source */
+    insitu_array coordinates[3]; /* the mirrored coordinates; an axis has no data if its coordinates are those of the
+                                    source mesh */
     double *axes[3];             /* coordinates along a lattice's axes, owned; NULL: coordinates are given by vertex */
     insitu_lattice lattice;      /* lattice in the image's description */
     int64_t bytes;
-    /* the source's members of these names at the time when the image was made */
+    /* values of these members of the source mesh when the image was made */
     int64_t cells_stamp, coordinates_stamp;
 } session_mirrored;
 
@@ -292,22 +296,23 @@ typedef struct session_misfit {
     int rank;                  /* rank that has the finer block */
 } session_misfit;
 
-/* Block number of a mesh that does not consist of blocks; blocks have numbers from 0 on. */
+/* Value of session_mesh.block for a mesh that does not consist of blocks; blocks have numbers from 0 on. */
 #define SESSION_WHOLE INT64_MIN
 
 /* One rank's part of a mesh, or one block of it. Blocks of one mesh have the same name. */
 typedef struct session_mesh {
     char *name;
     int64_t block; /* the block's number, or SESSION_WHOLE */
-    /* Mirror images are further parts of the mesh beside the caller's own. Statistics, counts and errors ignore
-     * them. */
-    struct session_mesh *source; /* the caller's part of which this one is a mirror image; NULL: it is the caller's */
-    int mirror_axes;             /* bit i is set if the image is mirrored along axis i; 0: it is the caller's part */
+    /* A mesh that the scene mirrors has its mirror images as further parts, in addition to the caller's own parts.
+     * Statistics, counts and errors ignore them. */
+    struct session_mesh
+        *source;     /* for a mirror image: the caller's part that is mirrored; NULL: this part is the caller's */
+    int mirror_axes; /* bit i is set if this mirror image is mirrored along axis i; 0: this part is the caller's */
     session_mirrored mirrored;
     char *label;          /* name for messages: "m", or "m[17]" for block 17 */
     insitu_mesh original; /* the caller's description */
-    /* the description with copies in place of the arrays that cannot be read in place, and of moved coordinates, or the
-     * cells of finer lattices */
+    /* the description that is read: as `original`, but with copies of arrays that cannot be read in place, and with
+     * moved coordinates; or the cells of finer lattices */
     insitu_mesh given;
     session_conformed conformed;
     session_topology topology;
@@ -326,7 +331,7 @@ typedef struct session_mesh {
     int field_count;
     session_field *fields;
 
-    /* session_meshes.stamp at the last change of the cells, and at that of the coordinates */
+    /* session_meshes.stamp at the last change of the cells, and at the last change of the coordinates */
     int64_t cells_stamp, coordinates_stamp;
     bool is_check_stale;       /* set if cells or coordinates have not been checked since they changed */
     bool is_topology_stale;    /* set if the tree was built for other cells */
@@ -336,7 +341,7 @@ typedef struct session_mesh {
      * flat */
     int64_t drawn_count, flat_count, shell_count;
     session_counts given_counts; /* counts of the caller's cells */
-    /* same as session_catalogue_mesh.has_shells_alone, so true only if it holds over all ranks */
+    /* true if all drawn cells of the mesh are shells, on all ranks (session_catalogue_mesh.has_shells_alone) */
     bool has_shells_alone;
     double size_sum;      /* sum of the cube roots of the volumes of the drawn cells */
     uint64_t *flat_cells; /* one bit per cell, set if the cell is flat (grid.flat); NULL: no cell is flat */
@@ -386,10 +391,10 @@ typedef struct session_meshes {
     int64_t stamp; /* incremented by each change of cells or coordinates */
     /* set if the last step that drew an image warped or mirrored meshes; the same on all ranks */
     bool are_transformed;
-    /* error of a set call that belongs to no stored mesh; it is kept for one step */
+    /* error of an insitu_set_*() call that belongs to no stored mesh; it is kept for one step */
     base_error pending_error;
     char *pending_mesh, *pending_field; /* mesh and field of this error; NULL: it belongs to no particular one */
-    /* number of meshes that this step ignores; they are stored in `items` after the first `count` meshes */
+    /* number of meshes that this step ignores; they are stored in `items` behind the first `count` meshes */
     int excluded_count;
     session_filling filling;
 } session_meshes;
@@ -454,7 +459,7 @@ typedef struct session_parts {
     session_mesh **items;
 } session_parts;
 
-/* Returns the description of a mesh by the caller's nodes, which may be read as finer lattices. */
+/* Returns the description of a mesh whose cells have the caller's nodes, even if finer lattices are read instead. */
 static inline const insitu_mesh *session_nodal_mesh(const session_mesh *mesh)
 {
     return mesh->finer.parts ? &mesh->finer.nodal : &mesh->given;
@@ -539,7 +544,7 @@ typedef struct session_part_walk {
 /* Advances to the next part. Returns false after the last one. */
 bool session_next_part(session_part_walk *walk);
 
-/* Returns the part that the caller gave: the source of a mirror image, or the part itself. */
+/* Returns the caller's part: for a mirror image the part that is mirrored, otherwise the part itself. */
 static inline const session_mesh *session_source(const session_mesh *mesh)
 {
     return mesh->source ? mesh->source : mesh;
@@ -600,8 +605,8 @@ void session_exclude_mesh(session_meshes *meshes, session_mesh *mesh);
 /* Puts the meshes that the step has excluded back into the list. */
 void session_restore_excluded(session_meshes *meshes);
 
-/* Refuses a public call made inside a fill function, as it would change data that the step reads. Returns whether it
- * was refused; the error is stored in filling.refused_error, and the step fails with it. Local. */
+/* Refuses a public call that is made inside a fill function, because the call would change data that the step reads.
+ * Returns whether it was refused; the error is stored in filling.refused_error, and the step fails with it. Local. */
 bool session_refuse_in_fill(session_meshes *meshes, const char *call);
 
 /* Returns whether cells are described by the owners of their faces. */

@@ -1,6 +1,6 @@
 /* The set calls store meshes and fields in the table of meshes. Only descriptions are checked here; the arrays are read
- * by a step. An error is returned immediately, and is also kept with the mesh or the field until that is set again, so
- * that the next step can return it on every rank. */
+ * by a step. An error is returned immediately. It is also stored with the mesh or the field until the mesh or field is
+ * set again, so that the next step can return it on every rank. */
 #include "session_mesh_input.h"
 
 #include <stdio.h>
@@ -220,7 +220,8 @@ static insitu_status check_cell_rows(const insitu_mesh *mesh, base_error *error)
     return INSITU_OK;
 }
 
-/* Checks that `order` is only given for a mesh of one Lagrange type, in which no other array gives the order. */
+/* Checks that `order` is only given for a mesh of one Lagrange type, in which the number of nodes per cell does not
+ * already determine it. */
 static insitu_status check_lagrange_order(const insitu_mesh *mesh, base_error *error)
 {
     const int type = (int)mesh->cell_type;
@@ -315,7 +316,8 @@ static insitu_status check_mesh(const insitu_mesh *mesh, base_error *error)
     return status;
 }
 
-/* Returns whether the cells of two descriptions must differ, regardless of what the caller declares as changed. */
+/* Returns whether the cells of two descriptions differ so much that the mesh is a new one, regardless of the changes
+ * that the caller declares. */
 static bool has_other_shape(const insitu_mesh *a, const insitu_mesh *b)
 {
     return a->vertex_count != b->vertex_count || a->cell_count != b->cell_count ||
@@ -332,8 +334,8 @@ static bool has_other_shape(const insitu_mesh *a, const insitu_mesh *b)
            a->boundary_face_connectivity_count != b->boundary_face_connectivity_count;
 }
 
-/* Returns the INSITU_CHANGED_* bits of the changes between two descriptions with equal numbers of cells and vertices:
- * arrays that have another address or layout have not been checked yet. */
+/* Returns the INSITU_CHANGED_* bits of the changes between two descriptions with equal numbers of cells and vertices.
+ * Arrays with a new address or layout count as changed, because they have not been checked yet. */
 static unsigned find_description_changes(const session_mesh *mesh, const insitu_mesh *b)
 {
     const insitu_mesh *a = &mesh->original;
@@ -358,7 +360,8 @@ static unsigned find_description_changes(const session_mesh *mesh, const insitu_
 
 /* ---- meshes -------------------------------------------------------------------------------------------------- */
 
-/* Replaces the caller's new description by the finer lattices again, unless these no longer fit it. */
+/* Makes the mesh read its finer lattices again after the caller has set a new description, unless the lattices no
+ * longer fit this description. */
 static void restore_finer_lattices(session_mesh *mesh, unsigned changed)
 {
     if (changed & (INSITU_CHANGED_TOPOLOGY | INSITU_CHANGED_GEOMETRY)) session_drop_finer(&mesh->finer);
@@ -410,7 +413,7 @@ insitu_status session_prefix_error(base_error *error, const char *mesh, const ch
     return base_fail(error, what->status, "mesh \"%s\": %.700s", mesh, what->message);
 }
 
-/* Removes the mesh of this name if it is of the other kind: a mesh is either given as a whole or as blocks. */
+/* Removes the whole mesh of this name if a block is set, and the blocks of this name if a whole mesh is set. */
 static void remove_other_kind(session_meshes *meshes, const char *name, int64_t block)
 {
     const session_parts parts = session_find_parts(meshes, name);

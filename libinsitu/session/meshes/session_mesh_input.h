@@ -17,8 +17,8 @@ void session_store_mesh(session_meshes *meshes, session_mesh *mesh, const insitu
 /* Returns whether cells without z coordinates may be visible, namely as shells in the plane z = 0. */
 bool session_may_lack_z(const insitu_mesh *mesh);
 
-/* Stores the error of a check. The message begins with the mesh's name and, if there is a field, the field's name.
- * Returns the error's status. */
+/* Adds the mesh's name and, if there is a field, the field's name to the beginning of the error's message. Returns the
+ * error's status. */
 insitu_status session_prefix_error(base_error *error, const char *mesh, const char *field, const base_error *what);
 
 #endif

@@ -20,8 +20,8 @@ static bool is_mirrored(const session_mesh *image, int axis)
 
 /* ---- coordinates by vertex --------------------------------------------------------------------------------------- */
 
-/* Returns the axes along which the image stores coordinates of its own: the mirrored axes; or all axes of the source,
- * if the source's coordinates are interleaved or strided. */
+/* Returns the axes along which the mirror image stores its own coordinates. These are the mirrored axes, or all axes if
+ * the source's coordinates are interleaved or strided. */
 static int find_own_axes(const session_mesh *image)
 {
     enum { IN_PLANE = 3, ALL = 7 };
@@ -120,7 +120,7 @@ static insitu_mesh describe_image(session_mesh *image, unsigned changed)
     return out;
 }
 
-/* Returns the INSITU_CHANGED_* bits of what has changed since the image was made. */
+/* Returns the INSITU_CHANGED_* bits of the changes of the source mesh since the mirror image was made. */
 static unsigned find_changes(const session_mesh *image, const double planes[3])
 {
     const session_mirrored *m = &image->mirrored;

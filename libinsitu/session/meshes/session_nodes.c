@@ -229,7 +229,7 @@ static int number_triangle_row_node(int p, int i, int j)
     return i + j * (p + 1) - j * (j - 1) / 2;
 }
 
-/* Returns the number of nodes of a tet with so many on an edge. */
+/* Returns the number of nodes of a tet with n nodes on each edge. */
 static int count_tet_nodes(int n)
 {
     return n * (n + 1) * (n + 2) / 6;

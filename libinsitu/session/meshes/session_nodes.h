@@ -33,15 +33,15 @@ int session_lagrange_type(int corner_type);
 session_nodes session_complete_nodes(int corner_type, int order);
 
 /* Returns the number of nodes of a cell of the type and order, or 0 if there is no such cell. Order 0 stands for the
- * order of a type that has only one. */
+ * only order of a type that has just one. */
 int64_t session_node_count(int type, int order);
 
 /* Returns the reason why the vertex order is not defined for the cell, or NULL if it is defined. */
 const char *session_order_refused(const session_nodes *of, insitu_vertex_order order);
 
-/* Returns the position in the row of the cell's node i, j, k of its lattice, whose axes are the edges at the first
- * corner. Each layer k of a pyramid has one node less along i and j than the layer below. For a node that a serendipity
- * cell lacks, the result is at least session_nodes.count. */
+/* Returns the position, in the cell's row of connectivity, of the node with the lattice indices i, j, k. The axes of
+ * the lattice are the edges at the cell's first corner. Each layer k of a pyramid has one node less along i and j than
+ * the layer below. For a node that a serendipity cell lacks, the result is at least session_nodes.count. */
 int session_node_index(const session_nodes *of, insitu_vertex_order order, int i, int j, int k);
 
 /* Returns whether the lattice of the cell's order has a node i, j, k; each of them is from 0 to the order. */

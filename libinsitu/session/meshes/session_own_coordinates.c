@@ -7,7 +7,7 @@ static bool has_axis(int axes, int axis)
     return axes >> axis & 1;
 }
 
-/* Returns whether there are coordinates along exactly these axes, with these types. */
+/* Returns whether exactly these axes have coordinates, and with these types. */
 static bool have_axes_and_types(const insitu_array coordinates[3], int axes, const insitu_type types[3])
 {
     bool are_so = true;
@@ -37,7 +37,7 @@ bool session_reserve_coordinates(char **memory, insitu_array coordinates[3], int
     for (int axis = 0; axis < 3; axis++) {
         coordinates[axis] = (insitu_array){0};
         if (!*memory || !has_axis(axes, axis)) continue;
-        /* coordinates whose types differ in size are not interleaved: each axis has an array of its own */
+        /* coordinates whose types differ in size are not interleaved: each axis has a separate array */
         coordinates[axis] = (insitu_array){*memory + offset, types[axis],
                                            has_one_type ? used * largest : session_type_size(types[axis])};
         offset += has_one_type ? largest : count * largest;

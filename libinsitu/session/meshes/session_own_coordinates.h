@@ -8,13 +8,14 @@
 #include "session_mesh.h"
 
 /* Allocates memory for the coordinates of `count` vertices, in these types, along the axes whose bits are set in
- * `axes`, and makes `coordinates` refer to it; coordinates along other axes get no data. The memory, *memory, is reused
- * if it already has the same axes and types, and then must also have the same count; otherwise *is_new is set. *bytes
- * receives its size. Returns false if memory runs out; then *memory is NULL and no coordinates have data. Local. */
+ * `axes`, and makes `coordinates` refer to it; coordinates along other axes get no data. If *memory already holds
+ * coordinates along the same axes with the same types, it is reused; the count must then be the same too. Otherwise new
+ * memory is allocated and *is_new is set. *bytes receives its size. Returns false if memory runs out; then *memory is
+ * NULL and no coordinates have data. Local. */
 bool session_reserve_coordinates(char **memory, insitu_array coordinates[3], int64_t count, int axes,
                                  const insitu_type types[3], int64_t *bytes, bool *is_new);
 
-/* Stores a coordinate. Returns whether it differs from the one that was stored before. */
+/* Stores a coordinate. Returns whether it differs from the value stored there before. */
 static inline bool session_store_coordinate(const insitu_array *array, int64_t vertex, double number)
 {
     char *to = (char *)(uintptr_t)array->data + vertex * array->stride_bytes;
@@ -25,7 +26,7 @@ static inline bool session_store_coordinate(const insitu_array *array, int64_t v
         return differs;
     }
     const float narrow = (float)number;
-    /* NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): bits, as above */
+    /* NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): -0 and 0, and two NaNs, are compared by their bits */
     const bool differs = memcmp(to, &narrow, sizeof narrow) != 0;
     memcpy(to, &narrow, sizeof narrow);
     return differs;

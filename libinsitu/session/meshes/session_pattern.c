@@ -1,9 +1,10 @@
 /* Cells with all nodes of their order are split along the lattice of the nodes: hexes into hexes, wedges into wedges,
- * and so on. The split of a face depends only on the nodes of the face: quads become quads and triangles triangles. So
- * the pieces of neighbouring cells share their faces.
+ * and so on. The split of a face depends only on the nodes of the face: quads become quads and triangles triangles.
+ * Therefore the pieces of neighbouring cells share faces.
  *
  *   A tet of order p is split by the planes of its lattice into tets and octahedra, and each octahedron into four tets
- *   around the same one of its diagonals. A pyramid is split into pyramids, upright and inverted, and tets.
+ * around one of its diagonals, which has the same direction in all octahedra. A pyramid is split into pyramids, upright
+ * and inverted, and tets.
  *
  * Serendipity cells have no nodes inside faces. They are split by their corners and the midpoints of their edges:
  *
@@ -24,8 +25,8 @@
 
 /* ---- listed pieces --------------------------------------------------------------------------------------------- */
 
-/* A list of pieces while it is made. The pieces are counted while `piece_positions` and `types` are NULL, and then
- * stored. */
+/* A list of pieces under construction. If `piece_positions` and `types` are NULL, pieces are only counted; otherwise
+ * they are stored. */
 typedef struct pattern_list {
     session_pattern *out;
     insitu_vertex_order order;
@@ -43,7 +44,8 @@ static void add_piece(const pattern_list *list, int type, const int nodes[][3])
     out->piece_size += count;
 }
 
-/* Adds a piece whose nodes are at `at` plus 0 or 1 along each axis; bit n of a step is the offset along axis n. */
+/* Adds a piece whose nodes are at `at` plus 0 or 1 along each axis; bit n of an entry of steps is the offset along axis
+ * n. */
 static void add_steps(const pattern_list *list, int type, const int at[3], const signed char *steps)
 {
     int nodes[GRID_MAX_CELL_VERTICES][3];
@@ -141,8 +143,8 @@ static void add_cut(session_pattern *out, const session_shape *shape, int corner
             cut->nodes[cut->count++] = shape->corner_count + e;
 }
 
-/* Returns the coordinates of a node in a straight cell: the lattice of order 1, in which the top of a pyramid is above
- * its first corner. */
+/* Returns the coordinates of a node in the reference cell. The apex of a pyramid has the same x and y as its first
+ * corner. */
 static void reference_position(const session_shape *shape, int node, double out[3])
 {
     const int corners = shape->corner_count;
@@ -197,7 +199,8 @@ static void find_polygons(session_pattern *out, insitu_vertex_order order)
         out->midpoints[e] = session_quadratic_index(&out->nodes, order, corners + e);
 }
 
-/* Splits a polygon into triangles of the same orientation by the diagonals from the node of the lowest rank. */
+/* Splits a polygon into triangles of the same orientation by the diagonals from the node that comes first in the order
+ * of coordinates. */
 static int split_into_triangles(const pattern_polygon *p, const int *ranks, int triangles[2][3])
 {
     int first = 0;

@@ -1,4 +1,5 @@
-/* The linear pieces of a type of cell of higher order, as positions of nodes in the cell's row of connectivity. */
+/* The linear cells (pieces) into which a type of cell of higher order is split. Their vertices are given as positions
+ * of nodes in the cell's row of connectivity. */
 #ifndef SESSION_PATTERN_H
 #define SESSION_PATTERN_H
 
@@ -9,7 +10,7 @@ enum { PATTERN_MOST_LOOSE = 24, PATTERN_MOST_POLYGONS = 16 };
 /* A triangle or quad whose vertices are midpoints of edges. */
 typedef struct pattern_polygon {
     int count;
-    int corner;   /* the corner that it cuts off, or -1 if it lies on a face of the cell */
+    int corner; /* the corner of the cell that the polygon cuts off, or -1 if the polygon lies on a face of the cell */
     int nodes[4]; /* positions of the vertices in the cell's row of nodes */
 } pattern_polygon;
 
@@ -33,8 +34,7 @@ bool session_make_pattern(int type, const session_nodes *nodes, insitu_vertex_or
 void session_drop_pattern(session_pattern *pattern);
 
 /* Stores the positions of the vertices of a serendipity cell's pieces: 4 for each tet, or 3 for each triangle of a
- * quad. ranks: indexed by position, the rank of each midpoint in the order of coordinates. Returns the number of
- * pieces. */
+ * quad. ranks[position]: the number of a midpoint in the order of coordinates. Returns the number of pieces. */
 int session_cut_serendipity(const session_pattern *pattern, const int *ranks, int pieces[PATTERN_MOST_LOOSE][4]);
 
 #endif

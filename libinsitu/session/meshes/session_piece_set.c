@@ -1,6 +1,6 @@
 /* A linear piece contains a part of an isosurface only if the isovalue is in the range of the values at the piece's
- * corners. These ranges therefore decide exactly, without bounds: rays find nothing in pieces that are not made.
- * Neighbours of a piece that is made may be missing, since the isosurface crosses none of their common faces.
+ * corners. These ranges therefore determine exactly which pieces must be made, because rays find no isosurface in other
+ * pieces. If a neighbour of a made piece is missing, the isosurface does not cross their common face.
  *
  * The distance from a plane is a polynomial of the same order as the positions, and its values at the nodes of the
  * finer lattice are computed from those at the cell's nodes. */
@@ -74,8 +74,8 @@ static insitu_status fail_for_memory(const session_mesh *mesh, base_error *error
 
 /* ---- pieces at nodes --------------------------------------------------------------------------------------------- */
 
-/* Finds a piece at each of the cell's own nodes, whatever their order in the row, and all pieces of pyramids. is_own:
- * buffer of one flag per node of the finer lattice. */
+/* Finds one piece at each of the cell's own nodes, for any order of nodes in the row, and all pieces of pyramids.
+ * is_own: buffer of one flag per node of the finer lattice. */
 static void find_pieces_at_nodes(const piece_kind *kind, int parts, bool *is_own, uint64_t *out)
 {
     const session_nodes *fine = &kind->nodes.fine;

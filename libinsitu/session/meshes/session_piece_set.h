@@ -1,13 +1,13 @@
-/* Sets of the pieces of refined cells that are made: those that an isosurface or a slice may cross, and one at each of
- * the cell's own nodes. The number of pieces therefore grows with the square of the number along an edge, not with its
- * cube. */
+/* Sets of linear pieces in refined cells. Only pieces that an isosurface or a slice may cross are made, and one piece
+ * at each of the cell's own nodes. Their number therefore grows with the square of the number of pieces along an edge,
+ * not with its cube. */
 #ifndef SESSION_PIECE_SET_H
 #define SESSION_PIECE_SET_H
 
 #include "session_deviation.h"
 
 /* Makes the sets of the marked cells, which have `parts` pieces between two nodes. The sets contain one piece at each
- * of a cell's own nodes, because ranges of all fields contain the values there. Other cells have all of their pieces.
+ * of a cell's own nodes, because ranges of all fields contain the values there. All pieces of other cells are made.
  * Local. The caller must drop *out even after an error. */
 insitu_status session_begin_piece_set(const session_mesh *mesh, const unsigned char *marks, int parts,
                                       session_piece_set *out, base_error *error);

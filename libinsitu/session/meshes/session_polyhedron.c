@@ -1,7 +1,6 @@
-/* The distance between samples depends on the mean size of cells, which is computed from volumes. So a volume must
- * depend only on the cell's geometry: another rank may list a face beginning at another vertex or in the opposite
- * direction, and the faces in another order. Volumes may still differ by rounding, but the mean size does not
- * (session_space.c). */
+/* The distance between samples depends on the mean size of cells, which is computed from volumes. Therefore a volume
+ * must depend only on the cell's geometry, and not on the order in which faces and vertices are listed, which may
+ * differ between ranks. Volumes may still differ by rounding, but the mean size does not (session_space.c). */
 #include "session_polyhedron.h"
 
 #include <string.h>
@@ -19,7 +18,7 @@ typedef struct frame_sums {
     double count;
 } frame_sums;
 
-/* Adds a face's vertices to the mean. A vertex that is repeated consecutively counts once. */
+/* Adds a face's vertices to the mean. Consecutive repetitions of a vertex are added once. */
 static void add_face(const grid *g, int64_t face, frame_sums *sums, double least[3])
 {
     int64_t from, to;
@@ -80,8 +79,8 @@ static double tet_volume_from_origin(const double origin[3], double corners[3][3
 }
 
 /* Returns the entry of a face's vertex with the least index, at which its canonical fan of triangles begins. If the
- * face contains that vertex twice, either entry may be returned: the fan then has the same triangles, and some of area
- * 0. */
+ * face contains that vertex twice, either entry may be returned, because both fans have the same triangles, apart from
+ * triangles of area 0. */
 static int64_t least_entry(const grid *g, int64_t from, int64_t to)
 {
     int64_t least = from;
@@ -121,7 +120,7 @@ static void add_fan(const grid *g, int64_t face, const double mean[3], const dou
 
 /* Upper bound of the rounding error of the volume of a tet formed by a triangle and a corner in the same plane, as a
  * fraction of the volume of the cell's bounding box. With u = 2^-53: an edge is computed by three differences, each
- * with an error of u times the box's side (the mean cancels, whatever it is). The six products of three edges of a
+ * with an error of u times the box's side (the mean of the vertices cancels). The six products of three edges of a
  * determinant add 9 u, and products and sums another 2 u and 3 u: 6 times 14 u, divided by 6. The bound of 32 u leaves
  * a margin for the sum over triangles, whose number is small compared to 1 / u, for the box's own rounding, and for
  * squares of u. */

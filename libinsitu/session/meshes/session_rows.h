@@ -1,4 +1,4 @@
-/* The caller's cells of a mesh whose cells are split into pieces, each as a row of nodes. */
+/* Access to the caller's cells of a mesh whose cells are split into pieces. Each cell is a row of nodes. */
 #ifndef SESSION_ROWS_H
 #define SESSION_ROWS_H
 
@@ -14,10 +14,10 @@ typedef struct session_row_kind {
 } session_row_kind;
 
 typedef struct session_rows {
-    grid cells; /* the caller's cells; if they have no connectivity, entry i is vertex i */
+    grid cells; /* the caller's cells; without connectivity, entry i refers to vertex i */
     /* if cells have no offsets: number of nodes of each cell, and number of entries from one cell to the next */
     int64_t nodes_per_cell, row_stride;
-    /* set if the mesh is discontinuous (session_discontinuous), so that each node has a vertex of its own */
+    /* set if the mesh is discontinuous (session_discontinuous), so that each node of each cell is a separate vertex */
     bool is_discontinuous;
     int kind_count;
     session_row_kind kinds[ROWS_MOST_KINDS];

@@ -1,6 +1,6 @@
 /* All numbers here are results of reductions, so that they are the same on every rank and for every partition. A new
- * origin or scale requires new trees. So the old ones are kept while the bounds change little, even if the mesh moves
- * slightly in every step. */
+ * origin or scale requires new trees. Therefore the old origin and scale are kept while the bounds change little, even
+ * if the mesh moves slightly in every step. */
 #include "session_space.h"
 
 #include "session_agree.h"
@@ -25,9 +25,9 @@ static double half_diagonal(const double lower[3], const double upper[3])
     return hypot(hypot(half[0], half[1]), half[2]);
 }
 
-/* Computes the global bounds, counts and mean cell size. Bounds are those of the caller's nodes, because the bounds of
- * finer lattices would change with the cells that images show. If by_nodes is set, cells are also counted and measured
- * as if meshes had no finer lattices. */
+/* Computes the global bounds, counts and mean cell size. Bounds are computed from the caller's nodes, because bounds of
+ * finer lattices would depend on which cells images show. If by_nodes is set, cells are also counted and measured as if
+ * meshes had no finer lattices. */
 static insitu_status reduce_extent(const session_meshes *meshes, bool by_nodes, MPI_Comm comm, session_extent *out,
                                    base_error *error)
 {

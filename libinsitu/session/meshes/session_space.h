@@ -11,7 +11,7 @@ typedef struct session_extent {
     double lower[3], upper[3]; /* bounds of the drawn cells; both 0 if there are no cells */
     double half_diagonal;      /* half the diagonal of the bounds */
     int64_t cell_count;        /* number of drawn cells on all ranks */
-    int64_t solid_count;       /* cells that have a volume */
+    int64_t solid_count;       /* number of drawn cells that have a volume */
     double cell_size;          /* mean cube root of the volumes of solid cells; 0 if there are none */
     int rank_count;            /* number of ranks with at least one drawn cell */
 } session_extent;
@@ -33,8 +33,8 @@ typedef struct session_space {
  * Collective. */
 insitu_status session_update_space(session_space *space, session_meshes *meshes, MPI_Comm comm, base_error *error);
 
-/* Computes the global bounds as they would be if no mesh had finer lattices (session_finer.h), so that they do not
- * depend on these. Collective. */
+/* Computes the global bounds as they would be if no mesh had finer lattices (session_finer.h), so that the bounds do
+ * not depend on finer lattices. Collective. */
 insitu_status session_find_nodal_extent(const session_meshes *meshes, MPI_Comm comm, session_extent *out,
                                         base_error *error);
 

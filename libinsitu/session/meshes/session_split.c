@@ -21,7 +21,7 @@ enum { LINEAR_TYPES = GRID_POLYHEDRON + 1 };
 typedef struct split_work {
     const session_mesh *mesh;
     session_rows rows;
-    session_pattern patterns[ROWS_MOST_KINDS]; /* pattern of pieces for each kind of row */
+    session_pattern patterns[ROWS_MOST_KINDS]; /* pattern of pieces for each kind of row (type and number of nodes) */
     bool is_of_type[LINEAR_TYPES];             /* for each type, set if some piece has it */
     int only_type;                             /* the type of all pieces; 0 if they differ */
     /* index of the first piece and of its first entry, for each cell, and the totals; first_entries is NULL if pieces
@@ -197,7 +197,7 @@ static void rank_midpoints(const split_work *w, const session_pattern *of, int64
     }
 }
 
-/* The pieces of a complete cell that are made. */
+/* Iterator over the pieces of a complete cell that are made. */
 typedef struct piece_walk {
     const uint64_t *words; /* NULL: all pieces are made */
     int count;             /* number of pieces of the pattern */
@@ -207,7 +207,7 @@ typedef struct piece_walk {
 static piece_walk walk_pieces(const split_work *w, const session_pattern *of, int64_t cell)
 {
     const int64_t *first = w->set->first_words;
-    /* all pieces of pyramids are made, and they have two types */
+    /* pyramids have no words, because all of their pieces are made; these have two types */
     const bool has_words = first && first[cell] < first[cell + 1] && of->nodes.type != GRID_PYRAMID;
     return (piece_walk){has_words ? w->set->bits + first[cell] : NULL, of->piece_count, 0};
 }
@@ -250,7 +250,7 @@ static void count_pieces(const split_work *w, int64_t cell)
     if (!w->first_entries) return;
     if (of->polygon_count)
         w->first_entries[cell + 1] = count * (of->nodes.type == GRID_QUAD ? 3 : 4);
-    else /* the pieces of a cell differ in type only if all are made */
+    else /* only cells all of whose pieces are made can have pieces of different types */
         w->first_entries[cell + 1] =
             count == of->piece_count ? of->piece_size : count * grid_type_vertices(of->types[0]);
 }

@@ -1,4 +1,4 @@
-/* Splits cells of higher order into linear pieces, which are read in their place. */
+/* Splits cells of higher order into linear pieces, which are read instead of the cells. */
 #ifndef SESSION_SPLIT_H
 #define SESSION_SPLIT_H
 
@@ -18,12 +18,12 @@ insitu_status session_split_entries(const session_mesh *mesh, int threads, grid_
 /* Returns the position in the caller's connectivity of an entry that is counted without the unused ends of rows. */
 int64_t session_entry_index(const insitu_mesh *given, int64_t entry);
 
-/* Counts the caller's cells of a mesh whose cells are split. A cell is inverted if one of its pieces is, which is
- * tested only if any_inverted is set, and flat if all its pieces are. Local. */
+/* Counts the caller's cells of a mesh whose cells are split. A cell is flat if all its pieces are flat, and inverted if
+ * one of its pieces is inverted; this is tested only if any_inverted is set. Local. */
 session_counts session_count_parents(const session_mesh *mesh, bool any_inverted);
 
-/* Returns the number of the caller's cells of which the list contains at least one piece. If memory runs out, returns
- * the number of all drawn cells. Local. */
+/* Returns the number of the caller's cells that have at least one piece in the list. If memory runs out, returns the
+ * number of all drawn cells. Local. */
 int64_t session_count_parents_of(const session_mesh *mesh, const uint32_t *pieces, int64_t count);
 
 #endif

@@ -166,7 +166,7 @@ void tally_cell(const grid *g, int64_t cell, mesh_tally *tally)
 /* ---- corners with different signs ---------------------------------------------------------------------------- */
 
 /* A corner counts as flat if its volume is less than this fraction of the cell's largest one. Hexes with two coincident
- * vertices have such corners, and so have cells with a vertex on a nearly straight edge. */
+ * vertices, and cells with a vertex on a nearly straight edge, have such corners. */
 static const double least_share = 1e-6;
 
 /* Computes the signed areas at a quad's corners, with respect to the normal at the first corner. */
@@ -231,7 +231,7 @@ MMBVH_INLINE bool read_points(const grid *g, int64_t first, int count, bool is_g
         if (vertex < 0 || vertex >= g->vertex_count) return false;
         for (int axis = 0; axis < 3; axis++) {
             points[i][axis] = fetch_number(&g->coordinates[axis], vertex, wide_number);
-            /* remains 0 while all coordinates are finite, and becomes NaN otherwise */
+            /* poison remains 0 if all coordinates are finite, and becomes NaN otherwise */
             poison += points[i][axis] - points[i][axis];
         }
     }
@@ -314,8 +314,8 @@ static lane_cells find_row_run(const session_mesh *mesh, int64_t cell, int64_t e
     return alike;
 }
 
-/* Adds the first cells of the run to the sums with vectorized code, and returns their number. *alone becomes the number
- * of cells after them that must be added one by one. */
+/* Adds the first cells of the run to the sums with vectorized code, and returns their number. *alone receives the
+ * number of following cells that must be added one by one. */
 static int64_t tally_lanes(const lane_cells *alike, mesh_tally *t, double *least, int64_t *alone)
 {
     *alone = alike->count;
@@ -352,7 +352,7 @@ MMBVH_INLINE bool may_be_flat(const mesh_tally *t, double least)
 
 /* The lengths of the drawn cells along one axis. */
 typedef struct axis_lengths {
-    int64_t positive_count, negative_count; /* numbers of positive and of negative lengths; all others are 0 */
+    int64_t positive_count, negative_count; /* numbers of positive and of negative lengths; other lengths are 0 */
     double size_sum;                        /* sum of the cube roots of the lengths */
     double lower, upper;
 } axis_lengths;

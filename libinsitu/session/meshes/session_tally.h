@@ -19,14 +19,15 @@ void tally_merge(mesh_tally *sum, const mesh_tally *part);
 void tally_cell(const grid *g, int64_t cell, mesh_tally *tally);
 
 /* Returns whether the volumes at the corners of a hex, wedge or pyramid, or the areas at the corners of a quad, have
- * both signs. They do if the vertices are read in another order than the one in which they are stored. */
+ * both signs. This is the case if vertices are stored in another order than the one in which they are read. */
 bool tally_has_both_signs(int type, double points[][3]);
 
 /* Returns the mean of the volumes at the corners of a tet, hex, wedge or pyramid, computed from the positions of its
  * vertices. It is negative if the cell is left-handed. */
 double tally_signed_volume(int type, double points[][3]);
 
-/* Returns whether a valid cell has no volume up to rounding, as shells have none. Returns false for a ghost. */
+/* Returns whether the volume of a valid cell is 0 up to rounding, which includes all shells. Returns false for a
+ * ghost. */
 bool tally_is_flat(const grid *g, int64_t cell);
 
 /* Checks cells begin .. end - 1 and adds them to the sums. Returns the first bad cell, or end if all are valid. */

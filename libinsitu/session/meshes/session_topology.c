@@ -5,8 +5,8 @@
  * boundary are in a separate list, they are copied into one.
  *
  * A polyhedron with six quads may be a hex, which is drawn in a fraction of the time. It is recognized by its faces
- * alone, never by coordinates: all ranks that have the cell recognize it alike, and so does every step of a moving
- * mesh.
+ * alone, never by coordinates: therefore the result is the same on all ranks that have the cell, and in all steps of a
+ * moving mesh.
  *
  *           t3 ------ t2
  *          /|        /|      The base is any face of the right size. The face on the other side of each of its edges
@@ -187,7 +187,7 @@ void session_cells_of_face(const session_face_sides *sides, int64_t face, int64_
     if (apart >= 0 && (cells[0] == -1 || cells[0] == -1 - base)) cells[0] = outside;
     for (int i = 0; i < 2; i++)
         if (cells[i] >= given->cell_count && cells[i] - given->cell_count < given->halo_cell_count) cells[i] = outside;
-    /* CGNS gives a missing cell the number 0, on either side of the face. */
+    /* In CGNS, the number 0 stands for a missing cell, on either side of the face. */
     if (cells[1] >= 0 && (cells[0] == outside || (base == 1 && cells[0] == -1))) {
         cells[0] = cells[1];
         cells[1] = -1;
@@ -380,7 +380,7 @@ static void make_right_handed(const grid *g, int type, int n, int64_t *vertices)
 }
 
 /* Returns the type of cell that a polyhedron's faces form, with its vertices in that type's order. Returns
- * GRID_POLYHEDRON if they form none of these types. */
+ * GRID_POLYHEDRON if the faces do not form a tet, hex, wedge or pyramid. */
 static int recognise_polyhedron(const session_mesh *mesh, int64_t cell, int64_t vertices[GRID_MAX_CELL_VERTICES])
 {
     static const struct {

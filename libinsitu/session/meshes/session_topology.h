@@ -28,20 +28,21 @@ typedef struct session_face_sides {
 } session_face_sides;
 
 session_face_sides session_find_face_sides(const insitu_mesh *given);
-/* Stores the two cells of a face. A missing cell is negative; it is cells[1], unless both are missing. */
+/* Stores the two cells of a face. A negative number stands for a missing cell, which is cells[1] if only one is
+ * missing. */
 void session_cells_of_face(const session_face_sides *sides, int64_t face, int64_t cells[2]);
 
 /* Sets the arrays that the grid reads: the session's own arrays if there are any, otherwise the caller's. Local. */
 void session_read_topology(session_mesh *mesh);
 
-/* Returns the type that the caller gave the cell, regardless of the type as which it is read. */
+/* Returns the cell's type in the caller's description. The session may read the cell as another type. */
 int session_caller_type(const session_mesh *mesh, int64_t cell);
 
-/* Computes what the caller's description of the mesh omits, once per topology: the faces of cells from owner and
- * neighbour; one array of the vertices of all faces, if they are given in several; the vertices of cells in VTK's
- * order; and tets, hexes, wedges and pyramids in place of polyhedra that have the faces of one. Then the grid reads
- * these arrays. Errors in owner, neighbour and lists are reported; session_check.c finds all others. After an error
- * nothing is stored. Local. */
+/* Computes what the caller's description of the mesh omits, once per topology. These are the faces of cells, from owner
+ * and neighbour; a single array of the vertices of all faces, if the caller gives several arrays; the vertices of cells
+ * in VTK's order; and tets, hexes, wedges and pyramids that replace polyhedra with the same faces. The grid reads these
+ * arrays afterwards. Errors in owner, neighbour and lists of faces are reported here; session_check.c finds all other
+ * errors. After an error nothing is stored. Local. */
 insitu_status session_make_topology(session_mesh *mesh, int threads, base_error *error);
 
 #endif

@@ -1,7 +1,7 @@
-/* Moved coordinates have the type of the caller's. If a lattice has coordinates along its axes, the moved coordinates
- * are stored by vertex instead, in double. A coordinate is computed as x + scale * u in double and rounded once, so
- * that equal vertices of blocks and ranks with equal displacements stay equal. New coordinates are compared with the
- * old ones, so that the mesh does not count as moved if the field was set again with the same values. */
+/* Moved coordinates have the type of the caller's coordinates. If a lattice has coordinates along its axes, the moved
+ * coordinates are stored by vertex instead, in double. A coordinate is computed as x + scale * u in double and rounded
+ * once, so that equal vertices of blocks and ranks with equal displacements stay equal. New coordinates are compared
+ * with the old ones, so that the mesh is not marked as moved if the field was set again with the same values. */
 #include "session_warp.h"
 
 #include <string.h>
@@ -50,7 +50,7 @@ static void mark_moved(session_meshes *meshes, session_mesh *mesh)
 void session_unwarp_mesh(session_meshes *meshes, session_mesh *mesh)
 {
     const bool was_on = mesh->warp.is_applied;
-    /* the check of the mesh has stored this problem as the mesh's error, which a new check removes */
+    /* the check of the mesh has stored this problem as the mesh's error; it must run again to remove the error */
     if (mesh->warp.problem.status) {
         mesh->is_check_stale = true;
         meshes->are_cells_changed = true;
@@ -66,15 +66,15 @@ void session_unwarp_mesh(session_meshes *meshes, session_mesh *mesh)
 
 /* ---- moving ------------------------------------------------------------------------------------------------------ */
 
-/* Returns the type of the moved coordinates. Missing z coordinates get the type of the others. */
+/* Returns the type of the moved coordinates. Missing z coordinates get the type of the x and y coordinates. */
 static insitu_type moved_type(const insitu_mesh *given, int axis)
 {
     if (session_has_axes(given)) return INSITU_FLOAT64;
     return given->coordinates[given->coordinates[axis].data ? axis : 0].type;
 }
 
-/* Ensures that there is memory for the moved coordinates. *is_new is set if it is new. Returns false if memory runs
- * out. Coordinates along z get no memory if they are not given and do not move. */
+/* Ensures that there is memory for the moved coordinates. *is_new is set if the memory is new. Returns false if memory
+ * runs out. Coordinates along z get no memory if they are not given and do not move. */
 static bool reserve_coordinates(session_mesh *mesh, int component_count, bool *is_new)
 {
     enum { IN_PLANE = 3, ALL = 7 };
@@ -89,7 +89,8 @@ static bool reserve_coordinates(session_mesh *mesh, int component_count, bool *i
 /* The coordinates along one axis before and after the move. */
 typedef struct moved_axis {
     grid_array from;
-    grid_array by;          /* displacements, in the order of the tuples; without data, nothing moves along the axis */
+    grid_array by; /* displacements along the axis, in the order of the tuples; without data, vertices do not move along
+                      the axis */
     const insitu_array *to; /* receives the moved coordinates; NULL: those along this axis are not stored */
 } moved_axis;
 
@@ -170,7 +171,7 @@ insitu_status session_warp_mesh(session_meshes *meshes, session_mesh *mesh, cons
     const bool was_on = warp->is_applied;
     bool differ = !was_on;
     if (warp->is_applied && !warp->is_stale && warp->key == by->key) return INSITU_OK;
-    session_end_finer_mesh(meshes, mesh); /* finer lattices are made of the moved nodes */
+    session_end_finer_mesh(meshes, mesh); /* finer lattices must be computed again from the moved nodes */
     if (warp->is_stale) session_fill_conformed(mesh, threads);
     restore_coordinates(mesh);
     if (compute_coordinates(mesh, by, threads, &differ, error)) {

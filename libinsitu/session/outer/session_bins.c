@@ -22,7 +22,7 @@ static const double *position_at(const double *positions, int64_t stride, int64_
     return (const double *)(const void *)((const char *)positions + i * stride);
 }
 
-/* Computes the size of the bins and their number along each axis. Returns the total number of bins. */
+/* Computes the size of the bins and the number of bins along each axis. Returns the total number of bins. */
 static int64_t choose_bin_size(session_bins *b, const double *positions, int64_t stride, int64_t count)
 {
     double upper[3], widest = 0;

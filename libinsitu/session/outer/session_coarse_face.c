@@ -7,8 +7,8 @@
 #include "vector3.h"
 
 /* Coordinates on the face are rounded to the nearest multiple of 1 / PARTS if they differ from it by at most a
- * hundredth of 1 / PARTS. Then the positions at refinements of 2:1, 3:1 and 4:1 are exact, however the vertices'
- * coordinates are rounded. */
+ * hundredth of 1 / PARTS. Then hanging vertices at refinements of 2:1, 3:1 and 4:1 have exact positions on the face,
+ * even if the vertices' coordinates are rounded. */
 enum { PARTS = 96 };
 
 /* ---- faces ---------------------------------------------------------------------------------------------------- */

@@ -1,6 +1,6 @@
-/* Each rank sends the box of each of its blocks to all ranks near the block: those whose own blocks have a common
- * bounding box that intersects the block's box. Boxes are compared in units of cells of the coarsest level. They are
- * sorted into bins by their centres, so that the work grows only with the number of blocks and the number of blocks
+/* Each rank sends the box of each of its blocks to all ranks near the block. A rank is near a block if the bounding box
+ * of all its own blocks intersects the block's box. Boxes are compared in units of cells of the coarsest level. They
+ * are sorted into bins by their centres, so that the work grows only with the number of blocks and the number of blocks
  * that cover each. The boxes are kept, because session_drop_faces_between_levels() uses them later. */
 #include "session_covers.h"
 
@@ -58,7 +58,7 @@ static session_level_box make_level_box(const session_mesh *mesh, int rank)
     session_level_box out = {SESSION_HASH_BEGIN, mesh->block, rank, {0, 0, 0}, {1, 1, 1}, {1, 1, 1}};
     session_hash_text(&out.mesh, mesh->name);
     for (int axis = 0; axis < 3; axis++) {
-        /* all quads count as lying at the same index along the axis without cells */
+        /* along the axis without cells, all quads are treated as having the same index */
         if (!l->cells[axis]) continue;
         out.lower[axis] = l->first[axis] + cells->drawn_first[axis];
         out.upper[axis] = l->first[axis] + cells->drawn_end[axis];
@@ -236,7 +236,7 @@ static bool find_overlap(const session_level_box *coarse, const session_level_bo
     out->cut_axis = -1;
     for (int axis = 0; axis < 3; axis++) {
         const int64_t of = fine->refinement[axis], by = coarse->refinement[axis];
-        /* ends of the fine box, in units of 1 / (of * by) of a cell of the coarsest level */
+        /* ends of the fine box, in units of the size of a coarsest cell divided by (of * by) */
         const int64_t begin = fine->lower[axis] * by, end = fine->upper[axis] * by;
         const int64_t first = coarse->lower[axis], last = coarse->upper[axis];
         const int64_t lower = floor_quotient(begin, of), upper = -floor_quotient(-end, of);
@@ -310,7 +310,7 @@ static bool has_cut_cell(const session_mesh *mesh, const overlap *cells, const u
 /* Iterates over the finer boxes that overlap a block. */
 typedef struct finer_walk {
     const cover_search *search;
-    session_level_box box; /* of the block */
+    session_level_box box; /* box of the block */
     session_bin_walk bins;
     const session_level_box *fine;
     overlap cells;
@@ -351,8 +351,9 @@ static bool find_covered_cells(const cover_search *s, const session_mesh *mesh, 
     return true;
 }
 
-/* Removes the marks of cells that a finer block covers in part. Such a cell is an error, unless another block covers it
- * wholly: a block two levels finer may start within a cell if the level between them lies there too. */
+/* Removes the marks of cells that a finer block covers in part. A cell that is covered only in part is an error, unless
+ * another block covers it wholly. For example, a block that is two levels finer may begin within a cell if a block of
+ * the level in between covers the cell. */
 static void resolve_cuts(const cover_search *s, session_mesh *mesh, unsigned char *covered)
 {
     for (finer_walk w = walk_finer(s, mesh); next_finer(&w) && !mesh->misfit.exists;) {
@@ -486,7 +487,8 @@ insitu_status session_drop_faces_between_levels(const session_meshes *meshes, co
     if (has_levels && !bin_boxes(meshes->level_boxes, meshes->level_box_count, true, &bins))
         session_fail_for_memory(error, meshes->level_box_count * 32, "faces between levels");
     for (int i = 0; i < count && has_levels && !error->status; i++) {
-        const session_mesh *mesh = session_source(parts[i].mesh); /* an image's cells and faces have the same numbers */
+        const session_mesh *mesh = session_source(
+            parts[i].mesh); /* the cells and faces of a mirror image have the same numbers as those of its source */
         if (is_level_block(mesh) && !session_is_quad_lattice(mesh->given.lattice) &&
             !parts[i].outer->threshold.is_given)
             drop_inner_faces(meshes, &bins, mesh, parts[i].outer);

@@ -2,7 +2,7 @@
  *
  * The covered cells are determined by integers: the index of a block's first cell, the numbers of its cells without
  * ghost layers, and its refinement. Finer blocks must begin and end at borders of coarser cells, so that a cell is
- * either covered completely or not at all. A block that does not is an error. */
+ * either covered completely or not at all. A block that begins or ends within a coarser cell is an error. */
 #ifndef SESSION_COVERS_H
 #define SESSION_COVERS_H
 

@@ -43,7 +43,9 @@ static void read_cell(session_face_normals *n, const session_mesh *mesh, int64_t
 static int find_node(const session_rows *rows, int64_t cell, int64_t vertex)
 {
     const int count = (int)session_row_size(rows, cell);
-    const int64_t guess = vertex - session_row_node(rows, cell, 0); /* finer lattices number their nodes in order */
+    const int64_t guess =
+        vertex -
+        session_row_node(rows, cell, 0); /* in finer lattices, the nodes of a cell are numbered consecutively */
     if (guess >= 0 && guess < count && session_row_node(rows, cell, (int)guess) == vertex) return (int)guess;
     for (int i = 0; i < count; i++)
         if (session_row_node(rows, cell, i) == vertex) return i;

@@ -7,8 +7,8 @@
 
 typedef struct session_face_normals {
     session_polynomials polynomials;
-    int64_t cell;                           /* the caller's cell that was read last; -1: none */
-    const session_derivatives *derivatives; /* those of the cell */
+    int64_t cell;                           /* the caller's cell that was read last; -1: no cell has been read */
+    const session_derivatives *derivatives; /* the derivatives of this cell's polynomials */
     double *positions;                      /* x, y and z of the cell's nodes, in the order of its row */
 } session_face_normals;
 
@@ -17,12 +17,12 @@ typedef struct session_face_normals {
 bool session_face_normals_create(const session_mesh *mesh, session_face_normals *out);
 void session_face_normals_free(session_face_normals *normals);
 
-/* Returns whether normals of a cell's faces are known. Those of pyramids are not. */
+/* Returns whether the normals of a cell's faces can be computed, which is not supported for pyramids. */
 bool session_has_face_normals(session_face_normals *normals, const session_mesh *mesh, int64_t cell);
 
-/* Computes the normal, of any length, of a face of one of the caller's cells at one of its nodes. face: its number
- * (session_find_rim()). vertex: the node, as a vertex of session_mesh.cells. Normals at all nodes of a face are on the
- * same side of it. Returns false if it is not known, or 0. */
+/* Computes the normal, of any length, of a face of one of the caller's cells at one of its nodes. face: number of the
+ * face (session_find_rim()). vertex: the node, as a vertex of session_mesh.cells. Normals at all nodes of a face point
+ * to the same side of it. Returns false if the normal is 0 or cannot be computed. */
 bool session_find_face_normal(session_face_normals *normals, const session_mesh *mesh, int64_t cell, int face,
                               int64_t vertex, double out[3]);
 

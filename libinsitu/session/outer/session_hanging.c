@@ -12,9 +12,9 @@
 #include "session_twins.h"
 #include "vector3.h"
 
-/* Distance, as a fraction of a face's width, within which a vertex counts as lying on the face. It covers the rounding
- * errors of codes that compute hanging vertices in other ways. Hanging vertices are at least an eighth of the width
- * apart. The ranks' boxes are extended by the same fraction (session_homes.h). */
+/* Distance, as a fraction of a face's width, within which a vertex is treated as lying on the face. It is larger than
+ * the rounding errors of positions in the caller's code. Hanging vertices are at least an eighth of the width apart.
+ * The ranks' boxes are extended by the same fraction (session_homes.h). */
 static const double relative_slack = 1e-5;
 
 /* A vertex hangs on a face only if the face's area is larger by this factor than those of the faces that have the
@@ -273,7 +273,7 @@ static bool is_face_needed(const hanging_search *s, int m, const session_face *f
 {
     session_face_outline f;
     if (!session_read_outline(&s->basis->meshes[m]->cells, face, &f)) return false;
-    /* a bound that is at least as large as the result of find_face_slack() */
+    /* an upper bound of the result of find_face_slack() */
     const double slack = relative_slack * f.diameter + s->rounding;
     return has_candidate(s, m, &f, slack, needs_hit) || (!needs_hit && intersects_rank_box(s, &f.box, slack));
 }
@@ -297,9 +297,9 @@ static bool read_face(hanging_search *s, int m, const session_face *face)
     return true;
 }
 
-/* Reads those faces of this rank that have not been read. In the first pass (needs_hit is false), it reads faces on
- * which a candidate may lie, and those near other ranks. In the second pass (needs_hit is true), it reads faces near
- * candidates that lie on some face. Returns false if memory runs out. */
+/* Reads faces of this rank that have not been read yet. The first pass (needs_hit is false) reads faces on which a
+ * candidate may lie, and faces near other ranks. The second pass (needs_hit is true) reads faces near candidates that
+ * lie on some face. Returns false if memory runs out. */
 static bool read_faces(hanging_search *s, bool needs_hit)
 {
     const session_border *borders = s->basis->mesh_group->hanging.borders;
@@ -415,8 +415,7 @@ static bool add_contact(hanging_search *s, int64_t number, const double weights[
     return true;
 }
 
-/* Adds the face to the list of faces on which the candidate lies, if it lies on it. Returns false if memory runs
- * out. */
+/* Adds the face to the candidate's list of hits if the candidate lies on the face. Returns false if memory runs out. */
 static bool test_face_hit(hanging_search *s, int64_t number, candidate *c)
 {
     const session_coarse_face *f = &s->faces[number].face;
@@ -484,8 +483,9 @@ static bool find_contacts(hanging_search *s)
 
 /* ---- results -------------------------------------------------------------------------------------------------- */
 
-/* Requests those received faces on which vertices hang: packs their numbers for the ranks that sent them. *firsts
- * receives, for each such face, the index of its first value among the values that will be received. */
+/* Requests the values of received faces on which vertices hang: packs the numbers of these faces for the ranks that
+ * sent them. *firsts receives, for each such face, the index of its first value among the values that will be
+ * received. */
 static bool request_faces(const hanging_search *s, session_mail *requested, int64_t **firsts)
 {
     int64_t *first = base_alloc((size_t)(s->face_count + 1) * sizeof *first);
@@ -610,8 +610,8 @@ insitu_status session_update_hanging(const session_hanging_basis *basis, const s
 
 /* ---- values --------------------------------------------------------------------------------------------------- */
 
-/* Sets the values of the hanging vertices to those of their faces at their positions. Returns whether a value
- * changed. */
+/* Sets the value of each hanging vertex to the value that is interpolated at its position on the face. Returns whether
+ * a value changed. */
 static bool apply_constraints(const session_hanging *hanging, const double *received, double *means)
 {
     bool is_changed = false;
@@ -627,7 +627,7 @@ static bool apply_constraints(const session_hanging *hanging, const double *rece
     return is_changed;
 }
 
-/* Exchanges values with other ranks, then sets the values of the hanging vertices once. *is_changed is set if a value
+/* Exchanges values with other ranks, and then sets the value of each hanging vertex once. *is_changed is set if a value
  * changed on any rank. */
 static insitu_status exchange_and_constrain(const session_hanging *hanging, const session_team *team, double *means,
                                             int *is_changed, base_error *error)

@@ -5,20 +5,21 @@
  * same position, so that an isosurface would have gaps. Therefore the vertex takes the value of the face, which is
  * linear or bilinear in the values at its corners.
  *
- * Vertices may hang on faces that only one cell has, over all ranks' parts of its mesh. The vertices that may hang are
- * those of faces that a rank has once. A vertex hangs on a face that contains it if there are faces that have this
- * vertex as a corner, have the opposite orientation, and are all smaller. Then it lies between a large cell and small
- * ones, and not beside both, as it would on a wall along which two meshes overlap. If there are several such faces, the
- * largest one is used. Corners of a face may hang themselves, on still larger faces. The face, and the vertex's
- * position on it, are determined from coordinates alone, with the same result on all ranks, regardless of which mesh of
- * a mesh group has the face. */
+ * Vertices may hang on faces that belong to only one cell, counted over all ranks' parts of the mesh. The vertices
+ * that are tested are the corners of faces that belong to only one cell on this rank. A vertex hangs on a face that
+ * contains it if faces with the opposite orientation have this vertex as a corner, and all of these are smaller. In
+ * this case the vertex lies between a large cell and small ones. On a wall along which two meshes overlap, however,
+ * a large cell and small ones lie on the same side of the vertex. If there are several such faces, the largest one
+ * is used. Corners of a face may hang themselves, on still larger faces. The face, and the vertex's position on it,
+ * are determined from coordinates alone, with the same result on all ranks, regardless of which mesh of a mesh group
+ * has the face. */
 #ifndef SESSION_HANGING_H
 #define SESSION_HANGING_H
 
 #include "session_catalogue.h"
 #include "session_exchange.h"
 
-/* This rank's vertices, divided into groups of equal ones. The vertices of the mesh group's meshes are numbered
+/* This rank's vertices, divided into groups of equal vertices. The vertices of the mesh group's meshes are numbered
  * consecutively, and so are the groups of the vertices of drawn cells. */
 typedef struct session_hanging_basis {
     session_mesh_group *mesh_group;
@@ -29,12 +30,12 @@ typedef struct session_hanging_basis {
     int64_t group_count;
 } session_hanging_basis;
 
-/* Returns whether vertices of the mesh group that differ only by rounding count as equal. They do in mesh groups of
- * several meshes, and in meshes with levels of refinement. */
+/* Returns whether vertices of the mesh group whose positions differ only by rounding are treated as equal. This is the
+ * case in mesh groups of several meshes, and in meshes with levels of refinement. */
 bool session_has_twins(const session_mesh_group *mesh_group);
 
-/* Computes the mesh group's borders, and the twins of its vertices, unless they are up to date. `parts` are this
- * rank's. Collective; all ranks return the same status. */
+/* Computes the mesh group's borders, and the twins of its vertices, unless they are up to date. `parts` contains this
+ * rank's parts. Collective; all ranks return the same status. */
 insitu_status session_update_borders(session_mesh_group *mesh_group, const session_mesh_group_parts *parts,
                                      const session_team *team, base_error *error);
 
@@ -42,8 +43,9 @@ insitu_status session_update_borders(session_mesh_group *mesh_group, const sessi
  * all ranks return the same status. */
 insitu_status session_update_hanging(const session_hanging_basis *basis, const session_team *team, base_error *error);
 
-/* Sets the values of the hanging vertices to those of their faces. means contains one value per group. If a face's own
- * values are not finite, its hanging vertices keep their values. Collective; all ranks return the same status. */
+/* Sets the value of each hanging vertex to the value that is interpolated on its face. `means` contains one value per
+ * group. If a face's own values are not finite, its hanging vertices keep their values. Collective; all ranks return
+ * the same status. */
 insitu_status session_constrain_hanging(const session_hanging *hanging, const session_team *team, double *means,
                                         base_error *error);
 

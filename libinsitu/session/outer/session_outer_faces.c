@@ -2,10 +2,11 @@
  *
  * The first pass gives each face a hash that does not depend on the order of its vertices, and adds it by exclusive or
  * to a sum at each of the face's vertices. Two cells that share a face add the same hash, so that it cancels. A vertex
- * whose sum is 0 lies inside of the mesh, and a face with such a vertex is no outer face.
+ * whose sum is 0 lies inside the mesh, and a face with such a vertex is not an outer face.
  *
- * The second pass collects the other faces, which are few, and counts them exactly by keys: the first three power sums
- * of their vertices' hashes. So memory is needed for vertices and outer faces, not for all faces.
+ * The second pass collects the remaining faces, which are few, and counts faces with equal keys. A key consists of the
+ * first three power sums of the hashes of the face's vertices. Memory is therefore needed for vertices and outer faces,
+ * not for all faces.
  *
  * Shells are faces that are always kept. A shell on a cell's outer face replaces it, so that only one is drawn there.
  *
@@ -42,7 +43,7 @@ typedef struct part_cells {
 /* A face that may be an outer face. */
 typedef struct found_face {
     session_face face;
-    int part; /* -1: the face has turned out to be no outer face */
+    int part; /* index of the part that has the face; -1: the face is not an outer face */
 } found_face;
 
 typedef struct face_search {
@@ -55,8 +56,8 @@ typedef struct face_search {
     /* number of tables in vertex_sums; threads share tables if there are more threads than tables */
     int table_count;
     uint64_t *vertex_sums; /* exclusive or of the hashes of each vertex's faces, in table_count tables */
-    /* exclusive or of the sums of all vertices whose hashes have the same lowest bits, so that vertices at one position
-     * count as one vertex */
+    /* exclusive or of the sums of all vertices whose hashes have the same lowest bits, so that vertices at the same
+     * position are treated as one vertex */
     uint64_t *hash_sums;
     uint64_t mask;
     unsigned char *may_be_outer; /* one byte per vertex of all parts, nonzero if an outer face may contain the vertex */
@@ -81,8 +82,8 @@ static void search_free(face_search *s)
     base_free(s->group_sizes);
 }
 
-/* Returns the number of vertices of the part. Vertices of a part without cells do not count: they may lack the ids that
- * all others have. */
+/* Returns the number of vertices of the part. The number is 0 for a part without cells, because such a part may lack
+ * vertex ids although all other parts have them. */
 static int64_t count_part_vertices(const part_cells *p)
 {
     return p->grid->cell_count ? p->grid->vertex_count : 0;
@@ -90,8 +91,8 @@ static int64_t count_part_vertices(const part_cells *p)
 
 /* ---- keys ---------------------------------------------------------------------------------------------------- */
 
-/* Returns whether the face's i-th vertex is new, that is, different from all vertices before it. A vertex that the face
- * contains twice counts once: a quad with two corners at the same position is a triangle. */
+/* Returns whether the face's i-th vertex is new, that is, different from all vertices before it. A repeated vertex is
+ * counted once, so that a quad with two corners at the same position is a triangle. */
 static inline bool is_first_occurrence(const part_cells *p, const session_face_loop *loop, int64_t i)
 {
     const uint64_t hash = p->hashes[session_face_vertex(loop, i)];
@@ -159,7 +160,7 @@ static inline void add_xor(uint64_t *sum, uint64_t hash, bool is_shared)
     *sum ^= hash;
 }
 
-/* Adds the face's hash to the sums of its vertices. */
+/* Adds the face's hash, by exclusive or, to the sums of its vertices. */
 static void add_face(const xor_table *x, const session_face_loop *loop)
 {
     const part_cells *p = x->part;
@@ -298,7 +299,7 @@ static bool has_open_vertices(const part_cells *p, int64_t cell)
     return open >= 3;
 }
 
-/* Appends those faces of the cell to the list that may be outer faces. */
+/* Appends the faces of the cell that may be outer faces to the list. */
 static void append_open_faces(const face_search *s, int part, int64_t cell, face_list *out)
 {
     const part_cells *p = &s->cells[part];

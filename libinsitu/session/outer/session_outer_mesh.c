@@ -14,8 +14,8 @@
 
 /* ---- one face ------------------------------------------------------------------------------------------------ */
 
-/* A face with three or four corners. Their order depends only on their positions: it begins with the least corner and
- * continues to the lesser of its neighbours. */
+/* A face with three or four corners. Their order depends only on their positions: it begins with the lexicographically
+ * smallest corner and continues to the smaller one of its neighbours. */
 typedef struct corner_loop {
     int count;
     int64_t vertices[4];
@@ -73,9 +73,9 @@ static double measure_perimeter(const corner_loop *loop)
     return sum;
 }
 
-/* Fraction of a face's width. A point that is farther than this from the face's plane lies on one side of it. The
- * centre of a shell lies in its plane up to rounding, which must not determine its side, because it depends on the
- * vertex at which the shell's list of vertices begins. */
+/* Smallest distance, as a fraction of a face's width, at which a point is treated as lying on one side of the face's
+ * plane. The centre of a shell lies in its plane except for rounding errors. These must not determine the side, because
+ * they depend on the vertex at which the shell's list of vertices begins. */
 static const double side_slack = 1e-9;
 
 /* Computes the apex of the cell made on a face. It lies above the centre of the corners, at half of the mean side
@@ -128,7 +128,7 @@ typedef struct outer_work {
     session_outer *out;
     /* for each vertex of the whole mesh, its index in the outer mesh; -1: the outer mesh does not contain it yet */
     int64_t *vertex_map;
-    float *heights; /* for each vertex of the outer mesh, 0 if it lies on a face, -1 if it is an apex */
+    float *heights; /* value of the scalar at each vertex of the outer mesh: 0 on a face, -1 at an apex */
     int64_t vertex_count, cell_count, entry_count, pyramid_count;
     face_polygon polygon; /* buffer with space for the largest polygon */
     int64_t loop_end;     /* number of entries of the stored loops */
@@ -138,16 +138,17 @@ typedef struct outer_work {
     session_rims rims;
     const uint32_t *parents; /* for each piece of a split cell, the caller's cell (session_topology.parents) */
     const session_mesh *whole;
-    float (*normals)[3];         /* for each vertex of the outer mesh; NULL: there are none */
-    session_face_normals curved; /* used if there are normals and rims */
-    /* The caller's cell and its face on which the current face lies; face: -1 if it lies on none. */
+    float (*normals)[3];         /* normal at each vertex of the outer mesh; NULL: the mesh has no normals */
+    session_face_normals curved; /* computes normals of curved faces; used only if there are normals and rims */
+    /* The caller's cell (parent) and the number of its face that contains the current face; the number is -1 if the
+     * current face lies inside the cell. */
     int64_t parent;
     int face;
-    bool is_curved; /* set if the normals of that face are known */
+    bool is_curved; /* true: the normals of the parent's face can be computed */
     /* the parent and the face for which vertex_map holds vertices, and the first of these vertices */
     int64_t mapped_parent, first_mapped;
     int mapped_face;
-    double normal_scale; /* factor by which their normals are multiplied; 0: not known yet */
+    double normal_scale; /* factor by which the normals at these vertices are multiplied; 0: not computed yet */
     /* for each face of the current cell, the index of its rim's loop; 0: the loop is not stored yet */
     int64_t rim_loops[RIMS_MOST_FACES];
 } outer_work;
@@ -167,7 +168,7 @@ static int64_t add_copied_vertex(outer_work *w, int64_t origin, const double pos
     return *out;
 }
 
-/* Makes the current face use other vertices than the faces before, unless both lie on the same curved face. */
+/* Makes the current face use new vertices, unless it lies on the same curved face as the previous face. */
 static void separate_vertices(outer_work *w)
 {
     if (w->is_curved && w->face == w->mapped_face && w->parent == w->mapped_parent) return;
@@ -178,8 +179,8 @@ static void separate_vertices(outer_work *w)
     w->normal_scale = 0;
 }
 
-/* Computes the normal at a corner: of the curved face, or else of the bilinear patch or triangle, which has the length
- * of twice its area there. */
+/* Computes the normal at a corner of the curved face or, if its normals are unknown, of the bilinear patch or triangle.
+ * The length of the latter is twice the area of the triangle at the corner. */
 static void find_corner_normal(outer_work *w, const corner_loop *loop, int corner, double out[3])
 {
     const int count = loop->count, next = (corner + 1) % count, last = (corner + count - 1) % count;
@@ -191,9 +192,9 @@ static void find_corner_normal(outer_work *w, const corner_loop *loop, int corne
     vector3_cross(a, b, out);
 }
 
-/* Stores the normals at the corners of a cell that was added last, and at its apex, where they are not used. All
- * normals of a face are multiplied by the same factor: a face of order 2 has normals that are polynomials, which pieces
- * could not interpolate if each had the length 1. */
+/* Stores the normals at the corners and at the apex of the cell that was added last; the normal at the apex is not
+ * used. All normals of a face are multiplied by the same factor, instead of being normalized: the normals of a face of
+ * order 2 are polynomials, which pieces interpolate well only without normalization. */
 static void add_normals(outer_work *w, const corner_loop *loop, int64_t apex)
 {
     const int64_t *vertices = w->out->connectivity + w->entry_count - loop->count - 1;
@@ -247,9 +248,9 @@ static bool polygon_triangle(const face_polygon *p, int i, corner_loop *out, dou
 }
 
 /* Computes one apex for all triangles of the polygon, which is the mean of their own apexes. Their tets then share
- * faces, and a ray along the line between two triangles passes from one tet into the other; between separate tets it
- * might hit neither. Returns false if the apex is not well above each triangle, because the triangles are too far from
- * a common plane. */
+ * faces, and a ray along the line between two triangles passes from one tet into the other; with separate apexes it
+ * might miss both tets. Returns false if the apex is not well above each triangle, because the triangles are too far
+ * from a common plane. */
 static bool find_common_apex(const face_polygon *p, double out[3])
 {
     corner_loop loop;
@@ -273,8 +274,8 @@ static bool find_common_apex(const face_polygon *p, double out[3])
     return count > 0;
 }
 
-/* Computes the polygon's normal. It points to the side of `inside` or, if that is in the polygon's plane, has a
- * positive largest component. Its length is about the polygon's width. */
+/* Computes the polygon's normal. It points to the side of `inside` or, if `inside` is in the polygon's plane, the
+ * normal's component of largest magnitude is positive. Its length is about the polygon's width. */
 static void find_polygon_normal(face_polygon *p, const double inside[3])
 {
     double towards[3], middle[3] = {0, 0, 0}, sum[3] = {0, 0, 0};
@@ -298,7 +299,7 @@ static void find_polygon_normal(face_polygon *p, const double inside[3])
     for (int axis = 0; axis < 3; axis++) p->normal[axis] = length > 0 ? sign * sum[axis] / width : 0;
 }
 
-/* Appends the loop around the polygon as that of the cells from number `first` on. */
+/* Appends the loop around the polygon, and assigns it to the cells from number `first` on. */
 static void add_loop(outer_work *w, const face_polygon *p, int64_t first)
 {
     int64_t *loops = w->out->loops;
@@ -357,8 +358,8 @@ static void add_polygon(outer_work *w, face_polygon *p, const double inside[3], 
     add_loop(w, p, first);
 }
 
-/* Returns whether a face is a concave quad. Faces of hexes, wedges and pyramids are bilinear patches, whatever their
- * shape. */
+/* Returns whether a face is a concave quad. Returns false for faces of hexes, wedges and pyramids, which are always
+ * bilinear patches. */
 static bool is_concave(const session_face_loop *face, const double (*positions)[3], int count)
 {
     return count == 4 && !face->corners && polygon_is_concave_quad(positions);
@@ -423,8 +424,8 @@ static outer_counts find_count_bounds(const grid *g, const session_outer *outer)
     return most;
 }
 
-/* Adds the entries that are needed for the rims of those of the caller's cells that have outer faces. Some nodes of a
- * rim may lie on no outer face. */
+/* Adds the number of entries that the rims of the caller's cells with outer faces need. Some nodes of a rim may lie on
+ * no outer face. */
 static void add_rim_bounds(const outer_work *w, const session_outer *outer, outer_counts *most)
 {
     int64_t last = -1;
@@ -520,8 +521,8 @@ static grid describe_grid(const outer_work *w)
     return g;
 }
 
-/* Moves the normals to the scalar as its gradients. Returns false if memory runs out, or if there are more vertices
- * than indices of gradients can number. */
+/* Moves the normals to the scalar as its gradients. Returns false if memory runs out, or if there are too many vertices
+ * for 32-bit indices of gradients. */
 static bool finish_normals(outer_work *w, session_scalar *scalar)
 {
     if (!w->normals) return true;

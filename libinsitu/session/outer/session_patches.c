@@ -1,8 +1,8 @@
-/* A face is on the boundary if only one cell has it. In meshes with face owners this is given. In other meshes the
- * faces of all cells are searched: a face's key is a hash of the first three power sums of its vertices' groups,
- * independent of their order, and for each given face there must be a different cell that has it. So a face between two
- * cells is detected as an error, while a baffle, whose two sides are the same face of such a mesh, may be given once
- * for each side.
+/* A face is on the boundary if it belongs to only one cell. In meshes with face owners this is given. In other meshes
+ * the faces of all cells are searched: a face's key is a hash of the first three power sums of its vertices' groups,
+ * which does not depend on the order of vertices. The number of cells that have a face with this key must equal the
+ * number of times that the caller gives the face. Therefore a face between two cells is detected as an error, while a
+ * baffle, whose two sides are the same face of such a mesh, may be given once for each side.
  *
  * The steps are: list the vertex groups and the value of each face of each patch; determine whether a drawn cell has
  * the face; output the pair (group, value) for each vertex. */
@@ -115,7 +115,7 @@ static insitu_status read_face(const patch_faces *p, int patch, int64_t i, const
     return INSITU_OK;
 }
 
-/* Lists all faces of all patches, in two passes. The first pass computes the space that they require. */
+/* Lists all faces of all patches, in two passes. The first pass only computes the memory that the lists require. */
 static insitu_status list_faces(patch_faces *p, base_error *error)
 {
     const insitu_field *field = &p->field->given;
@@ -184,8 +184,8 @@ static insitu_status check_owners(patch_faces *p, base_error *error)
 /* cells of the faces, by a search of all cells ----------------------------------------------------------------- */
 
 typedef struct cell_search {
-    session_key_table keys; /* keys of those faces all of whose vertices have groups */
-    int64_t *key_of_face;   /* for each face, the index of its key; -1: it has none */
+    session_key_table keys; /* keys of the faces all of whose vertices have groups */
+    int64_t *key_of_face;   /* for each face, the index of its key; -1: the face has no key */
     /* for each key, number of given faces with this key, and number of cells that have such a face */
     int64_t *given_counts, *cell_counts;
     unsigned char *is_drawn; /* for each key, set if one of its cells is drawn */
@@ -273,7 +273,7 @@ static insitu_status check_cell_counts(const cell_search *s, patch_faces *p, bas
     for (int patch = 0; patch < field->patch_count; patch++)
         for (int64_t i = 0; i < field->patches[patch].count; i++, f++) {
             const int64_t key = s->key_of_face[f];
-            if (key < 0) continue; /* no drawn cell has the face, only a ghost cell */
+            if (key < 0) continue; /* the face belongs to no drawn cell, but only to a ghost cell */
             if (s->cell_counts[key] > s->given_counts[key])
                 return fail_at_face(p, patch, i, "is between two cells, not on the boundary", error);
             if (s->cell_counts[key] == 0) return fail_at_face(p, patch, i, "is no face of a cell", error);

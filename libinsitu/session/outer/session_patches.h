@@ -5,7 +5,7 @@
 #include "session_exchange.h"
 #include "session_mesh.h"
 
-/* Numbers of groups of this rank's equal vertices, by which faces are recognized. */
+/* The groups of equal vertices on this rank. Faces are recognized by the groups of their vertices. */
 typedef struct session_vertex_numbers {
     const session_key_table *keys;  /* keys of the vertices of drawn cells; the numbers of the keys are the groups */
     const int64_t *group_of_vertex; /* for each vertex of mesh->cells, its group; -1: it belongs to no drawn cell */

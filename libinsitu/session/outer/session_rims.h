@@ -1,5 +1,5 @@
-/* The faces of the caller's cells of higher order, and their rims, that is, the nodes along a face's edges. A cell is
- * split into pieces, whose faces are parts of these faces. */
+/* The faces of the caller's cells of higher order, and their rims. A rim consists of the nodes along a face's edges.
+ * Cells are split into pieces, so that the outer faces of pieces are parts of these faces. */
 #ifndef SESSION_RIMS_H
 #define SESSION_RIMS_H
 
@@ -17,7 +17,7 @@ typedef struct session_rim_kind {
 typedef struct session_rims {
     session_rows rows;
     session_rim_kind *kinds;
-    int64_t cell; /* the caller's cell to which faces_of_vertex refers; -1: none */
+    int64_t cell; /* the caller's cell to which faces_of_vertex refers; -1: no cell yet */
     /* for each vertex of session_mesh.cells, a bit mask of the faces of `cell` on which it lies */
     unsigned char *faces_of_vertex;
 } session_rims;

@@ -16,11 +16,11 @@ enum { CORNER_WORDS = 4 };
 /* A vertex of an outer face. */
 typedef struct face_corner {
     double position[3];
-    double slack; /* vertices that are nearer than this to it are treated as equal to it */
+    double slack; /* vertices within this distance are treated as equal to the corner */
 } face_corner;
 
-/* A vertex of a face that only one cell of this rank has, and the lexicographically least position of all vertices
- * equal to it. */
+/* A vertex of a face that belongs to only one cell on this rank, and the lexicographically smallest position of all
+ * vertices that are equal to this vertex. */
 typedef struct border_vertex {
     double position[3], least_position[3];
 } border_vertex;
@@ -94,7 +94,8 @@ static bool list_own_corners(twin_search *s)
 
 /* ---- corners of several ranks --------------------------------------------------------------------------------- */
 
-/* Writes, for each rank, the corners that lie in the rank's box. If mail->words is NULL, the words are only counted. */
+/* Writes, for each rank, the corners that lie in that rank's box. If mail->words is NULL, the words are only
+ * counted. */
 static void write_corners(const twin_search *s, session_mail *mail)
 {
     const session_homes *homes = s->mesh_group->homes;

@@ -1,17 +1,17 @@
 /* Finds twins: vertices of several meshes that coincide up to rounding.
  *
  * Codes compute the vertex positions of each block or level from its own origin and spacing, so that the same vertex
- * differs in its last bits between two meshes. All twins on outer faces are given the lexicographically least of their
- * positions. Vertices count as twins if their distance is below 1e-5 of the shortest edge of the faces there, or below
- * the rounding errors of coordinates. */
+ * differs in its last bits between two meshes. All twins on outer faces are given the lexicographically least of
+ * their positions. Vertices are twins if their distance is below 1e-5 of the shortest edge of the faces there, or
+ * below the rounding errors of coordinates. */
 #ifndef SESSION_TWINS_H
 #define SESSION_TWINS_H
 
 #include "session_catalogue.h"
 #include "session_team.h"
 
-/* Finds the twins of the mesh group's vertices. Its borders and homes must be up to date, and `parts` are this rank's.
- * Errors that occur only on this rank are stored in *error and not returned. Collective. */
+/* Finds the twins of the mesh group's vertices. Its borders and homes must be up to date, and `parts` contains this
+ * rank's parts. Errors that occur only on this rank are stored in *error and not returned. Collective. */
 insitu_status session_find_twins(session_mesh_group *mesh_group, const session_mesh_group_parts *parts,
                                  const session_team *team, base_error *error);
 

@@ -49,7 +49,7 @@ static insitu_status draw_surface_numbers(const session_frame_target *target, co
     return status;
 }
 
-/* Returns a copy of the job without volumes and clips, whose surfaces are all opaque. `surfaces` is a buffer for the
+/* Returns a copy of the job without volumes and clips, in which all surfaces are opaque. `surfaces` is a buffer for the
  * copied surfaces. */
 static render_job make_opaque_job(const render_job *job, render_surface_layer *surfaces)
 {

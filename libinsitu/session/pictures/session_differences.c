@@ -1,7 +1,7 @@
 /* Computes normals by central differences from the samples of all ranks. A rank samples its own cells at the six points
  * around each of its hits, and requests samples from every rank whose bounding box contains one of these points. A
- * request is the hit (16 bytes); its answer is the samples (32 bytes). If the partition consists of compact blocks,
- * only hits near the faces between blocks cause requests.
+ * request is the hit (16 bytes); its answer is the samples (32 bytes). If ranks have compact parts of the domain, only
+ * hits near the faces between these parts cause requests.
  *
  *     rank A   hits -> own samples -> requests to ranks by their boxes ............ and all samples -> light
  *     rank B                          requests -> own samples -> answers
@@ -70,7 +70,7 @@ static insitu_status share_ranges(difference_exchange *d, base_error *error)
 }
 
 /* Lists the ranks whose boxes are near enough to have samples for this rank's hits. Hits lie in this rank's own box, so
- * that their samples are at most the largest sampling distance away from it. */
+ * that the distance of their samples from this box is at most the largest sampling distance. */
 static void keep_near_ranks(difference_exchange *d)
 {
     const render_box *own = &d->boxes[d->rank];

@@ -1,6 +1,6 @@
 /* Draws all due images one after the other, frame by frame, and frees the memory of each before the next begins.
  *
- * If an error (mostly lack of memory) may occur on one rank alone, all ranks agree on a status before the next
+ * If an error, such as lack of memory, may occur on one rank alone, all ranks agree on a status before the next
  * collective call. An image that fails is skipped, and the next one is drawn; the step returns the first error. */
 #include "session_draw.h"
 
@@ -30,15 +30,15 @@ typedef struct canvas {
     image frame;
     /* block that holds the pixels of `frame`; the writer becomes its owner when the picture is passed to it */
     session_picture memory;
-    float *depth; /* depth of the frame, kept here while more frames are drawn without depth */
-    /* if only pixels at edges are drawn more than once: frames that contain only these, and their sums */
+    float *depth; /* depth of the first frame, which is kept here while further frames are drawn without depth */
+    /* if only pixels at edges are drawn several times: current frame and sums of frames, for these pixels only */
     image samples;
     int64_t edge_count, *edges;
     double *edge_sums;
     double *frame_sum; /* sum of the frames; NULL: there is only one frame */
     session_channels channels;
     deep_image deep;
-    /* decorations of the picture; NULL: none, and the frame contains its background */
+    /* decorations of the picture; NULL: there are no decorations, and the frame includes the background */
     session_decorations *decorations;
 } canvas;
 
@@ -119,7 +119,7 @@ static void canvas_add(canvas *c, int threads)
     }
 }
 
-/* Allocates memory for the pixels at edges, and for frames that contain only these. Returns false if memory runs
+/* Allocates memory for the pixels at edges, and for frames that contain only these pixels. Returns false if memory runs
  * out. */
 static bool canvas_begin_edges(canvas *c, const unsigned char *pixels)
 {
@@ -254,7 +254,8 @@ typedef struct frames_basis {
     session_frame_target target;
     canvas *canvas;
     int64_t overlap_count; /* maximum over the frames of the number of pixels in which cells overlap */
-    deep_image *deep;      /* deep picture that the next frame fills; NULL: none, or a frame has filled it already */
+    deep_image *deep;      /* deep picture that the next frame fills; NULL: no deep picture is requested, or a frame has
+                              filled it already */
 } frames_basis;
 
 static insitu_status draw_frame(frames_basis *b, const render_job *job, image *out, base_error *error)
@@ -284,8 +285,8 @@ static insitu_status share_edges(frames_basis *b, unsigned char **pixels, base_e
     return session_check_mpi(error, MPI_Bcast(*pixels, (int)bytes, MPI_BYTE, 0, team->comm), "MPI_Bcast");
 }
 
-/* Draws the image's frames, whose sample positions in the pixels differ. If only edges are drawn, the job contains only
- * their pixels. */
+/* Draws the image's frames, each with other sample positions in the pixels. If only edges are drawn, the job contains
+ * only their pixels. */
 static insitu_status draw_samples(frames_basis *b, const scene_image *image, render_job *job, base_error *error)
 {
     canvas *c = b->canvas;
@@ -426,8 +427,8 @@ static insitu_status write_outputs(const session_drawing *d, const scene_image *
 
 /* ---- images -------------------------------------------------------------------------------------------------- */
 
-/* Finds the parts of the picture that insets will cover, in the first of the image's files in which insets cover any
- * part. Returns the number of parts. */
+/* Finds the areas of the picture that insets will cover. If several of the image's files have insets, the areas are
+ * those of the first such file. Returns the number of areas. */
 static int find_covered(const scene *scene, const scene_image *image, insitu_rectangle covered[SCENE_ANCHORS])
 {
     int count = 0;
@@ -440,8 +441,8 @@ static int find_covered(const scene *scene, const scene_image *image, insitu_rec
     return count;
 }
 
-/* Warns on rank 0 of texts that cannot be drawn as they are written. Texts are laid out here only for these warnings,
- * so that they belong to the step; the writing thread lays them out again. */
+/* Warns on rank 0 of texts that cannot be drawn as they are written. Their layout is computed here only so that the
+ * warnings are reported in this step; the writing thread computes it again. */
 static void warn_of_words(const session_drawing *d, const scene_image *image, const session_decorations *decorations)
 {
     insitu_word_faults faults;
@@ -547,7 +548,7 @@ insitu_status session_draw_images(const session_drawing *drawing, const session_
     session_drawing own = *drawing;
     const session_drawing *d = &own;
     const bool are_bars_shared = has_shared_bars(d->scene);
-    /* if memory runs out here, only the warning is lost */
+    /* if memory runs out here, the comparison of colour bars is skipped, and only its warning is lost */
     own.shared_bars = are_bars_shared && d->team->rank == 0
                           ? base_calloc((size_t)d->scene->montage_count, sizeof *own.shared_bars)
                           : NULL;

@@ -46,8 +46,8 @@ typedef struct session_drawing {
 } session_drawing;
 
 /* Draws the plan's images and passes them to the writer. An image that fails is skipped. Returns the error of the plan
- * if there is one, and otherwise the first error of an image. In *drawn the bits of the images of the scene file that
- * were drawn are set; a bit's position is the image's number in the file. Collective. */
+ * if there is one, and otherwise the first error of an image. *drawn receives a bit mask of the images that were drawn:
+ * bit n stands for image number n of the scene file. Collective. */
 insitu_status session_draw_images(const session_drawing *drawing, const session_plan *plan, uint64_t *drawn,
                                   base_error *error);
 

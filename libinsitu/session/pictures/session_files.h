@@ -21,11 +21,11 @@ typedef struct session_files {
     const scene *scene;         /* the scene of the image; it must exist until the files are written */
     session_cinema *cinema;
     session_montages *montages;
-    /* set if there is a picture; otherwise report.json is written if `news` is not NULL, and else the tables of
-     * databases and the montages, which are written after all pictures of a step */
+    /* true: the element is a picture. Otherwise it is report.json if `news` is not NULL, or else a request to write the
+     * montages and the tables of databases, which comes after all pictures of a step */
     bool has_picture;
     char *news;        /* text of report.json, owned by this struct (session_news.h); NULL: it is not written */
-    scene_image image; /* a copy whose camera is that of the step, and whose lists belong to the scene */
+    scene_image image; /* copy of the image with the camera of the step; its lists belong to the scene */
     scene_placeholder_values moment;
     image frame;
     session_picture memory; /* block that holds the pixels of `frame`; owned by this struct */

@@ -1,12 +1,12 @@
 /* Draws a frame, and draws the pixels in which cells overlap a second time.
  *
  * Fragments that overlap cannot be sorted by depth, and the positions of their samples are no longer known when
- * compositing finds the overlap. So these pixels, whose set compositing sends to all ranks, are traced again with every
- * sample as a separate fragment (render.h), composited into a second picture, and copied into the first. A mesh with a
- * few overlapping cells causes only a few such pixels. Two meshes that fill the same space may cause a thousand
- * fragments in each of a million pixels. Such pixels are drawn in several turns, each with as many pixels as the
- * busiest rank can store fragments for. If segments of several volumes are drawn, all pixels are drawn in this way at
- * once. */
+ * compositing finds the overlap. Therefore compositing sends the set of these pixels to all ranks, and the pixels
+ * are traced again with every sample as a separate fragment (render.h), composited into a second picture, and copied
+ * into the first. A mesh with a few overlapping cells causes only a few such pixels. Two meshes that fill the same
+ * space may cause a thousand fragments in each of a million pixels. Such pixels are drawn in several passes, called
+ * turns. Each turn has as many pixels as the busiest rank can store fragments for. If segments of several volumes
+ * are drawn, all pixels are drawn in this way at once. */
 #include "session_frame.h"
 
 #include <math.h>
@@ -95,7 +95,7 @@ static insitu_status draw_frame(const session_frame_target *t, const render_job 
                                            &composited, error)
                  : comp_composite(&t->compositing, &fragments, t->background, job->threads, out, &composited, error);
     if (status && !composited.has_failed) *error = (base_error){0};
-    /* all ranks have the same status here, but their messages may differ, so that ranks agree on one */
+    /* all ranks have the same status here, but messages may differ, so that ranks agree on one message */
     if (status) status = session_agree(t->comm, error);
     base_free(fragments.items);
     add_to_frame(frame, &rendered, composited.sent_fragments, 1e3 * (MPI_Wtime() - start));
@@ -107,8 +107,8 @@ static insitu_status draw_frame(const session_frame_target *t, const render_job 
 /* ---- overlaps ------------------------------------------------------------------------------------------------ */
 
 /* Estimates the number of pixels that produce fragment_limit fragments. The number of samples per pixel is estimated
- * from the length of a ray in the scene, which is about 1, at most sqrt(3), in scaled units. The number of segments per
- * pixel is an empirical value. */
+ * from the length of a ray in the scene, which is about 1 and at most sqrt(3) in scaled units. The number of segments
+ * per pixel is an empirical value. */
 static int64_t estimate_turn_pixels(const render_job *job, int64_t fragment_limit)
 {
     enum { SEGMENTS = 500, CUT_BY_SURFACES = 5000 };
@@ -138,12 +138,12 @@ static insitu_status update_turn_pixels(const session_frame_target *t, int64_t f
 
 /* The order in which a picture's pixels are drawn in turns. Pixels are ordered by squares of SQUARE × SQUARE, so that
  * the rays of a packet are neighbours. Squares that follow each other are far apart: the step between their numbers is
- * about the number of squares divided by the golden ratio. Each turn therefore contains a similar share of dense
- * regions. */
+ * about the number of squares divided by the golden ratio. Each turn therefore contains about the same fraction of
+ * pixels in dense regions. */
 typedef struct turn_order {
     int width, height, squares_per_row; /* size of the picture in pixels, and number of squares in a row of squares */
-    /* number of squares; step in numbers from one square to the next in the order, which has no common divisor with
-     * it */
+    /* number of squares, and difference between the numbers of consecutive squares in the order; the two have no common
+     * divisor */
     int64_t squares, stride;
 } turn_order;
 
@@ -284,8 +284,8 @@ static insitu_status draw_overlaps(const session_frame_target *t, const render_j
 }
 
 /* Returns whether all pixels must be drawn with separate fragments. Segments of several volumes overlap on every pixel.
- * Samples of several volumes are rounded differently depending on whether a rank or compositing blends them; if
- * pictures must be reproducible, compositing blends them all. */
+ * Samples of several volumes are rounded differently depending on whether a rank or compositing blends them. If
+ * pictures must be reproducible, all samples are therefore blended by compositing. */
 static bool is_mixed_throughout(const render_job *job)
 {
     return (job->integration == RENDER_SEGMENTS || job->reproducible) && job->volume_count > 1;

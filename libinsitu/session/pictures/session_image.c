@@ -1,8 +1,8 @@
 /* Loads the image library at run time, by its full path, so that no other library of the same name is used. It is
  * searched in the folder of the object that contains this code (libinsitu), and then in the lib folder beside it, where
- * it is if a program in bin links libinsitu statically. If it is in neither, the dynamic loader searches for it, unless
- * LD_LIBRARY_PATH would make it search the working directory. The library stays loaded until the process ends: C++
- * libraries with threads and static objects cannot be unloaded safely.
+ * it is if a program in bin links libinsitu statically. If neither folder contains it, the dynamic loader searches for
+ * it, unless LD_LIBRARY_PATH would make it search the working directory. The library stays loaded until the process
+ * ends: C++ libraries with threads and static objects cannot be unloaded safely.
  *
  * Some library that OpenImageIO uses starts threads when it is loaded. These threads sleep, but could receive the
  * simulation's signals and run its handlers, so that they are started with all signals blocked. Other libraries end the

@@ -21,8 +21,8 @@ insitu_status session_place_image(const insitu_image *image, const insitu_place 
 double session_load_image_library(void);
 
 /* Finds the reasons why a picture's texts cannot be drawn (image_output.h). Only the size and the decorations of the
- * picture are read. If the library cannot be loaded or memory runs out, none are found; writing the picture then fails
- * anyway. Local. Thread-safe. */
+ * picture are read. If the library cannot be loaded or memory runs out, no reasons are found, because writing the
+ * picture will fail anyway. Local. Thread-safe. */
 void session_check_words(const insitu_image *image, insitu_word_faults *out);
 
 /* Set if pictures may be written by a separate thread (session_writer.h). Tests that replace this file set it to

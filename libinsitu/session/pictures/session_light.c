@@ -1,8 +1,8 @@
-/* Computes shadows and ambient occlusion over all ranks. The rank that has a hit computes its lighting. It first traces
- * the hit's shadow and occlusion rays in its own cells, which block most of them. Then it sends requests to the ranks
- * whose bounding box an unblocked ray intersects. A request consists of the hit and the set of its unblocked rays, 32
- * bytes in all; the other rank computes the rays from the hit in the same way. The answer is the set of rays that are
- * still unblocked, 8 or 16 bytes.
+/* Computes shadows and ambient occlusion over all ranks. The rank that has a hit computes its lighting. This rank first
+ * traces the hit's shadow and occlusion rays in its own cells, which block most of the rays. Then it sends requests to
+ * the ranks whose bounding box an unblocked ray intersects. A request consists of the hit and the set of its unblocked
+ * rays, 32 bytes in all; the other rank computes the rays from the hit in the same way. The answer is the set of rays
+ * that are still unblocked, 8 or 16 bytes.
  *
  *     rank A   hits -> own cells -> unblocked rays -> requests to ranks by their boxes ...... all answers -> colours
  *     rank B                                          requests -> own cells -> unblocked rays -> answers
@@ -26,7 +26,8 @@ enum {
     ANSWER_WORDS = sizeof(render_hit_rays) / 8
 };
 
-/* The state of a round: the hits of this rank that it contains, and the rays of each that are not blocked yet. */
+/* The state of a round: the hits of this rank that are processed in this round, and the rays of each hit that are not
+ * blocked yet. */
 typedef struct lighting {
     MPI_Comm comm;
     const render_job *job;
@@ -47,7 +48,7 @@ typedef struct request_list {
     int *ranks;
     int64_t *hits;
     render_hit_rays *rays;
-    int64_t current_hit; /* index of the hit to which added requests belong */
+    int64_t current_hit; /* index of the hit to which the requests being added belong */
     const lighting *lighting_state;
     int64_t *first_requests; /* ranks + 1 entries: position in the message of the first request to each rank */
     int64_t *message_order;  /* for each position in the message, the request's index in this list */

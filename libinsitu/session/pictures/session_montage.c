@@ -26,7 +26,7 @@ static int64_t count_pixels(const scene_montage *montage)
     return (int64_t)width_of(montage) * height_of(montage);
 }
 
-/* Returns the place of a panel in the montage, whose pixels are rgba. */
+/* Returns the position of a panel in the montage with the pixels rgba. */
 static insitu_place find_panel_region(const scene_montage *of, float *rgba, int panel)
 {
     const int left = of->are_bars_left ? of->bar_width : 0;
@@ -88,7 +88,7 @@ static void free_montage(session_montage *m)
     *m = (session_montage){0};
 }
 
-/* Returns row y of the picture at the place. */
+/* Returns row y of the picture at this position of the montage. */
 static float *find_row(const insitu_place *place, int y)
 {
     return place->rgba + 4 * ((ptrdiff_t)(place->y + y) * place->width + place->x);
@@ -112,7 +112,7 @@ static insitu_status keep_panel(const scene_montage *of, session_montage *m, int
     return INSITU_OK;
 }
 
-/* Stores a copy of a picture without decorations, and a copy of its decorations, until the picture is drawn over the
+/* Stores a copy of a picture without decorations, and a copy of its decorations, until the inset is drawn over the
  * panels. */
 static insitu_status keep_inset(const scene_montage *of, session_inset *inset, const scene_output *output,
                                 const insitu_image *picture, const session_decorations *decorations, base_error *error)

@@ -24,7 +24,7 @@ void session_drop_picture(session_picture *picture);
 
 /* Copies of the last step's pictures, on rank 0, which the caller can read. */
 typedef struct session_kept_pictures {
-    bool is_enabled; /* set if pictures are kept; the same on every rank, because all images then need depth */
+    bool is_enabled; /* true: pictures are kept, so that all images need depth. The same on every rank */
     int count;
     /* pictures; their names belong to the scene, and pixels and depth of each are one block of memory */
     insitu_picture items[SCENE_MAX_PICTURES];

@@ -1,12 +1,13 @@
 /* Implements the writer and its thread. The caller's thread loads the image library before the writing thread is
- * started. Loading takes 0.1 s, or 1 s from a cold disk, and holds the loader's lock, which every start of a thread
- * needs: if the writing thread loaded the library during the first step, all ranks would wait until it is loaded.
+ * started. Loading takes 0.1 s, or 1 s from a cold disk, and holds the loader's lock, which is needed to start any
+ * thread. If the writing thread loaded the library during the first step, all ranks would therefore wait until it is
+ * loaded.
  *
  * Some library that OpenImageIO uses creates threads and static objects when it is loaded. When the process exits,
- * these are destroyed in the reverse order of their creation. So the function that waits for pictures at exit is
- * registered again after the library is loaded, and again after the first pictures are written, because that creates
- * more such objects. The function therefore runs first, and no picture is being written while these objects are
- * destroyed. */
+ * these are destroyed in the reverse order of their creation. Therefore the function that waits for pictures at exit
+ * is registered again after the library is loaded, and again after the first pictures are written, because writing
+ * creates more such objects. The function then runs before their destructors, and no picture is being written while
+ * these objects are destroyed. */
 #include "session_writer.h"
 
 #include <mpi.h>

@@ -4,9 +4,9 @@
  * until there is space. Pictures are written in order, and the next step collects the results when it begins. If the
  * scene requests it, or no thread can be started, pictures are written before the step ends.
  *
- * The thread does not call MPI, receives none of the process's signals, and does not unload the image library when it
- * ends. A process that ends without insitu_destroy() waits for it in MPI_Finalize() or when it exits. If a process is
- * killed, queued pictures are lost, but no file is ever incomplete (image_output.h). */
+ * The thread does not call MPI, receives none of the process's signals, and does not unload the image library when
+ * it ends. A process that ends without insitu_destroy() waits for the thread in MPI_Finalize() or at exit. If a
+ * process is killed, queued pictures are lost, but no file is ever incomplete (image_output.h). */
 #ifndef SESSION_WRITER_H
 #define SESSION_WRITER_H
 
@@ -36,7 +36,7 @@ typedef struct session_writer {
     int64_t queued_bytes;                               /* size of all data in the queue */
     session_picture free_memory[SESSION_FREE_PICTURES]; /* unused blocks that are kept for future pictures */
     base_error failure; /* first error that no step has returned yet; used by the caller's thread only */
-    int failure_count;  /* number of errors since that one, which it includes */
+    int failure_count;  /* number of errors since `failure` was stored, including that one */
     /* time in milliseconds that loading the image library took in insitu_create(), for the next report */
     double loading_ms;
     struct session_writer *next; /* next writer of this process */
@@ -68,8 +68,8 @@ void session_writer_release(session_writer *writer, session_picture *memory);
  * immediately; errors of the latter are stored in *error. Local. */
 void session_writer_queue(session_writer *writer, struct session_files *files, base_error *error);
 
-/* Collects the results of the thread: the time it has used is added to the report, errors to the writer's `failure`.
- * Local. */
+/* Collects the results of the thread: adds the time that the thread has used to the report, and its errors to the
+ * writer's `failure`. Local. */
 void session_writer_collect(session_writer *writer, session_report *report);
 
 /* Returns the first error, together with the number of further ones, and clears them. Local. */

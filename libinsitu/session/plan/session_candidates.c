@@ -68,7 +68,7 @@ static bool mark_volume(session_mesh *mesh, const scene_volume *layer)
 }
 
 /* Marks the scalar of distances from a plane as used. Its interval contains the distance at which the slice is drawn,
- * which is 0 or close to it (session_slice_distance()). */
+ * which is about 0 (session_slice_distance()). */
 static bool mark_plane(session_mesh *mesh, const scene_plane *plane, const session_extent *extent)
 {
     const float reach = (float)(2 * SESSION_BORDER_SHARE * extent->half_diagonal);

@@ -1,4 +1,4 @@
-/* Determines the candidates: the cells that the due images can show, judged by the cells' values. A partial tree
+/* Determines the candidates: the cells that the due images can show, according to the cells' values. A partial tree
  * contains only the candidates. */
 #ifndef SESSION_CANDIDATES_H
 #define SESSION_CANDIDATES_H

@@ -1,13 +1,13 @@
-/* Derived fields are computed one after the other, each after the fields on which it depends. These are the steps for
- * one:
+/* Derived fields are computed one after the other, each after the fields on which it depends. The steps for one derived
+ * field are:
  *     cells' values that are needed at vertices  ->  session_recentre()
  *     an expression:  blocks of vertices or cells, each instruction for a whole block
  *     a gradient, or a quantity computed from one:  sums over the cells around each vertex and over all ranks
  *         (session_vertex_sums.h), over all meshes that share the field, so that blocks show no seam
  *
- * The values are copies owned by the session, packed, with 4 bytes if all values on which they depend have 4, else with
- * 8. A hash of the versions of these values determines whether the copies are up to date; they are recomputed if it has
- * changed on any rank. */
+ * The values are copies owned by the session, packed, with 4 bytes per value if all values on which they depend have
+ * 4 bytes, else with 8. A hash of the versions of these values determines whether the copies are up to date; they
+ * are recomputed if it has changed on any rank. */
 #include "session_derive.h"
 
 #include <omp.h>
@@ -432,7 +432,8 @@ static const session_catalogue_mesh *find_first_faultless(const derive_work *w, 
     return i < mesh_group->count ? mesh_group->meshes[i] : NULL;
 }
 
-/* Returns the number of scalars whose gradients are computed; ranks without a part of a mesh need it, too. */
+/* Returns the number of scalars whose gradients are computed; ranks without a part of the mesh need this number,
+ * too. */
 static int count_scalars(const derive_work *w, const session_mesh_group *mesh_group)
 {
     if (!session_needs_vector(w->derived)) return w->derived->input_count;

@@ -15,8 +15,8 @@ insitu_status session_add_derived_fields(const scene *scene, const char *scene_p
                                          session_meshes *meshes, const session_team *team, base_error *error);
 
 /* Return sets of derived fields, one bit each, including the fields on which they depend. session_derived_of_plan()
- * returns those that the images of the plan need; session_derived_of_events() those that the statistics of a step and,
- * if `images` is set, the conditions of images need. Local, the same on all ranks. */
+ * returns those that the images of the plan need; session_derived_of_events() those that are needed by the statistics
+ * of a step and, if `images` is set, by the conditions of images. Local, the same on all ranks. */
 uint64_t session_derived_of_plan(const scene *scene, const session_plan *plan);
 uint64_t session_derived_of_events(const scene *scene, int64_t cycle, bool images);
 
@@ -24,7 +24,7 @@ uint64_t session_derived_of_events(const scene *scene, int64_t cycle, bool image
  * copied. */
 void session_mark_sources(const scene *scene, uint64_t needed, const session_meshes *meshes);
 
-/* Returns whether the field is computed from one vector, by the gradients of its components. */
+/* Returns whether the derived field is computed from the gradients of a vector's components. */
 bool session_needs_vector(const scene_derived *derived);
 
 #endif

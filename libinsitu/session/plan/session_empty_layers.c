@@ -1,6 +1,6 @@
 /* Finds layers that show nothing. Trees contain the ranges of their cells' values, rounded outward to float32. A layer
- * that shows no value within these ranges may be empty. Only then the exact range of all cells is computed, once, and
- * decides. */
+ * that shows no value within these ranges may be empty. Only in this case, the exact range of all cells is computed
+ * once to decide this. */
 #include "session_empty_layers.h"
 
 #include <math.h>
@@ -78,9 +78,9 @@ static void list_thresholds(const scene_image *image, layer_batch *batch)
             list_layer(batch, (planned_layer){.image = image, .surface = &image->surfaces[n], .number = n});
 }
 
-/* Lists the layers of the batch, and returns the number of all layers. Each layer is listed once: views of an image
- * share their layers, pictures of a sweep over fields share the isosurfaces, those of a sweep over isovalues the
- * volumes, those of a sweep over planes both, and all of them share the thresholds. */
+/* Lists the layers of the batch, and returns the number of all layers. Each layer is listed once, although pictures
+ * share layers: views of an image share all layers, pictures of a sweep over fields share isosurfaces, of a sweep over
+ * isovalues volumes, and of a sweep over planes both. All these pictures share thresholds. */
 static int list_layers(const session_plan *plan, layer_batch *batch)
 {
     for (int i = 0; i < plan->image_count; i++) {
@@ -107,7 +107,7 @@ static void widen_range(double low, double high, field_range *range)
     range->negated_high = fmin(range->negated_high, -high);
 }
 
-/* Widens the range by that of the tree's root, which contains all visible values. */
+/* Widens the range by the range of the tree's root, which contains all visible values. */
 static void add_root_range(const session_mesh *mesh, const session_scalar *scalar, field_range *range)
 {
     if (!mesh->is_needed || !mesh->has_tree || mesh->tree.node_count == 0) return;
@@ -115,7 +115,7 @@ static void add_root_range(const session_mesh *mesh, const session_scalar *scala
     widen_range((double)*(const float *)(const void *)root.low, (double)*(const float *)(const void *)root.high, range);
 }
 
-/* Widens the range by that of the scalar over this kind of cells, which is computed if necessary. */
+/* Widens the range by the scalar's range over this kind of cells, which is computed if necessary. */
 static void add_extent_range(const session_mesh *mesh, session_scalar *scalar, int threads, session_extent_kind kind,
                              field_range *range)
 {
@@ -142,7 +142,7 @@ static field_range find_own_range(const session_meshes *meshes, const planned_la
         if (layer->surface && !of_all_cells)
             add_face_range(mesh, layer->surface, &range);
         else if (scalar && layer->isosurface && mesh->has_shells_alone)
-            /* shells are not in trees, so that their values are read */
+            /* trees do not contain shells, so that the shells' values must be read */
             add_extent_range(mesh, scalar, threads, SESSION_SEEN, &range);
         else if (scalar && of_all_cells)
             add_extent_range(mesh, scalar, threads, SESSION_SOLID, &range);
@@ -188,8 +188,8 @@ static insitu_status reduce_ranges(const session_meshes *meshes, const session_t
 
 /* ---- empty layers ---------------------------------------------------------------------------------------------- */
 
-/* Returns the subject of the layer's warning. In a sweep over isovalues each picture has one isovalue, whose number is
- * its index in the file's list. */
+/* Returns the subject of the layer's warning. In a sweep over isovalues each picture has one isovalue. The number in
+ * the subject is then the isovalue's index in the scene file's list. */
 static session_warning make_warning(const planned_layer *layer, int value)
 {
     const session_warning_kind kind = layer->isosurface ? WARNING_ISOVALUE
@@ -199,7 +199,7 @@ static session_warning make_warning(const planned_layer *layer, int value)
 }
 
 /* Returns whether no cell crosses an isovalue. A crossing belongs to the cell whose values reach the isovalue from
- * below, so that the minimum of all values has none. */
+ * below, so that no cell crosses an isovalue that equals the minimum of all values. */
 static bool is_outside(double value, const field_range *range)
 {
     return value <= range->low || value > -range->negated_high;

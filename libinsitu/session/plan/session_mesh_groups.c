@@ -5,8 +5,8 @@
 #include "session_hash.h"
 #include "session_scalars.h"
 
-/* The purpose for which meshes are grouped: to average the values of a layer's field, or the gradients of a derived
- * field. */
+/* The purpose for which meshes are grouped: values of a layer's field, or gradients of a derived field, are averaged
+ * over the group. */
 typedef struct group_purpose {
     const scene_field *field; /* field of a layer; NULL if the meshes are those of a derived field */
     int derived_index;        /* index of the derived field; -1: none */
@@ -53,7 +53,7 @@ static bool add_single_group(session_catalogue *catalogue, session_catalogue_mes
 }
 
 /* Computes the name of the group of all meshes without global ids for this purpose; it is 0 if there are none. Adds the
- * group if it is new. Meshes with ids get groups of their own. Returns false if memory runs out. */
+ * group if it is new. A mesh with ids forms a group by itself. Returns false if memory runs out. */
 static bool group_meshes(session_catalogue *catalogue, const group_purpose *purpose, uint64_t *mesh_group_name)
 {
     uint64_t hash = SESSION_HASH_BEGIN;

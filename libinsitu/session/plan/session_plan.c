@@ -1,5 +1,5 @@
 /* The plan: trees, recentred values and ranges are computed only if an image of this step uses them. All ranks have the
- * same catalogue, which determines whether an image can be drawn, so all reach the same decision without
+ * same catalogue, which determines whether an image can be drawn. Therefore all ranks make the same plan without
  * communication. */
 #include "session_plan.h"
 
@@ -171,7 +171,7 @@ static const session_catalogue_field *find_drawn_field(const session_catalogue_m
     return scene_field_is_on(field, mesh->name) ? session_catalogue_find(mesh, field->name) : NULL;
 }
 
-/* Checks that some mesh has the field, and that it has no fault on the meshes on which the layer is drawn. */
+/* Checks that some mesh has the field, and that the field has no fault on the meshes on which the layer is drawn. */
 static insitu_status check_field(const session_plan_basis *basis, const scene_field *field, const scene_field *layer,
                                  base_error *error)
 {
@@ -290,8 +290,8 @@ static bool plan_recentrings(const session_catalogue *catalogue, session_plan *p
 
 /* ---- all images ---------------------------------------------------------------------------------------------- */
 
-/* Returns the number of multiples of the interval up to the time. A time within rounding of a multiple counts, because
- * steps of 0.1 add up to slightly less. */
+/* Returns the number of multiples of the interval up to the time. A multiple is included even if the time is below it
+ * by rounding, because ten steps of 0.1 add up to slightly less than 1. */
 static double count_intervals(double time, double interval)
 {
     const double count = time / interval;
@@ -392,8 +392,8 @@ static void warn_of_shells(const session_catalogue *catalogue, const scene_image
                  image->name, layer, field->name, name ? name : "", field->name);
 }
 
-/* Warns of a mesh with global vertex ids if a layer shows it, by means at vertices, together with other meshes: its
- * vertices are not matched with those of the others. */
+/* Warns of a mesh with global vertex ids if a layer averages values at the vertices of this and other meshes, because
+ * vertices of this mesh are not matched with those of other meshes. */
 static void warn_of_ungrouped_mesh(const session_catalogue *catalogue, const scene_image *image, const char *layer,
                                    const scene_field *field, session_report *report)
 {
@@ -456,8 +456,8 @@ void session_plan_free(session_plan *plan)
     *plan = (session_plan){0};
 }
 
-/* Returns whether an image has no outputs and pictures are not kept in memory, so that nobody would see it; warns if
- * so. */
+/* Returns whether an image has no outputs and pictures are not kept in memory, so that the image would be lost. Warns
+ * in this case. */
 static bool lacks_outputs(const session_plan_basis *basis, const scene_image *image, session_report *report)
 {
     const bool is_lacking = image->output_count == 0 && !basis->keeps_pictures;

@@ -19,12 +19,12 @@ typedef struct session_recentring {
 typedef struct session_plan {
     int image_count; /* number of images that can be drawn */
     const scene_image **images;
-    /* Number of layers of each kind in all images; views of an orbit count once. `surfaces` counts outer surfaces and,
-     * if there are meshes of shells alone, isosurfaces. */
+    /* Number of layers of each kind in all images; views of an orbit count once. surface_count includes outer surfaces
+     * and, if some meshes contain only shells, isosurfaces. */
     int slice_count, surface_count;
     int recentring_count;
     session_recentring *recentrings;
-    int *stale;         /* one number per recentring: working memory of session_recentre() */
+    int *stale;         /* working memory of session_recentre(): one number per recentring */
     int64_t cell_count; /* number of drawn cells over all ranks */
     base_error refusal; /* error of the first due image that cannot be drawn */
 } session_plan;
@@ -41,7 +41,7 @@ typedef struct session_plan_basis {
     const scene *scene;
     const char *scene_path; /* path of the scene file, for messages */
     const session_moment *moment;
-    /* one bit per image of the file, not set if the image's condition does not hold in this step */
+    /* one bit per image of the scene file; the bit is not set if the image's condition is false in this step */
     uint64_t allowed_images;
     const session_catalogue *catalogue;
     const session_extent *extent;
@@ -54,8 +54,8 @@ bool session_is_due(const scene_image *image, const session_moment *moment);
 /* Returns the number of images that are due, without regard to conditions. Local. */
 int session_count_due(const scene *scene, const session_moment *moment);
 
-/* Finds the statistics that are due and, if images is set, the conditions, and keeps those whose fields exist. The
- * first fault is stored in *error. Local, the same on every rank. */
+/* Finds the statistics that are due and, if `images` is set, the conditions of images. Keeps those whose fields exist.
+ * The first fault is stored in *error. Local, the same on every rank. */
 session_valid_events session_check_event_fields(const session_plan_basis *basis, bool images, base_error *error);
 
 /* Determines which of the due images can be drawn, marks on this rank's meshes and scalars the data that they need, and

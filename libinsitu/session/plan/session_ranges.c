@@ -1,14 +1,15 @@
 /* Percentiles are computed digit by digit. Values are doubles, mapped to 64-bit integers in the same order. A pass
- * considers the values whose leading bits are those already determined, and adds up their weights by their next 11
- * bits. The sum of these weights over all ranks determines the next digit of the percentile. Six passes find all 64
- * bits, and so the exact value instead of an estimate, for any partition. From the third pass on few values are left: a
- * pass stores them, and the next ones do not read cells.
+ * selects the values whose leading bits equal the bits determined so far, and adds up their weights, separately for
+ * each value of the next 11 bits. The sum of these weights over all ranks determines the next digit of the percentile.
+ * Six passes find all 64 bits, and thus the exact percentile, for any partition. From the third pass on few values are
+ * left. Therefore this pass stores them, and later passes do not read cells.
  *
  * Each cell with a volume has the weight 1. If all cells are shells, their weights are their areas. Weights are
  * integers, so that their sums are the same in any order: an area is a fraction of the largest one, times 2^28 and
  * rounded, so that 2^35 cells can be added and the error of each cell is at most 2^-29 of the largest one.
  *
- * A cell of higher order counts once, by the values at its own nodes, whatever the pieces into which it is divided. */
+ * A cell of higher order is counted once, with the values at its own nodes, independent of the pieces into which it
+ * is divided. */
 #include "session_ranges.h"
 
 #include <math.h>
@@ -97,10 +98,10 @@ typedef struct kept_values {
 typedef struct digit_count {
     uint64_t known_bits[2]; /* known leading bits of the low and the high percentile; the other bits are 0 */
     int pass;               /* number of the current pass, from 0; each pass determines one more digit */
-    bool is_positive;       /* set if only positive values count */
-    bool is_of_shells;      /* set if only shells count; otherwise only cells with a volume do */
-    double largest_area;    /* area of the largest shell that counts */
-    /* for each mesh, the values of the caller's cells if some are of higher order; NULL for others */
+    bool is_positive;       /* true: only positive values are counted */
+    bool is_of_shells;      /* true: only shells are counted; false: only cells with a volume are counted */
+    double largest_area;    /* area of the largest shell that is counted */
+    /* for each mesh with cells of higher order, the values of the caller's cells; NULL for all other meshes */
     session_cell_value **order_values;
     bool is_kept; /* set if the stored values are read instead of cells */
     kept_values kept;
@@ -161,8 +162,8 @@ static double find_area(const counted_cells *cells, int64_t cell)
     return cells->values ? cells->values[cell].volume : session_shell_area(cells->g, cell);
 }
 
-/* Computes the mean of a cell's minimum and maximum. Returns false if the cell is not seen or its values do not
- * count. */
+/* Computes the mean of a cell's minimum and maximum. Returns false if the cell is not shown or its values are not
+ * counted. */
 static bool find_middle(const digit_count *of, const counted_cells *cells, int64_t cell, double *middle)
 {
     if (cells->values) {
@@ -220,8 +221,8 @@ static insitu_status count_digits(const session_meshes *meshes, const session_te
                              "MPI_Allreduce");
 }
 
-/* Entries of the reduction by minimum that determines which cells count. SOLID: -1 if a cell with a volume counts,
- * otherwise 0. AREA: the negated area of the largest shell; it is not computed any more after a cell with a volume has
+/* Entries of the reduction by minimum that determines which cells are counted. SOLID: -1 if there is a cell with a
+ * volume, otherwise 0. AREA: the negated area of the largest shell; it is not updated after a cell with a volume has
  * been found. LACKING: -1 if memory ran out on a rank, otherwise 0. */
 enum { SOLID, AREA, LACKING, KINDS };
 
@@ -243,8 +244,8 @@ static void find_own_kind(const counted_cells *cells, int threads, const digit_c
     }
 }
 
-/* Computes the values of the caller's cells of meshes with cells of higher order. The nodes of quads are taken as
- * equispaced, since areas hardly depend on it. Returns false if memory runs out. */
+/* Computes the values of the caller's cells of meshes with cells of higher order. The nodes of quads are assumed to be
+ * equispaced, because areas hardly depend on the spacing. Returns false if memory runs out. */
 static bool find_order_values(const session_meshes *meshes, int threads, const scene_field *field, digit_count *of,
                               base_error *error)
 {
@@ -270,7 +271,7 @@ static void free_order_values(const session_meshes *meshes, digit_count *of)
     base_free(of->order_values);
 }
 
-/* Determines whether cells with a volume count, or only shells. */
+/* Determines whether cells with a volume are counted, or shells. */
 static insitu_status find_kind(const session_meshes *meshes, const session_team *team, const scene_field *field,
                                digit_count *of, base_error *error)
 {
@@ -287,8 +288,8 @@ static insitu_status find_kind(const session_meshes *meshes, const session_team 
     return status || least[LACKING] == 0 ? status : session_agree(team->comm, error);
 }
 
-/* Returns the digit of the value with the given rank (a sum of weights, counted from 0). *rank becomes its rank among
- * the values with this digit. */
+/* Returns the digit of the value with the given rank (a sum of weights, counted from 0). *rank receives the value's
+ * rank among the values with this digit. */
 static int find_digit(const int64_t counts[DIGITS], int64_t *rank)
 {
     int digit = 0;

@@ -12,7 +12,7 @@
 typedef struct session_range_subject {
     const scene_field *field;
     const scene_plane *plane; /* the plane; NULL: the field's own values are used */
-    bool is_positive;         /* set if only positive values count (session_scalars.h) */
+    bool is_positive;         /* true: only positive values are used (session_scalars.h) */
 } session_range_subject;
 
 /* Computes the minimum and maximum over all ranks' drawn cells; low > high: there are no values. Collective. */

@@ -1,18 +1,21 @@
-/* Recentring computes values at vertices. The value at a vertex is the mean over the caller's cells there, on all
- * ranks, with the same bits for any partition. (For values at corners, the mean is over the corners there; for values
- * at vertices of refined blocks, over the vertices there.) If the field has values on faces of the boundary, a vertex
- * of such faces gets the mean over these instead, even if all of them are on other ranks than its cells.
+/* Recentring computes values at vertices. The value at a vertex is the mean over the caller's cells that have this
+ * vertex, on all ranks. It has the same bits for any partition. (For corner fields, the mean is over the corners at
+ * this vertex; for values at vertices of refined blocks, over all vertices at the same position.) If the field has
+ * values on faces of the boundary, a vertex of such faces gets the mean of the faces' values instead, even if these
+ * faces are on other ranks.
  *
- * Sums depend on their order, so sums of ranks' partial sums would depend on the partition. Instead all ranks' single
- * values are gathered, and summed so that their order does not matter (sum_values()).
+ * Rounding of a sum depends on the order of its terms, so that adding partial sums of ranks would make the result
+ * depend on the partition. Instead, the individual values of all ranks are gathered and added by sum_values(), whose
+ * result does not depend on the order.
  *
  *     local:  groups of equal vertices (session_vertex_groups.h) -> values of the cells around each -> means
  *     shared: groups inside another rank's box  --(key, values)-->  their home (session_homes.h): merged by key, means
  *             means  <-------------------------------------------
  *
- * Then vertices that hang on larger cells take those cells' values (outer/session_hanging.h).
+ * Then vertices that hang on faces of larger cells get the values interpolated on these faces
+ * (outer/session_hanging.h).
  *
- * Each field takes two collective deliveries of messages. The first one also sends errors to all ranks. An error in
+ * Each field takes two collective exchanges of messages. The first one also sends errors to all ranks. An error in
  * receiving the means is sent to the other ranks in the next phase of the step. */
 #include "session_recentre.h"
 
@@ -37,7 +40,7 @@ typedef struct value_groups {
     int64_t *ends;         /* index after each group's last value; count entries */
     double *values;
     double *means; /* mean of each group; count entries */
-    /* for each group, nonzero if its values are those of boundary faces, and 0 if those of cells or corners; count
+    /* for each group, nonzero if its values come from boundary faces, and 0 if they come from cells or corners; count
      * entries */
     unsigned char *has_face_values;
 } value_groups;
@@ -87,8 +90,8 @@ static void groups_free(value_groups *groups)
 /* Returns the sum of finite values, each multiplied by scale; the bits of the sum do not depend on the order of the
  * values. A value is rounded to a multiple of a unit that is coarse enough for sums of such multiples to be exact; the
  * rest of it, which is exact too, is rounded to a multiple of a finer unit (Rump, Ogita and Oishi, Accurate
- * floating-point summation, 2008, section 3). What remains of 100 values after that is below 2^-85 of the largest
- * value, so the sum is rounded correctly unless it is that close to a tie. */
+ * floating-point summation, 2008, section 3). For 100 values, the remainder that is neglected is below 2^-85 of the
+ * largest value. Therefore the sum is rounded correctly, unless it is so close to the middle between two doubles. */
 static double sum_values(const double *values, int64_t count, double largest, double scale)
 {
     double sums[2] = {0, 0};
@@ -132,8 +135,8 @@ static void groups_average(value_groups *groups, int threads)
 
 /* ---- this rank's values ---------------------------------------------------------------------------------------- */
 
-/* The groups of a cell's vertices without duplicates. For vertex values of split cells, it contains the vertices
- * instead of their groups. */
+/* The groups of a cell's vertices without duplicates. If values at vertices of split cells are averaged, the list
+ * contains the vertices instead of their groups. */
 typedef struct cell_groups {
     int64_t count, capacity;
     int64_t *groups;
@@ -188,8 +191,8 @@ static inline void add_value(value_groups *values, int64_t group, double value, 
     values->values[at] = value;
 }
 
-/* Adds a cell's values to the groups of its vertices. A cell value is added once per group. Of values at corners, each
- * finite one is added to its corner's group. */
+/* Adds a cell's values to the groups of its vertices. A cell value is added once per group. Each finite value at a
+ * corner is added to the corner's group. */
 static void add_cell_values(recentring *r, int part, int64_t cell, cell_groups *list, bool is_shared)
 {
     const grid_field *field = &r->parts[part].field;
@@ -481,7 +484,7 @@ static bool merge_records(const session_mail *in, int ranks, int threads, sessio
     return is_done;
 }
 
-/* Replaces the means of groups that other ranks share by the means over all ranks. */
+/* Replaces the means of groups that are shared with other ranks by the means over all ranks. */
 static insitu_status merge_shared(const session_team *team, recentring *r, base_error *error)
 {
     const session_vertex_groups *groups = &r->mesh_group->groups;
@@ -505,7 +508,7 @@ static insitu_status merge_shared(const session_team *team, recentring *r, base_
 /* ---- one recentring -------------------------------------------------------------------------------------------- */
 
 /* Copies the means to the vertices. A corner whose own value is not finite keeps that value, so that its cell is not
- * drawn, as without means. For values of cells, grid_field.own serves this purpose instead. */
+ * drawn. For cell values, grid_field.source_cells serves this purpose. */
 static void copy_means_to_vertices(const recentring *r, int part, int threads)
 {
     const int64_t *of_vertex = r->mesh_group->groups.group_of_vertex + r->mesh_group->groups.first_vertices[part];
@@ -524,9 +527,8 @@ static void copy_means_to_vertices(const recentring *r, int part, int threads)
     }
 }
 
-/* Returns whether values at hanging vertices must be constrained: some mesh has values of cells, or values of vertices
- * of which some may be hanging. Values at corners are not constrained, because codes that have them do so
- * themselves. */
+/* Returns whether values at hanging vertices must be constrained: some mesh has cell values, or has values at vertices
+ * that may hang. Corner values are not constrained, because codes with such values constrain them themselves. */
 static bool is_constrained(const session_recentring *item)
 {
     for (int i = 0; i < item->mesh_group->count; i++)

@@ -1,12 +1,12 @@
-/* Keeps colour ranges that widen over a run (range: run): for each layer of an image, the widest range with which it
- * has been drawn.
+/* Keeps colour ranges that widen over a run (range: run): for each layer of an image, stores the smallest range that
+ * contains the layer's ranges of all steps so far.
  *
- * They are stored in a file NAME.ranges, where NAME is the image's name, in the folder of the image's first output: the
- * part of its path before the last slash that comes before any placeholder. Further pictures of a sweep use
- * NAME.1.ranges and so on. The file is text. It is written anew after each picture for which a range became wider, and
- * read when the first picture of the image is drawn, so that a restarted run continues with the ranges of the previous
- * one. A line has: isosurface, surface, slice or volume; the layer's number among those of its kind from 0 on; the
- * component (scene.h); low; high; and the field. Lines that match no layer of the image are ignored. */
+ * The ranges are stored in a file NAME.ranges, where NAME is the image's name, in the folder of the image's first
+ * output: the part of its path before the last slash that comes before any placeholder. Further pictures of a sweep
+ * use NAME.1.ranges and so on. The file is text. It is written anew after each picture for which a range became
+ * wider, and read when the first picture of the image is drawn, so that a restarted run continues with the ranges of
+ * the previous one. A line has: isosurface, surface, slice or volume; the layer's number among those of its kind
+ * from 0 on; the component (scene.h); low; high; and the field. Lines that match no layer of the image are ignored. */
 #ifndef SESSION_RUN_RANGES_H
 #define SESSION_RUN_RANGES_H
 
@@ -20,7 +20,7 @@ typedef struct session_run_range {
     int number;       /* number of the layer among those of its kind */
     const scene_field *field;
     const scene_colour_map *map;
-    double low, high; /* ends of the range, the same on all ranks; low > high: there is none yet */
+    double low, high; /* ends of the range, the same on all ranks; low > high: there is no range yet */
 } session_run_range;
 
 typedef struct session_image_ranges {

@@ -21,7 +21,7 @@ typedef struct smooth_item {
     uint64_t mesh_group_name;
     int component;
     int value_count;
-    mmbvh_interval *values; /* isovalues of all layers that show the field */
+    mmbvh_interval *values; /* intervals that contain the isovalues of all layers that show the field */
 } smooth_item;
 
 typedef struct smooth_items {
@@ -99,7 +99,7 @@ static bool list_items(const session_plan *plan, const session_catalogue *catalo
     for (int m = 0; m < catalogue->mesh_count; m++)
         for (int i = 0; i < plan->image_count; i++) {
             const scene_image *image = plan->images[i];
-            /* views of an orbit share the layers of their first view, so that only that one is listed */
+            /* views of an orbit share the layers of their first view, so that only the first view is listed */
             if (image->variant.view > 0) continue;
             for (int n = 0; n < image->isosurface_count && is_listed; n++)
                 is_listed = !session_has_smooth_normals(&image->isosurfaces[n], catalogue) ||
@@ -124,7 +124,8 @@ bool session_is_smooth(const session_plan *plan, const session_catalogue *catalo
 
 /* ---- vertices of crossed cells ------------------------------------------------------------------------------- */
 
-/* Marks the vertices of a part's crossed cells by 0, and all others by -1. Returns the number of marked vertices. */
+/* Marks the vertices of the part's crossed cells by 0, and all other vertices by -1. Returns the number of marked
+ * vertices. */
 static int64_t mark_crossed_vertices(const mmbvh_selection *crossed, session_sum_part *part)
 {
     const grid *g = &part->mesh->cells;
@@ -210,9 +211,9 @@ static void free_work(smooth_work *work)
 
 /* ---- one item ------------------------------------------------------------------------------------------------ */
 
-/* Numbers the part's vertices whose gradients this rank needs; all other vertices have a sum for other ranks only, or
- * none. key_indices of a vertex becomes its number or -1, and sum_of[n] the index of the sum of vertex number n.
- * Returns the number of these vertices. */
+/* Numbers the vertices of the part whose gradients this rank needs. Other vertices have no sum, or only one for other
+ * ranks. key_indices[vertex] becomes the vertex's number or -1, and sum_of[n] becomes the index of the sum of vertex
+ * number n. Returns the number of these vertices. */
 static int64_t number_gradients(session_sum_part *part, int64_t own_count, int32_t *sum_of)
 {
     int64_t count = 0;

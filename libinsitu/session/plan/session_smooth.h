@@ -6,10 +6,10 @@
 #include "session_team.h"
 
 /* Computes, for the isosurfaces of the plan that have smooth normals, the gradients at the vertices of the cells that
- * they cross. Each is computed over the cells around the vertex on all ranks, with the same bits on any partition.
- * Vertices are matched by the same keys as in recentring. extent: the global bounds. The homes of the catalogue's
- * meshes must be up to date. An error that occurs on this rank at the very end is stored only in *error, and is shared
- * in the next phase. Collective; apart from that, all ranks return the same status. */
+ * these isosurfaces cross. Each gradient is computed from the cells around the vertex on all ranks, with the same bits
+ * on any partition. Vertices are matched by the same keys as in recentring. extent: the global bounds. The homes of the
+ * catalogue's meshes must be up to date. An error that occurs on this rank at the very end is stored only in *error,
+ * and is shared in the next phase. Collective; apart from that, all ranks return the same status. */
 insitu_status session_find_smooth_gradients(const session_plan *plan, const session_catalogue *catalogue,
                                             const session_meshes *meshes, const session_team *team,
                                             const session_extent *extent, base_error *error);

@@ -80,13 +80,13 @@ static int list_requests(const session_plan *plan, const session_catalogue *cata
     return count;
 }
 
-/* Determines which outer faces are out of date on some rank. If a rank has failed before, all return its error.
- * Collective. */
+/* Determines which outer faces are out of date on some rank. If *error of any rank already holds an error, all ranks
+ * return this error. Collective. */
 static insitu_status find_stale_surfaces(const session_meshes *meshes, const surface_request *requests, int count,
                                          const session_team *team, int *stale, bool *is_any, base_error *error)
 {
-    /* first entry: nonzero if this rank has failed; the others: nonzero if its outer faces of a surface are out of
-     * date */
+    /* first entry: nonzero if this rank has an error; second entry: nonzero if the outer faces of a surface are out of
+     * date on this rank */
     int own[2] = {error->status != INSITU_OK, 0}, all[2] = {0, 0};
     for (int i = 0; i < count; i++) {
         stale[i] = are_faces_stale(meshes, &requests[i]);
@@ -120,7 +120,8 @@ static insitu_status find_faces(const session_meshes *meshes, const surface_requ
     return status ? status : session_agree(team->comm, error);
 }
 
-/* Prepares a mesh of outer faces for drawing, so that each of its cells shows one face. */
+/* Makes an outer mesh ready to be drawn: fills the members that its trees and kernels need. Each cell of the mesh lies
+ * behind one outer face. */
 static insitu_status prepare_outer_mesh(const session_mesh *mesh, session_outer *outer, bool has_normals,
                                         base_error *error)
 {

@@ -18,24 +18,26 @@
  *
  * A topology "T" of a node that is set as "name" becomes the mesh "name/T", or "T" if name is "". If the node is a list
  * of domains, their topologies "T" become blocks of this mesh (insitu_set_block), numbered by the domain's index on
- * this rank, so that there is no seam between domains. A domain that has other fields than those before it on this rank
- * becomes a mesh "name/T/3" of its own, with the same number. The adaptor reads uniform, rectilinear, structured and
- * unstructured topologies of two and three dimensions, with the shapes tri, quad, polygonal, tet, hex, wedge, pyramid,
- * polyhedral and mixed. The first three types of topologies become lattices (insitu_lattice). Fields at vertices and
- * elements may have any numeric type, and their components may be in one allocation or several. Ghost flags are the
- * element fields ascent_ghosts and vtkGhostType, and those that state/metadata/vtk_fields declares as "Ghosts".
+ * this rank, so that there is no seam between domains. If a domain has other fields than the domains before it on this
+ * rank, it becomes a separate mesh "name/T/3", where 3 is the domain's number. The adaptor reads uniform, rectilinear,
+ * structured and unstructured topologies of two and three dimensions, with the shapes tri, quad, polygonal, tet, hex,
+ * wedge, pyramid, polyhedral and mixed. The first three types of topologies become lattices (insitu_lattice). Fields at
+ * vertices and elements may have any numeric type, and their components may be in one allocation or several. Ghost
+ * flags are the element fields ascent_ghosts and vtkGhostType, and element fields that state/metadata/vtk_fields
+ * declares as "Ghosts".
  *
  * Uniform domains of a mesh get a common origin, found by all ranks in the first step, so that common vertices have
- * equal coordinates even if their stated positions differ by roundings. Uniform domains with state/level (or
- * state/level_id) are blocks of levels of refinement (insitu_lattice): their ratios follow from the spacings, and cells
- * that finer domains cover, on any rank, are not drawn. The layers of flagged cells around such a domain lie outside of
- * the block's interior. Of other domains, cells that a nestset's windows assign to a child domain are not drawn.
+ * equal coordinates even if the positions in the nodes differ by rounding errors. Uniform domains with state/level (or
+ * state/level_id) are blocks of levels of refinement (insitu_lattice). The refinement ratios are computed from the
+ * spacings. Cells that a finer domain on any rank covers are not drawn. Layers of ghost cells around such a domain are
+ * not part of the block's interior. In domains without a level, cells are not drawn if a nestset's windows assign them
+ * to a child domain.
  *
  * The following is left out, and named in the report: points and lines, the old stream of element_types, the
  * coordinates r, theta and phi, fields that are given by a basis or have only values per material, ghost flags at
  * vertices, fields of structured topologies whose strides differ from those of the topology or of the other element
  * fields, and windows that are not within their domain. A domain whose spacing or position does not fit the coarsest
- * level's is drawn, but covers no cells, and is named too.
+ * level is drawn, but hides no coarser cells; the report names it too.
  *
  * The arrays must stay valid until insitu_blueprint_step() returns; the node may be destroyed earlier. */
 #ifndef INSITU_BLUEPRINT_H
@@ -47,9 +49,9 @@
 extern "C" {
 #endif
 
-/* The functions of Conduit's C API that the adaptor calls; insitu/conduit.h defines such a table. Each function takes a
- * conduit_node and does the same as Conduit's function of that name (conduit_node_child() and so on); those from id on
- * correspond to functions of the node's conduit_datatype. */
+/* The functions of Conduit's C API that the adaptor calls; insitu/conduit.h defines such a table. Each member is called
+ * with a conduit_node and does the same as the function of Conduit with that name, such as conduit_node_child(). The
+ * members from id on correspond to functions of the node's conduit_datatype. */
 typedef struct insitu_conduit {
     int64_t (*number_of_children)(const void *node);
     void *(*child)(const void *node, int64_t number);
@@ -94,8 +96,8 @@ INSITU_API insitu_status insitu_blueprint_create(insitu_session *session, const 
  * insitu_set_field(). */
 INSITU_API insitu_status insitu_blueprint_set(insitu_blueprint *adaptor, const char *name, const void *node);
 
-/* Makes the next step fail for a reason of the caller's own, as if a node were invalid: the step returns this status on
- * all ranks. If there are several reasons, the first one counts. Local. */
+/* Makes the next step fail, as if a node were invalid, for a reason that the caller has found itself. The step returns
+ * this status on all ranks. If the function is called several times, the first call counts. Local. */
 INSITU_API void insitu_blueprint_refuse(insitu_blueprint *adaptor, insitu_status status, const char *message);
 
 /* Performs a step of the session with the meshes and fields that have been set. If cycle or time is NULL, the largest

@@ -20,25 +20,25 @@
  * "name/blocks of a, b", or of "name/flat blocks of a, b" if they have two dimensions. All other leaves become the
  * meshes "name/0", "name/1", ....
  *
- * The names contain the fields because all blocks of a mesh must have the same fields, also those on other ranks, of
- * which this rank knows nothing. Scenes hardly need them: `mesh: name` stands for all leaves, and a layer without mesh
- * is drawn on the leaves that have its field. A layer cannot be drawn on one block of a mesh. To draw a structured leaf
- * alone, set it by a call of its own, under a name of its own.
+ * The names contain the fields because all blocks of a mesh must have the same fields on all ranks, and one rank does
+ * not know the fields of the other ranks' blocks. Scenes hardly need them: `mesh: name` stands for all leaves, and a
+ * layer without mesh is drawn on the leaves that have its field. A layer cannot be drawn on one block of a mesh. To
+ * draw a structured leaf alone, set it by a separate call, under a different name.
  *
  * Points are borrowed if they are float or double, interleaved (AOS) or with separate components (SOA); others are
  * copied to double.
  *
  * Images, rectilinear and curvilinear grids become lattices (insitu_lattice), also if they are flat, so that no cells
- * are listed. Nothing of an image is copied, unless its axes are rotated or a spacing is 0: then its points are listed.
- * Axes of rectilinear grids and points of curvilinear grids are borrowed if they are float or double.
+ * are listed. Nothing of an image is copied, unless its axes are rotated or a spacing is 0. In these cases its points
+ * are listed. Axes of rectilinear grids and points of curvilinear grids are borrowed if they are float or double.
  *
  * Cells of the types 10, 12, 13, 14, and of the shell types 5, 7, 9, are borrowed with 32- or 64-bit storage. Voxels
  * (11) and pixels (8) are drawn as hexahedra and quads, with a copied connectivity. The face streams of polyhedra (42)
  * are copied to a list of faces that cells share. Pentagonal and hexagonal prisms (15, 16) become polyhedra too.
- * Quadratic and Lagrange cells are borrowed and drawn as linear pieces between their points; of the types 33, 34 and 37
- * the first 20, 6 and 14 points are copied. Bezier cells, cells of several orders, and all cells of higher order in
- * grids with polygons or polyhedra are copied, drawn as linear cells with the same corners, and reported. All other
- * cells are reported and not drawn, including polyhedra without faces, lines and points.
+ * Quadratic and Lagrange cells are borrowed, and are drawn as linear cells between their points. For cells of the types
+ * 33, 34 and 37, the first 20, 6 and 14 points are copied. Bezier cells, cells of several orders, and all cells of
+ * higher order in grids with polygons or polyhedra are copied, drawn as linear cells with the same corners, and
+ * reported. All other cells are reported and not drawn, including polyhedra without faces, lines and points.
  *
  * Of polygonal data the points are borrowed, and the polygons too if there are no lines, points or strips.
  *
@@ -67,13 +67,14 @@ typedef struct insitu_vtk_adaptor insitu_vtk_adaptor;
 
 /* The report of insitu_vtk_set() on one data set, on this rank. */
 typedef struct insitu_vtk_report {
-    int meshes;              /* number of meshes and blocks set: 1, or that of the leaves with cells */
-    int fields;              /* number of fields set, over all meshes */
-    int64_t cells;           /* number of cells set, including ghosts */
-    int64_t cells_split;     /* number of cells split into several; currently always 0 */
-    int64_t cells_linear;    /* number of cells of higher order drawn by their corners: Bezier cells, cells of several
-                                orders or with points missing, and all in grids with polygons or polyhedra */
-    int64_t cells_flat;      /* number of points and lines, which are not drawn */
+    int meshes;           /* number of meshes and blocks set: 1, or, for composites, the number of leaves with cells */
+    int fields;           /* number of fields set, over all meshes */
+    int64_t cells;        /* number of cells set, including ghosts */
+    int64_t cells_split;  /* number of cells split into several; currently always 0 */
+    int64_t cells_linear; /* number of cells of higher order that are drawn as linear cells with the same corners. These
+                             are Bezier cells, cells of several orders or with points missing, and all cells of higher
+                             order in grids with polygons or polyhedra. */
+    int64_t cells_flat;   /* number of points and lines, which are not drawn */
     int64_t cells_not_drawn; /* number of 3-D cells not drawn: unknown types, too few points or faces */
     int64_t bytes_borrowed;  /* size in bytes of VTK's arrays that are borrowed */
     int64_t bytes_copied;    /* size of converted arrays, which are held until the mesh is set again */
@@ -92,7 +93,7 @@ INSITU_API insitu_status insitu_vtk_create(insitu_session *session, insitu_vtk_a
  * insitu_step() returns. report may be NULL; it is filled on an error too. Local.
  *
  * Returns INSITU_ERROR_ARGUMENT if data is of an unsupported class, and INSITU_ERROR_MESH if data has 3-D cells of
- * which none can be drawn, or is not well formed. Other errors are those of insitu_set_mesh() and
+ * which none can be drawn, or if data is not well formed. Other errors are those of insitu_set_mesh() and
  * insitu_set_field(). */
 INSITU_API insitu_status insitu_vtk_set(insitu_vtk_adaptor *adaptor, const char *name, vtkDataObject *data,
                                         insitu_vtk_report *report);

@@ -16,17 +16,18 @@ extern "C" {
 
 /* Converts a data set to an unstructured grid. Images, rectilinear and curvilinear grids become hexahedra, or quads if
  * they are flat; all other data keep their cells. Point and cell arrays are shared with data, and so are the points if
- * data lists them, and the polygons of polygonal data that has nothing else. A list of cells is allocated with 37 bytes
- * per hexahedron including its offset and type, or 73 bytes if there are more than 268 million points; for images and
- * rectilinear grids also a list of points, with 24 bytes each, or 12 if the axes are floats. A cell with a hidden point
- * is flagged as hidden. The caller owns the grid and must call its Delete(). data does not change. May throw
- * std::bad_alloc. Local. */
+ * data lists them, and the polygons of polygonal data that has nothing else. The list of cells takes 37 bytes per
+ * hexahedron including its offset and type, or 73 bytes if there are more than 268 million points; For images and
+ * rectilinear grids, a list of points is allocated too, with 24 bytes per point, or 12 if the axes are floats. A cell
+ * with a hidden point is flagged as hidden. The caller owns the grid and must call its Delete(). data does not change.
+ * May throw std::bad_alloc. Local. */
 INSITU_API vtkUnstructuredGrid *insitu_vtk_make_grid(vtkDataSet *data);
 
 /* Returns the ghost flags of cells or points in VTK's format: data's own vtkGhostType if it consists of bytes;
- * otherwise a new array of that name, computed from a vtkGhostType of other integers and from VisIt's avtGhostZones,
- * whose nonzero values count as duplicate cells. NULL if there are none for `count` cells or points. The caller must
- * release the array by UnRegister(). data does not change. May throw std::bad_alloc. Local. */
+ * otherwise a new array of that name, computed from a vtkGhostType of other integer types and from VisIt's
+ * avtGhostZones, whose nonzero values are treated as duplicate cells. Returns NULL if data has no such array with
+ * `count` values. The caller must release the array by UnRegister(). data does not change. May throw std::bad_alloc.
+ * Local. */
 INSITU_API vtkUnsignedCharArray *insitu_vtk_ghost_flags(vtkDataSetAttributes *data, int64_t count);
 
 } // extern "C"
