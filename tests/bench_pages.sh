@@ -112,7 +112,7 @@ says 'are there any in bench/results?' $performance
 says 'the first argument names the page' bench/pages/performance.py "$folder/held.csv"
 says "$folder/none.csv: No such file" $performance "$folder/none.csv"
 says "$folder/none.csv: No such file" $accuracy "$folder/none.csv"
-says "no rows of render, light, steps, volumes, layers, flow, cells, blocks, tables, scaling in $folder/held.csv" $performance "$folder/held.csv"
+says "no rows of render, light, steps, volumes, layers, flow, cells, blocks, order, tables, scaling in $folder/held.csv" $performance "$folder/held.csv"
 says "$folder/narrow.csv, line 3: there is no column \"max\"" $performance --partial "$folder/narrow.csv"
 says "$folder/words.csv, line 4: \"fast\" in column \"median\" is not a number" $performance --partial "$folder/words.csv"
 says "$folder/torn.csv, line 5: 11 values under 12 columns" $performance --partial "$folder/torn.csv"

@@ -66,6 +66,15 @@ def all_agreements(meshes):
     return agreements
 
 
+def beside(mesh, ours, theirs, most=None):
+    """Return the ratio of two measures, bold if it is above `most`, and both."""
+    ours, theirs = mesh.median(ours), mesh.median(theirs)
+    if not ours or not theirs:
+        return NONE
+    ratio = write_ratio(ours / theirs)
+    return f"{f'**{ratio}**' if most and ours / theirs > most else ratio} ({figures(ours, theirs)})"
+
+
 class FlowRow(NamedTuple):
     """A picture of the section "flow", and how VTK makes it."""
     picture: str
@@ -74,8 +83,7 @@ class FlowRow(NamedTuple):
 
     def text(self, mesh):
         """Return the ratio of our time to VTK's, and both."""
-        ours, theirs = mesh.median(f"{self.name} new values"), mesh.median(f"{self.name} vtk")
-        return f"{write_ratio(ours / theirs)} ({figures(ours, theirs)})" if ours and theirs else NONE
+        return beside(mesh, f"{self.name} new values", f"{self.name} vtk")
 
 
 FLOW = (
@@ -122,7 +130,7 @@ def draw(arguments):
     return page.fill_template(
         f"{name}.md.j2", results=results, bars=Standing(all_claims(results)), hexes=Hexes(results),
         scalings=all_scalings(results), agreements=all_agreements(results["peers"].meshes),
-        flow=FLOW, disagreement=count_disagreements([results["render"], results["tables sizes"]]), span_of_speeds=span_of_speeds)
+        beside=beside, flow=FLOW, disagreement=count_disagreements([results["render"], results["tables sizes"]]), span_of_speeds=span_of_speeds)
 
 
 if __name__ == "__main__":

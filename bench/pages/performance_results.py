@@ -6,7 +6,7 @@ import page
 
 SECTIONS = {"render": "render", "peers": "peers", "light": "light", "steps": "steps", "volumes": "volumes",
             "layers": "layers", "layers flow": "flow", "cells types": "cells", "cells layouts": "cells", "cells thousand": "cells",
-            "blocks": "blocks",
+            "blocks": "blocks", "order": "order",
             "tables sizes": "tables",
             "tables groups": "tables", "tables steps": "tables", "scaling": "scaling"}
 NONE = "–"
