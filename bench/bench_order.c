@@ -45,7 +45,7 @@ static data_cells make_cells(const char *name, int side, double bend)
     int kind = 0;
     order_mesh m;
     while (strcmp(order_kinds[kind].name, name) != 0) kind++;
-    order_mesh_create(&order_kinds[kind], side, bend, order_sphere, 0, 1, &m);
+    order_mesh_create(&order_kinds[kind], side, bend, order_sphere_field, 0, 1, &m);
     return cells_of(&m);
 }
 
@@ -55,8 +55,8 @@ static data_cells make_split_hexes(int side, double bend)
 {
     const order_kind kind = {"hex", INSITU_LAGRANGE_HEX, INSITU_ORDER_LEXICOGRAPHIC, 2 * FINER};
     order_mesh m;
-    order_mesh_create(&kind, side, bend, order_sphere, 0, 1, &m);
-    order_mesh split = order_mesh_linear_hexes(&m, kind.order);
+    order_mesh_create(&kind, side, bend, order_sphere_field, 0, 1, &m);
+    order_mesh split = order_mesh_make_linear_hexes(&m, kind.order);
     split.nodes = 8;
     free(m.connectivity);
     return cells_of(&split);
@@ -103,7 +103,7 @@ static void set_mesh(insitu_session *session, const bench_drawing *d)
     mesh.cell_type = (insitu_cell_type)d->cells.type;
     mesh.connectivity = (insitu_array){.data = d->cells.connectivity, .type = INSITU_INT64};
     mesh.connectivity_count = d->cells.cell_count * d->cells.nodes;
-    bench_must(d->scene, session, insitu_set_mesh(session, "cells", &mesh));
+    bench_require_success(d->scene, session, insitu_set_mesh(session, "cells", &mesh));
 }
 
 static void set_values(insitu_session *session, const bench_drawing *d, int phase)
@@ -114,7 +114,7 @@ static void set_values(insitu_session *session, const bench_drawing *d, int phas
     field.values = (insitu_array){.data = d->values[phase], .type = INSITU_FLOAT64};
     field.count = d->cells.vertex_count;
     field.changed = INSITU_CHANGED_VALUES;
-    bench_must(d->scene, session, insitu_set_field(session, "cells", &field));
+    bench_require_success(d->scene, session, insitu_set_field(session, "cells", &field));
 }
 
 /* Takes the first step of a new session, which replaces *session. */
@@ -122,19 +122,19 @@ static void take_first_step(const bench_drawing *d, int number, insitu_session *
 {
     insitu_destroy(session);
     *session = bench_open_session(d->scene, write_scene, d);
-    const double began = bench_begin();
+    const double began = bench_start_timer();
     set_mesh(*session, d);
     set_values(*session, d, 0);
-    bench_must(d->scene, *session, insitu_step(*session, 0, 0));
-    bench_end(began, number, &times->first);
+    bench_require_success(d->scene, *session, insitu_step(*session, 0, 0));
+    bench_stop_timer(began, number, &times->first);
 }
 
 static void take_later_step(const bench_drawing *d, int number, insitu_session *session, bench_times *times)
 {
     if (!d->is_real) set_values(session, d, number & 1);
-    const double began = bench_begin();
-    bench_must(d->scene, session, insitu_step(session, number, 0));
-    bench_end(began, number, &times->later);
+    const double began = bench_start_timer();
+    bench_require_success(d->scene, session, insitu_step(session, number, 0));
+    bench_stop_timer(began, number, &times->later);
 }
 
 /* Measures drawings in turns. The caller destroys the sessions. */
@@ -217,9 +217,9 @@ static void measure_pieces(bench_drawing *d, int pieces, int runs)
     snprintf(name, sizeof name, "%d pieces", pieces);
     for (int number = 0; number <= runs; number++) {
         take_first_step(d, number, &session, &times);
-        const double began = bench_begin();
+        const double began = bench_start_timer();
         if (vtk) bench_tessellator_update(vtk);
-        if (vtk) bench_end(began, number, &update);
+        if (vtk) bench_stop_timer(began, number, &update);
     }
     print_series(d, name, "step", &times.first);
     print_number(d, name, "error", "field", error);
@@ -253,7 +253,7 @@ static void measure_real(const bench_scene *scene, int runs)
     data_cells cells;
     bench_drawing d;
     snprintf(path, sizeof path, "%s/cylinder_quadratic.vtu", folder ? folder : "");
-    if (!folder || !data_cells_read(path, "velocity_norm", &cells)) {
+    if (!folder || !data_cells_read_file(path, "velocity_norm", &cells)) {
         fprintf(stderr, "bench_order: without VTK or INSITU_TEST_DATA no real mesh is measured\n");
         return;
     }
