@@ -79,12 +79,6 @@ struct render_occluders {
     int threads;
 };
 
-/* Identifies a ray of a chunk of hits. hit: index of the hit in the chunk; number: index of the ray in the hemisphere
- * or, for a ray to a light, RENDER_MAX_SAMPLES plus the light's index. */
-typedef struct ray_id {
-    int16_t hit, number;
-} ray_id;
-
 /* The state of a thread that traces rays from hits. Each thread has its own copy of the frame and the job, because each
  * tile space has a different camera. */
 typedef struct tracer {
@@ -97,7 +91,6 @@ typedef struct tracer {
     kernel_bundle bundle;
     kernel_secondary_rays secondary_rays;
     kernel_secondary_ray rays[CHUNK_RAYS];
-    ray_id names[CHUNK_RAYS];
 } tracer;
 
 static bool grow_undecided(kernel_secondary_rays *s)
@@ -115,9 +108,9 @@ static bool grow_undecided(kernel_secondary_rays *s)
 static void add_ray(tracer *t, int hit, int number, const double start[3], const double direction[3], double far)
 {
     const render_space *space = &t->job->space;
-    const int i = t->secondary_rays.count++;
-    kernel_secondary_ray *ray = &t->rays[i];
-    t->names[i] = (ray_id){(int16_t)hit, (int16_t)number};
+    kernel_secondary_ray *ray = &t->rays[t->secondary_rays.count++];
+    ray->hit = (int16_t)hit;
+    ray->number = (int16_t)number;
     for (int a = 0; a < 3; a++) {
         ray->origin[a] = (float)((start[a] - space->origin[a]) * space->scale);
         ray->direction[a] = (float)direction[a];
@@ -238,7 +231,7 @@ static void trace_hemisphere(tracer *t, const render_hit *hit, kernel_undecided_
     int32_t ray_of[RENDER_MAX_SAMPLES];
     set_hemisphere_rays(t, hit);
     for (int64_t i = 0; i < count; i++) {
-        const int k = t->names[undecided[i].ray].number;
+        const int k = t->rays[undecided[i].ray].number;
         ray_of[k] = undecided[i].ray;
         if (t->rays[undecided[i].ray].is_open) open |= (uint64_t)1 << k;
     }
@@ -249,7 +242,7 @@ static void trace_hemisphere(tracer *t, const render_hit *hit, kernel_undecided_
         t->bundle.open = 0;
         for (int64_t j = i; j < count; j++) {
             if (undecided[j].occluder != occluder) continue;
-            t->bundle.open |= (uint64_t)1 << t->names[undecided[j].ray].number;
+            t->bundle.open |= (uint64_t)1 << t->rays[undecided[j].ray].number;
             undecided[j].occluder = TESTED;
         }
         t->bundle.open &= open;
@@ -266,7 +259,7 @@ static void trace_light(tracer *t, const render_hit *hit, const kernel_undecided
 {
     kernel_secondary_ray *ray = &t->rays[doubt->ray];
     if (!ray->is_open) return;
-    set_light_ray(t, hit, t->names[doubt->ray].number - RENDER_MAX_SAMPLES);
+    set_light_ray(t, hit, ray->number - RENDER_MAX_SAMPLES);
     t->bundle.open = 1;
     test_cell(t, doubt->occluder);
     ray->is_open = t->bundle.open;
@@ -278,15 +271,15 @@ static void trace_undecided(tracer *t, const render_hit *hits)
     qsort(s->undecided, (size_t)s->undecided_count, sizeof *s->undecided, by_ray);
     for (int64_t first = 0, end; first < s->undecided_count; first = end) {
         kernel_undecided_pair *from = &s->undecided[first];
-        const ray_id name = t->names[from->ray];
-        for (end = first + 1; end < s->undecided_count && name.number < RENDER_MAX_SAMPLES; end++) {
-            const ray_id next = t->names[s->undecided[end].ray];
-            if (next.hit != name.hit || next.number >= RENDER_MAX_SAMPLES) break;
+        const kernel_secondary_ray *ray = &t->rays[from->ray];
+        for (end = first + 1; end < s->undecided_count && ray->number < RENDER_MAX_SAMPLES; end++) {
+            const kernel_secondary_ray *next = &t->rays[s->undecided[end].ray];
+            if (next->hit != ray->hit || next->number >= RENDER_MAX_SAMPLES) break;
         }
-        if (name.number < RENDER_MAX_SAMPLES)
-            trace_hemisphere(t, &hits[name.hit], from, end - first);
+        if (ray->number < RENDER_MAX_SAMPLES)
+            trace_hemisphere(t, &hits[ray->hit], from, end - first);
         else
-            trace_light(t, &hits[name.hit], from);
+            trace_light(t, &hits[ray->hit], from);
     }
 }
 
@@ -301,12 +294,12 @@ static void trace_chunk(tracer *t, const render_hit *hits, render_hit_rays *rays
     t->kernels->occlude(&t->frame, &t->thread, &t->of->trees, s);
     if (s->undecided_count) trace_undecided(t, hits);
     for (int i = 0; i < s->count; i++) {
-        const ray_id name = t->names[i];
-        if (t->rays[i].is_open) continue;
-        if (name.number < RENDER_MAX_SAMPLES)
-            rays[name.hit].samples &= ~((uint64_t)1 << name.number);
+        const kernel_secondary_ray *ray = &t->rays[i];
+        if (ray->is_open) continue;
+        if (ray->number < RENDER_MAX_SAMPLES)
+            rays[ray->hit].samples &= ~((uint64_t)1 << ray->number);
         else
-            rays[name.hit].lights &= ~(1u << (name.number - RENDER_MAX_SAMPLES));
+            rays[ray->hit].lights &= ~(1u << (ray->number - RENDER_MAX_SAMPLES));
     }
 }
 

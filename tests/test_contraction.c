@@ -346,7 +346,7 @@ static bool graze(const batch *b, int lane, double slope[2])
 }
 
 /* Aims the rays of a box, most of them at its corners. */
-static void aim_box(batch *b, kernel_rays rays[BOX_RAYS], kernel_ray_box *box)
+static void aim_box(batch *b, kernel_rays rays[BOX_RAYS], vf slope[2][2], vf origin[2][2])
 {
     double middle[SIMD_WIDTH][2], half[SIMD_WIDTH];
     for (int lane = 0; lane < SIMD_WIDTH; lane++) {
@@ -355,7 +355,7 @@ static void aim_box(batch *b, kernel_rays rays[BOX_RAYS], kernel_ray_box *box)
         half[lane] = !grazes ? (double)b->beam.spread : uniform(0, 1) < 0.7 ? 0 : pow(10, uniform(-8, -2));
     }
     for (int a = 0; a < 2; a++)
-        for (int end = 0; end < 2; end++) box->slope[a][end] = box->origin[a][end] = vf_set(end ? -INFINITY : INFINITY);
+        for (int end = 0; end < 2; end++) slope[a][end] = origin[a][end] = vf_set(end ? -INFINITY : INFINITY);
     for (int n = 0; n < BOX_RAYS; n++) {
         vf own[2][2];
         for (int lane = 0; lane < SIMD_WIDTH; lane++) {
@@ -369,10 +369,10 @@ static void aim_box(batch *b, kernel_rays rays[BOX_RAYS], kernel_ray_box *box)
         }
         rays[n] = (kernel_rays){own[1][0], own[1][1], own[0][0], own[0][1]};
         for (int a = 0; a < 2; a++) {
-            box->slope[a][0] = vf_min(own[0][a], box->slope[a][0]);
-            box->slope[a][1] = vf_max(own[0][a], box->slope[a][1]);
-            box->origin[a][0] = vf_min(own[1][a], box->origin[a][0]);
-            box->origin[a][1] = vf_max(own[1][a], box->origin[a][1]);
+            slope[a][0] = vf_min(own[0][a], slope[a][0]);
+            slope[a][1] = vf_max(own[0][a], slope[a][1]);
+            origin[a][0] = vf_min(own[1][a], origin[a][0]);
+            origin[a][1] = vf_max(own[1][a], origin[a][1]);
         }
     }
 }
@@ -447,13 +447,12 @@ static void quads_that_look_convex_are(void **state)
             while (n.quads < 4 * rays_wanted) {
                 batch b;
                 kernel_rays rays[BOX_RAYS];
-                kernel_ray_box box;
-                vf at[3][8];
+                vf at[3][8], slope[2][2], origin[2][2];
                 make_batch(&b, types[k], s);
-                aim_box(&b, rays, &box);
+                aim_box(&b, rays, slope, origin);
                 for (int a = 0; a < 3; a++)
                     for (int i = 0; i < 8; i++) at[a][i] = vf_load(b.at[a][i]);
-                const vi dents = kernel_curved_nonconvex_quads(at, &box, types[k]);
+                const vi dents = kernel_curved_nonconvex_quads(at, slope, origin, types[k]);
                 for (int i = 0; i < BOX_RAYS; i++) verify_quads(&b, &rays[i], dents, &n);
             }
             printf("%s: of %lld quads seen %lld look convex, %lld do not, %lld are wrong\n", shape_names[s],

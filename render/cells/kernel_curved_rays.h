@@ -179,14 +179,14 @@ static __attribute__((noinline, cold)) void kernel_curved_triangle_recompute(con
 SIMD_INLINE void kernel_curved_triangle_lines(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type,
                                               vm rays, vi face, const kernel_curved_corners *c, vf e[3])
 {
-    const int size = (int)(sizeof(kernel_triangle_lines) / sizeof(float));
+    const int size = (int)(sizeof h->triangles[0] / sizeof(float));
     const vi number = vi_select(rays, face - kernel_first_triangle(type), vi_set(0)), at = number * size + p->lane;
     vm doubt[3], any = vm_none();
     for (int i = 0; i < 3; i++) {
-        const kernel_triangle_lines *lines = &h->triangles[0];
-        e[i] = vf_muladd(vf_gather(lines->cv[i], at), p->v,
-                         vf_muladd(vf_gather(lines->cu[i], at), p->u, vf_gather(lines->c[i], at)));
-        doubt[i] = vm_andnot(rays, vf_lt(vf_gather(lines->bound[i], at), vf_abs(e[i])));
+        const float(*const lines)[3][SIMD_WIDTH] = h->triangles[0];
+        e[i] = vf_muladd(vf_gather(lines[2][i], at), p->v,
+                         vf_muladd(vf_gather(lines[1][i], at), p->u, vf_gather(lines[0][i], at)));
+        doubt[i] = vm_andnot(rays, vf_lt(vf_gather(lines[3][i], at), vf_abs(e[i])));
         any = vm_or(any, doubt[i]);
     }
     any = vm_or(any, kernel_curved_triangle_inaccurate(h, p->lane, rays, number, e));

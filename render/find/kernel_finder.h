@@ -95,7 +95,7 @@ static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, 
     if (subtree->surface >= 0) {
         s->surface = &f->surfaces[subtree->surface];
         s->source *= RENDER_MAX_ISOVALUES;
-        while (f->isovalues[s->source % RENDER_MAX_ISOVALUES].surface != subtree->surface) s->source++;
+        while (f->isovalue_surface[s->source % RENDER_MAX_ISOVALUES] != subtree->surface) s->source++;
     }
     s->field = s->surface ? &s->surface->layer->field : &f->job->volumes[0].field;
     s->visible_values = s->surface ? &s->surface->visible_values : &s->transfer->visible_values;

@@ -167,8 +167,7 @@ SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_cell_
 {
     const int terms = kernel_nonlinear_count(type);
     const vf over = 1.0f / ray->rise, t = (ray->level + c->middle) * over;
-    vf a[3], slope[4][3], q[3], s[3], local[3];
-    kernel_nonlinear_terms bend;
+    vf a[3], slope[4][3], q[3], s[3], local[3], term[KERNEL_NONLINEAR_TERMS], unused[KERNEL_NONLINEAR_TERMS][3];
     out->one = out->none = vm_none();
     out->t = vf_set(0);
     for (int i = 0; i < 3; i++) q[i] = a[i] = (ray->y[i] + c->offset[i]) - ray->w[i] * t;
@@ -180,13 +179,13 @@ SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_cell_
     for (int n = 0; n < KERNEL_CONTRACTION_STEPS; n++) {
         kernel_contraction_clamp(type, c->domain_margin, q);
         kernel_contraction_local(type, q, local);
-        kernel_nonlinear_terms_at(type, local, &bend);
+        kernel_nonlinear_terms_at(type, local, term, unused);
         /* kernel_bounds.h computes the Jacobian at the centre with a b / k² = 1/2 instead of 1/4, which leaves this
          * linear term */
-        if (kernel_has_apex(type)) bend.term[0] += 0.25f * q[2];
+        if (kernel_has_apex(type)) term[0] += 0.25f * q[2];
         for (int i = 0; i < 3; i++) {
             vf at = a[i];
-            for (int k = 0; k < terms; k++) at -= slope[k][i] * bend.term[k];
+            for (int k = 0; k < terms; k++) at -= slope[k][i] * term[k];
             s[i] = at - q[i];
             out->r[i] = at;
         }
@@ -200,7 +199,7 @@ SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_cell_
     const vm inside = vf_lt(off + c->domain_margin, kernel_contraction_border_distance(type, out->r));
     out->one = vm_andnot(vm_and(sure, vm_and(inside, vf_lt(off, vf_set(KERNEL_CONTRACTION_END)))), out->none);
     vf e = ray->level + c->middle;
-    for (int k = 0; k < terms; k++) e += c->field_terms[k] * bend.term[k];
+    for (int k = 0; k < terms; k++) e += c->field_terms[k] * term[k];
     out->t = -(e * over);
     if (kernel_has_apex(type)) return;
     for (int i = 0; i < 3; i++) out->r[i] += (float)kernel_domain_of(type)->centre[i];

@@ -80,6 +80,9 @@ typedef struct kernel_secondary_ray {
     float origin[3], direction[3]; /* the direction has unit length */
     float far;
     bool is_open;
+    /* hit: index of the ray's hit in its chunk; number: index of the ray in the hemisphere or, for a ray to a light,
+     * RENDER_MAX_SAMPLES plus the light's index */
+    int16_t hit, number;
 } kernel_secondary_ray;
 
 /* A ray that the trees cannot decide for a cell, so that it must be traced in that cell. */

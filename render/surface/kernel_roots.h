@@ -47,13 +47,6 @@
 #define KERNEL_SMALLEST_PIECE 0x1p-12f
 enum { KERNEL_ROOT_PIECES = 256, KERNEL_POLISH_STEPS = 8, KERNEL_BRACKET_STEPS = 48 };
 
-/* The result of testing a piece of the interval, per ray. */
-typedef struct kernel_piece_class {
-    vm clear;      /* the piece has no root: the field has the sign `side` everywhere */
-    vm monotone;   /* the field is monotone, so the piece has at most one root */
-    vm negligible; /* the field is within rounding of 0 everywhere on the piece, so that its sign is not significant */
-} kernel_piece_class;
-
 /* The bounds of kernel_bounds, gathered from each ray's own cell. */
 typedef struct kernel_limits {
     vf nonlinear_part[3][8], inverse[3][3], stretch, slope, field_curvature, map_curvature;
@@ -102,10 +95,12 @@ SIMD_INLINE void kernel_chord_bend(bool is_pyramid, const kernel_limits *b, cons
     *slope = vf_sqrt(vf_max(largest, between));
 }
 
-/* Tests whether the field has a root on the piece between two points. side: the sign of the field at `from`, 1 or -1.
+/* Returns the rays for which the piece between two points has no root: the field has the sign `side` everywhere, 1 or
+ * -1, which is its sign at `from`. *monotone: rays on which the field is monotone, so that the piece has at most one
+ * root; *negligible: rays on which the field is within rounding of 0 everywhere, so that its sign is not significant.
  * gap: upper bound of the distance of Y(from) and Y(to) from the ray. */
-SIMD_INLINE kernel_piece_class kernel_classify_piece(const kernel_map *map, const kernel_limits *b,
-                                                     const kernel_point *from, const kernel_point *to, vf gap, vf side)
+SIMD_INLINE vm kernel_classify_piece(const kernel_map *map, const kernel_limits *b, const kernel_point *from,
+                                     const kernel_point *to, vf gap, vf side, vm *monotone, vm *negligible)
 {
     const bool is_pyramid = map->is_pyramid;
     const kernel_product m[2] = {kernel_product_at(is_pyramid, from->r), kernel_product_at(is_pyramid, to->r)};
@@ -134,11 +129,9 @@ SIMD_INLINE kernel_piece_class kernel_classify_piece(const kernel_map *map, cons
     const vf tolerance =
         b->field_curvature * scale * off * (length + off_slope) + b->slope * off_slope + KERNEL_ROOT_BAND;
     const vf low = vf_min(middle, vf_min(d0, d1)), high = vf_max(middle, vf_max(d0, d1));
-    kernel_piece_class out;
-    out.clear = vf_lt(bound, least);
-    out.monotone = vm_or(vf_lt(tolerance, low), vf_lt(tolerance, -high));
-    out.negligible = vf_le(most + wrong, vf_set(KERNEL_ROOT_BAND));
-    return out;
+    *monotone = vm_or(vf_lt(tolerance, low), vf_lt(tolerance, -high));
+    *negligible = vf_le(most + wrong, vf_set(KERNEL_ROOT_BAND));
+    return vf_lt(bound, least);
 }
 
 /* The state of a search for roots, per ray. The interval is divided into pieces, which are processed in order; the
@@ -237,11 +230,12 @@ SIMD_INLINE void kernel_search_whole(kernel_search *s, vm rays)
     const kernel_interval *i = s->interval;
     const vm change = vm_xor(vf_lt(i->v_in, vf_set(0)), vf_lt(i->v_out, vf_set(0)));
     const vf gap = vf_max(kernel_face_gap(s, &s->low), kernel_face_gap(s, &s->high));
-    const kernel_piece_class v = kernel_classify_piece(&s->map, &s->limits, &s->low, &s->high, gap, s->side);
+    vm is_monotone, unused;
+    const vm clear = kernel_classify_piece(&s->map, &s->limits, &s->low, &s->high, gap, s->side, &is_monotone, &unused);
     const vf jump = s->limits.slope * s->limits.stretch * gap + KERNEL_ROOT_BAND;
     const vm faced = vf_lt(jump, vf_min(i->v_in * s->side, i->v_out * s->side));
-    const vm monotone = vm_or(s->limits.is_monotone, v.monotone), sure = vf_le(vf_set(1), s->limits.coarsest);
-    const vm none = vm_and(sure, vm_or(v.clear, vm_and(monotone, faced))), one = vm_and(sure, vm_and(monotone, change));
+    const vm monotone = vm_or(s->limits.is_monotone, is_monotone), sure = vf_le(vf_set(1), s->limits.coarsest);
+    const vm none = vm_and(sure, vm_or(clear, vm_and(monotone, faced))), one = vm_and(sure, vm_and(monotone, change));
     s->found = vm_or(s->found, vm_and(rays, one));
     s->open = vm_andnot(vm_andnot(rays, none), one);
     if (!vm_any(s->open)) return;
@@ -310,12 +304,14 @@ SIMD_INLINE void kernel_search_next(kernel_search *s)
     s->found = vm_none();
     while (vm_any(going)) {
         kernel_point to;
+        vm monotone, negligible;
         kernel_search_piece(s, going, &to);
-        const kernel_piece_class v = kernel_classify_piece(&s->map, &s->limits, &s->from, &to, vf_set(0), s->side);
+        const vm clear =
+            kernel_classify_piece(&s->map, &s->limits, &s->from, &to, vf_set(0), s->side, &monotone, &negligible);
         const vm small =
             vm_or(vf_le(s->size, vf_set(KERNEL_SMALLEST_PIECE)), vf_lt(vf_set(KERNEL_ROOT_PIECES), s->pieces));
-        const vm certain = vm_and(vm_or(v.monotone, v.clear), vf_le(s->size, s->limits.coarsest));
-        const vm decided = vm_and(going, vm_or(vm_or(certain, v.negligible), small));
+        const vm certain = vm_and(vm_or(monotone, clear), vf_le(s->size, s->limits.coarsest));
+        const vm decided = vm_and(going, vm_or(vm_or(certain, negligible), small));
         const vm roots = vm_andnot(decided, vf_eq(kernel_side(to.value), s->side));
         const vm halve = vm_andnot(going, decided);
         /* divisions are counted per ray, so that a ray's result does not depend on the other rays */

@@ -48,10 +48,9 @@ static void kernel_tile_process_candidate(kernel_tile_trace *t, const kernel_til
  * mesh part in *part, and returns the number of its isovalue in the layer. */
 SIMD_INLINE int kernel_tile_set_source(kernel_tile_trace *t, uint32_t source, int *part)
 {
-    const kernel_isovalue *isovalue = &t->frame->isovalues[source % RENDER_MAX_ISOVALUES];
     *part = (int)(source / RENDER_MAX_ISOVALUES);
-    kernel_tile_set_layer(t, isovalue->surface);
-    return isovalue->value;
+    kernel_tile_set_layer(t, t->frame->isovalue_surface[source % RENDER_MAX_ISOVALUES]);
+    return t->frame->isovalue_number[source % RENDER_MAX_ISOVALUES];
 }
 
 SIMD_INLINE unsigned kernel_candidate_blocks(const kernel_tile_trace *t, const kernel_tile_candidate *candidate)

@@ -99,13 +99,6 @@ static void kernel_tile_find_leaf(kernel_tile_trace *t, int part, const uint32_t
  * the data of further nodes are prefetched. */
 enum { KERNEL_NODES_AT_ONCE = SIMD_WIDTH / 2, KERNEL_NODES_ROOM = (KERNEL_NODES_AT_ONCE + 1) * MMBVH_MAX_DEPTH };
 
-/* A node that may be visible. ref: index of the node's first cell if it is a leaf, otherwise of its left child. */
-typedef struct kernel_tile_node {
-    int64_t ref;
-    float near;
-    uint16_t box, count; /* number of cells of a leaf; 0 for an inner node */
-} kernel_tile_node;
-
 /* One node per lane: its box and range of values, and the results of testing it: its least depth (near), box of pixels
  * (box), and position along the tile's direction, by which nodes are sorted (along). */
 typedef struct kernel_node_lanes {
@@ -270,7 +263,7 @@ SIMD_INLINE void kernel_tile_find_cells(kernel_tile_trace *t, int part)
         int inner_count = 0;
         for (int n = 0; n < most && top; n++) {
             const kernel_tile_node e = stack[--top];
-            if (!kernel_pixels_beyond(t, e.box, e.near)) continue;
+            if (!kernel_pixels_beyond(t, e.place, e.near)) continue;
             if (e.count) {
                 kernel_tile_find_leaf(t, part, tree->cells + e.ref, e.count);
             } else {

@@ -48,14 +48,14 @@ typedef struct kernel_double_face {
 /* Computes the (u, v) of a packet's rays in double, relative to the tile's centre. */
 SIMD_INLINE void kernel_double_rays_of(const kernel_packet *p, kernel_f64 u[2], kernel_f64 v[2])
 {
-    kernel_lanes lanes;
-    kernel_packet_lanes(p, &lanes);
+    double px[SIMD_WIDTH], py[SIMD_WIDTH];
+    kernel_packet_lanes(p, px, py);
     for (int i = 0; i < SIMD_WIDTH; i++) {
-        lanes.px[i] -= p->tile->centre_x;
-        lanes.py[i] -= p->tile->centre_y;
+        px[i] -= p->tile->centre_x;
+        py[i] -= p->tile->centre_y;
     }
-    memcpy(u, lanes.px, sizeof lanes.px);
-    memcpy(v, lanes.py, sizeof lanes.py);
+    memcpy(u, px, sizeof px);
+    memcpy(v, py, sizeof py);
 }
 
 /* ---- a cell ---- */
@@ -210,12 +210,8 @@ enum { KERNEL_EXACT_STEPS = 24 };
 
 /* ---- the map and the field ---- */
 
-typedef struct kernel_exact_map {
-    bool is_pyramid;
-    double position[3][8], field[8];
-} kernel_exact_map;
-
-static void kernel_exact_setup(kernel_exact_map *m, const kernel_packet *p, const kernel_cell *c,
+/* Computes the coefficients of the cell's map (3 rows), and of the field in the last row. */
+static void kernel_exact_setup(double map[4][8], const kernel_packet *p, const kernel_cell *c,
                                const kernel_transfer *transfer)
 {
     double d[4][GRID_MAX_CELL_VERTICES];
@@ -226,9 +222,7 @@ static void kernel_exact_setup(kernel_exact_map *m, const kernel_packet *p, cons
         d[2][i] = spot.t;
         d[3][i] = kernel_double_domain(transfer, c->values[i]);
     }
-    m->is_pyramid = kernel_has_apex(c->type);
-    for (int a = 0; a < 3; a++) kernel_polynomial_fit(m->position[a], c->type, d[a]);
-    kernel_polynomial_fit(m->field, c->type, d[3]);
+    for (int n = 0; n < 4; n++) kernel_polynomial_fit(map[n], c->type, d[n]);
 }
 
 /* Returns the bilinear product m, a term of the cell's map (kernel_map.h), at the reference coordinates r, and its
@@ -263,14 +257,14 @@ static inline void kernel_exact_gradient(const double c[8], const double r[3], d
 
 /* Inverts the map by Newton's method in double, until a step is below 1e-8, after which the error is below rounding.
  * Returns false if the method does not converge. */
-static bool kernel_exact_newton(const kernel_exact_map *map, const double target[3], double r[3])
+static bool kernel_exact_newton(const double (*map)[8], bool is_pyramid, const double target[3], double r[3])
 {
     for (int n = 0; n < KERNEL_EXACT_STEPS; n++) {
         double slopes[3], row[3][3], off[3], cross[3][3], largest = 0;
-        const double m = kernel_exact_product(map->is_pyramid, r, slopes);
+        const double m = kernel_exact_product(is_pyramid, r, slopes);
         for (int a = 0; a < 3; a++) {
-            off[a] = target[a] - kernel_exact_value(map->position[a], r, m);
-            kernel_exact_gradient(map->position[a], r, m, slopes, row[a]);
+            off[a] = target[a] - kernel_exact_value(map[a], r, m);
+            kernel_exact_gradient(map[a], r, m, slopes, row[a]);
         }
         for (int a = 0; a < 3; a++) {
             const double *x = row[(a + 1) % 3], *y = row[(a + 2) % 3];

@@ -44,7 +44,6 @@ typedef struct kernel_tile_segments {
     kernel_double_face precise[4]; /* the current tet in double; set only if the frame is in double */
     float depth;                   /* depth of the next window; 0 if it has not been determined yet */
     unsigned blocks;               /* blocks of the current window */
-    kernel_local_faces faces;
     kernel_local_budget budget;
     kernel_local_bounds bounds;
     bool is_double; /* set if the ends of segments are stored in double */
@@ -314,7 +313,7 @@ SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_tile_s
     kernel_curved_crossed crossed;
     vi words;
     const vm all = kernel_local_list_load(&b->met, &t->tile, n, &words, &rays);
-    kernel_local_find_faces(&t->thread->tile_cells->lanes.transformed, &b->faces, &rays, all, type, &crossed);
+    kernel_local_find_faces(&t->thread->tile_cells->lanes.transformed, &rays, all, type, &crossed);
     const vm on_quad = kernel_curved_on_quad(type, 0, crossed.first);
     words = words | crossed.first << KERNEL_LOCAL_FACES | crossed.last << (KERNEL_LOCAL_FACES + 3);
     kernel_local_list_add(&b->crossed[0], vm_and(crossed.two, on_quad), words);
@@ -337,7 +336,7 @@ SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_tile_s
     p.share = 1;
     p.active = kernel_local_list_load(list, &t->tile, n, &words, &p.rays);
     const vi face[2] = {words >> KERNEL_LOCAL_FACES & 7, words >> (KERNEL_LOCAL_FACES + 3) & 7};
-    kernel_local_cross(&l->transformed, &b->faces, &p.rays, p.active, type, face, p.ends);
+    kernel_local_cross(&l->transformed, &p.rays, p.active, type, face, p.ends);
     vf_gather_pair(b->window, 2 * p.rays.at, &p.begin, &end);
     vf_gather_pair(b->reach, 2 * p.rays.at, &reach[0], &reach[1]);
     p.active = vm_and(p.active, vm_and(vf_lt(p.begin, p.ends[1].t), vf_lt(p.ends[0].t, end)));
@@ -399,7 +398,7 @@ static __attribute__((noinline)) void kernel_local_segments_cast(kernel_tile_tra
 SIMD_INLINE void kernel_local_segments_prepare(const kernel_tile_trace *t, kernel_local_lanes *l,
                                                kernel_tile_segments *s, int type)
 {
-    kernel_local_faces_of(&t->tile, &l->transformed, l->ends, type, &s->faces);
+    kernel_local_faces_of(&t->tile, &l->transformed, l->ends, type);
     kernel_local_nonlinear_of(&l->cells, type, &s->bounds);
     kernel_local_bound(&s->budget, (const float(*)[SIMD_WIDTH])l->transformed.at[3], type, &s->bounds);
 }

@@ -149,9 +149,9 @@ SIMD_INLINE bool kernel_samples_use_lanes(const kernel_frame *f)
 SIMD_INLINE void kernel_ray_samples_begin(kernel_packet *p, kernel_samples *s, float near, float far, int *first,
                                           int *last)
 {
-    kernel_lanes lanes;
-    kernel_packet_lanes(p, &lanes);
-    kernel_packet_samples(p, &lanes);
+    double px[SIMD_WIDTH], py[SIMD_WIDTH];
+    kernel_packet_lanes(p, px, py);
+    kernel_packet_samples(p, px, py);
     s->active = p->active;
     s->blend = kernel_blend_begin();
     s->overlap_depth = vf_set(INFINITY);

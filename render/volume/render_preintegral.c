@@ -33,9 +33,9 @@ typedef struct bin_sums {
     double colour_low[3], colour_high[3];
 } bin_sums;
 
-static double entry_of(const kernel_piece *p, int entry)
+static double entry_of(const kernel_real *p, int entry)
 {
-    return (double)p->entry[entry];
+    return (double)p[entry];
 }
 
 static double within(double x, double low, double high)
@@ -43,7 +43,7 @@ static double within(double x, double low, double high)
     return x < low ? low : x > high ? high : x;
 }
 
-static double clear_at(const kernel_piece *p, double x)
+static double clear_at(const kernel_real *p, double x)
 {
     const double along = (x - entry_of(p, KERNEL_PIECE_LOW)) * entry_of(p, KERNEL_PIECE_INVERSE);
     const double low = entry_of(p, KERNEL_PIECE_CLEAR), high = entry_of(p, KERNEL_PIECE_CLEAR_HIGH);
@@ -65,7 +65,7 @@ static double extinction_of(double clear)
     return lesser(-log(greater(clear, 1e-300)), steepest);
 }
 
-static double extinction_at(const kernel_piece *p, double x)
+static double extinction_at(const kernel_real *p, double x)
 {
     return extinction_of(clear_at(p, x));
 }
@@ -82,7 +82,7 @@ static double extinction_again(last_extinction *last, double clear)
     return last->extinction;
 }
 
-static double colour_at(const kernel_piece *p, double x, int c)
+static double colour_at(const kernel_real *p, double x, int c)
 {
     return entry_of(p, KERNEL_PIECE_COLOUR + c) +
            (x - entry_of(p, KERNEL_PIECE_LOW)) * entry_of(p, KERNEL_PIECE_COLOUR_SLOPE + c);
@@ -90,7 +90,7 @@ static double colour_at(const kernel_piece *p, double x, int c)
 
 /* Adds the integrals between two values of a piece, by three Gauss nodes. Intervals are halved repeatedly towards an
  * opacity of 1. If both ends have the same opacity, it is constant between them. */
-static void integrate(const kernel_piece *p, double from, double to, int depth, last_extinction *last,
+static void integrate(const kernel_real *p, double from, double to, int depth, last_extinction *last,
                       double sum[CHANNELS])
 {
     static const double node[3] = {0.1127016653792583, 0.5, 0.8872983346207417};
@@ -109,7 +109,7 @@ static void integrate(const kernel_piece *p, double from, double to, int depth, 
     }
 }
 
-static void widen(bin_sums *bin, const kernel_piece *p, double x, last_extinction *last)
+static void widen(bin_sums *bin, const kernel_real *p, double x, last_extinction *last)
 {
     const double extinction = extinction_again(last, clear_at(p, x));
     bin->low = lesser(extinction, bin->low);
@@ -131,7 +131,7 @@ static int fill_bin(const kernel_pieces *pieces, int first, double begin, double
                       .colour_low = {INFINITY, INFINITY, INFINITY},
                       .colour_high = {-INFINITY, -INFINITY, -INFINITY}};
     for (int i = first;; i++) {
-        const kernel_piece *p = &pieces->pieces[i];
+        const kernel_real *p = pieces->pieces[i];
         const double from = greater(begin, entry_of(p, KERNEL_PIECE_LOW)),
                      to = lesser(end, entry_of(p, KERNEL_PIECE_HIGH));
         if (from < to) {
@@ -155,7 +155,7 @@ static void fill_bins(const kernel_pieces *pieces, double low, double width, int
     /* The outermost bins are computed again from the outermost pieces alone, so that they do not include a part of a
      * neighbouring piece by rounding of their border. */
     for (int end = 0; end < 2; end++) {
-        const kernel_piece *p = &pieces->pieces[end ? pieces->count - 1 : 0];
+        const kernel_real *p = pieces->pieces[end ? pieces->count - 1 : 0];
         const double x = end ? low + (count + 0.5) * width : low - 0.5 * width;
         bin_sums *bin = &bins[end ? count + 1 : 0];
         memset(bin->sum, 0, sizeof bin->sum);
