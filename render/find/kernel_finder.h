@@ -82,7 +82,6 @@ typedef struct kernel_finder {
 
 static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, const kernel_subtree *subtree)
 {
-    kernel_borders borders;
     s->frame = f;
     for (int a = 0; a < 2; a++) {
         s->first[a] = 0;
@@ -106,8 +105,7 @@ static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, 
         if (!kernel_is_linear(type)) kernel_cells_begin(&s->crossed[i], type);
     }
     kernel_arrays_begin(&s->arrays, f->job->parts[s->part].cells, &s->field->fields[s->part]);
-    kernel_picture_borders(&borders, f);
-    kernel_tree_planes(&s->planes, f, &borders);
+    kernel_tree_planes(&s->planes, f, NULL);
     const double unit = f->job->camera.is_orthographic ? f->job->space.scale : 1;
     s->t_near = (float)-f->depth_shift;
     for (int a = 0; a < 3; a++) s->eye[a] = kernel_level_of(f->job->camera.eye[a]);

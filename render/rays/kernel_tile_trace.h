@@ -145,10 +145,8 @@ SIMD_INLINE void kernel_tile_begin(kernel_tile_trace *t, const kernel_frame *f, 
         const int column = i % KERNEL_TILE / KERNEL_BLOCK, row = i / KERNEL_TILE / KERNEL_BLOCK;
         t->pixel_far[i] = wanted >> (row * KERNEL_BLOCKS_ACROSS + column) & 1 ? INFINITY : -INFINITY;
     }
-    kernel_borders borders;
-    kernel_tile_borders(&borders, f, &t->tile);
-    kernel_tree_planes(&t->tree_planes, f, &borders);
-    kernel_tile_planes(&t->tile_planes, f, &borders);
+    kernel_tree_planes(&t->tree_planes, f, &t->tile);
+    kernel_tile_planes(&t->tile_planes, f, &t->tile);
 }
 
 /* A node on a traversal's stack. A tile traverses a tree once for all its blocks, with a mask of the blocks that a node

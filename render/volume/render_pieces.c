@@ -75,39 +75,34 @@ typedef struct kept_entry {
 /* Error bound of the extinction of ramps, relative to the extinction, if the job allows no error. */
 static const double exact_share = 1e-4;
 
-/* A part of a ramp; the ramp goes from the opacity point with index `ramp` to the next one. */
-typedef struct ramp_part {
-    const render_transfer *transfer;
-    int ramp;
-    double low, high; /* begin and end of the part, as shares of the ramp along the scale */
-} ramp_part;
+/* A ramp goes from the opacity point with index `ramp` to the next one. A part of it begins and ends at low and high,
+ * which are shares of the ramp along the scale. */
 
-static double ramp_opacity(const ramp_part *r, double share)
+static double ramp_opacity(const render_transfer *t, int ramp, double share)
 {
-    const double low = (double)r->transfer->opacities[r->ramp], high = (double)r->transfer->opacities[r->ramp + 1];
+    const double low = (double)t->opacities[ramp], high = (double)t->opacities[ramp + 1];
     return low + share * (high - low);
 }
 
 /* Returns the value, in the domain, at a share of the ramp. */
-static double ramp_value(const ramp_part *r, double share)
+static double ramp_value(const render_transfer *t, int ramp, double share)
 {
-    const render_transfer *t = r->transfer;
-    const double low = render_scaled(t->scale, t->threshold, t->opacity_values[r->ramp]);
-    const double high = render_scaled(t->scale, t->threshold, t->opacity_values[r->ramp + 1]);
+    const double low = render_scaled(t->scale, t->threshold, t->opacity_values[ramp]);
+    const double high = render_scaled(t->scale, t->threshold, t->opacity_values[ramp + 1]);
     return render_domain_of(t, render_unscaled(t->scale, t->threshold, low + share * (high - low)));
 }
 
 /* Returns whether the relative error of the extinction along the part's chord exceeds the tolerance. It is largest at
  * an end with opacity 0, but the first sample is 1/32 of the part away from it; the factor 1.1 covers that. */
-static bool is_bent(const ramp_part *r, double tolerance)
+static bool is_bent(const render_transfer *t, int ramp, double low, double high, double tolerance)
 {
     enum { PLACES = 32 };
-    const double low = ramp_value(r, r->low), high = ramp_value(r, r->high);
-    const double a0 = ramp_opacity(r, r->low), a1 = ramp_opacity(r, r->high);
+    const double x0 = ramp_value(t, ramp, low), x1 = ramp_value(t, ramp, high);
+    const double a0 = ramp_opacity(t, ramp, low), a1 = ramp_opacity(t, ramp, high);
     for (int i = 1; i < PLACES; i++) {
-        const double share = r->low + (r->high - r->low) * i / PLACES;
-        const double chord = a0 + (ramp_value(r, share) - low) / (high - low) * (a1 - a0);
-        const double truth = kernel_extinction_of(ramp_opacity(r, share));
+        const double share = low + (high - low) * i / PLACES;
+        const double chord = a0 + (ramp_value(t, ramp, share) - x0) / (x1 - x0) * (a1 - a0);
+        const double truth = kernel_extinction_of(ramp_opacity(t, ramp, share));
         if (1.1 * fabs(kernel_extinction_of(chord) - truth) > tolerance * truth) return true;
     }
     return false;
@@ -115,17 +110,16 @@ static bool is_bent(const ramp_part *r, double tolerance)
 
 /* Stores the values at which the part must be cut, unless cuts is NULL. Returns their number. A part is not cut if
  * float32 cannot distinguish its middle from its ends. */
-static int cut_part(const ramp_part *r, double tolerance, kernel_real *cuts)
+static int cut_part(const render_transfer *t, int ramp, double low, double high, double tolerance, kernel_real *cuts)
 {
-    const double middle = 0.5 * (r->low + r->high), at = ramp_value(r, middle);
-    const ramp_part left = {r->transfer, r->ramp, r->low, middle}, right = {r->transfer, r->ramp, middle, r->high};
+    const double middle = 0.5 * (low + high), at = ramp_value(t, ramp, middle);
     const float rounded = (float)at;
-    if (!((float)ramp_value(r, r->low) < rounded && rounded < (float)ramp_value(r, r->high))) return 0;
-    if (!is_bent(r, tolerance)) return 0;
-    int count = cut_part(&left, tolerance, cuts);
+    if (!((float)ramp_value(t, ramp, low) < rounded && rounded < (float)ramp_value(t, ramp, high))) return 0;
+    if (!is_bent(t, ramp, low, high, tolerance)) return 0;
+    int count = cut_part(t, ramp, low, middle, tolerance, cuts);
     if (cuts) cuts[count] = (kernel_real)at;
     count++;
-    return count + cut_part(&right, tolerance, cuts ? cuts + count : NULL);
+    return count + cut_part(t, ramp, middle, high, tolerance, cuts ? cuts + count : NULL);
 }
 
 /* Stores the values at which all ramps must be cut, unless cuts is NULL. Returns their number. */
@@ -134,9 +128,8 @@ static int cut_ramps(const render_transfer *t, double tolerance, kernel_real *cu
     const double share = tolerance > rounding ? tolerance : exact_share;
     int count = 0;
     for (int i = 0; i + 1 < t->opacity_count && t->scale != RENDER_LINEAR; i++) {
-        const ramp_part whole = {t, i, 0, 1};
         if (t->opacities[i] == t->opacities[i + 1]) continue;
-        count += cut_part(&whole, share, cuts ? cuts + count : NULL);
+        count += cut_part(t, i, 0, 1, share, cuts ? cuts + count : NULL);
     }
     return count;
 }
