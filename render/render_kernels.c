@@ -44,7 +44,7 @@ static void kernel_prefetched_sort(const kernel_tile_candidate **items, int coun
 }
 
 /* Prefetches the vertices of all prefetched cells, then queues them for tracing. */
-static __attribute__((noinline)) void kernel_tile_queue_prefetched(kernel_tile_trace *t, kernel_tile_queue *m)
+static __attribute__((noinline)) void kernel_tile_queue_prefetched(kernel_tile_trace *t, kernel_tile_search *m)
 {
     const kernel_tile_candidate **items = m->prefetched;
     kernel_prefetched_sort(items, m->prefetched_count);
@@ -71,7 +71,7 @@ static __attribute__((noinline)) void kernel_tile_queue_prefetched(kernel_tile_t
 static __attribute__((noinline)) void kernel_tile_trace_candidates(kernel_tile_trace *t, const kernel_bin *q,
                                                                    bool transparent)
 {
-    kernel_tile_queue *queue = &t->search->queue;
+    kernel_tile_search *queue = t->search;
     kernel_tile_queue_begin(queue);
     for (int bin = 0; bin < KERNEL_DEPTHS && bin <= kernel_depth_bin(q, kernel_tile_far(t)); bin++)
         for (int i = q->first[bin]; i >= 0; i = q->items[i].next) {

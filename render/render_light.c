@@ -58,7 +58,7 @@ void render_hit_samples(const render_job *job, const render_hit *hit, double sta
 {
     const hit_frame p = place_of(job, hit);
     memcpy(start, p.start, sizeof p.start);
-    hit_directions(job, hit->pixel, &p.a, directions);
+    hit_directions(job, hit->pixel, (const double(*)[3])p.axes, directions);
 }
 
 /* ---- tracing ------------------------------------------------------------------------------------------------- */
@@ -93,7 +93,7 @@ typedef struct tracer {
     kernel_secondary_ray rays[CHUNK_RAYS];
 } tracer;
 
-static bool grow_undecided(kernel_secondary_rays *s)
+bool render_grow_undecided(kernel_secondary_rays *s)
 {
     const int64_t capacity = s->capacity + s->capacity / 2 + 1024;
     kernel_undecided_pair *undecided = base_realloc(s->undecided, (size_t)capacity * sizeof *undecided);
@@ -124,7 +124,7 @@ static void add_hit(tracer *t, int i, const render_hit *hit, const render_hit_ra
     const render_occlusion *o = t->job->occlusion;
     const hit_frame p = place_of(t->job, hit);
     double samples[RENDER_MAX_SAMPLES][3];
-    if (rays->samples) hit_directions(t->job, hit->pixel, &p.a, samples);
+    if (rays->samples) hit_directions(t->job, hit->pixel, (const double(*)[3])p.axes, samples);
     for (uint64_t left = rays->samples; left; left &= left - 1) {
         const int k = __builtin_ctzll(left);
         add_ray(t, i, k, p.start, samples[k], o->radius * t->job->space.scale);
@@ -137,19 +137,16 @@ static void add_hit(tracer *t, int i, const render_hit *hit, const render_hit_ra
 
 /* ---- rays that must be tested exactly in a cell */
 
-static void tracer_set_camera(tracer *t, const double eye[3], const hit_axes *a, bool is_orthographic)
+static void tracer_set_camera(tracer *t, const double eye[3], const double (*axes)[3], bool is_orthographic)
 {
     render_camera *c = &t->moved_job.camera;
     memcpy(c->eye, eye, sizeof c->eye);
-    memcpy(c->right, a->right, sizeof c->right);
-    memcpy(c->up, a->up, sizeof c->up);
-    memcpy(c->forward, a->forward, sizeof c->forward);
+    memcpy(c->right, axes[0], sizeof c->right);
+    memcpy(c->up, axes[1], sizeof c->up);
+    memcpy(c->forward, axes[2], sizeof c->forward);
     c->is_orthographic = is_orthographic;
-    for (int k = 0; k < 3; k++) {
-        t->frame.scaled_axes[0][k] = a->right[k] * t->moved_job.space.scale;
-        t->frame.scaled_axes[1][k] = a->up[k] * t->moved_job.space.scale;
-        t->frame.scaled_axes[2][k] = a->forward[k] * t->moved_job.space.scale;
-    }
+    for (int a = 0; a < 3; a++)
+        for (int k = 0; k < 3; k++) t->frame.scaled_axes[a][k] = axes[a][k] * t->moved_job.space.scale;
 }
 
 /* Sets up the bundle with the rays of a hit's hemisphere. */
@@ -161,7 +158,7 @@ static void set_hemisphere_rays(tracer *t, const render_hit *hit)
     kernel_bundle *b = &t->bundle;
     double directions[RENDER_MAX_SAMPLES][3];
     hit_hemisphere(t->job, hit->pixel, directions);
-    tracer_set_camera(t, p.start, &p.a, false);
+    tracer_set_camera(t, p.start, (const double(*)[3])p.axes, false);
     b->tile.centre_x = b->tile.centre_y = 0;
     b->tile.radius = 0;
     for (int k = 0; k < o->samples; k++) {
@@ -173,7 +170,7 @@ static void set_hemisphere_rays(tracer *t, const render_hit *hit)
         b->tile.radius = fmaxf(b->tile.radius, fmaxf(fabsf(b->slope_x[k]), fabsf(b->slope_y[k])));
         for (int a = 0; a < 3; a++) {
             b->rays[k].base[a] = (p.start[a] - space->origin[a]) * space->scale;
-            b->rays[k].direction[a] = p.a.forward[a] + slope_x * p.a.right[a] + slope_y * p.a.up[a];
+            b->rays[k].direction[a] = p.axes[2][a] + slope_x * p.axes[0][a] + slope_y * p.axes[1][a];
         }
     }
     b->count = o->samples;
@@ -182,27 +179,27 @@ static void set_hemisphere_rays(tracer *t, const render_hit *hit)
 /* Sets up the bundle with a hit's ray to a light. */
 static void set_light_ray(tracer *t, const render_hit *hit, int light)
 {
-    const hit_axes a = hit_axes_around(t->job->lights[light].direction);
     const render_space *space = &t->job->space;
     const hit_frame p = place_of(t->job, hit);
     kernel_bundle *b = &t->bundle;
-    double from[3];
+    double from[3], axes[3][3];
+    hit_axes_around(t->job->lights[light].direction, axes);
     for (int k = 0; k < 3; k++) from[k] = (p.start[k] - space->origin[k]) * space->scale;
-    const double x = hit_dot(a.right, from), y = hit_dot(a.up, from);
+    const double x = hit_dot(axes[0], from), y = hit_dot(axes[1], from);
     const double centre[2] = {(floor(x * LIGHT_TILES) + 0.5) / LIGHT_TILES,
                               (floor(y * LIGHT_TILES) + 0.5) / LIGHT_TILES};
-    tracer_set_camera(t, space->origin, &a, true);
+    tracer_set_camera(t, space->origin, (const double(*)[3])axes, true);
     b->tile.centre_x = centre[0] / space->scale;
     b->tile.centre_y = centre[1] / space->scale;
     b->tile.radius = 0.5F / LIGHT_TILES;
     b->origin_x[0] = (float)(x - centre[0]);
     b->origin_y[0] = (float)(y - centre[1]);
     b->slope_x[0] = b->slope_y[0] = 0;
-    b->t_near[0] = (float)hit_dot(a.forward, from);
+    b->t_near[0] = (float)hit_dot(axes[2], from);
     b->t_far[0] = INFINITY;
     for (int k = 0; k < 3; k++) {
-        b->rays[0].base[k] = x * a.right[k] + y * a.up[k];
-        b->rays[0].direction[k] = a.forward[k];
+        b->rays[0].base[k] = x * axes[0][k] + y * axes[1][k];
+        b->rays[0].direction[k] = axes[2][k];
     }
     b->count = 1;
 }
@@ -319,7 +316,7 @@ static tracer *tracer_create(const render_occluders *of)
     t->frame = of->frame;
     t->frame.job = &t->moved_job;
     t->frame.depth_shift = t->moved_job.space.depth_origin = 0;
-    t->secondary_rays = (kernel_secondary_rays){.rays = t->rays, .grow = grow_undecided};
+    t->secondary_rays = (kernel_secondary_rays){.rays = t->rays};
     t->thread = (kernel_thread){.memory = base_alloc(t->kernels->memory_bytes),
                                 .polyhedra = has_polyhedra ? polyhedra_create() : NULL};
     if (t->thread.memory) t->kernels->begin(&t->thread);
@@ -453,7 +450,7 @@ void render_rays_to_boxes(const render_job *job, const render_hit *hit, const re
     const hit_frame p = place_of(job, hit);
     const double margin = box_margin / job->space.scale;
     double samples[RENDER_MAX_SAMPLES][3];
-    if (rays->samples) hit_directions(job, hit->pixel, &p.a, samples);
+    if (rays->samples) hit_directions(job, hit->pixel, (const double(*)[3])p.axes, samples);
     for (int i = 0; i < count; i++) {
         render_hit_rays met = {0, 0, 0};
         for (uint32_t left = rays->lights; left; left &= left - 1) {
@@ -476,7 +473,7 @@ void render_rays_to_boxes(const render_job *job, const render_hit *hit, const re
 static void shade(const render_job *job, const render_material *m, const hit_frame *p, uint32_t lights,
                   double diffuse[3], double specular[3])
 {
-    const double *n = p->a.forward;
+    const double *n = p->axes[2];
     for (int a = 0; a < 3; a++) diffuse[a] = (double)m->ambient, specular[a] = 0;
     for (int i = 0; i < job->light_count; i++) {
         const double *l = job->lights[i].direction;

@@ -157,27 +157,22 @@ static void make_batch(batch *b, int type, shape s)
 
 /* ---- contraction ---- */
 
-static void contract(const batch *b, kernel_decided *out, kernel_bounds *bounds)
+static void contract(const batch *b, kernel_point *out, vm *none, kernel_bounds *bounds)
 {
     const kernel_curved cells = {.type = b->type, .at = b->at, .bounds = bounds};
     int32_t own[SIMD_WIDTH];
     vi lanes;
     kernel_contraction c;
-    kernel_cell_ray ray;
     kernel_map map;
-    kernel_point at;
     for (int lane = 0; lane < SIMD_WIDTH; lane++) own[lane] = lane;
     memcpy(&lanes, own, sizeof lanes);
     kernel_bounds_of(b->type, b->at, &b->beam, bounds);
-    kernel_cell_ray_of(&cells, &b->rays, lanes, &ray);
+    kernel_contraction_ray(&cells, &b->rays, lanes, &c);
     kernel_contraction_of(bounds, lanes, b->type, &c);
-    KERNEL_OF_TYPE(b->type, kernel_contract, &c, &ray, vm_all_lanes(), out);
+    KERNEL_OF_TYPE(b->type, kernel_contract, &c, vm_all_lanes(), out, none);
     kernel_maps_of_type(b->at, lanes, b->type, &map);
-    at.t = out->t + vf_load(b->at[2][0]);
-    memcpy(at.r, out->r, sizeof at.r);
-    kernel_polish_near(&b->rays, &map, out->one, KERNEL_CONTRACTION_END, &at);
-    out->t = at.t;
-    memcpy(out->r, at.r, sizeof at.r);
+    out->t += vf_load(b->at[2][0]);
+    kernel_polish_near(&b->rays, &map, out->mask, KERNEL_CONTRACTION_END, out);
 }
 
 /* ---- reference ---- */
@@ -258,12 +253,12 @@ static double depth_bound(const batch *b, int lane, double t)
     return 6e-8 * fabs(t) + 1.8e-7 * (high - low);
 }
 
-static void verify(const batch *b, int lane, const kernel_decided *at, count *n)
+static void verify(const batch *b, int lane, const kernel_point *at, vm without, count *n)
 {
     reference_cell cell;
     reference_line line;
     double values[8];
-    const bool one = vm_bits(at->one) >> lane & 1, none = vm_bits(at->none) >> lane & 1;
+    const bool one = vm_bits(at->mask) >> lane & 1, none = vm_bits(without) >> lane & 1;
     n->rays++;
     n->one += one;
     n->none += none;
@@ -294,12 +289,13 @@ static void decided_crossings_are_right(void **state)
             while (n.rays < rays_wanted / (3 * SHAPE_COUNT)) {
                 batch b;
                 kernel_bounds bounds;
-                kernel_decided at;
+                kernel_point at;
+                vm none;
                 make_batch(&b, types[k], s);
-                contract(&b, &at, &bounds);
+                contract(&b, &at, &none, &bounds);
                 for (int lane = 0; lane < SIMD_WIDTH; lane++) {
                     n.contracting += bounds.error_growth[lane] < INFINITY;
-                    verify(&b, lane, &at, &n);
+                    verify(&b, lane, &at, none, &n);
                 }
             }
             printf("%s %s: %lld rays, %lld in cells that contract, %lld with one crossing, %lld with none, %lld wrong, "

@@ -469,28 +469,22 @@ static __attribute__((noinline)) void kernel_transformed_curved_cell(const kerne
     }
 }
 
-/* Rays that cross exactly two faces (`two`), with the numbers of these faces, and rays that must be traced cell by cell
- * (`alone`). */
-typedef struct kernel_curved_crossed {
-    vm two, alone;
-    vi first, last;
-} kernel_curved_crossed;
-
 /* Returns the index of the lowest bit that is set, per lane; the result is meaningless for 0. */
 SIMD_INLINE vi kernel_least_bit(vi bits)
 {
     return ((vi_from_bits(vf_from_vi(bits & -bits)) >> 23) - 127) & 7;
 }
 
-/* Finds the rays that cross exactly two faces. faces: per ray, one bit for each face that the ray crosses once. alone:
- * rays that must be traced cell by cell whatever they cross; rays that cross more than two faces are added to them. */
-SIMD_INLINE void kernel_curved_count(vi faces, vm rays, vm alone, kernel_curved_crossed *out)
+/* Finds the rays that cross exactly two faces (*two), and the numbers of these faces. faces: per ray, one bit for each
+ * face that the ray crosses once. *alone: rays that must be traced cell by cell whatever they cross; rays that cross
+ * more than two faces are added to them. */
+SIMD_INLINE void kernel_curved_count(vi faces, vm rays, vm *two, vm *alone, vi face[2])
 {
     const vi others = faces & (faces - 1), more = others & (others - 1);
-    out->alone = vm_and(rays, vm_or(alone, vm_sign(-more)));
-    out->two = vm_andnot(vm_and(rays, vm_sign(-others)), out->alone);
-    out->first = kernel_least_bit(faces);
-    out->last = kernel_least_bit(others);
+    *alone = vm_and(rays, vm_or(*alone, vm_sign(-more)));
+    *two = vm_andnot(vm_and(rays, vm_sign(-others)), *alone);
+    face[0] = kernel_least_bit(faces);
+    face[1] = kernel_least_bit(others);
 }
 
 #endif

@@ -223,9 +223,11 @@ typedef struct kernel_rays {
     vf origin_x, origin_y, slope_x, slope_y;
 } kernel_rays;
 
-/* A point of each ray in its cell: its depth t, the field's value there, and its reference coordinates r. */
+/* A point of each ray in its cell: its depth t, the field's value there, and its reference coordinates r. mask: the
+ * rays that have the point; set only for crossings of faces and for points whose comments mention it. */
 typedef struct kernel_point {
     vf t, value, r[3];
+    vm mask;
 } kernel_point;
 
 /* Copies the points of the rays in the mask; other lanes of *to are unchanged. */

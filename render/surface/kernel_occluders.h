@@ -95,8 +95,10 @@ typedef struct kernel_secondary_rays {
     kernel_secondary_ray *rays;
     int64_t undecided_count, capacity;
     kernel_undecided_pair *undecided; /* undecided ray-cell pairs, sorted by ray */
-    bool (*grow)(struct kernel_secondary_rays *rays);
 } kernel_secondary_rays;
+
+/* Grows the list of undecided pairs; returns false if memory runs out. */
+bool render_grow_undecided(kernel_secondary_rays *s);
 
 /* ---- a ray, prepared for traversal ---- */
 

@@ -25,32 +25,6 @@
 #include "render.h"
 #include "simd.h"
 
-/* Numbers of the planes of the tile (kernel_tile.h) that classify nodes. */
-enum {
-    KERNEL_FIND_LEFT,
-    KERNEL_FIND_RIGHT,
-    KERNEL_FIND_TOP,
-    KERNEL_FIND_BOTTOM,
-    KERNEL_FIND_DEPTH,
-    KERNEL_FIND_ALONG,
-    KERNEL_FIND_PLANES
-};
-
-/* The state of a tile's search for cells, and the queue of cells to be traced. A thread keeps it from tile to tile. */
-typedef struct kernel_tile_search {
-    kernel_tile_trace *tile;
-    kernel_tile_queue queue;
-    kernel_candidate_list list; /* the cells that have been found and are not queued yet */
-    kernel_candidate items[2 * SIMD_WIDTH];
-    /* number of pixels per unit of slope or, if the camera is orthographic, per scaled unit */
-    float column_scale, row_scale;
-    float pad[2]; /* margins by which columns and rows are extended, in pixels */
-    /* Planes of kernel_planes (kernel_tile.h). A point's signed distance from one is normal . position + offset, with a
-     * rounding error of at most `error`. size: absolute values of the normal's components. */
-    float normal[3][KERNEL_FIND_PLANES], size[3][KERNEL_FIND_PLANES], offset[KERNEL_FIND_PLANES];
-    float error[KERNEL_FIND_PLANES];
-} kernel_tile_search;
-
 /* ---- cells of leaves ---- */
 
 /* Queues the cells found so far for tracing, unless nearer hits hide them. */
@@ -64,7 +38,7 @@ static bool kernel_tile_find_flush(kernel_candidate_list *list)
         const int value = kernel_tile_set_source(t, found->source, &part);
         const kernel_tile_candidate candidate = kernel_candidate_in_tile(found, t->tile.x0, t->tile.y0);
         if (kernel_candidate_blocks(t, &candidate) && kernel_pixels_beyond(t, candidate.box, found->near))
-            kernel_tile_queue_add(t, &s->queue, &candidate, part, value);
+            kernel_tile_queue_add(t, s, &candidate, part, value);
     }
     list->count = 0;
     return true;
@@ -337,13 +311,13 @@ static void kernel_tile_surfaces(kernel_tile_trace *t)
     s->list = (kernel_candidate_list){.items = s->items, .capacity = 2 * SIMD_WIDTH};
     t->thread->finder->frame = NULL;
     kernel_tile_find_begin(t);
-    kernel_tile_queue_begin(&s->queue);
+    kernel_tile_queue_begin(s);
     for (int layer = 0; layer < t->frame->surface_count; layer++) {
         kernel_tile_set_layer(t, layer);
         kernel_tile_surface(t);
         if (t->thread->finder->frame) kernel_find_flush(t->thread->finder);
         kernel_tile_find_flush(&s->list);
-        kernel_tile_queue_finish(t, &s->queue);
+        kernel_tile_queue_finish(t, s);
     }
 }
 

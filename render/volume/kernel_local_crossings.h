@@ -102,21 +102,22 @@ SIMD_INLINE void kernel_local_faces_of(const kernel_tile *tile, kernel_transform
 
 static __attribute__((noinline)) void kernel_local_find_faces_nonconvex(const kernel_transformed_curved *cells,
                                                                         const kernel_lane_rays *own,
-                                                                        const vi *nonconvex, vm rays, int type,
-                                                                        kernel_curved_crossed *out)
+                                                                        const vi *nonconvex, vm rays, int type, vm *two,
+                                                                        vm *alone, vi face[2])
 {
-    KERNEL_OF_TYPE(type, kernel_curved_find, (const float(*)[8][SIMD_WIDTH])cells->at, own, nonconvex, rays, out);
+    KERNEL_OF_TYPE(type, kernel_curved_find, (const float(*)[8][SIMD_WIDTH])cells->at, own, nonconvex, rays, two, alone,
+                   face);
 }
 
-/* Finds the two faces that each ray crosses once. All other rays are added to out->alone, to be traced one by one. */
+/* Finds the two faces that each ray crosses once. All other rays are added to *alone, to be traced one by one. */
 SIMD_INLINE void kernel_local_find_faces(const kernel_transformed_curved *cells, const kernel_lane_rays *own, vm rays,
-                                         int type, kernel_curved_crossed *out)
+                                         int type, vm *two, vm *alone, vi face[2])
 {
     const vi nonconvex = vi_from_bits(kernel_gather_lane(cells->nonconvex, own->lane));
     if (vm_any(vm_and(rays, vm_sign(-nonconvex))))
-        kernel_local_find_faces_nonconvex(cells, own, &nonconvex, rays, type, out);
+        kernel_local_find_faces_nonconvex(cells, own, &nonconvex, rays, type, two, alone, face);
     else
-        kernel_curved_find((const float(*)[8][SIMD_WIDTH])cells->at, own, NULL, rays, out, type);
+        kernel_curved_find((const float(*)[8][SIMD_WIDTH])cells->at, own, NULL, rays, two, alone, face, type);
 }
 
 /* Reads the corners of each ray's face from the rows of cells, if the given rays have at most two different cells, as

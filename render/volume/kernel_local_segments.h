@@ -310,18 +310,18 @@ SIMD_INLINE vm kernel_local_list_load(const kernel_local_list *list, const kerne
 SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_tile_segments *b, int type, int n)
 {
     kernel_lane_rays rays;
-    kernel_curved_crossed crossed;
-    vi words;
+    vm two, alone;
+    vi words, face[2];
     const vm all = kernel_local_list_load(&b->met, &t->tile, n, &words, &rays);
-    kernel_local_find_faces(&t->thread->tile_cells->lanes.transformed, &rays, all, type, &crossed);
-    const vm on_quad = kernel_curved_on_quad(type, 0, crossed.first);
-    words = words | crossed.first << KERNEL_LOCAL_FACES | crossed.last << (KERNEL_LOCAL_FACES + 3);
-    kernel_local_list_add(&b->crossed[0], vm_and(crossed.two, on_quad), words);
-    if (kernel_has_triangles(type)) kernel_local_list_add(&b->crossed[1], vm_andnot(crossed.two, on_quad), words);
-    if (__builtin_expect(vm_any(crossed.alone), 0)) {
+    kernel_local_find_faces(&t->thread->tile_cells->lanes.transformed, &rays, all, type, &two, &alone, face);
+    const vm on_quad = kernel_curved_on_quad(type, 0, face[0]);
+    words = words | face[0] << KERNEL_LOCAL_FACES | face[1] << (KERNEL_LOCAL_FACES + 3);
+    kernel_local_list_add(&b->crossed[0], vm_and(two, on_quad), words);
+    if (kernel_has_triangles(type)) kernel_local_list_add(&b->crossed[1], vm_andnot(two, on_quad), words);
+    if (__builtin_expect(vm_any(alone), 0)) {
         vf reach[2];
         vf_gather_pair(b->reach, 2 * rays.at, &reach[0], &reach[1]);
-        kernel_local_segments_process_singly(t, rays.at, rays.lane, vm_bits(crossed.alone), reach, 1);
+        kernel_local_segments_process_singly(t, rays.at, rays.lane, vm_bits(alone), reach, 1);
     }
 }
 
