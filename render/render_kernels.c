@@ -193,7 +193,7 @@ static bool begins_task(const kernel_frame *f, int x0, int y0)
 static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int y0)
 {
     thread->serial++;
-    if (begins_task(f, x0, y0)) kernel_depth_reset(&thread->tile_volume->depth);
+    if (begins_task(f, x0, y0)) kernel_depth_reset(thread->tile_volume);
     kernel_tile_trace *t = thread->tile;
     const bool fogs = has_volume(f, thread, x0, y0);
     if (!fogs && !has_surface(f, thread, x0, y0)) return;

@@ -1,5 +1,5 @@
 /* Searches a subtree for visible cells (kernel_candidates.h), and computes the pixels in which a single cell may be
- * visible. Cells are tested SIMD_WIDTH at a time (kernel_candidate_surfaces.h, kernel_candidate_volumes.h). Cells whose
+ * visible. Cells are tested SIMD_WIDTH at a time (kernel_candidate_surfaces.h, kernel_candidates.h). Cells whose
  * numbers are too large, too small or NaN for lanes are tested one by one, by the bounds of their vertices. */
 #ifndef RENDER_KERNEL_FINDER_H
 #define RENDER_KERNEL_FINDER_H

@@ -126,31 +126,9 @@ static __attribute__((noinline)) void kernel_double_begin(const kernel_frame *f,
 
 /* ---- rays in a tet ---- */
 
-/* Points at which rays meet the plane of a face. is_sound: rays for which the face is not seen edge on, so that the
- * point is valid. */
-typedef struct kernel_double_end {
-    kernel_f64 t, v;
-    kernel_f64_mask is_sound;
-} kernel_double_end;
-
 SIMD_INLINE kernel_f64 kernel_affine_at(const double c[3], kernel_f64 u, kernel_f64 v)
 {
     return (c[0] + c[1] * u) + c[2] * v;
-}
-
-SIMD_INLINE kernel_double_end kernel_double_intersect(const kernel_double_face *face, kernel_f64 u, kernel_f64 v)
-{
-    const kernel_f64 weight = kernel_affine_at(face->weight, u, v), inverse = 1.0 / weight;
-    return (kernel_double_end){kernel_affine_at(face->depth, u, v) * inverse,
-                               kernel_affine_at(face->value, u, v) * inverse,
-                               (kernel_f64_mask)(weight * weight > face->least * face->least)};
-}
-
-SIMD_INLINE void kernel_double_select(kernel_f64_mask m, const kernel_double_end *from, kernel_double_end *to)
-{
-    to->t = kernel_f64_select(m, from->t, to->t);
-    to->v = kernel_f64_select(m, from->v, to->v);
-    to->is_sound = (from->is_sound & m) | (to->is_sound & ~m);
 }
 
 /* Stores half of a vector of doubles, rounded to float32, and the rounding errors. */
@@ -165,23 +143,29 @@ SIMD_INLINE void kernel_double_value(kernel_f64 value, int half, vf *v, vf *rest
 SIMD_INLINE kernel_f64_mask kernel_double_half(const kernel_double_face faces[4], kernel_f64 u, kernel_f64 v,
                                                const vm hit[4], int half, kernel_unit_segment *out)
 {
-    kernel_double_end first = {0}, last = {0};
-    kernel_f64_mask met = {0};
+    kernel_f64 t[2] = {{0}, {0}}, value[2] = {{0}, {0}};
+    kernel_f64_mask met[2] = {{0}, {0}}, sound = ~(kernel_f64_mask){0};
     for (int n = 0; n < 4; n++) {
-        const kernel_f64_mask m = kernel_f64_of_mask(hit[n], half);
-        const kernel_double_end end = kernel_double_intersect(&faces[n], u, v);
-        kernel_double_select(m & ~met, &end, &first);
-        kernel_double_select(m & met, &end, &last);
-        met |= m;
+        const kernel_double_face *face = &faces[n];
+        const kernel_f64_mask hits = kernel_f64_of_mask(hit[n], half);
+        const kernel_f64 weight = kernel_affine_at(face->weight, u, v), inverse = 1.0 / weight;
+        const kernel_f64 depth = kernel_affine_at(face->depth, u, v) * inverse;
+        const kernel_f64 own = kernel_affine_at(face->value, u, v) * inverse;
+        /* the point is not valid if the face is seen edge on */
+        sound &= ~hits | (kernel_f64_mask)(weight * weight > face->least * face->least);
+        for (int end = 1; end >= 0; end--) {
+            const kernel_f64_mask m = end ? hits & met[0] : hits & ~met[0];
+            t[end] = kernel_f64_select(m, depth, t[end]);
+            value[end] = kernel_f64_select(m, own, value[end]);
+            met[end] |= m;
+        }
     }
-    const kernel_f64_mask swap = (kernel_f64_mask)(last.t < first.t);
-    const kernel_double_end nearer = first;
-    kernel_double_select(swap, &last, &first);
-    kernel_double_select(swap, &nearer, &last);
-    kernel_f64_store_lanes(&out->length, half, last.t - first.t);
-    kernel_double_value(first.v, half, &out->v_in, &out->rest_in);
-    kernel_double_value(last.v, half, &out->v_out, &out->rest_out);
-    return first.is_sound & last.is_sound;
+    const kernel_f64_mask swap = (kernel_f64_mask)(t[1] < t[0]);
+    kernel_f64_store_lanes(&out->length, half,
+                           kernel_f64_select(swap, t[0], t[1]) - kernel_f64_select(swap, t[1], t[0]));
+    kernel_double_value(kernel_f64_select(swap, value[1], value[0]), half, &out->v_in, &out->rest_in);
+    kernel_double_value(kernel_f64_select(swap, value[0], value[1]), half, &out->v_out, &out->rest_out);
+    return sound & met[0] & met[1];
 }
 
 /* Replaces, on the given rays, the length, in t, and the values of *run, a tet's interval in float32, by those computed
