@@ -150,16 +150,12 @@ typedef struct render_pending_hit {
     float t, reach;
 } render_pending_hit;
 
-/* The data for lighting a pending hit: the gradient in its own cell, in camera axes, and its unlit colour. */
-typedef struct render_pending_shading {
-    float normal[3], colour[3];
-} render_pending_shading;
-
 /* Growing lists of pending hits and of the data for lighting them; both have `count` entries. Memory comes from
  * memory.h. */
 typedef struct render_pending_list {
     render_pending_hit *items;
-    render_pending_shading *shadings;
+    /* per hit, the gradient in its own cell, in camera axes, and its unlit colour */
+    float (*shadings)[2][3];
     int64_t count, capacity;
 } render_pending_list;
 
@@ -172,13 +168,6 @@ typedef struct render_difference_samples {
 
 /* Value of `transmittance` that marks the placeholder fragments of pending hits while a frame is traced. */
 #define RENDER_PENDING_TRANSMITTANCE 2.0f
-
-/* The value range of each surface's field over all ranks (low > high if no rank has the field), and the list of hits
- * that need samples of other ranks. */
-typedef struct render_pending_hits {
-    double ranges[RENDER_MAX_ISOVALUES][2];
-    render_pending_list list;
-} render_pending_hits;
 
 /* Gradients at the vertices of a mesh part, of any length. All vertices of cells that the layer's isovalues cross have
  * one. */
@@ -321,8 +310,11 @@ typedef struct render_job {
     render_paint paint;
     const render_occlusion *occlusion; /* shadows and ambient occlusion; used by RENDER_UNLIT */
     /* NULL: normals by RENDER_DIFFERENCES are computed at once from this rank's cells. Otherwise such hits, except
-     * those of polyhedra, are added to its list instead of becoming fragments. Not allowed with RENDER_VALUES. */
-    render_pending_hits *waiting;
+     * those of polyhedra, are added to this list instead of becoming fragments. Not allowed with RENDER_VALUES. */
+    render_pending_list *waiting;
+    /* used to light pending hits: the value range of each surface's field over all ranks (low > high if no rank has the
+     * field) */
+    double (*waiting_ranges)[2];
     render_traversal traversal;
     const render_volume_layer *volumes;
     int volume_count;

@@ -100,7 +100,7 @@ static void sort_hits(const render_camera *camera, render_pending_list *list, in
     qsort(places, (size_t)count, sizeof *places, compare_locations);
     for (int64_t i = 0; i < count; i++) {
         list->items[first + i] = scratch->items[places[i].index];
-        list->shadings[first + i] = scratch->shadings[places[i].index];
+        memcpy(list->shadings[first + i], scratch->shadings[places[i].index], sizeof *list->shadings);
     }
 }
 

@@ -65,7 +65,7 @@ static bool grow_list(render_pending_list *list, int64_t capacity)
 {
     render_pending_hit *items = base_realloc(list->items, (size_t)capacity * sizeof *items);
     if (items) list->items = items;
-    render_pending_shading *shadings = base_realloc(list->shadings, (size_t)capacity * sizeof *shadings);
+    float(*shadings)[2][3] = base_realloc(list->shadings, (size_t)capacity * sizeof *shadings);
     if (shadings) list->shadings = shadings;
     if (!items || !shadings) return false;
     list->capacity = capacity;
@@ -134,7 +134,7 @@ static bool end_threads(const render_job *job, kernel_thread *states, int thread
         base_free(states[i].bin.buffer);
         base_free(states[i].volume_bin.buffer);
         has_memory = has_memory && !states[i].out_of_memory;
-        if (has_memory && job->waiting) has_memory = append_pending(&job->waiting->list, &states[i].waiting);
+        if (has_memory && job->waiting) has_memory = append_pending(job->waiting, &states[i].waiting);
         base_free(states[i].waiting.items);
         base_free(states[i].waiting.shadings);
         surface = fmax(surface, states[i].surface_seconds);
@@ -225,8 +225,8 @@ static bool trace_to_list(kernel_frame *frame, int threads, fragment_list *out, 
     const render_job *job = frame->job;
     const int64_t first = out->count, expected = job->pixels ? 0 : (int64_t)job->camera.width * job->camera.height / 2;
     shared_list list = {.out = out, .end = first, .used = -1, .rest = base_calloc((size_t)threads, sizeof *list.rest)};
-    bool is_well =
-        list.rest && render_reserve_fragments(out, expected) && trace_frame(frame, append_tile, &list, threads, statistics);
+    bool is_well = list.rest && render_reserve_fragments(out, expected) &&
+                   trace_frame(frame, append_tile, &list, threads, statistics);
     out->count = list.used < 0 ? list.end : list.used;
     for (int i = 0; list.rest && i < threads; i++) {
         is_well = is_well && append_fragments(out, list.rest[i].items, list.rest[i].count);

@@ -44,7 +44,7 @@ static void kernel_prefetched_sort(const kernel_tile_candidate **items, int coun
 }
 
 /* Prefetches the vertices of all prefetched cells, then queues them for tracing. */
-static __attribute__((noinline)) void kernel_tile_queue_prefetched(kernel_tile_trace *t, kernel_tile_queue *m)
+static __attribute__((noinline)) void kernel_tile_queue_prefetched(kernel_tile_trace *t, kernel_tile_search *m)
 {
     const kernel_tile_candidate **items = m->prefetched;
     kernel_prefetched_sort(items, m->prefetched_count);
@@ -68,17 +68,17 @@ static __attribute__((noinline)) void kernel_tile_queue_prefetched(kernel_tile_t
 
 /* Traces the tile's transparent surfaces if `transparent` is set, otherwise its opaque ones, which must be traced
  * first. */
-static __attribute__((noinline)) void kernel_tile_trace_candidates(kernel_tile_trace *t, const kernel_by_depth *q,
+static __attribute__((noinline)) void kernel_tile_trace_candidates(kernel_tile_trace *t, const kernel_bin *q,
                                                                    bool transparent)
 {
-    kernel_tile_queue *queue = &t->search->queue;
+    kernel_tile_search *queue = t->search;
     kernel_tile_queue_begin(queue);
     for (int bin = 0; bin < KERNEL_DEPTHS && bin <= kernel_depth_bin(q, kernel_tile_far(t)); bin++)
         for (int i = q->first[bin]; i >= 0; i = q->items[i].next) {
             const kernel_tile_candidate *candidate = &q->items[i];
             const uint32_t source = candidate->source;
             const bool is_transparent =
-                t->frame->isovalues[source % RENDER_MAX_ISOVALUES].surface >= t->frame->opaque_count;
+                t->frame->isovalue_surface[source % RENDER_MAX_ISOVALUES] >= t->frame->opaque_count;
             if (is_transparent != transparent || !kernel_candidate_blocks(t, candidate)) continue;
             kernel_prefetch_indices(t->frame->job->parts[source / RENDER_MAX_ISOVALUES].cells, candidate->cell);
             queue->prefetched[queue->prefetched_count++] = candidate;
@@ -91,12 +91,11 @@ static __attribute__((noinline)) void kernel_tile_trace_candidates(kernel_tile_t
 SIMD_INLINE void kernel_tile_surface_candidates(kernel_tile_trace *t)
 {
     const kernel_frame *f = t->frame;
-    const kernel_bin *bin = &t->thread->bin;
+    kernel_bin *bin = &t->thread->bin;
     if (!bin->count) return;
-    kernel_by_depth by_depth;
-    kernel_sort_by_depth(&by_depth, bin->items, bin->count);
-    if (f->opaque_count) kernel_tile_trace_candidates(t, &by_depth, false);
-    if (f->opaque_count < f->surface_count) kernel_tile_trace_candidates(t, &by_depth, true);
+    kernel_sort_by_depth(bin);
+    if (f->opaque_count) kernel_tile_trace_candidates(t, bin, false);
+    if (f->opaque_count < f->surface_count) kernel_tile_trace_candidates(t, bin, true);
 }
 
 /* ---- tiles ---- */
@@ -194,7 +193,7 @@ static bool begins_task(const kernel_frame *f, int x0, int y0)
 static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int y0)
 {
     thread->serial++;
-    if (begins_task(f, x0, y0)) kernel_depth_reset(&thread->tile_volume->depth);
+    if (begins_task(f, x0, y0)) kernel_depth_reset(thread->tile_volume);
     kernel_tile_trace *t = thread->tile;
     const bool fogs = has_volume(f, thread, x0, y0);
     if (!fogs && !has_surface(f, thread, x0, y0)) return;

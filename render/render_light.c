@@ -58,7 +58,7 @@ void render_hit_samples(const render_job *job, const render_hit *hit, double sta
 {
     const hit_frame p = place_of(job, hit);
     memcpy(start, p.start, sizeof p.start);
-    hit_directions(job, hit->pixel, &p.a, directions);
+    hit_directions(job, hit->pixel, (const double(*)[3])p.axes, directions);
 }
 
 /* ---- tracing ------------------------------------------------------------------------------------------------- */
@@ -79,12 +79,6 @@ struct render_occluders {
     int threads;
 };
 
-/* Identifies a ray of a chunk of hits. hit: index of the hit in the chunk; number: index of the ray in the hemisphere
- * or, for a ray to a light, RENDER_MAX_SAMPLES plus the light's index. */
-typedef struct ray_id {
-    int16_t hit, number;
-} ray_id;
-
 /* The state of a thread that traces rays from hits. Each thread has its own copy of the frame and the job, because each
  * tile space has a different camera. */
 typedef struct tracer {
@@ -97,10 +91,9 @@ typedef struct tracer {
     kernel_bundle bundle;
     kernel_secondary_rays secondary_rays;
     kernel_secondary_ray rays[CHUNK_RAYS];
-    ray_id names[CHUNK_RAYS];
 } tracer;
 
-static bool grow_undecided(kernel_secondary_rays *s)
+bool render_grow_undecided(kernel_secondary_rays *s)
 {
     const int64_t capacity = s->capacity + s->capacity / 2 + 1024;
     kernel_undecided_pair *undecided = base_realloc(s->undecided, (size_t)capacity * sizeof *undecided);
@@ -115,9 +108,9 @@ static bool grow_undecided(kernel_secondary_rays *s)
 static void add_ray(tracer *t, int hit, int number, const double start[3], const double direction[3], double far)
 {
     const render_space *space = &t->job->space;
-    const int i = t->secondary_rays.count++;
-    kernel_secondary_ray *ray = &t->rays[i];
-    t->names[i] = (ray_id){(int16_t)hit, (int16_t)number};
+    kernel_secondary_ray *ray = &t->rays[t->secondary_rays.count++];
+    ray->hit = (int16_t)hit;
+    ray->number = (int16_t)number;
     for (int a = 0; a < 3; a++) {
         ray->origin[a] = (float)((start[a] - space->origin[a]) * space->scale);
         ray->direction[a] = (float)direction[a];
@@ -131,7 +124,7 @@ static void add_hit(tracer *t, int i, const render_hit *hit, const render_hit_ra
     const render_occlusion *o = t->job->occlusion;
     const hit_frame p = place_of(t->job, hit);
     double samples[RENDER_MAX_SAMPLES][3];
-    if (rays->samples) hit_directions(t->job, hit->pixel, &p.a, samples);
+    if (rays->samples) hit_directions(t->job, hit->pixel, (const double(*)[3])p.axes, samples);
     for (uint64_t left = rays->samples; left; left &= left - 1) {
         const int k = __builtin_ctzll(left);
         add_ray(t, i, k, p.start, samples[k], o->radius * t->job->space.scale);
@@ -144,19 +137,16 @@ static void add_hit(tracer *t, int i, const render_hit *hit, const render_hit_ra
 
 /* ---- rays that must be tested exactly in a cell */
 
-static void tracer_set_camera(tracer *t, const double eye[3], const hit_axes *a, bool is_orthographic)
+static void tracer_set_camera(tracer *t, const double eye[3], const double (*axes)[3], bool is_orthographic)
 {
     render_camera *c = &t->moved_job.camera;
     memcpy(c->eye, eye, sizeof c->eye);
-    memcpy(c->right, a->right, sizeof c->right);
-    memcpy(c->up, a->up, sizeof c->up);
-    memcpy(c->forward, a->forward, sizeof c->forward);
+    memcpy(c->right, axes[0], sizeof c->right);
+    memcpy(c->up, axes[1], sizeof c->up);
+    memcpy(c->forward, axes[2], sizeof c->forward);
     c->is_orthographic = is_orthographic;
-    for (int k = 0; k < 3; k++) {
-        t->frame.scaled_axes[0][k] = a->right[k] * t->moved_job.space.scale;
-        t->frame.scaled_axes[1][k] = a->up[k] * t->moved_job.space.scale;
-        t->frame.scaled_axes[2][k] = a->forward[k] * t->moved_job.space.scale;
-    }
+    for (int a = 0; a < 3; a++)
+        for (int k = 0; k < 3; k++) t->frame.scaled_axes[a][k] = axes[a][k] * t->moved_job.space.scale;
 }
 
 /* Sets up the bundle with the rays of a hit's hemisphere. */
@@ -168,7 +158,7 @@ static void set_hemisphere_rays(tracer *t, const render_hit *hit)
     kernel_bundle *b = &t->bundle;
     double directions[RENDER_MAX_SAMPLES][3];
     hit_hemisphere(t->job, hit->pixel, directions);
-    tracer_set_camera(t, p.start, &p.a, false);
+    tracer_set_camera(t, p.start, (const double(*)[3])p.axes, false);
     b->tile.centre_x = b->tile.centre_y = 0;
     b->tile.radius = 0;
     for (int k = 0; k < o->samples; k++) {
@@ -180,7 +170,7 @@ static void set_hemisphere_rays(tracer *t, const render_hit *hit)
         b->tile.radius = fmaxf(b->tile.radius, fmaxf(fabsf(b->slope_x[k]), fabsf(b->slope_y[k])));
         for (int a = 0; a < 3; a++) {
             b->rays[k].base[a] = (p.start[a] - space->origin[a]) * space->scale;
-            b->rays[k].direction[a] = p.a.forward[a] + slope_x * p.a.right[a] + slope_y * p.a.up[a];
+            b->rays[k].direction[a] = p.axes[2][a] + slope_x * p.axes[0][a] + slope_y * p.axes[1][a];
         }
     }
     b->count = o->samples;
@@ -189,27 +179,27 @@ static void set_hemisphere_rays(tracer *t, const render_hit *hit)
 /* Sets up the bundle with a hit's ray to a light. */
 static void set_light_ray(tracer *t, const render_hit *hit, int light)
 {
-    const hit_axes a = hit_axes_around(t->job->lights[light].direction);
     const render_space *space = &t->job->space;
     const hit_frame p = place_of(t->job, hit);
     kernel_bundle *b = &t->bundle;
-    double from[3];
+    double from[3], axes[3][3];
+    hit_axes_around(t->job->lights[light].direction, axes);
     for (int k = 0; k < 3; k++) from[k] = (p.start[k] - space->origin[k]) * space->scale;
-    const double x = hit_dot(a.right, from), y = hit_dot(a.up, from);
+    const double x = hit_dot(axes[0], from), y = hit_dot(axes[1], from);
     const double centre[2] = {(floor(x * LIGHT_TILES) + 0.5) / LIGHT_TILES,
                               (floor(y * LIGHT_TILES) + 0.5) / LIGHT_TILES};
-    tracer_set_camera(t, space->origin, &a, true);
+    tracer_set_camera(t, space->origin, (const double(*)[3])axes, true);
     b->tile.centre_x = centre[0] / space->scale;
     b->tile.centre_y = centre[1] / space->scale;
     b->tile.radius = 0.5F / LIGHT_TILES;
     b->origin_x[0] = (float)(x - centre[0]);
     b->origin_y[0] = (float)(y - centre[1]);
     b->slope_x[0] = b->slope_y[0] = 0;
-    b->t_near[0] = (float)hit_dot(a.forward, from);
+    b->t_near[0] = (float)hit_dot(axes[2], from);
     b->t_far[0] = INFINITY;
     for (int k = 0; k < 3; k++) {
-        b->rays[0].base[k] = x * a.right[k] + y * a.up[k];
-        b->rays[0].direction[k] = a.forward[k];
+        b->rays[0].base[k] = x * axes[0][k] + y * axes[1][k];
+        b->rays[0].direction[k] = axes[2][k];
     }
     b->count = 1;
 }
@@ -238,7 +228,7 @@ static void trace_hemisphere(tracer *t, const render_hit *hit, kernel_undecided_
     int32_t ray_of[RENDER_MAX_SAMPLES];
     set_hemisphere_rays(t, hit);
     for (int64_t i = 0; i < count; i++) {
-        const int k = t->names[undecided[i].ray].number;
+        const int k = t->rays[undecided[i].ray].number;
         ray_of[k] = undecided[i].ray;
         if (t->rays[undecided[i].ray].is_open) open |= (uint64_t)1 << k;
     }
@@ -249,7 +239,7 @@ static void trace_hemisphere(tracer *t, const render_hit *hit, kernel_undecided_
         t->bundle.open = 0;
         for (int64_t j = i; j < count; j++) {
             if (undecided[j].occluder != occluder) continue;
-            t->bundle.open |= (uint64_t)1 << t->names[undecided[j].ray].number;
+            t->bundle.open |= (uint64_t)1 << t->rays[undecided[j].ray].number;
             undecided[j].occluder = TESTED;
         }
         t->bundle.open &= open;
@@ -266,7 +256,7 @@ static void trace_light(tracer *t, const render_hit *hit, const kernel_undecided
 {
     kernel_secondary_ray *ray = &t->rays[doubt->ray];
     if (!ray->is_open) return;
-    set_light_ray(t, hit, t->names[doubt->ray].number - RENDER_MAX_SAMPLES);
+    set_light_ray(t, hit, ray->number - RENDER_MAX_SAMPLES);
     t->bundle.open = 1;
     test_cell(t, doubt->occluder);
     ray->is_open = t->bundle.open;
@@ -278,15 +268,15 @@ static void trace_undecided(tracer *t, const render_hit *hits)
     qsort(s->undecided, (size_t)s->undecided_count, sizeof *s->undecided, by_ray);
     for (int64_t first = 0, end; first < s->undecided_count; first = end) {
         kernel_undecided_pair *from = &s->undecided[first];
-        const ray_id name = t->names[from->ray];
-        for (end = first + 1; end < s->undecided_count && name.number < RENDER_MAX_SAMPLES; end++) {
-            const ray_id next = t->names[s->undecided[end].ray];
-            if (next.hit != name.hit || next.number >= RENDER_MAX_SAMPLES) break;
+        const kernel_secondary_ray *ray = &t->rays[from->ray];
+        for (end = first + 1; end < s->undecided_count && ray->number < RENDER_MAX_SAMPLES; end++) {
+            const kernel_secondary_ray *next = &t->rays[s->undecided[end].ray];
+            if (next->hit != ray->hit || next->number >= RENDER_MAX_SAMPLES) break;
         }
-        if (name.number < RENDER_MAX_SAMPLES)
-            trace_hemisphere(t, &hits[name.hit], from, end - first);
+        if (ray->number < RENDER_MAX_SAMPLES)
+            trace_hemisphere(t, &hits[ray->hit], from, end - first);
         else
-            trace_light(t, &hits[name.hit], from);
+            trace_light(t, &hits[ray->hit], from);
     }
 }
 
@@ -301,12 +291,12 @@ static void trace_chunk(tracer *t, const render_hit *hits, render_hit_rays *rays
     t->kernels->occlude(&t->frame, &t->thread, &t->of->trees, s);
     if (s->undecided_count) trace_undecided(t, hits);
     for (int i = 0; i < s->count; i++) {
-        const ray_id name = t->names[i];
-        if (t->rays[i].is_open) continue;
-        if (name.number < RENDER_MAX_SAMPLES)
-            rays[name.hit].samples &= ~((uint64_t)1 << name.number);
+        const kernel_secondary_ray *ray = &t->rays[i];
+        if (ray->is_open) continue;
+        if (ray->number < RENDER_MAX_SAMPLES)
+            rays[ray->hit].samples &= ~((uint64_t)1 << ray->number);
         else
-            rays[name.hit].lights &= ~(1u << (name.number - RENDER_MAX_SAMPLES));
+            rays[ray->hit].lights &= ~(1u << (ray->number - RENDER_MAX_SAMPLES));
     }
 }
 
@@ -326,7 +316,7 @@ static tracer *tracer_create(const render_occluders *of)
     t->frame = of->frame;
     t->frame.job = &t->moved_job;
     t->frame.depth_shift = t->moved_job.space.depth_origin = 0;
-    t->secondary_rays = (kernel_secondary_rays){.rays = t->rays, .grow = grow_undecided};
+    t->secondary_rays = (kernel_secondary_rays){.rays = t->rays};
     t->thread = (kernel_thread){.memory = base_alloc(t->kernels->memory_bytes),
                                 .polyhedra = has_polyhedra ? polyhedra_create() : NULL};
     if (t->thread.memory) t->kernels->begin(&t->thread);
@@ -460,7 +450,7 @@ void render_rays_to_boxes(const render_job *job, const render_hit *hit, const re
     const hit_frame p = place_of(job, hit);
     const double margin = box_margin / job->space.scale;
     double samples[RENDER_MAX_SAMPLES][3];
-    if (rays->samples) hit_directions(job, hit->pixel, &p.a, samples);
+    if (rays->samples) hit_directions(job, hit->pixel, (const double(*)[3])p.axes, samples);
     for (int i = 0; i < count; i++) {
         render_hit_rays met = {0, 0, 0};
         for (uint32_t left = rays->lights; left; left &= left - 1) {
@@ -483,7 +473,7 @@ void render_rays_to_boxes(const render_job *job, const render_hit *hit, const re
 static void shade(const render_job *job, const render_material *m, const hit_frame *p, uint32_t lights,
                   double diffuse[3], double specular[3])
 {
-    const double *n = p->a.forward;
+    const double *n = p->axes[2];
     for (int a = 0; a < 3; a++) diffuse[a] = (double)m->ambient, specular[a] = 0;
     for (int i = 0; i < job->light_count; i++) {
         const double *l = job->lights[i].direction;

@@ -83,11 +83,11 @@ static void prepare_scale(kernel_transfer *out, const render_transfer *t)
      * values are still recognized as below the range. */
     const double least = t->scale == RENDER_LOG ? t->low / 2 : t->threshold;
     const double begin = t->scale == RENDER_LOG ? log(least) : 0;
-    out->scale = (kernel_scale){.kind = t->scale,
-                                .threshold = (float)(least * out->inverse_width),
-                                .inverse = (float)(1 / (least * out->inverse_width)),
-                                .slope = (float)slope,
-                                .shift = (float)((begin - low) * slope)};
+    out->scale = t->scale;
+    out->threshold = (float)(least * out->inverse_width);
+    out->inverse_threshold = (float)(1 / (least * out->inverse_width));
+    out->scale_slope = (float)slope;
+    out->scale_shift = (float)((begin - low) * slope);
 }
 
 /* Returns the position in the colour table of a value at which an opacity is given, as kernel_colour_position()
@@ -178,7 +178,7 @@ static double value_scale(const render_job *job, int surface)
 {
     double range[2];
     if (job->waiting)
-        memcpy(range, job->waiting->ranges[surface], sizeof range);
+        memcpy(range, job->waiting_ranges[surface], sizeof range);
     else
         render_surface_range(job, surface, range);
     const double width = range[1] - range[0];
@@ -221,8 +221,10 @@ static void prepare_surfaces(kernel_frame *f)
                 if (layer->colour_map) prepare_transfer(&s->colour, layer->colour_map, 1);
                 if (layer->lines) prepare_lines(&s->lines, layer->lines);
                 f->opaque_count += is_opaque;
-                for (int value = 0; value < layer->value_count; value++)
-                    f->isovalues[isovalues++] = (kernel_isovalue){f->surface_count - 1, value};
+                for (int value = 0; value < layer->value_count; value++) {
+                    f->isovalue_surface[isovalues] = f->surface_count - 1;
+                    f->isovalue_number[isovalues++] = value;
+                }
                 f->has_transparent = f->has_transparent || !is_opaque;
             }
             kind += (uint32_t)layer->value_count;

@@ -82,20 +82,22 @@ static bool chord_meets_box(const double base[3], const double direction[3], con
     return from <= to;
 }
 
-static unsigned chord_rays_in_box(const kernel_packet *p, const kernel_lanes *l, const mmbvh *tree, int64_t node)
+static unsigned chord_rays_in_box(const kernel_packet *p, const double px[SIMD_WIDTH], const double py[SIMD_WIDTH],
+                                  const mmbvh *tree, int64_t node)
 {
     float lower[4], upper[4];
     unsigned met = 0;
     mmbvh_node_box(tree, node, lower, upper);
     for (int i = 0; i < SIMD_WIDTH; i++) {
         double base[3], direction[3];
-        kernel_tree_ray(p->frame, l->px[i], l->py[i], base, direction);
+        kernel_tree_ray(p->frame, px[i], py[i], base, direction);
         met |= (unsigned)chord_meets_box(base, direction, lower, upper) << i;
     }
     return met & vm_bits(p->active);
 }
 
-static void chord_trace_part(kernel_packet *p, const kernel_lanes *l, const chord_state *state, int part)
+static void chord_trace_part(kernel_packet *p, const double px[SIMD_WIDTH], const double py[SIMD_WIDTH],
+                             const chord_state *state, int part)
 {
     const mmbvh *tree = p->frame->job->parts[part].tree;
     const grid_field *field = &p->frame->job->surfaces[0].field.fields[part];
@@ -105,7 +107,7 @@ static void chord_trace_part(kernel_packet *p, const kernel_lanes *l, const chor
     while (top) {
         const int64_t node = stack[--top], ref = mmbvh_node_ref(tree, node);
         const int count = mmbvh_node_count(tree, node);
-        const unsigned met = chord_rays_in_box(p, l, tree, node);
+        const unsigned met = chord_rays_in_box(p, px, py, tree, node);
         if (!met) continue;
         for (int n = 0; n < count; n++)
             chord_trace_cell(p, state, field, part, tree->cells[ref + n], vm_from_bits(met));
@@ -115,13 +117,13 @@ static void chord_trace_part(kernel_packet *p, const kernel_lanes *l, const chor
     }
 }
 
-static void chord_tile_rays(kernel_packet *p, const kernel_lanes *l)
+static void chord_tile_rays(kernel_packet *p, const double px[SIMD_WIDTH], const double py[SIMD_WIDTH])
 {
     const bool flat = p->frame->job->camera.is_orthographic;
     const double reach = kernel_slope_to_origin(p->frame);
     float lanes[4][SIMD_WIDTH];
     for (int i = 0; i < SIMD_WIDTH; i++) {
-        const double dx = l->px[i] - p->tile->centre_x, dy = l->py[i] - p->tile->centre_y;
+        const double dx = px[i] - p->tile->centre_x, dy = py[i] - p->tile->centre_y;
         lanes[0][i] = (float)(dx * reach);
         lanes[1][i] = flat ? 0 : (float)dx;
         lanes[2][i] = (float)(dy * reach);
@@ -135,7 +137,7 @@ static void chord_tile_rays(kernel_packet *p, const kernel_lanes *l)
 
 /* Sets up a packet as kernel_packet_begin() does, but for any rays, not only those of pixels. */
 static void chord_trace_packet(kernel_packet *p, const kernel_frame *f, const kernel_tile *tile, kernel_thread *thread,
-                               const chord_rays *rays, int first, kernel_lanes *l)
+                               const chord_rays *rays, int first, double px[SIMD_WIDTH], double py[SIMD_WIDTH])
 {
     const int count = rays->count - first < SIMD_WIDTH ? rays->count - first : SIMD_WIDTH;
     p->frame = f;
@@ -144,10 +146,10 @@ static void chord_trace_packet(kernel_packet *p, const kernel_frame *f, const ke
     p->active = vm_from_bits((1u << count) - 1u);
     for (int lane = 0; lane < SIMD_WIDTH; lane++) {
         const int ray = first + (lane < count ? lane : 0);
-        l->px[lane] = rays->x[ray];
-        l->py[lane] = rays->y[ray];
+        px[lane] = rays->x[ray];
+        py[lane] = rays->y[ray];
     }
-    chord_tile_rays(p, l);
+    chord_tile_rays(p, px, py);
     p->is_pencil = rays->is_pencil;
     p->u = f->job->camera.is_orthographic ? p->origin_x : p->slope_x;
     p->v = f->job->camera.is_orthographic ? p->origin_y : p->slope_y;
@@ -176,10 +178,10 @@ static void chord_trace(const kernel_frame *f, kernel_thread *thread, chord_rays
     for (int i = 0; i < rays->count; i++) rays->interval_count[i] = 0;
     for (int first = 0; first < rays->count; first += SIMD_WIDTH) {
         kernel_packet p;
-        kernel_lanes l;
+        double px[SIMD_WIDTH], py[SIMD_WIDTH];
         const chord_state state = {rays, first};
-        chord_trace_packet(&p, f, &tile, thread, rays, first, &l);
-        for (int part = 0; part < f->job->part_count; part++) chord_trace_part(&p, &l, &state, part);
+        chord_trace_packet(&p, f, &tile, thread, rays, first, px, py);
+        for (int part = 0; part < f->job->part_count; part++) chord_trace_part(&p, px, py, &state, part);
     }
 }
 

@@ -160,27 +160,22 @@ static void make_batch(batch *b, int type, shape s)
 
 /* ---- contraction ---- */
 
-static void run_contraction(const batch *b, kernel_decided *out, kernel_bounds *bounds)
+static void run_contraction(const batch *b, kernel_point *out, vm *none, kernel_bounds *bounds)
 {
     const kernel_curved cells = {.type = b->type, .at = b->at, .bounds = bounds};
     int32_t own[SIMD_WIDTH];
     vi lanes;
     kernel_contraction c;
-    kernel_cell_ray ray;
     kernel_map map;
-    kernel_point at;
     for (int lane = 0; lane < SIMD_WIDTH; lane++) own[lane] = lane;
     memcpy(&lanes, own, sizeof lanes);
     kernel_bounds_of(b->type, b->at, &b->beam, bounds);
-    kernel_cell_ray_of(&cells, &b->rays, lanes, &ray);
+    kernel_contraction_ray(&cells, &b->rays, lanes, &c);
     kernel_contraction_of(bounds, lanes, b->type, &c);
-    KERNEL_OF_TYPE(b->type, kernel_contract, &c, &ray, vm_all_lanes(), out);
+    KERNEL_OF_TYPE(b->type, kernel_contract, &c, vm_all_lanes(), out, none);
     kernel_maps_of_type(b->at, lanes, b->type, &map);
-    at.t = out->t + vf_load(b->at[2][0]);
-    memcpy(at.r, out->r, sizeof at.r);
-    kernel_polish_near(&b->rays, &map, out->one, KERNEL_CONTRACTION_END, &at);
-    out->t = at.t;
-    memcpy(out->r, at.r, sizeof at.r);
+    out->t += vf_load(b->at[2][0]);
+    kernel_polish_near(&b->rays, &map, out->mask, KERNEL_CONTRACTION_END, out);
 }
 
 /* ---- reference ---- */
@@ -261,12 +256,12 @@ static double depth_bound(const batch *b, int lane, double t)
     return 6e-8 * fabs(t) + 1.8e-7 * (high - low);
 }
 
-static void verify_ray(const batch *b, int lane, const kernel_decided *at, count *n)
+static void verify_ray(const batch *b, int lane, const kernel_point *at, vm without, count *n)
 {
     reference_cell cell;
     reference_line line;
     double values[8];
-    const bool one = vm_bits(at->one) >> lane & 1, none = vm_bits(at->none) >> lane & 1;
+    const bool one = vm_bits(at->mask) >> lane & 1, none = vm_bits(without) >> lane & 1;
     n->rays++;
     n->one += one;
     n->none += none;
@@ -297,12 +292,13 @@ static void decided_crossings_match_the_reference(void **state)
             while (n.rays < rays_wanted / (3 * SHAPE_COUNT)) {
                 batch b;
                 kernel_bounds bounds;
-                kernel_decided at;
+                kernel_point at;
+                vm none;
                 make_batch(&b, types[k], s);
-                run_contraction(&b, &at, &bounds);
+                run_contraction(&b, &at, &none, &bounds);
                 for (int lane = 0; lane < SIMD_WIDTH; lane++) {
                     n.contracting += bounds.error_growth[lane] < INFINITY;
-                    verify_ray(&b, lane, &at, &n);
+                    verify_ray(&b, lane, &at, none, &n);
                 }
             }
             printf("%s %s: %lld rays, %lld in cells that contract, %lld with one crossing, %lld with none, %lld wrong, "
@@ -350,7 +346,7 @@ static bool aim_along_grazed_edge(const batch *b, int lane, double slope[2])
 }
 
 /* Aims the rays of a box, most of them at its corners. */
-static void aim_box(batch *b, kernel_rays rays[BOX_RAYS], kernel_ray_box *box)
+static void aim_box(batch *b, kernel_rays rays[BOX_RAYS], vf slope[2][2], vf origin[2][2])
 {
     double middle[SIMD_WIDTH][2], half[SIMD_WIDTH];
     for (int lane = 0; lane < SIMD_WIDTH; lane++) {
@@ -359,7 +355,7 @@ static void aim_box(batch *b, kernel_rays rays[BOX_RAYS], kernel_ray_box *box)
         half[lane] = !grazes ? (double)b->beam.spread : draw_uniform(0, 1) < 0.7 ? 0 : pow(10, draw_uniform(-8, -2));
     }
     for (int a = 0; a < 2; a++)
-        for (int end = 0; end < 2; end++) box->slope[a][end] = box->origin[a][end] = vf_set(end ? -INFINITY : INFINITY);
+        for (int end = 0; end < 2; end++) slope[a][end] = origin[a][end] = vf_set(end ? -INFINITY : INFINITY);
     for (int n = 0; n < BOX_RAYS; n++) {
         vf own[2][2];
         for (int lane = 0; lane < SIMD_WIDTH; lane++) {
@@ -373,10 +369,10 @@ static void aim_box(batch *b, kernel_rays rays[BOX_RAYS], kernel_ray_box *box)
         }
         rays[n] = (kernel_rays){own[1][0], own[1][1], own[0][0], own[0][1]};
         for (int a = 0; a < 2; a++) {
-            box->slope[a][0] = vf_min(own[0][a], box->slope[a][0]);
-            box->slope[a][1] = vf_max(own[0][a], box->slope[a][1]);
-            box->origin[a][0] = vf_min(own[1][a], box->origin[a][0]);
-            box->origin[a][1] = vf_max(own[1][a], box->origin[a][1]);
+            slope[a][0] = vf_min(own[0][a], slope[a][0]);
+            slope[a][1] = vf_max(own[0][a], slope[a][1]);
+            origin[a][0] = vf_min(own[1][a], origin[a][0]);
+            origin[a][1] = vf_max(own[1][a], origin[a][1]);
         }
     }
 }
@@ -451,13 +447,12 @@ static void quads_classified_as_convex_are_convex(void **state)
             while (n.quads < 4 * rays_wanted) {
                 batch b;
                 kernel_rays rays[BOX_RAYS];
-                kernel_ray_box box;
-                vf at[3][8];
+                vf at[3][8], slope[2][2], origin[2][2];
                 make_batch(&b, types[k], s);
-                aim_box(&b, rays, &box);
+                aim_box(&b, rays, slope, origin);
                 for (int a = 0; a < 3; a++)
                     for (int i = 0; i < 8; i++) at[a][i] = vf_load(b.at[a][i]);
-                const vi dents = kernel_curved_nonconvex_quads(at, &box, types[k]);
+                const vi dents = kernel_curved_nonconvex_quads(at, slope, origin, types[k]);
                 for (int i = 0; i < BOX_RAYS; i++) verify_quads(&b, &rays[i], dents, &n);
             }
             printf("%s: of %lld quads seen %lld look convex, %lld do not, %lld are wrong\n", shape_names[s],

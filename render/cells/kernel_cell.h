@@ -166,13 +166,6 @@ typedef struct kernel_cell {
     kernel_tet_line line; /* for a tet: the field of contour lines; valid if has_line_field is set */
 } kernel_cell;
 
-/* Points at which rays cross a face: depth t, value v of the field, and reference coordinates r. */
-typedef struct kernel_crossing {
-    vm mask;
-    vf t, v;
-    vf r[3];
-} kernel_crossing;
-
 /* The interval of each ray inside the cell, between two crossings: depths t, values v of kernel_cell.f and w of
  * kernel_cell.g, and reference coordinates r. */
 typedef struct kernel_interval {

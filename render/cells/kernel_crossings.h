@@ -218,11 +218,11 @@ SIMD_INLINE void kernel_curved_edge(kernel_face_search *s, int n, int i, int j)
     s->edge[a][b] = kernel_edge(s->packet, &c->lines[n], kernel_cell_position(c, a), kernel_cell_position(c, b));
 }
 
-SIMD_INLINE void kernel_triangle_values(const kernel_face_search *s, const kernel_weights *w, kernel_crossing *out)
+SIMD_INLINE void kernel_triangle_values(const kernel_face_search *s, const kernel_weights *w, kernel_point *out)
 {
     const kernel_cell *c = s->cell;
     const kernel_shape *shape = s->shape;
-    out->v = kernel_weighted_sum(w, c->f[w->i], c->f[w->j], c->f[w->k]);
+    out->value = kernel_weighted_sum(w, c->f[w->i], c->f[w->j], c->f[w->k]);
     for (int a = 0; a < 3; a++)
         out->r[a] = kernel_weighted_sum(w, shape->corners[w->i][a], shape->corners[w->j][a], shape->corners[w->k][a]);
 }
@@ -236,7 +236,7 @@ SIMD_INLINE vf kernel_corner_edge(const kernel_face_search *s, int from, int to)
 /* Computes values and reference coordinates at a crossing of a quad's bilinear patch. The isoparametric maps of both
  * cells contain this patch, so the field is continuous across the face. */
 SIMD_INLINE void kernel_quad_values(const kernel_face_search *s, const int corner[4], const kernel_quad_point *at,
-                                    kernel_crossing *out)
+                                    kernel_point *out)
 {
     const kernel_cell *c = s->cell;
     const kernel_shape *shape = s->shape;
@@ -244,7 +244,7 @@ SIMD_INLINE void kernel_quad_values(const kernel_face_search *s, const int corne
     for (int i = 0; i < 4; i++) f[i] = vf_set(c->f[corner[i]]);
     out->mask = at->mask;
     out->t = at->t;
-    out->v = kernel_bilinear(f, at->s, at->r);
+    out->value = kernel_bilinear(f, at->s, at->r);
     for (int a = 0; a < 3; a++) {
         const float base = shape->corners[corner[0]][a];
         out->r[a] =
@@ -272,7 +272,7 @@ SIMD_INLINE vm kernel_triangle(const kernel_face_search *s, const int ijk[3])
 
 /* Computes the crossings of rays with the triangle of three of the cell's vertices. Returns false if no ray crosses
  * it. */
-SIMD_INLINE bool kernel_triangle_crossing(const kernel_face_search *s, const int corners[3], kernel_crossing *out)
+SIMD_INLINE bool kernel_triangle_crossing(const kernel_face_search *s, const int corners[3], kernel_point *out)
 {
     const kernel_cell *c = s->cell;
     int ijk[3];
@@ -292,7 +292,7 @@ SIMD_INLINE bool kernel_triangle_crossing(const kernel_face_search *s, const int
 /* Computes the crossings of a quad that has collapsed to a triangle, and returns their number, as
  * kernel_quad_crossings() does. */
 static __attribute__((noinline, cold)) int kernel_collapsed_crossings(const kernel_face_search *s, const int corner[4],
-                                                                      kernel_crossing *out)
+                                                                      kernel_point *out)
 {
     int n = 0;
     for (int half = 0; half < 2; half++) {
@@ -304,7 +304,7 @@ static __attribute__((noinline, cold)) int kernel_collapsed_crossings(const kern
 
 /* Computes the crossings of rays with a quad, and returns how many entries of out are set (0 to 2). A ray that meets
  * the patch twice has a crossing in both entries. */
-SIMD_INLINE int kernel_quad_crossings(const kernel_face_search *s, const int corner[4], kernel_crossing *out)
+SIMD_INLINE int kernel_quad_crossings(const kernel_face_search *s, const int corner[4], kernel_point *out)
 {
     const kernel_cell *c = s->cell;
     kernel_quad quad;
@@ -336,7 +336,7 @@ SIMD_INLINE int kernel_quad_crossings(const kernel_face_search *s, const int cor
 /* Computes all crossings of rays with a cell that has quadrilateral faces. Returns the number of entries of `out` that
  * are set; each entry contains the mask of rays to which it applies. */
 SIMD_INLINE int kernel_curved_crossings(const kernel_packet *p, const kernel_cell *c, vm rays,
-                                        kernel_crossing out[KERNEL_MAX_CROSSINGS])
+                                        kernel_point out[KERNEL_MAX_CROSSINGS])
 {
     const kernel_shape *shape = kernel_cell_shape(c->type);
     kernel_face_search s;
@@ -367,17 +367,17 @@ SIMD_INLINE int kernel_curved_crossings(const kernel_packet *p, const kernel_cel
 
 /* Removes the nearest crossing of each ray from the list and returns it in *out. Returns false if no ray has a crossing
  * left. */
-SIMD_INLINE bool kernel_take_nearest(kernel_crossing *list, int count, kernel_crossing *out)
+SIMD_INLINE bool kernel_take_nearest(kernel_point *list, int count, kernel_point *out)
 {
     vi taken = vi_set(-1);
     out->mask = vm_none();
     out->t = vf_set(INFINITY);
-    out->v = out->r[0] = out->r[1] = out->r[2] = vf_set(0);
+    out->value = out->r[0] = out->r[1] = out->r[2] = vf_set(0);
     for (int n = 0; n < count; n++) {
         const vm nearer = vm_and(list[n].mask, vf_lt(list[n].t, out->t));
         out->mask = vm_or(out->mask, nearer);
         out->t = vf_select(nearer, list[n].t, out->t);
-        out->v = vf_select(nearer, list[n].v, out->v);
+        out->value = vf_select(nearer, list[n].value, out->value);
         for (int a = 0; a < 3; a++) out->r[a] = vf_select(nearer, list[n].r[a], out->r[a]);
         taken = (vi)vf_select(nearer, (vf)vi_set(n), (vf)taken);
     }
@@ -391,7 +391,7 @@ static __attribute__((noinline, unused)) int kernel_curved_intervals(const kerne
                                                                      vm rays,
                                                                      kernel_interval out[KERNEL_MAX_CELL_INTERVALS])
 {
-    kernel_crossing list[KERNEL_MAX_CROSSINGS], in, next;
+    kernel_point list[KERNEL_MAX_CROSSINGS], in, next;
     const int crossings = kernel_curved_crossings(p, c, rays, list);
     int n = 0;
     while (n < KERNEL_MAX_CELL_INTERVALS && kernel_take_nearest(list, crossings, &in) &&
@@ -399,8 +399,8 @@ static __attribute__((noinline, unused)) int kernel_curved_intervals(const kerne
         out[n].mask = vm_and(in.mask, next.mask);
         out[n].t_in = in.t;
         out[n].t_out = next.t;
-        out[n].v_in = in.v;
-        out[n].v_out = next.v;
+        out[n].v_in = in.value;
+        out[n].v_out = next.value;
         memcpy(out[n].r_in, in.r, sizeof in.r);
         memcpy(out[n].r_out, next.r, sizeof next.r);
         n++;

@@ -16,11 +16,6 @@
 #include "kernel_types.h"
 #include "simd.h"
 
-/* Depths t, values v and reference coordinates r at which the rays of a list enter and leave their cells. */
-typedef struct kernel_curved_ends {
-    float t[2][KERNEL_LIST_ROOM], v[2][KERNEL_LIST_ROOM], r[2][3][KERNEL_LIST_ROOM];
-} kernel_curved_ends;
-
 SIMD_INLINE void kernel_curved_ray_add(kernel_pixel_list *to, const kernel_pixel_list *from, int i)
 {
     to->pixel[to->count] = from->pixel[i];
@@ -52,10 +47,10 @@ SIMD_INLINE vm kernel_curved_cross_one_triangle(const vf x[8], const vf y[8], co
 }
 
 /* Finds the two faces that each ray crosses once: those whose edge functions all have the same sign. Rays for which
- * there are not exactly two such faces are added to out->alone, to be traced cell by cell. at: the cells' vertices, per
+ * there are not exactly two such faces are added to *alone, to be traced cell by cell. at: the cells' vertices, per
  * lane. nonconvex: per ray, one bit for each quad that may not look convex; NULL: there are no such quads. */
 SIMD_INLINE void kernel_curved_find(const float (*at)[8][SIMD_WIDTH], const kernel_lane_rays *r, const vi *nonconvex,
-                                    vm rays, kernel_curved_crossed *out, int type)
+                                    vm rays, vm *two, vm *alone, vi face[2], int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
     vf x[8], y[8], least = vf_set(INFINITY);
@@ -67,35 +62,35 @@ SIMD_INLINE void kernel_curved_find(const float (*at)[8][SIMD_WIDTH], const kern
     }
     for (int n = 0; n < shape->edge_count; n++)
         side[n] = kernel_curved_side(x, y, shape->edges[n][0], shape->edges[n][1], &least);
-    for (int face = 0; face < shape->face_count; face++) {
-        const signed char *loop = shape->faces[face].vertices;
-        if (shape->faces[face].count == 4)
-            side[shape->edge_count + face] = kernel_curved_side(x, y, loop[0], loop[2], &least);
+    for (int n = 0; n < shape->face_count; n++) {
+        const signed char *loop = shape->faces[n].vertices;
+        if (shape->faces[n].count == 4)
+            side[shape->edge_count + n] = kernel_curved_side(x, y, loop[0], loop[2], &least);
     }
-    vm alone = vm_not(vf_lt(vf_set(KERNEL_EDGE_LEAST), least));
-    for (int face = 0; face < shape->face_count; face++) {
-        const vi bit = vi_set(1 << face);
+    *alone = vm_not(vf_lt(vf_set(KERNEL_EDGE_LEAST), least));
+    for (int n = 0; n < shape->face_count; n++) {
+        const vi bit = vi_set(1 << n);
         vi around[4];
         for (int i = 0; i < 4; i++) {
-            const signed char *edge = shape->faces[face].sides[i];
+            const signed char *edge = shape->faces[n].sides[i];
             around[i] = edge[1] ? ~side[(int)edge[0]] : side[(int)edge[0]];
         }
-        vi crossed = kernel_sides_agree(around, shape->faces[face].count) >> (31 - face) & bit;
-        if (nonconvex && shape->faces[face].count == 4 && vm_any(vm_and(rays, vm_sign(*nonconvex << (31 - face))))) {
-            const vm once = kernel_curved_cross_one_triangle(x, y, shape->faces[face].vertices, around,
-                                                             side[shape->edge_count + face], rays, &alone);
+        vi crossed = kernel_sides_agree(around, shape->faces[n].count) >> (31 - n) & bit;
+        if (nonconvex && shape->faces[n].count == 4 && vm_any(vm_and(rays, vm_sign(*nonconvex << (31 - n))))) {
+            const vm once = kernel_curved_cross_one_triangle(x, y, shape->faces[n].vertices, around,
+                                                             side[shape->edge_count + n], rays, alone);
             crossed = vi_select(once, bit, vi_set(0));
         }
         faces |= crossed;
     }
-    kernel_curved_count(faces, rays, alone, out);
+    kernel_curved_count(faces, rays, two, alone, face);
 }
 
-SIMD_INLINE void kernel_curved_faces(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type,
-                                     kernel_curved_crossed *out)
+SIMD_INLINE void kernel_curved_faces(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type, vm *two,
+                                     vm *alone, vi face[2])
 {
     const vi all = vi_set((1 << KERNEL_CURVED_FACES) - 1);
-    kernel_curved_find((const float(*)[8][SIMD_WIDTH])h->at, p, &all, p->active, out, type);
+    kernel_curved_find((const float(*)[8][SIMD_WIDTH])h->at, p, &all, p->active, two, alone, face, type);
 }
 
 /* ---- crossing points ---- */
@@ -179,14 +174,14 @@ static __attribute__((noinline, cold)) void kernel_curved_triangle_recompute(con
 SIMD_INLINE void kernel_curved_triangle_lines(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type,
                                               vm rays, vi face, const kernel_curved_corners *c, vf e[3])
 {
-    const int size = (int)(sizeof(kernel_triangle_lines) / sizeof(float));
+    const int size = (int)(sizeof h->triangles[0] / sizeof(float));
     const vi number = vi_select(rays, face - kernel_first_triangle(type), vi_set(0)), at = number * size + p->lane;
     vm doubt[3], any = vm_none();
     for (int i = 0; i < 3; i++) {
-        const kernel_triangle_lines *lines = &h->triangles[0];
-        e[i] = vf_muladd(vf_gather(lines->cv[i], at), p->v,
-                         vf_muladd(vf_gather(lines->cu[i], at), p->u, vf_gather(lines->c[i], at)));
-        doubt[i] = vm_andnot(rays, vf_lt(vf_gather(lines->bound[i], at), vf_abs(e[i])));
+        const float(*const lines)[3][SIMD_WIDTH] = h->triangles[0];
+        e[i] = vf_muladd(vf_gather(lines[2][i], at), p->v,
+                         vf_muladd(vf_gather(lines[1][i], at), p->u, vf_gather(lines[0][i], at)));
+        doubt[i] = vm_andnot(rays, vf_lt(vf_gather(lines[3][i], at), vf_abs(e[i])));
         any = vm_or(any, doubt[i]);
     }
     any = vm_or(any, kernel_curved_triangle_inaccurate(h, p->lane, rays, number, e));
@@ -207,7 +202,7 @@ SIMD_INLINE void kernel_curved_triangle_point(int type, const kernel_curved_corn
                 kernel_curved_vertex_coordinate(kernel_cell_shape(type), grid_type_vertices(type), a, c->vertex[i]);
     }
     for (int n = 0; n < 5; n++) v[n][0] = vf_muladd(e[0], v[n][2], vf_muladd(-e[2], v[n][1], e[1] * v[n][0])) * inverse;
-    *out = (kernel_point){v[0][0], v[1][0], {v[2][0], v[3][0], v[4][0]}};
+    *out = (kernel_point){.t = v[0][0], .value = v[1][0], .r = {v[2][0], v[3][0], v[4][0]}};
 }
 
 /* Computes the two crossings of each active ray, the nearer one first. corners: those of the two faces `face`. h: the
@@ -259,8 +254,10 @@ SIMD_INLINE void kernel_curved_cross(const kernel_transformed_curved *h, const k
     kernel_curved_cross_corners(h, p, p->active, type, face, corners, out);
 }
 
+/* Appends rays of the list `met`, from index n on, to the list `rays`. out: for both ends of the interval of each of
+ * these, depth, value and reference coordinates. */
 SIMD_INLINE void kernel_curved_ends_add(const kernel_pixel_list *met, int n, const kernel_point ends[2], unsigned bits,
-                                        kernel_pixel_list *rays, kernel_curved_ends *out)
+                                        kernel_pixel_list *rays, float (*out)[5][KERNEL_LIST_ROOM])
 {
     if (!bits) return;
     float lanes[2][5][SIMD_WIDTH];
@@ -271,11 +268,8 @@ SIMD_INLINE void kernel_curved_ends_add(const kernel_pixel_list *met, int n, con
     }
     for (; bits; bits &= bits - 1) {
         const int i = __builtin_ctz(bits), to = rays->count;
-        for (int e = 0; e < 2; e++) {
-            out->t[e][to] = lanes[e][0][i];
-            out->v[e][to] = lanes[e][1][i];
-            for (int a = 0; a < 3; a++) out->r[e][a][to] = lanes[e][2 + a][i];
-        }
+        for (int e = 0; e < 2; e++)
+            for (int k = 0; k < 5; k++) out[e][k][to] = lanes[e][k][i];
         kernel_curved_ray_add(rays, met, n + i);
     }
 }

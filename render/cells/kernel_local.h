@@ -104,34 +104,32 @@ SIMD_INLINE void kernel_local_terms(int type, const vf *v, vf out[8])
         kernel_pyramid_terms(v, out);
 }
 
-/* The nonlinear terms of a cell's map at given reference coordinates, and their derivatives along each of these. */
-typedef struct kernel_nonlinear_terms {
-    vf term[KERNEL_NONLINEAR_TERMS], along[KERNEL_NONLINEAR_TERMS][3];
-} kernel_nonlinear_terms;
-
-SIMD_INLINE void kernel_nonlinear_terms_at(int type, const vf r[3], kernel_nonlinear_terms *b)
+/* Computes the nonlinear terms of a cell's map at the reference coordinates r, and their derivatives `slopes` along
+ * each of these. */
+SIMD_INLINE void kernel_nonlinear_terms_at(int type, const vf r[3], vf term[KERNEL_NONLINEAR_TERMS],
+                                           vf slopes[KERNEL_NONLINEAR_TERMS][3])
 {
     const vf zero = vf_set(0);
     if (kernel_is_box(type)) {
-        b->term[0] = r[0] * r[1];
-        b->term[1] = r[0] * r[2];
-        b->term[2] = r[1] * r[2];
-        b->term[3] = b->term[0] * r[2];
+        term[0] = r[0] * r[1];
+        term[1] = r[0] * r[2];
+        term[2] = r[1] * r[2];
+        term[3] = term[0] * r[2];
         const vf along[4][3] = {
-            {r[1], r[0], zero}, {r[2], zero, r[0]}, {zero, r[2], r[1]}, {b->term[2], b->term[1], b->term[0]}};
-        memcpy(b->along, along, sizeof along);
+            {r[1], r[0], zero}, {r[2], zero, r[0]}, {zero, r[2], r[1]}, {term[2], term[1], term[0]}};
+        memcpy(slopes, along, sizeof along);
     } else if (kernel_is_prism(type)) {
-        b->term[0] = r[0] * r[2];
-        b->term[1] = r[1] * r[2];
+        term[0] = r[0] * r[2];
+        term[1] = r[1] * r[2];
         const vf along[2][3] = {{r[2], zero, r[0]}, {zero, r[2], r[1]}};
-        memcpy(b->along, along, sizeof along);
+        memcpy(slopes, along, sizeof along);
     } else {
         /* inside the cell |α / k| and |β / k| are at most 1/2; the clamp limits steps beyond the apex */
         const vf half = vf_set(0.75f), inverse = 1.0f / vf_max(r[2], vf_set(1e-6f));
         const vf a = vf_clamp(r[0] * inverse, -half, half), c = vf_clamp(r[1] * inverse, -half, half);
-        b->term[0] = a * r[1];
+        term[0] = a * r[1];
         const vf along[1][3] = {{c, a, -(a * c)}};
-        memcpy(b->along, along, sizeof along);
+        memcpy(slopes, along, sizeof along);
     }
 }
 
@@ -182,13 +180,12 @@ SIMD_INLINE vf kernel_local_nonlinearity(int type, const vf nonlinear_part[KERNE
     for (int n = 0; n < (kernel_is_box(type) ? 8 : kernel_is_prism(type) ? 6 : 0); n++) {
         const float *corner = corners[kernel_is_box(type) ? 0 : 1][n];
         const vf r[3] = {vf_set(corner[0]), vf_set(corner[1]), vf_set(corner[2])};
-        kernel_nonlinear_terms b;
-        vf sum = vf_set(0);
-        kernel_nonlinear_terms_at(type, r, &b);
+        vf term[KERNEL_NONLINEAR_TERMS], slopes[KERNEL_NONLINEAR_TERMS][3], sum = vf_set(0);
+        kernel_nonlinear_terms_at(type, r, term, slopes);
         for (int i = 0; i < 3; i++)
             for (int a = 0; a < 3; a++) {
                 vf slope = vf_set(0);
-                for (int k = 0; k < kernel_nonlinear_count(type); k++) slope += nonlinear_part[k][a] * b.along[k][i];
+                for (int k = 0; k < kernel_nonlinear_count(type); k++) slope += nonlinear_part[k][a] * slopes[k][i];
                 sum += slope * slope;
             }
         most = vf_max(sum, most);
@@ -289,8 +286,8 @@ SIMD_INLINE vm kernel_local_setup(int type, const vf places[3][8], const vf valu
 /* Points, one per lane, each in the cell of its lane. */
 typedef struct kernel_local_points {
     vf y[3], r[3], nonlinear_part[KERNEL_NONLINEAR_TERMS][3];
-    kernel_nonlinear_terms
-        bend;             /* nonlinear terms of the map at the current reference coordinates r, and their derivatives */
+    /* nonlinear terms of the map at the current reference coordinates r, and their derivatives */
+    vf term[KERNEL_NONLINEAR_TERMS], slopes[KERNEL_NONLINEAR_TERMS][3];
     vf column[3][3], det; /* columns of the adjugate of the derivatives' matrix, and 1 / its determinant in det */
 } kernel_local_points;
 
@@ -301,7 +298,7 @@ SIMD_INLINE void kernel_local_newton_residual(int type, const kernel_local_point
     for (int a = 0; a < 3; a++) {
         out[a] = p->y[a] - p->r[a];
         for (int k = 0; k < kernel_nonlinear_count(type); k++)
-            out[a] = vf_muladd(-p->nonlinear_part[k][a], p->bend.term[k], out[a]);
+            out[a] = vf_muladd(-p->nonlinear_part[k][a], p->term[k], out[a]);
     }
 }
 
@@ -314,7 +311,7 @@ SIMD_INLINE void kernel_local_derivatives(int type, kernel_local_points *p)
         for (int a = 0; a < 3; a++) {
             j[i][a] = vf_set(i == a);
             for (int k = 0; k < kernel_nonlinear_count(type); k++)
-                j[i][a] = vf_muladd(p->nonlinear_part[k][a], p->bend.along[k][i], j[i][a]);
+                j[i][a] = vf_muladd(p->nonlinear_part[k][a], p->slopes[k][i], j[i][a]);
         }
     for (int i = 0; i < 3; i++) {
         const vf *u = j[(i + 1) % 3], *v = j[(i + 2) % 3];
@@ -341,7 +338,7 @@ SIMD_INLINE vf kernel_local_step(int type, kernel_local_points *p, vm lanes)
         largest = vf_max(largest, vf_abs(move));
         p->r[i] = vf_select(lanes, vf_clamp(p->r[i] + move, -far, far), p->r[i]);
     }
-    kernel_nonlinear_terms_at(type, p->r, &p->bend);
+    kernel_nonlinear_terms_at(type, p->r, p->term, p->slopes);
     return largest;
 }
 
@@ -361,10 +358,10 @@ SIMD_INLINE vm kernel_local_find(int type, const kernel_local_cells *cells, vi l
     for (int k = 0; k < kernel_nonlinear_count(type); k++)
         for (int a = 0; a < 3; a++) p->nonlinear_part[k][a] = kernel_gather_lane(cells->nonlinear_part[k][a], lane);
     vf left[3];
-    kernel_nonlinear_terms_at(type, p->r, &p->bend);
+    kernel_nonlinear_terms_at(type, p->r, p->term, p->slopes);
     kernel_local_newton_residual(type, p, left);
     for (int i = 0; i < 3; i++) p->r[i] += left[i];
-    kernel_nonlinear_terms_at(type, p->r, &p->bend);
+    kernel_nonlinear_terms_at(type, p->r, p->term, p->slopes);
     kernel_local_derivatives(type, p);
     const vf first = kernel_local_step(type, p, vm_all_lanes()), second = kernel_local_step(type, p, vm_all_lanes());
     vm open = vm_not(vf_le(first * second, vf_set(5e-7f)));
@@ -381,7 +378,7 @@ SIMD_INLINE vf kernel_local_value(int type, const kernel_local_cells *cells, vi 
     vf v = kernel_gather_lane(cells->field[0], lane);
     for (int i = 0; i < 3; i++) v = vf_muladd(kernel_gather_lane(cells->field[1 + i], lane), p->r[i], v);
     for (int k = 0; k < kernel_nonlinear_count(type); k++)
-        v = vf_muladd(kernel_gather_lane(cells->field[4 + k], lane), p->bend.term[k], v);
+        v = vf_muladd(kernel_gather_lane(cells->field[4 + k], lane), p->term[k], v);
     return v;
 }
 

@@ -238,6 +238,8 @@ static __attribute__((noinline, cold)) vm kernel_quad_two_points(const kernel_qu
 typedef struct kernel_patch {
     vf ax, ay, ex, ey, gx, gy, hx, hy;
     vf ez, gz;
+    /* derivatives at the parameters (s, r), their determinant, and the distance from the point to the ray */
+    vf sx, sy, rx, ry, det, dx, dy;
 } kernel_patch;
 
 SIMD_INLINE void kernel_patch_setup(kernel_patch *p, const kernel_quad *q)
@@ -250,48 +252,40 @@ SIMD_INLINE void kernel_patch_setup(kernel_patch *p, const kernel_quad *q)
     p->hx = (q->x[2] - q->x[1]) - p->gx, p->hy = (q->y[2] - q->y[1]) - p->gy;
 }
 
-/* Properties of the patch at the parameters (s, r): its derivatives, their determinant, and the distance from the point
- * to the ray. */
-typedef struct kernel_patch_at {
-    vf sx, sy, rx, ry, det, dx, dy;
-} kernel_patch_at;
-
-SIMD_INLINE kernel_patch_at kernel_patch_evaluate(const kernel_patch *p, vf s, vf r)
+SIMD_INLINE void kernel_patch_evaluate(kernel_patch *p, vf s, vf r)
 {
-    kernel_patch_at at;
-    at.rx = p->gx + s * p->hx, at.ry = p->gy + s * p->hy;
-    at.dx = -((p->ax + s * p->ex) + r * at.rx), at.dy = -((p->ay + s * p->ey) + r * at.ry);
-    at.sx = p->ex + r * p->hx, at.sy = p->ey + r * p->hy;
-    at.det = at.sx * at.ry - at.sy * at.rx;
-    return at;
+    p->rx = p->gx + s * p->hx, p->ry = p->gy + s * p->hy;
+    p->dx = -((p->ax + s * p->ex) + r * p->rx), p->dy = -((p->ay + s * p->ey) + r * p->ry);
+    p->sx = p->ex + r * p->hx, p->sy = p->ey + r * p->hy;
+    p->det = p->sx * p->ry - p->sy * p->rx;
 }
 
 /* Number of steps of Newton's method that compute a ray's point on the patch. The parameters are clamped to [0, 1].
  * Each step squares the error, so that four steps reduce it from 0.2 to 1e-9. */
 enum { KERNEL_PATCH_STEPS = 4 };
 
-SIMD_INLINE void kernel_patch_step(const kernel_patch *p, vf *s, vf *r)
+SIMD_INLINE void kernel_patch_step(kernel_patch *p, vf *s, vf *r)
 {
     const vf zero = vf_set(0), one = vf_set(1);
-    const kernel_patch_at at = kernel_patch_evaluate(p, *s, *r);
-    const vf inverse = vf_select(vf_eq(at.det, zero), zero, 1.0f / at.det);
-    *s = vf_clamp(*s + (at.dx * at.ry - at.dy * at.rx) * inverse, zero, one);
-    *r = vf_clamp(*r + (at.sx * at.dy - at.sy * at.dx) * inverse, zero, one);
+    kernel_patch_evaluate(p, *s, *r);
+    const vf inverse = vf_select(vf_eq(p->det, zero), zero, 1.0f / p->det);
+    *s = vf_clamp(*s + (p->dx * p->ry - p->dy * p->rx) * inverse, zero, one);
+    *r = vf_clamp(*r + (p->sx * p->dy - p->sy * p->dx) * inverse, zero, one);
 }
 
 /* Returns the rays whose points are accurate: the distance from the point to the ray is at most float32's resolution of
  * the quad's size. Three kinds of rays are excluded: those for which the quad is so steep that the error along the ray
  * would be 8 times as large, those for which it is nearly folded, and those whose point is so near the quad's border
  * that a neighbouring face's crossing, with an error of 1e-6 of the face's size, could come in the wrong order. */
-SIMD_INLINE vm kernel_patch_converged(const kernel_patch *p, vf s, vf r)
+SIMD_INLINE vm kernel_patch_converged(kernel_patch *p, vf s, vf r)
 {
     const vf one = vf_set(1);
-    const kernel_patch_at at = kernel_patch_evaluate(p, s, r);
+    kernel_patch_evaluate(p, s, r);
     const vf e = vf_abs(p->ex) + vf_abs(p->ey), g = vf_abs(p->gx) + vf_abs(p->gy);
     const vf domain_margin = vf_min(vf_min(s, one - s), vf_min(r, one - r));
-    const vm open = vf_lt(e * (p->gz + 0.5f * g) + g * p->ez, vf_abs(at.det) * 8.0f);
+    const vm open = vf_lt(e * (p->gz + 0.5f * g) + g * p->ez, vf_abs(p->det) * 8.0f);
     const vm inside = vm_and(open, vf_lt(vf_set(1.0f / 1024), domain_margin));
-    return vm_and(inside, vf_le(vf_abs(at.dx) + vf_abs(at.dy), (e + g) * 1.2e-7f));
+    return vm_and(inside, vf_le(vf_abs(p->dx) + vf_abs(p->dy), (e + g) * 1.2e-7f));
 }
 
 /* Returns a first guess of the patch parameter s or r: the relative distance of the ray from two opposite sides of the
@@ -442,11 +436,6 @@ SIMD_INLINE int kernel_quad_points(const kernel_quad *q, vm once, vm twice, kern
  * coordinate of both edges: 4 d k + 8 d d. The products that are computed here have magnitudes that sum to at most k k,
  * and each is rounded at most 10 times: 6e-7 k k. */
 
-/* A box of rays: [axis][end] has the slope and origin of the first and the last ray along each axis of the tile. */
-typedef struct kernel_ray_box {
-    vf slope[2][2], origin[2][2];
-} kernel_ray_box;
-
 /* Returns the lanes whose quad looks convex along all rays of the box. edge: the cell's edges as seen by the middle ray
  * of the box; square: the squares of their lengths in space; spread: half width plus half height of the range of the
  * rays' slopes; margin: upper bound of the rounding error of a cross product of two edges; sides: the quad's edges in
@@ -468,16 +457,17 @@ SIMD_INLINE vm kernel_quad_is_convex(const vf (*edge)[2], const vf *square, vf s
     return vm_or(left, right);
 }
 
-/* Returns a mask of the quads that may look other than convex along some ray of the box. */
-SIMD_INLINE vi kernel_curved_nonconvex_quads(vf (*const at)[8], const kernel_ray_box *box, int type)
+/* Returns a mask of the quads that may look other than convex along some ray of a box. slope and origin: [axis][end]
+ * has those of the first and the last ray along each axis of the tile. */
+SIMD_INLINE vi kernel_curved_nonconvex_quads(vf (*const at)[8], vf (*const slope)[2], vf (*const origin)[2], int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
     vf edge[12][2], square[12], middle[2], steep[2], reach[2], longest = vf_set(0), spread = longest;
     vi nonconvex = vi_set(0);
     for (int a = 0; a < 2; a++) {
-        middle[a] = 0.5f * (box->slope[a][0] + box->slope[a][1]);
-        spread += 0.5f * vf_abs(box->slope[a][1] - box->slope[a][0]);
-        steep[a] = vf_max(vf_abs(box->slope[a][0]), vf_abs(box->slope[a][1]));
+        middle[a] = 0.5f * (slope[a][0] + slope[a][1]);
+        spread += 0.5f * vf_abs(slope[a][1] - slope[a][0]);
+        steep[a] = vf_max(vf_abs(slope[a][0]), vf_abs(slope[a][1]));
     }
     for (int n = 0; n < shape->edge_count; n++) {
         const int i = shape->edges[n][0], j = shape->edges[n][1];
@@ -490,8 +480,7 @@ SIMD_INLINE vi kernel_curved_nonconvex_quads(vf (*const at)[8], const kernel_ray
     /* Every vertex is at most three edges away from the first. */
     const vf far = 3.0f * vf_sqrt(longest), depth = vf_abs(at[2][0]) + far, slopes = steep[0] + steep[1];
     for (int a = 0; a < 2; a++)
-        reach[a] = ((vf_abs(at[a][0]) + far) + vf_max(vf_abs(box->origin[a][0]), vf_abs(box->origin[a][1]))) +
-                   steep[a] * depth;
+        reach[a] = ((vf_abs(at[a][0]) + far) + vf_max(vf_abs(origin[a][0]), vf_abs(origin[a][1]))) + steep[a] * depth;
     const vf off = 1.25e-7f * vf_max(reach[0], reach[1]), most = (2.0f + slopes * slopes) * longest;
     const vf margin = (1e-6f * most + 4.0f * off * vf_sqrt(most)) + (8.0f * off * off + KERNEL_EDGE_LEAST);
     for (int face = 0; face < shape->face_count; face++) {

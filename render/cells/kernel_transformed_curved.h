@@ -22,13 +22,9 @@ enum {
     KERNEL_CURVED_EDGES = 12,
     KERNEL_CURVED_FACES = 6,
     KERNEL_MAX_TRIANGLES = 4, /* maximum number of triangular faces of a cell */
+    KERNEL_LOCAL_ROW = 16,
+    KERNEL_LOCAL_ROWS = 3
 };
-
-/* The edge functions of a triangle with corners i, j, k in the order of coordinates: of the edges ij, jk and ik, each
- * from the smaller vertex. */
-typedef struct kernel_triangle_lines {
-    float c[3][SIMD_WIDTH], cu[3][SIMD_WIDTH], cv[3][SIMD_WIDTH], bound[3][SIMD_WIDTH];
-} kernel_triangle_lines;
 
 /* Transformed cells of one type, one per lane. */
 typedef struct kernel_transformed_curved {
@@ -36,11 +32,19 @@ typedef struct kernel_transformed_curved {
     /* For each face, a word that lists its corners, four bits each, in the order of kernel_quad_corners() or
      * kernel_triangle_order(). */
     int32_t corners[KERNEL_CURVED_FACES * SIMD_WIDTH];
-    /* edge functions of the triangular faces, in the shape's order */
-    kernel_triangle_lines triangles[KERNEL_MAX_TRIANGLES];
+    /* Edge functions of the triangular faces, in the shape's order. A triangle's corners are i, j, k in the order of
+     * coordinates. Its four rows are the members c, cu, cv and bound of kernel_line, each for the edges ij, jk and ik
+     * from the smaller vertex. */
+    float triangles[KERNEL_MAX_TRIANGLES][4][3][SIMD_WIDTH];
     /* least sum of weights of each triangle that is accurate enough (kernel_triangle_least()) */
     float least[KERNEL_MAX_TRIANGLES][SIMD_WIDTH];
     unsigned cuboids; /* mask of the lanes with a hex whose edges are parallel to the axes */
+    /* The following two members are used only for segments of volumes (kernel_local_crossings.h). Per cell, a bit for
+     * each quad that may not look convex on some of the cell's pixels (kernel_curved_nonconvex_quads()). */
+    float nonconvex[SIMD_WIDTH];
+    /* for vectors of 16 lanes, the cells' data per cell, in three rows of 16 numbers: x and y by vertex; z and the
+     * field by vertex; the corners' words by face */
+    float rows[SIMD_WIDTH < KERNEL_LOCAL_ROW ? 1 : SIMD_WIDTH][KERNEL_LOCAL_ROWS][KERNEL_LOCAL_ROW];
     /* The following members are used only by kernel_transformed_curved_cell(), which extracts one lane's cell. */
     kernel_wide_doubles world[3][8];
     int32_t rank[8][SIMD_WIDTH], vertex[8][SIMD_WIDTH];
@@ -236,37 +240,31 @@ SIMD_INLINE vi kernel_curved_quad_word(const signed char *loop, const vf rank[8]
     return word;
 }
 
-/* The order of a triangle's corners: first[n] and last[n] are the lanes in which vertex n of the loop is the smallest
- * (i) and the largest (k). */
-typedef struct kernel_lanes_order {
-    vm first[3], last[3];
-} kernel_lanes_order;
-
-/* Returns a triangle's corners in the order of coordinates, four bits each. falls: for each side 01, 12, 20 of the
- * loop, the lanes in which the rank decreases along it. */
-SIMD_INLINE vi kernel_triangle_word(const signed char *loop, const vf rank[8], kernel_lanes_order *o, vm falls[3])
+/* Returns a triangle's corners in the order of coordinates, four bits each. first[n] and last[n]: the lanes in which
+ * vertex n of the loop is the smallest (i) and the largest (k); falls: for each side 01, 12, 20 of the loop, the lanes
+ * in which the rank decreases along it. */
+SIMD_INLINE vi kernel_triangle_word(const signed char *loop, const vf rank[8], vm first[3], vm last[3], vm falls[3])
 {
     const vf r[3] = {rank[(int)loop[0]], rank[(int)loop[1]], rank[(int)loop[2]]};
     vi word = vi_set(0);
     for (int i = 0; i < 3; i++) falls[i] = vf_lt(r[(i + 1) % 3], r[i]);
     for (int i = 0; i < 3; i++) {
         const vm before = falls[(i + 2) % 3], behind = falls[i];
-        o->first[i] = vm_andnot(before, behind);
-        o->last[i] = vm_andnot(behind, before);
-        word |=
-            vi_select(o->first[i], vi_set(loop[i]), vi_select(o->last[i], vi_set(loop[i] << 8), vi_set(loop[i] << 4)));
+        first[i] = vm_andnot(before, behind);
+        last[i] = vm_andnot(behind, before);
+        word |= vi_select(first[i], vi_set(loop[i]), vi_select(last[i], vi_set(loop[i] << 8), vi_set(loop[i] << 4)));
     }
     return word;
 }
 
 /* Permutes three numbers that belong to a triangle's sides, given by the opposite corner, into the order ij, jk, ik.
  * The sides ij, jk and ik are opposite to the corners k, i and j. */
-SIMD_INLINE void kernel_order_sides(const kernel_lanes_order *o, const vf opposite[3], vf out[3])
+SIMD_INLINE void kernel_order_sides(const vm first[3], const vm last[3], const vf opposite[3], vf out[3])
 {
-    out[0] = vf_select(o->last[0], opposite[0], vf_select(o->last[1], opposite[1], opposite[2]));
-    out[1] = vf_select(o->first[0], opposite[0], vf_select(o->first[1], opposite[1], opposite[2]));
+    out[0] = vf_select(last[0], opposite[0], vf_select(last[1], opposite[1], opposite[2]));
+    out[1] = vf_select(first[0], opposite[0], vf_select(first[1], opposite[1], opposite[2]));
     out[2] = opposite[2];
-    for (int i = 0; i < 2; i++) out[2] = vf_select(vm_not(vm_or(o->first[i], o->last[i])), opposite[i], out[2]);
+    for (int i = 0; i < 2; i++) out[2] = vf_select(vm_not(vm_or(first[i], last[i])), opposite[i], out[2]);
 }
 
 /* Computes, for each edge of the shape, from its first vertex to its second: the coefficients of the edge function and
@@ -295,13 +293,11 @@ SIMD_INLINE void kernel_transformed_triangle(kernel_transformed_curved *out, int
 {
     const signed char *loop = kernel_cell_shape(type)->faces[face].vertices;
     const signed char(*sides)[2] = kernel_cell_shape(type)->faces[face].sides;
-    kernel_triangle_lines *own = &out->triangles[face - kernel_first_triangle(type)];
-    kernel_lanes_order o;
-    vm falls[3];
+    const int number = face - kernel_first_triangle(type);
+    vm first[3], last[3], falls[3];
     vf opposite[3], in_order[6][3];
-    const vi word = kernel_triangle_word(loop, rank, &o, falls);
+    const vi word = kernel_triangle_word(loop, rank, first, last, falls);
     memcpy(out->corners + face * SIMD_WIDTH, &word, sizeof word);
-    float(*const to[4])[SIMD_WIDTH] = {own->c, own->cu, own->cv, own->bound};
     for (int n = 0; n < 6; n++) {
         for (int i = 0; i < 3; i++) {
             const int side = (i + 1) % 3;
@@ -309,12 +305,12 @@ SIMD_INLINE void kernel_transformed_triangle(kernel_transformed_curved *out, int
             const vm falling = sides[side][1] ? vm_not(falls[side]) : falls[side];
             opposite[i] = n < 3 ? vf_select(falling, turned, v) : v;
         }
-        kernel_order_sides(&o, opposite, in_order[n]);
-        for (int i = 0; i < 3 && n < 4; i++) vf_store(to[n][i], in_order[n][i]);
+        kernel_order_sides(first, last, opposite, in_order[n]);
+        for (int i = 0; i < 3 && n < 4; i++) vf_store(out->triangles[number][n][i], in_order[n][i]);
     }
     const vf error = (in_order[4][0] + in_order[4][1]) + in_order[4][2];
     const vf extent = (in_order[5][0] + in_order[5][1]) + in_order[5][2];
-    vf_store(out->least[face - kernel_first_triangle(type)], error * extent * (0.5f / KERNEL_WEIGHT_ERROR));
+    vf_store(out->least[number], error * extent * (0.5f / KERNEL_WEIGHT_ERROR));
 }
 
 SIMD_INLINE void kernel_transformed_faces_of(kernel_transformed_curved *out, const kernel_frame *f,
@@ -473,28 +469,22 @@ static __attribute__((noinline)) void kernel_transformed_curved_cell(const kerne
     }
 }
 
-/* Rays that cross exactly two faces (`two`), with the numbers of these faces, and rays that must be traced cell by cell
- * (`alone`). */
-typedef struct kernel_curved_crossed {
-    vm two, alone;
-    vi first, last;
-} kernel_curved_crossed;
-
 /* Returns the index of the lowest bit that is set, per lane; the result is meaningless for 0. */
 SIMD_INLINE vi kernel_least_bit(vi bits)
 {
     return ((vi_from_bits(vf_from_vi(bits & -bits)) >> 23) - 127) & 7;
 }
 
-/* Finds the rays that cross exactly two faces. faces: per ray, one bit for each face that the ray crosses once. alone:
- * rays that must be traced cell by cell whatever they cross; rays that cross more than two faces are added to them. */
-SIMD_INLINE void kernel_curved_count(vi faces, vm rays, vm alone, kernel_curved_crossed *out)
+/* Finds the rays that cross exactly two faces (*two), and the numbers of these faces. faces: per ray, one bit for each
+ * face that the ray crosses once. *alone: rays that must be traced cell by cell whatever they cross; rays that cross
+ * more than two faces are added to them. */
+SIMD_INLINE void kernel_curved_count(vi faces, vm rays, vm *two, vm *alone, vi face[2])
 {
     const vi others = faces & (faces - 1), more = others & (others - 1);
-    out->alone = vm_and(rays, vm_or(alone, vm_sign(-more)));
-    out->two = vm_andnot(vm_and(rays, vm_sign(-others)), out->alone);
-    out->first = kernel_least_bit(faces);
-    out->last = kernel_least_bit(others);
+    *alone = vm_and(rays, vm_or(*alone, vm_sign(-more)));
+    *two = vm_andnot(vm_and(rays, vm_sign(-others)), *alone);
+    face[0] = kernel_least_bit(faces);
+    face[1] = kernel_least_bit(others);
 }
 
 #endif

@@ -22,33 +22,22 @@ static inline kernel_tile_candidate kernel_candidate_in_tile(const kernel_candid
                                    .box = (uint16_t)(ends[0] | ends[1] << 4 | ends[2] << 8 | ends[3] << 12)};
 }
 
-/* A tile's cells are sorted by depth into KERNEL_DEPTHS bins, without an order within a bin. That is accurate enough to
- * skip cells that are hidden. */
-enum { KERNEL_DEPTHS = 32 };
-
-typedef struct kernel_by_depth {
-    kernel_tile_candidate *items;
-    float low, scale;
-    /* Index of each bin's first item; the nearest bin comes first. Items of a bin are linked by `next`, which is -1 at
-     * the end. */
-    int first[KERNEL_DEPTHS];
-} kernel_by_depth;
-
 /* Returns the number of the bin that contains a depth. It never decreases as the depth grows. */
-SIMD_INLINE int kernel_depth_bin(const kernel_by_depth *q, float near)
+SIMD_INLINE int kernel_depth_bin(const kernel_bin *q, float near)
 {
     const float bin = (near - q->low) * q->scale;
     return bin > 0 ? bin < KERNEL_DEPTHS - 1 ? (int)bin : KERNEL_DEPTHS - 1 : 0;
 }
 
-static inline void kernel_sort_by_depth(kernel_by_depth *q, kernel_tile_candidate *items, int count)
+static inline void kernel_sort_by_depth(kernel_bin *q)
 {
+    kernel_tile_candidate *items = q->items;
+    const int count = q->count;
     float low = items[0].near, high = low;
     for (int i = 1; i < count; i++) {
         low = items[i].near < low ? items[i].near : low;
         high = items[i].near > high ? items[i].near : high;
     }
-    q->items = items;
     q->low = low;
     q->scale = high > low ? KERNEL_DEPTHS / (high - low) : 0;
     for (int bin = 0; bin < KERNEL_DEPTHS; bin++) q->first[bin] = -1;

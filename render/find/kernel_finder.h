@@ -1,5 +1,5 @@
 /* Searches a subtree for visible cells (kernel_candidates.h), and computes the pixels in which a single cell may be
- * visible. Cells are tested SIMD_WIDTH at a time (kernel_candidate_surfaces.h, kernel_candidate_volumes.h). Cells whose
+ * visible. Cells are tested SIMD_WIDTH at a time (kernel_candidate_surfaces.h, kernel_candidates.h). Cells whose
  * numbers are too large, too small or NaN for lanes are tested one by one, by the bounds of their vertices. */
 #ifndef RENDER_KERNEL_FINDER_H
 #define RENDER_KERNEL_FINDER_H
@@ -82,7 +82,6 @@ typedef struct kernel_finder {
 
 static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, const kernel_subtree *subtree)
 {
-    kernel_borders borders;
     s->frame = f;
     for (int a = 0; a < 2; a++) {
         s->first[a] = 0;
@@ -95,7 +94,7 @@ static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, 
     if (subtree->surface >= 0) {
         s->surface = &f->surfaces[subtree->surface];
         s->source *= RENDER_MAX_ISOVALUES;
-        while (f->isovalues[s->source % RENDER_MAX_ISOVALUES].surface != subtree->surface) s->source++;
+        while (f->isovalue_surface[s->source % RENDER_MAX_ISOVALUES] != subtree->surface) s->source++;
     }
     s->field = s->surface ? &s->surface->layer->field : &f->job->volumes[0].field;
     s->visible_values = s->surface ? &s->surface->visible_values : &s->transfer->visible_values;
@@ -106,8 +105,7 @@ static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, 
         if (!kernel_is_linear(type)) kernel_cells_begin(&s->crossed[i], type);
     }
     kernel_arrays_begin(&s->arrays, f->job->parts[s->part].cells, &s->field->fields[s->part]);
-    kernel_picture_borders(&borders, f);
-    kernel_tree_planes(&s->planes, f, &borders);
+    kernel_tree_planes(&s->planes, f, NULL);
     const double unit = f->job->camera.is_orthographic ? f->job->space.scale : 1;
     s->t_near = (float)-f->depth_shift;
     for (int a = 0; a < 3; a++) s->eye[a] = kernel_level_of(f->job->camera.eye[a]);

@@ -78,15 +78,12 @@ static void free_list(kernel_candidate_list *list)
 /* ---- tiles ---------------------------------------------------------------------------------------------------- */
 
 /* The cells that one thread has found, sorted by tile: the cells of a tile are items[starts[tile]] to items[starts[tile
- * + 1] - 1]. */
-typedef struct bin_list {
+ * + 1] - 1]. The bins of all threads that have searched are one array; `next` is NULL in the last. */
+struct kernel_bins {
+    kernel_candidate_list list; /* the cells as they were found; empty after the search */
     kernel_tile_candidate *items;
     uint32_t *starts;
-} bin_list;
-
-struct kernel_bins {
-    int list_count; /* number of threads that have searched, each of which has a list */
-    bin_list lists[];
+    struct kernel_bins *next;
 };
 
 static int64_t tiles_across(const kernel_frame *f)
@@ -101,9 +98,10 @@ static int64_t tile_count(const kernel_frame *f)
 
 static void bins_free(struct kernel_bins *bins)
 {
-    for (int i = 0; bins && i < bins->list_count; i++) {
-        base_free(bins->lists[i].items);
-        base_free(bins->lists[i].starts);
+    for (struct kernel_bins *b = bins; b; b = b->next) {
+        free_list(&b->list);
+        base_free(b->items);
+        base_free(b->starts);
     }
     base_free(bins);
 }
@@ -119,7 +117,7 @@ static void bin_tiles(const kernel_candidate_chunk *chunk, int64_t across, uint3
 
 /* Bins the cells that a thread has found. On entry starts[1 + tile] must be the number of cells in each tile. Returns
  * false if the sum is more than `most`, or memory runs out. */
-static bool bin_list_fill(bin_list *bin, const kernel_candidate_list *list, int64_t tiles, int64_t most)
+static bool bins_fill(struct kernel_bins *bin, int64_t tiles, int64_t most)
 {
     uint32_t *starts = bin->starts;
     uint64_t sum = 0;
@@ -132,8 +130,8 @@ static bool bin_list_fill(bin_list *bin, const kernel_candidate_list *list, int6
     if (sum > (uint64_t)most) return false;
     bin->items = base_alloc(sum * sizeof *bin->items);
     if (!bin->items) return false;
-    for (const kernel_candidate_chunk *c = list->chunk; c; c = c->before)
-        bin_tiles(c, list->tile_columns, starts + 1, bin->items);
+    for (const kernel_candidate_chunk *c = bin->list.chunk; c; c = c->before)
+        bin_tiles(c, bin->list.tile_columns, starts + 1, bin->items);
     return true;
 }
 
@@ -146,23 +144,22 @@ static bool ensure_bin_capacity(kernel_bin *bin, int64_t count)
     return bin->buffer != NULL;
 }
 
-static int count_in_tile(const bin_list *list, int64_t tile)
+static int count_in_tile(const struct kernel_bins *bins, int64_t tile)
 {
-    return (int)(list->starts[tile + 1] - list->starts[tile]);
+    return (int)(bins->starts[tile + 1] - bins->starts[tile]);
 }
 
 /* Gathers a tile's cells in *bin. If a single thread has found them all, they are used where they are; otherwise they
  * are copied to the bin's own memory. Returns false if there is no memory. */
 static bool gather(const struct kernel_bins *bins, int64_t tile, kernel_bin *bin)
 {
-    const bin_list *last = NULL;
+    const struct kernel_bins *last = NULL;
     int64_t count = 0;
     bin->count = 0;
-    if (!bins) return true;
-    for (const bin_list *list = bins->lists, *end = list + bins->list_count; list < end; list++)
-        if (count_in_tile(list, tile)) {
-            last = list;
-            count += count_in_tile(list, tile);
+    for (const struct kernel_bins *b = bins; b; b = b->next)
+        if (count_in_tile(b, tile)) {
+            last = b;
+            count += count_in_tile(b, tile);
         }
     if (!last) return true;
     const bool is_shared = count_in_tile(last, tile) < count;
@@ -170,9 +167,9 @@ static bool gather(const struct kernel_bins *bins, int64_t tile, kernel_bin *bin
     bin->items = is_shared ? bin->buffer : last->items + last->starts[tile];
     bin->count = (int)count;
     kernel_tile_candidate *to = bin->items;
-    for (const bin_list *list = bins->lists; is_shared && list <= last; list++) {
-        const int own = count_in_tile(list, tile);
-        memcpy(to, list->items + list->starts[tile], (size_t)own * sizeof *to);
+    for (const struct kernel_bins *b = bins; is_shared && b; b = b->next) {
+        const int own = count_in_tile(b, tile);
+        memcpy(to, b->items + b->starts[tile], (size_t)own * sizeof *to);
         to += own;
     }
     return true;
@@ -222,29 +219,26 @@ static double widen_by_tree(const kernel_frame *f, const mmbvh *tree, double spa
     return least;
 }
 
-/* The number of cells of some mesh parts, and the area of the picture that their bounding boxes cover. */
-typedef struct coverage {
-    double cells;
-    double pixels;    /* sum of the areas of the parts' boxes */
-    double all[2][2]; /* ranges of columns and rows that all boxes together cover */
-} coverage;
-
-/* Counts the cells and the pixels of the parts on which the field exists (ranges[part].low is set), or of all parts if
- * ranges is NULL. Returns false if a part does not lie completely in front of the eye. */
-static bool measure_parts(const kernel_frame *f, const mmbvh_ranges *ranges, coverage *out)
+/* Counts the cells of the parts on which the field exists (ranges[part].low is set), or of all parts if ranges is NULL.
+ * *pixels: sum of the areas of the parts' bounding boxes in the picture; all: ranges of columns and rows that the boxes
+ * together cover. Returns false if a part does not lie completely in front of the eye. */
+static bool measure_parts(const kernel_frame *f, const mmbvh_ranges *ranges, double *cells, double *pixels,
+                          double all[2][2])
 {
-    *out = (coverage){.all = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}}};
+    *cells = *pixels = 0;
+    all[0][0] = all[1][0] = INFINITY;
+    all[0][1] = all[1][1] = -INFINITY;
     for (int part = 0; part < f->job->part_count; part++) {
         const mmbvh *tree = f->job->parts[part].tree;
         double own[2][2] = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
         if ((ranges && !ranges[part].low) || !tree->node_count) continue;
         if (!(widen_by_tree(f, tree, own) > 0)) return false;
         for (int a = 0; a < 2; a++) {
-            out->all[a][0] = fmin(own[a][0], out->all[a][0]);
-            out->all[a][1] = fmax(own[a][1], out->all[a][1]);
+            all[a][0] = fmin(own[a][0], all[a][0]);
+            all[a][1] = fmax(own[a][1], all[a][1]);
         }
-        out->cells += (double)tree->cell_count;
-        out->pixels += (own[0][1] - own[0][0]) * (own[1][1] - own[1][0]);
+        *cells += (double)tree->cell_count;
+        *pixels += (own[0][1] - own[0][0]) * (own[1][1] - own[1][0]);
     }
     return true;
 }
@@ -253,8 +247,8 @@ static bool measure_parts(const kernel_frame *f, const mmbvh_ranges *ranges, cov
  * twice, once for its pixels and once for its samples; tiles that traverse the trees themselves fetch it once. */
 static bool volume_cells_are_small(const kernel_frame *f)
 {
-    coverage c;
-    return measure_parts(f, f->job->volumes[0].field.ranges, &c) && c.cells > SMALL_CELLS * c.pixels;
+    double cells, pixels, all[2][2];
+    return measure_parts(f, f->job->volumes[0].field.ranges, &cells, &pixels, all) && cells > SMALL_CELLS * pixels;
 }
 
 /* Adds counts over `samples` nodes that are spread evenly over the part's tree: of cells, and of cells that isovalues
@@ -281,22 +275,21 @@ static void sample_leaves(const kernel_frame *f, const kernel_surface *s, int pa
  * so that tiles which traverse the trees themselves read fewer of them. */
 bool render_surfaces_are_small(const kernel_frame *f)
 {
-    coverage c;
-    double crossed = 0;
+    double cells, boxes, all[2][2], crossed = 0;
     int values = 0;
-    if (f->has_transparent || !measure_parts(f, NULL, &c)) return false;
-    const double all = (c.all[0][1] - c.all[0][0]) * (c.all[1][1] - c.all[1][0]);
+    if (f->has_transparent || !measure_parts(f, NULL, &cells, &boxes, all)) return false;
     /* area of at least one tile, because parts may be seen edge on */
-    const double pixels = fmax(fmin(c.pixels, all), KERNEL_TILE * KERNEL_TILE);
+    const double pixels =
+        fmax(fmin(boxes, (all[0][1] - all[0][0]) * (all[1][1] - all[1][0])), KERNEL_TILE * KERNEL_TILE);
     for (int s = 0; s < f->surface_count; s++) values += f->surfaces[s].layer->value_count;
-    if (!(values * c.cells > SMALL_CROSSED * pixels)) return false;
+    if (!(values * cells > SMALL_CROSSED * pixels)) return false;
     for (int s = 0; s < f->surface_count; s++) {
         double sampled = 0, sampled_crossed = 0;
         double own = 0; /* number of cells of the parts on which the field exists */
         for (int part = 0; part < f->job->part_count; part++) {
             const double held = (double)f->job->parts[part].tree->cell_count;
             if (!f->surfaces[s].layer->field.ranges[part].low) continue;
-            sample_leaves(f, &f->surfaces[s], part, 1 + (int64_t)(SAMPLES * (held / c.cells)), &sampled,
+            sample_leaves(f, &f->surfaces[s], part, 1 + (int64_t)(SAMPLES * (held / cells)), &sampled,
                           &sampled_crossed);
             own += held;
         }
@@ -327,62 +320,55 @@ void render_trees_cover(kernel_frame *f)
 
 /* ---- the search ----------------------------------------------------------------------------------------------- */
 
-typedef struct candidate_search {
-    kernel_frame *frame;
-    render_subtrees subtrees;
-    kernel_candidate_list *lists; /* one list of candidates per thread */
-    int64_t bound;
-    struct kernel_bins *bins;
-} candidate_search;
-
-/* Searches all subtrees in parallel. Each thread bins its own cells as soon as no subtree is left, without waiting for
- * the others. */
-static void run(candidate_search *s, kernel_thread *thread_of, int threads)
+/* Searches all subtrees in parallel. Each thread bins its own cells, at most `most`, as soon as no subtree is left,
+ * without waiting for the others. */
+static void run(const kernel_frame *frame, const render_subtrees *subtrees, struct kernel_bins *bins, int64_t most,
+                kernel_thread *thread_of, int threads)
 {
     const kernel_table *kernels = render_kernels();
-    const int64_t tiles = tile_count(s->frame), most = 2 * s->bound;
+    const int64_t tiles = tile_count(frame);
 #pragma omp parallel num_threads(threads)
     {
         region_enter();
         const int me = omp_get_thread_num();
-        kernel_candidate_list *list = &s->lists[me];
+        kernel_candidate_list *list = &bins[me].list;
 #pragma omp for schedule(dynamic, 1) nowait
-        for (int64_t i = 0; i < s->subtrees.count; i++) {
+        for (int64_t i = 0; i < subtrees->count; i++) {
             list->is_full = list->is_full || !render_thread_begin(kernels, &thread_of[me]);
-            if (!list->is_full) kernels->find_candidates(s->frame, &thread_of[me], &s->subtrees.items[i], list, grow);
+            if (!list->is_full) kernels->find_candidates(frame, &thread_of[me], &subtrees->items[i], list, grow);
         }
         if (list->chunk) list->chunk->count = list->count;
-        list->is_full = list->is_full || !bin_list_fill(&s->bins->lists[me], list, tiles, most);
+        list->is_full = list->is_full || !bins_fill(&bins[me], tiles, most);
         region_leave();
     }
 }
 
-/* Creates each thread's list and bins. Returns false if there is no memory. */
-static bool begin_lists(candidate_search *s, int threads)
+/* Creates each thread's list and bins. bound: number of candidates that the lists may contain. Returns NULL if there is
+ * no memory. */
+static struct kernel_bins *begin_bins(const kernel_frame *frame, int64_t *bound, int threads)
 {
-    const int64_t tiles = tile_count(s->frame);
-    s->lists = base_calloc((size_t)threads, sizeof *s->lists);
-    s->bins = base_calloc(1, sizeof *s->bins + (size_t)threads * sizeof *s->bins->lists);
-    if (!s->lists || !s->bins) return false;
-    s->bins->list_count = threads;
-    for (int t = 0; t < threads; t++) {
-        uint32_t *starts = base_calloc((size_t)(tiles + 1), sizeof *starts);
-        s->bins->lists[t].starts = starts;
-        if (!starts) return false;
-        s->lists[t] = (kernel_candidate_list){
-            .bound = &s->bound, .counts = starts + 1, .tile_columns = (int)tiles_across(s->frame)};
+    struct kernel_bins *bins = base_calloc((size_t)threads, sizeof *bins);
+    for (int t = 0; bins && t < threads; t++) {
+        uint32_t *starts = base_calloc((size_t)(tile_count(frame) + 1), sizeof *starts);
+        if (!starts) {
+            bins_free(bins);
+            return NULL;
+        }
+        if (t) bins[t - 1].next = &bins[t];
+        bins[t].starts = starts;
+        bins[t].list =
+            (kernel_candidate_list){.bound = bound, .counts = starts + 1, .tile_columns = (int)tiles_across(frame)};
     }
-    return true;
+    return bins;
 }
 
 /* Returns whether every thread has binned all of its cells, and the number of all cells is at most `most`. */
-static bool is_complete(const candidate_search *s, int threads, int64_t most)
+static bool is_complete(const struct kernel_bins *bins, int64_t tiles, int64_t most)
 {
-    const int64_t tiles = tile_count(s->frame);
     int64_t count = 0;
-    for (int t = 0; t < threads; t++) {
-        if (s->lists[t].is_full) return false;
-        count += s->bins->lists[t].starts[tiles];
+    for (; bins; bins = bins->next) {
+        if (bins->list.is_full) return false;
+        count += bins->starts[tiles];
     }
     return count <= most;
 }
@@ -392,18 +378,19 @@ static struct kernel_bins *find(kernel_frame *frame, bool is_volume, kernel_thre
 {
     const int64_t pixels = (int64_t)frame->job->camera.width * frame->job->camera.height;
     const int64_t cells = is_volume && pixels < VOLUME_ITEMS ? VOLUME_ITEMS : pixels;
-    const int64_t bound = cells + ITEMS * (int64_t)threads;
-    candidate_search s = {.frame = frame, .bound = bound};
-    const bool is_begun = begin_lists(&s, threads) && cut_trees(frame, is_volume, &s.subtrees);
-    if (is_begun) run(&s, thread_of, threads);
-    if (!is_begun || !is_complete(&s, threads, 2 * bound)) {
-        bins_free(s.bins);
-        s.bins = NULL;
+    int64_t bound = cells + ITEMS * (int64_t)threads;
+    const int64_t most = 2 * bound;
+    render_subtrees subtrees = {0};
+    struct kernel_bins *bins = begin_bins(frame, &bound, threads);
+    const bool is_begun = bins && cut_trees(frame, is_volume, &subtrees);
+    if (is_begun) run(frame, &subtrees, bins, most, thread_of, threads);
+    base_free(subtrees.items);
+    if (!is_begun || !is_complete(bins, tile_count(frame), most)) {
+        bins_free(bins);
+        return NULL;
     }
-    for (int t = 0; s.lists && t < threads; t++) free_list(&s.lists[t]);
-    base_free(s.lists);
-    base_free(s.subtrees.items);
-    return s.bins;
+    for (struct kernel_bins *b = bins; b; b = b->next) free_list(&b->list);
+    return bins;
 }
 
 void render_candidates_find(kernel_frame *frame, kernel_thread *thread_of, int threads)

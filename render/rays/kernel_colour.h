@@ -42,18 +42,20 @@ SIMD_INLINE vf kernel_transmittance(vf opacity, float exponent, vf *absorbed)
 
 /* Returns the position in the colour table, with 0 and 1 as its ends, of a value on a logarithmic or symlog scale. The
  * result is that of render_scaled(), mapped to the table, with a relative error of 3e-7. */
-static __attribute__((noinline)) vf kernel_scaled_position(const kernel_scale *s, vf x)
+static __attribute__((noinline)) vf kernel_scaled_position(const kernel_transfer *t, vf x)
 {
-    const vf threshold = vf_set(s->threshold), size = vf_max(vf_abs(x), threshold);
-    const vf above = vf_log2(size * s->inverse) * 0.69314718f;
-    if (s->kind == RENDER_LOG) return vf_select(vf_lt(threshold, x), above, vf_set(0)) * s->slope + s->shift;
+    const vf threshold = vf_set(t->threshold), size = vf_max(vf_abs(x), threshold);
+    const vf above = vf_log2(size * t->inverse_threshold) * 0.69314718f;
+    if (t->scale == RENDER_LOG)
+        return vf_select(vf_lt(threshold, x), above, vf_set(0)) * t->scale_slope + t->scale_shift;
     const vf beyond = vf_select(vf_lt(x, vf_set(0)), -1.0f - above, 1.0f + above);
-    return vf_select(vf_lt(threshold, vf_abs(x)), beyond, x * s->inverse) * s->slope + s->shift;
+    const vf position = vf_select(vf_lt(threshold, vf_abs(x)), beyond, x * t->inverse_threshold);
+    return position * t->scale_slope + t->scale_shift;
 }
 
 SIMD_INLINE vf kernel_colour_position(const kernel_transfer *t, vf x)
 {
-    return t->scale.kind == RENDER_LINEAR ? x : kernel_scaled_position(&t->scale, x);
+    return t->scale == RENDER_LINEAR ? x : kernel_scaled_position(t, x);
 }
 
 /* Computes the colour at a position in the table; NaN gives the first colour. */

@@ -61,17 +61,12 @@ static inline void kernel_tree_ray(const kernel_frame *f, double px, double py, 
     }
 }
 
-/* Column and row parameters of a packet's rays (kernel_tree_ray()). */
-typedef struct kernel_lanes {
-    double px[SIMD_WIDTH], py[SIMD_WIDTH];
-} kernel_lanes;
-
-static inline void kernel_packet_lanes(const kernel_packet *p, kernel_lanes *l)
+/* Computes the column and row parameters of a packet's rays (kernel_tree_ray()). */
+static inline void kernel_packet_lanes(const kernel_packet *p, double px[SIMD_WIDTH], double py[SIMD_WIDTH])
 {
     for (int i = 0; i < SIMD_WIDTH; i++) {
-        l->px[i] = kernel_column(p->frame, p->x0 + i % KERNEL_PACKET_COLUMNS);
-        const int row = p->y0 + i / KERNEL_PACKET_COLUMNS;
-        l->py[i] = kernel_row(p->frame, row);
+        px[i] = kernel_column(p->frame, p->x0 + i % KERNEL_PACKET_COLUMNS);
+        py[i] = kernel_row(p->frame, p->y0 + i / KERNEL_PACKET_COLUMNS);
     }
 }
 
@@ -96,8 +91,7 @@ static inline void kernel_packet_tile_rays(kernel_packet *p)
 static inline void kernel_packet_view(kernel_packet *p)
 {
     if (p->has_view) return;
-    kernel_lanes lanes;
-    double inverse[SIMD_WIDTH];
+    double px[SIMD_WIDTH], py[SIMD_WIDTH], inverse[SIMD_WIDTH];
     float view[3][SIMD_WIDTH];
     p->has_view = true;
     if (p->frame->job->camera.is_orthographic) {
@@ -105,8 +99,7 @@ static inline void kernel_packet_view(kernel_packet *p)
         p->view[2] = vf_set(-1);
         return;
     }
-    kernel_packet_lanes(p, &lanes);
-    const double *px = lanes.px, *py = lanes.py;
+    kernel_packet_lanes(p, px, py);
     for (int i = 0; i < SIMD_WIDTH; i++) inverse[i] = 1 / sqrt(1 + px[i] * px[i] + py[i] * py[i]);
     for (int i = 0; i < SIMD_WIDTH; i++) {
         view[0][i] = (float)(-px[i] * inverse[i]);
@@ -125,14 +118,14 @@ static inline int kernel_sample_first(const kernel_frame *f)
     return count > 0 && count < 1e9 ? -(int)count : 0;
 }
 
-static inline void kernel_packet_samples(kernel_packet *p, const kernel_lanes *l)
+static inline void kernel_packet_samples(kernel_packet *p, const double px[SIMD_WIDTH], const double py[SIMD_WIDTH])
 {
     const kernel_frame *f = p->frame;
     float base[SIMD_WIDTH], step[SIMD_WIDTH];
     p->sample_first = kernel_sample_first(f);
     for (int i = 0; i < SIMD_WIDTH; i++) {
         const bool flat = f->job->camera.is_orthographic;
-        const double length = flat ? 1 : sqrt(1 + l->px[i] * l->px[i] + l->py[i] * l->py[i]);
+        const double length = flat ? 1 : sqrt(1 + px[i] * px[i] + py[i] * py[i]);
         const double dt = f->scaled_step / length;
         const double jitter = f->job->jitter ? render_jitter(p->pixel[i], (uint32_t)f->job->frame) : 0.5;
         base[i] = (float)((-p->sample_first + jitter) * dt - f->depth_shift);
@@ -148,12 +141,12 @@ static inline void kernel_packet_samples(kernel_packet *p, const kernel_lanes *l
 static __attribute__((noinline, cold)) void kernel_packet_part(kernel_packet *p, uint32_t clips, int number)
 {
     const kernel_frame *f = p->frame;
-    kernel_lanes l;
+    double px[SIMD_WIDTH], py[SIMD_WIDTH];
     float from[SIMD_WIDTH], to[SIMD_WIDTH], stretch[SIMD_WIDTH];
-    kernel_packet_lanes(p, &l);
+    kernel_packet_lanes(p, px, py);
     for (int i = 0; i < SIMD_WIDTH; i++) {
         kernel_clip_ray ray;
-        kernel_tree_ray(f, l.px[i], l.py[i], ray.base, ray.direction);
+        kernel_tree_ray(f, px[i], py[i], ray.base, ray.direction);
         const kernel_ray_part part = kernel_clip_part(f->job, clips, &ray, -f->depth_shift, number);
         const double length = part.end - part.begin;
         from[i] = (float)part.begin;
@@ -230,9 +223,11 @@ typedef struct kernel_rays {
     vf origin_x, origin_y, slope_x, slope_y;
 } kernel_rays;
 
-/* A point of each ray in its cell: its depth t, the field's value there, and its reference coordinates r. */
+/* A point of each ray in its cell: its depth t, the field's value there, and its reference coordinates r. mask: the
+ * rays that have the point; set only for crossings of faces and for points whose comments mention it. */
 typedef struct kernel_point {
     vf t, value, r[3];
+    vm mask;
 } kernel_point;
 
 /* Copies the points of the rays in the mask; other lanes of *to are unchanged. */

@@ -80,55 +80,42 @@ typedef struct kernel_planes {
     vf offset[KERNEL_LANE_VECTORS], error[KERNEL_LANE_VECTORS];
 } kernel_planes;
 
-/* Slopes (perspective) or offsets (orthographic) of all borders between blocks, and of the tile's central direction. */
-typedef struct kernel_borders {
-    double x[KERNEL_BLOCKS_ACROSS + 1], y[KERNEL_BLOCKS_ACROSS + 1];
-    double centre_x, centre_y;
-} kernel_borders;
-
-static inline void kernel_tile_borders(kernel_borders *b, const kernel_frame *f, const kernel_tile *tile)
+/* Computes the slopes (perspective) or offsets (orthographic) of all borders between the tile's blocks. If tile is
+ * NULL, these are the borders of the whole picture. Block 0 then stands for the picture: a body that may be visible in
+ * it is reported to be in block 0. */
+static inline void kernel_borders(const kernel_frame *f, const kernel_tile *tile, double x[KERNEL_BLOCKS_ACROSS + 1],
+                                  double y[KERNEL_BLOCKS_ACROSS + 1])
 {
     for (int n = 0; n <= KERNEL_BLOCKS_ACROSS; n++) {
-        b->x[n] = kernel_column(f, tile->x0 + n * KERNEL_BLOCK - 0.5);
-        b->y[n] = kernel_row(f, tile->y0 + n * KERNEL_BLOCK - 0.5);
+        x[n] = kernel_column(f, tile ? tile->x0 + n * KERNEL_BLOCK - 0.5 : n ? f->job->camera.width - 0.5 : -0.5);
+        y[n] = kernel_row(f, tile ? tile->y0 + n * KERNEL_BLOCK - 0.5 : n ? f->job->camera.height - 0.5 : -0.5);
     }
-    b->centre_x = tile->centre_x;
-    b->centre_y = tile->centre_y;
-}
-
-/* Replaces the borders between a tile's blocks by the borders of the whole picture. Block 0 then stands for the
- * picture: a body that may be visible in it is reported to be in block 0. */
-static inline void kernel_picture_borders(kernel_borders *b, const kernel_frame *f)
-{
-    for (int n = 0; n <= KERNEL_BLOCKS_ACROSS; n++) {
-        b->x[n] = kernel_column(f, n ? f->job->camera.width - 0.5 : -0.5);
-        b->y[n] = kernel_row(f, n ? f->job->camera.height - 0.5 : -0.5);
-    }
-    b->centre_x = b->centre_y = 0;
 }
 
 /* Computes the planes relative to the eye, in double: the components of their normals along the camera's right, up and
  * forward axes, and their offsets. Their positive side is that of greater columns and rows. */
-static inline void kernel_planes_from_eye(const kernel_frame *f, const kernel_borders *b, double axes[3][KERNEL_LANES],
+static inline void kernel_planes_from_eye(const kernel_frame *f, const kernel_tile *tile, double axes[3][KERNEL_LANES],
                                           double offset[KERNEL_LANES])
 {
     const bool flat = f->job->camera.is_orthographic;
     const double scale = f->job->space.scale;
+    double x[KERNEL_BLOCKS_ACROSS + 1], y[KERNEL_BLOCKS_ACROSS + 1];
+    kernel_borders(f, tile, x, y);
     memset(axes, 0, 3 * sizeof *axes);
     memset(offset, 0, KERNEL_LANES * sizeof *offset);
     for (int n = 0; n <= KERNEL_BLOCKS_ACROSS; n++) {
         const int row = KERNEL_ROWS_LANE + n;
         axes[0][n] = 1;
         axes[1][row] = -1;
-        axes[2][n] = flat ? 0 : -b->x[n];
-        axes[2][row] = flat ? 0 : b->y[n];
-        offset[n] = flat ? -b->x[n] * scale : 0;
-        offset[row] = flat ? b->y[n] * scale : 0;
+        axes[2][n] = flat ? 0 : -x[n];
+        axes[2][row] = flat ? 0 : y[n];
+        offset[n] = flat ? -x[n] * scale : 0;
+        offset[row] = flat ? y[n] * scale : 0;
     }
     axes[2][KERNEL_DEPTH_LANE] = axes[2][KERNEL_ALONG_LANE] = 1;
     offset[KERNEL_DEPTH_LANE] = -f->depth_shift;
-    axes[0][KERNEL_ALONG_LANE] = flat ? 0 : b->centre_x;
-    axes[1][KERNEL_ALONG_LANE] = flat ? 0 : b->centre_y;
+    axes[0][KERNEL_ALONG_LANE] = flat || !tile ? 0 : tile->centre_x;
+    axes[1][KERNEL_ALONG_LANE] = flat || !tile ? 0 : tile->centre_y;
 }
 
 /* Loads planes, one per number of each list. */
@@ -145,16 +132,16 @@ static inline void kernel_planes_load(kernel_planes *q, float (*const normal)[KE
     }
 }
 
-/* Computes the planes in tree space, for boxes. Normals are rounded before the offsets are computed, so that the planes
- * still pass through the eye. The remaining error is a rotation by one rounding, at a distance of at most the eye's and
- * the scene's. */
-static inline void kernel_tree_planes(kernel_planes *q, const kernel_frame *f, const kernel_borders *b)
+/* Computes the planes of the tile, or of the whole picture if tile is NULL, in tree space, for boxes. Normals are
+ * rounded before the offsets are computed, so that the planes still pass through the eye. The remaining error is a
+ * rotation by one rounding, at a distance of at most the eye's and the scene's. */
+static inline void kernel_tree_planes(kernel_planes *q, const kernel_frame *f, const kernel_tile *tile)
 {
     const render_camera *c = &f->job->camera;
     const render_space *s = &f->job->space;
     double axes[3][KERNEL_LANES], exact[KERNEL_LANES], size = 0;
     float normal[3][KERNEL_LANES], offset[KERNEL_LANES], error[KERNEL_LANES];
-    kernel_planes_from_eye(f, b, axes, exact);
+    kernel_planes_from_eye(f, tile, axes, exact);
     for (int i = 0; i < KERNEL_LANES; i++) error[i] = 0;
     for (int a = 0; a < 3; a++) {
         const double eye = (c->eye[a] - s->origin[a]) * s->scale;
@@ -177,13 +164,15 @@ static inline void kernel_tree_planes(kernel_planes *q, const kernel_frame *f, c
 
 /* Computes the planes in tile space, against which cells are tested: X - slope * Z - origin for columns, and likewise Y
  * for rows. The lane of the distance along the direction is not used. */
-static inline void kernel_tile_planes(kernel_planes *q, const kernel_frame *f, const kernel_borders *b)
+static inline void kernel_tile_planes(kernel_planes *q, const kernel_frame *f, const kernel_tile *tile)
 {
     const bool flat = f->job->camera.is_orthographic;
     const double reach = kernel_slope_to_origin(f);
     float normal[3][KERNEL_LANES] = {{0}}, offset[KERNEL_LANES] = {0}, error[KERNEL_LANES];
+    double columns[KERNEL_BLOCKS_ACROSS + 1], rows[KERNEL_BLOCKS_ACROSS + 1];
+    kernel_borders(f, tile, columns, rows);
     for (int n = 0; n <= KERNEL_BLOCKS_ACROSS; n++) {
-        const double x = b->x[n] - b->centre_x, y = b->y[n] - b->centre_y;
+        const double x = columns[n] - tile->centre_x, y = rows[n] - tile->centre_y;
         const int row = KERNEL_ROWS_LANE + n;
         normal[0][n] = 1;
         normal[1][row] = -1;

@@ -145,20 +145,20 @@ SIMD_INLINE void kernel_tile_begin(kernel_tile_trace *t, const kernel_frame *f, 
         const int column = i % KERNEL_TILE / KERNEL_BLOCK, row = i / KERNEL_TILE / KERNEL_BLOCK;
         t->pixel_far[i] = wanted >> (row * KERNEL_BLOCKS_ACROSS + column) & 1 ? INFINITY : -INFINITY;
     }
-    kernel_borders borders;
-    kernel_tile_borders(&borders, f, &t->tile);
-    kernel_tree_planes(&t->tree_planes, f, &borders);
-    kernel_tile_planes(&t->tile_planes, f, &borders);
+    kernel_tree_planes(&t->tree_planes, f, &t->tile);
+    kernel_tile_planes(&t->tile_planes, f, &t->tile);
 }
 
-/* An entry of the traversal's stack. A tile traverses a tree once for all its blocks, with a mask of the blocks that a
- * node may meet in front of their nearest hits. */
-
-typedef struct kernel_tile_entry {
-    int64_t node;
+/* A node on a traversal's stack. A tile traverses a tree once for all its blocks, with a mask of the blocks that a node
+ * may meet in front of their nearest hits; or once for its pixels, with the box of pixels that a node may meet
+ * (kernel_tile_surface.h). */
+typedef struct kernel_tile_node {
+    /* index of the node; or, in traversals by pixels, index of a leaf's first cell or of an inner node's left child */
+    int64_t ref;
     float near;
-    unsigned blocks;
-} kernel_tile_entry;
+    uint16_t place; /* mask of blocks, or box of pixels */
+    uint16_t count; /* number of cells of a leaf, 0 for an inner node; not used in traversals by blocks */
+} kernel_tile_node;
 
 typedef void kernel_tile_visit(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks);
 
@@ -198,27 +198,28 @@ SIMD_INLINE void kernel_tile_traverse(kernel_tile_trace *t, const mmbvh *tree, c
                                       const kernel_visible_values *visible_values, unsigned blocks, int part,
                                       kernel_tile_visit *visit)
 {
-    kernel_tile_entry stack[MMBVH_MAX_DEPTH + 1];
+    kernel_tile_node stack[MMBVH_MAX_DEPTH + 1];
     int top = 0;
     if (!tree->node_count) return;
     const kernel_placement root = kernel_tile_classify_node(t, tree, ranges, visible_values, 0, blocks);
-    if (root.blocks) stack[top++] = (kernel_tile_entry){0, root.near, root.blocks};
+    if (root.blocks) stack[top++] = (kernel_tile_node){0, root.near, (uint16_t)root.blocks, 0};
     while (top) {
-        const kernel_tile_entry e = stack[--top];
-        blocks = e.blocks & kernel_blocks_beyond(t, e.near);
+        const kernel_tile_node e = stack[--top];
+        blocks = e.place & kernel_blocks_beyond(t, e.near);
         if (!blocks) continue;
-        const int count = mmbvh_node_count(tree, e.node);
-        const int64_t ref = mmbvh_node_ref(tree, e.node);
+        const int count = mmbvh_node_count(tree, e.ref);
+        const int64_t ref = mmbvh_node_ref(tree, e.ref);
         if (count) {
             visit(t, part, tree->cells + ref, count, blocks);
             continue;
         }
         const kernel_placement left = kernel_tile_classify_node(t, tree, ranges, visible_values, ref, blocks);
         const kernel_placement right = kernel_tile_classify_node(t, tree, ranges, visible_values, ref + 1, blocks);
-        const kernel_tile_entry entries[2] = {{ref, left.near, left.blocks}, {ref + 1, right.near, right.blocks}};
+        const kernel_tile_node nodes[2] = {{ref, left.near, (uint16_t)left.blocks, 0},
+                                           {ref + 1, right.near, (uint16_t)right.blocks, 0}};
         const int far = left.along < right.along;
-        if (entries[far].blocks) stack[top++] = entries[far];
-        if (entries[!far].blocks) stack[top++] = entries[!far];
+        if (nodes[far].place) stack[top++] = nodes[far];
+        if (nodes[!far].place) stack[top++] = nodes[!far];
     }
 }
 

@@ -54,10 +54,6 @@ enum {
     KERNEL_PIECE_ENTRIES = KERNEL_PIECE_COLOUR_SLOPE + 3
 };
 
-typedef struct kernel_piece {
-    kernel_real entry[KERNEL_PIECE_ENTRIES];
-} kernel_piece;
-
 /* Bounds of a transfer function over a range of values that contains no step of the opacity. Extinctions are per unit
  * distance; slopes are per unit of the domain, whose width is 1. */
 typedef struct kernel_bound {
@@ -71,12 +67,6 @@ typedef struct kernel_light_variation {
     float variation, cost;
     float extinction, steepness; /* maximum of the extinction, and of its slope times the contrast */
 } kernel_light_variation;
-
-/* A step of the opacity: its exact value, and that value rounded to float, at which pieces end. */
-typedef struct kernel_step {
-    double at;
-    float cut;
-} kernel_step;
 
 /* A bin of the table of sums for preintegration (kernel_preintegral.h), in integer units. Each array holds the
  * extinction first, then the emission in three channels. The struct is read as rows of four floats. */
@@ -100,7 +90,7 @@ typedef struct kernel_preintegral {
 
 typedef struct kernel_pieces {
     int count;
-    kernel_piece *pieces; /* sorted by value; the first and the last are infinite */
+    kernel_real (*pieces)[KERNEL_PIECE_ENTRIES]; /* sorted by value; the first and the last are infinite */
     /* Equal-width bins from bin_low on, by which the piece of a value is found: each holds the number of the piece at
      * the bin's begin. */
     kernel_real bin_low, bin_inverse;
@@ -114,11 +104,17 @@ typedef struct kernel_pieces {
      * ends' rounding errors (KERNEL_PIECE_LOW_REST). */
     bool has_rests;
     int step_count;
-    kernel_step steps[RENDER_MAX_OPACITY_POINTS]; /* steps of the opacity, sorted by value */
+    double steps[RENDER_MAX_OPACITY_POINTS]; /* values of the opacity's steps, sorted; pieces end at them, rounded */
     /* largest difference between two colours of the function in any channel; black and white count as its colours */
     float contrast;
     kernel_preintegral *preintegral; /* table of sums; NULL if the job allows no error (max_error) */
 } kernel_pieces;
+
+/* Returns the value at which pieces end at a step of the opacity. */
+static inline float kernel_step_cut(double step)
+{
+    return (float)(kernel_real)step;
+}
 
 typedef struct kernel_tile {
     int x0, y0;                /* column and row of the tile's upper left pixel */
@@ -136,17 +132,6 @@ typedef struct kernel_visible_values {
     float low[KERNEL_MAX_INTERVALS], high[KERNEL_MAX_INTERVALS];
 } kernel_visible_values;
 
-/* Maps values to positions in a colour table with a logarithmic or symlog scale s: position = s(value) * slope +
- * shift. */
-typedef struct kernel_scale {
-    render_scale kind;
-    /* symmetric logarithmic scale: s is linear for magnitudes up to it; logarithmic scale: smaller values are raised to
-     * it */
-    float threshold;
-    float inverse; /* 1 divided by the threshold */
-    float slope, shift;
-} kernel_scale;
-
 /* A transfer function in its own domain, in which low is 0 and low + 1 / inverse_width is 1. The domain is the range
  * [low, high]; with a logarithmic scale it goes from 0 to the largest magnitude, so that small values keep their
  * digits. Opacity is the first point's plus a sum of ramps (a step is a ramp of infinite slope), by position in the
@@ -155,7 +140,13 @@ typedef struct kernel_transfer {
     double low, inverse_width; /* a value x is mapped to the domain by (x - low) * inverse_width */
     const float *colours;
     int colour_count;
-    kernel_scale scale;
+    /* The position in the colour table on a logarithmic or symlog scale s is s(value) * scale_slope + scale_shift. */
+    render_scale scale;
+    /* symmetric logarithmic scale: s is linear for magnitudes up to it; logarithmic scale: smaller values are raised to
+     * it */
+    float threshold;
+    float inverse_threshold; /* 1 divided by the threshold */
+    float scale_slope, scale_shift;
     bool is_banded;
     /* colours of values below the range, above it, and of NaN, 3 numbers each; NULL if there are none */
     const float *outside;
@@ -206,10 +197,18 @@ typedef struct kernel_tile_candidate {
     uint16_t blocks, box;
 } kernel_tile_candidate;
 
+/* A tile's cells are sorted by depth into KERNEL_DEPTHS bins, without an order within a bin. That is accurate enough to
+ * skip cells that are hidden. */
+enum { KERNEL_DEPTHS = 32 };
+
 /* The candidates of a tile, unordered; kernels may reorder them. */
 typedef struct kernel_bin {
     kernel_tile_candidate *items;
     int count;
+    /* The following members are set by kernel_sort_by_depth(). Index of each depth bin's first item; the nearest bin
+     * comes first. Items of a depth bin are linked by `next`, which is -1 at the end. */
+    int first[KERNEL_DEPTHS];
+    float low, scale;
     /* buffer in which candidates found by several threads are put together; `capacity` items */
     kernel_tile_candidate *buffer;
     int64_t capacity;
@@ -250,16 +249,13 @@ typedef struct kernel_subtree {
     int64_t node;      /* index of the subtree's root in the tree */
 } kernel_subtree;
 
-typedef struct kernel_isovalue {
-    int surface, value;
-} kernel_isovalue;
-
 typedef struct kernel_frame {
     const render_job *job;
     int surface_count, volume_count;
     kernel_surface *surfaces; /* surface layers, the opaque ones first */
     int opaque_count;
-    kernel_isovalue isovalues[RENDER_MAX_ISOVALUES];
+    /* for each isovalue of the frame, the index of its surface, and its index among the surface's isovalues */
+    int isovalue_surface[RENDER_MAX_ISOVALUES], isovalue_number[RENDER_MAX_ISOVALUES];
     /* binned candidates of surfaces (render_candidates.c); NULL if tiles traverse the trees themselves */
     struct kernel_bins *candidates;
     /* binned candidates of the volume; NULL if tiles traverse the tree themselves */

@@ -6,6 +6,7 @@
 #include "render_hits.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "mmbvh.h"
 #include "render.h"
@@ -16,11 +17,12 @@ static void normalize(double v[3])
     for (int a = 0; a < 3; a++) v[a] /= length;
 }
 
-hit_axes hit_axes_around(const double n[3])
+void hit_axes_around(const double n[3], double axes[3][3])
 {
     const double sign = n[2] < 0 ? -1 : 1, a = -1 / (sign + n[2]), b = n[0] * n[1] * a;
-    return (hit_axes){
+    const double out[3][3] = {
         {1 + sign * n[0] * n[0] * a, sign * b, -sign * n[0]}, {b, sign + n[1] * n[1] * a, -n[1]}, {n[0], n[1], n[2]}};
+    memcpy(axes, out, sizeof out);
 }
 
 void hit_normal(const float folded[2], double n[3])
@@ -45,7 +47,7 @@ hit_frame hit_frame_of(const render_job *job, uint32_t pixel, float t, const flo
     hit_frame out;
     render_camera_ray(c, (int)(pixel % width), (int)(pixel / width), base, direction);
     hit_normal(normal, n);
-    out.a = hit_axes_around(n);
+    hit_axes_around(n, out.axes);
     for (int a = 0; a < 3; a++) {
         out.start[a] = base[a] + z * direction[a] + above * n[a];
         out.view[a] = -direction[a];
@@ -84,12 +86,12 @@ void hit_hemisphere(const render_job *job, uint32_t pixel, double (*out)[3])
     }
 }
 
-void hit_directions(const render_job *job, uint32_t pixel, const hit_axes *a, double (*out)[3])
+void hit_directions(const render_job *job, uint32_t pixel, const double (*axes)[3], double (*out)[3])
 {
     hit_hemisphere(job, pixel, out);
     for (int k = 0; k < job->occlusion->samples; k++) {
         const double d[3] = {out[k][0], out[k][1], out[k][2]};
-        for (int i = 0; i < 3; i++) out[k][i] = d[0] * a->right[i] + d[1] * a->up[i] + d[2] * a->forward[i];
+        for (int i = 0; i < 3; i++) out[k][i] = d[0] * axes[0][i] + d[1] * axes[1][i] + d[2] * axes[2][i];
     }
 }
 

@@ -5,14 +5,10 @@
 
 #include "render.h"
 
-typedef struct hit_axes {
-    double right[3], up[3], forward[3];
-} hit_axes;
-
-/* The point at which a hit's rays begin, the unit direction to the eye, and axes of which `forward` is the normal. */
+/* The point at which a hit's rays begin, the unit direction to the eye, and orthonormal axes: right, up, and the normal
+ * as forward. */
 typedef struct hit_frame {
-    double start[3], view[3];
-    hit_axes a;
+    double start[3], view[3], axes[3][3];
 } hit_frame;
 
 static inline double hit_dot(const double a[3], const double b[3])
@@ -24,8 +20,8 @@ static inline double hit_dot(const double a[3], const double b[3])
  * is_wanted() has values. */
 render_box hit_box(const render_job *job, bool (*has_active_pixel)(const render_surface_layer *layer));
 
-/* Returns an orthonormal set of axes whose `forward` is the unit vector n. */
-hit_axes hit_axes_around(const double n[3]);
+/* Computes an orthonormal set of axes (right, up, forward) whose last one is the unit vector n. */
+void hit_axes_around(const double n[3], double axes[3][3]);
 
 /* Unpacks the unit normal of an unlit fragment from its octahedral encoding. */
 void hit_normal(const float folded[2], double n[3]);
@@ -37,6 +33,6 @@ hit_frame hit_frame_of(const render_job *job, uint32_t pixel, float t, const flo
 /* Computes occlusion->samples unit directions for the pixel's hit, relative to the surface: z is along the normal. */
 void hit_hemisphere(const render_job *job, uint32_t pixel, double (*out)[3]);
 /* Computes the same unit directions as hit_hemisphere(), but rotated into the scene's axes. */
-void hit_directions(const render_job *job, uint32_t pixel, const hit_axes *a, double (*out)[3]);
+void hit_directions(const render_job *job, uint32_t pixel, const double (*axes)[3], double (*out)[3]);
 
 #endif

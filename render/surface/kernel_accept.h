@@ -25,13 +25,6 @@
  * its reference coordinates in place of the normal. When all cells have been traced, the rays are processed one by one,
  * and consecutive rays that hit the same cell share its coefficients. */
 
-/* The gradients at a cell's vertices, in camera axes, and their interpolating polynomials. */
-typedef struct kernel_smooth_cell {
-    kernel_cell cell;
-    double gradient[3][GRID_MAX_CELL_VERTICES];
-    double polynomial[3][8]; /* coefficients of the three components; not set for tets */
-} kernel_smooth_cell;
-
 /* Computes the gradient at a vertex, in camera axes; 0 if the vertex has none. */
 SIMD_INLINE void kernel_vertex_gradient(const kernel_frame *f, const render_vertex_gradients *gradients, int64_t vertex,
                                         double out[3])
@@ -44,21 +37,25 @@ SIMD_INLINE void kernel_vertex_gradient(const kernel_frame *f, const render_vert
     }
 }
 
+/* Fetches a cell, and computes the three components of the gradient in camera axes: in a tet their values at the
+ * vertices, otherwise the coefficients of their interpolating polynomials. */
 static void kernel_smooth_setup(const kernel_packet *p, const render_surface_layer *layer, int part, uint32_t index,
-                                kernel_smooth_cell *out)
+                                kernel_cell *c, double gradient[3][GRID_MAX_CELL_VERTICES])
 {
     const grid *g = p->frame->job->parts[part].cells;
-    kernel_cell *c = &out->cell;
     c->part = part;
     kernel_cell_fetch(c, g, &layer->field.fields[part], index);
     kernel_cell_transform_in_tile(c, p->frame, p->tile, g);
     for (int i = 0; i < c->count; i++) {
-        double gradient[3];
-        kernel_vertex_gradient(p->frame, &layer->gradients[part], c->vertices[i], gradient);
-        for (int k = 0; k < 3; k++) out->gradient[k][i] = gradient[k];
+        double own[3];
+        kernel_vertex_gradient(p->frame, &layer->gradients[part], c->vertices[i], own);
+        for (int k = 0; k < 3; k++) gradient[k][i] = own[k];
     }
-    for (int k = 0; k < 3 && !kernel_is_linear(c->type); k++)
-        kernel_polynomial_fit(out->polynomial[k], c->type, out->gradient[k]);
+    for (int k = 0; k < 3 && !kernel_is_linear(c->type); k++) {
+        double polynomial[8];
+        kernel_polynomial_fit(polynomial, c->type, gradient[k]);
+        memcpy(gradient[k], polynomial, sizeof polynomial);
+    }
 }
 
 /* Computes a point's barycentric coordinates in a tet. They are 1/4 each if the tet has no volume or the point is far
@@ -95,14 +92,13 @@ SIMD_INLINE double kernel_polynomial_at(const double c[8], bool is_pyramid, cons
     return is_pyramid ? v : v + r[2] * ((r[0] * c[5] + r[1] * c[6]) + m * c[7]);
 }
 
-/* Computes the gradient at a point by interpolation. place: the reference coordinates or, in a tet, the position in
- * tile space. */
-SIMD_INLINE void kernel_smooth_at(const kernel_smooth_cell *s, const double place[3], float out[3])
+/* Computes the gradient at a point by interpolation. gradient: as computed by kernel_smooth_setup(); place: the
+ * reference coordinates or, in a tet, the position in tile space. */
+SIMD_INLINE void kernel_smooth_at(const kernel_cell *c, double (*const gradient)[GRID_MAX_CELL_VERTICES],
+                                  const double place[3], float out[3])
 {
-    const kernel_cell *c = &s->cell;
     if (!kernel_is_linear(c->type)) {
-        for (int k = 0; k < 3; k++)
-            out[k] = (float)kernel_polynomial_at(s->polynomial[k], kernel_has_apex(c->type), place);
+        for (int k = 0; k < 3; k++) out[k] = (float)kernel_polynomial_at(gradient[k], kernel_has_apex(c->type), place);
         return;
     }
     double corner[4][3], share[4];
@@ -113,7 +109,7 @@ SIMD_INLINE void kernel_smooth_at(const kernel_smooth_cell *s, const double plac
     }
     kernel_barycentric(corner, place, share);
     for (int k = 0; k < 3; k++) {
-        const double *g = s->gradient[k];
+        const double *g = gradient[k];
         out[k] = (float)((share[0] * g[0] + share[1] * g[1]) + (share[2] * g[2] + share[3] * g[3]));
     }
 }
@@ -131,8 +127,9 @@ SIMD_INLINE void kernel_ray_point(const kernel_packet *p, int ray, float t, doub
 static __attribute__((noinline)) void kernel_vertex_normals(const kernel_packet *p, const kernel_surface *s, vm rays,
                                                             vf t, vi parts, vi cells, vf normal[3])
 {
-    kernel_smooth_cell known;
-    known.cell.part = -1;
+    kernel_cell known;
+    double gradient[3][GRID_MAX_CELL_VERTICES];
+    known.part = -1;
     for (unsigned left = vm_bits(rays); left; left &= left - 1) {
         const int ray = __builtin_ctz(left);
         const int part = parts[ray];
@@ -140,12 +137,12 @@ static __attribute__((noinline)) void kernel_vertex_normals(const kernel_packet 
         double place[3];
         float out[3];
         if (part < 0) continue;
-        if (known.cell.part != part || known.cell.index != index) kernel_smooth_setup(p, s->layer, part, index, &known);
-        if (kernel_is_linear(known.cell.type))
+        if (known.part != part || known.index != index) kernel_smooth_setup(p, s->layer, part, index, &known, gradient);
+        if (kernel_is_linear(known.type))
             kernel_ray_point(p, ray, t[ray], place);
         else
             for (int a = 0; a < 3; a++) place[a] = (double)normal[a][ray];
-        kernel_smooth_at(&known, place, out);
+        kernel_smooth_at(&known, gradient, place, out);
         for (int a = 0; a < 3; a++) normal[a][ray] = out[a];
     }
 }
@@ -295,8 +292,11 @@ static __attribute__((noinline, cold)) vm kernel_defer_hits(kernel_packet *p, co
     for (unsigned left = vm_bits(waits); left; left &= left - 1) {
         const int i = __builtin_ctz(left);
         list->items[list->count] = (render_pending_hit){p->pixel[i], kind, h->t[i], h->reach[i]};
-        list->shadings[list->count++] = (render_pending_shading){{normal[0][i], normal[1][i], normal[2][i]},
-                                                                 {colour[0][i], colour[1][i], colour[2][i]}};
+        for (int a = 0; a < 3; a++) {
+            list->shadings[list->count][0][a] = normal[a][i];
+            list->shadings[list->count][1][a] = colour[a][i];
+        }
+        list->count++;
     }
     return vm_andnot(hit, waits);
 }
@@ -324,13 +324,13 @@ SIMD_INLINE vm kernel_is_near(const kernel_packet *p, const kernel_interval *i)
 /* Returns those of the hits at t that all clips keep. clips: one bit per clip of the job. */
 static __attribute__((noinline, cold)) vm kernel_clip_hits(const kernel_packet *p, uint32_t clips, vm hit, vf t)
 {
-    kernel_lanes l;
+    double px[SIMD_WIDTH], py[SIMD_WIDTH];
     unsigned kept = 0;
-    kernel_packet_lanes(p, &l);
+    kernel_packet_lanes(p, px, py);
     for (unsigned left = vm_bits(hit); left; left &= left - 1) {
         const int i = __builtin_ctz(left);
         kernel_clip_ray ray;
-        kernel_tree_ray(p->frame, l.px[i], l.py[i], ray.base, ray.direction);
+        kernel_tree_ray(p->frame, px[i], py[i], ray.base, ray.direction);
         kept |= (unsigned)kernel_clip_keeps(p->frame->job, clips, &ray, (double)t[i]) << i;
     }
     return vm_from_bits(kept);

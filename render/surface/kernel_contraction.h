@@ -42,27 +42,18 @@ enum { KERNEL_CONTRACTION_STEPS = 7 };
  * about 4 K per unit length: 1.8e-7 at most. */
 #define KERNEL_CONTRACTION_END 1e-4f
 
-/* A ray in the reference space of its cell. y and w are defined at the top of this file, with the ray's point at the
- * depth of vertex 0 as X0. level: L at that point; rise: the derivative of L along the ray. */
-typedef struct kernel_cell_ray {
-    vf y[3], w[3], level, rise;
-} kernel_cell_ray;
-
-/* Coefficients and error bounds of kernel_bounds, gathered from each ray's own cell. */
+/* A ray in the reference space of its cell, and the cell's coefficients and error bounds. */
 typedef struct kernel_contraction {
+    /* y and w are defined at the top of this file, with the ray's point at the depth of vertex 0 as X0. level: L at
+     * that point; rise: the derivative of L along the ray. */
+    vf y[3], w[3], level, rise;
+    /* members of kernel_bounds, gathered from each ray's own cell */
     vf offset[3], middle, terms[4][3], field_terms[4], error_growth, error_bound, domain_margin;
 } kernel_contraction;
 
-/* The result of a test that needs no crossings of faces, per ray. one: rays with exactly one crossing; none: rays
- * without a crossing. For rays in `one`, t is the crossing's depth and r its reference coordinates. kernel_contract()
- * computes depths relative to vertex 0, and reference coordinates that are accurate to KERNEL_CONTRACTION_END. */
-typedef struct kernel_decided {
-    vm one, none;
-    vf t, r[3];
-} kernel_decided;
-
 /* Computes the rays in the reference spaces of their cells. */
-SIMD_INLINE void kernel_cell_ray_of(const kernel_curved *c, const kernel_rays *rays, vi lane, kernel_cell_ray *out)
+SIMD_INLINE void kernel_contraction_ray(const kernel_curved *c, const kernel_rays *rays, vi lane,
+                                        kernel_contraction *out)
 {
     vf origin[3], normal[3], g[3];
     for (int a = 0; a < 3; a++) {
@@ -162,45 +153,45 @@ SIMD_INLINE vm kernel_contraction_excludes_root(int type, const kernel_contracti
     return vf_lt(2.0f * most + error_bound, 0.999f * kernel_dot(s, s));
 }
 
-SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_cell_ray *ray, vm rays, kernel_decided *out,
-                                 int type)
+/* Tests rays without crossings of faces. out->mask: rays with exactly one crossing, and its depth relative to vertex 0
+ * and its reference coordinates, which are accurate to KERNEL_CONTRACTION_END. *none: rays without a crossing. */
+SIMD_INLINE void kernel_contract(const kernel_contraction *c, vm rays, kernel_point *out, vm *none, int type)
 {
     const int terms = kernel_nonlinear_count(type);
-    const vf over = 1.0f / ray->rise, t = (ray->level + c->middle) * over;
-    vf a[3], slope[4][3], q[3], s[3], local[3];
-    kernel_nonlinear_terms bend;
-    out->one = out->none = vm_none();
+    const vf over = 1.0f / c->rise, t = (c->level + c->middle) * over;
+    vf a[3], slope[4][3], q[3], s[3], local[3], term[KERNEL_NONLINEAR_TERMS], unused[KERNEL_NONLINEAR_TERMS][3];
+    out->mask = *none = vm_none();
     out->t = vf_set(0);
-    for (int i = 0; i < 3; i++) q[i] = a[i] = (ray->y[i] + c->offset[i]) - ray->w[i] * t;
+    for (int i = 0; i < 3; i++) q[i] = a[i] = (c->y[i] + c->offset[i]) - c->w[i] * t;
     for (int k = 0; k < terms; k++) {
         const vf rate = c->field_terms[k] * over;
-        for (int i = 0; i < 3; i++) slope[k][i] = c->terms[k][i] + ray->w[i] * rate;
+        for (int i = 0; i < 3; i++) slope[k][i] = c->terms[k][i] + c->w[i] * rate;
     }
     const vm sure = vm_and(rays, vf_lt(c->error_growth, vf_set(INFINITY)));
     for (int n = 0; n < KERNEL_CONTRACTION_STEPS; n++) {
         kernel_contraction_clamp(type, c->domain_margin, q);
         kernel_contraction_local(type, q, local);
-        kernel_nonlinear_terms_at(type, local, &bend);
+        kernel_nonlinear_terms_at(type, local, term, unused);
         /* kernel_bounds.h computes the Jacobian at the centre with a b / k² = 1/2 instead of 1/4, which leaves this
          * linear term */
-        if (kernel_has_apex(type)) bend.term[0] += 0.25f * q[2];
+        if (kernel_has_apex(type)) term[0] += 0.25f * q[2];
         for (int i = 0; i < 3; i++) {
             vf at = a[i];
-            for (int k = 0; k < terms; k++) at -= slope[k][i] * bend.term[k];
+            for (int k = 0; k < terms; k++) at -= slope[k][i] * term[k];
             s[i] = at - q[i];
             out->r[i] = at;
         }
         if (n == 1 || n == KERNEL_CONTRACTION_STEPS - 1) {
-            out->none = vm_or(out->none, vm_and(sure, kernel_contraction_excludes_root(type, c, q, s)));
-            if (!vm_any(vm_andnot(sure, out->none))) return;
+            *none = vm_or(*none, vm_and(sure, kernel_contraction_excludes_root(type, c, q, s)));
+            if (!vm_any(vm_andnot(sure, *none))) return;
         }
         for (int i = 0; i < 3; i++) q[i] = out->r[i];
     }
     const vf off = c->error_growth * vf_sqrt(kernel_dot(s, s)) + (1.0f + c->error_growth) * c->error_bound;
     const vm inside = vf_lt(off + c->domain_margin, kernel_contraction_border_distance(type, out->r));
-    out->one = vm_andnot(vm_and(sure, vm_and(inside, vf_lt(off, vf_set(KERNEL_CONTRACTION_END)))), out->none);
-    vf e = ray->level + c->middle;
-    for (int k = 0; k < terms; k++) e += c->field_terms[k] * bend.term[k];
+    out->mask = vm_andnot(vm_and(sure, vm_and(inside, vf_lt(off, vf_set(KERNEL_CONTRACTION_END)))), *none);
+    vf e = c->level + c->middle;
+    for (int k = 0; k < terms; k++) e += c->field_terms[k] * term[k];
     out->t = -(e * over);
     if (kernel_has_apex(type)) return;
     for (int i = 0; i < 3; i++) out->r[i] += (float)kernel_domain_of(type)->centre[i];

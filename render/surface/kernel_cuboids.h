@@ -233,30 +233,31 @@ SIMD_INLINE vf kernel_cuboid_value(const float values[8][SIMD_WIDTH], vi lane, c
     return v[0] + r[2] * (v[4] - v[0]);
 }
 
-/* Finds the roots of the given rays, all of which have cuboids, and the field's gradients there, in tile space. */
+/* Finds the roots of the given rays, all of which have cuboids, and the field's gradients there, in tile space.
+ * out->mask: rays with exactly one root; *none: rays without a root. */
 SIMD_INLINE void kernel_cuboid_roots_of(const kernel_cuboids *cells, const float (*at)[8][SIMD_WIDTH],
-                                        const kernel_lane_rays *p, vm rays, kernel_decided *out, vf gradient[3])
+                                        const kernel_lane_rays *p, vm rays, kernel_point *out, vm *none, vf gradient[3])
 {
     kernel_cuboid_ray ray;
     vf s, g[3];
     const vm within = kernel_cuboid_interval(cells, at, p, &ray);
-    out->one = vm_none();
-    out->none = vm_andnot(rays, within);
+    out->mask = vm_none();
+    *none = vm_andnot(rays, within);
     rays = vm_and(rays, within);
     if (!vm_any(rays)) return;
     kernel_cuboid_polynomial(cells, p->lane, &ray);
-    vm none;
-    kernel_cuboid_count(&ray, &none, &out->one, &s);
-    out->none = vm_or(out->none, vm_and(rays, none));
-    out->one = vm_and(rays, out->one);
-    if (!vm_any(out->one)) return;
-    out->one = vm_andnot(out->one, kernel_cuboid_newton(&ray, out->one, &s));
+    vm no_root;
+    kernel_cuboid_count(&ray, &no_root, &out->mask, &s);
+    *none = vm_or(*none, vm_and(rays, no_root));
+    out->mask = vm_and(rays, out->mask);
+    if (!vm_any(out->mask)) return;
+    out->mask = vm_andnot(out->mask, kernel_cuboid_newton(&ray, out->mask, &s));
     for (int i = 0; i < 3; i++) out->r[i] = ray.r[i] + s * ray.d[i];
     s -= kernel_cuboid_value(at[3], p->lane, out->r) / kernel_cuboid_rate(ray.k, s);
     for (int i = 0; i < 3; i++) {
         out->r[i] = ray.r[i] + s * ray.d[i];
         const vm inside = vm_and(vf_lt(ray.domain_margin, out->r[i]), vf_lt(out->r[i], 1 - ray.domain_margin));
-        out->one = vm_and(out->one, inside);
+        out->mask = vm_and(out->mask, inside);
     }
     out->t = ray.origin[2] + (ray.begin + s * ray.length);
     const kernel_product m = kernel_product_at(false, out->r);

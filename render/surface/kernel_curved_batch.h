@@ -63,7 +63,8 @@ typedef struct kernel_curved_batch {
     /* for each ray in `met`, the two faces that it crosses: number of the first plus 8 times that of the second */
     uint8_t faces[KERNEL_LIST_ROOM];
     /* depths, values and reference coordinates of the rays in `found` and in `others` */
-    kernel_curved_ends found_ends, other_ends;
+    /* the ends of these rays' intervals (kernel_curved_ends_add()) */
+    float found_ends[2][5][KERNEL_LIST_ROOM], other_ends[2][5][KERNEL_LIST_ROOM];
 } kernel_curved_batch;
 
 static void kernel_curved_batch_begin(kernel_curved_batch *h)
@@ -137,7 +138,7 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_trace_singly(kerne
 /* Returns the rays that have no root because they do not meet the slab |L| <= thickness that contains the isosurface
  * (kernel_bounds.h) between the cell's bounding planes. The values at the faces then have L's sign. Depths are relative
  * to vertex 0. */
-SIMD_INLINE vm kernel_curved_batch_beside(const kernel_curved_batch *h, vi lane, const kernel_cell_ray *ray)
+SIMD_INLINE vm kernel_curved_batch_beside(const kernel_curved_batch *h, vi lane, const kernel_contraction *ray)
 {
     const vf thick = kernel_gather_lane(h->bounds.thickness, lane);
     vf from = vf_set(-INFINITY), to = vf_set(INFINITY);
@@ -165,15 +166,15 @@ SIMD_INLINE int kernel_curved_batch_keep(kernel_curved_batch *h, int n, unsigned
     return kept;
 }
 
-/* Appends the rays in at->one to the list `found`, and their depths and reference coordinates to found_ends. The rays
+/* Appends the rays in at->mask to the list `found`, and their depths and reference coordinates to found_ends. The rays
  * in `undecided` are stored in the list `rays` from index `kept` on. Returns the new number of kept rays. */
-SIMD_INLINE int kernel_curved_batch_part(kernel_curved_batch *h, int n, const kernel_decided *at, vf depth,
+SIMD_INLINE int kernel_curved_batch_part(kernel_curved_batch *h, int n, const kernel_point *at, vf depth,
                                          unsigned undecided, int kept)
 {
-    for (unsigned bits = vm_bits(at->one); bits; bits &= bits - 1) {
+    for (unsigned bits = vm_bits(at->mask); bits; bits &= bits - 1) {
         const int i = __builtin_ctz(bits), to = h->found.count;
-        h->found_ends.t[0][to] = depth[i];
-        for (int a = 0; a < 3; a++) h->found_ends.r[0][a][to] = at->r[a][i];
+        h->found_ends[0][0][to] = depth[i];
+        for (int a = 0; a < 3; a++) h->found_ends[0][2 + a][to] = at->r[a][i];
         kernel_curved_ray_add(&h->found, &h->rays, n + i);
     }
     return kernel_curved_batch_keep(h, n, undecided, kept);
@@ -188,19 +189,19 @@ SIMD_INLINE void kernel_curved_batch_contract_of(const kernel_tile_trace *t, ker
     h->found.count = 0;
     for (int n = 0; n < h->rays.count; n += SIMD_WIDTH) {
         kernel_lane_rays p;
-        kernel_cell_ray ray;
         kernel_contraction c;
-        kernel_decided at;
+        kernel_point at;
+        vm none;
         kernel_lane_rays_begin(&p, t, &h->rays, n);
         p.far = kernel_pixel_far(t, p.at);
         p.active = vm_and(p.active, vf_le(kernel_gather_lane(h->queued->near, p.lane), p.far));
-        kernel_cell_ray_of(&cells, &p.rays, p.lane, &ray);
-        p.active = vm_andnot(p.active, kernel_curved_batch_beside(h, p.lane, &ray));
+        kernel_contraction_ray(&cells, &p.rays, p.lane, &c);
+        p.active = vm_andnot(p.active, kernel_curved_batch_beside(h, p.lane, &c));
         if (!vm_any(p.active)) continue;
         kernel_contraction_of(&h->bounds, p.lane, type, &c);
-        kernel_contract(&c, &ray, p.active, &at, type);
+        kernel_contract(&c, p.active, &at, &none, type);
         const vf depth = at.t + kernel_gather_lane(h->transformed.at[2][0], p.lane);
-        kept = kernel_curved_batch_part(h, n, &at, depth, vm_bits(vm_andnot(p.active, vm_or(at.one, at.none))), kept);
+        kept = kernel_curved_batch_part(h, n, &at, depth, vm_bits(vm_andnot(p.active, vm_or(at.mask, none))), kept);
     }
     h->rays.count = kept;
     kernel_pixel_list_close(&h->rays);
@@ -220,22 +221,23 @@ SIMD_INLINE unsigned kernel_curved_batch_find_faces_of_type(kernel_tile_trace *t
     h->met.count = 0;
     for (int n = 0; n < h->rays.count; n += SIMD_WIDTH) {
         kernel_lane_rays p;
-        kernel_curved_crossed crossed;
+        vm two, alone;
+        vi face[2];
         uint8_t faces[SIMD_WIDTH];
         kernel_lane_rays_begin(&p, t, &h->rays, n);
         p.far = kernel_pixel_far(t, p.at);
         p.active = vm_and(p.active, vf_le(kernel_gather_lane(h->queued->near, p.lane), p.far));
         if (!vm_any(p.active)) continue;
-        kernel_curved_faces(&h->transformed, &p, type, &crossed);
-        const vi both = crossed.first | crossed.last << 3;
+        kernel_curved_faces(&h->transformed, &p, type, &two, &alone, face);
+        const vi both = face[0] | face[1] << 3;
         for (int i = 0; i < SIMD_WIDTH; i++) faces[i] = (uint8_t)both[i];
-        for (unsigned bits = vm_bits(crossed.two); bits; bits &= bits - 1) {
+        for (unsigned bits = vm_bits(two); bits; bits &= bits - 1) {
             const int i = __builtin_ctz(bits);
             h->faces[h->met.count] = faces[i];
             kernel_curved_ray_add(&h->met, &h->rays, n + i);
         }
-        if (__builtin_expect(vm_any(crossed.alone), 0))
-            nearer |= kernel_curved_batch_trace_singly(t, h, &h->rays, n, p.at, vm_bits(crossed.alone));
+        if (__builtin_expect(vm_any(alone), 0))
+            nearer |= kernel_curved_batch_trace_singly(t, h, &h->rays, n, p.at, vm_bits(alone));
     }
     kernel_pixel_list_close(&h->met);
     memset(h->faces + h->met.count, 0, SIMD_WIDTH);
@@ -267,8 +269,8 @@ SIMD_INLINE void kernel_curved_batch_cross_of(const kernel_tile_trace *t, kernel
         const vm change = vm_xor(vf_lt(ends[0].value, zero), vf_lt(ends[1].value, zero));
         const vm nonempty = vm_and(near, vm_or(change, vf_lt(ends[0].t, ends[1].t)));
         const vm left = kernel_ends_decide(&cells, &p.rays, p.lane, nonempty, &ends[0], &ends[1], &found);
-        kernel_curved_ends_add(&h->met, n, ends, vm_bits(found), &h->found, &h->found_ends);
-        kernel_curved_ends_add(&h->met, n, ends, vm_bits(left), &h->others, &h->other_ends);
+        kernel_curved_ends_add(&h->met, n, ends, vm_bits(found), &h->found, h->found_ends);
+        kernel_curved_ends_add(&h->met, n, ends, vm_bits(left), &h->others, h->other_ends);
     }
 }
 
@@ -394,21 +396,21 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_cross_cuboids(kern
     int kept = 0;
     for (int n = 0; n < h->rays.count; n += SIMD_WIDTH) {
         kernel_lane_rays p;
-        kernel_decided roots;
+        kernel_point root;
+        vm none;
         vf gradient[3], normal[3];
         kernel_lane_rays_begin(&p, t, &h->rays, n);
         p.far = kernel_pixel_far(t, p.at);
         p.active = vm_and(p.active, vf_le(kernel_gather_lane(h->queued->near, p.lane), p.far));
         const vm cuboid = vf_lt(kernel_gather_lane(h->cuboids.domain_margin, p.lane), vf_set(INFINITY));
         const vm rays = vm_and(p.active, cuboid);
-        kernel_cuboid_roots_of(&h->cuboids, at, &p, rays, &roots, gradient);
-        const vm hit = vm_and(roots.one, vm_and(vf_le(vf_set(t->t_near), roots.t), vf_le(roots.t, p.far)));
+        kernel_cuboid_roots_of(&h->cuboids, at, &p, rays, &root, &none, gradient);
+        const vm hit = vm_and(root.mask, vm_and(vf_le(vf_set(t->t_near), root.t), vf_le(root.t, p.far)));
         if (vm_any(hit)) {
-            const kernel_point root = {.t = roots.t, .r = {roots.r[0], roots.r[1], roots.r[2]}};
-            kernel_curved_batch_orient(t, gradient, roots.r, normal);
+            kernel_curved_batch_orient(t, gradient, root.r, normal);
             nearer |= kernel_curved_batch_accept(t, h, &h->rays, n, &p, vm_bits(hit), &root, normal);
         }
-        kept = kernel_curved_batch_keep(h, n, vm_bits(vm_andnot(p.active, vm_or(roots.one, roots.none))), kept);
+        kept = kernel_curved_batch_keep(h, n, vm_bits(vm_andnot(p.active, vm_or(root.mask, none))), kept);
     }
     h->rays.count = kept;
     kernel_pixel_list_close(&h->rays);
@@ -420,7 +422,6 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_cross_cuboids(kern
 SIMD_INLINE unsigned kernel_curved_batch_hit_of(kernel_tile_trace *t, kernel_curved_batch *h, bool is_contracted,
                                                 int type)
 {
-    const kernel_curved_ends *found = &h->found_ends;
     unsigned nearer = 0;
     for (int n = 0; n < h->found.count; n += SIMD_WIDTH) {
         kernel_lane_rays p;
@@ -430,9 +431,9 @@ SIMD_INLINE unsigned kernel_curved_batch_hit_of(kernel_tile_trace *t, kernel_cur
         kernel_lane_rays_begin(&p, t, &h->found, n);
         p.far = kernel_pixel_far(t, p.at);
         for (int e = 0; e < (is_contracted ? 1 : 2); e++) {
-            ends[e].t = vf_load(found->t[e] + n);
-            ends[e].value = vf_load(found->v[e] + n);
-            for (int a = 0; a < 3; a++) ends[e].r[a] = vf_load(found->r[e][a] + n);
+            ends[e].t = vf_load(h->found_ends[e][0] + n);
+            ends[e].value = vf_load(h->found_ends[e][1] + n);
+            for (int a = 0; a < 3; a++) ends[e].r[a] = vf_load(h->found_ends[e][2 + a] + n);
         }
         kernel_maps_of((const float(*)[8][SIMD_WIDTH])h->transformed.at, p.lane, &map, type);
         if (is_contracted) {
@@ -464,7 +465,7 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_hit(kernel_tile_tr
 static __attribute__((noinline)) unsigned kernel_curved_batch_search(kernel_tile_trace *t, kernel_curved_batch *h,
                                                                      int n)
 {
-    const kernel_curved_ends *ends = &h->other_ends;
+    const float(*ends)[5][KERNEL_LIST_ROOM] = (const float(*)[5][KERNEL_LIST_ROOM])h->other_ends;
     kernel_lane_rays p;
     kernel_interval i = {.w_in = vf_set(0), .w_out = vf_set(0)};
     kernel_point first = {.t = vf_set(0)};
@@ -474,13 +475,13 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_search(kernel_tile
     kernel_lane_rays_begin(&p, t, &h->others, n);
     p.far = kernel_pixel_far(t, p.at);
     i.mask = p.active;
-    i.t_in = vf_load(ends->t[0] + n);
-    i.t_out = vf_load(ends->t[1] + n);
-    i.v_in = vf_load(ends->v[0] + n);
-    i.v_out = vf_load(ends->v[1] + n);
+    i.t_in = vf_load(ends[0][0] + n);
+    i.t_out = vf_load(ends[1][0] + n);
+    i.v_in = vf_load(ends[0][1] + n);
+    i.v_out = vf_load(ends[1][1] + n);
     for (int a = 0; a < 3; a++) {
-        i.r_in[a] = vf_load(ends->r[0][a] + n);
-        i.r_out[a] = vf_load(ends->r[1][a] + n);
+        i.r_in[a] = vf_load(ends[0][2 + a] + n);
+        i.r_out[a] = vf_load(ends[1][2 + a] + n);
     }
     const kernel_curved cells = kernel_curved_batch_cells(h);
     if (!kernel_search_cells(&s, &cells, &p.rays, p.lane, &i, p.active, &t->thread->map_failures)) return 0;

@@ -153,12 +153,12 @@ static void kernel_probe_tree(kernel_packet *p, kernel_probe *probe, const mmbvh
  * (6e-8) of positions near the scene and the eye, at most 16 together. */
 static void kernel_probe_points(const kernel_packet *p, vf t, kernel_probe *probe)
 {
-    kernel_lanes l;
+    double px[SIMD_WIDTH], py[SIMD_WIDTH];
     double size = 0;
-    kernel_packet_lanes(p, &l);
+    kernel_packet_lanes(p, px, py);
     for (int i = 0; i < SIMD_WIDTH; i++) {
         double base[3], direction[3];
-        kernel_tree_ray(p->frame, l.px[i], l.py[i], base, direction);
+        kernel_tree_ray(p->frame, px[i], py[i], base, direction);
         for (int a = 0; a < 3; a++) {
             probe->at[a][i] = (float)(base[a] + (double)t[i] * direction[a]);
             size = fmax(size, fabs(base[a]));
@@ -192,43 +192,37 @@ SIMD_INLINE vm kernel_probe_at(const kernel_packet *p, kernel_probe *probe, vm r
     return probe->found;
 }
 
-/* Samples around a packet's hits: before and behind each hit along the first axis, then along the second and the
- * third. */
-typedef struct kernel_difference_samples {
-    vm found[RENDER_DIFFERENCE_SAMPLES];
-    vf values[RENDER_DIFFERENCE_SAMPLES];
-} kernel_difference_samples;
-
-/* Takes six samples of the field around each hit at depth t, at the distance `reach` from it. s must be one of the
- * frame's surfaces. */
+/* Takes six samples of the field around each hit at depth t, at the distance `reach` from it: before and behind the hit
+ * along the first axis, then along the second and the third. s must be one of the frame's surfaces. */
 static __attribute__((noinline)) void kernel_sample_differences(const kernel_packet *p, const kernel_surface *s,
                                                                 int value, vm hit, vf t, vf reach,
-                                                                kernel_difference_samples *out)
+                                                                vm found[RENDER_DIFFERENCE_SAMPLES],
+                                                                vf values[RENDER_DIFFERENCE_SAMPLES])
 {
     const kernel_frame *f = p->frame;
     kernel_probe probe = {.surface = s,
                           .layer = f->surface_count + f->volume_count + (int)(s - f->surfaces),
                           .isovalue = s->layer->values[value]};
     for (int i = 0; i < RENDER_DIFFERENCE_SAMPLES; i++) {
-        out->found[i] = kernel_probe_at(p, &probe, hit, t, i / 2, i % 2 ? reach : -reach);
+        found[i] = kernel_probe_at(p, &probe, hit, t, i / 2, i % 2 ? reach : -reach);
         /* adding 0 turns -0 into 0, because the sign of a zero sample must not depend on the order of cells */
-        out->values[i] = probe.sample + 0.0f;
+        values[i] = probe.sample + 0.0f;
     }
 }
 
 /* Replaces the cells' gradients in `normal` (camera axes) by differences of the samples, for the rays in `hit`. The
  * difference is one-sided if one sample of an axis is in no cell. If both are in no cell, the ray keeps its cell's
  * gradient. */
-SIMD_INLINE void kernel_normals_from_samples(const kernel_packet *p, const kernel_difference_samples *about, vm hit,
-                                             vf normal[3])
+SIMD_INLINE void kernel_normals_from_samples(const kernel_packet *p, const vm found[RENDER_DIFFERENCE_SAMPLES],
+                                             const vf values[RENDER_DIFFERENCE_SAMPLES], vm hit, vf normal[3])
 {
     const render_camera *c = &p->frame->job->camera;
     const double *axes[3] = {c->right, c->up, c->forward};
     vf g[3];
     for (int a = 0; a < 3; a++) {
-        const vm before = about->found[2 * a], behind = about->found[2 * a + 1];
-        const vf low = vf_select(before, about->values[2 * a], vf_set(0));
-        const vf high = vf_select(behind, about->values[2 * a + 1], vf_set(0));
+        const vm before = found[2 * a], behind = found[2 * a + 1];
+        const vf low = vf_select(before, values[2 * a], vf_set(0));
+        const vf high = vf_select(behind, values[2 * a + 1], vf_set(0));
         g[a] = (high - low) * vf_select(vm_and(before, behind), vf_set(1), vf_set(2));
         hit = vm_and(hit, vm_or(before, behind));
     }
@@ -242,10 +236,11 @@ SIMD_INLINE void kernel_normals_from_samples(const kernel_packet *p, const kerne
 SIMD_INLINE void kernel_normals_by_differences(const kernel_packet *p, const kernel_surface *s, int value, vm hit, vf t,
                                                vf reach, vf normal[3])
 {
-    kernel_difference_samples about;
+    vm found[RENDER_DIFFERENCE_SAMPLES];
+    vf values[RENDER_DIFFERENCE_SAMPLES];
     hit = vm_and(hit, vf_lt(vf_set(0), reach));
-    kernel_sample_differences(p, s, value, hit, t, reach, &about);
-    kernel_normals_from_samples(p, &about, hit, normal);
+    kernel_sample_differences(p, s, value, hit, t, reach, found, values);
+    kernel_normals_from_samples(p, found, values, hit, normal);
 }
 
 /* Returns half the distance between two samples of a difference, in scaled units. */
@@ -324,16 +319,18 @@ static void kernel_sample_pending(const kernel_frame *f, kernel_thread *thread, 
     kernel_pending_group group;
     kernel_pending_packet_begin(&group);
     for (int64_t i = 0; i < count; i += group.count) {
-        kernel_difference_samples about;
+        vm found[RENDER_DIFFERENCE_SAMPLES];
+        vf values[RENDER_DIFFERENCE_SAMPLES];
         kernel_pending_group_begin(&group, f, thread, hits + i, count - i);
-        kernel_sample_differences(&group.packet, group.surface, group.value, group.rays, group.t, group.reach, &about);
+        kernel_sample_differences(&group.packet, group.surface, group.value, group.rays, group.t, group.reach, found,
+                                  values);
         for (int n = 0; n < group.count; n++) {
             render_difference_samples *own = &out[i + n];
             *own = (render_difference_samples){0, 0, {0}};
             for (int k = 0; k < RENDER_DIFFERENCE_SAMPLES; k++) {
-                const bool is_found = vm_bits(about.found[k]) >> group.lanes[n] & 1;
+                const bool is_found = vm_bits(found[k]) >> group.lanes[n] & 1;
                 own->found |= (uint32_t)is_found << k;
-                own->values[k] = is_found ? about.values[k][group.lanes[n]] : 0;
+                own->values[k] = is_found ? values[k][group.lanes[n]] : 0;
             }
         }
     }
@@ -341,17 +338,18 @@ static void kernel_sample_pending(const kernel_frame *f, kernel_thread *thread, 
 
 SIMD_INLINE void kernel_load_difference_samples(const kernel_pending_group *group,
                                                 const render_difference_samples *samples,
-                                                kernel_difference_samples *out)
+                                                vm found[RENDER_DIFFERENCE_SAMPLES],
+                                                vf values[RENDER_DIFFERENCE_SAMPLES])
 {
     for (int k = 0; k < RENDER_DIFFERENCE_SAMPLES; k++) {
-        float values[SIMD_WIDTH] = {0};
-        unsigned found = 0;
+        float own[SIMD_WIDTH] = {0};
+        unsigned bits = 0;
         for (int n = 0; n < group->count; n++) {
-            values[group->lanes[n]] = samples[n].values[k];
-            found |= (samples[n].found >> k & 1) << group->lanes[n];
+            own[group->lanes[n]] = samples[n].values[k];
+            bits |= (samples[n].found >> k & 1) << group->lanes[n];
         }
-        out->found[k] = vm_from_bits(found);
-        out->values[k] = vf_load(values);
+        found[k] = vm_from_bits(bits);
+        values[k] = vf_load(own);
     }
 }
 

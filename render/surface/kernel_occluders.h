@@ -80,6 +80,9 @@ typedef struct kernel_secondary_ray {
     float origin[3], direction[3]; /* the direction has unit length */
     float far;
     bool is_open;
+    /* hit: index of the ray's hit in its chunk; number: index of the ray in the hemisphere or, for a ray to a light,
+     * RENDER_MAX_SAMPLES plus the light's index */
+    int16_t hit, number;
 } kernel_secondary_ray;
 
 /* A ray that the trees cannot decide for a cell, so that it must be traced in that cell. */
@@ -92,8 +95,10 @@ typedef struct kernel_secondary_rays {
     kernel_secondary_ray *rays;
     int64_t undecided_count, capacity;
     kernel_undecided_pair *undecided; /* undecided ray-cell pairs, sorted by ray */
-    bool (*grow)(struct kernel_secondary_rays *rays);
 } kernel_secondary_rays;
+
+/* Grows the list of undecided pairs; returns false if memory runs out. */
+bool render_grow_undecided(kernel_secondary_rays *s);
 
 /* ---- a ray, prepared for traversal ---- */
 

@@ -31,7 +31,7 @@ typedef struct kernel_curved_pairs {
 
 SIMD_INLINE bool kernel_undecided_add(kernel_secondary_rays *s, int32_t ray, int32_t occluder)
 {
-    if (s->undecided_count == s->capacity && !s->grow(s)) return false;
+    if (s->undecided_count == s->capacity && !render_grow_undecided(s)) return false;
     s->undecided[s->undecided_count++] = (kernel_undecided_pair){ray, occluder};
     return true;
 }
@@ -114,18 +114,18 @@ SIMD_INLINE vm kernel_pairs_classify(const kernel_curved_pairs *pairs, vm active
 {
     const vf zero = vf_set(0), reach = vf_load(pairs->reach), far = vf_load(pairs->far);
     kernel_lane_rays p = {.active = active, .u = zero, .v = zero, .far = far, .rays = {zero, zero, zero, zero}};
-    kernel_curved_crossed crossed;
+    vm two;
+    vi face[2];
     kernel_point ends[2];
     int32_t lanes[SIMD_WIDTH];
     for (int i = 0; i < SIMD_WIDTH; i++) lanes[i] = i;
     p.lane = kernel_load_ints(lanes);
-    kernel_curved_faces(&pairs->transformed, &p, GRID_HEX, &crossed);
-    *undecided = crossed.alone;
-    if (!vm_any(crossed.two)) return vm_none();
-    p.active = crossed.two;
-    kernel_curved_cross(&pairs->transformed, &p, GRID_HEX, crossed.first | crossed.last << 3, ends);
+    kernel_curved_faces(&pairs->transformed, &p, GRID_HEX, &two, undecided, face);
+    if (!vm_any(two)) return vm_none();
+    p.active = two;
+    kernel_curved_cross(&pairs->transformed, &p, GRID_HEX, face[0] | face[1] << 3, ends);
     const vf from = vf_max(ends[0].t, reach), to = vf_min(ends[1].t, far);
-    const vm near = vm_and(crossed.two, vf_le(from, to));
+    const vm near = vm_and(two, vf_le(from, to));
     const vm change = vm_xor(vf_lt(ends[0].value, zero), vf_lt(ends[1].value, zero));
     /* If the sign changes, the interval has a root. The root blocks the ray only if it lies between `from` and `to`, so
      * the parts of the interval before and behind these must be known to have none. */

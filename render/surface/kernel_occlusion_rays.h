@@ -15,29 +15,18 @@
  * from which it was built. */
 enum { KERNEL_PATH_STACK = (MMBVH_MAX_DEPTH + 1) * (SIMD_WIDTH - 1) + 1 };
 
-typedef struct kernel_path {
-    const kernel_occluder_tree *tree;
-    int top;
-    int32_t stack[KERNEL_PATH_STACK];
-} kernel_path;
-
-SIMD_INLINE void kernel_path_begin(kernel_path *path, const kernel_occluder_tree *tree)
+/* Returns the next leaf that the ray may meet, or -1. *top: number of nodes on the stack, which at first has the root
+ * alone. */
+SIMD_INLINE int32_t kernel_path_next(const kernel_occluder_tree *tree, int32_t *stack, int *top,
+                                     const kernel_prepared_ray *p)
 {
-    path->tree = tree;
-    path->top = tree->node_count > 0;
-    path->stack[0] = 0;
-}
-
-/* Returns the next leaf that the ray may meet, or -1. */
-SIMD_INLINE int32_t kernel_path_next(kernel_path *path, const kernel_prepared_ray *p)
-{
-    while (path->top) {
-        const int64_t at = path->stack[--path->top];
+    while (*top) {
+        const int64_t at = stack[--*top];
         if (at < 0) return (int32_t)~at;
-        const int32_t *children = path->tree->children + at * SIMD_WIDTH;
+        const int32_t *children = tree->children + at * SIMD_WIDTH;
         vf low, high;
-        unsigned met = vm_bits(kernel_prepared_ray_boxes(p, path->tree->boxes + at * (6 * SIMD_WIDTH), &low, &high));
-        for (; met; met &= met - 1) path->stack[path->top++] = children[__builtin_ctz(met)];
+        unsigned met = vm_bits(kernel_prepared_ray_boxes(p, tree->boxes + at * (6 * SIMD_WIDTH), &low, &high));
+        for (; met; met &= met - 1) stack[(*top)++] = children[__builtin_ctz(met)];
     }
     return -1;
 }
@@ -63,11 +52,12 @@ static __attribute__((noinline, cold)) bool kernel_secondary_ray_unclipped(const
 static bool kernel_meets_triangles(const kernel_frame *f, const kernel_occluder_tree *tree,
                                    const kernel_secondary_ray *ray)
 {
-    kernel_path path;
+    int32_t stack[KERNEL_PATH_STACK];
+    int top = 1;
     kernel_prepared_ray p;
+    stack[0] = 0;
     kernel_prepared_ray_begin(ray, tree->size, &p);
-    kernel_path_begin(&path, tree);
-    for (int64_t leaf; (leaf = kernel_path_next(&path, &p)) >= 0;) {
+    for (int64_t leaf; (leaf = kernel_path_next(tree, stack, &top, &p)) >= 0;) {
         vf t;
         const unsigned met =
             vm_bits(kernel_prepared_ray_triangles(&p, tree->leaves + leaf * (KERNEL_TRIANGLE_ROWS * SIMD_WIDTH), &t));
@@ -86,12 +76,13 @@ static bool kernel_meets_triangles(const kernel_frame *f, const kernel_occluder_
 static bool kernel_meets_slabs(const kernel_occluders *o, kernel_secondary_rays *s, kernel_curved_pairs *pairs, int ray)
 {
     const kernel_occluder_tree *tree = &o->slabs;
-    kernel_path path;
+    int32_t stack[KERNEL_PATH_STACK];
+    int top = 1;
     kernel_prepared_ray p;
     bool is_well = true;
+    stack[0] = 0;
     kernel_prepared_ray_begin(&s->rays[ray], tree->size, &p);
-    kernel_path_begin(&path, tree);
-    for (int64_t leaf; s->rays[ray].is_open && (leaf = kernel_path_next(&path, &p)) >= 0;) {
+    for (int64_t leaf; s->rays[ray].is_open && (leaf = kernel_path_next(tree, stack, &top, &p)) >= 0;) {
         const float *rows = tree->leaves + leaf * (KERNEL_SLAB_ROWS * SIMD_WIDTH);
         vf level, rise, thickness; /* L along the ray is level + rise * t */
         for (unsigned met = vm_bits(kernel_prepared_ray_slabs(&p, rows, &level, &rise, &thickness)); met;

@@ -58,18 +58,18 @@ static void kernel_light_pending(const kernel_frame *f, kernel_thread *thread, c
     kernel_pending_group run;
     kernel_pending_packet_begin(&run);
     for (int64_t i = first; i < first + count; i += run.count) {
-        kernel_difference_samples about;
-        vf normal[3], colour[3];
+        vm found[RENDER_DIFFERENCE_SAMPLES];
+        vf values[RENDER_DIFFERENCE_SAMPLES], normal[3], colour[3];
         kernel_pending_group_begin(&run, f, thread, list->items + i, first + count - i);
         for (int a = 0; a < 3; a++) {
             normal[a] = colour[a] = vf_set(0);
             for (int n = 0; n < run.count; n++) {
-                normal[a][run.lanes[n]] = list->shadings[i + n].normal[a];
-                colour[a][run.lanes[n]] = list->shadings[i + n].colour[a];
+                normal[a][run.lanes[n]] = list->shadings[i + n][0][a];
+                colour[a][run.lanes[n]] = list->shadings[i + n][1][a];
             }
         }
-        kernel_load_difference_samples(&run, samples + i, &about);
-        kernel_normals_from_samples(&run.packet, &about, run.rays, normal);
+        kernel_load_difference_samples(&run, samples + i, found, values);
+        kernel_normals_from_samples(&run.packet, found, values, run.rays, normal);
         const float opacity = run.surface->layer->opacity;
         const vf kind = vf_set((float)((int)run.surface->first_kind + run.value));
         kernel_fragments lit = {

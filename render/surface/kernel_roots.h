@@ -47,21 +47,28 @@
 #define KERNEL_SMALLEST_PIECE 0x1p-12f
 enum { KERNEL_ROOT_PIECES = 256, KERNEL_POLISH_STEPS = 8, KERNEL_BRACKET_STEPS = 48 };
 
-/* The result of testing a piece of the interval, per ray. */
-typedef struct kernel_piece_class {
-    vm clear;      /* the piece has no root: the field has the sign `side` everywhere */
-    vm monotone;   /* the field is monotone, so the piece has at most one root */
-    vm negligible; /* the field is within rounding of 0 everywhere on the piece, so that its sign is not significant */
-} kernel_piece_class;
-
-/* The bounds of kernel_bounds, gathered from each ray's own cell. */
-typedef struct kernel_limits {
+/* The state of a search for roots, per ray. The interval is divided into pieces, which are processed in order; the
+ * current piece extends from number * size to (number + 1) * size. */
+typedef struct kernel_search {
+    kernel_rays rays;
+    /* The following members are set only if the values at the ends of the interval do not decide all rays: the cell's
+     * map, and members of kernel_bounds, gathered from each ray's own cell. */
+    kernel_map map;
     vf nonlinear_part[3][8], inverse[3][3], stretch, slope, field_curvature, map_curvature;
     vf coarsest; /* pieces longer than this share of the interval are always halved */
     vm is_monotone;
-} kernel_limits;
+    const kernel_interval *interval;
+    int64_t *failures; /* number of failed inversions of the map */
+    vm open;           /* rays that have unprocessed pieces */
+    vm ended;          /* rays whose last piece has been processed; `side` is then the field's sign at its end */
+    vf side;           /* sign of the field at `from`: 1 or -1 */
+    vf number, size, pieces;
+    kernel_point from, end;
+    vm found; /* rays with a root between the points low and high */
+    kernel_point low, high;
+} kernel_search;
 
-SIMD_INLINE void kernel_limits_of(const kernel_bounds *b, vi lane, kernel_limits *out)
+SIMD_INLINE void kernel_search_bounds(const kernel_bounds *b, vi lane, kernel_search *out)
 {
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 4; j++) {
@@ -82,16 +89,17 @@ SIMD_INLINE void kernel_limits_of(const kernel_bounds *b, vi lane, kernel_limits
 /* Computes how far the map bends along the chord between two points in reference coordinates: the largest of |e1| and
  * |e2| (*size), and of the coefficients of e's derivative divided by 3 (*slope). m: the map's product at both ends;
  * move: to - from. */
-SIMD_INLINE void kernel_chord_bend(bool is_pyramid, const kernel_limits *b, const vf from[3], const vf to[3],
-                                   const kernel_product m[2], const vf move[3], vf *size, vf *slope)
+SIMD_INLINE void kernel_chord_bend(const kernel_search *s, const vf from[3], const vf to[3], const kernel_product m[2],
+                                   const vf move[3], vf *size, vf *slope)
 {
+    const bool is_pyramid = s->map.is_pyramid;
     vf first = vf_set(0), second = first, between = first;
     for (int i = 0; i < 3; i++) {
         vf g0[3], g1[3];
-        kernel_gradient_of(b->nonlinear_part[i], is_pyramid, &m[0], from, g0);
-        kernel_gradient_of(b->nonlinear_part[i], is_pyramid, &m[1], to, g1);
-        const vf rise = kernel_value_of(b->nonlinear_part[i], is_pyramid, &m[1], to) -
-                        kernel_value_of(b->nonlinear_part[i], is_pyramid, &m[0], from);
+        kernel_gradient_of(s->nonlinear_part[i], is_pyramid, &m[0], from, g0);
+        kernel_gradient_of(s->nonlinear_part[i], is_pyramid, &m[1], to, g1);
+        const vf rise = kernel_value_of(s->nonlinear_part[i], is_pyramid, &m[1], to) -
+                        kernel_value_of(s->nonlinear_part[i], is_pyramid, &m[0], from);
         const vf e1 = (kernel_dot(g0, move) - rise) * (1.0f / 3), e2 = (rise - kernel_dot(g1, move)) * (1.0f / 3);
         first += e1 * e1;
         second += e2 * e2;
@@ -102,18 +110,21 @@ SIMD_INLINE void kernel_chord_bend(bool is_pyramid, const kernel_limits *b, cons
     *slope = vf_sqrt(vf_max(largest, between));
 }
 
-/* Tests whether the field has a root on the piece between two points. side: the sign of the field at `from`, 1 or -1.
+/* Returns the rays for which the piece between two points has no root: the field has the sign s->side everywhere, 1 or
+ * -1, which is its sign at `from`. *monotone: rays on which the field is monotone, so that the piece has at most one
+ * root; *negligible: rays on which the field is within rounding of 0 everywhere, so that its sign is not significant.
  * gap: upper bound of the distance of Y(from) and Y(to) from the ray. */
-SIMD_INLINE kernel_piece_class kernel_classify_piece(const kernel_map *map, const kernel_limits *b,
-                                                     const kernel_point *from, const kernel_point *to, vf gap, vf side)
+SIMD_INLINE vm kernel_classify_piece(const kernel_search *s, const kernel_point *from, const kernel_point *to, vf gap,
+                                     vm *monotone, vm *negligible)
 {
-    const bool is_pyramid = map->is_pyramid;
+    const bool is_pyramid = s->map.is_pyramid;
+    const vf side = s->side;
     const kernel_product m[2] = {kernel_product_at(is_pyramid, from->r), kernel_product_at(is_pyramid, to->r)};
     vf move[3], g0[3], g1[3], bend, bend_slope;
     for (int a = 0; a < 3; a++) move[a] = to->r[a] - from->r[a];
-    kernel_gradient_of(map->field, is_pyramid, &m[0], from->r, g0);
-    kernel_gradient_of(map->field, is_pyramid, &m[1], to->r, g1);
-    kernel_chord_bend(is_pyramid, b, from->r, to->r, m, move, &bend, &bend_slope);
+    kernel_gradient_of(s->map.field, is_pyramid, &m[0], from->r, g0);
+    kernel_gradient_of(s->map.field, is_pyramid, &m[1], to->r, g1);
+    kernel_chord_bend(s, from->r, to->r, m, move, &bend, &bend_slope);
     const vf d0 = kernel_dot(g0, move), d1 = kernel_dot(g1, move), rise = to->value - from->value;
     vf b1 = from->value + d0 * (1.0f / 3), b2 = to->value - d1 * (1.0f / 3), middle = 3.0f * (b2 - b1);
     vf scale = vf_set(1);
@@ -123,41 +134,21 @@ SIMD_INLINE kernel_piece_class kernel_classify_piece(const kernel_map *map, cons
         const vf at = vf_select(vf_eq(turn, vf_set(0)), vf_set(0), (rise - d1) / turn);
         b1 = b2 = from->value + d0 * vf_clamp(at, vf_set(0), vf_set(1));
         middle = d0;
-        scale = 1.0f / vf_max(vf_min(from->r[2], to->r[2]) - b->stretch * (1.5f * bend + gap), vf_set(1e-30f));
+        scale = 1.0f / vf_max(vf_min(from->r[2], to->r[2]) - s->stretch * (1.5f * bend + gap), vf_set(1e-30f));
     }
-    const vf off = b->stretch * ((is_pyramid ? 1.5f : 0.75f) * bend + gap);
-    const vf wrong = b->slope * off, bound = wrong + KERNEL_ROOT_BAND;
+    const vf off = s->stretch * ((is_pyramid ? 1.5f : 0.75f) * bend + gap);
+    const vf wrong = s->slope * off, bound = wrong + KERNEL_ROOT_BAND;
     const vf least = vf_min(vf_min(from->value * side, to->value * side), vf_min(b1 * side, b2 * side));
     const vf most = vf_max(vf_max(vf_abs(from->value), vf_abs(to->value)), vf_max(vf_abs(b1), vf_abs(b2)));
     const vf length = vf_sqrt(kernel_dot(move, move));
-    const vf off_slope = b->stretch * (b->map_curvature * scale * off * length + 3.0f * bend_slope + 2.0f * gap);
+    const vf off_slope = s->stretch * (s->map_curvature * scale * off * length + 3.0f * bend_slope + 2.0f * gap);
     const vf tolerance =
-        b->field_curvature * scale * off * (length + off_slope) + b->slope * off_slope + KERNEL_ROOT_BAND;
+        s->field_curvature * scale * off * (length + off_slope) + s->slope * off_slope + KERNEL_ROOT_BAND;
     const vf low = vf_min(middle, vf_min(d0, d1)), high = vf_max(middle, vf_max(d0, d1));
-    kernel_piece_class out;
-    out.clear = vf_lt(bound, least);
-    out.monotone = vm_or(vf_lt(tolerance, low), vf_lt(tolerance, -high));
-    out.negligible = vf_le(most + wrong, vf_set(KERNEL_ROOT_BAND));
-    return out;
+    *monotone = vm_or(vf_lt(tolerance, low), vf_lt(tolerance, -high));
+    *negligible = vf_le(most + wrong, vf_set(KERNEL_ROOT_BAND));
+    return vf_lt(bound, least);
 }
-
-/* The state of a search for roots, per ray. The interval is divided into pieces, which are processed in order; the
- * current piece extends from number * size to (number + 1) * size. */
-typedef struct kernel_search {
-    kernel_rays rays;
-    /* map of the cell; set only if the values at the ends of the interval do not decide all rays, as is `limits` */
-    kernel_map map;
-    kernel_limits limits;
-    const kernel_interval *interval;
-    int64_t *failures; /* number of failed inversions of the map */
-    vm open;           /* rays that have unprocessed pieces */
-    vm ended;          /* rays whose last piece has been processed; `side` is then the field's sign at its end */
-    vf side;           /* sign of the field at `from`: 1 or -1 */
-    vf number, size, pieces;
-    kernel_point from, end;
-    vm found; /* rays with a root between the points low and high */
-    kernel_point low, high;
-} kernel_search;
 
 SIMD_INLINE vf kernel_side(vf v)
 {
@@ -181,7 +172,7 @@ SIMD_INLINE vf kernel_face_gap(const kernel_search *s, const kernel_point *at)
     kernel_rays_at(&s->rays, map, at->t, target);
     for (int a = 0; a < 3; a++) off[a] = kernel_value_of(map->position[a], map->is_pyramid, &m, at->r) - target[a];
     for (int i = 0; i < 3; i++) {
-        const vf *row = s->limits.inverse[i];
+        const vf *row = s->inverse[i];
         const vf y = (off[0] * row[0] + off[1] * row[1]) + off[2] * row[2];
         sum += y * y;
     }
@@ -237,11 +228,12 @@ SIMD_INLINE void kernel_search_whole(kernel_search *s, vm rays)
     const kernel_interval *i = s->interval;
     const vm change = vm_xor(vf_lt(i->v_in, vf_set(0)), vf_lt(i->v_out, vf_set(0)));
     const vf gap = vf_max(kernel_face_gap(s, &s->low), kernel_face_gap(s, &s->high));
-    const kernel_piece_class v = kernel_classify_piece(&s->map, &s->limits, &s->low, &s->high, gap, s->side);
-    const vf jump = s->limits.slope * s->limits.stretch * gap + KERNEL_ROOT_BAND;
+    vm is_monotone, unused;
+    const vm clear = kernel_classify_piece(s, &s->low, &s->high, gap, &is_monotone, &unused);
+    const vf jump = s->slope * s->stretch * gap + KERNEL_ROOT_BAND;
     const vm faced = vf_lt(jump, vf_min(i->v_in * s->side, i->v_out * s->side));
-    const vm monotone = vm_or(s->limits.is_monotone, v.monotone), sure = vf_le(vf_set(1), s->limits.coarsest);
-    const vm none = vm_and(sure, vm_or(v.clear, vm_and(monotone, faced))), one = vm_and(sure, vm_and(monotone, change));
+    const vm monotone = vm_or(s->is_monotone, is_monotone), sure = vf_le(vf_set(1), s->coarsest);
+    const vm none = vm_and(sure, vm_or(clear, vm_and(monotone, faced))), one = vm_and(sure, vm_and(monotone, change));
     s->found = vm_or(s->found, vm_and(rays, one));
     s->open = vm_andnot(vm_andnot(rays, none), one);
     if (!vm_any(s->open)) return;
@@ -270,7 +262,7 @@ static __attribute__((noinline, unused)) bool kernel_search_cells(kernel_search 
     if (!vm_any(vm_or(wanted, s->found))) return false;
     kernel_maps_of_type(c->at, lane, c->type, &s->map);
     if (vm_any(wanted)) {
-        kernel_limits_of(c->bounds, lane, &s->limits);
+        kernel_search_bounds(c->bounds, lane, s);
         kernel_search_whole(s, wanted);
     }
     return true;
@@ -310,12 +302,13 @@ SIMD_INLINE void kernel_search_next(kernel_search *s)
     s->found = vm_none();
     while (vm_any(going)) {
         kernel_point to;
+        vm monotone, negligible;
         kernel_search_piece(s, going, &to);
-        const kernel_piece_class v = kernel_classify_piece(&s->map, &s->limits, &s->from, &to, vf_set(0), s->side);
+        const vm clear = kernel_classify_piece(s, &s->from, &to, vf_set(0), &monotone, &negligible);
         const vm small =
             vm_or(vf_le(s->size, vf_set(KERNEL_SMALLEST_PIECE)), vf_lt(vf_set(KERNEL_ROOT_PIECES), s->pieces));
-        const vm certain = vm_and(vm_or(v.monotone, v.clear), vf_le(s->size, s->limits.coarsest));
-        const vm decided = vm_and(going, vm_or(vm_or(certain, v.negligible), small));
+        const vm certain = vm_and(vm_or(monotone, clear), vf_le(s->size, s->coarsest));
+        const vm decided = vm_and(going, vm_or(vm_or(certain, negligible), small));
         const vm roots = vm_andnot(decided, vf_eq(kernel_side(to.value), s->side));
         const vm halve = vm_andnot(going, decided);
         /* divisions are counted per ray, so that a ray's result does not depend on the other rays */

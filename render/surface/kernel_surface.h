@@ -224,22 +224,21 @@ SIMD_INLINE void kernel_curved_robust(kernel_packet *p, kernel_surface_state *st
 }
 
 SIMD_INLINE void kernel_contract_rays(const kernel_curved *c, const kernel_rays *rays, vi lane, vm wanted,
-                                      kernel_decided *out, int type)
+                                      kernel_point *out, vm *none, int type)
 {
     kernel_contraction contraction;
-    kernel_cell_ray ray;
-    kernel_cell_ray_of(c, rays, lane, &ray);
+    kernel_contraction_ray(c, rays, lane, &contraction);
     kernel_contraction_of(c->bounds, lane, type, &contraction);
-    kernel_contract(&contraction, &ray, wanted, out, type);
+    kernel_contract(&contraction, wanted, out, none, type);
     out->t += kernel_gather_lane(c->at[2][0], lane);
 }
 
 /* Tests the rays of a packet in one cell by contraction (kernel_contraction.h), without intersecting the cell's
  * faces. */
 static __attribute__((noinline)) void kernel_contract_packet(const kernel_curved *c, const kernel_rays *rays, vi lane,
-                                                             vm wanted, kernel_decided *out)
+                                                             vm wanted, kernel_point *out, vm *none)
 {
-    KERNEL_OF_TYPE(c->type, kernel_contract_rays, c, rays, lane, wanted, out);
+    KERNEL_OF_TYPE(c->type, kernel_contract_rays, c, rays, lane, wanted, out, none);
 }
 
 /* Accepts the crossings that are computed by contraction (kernel_contraction.h). Returns the rays that contraction has
@@ -250,17 +249,16 @@ static __attribute__((noinline)) vm kernel_curved_accept_contracted(kernel_packe
 {
     const kernel_rays rays = kernel_packet_rays(p);
     const vi lane = vi_set(curved->lane);
-    kernel_decided known;
-    kernel_contract_packet(curved, &rays, lane, wanted, &known);
-    if (vm_any(known.one)) {
+    kernel_point at;
+    vm none;
+    kernel_contract_packet(curved, &rays, lane, wanted, &at, &none);
+    if (vm_any(at.mask)) {
         kernel_map map;
-        kernel_point at = {.t = known.t};
-        memcpy(at.r, known.r, sizeof at.r);
         kernel_maps_of_type(curved->at, lane, curved->type, &map);
-        kernel_polish_near(&rays, &map, known.one, KERNEL_CONTRACTION_END, &at);
-        kernel_curved_accept(p, state, c, curved, value, &map, known.one, &at);
+        kernel_polish_near(&rays, &map, at.mask, KERNEL_CONTRACTION_END, &at);
+        kernel_curved_accept(p, state, c, curved, value, &map, at.mask, &at);
     }
-    return vm_or(known.one, known.none);
+    return vm_or(at.mask, none);
 }
 
 static __attribute__((noinline)) void kernel_curved_surface(kernel_packet *p, kernel_surface_state *state,

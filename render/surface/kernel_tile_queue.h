@@ -48,10 +48,9 @@ static void kernel_tile_process_candidate(kernel_tile_trace *t, const kernel_til
  * mesh part in *part, and returns the number of its isovalue in the layer. */
 SIMD_INLINE int kernel_tile_set_source(kernel_tile_trace *t, uint32_t source, int *part)
 {
-    const kernel_isovalue *isovalue = &t->frame->isovalues[source % RENDER_MAX_ISOVALUES];
     *part = (int)(source / RENDER_MAX_ISOVALUES);
-    kernel_tile_set_layer(t, isovalue->surface);
-    return isovalue->value;
+    kernel_tile_set_layer(t, t->frame->isovalue_surface[source % RENDER_MAX_ISOVALUES]);
+    return t->frame->isovalue_number[source % RENDER_MAX_ISOVALUES];
 }
 
 SIMD_INLINE unsigned kernel_candidate_blocks(const kernel_tile_trace *t, const kernel_tile_candidate *candidate)
@@ -62,9 +61,21 @@ SIMD_INLINE unsigned kernel_candidate_blocks(const kernel_tile_trace *t, const k
 /* Maximum number of queued cells that are traced one by one. */
 enum { KERNEL_ALONE = SIMD_WIDTH };
 
+/* Numbers of the planes of the tile (kernel_tile.h) that classify nodes. */
+enum {
+    KERNEL_FIND_LEFT,
+    KERNEL_FIND_RIGHT,
+    KERNEL_FIND_TOP,
+    KERNEL_FIND_BOTTOM,
+    KERNEL_FIND_DEPTH,
+    KERNEL_FIND_ALONG,
+    KERNEL_FIND_PLANES
+};
+
 /* A tile's cells that are queued for tracing: one vector of cells per type, and cells that are traced one by one
- * (alone). */
-typedef struct kernel_tile_queue {
+ * (alone). And the state of a tile's search for cells in trees (kernel_tile_surface.h). A thread keeps it from tile to
+ * tile. */
+typedef struct kernel_tile_search {
     int layer, part;      /* layer and mesh part of the last queued cell; -1: there is none yet */
     kernel_arrays arrays; /* arrays of the layer's field on the mesh part */
     kernel_surface_cells pending[KERNEL_LANE_TYPES];
@@ -75,9 +86,20 @@ typedef struct kernel_tile_queue {
     /* binned candidates whose cells' vertex indices are being prefetched */
     int prefetched_count;
     const kernel_tile_candidate *prefetched[SIMD_WIDTH];
-} kernel_tile_queue;
+    /* The following members are used by the search. */
+    kernel_tile_trace *tile;
+    kernel_candidate_list list; /* the cells that have been found and are not queued yet */
+    kernel_candidate items[2 * SIMD_WIDTH];
+    /* number of pixels per unit of slope or, if the camera is orthographic, per scaled unit */
+    float column_scale, row_scale;
+    float pad[2]; /* margins by which columns and rows are extended, in pixels */
+    /* Planes of kernel_planes (kernel_tile.h). A point's signed distance from one is normal . position + offset, with a
+     * rounding error of at most `error`. size: absolute values of the normal's components. */
+    float normal[3][KERNEL_FIND_PLANES], size[3][KERNEL_FIND_PLANES], offset[KERNEL_FIND_PLANES];
+    float error[KERNEL_FIND_PLANES];
+} kernel_tile_search;
 
-static void kernel_tile_queue_begin(kernel_tile_queue *m)
+static void kernel_tile_queue_begin(kernel_tile_search *m)
 {
     m->layer = m->part = -1;
     for (int i = 0; i < KERNEL_LANE_TYPES; i++) {
@@ -90,7 +112,7 @@ static void kernel_tile_queue_begin(kernel_tile_queue *m)
 }
 
 /* Sets the mesh part of the cells that are queued next; their layer is the current one. */
-SIMD_INLINE void kernel_tile_queue_set_part(const kernel_tile_trace *t, kernel_tile_queue *m, int part)
+SIMD_INLINE void kernel_tile_queue_set_part(const kernel_tile_trace *t, kernel_tile_search *m, int part)
 {
     if (m->layer == t->layer && m->part == part) return;
     m->layer = t->layer;
@@ -101,7 +123,7 @@ SIMD_INLINE void kernel_tile_queue_set_part(const kernel_tile_trace *t, kernel_t
 /* Returns whether a cell of the queue's layer and part is to be queued in the vector of its type. Polyhedra never are.
  * In a mesh of mixed types a tile has few large wedges or pyramids of one type; these are traced one by one, because
  * their hits then hide other cells sooner. */
-SIMD_INLINE bool kernel_is_traced_in_vectors(const kernel_tile_queue *m, const kernel_tile_candidate *candidate,
+SIMD_INLINE bool kernel_is_traced_in_vectors(const kernel_tile_search *m, const kernel_tile_candidate *candidate,
                                              int type)
 {
     if (!m->arrays.has_lanes || kernel_has_own_faces(type)) return false;
@@ -110,7 +132,7 @@ SIMD_INLINE bool kernel_is_traced_in_vectors(const kernel_tile_queue *m, const k
 }
 
 /* Traces the pending cells of a type. */
-static void kernel_tile_queue_trace(kernel_tile_trace *t, kernel_tile_queue *m, kernel_surface_cells *own)
+static void kernel_tile_queue_trace(kernel_tile_trace *t, kernel_tile_search *m, kernel_surface_cells *own)
 {
     const int layer = t->layer;
     if (!own->count) return;
@@ -122,7 +144,7 @@ static void kernel_tile_queue_trace(kernel_tile_trace *t, kernel_tile_queue *m, 
     kernel_tile_set_layer(t, layer);
 }
 
-SIMD_INLINE void kernel_tile_queue_append(kernel_tile_trace *t, kernel_tile_queue *m, kernel_surface_cells *own,
+SIMD_INLINE void kernel_tile_queue_append(kernel_tile_trace *t, kernel_tile_search *m, kernel_surface_cells *own,
                                           const kernel_tile_candidate *candidate, int value)
 {
     if (own->layer != m->layer || own->part != m->part) {
@@ -137,7 +159,7 @@ SIMD_INLINE void kernel_tile_queue_append(kernel_tile_trace *t, kernel_tile_queu
 
 /* Traces the cells that are in no vector, one by one. The vectors of cells are traced before, because their cells were
  * found earlier and their hits may hide the single cells. */
-static void kernel_tile_queue_trace_singly(kernel_tile_trace *t, kernel_tile_queue *m)
+static void kernel_tile_queue_trace_singly(kernel_tile_trace *t, kernel_tile_search *m)
 {
     if (!m->alone_count) return;
     for (int i = 0; i < KERNEL_LANE_TYPES; i++) kernel_tile_queue_trace(t, m, &m->pending[i]);
@@ -152,7 +174,7 @@ static void kernel_tile_queue_trace_singly(kernel_tile_trace *t, kernel_tile_que
 
 /* Queues a cell of the current layer and the given part for tracing: in a batch if it fits one, else in the list of
  * single cells. */
-SIMD_INLINE void kernel_tile_queue_add(kernel_tile_trace *t, kernel_tile_queue *m,
+SIMD_INLINE void kernel_tile_queue_add(kernel_tile_trace *t, kernel_tile_search *m,
                                        const kernel_tile_candidate *candidate, int part, int value)
 {
     kernel_tile_queue_set_part(t, m, part);
@@ -166,7 +188,7 @@ SIMD_INLINE void kernel_tile_queue_add(kernel_tile_trace *t, kernel_tile_queue *
 }
 
 /* Traces all cells that are still queued. */
-static void kernel_tile_queue_finish(kernel_tile_trace *t, kernel_tile_queue *m)
+static void kernel_tile_queue_finish(kernel_tile_trace *t, kernel_tile_search *m)
 {
     kernel_tile_queue_trace_singly(t, m);
     for (int i = 0; i < KERNEL_LANE_TYPES; i++) kernel_tile_queue_trace(t, m, &m->pending[i]);

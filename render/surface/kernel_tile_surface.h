@@ -25,32 +25,6 @@
 #include "render.h"
 #include "simd.h"
 
-/* Numbers of the planes of the tile (kernel_tile.h) that classify nodes. */
-enum {
-    KERNEL_FIND_LEFT,
-    KERNEL_FIND_RIGHT,
-    KERNEL_FIND_TOP,
-    KERNEL_FIND_BOTTOM,
-    KERNEL_FIND_DEPTH,
-    KERNEL_FIND_ALONG,
-    KERNEL_FIND_PLANES
-};
-
-/* The state of a tile's search for cells, and the queue of cells to be traced. A thread keeps it from tile to tile. */
-typedef struct kernel_tile_search {
-    kernel_tile_trace *tile;
-    kernel_tile_queue queue;
-    kernel_candidate_list list; /* the cells that have been found and are not queued yet */
-    kernel_candidate items[2 * SIMD_WIDTH];
-    /* number of pixels per unit of slope or, if the camera is orthographic, per scaled unit */
-    float column_scale, row_scale;
-    float pad[2]; /* margins by which columns and rows are extended, in pixels */
-    /* Planes of kernel_planes (kernel_tile.h). A point's signed distance from one is normal . position + offset, with a
-     * rounding error of at most `error`. size: absolute values of the normal's components. */
-    float normal[3][KERNEL_FIND_PLANES], size[3][KERNEL_FIND_PLANES], offset[KERNEL_FIND_PLANES];
-    float error[KERNEL_FIND_PLANES];
-} kernel_tile_search;
-
 /* ---- cells of leaves ---- */
 
 /* Queues the cells found so far for tracing, unless nearer hits hide them. */
@@ -64,7 +38,7 @@ static bool kernel_tile_find_flush(kernel_candidate_list *list)
         const int value = kernel_tile_set_source(t, found->source, &part);
         const kernel_tile_candidate candidate = kernel_candidate_in_tile(found, t->tile.x0, t->tile.y0);
         if (kernel_candidate_blocks(t, &candidate) && kernel_pixels_beyond(t, candidate.box, found->near))
-            kernel_tile_queue_add(t, &s->queue, &candidate, part, value);
+            kernel_tile_queue_add(t, s, &candidate, part, value);
     }
     list->count = 0;
     return true;
@@ -98,13 +72,6 @@ static void kernel_tile_find_leaf(kernel_tile_trace *t, int part, const uint32_t
 /* Number of nodes that are tested at once, one per lane, with siblings in neighbouring lanes. While these are tested,
  * the data of further nodes are prefetched. */
 enum { KERNEL_NODES_AT_ONCE = SIMD_WIDTH / 2, KERNEL_NODES_ROOM = (KERNEL_NODES_AT_ONCE + 1) * MMBVH_MAX_DEPTH };
-
-/* A node that may be visible. ref: index of the node's first cell if it is a leaf, otherwise of its left child. */
-typedef struct kernel_tile_node {
-    int64_t ref;
-    float near;
-    uint16_t box, count; /* number of cells of a leaf; 0 for an inner node */
-} kernel_tile_node;
 
 /* One node per lane: its box and range of values, and the results of testing it: its least depth (near), box of pixels
  * (box), and position along the tile's direction, by which nodes are sorted (along). */
@@ -270,7 +237,7 @@ SIMD_INLINE void kernel_tile_find_cells(kernel_tile_trace *t, int part)
         int inner_count = 0;
         for (int n = 0; n < most && top; n++) {
             const kernel_tile_node e = stack[--top];
-            if (!kernel_pixels_beyond(t, e.box, e.near)) continue;
+            if (!kernel_pixels_beyond(t, e.place, e.near)) continue;
             if (e.count) {
                 kernel_tile_find_leaf(t, part, tree->cells + e.ref, e.count);
             } else {
@@ -344,13 +311,13 @@ static void kernel_tile_surfaces(kernel_tile_trace *t)
     s->list = (kernel_candidate_list){.items = s->items, .capacity = 2 * SIMD_WIDTH};
     t->thread->finder->frame = NULL;
     kernel_tile_find_begin(t);
-    kernel_tile_queue_begin(&s->queue);
+    kernel_tile_queue_begin(s);
     for (int layer = 0; layer < t->frame->surface_count; layer++) {
         kernel_tile_set_layer(t, layer);
         kernel_tile_surface(t);
         if (t->thread->finder->frame) kernel_find_flush(t->thread->finder);
         kernel_tile_find_flush(&s->list);
-        kernel_tile_queue_finish(t, &s->queue);
+        kernel_tile_queue_finish(t, s);
     }
 }
 

@@ -14,24 +14,23 @@ static inline double kernel_extinction_of(double opacity)
     return opacity < 1 ? fmin(-log1p(-opacity), kernel_most_extinction) : kernel_most_extinction;
 }
 
-static inline double kernel_piece_opacity(const kernel_piece *p, double x)
+static inline double kernel_piece_opacity(const kernel_real *p, double x)
 {
-    const kernel_real *e = p->entry;
-    const double along = (x - (double)e[KERNEL_PIECE_LOW]) - (double)e[KERNEL_PIECE_LOW_REST];
-    return fmin(fmax((double)e[KERNEL_PIECE_OPACITY] + along * (double)e[KERNEL_PIECE_SLOPE], 0), 1);
+    const double along = (x - (double)p[KERNEL_PIECE_LOW]) - (double)p[KERNEL_PIECE_LOW_REST];
+    return fmin(fmax((double)p[KERNEL_PIECE_OPACITY] + along * (double)p[KERNEL_PIECE_SLOPE], 0), 1);
 }
 
 /* Computes the minimum and the maximum of the absolute slope of the extinction between two values of a piece. */
-static inline void kernel_piece_steepness(const kernel_piece *p, double from, double to, double out[2])
+static inline void kernel_piece_steepness(const kernel_real *p, double from, double to, double out[2])
 {
     const double a0 = kernel_piece_opacity(p, from), a1 = kernel_piece_opacity(p, to), most = fmax(a0, a1);
-    const double steepness = fabs((double)p->entry[KERNEL_PIECE_SLOPE]);
+    const double steepness = fabs((double)p[KERNEL_PIECE_SLOPE]);
     out[0] = steepness / fmax(1 - fmin(a0, a1), 1e-30);
     out[1] = steepness > 0 ? (most < 1 ? fmin(steepness / (1 - most), 1e30) : 1e30) : 0;
 }
 
 /* Widens the bounds by those of the piece between two of its values. */
-static inline void kernel_bound_widen(kernel_bound *b, const kernel_piece *p, double from, double to)
+static inline void kernel_bound_widen(kernel_bound *b, const kernel_real *p, double from, double to)
 {
     const double a0 = kernel_piece_opacity(p, from), a1 = kernel_piece_opacity(p, to);
     double steepness[2];
@@ -40,7 +39,7 @@ static inline void kernel_bound_widen(kernel_bound *b, const kernel_piece *p, do
     b->extinction_high = fmaxf(b->extinction_high, (float)kernel_extinction_of(fmax(a0, a1)));
     b->extinction_slope = fmaxf(b->extinction_slope, (float)steepness[1]);
     for (int c = 0; c < 3; c++)
-        b->colour_slope = fmaxf(b->colour_slope, fabsf((float)p->entry[KERNEL_PIECE_COLOUR_SLOPE + c]));
+        b->colour_slope = fmaxf(b->colour_slope, fabsf((float)p[KERNEL_PIECE_COLOUR_SLOPE + c]));
 }
 
 #endif

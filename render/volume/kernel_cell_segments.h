@@ -28,7 +28,7 @@ SIMD_INLINE vm kernel_values_have_step(const kernel_pieces *t, vf low, vf high)
 {
     vm any = vm_none();
     for (int i = 0; i < t->step_count; i++) {
-        const vf cut = vf_set(t->steps[i].cut);
+        const vf cut = vf_set(kernel_step_cut(t->steps[i]));
         any = vm_or(any, vm_and(vf_le(low, cut), vf_le(cut, high)));
     }
     return any;
@@ -107,7 +107,8 @@ typedef struct kernel_exact_point {
 /* State of the bisection of a ray's interval in a cell. */
 typedef struct kernel_bisection {
     kernel_segments *list;
-    const kernel_exact_map *map; /* inverse map of the cell */
+    const double (*map)[8]; /* coefficients of the cell's map (3 rows) and of the field */
+    bool is_pyramid;
     /* constants of the ray: at depth t its point is (u, v) * (slope * t + depth_offset) */
     double u, v, slope, depth_offset;
     kernel_exact_point in, out; /* ends of the interval, at the crossings of the faces */
@@ -129,10 +130,10 @@ static kernel_exact_point kernel_exact_point_at(const kernel_bisection *h, doubl
     const double reach = h->slope * t + h->depth_offset, target[3] = {h->u * reach, h->v * reach, t};
     double slopes[3];
     memcpy(out.r, guess, sizeof out.r);
-    if (!kernel_exact_newton(h->map, target, out.r) || !kernel_exact_is_near(out.r)) {
+    if (!kernel_exact_newton(h->map, h->is_pyramid, target, out.r) || !kernel_exact_is_near(out.r)) {
         out.r[0] = out.r[1] = 0.4;
         out.r[2] = 0.5;
-        if (!kernel_exact_newton(h->map, target, out.r) || !kernel_exact_is_near(out.r)) {
+        if (!kernel_exact_newton(h->map, h->is_pyramid, target, out.r) || !kernel_exact_is_near(out.r)) {
             const double share = (t - h->in.t) / (h->out.t - h->in.t);
             for (int a = 0; a < 3; a++) out.r[a] = kernel_interpolate(h->in.r[a], h->out.r[a], share);
             out.v = kernel_interpolate(h->in.v, h->out.v, share);
@@ -140,7 +141,7 @@ static kernel_exact_point kernel_exact_point_at(const kernel_bisection *h, doubl
             return out;
         }
     }
-    out.v = kernel_exact_value(h->map->field, out.r, kernel_exact_product(h->map->is_pyramid, out.r, slopes));
+    out.v = kernel_exact_value(h->map[3], out.r, kernel_exact_product(h->is_pyramid, out.r, slopes));
     return out;
 }
 
@@ -181,14 +182,14 @@ static kernel_exact_point kernel_exact_point_where(const kernel_bisection *h, co
 
 /* ---- effect of a subinterval on the light ---- */
 
-static inline double kernel_piece_low(const kernel_piece *p)
+static inline double kernel_piece_low(const kernel_real *p)
 {
-    return (double)p->entry[KERNEL_PIECE_LOW] + (double)p->entry[KERNEL_PIECE_LOW_REST];
+    return (double)p[KERNEL_PIECE_LOW] + (double)p[KERNEL_PIECE_LOW_REST];
 }
 
-static inline double kernel_piece_high(const kernel_piece *p)
+static inline double kernel_piece_high(const kernel_real *p)
 {
-    return (double)p->entry[KERNEL_PIECE_HIGH] + (double)p->entry[KERNEL_PIECE_HIGH_REST];
+    return (double)p[KERNEL_PIECE_HIGH] + (double)p[KERNEL_PIECE_HIGH_REST];
 }
 
 /* Returns bounds of the transfer function over the values from low to high. */
@@ -197,12 +198,12 @@ static kernel_bound kernel_bound_of_values(const kernel_pieces *t, double low, d
     const double last = KERNEL_PIECE_BINS - 1;
     kernel_bound out = {.extinction_low = 1e30f};
     int at = (int)t->bin_first[(int)fmin(fmax((low - (double)t->bin_low) * (double)t->bin_inverse, 0), last)];
-    while (at > 0 && low < kernel_piece_low(&t->pieces[at])) at--;
-    while (at + 1 < t->count && kernel_piece_high(&t->pieces[at]) <= low) at++;
+    while (at > 0 && low < kernel_piece_low(t->pieces[at])) at--;
+    while (at + 1 < t->count && kernel_piece_high(t->pieces[at]) <= low) at++;
     do {
-        const kernel_piece *p = &t->pieces[at++];
+        const kernel_real *p = t->pieces[at++];
         kernel_bound_widen(&out, p, fmax(low, kernel_piece_low(p)), fmin(high, kernel_piece_high(p)));
-    } while (at < t->count && kernel_piece_low(&t->pieces[at]) < high);
+    } while (at < t->count && kernel_piece_low(t->pieces[at]) < high);
     return out;
 }
 
@@ -249,25 +250,24 @@ static double kernel_subinterval_error(const kernel_bisection *h, const kernel_s
 /* ---- steps ---- */
 
 /* Returns a step of the opacity whose value is strictly between low and high, or NULL if there is none. */
-static const kernel_step *kernel_step_between(const kernel_bisection *h, double low, double high)
+static const double *kernel_step_between(const kernel_bisection *h, double low, double high)
 {
-    const kernel_step *steps = h->list->pieces->steps;
+    const double *steps = h->list->pieces->steps;
     for (int i = 0; i < h->list->pieces->step_count; i++)
-        if (low < steps[i].at && steps[i].at < high) return &steps[i];
+        if (low < steps[i] && steps[i] < high) return &steps[i];
     return NULL;
 }
 
-/* Computes the range of float values between two neighbouring steps of the opacity, in which `inside` lies. Pieces end
- * at steps, rounded to float. */
+/* Computes the range of float values between two neighbouring steps of the opacity, in which `inside` lies. */
 static void kernel_step_side(const kernel_bisection *h, double inside, float side[2])
 {
-    const kernel_step *steps = h->list->pieces->steps;
+    const double *steps = h->list->pieces->steps;
     int n = 0;
     side[0] = -3e38f, side[1] = 3e38f;
-    for (; n < h->list->pieces->step_count && steps[n].at <= inside; n++) side[0] = steps[n].cut;
+    for (; n < h->list->pieces->step_count && steps[n] <= inside; n++) side[0] = kernel_step_cut(steps[n]);
     /* a segment whose constant value is a step's value lies above the step; rounding must not move other segments
      * there */
-    if (n < h->list->pieces->step_count) side[1] = nextafterf(steps[n].cut, side[0]);
+    if (n < h->list->pieces->step_count) side[1] = nextafterf(kernel_step_cut(steps[n]), side[0]);
 }
 
 /* Rounds x to float and clamps it to the range between two neighbouring steps; *rest: the rounding error. */
@@ -280,13 +280,14 @@ static void kernel_step_round(const float side[2], double x, float *v, double *r
 
 /* Returns bounds of the transfer function over the subinterval's values. step: a step among the values, or NULL. */
 static kernel_bound kernel_subinterval_bound(const kernel_bisection *h, const kernel_subinterval *sub,
-                                             const kernel_step *step)
+                                             const double *step)
 {
     float side[2];
     kernel_step_side(h, sub->middle.v, side);
     if (step)
-        return kernel_bound_of_values(h->list->pieces, fmin(sub->low, (double)nextafterf(step->cut, -3e38f)),
-                                      fmax(sub->high, (double)nextafterf(step->cut, 3e38f)));
+        return kernel_bound_of_values(h->list->pieces,
+                                      fmin(sub->low, (double)nextafterf(kernel_step_cut(*step), -3e38f)),
+                                      fmax(sub->high, (double)nextafterf(kernel_step_cut(*step), 3e38f)));
     const double low = fmin(fmax(sub->low, (double)side[0]), (double)side[1]);
     const double high = fmin(fmax(sub->high, (double)side[0]), (double)side[1]);
     return kernel_bound_of_values(h->list->pieces, low, high);
@@ -343,7 +344,7 @@ static void kernel_subinterval_halve(kernel_bisection *h, int lane, kernel_exact
         const kernel_exact_point first = kernel_exact_point_between(h, &from, &sub.middle, 0.5);
         const kernel_exact_point third = kernel_exact_point_between(h, &sub.middle, &sub.end, 0.5);
         kernel_subinterval_sample(&from, &sub, &first, &third);
-        const kernel_step *step = kernel_step_between(h, sub.low, sub.high);
+        const double *step = kernel_step_between(h, sub.low, sub.high);
         const kernel_bound s = kernel_subinterval_bound(h, &sub, step);
         const double length = (sub.end.t - from.t) * h->per_t;
         const bool is_last = sub.depth >= KERNEL_BISECTION_DEPTH || h->count >= KERNEL_BISECTION_SEGMENTS ||
@@ -359,7 +360,7 @@ static void kernel_subinterval_halve(kernel_bisection *h, int lane, kernel_exact
         kernel_subinterval near = {.end = sub.middle, .middle = first, sub.depth + 1, sub.is_monotone};
         kernel_subinterval far = {.end = sub.end, .middle = third, sub.depth + 1, sub.is_monotone};
         if (step && sub.is_monotone) {
-            near.end = kernel_exact_point_where(h, &from, &sub.end, step->at);
+            near.end = kernel_exact_point_where(h, &from, &sub.end, *step);
             near.middle = kernel_exact_point_between(h, &from, &near.end, 0.5);
             far.middle = kernel_exact_point_between(h, &near.end, &far.end, 0.5);
         }
@@ -376,16 +377,17 @@ static __attribute__((noinline, cold)) void kernel_interval_bisect(kernel_packet
 {
     const kernel_frame *f = p->frame;
     const bool is_flat = f->job->camera.is_orthographic;
-    kernel_exact_map map;
-    kernel_lanes at;
-    kernel_packet_lanes(p, &at);
-    kernel_exact_setup(&map, p, c, &f->volumes[list->volume]);
+    double map[4][8];
+    double px[SIMD_WIDTH], py[SIMD_WIDTH];
+    kernel_packet_lanes(p, px, py);
+    kernel_exact_setup(map, p, c, &f->volumes[list->volume]);
     for (unsigned bits = vm_bits(rays); bits; bits &= bits - 1) {
         const int n = __builtin_ctz(bits);
         kernel_bisection h = {.list = list,
-                              .map = &map,
-                              .u = at.px[n] - p->tile->centre_x,
-                              .v = at.py[n] - p->tile->centre_y,
+                              .map = (const double(*)[8])map,
+                              .is_pyramid = kernel_has_apex(c->type),
+                              .u = px[n] - p->tile->centre_x,
+                              .v = py[n] - p->tile->centre_y,
                               .slope = is_flat ? 0 : 1,
                               .depth_offset = is_flat ? f->job->space.scale : p->tile->depth_shift,
                               .in = {.t = (double)i->t_in[n], .v = (double)i->v_in[n]},

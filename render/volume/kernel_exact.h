@@ -48,14 +48,14 @@ typedef struct kernel_double_face {
 /* Computes the (u, v) of a packet's rays in double, relative to the tile's centre. */
 SIMD_INLINE void kernel_double_rays_of(const kernel_packet *p, kernel_f64 u[2], kernel_f64 v[2])
 {
-    kernel_lanes lanes;
-    kernel_packet_lanes(p, &lanes);
+    double px[SIMD_WIDTH], py[SIMD_WIDTH];
+    kernel_packet_lanes(p, px, py);
     for (int i = 0; i < SIMD_WIDTH; i++) {
-        lanes.px[i] -= p->tile->centre_x;
-        lanes.py[i] -= p->tile->centre_y;
+        px[i] -= p->tile->centre_x;
+        py[i] -= p->tile->centre_y;
     }
-    memcpy(u, lanes.px, sizeof lanes.px);
-    memcpy(v, lanes.py, sizeof lanes.py);
+    memcpy(u, px, sizeof px);
+    memcpy(v, py, sizeof py);
 }
 
 /* ---- a cell ---- */
@@ -126,31 +126,9 @@ static __attribute__((noinline)) void kernel_double_begin(const kernel_frame *f,
 
 /* ---- rays in a tet ---- */
 
-/* Points at which rays meet the plane of a face. is_sound: rays for which the face is not seen edge on, so that the
- * point is valid. */
-typedef struct kernel_double_end {
-    kernel_f64 t, v;
-    kernel_f64_mask is_sound;
-} kernel_double_end;
-
 SIMD_INLINE kernel_f64 kernel_affine_at(const double c[3], kernel_f64 u, kernel_f64 v)
 {
     return (c[0] + c[1] * u) + c[2] * v;
-}
-
-SIMD_INLINE kernel_double_end kernel_double_intersect(const kernel_double_face *face, kernel_f64 u, kernel_f64 v)
-{
-    const kernel_f64 weight = kernel_affine_at(face->weight, u, v), inverse = 1.0 / weight;
-    return (kernel_double_end){kernel_affine_at(face->depth, u, v) * inverse,
-                               kernel_affine_at(face->value, u, v) * inverse,
-                               (kernel_f64_mask)(weight * weight > face->least * face->least)};
-}
-
-SIMD_INLINE void kernel_double_select(kernel_f64_mask m, const kernel_double_end *from, kernel_double_end *to)
-{
-    to->t = kernel_f64_select(m, from->t, to->t);
-    to->v = kernel_f64_select(m, from->v, to->v);
-    to->is_sound = (from->is_sound & m) | (to->is_sound & ~m);
 }
 
 /* Stores half of a vector of doubles, rounded to float32, and the rounding errors. */
@@ -165,23 +143,29 @@ SIMD_INLINE void kernel_double_value(kernel_f64 value, int half, vf *v, vf *rest
 SIMD_INLINE kernel_f64_mask kernel_double_half(const kernel_double_face faces[4], kernel_f64 u, kernel_f64 v,
                                                const vm hit[4], int half, kernel_unit_segment *out)
 {
-    kernel_double_end first = {0}, last = {0};
-    kernel_f64_mask met = {0};
+    kernel_f64 t[2] = {{0}, {0}}, value[2] = {{0}, {0}};
+    kernel_f64_mask met[2] = {{0}, {0}}, sound = ~(kernel_f64_mask){0};
     for (int n = 0; n < 4; n++) {
-        const kernel_f64_mask m = kernel_f64_of_mask(hit[n], half);
-        const kernel_double_end end = kernel_double_intersect(&faces[n], u, v);
-        kernel_double_select(m & ~met, &end, &first);
-        kernel_double_select(m & met, &end, &last);
-        met |= m;
+        const kernel_double_face *face = &faces[n];
+        const kernel_f64_mask hits = kernel_f64_of_mask(hit[n], half);
+        const kernel_f64 weight = kernel_affine_at(face->weight, u, v), inverse = 1.0 / weight;
+        const kernel_f64 depth = kernel_affine_at(face->depth, u, v) * inverse;
+        const kernel_f64 own = kernel_affine_at(face->value, u, v) * inverse;
+        /* the point is not valid if the face is seen edge on */
+        sound &= ~hits | (kernel_f64_mask)(weight * weight > face->least * face->least);
+        for (int end = 1; end >= 0; end--) {
+            const kernel_f64_mask m = end ? hits & met[0] : hits & ~met[0];
+            t[end] = kernel_f64_select(m, depth, t[end]);
+            value[end] = kernel_f64_select(m, own, value[end]);
+            met[end] |= m;
+        }
     }
-    const kernel_f64_mask swap = (kernel_f64_mask)(last.t < first.t);
-    const kernel_double_end nearer = first;
-    kernel_double_select(swap, &last, &first);
-    kernel_double_select(swap, &nearer, &last);
-    kernel_f64_store_lanes(&out->length, half, last.t - first.t);
-    kernel_double_value(first.v, half, &out->v_in, &out->rest_in);
-    kernel_double_value(last.v, half, &out->v_out, &out->rest_out);
-    return first.is_sound & last.is_sound;
+    const kernel_f64_mask swap = (kernel_f64_mask)(t[1] < t[0]);
+    kernel_f64_store_lanes(&out->length, half,
+                           kernel_f64_select(swap, t[0], t[1]) - kernel_f64_select(swap, t[1], t[0]));
+    kernel_double_value(kernel_f64_select(swap, value[1], value[0]), half, &out->v_in, &out->rest_in);
+    kernel_double_value(kernel_f64_select(swap, value[0], value[1]), half, &out->v_out, &out->rest_out);
+    return sound & met[0] & met[1];
 }
 
 /* Replaces, on the given rays, the length, in t, and the values of *run, a tet's interval in float32, by those computed
@@ -210,12 +194,8 @@ enum { KERNEL_EXACT_STEPS = 24 };
 
 /* ---- the map and the field ---- */
 
-typedef struct kernel_exact_map {
-    bool is_pyramid;
-    double position[3][8], field[8];
-} kernel_exact_map;
-
-static void kernel_exact_setup(kernel_exact_map *m, const kernel_packet *p, const kernel_cell *c,
+/* Computes the coefficients of the cell's map (3 rows), and of the field in the last row. */
+static void kernel_exact_setup(double map[4][8], const kernel_packet *p, const kernel_cell *c,
                                const kernel_transfer *transfer)
 {
     double d[4][GRID_MAX_CELL_VERTICES];
@@ -226,9 +206,7 @@ static void kernel_exact_setup(kernel_exact_map *m, const kernel_packet *p, cons
         d[2][i] = spot.t;
         d[3][i] = kernel_double_domain(transfer, c->values[i]);
     }
-    m->is_pyramid = kernel_has_apex(c->type);
-    for (int a = 0; a < 3; a++) kernel_polynomial_fit(m->position[a], c->type, d[a]);
-    kernel_polynomial_fit(m->field, c->type, d[3]);
+    for (int n = 0; n < 4; n++) kernel_polynomial_fit(map[n], c->type, d[n]);
 }
 
 /* Returns the bilinear product m, a term of the cell's map (kernel_map.h), at the reference coordinates r, and its
@@ -263,14 +241,14 @@ static inline void kernel_exact_gradient(const double c[8], const double r[3], d
 
 /* Inverts the map by Newton's method in double, until a step is below 1e-8, after which the error is below rounding.
  * Returns false if the method does not converge. */
-static bool kernel_exact_newton(const kernel_exact_map *map, const double target[3], double r[3])
+static bool kernel_exact_newton(const double (*map)[8], bool is_pyramid, const double target[3], double r[3])
 {
     for (int n = 0; n < KERNEL_EXACT_STEPS; n++) {
         double slopes[3], row[3][3], off[3], cross[3][3], largest = 0;
-        const double m = kernel_exact_product(map->is_pyramid, r, slopes);
+        const double m = kernel_exact_product(is_pyramid, r, slopes);
         for (int a = 0; a < 3; a++) {
-            off[a] = target[a] - kernel_exact_value(map->position[a], r, m);
-            kernel_exact_gradient(map->position[a], r, m, slopes, row[a]);
+            off[a] = target[a] - kernel_exact_value(map[a], r, m);
+            kernel_exact_gradient(map[a], r, m, slopes, row[a]);
         }
         for (int a = 0; a < 3; a++) {
             const double *x = row[(a + 1) % 3], *y = row[(a + 2) % 3];

@@ -113,7 +113,8 @@ SIMD_INLINE kernel_unit_segment kernel_unit_segment_of(vf length, vf v_in, vf v_
  * `common` points to it, which saves gathers. */
 typedef struct kernel_piece_index {
     vi at;
-    const kernel_piece *common;
+    const kernel_real *common;
+    vf low, high, low_rest, high_rest; /* values at the piece's two ends, and their rounding errors */
 } kernel_piece_index;
 
 SIMD_INLINE kernel_piece_index kernel_piece_index_of(const kernel_pieces *t, vm rays, vf piece)
@@ -121,29 +122,26 @@ SIMD_INLINE kernel_piece_index kernel_piece_index_of(const kernel_pieces *t, vm 
     const int lane = __builtin_ctz(vm_bits(rays));
     const int first = (int)piece[lane];
     const bool is_common = !vm_any(vm_andnot(rays, vf_eq(piece, vf_set((kernel_real)first))));
-    return (kernel_piece_index){vi_from_vf(vf_select(rays, piece, vf_set(0))), is_common ? &t->pieces[first] : NULL};
+    return (kernel_piece_index){.at = vi_from_vf(vf_select(rays, piece, vf_set(0))),
+                                .common = is_common ? t->pieces[first] : NULL};
 }
 
 SIMD_INLINE vf kernel_piece_entry(const kernel_pieces *t, const kernel_piece_index *place, int entry)
 {
-    if (place->common) return vf_set(place->common->entry[entry]);
-    return vf_gather(t->pieces[0].entry + entry, place->at * KERNEL_PIECE_ENTRIES);
+    if (place->common) return vf_set(place->common[entry]);
+    return vf_gather(t->pieces[0] + entry, place->at * KERNEL_PIECE_ENTRIES);
 }
 
-/* Values at a piece's two ends, and their rounding errors. */
-typedef struct kernel_piece_ends {
-    vf low, high, low_rest, high_rest;
-} kernel_piece_ends;
-
-SIMD_INLINE kernel_piece_ends kernel_piece_ends_of(const kernel_pieces *t, const kernel_piece_index *at)
+/* Sets the values at the ends of the pieces. */
+SIMD_INLINE void kernel_piece_read_ends(const kernel_pieces *t, kernel_piece_index *at)
 {
-    kernel_piece_ends out = {kernel_piece_entry(t, at, KERNEL_PIECE_LOW), kernel_piece_entry(t, at, KERNEL_PIECE_HIGH),
-                             vf_set(0), vf_set(0)};
+    at->low = kernel_piece_entry(t, at, KERNEL_PIECE_LOW);
+    at->high = kernel_piece_entry(t, at, KERNEL_PIECE_HIGH);
+    at->low_rest = at->high_rest = vf_set(0);
     if (__builtin_expect(t->has_rests, 0)) {
-        out.low_rest = kernel_piece_entry(t, at, KERNEL_PIECE_LOW_REST);
-        out.high_rest = kernel_piece_entry(t, at, KERNEL_PIECE_HIGH_REST);
+        at->low_rest = kernel_piece_entry(t, at, KERNEL_PIECE_LOW_REST);
+        at->high_rest = kernel_piece_entry(t, at, KERNEL_PIECE_HIGH_REST);
     }
-    return out;
 }
 
 /* Returns the number of the piece that contains the value x + rest. At a boundary that is the upper piece, or the lower
@@ -153,12 +151,12 @@ SIMD_INLINE vf kernel_piece_find(const kernel_pieces *t, vm rays, vf x, vf rest,
     const vf spot = vf_clamp((x - t->bin_low) * t->bin_inverse, vf_set(0), vf_set(KERNEL_PIECE_BINS - 1));
     vf piece = vf_gather(t->bin_first, vi_from_vf(spot));
     for (vm open = rays; vm_any(open);) {
-        const kernel_piece_index at = kernel_piece_index_of(t, open, piece);
-        const kernel_piece_ends ends = kernel_piece_ends_of(t, &at);
-        vf below = x - ends.low, above = ends.high - x;
+        kernel_piece_index at = kernel_piece_index_of(t, open, piece);
+        kernel_piece_read_ends(t, &at);
+        vf below = x - at.low, above = at.high - x;
         if (__builtin_expect(t->has_rests, 0)) {
-            below += rest - ends.low_rest;
-            above += ends.high_rest - rest;
+            below += rest - at.low_rest;
+            above += at.high_rest - rest;
         }
         const vf zero = vf_set(0);
         const vm up = vm_and(open, vm_or(vf_lt(above, zero), vm_andnot(vf_eq(above, zero), falling)));
@@ -169,7 +167,7 @@ SIMD_INLINE vf kernel_piece_find(const kernel_pieces *t, vm rays, vf x, vf rest,
     return piece;
 }
 
-/* A ray's position in a segment, and in a piece of the transfer function. */
+/* A ray's position in a segment, and in a piece of the transfer function, and one step of the integration there. */
 typedef struct kernel_piece_state {
     vf below, above;     /* distances of the value to the piece's low and high end */
     vf remaining;        /* remaining change of the value within this piece */
@@ -183,6 +181,12 @@ typedef struct kernel_piece_state {
     vm falling, level;
     vf sign;      /* sign of the value's change along the ray: 1 or -1 */
     vf per_value; /* length of the ray per change of the value */
+    /* The following members describe the step. */
+    vf opacity, clear; /* opacity at the step's begin, and 1 - opacity */
+    vf rise;           /* change of the opacity over the part of the piece that lies ahead of the ray */
+    vf share;          /* fraction of that part that the step covers */
+    vf length;         /* length of the step, in unit distances */
+    vm is_opaque;
 } kernel_piece_state;
 
 SIMD_INLINE kernel_piece_state kernel_piece_state_begin(const kernel_unit_segment *run)
@@ -198,7 +202,7 @@ SIMD_INLINE kernel_piece_state kernel_piece_state_begin(const kernel_unit_segmen
 
 /* Sets the positions of the rays in `fresh`, which enter a piece with the given ends. */
 SIMD_INLINE void kernel_piece_state_enter(kernel_piece_state *s, const kernel_unit_segment *run, vm fresh,
-                                          const kernel_piece_ends *ends)
+                                          const kernel_piece_index *ends)
 {
     const vf v = s->edge, zero = vf_set(0);
     const vf below = vf_max((v - ends->low) + (s->rest - ends->low_rest), zero);
@@ -218,65 +222,55 @@ SIMD_INLINE void kernel_piece_state_enter(kernel_piece_state *s, const kernel_un
 
 /* Interpolates between at_low and at_high from both ends of the piece. Near an end with value 0 the result is as exact
  * as the distance to that end. */
-SIMD_INLINE vf kernel_piece_state_interpolate(const kernel_piece_state *piece_state, vf inverse, vf at_low, vf at_high)
+SIMD_INLINE vf kernel_piece_state_interpolate(const kernel_piece_state *s, vf inverse, vf at_low, vf at_high)
 {
     const vf zero = vf_set(0), one = vf_set(1);
-    const vf from_low = at_low * vf_clamp(piece_state->above * inverse, zero, one);
-    const vf from_high = at_high * vf_clamp(piece_state->below * inverse, zero, one);
+    const vf from_low = at_low * vf_clamp(s->above * inverse, zero, one);
+    const vf from_high = at_high * vf_clamp(s->below * inverse, zero, one);
     return vf_min(from_low + from_high, one);
 }
 
-/* One step of the integration in a piece. */
-typedef struct kernel_integration_step {
-    vf opacity, clear; /* opacity at the step's begin, and 1 - opacity */
-    vf rise;           /* change of the opacity over the part of the piece that lies ahead of the ray */
-    vf share;          /* fraction of that part that the step covers */
-    vf length;         /* length of the step, in unit distances */
-    vm is_opaque;
-} kernel_integration_step;
-
-SIMD_INLINE kernel_integration_step kernel_integration_step_begin(const kernel_pieces *t, const kernel_piece_index *at,
-                                                                  const kernel_piece_state *s)
+SIMD_INLINE void kernel_integration_step_begin(const kernel_pieces *t, const kernel_piece_index *at,
+                                               kernel_piece_state *s)
 {
     const vf inverse = kernel_piece_entry(t, at, KERNEL_PIECE_INVERSE);
-    kernel_integration_step out;
-    out.opacity = kernel_piece_state_interpolate(s, inverse, kernel_piece_entry(t, at, KERNEL_PIECE_OPACITY),
-                                                 kernel_piece_entry(t, at, KERNEL_PIECE_OPACITY_HIGH));
-    out.clear = kernel_piece_state_interpolate(s, inverse, kernel_piece_entry(t, at, KERNEL_PIECE_CLEAR),
-                                               kernel_piece_entry(t, at, KERNEL_PIECE_CLEAR_HIGH));
-    out.rise = s->sign * s->remaining * kernel_piece_entry(t, at, KERNEL_PIECE_SLOPE);
-    return out;
+    s->opacity = kernel_piece_state_interpolate(s, inverse, kernel_piece_entry(t, at, KERNEL_PIECE_OPACITY),
+                                                kernel_piece_entry(t, at, KERNEL_PIECE_OPACITY_HIGH));
+    s->clear = kernel_piece_state_interpolate(s, inverse, kernel_piece_entry(t, at, KERNEL_PIECE_CLEAR),
+                                              kernel_piece_entry(t, at, KERNEL_PIECE_CLEAR_HIGH));
+    s->rise = s->sign * s->remaining * kernel_piece_entry(t, at, KERNEL_PIECE_SLOPE);
 }
 
-SIMD_INLINE void kernel_integration_step_limit(kernel_integration_step *st, vf left, vf shortest)
+SIMD_INLINE void kernel_integration_step_limit(kernel_piece_state *s)
 {
-    const vf zero = vf_set(0), one = vf_set(1), rise = vf_abs(st->rise), ratio = st->clear * KERNEL_STEP_RATIO;
+    const vf left = s->remaining_length, zero = vf_set(0), one = vf_set(1), rise = vf_abs(s->rise),
+             ratio = s->clear * KERNEL_STEP_RATIO;
     const vm nonlinear_part = vf_lt(ratio, rise);
-    st->share = one;
+    s->share = one;
     if (vm_any(nonlinear_part))
-        st->share = vf_select(nonlinear_part, vf_min(vf_max(ratio / rise, shortest / left), one), one);
-    st->is_opaque = vm_and(vf_eq(st->clear, zero), vf_eq(rise, zero));
-    const vf up = vf_max(st->share * st->rise, zero), clear = vf_max(st->clear - up, vf_set(KERNEL_TINY));
-    const vf most = kernel_extinction(vf_min(st->opacity + up, one), clear), length = left * st->share;
-    const vf depth = length * vf_select(st->is_opaque, vf_set(KERNEL_OPAQUE), most);
+        s->share = vf_select(nonlinear_part, vf_min(vf_max(ratio / rise, s->shortest / left), one), one);
+    s->is_opaque = vm_and(vf_eq(s->clear, zero), vf_eq(rise, zero));
+    const vf up = vf_max(s->share * s->rise, zero), clear = vf_max(s->clear - up, vf_set(KERNEL_TINY));
+    const vf most = kernel_extinction(vf_min(s->opacity + up, one), clear), length = left * s->share;
+    const vf depth = length * vf_select(s->is_opaque, vf_set(KERNEL_OPAQUE), most);
     if (vm_any(vf_lt(vf_set(KERNEL_STEP_CHANGE), depth))) {
-        const vf change = vf_min(length * st->share * rise / clear, depth);
+        const vf change = vf_min(length * s->share * rise / clear, depth);
         const vf over = vf_max(depth * (1 / KERNEL_STEP_DEPTH), vf_sqrt(change * (1 / KERNEL_STEP_CHANGE)));
-        st->share = vf_select(vf_lt(one, over), st->share / over, st->share);
+        s->share = vf_select(vf_lt(one, over), s->share / over, s->share);
     }
-    st->length = left * st->share;
+    s->length = left * s->share;
 }
 
 /* Computes the light that a step emits (*e0), and the first moment of the emission along the step (*e1). Returns the
  * step's optical depth. */
-SIMD_INLINE vf kernel_integration_step_sum(const kernel_integration_step *st, vf *e0, vf *e1)
+SIMD_INLINE vf kernel_integration_step_sum(const kernel_piece_state *s, vf *e0, vf *e1)
 {
     vf sigma[KERNEL_NODES], depth = vf_set(0);
-    const vf rise = st->rise * st->share, zero = vf_set(0), one = vf_set(1);
+    const vf rise = s->rise * s->share, zero = vf_set(0), one = vf_set(1);
     for (int j = 0; j < KERNEL_NODES; j++) {
-        const vf up = rise * kernel_gauss.node[j], clear = vf_clamp(st->clear - up, vf_set(KERNEL_TINY), one);
-        const vf extinction = kernel_extinction(vf_clamp(st->opacity + up, zero, one), clear);
-        sigma[j] = vf_select(st->is_opaque, vf_set(KERNEL_OPAQUE), extinction) * st->length;
+        const vf up = rise * kernel_gauss.node[j], clear = vf_clamp(s->clear - up, vf_set(KERNEL_TINY), one);
+        const vf extinction = kernel_extinction(vf_clamp(s->opacity + up, zero, one), clear);
+        sigma[j] = vf_select(s->is_opaque, vf_set(KERNEL_OPAQUE), extinction) * s->length;
     }
     *e0 = *e1 = zero;
     for (int j = 0; j < KERNEL_NODES; j++) {
@@ -290,17 +284,16 @@ SIMD_INLINE vf kernel_integration_step_sum(const kernel_integration_step *st, vf
     return depth;
 }
 
-/* Adds the light of one integration step, over which the value changes by `move`. `below` is the distance of the value
- * at the step's begin from the piece's low end. */
-SIMD_INLINE void kernel_light_step(const kernel_pieces *t, const kernel_piece_index *at, vm open, vf below, vf move,
-                                   const kernel_integration_step *st, kernel_light *light)
+/* Adds the light of one integration step, over which the value changes by `move`. */
+SIMD_INLINE void kernel_light_step(const kernel_pieces *t, const kernel_piece_index *at, vm open, vf move,
+                                   const kernel_piece_state *s, kernel_light *light)
 {
     vf e0, e1;
-    const vf depth = kernel_integration_step_sum(st, &e0, &e1);
+    const vf depth = kernel_integration_step_sum(s, &e0, &e1);
     const vf whole = light->transmittance * e0, moment = light->transmittance * e1 * move;
     for (int a = 0; a < 3; a++) {
         const vf slope = kernel_piece_entry(t, at, KERNEL_PIECE_COLOUR_SLOPE + a);
-        const vf colour = kernel_piece_entry(t, at, KERNEL_PIECE_COLOUR + a) + below * slope;
+        const vf colour = kernel_piece_entry(t, at, KERNEL_PIECE_COLOUR + a) + s->below * slope;
         const vf sum = light->colour[a] + (whole * colour + moment * slope);
         light->colour[a] = vf_select(open, sum, light->colour[a]);
     }
@@ -316,20 +309,20 @@ static __attribute__((noinline)) void kernel_integrate(const kernel_pieces *t, v
     vf piece = kernel_piece_find(t, rays, run->v_in, run->rest_in, s.falling);
     vm open = rays, fresh = rays;
     while (vm_any(open)) {
-        const kernel_piece_index at = kernel_piece_index_of(t, open, piece);
+        kernel_piece_index at = kernel_piece_index_of(t, open, piece);
         if (vm_any(fresh)) {
-            const kernel_piece_ends ends = kernel_piece_ends_of(t, &at);
-            kernel_piece_state_enter(&s, run, fresh, &ends);
+            kernel_piece_read_ends(t, &at);
+            kernel_piece_state_enter(&s, run, fresh, &at);
         }
-        kernel_integration_step st = kernel_integration_step_begin(t, &at, &s);
-        kernel_integration_step_limit(&st, s.remaining_length, s.shortest);
-        const vf size = s.remaining * st.share, move = s.sign * size;
-        kernel_light_step(t, &at, open, s.below, move, &st, light);
+        kernel_integration_step_begin(t, &at, &s);
+        kernel_integration_step_limit(&s);
+        const vf size = s.remaining * s.share, move = s.sign * size;
+        kernel_light_step(t, &at, open, move, &s, light);
         s.below += move;
         s.above -= move;
         s.remaining -= size;
-        s.remaining_length -= st.length;
-        const vm through = vf_le(vf_set(1), st.share);
+        s.remaining_length -= s.length;
+        const vm through = vf_le(vf_set(1), s.share);
         open = vm_and(vm_andnot(open, vm_and(through, s.is_last)), vf_lt(vf_set(KERNEL_BLACK), light->transmittance));
         fresh = vm_and(open, through);
         piece = vf_select(fresh, piece + s.sign, piece);

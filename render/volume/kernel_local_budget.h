@@ -140,45 +140,19 @@ SIMD_INLINE vm kernel_local_leaves_range(const kernel_local_bounds *b, const ker
                  vf_lt(kernel_gather_lane(b->high, p->rays.lane), high));
 }
 
-/* Errors, per ray, that arise if one segment replaces the ray's whole interval in its cell. */
-typedef struct kernel_local_errors {
-    vf mean;           /* mean of |v - f|; with n segments it is divided by n^2 */
-    vf quartic;        /* upper bound E of the quartic part of the field's deviation from its chord */
-    vf residual_error; /* error of the field that the residual of Newton's method causes */
-    vf length;         /* length of the interval in unit distances */
-    /* variation of the error's weight g (see the top of this file) that is caused by the changes of T and b along the
-     * segment */
-    vf weight_change;
-} kernel_local_errors;
-
-SIMD_INLINE void kernel_local_errors_of(const kernel_local_budget *b, const kernel_local_bounds *bounds,
-                                        const kernel_local_pairs *p, kernel_local_errors *out)
-{
-    const vi lane = p->rays.lane;
-    const vf *d = p->field, length = (p->ends[1].t - p->ends[0].t) * vf_gather(b->per_t, p->rays.at);
-    const vf parabola = vf_abs(d[1]), cubic = 0.5f * vf_abs(d[2] - d[0]);
-    const vf bend = kernel_gather_lane(bounds->bend, lane);
-    const float square = p->share * p->share, unsampled = p->share < 1 ? 2 * square * square : 1;
-    const vf unseen = unsampled * kernel_gather_lane(bounds->unsampled, lane);
-    const vf least = vf_muladd(0.01f * bend, parabola + cubic, unseen);
-    const vf depth = vf_min(kernel_gather_lane(bounds->extinction, lane) * length, vf_set(1));
-    out->quartic = vf_max(vf_abs(0.5f * (d[0] + d[2]) - 0.75f * d[1]), least);
-    out->mean = 0.26f * parabola + (1.09f * cubic + 4.0f * out->quartic);
-    out->residual_error = kernel_gather_lane(bounds->sensitivity, lane) * p->residual;
-    if (__builtin_expect(b->pieces->has_rests, 0)) {
-        const vf largest = vf_max(vf_max(vf_abs(p->ends[0].value), vf_abs(p->ends[1].value)), vf_set(1));
-        out->residual_error += KERNEL_VALUE_ROUNDING * largest;
-    }
-    out->length = length;
-    out->weight_change = kernel_gather_lane(bounds->weight_change, lane) * depth;
-}
+/* Errors of one segment that replaces a ray's whole interval in its cell:
+ *     mean            mean of |v - f|; with n segments it is divided by n^2
+ *     quartic         upper bound E of the quartic part of the field's deviation from its chord
+ *     residual_error  error of the field that the residual of Newton's method causes
+ *     weight_change   variation of the error's weight g that the changes of T and b along the segment cause */
 
 /* Returns the error of light per unit distance if the interval becomes one segment: the part that varies along the
  * segment, plus the part of its mean. */
-SIMD_INLINE vf kernel_local_single_segment_error(const kernel_local_errors *w, vf error_variation, vf cost)
+SIMD_INLINE vf kernel_local_single_segment_error(vf mean, vf quartic, vf residual_error, vf weight_change,
+                                                 vf error_variation, vf cost)
 {
-    const vf half = vf_min(0.5f * (error_variation + w->weight_change), cost);
-    return vf_muladd(half, w->mean, cost * (w->quartic + w->residual_error));
+    const vf half = vf_min(0.5f * (error_variation + weight_change), cost);
+    return vf_muladd(half, mean, cost * (quartic + residual_error));
 }
 
 /* Computes the upper bounds of the change of light by a field error, over the range of the ray's own values, which
@@ -196,11 +170,11 @@ SIMD_INLINE vm kernel_local_ray_bound(const kernel_pieces *t, const kernel_local
     return kernel_values_have_step(t, low - rounding, high + rounding);
 }
 
-/* Sets the number of segments per ray, with an allowed error that includes the ray's absorption. Returns the rays for
- * which no number is enough. */
-static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_local_budget *b,
-                                                                const kernel_local_errors *wrong, vf least,
-                                                                kernel_local_pairs *p)
+/* Sets the number of segments per ray, with an allowed error that includes the ray's absorption. length: that of the
+ * interval in unit distances. Returns the rays for which no number is enough. */
+static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_local_budget *b, vf mean, vf quartic,
+                                                                vf residual_error, vf weight_change, vf length,
+                                                                vf least, kernel_local_pairs *p)
 {
     const vf v0 = p->ends[0].value, v1 = p->ends[1].value, one = vf_set(1);
     vf opacities = 0.125f * (kernel_opacity(b->transfer, v0) + kernel_opacity(b->transfer, v1)), error_variation, cost;
@@ -208,12 +182,14 @@ static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_loc
         const vf value = v0 + (float)(i + 1) * 0.25f * (v1 - v0) + p->field[i];
         opacities += 0.25f * kernel_opacity(b->transfer, value);
     }
-    const vm has_step = kernel_local_ray_bound(b->pieces, p, wrong->quartic, &error_variation, &cost);
+    const vm has_step = kernel_local_ray_bound(b->pieces, p, quartic, &error_variation, &cost);
     /* The error of light that is allowed per unit distance. */
-    const vf allowed = b->allowance * (vf_set(1 / b->reach) + opacities / vf_muladd(wrong->length, opacities, one));
-    const vm few = vf_le(kernel_local_single_segment_error(wrong, error_variation, cost), allowed);
-    const vf half = vf_min(0.5f * (error_variation + wrong->weight_change), cost), made = half * wrong->mean;
-    const vf rest = cost * (wrong->quartic + wrong->residual_error) + vf_min(3.1f * half, 2.1f * cost) * wrong->quartic;
+    const vf allowed = b->allowance * (vf_set(1 / b->reach) + opacities / vf_muladd(length, opacities, one));
+    const vm few =
+        vf_le(kernel_local_single_segment_error(mean, quartic, residual_error, weight_change, error_variation, cost),
+              allowed);
+    const vf half = vf_min(0.5f * (error_variation + weight_change), cost), made = half * mean;
+    const vf rest = cost * (quartic + residual_error) + vf_min(3.1f * half, 2.1f * cost) * quartic;
     const vf wanted = -vf_floor(-vf_sqrt(made / vf_max(allowed - rest, vf_set(1e-30f))));
     p->count = vf_select(few, least, vf_clamp(wanted, vf_set(2), vf_set(KERNEL_LOCAL_PIECES + 1)));
     const vm fails = vm_or(vm_not(vf_lt(rest, 0.9f * allowed)), vf_lt(vf_set(KERNEL_LOCAL_PIECES), p->count));
@@ -236,20 +212,37 @@ SIMD_INLINE vm kernel_local_count_by_step(const kernel_local_budget *b, kernel_l
 SIMD_INLINE vm kernel_local_count(const kernel_local_budget *b, const kernel_local_bounds *bounds,
                                   kernel_local_pairs *p)
 {
-    kernel_local_errors wrong;
+    const vi lane = p->rays.lane;
     if (!(b->allowance > 0)) return kernel_local_count_by_step(b, p);
-    kernel_local_errors_of(b, bounds, p, &wrong);
+    const vf *d = p->field, length = (p->ends[1].t - p->ends[0].t) * vf_gather(b->per_t, p->rays.at);
+    const vf parabola = vf_abs(d[1]), cubic = 0.5f * vf_abs(d[2] - d[0]);
+    const float square = p->share * p->share, unsampled = p->share < 1 ? 2 * square * square : 1;
+    const vf unseen = unsampled * kernel_gather_lane(bounds->unsampled, lane);
+    const vf lower = vf_muladd(0.01f * kernel_gather_lane(bounds->bend, lane), parabola + cubic, unseen);
+    const vf depth = vf_min(kernel_gather_lane(bounds->extinction, lane) * length, vf_set(1));
+    const vf quartic = vf_max(vf_abs(0.5f * (d[0] + d[2]) - 0.75f * d[1]), lower);
+    const vf mean = 0.26f * parabola + (1.09f * cubic + 4.0f * quartic);
+    const vf weight_change = kernel_gather_lane(bounds->weight_change, lane) * depth;
+    vf residual_error = kernel_gather_lane(bounds->sensitivity, lane) * p->residual;
+    if (__builtin_expect(b->pieces->has_rests, 0)) {
+        const vf largest = vf_max(vf_max(vf_abs(p->ends[0].value), vf_abs(p->ends[1].value)), vf_set(1));
+        residual_error += KERNEL_VALUE_ROUNDING * largest;
+    }
     const vf one = vf_set(1), allowed = vf_set(b->allowance * (1 / b->reach));
-    const vf error_variation = kernel_gather_lane(bounds->error_variation, p->rays.lane),
-             cost = kernel_gather_lane(bounds->cost, p->rays.lane);
+    const vf error_variation = kernel_gather_lane(bounds->error_variation, lane),
+             cost = kernel_gather_lane(bounds->cost, lane);
     const vm strays = kernel_local_leaves_range(bounds, p);
-    vm enough = vm_andnot(vf_le(kernel_local_single_segment_error(&wrong, error_variation, cost), allowed), strays);
+    vm enough = vm_andnot(
+        vf_le(kernel_local_single_segment_error(mean, quartic, residual_error, weight_change, error_variation, cost),
+              allowed),
+        strays);
     if (__builtin_expect(b->pieces->step_count > 0, 0))
-        enough = vm_andnot(enough, kernel_values_have_step(b->pieces, kernel_gather_lane(bounds->low, p->rays.lane),
-                                                           kernel_gather_lane(bounds->high, p->rays.lane)));
+        enough = vm_andnot(enough, kernel_values_have_step(b->pieces, kernel_gather_lane(bounds->low, lane),
+                                                           kernel_gather_lane(bounds->high, lane)));
     p->count = one;
     if (!vm_any(vm_andnot(p->active, enough))) return vm_none();
-    const vm none = kernel_local_count_by_depth(b, &wrong, vf_select(strays, 2.0f * one, one), p);
+    const vm none = kernel_local_count_by_depth(b, mean, quartic, residual_error, weight_change, length,
+                                                vf_select(strays, 2.0f * one, one), p);
     p->count = vf_select(enough, one, p->count);
     return vm_andnot(none, enough);
 }

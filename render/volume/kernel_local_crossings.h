@@ -20,18 +20,6 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
-enum { KERNEL_LOCAL_ROW = 16, KERNEL_LOCAL_ROWS = 3 };
-
-/* What is computed of the faces of one cell per lane, beside kernel_transformed_curved. For vectors of 16 lanes `rows`
- * holds the data of the transformed cells per cell, in three rows of 16 numbers: x and y by vertex; z and the field by
- * vertex; the corners' words by face. */
-typedef struct kernel_local_faces {
-    /* per cell, a bit for each quad that may not look convex on some of the cell's pixels
-     * (kernel_curved_nonconvex_quads()) */
-    float nonconvex[SIMD_WIDTH];
-    float rows[SIMD_WIDTH < KERNEL_LOCAL_ROW ? 1 : SIMD_WIDTH][KERNEL_LOCAL_ROWS][KERNEL_LOCAL_ROW];
-} kernel_local_faces;
-
 /* ---- cells ---- */
 
 /* Does one step of a transposition of 16 × 16 floats, after vf_transpose() has transposed the 4 × 4 blocks: exchanges
@@ -50,7 +38,7 @@ SIMD_INLINE void kernel_local_transpose(vf v[KERNEL_LOCAL_ROW], vi number, int a
 /* Stores row number `row` of every cell, by transposing two lists of up to 8 vectors each, whose lanes are cells. */
 SIMD_INLINE void kernel_local_row_of(const float (*first)[SIMD_WIDTH], int first_count,
                                      const float (*second)[SIMD_WIDTH], int second_count, int row,
-                                     kernel_local_faces *out)
+                                     kernel_transformed_curved *out)
 {
     static const int32_t numbers[KERNEL_LOCAL_ROW] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
     vf v[KERNEL_LOCAL_ROW];
@@ -67,7 +55,8 @@ SIMD_INLINE void kernel_local_row_of(const float (*first)[SIMD_WIDTH], int first
 }
 
 /* Reads, per lane, the slopes and origins of the tile's rays at the cell's first and last column and row. */
-SIMD_INLINE void kernel_local_ray_box(const kernel_tile *tile, int32_t ends[4][SIMD_WIDTH], kernel_ray_box *out)
+SIMD_INLINE void kernel_local_ray_box(const kernel_tile *tile, int32_t ends[4][SIMD_WIDTH], vf slope[2][2],
+                                      vf origin[2][2])
 {
     const vf first = vf_set(0), last = vf_set(KERNEL_TILE - 1);
     for (int n = 0; n < 4; n++) {
@@ -75,68 +64,67 @@ SIMD_INLINE void kernel_local_ray_box(const kernel_tile *tile, int32_t ends[4][S
         vi at;
         memcpy(&at, ends[n], sizeof at);
         at = vi_from_vf(vf_clamp(vf_from_vi(at), first, last));
-        out->slope[a][end] = kernel_gather_tile_numbers(a ? tile->slope_y : tile->slope_x, at);
-        out->origin[a][end] = kernel_gather_tile_numbers(a ? tile->origin_y : tile->origin_x, at);
+        slope[a][end] = kernel_gather_tile_numbers(a ? tile->slope_y : tile->slope_x, at);
+        origin[a][end] = kernel_gather_tile_numbers(a ? tile->origin_y : tile->origin_x, at);
     }
 }
 
 /* Computes the faces of all lanes' cells, whose positions, ranks and field are stored in *cells. ends: first and last
  * column and row of each cell (kernel_local_pixels()). */
 SIMD_INLINE void kernel_local_faces_of(const kernel_tile *tile, kernel_transformed_curved *cells,
-                                       int32_t ends[4][SIMD_WIDTH], int type, kernel_local_faces *out)
+                                       int32_t ends[4][SIMD_WIDTH], int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
     const int count = grid_type_vertices(type);
-    kernel_ray_box box;
-    vf places[3][8], rank[8];
+    vf places[3][8], rank[8], slope[2][2], origin[2][2];
     for (int i = 0; i < count; i++) {
         vi own_rank;
         memcpy(&own_rank, cells->rank[i], sizeof own_rank);
         rank[i] = vf_from_vi(own_rank);
         for (int a = 0; a < 3; a++) places[a][i] = vf_load(cells->at[a][i]);
     }
-    kernel_local_ray_box(tile, ends, &box);
-    vf_store(out->nonconvex, vf_from_bits(kernel_curved_nonconvex_quads(places, &box, type)));
+    kernel_local_ray_box(tile, ends, slope, origin);
+    vf_store(cells->nonconvex, vf_from_bits(kernel_curved_nonconvex_quads(places, slope, origin, type)));
     for (int face = 0; face < shape->face_count; face++) {
         const signed char *loop = shape->faces[face].vertices;
-        kernel_lanes_order unused;
-        vm falls[3];
-        const vi word = shape->faces[face].count == 3 ? kernel_triangle_word(loop, rank, &unused, falls)
+        vm first[3], last[3], falls[3];
+        const vi word = shape->faces[face].count == 3 ? kernel_triangle_word(loop, rank, first, last, falls)
                                                       : kernel_curved_quad_word(loop, rank);
         memcpy(cells->corners + face * SIMD_WIDTH, &word, sizeof word);
     }
     if (SIMD_WIDTH < KERNEL_LOCAL_ROW) return;
     const float(*words)[SIMD_WIDTH] = (const float(*)[SIMD_WIDTH])(const void *)cells->corners;
-    for (int n = 0; n < 2; n++) kernel_local_row_of(cells->at[2 * n], count, cells->at[2 * n + 1], count, n, out);
-    kernel_local_row_of(words, shape->face_count, NULL, 0, 2, out);
+    for (int n = 0; n < 2; n++) kernel_local_row_of(cells->at[2 * n], count, cells->at[2 * n + 1], count, n, cells);
+    kernel_local_row_of(words, shape->face_count, NULL, 0, 2, cells);
 }
 
 /* ---- rays ---- */
 
 static __attribute__((noinline)) void kernel_local_find_faces_nonconvex(const kernel_transformed_curved *cells,
                                                                         const kernel_lane_rays *own,
-                                                                        const vi *nonconvex, vm rays, int type,
-                                                                        kernel_curved_crossed *out)
+                                                                        const vi *nonconvex, vm rays, int type, vm *two,
+                                                                        vm *alone, vi face[2])
 {
-    KERNEL_OF_TYPE(type, kernel_curved_find, (const float(*)[8][SIMD_WIDTH])cells->at, own, nonconvex, rays, out);
+    KERNEL_OF_TYPE(type, kernel_curved_find, (const float(*)[8][SIMD_WIDTH])cells->at, own, nonconvex, rays, two, alone,
+                   face);
 }
 
-/* Finds the two faces that each ray crosses once. All other rays are added to out->alone, to be traced one by one. */
-SIMD_INLINE void kernel_local_find_faces(const kernel_transformed_curved *cells, const kernel_local_faces *f,
-                                         const kernel_lane_rays *own, vm rays, int type, kernel_curved_crossed *out)
+/* Finds the two faces that each ray crosses once. All other rays are added to *alone, to be traced one by one. */
+SIMD_INLINE void kernel_local_find_faces(const kernel_transformed_curved *cells, const kernel_lane_rays *own, vm rays,
+                                         int type, vm *two, vm *alone, vi face[2])
 {
-    const vi nonconvex = vi_from_bits(kernel_gather_lane(f->nonconvex, own->lane));
+    const vi nonconvex = vi_from_bits(kernel_gather_lane(cells->nonconvex, own->lane));
     if (vm_any(vm_and(rays, vm_sign(-nonconvex))))
-        kernel_local_find_faces_nonconvex(cells, own, &nonconvex, rays, type, out);
+        kernel_local_find_faces_nonconvex(cells, own, &nonconvex, rays, type, two, alone, face);
     else
-        kernel_curved_find((const float(*)[8][SIMD_WIDTH])cells->at, own, NULL, rays, out, type);
+        kernel_curved_find((const float(*)[8][SIMD_WIDTH])cells->at, own, NULL, rays, two, alone, face, type);
 }
 
 /* Reads the corners of each ray's face from the rows of cells, if the given rays have at most two different cells, as
  * most vectors of 16 rays have, because rays are listed cell by cell. One permutation of the two cells' rows then reads
  * a number of a vertex for each ray. Returns false if there are more cells, or fewer lanes. */
-SIMD_INLINE bool kernel_local_corners_of_pair(const kernel_local_faces *f, const kernel_lane_rays *own, vm rays,
-                                              const vi face[2], kernel_curved_corners out[2])
+SIMD_INLINE bool kernel_local_corners_of_pair(const kernel_transformed_curved *cells, const kernel_lane_rays *own,
+                                              vm rays, const vi face[2], kernel_curved_corners out[2])
 {
     enum { WORDS = 2, HALF = KERNEL_LOCAL_ROW / 2 };
     const unsigned bits = vm_bits(rays);
@@ -149,7 +137,7 @@ SIMD_INLINE bool kernel_local_corners_of_pair(const kernel_local_faces *f, const
     if (vm_any(vm_andnot(rays, vm_or(in_first, in_last)))) return false;
     /* added to the index of a permutation: SIMD_WIDTH for rays whose cell is the second one */
     const vi second = vi_select(in_first, vi_set(0), vi_set(SIMD_WIDTH));
-    const float(*const rows[2])[KERNEL_LOCAL_ROW] = {f->rows[first], f->rows[last]};
+    const float(*const rows[2])[KERNEL_LOCAL_ROW] = {cells->rows[first], cells->rows[last]};
     for (int k = 0; k < 2; k++) {
         const vi word =
             vi_from_bits(vf_permute_pair(vf_load(rows[0][WORDS]), vf_load(rows[1][WORDS]), face[k] | second));
@@ -166,12 +154,11 @@ SIMD_INLINE bool kernel_local_corners_of_pair(const kernel_local_faces *f, const
 
 /* Computes entry and exit of the rays that cross two faces; the nearer point comes first. Reference coordinates are
  * those of kernel_local.h. */
-SIMD_INLINE void kernel_local_cross(const kernel_transformed_curved *cells, const kernel_local_faces *f,
-                                    const kernel_lane_rays *own, vm rays, int type, const vi face[2],
-                                    kernel_point out[2])
+SIMD_INLINE void kernel_local_cross(const kernel_transformed_curved *cells, const kernel_lane_rays *own, vm rays,
+                                    int type, const vi face[2], kernel_point out[2])
 {
     kernel_curved_corners corners[2];
-    if (!__builtin_expect(kernel_local_corners_of_pair(f, own, rays, face, corners), 1))
+    if (!__builtin_expect(kernel_local_corners_of_pair(cells, own, rays, face, corners), 1))
         for (int n = 0; n < 2; n++) kernel_curved_corners_gather(cells, own, type, face[n], &corners[n]);
     kernel_curved_cross_corners(NULL, own, rays, type, face, corners, out);
     for (int n = 0; n < 2; n++) kernel_local_of_reference(type, out[n].r);

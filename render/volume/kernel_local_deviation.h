@@ -132,15 +132,10 @@ typedef struct kernel_local_places {
     vm is_known;        /* rays for which Newton's method found all reference coordinates */
 } kernel_local_places;
 
-typedef struct kernel_local_iterate {
-    vf r[3], residual[3], deviation;
-} kernel_local_iterate;
-
 SIMD_INLINE void kernel_local_nonlinear_at(int type, const vf r[3], vf out[KERNEL_NONLINEAR_TERMS])
 {
-    kernel_nonlinear_terms b;
-    kernel_nonlinear_terms_at(type, r, &b);
-    memcpy(out, b.term, sizeof b.term);
+    vf unused[KERNEL_NONLINEAR_TERMS][3];
+    kernel_nonlinear_terms_at(type, r, out, unused);
 }
 
 /* Returns the rays whose reference coordinates r lie in the cell, or outside by at most KERNEL_DEVIATION_MARGIN. */
@@ -172,42 +167,39 @@ SIMD_INLINE void kernel_local_chord_of(const kernel_local_cells *cells, const ke
     out->residual_limit = kernel_gather_lane(bounds->residual_limit, lane);
 }
 
-/* Computes the residual of the reference coordinates r at position u on the ray, and the field's deviation from its
- * chord there. */
-SIMD_INLINE void kernel_local_iterate_at(const kernel_local_chord *c, vf u, int type, kernel_local_iterate *p)
+/* Computes the residual of the reference coordinates p->r at position u on the ray, and the field's deviation from its
+ * chord there as p->value. */
+SIMD_INLINE void kernel_local_residual(const kernel_local_chord *c, vf u, int type, kernel_point *p, vf residual[3])
 {
     vf term[KERNEL_NONLINEAR_TERMS];
     kernel_local_nonlinear_at(type, p->r, term);
-    for (int a = 0; a < 3; a++) p->residual[a] = vf_muladd(c->span[a], u, c->middle[a]) - p->r[a];
+    for (int a = 0; a < 3; a++) residual[a] = vf_muladd(c->span[a], u, c->middle[a]) - p->r[a];
     for (int k = 0; k < kernel_nonlinear_count(type); k++) {
         term[k] -= vf_muladd(c->rise[k], u, c->mean[k]);
-        for (int a = 0; a < 3; a++) p->residual[a] = vf_muladd(-c->nonlinear_part[k][a], term[k], p->residual[a]);
+        for (int a = 0; a < 3; a++) residual[a] = vf_muladd(-c->nonlinear_part[k][a], term[k], residual[a]);
     }
-    p->deviation = c->own[0] * term[0];
-    for (int k = 1; k < kernel_nonlinear_count(type); k++) p->deviation = vf_muladd(c->own[k], term[k], p->deviation);
+    p->value = c->own[0] * term[0];
+    for (int k = 1; k < kernel_nonlinear_count(type); k++) p->value = vf_muladd(c->own[k], term[k], p->value);
 }
 
-SIMD_INLINE vf kernel_local_residual_of(const kernel_local_iterate *p)
-{
-    return (vf_abs(p->residual[0]) + vf_abs(p->residual[1])) + vf_abs(p->residual[2]);
-}
-
-/* Refines the reference coordinates r at `count` places from initial guesses by Newton's method. *residual receives the
- * largest residual left at any place. Returns the rays for which r is valid at all places: in the cell or slightly
- * outside, with a small enough residual. */
+/* Refines the reference coordinates r at `count` places, at most 3, from initial guesses by Newton's method.
+ * at[i].value becomes the field's deviation from its chord. *residual receives the largest residual left at any place.
+ * Returns the rays for which r is valid at all places: in the cell or slightly outside, with a small enough residual.
+ */
 SIMD_INLINE vm kernel_local_newton(const kernel_local_chord *c, const vf *places, int count, vm rays, int type,
-                                   kernel_local_iterate *at, vf *residual)
+                                   kernel_point *at, vf *residual)
 {
+    vf off[3][3];
     for (int n = 0;; n++) {
         *residual = vf_set(0);
         for (int i = 0; i < count; i++) {
-            kernel_local_iterate_at(c, places[i], type, &at[i]);
-            *residual = vf_max(kernel_local_residual_of(&at[i]), *residual);
+            kernel_local_residual(c, places[i], type, &at[i], off[i]);
+            *residual = vf_max((vf_abs(off[i][0]) + vf_abs(off[i][1])) + vf_abs(off[i][2]), *residual);
         }
         const vm open = vm_andnot(rays, vf_le(*residual, c->tolerance));
         if (n == KERNEL_DEVIATION_STEPS || !vm_any(open)) break;
         for (int i = 0; i < count; i++)
-            for (int a = 0; a < 3; a++) at[i].r[a] = vf_select(open, at[i].r[a] + at[i].residual[a], at[i].r[a]);
+            for (int a = 0; a < 3; a++) at[i].r[a] = vf_select(open, at[i].r[a] + off[i][a], at[i].r[a]);
     }
     vm is_near = vf_le(*residual, c->residual_limit);
     for (int i = 0; i < count; i++) is_near = vm_and(is_near, kernel_local_is_near(type, at[i].r));
@@ -230,7 +222,7 @@ static __attribute__((noinline)) void kernel_local_map_deviations(const kernel_l
 SIMD_INLINE void kernel_local_evaluate(const kernel_local_chord *c, const kernel_point *ends, int first, int step,
                                        vm rays, int type, kernel_local_places *p)
 {
-    kernel_local_iterate at[3];
+    kernel_point at[3];
     vf u[3], off[3], residual;
     int count = 0;
     for (int i = first; i < 4; i += step, count++) {
@@ -245,7 +237,7 @@ SIMD_INLINE void kernel_local_evaluate(const kernel_local_chord *c, const kernel
     }
     for (int i = first, n = 0; i < 4; i += step, n++) {
         memcpy(p->r[i], at[n].r, sizeof p->r[i]);
-        p->off[i] = type == GRID_NO_TYPE ? off[n] : at[n].deviation;
+        p->off[i] = type == GRID_NO_TYPE ? off[n] : at[n].value;
     }
 }
 
@@ -255,11 +247,12 @@ SIMD_INLINE void kernel_local_places_of(const kernel_local_chord *c, const kerne
 {
     *out = (kernel_local_places){.u = -0.5f, .width = 1, .is_known = vm_all_lanes()};
     if (type != GRID_NO_TYPE) {
-        kernel_local_iterate middle;
+        kernel_point middle;
+        vf residual[3];
         memcpy(middle.r, c->middle, sizeof middle.r);
         for (int n = 0; n < 2; n++) {
-            kernel_local_iterate_at(c, vf_set(0), type, &middle);
-            for (int a = 0; a < 3; a++) middle.r[a] += middle.residual[a];
+            kernel_local_residual(c, vf_set(0), type, &middle, residual);
+            for (int a = 0; a < 3; a++) middle.r[a] += residual[a];
         }
         for (int a = 0; a < 3; a++) {
             const vf near_middle = 0.25f * c->middle[a];
@@ -335,13 +328,13 @@ SIMD_INLINE vm kernel_local_move_end(const kernel_local_chord *c, const kernel_p
                                      kernel_point *out)
 {
     const vf along = (t - ends[0].t) / (ends[1].t - ends[0].t), u = along - 0.5f;
-    kernel_local_iterate at;
+    kernel_point at;
     vf residual;
     for (int a = 0; a < 3; a++) at.r[a] = vf_muladd(c->span[a], u, c->middle[a]);
     const vm known = kernel_local_newton(c, &u, 1, rays, type, &at, &residual);
-    kernel_point point = {.t = t, .value = (ends[0].value + (ends[1].value - ends[0].value) * along) + at.deviation};
-    memcpy(point.r, at.r, sizeof point.r);
-    kernel_point_move(rays, &point, out);
+    at.t = t;
+    at.value = (ends[0].value + (ends[1].value - ends[0].value) * along) + at.value;
+    kernel_point_move(rays, &at, out);
     return vm_andnot(rays, known);
 }
 

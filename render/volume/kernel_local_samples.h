@@ -24,7 +24,6 @@
 #include "kernel_samples.h"
 #include "kernel_shapes.h"
 #include "kernel_tile_cells.h"
-#include "kernel_tile_depth.h"
 #include "kernel_tile_trace.h"
 #include "kernel_types.h"
 #include "render.h"
@@ -42,7 +41,6 @@ enum {
 /* The samples of a tile's rays in a window. */
 typedef struct kernel_tile_volume {
     kernel_samples packets[KERNEL_TILE_PACKETS];
-    kernel_tile_depth depth;
     int first, count; /* number of the window's first sample, and number of samples in the window */
     float pad;        /* error bound of sample numbers, as in kernel_samples */
     /* For each packet and lane: depth of sample 0 and distance between samples, side by side; and the depth at which
@@ -51,6 +49,21 @@ typedef struct kernel_tile_volume {
     /* samples of hexes, wedges and pyramids whose values are still to be computed: depth and word of each */
     int sample_count;
     float t[KERNEL_LOCAL_SAMPLES + SIMD_WIDTH], bits[KERNEL_LOCAL_SAMPLES + SIMD_WIDTH];
+    /* The members from here on choose the depth of windows (kernel_tile_depth.h). */
+    /* Depth, relative to the begin of the last tile, at which at least half of those of its rays that lost light were
+     * dark; +inf if they did not become dark. */
+    float dark;
+    /* The following members describe the current tile. */
+    float own_dark; /* depth, relative to `begin`, at which this tile became dark; +inf until it is known */
+    float begin;    /* depth of the first cell if it is known, else of the first sample; +inf before any sample */
+    bool has_met;   /* set if some ray of the tile has lost light */
+    /* expected further depth until the rays are dark, computed from the light left after the last window */
+    float expected;
+    float before; /* light of the brightest ray before the last window */
+    /* number of the last window's rays that have lost light, and number of those that are dark */
+    int lit_count, dark_count;
+    /* first_lit: least depth of their samples; last_dark: greatest depth at which one of them became dark */
+    float brightest, first_lit, last_dark;
 } kernel_tile_volume;
 
 /* ---- samples ---- */

@@ -29,14 +29,13 @@
 #include "kernel_types.h"
 #include "simd.h"
 
-/* A list of rays that have passed a stage, one word per ray: the pixel in the tile from bit 0 on, the lane of the cell
- * from KERNEL_LOCAL_CELL on, and the numbers of the two crossed faces from KERNEL_LOCAL_FACES on, three bits each. */
-typedef struct kernel_local_list {
-    int count;
-    float words[KERNEL_LIST_ROOM];
-} kernel_local_list;
-
+/* Layout of a listed ray's word: its pixel in the tile begins at bit 0, the lane of its cell at bit KERNEL_LOCAL_CELL,
+ * and the numbers of the two crossed faces, three bits each, at bit KERNEL_LOCAL_FACES. */
 enum { KERNEL_LOCAL_CELL = 8, KERNEL_LOCAL_FACES = 16 };
+
+/* Lists of rays that have passed a stage: those that meet their cells' slabs, and those that cross two faces; of the
+ * latter the rays whose first face is a quad are listed apart. */
+enum { KERNEL_LOCAL_MET, KERNEL_LOCAL_CROSSED, KERNEL_LOCAL_CROSSED_TRIANGLE, KERNEL_LOCAL_LISTS };
 
 /* The segments of a tile's rays in a window, and the state of the vector of cells that is being processed. */
 typedef struct kernel_tile_segments {
@@ -44,12 +43,12 @@ typedef struct kernel_tile_segments {
     kernel_double_face precise[4]; /* the current tet in double; set only if the frame is in double */
     float depth;                   /* depth of the next window; 0 if it has not been determined yet */
     unsigned blocks;               /* blocks of the current window */
-    kernel_local_faces faces;
     kernel_local_budget budget;
     kernel_local_bounds bounds;
     bool is_double; /* set if the ends of segments are stored in double */
     bool has_cuts;  /* set if transparent surfaces cut segments */
-    kernel_local_list met, crossed[2];
+    int list_count[KERNEL_LOCAL_LISTS];
+    float list[KERNEL_LOCAL_LISTS][KERNEL_LIST_ROOM]; /* one word per ray */
     /* For each packet and lane: begin and end of the window, side by side; likewise begin and end of the ray. */
     float window[2 * KERNEL_LOCAL_PIXELS], reach[2 * KERNEL_LOCAL_PIXELS];
 } kernel_tile_segments;
@@ -290,18 +289,18 @@ static __attribute__((noinline)) void kernel_local_segments_cut(kernel_tile_trac
     KERNEL_OF_TYPE(type, kernel_local_segments_cut_of, t, b, whole, rays, reach);
 }
 
-SIMD_INLINE void kernel_local_list_add(kernel_local_list *list, vm rays, vi words)
+SIMD_INLINE void kernel_local_list_add(kernel_tile_segments *b, int list, vm rays, vi words)
 {
-    list->count += vf_compress(list->words + list->count, rays, vf_from_bits(words));
+    b->list_count[list] += vf_compress(b->list[list] + b->list_count[list], rays, vf_from_bits(words));
 }
 
 /* Loads a vector of rays of a list, from index n on. Returns the lanes that contain a ray. */
-SIMD_INLINE vm kernel_local_list_load(const kernel_local_list *list, const kernel_tile *tile, int n, vi *words,
-                                      kernel_lane_rays *rays)
+SIMD_INLINE vm kernel_local_list_load(const kernel_tile_segments *b, int list, const kernel_tile *tile, int n,
+                                      vi *words, kernel_lane_rays *rays)
 {
-    const int left = list->count - n;
+    const int left = b->list_count[list] - n;
     const vm all = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
-    *words = vi_select(all, vi_from_bits(vf_load(list->words + n)), vi_set(0));
+    *words = vi_select(all, vi_from_bits(vf_load(b->list[list] + n)), vi_set(0));
     kernel_lane_rays_of(rays, tile, *words, *words >> KERNEL_LOCAL_CELL);
     return all;
 }
@@ -311,33 +310,33 @@ SIMD_INLINE vm kernel_local_list_load(const kernel_local_list *list, const kerne
 SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_tile_segments *b, int type, int n)
 {
     kernel_lane_rays rays;
-    kernel_curved_crossed crossed;
-    vi words;
-    const vm all = kernel_local_list_load(&b->met, &t->tile, n, &words, &rays);
-    kernel_local_find_faces(&t->thread->tile_cells->lanes.transformed, &b->faces, &rays, all, type, &crossed);
-    const vm on_quad = kernel_curved_on_quad(type, 0, crossed.first);
-    words = words | crossed.first << KERNEL_LOCAL_FACES | crossed.last << (KERNEL_LOCAL_FACES + 3);
-    kernel_local_list_add(&b->crossed[0], vm_and(crossed.two, on_quad), words);
-    if (kernel_has_triangles(type)) kernel_local_list_add(&b->crossed[1], vm_andnot(crossed.two, on_quad), words);
-    if (__builtin_expect(vm_any(crossed.alone), 0)) {
+    vm two, alone;
+    vi words, face[2];
+    const vm all = kernel_local_list_load(b, KERNEL_LOCAL_MET, &t->tile, n, &words, &rays);
+    kernel_local_find_faces(&t->thread->tile_cells->lanes.transformed, &rays, all, type, &two, &alone, face);
+    const vm on_quad = kernel_curved_on_quad(type, 0, face[0]);
+    words = words | face[0] << KERNEL_LOCAL_FACES | face[1] << (KERNEL_LOCAL_FACES + 3);
+    kernel_local_list_add(b, KERNEL_LOCAL_CROSSED, vm_and(two, on_quad), words);
+    if (kernel_has_triangles(type))
+        kernel_local_list_add(b, KERNEL_LOCAL_CROSSED_TRIANGLE, vm_andnot(two, on_quad), words);
+    if (__builtin_expect(vm_any(alone), 0)) {
         vf reach[2];
         vf_gather_pair(b->reach, 2 * rays.at, &reach[0], &reach[1]);
-        kernel_local_segments_process_singly(t, rays.at, rays.lane, vm_bits(crossed.alone), reach, 1);
+        kernel_local_segments_process_singly(t, rays.at, rays.lane, vm_bits(alone), reach, 1);
     }
 }
 
 /* Adds the segments of a vector of rays, from index n on, each of which crosses two faces of its cell. */
-SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_tile_segments *b,
-                                             const kernel_local_list *list, int type, int n)
+SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_tile_segments *b, int list, int type, int n)
 {
     const kernel_local_lanes *l = &t->thread->tile_cells->lanes;
     kernel_local_pairs p;
     vi words;
     vf end, reach[2];
     p.share = 1;
-    p.active = kernel_local_list_load(list, &t->tile, n, &words, &p.rays);
+    p.active = kernel_local_list_load(b, list, &t->tile, n, &words, &p.rays);
     const vi face[2] = {words >> KERNEL_LOCAL_FACES & 7, words >> (KERNEL_LOCAL_FACES + 3) & 7};
-    kernel_local_cross(&l->transformed, &b->faces, &p.rays, p.active, type, face, p.ends);
+    kernel_local_cross(&l->transformed, &p.rays, p.active, type, face, p.ends);
     vf_gather_pair(b->window, 2 * p.rays.at, &p.begin, &end);
     vf_gather_pair(b->reach, 2 * p.rays.at, &reach[0], &reach[1]);
     p.active = vm_and(p.active, vm_and(vf_lt(p.begin, p.ends[1].t), vf_lt(p.ends[0].t, end)));
@@ -371,23 +370,23 @@ SIMD_INLINE void kernel_local_segments_overlap(const kernel_tile_trace *t, const
     kernel_local_slab_interval(&l->cells, &rays, depth, &near, &far);
     vf_gather_pair(b->window, 2 * rays.at, &begin, &end);
     const vm meets = vm_and(vf_le(near, far), vm_and(vf_le(begin, depth + far), vf_le(depth + near, end)));
-    kernel_local_list_add(&b->met, vm_and(active, meets), pixel | lane << KERNEL_LOCAL_CELL);
+    kernel_local_list_add(b, KERNEL_LOCAL_MET, vm_and(active, meets), pixel | lane << KERNEL_LOCAL_CELL);
 }
 
 SIMD_INLINE void kernel_local_segments_met(kernel_tile_trace *t, kernel_tile_segments *b, int type)
 {
-    for (int i = 0; i < 2; i++) b->crossed[i].count = 0;
-    for (int n = 0; n < b->met.count; n += SIMD_WIDTH) kernel_local_segments_faces(t, b, type, n);
-    for (int i = 0; i < 2; i++)
-        for (int n = 0; n < b->crossed[i].count; n += SIMD_WIDTH)
-            kernel_local_segments_lanes(t, b, &b->crossed[i], type, n);
+    const int met = b->list_count[KERNEL_LOCAL_MET];
+    b->list_count[KERNEL_LOCAL_CROSSED] = b->list_count[KERNEL_LOCAL_CROSSED_TRIANGLE] = 0;
+    for (int n = 0; n < met; n += SIMD_WIDTH) kernel_local_segments_faces(t, b, type, n);
+    for (int list = KERNEL_LOCAL_CROSSED; list <= KERNEL_LOCAL_CROSSED_TRIANGLE; list++)
+        for (int n = 0; n < b->list_count[list]; n += SIMD_WIDTH) kernel_local_segments_lanes(t, b, list, type, n);
 }
 
 static __attribute__((noinline)) void kernel_local_segments_cast(kernel_tile_trace *t, kernel_local_lanes *l, int type)
 {
     kernel_tile_segments *b = t->thread->tile_segments;
     kernel_pixel_list_close(&l->rays);
-    b->met.count = 0;
+    b->list_count[KERNEL_LOCAL_MET] = 0;
     for (int n = 0; n < l->rays.count; n += SIMD_WIDTH) kernel_local_segments_overlap(t, l, b, n);
     KERNEL_OF_TYPE(type, kernel_local_segments_met, t, b);
     l->rays.count = 0;
@@ -399,7 +398,7 @@ static __attribute__((noinline)) void kernel_local_segments_cast(kernel_tile_tra
 SIMD_INLINE void kernel_local_segments_prepare(const kernel_tile_trace *t, kernel_local_lanes *l,
                                                kernel_tile_segments *s, int type)
 {
-    kernel_local_faces_of(&t->tile, &l->transformed, l->ends, type, &s->faces);
+    kernel_local_faces_of(&t->tile, &l->transformed, l->ends, type);
     kernel_local_nonlinear_of(&l->cells, type, &s->bounds);
     kernel_local_bound(&s->budget, (const float(*)[SIMD_WIDTH])l->transformed.at[3], type, &s->bounds);
 }

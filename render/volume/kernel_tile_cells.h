@@ -25,14 +25,18 @@
 #include "kernel_transformed_tets.h"
 #include "kernel_prefetch.h"
 #include "kernel_tile.h"
-#include "kernel_tile_blocks.h"
 #include "kernel_tile_trace.h"
 #include "kernel_types.h"
 #include "kernel_wide.h"
 #include "render.h"
 #include "simd.h"
 
-enum { KERNEL_OPEN_PIECE = 16, KERNEL_SORT_PIECE = 64, KERNEL_SORT_ENDS = 48 };
+enum {
+    KERNEL_OPEN_PIECE = 16,
+    KERNEL_SORT_PIECE = 64,
+    KERNEL_SORT_ENDS = 48,
+    KERNEL_BLOCK_VECTORS = KERNEL_BLOCKS / SIMD_WIDTH
+};
 
 /* Callbacks by which a volume is sampled (kernel_tile_volume.h) or integrated (kernel_tile_segments.h) in its cells. */
 typedef struct kernel_volume_method {
@@ -67,8 +71,71 @@ typedef struct kernel_tile_cells {
     bool has_curved_lanes; /* set if hexes, wedges and pyramids are processed in lanes */
     kernel_local_lanes lanes;
     kernel_transformed_tets transformed; /* a vector of tets from the queue */
-    kernel_block_rays block_rays;
+    /* the (u, v) at the middle of each block, and half of their extent in a block */
+    vf block_u[KERNEL_BLOCK_VECTORS], block_v[KERNEL_BLOCK_VECTORS];
+    float half_u, half_v;
 } kernel_tile_cells;
+
+/* ---- the blocks that a tet's outline meets ----
+ *
+ * Finds which of a tile's blocks a tet's outline meets, one block per lane. The outline's bounding box
+ * (kernel_points_placement()) also covers blocks beside its slanted edges; with it alone, two of five packets would be
+ * traced for nothing.
+ *
+ * An edge function is affine over the tile (kernel_cell.h), so that over a block it is its value at the block's middle,
+ * plus or minus its slopes times half of the extent of the block's rays. If in a block no face can have its three edge
+ * functions' signs as on a ray that crosses it, no ray of the block crosses the tet. */
+
+/* Sets up the blocks of a tile whose rays are set. The half extents are those of the widest block, plus a thousandth
+ * for all rounding. */
+static inline void kernel_block_rays_setup(kernel_tile_cells *cells, const kernel_frame *f, const kernel_tile *tile)
+{
+    const bool flat = f->job->camera.is_orthographic;
+    const float *u = flat ? tile->origin_x : tile->slope_x, *v = flat ? tile->origin_y : tile->slope_y;
+    float middle[2][KERNEL_BLOCKS];
+    cells->half_u = cells->half_v = 0;
+    for (int b = 0; b < KERNEL_BLOCKS; b++) {
+        const int column = b % KERNEL_BLOCKS_ACROSS * KERNEL_BLOCK, row = b / KERNEL_BLOCKS_ACROSS * KERNEL_BLOCK;
+        const float *first_u = u + column, *first_v = v + row;
+        middle[0][b] = 0.5f * (first_u[0] + first_u[KERNEL_BLOCK - 1]);
+        middle[1][b] = 0.5f * (first_v[0] + first_v[KERNEL_BLOCK - 1]);
+        cells->half_u = fmaxf(cells->half_u, 0.5005f * fabsf(first_u[KERNEL_BLOCK - 1] - first_u[0]));
+        cells->half_v = fmaxf(cells->half_v, 0.5005f * fabsf(first_v[KERNEL_BLOCK - 1] - first_v[0]));
+    }
+    for (int n = 0; n < KERNEL_BLOCK_VECTORS; n++) {
+        cells->block_u[n] = vf_load(middle[0] + n * SIMD_WIDTH);
+        cells->block_v[n] = vf_load(middle[1] + n * SIMD_WIDTH);
+    }
+}
+
+/* Returns the blocks that may have a ray inside the tet, whose edge functions must be set. The middle's edge function
+ * errs by at most as much as a ray's; for rays on which the sign is uncertain, or is computed from projected vertices,
+ * it is decided within the same bound: twice the bound is more than both together. If a number is NaN, the block counts
+ * as met. */
+SIMD_INLINE unsigned kernel_tet_blocks(const kernel_tile_cells *cells, const kernel_cell *c)
+{
+    unsigned blocks = 0;
+    for (int i = 0; i < KERNEL_BLOCK_VECTORS; i++) {
+        vm above[KERNEL_TET_EDGES], below[KERNEL_TET_EDGES], met = vm_none();
+        for (int n = 0; n < KERNEL_TET_EDGES; n++) {
+            const kernel_line *l = &c->lines[n];
+            const float reach = fabsf(l->cu) * cells->half_u + fabsf(l->cv) * cells->half_v + 2 * l->bound;
+            const vf e =
+                vf_muladd(vf_set(l->cv), cells->block_v[i], vf_muladd(vf_set(l->cu), cells->block_u[i], vf_set(l->c)));
+            above[n] = vm_not(vf_lt(e, vf_set(-reach)));
+            below[n] = vm_not(vf_lt(vf_set(reach), e));
+        }
+        for (int n = 0; n < 4; n++) { /* a ray that lies on the same side of all three edges of a face crosses it */
+            const signed char *edge = kernel_tet_face[n] + 3;
+            met = vm_or(met, vm_and(vm_and(above[edge[0]], above[edge[1]]), below[edge[2]]));
+            met = vm_or(met, vm_and(vm_and(below[edge[0]], below[edge[1]]), above[edge[2]]));
+        }
+        blocks |= vm_bits(met) << i * SIMD_WIDTH;
+    }
+    return blocks;
+}
+
+/* ---- cells ---- */
 
 /* Transforms the cell that has been read, and prepares it for the rays of the blocks. Returns the blocks in which it
  * may be visible. */
@@ -85,7 +152,7 @@ static __attribute__((noinline)) unsigned kernel_tile_transform_cell(kernel_tile
     kernel_cell_order(c);
     kernel_cell_domain(c, transfer);
     if (cells->method->is_pencil || kernel_is_linear(c->type)) kernel_cell_lines(c, t->frame, &t->tile);
-    if (kernel_is_linear(c->type)) return meets & kernel_tet_blocks(&cells->block_rays, c);
+    if (kernel_is_linear(c->type)) return meets & kernel_tet_blocks(cells, c);
     if (!c->is_constant) kernel_map_setup(&cells->map, c);
     return meets;
 }
@@ -243,7 +310,7 @@ SIMD_INLINE void kernel_tile_process_tets(kernel_tile_trace *t, kernel_tile_cell
         const int n = __builtin_ctz(lanes);
         kernel_transformed_tets_cell(&cells->transformed, n, &cells->cell);
         if (t->frame->is_double) kernel_transformed_tets_double(&cells->transformed, n, &cells->cell);
-        const unsigned blocks = q->blocks[n] & kernel_tet_blocks(&cells->block_rays, &cells->cell);
+        const unsigned blocks = q->blocks[n] & kernel_tet_blocks(cells, &cells->cell);
         cells->cell.index = q->cell[n];
         if (blocks) cells->method->take(t, cells->lanes.part, &cells->cell, NULL, blocks);
     }
@@ -542,7 +609,7 @@ SIMD_INLINE int kernel_tile_volume_begin(kernel_tile_trace *t, unsigned blocks, 
             packets[count++] = i;
         }
     }
-    if (count) kernel_block_rays_setup(&t->thread->tile_cells->block_rays, t->frame, &t->tile);
+    if (count) kernel_block_rays_setup(t->thread->tile_cells, t->frame, &t->tile);
     return count;
 }
 

@@ -19,43 +19,27 @@
 
 #include <math.h>
 
+#include "kernel_local_samples.h"
 #include "kernel_samples.h"
 #include "simd.h"
 
-typedef struct kernel_tile_depth {
-    /* Depth, relative to the begin of the last tile, at which at least half of those of its rays that lost light were
-     * dark; +inf if they did not become dark. */
-    float dark;
-    /* The following members describe the current tile. */
-    float own_dark; /* depth, relative to `begin`, at which this tile became dark; +inf until it is known */
-    float begin;    /* depth of the first cell if it is known, else of the first sample; +inf before any sample */
-    bool has_met;   /* set if some ray of the tile has lost light */
-    /* expected further depth until the rays are dark, computed from the light left after the last window */
-    float expected;
-    float before; /* light of the brightest ray before the last window */
-    /* number of the last window's rays that have lost light, and number of those that are dark */
-    int lit_count, dark_count;
-    /* first: least depth of their samples; last: greatest depth at which one of them became dark */
-    float brightest, first, last;
-} kernel_tile_depth;
-
 /* Begins a run of tiles, in which no earlier tile's depth is known. */
-SIMD_INLINE void kernel_depth_reset(kernel_tile_depth *d)
+SIMD_INLINE void kernel_depth_reset(kernel_tile_volume *d)
 {
     d->dark = INFINITY;
     d->has_met = false;
 }
 
-SIMD_INLINE void kernel_depth_begin_window(kernel_tile_depth *d)
+SIMD_INLINE void kernel_depth_begin_window(kernel_tile_volume *d)
 {
     d->lit_count = d->dark_count = 0;
     d->brightest = 0;
-    d->first = INFINITY;
-    d->last = -INFINITY;
+    d->first_lit = INFINITY;
+    d->last_dark = -INFINITY;
 }
 
 /* Begins a tile. begin: depth of its first cell, or +inf if it is not known. */
-SIMD_INLINE void kernel_depth_begin(kernel_tile_depth *d, float begin)
+SIMD_INLINE void kernel_depth_begin(kernel_tile_volume *d, float begin)
 {
     if (d->has_met) d->dark = d->own_dark;
     d->has_met = false;
@@ -67,14 +51,14 @@ SIMD_INLINE void kernel_depth_begin(kernel_tile_depth *d, float begin)
 
 /* Returns the depth of the next window, which begins at depth `at`: an eighth more than the depth at which the tile is
  * expected to become dark. */
-SIMD_INLINE float kernel_depth_next_window(const kernel_tile_depth *d, float at)
+SIMD_INLINE float kernel_depth_next_window(const kernel_tile_volume *d, float at)
 {
     const float left = simd_min(d->begin, at) + d->dark - at;
     return 1.125f * simd_min(left > 0 ? left : INFINITY, d->expected);
 }
 
 /* Adds the light that is left on a packet's rays after the window. */
-SIMD_INLINE void kernel_depth_add(kernel_tile_depth *d, vm rays, const kernel_blend *b)
+SIMD_INLINE void kernel_depth_add(kernel_tile_volume *d, vm rays, const kernel_blend *b)
 {
     const vf far = vf_set(INFINITY);
     const vm met = vm_and(rays, vf_lt(b->light, vf_set(1))), lit = vm_and(met, vf_lt(vf_set(KERNEL_DARK), b->light));
@@ -83,22 +67,22 @@ SIMD_INLINE void kernel_depth_add(kernel_tile_depth *d, vm rays, const kernel_bl
     d->lit_count += __builtin_popcount(vm_bits(met));
     d->dark_count += __builtin_popcount(vm_bits(ended));
     d->brightest = simd_max(vf_reduce_max(vf_select(lit, b->light, vf_set(0))), d->brightest);
-    d->first = simd_min(vf_reduce_min(vf_select(met, b->t_first, far)), d->first);
-    d->last = simd_max(vf_reduce_max(vf_select(ended, b->t_last, -far)), d->last);
+    d->first_lit = simd_min(vf_reduce_min(vf_select(met, b->t_first, far)), d->first_lit);
+    d->last_dark = simd_max(vf_reduce_max(vf_select(ended, b->t_last, -far)), d->last_dark);
 }
 
 /* Updates the expected depth after all rays of a window have been added. depth: the depth of that window. */
-SIMD_INLINE void kernel_depth_end_window(kernel_tile_depth *d, float depth)
+SIMD_INLINE void kernel_depth_end_window(kernel_tile_volume *d, float depth)
 {
     const bool fades = d->brightest > 0 && d->brightest < 0.9f * d->before;
     d->expected = fades ? depth * logf(KERNEL_DARK / d->brightest) / logf(d->brightest / d->before) : INFINITY;
     d->before = d->brightest > 0 ? d->brightest : 1;
-    d->begin = simd_min(d->first, d->begin);
+    d->begin = simd_min(d->first_lit, d->begin);
     d->has_met = d->has_met || d->lit_count;
     /* the depth of the last tile is a poor estimate, because this tile has no sample yet */
     if (d->begin == INFINITY) d->dark *= 2;
     if (d->own_dark == INFINITY && d->dark_count > 0 && 2 * d->dark_count >= d->lit_count)
-        d->own_dark = d->last - d->begin;
+        d->own_dark = d->last_dark - d->begin;
     kernel_depth_begin_window(d);
 }
 

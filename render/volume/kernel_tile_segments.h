@@ -122,9 +122,9 @@ static const kernel_volume_method kernel_volume_by_segments = {
 SIMD_INLINE void kernel_ray_segments_begin(kernel_packet *p, kernel_segments *list, float far, const kernel_hits *hits)
 {
     const kernel_frame *f = p->frame;
-    kernel_lanes lanes;
-    kernel_packet_lanes(p, &lanes);
-    kernel_packet_samples(p, &lanes);
+    double px[SIMD_WIDTH], py[SIMD_WIDTH];
+    kernel_packet_lanes(p, px, py);
+    kernel_packet_samples(p, px, py);
     p->is_pencil = false;
     list->active = p->active;
     list->blend = kernel_blend_begin();

@@ -149,9 +149,9 @@ SIMD_INLINE bool kernel_samples_use_lanes(const kernel_frame *f)
 SIMD_INLINE void kernel_ray_samples_begin(kernel_packet *p, kernel_samples *s, float near, float far, int *first,
                                           int *last)
 {
-    kernel_lanes lanes;
-    kernel_packet_lanes(p, &lanes);
-    kernel_packet_samples(p, &lanes);
+    double px[SIMD_WIDTH], py[SIMD_WIDTH];
+    kernel_packet_lanes(p, px, py);
+    kernel_packet_samples(p, px, py);
     s->active = p->active;
     s->blend = kernel_blend_begin();
     s->overlap_depth = vf_set(INFINITY);
@@ -207,7 +207,7 @@ SIMD_INLINE int kernel_tile_window_samples(const kernel_tile_volume *v, const ke
 {
     enum { LEAST = 8 };
     const int most = p->frame->job->sample_group, least = most < LEAST ? most : LEAST;
-    const float wanted = kernel_depth_next_window(&v->depth, kernel_sample_t(p, first)[0]) * p->sample_inverse[0];
+    const float wanted = kernel_depth_next_window(v, kernel_sample_t(p, first)[0]) * p->sample_inverse[0];
     return wanted < (float)most ? wanted < (float)least ? least : (int)wanted + 1 : most;
 }
 
@@ -219,9 +219,9 @@ SIMD_INLINE void kernel_tile_window_blend(kernel_tile_trace *t, kernel_tile_volu
         const int i = packets[n];
         kernel_samples *s = &v->packets[i];
         if (vm_any(t->packets[i].active)) kernel_blend_window(&t->packets[i], s, &t->hits[i]);
-        kernel_depth_add(&v->depth, s->active, &s->blend);
+        kernel_depth_add(v, s->active, &s->blend);
     }
-    kernel_depth_end_window(&v->depth, (float)samples * t->packets[packets[0]].sample_step[0]);
+    kernel_depth_end_window(v, (float)samples * t->packets[packets[0]].sample_step[0]);
 }
 
 /* Traces the tile's volumes after its opaque surfaces, whose hits are in the packets. */
@@ -239,7 +239,7 @@ static void kernel_tile_volumes(kernel_tile_trace *t)
     for (int n = 0; n < count; n++)
         kernel_ray_samples_begin(&t->packets[packets[n]], &v->packets[packets[n]], reach.near, reach.far, &first,
                                  &last);
-    kernel_depth_begin(&v->depth, cells_near);
+    kernel_depth_begin(v, cells_near);
     for (int from = first, to; from <= last; from = to) {
         const int samples = kernel_tile_window_samples(v, &t->packets[packets[0]], from);
         to = last - from < samples ? last + 1 : from + samples;

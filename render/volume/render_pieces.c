@@ -75,39 +75,34 @@ typedef struct kept_entry {
 /* Error bound of the extinction of ramps, relative to the extinction, if the job allows no error. */
 static const double exact_share = 1e-4;
 
-/* A part of a ramp; the ramp goes from the opacity point with index `ramp` to the next one. */
-typedef struct ramp_part {
-    const render_transfer *transfer;
-    int ramp;
-    double low, high; /* begin and end of the part, as shares of the ramp along the scale */
-} ramp_part;
+/* A ramp goes from the opacity point with index `ramp` to the next one. A part of it begins and ends at low and high,
+ * which are shares of the ramp along the scale. */
 
-static double ramp_opacity(const ramp_part *r, double share)
+static double ramp_opacity(const render_transfer *t, int ramp, double share)
 {
-    const double low = (double)r->transfer->opacities[r->ramp], high = (double)r->transfer->opacities[r->ramp + 1];
+    const double low = (double)t->opacities[ramp], high = (double)t->opacities[ramp + 1];
     return low + share * (high - low);
 }
 
 /* Returns the value, in the domain, at a share of the ramp. */
-static double ramp_value(const ramp_part *r, double share)
+static double ramp_value(const render_transfer *t, int ramp, double share)
 {
-    const render_transfer *t = r->transfer;
-    const double low = render_scaled(t->scale, t->threshold, t->opacity_values[r->ramp]);
-    const double high = render_scaled(t->scale, t->threshold, t->opacity_values[r->ramp + 1]);
+    const double low = render_scaled(t->scale, t->threshold, t->opacity_values[ramp]);
+    const double high = render_scaled(t->scale, t->threshold, t->opacity_values[ramp + 1]);
     return render_domain_of(t, render_unscaled(t->scale, t->threshold, low + share * (high - low)));
 }
 
 /* Returns whether the relative error of the extinction along the part's chord exceeds the tolerance. It is largest at
  * an end with opacity 0, but the first sample is 1/32 of the part away from it; the factor 1.1 covers that. */
-static bool is_bent(const ramp_part *r, double tolerance)
+static bool is_bent(const render_transfer *t, int ramp, double low, double high, double tolerance)
 {
     enum { PLACES = 32 };
-    const double low = ramp_value(r, r->low), high = ramp_value(r, r->high);
-    const double a0 = ramp_opacity(r, r->low), a1 = ramp_opacity(r, r->high);
+    const double x0 = ramp_value(t, ramp, low), x1 = ramp_value(t, ramp, high);
+    const double a0 = ramp_opacity(t, ramp, low), a1 = ramp_opacity(t, ramp, high);
     for (int i = 1; i < PLACES; i++) {
-        const double share = r->low + (r->high - r->low) * i / PLACES;
-        const double chord = a0 + (ramp_value(r, share) - low) / (high - low) * (a1 - a0);
-        const double truth = kernel_extinction_of(ramp_opacity(r, share));
+        const double share = low + (high - low) * i / PLACES;
+        const double chord = a0 + (ramp_value(t, ramp, share) - x0) / (x1 - x0) * (a1 - a0);
+        const double truth = kernel_extinction_of(ramp_opacity(t, ramp, share));
         if (1.1 * fabs(kernel_extinction_of(chord) - truth) > tolerance * truth) return true;
     }
     return false;
@@ -115,17 +110,16 @@ static bool is_bent(const ramp_part *r, double tolerance)
 
 /* Stores the values at which the part must be cut, unless cuts is NULL. Returns their number. A part is not cut if
  * float32 cannot distinguish its middle from its ends. */
-static int cut_part(const ramp_part *r, double tolerance, kernel_real *cuts)
+static int cut_part(const render_transfer *t, int ramp, double low, double high, double tolerance, kernel_real *cuts)
 {
-    const double middle = 0.5 * (r->low + r->high), at = ramp_value(r, middle);
-    const ramp_part left = {r->transfer, r->ramp, r->low, middle}, right = {r->transfer, r->ramp, middle, r->high};
+    const double middle = 0.5 * (low + high), at = ramp_value(t, ramp, middle);
     const float rounded = (float)at;
-    if (!((float)ramp_value(r, r->low) < rounded && rounded < (float)ramp_value(r, r->high))) return 0;
-    if (!is_bent(r, tolerance)) return 0;
-    int count = cut_part(&left, tolerance, cuts);
+    if (!((float)ramp_value(t, ramp, low) < rounded && rounded < (float)ramp_value(t, ramp, high))) return 0;
+    if (!is_bent(t, ramp, low, high, tolerance)) return 0;
+    int count = cut_part(t, ramp, low, middle, tolerance, cuts);
     if (cuts) cuts[count] = (kernel_real)at;
     count++;
-    return count + cut_part(&right, tolerance, cuts ? cuts + count : NULL);
+    return count + cut_part(t, ramp, middle, high, tolerance, cuts ? cuts + count : NULL);
 }
 
 /* Stores the values at which all ramps must be cut, unless cuts is NULL. Returns their number. */
@@ -134,9 +128,8 @@ static int cut_ramps(const render_transfer *t, double tolerance, kernel_real *cu
     const double share = tolerance > rounding ? tolerance : exact_share;
     int count = 0;
     for (int i = 0; i + 1 < t->opacity_count && t->scale != RENDER_LINEAR; i++) {
-        const ramp_part whole = {t, i, 0, 1};
         if (t->opacities[i] == t->opacities[i + 1]) continue;
-        count += cut_part(&whole, share, cuts ? cuts + count : NULL);
+        count += cut_part(t, i, 0, 1, share, cuts ? cuts + count : NULL);
     }
     return count;
 }
@@ -184,7 +177,7 @@ static double opacity_on(const render_transfer *t, double middle, double x)
 }
 
 static void set_colours(const render_transfer *t, const kept_entry *entries, double middle, double x,
-                        kernel_piece *piece)
+                        kernel_real piece[KERNEL_PIECE_ENTRIES])
 {
     const int last = t->colour_count - 1;
     int k = 0;
@@ -195,8 +188,8 @@ static void set_colours(const render_transfer *t, const kept_entry *entries, dou
         const double low = colour_at(t, entries[k].index, c), high = colour_at(t, entries[k + 1].index, c);
         const double slope = is_before || is_behind ? 0 : (high - low) / (end - begin);
         const double colour = is_before ? low : is_behind ? high : low + (x - begin) * slope;
-        piece->entry[KERNEL_PIECE_COLOUR + c] = (kernel_real)colour;
-        piece->entry[KERNEL_PIECE_COLOUR_SLOPE + c] = (kernel_real)slope;
+        piece[KERNEL_PIECE_COLOUR + c] = (kernel_real)colour;
+        piece[KERNEL_PIECE_COLOUR_SLOPE + c] = (kernel_real)slope;
     }
 }
 
@@ -226,21 +219,20 @@ static double exact_cut_value(const render_transfer *t, kernel_real cut)
 }
 
 static void set_piece(const render_transfer *t, const kept_entry *entries, kernel_real low, kernel_real high,
-                      kernel_piece *piece)
+                      kernel_real piece[KERNEL_PIECE_ENTRIES])
 {
     const double begin = exact_cut_value(t, low), end = exact_cut_value(t, high), middle = 0.5 * (begin + end);
-    piece->entry[KERNEL_PIECE_LOW] = low;
-    piece->entry[KERNEL_PIECE_HIGH] = high;
-    piece->entry[KERNEL_PIECE_LOW_REST] = (kernel_real)(begin - (double)low);
-    piece->entry[KERNEL_PIECE_HIGH_REST] = (kernel_real)(end - (double)high);
+    piece[KERNEL_PIECE_LOW] = low;
+    piece[KERNEL_PIECE_HIGH] = high;
+    piece[KERNEL_PIECE_LOW_REST] = (kernel_real)(begin - (double)low);
+    piece[KERNEL_PIECE_HIGH_REST] = (kernel_real)(end - (double)high);
     const double at_low = opacity_on(t, middle, begin), at_high = opacity_on(t, middle, end);
-    piece->entry[KERNEL_PIECE_OPACITY] = (kernel_real)at_low;
-    piece->entry[KERNEL_PIECE_OPACITY_HIGH] = (kernel_real)at_high;
-    piece->entry[KERNEL_PIECE_CLEAR] = (kernel_real)(1 - at_low);
-    piece->entry[KERNEL_PIECE_CLEAR_HIGH] = (kernel_real)(1 - at_high);
-    piece->entry[KERNEL_PIECE_SLOPE] = (kernel_real)((at_high - at_low) / (end - begin));
-    piece->entry[KERNEL_PIECE_INVERSE] =
-        1 / ((high - low) + (piece->entry[KERNEL_PIECE_HIGH_REST] - piece->entry[KERNEL_PIECE_LOW_REST]));
+    piece[KERNEL_PIECE_OPACITY] = (kernel_real)at_low;
+    piece[KERNEL_PIECE_OPACITY_HIGH] = (kernel_real)at_high;
+    piece[KERNEL_PIECE_CLEAR] = (kernel_real)(1 - at_low);
+    piece[KERNEL_PIECE_CLEAR_HIGH] = (kernel_real)(1 - at_high);
+    piece[KERNEL_PIECE_SLOPE] = (kernel_real)((at_high - at_low) / (end - begin));
+    piece[KERNEL_PIECE_INVERSE] = 1 / ((high - low) + (piece[KERNEL_PIECE_HIGH_REST] - piece[KERNEL_PIECE_LOW_REST]));
     set_colours(t, entries, middle, begin, piece);
 }
 
@@ -251,7 +243,7 @@ static void fill_bins(kernel_pieces *out)
     int piece = 0;
     for (int i = 0; i < KERNEL_PIECE_BINS; i++) {
         const kernel_real x = out->bin_low + (kernel_real)i / out->bin_inverse;
-        while (piece + 1 < out->count && out->pieces[piece].entry[KERNEL_PIECE_HIGH] <= x) piece++;
+        while (piece + 1 < out->count && out->pieces[piece][KERNEL_PIECE_HIGH] <= x) piece++;
         out->bin_first[i] = (kernel_real)piece;
     }
 }
@@ -267,8 +259,7 @@ static void fill_steps(kernel_pieces *out, const render_transfer *t)
         while (last + 1 < t->opacity_count &&
                (kernel_real)render_domain_of(t, t->opacity_values[last + 1]) == (kernel_real)at)
             last++;
-        if (t->opacities[i] != t->opacities[last])
-            out->steps[out->step_count++] = (kernel_step){at, (float)(kernel_real)at};
+        if (t->opacities[i] != t->opacities[last]) out->steps[out->step_count++] = at;
     }
 }
 
@@ -313,11 +304,11 @@ static void unite_variations(value_variation *a, const value_variation *b)
 
 /* Widens the bounds of the change of light by those of the piece between two of its values. behind: the minimum and
  * maximum of the light from behind. */
-static void variation_in_piece(value_variation *variation, const kernel_piece *p, double from, double to,
+static void variation_in_piece(value_variation *variation, const kernel_real *p, double from, double to,
                                const double behind[2])
 {
     kernel_bound b = {.extinction_low = 1e30f};
-    const bool falls = p->entry[KERNEL_PIECE_SLOPE] < 0;
+    const bool falls = p[KERNEL_PIECE_SLOPE] < 0;
     double steepness[2];
     kernel_bound_widen(&b, p, from, to);
     kernel_piece_steepness(p, from, to, steepness);
@@ -328,9 +319,9 @@ static void variation_in_piece(value_variation *variation, const kernel_piece *p
     widen_variation(variation, 0, fall, rise);
     for (int kind = 1; kind < VARIATION_KINDS; kind++) {
         const int channel = (kind - 1) / 2;
-        const double slope = (double)p->entry[KERNEL_PIECE_COLOUR_SLOPE + channel];
-        const double first = (double)p->entry[KERNEL_PIECE_COLOUR + channel] - behind[kind % 2];
-        const double c0 = first + (from - (double)p->entry[KERNEL_PIECE_LOW]) * slope, c1 = c0 + (to - from) * slope;
+        const double slope = (double)p[KERNEL_PIECE_COLOUR_SLOPE + channel];
+        const double first = (double)p[KERNEL_PIECE_COLOUR + channel] - behind[kind % 2];
+        const double c0 = first + (from - (double)p[KERNEL_PIECE_LOW]) * slope, c1 = c0 + (to - from) * slope;
         const double corners[4] = {fall * c0, fall * c1, rise * c0, rise * c1};
         const double low = fmin(fmin(corners[0], corners[1]), fmin(corners[2], corners[3]));
         const double high = fmax(fmax(corners[0], corners[1]), fmax(corners[2], corners[3]));
@@ -350,11 +341,11 @@ static int variation_in_bin(const kernel_pieces *t, int bin, int piece, const do
     variation->extinction = 0;
     for (int kind = 0; kind < VARIATION_KINDS; kind++)
         variation->low[kind] = INFINITY, variation->high[kind] = -INFINITY;
-    while (piece + 1 < t->count && (double)t->pieces[piece].entry[KERNEL_PIECE_HIGH] < low) piece++;
-    for (int i = piece; i < t->count && (double)t->pieces[i].entry[KERNEL_PIECE_LOW] <= high; i++) {
-        const double from = fmax(low, (double)t->pieces[i].entry[KERNEL_PIECE_LOW]);
-        const double to = fmin(high, (double)t->pieces[i].entry[KERNEL_PIECE_HIGH]);
-        variation_in_piece(variation, &t->pieces[i], from, to, behind);
+    while (piece + 1 < t->count && (double)t->pieces[piece][KERNEL_PIECE_HIGH] < low) piece++;
+    for (int i = piece; i < t->count && (double)t->pieces[i][KERNEL_PIECE_LOW] <= high; i++) {
+        const double from = fmax(low, (double)t->pieces[i][KERNEL_PIECE_LOW]);
+        const double to = fmin(high, (double)t->pieces[i][KERNEL_PIECE_HIGH]);
+        variation_in_piece(variation, t->pieces[i], from, to, behind);
     }
     return piece;
 }
@@ -394,9 +385,9 @@ static void fill(kernel_pieces *out, const render_transfer *t, double tolerance,
     const int count = collect_cuts(t, tolerance > rounding ? tolerance : rounding, cuts, entries);
     float low, high;
     out->count = count + 1;
-    set_piece(t, entries, -endless, cuts[0], &out->pieces[0]);
-    for (int i = 0; i + 1 < count; i++) set_piece(t, entries, cuts[i], cuts[i + 1], &out->pieces[i + 1]);
-    set_piece(t, entries, cuts[count - 1], endless, &out->pieces[count]);
+    set_piece(t, entries, -endless, cuts[0], out->pieces[0]);
+    for (int i = 0; i + 1 < count; i++) set_piece(t, entries, cuts[i], cuts[i + 1], out->pieces[i + 1]);
+    set_piece(t, entries, cuts[count - 1], endless, out->pieces[count]);
     out->bin_low = cuts[0];
     out->bin_inverse = KERNEL_PIECE_BINS / (cuts[count - 1] - cuts[0]);
     fill_bins(out);

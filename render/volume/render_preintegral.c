@@ -33,9 +33,9 @@ typedef struct bin_sums {
     double colour_low[3], colour_high[3];
 } bin_sums;
 
-static double entry_of(const kernel_piece *p, int entry)
+static double entry_of(const kernel_real *p, int entry)
 {
-    return (double)p->entry[entry];
+    return (double)p[entry];
 }
 
 static double within(double x, double low, double high)
@@ -43,7 +43,7 @@ static double within(double x, double low, double high)
     return x < low ? low : x > high ? high : x;
 }
 
-static double clear_at(const kernel_piece *p, double x)
+static double clear_at(const kernel_real *p, double x)
 {
     const double along = (x - entry_of(p, KERNEL_PIECE_LOW)) * entry_of(p, KERNEL_PIECE_INVERSE);
     const double low = entry_of(p, KERNEL_PIECE_CLEAR), high = entry_of(p, KERNEL_PIECE_CLEAR_HIGH);
@@ -65,24 +65,23 @@ static double extinction_of(double clear)
     return lesser(-log(greater(clear, 1e-300)), steepest);
 }
 
-static double extinction_at(const kernel_piece *p, double x)
+static double extinction_at(const kernel_real *p, double x)
 {
     return extinction_of(clear_at(p, x));
 }
 
-/* Caches the last computed extinction, because consecutive bins share an end, and the function is constant in many
- * bins. */
-typedef struct last_extinction {
-    double clear, extinction;
-} last_extinction;
-
-static double extinction_again(last_extinction *last, double clear)
+/* Returns the extinction for 1 - opacity. last: the last argument and result, kept because consecutive bins share an
+ * end, and the function is constant in many bins. */
+static double extinction_again(double last[2], double clear)
 {
-    if (clear != last->clear) *last = (last_extinction){clear, extinction_of(clear)};
-    return last->extinction;
+    if (clear != last[0]) {
+        last[0] = clear;
+        last[1] = extinction_of(clear);
+    }
+    return last[1];
 }
 
-static double colour_at(const kernel_piece *p, double x, int c)
+static double colour_at(const kernel_real *p, double x, int c)
 {
     return entry_of(p, KERNEL_PIECE_COLOUR + c) +
            (x - entry_of(p, KERNEL_PIECE_LOW)) * entry_of(p, KERNEL_PIECE_COLOUR_SLOPE + c);
@@ -90,8 +89,7 @@ static double colour_at(const kernel_piece *p, double x, int c)
 
 /* Adds the integrals between two values of a piece, by three Gauss nodes. Intervals are halved repeatedly towards an
  * opacity of 1. If both ends have the same opacity, it is constant between them. */
-static void integrate(const kernel_piece *p, double from, double to, int depth, last_extinction *last,
-                      double sum[CHANNELS])
+static void integrate(const kernel_real *p, double from, double to, int depth, double last[2], double sum[CHANNELS])
 {
     static const double node[3] = {0.1127016653792583, 0.5, 0.8872983346207417};
     static const double weight[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
@@ -109,7 +107,7 @@ static void integrate(const kernel_piece *p, double from, double to, int depth, 
     }
 }
 
-static void widen(bin_sums *bin, const kernel_piece *p, double x, last_extinction *last)
+static void widen(bin_sums *bin, const kernel_real *p, double x, double last[2])
 {
     const double extinction = extinction_again(last, clear_at(p, x));
     bin->low = lesser(extinction, bin->low);
@@ -123,15 +121,14 @@ static void widen(bin_sums *bin, const kernel_piece *p, double x, last_extinctio
 
 /* Computes the integrals and ranges of the bin from begin to end. first: the piece that contains begin. Returns the
  * piece that contains end. */
-static int fill_bin(const kernel_pieces *pieces, int first, double begin, double end, last_extinction *last,
-                    bin_sums *bin)
+static int fill_bin(const kernel_pieces *pieces, int first, double begin, double end, double last[2], bin_sums *bin)
 {
     *bin = (bin_sums){.low = INFINITY,
                       .high = -INFINITY,
                       .colour_low = {INFINITY, INFINITY, INFINITY},
                       .colour_high = {-INFINITY, -INFINITY, -INFINITY}};
     for (int i = first;; i++) {
-        const kernel_piece *p = &pieces->pieces[i];
+        const kernel_real *p = pieces->pieces[i];
         const double from = greater(begin, entry_of(p, KERNEL_PIECE_LOW)),
                      to = lesser(end, entry_of(p, KERNEL_PIECE_HIGH));
         if (from < to) {
@@ -148,18 +145,18 @@ static int fill_bin(const kernel_pieces *pieces, int first, double begin, double
 static void fill_bins(const kernel_pieces *pieces, double low, double width, int count, bin_sums *bins)
 {
     /* an invalid value, because a transmittance is never -1; the cache is empty at the beginning */
-    last_extinction last = {-1, 0};
+    double last[2] = {-1, 0};
     int piece = 0;
     for (int i = 0; i < count + 2; i++)
-        piece = fill_bin(pieces, piece, low + (i - 1) * width, low + i * width, &last, &bins[i]);
+        piece = fill_bin(pieces, piece, low + (i - 1) * width, low + i * width, last, &bins[i]);
     /* The outermost bins are computed again from the outermost pieces alone, so that they do not include a part of a
      * neighbouring piece by rounding of their border. */
     for (int end = 0; end < 2; end++) {
-        const kernel_piece *p = &pieces->pieces[end ? pieces->count - 1 : 0];
+        const kernel_real *p = pieces->pieces[end ? pieces->count - 1 : 0];
         const double x = end ? low + (count + 0.5) * width : low - 0.5 * width;
         bin_sums *bin = &bins[end ? count + 1 : 0];
         memset(bin->sum, 0, sizeof bin->sum);
-        integrate(p, x - 0.5 * width, x + 0.5 * width, 0, &last, bin->sum);
+        integrate(p, x - 0.5 * width, x + 0.5 * width, 0, last, bin->sum);
         bin->low = bin->high = extinction_at(p, x);
         for (int c = 0; c < 3; c++) bin->colour_low[c] = bin->colour_high[c] = colour_at(p, x, c);
     }

@@ -62,8 +62,8 @@ static insitu_status share_ranges(difference_exchange *d, base_error *error)
     if (status) return status;
     if (shared[SHARED_FAILURE] > 0) return session_agree(d->comm, error);
     for (int i = 0; i < RENDER_MAX_ISOVALUES; i++) {
-        d->job->waiting->ranges[i][0] = -shared[2 * i];
-        d->job->waiting->ranges[i][1] = shared[2 * i + 1];
+        d->job->waiting_ranges[i][0] = -shared[2 * i];
+        d->job->waiting_ranges[i][1] = shared[2 * i + 1];
     }
     d->rounds = (int64_t)shared[SHARED_ROUNDS];
     return INSITU_OK;
@@ -217,7 +217,7 @@ insitu_status session_light_by_differences(MPI_Comm comm, const render_job *job,
                                            base_error *error)
 {
     const double start = MPI_Wtime();
-    difference_exchange d = {.comm = comm, .job = job, .list = &job->waiting->list};
+    difference_exchange d = {.comm = comm, .job = job, .list = job->waiting};
     MPI_Comm_rank(comm, &d.rank);
     MPI_Comm_size(comm, &d.ranks);
     d.round_hits = session_mail_round_size(d.ranks, ROUND_HITS);

@@ -54,9 +54,11 @@ static insitu_status trace_fragments(const session_frame_target *t, const render
 {
     int ranks = 1;
     MPI_Comm_size(t->comm, &ranks);
-    render_pending_hits waiting = {0};
+    render_pending_list waiting = {0};
+    double ranges[RENDER_MAX_ISOVALUES][2] = {{0}};
     render_job traced = *job;
     traced.waiting = ranks > 1 && render_has_differences(job) ? &waiting : NULL;
+    traced.waiting_ranges = ranges;
     if (job->part_count > 0 && !error->status) render_frame(&traced, fragments, rendered, error);
     if (!traced.waiting) return INSITU_OK;
     return session_light_by_differences(t->comm, &traced, fragments, &rendered->surface_ms, error);
