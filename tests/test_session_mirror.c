@@ -50,7 +50,7 @@ static void mirror_by_vertex(const insitu_mesh *mesh, int axes, const mirror *by
         out->places[axis] = test_calloc((size_t)mesh->vertex_count + 1, 8);
         for (int64_t v = 0; v < mesh->vertex_count; v++) {
             double place[3];
-            place_of(mesh, v, place);
+            compute_vertex_position(mesh, v, place);
             if (type == INSITU_FLOAT64)
                 ((double *)out->places[axis])[v] = 2 * by->planes[axis] - place[axis];
             else
@@ -69,7 +69,7 @@ static void mirror_along_axes(const insitu_mesh *mesh, int axes, const mirror *b
         out->along[axis] = test_calloc((size_t)count, sizeof(double));
         for (int64_t n = 0; n < count; n++) {
             double place[3];
-            place_of(mesh, n * stride, place);
+            compute_vertex_position(mesh, n * stride, place);
             out->along[axis][n] = axes >> axis & 1 ? 2 * by->planes[axis] - place[axis] : place[axis];
         }
         stride *= count;
@@ -85,7 +85,7 @@ static void renumber_vertices(const insitu_mesh *mesh, int axes, const mirror *b
     for (int64_t v = 0; v < mesh->vertex_count; v++) {
         double place[3];
         out->ids[v] = ((const int64_t *)mesh->vertex_ids.data)[v];
-        place_of(mesh, v, place);
+        compute_vertex_position(mesh, v, place);
         for (int axis = 0; axis < 3; axis++)
             if (axes >> axis & 1 && place[axis] != by->planes[axis]) out->ids[v] += (int64_t)1 << (45 + axis);
     }
@@ -515,7 +515,7 @@ static void warped_meshes_are_mirrored_after_the_warp(void **state)
     insitu_field_defaults(&field);
     field.name = "u";
     field.component_count = 3;
-    field.fill = give_values;
+    field.fill = copy_filled_values;
     field.fill_data = &values;
     static const char scene[] =
         "threads: 1\nimages:\n" LAYERS("a", "[{surface: {colour_by: {field: u, component: y}}}]")
@@ -544,7 +544,7 @@ static void fill_functions_are_called_once(void **state)
     insitu_field field;
     insitu_field_defaults(&field);
     field.name = "f";
-    field.fill = give_values;
+    field.fill = copy_filled_values;
     field.fill_data = &values;
     insitu_session *session = open_text(MPI_COMM_WORLD, mirrors[0].text, all_layers);
     insitu_session *blocks = open_text(MPI_COMM_WORLD, "", all_layers);

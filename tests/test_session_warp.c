@@ -43,7 +43,7 @@ static void make_field(const insitu_mesh *mesh, int components, warped *out)
     out->u = test_calloc((size_t)(components * mesh->vertex_count) + 1, sizeof(double));
     for (int64_t v = 0; v < mesh->vertex_count; v++) {
         double place[3], u[3];
-        place_of(mesh, v, place);
+        compute_vertex_position(mesh, v, place);
         compute_displacement(place, u);
         memcpy(out->u + components * v, u, (size_t)components * sizeof *u);
     }
@@ -67,7 +67,7 @@ static void move_mesh(const insitu_mesh *mesh, double factor, warped *w)
         w->places[axis] = test_calloc((size_t)mesh->vertex_count + 1, 8);
         for (int64_t v = 0; v < mesh->vertex_count; v++) {
             double place[3];
-            place_of(mesh, v, place);
+            compute_vertex_position(mesh, v, place);
             const double moved = place[axis] + (axis < w->components ? factor * w->u[w->components * v + axis] : 0);
             if (type == INSITU_FLOAT64)
                 ((double *)w->places[axis])[v] = moved;
@@ -309,7 +309,7 @@ static void store_displacements(layout as, warped *w, void *room, int64_t *index
     }
     if (as != FILLED) return;
     *values = (filled_values){u->values, u->count, 0};
-    u->fill = give_values;
+    u->fill = copy_filled_values;
     u->fill_data = values;
 }
 

@@ -7,17 +7,17 @@
 
 /* Computes the position of a vertex from the mesh's description: from coordinates by vertex, or along the axes of a
  * lattice with packed strides. */
-void place_of(const insitu_mesh *mesh, int64_t vertex, double out[3]);
+void compute_vertex_position(const insitu_mesh *mesh, int64_t vertex, double out[3]);
 
-/* The data of give_values(), a fill function that all ranks must call. `calls` counts the calls that all ranks made
- * together. */
+/* The data of copy_filled_values(), a fill function that all ranks must call. `calls` counts the calls that all ranks
+ * made together. */
 typedef struct filled_values {
     insitu_array values;
     int64_t count;
     int calls;
 } filled_values;
 
-insitu_status give_values(void *filled, insitu_field *field);
+insitu_status copy_filled_values(void *filled, insitu_field *field);
 
 /* Compares both drawings and frees them. Also fails if the compared pictures are empty. */
 void expect_same(drawn *a, drawn *b, const char *what);
