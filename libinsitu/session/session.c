@@ -10,14 +10,15 @@
 #include "session_field_input.h"
 #include "session_mesh_input.h"
 
-/* The message that insitu_error(NULL) returns after a failed insitu_create(), which leaves no session. */
+/* The message that insitu_error(NULL) returns after a failed insitu_create(), because there is no session that could
+ * hold the message. */
 static _Thread_local base_error thread_error;
 
 /* Report that is returned while a fill function runs, since the step's report is incomplete then. */
 static const insitu_report no_report = {.schedule = "", .copied_why = "", .left_out = "", .warnings = "", .pieces = ""};
 
-/* Returns whether a fill function is running, in which the call is not allowed; the error is then recorded. That is the
- * only change of the session, for which const is cast away. */
+/* Returns whether a fill function is running, in which the call is not allowed; the error is then recorded. Recording
+ * the error is the only change of the session, for which const is cast away. */
 static bool is_in_fill(const insitu_session *session, const char *call)
 {
     return session_refuse_in_fill(&((insitu_session *)(uintptr_t)session)->meshes, call);
@@ -146,8 +147,8 @@ insitu_status insitu_create_fortran(MPI_Fint comm, const char *scene, int is_tex
     return is_text ? insitu_create_from_text(of_c, scene, out) : insitu_create(of_c, scene, out);
 }
 
-/* Stores the error of a failed call, and returns its status. A successful call keeps the message of the last failed
- * one; the next step clears it. */
+/* Stores the error of a failed call, and returns its status. A successful call does not clear the message of the last
+ * failed call; the next step clears it. */
 static insitu_status store_error(insitu_session *session, const base_error *error)
 {
     if (error->status) session->error = *error;

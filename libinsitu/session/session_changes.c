@@ -1,5 +1,5 @@
-/* Finds out by one reduction what has changed on any rank. The reduction is a maximum over a few integers. From it
- * every rank determines:
+/* Finds out by one reduction what has changed on any rank. The reduction is a maximum over a few integers. From the
+ * result every rank determines:
  *
  *     - whether all ranks are at the same cycle (maximum and minimum), and the lowest rank with an error
  *     - whether cells, coordinates, levels of refinement or names have changed on any rank

@@ -9,7 +9,7 @@ enum { SESSION_MOST_REQUESTED = 256 };
 
 /* The names of parameters that the simulation has requested on this rank. */
 typedef struct session_requested_names {
-    /* number of names that were requested; only the first SESSION_MOST_REQUESTED are recorded, and if there are more,
+    /* number of names that were requested. Only the first SESSION_MOST_REQUESTED names are recorded; if there are more,
      * no parameter is reported as unused */
     int count;
     uint64_t names[SESSION_MOST_REQUESTED]; /* hashes of the recorded names */

@@ -45,7 +45,7 @@ static insitu_status read_attachment(const char *path, char **text, int64_t *siz
     return INSITU_OK;
 }
 
-/* Sends rank 0's bytes to all ranks; *data is allocated on the others. Collective. */
+/* Sends rank 0's bytes to all ranks; *data is allocated on the other ranks. Collective. */
 static insitu_status broadcast_bytes(const session_team *team, char **data, int64_t *size, base_error *error)
 {
     insitu_status status = session_check_mpi(error, MPI_Bcast(size, 1, MPI_INT64_T, 0, team->comm), "MPI_Bcast");
@@ -172,7 +172,7 @@ insitu_status session_load_scene(session_scene_file *file, const session_team *t
 bool session_is_scene_edited(const session_scene_file *file, int rank)
 {
     struct stat now;
-    /* an editor may have removed the file for a moment; then a later step reads it */
+    /* if an editor has removed the file for a moment, a later step reads it */
     if (rank != 0 || file->is_text || stat(file->path, &now) != 0) return false;
     return !file->has_stamp || !is_same_file(&now, &file->stamp);
 }

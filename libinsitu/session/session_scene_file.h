@@ -20,14 +20,15 @@ typedef struct session_scene_file {
 /* Stands for the file's path in messages if the scene was given as text. */
 #define SESSION_SCENE_TEXT "scene text"
 
-/* The source of a scene; only rank 0's is used. */
+/* The source of a scene; only the source given on rank 0 is used. */
 typedef struct session_scene_source {
     const char *call; /* name of the public call, for messages */
     const char *path; /* path of the file; NULL if text is given or there is no scene */
     const char *text; /* YAML text; NULL if a path is given or there is no scene */
 } session_scene_source;
 
-/* Reads the scene for the first time. *file must be empty before, and must be freed even after an error. Collective. */
+/* Reads the scene for the first time. *file must be empty before the call, and must be freed even after an error.
+ * Collective. */
 insitu_status session_load_scene(session_scene_file *file, const session_team *team, const session_scene_source *source,
                                  base_error *error);
 

@@ -42,7 +42,7 @@ static double milliseconds_since(double start)
 }
 
 /* Reads the edited scene, and frees everything that was created for images of the old one. If the new scene divides
- * cells into pieces in another way, cells are marked as changed. */
+ * cells of higher order into other pieces, cells are marked as changed. */
 static void reload_scene(insitu_session *s, session_changes *changes)
 {
     const scene old = s->scene_file.scene;
@@ -73,8 +73,8 @@ static void reload_scene(insitu_session *s, session_changes *changes)
     changes->are_cells_changed = changes->are_names_changed = true;
 }
 
-/* Makes all ranks use the lowest of their instruction sets. Instruction sets round differently, so that volumes of
- * ranks with different ones would overlap or leave gaps at a face between cells of two ranks. */
+/* Makes all ranks use the lowest of their instruction sets. Instruction sets round differently. If ranks used different
+ * ones, volumes would overlap or leave gaps at faces between cells of two ranks. */
 static void use_common_kernels(const session_changes *changes, session_report *report)
 {
     render_isa_limit(changes->isa_level);
@@ -137,8 +137,8 @@ static insitu_status name_derived(insitu_session *s, base_error *error)
                                       error);
 }
 
-/* Updates the catalogue of all ranks' meshes and fields if names are new, adds the derived fields to it, and finds the
- * mesh groups of meshes. An error in finding mesh groups is stored only in *error. Collective. */
+/* Updates the catalogue of all ranks' meshes and fields if names are new, adds the derived fields to it, and creates
+ * the mesh groups (session_mesh_groups.h). An error of the latter is only stored in *error. Collective. */
 static insitu_status list_meshes(insitu_session *s, bool are_names_new, bool is_shared, base_error *error)
 {
     insitu_status status = INSITU_OK;
@@ -167,9 +167,9 @@ static insitu_status transform_meshes(insitu_session *s, bool *are_cells_changed
     return status;
 }
 
-/* Reads cells of higher order as finer ones, unless the scene says otherwise. Which cells are refined follows from the
- * images that are due, and so does the number of pieces by surface_error. *are_cells_changed is set if cells are split
- * otherwise on any rank. Collective. */
+/* Divides cells of higher order into finer pieces, unless the scene disables this. The images that are due determine
+ * which cells are refined and, with surface_error, the number of pieces. *are_cells_changed is set if the pieces have
+ * changed on any rank. Collective. */
 static insitu_status refine_cells(insitu_session *s, const session_moment *moment, bool *are_cells_changed,
                                   base_error *error)
 {
@@ -278,7 +278,7 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     if (!status && plan.slice_count) session_update_distances(&s->meshes, team, error);
     if (!status && plan.surface_count) status = session_update_surfaces(&plan, &s->catalogue, &s->meshes, team, error);
     s->report.public_report.prepare_ms = milliseconds_since(start);
-    /* errors of all phases above that are only in *error are passed to all ranks by the next reduction */
+    /* the next reduction passes errors that the phases above have only stored in *error to all ranks */
     if (!status) {
         if (!error->status)
             session_update_trees(&s->trees, &s->meshes, &s->space, basis.scene->tree, team, &s->report.public_report,

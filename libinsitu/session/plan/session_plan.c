@@ -278,7 +278,7 @@ static bool plan_recentrings(const session_catalogue *catalogue, session_plan *p
 {
     bool is_planned = true;
     for (int i = 0; i < plan->image_count; i++) {
-        /* views of an orbit share the layers of their first view, which is checked alone */
+        /* views of an orbit share the layers of their first view, so that only the first view is checked */
         if (plan->images[i]->variant.view > 0) continue;
         scene_field_walk walk = {.image = plan->images[i]};
         for (const scene_field *field; is_planned && (field = scene_next_field(&walk)) != NULL;)

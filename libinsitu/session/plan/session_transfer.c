@@ -13,17 +13,18 @@
 
 enum { band_entries = 16 };
 
-/* Limits, as shares of the larger end, below which a range from the data counts as a single value, because means over
- * cells and ranks have rounding errors of a few times 2^-53. A range that the scene gives may be as narrow as its
- * digits allow, because values are stored relative to its low end in double. */
+/* Limits of the width of a range, as fractions of its larger end, below which the range is treated as a single value.
+ * least_of_data is for ranges from the data, because means over cells and ranks have rounding errors of a few times
+ * 2^-53. A range that the scene gives may be as narrow as its digits allow, because values are stored relative to its
+ * low end in double. */
 static const double least_of_data = 64 * DBL_EPSILON, widest_log = 1e30;
 
-/* Width of the range that a constant field gets, as a share of its value. */
+/* Width of the range that a constant field gets, as a fraction of the field's value. */
 static const double constant_linear = 1e-6, constant_scaled = 1e-3;
 
-/* With a logarithmic scale, values are stored relative to 0 in float32. In a range narrower than this share of its
- * larger end, their rounding would be visible. Such a range gets a linear scale instead: the error is at most an eighth
- * of the share, 1.3e-4 of the map. */
+/* With a logarithmic scale, values are stored relative to 0 in float32. In a range narrower than this fraction of its
+ * larger end, the rounding would be visible. Such a range gets a linear scale instead, which changes positions in the
+ * map by at most an eighth of this fraction, 1.3e-4. */
 static const double straight = 1e-3;
 
 static double larger_magnitude(double low, double high)
@@ -47,8 +48,8 @@ bool session_is_range_too_narrow(double low, double high)
     return low < high && high - low < fmax(least_of_data * larger_magnitude(low, high), FLT_MIN);
 }
 
-/* Widens a range so that it is not empty and, for a logarithmic scale, positive. The range of a constant field gets the
- * field's value in its middle. Returns whether there is a single value, and stores it in *constant. */
+/* Widens a range so that it is not empty and, for a logarithmic scale, positive. If the field is constant, its value
+ * becomes the middle of the range. Returns whether there is a single value, and stores it in *constant. */
 static bool make_range_usable(const scene_colour_map *map, double *low, double *high, double *constant)
 {
     const bool is_log = map->scale == SCENE_LOG;

@@ -9,16 +9,17 @@ typedef struct session_transfer {
     render_transfer transfer;                         /* the transfer function; it points into this struct */
     double opacity_values[RENDER_MAX_OPACITY_POINTS]; /* value of the field at each point of the opacity curve */
     float opacities[RENDER_MAX_OPACITY_POINTS];       /* opacity at each of these values */
-    /* values at the ends of the colour map; the transfer function's range is larger if a volume shows values outside */
+    /* values at the ends of the colour map; the transfer function's range is larger if a volume shows values outside of
+     * [low, high] */
     double low, high;
     bool is_constant; /* set if all values are equal; the value is then in the middle of low and high */
     double constant;
     float *table; /* table of colours that this struct owns; NULL: the map's table is used */
 } session_transfer;
 
-/* Computes the transfer function of a colour map over [low, high] (low > high: there are no values), with the opacity
- * of the volume; volume is NULL for a surface. half_diagonal: half the diagonal of the global bounds. *out points into
- * the map. Returns false if memory ran out, with nothing to free. Local. */
+/* Computes the transfer function of a colour map over [low, high] with the opacity of the volume. low > high: there are
+ * no values. volume: NULL for a surface. half_diagonal: half the diagonal of the global bounds. *out points into the
+ * map. Returns false if memory ran out, with nothing to free. Local. */
 bool session_make_transfer(double half_diagonal, const scene_colour_map *map, double low, double high,
                            const scene_volume *volume, session_transfer *out);
 /* Returns whether the transfer function needs memory, and so may fail; the result is the same on all ranks. */

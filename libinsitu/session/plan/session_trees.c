@@ -1,18 +1,18 @@
 /* Updates trees. Trees that are up to date are not changed. New cells require a new tree; moved vertices require a
- * refit of its bounds (or, if its cost has grown by half, a new tree); new values require a refit of ranges. The first
- * scalar with which a mesh is drawn has its ranges in the nodes themselves, further ones in arrays beside the tree. If
- * values determine which cells are visible and vertices move in every step, only the bounds of visible nodes are
- * refitted: a fifth of the nodes for an isosurface.
+ * refit of its bounds (or, if its cost has grown by half, a new tree); new values require a refit of ranges. The ranges
+ * of the first scalar with which a mesh is drawn are stored in the nodes themselves, and those of further scalars in
+ * separate arrays. If values determine which cells are visible and vertices move in every step, only the bounds of
+ * visible nodes are refitted, which are a fifth of all nodes for an isosurface.
  *
  * A full tree is expensive to build and cheap to keep. A partial tree, over the cells that the images can show, is
  * cheap to build if they show little, but is valid only for the current values. Which is better depends on how long the
- * cells will stay unchanged, which is unknown. So partial trees are "rented" until the time spent on them since the
- * cells last changed reaches the price of the full tree, which is then "bought". This never costs more than twice the
- * best choice in hindsight (Karlin, Manasse, Rudolph and Sleator 1988). Prices are measured in this run.
+ * cells will stay unchanged, which is unknown. Therefore partial trees are "rented" until the time spent on them since
+ * the cells last changed reaches the price of the full tree, which is then "bought". This never costs more than twice
+ * the best choice in hindsight (Karlin, Manasse, Rudolph and Sleator 1988). Prices are measured in this run.
  *
- * If the last full tree of a mesh was used in only one step, the next one probably will be, too, as when the caller
- * sets a new mesh at every step. It is then built along a space-filling curve, in half the time, and is kept if it is
- * used longer after all. */
+ * If the last full tree of a mesh was used in only one step, the next tree will probably also be used only once, for
+ * example because the caller sets a new mesh at every step. The next tree is then built along a space-filling curve,
+ * which takes half the time. It is kept if it is used longer after all. */
 #include "session_trees.h"
 
 #include <math.h>
@@ -87,7 +87,7 @@ static double half_box_area(const session_mesh *mesh)
     return d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
 }
 
-/* Chooses the tree builder. Trees over a selection of cells are small, so that the choice hardly matters for them. */
+/* Chooses the tree builder. For trees over a selection of cells the choice hardly matters, because they are small. */
 static mmbvh_builder choose_builder(const session_mesh *mesh, const mmbvh_selection *selection)
 {
     return !selection && mesh->full_tree_steps == 1 ? MMBVH_MORTON : MMBVH_SAH;
@@ -170,7 +170,7 @@ static insitu_status build_and_refit(const tree_update *u, session_mesh *mesh, b
 }
 
 /* Returns whether the tree's cost, relative to the area of its mesh's box, has grown so much that it should be rebuilt.
- * Boxes of nodes that were not refitted count as unchanged. */
+ * Nodes that were not refitted are included with their old boxes. */
 static bool is_decayed(const session_mesh *mesh)
 {
     const double tree = mesh->tree.area * mesh->built_surface, built = mesh->tree.built_area * half_box_area(mesh);
@@ -211,8 +211,8 @@ static insitu_status refit_bounds(const tree_update *u, session_mesh *mesh, bool
     return is_decayed(mesh) ? build_and_refit(u, mesh, error) : INSITU_OK;
 }
 
-/* Updates the bounds. Bounds that are valid only for visible nodes suffice as long as the candidates are the same. If
- * the candidates have changed, and the vertices no longer move, all bounds are refitted, once. */
+/* Updates the bounds. As long as the candidates are the same, only bounds of visible nodes must be valid. If the
+ * candidates have changed and vertices no longer move, all bounds are refitted once. */
 static insitu_status update_bounds(const tree_update *u, session_mesh *mesh, bool are_values_new, base_error *error)
 {
     uint64_t key;
@@ -220,7 +220,8 @@ static insitu_status update_bounds(const tree_update *u, session_mesh *mesh, boo
     const bool is_other = !is_told || are_values_new || key != mesh->candidates_key;
     if (!mesh->is_geometry_stale && !(mesh->are_bounds_partial && is_other)) return INSITU_OK;
     const insitu_status status = refit_bounds(u, mesh, !is_told || !mesh->is_geometry_stale, error);
-    mesh->candidates_key = status ? ~key : key; /* if refitting fails, the bounds are valid for no set of candidates */
+    mesh->candidates_key =
+        status ? ~key : key; /* if refitting fails, the bounds are not valid for any set of candidates */
     return status;
 }
 
@@ -362,8 +363,8 @@ static insitu_status update_tree(const tree_update *u, session_mesh *mesh, base_
 }
 
 /* Updates some of the parts on one thread. If a mesh has many small blocks, a parallel region for each would cost more
- * than it saves; so if there are several parts per thread, each part is updated by one thread. Seconds per cell are
- * then not measured. */
+ * than it saves; therefore each part is updated by one thread if there are several parts per thread. In this case the
+ * seconds per cell are not measured. */
 typedef struct thread_update {
     tree_update update;
     session_trees trees;

@@ -12,7 +12,7 @@ typedef struct session_rates {
     double build, select, refit;
 } session_rates;
 
-/* The state of updating trees that does not belong to a single mesh. */
+/* The part of the state of trees that does not belong to a single mesh. */
 typedef struct session_trees {
     session_rates rates;
     mmbvh parent; /* tree over the trees that parent_key identifies; empty if there is at most one tree */
@@ -21,7 +21,7 @@ typedef struct session_trees {
 } session_trees;
 
 /* Builds or refits the trees of the marked meshes that are out of date. choice: which kind of tree the scene requests.
- * Adds the times to the report. Local; errors are shared by the next reduction. */
+ * Adds the times to the report. Local; the next reduction sends errors to all ranks. */
 insitu_status session_update_trees(session_trees *trees, const session_meshes *meshes, const session_space *space,
                                    scene_tree choice, const session_team *team, insitu_report *report,
                                    base_error *error);

@@ -8,7 +8,7 @@
 #include "session_team.h"
 
 /* Returns a hash of the cells on this rank that have values that are not finite in the plan's layers; 0 if there are
- * none. While it does not change on any rank, the warnings do not change either. Local. */
+ * none. The warnings are the same as before if the hash has not changed on any rank. Local. */
 uint64_t session_unusable_key(const session_plan *plan, const session_meshes *meshes);
 
 /* Counts the cells with values that are not finite over all ranks, and warns of them. Collective. */

@@ -47,7 +47,8 @@ static void group_part(const groups_basis *basis, int part, session_vertex_group
     }
 }
 
-/* Groups the vertices of all parts. *one_vertex: if they are grouped by id, the number of one vertex of each group. */
+/* Groups the vertices of all parts. If vertices are grouped by id, *one_vertex receives an array with the number of one
+ * vertex of each group. */
 static bool group_vertices(const groups_basis *basis, session_vertex_groups *out, int64_t **one_vertex)
 {
     out->first_vertices = base_calloc((size_t)basis->part_count + 1, sizeof *out->first_vertices);

@@ -1,9 +1,10 @@
 /* Groups this rank's equal vertices.
  *
- * Vertices with equal keys count as one vertex. The keys are global ids if all ranks give them, else the bits of the
- * coordinates, with -0 as +0. Vertices are also grouped if there is only one rank: otherwise a mesh that doubles its
- * vertices along a crack would look different on one rank and on two. The meshes of a mesh group
- * (session_mesh_groups.h) share the groups of vertices, but only by coordinates, because ids belong to one mesh. */
+ * Vertices with equal keys are treated as one vertex. The keys are global ids if all ranks give ids, else the bits
+ * of the coordinates, with -0 replaced by +0. Vertices are also grouped if there is only one rank, because otherwise
+ * a mesh with duplicate vertices along a crack would look different on one rank and on two. The meshes of a mesh
+ * group (session_mesh_groups.h) share the groups of vertices, but only by coordinates, because ids belong to one
+ * mesh. */
 #ifndef SESSION_VERTEX_GROUPS_H
 #define SESSION_VERTEX_GROUPS_H
 
@@ -17,11 +18,11 @@ typedef struct session_vertex_groups_basis {
     /* borders of the parts, which contain the twins of vertices; NULL: vertices have no twins */
     const session_border *borders;
     const session_homes *homes;
-    bool by_id; /* set if the mesh group is a single mesh whose vertices are equal if their global ids are */
+    bool by_id; /* true: the mesh group is a single mesh with global ids, and vertices with equal ids are equal */
     int ranks;
 } session_vertex_groups_basis;
 
-/* Makes the groups unless they are up to date. Returns false if memory ran out; they are then empty. Local. */
+/* Makes the groups unless they are up to date. Returns false if memory ran out; the groups are then empty. Local. */
 bool session_update_vertex_groups(const session_vertex_groups_basis *basis, session_vertex_groups *groups);
 
 #endif

@@ -1,5 +1,5 @@
-/* A rank has all vertices for which it needs sums, but may lack some of the cells around them. It therefore requests,
- * from the ranks whose boxes contain such a vertex, their shares of its sum.
+/* A rank has all vertices for which it needs sums, but may lack some of the cells around them. For each of these
+ * vertices, it therefore requests partial sums from the ranks whose boxes contain the vertex.
  *
  *     shared: keys inside another rank's box  --(keys)-->  that rank adds them to its own
  *     local:  every vertex with one of these keys; the cells around them; their sums (session_gradients.h)
@@ -21,7 +21,7 @@ enum { KEY_WORDS = 3 };
 
 /* ---- keys of all vertices ------------------------------------------------------------------------------------- */
 
-/* Marks the vertices of cells that are not ghosts by 0 in key_indices, and all others by -1. */
+/* Sets key_indices to 0 for vertices of cells that are not ghosts, and to -1 for all other vertices. */
 static void mark_vertices(session_sum_part *part)
 {
     const grid *g = &part->mesh->cells;
@@ -140,7 +140,8 @@ static bool write_requests(const session_vertex_sums *sums, const session_team *
     return true;
 }
 
-/* Ensures space for the keys that other ranks request, which are stored after this rank's own. */
+/* Ensures that the array has space for the keys that other ranks request, which are stored after this rank's own
+ * keys. */
 static bool extend_keys(session_vertex_sums *sums, int64_t more)
 {
     session_key_table all;
@@ -152,8 +153,8 @@ static bool extend_keys(session_vertex_sums *sums, int64_t more)
 }
 
 /* Finds the number of each key that other ranks have requested, and adds the key if it is new. If has_all_vertices is
- * set, no keys are added, because every vertex has one already. *numbers: these numbers, in the order of the messages;
- * -1: this rank has no vertex with the key. */
+ * set, no keys are added, because every vertex has one already. *numbers receives the numbers of the keys, in the order
+ * of the messages; -1: this rank has no vertex with the key. */
 static bool read_requests(const session_mail *in, session_vertex_sums *sums, int64_t **numbers)
 {
     const int64_t count = in->total / KEY_WORDS;
@@ -297,7 +298,7 @@ static bool make_polynomials(const session_vertex_sums *sums, session_sum_part *
     return part->polynomials && session_polynomials_create(part->mesh, part->polynomials);
 }
 
-/* Lists the cells of each part that contribute to sums, and computes this rank's bounds of their contributions. */
+/* Lists the cells of each part that contribute to sums, and computes bounds of these contributions on this rank. */
 static bool begin_sums(session_vertex_sums *sums, session_cell_list *lists, int threads)
 {
     const size_t count = (size_t)(sums->keys.count ? sums->keys.count : 1);
@@ -328,15 +329,16 @@ static bool add_sums(const session_vertex_sums *sums, const session_cell_list *l
     return is_done;
 }
 
-/* Computes the sums, with the bounds of all ranks. If a rank has failed before, all return its error; an error after
- * the reduction is stored only in *error. Collective. */
+/* Computes the sums of gradients in fixed-point integers, whose unit follows from the largest bounds over all ranks. If
+ * *error of any rank already holds an error, all ranks return this error; an error that occurs after the reduction is
+ * only stored in *error. Collective. */
 static insitu_status make_sums(const session_team *team, session_vertex_sums *sums, session_cell_list *lists,
                                base_error *error)
 {
     const int64_t bytes = sums->keys.count * session_sum_words(sums->field_count) * (int64_t)sizeof(int64_t);
     if (!error->status && !(lists && begin_sums(sums, lists, team->threads)))
         session_fail_for_memory(error, bytes, "gradients at vertices");
-    /* the last entry is 1 if this rank has failed */
+    /* the last entry is 1 if this rank has an error */
     double largest[3] = {sums->bounds.largest_difference, sums->bounds.largest_inverse_square,
                          error->status != INSITU_OK};
     insitu_status status = session_check_mpi(

@@ -13,8 +13,8 @@ typedef struct session_sum_part {
     bool of_shells;
     grid_field fields[SESSION_GRADIENTS];
     int32_t *key_indices; /* index of each vertex's key, or -1 */
-    /* the cells' polynomials, computed by session_find_sums(); NULL: cells are linear, or the values at their nodes are
-     * means of values of cells */
+    /* the cells' polynomials, computed by session_find_sums(); NULL: cells are linear, or values at nodes are means of
+     * cell values */
     session_polynomials *polynomials;
 } session_sum_part;
 
@@ -24,10 +24,10 @@ typedef struct session_vertex_sums {
     int part_count;
     session_sum_part *parts;
     int field_count;
-    /* set if vertices are equal if their global ids are; otherwise vertices with equal coordinates are equal */
+    /* true: vertices with equal global ids are equal; false: vertices with equal coordinates are equal */
     bool by_id;
-    bool has_all_vertices; /* set if every vertex of each part has a key, so that all ranks get the sums of all their
-                              cells */
+    bool has_all_vertices; /* true: every vertex of each part has a key, so that no key must be added for requests of
+                              other ranks */
     session_key_table keys;
     int64_t own_count; /* number of this rank's keys; the keys after them were requested by other ranks */
     session_gradient_bounds bounds;

@@ -1,5 +1,5 @@
-/* Data that depends on a scalar's values is expensive to compute. So it is computed again only if a checksum of the
- * values has changed. */
+/* Data that depends on a scalar's values is expensive to compute. Therefore it is computed again only if a checksum of
+ * the values has changed. */
 #include "session_checksums.h"
 
 #include <string.h>
@@ -15,8 +15,8 @@ static uint64_t mix_bits(uint64_t sum, uint64_t bits)
     return product ^ product >> 29;
 }
 
-/* Computes the checksum in several independent sums, which a CPU computes in parallel: within one sum, each
- * multiplication depends on the previous one. */
+/* Computes the checksum in several independent sums, which a CPU computes in parallel. Within one sum, each
+ * multiplication would have to wait for the previous one. */
 static uint64_t sum_words(const char *data, int64_t bytes)
 {
     uint64_t lanes[LANES] = {1, 2, 3, 4}, words[LANES];
@@ -104,8 +104,8 @@ static uint64_t find_sample(const session_mesh *mesh, const session_scalar *scal
     return field.source_cells ? sample_field(sum, mesh, field.source_cells) : sum;
 }
 
-/* Warns if the caller has changed values in place but declared them unchanged: trees then contain ranges of the old
- * values, while rays read the new ones. */
+/* Warns if the caller has changed values in place but declared them unchanged. In this case trees contain ranges of the
+ * old values, while rays read the new values. */
 static void warn_of_change(const session_mesh *mesh, session_scalar *scalar, session_report *report)
 {
     if (session_is_distance(scalar)) return;

@@ -6,10 +6,10 @@
 #include "session_report.h"
 
 /* Compares a checksum of the values with that of the last picture, for every scalar that an image of this step uses and
- * that was set anew. If they differ, everything that depends on the values is marked as stale. A checksum has 64 bits
- * and requires reading the values once, at the speed of memory. For other scalars a few values are sampled: if these
- * have changed although the caller declared them unchanged, the scalar is treated as if it was set anew, and a warning
- * is added. Parallel. Local. */
+ * whose field the caller has set again. If the checksums differ, everything that depends on the values is marked as
+ * stale. A checksum has 64 bits and requires reading the values once, at the speed of memory. For all other scalars
+ * only a few values are sampled. If these have changed although the caller declared them unchanged, the scalar is
+ * treated as if its field was set again, and a warning is added. Parallel. Local. */
 void session_find_changed_values(const session_meshes *meshes, int threads, session_report *report);
 
 #endif

@@ -168,7 +168,7 @@ insitu_status session_make_discontinuous(session_meshes *meshes, const session_c
 {
     for (int m = 0; m < meshes->count && !error->status; m++) {
         session_mesh *mesh = meshes->items[m];
-        /* in a mesh with finer lattices each cell has its own nodes already */
+        /* in a mesh with finer lattices cells do not share nodes, so that the mesh need not be made discontinuous */
         const bool is_discontinuous = !mesh->finer.parts && is_named_in_scene(mesh, scene);
         if (mesh->is_given) update_discontinuous_mesh(meshes, mesh, is_discontinuous, team->threads, error);
     }

@@ -1,11 +1,11 @@
 /* Discontinuous meshes, in which every cell has its own vertices. They are used for fields with a value at each corner
  * of each cell.
  *
- * All other code finds values by the number of a vertex. So a mesh with a field at corners is read as one in which
- * every corner is a vertex: its coordinates are copied corner by corner, and its connectivity is 0, 1, 2, .... All
- * layers of the mesh are drawn in this form, so that fields at corners, vertices and cells can be combined. Code that
- * must find equal vertices (for means at vertices, or for outer faces) compares ids or coordinates across ranks anyway,
- * and so works for corners too. */
+ * All other code finds values by the number of a vertex. Therefore a mesh with a corner field is read as a mesh in
+ * which every corner is a vertex. Its coordinates are copied corner by corner, and its connectivity is 0, 1, 2, ....
+ * All layers of the mesh are drawn in this form, so that fields at corners, vertices and cells can be combined. Code
+ * that must find equal vertices (for means at vertices, or for outer faces) compares ids or coordinates across
+ * ranks, which also works for corners. */
 #ifndef SESSION_DISCONTINUOUS_H
 #define SESSION_DISCONTINUOUS_H
 
@@ -14,9 +14,9 @@
 #include "session_mesh.h"
 #include "session_team.h"
 
-/* Makes the meshes discontinuous that have a field at corners which the scene uses, unless they are already
- * discontinuous with the current coordinates. All other meshes are read with the caller's vertices again. Cells must
- * have been checked. Collective. */
+/* Makes meshes discontinuous if the scene uses a corner field of the mesh, unless they are already discontinuous with
+ * the current coordinates. All other meshes are read with the caller's vertices again. Cells must have been checked.
+ * Collective. */
 insitu_status session_make_discontinuous(session_meshes *meshes, const session_catalogue *catalogue, const scene *scene,
                                          const session_team *team, base_error *error);
 

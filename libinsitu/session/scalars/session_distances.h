@@ -1,6 +1,5 @@
-/* Computes signed distances of vertices from planes. A slice is the isosurface of distance 0: in every cell the
- * interpolant of the distances at its vertices is the distance itself, because positions are interpolated in the same
- * way. */
+/* Computes signed distances of vertices from planes. A slice is drawn as the isosurface of distance 0. This is exact,
+ * because distances within a cell are interpolated in the same way as positions. */
 #ifndef SESSION_DISTANCES_H
 #define SESSION_DISTANCES_H
 
@@ -24,13 +23,13 @@ bool session_mark_distance(session_mesh *mesh, const scene_plane *plane, const s
 /* Returns the distances from the plane; NULL if the mesh has none. */
 session_scalar *session_find_distance(const session_mesh *mesh, const scene_plane *plane);
 
-/* Computes the distances that this step uses and that are out of date. Each is computed from the vertex's own
- * coordinates alone, so that all ranks obtain the same. Local. */
+/* Computes the distances that this step uses and that are out of date. Each distance is computed only from the vertex's
+ * coordinates, so that all ranks obtain the same value. Local. */
 void session_update_distances(const session_meshes *meshes, const session_team *team, base_error *error);
 
-/* Returns the distance at which the plane is drawn. low and high are the minimum and maximum of the data's distances
- * from it, over all ranks. The result is 0 or, if the plane lies on the border of the data, a distance just far enough
- * inside for the slice to be visible. */
+/* Returns the distance at which the plane is drawn. low and high are the minimum and maximum of the distances between
+ * the data and the plane, over all ranks. The result is 0 or, if the plane lies on the border of the data, a distance
+ * just far enough inside for the slice to be visible. */
 double session_slice_distance(double low, double high, double half_diagonal);
 
 #endif

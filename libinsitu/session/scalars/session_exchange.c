@@ -16,9 +16,10 @@ void session_mail_free(session_mail *mail)
 
 /* ---- messages -------------------------------------------------------------------------------------------------- */
 
-/* A received message. Ranks do not know in advance which ranks send to them, so the algorithm of Hoefler et al. (2010)
- * is used. Sends are synchronous: when all sends of a rank are complete, its messages have been received. The rank then
- * joins a non-blocking reduction. When that is complete, the messages of all ranks have been received. */
+/* A received message. Ranks do not know in advance which ranks send to them, so that the algorithm of Hoefler et al.
+ * (2010) is used. Sends are synchronous, so that a rank's messages have been received when all of its sends are
+ * complete. The rank then joins a non-blocking reduction. When the reduction is complete, the messages of all ranks
+ * have been received. */
 typedef struct message {
     struct message *next;
     int source_rank; /* rank that sent the message */
@@ -85,8 +86,8 @@ static void receive_message(delivery *d, const MPI_Status *found, base_error *er
         base_fail(error, INSITU_ERROR_MEMORY, "no memory for %lld bytes of data between ranks", (long long)count * 8);
 }
 
-/* Receives messages until the messages of all ranks have been received. *failed becomes the lowest rank that had an
- * error before this call, or `ranks` if none had. */
+/* Receives messages until the messages of all ranks have been received. *failed receives the lowest rank that had an
+ * error before this call, or `ranks` if no rank had one. */
 static insitu_status receive_all(delivery *d, int *failed, base_error *error)
 {
     int own = error->status ? d->rank : d->ranks, has_joined = 0, is_over = 0;

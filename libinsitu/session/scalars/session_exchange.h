@@ -23,15 +23,15 @@ void session_mail_free(session_mail *mail);
 typedef enum session_mail_tag { SESSION_MAIL_THERE = 1, SESSION_MAIL_BACK } session_mail_tag;
 
 /* Sends the words in every rank's `out` to the ranks for which they are intended. *in receives the words for this rank,
- * and owns its memory. Messages are sent only to ranks for which there are words, and one reduction determines when all
- * have been received. A rank on which an error has occurred before passes it in *error, and its `out` is not read; then
- * all ranks return that error. An error in receiving is stored only in this rank's *error, with *in empty, and must be
- * shared by the next phase. Collective. */
+ * and owns its memory. A rank sends messages only to ranks for which it has words. One reduction determines when all
+ * messages have been received. If a rank's *error already holds an error, its `out` is not read, and all ranks return
+ * this error. An error while receiving is only stored in *error of this rank, and *in is then empty; the next phase
+ * must pass the error to all ranks. Collective. */
 insitu_status session_mail_deliver(MPI_Comm comm, session_mail_tag tag, const session_mail *out, session_mail *in,
                                    base_error *error);
 
-/* Exchanges words in the same way as session_mail_deliver(), but ranks also share errors in receiving. Collective; all
- * ranks return the same status. */
+/* Exchanges words in the same way as session_mail_deliver(), but errors while receiving are also returned on all ranks.
+ * Collective; all ranks return the same status. */
 insitu_status session_mail_exchange(MPI_Comm comm, const session_mail *out, session_mail *in, base_error *error);
 
 /* Returns the number of items that a rank processes in one round of messages, if each item may cause a message to every

@@ -1,6 +1,6 @@
 /* insitu_set_field() stores fields in the table of fields. Only descriptions are checked here; the values are read by a
- * step. An error is returned immediately, and is also kept with the field until it is set again, so that the next step
- * returns it on every rank. */
+ * step. An error is returned immediately, and is also stored with the field until the field is set again, so that the
+ * next step returns it on every rank. */
 #include "session_field_input.h"
 
 #include <string.h>
@@ -81,7 +81,7 @@ static insitu_status check_field_arrays(const session_mesh *mesh, const insitu_f
 }
 
 /* Checks a field that has values at the corners of cells. For meshes of mixed cells, the cells' types are checked
- * later, when the mesh is discontinuous. */
+ * later, when the mesh is made discontinuous. */
 static insitu_status check_corners(const insitu_mesh *mesh, const insitu_field *field, base_error *error)
 {
     const long long row = field->corner_row, vertices = session_cell_nodes(mesh);
@@ -133,7 +133,7 @@ static insitu_status check_patch_arrays(const insitu_patch *patch, int component
                                     "components of values", error);
 }
 
-/* Checks the values of a patch, and the way in which it identifies its faces. */
+/* Checks the values of a patch, and how the patch identifies its faces. */
 static insitu_status check_patch(const session_mesh *mesh, const insitu_patch *patch, int components, base_error *error)
 {
     const bool has_vertices = patch->connectivity.data != NULL;
@@ -285,7 +285,7 @@ static void set_value_array(session_field *field, const insitu_field *given)
     if (!values.stride_bytes) values.stride_bytes = size * given->component_count;
     field->values = field->component_arrays ? field->component_arrays[0] : session_grid_array(&values);
     if (!values.data || field->component_arrays || field->component_stride % size == 0) return;
-    /* only the first component is known to be aligned, so that all are read as unaligned values */
+    /* only the first component is known to be aligned, so that all components are read as unaligned values */
     values.stride_bytes = field->component_stride;
     const grid_array other = session_grid_array(&values);
     field->values.unusual_type = other.unusual_type;
@@ -313,7 +313,7 @@ static void set_value_arrays(const session_mesh *mesh, session_field *field, con
 }
 
 /* Stores a field's description. The tables of patches and components must have been copied before, unless is_same is
- * set: then all values are read from the same addresses as before. */
+ * set, which means that all values have the same addresses as before. */
 static void store_field(session_meshes *meshes, session_mesh *mesh, int index, const insitu_field *given, bool is_same)
 {
     session_field *field = &mesh->fields[index];
@@ -373,8 +373,8 @@ static insitu_status refuse_field(session_meshes *meshes, session_mesh *mesh, co
     return base_fail(error, INSITU_ERROR_FIELD, "field \"%s\": its mesh \"%s\" was refused", name, mesh->label);
 }
 
-/* Reports that the mesh or block does not exist. The message depends on whether the name belongs to a mesh of the other
- * kind. */
+/* Reports that the mesh or block does not exist. If a block is requested but the name belongs to a whole mesh, or vice
+ * versa, the message says so. */
 static void refuse_missing_mesh(const session_meshes *meshes, const char *name, int64_t block, const char *field,
                                 base_error *error)
 {

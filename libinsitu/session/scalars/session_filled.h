@@ -1,4 +1,4 @@
-/* Fields whose values are computed by a fill function of the caller, in those steps that need them. */
+/* Fields whose values are computed by a fill function of the caller, in the steps that need them. */
 #ifndef SESSION_FILLED_H
 #define SESSION_FILLED_H
 
@@ -6,13 +6,13 @@
 #include "session_mesh.h"
 
 /* Calls the fill functions of the fields that statistics need or, if of_images is set, of the fields whose scalars
- * images use. Functions that have been called in this step are not called again. All are called, even if some fail, in
- * the same order on all ranks. The first error is returned. Local, but fill functions may communicate. */
+ * images use. Functions that have been called in this step are not called again. All functions are called, even if some
+ * fail, in the same order on all ranks. The first error is returned. Local, but fill functions may communicate. */
 insitu_status session_fill_fields(session_meshes *meshes, const session_catalogue *catalogue, bool of_images,
                                   base_error *error);
 
-/* Calls the field's fill function, if it has one, unless it was called in this step; *error is then that of the call.
- * Local, but the function may communicate. */
+/* Calls the field's fill function, if it has one, unless it was called in this step; in that case *error receives the
+ * error of that call. Local, but the function may communicate. */
 insitu_status session_fill_field(session_meshes *meshes, session_mesh *mesh, int index, base_error *error);
 
 /* Ends the step. Afterwards the session does not read the filled arrays any more. */

@@ -1,27 +1,29 @@
 /* Every corner of a cell contributes the gradient of the linear function that interpolates the value at the corner and
  * the values at the other ends of its three edges. The apex of a pyramid has four edges, and contributes one gradient
- * for each three of them. A corner of a polyhedron's face contributes one, which is computed from its two edges there
- * and the line to the cell's centre, where the mean of the vertices' values is assumed. At a corner of a shell the
- * gradient is computed from its two edges and the normal, along which the field is assumed to be constant. So a linear
- * field has its exact gradient everywhere, and vertices on a boundary obtain theirs from the cells on one side.
+ * for each three of them. A corner of a polyhedron's face contributes one gradient, which is computed from the two
+ * edges at the corner and the line to the cell's centre. The value at the centre is assumed to be the mean of the
+ * vertices' values. At a corner of a shell the gradient is computed from its two edges and the normal, along which the
+ * field is assumed to be constant. Therefore the gradient of a linear field is exact everywhere, and gradients at
+ * vertices on a boundary are computed from the cells on one side.
  *
- * A cell of higher order contributes at each of its nodes the gradient of its polynomial there: the edges are then the
- * derivatives of the position along the axes of the reference cell, and the differences those of the field.
+ * A cell of higher order contributes at each of its nodes the gradient of its polynomial there. In this case the
+ * derivatives of the position along the axes of the reference cell replace the edges, and the derivatives of the field
+ * replace the differences.
  *
  * The weight of a corner is its determinant divided by the fourth power of the length l = sqrt(|a|² + |b|² + |c|²) of
  * its edges. The ratio of the determinant to l³ distinguishes a well-shaped corner from a sliver, whose weight is
- * almost 0. The factor 1 / l gives small cells more weight, since their gradients belong to nearer positions: in a mesh
- * whose cells double their size at a vertex, the errors of first order cancel. The product of weight and gradient is a
- * sum of cross products, so that no division by a determinant is needed.
+ * almost 0. The factor 1 / l gives small cells more weight, because their gradients belong to nearer positions. With
+ * this weight, errors of first order cancel in a mesh whose cells double their size at a vertex. The product of weight
+ * and gradient is a sum of cross products, so that no division by a determinant is needed.
  *
- * Edges are sorted by coordinates, and each corner's numbers are rounded to integers before they are summed. So the
- * result does not depend on the order of cells, of their vertices, or of ranks. The unit of the integers follows from
- * bounds that are the same on all ranks. Let R be the largest difference of values along an edge and l the least length
- * of a corner. Then no weight exceeds 3^-1.5 / l, and no weighted gradient exceeds R / l²: a cross product of two edges
- * is at most half of the sum of their squares, so that three of them, times differences of at most R, sum to at most R
- * l². The last bit is 2^-86 of the bound, so that fields that change little from vertex to vertex keep the precision of
- * doubles. Corners shorter than 2^-32 of the scene are ignored, since a unit for them would be too coarse for all
- * others. A sum can contain 2^19 corners at one vertex. */
+ * Edges are sorted by coordinates, and each corner's numbers are rounded to integers before they are summed.
+ * Therefore the result does not depend on the order of cells, of their vertices, or of ranks. The unit of the
+ * integers follows from bounds that are the same on all ranks. Let R be the largest difference of values along an
+ * edge and l the least length of a corner. Then no weight exceeds 3^-1.5 / l, and no weighted gradient exceeds R /
+ * l²: a cross product of two edges is at most half of the sum of their squares, so that three of them, times
+ * differences of at most R, sum to at most R l². The last bit is 2^-86 of the bound, so that fields that change
+ * little from vertex to vertex keep the precision of doubles. Corners shorter than 2^-32 of the scene are ignored,
+ * since a unit for them would be too coarse for all others. A sum can contain 2^19 corners at one vertex. */
 #include "session_gradients.h"
 
 #include <omp.h>
@@ -152,8 +154,8 @@ static inline __attribute__((always_inline)) void bound_corner(target *to, doubl
 }
 
 /* Adds the contribution of a corner, given by its three sorted edges and the differences of the fields along them. If
- * the order of the edges is mirrored, the signs of both the sum and the determinant change, so that the gradient
- * remains the same. */
+ * two edges are exchanged, the signs of both the sum and the determinant change, so that the gradient remains the
+ * same. */
 static inline __attribute__((always_inline)) void add_edge_gradient(target *to, int64_t vertex, const double edge[3][3],
                                                                     const double rise[3][SESSION_GRADIENTS],
                                                                     int field_count)
@@ -300,7 +302,7 @@ static int compare_nodes(const void *a, const void *b)
     return (x->vertex > y->vertex) - (x->vertex < y->vertex);
 }
 
-/* Ensures space for so many nodes. */
+/* Ensures that the list has space for `count` nodes. */
 static bool reserve_nodes(node_list *list, int64_t count)
 {
     if (count <= list->capacity) return true;
@@ -330,7 +332,8 @@ static bool list_nodes(node_list *list, target *to, int64_t cell)
     return list->count > 0;
 }
 
-/* Returns the mean of the vertices, each counted once. They are summed in the order of their coordinates. */
+/* Returns the mean of the vertices without duplicates. The vertices are added in the order of their coordinates, so
+ * that the result does not depend on the order of faces. */
 static node find_centre(node_list *list, int field_count)
 {
     node centre = {.vertex = -1};
@@ -384,7 +387,7 @@ static bool has_own_values(const session_gradient_basis *basis, int64_t cell)
     return true;
 }
 
-/* Returns whether sums are computed over the cell: drawn cells with a volume or, if of_shells is set, shells. */
+/* Returns whether the cell contributes to sums: it is drawn and has a volume or, if of_shells is set, is a shell. */
 static bool is_summed(const session_gradient_basis *basis, int64_t cell)
 {
     return basis->of_shells ? !grid_is_ghost(basis->cells, cell) && grid_is_shell(basis->cells, cell)
@@ -504,8 +507,8 @@ static bool read_row_node(target *to, int64_t cell, node_list *row, int n)
                      to->basis->field_count, &row->nodes[n]);
 }
 
-/* Reads the nodes that have sums, and those by which their derivatives are determined: of finer lattices with few
- * pieces these are few. Returns whether all values are finite. */
+/* Reads the nodes that have sums, and the nodes from which the derivatives at these nodes are computed. In finer
+ * lattices of which few pieces are made, these nodes are few. Returns whether all values are finite. */
 static bool read_summed_nodes(target *to, int64_t cell, const session_derivatives *d, node_list *row, int size)
 {
     const session_polynomials *p = to->basis->polynomials;
@@ -585,7 +588,8 @@ static void record_adding_threads(const target *to, int64_t cell)
     while (grid_walk_next(&walk, &vertex)) record_adding_thread(to, vertex);
 }
 
-/* Adds the contributions of all cells. Both loops distribute the cells among the threads in the same way. */
+/* Adds the contributions of all cells. The loop distributes the cells among the threads in the same way as the loop
+ * that recorded the threads. */
 static bool add_all_cells(const target *like, const session_cell_list *list, session_gradient_bounds *bounds)
 {
     double rise = 0, sharpness = 0;

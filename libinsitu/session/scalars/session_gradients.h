@@ -13,7 +13,7 @@ typedef struct session_gradient_basis {
     const grid *cells;
     const grid_field *fields; /* array of field_count scalars, with values at vertices */
     int field_count;          /* number of scalars: 1 .. SESSION_GRADIENTS */
-    /* set if sums are computed over shells, so that gradients lie in their planes; otherwise over cells with a
+    /* true: sums are computed over shells, so that gradients lie in the planes of the shells; false: over cells with a
      * volume */
     bool of_shells;
     const int32_t *sum_indices; /* for each vertex, the index of its sum; -1: it has none */
@@ -24,9 +24,9 @@ typedef struct session_gradient_basis {
     const session_polynomials *polynomials;
 } session_gradient_basis;
 
-/* Returns how many numbers a sum consists of. A sum over the cells around a vertex consists of integer words, so that
- * adding two sums word by word is exact and does not depend on the order. These are first the high words of the three
- * components for each scalar, of the weights, and of padding, and then their low words. */
+/* Returns the number of numbers in a sum. A sum over the cells around a vertex consists of integer words, so that
+ * adding two sums word by word is exact and does not depend on the order. First come the high words of the three
+ * components for each scalar, of the weights, and of padding; then the low words follow in the same order. */
 static inline int session_count_sum_numbers(int field_count)
 {
     return field_count == 1 ? 4 : field_count == 2 ? 8 : 10;
@@ -60,7 +60,7 @@ bool session_list_cells(const session_gradient_basis *basis, session_cell_list *
 bool session_bound_gradients(const session_gradient_basis *basis, const session_cell_list *list,
                              session_gradient_bounds *out);
 
-/* Returns an array of one byte per sum, in which the number of the thread that adds to it is stored. It is allocated by
+/* Returns an array of one byte per sum, which holds the number of the thread that adds to the sum. It is allocated by
  * base_alloc(); NULL if memory runs out. Local. */
 unsigned char *session_sum_owners(int64_t sum_count, int threads);
 

@@ -34,7 +34,7 @@ typedef struct indexed_values {
     const session_mesh *mesh;
     /* if there is one value per piece of the split cells, the caller's cell of each piece; otherwise NULL */
     const uint32_t *parents;
-    grid_array index;                /* tuple of each position; if it has no data, position i has tuple i */
+    grid_array index;                /* index of the tuple at each position; without data, position i has tuple i */
     grid_field values;               /* the caller's tuples */
     int64_t row_length, used_length; /* number of positions in a row, and how many of them are read */
     int64_t count, position_count;   /* number of tuples, and number of positions that have a tuple */
@@ -190,7 +190,7 @@ insitu_status session_read_nodes(const session_mesh *mesh, int index, session_us
     return use(of, &values, error);
 }
 
-/* Updates the copy of a field's values if it is stale. If it is used for recentred scalars, the cells' own values are
+/* Updates the copy of a field's values if it is stale. If recentred scalars use the copy, the scalars' cell values are
  * updated too. */
 static insitu_status update_copy(session_mesh *mesh, int index, int threads, base_error *error)
 {

@@ -8,12 +8,12 @@
 
 /* Marks the field as needed by statistics of this step, on all meshes that have it. Local. */
 void session_request_field(const session_meshes *meshes, const scene_field *field);
-/* Removes all of these marks. Local. */
+/* Removes all marks that session_request_field() has set. Local. */
 void session_clear_requested_fields(const session_meshes *meshes);
 
 /* Copy values according to their index, unless the copy is up to date. session_copy_requested() copies the fields that
- * statistics need, and clears their marks. session_copy_used() copies those of scalars in use, and the fields from
- * which derived ones are computed. Must be called before the values are read. Local. */
+ * statistics need, and clears their marks. session_copy_used() copies the fields of scalars in use, and the fields from
+ * which derived fields are computed. Must be called before the values are read. Local. */
 insitu_status session_copy_requested(const session_meshes *meshes, int threads, base_error *error);
 insitu_status session_copy_used(const session_meshes *meshes, int threads, base_error *error);
 

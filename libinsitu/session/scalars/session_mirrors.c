@@ -1,7 +1,7 @@
-/* A mirror image has the fields of its source mesh, with the same arrays. So the picture of the image has the same
- * colours as that of the source, as in a mirror, even where components of vectors are shown. For a field with a fill
- * function, the image takes the values that the function has already computed for the source. Derived fields are those
- * of the source. */
+/* A mirror image has the fields of its source mesh, with the same arrays. Therefore the mirror image has the same
+ * colours as the source, also if components of vectors are shown. For a field with a fill function, the image takes the
+ * values that the function has already computed for the source. Derived fields have the values of the source's derived
+ * fields. */
 #include "session_mirrors.h"
 
 #include <math.h>
@@ -17,8 +17,8 @@ enum { ALL_AXES = 7 };
 
 /* ---- fields ------------------------------------------------------------------------------------------------------ */
 
-/* The fill function of a mirror image's field, which returns the values of the source's field. That field is filled
- * first. */
+/* The fill function of a mirror image's field, which returns the values of the source's field. The source's field is
+ * filled first. */
 static insitu_status copy_source_values(void *of_image, insitu_field *field)
 {
     session_mesh *image = of_image;
@@ -125,7 +125,7 @@ static void update_image(const scene_mirror *mirror, session_meshes *meshes, ses
     if (image) share_fields(meshes, image, error);
 }
 
-/* Mirror images have the names of their source meshes and fields, so that the catalogue does not change. */
+/* The catalogue does not change, because mirror images have the names of their source meshes and fields. */
 void session_update_mirrors(const scene *scene, session_meshes *meshes, int threads, base_error *error)
 {
     const bool are_names_changed = meshes->are_names_changed;
@@ -163,7 +163,7 @@ static void warn_of_mirror(const scene_mirror *mirror, const double ends[ENDS], 
     session_warn_of_absent_mesh(mirror->mesh, mirror->line, SESSION_MIRROR, catalogue, report);
     for (int axis = 0; axis < 3; axis++) {
         const double plane = mirror->planes[axis], below = plane - ends[axis], above = -ends[3 + axis] - plane;
-        /* rounding may put vertices near the plane on its other side, which is not reported */
+        /* vertices that lie on the other side of the plane only because of rounding are not reported */
         const bool is_cut = mirror->axes >> axis & 1 && fmin(below, above) > 1e-6 * fmax(below, above);
         session_warn(
             report, &(session_warning){WARNING_MIRROR, NULL, mirror->mesh, axis}, is_cut,

@@ -15,8 +15,8 @@ void session_update_mirrors(const scene *scene, session_meshes *meshes, int thre
 /* Copies the values of a derived field from the source meshes to their mirror images. Local. */
 void session_share_derived(const session_meshes *meshes, const char *name);
 
-/* Warns of mirrors in the scene that name no mesh, and of mirrors with cells on both sides of a plane, where the image
- * overlaps the mesh. Collective. */
+/* Warns of mirrors in the scene that name no mesh, and of meshes with cells on both sides of a mirror plane, because
+ * such a mesh overlaps its mirror image. Collective. */
 insitu_status session_check_mirrors(const scene *scene, const session_meshes *meshes,
                                     const session_catalogue *catalogue, const session_team *team,
                                     session_report *report, base_error *error);

@@ -103,7 +103,8 @@ grid_field session_caller_field(const session_mesh *mesh, int index, int compone
                       .is_cell_centred = field->given.centring == INSITU_CELL};
     if (!session_is_copied(mesh, field)) {
         if (!field->component_arrays) return out;
-        out.component_stride = 0; /* the component's own array is read, as component 0 of it */
+        out.component_stride =
+            0; /* the component has a separate array, which is read as a field with a single component */
         if (component >= 0)
             out.values = field->component_arrays[component];
         else
@@ -195,7 +196,7 @@ mmbvh_ranges session_scalar_ranges(const session_mesh *mesh, const session_scala
     return scalar->has_own_ranges ? mmbvh_own_ranges(&mesh->tree) : mmbvh_pair_ranges(scalar->node_ranges);
 }
 
-/* Returns whether the extent includes shells. For distances from planes it does not, because planes do not cut
+/* Returns whether the extent includes shells. Extents of distances from planes do not, because planes do not cut
  * shells. */
 static bool includes_shells(const session_scalar *scalar, session_extent_kind kind)
 {

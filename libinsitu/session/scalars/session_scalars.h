@@ -63,7 +63,7 @@ int64_t session_count_unusable(const session_mesh *mesh, const session_scalar *s
 /* Returns the ranges of a used scalar's values in the nodes of the tree. */
 mmbvh_ranges session_scalar_ranges(const session_mesh *mesh, const session_scalar *scalar);
 
-/* Computes the minimum and maximum over those drawn cells all of whose values are finite; low > high if there are none.
+/* Computes the minimum and maximum over the drawn cells all of whose values are finite; low > high if there are none.
  * Parallel. Local. */
 void session_scalar_extent(const session_mesh *mesh, session_scalar *scalar, int threads, session_extent_kind kind,
                            double *low, double *high);

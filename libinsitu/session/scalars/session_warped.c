@@ -7,7 +7,7 @@
 #include "session_mesh_input.h"
 #include "session_warp.h"
 
-/* The data of a step with which its meshes are warped. */
+/* The data that is needed to warp the meshes of a step. */
 typedef struct warp_step {
     const scene *scene;
     const char *scene_path;
@@ -100,7 +100,7 @@ static insitu_status warp_by_field(const warp_step *step, const scene_warp *warp
     return session_warp_mesh(step->meshes, mesh, &by, step->threads, error);
 }
 
-/* Warps the mesh if the scene does so. An error is stored; the check of the mesh returns it. */
+/* Warps the mesh if the scene requests it. An error is stored with the mesh, and the check of the mesh returns it. */
 static void update_mesh(const warp_step *step, session_mesh *mesh)
 {
     const scene_warp *warp = scene_find_warp(step->scene, mesh->name);

@@ -11,7 +11,7 @@
  * but fill functions may communicate. */
 void session_update_warps(const scene *scene, const char *scene_path, session_meshes *meshes, int threads);
 
-/* Warns of warps in the scene that name no mesh, and of gradients computed on warped meshes. Local. */
+/* Warns if a mesh that the scene warps does not exist, and if gradients are computed on a warped mesh. Local. */
 void session_check_warps(const scene *scene, const session_catalogue *catalogue, session_report *report);
 
 /* The ways in which the scene changes a mesh. */

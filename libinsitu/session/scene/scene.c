@@ -1,5 +1,5 @@
-/* Reads a scene. The document is checked against the schema and stored in the schema's structs (scene_schema.h). These
- * are converted into a struct scene, in which all defaults are filled in and all colours are linear.
+/* Reads a scene. The document is checked against the schema and stored in the schema's structs (scene_schema.h). The
+ * schema's structs are converted into a struct scene, in which all defaults are filled in and all colours are linear.
  *
  * strtod() reads numbers according to the locale, and a simulation may run in a locale with a decimal comma. Therefore
  * the thread is switched to the C locale while a scene is read, and back afterwards. */
@@ -121,8 +121,8 @@ static insitu_status convert_image(const scene_document *d, const char *path, co
     return status;
 }
 
-/* Converts those variants of an image that differ in their layers (field, isovalue or plane), each with its first view
- * only. */
+/* Converts the variants of an image that differ in their layers (field, isovalue or plane). Of the views of each
+ * variant, only the first is converted. */
 static insitu_status convert_layers_in_turn(const scene_document *d, const scene_file *in, int source, scene *out)
 {
     char path[32];
@@ -214,8 +214,8 @@ bool scene_field_is_on(const scene_field *field, const char *mesh)
     return field->mesh_count == 0;
 }
 
-/* Returns whether the name of an entry selects the mesh, and is longer than `found`, the name of the best entry so far,
- * if there is one. */
+/* Returns whether the name of an entry selects the mesh and is longer than `found`, which is the longest such name so
+ * far, or NULL. */
 static bool is_nearer(const char *name, const char *found, const char *mesh)
 {
     return scene_name_stands_for(name, mesh) && (!found || strlen(name) > strlen(found));

@@ -29,7 +29,7 @@ typedef struct scene_field {
     bool is_as_given;   /* set if hanging vertices keep the values that the caller gave */
     int line;           /* line in the scene file, for messages about the field */
     int mesh_count;     /* number of names in `meshes`; 0: the field is shown on all meshes that have it */
-    char **meshes;      /* names of meshes; "a" also selects the meshes whose names begin with "a/" */
+    char **meshes;      /* names of meshes; the name "a" also selects meshes whose names begin with "a/" */
     int meshes_line;    /* line of `meshes` in the scene file, for messages */
     /* hash of the set of meshes over which values are averaged at vertices; set by the session (session_mesh_groups.h)
      */
@@ -68,7 +68,7 @@ typedef struct scene_derived {
     /* fields from which the field is computed: for an expression its inputs; for a gradient a scalar; for other kinds a
      * vector field, or its two or three components */
     scene_field *inputs;
-    int *derived_indices; /* for each input, the index of the derived field that it is, or -1 */
+    int *derived_indices; /* for each input that is a derived field, the index of this field; otherwise -1 */
     /* hash of the set of meshes over which gradients are averaged; set by the session (session_mesh_groups.h) */
     uint64_t mesh_group_name;
 } scene_derived;
@@ -146,7 +146,7 @@ enum { SCENE_MAX_LINES = 64 };
 
 /* Contour lines on a layer's surface. */
 typedef struct scene_lines {
-    bool is_given; /* set if the layer has contour lines */
+    bool is_given; /* true: the layer has contour lines */
     scene_field field;
     /* set if the lines are contours of the field that colours the layer; otherwise of another field */
     bool is_of_colours;
@@ -180,7 +180,7 @@ typedef struct scene_isosurface {
     scene_material material;
     scene_normal normals;
     double difference; /* distance between samples of central differences, in cell sizes, > 0; 1 by default */
-    uint32_t clips;    /* set of clips that cut the layer: one bit per clip of the image */
+    uint32_t clips;    /* bit mask of the clips that cut the layer; bit n stands for clip n of the image */
     int number;        /* index of the layer in the image's list */
 } scene_isosurface;
 
@@ -202,7 +202,8 @@ typedef struct scene_threshold {
 } scene_threshold;
 
 typedef struct scene_surface {
-    /* only the names of meshes are used: those whose outer surface is drawn; the field's name is NULL */
+    /* selects the meshes whose outer surface is drawn; only the names of meshes are used, and the field's name is
+     * NULL */
     scene_field meshes_field;
     /* set if the session has added the layer for meshes that consist only of shells; a scene file cannot set it */
     bool is_of_shells;
@@ -215,7 +216,7 @@ typedef struct scene_surface {
     scene_colour_map colour_map;
     scene_lines lines;
     float opacity;
-    bool has_material; /* set if the scene gives a material; otherwise flat data is drawn without lighting */
+    bool has_material; /* true: the scene gives a material; false: two-dimensional data is drawn without lighting */
     scene_material material;
     uint32_t clips; /* set of clips that cut the layer: one bit per clip of the image */
     int number;     /* index of the layer in the image's list */
@@ -243,8 +244,8 @@ enum { SCENE_MAX_CLIPS = 32 };
  * SCENE_MAX_VOLUMES: maximum number of volumes of an image. */
 enum { SCENE_MAX_SURFACES = 64, SCENE_MAX_VOLUMES = 4 };
 
-/* A half space, box or sphere by which layers are clipped: what lies outside of it is cut away or, if is_outside is
- * set, what lies inside. */
+/* A half space, box or sphere by which layers are clipped. The part of a layer outside of it is cut away or, if
+ * is_outside is set, the part inside of it. */
 typedef struct scene_clip {
     scene_clip_kind kind;
     bool is_outside;
@@ -295,8 +296,8 @@ typedef struct scene_camera_point {
 typedef struct scene_camera {
     /* set if eye and focal point are computed from the bounds of all data, with the camera looking along -direction */
     bool is_automatic;
-    /* set for each of these keys that the scene gives; if the data is flat, the others are chosen from the data
-     * (session_camera.h) */
+    /* each is true if the scene gives the key with this name; if the data is flat, missing keys are chosen from the
+     * data (session_camera.h) */
     bool has_direction, has_up, has_fit, has_projection;
     bool has_bounds; /* automatic camera: set if the bounds below replace those of the data */
     double lower[3], upper[3];
@@ -308,7 +309,8 @@ typedef struct scene_camera {
     /* automatic camera: set if the box of the bounds must fill the frame; otherwise the sphere around the box */
     bool fits_box;
     bool is_orthographic;
-    /* orthographic camera: height of the visible region in scene units; 0: as with a perspective camera */
+    /* orthographic camera: height of the visible region in scene units; 0: the height that a perspective camera would
+     * show */
     double height;
     scene_orbit orbit;
     /* angles of an orbit's view in degrees: phi around the axis, theta above the plane perpendicular to it */
@@ -376,7 +378,7 @@ typedef struct scene_decorations {
     /* colour of text and lines, linear RGB; if has_colour is not set, it is light on a dark background and dark on a
      * light one */
     float colour[3];
-    double size; /* height of text, as a share of the picture's height */
+    double size; /* height of text, as a fraction of the picture's height */
 } scene_decorations;
 
 typedef enum scene_format { SCENE_PNG8, SCENE_PNG16, SCENE_EXR } scene_format;
@@ -412,7 +414,8 @@ typedef struct scene_rectangle {
 
 /* A file that contains several pictures (panels) side by side, and insets over their corners. */
 typedef struct scene_montage {
-    char *name; /* their common path, expanded for one cycle and time, which identifies the pictures of the file */
+    char *name; /* path of the file, expanded for a sample cycle and time; pictures with this path belong to the montage
+                 */
     int columns, rows;
     int width, height; /* size of each picture in pixels */
     scene_format format;
@@ -422,7 +425,8 @@ typedef struct scene_montage {
     bool are_bars_left; /* set if the strip is left of the pictures, otherwise it is right of them */
     int frame_width;    /* width in pixels of the frames of insets */
     int inset_margin;   /* distance in pixels of insets from the edges of the panels, including their frames */
-    /* the inset at each corner (scene_anchor), without its frame; width 0: none. No two insets overlap. */
+    /* rectangle of the inset at each corner (scene_anchor), without its frame; width 0: there is no inset. No two
+     * insets overlap. */
     scene_rectangle insets[SCENE_ANCHORS];
 } scene_montage;
 
@@ -430,7 +434,7 @@ typedef struct scene_montage {
 typedef struct scene_database {
     char *path;      /* path of the folder, relative to rank 0's working directory, without a slash at its end */
     int first_image; /* index in the scene file of the first image that writes to the database */
-    /* set for each of these columns that the table has */
+    /* each is true if the table has the column with this name */
     bool has_images, has_orbits, has_isovalues, has_planes, has_fields;
 } scene_database;
 
@@ -448,7 +452,7 @@ typedef struct scene_condition {
 typedef struct scene_statistics {
     scene_field field;
     char *path;         /* path of the file, relative to rank 0's working directory */
-    int cycle_interval; /* the statistics are written at cycles that are multiples of this */
+    int cycle_interval; /* the statistics are written at cycles that are multiples of this number */
     int bin_count;      /* number of the histogram's bins; 0: there is no histogram */
     double low, high;   /* range of values that the bins divide; low > high: the range of the step's values */
 } scene_statistics;
@@ -461,8 +465,8 @@ typedef struct scene_variant {
     /* index of the combination of field, isovalue and plane; 0 without a sweep */
     int layers;
     int field, isovalue, plane; /* indices in the sweep's lists; 0 if the sweep has no such list */
-    /* index of the view. Pictures with the same image and layers differ only in their view and camera; those with a
-     * view above 0 share the data that view 0 owns. */
+    /* index of the view. Pictures with the same `source` and `layers` differ only in their view and camera. Pictures
+     * with a view above 0 share the data that the picture with view 0 owns. */
     int view;
 } scene_variant;
 
@@ -488,19 +492,19 @@ typedef struct scene_image {
     scene_decorations decorations;
     int clip_count; /* number of clips of all layers together, 0 .. SCENE_MAX_CLIPS, without duplicates */
     scene_clip *clips;
-    uint32_t clips_of_all; /* set of the clips that cut all layers: one bit per clip */
+    uint32_t clips_of_all; /* bit mask of the clips that cut all layers */
     bool has_lights;       /* set if the scene gives lights */
     /* number of lights, 1 .. 8; if the scene gives none, there are a default key light and fill light */
     int light_count;
     scene_light *lights;
-    uint32_t shadows; /* set of the lights that cast shadows, one bit per light; empty by default */
+    uint32_t shadows; /* bit mask of the lights that cast shadows; 0 by default */
     /* number of rays for ambient occlusion per hit, 1 .. 64; 0 (default): no ambient occlusion */
     int occlusion_samples;
-    double occlusion_radius; /* length of these rays in scene units; 0: chosen from the data's bounds */
+    double occlusion_radius; /* length of occlusion rays in scene units; 0: chosen from the data's bounds */
     /* method for volumes; by default segments for one volume, samples for several */
     scene_sampling_method method;
-    /* error bound of segments in a colour channel, in linear light; 0: none, so that `step` determines the error. The
-     * default for one volume is 0.01. */
+    /* error bound of segments in a colour channel, in linear light; 0: there is no bound, so that `step` determines the
+     * error. The default for one volume is 0.01. */
     double max_error;
     bool has_default_samples; /* set if several volumes are sampled because the scene does not specify the method */
     double step;              /* distance between samples in scene units; 0: step_cells is used */
@@ -515,7 +519,7 @@ typedef struct scene_image {
     double max_seconds; /* upper bound of the estimated time for samples, in seconds; 3600 by default */
     int output_count;   /* number of output files; 0: the picture is only passed to the caller in memory */
     scene_output *outputs;
-    int cycle_interval;        /* the image is drawn at cycles that are multiples of this; 1 by default */
+    int cycle_interval;        /* the image is drawn at cycles that are multiples of this number; 1 by default */
     double time_interval;      /* if > 0, the image is instead drawn whenever the time passes a multiple of this */
     scene_condition condition; /* the image is drawn only if this condition holds */
     bool is_drawn_once;        /* set if the image is drawn only in the first step in which it is due */
@@ -531,8 +535,8 @@ typedef enum scene_field_role {
     SCENE_THRESHOLD /* a field that selects cells */
 } scene_field_role;
 
-/* Iterator over the fields that an image's layers use: layer by layer, in the order of scene_layer_kind; for each layer
- * in the order of scene_field_role. */
+/* Iterator over the fields that an image's layers use. Layers are visited in the order of scene_layer_kind, and the
+ * fields of each layer in the order of scene_field_role. */
 typedef struct scene_field_walk {
     const scene_image *image;
     int position; /* position of the next field; used by scene_next_field() alone */
@@ -615,7 +619,8 @@ typedef struct scene {
     int derived_count;      /* number of derived fields, 0 .. SCENE_MAX_DERIVED */
     scene_derived *derived; /* derived fields; each comes after those from which it is derived */
     int threads;            /* number of threads per rank; 0: the node's cores divided by its number of ranks */
-    /* number of pieces along an edge between two nodes of a cell of higher order, 1 .. 8; 0: surface_error decides */
+    /* number of linear pieces along an edge between two nodes of a cell of higher order, 1 .. 8; 0: the number is
+     * chosen by surface_error */
     int finer_pieces;
     double surface_error;        /* bound of the error of these pieces in pixels, > 0; used if finer_pieces is 0 */
     bool is_surface_error_given; /* set if the scene file has the bound; otherwise it is the default */
@@ -656,11 +661,11 @@ void scene_list_parameters(const scene *s, const char *name, char *words, size_t
 /* Returns the index of the field among the scene's derived fields; -1 if it is not derived. */
 int scene_find_derived(const scene *s, const char *name);
 
-/* Returns the warp of the mesh of this name, or NULL if it has none. If several entries select the mesh, the one with
- * the longest name is used. */
+/* Returns the warp of the mesh of this name, or NULL if the mesh is not warped. If several entries select the mesh, the
+ * one with the longest name is used. */
 const scene_warp *scene_find_warp(const scene *s, const char *mesh);
-/* Returns the mirror of the mesh of this name, or NULL if it has none. If several entries select the mesh, the one with
- * the longest name is used. */
+/* Returns the mirror of the mesh of this name, or NULL if the mesh is not mirrored. If several entries select the mesh,
+ * the one with the longest name is used. */
 const scene_mirror *scene_find_mirror(const scene *s, const char *mesh);
 
 /* The values by which placeholders are replaced. */
@@ -675,9 +680,10 @@ typedef struct scene_placeholder_values {
 
 scene_placeholder_values scene_placeholder_values_of(const scene_image *image, int64_t cycle, double time);
 
-/* Returns the pattern with its placeholders replaced. {cycle}, {view} and {plane} may have a format as in {cycle:0N},
- * {time} and {isovalue} one as in {time:.Nf} (or e or g instead of f); {name} and {field} have none. Numbers have a
- * decimal point in any locale. The result is allocated by base_alloc(); NULL if memory ran out. */
+/* Returns the pattern with its placeholders replaced. The placeholders {cycle}, {view} and {plane} may have a format
+ * such as {cycle:0N}, and {time} and {isovalue} a format such as {time:.Nf} (or e or g instead of f). {name} and
+ * {field} have no format. Numbers have a decimal point in any locale. The result is allocated by base_alloc(); NULL if
+ * memory ran out. */
 char *scene_expand(const char *pattern, const scene_placeholder_values *moment);
 
 #endif

@@ -6,7 +6,7 @@
 #include "memory.h"
 #include "scene_convert.h"
 
-/* Adds the clip to a set of clips, and to the image's list of clips if it is not there yet. */
+/* Adds the clip to a set of clips, and to the image's list of clips unless the list already contains it. */
 static insitu_status add_clip(const scene_document *d, const char *path, const scene_clip *clip, scene_image *image,
                               uint32_t *set)
 {

@@ -115,10 +115,10 @@ insitu_status scene_convert_lines(const scene_document *d, const char *layer, co
 scene_material scene_convert_material(const scene_file_material *in);
 
 /* Adds the clips at the path to the image's list, and to the set, which has one bit per entry of the list. in: NULL if
- * there are none. */
+ * there are no clips. */
 insitu_status scene_convert_clip(const scene_document *d, const char *path, const scene_file_clip *in,
                                  scene_image *image, uint32_t *set);
-/* Computes the set of clips that cut a layer: those of all layers, and the layer's own. */
+/* Computes the set of clips that cut a layer, which consists of the clips of all layers and the layer's own clips. */
 insitu_status scene_convert_layer_clip(const scene_document *d, const char *layer, const scene_file_clip *in,
                                        scene_image *image, uint32_t *set);
 /* Converts the plane with this index in the list `planes` of the mapping at the path. */

@@ -183,8 +183,8 @@ int scene_find_derived(const scene *s, const char *name)
 typedef struct search {
     const scene_document *d;
     scene *s;
-    /* path of the search: the field that is being sorted, and the chain of its dependencies down to the current
-     * field */
+    /* path of the search: the field at which the search began, and the chain of dependencies from this field to the
+     * current one */
     int path[SCENE_MAX_DERIVED], length;
     int order[SCENE_MAX_DERIVED], count; /* indices of the sorted fields, and their number */
     bool is_done[SCENE_MAX_DERIVED];

@@ -1,7 +1,7 @@
 /* Reads a scene file twice: first as events, to reject dangerous input before memory is allocated for it (deep nesting,
  * and aliases, by which a few lines can expand to billions of nodes), and then as a tree. The tree is checked against
- * the schema in this file, because only here a value, its key and its line are available together for a useful message.
- * The same traversal stores correct values in the schema's structs. */
+ * the schema in this file, because a message needs the value, its key and its line, which are available together only
+ * here. The same traversal stores correct values in the schema's structs. */
 #include "scene_document.h"
 
 #include <ctype.h>
@@ -393,8 +393,8 @@ static bool mapping_has_key(const cyaml_schema_value_t *mapping, const char *key
     return f->key != NULL;
 }
 
-/* Writes a question about a word in place of a mapping: the word may be one of the mapping's keys, or the name of a
- * field. */
+/* Writes a question about a word that stands in place of a mapping. The question depends on whether the word is one of
+ * the mapping's keys or the name of a field. */
 static void suggest_mapping(const char *word, const cyaml_schema_value_t *mapping, const char *begin, const char *end,
                             char question[question_size])
 {
@@ -407,8 +407,8 @@ static void suggest_mapping(const char *word, const cyaml_schema_value_t *mappin
         snprintf(question, question_size, " (did you mean %sfield: %.32s%s?)", begin, word, end);
 }
 
-/* Writes a question about a mapping in place of a list of mappings: entries may be given under their names, or a "- "
- * may be missing. */
+/* Writes a question about a mapping that stands in place of a list of mappings. The author may have written entries
+ * under their names, or omitted a "- ". */
 static void suggest_list_of_mappings(const scene_document *d, const yaml_node_t *node,
                                      const cyaml_schema_value_t *entry, char question[question_size])
 {
@@ -517,8 +517,8 @@ static bool is_scalar_right(const yaml_node_t *node, const cyaml_schema_value_t 
     }
 }
 
-/* Allocates memory for `count` values at *to or, if the schema has a pointer there, at the memory that it points to. If
- * *to is NULL, nothing is stored: the value is read from the document later. */
+/* Makes `count` values available at *to. If the schema has a pointer there, allocates memory for the values and stores
+ * its address in the pointer. If *to is NULL, nothing is stored: the value is read from the document later. */
 static bool allocate_values(scene_document *d, const cyaml_schema_value_t *value, int count, void **to)
 {
     if (!*to || !(value->flags & CYAML_FLAG_POINTER)) return true;

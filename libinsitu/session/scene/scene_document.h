@@ -35,8 +35,7 @@ void scene_document_close(scene_document *d);
 insitu_status scene_document_read(scene_document *d, scene_file **file);
 
 /* Returns the line (from 1) of a path such as "images[0].size[1]", or of the last node of the path that exists. In a
- * list whose entries have the key `name`, a name that is short and contains no . and [ may replace the index, as in
- * "fields.speed". */
+ * list whose entries have the key `name`, a short name without . and [ may replace the index, as in "fields.speed". */
 int scene_document_line(const scene_document *d, const char *path);
 
 bool scene_is_plain_name(const char *name);
@@ -45,7 +44,8 @@ bool scene_is_plain_name(const char *name);
  * stored. Returns their full number; 0 if there is no node at the path. */
 int scene_document_texts(const scene_document *d, const char *path, const char **texts, int most);
 
-/* As scene_document_texts(), for the keys of the mapping at the path, which must be names that the scene defines. */
+/* Does the same as scene_document_texts() for the keys of the mapping at the path, which must be names that the scene
+ * defines. */
 int scene_document_names(const scene_document *d, const char *path, const char **names, int most);
 
 /* The kind of the node at a path, and its value if it is a number. After the checks, the node has the type that the
@@ -56,7 +56,8 @@ scene_node scene_document_kind(const scene_document *d, const char *path);
 int scene_document_length(const scene_document *d, const char *path);
 double scene_document_number(const scene_document *d, const char *path);
 
-/* Records "file:line: parent.key: ..." and returns INSITU_ERROR_SCENE. An empty key means the parent itself. */
+/* Records "file:line: parent.key: ..." and returns INSITU_ERROR_SCENE. If the key is empty, the message refers to the
+ * parent itself. */
 insitu_status scene_fail_at_key(const scene_document *d, const char *parent, const char *key, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
 

@@ -36,7 +36,7 @@ enum { FUNCTIONS = sizeof functions / sizeof *functions };
 typedef struct parser {
     const char *text, *cursor;
     scene_expression *expression;
-    int nesting_depth; /* nesting depth: number of open brackets and signs, which is limited */
+    int nesting_depth; /* number of open brackets and signs at the current position (nesting depth), which is limited */
     int stack_count;   /* number of stack entries in use after the instructions emitted so far */
     scene_parse_result result;
     char *fault;
@@ -73,7 +73,7 @@ static bool is_digit(char c)
     return c >= '0' && c <= '9';
 }
 
-/* Returns whether c can be part of a name. Bytes of UTF-8 beyond ASCII count as letters. */
+/* Returns whether c can be part of a name. Bytes of UTF-8 beyond ASCII are treated as letters. */
 static bool is_letter(char c)
 {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' || (unsigned char)c >= 0x80;
@@ -399,8 +399,8 @@ static void apply_function(scene_operation operation, double *restrict a, int co
     }
 }
 
-/* Applies the operator to `count` pairs of numbers: a = a op b. If one number is NaN, the minimum and the maximum are
- * NaN. */
+/* Applies the operator to `count` pairs of numbers a and b, and stores the results in a. If one number is NaN, the
+ * minimum and the maximum are NaN. */
 static void apply_operator(scene_operation operation, double *restrict a, const double *restrict b, int count)
 {
     switch (operation) {

@@ -36,7 +36,7 @@ static insitu_status convert_values(const scene_document *d, const char *path, c
 }
 
 /* Converts the colours of an isosurface layer. first: number of isovalues of earlier layers; default colours continue
- * the cycle from there, so that layers differ. */
+ * the cycle after these isovalues, so that layers have different colours. */
 static insitu_status convert_colours(const scene_document *d, const char *path, const scene_file_isosurface *in,
                                      int first, scene_isosurface *out)
 {

@@ -7,8 +7,8 @@
 
 static const char *const axis_names[3] = {"x", "y", "z"};
 
-/* Writes the path of an entry of the mapping: by the entry's name if this contains no special characters, and otherwise
- * by its index. */
+/* Writes the path of an entry of the mapping: uses the entry's name if the name contains no special characters, and
+ * otherwise the entry's index. */
 static void write_path(const char *name, int index, char path[SCENE_PATH_SIZE])
 {
     if (scene_is_plain_name(name))

@@ -22,7 +22,7 @@ typedef enum placeholder_kind {
 
 typedef struct placeholder {
     placeholder_kind kind;
-    /* for a whole number its minimum number of digits, for another number its number of digits; -1: as few as needed */
+    /* minimum number of digits of an integer, or number of digits of another number; -1: as few digits as needed */
     int digits;
     char conversion; /* format of a number that is not whole: 'f', 'e' or 'g'; 't' for a text; 0 for a whole number */
     size_t length;   /* number of bytes of the placeholder in the pattern */
@@ -202,7 +202,7 @@ static insitu_status convert_deep(const scene_document *d, const char *path, con
     return INSITU_OK;
 }
 
-/* Converts the keys by which several pictures share a file. */
+/* Converts the keys that combine several pictures in one file (montages and insets). */
 static insitu_status convert_place(const scene_document *d, const char *path, const scene_file_output *in,
                                    scene_output *out)
 {

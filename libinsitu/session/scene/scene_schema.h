@@ -304,7 +304,7 @@ struct scene_mapping;
 /* The meaning and the range of a key, in addition to its field in libcyaml's schema. */
 typedef struct scene_key {
     const char *help;
-    const char *default_text; /* default value as the reference shows it; NULL: the key is required */
+    const char *default_text; /* default value, as shown in docs/scene.md; NULL: the key is required */
     double low, high; /* range of a number, or of each number of a list; any finite number is allowed if both are 0 */
     bool is_low_excluded;
     bool is_high_excluded;

@@ -1,6 +1,6 @@
-/* Rewrites short forms of values. A short form is recognised by its key and the type of its value, wherever the key
- * appears: no key of the schema has two meanings that could have the same short form. Nodes are identified by their
- * numbers, because adding a node may move all nodes in memory. */
+/* Rewrites short forms of values. A short form is recognised by its key and the type of its value, independent of where
+ * the key appears, because no key of the schema has two meanings that could have the same short form. Nodes are
+ * identified by their numbers, because adding a node may move all nodes in memory. */
 #include "scene_shorthand.h"
 
 #include <ctype.h>
@@ -10,10 +10,10 @@
 
 #include "scene_colour_names.h"
 
-/* A document while its short forms are expanded. */
+/* The state of expanding the short forms of a document. */
 typedef struct rewrite {
     yaml_document_t *document;
-    yaml_mark_t mark; /* position in the file of the value that is being rewritten; new nodes get it */
+    yaml_mark_t mark; /* position in the file of the value that is being rewritten; new nodes get the same position */
     bool has_memory;
 } rewrite;
 
@@ -305,7 +305,7 @@ static void replace_word(char *text, size_t size, const char *from, const char *
 {
     char *at = strstr(text, from);
     if (!at || strlen(text) + strlen(to) >= size) return;
-    /* a plural, such as colors, is replaced as well */
+    /* a plural, such as colors, is also replaced */
     const char *behind = at + strlen(from) + (at[strlen(from)] == 's');
     if ((at > text && at[-1] != '_') || (*behind && *behind != '_')) return;
     memmove(at + strlen(to), at + strlen(from), strlen(at + strlen(from)) + 1);
@@ -349,8 +349,8 @@ static void expand_mapping(rewrite *r, int number)
     if (r->has_memory) find_node_by_index(r, number)->data.mapping.pairs.top = kept;
 }
 
-/* Returns the node of the mapping with this key, whose own keys are names that the scene defines; 0 if there is
- * none. */
+/* Returns the number of the top-level mapping with this key, whose entries have names that the scene defines; 0 if
+ * there is no such mapping. */
 static int find_named_mapping(const rewrite *r, const char *name)
 {
     const yaml_node_t *root = find_node_by_index(r, 1);

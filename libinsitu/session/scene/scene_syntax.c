@@ -1,8 +1,8 @@
 /* Finds the mistake in a text that is not valid YAML. libyaml reports the position at which it could not continue,
  * which is often several lines behind the mistake, and in terms of the grammar. Its report is therefore only used to
- * select the lines to examine: from the start of the structure that could not be completed to the reported position.
- * These lines are searched for common mistakes, the most certain ones first; any other mistake is reported in libyaml's
- * words. */
+ * select the lines to examine. These are the lines from the start of the structure that could not be completed to the
+ * reported position. They are searched for common mistakes, beginning with those that can be identified most reliably.
+ * Any other mistake is reported in libyaml's words. */
 #include "scene_syntax.h"
 
 #include <ctype.h>
@@ -59,7 +59,8 @@ static bool has_content(text_line l)
     return l.indent < l.length && l.start[l.indent] != '#';
 }
 
-/* Stores the message and the line of the error. Always returns true, which a rule returns if it has found an error. */
+/* Stores the message and the line of the error. Always returns true, so that a rule that has found an error can return
+ * the result of this call. */
 __attribute__((format(printf, 3, 4))) static bool set_fault(const fault *f, size_t line, const char *format, ...)
 {
     va_list arguments;
@@ -168,7 +169,7 @@ static bool report_bare_placeholder(const fault *f, text_line l)
         if (!begins && !is_placeholder) continue;
         const size_t length = word_length(p, end);
         if (!memchr(p, '{', length)) continue;
-        /* a text {name} alone could also be a mapping */
+        /* a text that consists only of {name} could also be a mapping */
         if (is_placeholder && length == placeholder_length(p, end) && f->is_flow) continue;
         return set_fault(f, l.number, "a text with { } needs quotes, expected \"%.*s\"",
                          (int)(f->is_flow ? length : text_length(p, length, end)), p);
@@ -253,9 +254,9 @@ static bool is_list_item(text_line l)
     return l.indent + 1 < l.length && l.start[l.indent] == '-' && l.start[l.indent + 1] == ' ';
 }
 
-/* Returns the earlier line with a key or list item whose indentation is nearest to that of this line. A key may also be
- * at the indentation of the keys in a list item, which is 2 more than the item's. *expected receives the indentation
- * that this line should have. */
+/* Returns the earlier line with a key or list item whose indentation is nearest to that of this line. Keys in a list
+ * item are indented by 2 more than the item, so that this indentation is also tested. *expected receives the
+ * indentation that this line should have. */
 static text_line find_nearest_indent(const fault *f, text_line l, size_t *expected)
 {
     text_line nearest = l;

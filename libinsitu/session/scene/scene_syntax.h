@@ -1,5 +1,5 @@
-/* Describes the error in a text that is not YAML for the text's author: names the faulty line, and the text that should
- * be there. */
+/* Describes the error in a text that is not YAML for the text's author: names the faulty line, and the text that the
+ * line should contain. */
 #ifndef SCENE_SCENE_SYNTAX_H
 #define SCENE_SCENE_SYNTAX_H
 

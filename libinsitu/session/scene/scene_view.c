@@ -126,8 +126,8 @@ static insitu_status convert_light(const scene_document *d, const char *path, co
                : scene_fail_at_key(d, path, "direction", "has length 0, expected a direction");
 }
 
-/* Sets the default lights: a key light, and a fill light that makes the side that the key light does not reach
- * readable, but is too weak to flatten shapes. */
+/* Sets the default lights: a key light and a fill light. The fill light brightens surfaces that the key light does not
+ * reach, but is too weak to make shapes look flat. */
 static void default_lights(scene_light lights[2])
 {
     lights[0] = (scene_light){.direction = {0.5, 0.7, 1}, .colour = {1, 1, 1}};

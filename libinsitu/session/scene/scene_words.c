@@ -123,7 +123,7 @@ void scene_expected_words(const char *path, const cyaml_schema_value_t *value, c
         scene_value_words(value->sequence.entry, &entry, keys);
         append_words(expected, "%s", keys + strlen("a mapping"));
     }
-    /* the words for lists of names and for values of several forms are complete */
+    /* for lists of names and values of several forms, the words already include all forms */
     const char *name = last_key(path), *short_form = scene_shorthand_words(name, strlen(name));
     if (short_form && value->type != CYAML_IGNORE) append_words(expected, ", or %s", short_form);
 }

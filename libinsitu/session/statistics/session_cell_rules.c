@@ -1,6 +1,7 @@
 /* Let p be the order of a cell, J the Jacobian of its map, and f its value. The volume is the integral of det J, and
- * the deviation needs that of f^2 det J. In a straight cell the map is linear in each factor (a line, a triangle or a
- * tet), otherwise it has the order p. Then f^2 det J is a polynomial of these degrees, for which the rules are exact:
+ * the standard deviation needs the integral of f^2 det J. In a straight cell the map is linear in each factor (a line,
+ * a triangle or a tet), otherwise it has the order p. Then f^2 det J is a polynomial of these degrees, for which the
+ * rules are exact:
  *
  *     factor                  straight   bent
  *     each line of a hex      2 p + 2    5 p - 1
@@ -10,12 +11,13 @@
  *
  * Products of lines are summed factor by factor, so that all of their degrees are affordable: with p = 4 a bent hex has
  * 1000 points and takes some 50 multiplications for each of them. The functions of a tet are not products. With p = 7,
- * the last order of which bent tets are exact, there are 4913 points, at each of which 120 nodes are summed. Beyond,
- * straight tets are still exact. In bent ones the rest is that of an analytic function and a rule of degree 33.
+ * the last order of which bent tets are exact, there are 4913 points, at each of which 120 nodes are summed. For higher
+ * orders, straight tets are still integrated exactly. In bent tets a rule of degree 33 is used, whose error for
+ * analytic functions decreases fast.
  *
- * The area element of a shell is a root, which no rule integrates exactly unless the shell is flat. Flat shells need
- * the degree 4 p - 1, or 4 p - 2 in a triangle. Rules with 4 p points along each axis have twice that degree, and are
- * affordable in two dimensions. */
+ * The area element of a shell is a square root, which no rule integrates exactly unless the shell is flat. Flat
+ * shells need the degree 4 p - 1, or 4 p - 2 in a triangle. Rules with 4 p points along each axis have twice that
+ * degree, and are affordable in two dimensions. */
 #include "session_cell_rules.h"
 
 #include <math.h>
@@ -29,9 +31,11 @@ enum {
     LANES = 4,                /* points whose sums are computed together */
     BLOCK = 32,               /* most points of a block */
     MOST_FUNCTIONS = 1 << 20, /* most numbers of a factor's functions that are stored */
-    MOST_TET_POINTS = 17,     /* most points along an axis of bent tets, unless straight ones need more */
-    SIZE = 4,                 /* number of doubles of a tuple: x, y, z and a value */
-    MOST_SIZE = SIZE + 6,     /* the same with the slopes of positions along two lines */
+    MOST_TET_POINTS =
+        17, /* maximum number of points along an axis of bent tets, unless straight tets of the same order need more */
+    SIZE = 4, /* number of doubles of a tuple: x, y, z and a value */
+    MOST_SIZE =
+        SIZE + 6, /* number of doubles of a tuple together with the derivatives of the position along two lines */
     AXES = 3
 };
 
@@ -226,12 +230,13 @@ void session_drop_cell_rules(session_cell_rules *rules)
 
 /* ---- one cell -------------------------------------------------------------------------------------------------- */
 
-/* The state of visiting the points of one cell. Lattices have one array of nodes for each component. After a sum over a
- * line, a component is a value at the line's point, and there are three more: the slopes of the positions. */
+/* The state of visiting the points of one cell. Lattices have one array of nodes for each component. Each sum over a
+ * line evaluates the components at a point of the line, and adds three components: the derivatives of the position
+ * along the line. */
 typedef struct cell_visit {
     const session_cell_rules *rules;
     const session_product_rule *rule;
-    double *lattices[AXES]; /* at the nodes of the first factor and of so many lines */
+    double *lattices[AXES]; /* lattices[n]: components at the nodes of the first factor and of the first n lines */
     double *functions;      /* memory for a block of functions that are not stored */
     session_visit_points *visit;
     void *of;
@@ -252,8 +257,8 @@ size_t session_cell_rules_work_size(const session_cell_rules *rules)
     return size;
 }
 
-/* Multiplies a matrix of node_count x width with the values of one component, or of three components that follow each
- * other, at the nodes. Sums of LANES points stay in registers. */
+/* Multiplies a matrix of node_count x width with the values of one component, or of three consecutive components, at
+ * the nodes. Sums of LANES points stay in registers. */
 static inline __attribute__((always_inline)) void multiply_by_matrix(const double *restrict matrix, int node_count,
                                                                      int width, const double *restrict values,
                                                                      const int components,
@@ -322,7 +327,7 @@ static void visit_first(const cell_visit *v, double weight)
     }
 }
 
-/* Sums one component over a line. functions: those of the nodes at one point, `width` numbers apart. */
+/* Sums one component over a line. functions: the values of the nodes' functions at one point, `width` numbers apart. */
 static void sum_line(const session_rule_factor *line, const double *functions, size_t size, const double *restrict in,
                      double *restrict out)
 {
@@ -331,7 +336,7 @@ static void sum_line(const session_rule_factor *line, const double *functions, s
         for (size_t i = 0; i < size; i++) out[i] += functions[n * line->width] * in[(size_t)n * size + i];
 }
 
-/* Sums over the last of so many lines, at a point of its rule. */
+/* Sums over the last of `lines` lines, at one point of that line's rule. */
 static void reduce_line(const cell_visit *v, int lines, int point)
 {
     const session_rule_factor *line = &v->rule->line;
@@ -360,8 +365,8 @@ static void visit_points(const cell_visit *v)
     }
 }
 
-/* Returns whether the positions are the linear functions of the corners, up to rounding. If they are not, the degree is
- * higher, so that the tolerance must not be above the error of rounding by much. */
+/* Returns whether the positions are the linear functions of the corners, up to rounding. In other cells the degree is
+ * higher, so that the tolerance must not exceed the rounding error by much. */
 static bool is_straight(const session_cell_rules *rules, const double *tuples, const double *positions)
 {
     static const double tolerance = 1e-12;

@@ -12,8 +12,8 @@ typedef struct session_rule_factor {
     bool is_lobatto; /* set if the nodes of a line are Gauss-Lobatto points */
     session_quadrature rule;
     int width; /* number of points of a block, except the last one */
-    /* for each block of points: values, then slopes along each axis, as arrays of node_count x width. NULL: there are
-     * too many, and they are computed for each cell */
+    /* for each block of points: values, then slopes along each axis, as arrays of node_count x width. NULL: the
+     * functions take too much memory and are computed again for each cell */
     double *functions;
 } session_rule_factor;
 
@@ -24,14 +24,17 @@ typedef struct session_product_rule {
 
 /* The rules of one kind of cell. */
 typedef struct session_cell_rules {
-    session_interpolation nodes; /* the cell's nodes, and all nodes of its order; empty if there are no rules */
-    session_nodes lattice;       /* the same as nodes.complete; a hex for pyramids, which are read as collapsed hexes */
-    double *collapse;            /* for pyramids: matrix from nodes.complete to `lattice`; otherwise NULL */
-    int line_count;              /* number of factors that are lines, not counting the first one */
+    session_interpolation nodes; /* the cell's nodes, and all nodes of a complete cell of its order; empty if there are
+                                    no rules for this kind */
+    session_nodes
+        lattice; /* same as nodes.complete; for pyramids, which are read as collapsed hexes, the lattice of a hex */
+    double *collapse; /* for pyramids: matrix from nodes.complete to `lattice`; otherwise NULL */
+    int line_count;   /* number of factors that are lines, not counting the first one */
     int corner_count;
-    double *corner_weights; /* all nodes x corners: the linear functions of the corners at the nodes */
+    double
+        *corner_weights; /* values of the corners' linear functions at all nodes, a matrix of (all nodes) x (corners) */
     /* rules of straight cells, whose positions are linear in each factor, and of bent ones; shells and pyramids have
-     * only the latter */
+     * only rules of bent cells */
     session_product_rule straight, bent;
 } session_cell_rules;
 

@@ -1,4 +1,4 @@
-/* What one cell contributes to the statistics of a field. */
+/* The contribution of one cell to the statistics of a field. */
 #ifndef SESSION_CELL_VALUE_H
 #define SESSION_CELL_VALUE_H
 
@@ -7,16 +7,17 @@
 typedef struct session_cell_value {
     /* is_counted: the cell is drawn and all its values are finite; is_shell: it is a shell */
     bool is_counted, is_shell;
-    /* set if the value varies in the cell, so that `mean` may lie outside minimum .. maximum, and bins get parts of the
-     * volume */
+    /* true: the value is a polynomial that varies in the cell, so that `mean` may lie outside minimum .. maximum, and
+     * each bin gets a part of the cell's volume */
     bool is_integral;
-    double minimum, maximum; /* of the cell's value, or of the values at its vertices or nodes */
-    double mean;             /* the cell's value, or the mean of its values */
-    double half_deviation;   /* half the standard deviation of the value in the cell, which cannot overflow */
-    double volume;           /* volume, or area of a shell */
+    double minimum,
+        maximum; /* minimum and maximum of the values at the cell's vertices or nodes, or of its single value */
+    double mean; /* the cell's value, or the mean of its values */
+    double half_deviation; /* half the standard deviation of the value in the cell; the half cannot overflow */
+    double volume;         /* volume, or area of a shell */
 } session_cell_value;
 
-/* Reads a linear cell. Its mean is that of the values at its vertices. */
+/* Reads a linear cell. Its mean is the mean of the values at its vertices. */
 session_cell_value session_read_cell_value(const grid *g, const grid_field *field, int64_t cell, volume_buffer *buffer);
 
 #endif

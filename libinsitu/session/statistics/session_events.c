@@ -20,8 +20,8 @@ bool session_has_events(const scene *scene, int64_t cycle, bool images)
     return false;
 }
 
-/* The requests for statistics in a step: those of the scene's statistics that are due, followed by those of images'
- * conditions. */
+/* The requests for statistics in a step: requests of the scene's statistics that are due, followed by requests of
+ * images' conditions. */
 typedef struct event_work {
     int count;
     session_statistics_request *requests;
@@ -59,7 +59,7 @@ static bool work_create(const scene *scene, int64_t cycle, const session_valid_e
     return true;
 }
 
-/* Returns whether the condition holds. It does not hold if there are no values. */
+/* Returns whether the condition holds. Returns false if there are no values. */
 static bool condition_holds(const scene_condition *c, const session_statistics *s)
 {
     const double value = c->statistic == SCENE_MEAN ? s->mean : c->statistic == SCENE_MINIMUM ? s->minimum : s->maximum;

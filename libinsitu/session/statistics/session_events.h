@@ -24,21 +24,21 @@ typedef struct session_valid_events {
     uint64_t statistics, images;
 } session_valid_events;
 
-/* Returns whether the step needs statistics. images: set if the step may draw images, whose conditions then matter.
- * Local. */
+/* Returns whether the step needs statistics. images: true if the step may draw images, so that statistics for their
+ * conditions are needed. Local. */
 bool session_has_events(const scene *scene, int64_t cycle, bool images);
 bool session_is_statistics_due(const scene_statistics *statistics, int64_t cycle);
 
-/* Computes the statistics that are due and those of images' conditions, writes the former, and stores which conditions
- * hold. Only the events in `valid` are processed, which must be the same on all ranks. If one fails, the others are
- * still processed, and the error is returned afterwards. Collective. */
+/* Computes and writes the statistics that are due, and computes the statistics of images' conditions and stores which
+ * conditions hold. Only the events in `valid`, which must be the same on all ranks, are processed. If an event fails,
+ * the other events are still processed, and the error is returned afterwards. Collective. */
 insitu_status session_update_events(session_events *events, const scene *scene, session_meshes *meshes,
                                     const session_catalogue *catalogue, const session_team *team,
                                     const session_event_time *now, const session_valid_events *valid,
                                     base_error *error);
 
-/* Returns the images that may be drawn, one bit for each: their condition holds, and they have not been drawn before if
- * they are drawn only once. */
+/* Returns the images that may be drawn, one bit for each: an image may be drawn if its condition holds, unless it is to
+ * be drawn only once and has been drawn before. */
 uint64_t session_drawable_images(const session_events *events, const scene *scene);
 
 #endif

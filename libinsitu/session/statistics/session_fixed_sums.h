@@ -21,13 +21,13 @@ static inline double sum_from_fixed_point(const int64_t sum[2])
     return ((double)sum[0] * (1 << FIXED_LOW_BITS) + (double)sum[1]) * 0x1p-52;
 }
 
-/* Returns a value's position in the range, 0 at low and 1 at high. It does not overflow. */
+/* Returns a value's position in the range, 0 at low and 1 at high. The computation does not overflow. */
 static inline double position_in_range(double value, double low, double high)
 {
     return high > low ? (0.5 * value - 0.5 * low) / (0.5 * high - 0.5 * low) : 0;
 }
 
-/* As above, limited to 0 .. 1. */
+/* Returns the value's position in the range, limited to 0 .. 1: 0 at low and 1 at high. */
 static inline double share_of_range(double value, double low, double high)
 {
     return fmin(fmax(position_in_range(value, low, high), 0), 1);

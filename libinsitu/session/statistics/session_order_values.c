@@ -1,13 +1,13 @@
 /* The value in a cell is the polynomial through the values at the cell's own nodes. These are the caller's values, or
- * components and magnitudes of them. Derived fields have their values at the vertices that are read in place of the
- * nodes; if these are finer lattices, those at every n-th point of a lattice are taken, where n is the number of pieces
- * between two nodes.
+ * components and magnitudes of them. Derived fields have values at the vertices that are read instead of the caller's
+ * nodes. If these vertices are finer lattices with n pieces between two nodes, the values at every n-th point of a
+ * lattice are used.
  *
- * Pyramids of an order above INTERPOLATION_MOST_PYRAMID have no known functions. Integrals over their pieces are added
- * up, and a mesh with such pyramids is split at its own nodes. Linear cells have the mean of the values at their
- * vertices, as in meshes of linear cells.
+ * The functions of pyramids of an order above INTERPOLATION_MOST_PYRAMID are not implemented. Integrals over their
+ * linear pieces are added up instead, and a mesh with such pyramids has no finer lattices. The value of a linear cell
+ * is the mean of the values at its vertices, as in meshes of linear cells.
  *
- * Each cell's numbers follow from its own nodes alone, and so do not depend on the partition. */
+ * Each cell's results depend only on its own nodes, and therefore not on the partition. */
 #include "session_order_values.h"
 
 #include "memory.h"
@@ -25,7 +25,7 @@ typedef struct order_pass {
     const session_order_field *of;
     const session_binned_volumes *binned;
     const session_cell_value *cells;   /* the values of all cells, if `binned` is given */
-    session_cell_value *out;           /* receives them, if it is not */
+    session_cell_value *out;           /* receives the values of all cells, if `binned` is NULL */
     session_rows rows;                 /* rows of the caller's nodes */
     session_rows lattice;              /* rows of the nodes that are read */
     const session_node_values *values; /* the caller's values at nodes; NULL: those of `field` are used */
@@ -62,7 +62,7 @@ static void read_caller_values(const order_pass *p, int64_t cell, int count, dou
     }
 }
 
-/* Reads the values at those nodes of the finer lattice that are the cell's own. */
+/* Reads the values at the nodes of the finer lattice that coincide with the cell's own nodes. */
 static void read_lattice_values(const order_pass *p, const session_interpolation *nodes, int64_t cell, double *out)
 {
     const session_nodes *of = &nodes->complete;
@@ -130,7 +130,8 @@ static session_cell_value find_linear_value(const order_pass *p, const session_i
     return session_read_cell_value(&one, &field, 0, &buffer->volume);
 }
 
-/* Returns whether a cell's value is the sum over its pieces. Such cells are never refined (session_finer.c). */
+/* Returns whether integrals over the cell are computed as sums over its linear pieces. Such cells are never refined
+ * (session_finer.c). */
 static bool is_summed(const session_nodes *nodes)
 {
     return nodes->type == GRID_PYRAMID && nodes->order > INTERPOLATION_MOST_PYRAMID;
@@ -150,7 +151,7 @@ static session_cell_value sum_pieces(const order_pass *p, int64_t cell, order_bu
         out.is_counted = true;
         out.minimum = fmin(out.minimum, value.minimum);
         out.maximum = fmax(out.maximum, value.maximum);
-        /* the mean and the sum of squares around it are updated, which loses no digits (Welford, 1962) */
+        /* the mean and the sum of squares around it are updated, which avoids cancellation (Welford, 1962) */
         out.volume += value.volume;
         const double share = out.volume > 0 ? value.volume / out.volume : 0;
         const double half = 0.5 * value.mean - 0.5 * out.mean;
@@ -163,13 +164,13 @@ static session_cell_value sum_pieces(const order_pass *p, int64_t cell, order_bu
 
 /* ---- polynomials ------------------------------------------------------------------------------------------------- */
 
-/* A cell is flat if its volume, or that of its parts that are inside out, is not above rounding errors: products of
- * slopes, each of which is a sum over the nodes. */
+/* A cell is treated as flat if its volume is at most this fraction of the volume of its bounding box. The fraction
+ * covers rounding errors of products of derivatives, each of which is a sum over the nodes. */
 static const double flat_share = 0x1p-40;
 
 typedef struct cell_integrals {
     double volume, size;  /* integrals of the measure, and of its absolute value */
-    double first, second; /* integrals of the position of the value in the range, less 1/2, and of its square */
+    double first, second; /* integrals of (the value's position in the range, minus 1/2), and of its square */
 } cell_integrals;
 
 static void add_integrals(void *of, int count, const double *measures, const double *values)
@@ -184,7 +185,7 @@ static void add_integrals(void *of, int count, const double *measures, const dou
     }
 }
 
-/* A cell whose values are given by their position in the range of those at its nodes. */
+/* A cell whose values are scaled to their positions, 0 .. 1, in the range of the values at its nodes. */
 typedef struct scaled_cell {
     bool is_finite;
     double minimum, maximum;

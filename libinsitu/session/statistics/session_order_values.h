@@ -11,14 +11,15 @@
 /* A field on a mesh whose cells are split into pieces. */
 typedef struct session_order_field {
     const session_mesh *mesh;
-    grid_field values; /* the values at the vertices or cells that are read in place of the caller's nodes */
-    int given;         /* the field whose values the caller gives at nodes, or -1: only `values` are read */
-    bool is_lobatto;   /* as in session_make_interpolation() */
+    grid_field
+        values;      /* values at the vertices or cells that the session reads instead of the caller's nodes or cells */
+    int given;       /* index of the field whose values at the caller's nodes are read; -1: only `values` are read */
+    bool is_lobatto; /* as in session_make_interpolation() */
     int threads;
 } session_order_field;
 
 /* Returns the index of a mesh's field if its values at the caller's nodes can be read (session_order_field.given);
- * otherwise -1: it is derived, at cells, or on a mirror image. */
+ * returns -1 if the field is derived, has values in cells, or belongs to a mirror image. */
 int session_find_caller_nodes(const session_mesh *mesh, int field);
 
 /* Computes the value of each of the caller's cells. The caller must free *out in any case. Parallel. Local. */
@@ -27,13 +28,14 @@ insitu_status session_find_order_values(const session_order_field *of, session_c
 /* The volumes that cells have in the bins of a histogram. */
 typedef struct session_binned_volumes {
     session_bins bins;
-    bool is_whole;     /* set if the range of the bins is that of the values; values beyond it are in the end bins */
-    bool is_of_shells; /* set if only shells are counted; otherwise only cells with a volume are */
+    bool is_whole;     /* true: the range of the bins is the range of all values, and values beyond it are added to the
+                          first or last bin */
+    bool is_of_shells; /* true: only shells are counted; false: only cells with a volume are counted */
     double largest;    /* the volume of the largest cell, by which volumes are divided */
     int64_t *sums;     /* for each bin, a sum in fixed point (session_fixed_sums.h) */
 } session_binned_volumes;
 
-/* Adds the volumes in bins of those cells whose values vary (session_cell_value.is_integral). cells: those from
+/* Adds the volumes in bins of the cells whose values vary (session_cell_value.is_integral). cells: the values from
  * session_find_order_values(). Parallel. Local. */
 insitu_status session_bin_order_values(const session_order_field *of, const session_cell_value *cells,
                                        const session_binned_volumes *out, base_error *error);

@@ -27,7 +27,7 @@ static double jacobi_value(int n, int alpha, double x, double *slope)
 }
 
 /* Finds the Gauss-Jacobi rule on the line from 0 to 1 with the weight function (1 - x)^alpha. The points are found by
- * Newton's method, which is kept off the roots found before by dividing the polynomial by them. */
+ * Newton's method. The polynomial is divided by the factors of roots found before, so that no root is found twice. */
 static void find_line_rule(int count, int alpha, double *points, double *weights)
 {
     double roots[QUADRATURE_MOST_POINTS], slope = 1;

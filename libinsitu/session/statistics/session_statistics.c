@@ -29,11 +29,11 @@ typedef struct sum_basis {
     double largest;          /* volume of the largest cell */
     double approximate_mean; /* mean of the first pass, as a fraction of the range; used by the second pass */
     bool is_second;
-    bool is_of_shells; /* set if only shells are counted; otherwise only cells with a volume are */
+    bool is_of_shells; /* true: only shells are counted; false: only cells with a volume are counted */
 } sum_basis;
 
-/* Returns the position of a cell's mean in the range of the values. The mean of a polynomial may be outside, but not by
- * so much that sums would overflow. */
+/* Returns the position of a cell's mean in the range of the values. The mean of a polynomial may be outside the range,
+ * but not far enough to make sums overflow. */
 static double position_of_mean(const session_statistics *s, const session_cell_value *cell)
 {
     static const double most = 1024;
@@ -135,7 +135,8 @@ typedef struct statistics_work {
     const session_statistics_request *requests;
     int count;
     bool *are_lobatto; /* for each mesh, whether nodes of its cells of higher order are Gauss-Lobatto points */
-    /* for each request and mesh, the values of the cells of a mesh with cells of higher order; NULL for others */
+    /* for each request and mesh, the values of the caller's cells if the mesh has cells of higher order; otherwise
+     * NULL */
     session_cell_value **order_values;
     /* KINDS * ENDS entries per request, then one entry that is -1 if memory ran out on a rank, and otherwise 0 */
     double *extremes;

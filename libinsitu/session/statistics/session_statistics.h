@@ -14,14 +14,15 @@ typedef struct session_statistics_request {
     double low, high; /* range of values that the bins cover; low > high: the range of all values */
 } session_statistics_request;
 
-/* Statistics of a field. The value of a cell is its own, or the mean of the values at its vertices. In a cell of higher
- * order, values at nodes are those of its polynomial, which is integrated. Cells whose values are not all finite are
- * not counted. If no cell with a volume is counted, shells are counted instead, and their areas replace volumes. */
+/* Statistics of a field. The value of a cell is its cell value, or the mean of the values at its vertices. In a cell of
+ * higher order with values at nodes, the polynomial through these values is integrated. Cells whose values are not all
+ * finite are not counted. If no cell with a volume is counted, shells are counted instead, and their areas replace
+ * volumes. */
 typedef struct session_statistics {
     int64_t cell_count; /* number of counted cells */
     bool is_of_shells;  /* set if shells are counted, so that areas replace volumes */
     double volume;      /* total volume of the cells */
-    /* range of the values; for a vertex field that of the values at vertices, which include all nodes. minimum >
+    /* range of the values; for a vertex field, the range of the values at vertices, which include all nodes. minimum >
      * maximum: there are no values */
     double minimum, maximum;
     double mean, deviation; /* mean and standard deviation of the cells' values, or polynomials, weighted by volume */

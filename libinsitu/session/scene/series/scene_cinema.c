@@ -5,8 +5,8 @@
 #include "memory.h"
 #include "scene_convert.h"
 
-/* Finds a control character, which a database must not contain: a picture is one line of text in the table, so that an
- * incomplete line can be recognised. */
+/* Finds a control character, which a database must not contain: each picture must be exactly one line of the table, so
+ * that an incomplete line can be recognised. */
 static const char *find_control(const char *text)
 {
     for (; text && *text; text++)
@@ -63,7 +63,7 @@ insitu_status scene_convert_cinema(const scene_document *d, const char *path, co
 {
     char file[96];
     const char *folder = in->cinema;
-    /* removes "./", so that a folder has one table even if the scene writes its name in several ways */
+    /* removes "./", so that a folder has one table even if the scene spells its path in several ways */
     while (strncmp(folder, "./", 2) == 0) folder += 2;
     insitu_status status = check_folder(d, path, folder);
     if (!status) status = check_file(d, path, image, in->path);

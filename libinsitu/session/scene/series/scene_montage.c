@@ -1,6 +1,6 @@
 /* Finds which pictures are panels of one file, and which are insets over them. Panels are numbered in the order in
- * which pictures are drawn: images in the order of the scene, each image's sweep in its order, and for each of these
- * the views of its orbit. Insets are drawn after the panels, so that none is covered. */
+ * which pictures are drawn: images in the order of the scene, for each image the entries of its sweep, and for each
+ * entry the views of its orbit. Insets are drawn after the panels, so that no panel covers an inset. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -29,11 +29,11 @@ static insitu_status check_views(const scene_document *d, const char *path, cons
                              output->path);
 }
 
-/* The width of the strip for shared colour bars, as a multiple of the height of text: a bar whose label is as wide as
- * possible without being wrapped, and its borders (adaptors/image/layout.cpp). */
+/* The width of the strip for shared colour bars, as a multiple of the height of text. It has space for a bar with the
+ * widest label that is not wrapped, and for borders (adaptors/image/layout.cpp). */
 static const double bar_strip = 9;
 
-/* Width of the frames of insets, and their distance from the edges of the panels, as shares of the file's height. */
+/* Width of the frames of insets, and their distance from the edges of the panels, as fractions of the file's height. */
 static const double inset_frame = 1 / 400.0, inset_distance = 1 / 50.0;
 
 /* Returns the index of the montage of this name; -1: there is none. */

@@ -7,9 +7,9 @@
 #include "scene_convert.h"
 #include "vector3.h"
 
-/* Finds the directions perpendicular to the axis at phi = 0 and 90 degrees. Let a be the coordinate axis nearest to the
- * axis; the first direction is as near as possible to the coordinate axis that follows a (x -> y -> z -> x). For an
- * axis along z, phi is the longitude of spherical coordinates. */
+/* Finds the directions perpendicular to the axis at phi = 0 and 90 degrees. If a is the coordinate axis nearest to the
+ * orbit's axis, the first direction is as close as possible to the coordinate axis that follows a (x -> y -> z -> x).
+ * For an axis along z, phi is the longitude of spherical coordinates. */
 static void find_perpendiculars(const double axis[3], double first[3], double second[3])
 {
     int nearest = 0;

@@ -1,9 +1,9 @@
 /* Interpolates the position of a moving camera by cubic curves through its points, one curve per coordinate.
  *
  * The slope at a point is the weighted harmonic mean of the slopes to its neighbours (Fritsch and Butland's method),
- * and 0 at the ends and at extrema of the coordinate. The curve therefore has a continuous slope, and stays between the
- * values of two neighbouring points, for any spacing of the times. A spline would be smoother still, but would
- * overshoot, possibly through the data, if a short interval of time follows a long one. */
+ * and 0 at the ends and at extrema of the coordinate. The curve therefore has a continuous slope, and stays between
+ * the values of two neighbouring points, for any spacing of the times. A spline would be smoother still, but would
+ * overshoot if a short interval of time follows a long one, so that the camera might move through the data. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -40,8 +40,8 @@ static double slope_at(const cubic_points *p, int i)
     return (w + v) / (w / down + v / up);
 }
 
-/* Returns the interpolated value; share is 0 at the second point and 1 at the third. The result is clamped, so that
- * rounding does not take it beyond the values of these points. */
+/* Returns the interpolated value between the second point (share is 0) and the third point (share is 1). The result is
+ * clamped, so that rounding does not take it beyond the values of these points. */
 static double cubic_value(const cubic_points *p, double share)
 {
     const double h = p->times[2] - p->times[1], a = p->values[1], b = p->values[2], t = share;

@@ -3,8 +3,8 @@
 
 #include "scene_convert.h"
 
-/* The vector is scaled by its largest component first, so that squares of 1e-200 and 1e200 neither underflow nor
- * overflow. */
+/* The vector is scaled by its largest component first, so that squares of very small or large components, such as
+ * 1e-200 and 1e200, neither underflow nor overflow. */
 bool scene_normalize(double v[3])
 {
     const double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
