@@ -14,8 +14,8 @@
  * the light of these media are added:
  *
  *     |-- a ------------|            -ln T  = sum of the shares of -ln Ta, -ln Tb ... between the cuts
- *            |-- b -------------|    colour = (1 - T) times the mean of their colours, weighted by these shares of -ln
- * T |  a   |  a and b |   b   |
+ *            |-- b -------------|    colour = (1 - T) times the mean of their colours, weighted by these shares
+ *     |  a   |  a and b |   b   |
  *
  * The renderer makes intervals short enough for this approximation (render/volume/kernel_segments.h). */
 #include "comp_merge.h"

@@ -9,7 +9,7 @@
  *
  * The reconstruction needs no gradients. Let P_v be the state at a vertex, averaged from the cells around it, and let
  * P_f and P_c be its means over the vertices of a face and of a cell. The linear function through these values, shifted
- * to the cell's own mean q, has at the face the value
+ * so that its mean in the cell is q, has this value at the face:
  *
  *     q + (P_f - P_c) = P_f + j        with the cell's jump j = q - P_c + dt/2 q_t
  *
@@ -17,8 +17,9 @@
  * sides, so ranks exchange only the four jumps of each cell. In one dimension this is Fromm's scheme. In the
  * first-order scheme, j = q and P = 0.
  *
- * Each cell loops over its own faces, so every flux is computed twice, but no two cells write to the same place. Each
- * sum is in the order of the cell's faces, so that every cell's result has the same bits on any partition. */
+ * Each cell loops over its own faces, so every flux is computed twice, but no two cells write to the same address.
+ * Each sum is computed in the order of the cell's faces, so that every cell's result has the same bits on any
+ * partition. */
 #include "wave_kernel.h"
 
 #include <stddef.h>

@@ -28,7 +28,8 @@ typedef struct wave_grid {
     const int32_t *vertex_cells;
     const uint8_t *walls;
     const uint8_t *layers;           /* layer of the medium for each cell */
-    const void *vertex_cell_weights; /* real; for each entry of around: weight of the cell in the value at the vertex */
+    const void *vertex_cell_weights; /* real; for each entry of wave_mesh.vertex_cells: weight of the cell in the value
+                                        at the vertex */
     const void *faces;               /* real; outward unit normal and area of each own face */
     const void *inverse_volume;      /* real; 1 / volume of each own cell */
     wave_values state;               /* pressure and velocity of each cell */

@@ -48,7 +48,8 @@ struct option_row {
     bool (*read)(const option_row *row, const char *value,
                  void *field); /* function that reads the option's value; NULL for a flag */
     size_t offset;
-    const char *expected; /* expected value for messages; the words of a choice are separated by '|' */
+    const char *expected; /* description of the expected value for messages; if the option has a fixed set of values,
+                             these are separated by '|' */
     const int *choice;    /* value of each word of a choice; NULL means 0, 1, 2, ... */
     double low, high;
 };

@@ -23,8 +23,8 @@ typedef struct wave_options {
     bool help;
 } wave_options;
 
-/* Parses the arguments, which are the same on every rank, and so is the result. Returns false and a message (one line
- * without newline) if an option is wrong. */
+/* Parses the arguments. They are the same on every rank, so that the result is the same too. Returns false and a
+ * message (one line without newline) if an option is wrong. */
 bool wave_options_parse(int argc, char **argv, wave_options *options, char *message, int message_size);
 
 const char *wave_options_help(void);

@@ -10,9 +10,10 @@
 typedef struct wave_report {
     MPI_Comm comm;
     int rank;
-    double memory_before;            /* this rank's resident memory in bytes before libinsitu was opened */
-    double simulation_ms, insitu_ms; /* sum of the steps' times so far; each step counts its slowest rank */
-    double bytes_peak, bytes_grown;  /* maximum memory so far over all ranks */
+    double memory_before; /* this rank's resident memory in bytes before libinsitu was opened */
+    double simulation_ms,
+        insitu_ms; /* sums of the times of all steps so far; the time of a step is that of its slowest rank */
+    double bytes_peak, bytes_grown; /* maximum memory so far over all ranks */
 } wave_report;
 
 /* Prints what will run. Collective. */

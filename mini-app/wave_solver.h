@@ -14,7 +14,7 @@ typedef struct wave_setup {
     double swell;    /* exaggeration of the displacement of drawn vertices; 0 if they do not move */
     double courant;  /* time step as a fraction of the largest stable one; 0 means 0.9 */
     wave_medium medium;
-    wave_source source; /* source of the wave; none if its amplitude is 0 */
+    wave_source source; /* source of the wave; an amplitude of 0 means that there is no source */
 } wave_setup;
 
 typedef struct wave_solver {
@@ -52,7 +52,7 @@ void wave_solver_set(wave_solver *solver, int32_t cell, const double state[4]);
 void wave_solver_get(const wave_solver *solver, int32_t cell, double state[4]);
 void wave_solver_centroid(const wave_solver *solver, int32_t cell, double xyz[3]);
 
-/* Agrees on the time step, and updates halo and vertices to the state that was set. Collective. */
+/* Agrees with all ranks on the time step, and updates halo cells and vertices to the state that was set. Collective. */
 void wave_solver_start(wave_solver *solver);
 
 /* Performs one time step. Afterwards all cells, and the vertices of own cells, are up to date. Collective. */

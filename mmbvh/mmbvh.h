@@ -1,10 +1,11 @@
 /* The min-max bounding volume hierarchy: a binary tree over a grid's cells. Each node holds the bounds of its cells and
  * the range of a scalar on them (thesis, section 4.2). The tree has no access to MPI or pixels.
  *
- * The nodes are stored in one array, root first. Siblings are adjacent, so that one reference finds both. A leaf holds
- * at most 7 cells. Bounds are float32, of (position - origin) * scale, rounded outward; ranges are float32, rounded
- * outward from the double values; the compact layout rounds bounds further outward, to its grid. Ghost cells are not in
- * the tree. A cell with a non-finite value has the empty range (+inf, -inf), so that no traversal visits it.
+ * The nodes are stored in one array, root first. Siblings are adjacent, so that one reference is enough for both. A
+ * leaf holds at most 7 cells. Bounds are float32, of (position - origin) * scale, rounded outward; ranges are float32,
+ * rounded outward from the double values; in the compact layout, bounds are rounded further outward to a grid. Ghost
+ * cells are not in the tree. A cell with a non-finite value has the empty range (+inf, -inf), so that no traversal
+ * visits it.
  *
  * Nodes are numbered depth first by pairs: a pair of siblings, then the descendants of the left one, then those of the
  * right one. The leaves' cells are stored in the same order. Children therefore come after parents, and the descendants
@@ -35,8 +36,8 @@ typedef struct mmbvh_node {
 
 typedef enum mmbvh_layout {
     MMBVH_COMPACT,  /* 24 bytes per node, bounds in steps of a grid (mmbvh_compact.h) */
-    MMBVH_REFERENCE /* 40 bytes per node, bounds in float32; also used if the compact layout cannot store the tree: with
-                       more than 2^29 cells, or bounds that are not finite */
+    MMBVH_REFERENCE /* 40 bytes per node, bounds in float32; also used if the compact layout cannot store the tree,
+                       because it has more than 2^29 cells or bounds that are not finite */
 } mmbvh_layout;
 
 typedef enum mmbvh_builder {
@@ -54,8 +55,8 @@ typedef struct mmbvh {
     double origin[3]; /* origin of the tree's coordinates, which are (position - origin) * scale */
     double scale;
     double built_cost; /* SAH cost (mmbvh_cost()) when the tree was built */
-    double area;       /* sum over all nodes of half the box's surface area times the tests in the node (mmbvh_cost());
-                          updated when bounds are refitted */
+    double area;       /* sum, over all nodes, of half the surface area of the box times the number of tests in the node
+                          (mmbvh_cost()); updated when bounds are refitted */
     double built_area; /* value of `area` when the tree was built; if `area` has grown faster than the surface area of
                           the mesh, the tree has degraded */
     /* number of cells with non-finite values; the ranges stored in the nodes do not include them */
@@ -89,7 +90,8 @@ static inline int mmbvh_node_count(const mmbvh *tree, int64_t index)
     return tree->compact ? (int)(tree->compact[index].link & 7) : (int)tree->nodes[index].count;
 }
 
-/* Returns a leaf's first index in cells, or the index of an inner node's left child, which the right one follows. */
+/* Returns a leaf's first index in cells, or the index of an inner node's left child. The right child has the next
+ * index. */
 static inline int64_t mmbvh_node_ref(const mmbvh *tree, int64_t index)
 {
     return tree->compact ? (int64_t)(tree->compact[index].link >> 3) : (int64_t)tree->nodes[index].ref;
@@ -166,10 +168,10 @@ typedef struct mmbvh_visible {
     const mmbvh_interval *intervals;
 } mmbvh_visible;
 
-/* As mmbvh_refit_bounds(), but may skip nodes that no visible part contains. *is_whole is set to true if no node was
- * skipped. Otherwise the bounds of a node contain only its visible descendants, and are valid only until values,
- * intervals or vertices change. A traversal that skips invisible nodes finds the same cells as before, but
- * mmbvh_check() fails. */
+/* Does the same as mmbvh_refit_bounds(), but may skip nodes that are in none of the visible parts. *is_whole is set to
+ * true if no node was skipped. Otherwise the bounds of a node contain only its visible descendants, and are valid only
+ * until values, intervals or vertices change. A traversal that skips invisible nodes finds the same cells as before,
+ * but mmbvh_check() fails. */
 insitu_status mmbvh_refit_visible_bounds(mmbvh *tree, const grid *g, const mmbvh_visible *visible, int visible_count,
                                          const mmbvh_options *options, bool *is_whole);
 
@@ -196,7 +198,8 @@ static inline mmbvh_ranges mmbvh_pair_ranges(const float *pairs)
 }
 
 /* Returns the tree's current SAH cost: the expected number of boxes and cells that a random ray tests if it hits the
- * root's box; a box and a cell count the same. Only the number of threads is read from the options. */
+ * root's box; testing a box and testing a cell have the same cost. Only the number of threads is read from the
+ * options. */
 double mmbvh_cost(const mmbvh *tree, const mmbvh_options *options);
 
 typedef struct mmbvh_statistics {

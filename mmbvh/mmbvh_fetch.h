@@ -11,8 +11,8 @@
 
 #define MMBVH_INLINE static inline __attribute__((always_inline))
 
-/* The way in which a cell's vertices are found: all cells are tets; all are hexes; all have the same other type; each
- * cell has its own type; or the cells form a lattice. */
+/* The five cases of how a cell's vertices are found: all cells are tets, all are hexes, all have the same other type,
+ * cells have different types, or cells form a lattice. */
 typedef enum fetch_shape {
     FETCH_TETS,
     FETCH_HEXES,
@@ -51,8 +51,8 @@ MMBVH_INLINE int fetch_vertex_count(const grid *g, int64_t cell, const fetch_sha
     return grid_type_vertices(shape == FETCH_BY_CELL ? grid_cell_type(g, cell) : g->cell_type);
 }
 
-/* Returns the index of a cell's first entry in the connectivity; in a lattice, which has none, the index of its first
- * vertex. */
+/* Returns the index of a cell's first entry in the connectivity; in a lattice, which has no connectivity, the index of
+ * the cell's first vertex. */
 MMBVH_INLINE int64_t fetch_first_entry(const grid *g, int64_t cell, int count, const fetch_shape shape)
 {
     if (shape == FETCH_LATTICE) return grid_lattice_first(g->lattice, cell);
@@ -285,7 +285,8 @@ MMBVH_INLINE void round_box_outward(const fetch_box *box, const double origin[3]
     }
 }
 
-/* As round_box_outward(), with the same bits, for a box of floats. Lane 3 of the input is ignored. */
+/* Does the same as round_box_outward() for a box of floats; the results have the same bits. Lane 3 of the input is
+ * ignored. */
 MMBVH_INLINE void round_float_box_outward(const fetch_float_box *float_box, const double origin[3], double scale,
                                           vec4 *lower, vec4 *upper)
 {
@@ -365,7 +366,7 @@ static inline void fetch_box_any_cell(fetch_box *box, const grid *g, int64_t cel
     }
 /* clang-format on */
 
-/* As FETCH_INSTANCES, for floats only; the table is indexed by [shape][wide_index]. */
+/* Does the same as FETCH_INSTANCES for floats only; the table is indexed by [shape][wide_index]. */
 #define FETCH_FLOAT_INSTANCES(DEFINE, prefix)                                                                          \
     FETCH_EACH_SHAPE(FETCH_FLOAT_SHAPE_INSTANCES, DEFINE, prefix)                                                      \
     DEFINE(prefix##_lattice_4, FETCH_LATTICE, false, false)

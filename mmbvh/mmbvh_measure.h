@@ -6,8 +6,8 @@
 #include "mmbvh_store.h"
 #include "mmbvh_sweep.h"
 
-/* Returns half the surface area of a box, whose lane 3 must be 0, times the number of tests in the node: one for each
- * cell of a leaf, or two for the children's boxes. */
+/* Returns half the surface area of a box times the number of tests in the node, which is the number of cells of a leaf,
+ * or two for the children's boxes. Lane 3 of the box must be 0. */
 static inline double node_area(const mmbvh *tree, int64_t node, vec4 lower, vec4 upper)
 {
     const vec4 d = upper - lower;

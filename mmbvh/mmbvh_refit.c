@@ -9,7 +9,8 @@
 enum {
     TASK_NODES = 4096,
     PREFETCH_CELLS = 48,
-    /* prefetch distance for tets, in cells; larger, because a tet's connectivity takes half as many bytes as a hex's */
+    /* prefetch distance for tets, in cells; it is larger than for hexes, because the connectivity of a tet takes half
+     * as many bytes */
     PREFETCH_TETS = 96
 };
 

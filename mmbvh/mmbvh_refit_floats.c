@@ -6,8 +6,8 @@
 
 enum {
     PART_NODES = 256,                                   /* maximum number of nodes whose cells are read in one pass */
-    PART_CELLS = (PART_NODES / 2 + 1) * MMBVH_MAX_LEAF, /* maximum number of cells of these nodes; in a pair and its
-                                                           descendants leaves are half of the nodes, plus one */
+    PART_CELLS = (PART_NODES / 2 + 1) * MMBVH_MAX_LEAF, /* maximum number of cells of PART_NODES nodes; of a pair and
+                                                           its descendants, half of the nodes plus one are leaves */
     PREFETCH_CELLS = 64,
     PREFETCH_VERTICES = 24
 };
@@ -54,8 +54,9 @@ MMBVH_INLINE fetch_float_box read_cell(const sweep *s, int64_t cell, const pass_
     return float_box;
 }
 
-/* Prefetches one vertex of a hex whose connectivity was prefetched earlier; its other vertices are near it. Other cells
- * are skipped: a vertex of tets is shared by so many of them that it usually is in the cache. */
+/* Prefetches one vertex of a hex whose connectivity was prefetched earlier; the hex's other vertices are usually near
+ * this one. Cells other than hexes are skipped, because a vertex of tets is shared by so many cells that it is usually
+ * in the cache already. */
 MMBVH_INLINE void prefetch_vertex(const sweep *s, int64_t cell, const pass_constants pass)
 {
     const grid *g = s->source->g;

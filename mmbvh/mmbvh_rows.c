@@ -22,7 +22,7 @@ bool rows_can_read(const grid *g, const grid_field *field)
            !field->source_cells && grid_lattice_row_axis(g->lattice) >= 0;
 }
 
-/* The smaller (low) and the larger (high) of two numbers, per lane. */
+/* Compute the smaller (low) and the larger (high) of two numbers, per lane. */
 #define SMALLER(a, b) ((a) < (b) ? (a) : (b))
 #define LARGER(a, b) ((a) > (b) ? (a) : (b))
 

@@ -10,7 +10,7 @@ enum { ROWS_CELLS = 64 };
 /* The ranges of neighbouring cells of one row. */
 typedef struct rows_ranges {
     int64_t first, count;
-    float low[ROWS_CELLS], high[ROWS_CELLS]; /* range of each cell's values, rounded to float as a cast does */
+    float low[ROWS_CELLS], high[ROWS_CELLS]; /* range of each cell's values, rounded to the nearest float */
     unsigned char is_finite[ROWS_CELLS]; /* 1 if all values of the cell are finite, otherwise 0; entries from `count` to
                                             the next multiple of 8 are 0 */
 } rows_ranges;
@@ -23,8 +23,8 @@ bool rows_can_read(const grid *g, const grid_field *field);
  * Padding and ghost layers are skipped, but ghost flags are not checked. Returns false if there are no such cells. */
 bool rows_read(const grid *g, const grid_field *field, int64_t from, int64_t end, rows_ranges *out);
 
-/* Computes the range of the values at all vertices, rounded to float as a cast does. Returns false if the values are
- * not contiguous in memory, or one of them is not finite. */
+/* Computes the range of the values at all vertices, rounded to the nearest float. Returns false if the values are not
+ * contiguous in memory, or one of them is not finite. */
 bool rows_extent(const grid *g, const grid_field *field, float *low, float *high);
 
 #endif

@@ -1,9 +1,9 @@
 /* Selects the visible cells. In the thesis (section 4.2), nodes whose range contains no isovalue are skipped during
  * traversal; here cells are skipped before a tree is built.
  *
- * One pass per query sets a bit for each matching cell. Two more passes over the bits then count and list the cells, so
- * that the list is allocated with its exact size. The passes per query are limited by the memory bandwidth of the
- * connectivity and values. */
+ * One pass per query sets a bit for each matching cell. Two more passes over the bits then count and list the cells,
+ * so that the list is allocated with its exact size. The time of a pass per query is limited by the memory bandwidth
+ * for connectivity and values. */
 #include <string.h>
 
 #include "memory.h"
@@ -68,7 +68,7 @@ MMBVH_INLINE match_result match_doubles(const selector *s, int64_t cell, const f
     return match_range(s, fetch_combine_lanes(&v, is_finite));
 }
 
-/* Returns the lanes' sign bits; bit i is that of lane i. */
+/* Returns the lanes' sign bits; bit i is the sign of lane i. */
 static inline int sign_bits(ivec4 a)
 {
 #if defined(__SSE2__)
@@ -183,7 +183,7 @@ MMBVH_INLINE int64_t mark_matching_cells(const selector *s, int64_t begin, int64
     return unusable;
 }
 
-/* As mark_matching_cells(), four cells at a time. All cells must have the same type. */
+/* Does the same as mark(), four cells at a time. All cells must have the same type. */
 MMBVH_INLINE int64_t mark_four_at_once(const selector *s, int64_t begin, int64_t end, matcher match,
                                        const pass_constants pass)
 {

@@ -47,7 +47,7 @@ sweep_sum sweep_tree(const sweep *s, int threads);
 /* Returns a sweep that computes the ranges of the field; if field is NULL, they are infinite. */
 sweep sweep_of_ranges(const mmbvh *tree, const grid *g, const grid_field *field, mmbvh_ranges ranges);
 
-/* As sweep_of_ranges(), for a parent tree. `ranges` has a low and a high value per mesh. */
+/* Does the same as sweep_of_ranges() for a parent tree. `ranges` has a low and a high value per mesh. */
 sweep sweep_of_box_ranges(const mmbvh *tree, const float *ranges);
 
 /* Returns a sweep that computes the bounds. */
@@ -59,9 +59,9 @@ void sweep_bounds_as_floats(sweep *bounds);
 /* Returns whether the sweep reads values that are floats at vertices. */
 bool sweep_reads_floats(const sweep *ranges);
 
-/* Returns a sweep that computes both bounds and ranges of a grid's cells, so that a cell is read once. `ranges` must be
- * from sweep_of_ranges() for the same tree. If bounds or values cannot be read as floats, the two sweeps run one after
- * the other. */
+/* Returns a sweep that computes both bounds and ranges of a grid's cells, so that each cell is read only once. `ranges`
+ * must be from sweep_of_ranges() for the same tree. If bounds or values cannot be read as floats, the two sweeps run
+ * one after the other. */
 sweep sweep_of_bounds_and_ranges(const mmbvh *tree, const bounds_source *source, const sweep *ranges);
 
 /* Makes a sweep that computes bounds and ranges in one pass. Returns false if either cannot be read as floats. */

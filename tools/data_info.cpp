@@ -1,5 +1,5 @@
 /* Counts and ranges cover all leaves of a composite, so that a field of several blocks is printed as one line. Values
- * in hidden cells are often meaningless and do not count. */
+ * in hidden cells are often meaningless and are ignored. */
 #include "data_info.h"
 
 #include <algorithm>

@@ -11,8 +11,9 @@ namespace render_tool
 {
 
 /* Prints the number of cells by type, bounds, fields (centring, type, components, ranges) and times to stdout, after a
- * line that begins with title. data must contain only unstructured grids (grids_of.h). Cells that are not drawn (hidden
- * or ghosts) are counted on a line of their own; they, and points that only they use, are otherwise ignored. */
+ * line that begins with title. data must contain only unstructured grids (grids_of.h). The number of cells that are not
+ * drawn (hidden or ghosts) is printed on a separate line. Otherwise these cells, and points that only these cells use,
+ * are ignored. */
 void print_info(const std::string &title, vtkDataObject *data, const std::vector<double> &times);
 
 /* The extent of a series: the bounds of its points, and the smallest and largest value of a field (the magnitude of a

@@ -1,7 +1,7 @@
-/* Estimates how much of a field the outer surface shows. Considered are the faces that point to the viewer, weighted by
+/* Estimates how much of a field the outer surface shows. The faces that point to the viewer are considered, weighted by
  * their projected area. The measure is the interval between the 5th and 95th percentile of their values, relative to
  * the field's whole range. It is 0.07 to 0.32 for grids whose interior is of interest (a heated disk, a wind tunnel, a
- * blood vessel), and at least 0.44 for those whose surface shows the result. */
+ * blood vessel), and at least 0.44 for grids whose surface shows the result. */
 #include "default_look.h"
 
 #include <algorithm>
@@ -59,7 +59,7 @@ grid_list list_grids(vtkDataObject *data)
     return grids;
 }
 
-/* Checks whether an array is a field to display. Arrays of ids and VTK's own flags are not. */
+/* Checks whether an array is a field to display. Arrays of ids and VTK's own flags are not displayed. */
 bool is_field(vtkDataArray *array)
 {
     const std::string name = array && array->GetName() ? array->GetName() : "";
@@ -82,8 +82,8 @@ std::vector<std::string> names_of_fields(const grid_list &grids)
     return names;
 }
 
-/* Returns the first field that both steps have, otherwise the first of the last step: at its first step a run often
- * lacks fields that it computes later. "" if there are no fields. */
+/* Returns the first field that both steps have, otherwise the first of the last step: because at its first step a run
+ * often lacks fields that it computes later. "" if there are no fields. */
 std::string choose_field(const std::vector<std::string> &first, const std::vector<std::string> &last)
 {
     for (const std::string &name : first)

@@ -1,6 +1,6 @@
 /* Quads are bilinear patches. Their area vector is half the cross product of the diagonals, even if they are warped.
  * Their contribution to a volume is the mean over the two ways to split them into triangles, which is exact for the
- * patch. Therefore the volumes of all cells add up to that of the box, and the area vectors of a cell add up to
+ * patch. Therefore the volumes of all cells add up to the volume of the box, and the area vectors of a cell add up to
  * zero. */
 #include "wave_geometry.h"
 

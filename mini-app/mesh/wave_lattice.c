@@ -2,7 +2,7 @@
  *
  *   tets      six around the diagonal 000-111 (Kuhn): every face of the cube is split along the diagonal from its
  * lowest to its highest corner hex       one: no face is split wedges    two, extruded along z: the z faces are split
- * as Kuhn's are, the x and y faces are not split pyramids  six around a vertex in the centre. A face that must be split
+ * as for tets, the x and y faces are not split pyramids  six around a vertex in the centre. A face that must be split
  * for the neighbour becomes two tets instead: these cubes are the transition between all other kinds.
  *
  * A mixed lattice contains, from below: hexes, one layer of pyramid cubes, tets, wedges (both need the same split of
@@ -95,7 +95,8 @@ static bool neighbour_wants_split(const wave_lattice *lattice, const int ijk[3],
 
 static int cut_tets(const int64_t v[8], wave_cell *cells)
 {
-    /* Each path leads from corner 0 to corner 6 along the axes, in one of six orders; odd orders are mirrored. */
+    /* Each tet has the edges of a path from corner 0 to corner 6, which follows the three axes in one of six orders.
+     * Tets of odd orders are mirrored. */
     static const int8_t path[6][2] = {{1, 2}, {3, 7}, {4, 5}, {2, 3}, {7, 4}, {5, 1}};
     for (int t = 0; t < 6; ++t) {
         cells[t] = (wave_cell){WAVE_TYPE_TET, {v[0], v[path[t][0]], v[path[t][1]], v[6]}};

@@ -1,4 +1,4 @@
-/* A hash map from ids (>= 0) to local indices. It uses open addressing, and grows when it is two thirds full. */
+/* A hash map from ids (>= 0) to local indices. The map uses open addressing, and grows when it is two thirds full. */
 #ifndef WAVE_MAP_H
 #define WAVE_MAP_H
 

@@ -1,5 +1,5 @@
-/* One rank's part of the mesh: its own cells, followed by the halo, which consists of the cells of other ranks that
- * share a vertex with one of its own. Everything is computed from the partition by index arithmetic, so both sides of
+/* One rank's part of the mesh: its own cells, followed by the halo, which consists of cells of other ranks that share a
+ * vertex with one of this rank's cells. Everything is computed from the partition by index arithmetic, so both sides of
  * every exchange compute the same lists without communication. */
 #ifndef WAVE_MESH_H
 #define WAVE_MESH_H
@@ -28,16 +28,18 @@ typedef struct wave_mesh {
     uint8_t *types;       /* type of each cell; NULL if all have uniform_type */
     int index_bytes;      /* size of the integers in connectivity and offsets: 4 or 8 */
     void *connectivity;   /* vertices of all cells, cell by cell */
-    void *offsets;        /* first entry in connectivity of each cell, and the total; NULL if all cells have one type */
+    void *offsets; /* index of each cell's first entry in connectivity; a final entry is the total. NULL if all cells
+                      have one type */
     int64_t connectivity_count;
     /* index of each own cell's first face; own_cells + 1 entries; NULL if uniform. The faces of a cell are in the order
      * of its shape */
     int64_t *face_offsets;
-    int32_t *neighbours;          /* for each face of each own cell: the neighbour across it, or -1 at a wall */
-    int64_t face_count;           /* number of faces of own cells; a face between two of them counts twice */
-    int64_t unmatched;            /* faces of own cells without a neighbour, or with two: 0 for a conforming mesh */
-    int64_t *vertex_cell_offsets; /* first entry in around of each own vertex, and the total */
-    int32_t *vertex_cells;        /* cells around each vertex of an own cell, in ascending order of cell id */
+    int32_t *neighbours; /* for each face of each own cell: the neighbour across it, or -1 at a wall */
+    int64_t face_count;  /* number of faces of own cells; a face between two own cells is counted twice */
+    int64_t unmatched;   /* faces of own cells without a neighbour, or with two: 0 for a conforming mesh */
+    int64_t
+        *vertex_cell_offsets; /* index of each own vertex's first entry in vertex_cells; a final entry is the total */
+    int32_t *vertex_cells;    /* cells around each vertex of an own cell, in ascending order of cell id */
     int link_count;
     wave_link *links; /* links to other ranks, in ascending order of rank */
     int32_t *sends;   /* own cells to send to other ranks, link by link */

@@ -120,7 +120,7 @@ static bool add_send(mesh_builder *m, int rank, int32_t cell)
     return list_add(&m->sends, rank, cell);
 }
 
-/* Adds a send to every rank that has a cube at one of the cell's lattice vertices. */
+/* Adds a send to every rank that owns a cube with one of the cell's lattice vertices. */
 static bool add_sends(mesh_builder *m, int64_t cube, int32_t cell, const wave_cell *c, int owner[3][3][3])
 {
     const wave_lattice *lattice = &m->mesh->partition.lattice;

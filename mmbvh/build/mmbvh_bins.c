@@ -16,7 +16,7 @@ bin_mapping bin_mapping_make(lanes centroids, int64_t item_count)
     /* If the quotient is below 2^15, its rounding error is too small to reach the next integer; larger quotients are
      * clamped. */
     const vec4 quotient = vec4_set1((float)(count * 65536)) / vec4_from_int(extent + 1);
-    /* the limit makes a bin at least as wide as a step of the item_grid */
+    /* the limit ensures that a bin is at least as wide as a step of the item_grid */
     const ivec4 factor = vec4_truncate(vec4_min(quotient, vec4_set1(32768)));
     return (bin_mapping){(ulanes)lanes_pack(least, least),
                          lanes_pack(factor - 32768, factor - 32768) ^ lanes_set1(INT16_MIN), count};
@@ -75,8 +75,9 @@ static void add_lane_counts(bins *b, int count)
     }
 }
 
-/* Adds `count` items, every stride-th one, two at a time: one from each half of the list. Neighbouring items often
- * belong to the same bin; if they were added together, the second load would wait for the first store. */
+/* Adds `count` items, every stride-th one, two at a time: one from each half of the list. Two neighbouring items are
+ * not added at the same time, because they often belong to the same bin, and the second load would then wait for the
+ * first store. */
 static void bin_items(bins *b, const bin_mapping *mapping, const item *items, int64_t count, int64_t stride)
 {
     const int64_t half = count / 2;
@@ -164,8 +165,8 @@ bin_split bins_choose(const bins *b, const bin_mapping *m)
     return cheapest_axis(best, best_border);
 }
 
-/* Each item's box lies in the box of its side, so that no plane costs less than the sum of the surface areas of the
- * items' boxes. */
+/* Each item's box lies in the box of all items on its side of the plane. Therefore no plane costs less than the sum of
+ * the surface areas of the items' boxes. */
 float bins_least_cost(const item *items, int64_t count)
 {
     vec4 terms = {0};

@@ -13,7 +13,7 @@
 enum {
     BINS_MAX = 16,
     BINS_SAMPLED = 2048, /* minimum number of items of a node that is sampled */
-    /* sampling stride: one item in this many is binned; the resulting splits are as good as those of all items */
+    /* sampling stride: only every BINS_STRIDE-th item is binned; the resulting splits are as good as with all items */
     BINS_STRIDE = 7
 };
 
@@ -49,7 +49,7 @@ typedef struct bins {
 void bins_clear(bins *b, int count);
 void bins_merge(bins *b, const bins *other, int count);
 
-/* Returns the sampling stride for a node with `count` items: one item in this many is binned. */
+/* Returns the sampling stride for a node with `count` items: only every n-th item is binned, where n is the stride. */
 static inline int64_t bins_stride(int64_t count)
 {
     return count < BINS_SAMPLED ? 1 : BINS_STRIDE;
@@ -58,7 +58,8 @@ static inline int64_t bins_stride(int64_t count)
 /* Fills the bins with every stride-th item, starting with the first. */
 void bins_fill(bins *b, const bin_mapping *m, const item *items, int64_t count, int64_t stride);
 
-/* Returns the plane of lowest SAH cost for the items in the bins; of planes with equal costs, the first. */
+/* Returns the plane of lowest SAH cost for the items in the bins; if several planes have equal costs, the first of
+ * them. */
 bin_split bins_choose(const bins *b, const bin_mapping *m);
 
 /* Returns a lower bound of the SAH cost of all planes that separate the items. */
@@ -71,8 +72,8 @@ static inline bool bins_is_split_cheaper(float cost, int64_t count, lanes bounds
     return count > MMBVH_MAX_LEAF || cost < (float)(count - 2) * item_half_area(bounds);
 }
 
-/* Moves the items of the left side to the front and returns their number. The new order depends only on the order
- * before. */
+/* Moves the items of the left side to the front and returns their number. The new order depends only on the old
+ * order. */
 int64_t bins_partition(const bin_mapping *m, bin_split split, item *items, int64_t count);
 
 #endif

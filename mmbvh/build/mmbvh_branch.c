@@ -1,7 +1,7 @@
 /* Each node is a task. A node of many items processes them in chunks, which are tasks too. First the chunks fill bins,
  * which merge to the same bits in any order. When the plane is chosen, each chunk is partitioned in place. The total
- * number of left items determines the border; as many right items lie in front of it as left items behind it. These are
- * swapped, in order.
+ * number of left items determines the border between both sides. The number of right items in front of the border
+ * equals the number of left items behind it. These items are swapped, in order.
  *
  *      chunk 0        chunk 1        chunk 2
  *     | l l l r r r | l l r r r r | l l l l r r |
@@ -104,8 +104,8 @@ static void partition_chunk(node_split *s, const branch_builder *builder, int ch
 /* Iterator over the ranges of items that are on the wrong side of the border, chunk by chunk in their order. */
 typedef struct misplaced_items {
     const node_split *s;
-    bool is_left; /* set: iterates over items of the left child behind the border; otherwise over items of the right
-                     child in front of it */
+    bool is_left; /* true: iterates over items of the left child behind the border; false: over items of the right child
+                     in front of the border */
     int chunk;
     int64_t next, end;
 } misplaced_items;

@@ -1,9 +1,9 @@
-/* The cells of a lattice are already in spatial order: a box of indices is also compact in space, unless the lattice is
- * bent. Each node is split in two halves, across the axis along which its box is longest; lengths are estimated from
- * the mean edge lengths of cells. If the numbers of cells per side are powers of two, halving alone would end in leaves
- * of 2 x 2 x 1 cells, although a leaf may have MMBVH_MAX_LEAF = 7. Small boxes are therefore split so that the cost of
- * their leaves is minimal, which mostly gives leaves of 3 x 2 x 1 cells: a third fewer nodes, with a tenth less surface
- * area. */
+/* The cells of a lattice are already in spatial order: cells in a box of indices are also close to each other in space,
+ * unless the lattice is strongly deformed. Each node is split in two halves, across the axis along which its box is
+ * longest; lengths are estimated from the mean edge lengths of cells. If the numbers of cells per side are powers of
+ * two, halving alone would end in leaves of 2 x 2 x 1 cells, although a leaf may have MMBVH_MAX_LEAF = 7. Small boxes
+ * are therefore split so that the cost of their leaves is minimal, which mostly gives leaves of 3 x 2 x 1 cells: a
+ * third fewer nodes, with a tenth less surface area. */
 #include "mmbvh_bricks.h"
 
 #include <math.h>
@@ -17,9 +17,9 @@ typedef struct brick {
 } brick;
 
 /* SMALL_SIDE and SMALL_CELLS limit the boxes whose splits are chosen by cost. The cost of a leaf is LEAF_COST plus, for
- * each cell, the sum of the leaf's sides in cells, to which the probability that a surface crosses the leaf is
- * proportional. If LEAF_COST is between 12 and 126, leaves of 3 x 2 x 1 cells cost less per cell than leaves of 2 x 2 x
- * 1 or 7 x 1 x 1. */
+ * each cell, the sum of the leaf's sides, in cells. The probability that a surface crosses the leaf is proportional to
+ * this sum. If LEAF_COST is between 12 and 126, leaves of 3 x 2 x 1 cells cost less per cell than leaves of 2 x 2 x 1
+ * or 7 x 1 x 1. */
 enum { SMALL_SIDE = 8, SMALL_CELLS = 64, LEAF_COST = 24 };
 
 typedef struct bricks {
@@ -101,8 +101,8 @@ static int cost_of_split(const bricks *s, const int64_t count[3], brick_split sp
     return s->costs[sides[0][0]][sides[0][1]][sides[0][2]] + s->costs[sides[1][0]][sides[1][1]][sides[1][2]];
 }
 
-/* Returns the split of lowest cost of a small box, and `first` if no other split costs less. *cost receives the
- * cost. */
+/* Returns the split of a small box with the lowest cost; if several have this cost, `first` is preferred. *cost
+ * receives the cost. */
 static brick_split cheapest_split(const bricks *s, const int64_t count[3], brick_split first, int *cost)
 {
     brick_split best = first;

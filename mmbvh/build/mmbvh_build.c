@@ -4,7 +4,7 @@
  * the sweeps of a refit compute their bounds and ranges.
  *
  * Peak memory in bytes per cell: 16 for items or keys, 4 for each topology node (0.35 nodes per tet), and 4 for the
- * cell indices of the result. The items are freed before the nodes are allocated. */
+ * cell indices in the finished tree. The items are freed before the nodes are allocated. */
 #include "mmbvh.h"
 
 #include <string.h>

@@ -1,6 +1,6 @@
 /* The bits of a code are assigned to axes by repeatedly halving the bounding box across its longest side. The nodes are
- * therefore as close to cubes as possible, whatever the shape of the mesh. Bits are interleaved by table lookups, seven
- * bits at a time. */
+ * therefore as close to cubes as possible for any shape of the mesh. Bits are interleaved by table lookups, seven bits
+ * at a time. */
 #include "mmbvh_morton.h"
 
 #include <omp.h>
@@ -282,7 +282,7 @@ static void sort_serial(uint64_t *from, uint64_t *other, int64_t count, bool to_
     }
 }
 
-/* As sort_serial(), on all threads. All keys must be equal in their bits above the lowest `top` bits. */
+/* Does the same as sort_serial() on all threads. All keys must be equal in their bits above the lowest `top` bits. */
 static void sort_parallel(const sorting *s, uint64_t *from, uint64_t *other, int64_t count, int top, bool to_other)
 {
     int64_t starts[DIGITS + 1];
@@ -330,7 +330,7 @@ static int64_t find_split(const uint64_t *keys, int64_t count)
 {
     const int bit = count_significant_bits(keys[0] ^ keys[count - 1]) - 1;
     const uint64_t border = keys[count - 1] >> bit << bit;
-    int64_t low = 0, high = count - 1; /* invariant: keys[low] is below the border, keys[high] is not */
+    int64_t low = 0, high = count - 1; /* invariant: the highest differing bit is 0 in keys[low] and 1 in keys[high] */
     while (high - low > 1) {
         const int64_t middle = low + (high - low) / 2;
         if (keys[middle] < border) {

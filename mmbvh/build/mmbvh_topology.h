@@ -12,8 +12,8 @@
 
 enum {
     TOPOLOGY_SUBTREE_CELLS = 16384, /* maximum number of cells in a subtree: cells and nodes fit in a core's cache */
-    /* nodes at this depth and below are split into halves with equal numbers of cells, so that trees of 2^32 cells stay
-     * within the maximum depth */
+    /* nodes of this depth or a larger one are split into halves with equal numbers of cells, so that trees of 2^32
+     * cells stay within the maximum depth */
     TOPOLOGY_MEDIAN_DEPTH = MMBVH_MAX_DEPTH - 32
 };
 

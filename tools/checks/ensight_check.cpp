@@ -7,10 +7,11 @@
  *              | "block" i j k 3ijk floats [ijk ints]     (rectilinear: i + j + k floats, uniform: 6)
  *              | type n [n ids] n × nodes ints            (nsided, nfaced: counts, then nodes)
  *
- * The file of a variable has a description. Then, for some of the parts, it has "part" and a number; for variables at
- * nodes "coordinates" or "block", for variables at elements each type or "block"; and one value per node or element and
- * component. If "undef" follows that word, the value that represents undefined ones comes first. If "partial" follows
- * it, a count comes first, and the indices of the nodes or elements that have values. */
+ * The file of a variable has a description. Then, for some of the parts, it has "part" and a number; for variables
+ * at nodes "coordinates" or "block", for variables at elements each type or "block"; and one value per node or
+ * element and component. If the word "undef" follows "coordinates", "block" or the type, the value that represents
+ * undefined values comes first. If "partial" follows, a count and the indices of the nodes or elements with values
+ * come first. */
 #include "ensight_check.h"
 
 #include <algorithm>
@@ -51,7 +52,8 @@ bool starts_with(const std::string &text, const char *start)
     return text.compare(0, std::strlen(start), start) == 0;
 }
 
-/* Returns the number of nodes of an element type: -1 for an unknown type, 0 if elements of the type differ in size. */
+/* Returns the number of nodes of an element type: -1 for an unknown type, 0 if elements of the type have different
+ * numbers of nodes. */
 int nodes_of_type(const std::string &type)
 {
     static const std::map<std::string, int> nodes = {
@@ -77,8 +79,8 @@ std::string first_line(ensight_stream &in, encoding how)
     return is_name ? in.line() : line;
 }
 
-/* Checks whether another step begins, and reads its description if there is one. For the first step, `line` is its
- * first line, because a file may contain a single step without "BEGIN TIME STEP"; for later steps it is "". */
+/* Checks whether another step begins, and reads its description if there is one. `line` is the file's first line for
+ * the first step, because a file may contain a single step without "BEGIN TIME STEP"; for later steps it is "". */
 bool is_next(ensight_stream &in, std::string line, bool is_first)
 {
     if (!is_first && !in.next_line(line)) return false;
@@ -266,8 +268,8 @@ std::string check_values(ensight_stream &in, const geometry &parts, int componen
     return partial;
 }
 
-/* Checks all steps of a variable. Steps beyond those of the geometry use its last step. VTK's reader skips earlier
- * steps by the sizes of the step that it reads, so all steps must have the same sizes. */
+/* Checks all steps of a variable. Steps for which there is no geometry use the last step of the geometry. VTK's reader
+ * skips earlier steps by the sizes of the step that it reads, so all steps must have the same sizes. */
 void check_variable(const std::string &path, encoding how, const std::vector<geometry> &steps, const case_file &file)
 {
     ensight_stream in(path, how);

@@ -1,5 +1,6 @@
 /* A number that is cut off is often still a valid number, so plain text must end with a newline. Files of VTK's XML
- * formats must end with their last tag, and so must the files that they reference and VTK's readers open. */
+ * formats must end with their last tag. This also applies to the files that they reference and that VTK's readers
+ * open. */
 #include "file_length.h"
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 /* A file begins with four lines ("# vtk DataFile Version 5.1", a title, ASCII or BINARY, DATASET and its kind).
- * Sections follow: each has a keyword and counts, and most have values, either as text or as big-endian numbers
- * followed by a newline. */
+ * Sections follow: each section has a keyword and counts, and most sections have values, either as text or as
+ * big-endian numbers followed by a newline. */
 #include "legacy_check.h"
 
 #include "number_check.h"

@@ -91,7 +91,7 @@ class header
         }
         skip_attributes();
         const int64_t bytes = elements * bytes_of_type(number(4));
-        count(); // skips the stored size, which is wrong above 4 GB
+        count(); /* skips the size in the header, which is wrong above 4 GB */
         const int64_t begin = number(version_ == 1 ? 4 : 8);
         int64_t &end = has_records ? record_end_ : fixed_end_;
         end = std::max(end, begin + bytes);

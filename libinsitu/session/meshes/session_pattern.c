@@ -3,8 +3,8 @@
  * Therefore the pieces of neighbouring cells share faces.
  *
  *   A tet of order p is split by the planes of its lattice into tets and octahedra, and each octahedron into four tets
- * around one of its diagonals, which has the same direction in all octahedra. A pyramid is split into pyramids, upright
- * and inverted, and tets.
+ *   around one of its diagonals, which has the same direction in all octahedra. A pyramid is split into pyramids,
+ *   upright and inverted, and tets.
  *
  * Serendipity cells have no nodes inside faces. They are split by their corners and the midpoints of their edges:
  *

@@ -35,7 +35,7 @@ typedef struct new_lines {
     const session_statistics *values;
 } new_lines;
 
-/* Returns the number of significant digits that resolve the width of the range to nine digits, however far the range is
+/* Returns the number of significant digits that resolve the width of the range to nine digits, even if the range is far
  * from 0. It is at most the number of digits of a double. */
 static int count_needed_digits(double low, double high)
 {
@@ -63,7 +63,7 @@ static void write_lines(text_output *out, const void *what)
     write_line(out, n);
 }
 
-/* Stores an error for the file and returns its status. what is "read" or "written". */
+/* Stores an error for the file and returns its status. `what` is "read" or "written". */
 static insitu_status fail_at_file(const char *path, const char *what, const file_failure *failure, base_error *error)
 {
     return base_fail(error, failure->is_out_of_memory ? INSITU_ERROR_MEMORY : INSITU_ERROR_IO,

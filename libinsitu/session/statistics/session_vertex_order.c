@@ -1,7 +1,7 @@
-/* Finds meshes whose vertices are stored in another order than the one in which they are read. Such a cell is inverted
- * at some of its corners: the volumes at its corners have both signs, while those of a correct or mirrored cell all
- * have the same sign; their sum may have any sign, or be 0. So cells with both signs are counted, and, for each
- * possible value of vertex_order, the cells that would have a single sign if they were read in that order. */
+/* Finds meshes whose vertices are stored in another order than the one in which they are read. The volumes at the
+ * corners of such a cell have both signs, while in a correct or mirrored cell they all have the same sign. (The sum of
+ * the volumes is not useful, because it may have any sign or be 0.) Therefore cells with both signs are counted and,
+ * for each possible value of vertex_order, cells that would have a single sign if they were read in that order. */
 #include "session_vertex_order.h"
 
 #include "memory.h"
@@ -17,14 +17,14 @@ enum { ORDERS = 3, SAMPLES = 256 /* SAMPLES: approximate number of cells of a me
 enum { JUDGED = 4 };
 static const int judged[JUDGED] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID, GRID_QUAD};
 
-/* Counts of the cells of one type: sampled cells, those whose corners have both signs, and for each order those that
- * would have a single sign. */
+/* Counts of the cells of one type: sampled cells, cells whose corner volumes have both signs, and for each order cells
+ * whose corner volumes would have a single sign. */
 enum type_sum { SAMPLED, BOTH_SIGNS, FITTING, TYPE_SUMS = FITTING + ORDERS };
 
 enum cell_sum { DRAWN, FLAT, INVERTED, SHELLS, SPLIT, OF_TYPES, CELL_SUMS = OF_TYPES + JUDGED * TYPE_SUMS };
 
-/* Returns whether the volumes at all corners of the cell have the same sign if its vertices are read in `order`,
- * whatever the order in which they are read now. */
+/* Returns whether the volumes at all corners of the cell have the same sign if its vertices are read in `order` instead
+ * of the order in which they are read now. */
 static bool fits_order(const session_mesh *mesh, int64_t cell, int type, insitu_vertex_order order)
 {
     const signed char *read = session_vertex_permutation(mesh->given.vertex_order, type);
@@ -39,8 +39,8 @@ static bool fits_order(const session_mesh *mesh, int64_t cell, int type, insitu_
     return !tally_has_both_signs(type, points);
 }
 
-/* Returns the counts of the cell's type. Returns NULL if the cell is not counted: its type has a single order, it is a
- * ghost, or the caller gave it as a polyhedron, whose faces determine the order. */
+/* Returns the counts of the cell's type. Returns NULL if the cell is not counted. This is the case if its type has a
+ * single order, if it is a ghost, or if the caller gave it as a polyhedron, whose faces determine the order. */
 static int64_t *find_type_sums(const session_mesh *mesh, int64_t cell, int64_t sums[CELL_SUMS])
 {
     const int type = grid_cell_type(&mesh->cells, cell);
@@ -50,8 +50,8 @@ static int64_t *find_type_sums(const session_mesh *mesh, int64_t cell, int64_t s
     return sums + OF_TYPES + at * TYPE_SUMS;
 }
 
-/* Adds the counts of a sample of the mesh's cells. share: the number of blocks of the mesh, over which the samples are
- * divided; each gets at least one. */
+/* Adds the counts of a sample of the mesh's cells. share: number of blocks of the mesh, among which the samples are
+ * divided; each block gets at least one sample. */
 static void sum_orders(const session_mesh *mesh, int share, int64_t sums[CELL_SUMS])
 {
     const int64_t samples = (SAMPLES + share - 1) / share, step = mesh->cells.cell_count / samples + 1;
@@ -78,7 +78,8 @@ static void sum_cells(const session_meshes *meshes, const char *name, int64_t su
         sums[INVERTED] += part->cells.lattice ? 0 : part->given_counts.inverted_count;
         sums[SHELLS] += part->given_counts.shell_count;
         sums[SPLIT] += part->topology.is_split;
-        if (!part->topology.is_split) sum_orders(part, parts.count, sums); /* pieces are in VTK's order */
+        if (!part->topology.is_split)
+            sum_orders(part, parts.count, sums); /* pieces of split cells are always in VTK's order */
     }
 }
 
@@ -91,8 +92,8 @@ static bool is_any_type_inverted(const int64_t sums[CELL_SUMS])
     return is_any;
 }
 
-/* Returns the order with which most sampled cells have a single sign, if that holds for at least half of the cells of
- * each type; otherwise -1. */
+/* Returns the order with which most sampled cells have a single sign, if this is the case for at least half of the
+ * cells of each type; otherwise -1. */
 static int find_fitting_order(const int64_t sums[CELL_SUMS])
 {
     int best = -1;

@@ -6,8 +6,8 @@
 #include "session_mesh.h"
 #include "session_report.h"
 
-/* Finds the meshes that consist only of shells, and those with cells of higher order. Warns of meshes most of whose
- * cells, over all ranks, have no volume, are left-handed, or intersect themselves. Collective. */
+/* Finds the meshes that consist only of shells, and the meshes with cells of higher order. Warns of meshes most of
+ * whose cells, over all ranks, have no volume, are left-handed, or intersect themselves. Collective. */
 insitu_status session_check_vertex_order(const session_meshes *meshes, session_catalogue *catalogue, MPI_Comm comm,
                                          session_report *report, base_error *error);
 

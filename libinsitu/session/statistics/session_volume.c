@@ -6,7 +6,7 @@
  *
  * The volume of a polyhedron is the sum of the volumes of the cones from any point over its faces, oriented outward.
  * The two triangulations of a quad enclose a tet, which the quad's bilinear patch divides into halves, so that the
- * volume of the cone over a patch is the mean of those over both triangulations.
+ * volume of the cone over a patch is the mean of the volumes over both triangulations.
  *
  * The area of a shell is the length of its vector area, which is half the sum of the cross products of consecutive
  * vertices around it. */
@@ -37,7 +37,7 @@ static double tet_volume(double (*p)[3])
     return determinant3(u, v, w) / 6;
 }
 
-/* Returns, for each of the eight corners of a hex, the index of the corner of the cell that takes its place. */
+/* Returns, for each of the eight corners of a hex, the index of the cell's corner that replaces it. */
 static const signed char *corners_as_hex(int type)
 {
     static const signed char hex[8] = {0, 1, 2, 3, 4, 5, 6, 7}, wedge[8] = {0, 1, 2, 2, 3, 4, 5, 5},

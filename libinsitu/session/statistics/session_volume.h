@@ -20,7 +20,7 @@ void session_volume_free(volume_buffer *buffer);
 
 /* Returns the unsigned volume of a valid cell of any shape, and the area of a shell. Quads are bilinear patches; other
  * faces of polyhedra, and their concave quads, are divided into triangles. Returns NaN if memory runs out, which is
- * possible only for a polyhedron or polygon that is larger than all before. */
+ * possible only for a polyhedron or polygon that is larger than all earlier ones. */
 double session_cell_volume(const grid *g, int64_t cell, volume_buffer *buffer);
 
 /* Returns the area of a shell, projected along the mean normal. For a flat shell this is its whole area, whether it is

@@ -1,13 +1,14 @@
 /* Computes cameras. An automatic camera looks along a given direction. Its position is such that the sphere around the
  * bounds, or the corners of the bounds, just fit into the part of the frame that decorations leave free.
  *
- * Coordinates are relative to the centre of the bounds: x to the right, y up, and w against the direction of view. Let
- * a corner be at (x, y, w), and the eye at x = s and w = D. Let r and l be the tangents of the angles to the right and
- * left border of the frame. The corner is within the right border if x - s <= r (D - w), and within the left one if s -
- * x <= l (D - w). So with the maxima over the corners a = max(x + r w) and b = max(l w - x), s must be between a - r D
- * and l D - b. These limits are equal at D = (a + b) / (r + l), the smallest possible distance. The same holds for up
- * and down; the larger D is used. A sphere of radius R has a = R sqrt(1 + r^2) and b = R sqrt(1 + l^2). A box is placed
- * in the middle of its allowed interval of s, a sphere as near to the middle of the frame as the interval allows. */
+ * Coordinates are relative to the centre of the bounds: x to the right, y up, and w against the direction of view.
+ * Let a corner be at (x, y, w), and the eye at x = s and w = D. Let r and l be the tangents of the angles to the
+ * right and left border of the frame. The corner is within the right border if x - s <= r (D - w), and within the
+ * left border if s - x <= l (D - w). Therefore, with the maxima over the corners a = max(x + r w) and b = max(l w -
+ * x), s must be between a - r D and l D - b. These limits are equal at D = (a + b) / (r + l), the smallest possible
+ * distance. The same holds for up and down; the larger D is used. A sphere of radius R has a = R sqrt(1 + r^2) and b
+ * = R sqrt(1 + l^2). A box is placed in the middle of its allowed interval of s, a sphere as near to the middle of
+ * the frame as the interval allows. */
 #include "session_camera.h"
 
 #include <math.h>
@@ -18,7 +19,7 @@
 /* Largest fraction of half the frame that the data may fill. */
 static const double max_filled = 0.95;
 
-/* Returns `up` or, if that is parallel to the direction of view, a coordinate axis that is not. */
+/* Returns `up` or, if `up` is parallel to the direction of view, a coordinate axis that is not parallel to it. */
 static void choose_up(const double direction[3], const double up[3], double out[3])
 {
     double cross[3];
@@ -108,9 +109,9 @@ static double find_bar_width(const scene_image *image)
     return has_bars_inside(image) ? width * fmax(1, ceil(count / rows)) : 0;
 }
 
-/* Returns the height of the lines of text at the top or bottom of the picture, as a multiple of the height of text:
- * those in the middle or those at the corners, whichever is larger. Lines at corners count only if they extend far into
- * the picture. */
+/* Returns the height of the lines of text at the top or bottom of the picture, as a multiple of the height of text: the
+ * larger height of the lines in the middle and the lines at the corners. Lines at corners are included only if they
+ * extend far into the picture. */
 static double find_lines_height(const scene_image *image, scene_anchor middle, scene_anchor left, scene_anchor right)
 {
     const scene_decorations *d = &image->decorations;
@@ -192,7 +193,7 @@ static double find_eye_distance(const camera_fit *fit, double half_diagonal)
     const camera_frame *f = &fit->tangents;
     const double back =
         fmax((near->right + near->left) / (f->right + f->left), (near->up + near->down) / (f->up + f->down));
-    /* if bounds are flat and viewed edge-on, the second value keeps the eye outside of them */
+    /* if bounds are flat and viewed edge-on, the second value keeps the eye outside of the bounds */
     return fmax(back, near->back + 0.01 * half_diagonal);
 }
 
@@ -221,8 +222,8 @@ static double find_half_height(const scene_image *image, double fitting)
     return image->camera.height > 0 ? 0.5 * image->camera.height : fitting;
 }
 
-/* Makes the camera orthographic if the scene requests it. The eye keeps its position, from which all data lies in front
- * of it: an orthographic picture is the same from any distance. */
+/* Makes the camera orthographic if the scene requests it. The eye keeps its position, from which all data is visible,
+ * because an orthographic picture does not depend on the distance. */
 static void set_orthographic(const scene_image *image, double half_height, render_camera *camera)
 {
     if (!image->camera.is_orthographic) return;

@@ -147,8 +147,8 @@ typedef struct clip_basis {
     const scene_image *image;
     const render_clip *clips;
     session_report *report;
-    /* set if there are no cells, or the clips that cut all layers leave nothing; then no further layers are warned
-     * of */
+    /* true: there are no cells, or the clips that cut all layers leave nothing; no warnings of single layers are added
+     * in this case */
     bool is_empty;
 } clip_basis;
 

@@ -10,8 +10,8 @@
 /* Converts the image's clips to the renderer's form. Local. */
 void session_make_clips(const session_extent *extent, const scene_image *image, render_clip out[RENDER_MAX_CLIPS]);
 
-/* Warns of layers of which the clips leave nothing, that is, no point within the bounds of all cells. Local; the result
- * is the same on every rank. */
+/* Warns of layers that are cut away completely: the clips leave no point within the bounds of all cells. Local; the
+ * result is the same on every rank. */
 void session_warn_of_clips(const session_extent *extent, const scene_image *image, const render_clip *clips,
                            session_report *report);
 

@@ -1,5 +1,5 @@
-/* Lists what the due images show of a mesh with cells of higher order: the isosurfaces, slices and cells whose error is
- * measured (each is a "request"), and which cells must be refined. */
+/* Lists the isosurfaces, slices and volumes of meshes with cells of higher order that due images show. The error of
+ * each is measured (a "request"). Also determines which cells must be refined. */
 #ifndef SESSION_ERROR_REQUESTS_H
 #define SESSION_ERROR_REQUESTS_H
 
@@ -13,7 +13,7 @@ typedef struct session_due_views {
     int count; /* number of images of the scene */
     bool *are_due;
     render_camera *cameras; /* cameras of the images that are due */
-    session_extent extent;  /* bounds of the caller's nodes; empty if no camera, slice or volume needs them */
+    session_extent extent;  /* bounds of the caller's nodes; empty if no camera, slice or volume needs the bounds */
 } session_due_views;
 
 /* Computes the cameras of the images that are due at the moment. If a camera has no direction of view, its image is
@@ -22,10 +22,11 @@ insitu_status session_make_due_views(const scene *scene, const session_moment *m
                                      MPI_Comm comm, session_due_views *out, base_error *error);
 void session_free_due_views(session_due_views *views);
 
-/* Something whose error is measured: the isosurfaces of a field, a plane of a slice, or the positions of all cells. */
+/* A quantity whose error is measured: the isosurfaces of a field, a plane of a slice, a volume, or the positions of all
+ * cells. */
 typedef struct session_error_request {
     const session_due_views *views;
-    bool *images; /* set for each image of the scene that shows it */
+    bool *images; /* for each image of the scene: whether the image shows the isosurfaces, plane, volume or cells */
     bool is_shown;
     const char *field; /* name of the field; NULL: a plane or positions */
     int component;
@@ -33,22 +34,22 @@ typedef struct session_error_request {
     double *values; /* isovalues of the field */
     bool has_plane;
     session_plane plane;
-    const scene_volume *volume; /* a volume of the field; NULL: it is no volume */
+    const scene_volume *volume; /* the volume whose error is measured; NULL: the request is not for a volume */
     double allowed;             /* error of the volume's pixels that is allowed in each colour channel */
 } session_error_request;
 
 enum { SESSION_MOST_ERROR_REQUESTS = 256 };
 
-/* All requests of a mesh. The first one is the positions of all cells. */
+/* All requests of a mesh. The first request is for the positions of all cells. */
 typedef struct session_error_requests {
     int count;
-    bool is_complete; /* set as long as memory has not run out */
+    bool is_complete; /* false if memory has run out */
     bool is_shown;    /* set if some due image shows the mesh */
     bool needs_all;   /* set if all cells are refined, not only those that isosurfaces and slices may cross */
     session_error_request items[SESSION_MOST_ERROR_REQUESTS];
 } session_error_requests;
 
-/* Lists what the due images show of a mesh. has_shells: set if some of its cells, on any rank, are triangles or quads.
+/* Lists the requests of a mesh. has_shells: true if some cells of the mesh, on any rank, are triangles or quads.
  * report: receives warnings of isosurfaces whose error has no bound; may be NULL. Local; the result is the same on
  * every rank. The caller must free *out. */
 void session_list_error_requests(const scene *scene, const session_due_views *views, const session_catalogue_mesh *mesh,

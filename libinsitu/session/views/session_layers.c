@@ -1,6 +1,6 @@
 /* Converts layers to the renderer's form. A part is a mesh of this rank that has a tree with cells. Each layer has one
  * field per part. If a part does not have the field of a layer, its ranges are NULL, and the renderer skips the part.
- * If a part has the surface but not the field that colours it, the values of that field are NaN. */
+ * If a part has the surface but not the field that colours it, the values of the colouring field are NaN. */
 #include "session_layers.h"
 
 #include <math.h>
@@ -100,7 +100,7 @@ static void set_scalar_field(session_layers *layers, ptrdiff_t at, const session
 }
 
 /* Stores the fields of all parts for a layer in section `slot` of the array of fields; a section consists of part_count
- * fields. If plane is not NULL, the distances from the plane take the place of the field's values. */
+ * fields. If plane is not NULL, the distances from the plane replace the field's values. */
 static render_field set_layer_field(const session_meshes *meshes, session_layers *layers, int slot,
                                     const scene_field *field, const scene_plane *plane, bool needs_ranges)
 {
@@ -411,8 +411,8 @@ static insitu_status fill_volume(const session_layer_basis *basis, const scene_i
     return make_transfer(basis, &layer->field, &layer->colour_map, layer, transfer, error);
 }
 
-/* Warns that several volumes are sampled without an error bound. A single volume has an error bound by default; several
- * do not, because their segments must be mixed, which takes longer. */
+/* Warns that several volumes are sampled without an error bound. By default, a single volume is integrated with an
+ * error bound; several volumes are not, because mixing their segments takes longer. */
 static void warn_of_samples(const session_layer_basis *basis, const scene_image *image)
 {
     const session_warning warning = {WARNING_SAMPLES, image->name, NULL, 0};

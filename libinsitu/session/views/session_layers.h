@@ -46,9 +46,9 @@ typedef struct session_layer_basis {
     const scene_image *image;
 } session_layer_basis;
 
-/* Computes an image's layers. Collective, because ranges of the data are computed over all ranks. *error may hold an
- * error of this rank on entry, on which all ranks agree first. After an error there is nothing to free. If only this
- * rank lacks memory for colours, *error is set and passed to all ranks in the next phase. */
+/* Computes an image's layers. Collective, because ranges of the data are computed over all ranks. If *error of any rank
+ * holds an error on entry, all ranks return it. After an error there is nothing to free. If only this rank lacks memory
+ * for colours, *error is set and passed to all ranks in the next phase. */
 insitu_status session_make_layers(const session_layer_basis *basis, const scene_image *image, session_layers *out,
                                   base_error *error);
 

@@ -1,11 +1,11 @@
-/* Chooses the number of linear pieces into which cells of higher order are divided. The error of the pieces falls with
- * the square of their number. So each rank computes the largest error, in pixels, that its cells have with one piece
- * between two nodes, one reduction finds the maximum over all ranks, and the number of pieces follows from it. All
- * cells of a mesh have the same number, so that pieces of neighbours fit together.
+/* Chooses the number of linear pieces into which cells of higher order are divided. The error of the pieces decreases
+ * with the square of their number along an edge. Therefore each rank computes the largest error, in pixels, that its
+ * cells have with one piece between two nodes, one reduction finds the maximum over all ranks, and the number of pieces
+ * is computed from this maximum. All cells of a mesh have the same number, so that pieces of neighbours fit together.
  *
- * The number does not depend on the partition: errors of cells depend on their own nodes only, cameras fit the bounds
- * of all nodes, and the memory is the sum over all ranks. Nor does the set of cells that are refined depend on it,
- * which follows from their own values and positions. */
+ * The number does not depend on the partition: errors of cells depend on their own nodes only, cameras fit the
+ * bounds of all nodes, and the memory is the sum over all ranks. The set of refined cells does not depend on the
+ * partition either, because it is determined by the cells' own values and positions. */
 #include "session_pieces.h"
 
 #include <math.h>
@@ -27,35 +27,35 @@ static const double bytes_per_mib = 1048576;
 
 /* ---- errors ------------------------------------------------------------------------------------------------------ */
 
-/* The errors of one mesh, and what follows from them. */
+/* The errors of one mesh, and the numbers of pieces that are chosen by them. */
 typedef struct piece_error {
-    bool needs_all; /* that of the requests; the same on every rank */
-    bool is_shown;  /* set if some due image shows the mesh, or a fixed number is that of all cells; the same on every
-                       rank */
-    session_deviation all;                           /* counts are those of isosurfaces */
-    session_finer_bytes bytes[FINER_MOST_PARTS + 1]; /* that finer lattices take on all ranks */
+    bool needs_all; /* same as session_error_requests.needs_all; the same on every rank */
+    bool is_shown;  /* true: a due image shows the mesh, or the scene gives a fixed number for all cells; the same on
+                       every rank */
+    session_deviation all;                           /* errors of all requests; the counts are those of isosurfaces */
+    session_finer_bytes bytes[FINER_MOST_PARTS + 1]; /* size of finer lattices on all ranks, for each number of parts */
     double light_error;  /* largest estimate of the error of a pixel in a volume, if cells have one piece */
-    double light_excess; /* the largest quotient of such an error and of what is allowed */
+    double light_excess; /* largest quotient of a volume's error and the error that is allowed */
     int volume_count;    /* number of volumes */
     int components;      /* number of components of the fields that images of the scene show */
-    int wanted;          /* number of pieces without a limit of memory */
+    int wanted;          /* number of pieces that would be chosen without the limit of memory */
 } piece_error;
 
 /* The work on one mesh. */
 typedef struct mesh_work {
     const session_pieces_basis *basis;
     session_finer_choice *choice;
-    bool marks_only; /* set if errors are not needed */
+    bool marks_only; /* true: cells are only marked, because errors are not needed */
     session_error_requests requests;
     piece_error *out;
 } mesh_work;
 
-/* A part of a mesh of which a request is measured, or whose pieces are chosen by it. */
+/* The part of a mesh for which a request is measured, or for which pieces are chosen by a request. */
 typedef struct part_work {
     const mesh_work *of;
     const session_mesh *mesh;
     session_deviation_request request;
-    session_piece_set *pieces; /* NULL: the request is measured */
+    session_piece_set *pieces; /* the set of pieces to which crossed pieces are added; NULL: the request is measured */
 } part_work;
 
 static insitu_status use_request(part_work *work, base_error *error)
@@ -84,7 +84,7 @@ static void use_part(part_work *work, const session_error_request *request, base
     work->request.is_lobatto = w->choice->is_lobatto;
     work->request.marks_only = w->marks_only;
     work->request.values = NULL;
-    /* A slice at the border of the data may be moved by as much (session_slice_distance()). */
+    /* A slice at the border of the data may be moved by this distance (session_slice_distance()). */
     if (request->has_plane)
         work->request.isovalues =
             (session_isovalues){1, &zero, 2 * SESSION_BORDER_SHARE * request->views->extent.half_diagonal};
@@ -113,7 +113,8 @@ static void choose_part(const mesh_work *w, const session_mesh *mesh, session_ce
         if (w->requests.items[n].is_shown) use_part(&work, &w->requests.items[n], error);
 }
 
-/* Measures the parts of a mesh, or, if the number of pieces has been chosen, lists the pieces of refined cells. */
+/* Measures the parts of a mesh. If the number of pieces has been chosen already, lists the pieces of refined cells
+ * instead. */
 static void use_parts(const mesh_work *w, const char *name, base_error *error)
 {
     const session_parts parts = session_find_parts(w->basis->meshes, name);
@@ -257,7 +258,7 @@ static insitu_status find_errors(const session_pieces_basis *basis, const sessio
     return estimate_all_volumes(basis, views, choices, errors, error);
 }
 
-/* Lists the pieces that are made in meshes not all of whose cells are refined. */
+/* Lists the pieces that are made in meshes in which only some cells are refined. */
 static insitu_status list_pieces(const session_pieces_basis *basis, const session_due_views *views,
                                  session_finer_choice *choices, piece_error *errors, base_error *error)
 {
@@ -269,9 +270,9 @@ static insitu_status list_pieces(const session_pieces_basis *basis, const sessio
 
 /* ---- numbers of pieces ------------------------------------------------------------------------------------------- */
 
-/* Returns the smallest number of pieces with which the errors of surfaces and of volumes are allowed. In meshes all of
- * whose cells are refined, memory and time grow with its cube, so that more than 2 pieces for the error of surfaces
- * must be asked for. */
+/* Returns the smallest number of pieces with which the errors of surfaces and of volumes are allowed. If all cells of a
+ * mesh are refined, memory and time grow with the cube of this number. More than 2 pieces are then chosen for the error
+ * of surfaces only if the scene gives surface_error. */
 static int find_pieces(const scene *scene, const session_finer_choice *choice, const piece_error *of)
 {
     enum { MOST_UNASKED = 2 };
@@ -344,8 +345,8 @@ static double find_bytes(const piece_error *of, int parts)
     return (double)bytes->own + of->components * (double)bytes->per_component;
 }
 
-/* A possible step of reducing the memory of a mesh: from `parts` pieces to one less. `bytes` is the memory that `parts`
- * pieces take. */
+/* A possible step of reducing the memory of a mesh: from `parts` pieces between two nodes to `parts` - 1. `bytes` is
+ * the memory that `parts` pieces take. */
 typedef struct piece_step {
     double bytes;
     int mesh, parts;
@@ -360,8 +361,8 @@ static int compare_steps(const void *a, const void *b)
 }
 
 /* Reduces the numbers of pieces until the pieces of all meshes together take at most `limit` bytes; the mesh whose
- * pieces take most is reduced first. steps: space for FINER_MOST_PARTS steps per mesh. Returns the number of bytes
- * before the reduction. */
+ * pieces take most memory is reduced first. steps: space for FINER_MOST_PARTS steps per mesh. Returns the number of
+ * bytes before the reduction. */
 static double reduce_pieces(int mesh_count, double limit, const piece_error *errors, piece_step *steps,
                             session_finer_choice *choices)
 {
@@ -433,7 +434,7 @@ static void choose_all(const session_pieces_basis *basis, piece_error *errors, p
     }
     limit_memory(scene, catalogue, errors, steps, choices, report);
     for (int m = 0; m < catalogue->mesh_count && !scene->finer_pieces; m++) {
-        /* the bound does not hold for serendipity cells without the nodes that they lack */
+        /* the error bound holds for serendipity cells only if their missing nodes are added */
         choices[m].is_completed = errors[m].is_shown && choices[m].parts == 1 && choices[m].serendipity_count > 0;
         if (errors[m].is_shown) report_pieces(catalogue->meshes[m].name, &choices[m], &errors[m], report);
     }

@@ -14,10 +14,11 @@ typedef struct session_pieces_basis {
     session_meshes *meshes;
 } session_pieces_basis;
 
-/* Chooses the numbers: by the scene's finer_pieces, or so that what the due images show is within its surface_error of
- * the cells' polynomials, but with no more memory than its finer_memory. Calls fill functions of fields that
- * isosurfaces and volumes show. Adds what was chosen to the report. choices: those of session_count_finer(), one per
- * mesh of the catalogue. Collective; all ranks return the same status. */
+/* Chooses the numbers of pieces. They are the scene's finer_pieces or, if this is 0, the smallest numbers with which
+ * the error of all due images is at most the scene's surface_error; they are reduced if pieces would take more memory
+ * than its finer_memory. Calls fill functions of fields that isosurfaces and volumes show. Adds the chosen numbers to
+ * the report. choices: results of session_count_finer(), one per mesh of the catalogue. Collective; all ranks return
+ * the same status. */
 insitu_status session_choose_pieces(const session_pieces_basis *basis, session_finer_choice *choices,
                                     session_report *report, base_error *error);
 

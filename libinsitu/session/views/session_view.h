@@ -1,4 +1,4 @@
-/* Computes those parts of an image that depend on the global bounds: camera, lights and sampling distance. */
+/* Computes the camera, the lights and the sampling distance of an image, which depend on the global bounds. */
 #ifndef SESSION_VIEW_H
 #define SESSION_VIEW_H
 
@@ -18,10 +18,10 @@ typedef struct session_view {
     render_clip clips[RENDER_MAX_CLIPS];
 } session_view;
 
-/* Computes the view. If the camera has no direction of view, returns an error, the same on all ranks. If the samples of
- * the image's volumes are estimated to take longer than max_seconds, only *error is set; since the estimate may differ
- * between ranks, the next phase passes the error to all ranks. Warns of a camera that has no cells in view. scene_path:
- * path for messages. Local. */
+/* Computes the view. If the camera has no direction of view, returns an error, which is the same on all ranks. If the
+ * samples of the image's volumes are estimated to take longer than max_seconds, only *error is set; since the estimate
+ * may differ between ranks, the next phase passes the error to all ranks. Warns of a camera that has no cells in view.
+ * scene_path: path for messages. Local. */
 insitu_status session_make_view(const session_space *space, const char *scene_path, const scene_image *image,
                                 const session_team *team, session_report *report, session_view *out, base_error *error);
 

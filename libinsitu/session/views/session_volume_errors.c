@@ -6,13 +6,14 @@
  *
  * where b is the light that arrives from behind, between 0 and 1. The mean of the bracket's absolute value over a cell
  * is taken as the variation of c s - b s between the cell's least and largest value, divided by their distance; e is
- * the root mean square over the cell (session_bound.h). The variation is a convex function of b, so that the values for
- * b = 0 and b = 1 bound it for all b. That for the light of a whole ray is used, or that for b = 0 if it is larger.
+ * replaced by its root mean square over the cell (session_bound.h). The variation is a convex function of b, so that
+ * the values for b = 0 and b = 1 bound it for all b. The result for b = light of a whole ray is used, or the result for
+ * b = 0 if it is larger.
  *
  * The integrals along rays are found by a grid over the picture. Each cell's integrals over its volume are distributed
  * over the part of the grid that it covers. Let A and D be the integrals of the bracket and of s along a ray. If cells
- * where the bracket is large have no special place in the order along it, the change of light is A (1 - exp(-D)) / D,
- * and the light itself follows likewise from the integral of c s.
+ * with a large bracket are distributed evenly along the ray, the change of light is A (1 - exp(-D)) / D, and the light
+ * itself is computed from the integral of c s in the same way.
  *
  * The result is an estimate. It is too large because errors of opposite signs are added up, and too small because it is
  * a mean over the cells of the grid. */
@@ -34,20 +35,20 @@ enum {
     POSITIONS = 1024 /* steps of the tables over the range */
 };
 
-/* Sums are integers in this unit. A cell that adds more than the limit is opaque in any case, or far beyond any error
- * that is allowed. The sum of 2^23 cells at the limit is below 2^63. */
+/* Sums are integers in this unit. The contribution of a cell is limited to most_of_cell; a cell above the limit is
+ * opaque, or its error exceeds any allowed error by far. The sum of 2^23 cells at the limit is below 2^63. */
 static const double sum_unit = 1.0 / (1 << 30), most_of_cell = 1024;
-/* Errors in single pixels are larger than the mean over a cell of the grid. In the test session_order_volumes, whose cells
- * are 25 to 55 pixels wide, the error of 99.9 % of the pixels was 0.8 to 2.5 times that mean, and 3 times in one case
- * where the opacity has a steep step. */
+/* Errors in single pixels are larger than the mean over a cell of the grid. In the test session_order_volumes, whose
+ * cells are 25 to 55 pixels wide, the error of 99.9 % of the pixels was 0.8 to 2.5 times that mean, and 3 times in one
+ * case where the opacity has a steep step. */
 static const double worst_pixel = 2.75;
 /* Extinction of an opacity of 1, times the unit distance (render_pieces.c). */
 static const double largest_extinction = 1e6;
 
-/* What is integrated: over the range of values, and along rays. */
+/* Indices of the quantities that are integrated over the range of values and along rays. */
 enum {
-    IN_DARK = 0,  /* change of light, in 3 channels, if none arrives from behind */
-    IN_LIGHT = 3, /* the same if light of 1 arrives from behind */
+    IN_DARK = 0,  /* change of light, in 3 channels, if no light arrives from behind */
+    IN_LIGHT = 3, /* change of light, in 3 channels, if light of 1 arrives from behind */
     EMISSION = 6, /* colour times extinction, in 3 channels */
     EXTINCTION = 9,
     QUANTITIES = 10
@@ -62,9 +63,9 @@ typedef struct volume_errors {
     double slopes[2][QUANTITIES]; /* slopes of the integrals outside both ends of the range */
     int view_count;               /* number of due views that show the volume */
     int *views;
-    /* For each of these views, a grid over the picture; for each of its cells the integrals along rays, if cells have
-     * one piece between two nodes. These are sums of integers, so that they do not depend on the order of the cells,
-     * nor on the partition. */
+    /* For each view, a grid over the picture, and for each cell of the grid the integrals along rays, if there is one
+     * piece between two nodes. They are sums of integers, so that they do not depend on the order of the mesh's cells
+     * or on the partition. */
     int64_t *sums;
     int64_t sum_count;
 } volume_errors;
@@ -101,7 +102,7 @@ static bool list_ranges(const scene *scene, const session_due_views *views, sess
     return out->items != NULL;
 }
 
-/* A part of a mesh whose values extend a range. */
+/* The state of extending a range by the values of one part of a mesh. */
 typedef struct range_work {
     const session_mesh *mesh;
     int threads;
@@ -275,8 +276,8 @@ static double integral_at(const volume_errors *of, int quantity, double position
     return *before + (at - i) * (*after - *before);
 }
 
-/* Finds the means of all quantities over a cell. All values between the least and the largest one are taken as equally
- * frequent. */
+/* Finds the means of all quantities over a cell. All values between the smallest and the largest one are assumed to be
+ * equally frequent. */
 static void find_light(const volume_errors *of, const session_value_cell *cell, double out[QUANTITIES])
 {
     static const double least_width = 1e-6;
@@ -299,8 +300,8 @@ typedef struct covered_part {
     double low[2], high[2], area;
 } covered_part;
 
-/* Finds the part. Cells that the eye is in or near to are seen from a distance of their radius. Returns false if the
- * mesh's cell is behind the eye. */
+/* Finds the part of the grid that the cell covers. If the eye is closer to the cell than the cell's radius, the
+ * distance is replaced by the radius. Returns false if the mesh's cell is behind the eye. */
 static bool project_cell(const render_camera *camera, const session_value_cell *cell, covered_part *out)
 {
     const double half[2] = {camera->half_height * camera->width / camera->height, camera->half_height};
@@ -395,7 +396,7 @@ static double find_largest(const volume_errors *errors)
 
 /* ---- all cells --------------------------------------------------------------------------------------------------- */
 
-/* A part of a mesh whose cells are added to an estimate. */
+/* The state of adding the cells of one part of a mesh to an estimate. */
 typedef struct estimate_work {
     const session_mesh *mesh;
     int threads;

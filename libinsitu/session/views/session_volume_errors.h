@@ -1,4 +1,4 @@
-/* Estimates how far the pixels of a volume are off if cells of higher order are drawn as linear pieces. */
+/* Estimates the errors of pixels of a volume that result from drawing cells of higher order as linear pieces. */
 #ifndef SESSION_VOLUME_ERRORS_H
 #define SESSION_VOLUME_ERRORS_H
 
@@ -10,7 +10,8 @@ typedef struct session_value_range {
     double minus_low, high;
 } session_value_range;
 
-/* The ranges of the volumes of due images whose colour maps have no fixed range; the same on every rank. */
+/* The ranges of values for those volumes of due images whose colour maps have no fixed range; the same on every
+ * rank. */
 typedef struct session_value_ranges {
     int count;
     session_value_range *items;
@@ -23,9 +24,9 @@ insitu_status session_find_volume_ranges(const scene *scene, const session_due_v
 void session_free_volume_ranges(session_value_ranges *ranges);
 
 /* Estimates the largest error of a colour channel in the pixels of all due views that show the volume, if cells of a
- * mesh have one piece between two nodes. If there are n pieces between two nodes, it is divided by the square of n. The
- * result is the same on every rank and for every partition. parts: this rank's parts of the mesh. is_lobatto: as in
- * session_make_interpolation(). Collective; all ranks return the same status. */
+ * mesh have one piece between two nodes. If there are n pieces between two nodes, the error is divided by the square of
+ * n. The result is the same on every rank and for every partition. parts: this rank's parts of the mesh. is_lobatto: as
+ * in session_make_interpolation(). Collective; all ranks return the same status. */
 insitu_status session_estimate_volume_error(const session_error_request *request, const session_value_ranges *ranges,
                                             const session_parts *parts, bool is_lobatto, const session_team *team,
                                             double *out, base_error *error);
