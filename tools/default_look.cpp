@@ -196,7 +196,8 @@ double visible_range_fraction(const grid_list &grids, const std::string &field, 
     return (last - first) / (high - low);
 }
 
-/* Returns the axis, with the sign towards the viewer, perpendicular to which a cut has the largest projected area. */
+/* Returns the normal of the cut with the largest projected area: an axis, with the sign that points towards the
+ * viewer. */
 std::array<int, 3> best_cut(const vtkBoundingBox &bounds, const vector &to_viewer)
 {
     std::array<int, 3> cut = {0, 0, 0};

@@ -19,11 +19,11 @@ struct default_look {
 };
 
 /* Chooses the look from the first step. The field is the one named in the options, otherwise the first point field or
- * cell field that the last step has too, otherwise the first field of the last step. A solid is cut open if its outer
+ * cell field that the last step also has, otherwise the first field of the last step. A solid is cut open if its outer
  * surface, seen from the viewer, shows only a small part of the field's range. Throws std::runtime_error. */
 default_look choose_look(const options &o, const step_source &source);
 
-/* Return the direction from the data to the viewer, which is that of the options or a default, and the up direction. */
+/* Return the direction from the data to the viewer (from the options, or a default), and the up direction. */
 std::array<double, 3> eye_direction(const options &o);
 std::array<double, 3> up_direction(const options &o);
 

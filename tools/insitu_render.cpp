@@ -2,8 +2,8 @@
  * read, distributed to ranks, passed through the VTK adaptor and drawn.
  *
  * An error may occur on a single rank, for example if only that rank cannot read a file. After each local part all
- * ranks therefore agree on errors before the next collective call. If there is one, all ranks throw its message, and
- * rank 0 prints it. */
+ * ranks therefore agree on errors before the next collective call. If an error has occurred, all ranks throw its
+ * message, and rank 0 prints it. */
 #include <chrono>
 #include <climits>
 #include <cstdio>
@@ -241,7 +241,7 @@ void draw_step(const rank_info &w, step_source &source, render_session &on, size
         report = on.set(part.data);
     });
     const std::chrono::duration<double, std::milli> read_time = std::chrono::steady_clock::now() - start;
-    /* All ranks use rank 0's time, because some may have read a part without a time. */
+    /* All ranks use rank 0's time, because some ranks may have read a part without a time. */
     MPI_Bcast(&part.time, 1, MPI_DOUBLE, 0, w.comm);
     std::string warnings = part.warnings + check_cells(w, report, name) + report.warnings + "\n", missing;
     const insitu_report &done = on.step(source.cycle(index), part.time, missing);

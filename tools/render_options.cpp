@@ -1,5 +1,5 @@
-/* Options are parsed with CLI11, which throws exceptions and does not print: every rank parses the same command line,
- * and only one prints an error. */
+/* Options are parsed with CLI11, because it throws exceptions instead of printing. Every rank parses the same command
+ * line, but only one rank prints an error. */
 #include "render_options.h"
 
 #include <CLI/CLI.hpp>

@@ -11,7 +11,7 @@ namespace render_tool
 class progress
 {
   public:
-    /* Prints nothing if is_shown is false, as on ranks other than 0. */
+    /* Prints nothing if is_shown is false, which is the case on ranks other than 0. */
     progress(bool is_shown, size_t steps);
     ~progress();
     progress(const progress &) = delete;

@@ -30,7 +30,7 @@ class step_source
     } /* name of the step's file without its folder */
 
     struct result {
-        vtkSmartPointer<vtkDataObject> data; // this rank's part of the step; null if it has none
+        vtkSmartPointer<vtkDataObject> data; /* this rank's part of the step; null if the rank has no part */
         double time = 0;
         std::string warnings; // warnings about the step, one per line
     };

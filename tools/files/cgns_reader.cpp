@@ -4,8 +4,9 @@
  * are also the first ones of the zone in the file.
  *
  * For such zones VTK is given a different file of a few kilobytes. Its nodes are links to those of the user's file,
- * except for the element numbers and the order of sections. There the zone's cells, which are its elements of highest
- * dimension, come first; their relative order does not change, because the values are stored in that order. */
+ * except for the element numbers and the order of sections. In the new file the zone's cells, which are its elements
+ * of highest dimension, come first; their relative order does not change, because the values are stored in that
+ * order. */
 #include "cgns_reader.h"
 
 #include <algorithm>
@@ -41,8 +42,8 @@ namespace
 using element_type = CGNS_ENUMT(ElementType_t);
 using name_buffer = std::array<char, 33>; // CGNS names have at most 32 bytes
 
-/* Returns the dimension of an element type, recognized by the prefix of its name, for example HEXA_27. Polyhedra and
- * unknown types count as 3. */
+/* Returns the dimension of an element type, recognized by the prefix of its name, for example HEXA_27. Returns 3 for
+ * polyhedra and unknown types. */
 int dimension_of(element_type type)
 {
     const std::string name = cg_ElementTypeName(type);

@@ -123,8 +123,8 @@ class vtk_file : public data_file
     vtkSmartPointer<vtkAlgorithm> reader_;
     std::vector<double> times_;
     int pieces_ = 1;
-    extent whole_{};    // of a structured grid
-    int64_t cells_ = 0; // number of its cells; 0 for other files
+    extent whole_{};    /* extent of a structured grid */
+    int64_t cells_ = 0; /* number of cells of the structured grid; 0 for other files */
 };
 
 /* A .vtu file without points and cells. VTK's reader reports an error if the lists of points and cells are missing in
@@ -144,7 +144,7 @@ class empty_file : public data_file
 
   private:
     std::string path_;
-    std::vector<double> times_; // times of the steps, of which there are none
+    std::vector<double> times_; /* times of the steps; always empty, because the file has no steps */
 };
 
 } // namespace

@@ -1,6 +1,7 @@
 /* VTK 9.1 determines the cell type of a block from the first letters of its element type and a short list of numbers of
  * nodes. If the number is not in the list, it uses the linear type, but advances through the connectivity by the number
- * of nodes of the linear type: the second cell of a block of HEX9 elements begins at the ninth node of the first.
+ * of nodes of the linear type: for example, the second cell of a block of HEX9 elements begins at the ninth node of the
+ * first element.
  *
  * The corners are the first nodes of every element type. For a block whose elements have a different number of nodes
  * than its cells, the cells are therefore created again, from the corners in the file's connectivity. VTK's reader

@@ -1,5 +1,6 @@
-/* An extent is divided in two along its longest axis, and so on, as its ranks are divided in two. In this way the parts
- * are compact, and parts of a file consist of long runs of its bytes: of axes of equal length, the slowest is cut. */
+/* An extent is divided recursively: its longest axis is cut in two, and so is the set of its ranks. Therefore parts are
+ * compact. If axes have equal length, the slowest one is cut, so that a part consists of long sequences of bytes of the
+ * file. */
 #include "extent_parts.h"
 
 #include <algorithm>
@@ -28,7 +29,7 @@ size_t longest_axis(const extent &of)
     return longest;
 }
 
-/* The number of the first cell, among the total, of which the rank gets an equal share. */
+/* Returns the number of the rank's first cell if all cells are divided into equal parts. */
 double first_of_rank(const cell_range &range, int rank, int ranks)
 {
     return static_cast<double>(range.total) * rank / ranks;
@@ -65,7 +66,7 @@ int64_t cells_of_extent(const extent &whole)
 
 bool part_of_extent(const extent &whole, const cell_range &range, int rank, int ranks, extent &part)
 {
-    int first = 0, end = ranks; // the ranks that share `part`
+    int first = 0, end = ranks; /* the ranks among which `part` is divided */
     auto low = static_cast<double>(range.first), high = static_cast<double>(range.first + range.count);
     part = whole;
     while (end - first > 1) {

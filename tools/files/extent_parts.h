@@ -28,8 +28,9 @@ struct cell_range {
     int64_t first, count, total;
 };
 
-/* Finds the rank's part of an extent whose cells are this range. Each rank gets at most one part, in proportion to the
- * cells of the range that fall to it if each rank gets an equal share of the total. Returns false if it gets none. */
+/* Finds the rank's part of an extent whose cells are this range. Each rank gets at most one part. If all distributed
+ * cells are divided equally among ranks, a rank has some cells of the range; the size of its part is proportional to
+ * their number. Returns false if the rank gets no part. */
 bool part_of_extent(const extent &whole, const cell_range &range, int rank, int ranks, extent &part);
 
 /* Copies the part of a structured data set. */

@@ -14,13 +14,13 @@ namespace render_tool
 
 /* Returns data as a vtkUnstructuredGrid, or, for a composite, as a multiblock with one block per leaf in the order of
  * VTK's iterator; empty leaves are empty blocks. Images, rectilinear and curvilinear grids become hexahedra with VTK's
- * own arrays. Cells that these hide through a hidden point or, in overlapping AMR, under a finer level get a ghost
- * flag. Unstructured grids are returned unchanged. Throws std::runtime_error, whose message begins with path, if a cell
- * refers to a point that does not exist. */
+ * own arrays. Cells that are hidden in these grids, because of a hidden point or, in overlapping AMR, a finer level,
+ * get a ghost flag. Unstructured grids are returned unchanged. Throws std::runtime_error, whose message begins with
+ * path, if a cell refers to a point that does not exist. */
 vtkSmartPointer<vtkDataObject> grids_of(vtkDataObject *data, const std::string &path);
 
-/* Same as grids_of(), but images, rectilinear and curvilinear grids with cells of two or three dimensions stay as they
- * are, and overlapping AMR does. Cells of AMR under a finer level get a ghost flag. */
+/* Does the same as grids_of(), but overlapping AMR, and images, rectilinear and curvilinear grids with cells of two or
+ * three dimensions, are not converted. Cells of AMR under a finer level get a ghost flag. */
 vtkSmartPointer<vtkDataObject> drawable_data_of(vtkDataObject *data, const std::string &path);
 
 /* Returns "", or a description of the first cell that lies outside the connectivity or refers to a point that does not

@@ -154,8 +154,8 @@ class hdf_reader
         return all;
     }
 
-    /* Returns `count` rows of a data set from `first` on, or all if count is negative. They are converted to VTK's type
-     * `as`, or keep the file's type for VTK_VOID. Returns null if the data set is not numeric. */
+    /* Returns `count` rows of a data set from `first` on, or all if count is negative. Rows are converted to VTK's type
+     * `as`, or keep the file's type if `as` is VTK_VOID. Returns null if the data set is not numeric. */
     array_pointer rows(const std::string &name, int64_t first, int64_t count, int as = VTK_VOID) const
     {
         if (!has(name)) fail(name + " is missing");
@@ -305,8 +305,8 @@ class hdf_grids : public data_file
                in_.number(offsets, at.offset) == 0 && in_.number(offsets, at.offset + at.cells) == at.ids;
     }
 
-    /* Returns by how many entries the list of offsets is ahead of that of cells: one for each earlier part. Parts that
-     * reuse the cells of an earlier step have no entries of their own. */
+    /* Returns the difference between a part's first index in the list of offsets and in the list of cells. It is one
+     * for each earlier part, except parts that reuse the cells of an earlier step and have no entries. */
     int64_t offset_lead(const part_position &at) const
     {
         int64_t parts = 0;

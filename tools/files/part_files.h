@@ -56,9 +56,9 @@ std::string time_text(double time);
  * missing. */
 std::unique_ptr<data_file> open_nemesis(const std::string &path, const nemesis_name &name);
 
-/* Opens the processor folders of an OpenFOAM case, if it has any and has no mesh of its own next to path, or fewer
- * steps. Returns null for any other case, which VTK's reader can read. Throws std::runtime_error with the name of a
- * folder that is missing. */
+/* Opens the processor folders of an OpenFOAM case, if the case has any, unless it also has a complete mesh next to path
+ * with at least as many steps. Returns null for any other case, which VTK's reader can read. Throws std::runtime_error
+ * with the name of a folder that is missing. */
 std::unique_ptr<data_file> open_decomposed_foam(const std::string &path);
 
 } // namespace render_tool

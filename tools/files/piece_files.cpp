@@ -161,7 +161,7 @@ class pvtu_file : public data_file
     std::string path_;
     std::vector<std::string> pieces_;
     std::vector<declared_field> fields_;
-    std::vector<double> times_; // times of the steps, of which there are none
+    std::vector<double> times_; /* times of the steps; always empty, because the file has no steps */
 };
 
 struct series_step {

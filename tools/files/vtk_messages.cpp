@@ -39,7 +39,7 @@ class message_catcher : public vtkOutputWindow
     void DisplayGenericWarningText(const char *text) override { keep_if_serious(text); }
     void DisplayErrorText(const char *text) override
     {
-        /* This message is no error: VTK's own writer omits the points of a grid without cells. */
+        /* This message is not an error, because VTK's own writer omits the points of a grid without cells. */
         if (text && !contains_any(text, {"No Points element available in first piece"})) keep(text);
     }
 

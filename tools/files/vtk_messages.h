@@ -8,7 +8,7 @@
 namespace render_tool
 {
 
-/* Redirects VTK's messages from now on; VTK prints nothing any more. */
+/* Redirects VTK's messages from now on; VTK no longer prints them. */
 void catch_vtk_messages();
 
 /* Throws std::runtime_error with path and VTK's message since the last call, if there is one. */
