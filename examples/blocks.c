@@ -1,5 +1,5 @@
-/* A simulation on several uniform blocks per rank. Each block has ghost layers. Run it with: mpirun -n 2 blocks
- * blocks.yaml */
+/* A simulation on several uniform blocks per rank. Each block has ghost layers. Run it with:
+ * mpirun -n 2 blocks blocks.yaml */
 #include <insitu/insitu.h>
 
 #include <math.h>

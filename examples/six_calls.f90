@@ -1,4 +1,5 @@
-! A simulation that draws itself: the slab of hexahedra of six_calls.c, in Fortran. mpirun -n 2 six_calls_fortran
+! A simulation that draws itself: the slab of hexahedra of six_calls.c, in Fortran. Run it with:
+! mpirun -n 2 six_calls_fortran
 program six_calls
     use, intrinsic :: iso_fortran_env, only: real64, error_unit
     use mpi_f08
@@ -16,7 +17,7 @@ program six_calls
     do concurrent(k=0:nz, j=0:ny, i=0:nx)
         xyz(:, vertex(i, j, k)) = [i + rank*nx, j, k]
     end do
-    do concurrent(k=0:nz - 1, j=0:ny - 1, i=0:nx - 1) ! VTK's order: the lower quad around, then the upper
+    do concurrent(k=0:nz - 1, j=0:ny - 1, i=0:nx - 1) ! VTK's order: the lower quad in cyclic order, then the upper quad
         hexes(:, 1 + i + nx*(j + ny*k)) = [quad(i, j, k), quad(i, j, k + 1)]
     end do
     scene = 'scene.yaml'
@@ -30,9 +31,10 @@ program six_calls
     call pictures%set_mesh('slab', insitu_points(xyz), insitu_borrow(hexes), status, cell_type=INSITU_HEX) ! not copied
     do cycle = 0, 3
         pressure = cos(0.6_real64*hypot(hypot(xyz(1, :) - 12, xyz(2, :) - 12), xyz(3, :) - 12) - 0.5_real64*cycle)
-        call pictures%set_field('slab', 'pressure', insitu_borrow(pressure), status) ! new values, in the same array
+        ! the array is the same and has new values
+        call pictures%set_field('slab', 'pressure', insitu_borrow(pressure), status)
         call pictures%step(cycle, 0.5_real64*cycle, status)
-        if (status /= INSITU_OK .and. rank == 0) write (error_unit, '(a)') pictures%error() ! the run goes on
+        if (status /= INSITU_OK .and. rank == 0) write (error_unit, '(a)') pictures%error() ! the run continues
     end do
     call pictures%destroy(status)
     if (status /= INSITU_OK .and. rank == 0) write (error_unit, '(a)') pictures%error()

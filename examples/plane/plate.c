@@ -1,5 +1,5 @@
-/* A two-dimensional simulation: heat on squares of quads, one per rank, side by side. Run it with: mpirun -n 2 plate
- * plate.yaml */
+/* A two-dimensional simulation: heat on squares of quads, one per rank, side by side. Run it with:
+ * mpirun -n 2 plate plate.yaml */
 #include <insitu/insitu.h>
 
 #include <stdio.h>

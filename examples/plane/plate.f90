@@ -1,4 +1,6 @@
-! A plane run: heat on a square of quads a rank, side by side; the pictures of plate.c. mpirun -n 2 plate plate.yaml
+! A two-dimensional simulation: heat on squares of quads, one per rank, side by side. The pictures equal those of
+! plate.c. Run it with:
+! mpirun -n 2 plate plate.yaml
 program heat_in_a_plane
     use, intrinsic :: iso_fortran_env, only: real64, error_unit
     use mpi_f08

@@ -1,4 +1,4 @@
-! Two hot spots that turn around each other, in a box of hexahedra a rank.
+! Two hot spots that rotate around each other, on a box of hexahedra per rank.
 program heat_program
     use, intrinsic :: iso_fortran_env, only: real64, error_unit
     use mpi_f08
@@ -21,7 +21,7 @@ program heat_program
     do k = 0, n - 1
         do j = 0, n - 1
             do i = 0, n - 1
-                low = 1 + i + side*(j + side*k) ! the lower quad around, then the upper
+                low = 1 + i + side*(j + side*k) ! the lower quad in cyclic order, then the upper quad
                 hexes(:4, 1 + i + n*(j + n*k)) = [low, low + 1, low + 1 + side, low + side]
             end do
         end do

@@ -8,9 +8,9 @@
 !     if (status /= INSITU_OK) write (error_unit, '(a)') pictures%error()
 !     call pictures%destroy(status)
 !
-! Arrays are borrowed as they are, with their strides: nothing is copied. They must stay where they are until the next
-! step has returned or they are set again, whichever is later; give them the attribute target, and pass no expressions.
-! Indices count from 1. insitu.h tells more about each argument; docs/fortran.md is the page about this file.
+! Arrays are borrowed with their strides and not copied. They must keep their addresses until the next step has returned
+! or they are set again, whichever is later. Give them the attribute target, and do not pass expressions. Indices count
+! from 1. insitu.h describes each argument in more detail; docs/fortran.md is the page about this module.
 module insitu
     use, intrinsic :: iso_c_binding
     use, intrinsic :: iso_fortran_env, only: int16, int32, int64, int8, real32, real64
@@ -37,26 +37,26 @@ module insitu
     integer(c_int), parameter :: float32 = 1, float64 = 2, integer32 = 3, integer64 = 4, bytes = 6, &
         integer16 = 7
 
-    ! A borrowed array: elements one after the other, in so many rows of equal length; or of up to four dimensions, as
-    ! those of a block.
+    ! A borrowed array: its elements are stored in `rows` rows of equal length, or it has up to four dimensions, as
+    ! arrays of blocks have.
     type, public :: insitu_array
         private
         type(c_ptr) :: data = c_null_ptr
         integer(c_int) :: kind = float32
         integer(c_int64_t) :: rows = 1, columns = 0      ! rows: 1, or the first extent of a matrix
-        integer(c_int64_t) :: row_stride = 0, stride = 0 ! bytes, along the first extent and along the last
+        integer(c_int64_t) :: row_stride = 0, stride = 0 ! bytes along the first and the last extent
         integer :: dimensions = 1
-        integer(c_int64_t) :: extents(4) = 0, steps(4) = 0 ! steps: bytes, 0 where the extent is 1
+        integer(c_int64_t) :: extents(4) = 0, steps(4) = 0 ! steps: distance in bytes; 0 along extents of 1
     end type insitu_array
 
-    ! Faces as a list of vertices each: pointers to them, and how many each has.
+    ! Faces that each have their own list of vertices: pointers to the lists, and the number of vertices in each.
     type, public :: insitu_face_lists
         private
         type(insitu_array) :: lists, sizes
     end type insitu_face_lists
 
-    ! A cell field's values on faces of the boundary: insitu_patch(insitu_borrow(values), first_face=n). The faces are
-    ! named by a range, by their numbers, or by their vertices (a list with offsets, or a matrix (vertices, faces)).
+    ! Values of a cell field on faces of the boundary: insitu_patch(insitu_borrow(values), first_face=n). The faces are
+    ! given by a range, by their numbers, or by their vertices (a list with offsets, or a matrix (vertices, faces)).
     type, public :: insitu_patch
         type(insitu_array) :: values
         integer :: first_face = 0
@@ -132,7 +132,7 @@ module insitu
         type(c_ptr) :: components
     end type c_field
 
-    ! Report of the last step on this rank: as insitu_report in insitu.h.
+    ! The report of the last step on this rank; insitu_report in insitu.h describes the members.
     type, bind(C), public :: insitu_report
         integer(c_int64_t) :: cycle = 0
         real(c_double) :: time = 0
@@ -144,7 +144,7 @@ module insitu
             cells_shell = 0, cells_recognised = 0
         integer(c_int64_t) :: rays = 0, fragments = 0, bytes_sent = 0, map_failures = 0
         integer(c_int64_t) :: bytes_borrowed = 0, bytes_copied = 0, bytes_trees = 0, bytes_pictures = 0, bytes_peak = 0
-        ! texts: insitu_text()
+        ! insitu_text() converts these texts
         type(c_ptr) :: schedule = c_null_ptr, copied_why = c_null_ptr, left_out = c_null_ptr, &
             warnings = c_null_ptr, pieces = c_null_ptr
     end type insitu_report
@@ -155,15 +155,16 @@ module insitu
         type(c_ptr) :: rgba, depth
     end type c_picture
 
-    ! A picture of the last step, on rank 0, in the session's memory: valid until the next step.
+    ! A picture of the last step, on rank 0. It is in the session's memory, and is valid until the next step.
     type, public :: insitu_picture
-        character(:), allocatable :: image                           ! its name in the scene
+        character(:), allocatable :: image                           ! name of the image in the scene
         real(real32), pointer, contiguous :: rgba(:, :, :) => null() ! (4, width, height), the top row first
-        real(real32), pointer, contiguous :: depth(:, :) => null()   ! (width, height); huge or infinite: nothing
+        real(real32), pointer, contiguous :: depth(:, :) => null()   ! (width, height); huge or infinite: no surface
     end type insitu_picture
 
-    ! Makes the values of a field in the steps that need them: values = insitu_borrow(...), of an array that stays until
-    ! the step has returned. It may communicate (insitu_fill in insitu.h). status: INSITU_OK, or any other to fail.
+    ! Computes the values of a field in the steps that need them: values = insitu_borrow(...), of an array that must
+    ! exist until the step has returned. The procedure may communicate (insitu_fill in insitu.h). status: INSITU_OK, or
+    ! another status to report an error.
     abstract interface
         subroutine insitu_fill(values, status)
             import :: insitu_array
@@ -173,45 +174,47 @@ module insitu
     end interface
     public :: insitu_fill
 
-    ! How the arrays of a structured block lie: those of its vertices (1) and of its cells (2). Strides are whole numbers
-    ! without a common divisor, so that arrays of any kinds and numbers of components have the same ones; the first array
-    ! decides on them.
+    ! The layout of the arrays of a structured block: of its vertices (1) and of its cells (2). Strides are stored as
+    ! integers without a common divisor, so that arrays of different kinds and numbers of components have equal strides.
+    ! The first array determines them.
     type :: block_shape
-        integer :: dimensions = 0 ! 0: no block
+        integer :: dimensions = 0 ! 0: not a block
         integer(c_int64_t) :: extents(3, 2) = 1, strides(3, 2) = 1
         logical :: has_strides(2) = .false.
     end type block_shape
 
-    ! An array of a block as C is told of it. components: their number, and the bytes between them.
+    ! An array of a block in the form that is passed to C: with the number of components, and their distance in bytes.
     type :: block_array
         type(c_array) :: array
         integer(c_int64_t) :: count = 0, components = 1, component_stride = 0
     end type block_array
 
-    ! The data that C passes to the function that it calls. It stays where it is until the session ends.
+    ! The data that C passes to the function that it calls. Its address does not change until the session ends.
     type :: fill_record
         character(:), allocatable :: mesh, field
         type(block_shape) :: block
         procedure(insitu_fill), pointer, nopass :: fill => null()
-        character(:), allocatable :: fault ! of the values that it has made in this step
+        character(:), allocatable :: fault ! error in the values that `fill` has computed in this step
         type(fill_record), pointer :: next => null()
     end type fill_record
 
-    ! Sizes of a mesh or block that was handed over: they tell how long the index of a field must be.
+    ! The sizes of a mesh or block that was passed to C. They determine the required length of a field's index.
     type :: mesh_size
-        character(:), allocatable :: name ! or name[number]
+        character(:), allocatable :: name ! name of the mesh, or name[number] for a block
         integer(c_int64_t) :: vertices = 0, cells = 0, corners = 0
-        integer :: cell_size = 0 ! vertices of a cell; 0: cells have offsets
+        integer :: cell_size = 0 ! number of vertices per cell; 0: cells have offsets
         type(block_shape) :: block
     end type mesh_size
 
-    ! A session. create, step and destroy are collective, the others local. status: INSITU_OK, or what error() explains.
+    ! A session. create, step and destroy are collective, all other procedures local. status: INSITU_OK, or an error
+    ! that error() describes.
     type, public :: insitu_session
         private
         type(c_ptr) :: handle = c_null_ptr
-        character(:), allocatable :: own_error ! about an argument that was not passed to C
+        character(:), allocatable :: own_error ! error in an argument that was not passed to C
         type(mesh_size), allocatable :: sizes(:)
-        integer :: size_count = 0, last_size = 1 ! how many are in use; the last that was looked for
+        ! number of entries of sizes in use, and index of the entry that was found last
+        integer :: size_count = 0, last_size = 1
         type(fill_record), pointer :: fills => null()
     contains
         procedure, private :: create_integer, create_f08, text_integer, text_f08
@@ -225,9 +228,9 @@ module insitu
         procedure :: parameter => read_parameter
     end type insitu_session
 
-    ! An array of any kind that the library takes: reals and integers of 4 and 8 bytes, integers of 1 byte; a list, or a
-    ! matrix: connectivity (corners, cells), values (components, tuples). Of blocks also arrays (i, j, k), and of fields
-    ! with components, (components, i, j, k) or (i, j, k, components).
+    ! Borrows an array of any kind that the library supports: reals and integers of 4 and 8 bytes, and integers of 1
+    ! byte. It is a list or a matrix: (corners, cells) for connectivity, (components, tuples) for values. For blocks it
+    ! may also be an array (i, j, k) and, for fields with components, (components, i, j, k) or (i, j, k, components).
     interface insitu_borrow
         module procedure borrow_r4, borrow_r8, borrow_i1, borrow_i2, borrow_i4, borrow_i8
         module procedure borrow_r4_2, borrow_r8_2, borrow_i1_2, borrow_i2_2, borrow_i4_2, borrow_i8_2
@@ -235,13 +238,14 @@ module insitu
         module procedure borrow_r4_4, borrow_r8_4, borrow_i4_4, borrow_i8_4
     end interface insitu_borrow
 
-    ! Coordinates (3, vertices), or x, y and z. Without z, which is 0 then: (2, vertices), or x and y.
+    ! Borrows coordinates: a matrix (3, vertices), or x, y and z. If z is 0 everywhere: a matrix (2, vertices), or x and
+    ! y.
     interface insitu_points
         module procedure points_of_matrix_r4, points_of_matrix_r8, points_of_axes_r4, points_of_axes_r8
     end interface insitu_points
 
-    ! Pointers to the lists of faces' vertices, by c_loc, and the lists' sizes. kind: of the indices in the lists, int32 or
-    ! int64; int32 by default.
+    ! Borrows pointers (c_loc) to the lists of faces' vertices, and the sizes of the lists. kind: kind of the indices in
+    ! the lists, int32 (default) or int64.
     interface insitu_lists
         module procedure lists_i4, lists_i8
     end interface insitu_lists
@@ -331,13 +335,13 @@ contains
 
     ! ---- arrays ---------------------------------------------------------------------------------------------------
 
-    ! Bytes from one element to another.
+    ! Returns the number of bytes from one address to the other.
     integer(c_int64_t) function bytes_between(from, to)
         type(c_ptr), intent(in) :: from, to
         bytes_between = transfer(to, 0_c_intptr_t) - transfer(from, 0_c_intptr_t)
     end function bytes_between
 
-    ! An array of these extents, whose memory is not known yet.
+    ! Returns an array with these extents, whose memory is not set yet.
     function array_of(kind, extents) result(out)
         integer(c_int), intent(in) :: kind
         integer, intent(in) :: extents(:)
@@ -349,7 +353,8 @@ contains
         if (all(extents > 0)) out%columns = extents(size(extents))
     end function array_of
 
-    ! at: the first element, and for each dimension the element after it, or the first itself.
+    ! Sets the memory. at: address of the first element, and for each dimension address of the next element along it, or
+    ! of the first one if there is no next element.
     subroutine put_memory(array, at)
         type(insitu_array), intent(inout) :: array
         type(c_ptr), intent(in) :: at(:)
@@ -528,14 +533,15 @@ contains
             c_loc(a(1, 1, 1, min(2, size(a, 4))))])
     end function borrow_i8_4
 
-    ! So many elements that are not there: the coordinates z that plane meshes go without.
+    ! Returns an array of `count` elements without data, which stands for the z coordinates of plane meshes.
     function absent(count) result(out)
         integer, intent(in) :: count
         type(insitu_array) :: out
         out%columns = count
     end function absent
 
-    ! Three lists of a matrix of three rows or two; of another matrix an array that set_mesh refuses.
+    ! Returns the three coordinates of a matrix with three or two rows. For any other matrix, returns an array that
+    ! set_mesh refuses.
     function points_of_matrix_r4(xyz) result(out)
         real(real32), intent(in), target :: xyz(:, :)
         type(insitu_array) :: out(3)
@@ -604,7 +610,7 @@ contains
         out%sizes = borrow_i8(sizes)
     end function lists_i8
 
-    ! As C is told of a list. An array without elements is given all the same.
+    ! Converts a list to the form that is passed to C. An array without elements is also passed as given.
     function as_c(a, nothing) result(out)
         type(insitu_array), intent(in) :: a
         real(real64), intent(in), target :: nothing
@@ -615,14 +621,15 @@ contains
         out%stride = merge(a%row_stride, a%stride, a%rows > 1)
     end function as_c
 
-    ! Rows follow one another as a list would.
+    ! Returns whether the rows are contiguous, so that the array can be read as a list.
     logical function is_list(a)
         type(insitu_array), intent(in) :: a
         is_list = a%dimensions <= 2 .and. (a%rows <= 1 .or. a%columns <= 1 .or. a%stride == a%rows * a%row_stride)
     end function is_list
 
-    ! Elements from one column's first to the next one's, where there are others between; 0: there are none, or no whole
-    ! number of them.
+    ! Returns the number of elements from the first element of a column to that of the next, if there are further
+    ! elements between the columns. Returns 0 if there are none, or if the distance is not a multiple of the element's
+    ! size.
     integer(c_int64_t) function row_of(a)
         type(insitu_array), intent(in) :: a
         row_of = 0
@@ -632,7 +639,8 @@ contains
 
     ! ---- blocks ---------------------------------------------------------------------------------------------------
 
-    ! A block of so many cells, whose strides are not known yet, and its lattice, which has nothing but cells.
+    ! Creates a block with these numbers of cells, whose strides are not known yet, and its lattice, in which only the
+    ! cells are set.
     subroutine make_block(cells, lattice, block, fault)
         integer, intent(in) :: cells(:)
         type(c_lattice), intent(out) :: lattice
@@ -655,7 +663,8 @@ contains
         block%extents(:size(cells), 1) = cells + merge(1, 0, cells > 0)
     end subroutine make_block
 
-    ! Three numbers of the caller's, of which those of a block of two dimensions may lack the third.
+    ! Checks the length of an argument that has one number per axis. For blocks of two dimensions the third number may
+    ! be missing.
     subroutine check_size(what, length, dimensions, fault)
         character(*), intent(in) :: what
         integer, intent(in) :: length, dimensions
@@ -693,11 +702,11 @@ contains
         lattice%interior_first(:size(interior_first)) = interior_first - 1
         lattice%interior_end(:size(interior_last)) = interior_last
         if (any(lattice%interior_first /= 0) .or. any(lattice%interior_end /= 0)) return
-        lattice%interior_first = 1 ! all 0 would mean all cells to C
+        lattice%interior_first = 1 ! not 0, because in C all 0 means that all cells are drawn
         lattice%interior_end = 1
     end subroutine put_ranges
 
-    ! Coordinates of a block: a list along the axis, or an array of its vertices.
+    ! Sets the coordinates of a block: a list along the axis, or an array over its vertices.
     subroutine put_places(block, mesh, lattice, axis, what, fault, nothing, given)
         type(block_shape), intent(inout) :: block
         type(c_mesh), intent(inout) :: mesh
@@ -721,8 +730,8 @@ contains
         end if
     end subroutine put_places
 
-    ! Borrows an array of a block's vertices (of = 1) or cells (2): (i, j, k), with components before or after, or a list as
-    ! long as the block's arrays.
+    ! Borrows an array over a block's vertices (of = 1) or cells (of = 2). It is an array (i, j, k), with components as
+    ! the first or last dimension, or a list as long as the block's arrays.
     subroutine borrow_for(block, what, of, may_have_components, laid, fault, nothing, given)
         type(block_shape), intent(inout) :: block
         character(*), intent(in) :: what
@@ -745,7 +754,7 @@ contains
                 shape_text(block, of, .false.)
             return
         end if
-        skipped = 0 ! components come before
+        skipped = 0 ! number of dimensions of components before i
         if (may_have_components .and. given%dimensions == dimensions + 1) then
             if (all(given%extents(2:dimensions + 1) == block%extents(:dimensions, of))) skipped = 1
             beside = merge(1, dimensions + 1, skipped == 1)
@@ -763,7 +772,8 @@ contains
         end if
     end subroutine borrow_for
 
-    ! Finds the common divisor of an array's strides, in bytes; all arrays have the same strides in units of theirs.
+    ! Finds the common divisor of an array's strides, in bytes, and checks that the strides, as multiples of this
+    ! divisor, equal those of the block's other arrays.
     subroutine fit(block, what, of, steps, unit, fault)
         type(block_shape), intent(inout) :: block
         character(*), intent(in) :: what
@@ -797,7 +807,7 @@ contains
         if (b /= 0) out = divisor(b, mod(a, b))
     end function divisor
 
-    ! Without an array that says otherwise, i is fastest and nothing lies between.
+    ! Sets packed strides, in which i varies fastest, if no array has determined the strides.
     subroutine pack_strides(block, of)
         type(block_shape), intent(inout) :: block
         integer, intent(in) :: of
@@ -807,7 +817,7 @@ contains
         block%has_strides(of) = .true.
     end subroutine pack_strides
 
-    ! The length of arrays, from the first to the last element of the block.
+    ! Returns the length of the block's arrays, from the first to the last element.
     pure integer(c_int64_t) function count_of(block, of)
         type(block_shape), intent(in) :: block
         integer, intent(in) :: of
@@ -831,7 +841,7 @@ contains
 
     ! ---- texts ----------------------------------------------------------------------------------------------------
 
-    ! Numbers as in messages: 5, or (1, 12, 144).
+    ! Formats numbers for messages: 5, or (1, 12, 144).
     function as_text(numbers) result(out)
         integer(c_int64_t), intent(in) :: numbers(:)
         character(:), allocatable :: out
@@ -846,7 +856,7 @@ contains
         if (size(numbers) /= 1) out = '('//out//')'
     end function as_text
 
-    ! A text of C's, as those of a report; valid as long as they are.
+    ! Returns a text of C, such as a text of the report, which must still be valid.
     function insitu_text(from) result(out)
         type(c_ptr), intent(in) :: from
         character(:), allocatable :: out
@@ -908,8 +918,8 @@ contains
         call self%text_integer(comm%MPI_VAL, scene_text, status)
     end subroutine text_f08
 
-    ! Describes the first argument that cannot be passed to C; '' if there is none. row: as row_of(), 0 where there must
-    ! be no gaps.
+    ! Describes the first argument that cannot be passed to C; '' if there is none. row: result of row_of(); 0 if the
+    ! connectivity must not have gaps.
     function find_fault(points, connectivity, row, lists, face_lists) result(out)
         type(insitu_array), intent(in) :: points(3), connectivity, lists(:)
         integer(c_int64_t), intent(in) :: row
@@ -929,7 +939,7 @@ contains
         if (face_lists%lists%columns /= face_lists%sizes%columns) out = 'the lists of faces are not as many as their sizes'
     end function find_fault
 
-    ! Describes a name that C would take as a shorter one; '' if there is none.
+    ! Describes a name that contains a NUL, at which C would end it; '' if there is no such name.
     function find_zero(name, mesh) result(out)
         character(*), intent(in) :: name
         character(*), intent(in), optional :: mesh
@@ -940,7 +950,8 @@ contains
         if (index(mesh, c_null_char) > 0) out = 'a name holds a character 0'
     end function find_zero
 
-    ! Tells whether an argument is faulty: then its fault is the session's message. Else the last message stays.
+    ! Returns whether an argument is faulty, and stores the fault as the session's message. If there is no fault, the
+    ! last message is kept.
     logical function is_refused(self, fault)
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: fault
@@ -948,7 +959,7 @@ contains
         if (is_refused) self%own_error = fault
     end function is_refused
 
-    ! status becomes that of a call of C, whose message is the last one if the call failed.
+    ! Stores the status of a call of C in status. If the call failed, error() returns its message.
     subroutine take_status(self, of_c, status)
         class(insitu_session), intent(inout) :: self
         integer(c_int), intent(in) :: of_c
@@ -968,11 +979,12 @@ contains
         mesh%face_sizes = as_c(face_lists%sizes, nothing)
     end subroutine take_lists
 
-    ! Hand over this rank's part of a mesh. connectivity is a list, or a matrix (corners, cells), for cells of one type
-    ! also its first rows; vertices are in VTK's order, or in vertex_order. That of Lagrange cells is a matrix, whose
-    ! first extent tells their order, unless there are offsets. The connectivity of polyhedra lists faces:
-    ! then faces and face_offsets are the faces' vertices and where each face begins, or face_lists replaces them. All
-    ! indices and offsets count from 1, or from index_base.
+    ! Passes this rank's part of a mesh to the session. connectivity is a list or, for cells of one type, a matrix
+    ! (corners, cells), which may consist of the first rows of a larger one. Vertices are in VTK's order, or in
+    ! vertex_order. For Lagrange cells connectivity is a matrix, whose first extent determines their order, unless there
+    ! are offsets. For polyhedra, connectivity lists faces; faces and face_offsets are then the vertices of the faces
+    ! and the index at which each face begins, or face_lists replaces both. All indices and offsets count from 1, or
+    ! from index_base.
     subroutine set_mesh(self, name, points, connectivity, status, cell_type, cell_types, offsets, faces, face_offsets, &
         ghosts, vertex_ids, changed, index_base, keep_polyhedra, vertex_order, face_lists, number)
         class(insitu_session), intent(inout) :: self
@@ -984,7 +996,8 @@ contains
         type(insitu_face_lists), intent(in), optional :: face_lists
         logical, intent(in), optional :: keep_polyhedra
         type(insitu_array) :: given(6)
-        integer(c_int64_t) :: gap ! elements between one column's last and the next one's first
+        ! number of elements between the last element of a column and the first one of the next
+        integer(c_int64_t) :: gap
         type(c_mesh), target :: mesh
         real(real64), target :: nothing
         character(:), allocatable :: fault, part
@@ -1044,10 +1057,12 @@ contains
             merge(mesh%cell_count * corners, mesh%connectivity_count, corners > 0), corners))
     end subroutine set_mesh
 
-    ! Hand over this rank's part of a finite-volume mesh: faces' vertices and where each face begins, or a list for each
-    ! face; and for each face the cell that owns it and the neighbour beyond. Faces on the boundary have 0 (index_base -
-    ! 1) as neighbour, or come last, beyond the neighbours, or are in a list of their own: boundary_faces, where each of
-    ! them begins, and its only cell. owner and neighbour may name the halo_cells cells of a halo, behind cell_count.
+    ! Passes this rank's part of a finite-volume mesh to the session. The faces are given by their vertices and the
+    ! index at which each face begins, or by a list for each face. Each face also has the cell that owns it and the
+    ! neighbour on its other side. For faces on the boundary the neighbour is 0 (index_base - 1); or these faces come
+    ! last and have no entry in neighbour; or they are in a separate list, with boundary_faces, the index at which each
+    ! of them begins, and its only cell. owner and neighbour may refer to halo_cells cells of a halo, which are numbered
+    ! after cell_count.
     subroutine set_faces_by_offsets(self, name, points, faces, face_offsets, owner, neighbour, cell_count, status, ghosts, &
         vertex_ids, changed, index_base, keep_polyhedra, boundary_faces, boundary_offsets, boundary_owner, halo_cells)
         class(insitu_session), intent(inout) :: self
@@ -1087,7 +1102,8 @@ contains
             index_base, keep_polyhedra)
     end subroutine set_faces_by_offsets
 
-    ! As find_fault(), of the list for the boundary.
+    ! Describes the first argument of the separate list of boundary faces that cannot be passed to C; '' if there is
+    ! none.
     function find_boundary_fault(points, faces, offsets, owner) result(out)
         type(insitu_array), intent(in) :: points(3), faces, offsets, owner
         character(:), allocatable :: out
@@ -1122,7 +1138,7 @@ contains
             index_base, keep_polyhedra)
     end subroutine set_faces_by_lists
 
-    ! Hands over a mesh that has its faces already.
+    ! Passes a mesh to C in which the faces are already set.
     subroutine set_owned(self, mesh, name, points, owner, neighbour, cell_count, status, ghosts, vertex_ids, changed, &
         index_base, keep_polyhedra)
         class(insitu_session), intent(inout) :: self
@@ -1168,7 +1184,7 @@ contains
         call note_size(self, mesh_size(part, mesh%vertex_count, mesh%cell_count, 0_c_int64_t, 0))
     end subroutine set_owned
 
-    ! Hands a mesh to C, or one of its blocks where a number is given; mesh: none takes it away.
+    ! Passes a mesh to C or, if a number is given, one of its blocks. If mesh is absent, the mesh or block is removed.
     subroutine set_part(self, name, mesh, status, number)
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: name
@@ -1182,7 +1198,7 @@ contains
         end if
     end subroutine set_part
 
-    ! As find_length(). given: ghosts, vertex_ids.
+    ! Does the same as find_length() for a mesh of faces. given: ghosts, vertex_ids.
     function find_face_length(vertices, cells, given) result(out)
         integer(c_int64_t), intent(in) :: vertices, cells
         type(insitu_array), intent(in) :: given(2)
@@ -1195,7 +1211,8 @@ contains
         end if
     end function find_face_length
 
-    ! Lengths that C is not told, and would read beyond. given: cell_types, offsets, face_offsets, ghosts, vertex_ids.
+    ! Describes an array whose length is wrong; '' if there is none. C does not get these lengths, and would read beyond
+    ! the end. given: cell_types, offsets, face_offsets, ghosts, vertex_ids.
     function find_length(cells, vertices, rows, corners, given) result(out)
         integer(c_int64_t), intent(in) :: cells, vertices, rows
         integer, intent(in) :: corners
@@ -1215,7 +1232,7 @@ contains
         end if
     end function find_length
 
-    ! Vertices of a cell; 0: cells of the type have no fixed number, or there is no such type.
+    ! Returns the number of vertices of a cell type; 0 for types without a fixed number, and for unknown types.
     pure integer function corners_of(cell_type)
         integer(c_int), intent(in) :: cell_type
         select case (cell_type)
@@ -1258,7 +1275,7 @@ contains
         self%last_size = at
     end subroutine note_size
 
-    ! How a part of a mesh is called among the sizes.
+    ! Returns the name of a mesh or block in the list of sizes.
     function part_name(name, number) result(out)
         character(*), intent(in) :: name
         integer, intent(in), optional :: number
@@ -1267,8 +1284,8 @@ contains
         if (present(number)) out = out//'['//as_text([int(number, c_int64_t)])//']'
     end function part_name
 
-    ! Where a part stands among the sizes; 0: it is not there. Parts are mostly looked for in the order in which they stand,
-    ! so the search begins at the last one.
+    ! Returns the index of a mesh or block in the list of sizes; 0 if it is missing. Names are mostly requested in the
+    ! order of the list, so that the search begins at the entry that was found last.
     integer function size_at(self, name)
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: name
@@ -1282,7 +1299,7 @@ contains
         size_at = 0
     end function size_at
 
-    ! The shape of a part that is a block, for fields at its vertices or in its cells.
+    ! Returns the shape of a mesh or block, for fields at its vertices or in its cells.
     function block_of(self, part, centring) result(out)
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: part
@@ -1294,7 +1311,8 @@ contains
         if (at > 0) out = self%sizes(at)%block
     end function block_of
 
-    ! Has the index of a field an entry for each vertex, cell or corner of the part? What C refuses anyway is well.
+    ! Returns whether a field's index has an entry for each vertex, cell or corner. Also returns true in cases that C
+    ! refuses anyway.
     logical function is_as_long(self, part, centring, row, length)
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: part
@@ -1313,13 +1331,15 @@ contains
         end select
     end function is_as_long
 
-    ! Hand over this rank's part of a mesh as a structured block of so many cells along i, j and k, or along i and j: then
-    ! they are quads. With a number from 0 on it is one of several blocks of the mesh. refinement: how many of its cells make
-    ! one of the coarsest level along each axis; cells that finer blocks cover are not drawn. docs/structured.md is the page about blocks. Uniform: spacing and origin (0 by default), of the whole
-    ! lattice, of which first cells lie before the block along each axis. Rectilinear: x, y, z are lists along the axes.
-    ! Curvilinear: x, y, z (i, j, k). Cells with indices from interior_first to interior_last, counted from 1, are drawn,
-    ! the others are ghost layers. vertex_layout, cell_layout: any arrays that lie in memory as those of later fields at
-    ! vertices and in cells do; without them, and where no other array is given, fields are packed with i fastest.
+    ! Passes this rank's part of a mesh to the session as a structured block, with the given numbers of cells along i, j
+    ! and k, or of quads along i and j. If number (from 0 on) is given, it is one of several blocks of the mesh. Uniform
+    ! coordinates: spacing and origin (0 by default) of the lattice; first: number of cells of the lattice before the
+    ! block along each axis. Rectilinear coordinates: x, y and z are lists along the axes. Curvilinear coordinates: x, y
+    ! and z are arrays (i, j, k). Cells with indices from interior_first to interior_last, counted from 1, are drawn;
+    ! all other cells are ghost layers. vertex_layout, cell_layout: any arrays with the memory layout of later fields at
+    ! vertices and in cells. If these and all other arrays are missing, fields are packed with i fastest. refinement:
+    ! number of the block's cells along a cell of the coarsest level, for each axis; cells that finer blocks cover are
+    ! not drawn. docs/structured.md describes blocks.
     subroutine set_block(self, name, cells, status, spacing, origin, first, x, y, z, interior_first, interior_last, ghosts, &
         vertex_ids, vertex_layout, cell_layout, changed, refinement, number)
         class(insitu_session), intent(inout) :: self
@@ -1367,7 +1387,7 @@ contains
         call note_size(self, mesh_size(part, mesh%vertex_count, mesh%cell_count, 0_c_int64_t, 0, block))
     end subroutine set_block
 
-    ! Take this rank's part of a mesh away, or the block of that number.
+    ! Removes this rank's part of a mesh, or the block with that number.
     subroutine remove_mesh(self, name, status, number)
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: name
@@ -1378,11 +1398,12 @@ contains
         call set_part(self, name, c_null_ptr, status, number)
     end subroutine remove_mesh
 
-    ! Hand over this rank's part of a field: a list, or a matrix (components, tuples); on a block (i, j, k), with
-    ! components before or after. index: the tuple that each
-    ! vertex, cell or corner has, from 1 or from the mesh's index_base; for corners a list, or a matrix (corners,
-    ! cells), also its first rows. corner_row, for corners: tuples (or entries of a list index) from the first of a cell
-    ! to that of the next. patches, for cells: the values on the boundary. number: of a block of the mesh.
+    ! Passes this rank's part of a field to the session: a list, or a matrix (components, tuples); on a block also an
+    ! array (i, j, k), with components as the first or last dimension. index: the tuple of each vertex, cell or corner,
+    ! counted from 1 or from the mesh's index_base. For corners, index is a list or a matrix (corners, cells), which may
+    ! consist of the first rows of a larger one. corner_row, for corners: number of tuples (or of entries of index, if
+    ! it is a list) from the first corner of a cell to that of the next. patches, for cells: the values on the boundary.
+    ! number: number of the mesh's block.
     subroutine set_field(self, mesh, name, values, status, centring, changed, index, corner_row, patches, number)
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: mesh, name
@@ -1451,7 +1472,7 @@ contains
         call set_part_field(self, mesh, field, status, number)
     end subroutine set_field
 
-    ! Hands a field to C, of one of the blocks of its mesh if a number is given.
+    ! Passes a field to C. If number is given, the field belongs to this block of the mesh.
     subroutine set_part_field(self, mesh, field, status, number)
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: mesh
@@ -1465,9 +1486,9 @@ contains
         end if
     end subroutine set_part_field
 
-    ! Hand over this rank's part of a field whose components are arrays of their own, of any types:
+    ! Passes this rank's part of a field to the session whose components are separate arrays of any types:
     ! call pictures%set_components('domain', 'velocity', [insitu_borrow(u), insitu_borrow(v), insitu_borrow(w)], status).
-    ! number: of a block of the mesh. Local.
+    ! number: number of the mesh's block. Local.
     subroutine set_components(self, mesh, name, components, status, centring, changed, number)
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: mesh, name
@@ -1524,7 +1545,8 @@ contains
         field%component_stride = laid%component_stride
     end subroutine put_block_values
 
-    ! Lengths that C is not told, and would read beyond.
+    ! Describes a patch with an array of wrong length; '' if there is none. C does not get these lengths, and would read
+    ! beyond the end.
     function find_patch_fault(patches, components) result(out)
         type(insitu_patch), intent(in) :: patches(:)
         integer(c_int64_t), intent(in) :: components
@@ -1574,7 +1596,8 @@ contains
         end do
     end subroutine put_patches
 
-    ! C calls this: it runs the caller's procedure, and gives C its array. That may step another session.
+    ! C calls this function. It runs the caller's procedure, and passes the resulting array to C. It is recursive
+    ! because the procedure may perform a step of another session.
     recursive function run_fill(data, field) bind(C) result(status)
         type(c_ptr), value :: data
         type(c_field), intent(inout) :: field
@@ -1601,7 +1624,7 @@ contains
         if (len(record%fault) > 0) status = INSITU_ERROR_FIELD
     end function run_fill
 
-    ! The record of the field, a new one if it has none.
+    ! Returns the record of the field, which is created if it does not exist.
     function record_of(self, mesh, name) result(out)
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: mesh, name
@@ -1619,7 +1642,8 @@ contains
         self%fills => out
     end function record_of
 
-    ! Hand over this rank's part of a field of so many components, whose values fill makes in the steps that need them.
+    ! Passes this rank's part of a field to the session, with this number of components, whose values `fill` computes in
+    ! the steps that need them.
     subroutine set_filled_field(self, mesh, name, fill, status, centring, components, number)
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: mesh, name
@@ -1644,7 +1668,7 @@ contains
         if (status == INSITU_OK) record%fill => fill
     end subroutine set_filled_field
 
-    ! Turn on or off that rank 0 keeps each step's pictures in memory. Collective; rank 0's keep counts.
+    ! Sets whether rank 0 keeps each step's pictures in memory. Collective; only rank 0's keep is used.
     subroutine keep_pictures(self, keep, status)
         class(insitu_session), intent(inout) :: self
         logical, intent(in) :: keep
@@ -1652,8 +1676,8 @@ contains
         call take_status(self, c_keep_pictures(self%handle, merge(1_c_int, 0_c_int, keep)), status)
     end subroutine keep_pictures
 
-    ! A number of the scene's parameters; value stays as it is where the scene has none of this name, which is an error. An
-    ! edit of the scene changes it in a step, on all ranks.
+    ! Reads a parameter of the scene. If the scene has no parameter of this name, value is not changed, and status is an
+    ! error. An edit of the scene changes parameters during a step, on all ranks.
     subroutine read_parameter(self, name, value, status)
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: name
@@ -1664,7 +1688,7 @@ contains
         call take_status(self, c_parameter(self%handle, as_c_text(name), value), status)
     end subroutine read_parameter
 
-    ! The pictures of the last step; none on other ranks, or where none are kept.
+    ! Returns the pictures of the last step; none on ranks other than 0, or if pictures are not kept.
     function pictures(self) result(out)
         class(insitu_session), intent(in) :: self
         type(insitu_picture), allocatable :: out(:)
@@ -1683,8 +1707,8 @@ contains
         end do
     end function pictures
 
-    ! Draw the images that are due. Collective; after an error, which every rank gets, the session stays usable. It is
-    ! recursive because a fill may call it, on its own session to be refused.
+    ! Draws the images that are due. Collective. An error is returned on every rank, and the session remains usable. The
+    ! procedure is recursive because a fill procedure may call it; a call on its own session is refused.
     recursive subroutine step(self, cycle, time, status)
         class(insitu_session), intent(inout) :: self
         integer, intent(in) :: cycle
@@ -1702,7 +1726,7 @@ contains
         end do
     end subroutine step
 
-    ! The report of the last step. All zero before the first.
+    ! Returns the report of the last step. All members are zero before the first step.
     function report(self) result(out)
         class(insitu_session), intent(in) :: self
         type(insitu_report) :: out
@@ -1714,7 +1738,7 @@ contains
         out = last
     end function report
 
-    ! The reason why the last call failed, of those since the last step began (insitu_error in insitu.h).
+    ! Returns the message of the last call that failed since the last step began (insitu_error in insitu.h).
     function error(self) result(out)
         class(insitu_session), intent(in) :: self
         character(:), allocatable :: out
@@ -1729,7 +1753,7 @@ contains
         type(fill_record), pointer :: record
         self%own_error = ''
         status = c_destroy(self%handle)
-        if (c_associated(self%handle)) return ! refused, as a fill has called this
+        if (c_associated(self%handle)) return ! the call was refused, because a fill procedure has made it
         do while (associated(self%fills))
             record => self%fills
             self%fills => record%next
