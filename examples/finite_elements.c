@@ -59,8 +59,7 @@ static void set_mesh(insitu_session *session)
     mesh.cell_type = INSITU_HEX;
     mesh.connectivity_count = CELLS * NODES_PER_CELL;
     mesh.connectivity = (insitu_array){.data = cell_nodes, .type = INSITU_INT32};
-    mesh.connectivity_row =
-        NODES_PER_CELL; /* number of entries from one cell's first corner to that of the next cell */
+    mesh.connectivity_row = NODES_PER_CELL; /* distance between the first corners of consecutive cells */
     mesh.vertex_order = INSITU_ORDER_LEXICOGRAPHIC;
     insitu_set_mesh(session, "slab", &mesh);
 }

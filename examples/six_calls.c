@@ -69,8 +69,7 @@ int main(int argc, char **argv)
         advance(0.5 * cycle);
         insitu_set_field(session, "slab", &field); /* the array is the same and has new values */
         if (insitu_step(session, cycle, 0.5 * cycle) != INSITU_OK && rank == 0)
-            fprintf(stderr, "cycle %d: %s\n", cycle,
-                    insitu_error(session)); /* the simulation continues after an error */
+            fprintf(stderr, "cycle %d: %s\n", cycle, insitu_error(session)); /* the simulation continues */
     }
 
     if (insitu_destroy(&session) != INSITU_OK && rank == 0) fprintf(stderr, "%s\n", insitu_error(NULL));

@@ -1,4 +1,4 @@
-"""Two hot spots that turn around each other, in a box of hexahedra a rank."""
+"""Two hot spots that rotate around each other, on a box of hexahedra per rank."""
 import insitu
 import numpy
 from mpi4py import MPI

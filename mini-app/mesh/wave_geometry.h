@@ -7,8 +7,8 @@
 typedef struct wave_cell_geometry {
     double volume;
     double centroid[3];
-    double area[6]
-               [3]; /* outward area vector of each face; the vectors of the two cells of a face are exactly opposite */
+    /* outward area vector of each face; the vectors of the two cells of a face are exactly opposite */
+    double area[6][3];
 } wave_cell_geometry;
 
 /* Measures a cell. position and id belong to the shape's vertices; ids must be the same on every rank. */
