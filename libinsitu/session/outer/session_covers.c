@@ -487,8 +487,8 @@ insitu_status session_drop_faces_between_levels(const session_meshes *meshes, co
     if (has_levels && !bin_boxes(meshes->level_boxes, meshes->level_box_count, true, &bins))
         session_fail_for_memory(error, meshes->level_box_count * 32, "faces between levels");
     for (int i = 0; i < count && has_levels && !error->status; i++) {
-        const session_mesh *mesh =
-            session_source(parts[i].mesh); /* cells and faces of an image are numbered as in its source */
+        /* the cells and faces of a mirror image are numbered as those of its source */
+        const session_mesh *mesh = session_source(parts[i].mesh);
         if (is_level_block(mesh) && !session_is_quad_lattice(mesh->given.lattice) &&
             !parts[i].outer->threshold.is_given)
             drop_inner_faces(meshes, &bins, mesh, parts[i].outer);
