@@ -154,6 +154,73 @@ static void normals_of_curved_faces_are_exact(void **state)
         }
 }
 
+enum { POLYGONS = 40, CORNERS = 12 };
+
+/* Makes polygons around points of a grid in the plane z = 0, whose corners lie alternately above and below it: too bent
+ * for a common apex (session_outer_mesh.h). Rank 0 has all of them. */
+static void make_zigzag_polygons(double positions[][3], int64_t *connectivity, int64_t *offsets, insitu_mesh *mesh)
+{
+    const int count = own_rank == 0 ? POLYGONS : 0;
+    for (int n = 0; n < count * CORNERS; n++) {
+        const int polygon = n / CORNERS, corner = n % CORNERS;
+        const double angle = 6.28318530717958648 * corner / CORNERS;
+        positions[n][0] = -1.05 + 0.3 * (polygon % 8) + 0.13 * cos(angle);
+        positions[n][1] = -0.6 + 0.3 * (polygon / 8) + 0.13 * sin(angle);
+        positions[n][2] = corner % 2 ? 0.1 : -0.1;
+        connectivity[n] = n;
+    }
+    for (int polygon = 0; polygon <= count; polygon++) offsets[polygon] = (int64_t)polygon * CORNERS;
+    insitu_mesh_defaults(mesh);
+    insitu_mesh_interleaved(mesh, positions, INSITU_FLOAT64);
+    mesh->vertex_count = mesh->connectivity_count = (int64_t)count * CORNERS;
+    mesh->cell_count = count;
+    mesh->cell_type = INSITU_POLYGON;
+    mesh->connectivity = (insitu_array){connectivity, INSITU_INT64, 0};
+    mesh->offsets = (insitu_array){offsets, INSITU_INT64, 0};
+}
+
+/* Draws the polygons, and if `curved` is given this mesh too, which must not be in the picture. */
+static caught_picture draw_polygons(const insitu_mesh *polygons, const insitu_mesh *curved)
+{
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(SCENE("surface: {}")));
+    everywhere(insitu_set_mesh(session, "polygons", polygons) == INSITU_OK);
+    if (curved) everywhere(insitu_set_mesh(session, "curved", curved) == INSITU_OK);
+    discard_pictures();
+    everywhere(insitu_step(session, 0, 0) == INSITU_OK);
+    insitu_destroy(&session);
+    return pop_caught_picture();
+}
+
+/* In a session with curved faces, the faces of linear cells have normals at vertices too. They are the same but for the
+ * rounding of normals to float, also for polygons whose triangles have an apex each. */
+static void faces_of_linear_cells_keep_their_normals(void **state)
+{
+    (void)state;
+    static const order_kind hex_27 = {"hex 27", INSITU_TRIQUADRATIC_HEX, INSITU_ORDER_VTK, 2};
+    static double positions[POLYGONS * CORNERS][3];
+    static int64_t connectivity[POLYGONS * CORNERS], offsets[POLYGONS + 1];
+    insitu_mesh polygons;
+    order_mesh curved;
+    int hits = 0;
+    double worst = 0;
+    make_zigzag_polygons(positions, connectivity, offsets, &polygons);
+    order_mesh_create(&hex_27, 2, 0, order_sphere_field, own_rank, rank_count, &curved);
+    for (int64_t v = 0; v < curved.vertex_count; v++) curved.coordinates[3 * v] += 50;
+    caught_picture alone = draw_polygons(&polygons, NULL), beside = draw_polygons(&polygons, &curved.mesh);
+    for (int pixel = 0; pixel < PIXELS && own_rank == 0; pixel++) {
+        const bool is_hit = isfinite((double)alone.depth[pixel]);
+        if (is_hit != isfinite((double)beside.depth[pixel])) worst = INFINITY;
+        for (int a = 0; a < 3 && is_hit; a++)
+            worst = fmax(worst, fabs((double)(alone.data[a * PIXELS + pixel] - beside.data[a * PIXELS + pixel])));
+        hits += is_hit;
+    }
+    if (own_rank == 0) printf("%d pixels of polygons, normals differ by %.2g\n", hits, worst);
+    everywhere(own_rank || (hits > 1000 && worst < 2e-6));
+    free_caught(&alone);
+    free_caught(&beside);
+    order_mesh_free(&curved);
+}
+
 /* ---- derived gradients ------------------------------------------------------------------------------------------- */
 
 /* The derivative of the squared distance along z is 2 z at all nodes, and 0.3 on the plane z = 0.15. */
@@ -267,6 +334,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(normals_of_a_sphere_are_exact),
         cmocka_unit_test(normals_in_bent_cells_are_of_second_order),
         cmocka_unit_test(normals_of_curved_faces_are_exact),
+        cmocka_unit_test(faces_of_linear_cells_keep_their_normals),
         cmocka_unit_test(derived_gradients_are_exact),
         cmocka_unit_test(normals_between_lobatto_points_are_exact),
         cmocka_unit_test(normals_are_the_same_on_any_ranks),

@@ -405,7 +405,8 @@ typedef struct outer_counts {
     int64_t largest_corner_count;    /* largest number of corners of one face */
 } outer_counts;
 
-static outer_counts find_count_bounds(const grid *g, const session_outer *outer)
+/* If there are normals, the triangles of a polygon have no common vertices, and its loop has further ones. */
+static outer_counts find_count_bounds(const grid *g, const session_outer *outer, bool has_normals)
 {
     outer_counts most = {0};
     for (int64_t i = 0; i < outer->face_count; i++) {
@@ -418,7 +419,7 @@ static outer_counts find_count_bounds(const grid *g, const session_outer *outer)
         const bool is_polygon = size > 4 || is_concave(&loop, (const double(*)[3])positions, (int)size);
         most.cell_count += is_polygon ? size - 2 : 1;
         most.loop_entry_count += is_polygon ? size + 2 : 0;
-        most.entry_count += is_polygon ? 4 * (size - 2) : size + 1;
+        most.entry_count += is_polygon ? (has_normals ? 5 : 4) * (size - 2) : size + 1;
         most.largest_corner_count = size > most.largest_corner_count ? size : most.largest_corner_count;
     }
     return most;
@@ -465,7 +466,7 @@ static void work_free(outer_work *w)
 static bool work_create(const session_mesh *whole, bool has_normals, session_outer *out, outer_work *w)
 {
     const grid *g = &whole->cells;
-    outer_counts most = find_count_bounds(g, out);
+    outer_counts most = find_count_bounds(g, out, has_normals);
     *w = (outer_work){.cells = g,
                       .out = out,
                       .has_rims = whole->topology.is_split,
