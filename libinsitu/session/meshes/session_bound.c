@@ -37,6 +37,7 @@
 
 #include "memory.h"
 #include "session_derivatives.h"
+#include "session_matrix.h"
 #include "session_shape.h"
 #include "vector3.h"
 
@@ -104,48 +105,6 @@ static double bernstein_slope(int order, const int exponents[4], int axis, const
     raised[axis + 1]--;
     lowered[0]--;
     return order * (bernstein_value(raised, at) - bernstein_value(lowered, at));
-}
-
-/* Inverts a matrix of count x count by elimination with pivots. The matrix is overwritten; `inverse` must contain the
- * unit matrix and receives the result. */
-static void invert_matrix(int count, double *matrix, double *inverse)
-{
-    for (int c = 0; c < count; c++) {
-        int pivot = c;
-        for (int r = c + 1; r < count; r++)
-            if (fabs(matrix[r * count + c]) > fabs(matrix[pivot * count + c])) pivot = r;
-        for (int s = 0; s < count; s++) {
-            const double a = matrix[c * count + s], b = inverse[c * count + s];
-            matrix[c * count + s] = matrix[pivot * count + s];
-            inverse[c * count + s] = inverse[pivot * count + s];
-            matrix[pivot * count + s] = a;
-            inverse[pivot * count + s] = b;
-        }
-        const double scale = 1 / matrix[c * count + c];
-        for (int s = 0; s < count; s++) {
-            matrix[c * count + s] *= scale;
-            inverse[c * count + s] *= scale;
-        }
-        for (int r = 0; r < count; r++) {
-            const double factor = matrix[r * count + c];
-            for (int s = 0; s < count && r != c && factor != 0; s++) {
-                matrix[r * count + s] -= factor * matrix[c * count + s];
-                inverse[r * count + s] -= factor * inverse[c * count + s];
-            }
-        }
-    }
-}
-
-/* Multiplies each of `outer` arrays of columns x inner numbers with a matrix of rows x columns. */
-static void multiply_by_matrix(const double *matrix, int rows, int columns, int outer, int inner, const double *in,
-                               double *out)
-{
-    for (int o = 0; o < outer; o++, in += columns * inner)
-        for (int r = 0; r < rows; r++, out += inner) {
-            for (int s = 0; s < inner; s++) out[s] = 0;
-            for (int c = 0; c < columns; c++)
-                for (int s = 0; s < inner; s++) out[s] += matrix[r * columns + c] * in[c * inner + s];
-        }
 }
 
 /* Computes the values of all Bernstein polynomials (if axis is negative) or their derivatives along an axis, at the
@@ -253,7 +212,7 @@ static bool fill_bernstein(const node_lists *lists, session_bound_factor *out)
     if (is_made) {
         fill_basis(lists, -1, false, spare);
         for (int n = 0; n < count; n++) out->bernstein[n * count + n] = 1;
-        invert_matrix(count, spare, out->bernstein);
+        session_invert_matrix(count, spare, out->bernstein);
         list_differences(lists, out);
     }
     base_free(spare);
@@ -394,7 +353,7 @@ static void multiply_by_matrices(const bound_job *job, int size, const double *c
         const int rows = is_fine ? factor->fine_counts[job->level] : factor->node_count;
         double *to = f == count - 1 ? out : job->work + f % 2 * SIZE * job->of->levels[job->level].count;
         outer /= factor->node_count;
-        multiply_by_matrix(matrices[f], rows, factor->node_count, outer, inner, in, to);
+        session_multiply_matrix(matrices[f], rows, factor->node_count, outer, inner, in, to);
         inner *= rows;
         in = to;
     }
@@ -415,7 +374,7 @@ static double largest_q_in_tet(const double b[6])
     double matrix[16] = {0, b[0], b[1], b[2], b[0], 0, b[3], b[4], b[1], b[3], 0, b[5], b[2], b[4], b[5], 0};
     double inverse[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, sum = 0;
     bool is_inside = true;
-    invert_matrix(4, matrix, inverse);
+    session_invert_matrix(4, matrix, inverse);
     for (int c = 0; c < 4; c++) {
         const double at = inverse[4 * c] + inverse[4 * c + 1] + inverse[4 * c + 2] + inverse[4 * c + 3];
         is_inside = is_inside && at >= 0;
@@ -494,8 +453,8 @@ static void find_coefficients(const bound_job *job, int size, const double *tupl
     for (int f = 0; f < count_factors(job->of->lattice.type); f++) matrices[f] = factor_of(job->of, f)->bernstein;
     session_complete_tuples(&job->of->nodes, size, tuples, job->nodes);
     if (job->of->collapse) {
-        multiply_by_matrix(job->of->collapse, job->of->lattice.count, job->of->nodes.complete.count, 1, size,
-                           job->nodes, job->work);
+        session_multiply_matrix(job->of->collapse, job->of->lattice.count, job->of->nodes.complete.count, 1, size,
+                                job->nodes, job->work);
         memcpy(job->nodes, job->work, (size_t)(job->of->lattice.count * size) * sizeof *job->nodes);
     }
     multiply_by_matrices(job, size, matrices, false, job->nodes, job->coefficients);

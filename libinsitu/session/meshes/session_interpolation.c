@@ -17,11 +17,11 @@
  * Each sum adds up differences from its first value, so that a constant is reproduced exactly. */
 #include "session_interpolation.h"
 
-#include <math.h>
 #include <string.h>
 
 #include "memory.h"
 #include "session_derivatives.h"
+#include "session_matrix.h"
 #include "session_shape.h"
 #include "vector3.h"
 
@@ -122,59 +122,42 @@ static void fill_pyramid_rows(int p, int n, double *out)
                 fill_pyramid_basis(p, (const double[]){(double)i / n, (double)j / n, (double)k / n}, out);
 }
 
-/* Solves X A = B in place of B by elimination with pivots in the columns. A is destroyed. */
-static void solve_rows(int size, int rows, double *a, double *b)
+/* Replaces each row, the basis at a point, by the weights of the values at a pyramid's nodes for the value at the
+ * point. Returns false if memory runs out. */
+static bool convert_rows(int p, int count, double *rows)
 {
-    for (int c = 0; c < size; c++) {
-        int pivot = c;
-        for (int n = c + 1; n < size; n++)
-            if (fabs(a[c * size + n]) > fabs(a[c * size + pivot])) pivot = n;
-        for (int r = 0; r < size + rows; r++) {
-            double *row = r < size ? a + r * size : b + (r - size) * size;
-            const double swapped = row[c];
-            row[c] = row[pivot];
-            row[pivot] = swapped;
-        }
-        const double *top = a + c * size;
-        for (int r = c + 1; r < size + rows; r++) {
-            double *row = r < size ? a + r * size : b + (r - size) * size;
-            const double scaled = row[c] / top[c];
-            for (int n = c + 1; n < size; n++) row[n] -= scaled * top[n];
-            row[c] = scaled;
-        }
+    const int size = session_complete_nodes(GRID_PYRAMID, p).count;
+    const size_t squares = (size_t)size * (size_t)size, bytes = (size_t)count * (size_t)size * sizeof *rows;
+    double *basis = base_alloc(squares * sizeof *basis), *inverse = base_calloc(squares, sizeof *inverse);
+    double *copy = base_alloc(bytes);
+    const bool is_made = basis && inverse && copy;
+    if (is_made) {
+        for (int n = 0; n < size; n++) inverse[n * size + n] = 1;
+        fill_pyramid_rows(p, p, basis);
+        session_invert_matrix(size, basis, inverse);
+        memcpy(copy, rows, bytes);
+        session_multiply_matrix(copy, count, size, 1, size, inverse, rows);
     }
-    /* each row of B has been multiplied by the inverse of the upper triangle; the lower triangle has ones on its
-     * diagonal */
-    for (int r = 0; r < rows; r++)
-        for (int c = size - 1; c >= 0; c--)
-            for (int n = 0; n < c; n++) b[r * size + n] -= b[r * size + c] * a[c * size + n];
+    base_free(basis);
+    base_free(inverse);
+    base_free(copy);
+    return is_made;
 }
 
 /* Computes the weights of a pyramid. Returns false if memory runs out. */
 static bool fill_pyramid_weights(int p, int parts, double *out)
 {
-    const int size = session_complete_nodes(GRID_PYRAMID, p).count;
-    double *own = base_alloc((size_t)size * (size_t)size * sizeof *own);
-    if (!own) return false;
-    fill_pyramid_rows(p, p, own);
     fill_pyramid_rows(p, parts * p, out);
-    solve_rows(size, session_complete_nodes(GRID_PYRAMID, parts * p).count, own, out);
-    base_free(own);
-    return true;
+    return convert_rows(p, session_complete_nodes(GRID_PYRAMID, parts * p).count, out);
 }
 
 double *session_make_collapse(int p)
 {
-    const int size = session_complete_nodes(GRID_PYRAMID, p).count, rows = session_complete_nodes(GRID_HEX, p).count;
-    double *own = base_alloc((size_t)size * (size_t)size * sizeof *own);
-    double *out = base_alloc((size_t)rows * (size_t)size * sizeof *out);
-    if (own && out) {
-        fill_pyramid_rows(p, p, own);
-        fill_collapsed_rows(p, out);
-        solve_rows(size, rows, own, out);
-    }
-    base_free(own);
-    if (own) return out;
+    const int columns = session_complete_nodes(GRID_PYRAMID, p).count, rows = session_complete_nodes(GRID_HEX, p).count;
+    double *out = base_alloc((size_t)rows * (size_t)columns * sizeof *out);
+    if (!out) return NULL;
+    fill_collapsed_rows(p, out);
+    if (convert_rows(p, rows, out)) return out;
     base_free(out);
     return NULL;
 }

@@ -25,6 +25,7 @@
 
 #include "memory.h"
 #include "session_derivatives.h"
+#include "session_matrix.h"
 #include "session_shape.h"
 
 enum {
@@ -385,18 +386,6 @@ static bool is_straight(const session_cell_rules *rules, const double *tuples, c
     return most <= tolerance * size;
 }
 
-/* Computes the tuples of a collapsed hex from those of a pyramid. */
-static void expand_pyramid(const session_cell_rules *rules, const double *complete, double *expanded)
-{
-    const int columns = rules->nodes.complete.count;
-    for (int row = 0; row < rules->lattice.count; row++)
-        for (int c = 0; c < SIZE; c++) {
-            double sum = 0;
-            for (int n = 0; n < columns; n++) sum += rules->collapse[row * columns + n] * complete[SIZE * n + c];
-            expanded[SIZE * row + c] = sum;
-        }
-}
-
 void session_visit_cell(const session_cell_rules *rules, const double *tuples, double *work,
                         session_visit_points *visit, void *of)
 {
@@ -411,7 +400,8 @@ void session_visit_cell(const session_cell_rules *rules, const double *tuples, d
     }
     session_complete_tuples(&rules->nodes, SIZE, tuples, complete);
     if (rules->collapse)
-        expand_pyramid(rules, complete, expanded);
+        session_multiply_matrix(rules->collapse, rules->lattice.count, rules->nodes.complete.count, 1, SIZE, complete,
+                                expanded);
     else
         expanded = complete;
     double *lattice = v.lattices[rules->line_count];
