@@ -272,8 +272,10 @@ static void cell_values_match_the_callers_cells(void **state)
 static void thresholds_show_whole_cells(void **state)
 {
     (void)state;
-    const char *scene = "images:\n" IMAGE("a", "surface: {threshold: {field: f, from: -0.3}, colour_by: {field: f}}");
-    const char *plain = "images:\n" IMAGE("a", "surface: {colour_by: {field: f}}");
+    /* by default, the surface without a threshold has more pieces, because only cells with outer faces are refined */
+#define TWO_PIECES "finer_pieces: 2\nimages:\n"
+    const char *scene = TWO_PIECES IMAGE("a", "surface: {threshold: {field: f, from: -0.3}, colour_by: {field: f}}");
+    const char *plain = TWO_PIECES IMAGE("a", "surface: {colour_by: {field: f}}");
     for (int k = 0; k < order_kind_count; k++) {
         order_mesh mesh;
         order_mesh_create(&order_kinds[k], 2, 0.05, order_wave_field, own_rank, rank_count, &mesh);

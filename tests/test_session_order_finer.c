@@ -577,6 +577,30 @@ static void pieces_that_nothing_crosses_are_not_made(void **state)
     order_mesh_free(&mesh);
 }
 
+/* An outer surface shows only pieces on outer faces. With a volume, all pieces of all cells are made, and the surface
+ * has the same picture, including the normals of bent faces, the colours and the edges. */
+static void surfaces_are_made_of_pieces_on_outer_faces(void **state)
+{
+    (void)state;
+#define SURFACE                                                                                                        \
+    IMAGE("a", "surface: {colour_by: {field: f, range: [0, 1]}, edges: {}}")                                           \
+    IMAGE("b", "isosurface: {field: f, values: [0.05]}")
+    for (int k = 0; k < order_kind_count; k++) {
+        const order_kind *kind = &order_kinds[k];
+        order_mesh mesh;
+        if (kind->order == 1 || kind->order > 3) continue;
+        order_mesh_create(kind, 4, 0.05, order_sphere_field, own_rank, rank_count, &mesh);
+        drawn outer = draw_mesh(FINER("4") SURFACE, &mesh), all = draw_mesh(FINER("4") SURFACE WHOLE, &mesh);
+        everywhere(own_rank || are_same_pictures(&outer.pictures[0], &all.pictures[0]));
+        const int64_t few = count_pieces(FINER("4") SURFACE, &mesh), every = count_pieces(FINER("4") WHOLE, &mesh);
+        if (own_rank == 0) printf("%s: %lld of %lld pieces\n", kind->name, (long long)few, (long long)every);
+        everywhere(few > 0 && few < every / 2);
+        free_picture_set(&outer);
+        free_picture_set(&all);
+        order_mesh_free(&mesh);
+    }
+}
+
 /* ---- changes ----------------------------------------------------------------------------------------------------- */
 
 enum { VALUES, NODES, SCENE, COARSE, CHANGES };
@@ -651,6 +675,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(mixed_cells_draw_the_same),
         cmocka_unit_test(other_cells_are_not_refined),
         cmocka_unit_test(pieces_that_nothing_crosses_are_not_made),
+        cmocka_unit_test(surfaces_are_made_of_pieces_on_outer_faces),
         cmocka_unit_test(changes_are_drawn),
         cmocka_unit_test(exceeded_limits_are_reported),
     };

@@ -16,12 +16,15 @@
 #define SLICE "slice: {field: f, planes: [{normal: [1, 2, 3]}]}"
 #define REPRODUCIBLE "    sampling: {reproducible: true}\n"
 
-/* In the first scene all cells are refined, in the others those that the surfaces cross. */
+/* In the first and the last scene all cells are refined; in the others those that isosurfaces and slices cross, and
+ * those that have outer faces. */
 static const char *const scenes[] = {
     "finer_pieces: 3\nimages:\n" IMAGE("a", FRONT, ISOSURFACES) IMAGE("b", FRONT, SLICE)
         IMAGE("c", FRONT, "surface: {threshold: {field: f, from: -0.9}, colour_by: {field: f}, edges: {}}")
             IMAGE("d", FRONT, "volume: {field: f}") IMAGE("e", FRONT, "volume: {field: f}") REPRODUCIBLE,
     "finer_pieces: 3\nimages:\n" IMAGE("a", FRONT, ISOSURFACES) IMAGE("b", FRONT, SLICE),
+    "surface_error: 1.5\nimages:\n" IMAGE("a", FRONT, "surface: {colour_by: {field: f}, edges: {}}")
+        IMAGE("b", "automatic", ISOSURFACES),
     "surface_error: 1.5\nimages:\n" IMAGE("a", FRONT, ISOSURFACES) IMAGE("b", "automatic", SLICE)
         IMAGE("c{view}", "{orbit: {views: 2}}", "isosurface: {field: f, values: [0.2]}"),
     "images:\n" IMAGE("a", FRONT, ISOSURFACES) IMAGE("b", FRONT, "volume: {field: f}") REPRODUCIBLE,

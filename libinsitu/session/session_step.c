@@ -174,7 +174,7 @@ static insitu_status refine_cells(insitu_session *s, const session_moment *momen
                                   base_error *error)
 {
     const scene *scene = &s->scene_file.scene;
-    const session_pieces_basis basis = {scene, moment, &s->catalogue, &s->team, &s->meshes};
+    const session_pieces_basis basis = {scene, moment, *are_cells_changed, &s->catalogue, &s->team, &s->meshes};
     bool are_changed = false;
     if (scene->finer_pieces == 1 || !session_catalogue_has_higher_order(&s->catalogue)) return INSITU_OK;
     if (!*are_cells_changed && session_count_due(scene, moment) == 0) return INSITU_OK;

@@ -94,7 +94,7 @@ static bool may_cross(const deviation_work *w, const session_bound *of, int64_t 
     const session_deviation_request *request = w->request;
     const int count = of->nodes.of.count;
     double *values = buffer + w->field_size;
-    if (!request->values && !request->plane) return true;
+    if (!request->values && !request->plane) return !request->measured || request->measured[cell];
     session_read_request_values(&w->rows, request, cell, count, buffer, values);
     if (request->is_of_values) return true;
     if (!session_may_cross(of, values, &request->isovalues, values + 5 * count)) return false;

@@ -25,7 +25,7 @@ typedef struct session_value_cell {
 /* A request to measure a mesh: its isosurfaces, the values of a field, or the positions of its cells. */
 typedef struct session_deviation_request {
     /* values of the field that is measured, or whose isosurfaces are measured. NULL: positions are measured, in the
-     * cells that `plane` may cross or, if `plane` is NULL, in all cells. */
+     * cells that `plane` may cross or, if `plane` is NULL, in the cells of `measured`. */
     const session_node_values *values;
     int component;               /* component of the field */
     session_isovalues isovalues; /* isovalues of the field; if `plane` is given, the single isovalue 0 of the distance
@@ -41,6 +41,8 @@ typedef struct session_deviation_request {
     bool marks_only; /* true: cells are only marked in `marks`, and not measured */
     /* one byte per cell, which is set if an isosurface or the plane may cross the cell; NULL: cells are not marked */
     unsigned char *marks;
+    /* if positions are measured: one byte per cell, nonzero if the cell is measured; NULL: all cells are measured */
+    const unsigned char *measured;
 } session_deviation_request;
 
 /* Computes the component of the field that is measured, or the distance from the request's plane if no field is given,

@@ -250,7 +250,10 @@ static bool make_finer_mesh(session_meshes *meshes, session_mesh *mesh, const se
     memcpy(made.counts, old->counts, sizeof made.counts);
     if (old->parts == made.parts && (!made.parts || (old->is_lobatto == made.is_lobatto && has_marks(old, marks))))
         return false;
+    unsigned char *outer_faces = mesh->finer.outer_faces;
+    mesh->finer.outer_faces = NULL;
     session_end_finer_mesh(meshes, mesh);
+    mesh->finer.outer_faces = outer_faces;
     if (!made.parts || !session_has_higher_order(&mesh->given)) return true;
     made.nodal = mesh->given;
     if (!make_cells(&made, marks ? marks->cells : NULL, threads)) {
@@ -259,7 +262,9 @@ static bool make_finer_mesh(session_meshes *meshes, session_mesh *mesh, const se
         session_fail_for_memory(error, bytes, "finer lattices of nodes in cells of higher order");
         return true;
     }
+    mesh->finer.outer_faces = NULL;
     session_drop_finer(&mesh->finer);
+    made.outer_faces = outer_faces;
     if (marks) {
         made.pieces = marks->pieces;
         made.bytes += session_piece_set_bytes(&made.pieces, made.nodal.cell_count);

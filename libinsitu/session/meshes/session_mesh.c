@@ -189,6 +189,7 @@ void session_drop_piece_set(session_piece_set *set)
 void session_drop_finer(session_finer *finer)
 {
     session_drop_piece_set(&finer->pieces);
+    base_free(finer->outer_faces);
     base_free(finer->coordinates);
     base_free(finer->offsets);
     base_free(finer->types);

@@ -222,6 +222,8 @@ typedef struct session_finer {
     session_sizes sizes;
     session_counts given_counts;
     session_piece_set pieces;
+    /* for each of the caller's cells, a bit mask of its outer faces (session_outer_cells.h); NULL: not computed */
+    unsigned char *outer_faces;
     bool is_lobatto;     /* true: nodes of hexes and quads are treated as Gauss-Lobatto points */
     insitu_mesh nodal;   /* the caller's mesh with copies in place of the arrays that cannot be read in place */
     insitu_mesh fine;    /* same as session_mesh.given: cells with separate nodes in lexicographic order */

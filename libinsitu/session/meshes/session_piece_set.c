@@ -1,4 +1,6 @@
-/* A linear piece contains a part of an isosurface only if the isovalue is in the range of the values at the piece's
+/* Chooses the linear pieces of refined cells that are made.
+ *
+ * A linear piece contains a part of an isosurface only if the isovalue is in the range of the values at the piece's
  * corners. These ranges therefore determine exactly which pieces must be made, because rays find no isosurface in other
  * pieces. If a neighbour of a made piece is missing, the isosurface does not cross their common face.
  *
@@ -12,6 +14,7 @@
 #include "memory.h"
 #include "session_pattern.h"
 #include "session_region.h"
+#include "session_shape.h"
 
 /* The data with which pieces of one kind of cell are chosen. */
 typedef struct piece_kind {
@@ -209,6 +212,77 @@ insitu_status session_add_crossed_pieces(const session_mesh *mesh, const session
     bool is_made = w && begin_work(mesh, parts, request->is_lobatto, set, w);
     if (is_made) w->request = request;
     is_made = is_made && add_cells(w, threads);
+    if (w) end_work(w);
+    base_free(w);
+    return is_made ? INSITU_OK : fail_for_memory(mesh, error);
+}
+
+/* ---- pieces on outer faces --------------------------------------------------------------------------------------- */
+
+/* Finds a bit mask of faces for each node of the finer lattice. */
+static void find_faces_of_nodes(const session_nodes *fine, unsigned char *out)
+{
+    const session_shape *shape = session_shape_of(fine->type);
+    for (int k = 0; k <= fine->order; k++)
+        for (int j = 0; j <= fine->order; j++)
+            for (int i = 0; i <= fine->order; i++)
+                if (session_has_node(fine, i, j, k))
+                    out[session_node_index(fine, INSITU_ORDER_LEXICOGRAPHIC, i, j, k)] =
+                        (unsigned char)session_faces_of_node(shape, fine->order, (const int[]){i, j, k});
+}
+
+/* Finds, for each face of the cell, the pieces that have a face on it: those with at least three vertices there. out:
+ * the words of a set for each face. */
+static void find_pieces_on_faces(const piece_kind *kind, const unsigned char *faces_of_nodes, uint64_t *out)
+{
+    const int *corners = kind->pieces.piece_positions;
+    for (int piece = 0; piece < kind->pieces.piece_count; piece++, corners += kind->corner_count) {
+        int counts[SHAPE_MOST_FACES] = {0};
+        for (int c = 0; c < kind->corner_count; c++)
+            for (int f = 0; f < SHAPE_MOST_FACES; f++) counts[f] += faces_of_nodes[corners[c]] >> f & 1;
+        for (int f = 0; f < SHAPE_MOST_FACES; f++)
+            if (counts[f] >= 3) set_bit(out + f * kind->word_count, piece);
+    }
+}
+
+/* Returns the words of a set for each face of a kind of cell, allocated by base_alloc(), or NULL if memory runs out. */
+static uint64_t *list_pieces_on_faces(const piece_kind *kind)
+{
+    uint64_t *out = base_calloc((size_t)(SHAPE_MOST_FACES * kind->word_count), sizeof *out);
+    unsigned char *faces_of_nodes = base_calloc((size_t)kind->nodes.fine.count, 1);
+    const bool is_made = out && faces_of_nodes;
+    if (is_made && kind->corner_count) {
+        find_faces_of_nodes(&kind->nodes.fine, faces_of_nodes);
+        find_pieces_on_faces(kind, faces_of_nodes, out);
+    }
+    base_free(faces_of_nodes);
+    if (is_made) return out;
+    base_free(out);
+    return NULL;
+}
+
+static bool add_outer_pieces(const piece_work *w, const unsigned char *outer_faces)
+{
+    const int64_t cells = w->rows.cells.cell_count, *first_words = w->set->first_words;
+    uint64_t *on_faces[ROWS_MOST_KINDS] = {NULL};
+    bool is_made = true;
+    for (int i = 0; i < w->rows.kind_count && is_made; i++)
+        is_made = (on_faces[i] = list_pieces_on_faces(&w->kinds[i])) != NULL;
+    for (int64_t cell = 0; cell < cells && is_made; cell++) {
+        const int kind = session_kind_of(&w->rows, cell), words = w->kinds[kind].word_count;
+        if (first_words[cell] == first_words[cell + 1]) continue;
+        for (unsigned left = outer_faces[cell]; left; left &= left - 1)
+            for (int n = 0; n < words; n++)
+                w->set->bits[first_words[cell] + n] |= on_faces[kind][__builtin_ctz(left) * words + n];
+    }
+    for (int i = 0; i < w->rows.kind_count; i++) base_free(on_faces[i]);
+    return is_made;
+}
+
+insitu_status session_add_outer_pieces(const session_mesh *mesh, int parts, session_piece_set *set, base_error *error)
+{
+    piece_work *w = base_alloc(sizeof *w);
+    const bool is_made = w && begin_work(mesh, parts, false, set, w) && add_outer_pieces(w, mesh->finer.outer_faces);
     if (w) end_work(w);
     base_free(w);
     return is_made ? INSITU_OK : fail_for_memory(mesh, error);

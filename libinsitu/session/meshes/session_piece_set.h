@@ -17,6 +17,10 @@ insitu_status session_begin_piece_set(const session_mesh *mesh, const unsigned c
 insitu_status session_add_crossed_pieces(const session_mesh *mesh, const session_deviation_request *request, int parts,
                                          int threads, session_piece_set *set, base_error *error);
 
+/* Adds the pieces of the marked cells that have a face on an outer face of the cell (session_finer.outer_faces), which
+ * must be known. Local. */
+insitu_status session_add_outer_pieces(const session_mesh *mesh, int parts, session_piece_set *set, base_error *error);
+
 /* Returns whether two sets for the same cells are equal. */
 bool session_is_same_piece_set(const session_piece_set *a, const session_piece_set *b, int64_t cell_count);
 

@@ -2,6 +2,8 @@
 #ifndef SESSION_SHAPE_H
 #define SESSION_SHAPE_H
 
+enum { SHAPE_MOST_FACES = 6 };
+
 typedef struct session_shape {
     /* GRID_* type of a linear cell with a fixed number of corners, that is, neither a polygon nor a polyhedron */
     int type;
@@ -10,11 +12,18 @@ typedef struct session_shape {
      * (session_node_index()). */
     signed char corners[8][3];
     signed char edges[12][2]; /* two corners of each edge; edges are in VTK's order of their midpoints */
-    /* corners of each face; the fourth corner of a triangle is -1, and the only face of a shell is the shell */
-    signed char faces[6][4];
+    /* corners of each face, in the order of session_face_table (session_cell_faces.h); the fourth corner of a triangle
+     * is -1, and the only face of a shell is the shell */
+    signed char faces[SHAPE_MOST_FACES][4];
 } session_shape;
 
 /* Returns the shape of a linear type. */
 const session_shape *session_shape_of(int type);
+
+/* Computes the normal of a face's plane in the reference cell. It is (0, 0, z) for triangles and quads. */
+void session_find_face_plane(const session_shape *shape, int face, int out[3]);
+
+/* Returns a bit mask of the faces on which a node i, j, k of a lattice of this order lies. */
+unsigned session_faces_of_node(const session_shape *shape, int order, const int node[3]);
 
 #endif

@@ -461,7 +461,7 @@ static bool number_parts(face_search *s)
         if (!read_corners(of->mesh, p)) return false;
         s->cell_count += p->grid->cell_count;
         s->vertex_count += count_part_vertices(p);
-        if (!of->outer->threshold.is_given) continue;
+        if (!of->outer || !of->outer->threshold.is_given) continue;
         p->is_hidden = session_find_hidden_cells(of->mesh, &of->outer->threshold, s->threads);
         if (!p->is_hidden) return false;
     }
@@ -683,25 +683,31 @@ static bool append_faces(const face_search *s, const found_face *found, int64_t 
     return true;
 }
 
+/* Stores the found faces from number `first` to `end` - 1 in their part. */
+static void store_part_faces(const face_search *s, int64_t first, int64_t end, session_outer *outer, base_error *error)
+{
+    int64_t capacity = end - first + 1;
+    session_drop_outer(outer, true);
+    outer->faces = base_alloc((size_t)capacity * sizeof *outer->faces);
+    bool is_made = outer->faces;
+    for (int64_t i = first; i < end && is_made; i++) is_made = append_faces(s, &s->faces[i], &capacity, outer);
+    outer->are_faces_known = is_made;
+    if (is_made) return;
+    session_drop_outer(outer, true);
+    session_fail_for_memory(error, capacity * (int64_t)sizeof *outer->faces, "outer faces");
+}
+
 /* Stores the outer faces that were found with the parts to which they belong. */
 static void store_outer_faces(const face_search *s, base_error *error)
 {
     int64_t at = 0;
     for (int part = 0; part < s->part_count; part++) {
-        session_outer *outer = s->parts[part].outer;
+        const session_face_part *to = &s->parts[part];
         int64_t end = at;
         while (end < s->count && s->faces[end].part == part) end++;
-        session_drop_outer(outer, true);
-        int64_t capacity = end - at + 1;
-        outer->faces = base_alloc((size_t)capacity * sizeof *outer->faces);
-        outer->face_count = 0;
-        bool is_made = outer->faces;
-        for (int64_t i = at; i < end && is_made; i++) is_made = append_faces(s, &s->faces[i], &capacity, outer);
-        outer->are_faces_known = is_made;
-        if (!is_made) {
-            session_drop_outer(outer, true);
-            session_fail_for_memory(error, capacity * (int64_t)sizeof *outer->faces, "outer faces");
-        }
+        if (to->outer) store_part_faces(s, at, end, to->outer, error);
+        for (int64_t i = at; i < end && to->masks; i++)
+            to->masks[s->faces[i].face.cell] |= (unsigned char)(1U << s->faces[i].face.face);
         at = end;
     }
 }

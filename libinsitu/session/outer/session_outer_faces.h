@@ -10,7 +10,10 @@
 /* One of this rank's parts of a mesh in a search for outer faces. */
 typedef struct session_face_part {
     const session_mesh *mesh;
-    session_outer *outer; /* receives the faces; its threshold selects the cells */
+    session_outer *outer; /* receives the faces; its threshold selects the cells. NULL: see `masks` */
+    /* if `outer` is NULL and the mesh is split: one byte per cell of the caller, which receives a bit mask of the
+     * cell's outer faces, in the order of session_shape.faces */
+    unsigned char *masks;
     /* one byte per vertex, which the search sets to 1 if the vertex is on a face that only one cell of this rank has;
      * NULL: not requested */
     unsigned char *is_border;

@@ -1,46 +1,14 @@
 #include "session_rims.h"
 
 #include "memory.h"
-#include "session_cell_faces.h"
 #include "session_shape.h"
 
 /* ---- one kind -------------------------------------------------------------------------------------------------- */
 
-static const session_face_table *faces_of(int type)
-{
-    static const session_face_table triangle = {1, {{0, 1, 2, -1}}}, quad = {1, {{0, 1, 2, 3}}};
-    return type == GRID_TRIANGLE ? &triangle : type == GRID_QUAD ? &quad : session_faces_of_type(type);
-}
-
-/* Computes the normal of the face's plane in the lattice. */
-static void find_plane(const session_nodes *of, const signed char face[4], int out[3])
-{
-    const session_shape *shape = session_shape_of(of->type);
-    int a[3], b[3];
-    for (int axis = 0; axis < 3; axis++) {
-        const int begin = shape->corners[(int)face[0]][axis];
-        a[axis] = shape->corners[(int)face[1]][axis] - begin;
-        b[axis] = shape->corners[(int)face[2]][axis] - begin;
-    }
-    for (int axis = 0; axis < 3; axis++)
-        out[axis] = a[(axis + 1) % 3] * b[(axis + 2) % 3] - a[(axis + 2) % 3] * b[(axis + 1) % 3];
-}
-
-/* Returns whether a node of the lattice lies in the plane of the face. */
-static bool is_on_face(const session_nodes *of, const signed char face[4], const int node[3])
-{
-    const session_shape *shape = session_shape_of(of->type);
-    int plane[3], height = 0;
-    find_plane(of, face, plane);
-    for (int axis = 0; axis < 3; axis++)
-        height += plane[axis] * (node[axis] - shape->corners[(int)face[0]][axis] * of->order);
-    return height == 0;
-}
-
 void session_rim_plane(const session_nodes *of, int face, double out[3])
 {
     int plane[3];
-    find_plane(of, faces_of(of->type)->vertices[face], plane);
+    session_find_face_plane(session_shape_of(of->type), face, plane);
     for (int axis = 0; axis < 3; axis++) out[axis] = plane[axis];
 }
 
@@ -62,18 +30,18 @@ static void list_rim(const session_nodes *of, insitu_vertex_order order, const s
 
 static bool make_kind(const session_nodes *of, insitu_vertex_order order, session_rim_kind *out)
 {
-    const session_face_table *faces = faces_of(of->type);
+    const session_shape *shape = session_shape_of(of->type);
     out->faces_of_node = base_calloc((size_t)of->count, 1);
     if (!out->faces_of_node) return false;
-    for (int f = 0; f < faces->count; f++) list_rim(of, order, faces->vertices[f], &out->counts[f], out->nodes[f]);
+    for (int f = 0; f < shape->face_count; f++) list_rim(of, order, shape->faces[f], &out->counts[f], out->nodes[f]);
     for (int k = 0; k <= of->order; k++)
         for (int j = 0; j <= of->order; j++)
             for (int i = 0; i <= of->order; i++) {
                 if (!session_has_node(of, i, j, k)) continue;
                 const int at = session_node_index(of, order, i, j, k);
-                for (int f = 0; f < faces->count && at < of->count; f++)
-                    if (is_on_face(of, faces->vertices[f], (const int[]){i, j, k}))
-                        out->faces_of_node[at] |= (unsigned char)(1 << f);
+                if (at < of->count)
+                    out->faces_of_node[at] =
+                        (unsigned char)session_faces_of_node(shape, of->order, (const int[]){i, j, k});
             }
     return true;
 }

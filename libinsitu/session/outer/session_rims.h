@@ -4,8 +4,9 @@
 #define SESSION_RIMS_H
 
 #include "session_rows.h"
+#include "session_shape.h"
 
-enum { RIMS_MOST_FACES = 6, RIMS_MOST_NODES = 4 * NODES_MOST_ORDER };
+enum { RIMS_MOST_FACES = SHAPE_MOST_FACES, RIMS_MOST_NODES = 4 * NODES_MOST_ORDER };
 
 /* The faces of a kind of cell. Nodes are given by their positions in the cell's row. */
 typedef struct session_rim_kind {

@@ -110,7 +110,7 @@ static insitu_status find_faces(const session_meshes *meshes, const surface_requ
     if (!of) session_fail_for_memory(error, parts.count * (int64_t)sizeof *of, "surfaces");
     for (int i = 0; i < parts.count && of; i++) {
         session_outer *outer = find_own_outer(parts.items[i], request);
-        if (outer) of[count++] = (session_face_part){parts.items[i], outer, NULL};
+        if (outer) of[count++] = (session_face_part){.mesh = parts.items[i], .outer = outer};
     }
     insitu_status status = session_agree(team->comm, error);
     if (!status) status = session_find_outer_faces(of, count, &request->mesh->homes, team, error);

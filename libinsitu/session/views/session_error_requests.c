@@ -229,14 +229,24 @@ static void add_volume(session_error_requests *requests, const session_due_views
     show_request(requests, views, &like, index);
 }
 
-/* Returns whether a layer shows the mesh from all of its cells. */
-static bool has_whole_layers(const session_catalogue_mesh *mesh, const scene_image *image)
+/* Determines whether the image shows the mesh from all of its cells, and whether it shows its outer surface. With a
+ * threshold, outer faces of the selected cells may lie anywhere in the mesh. */
+static void add_whole_layers(session_error_requests *requests, const session_due_views *views,
+                             const session_catalogue_mesh *mesh, int index)
 {
-    bool is_any = false;
-    for (int i = 0; i < image->volume_count; i++) is_any = is_any || find_shown(mesh, &image->volumes[i].field);
-    for (int i = 0; i < image->surface_count; i++)
-        is_any = is_any || scene_field_is_on(&image->surfaces[i].meshes_field, mesh->name);
-    return is_any;
+    const scene_image *image = &views->scene->images[index];
+    const session_error_request positions = {.field = NULL};
+    for (int i = 0; i < image->volume_count; i++) {
+        if (!find_shown(mesh, &image->volumes[i].field)) continue;
+        requests->needs_all = true;
+        show_request(requests, views, &positions, index);
+    }
+    for (int i = 0; i < image->surface_count; i++) {
+        if (!scene_field_is_on(&image->surfaces[i].meshes_field, mesh->name)) continue;
+        requests->needs_outer = true;
+        requests->needs_all = requests->needs_all || image->surfaces[i].threshold.is_given;
+        show_request(requests, views, &positions, index);
+    }
 }
 
 static bool has_fields_of_neighbours(const session_catalogue_mesh *mesh, const scene_image *image)
@@ -260,10 +270,7 @@ void session_list_error_requests(const scene *scene, const session_due_views *vi
         const scene_image *image = &scene->images[i];
         are_any_due = are_any_due || views->are_due[i];
         if (!views->are_due[i]) continue;
-        if (has_whole_layers(mesh, image)) {
-            show_request(out, views, &positions, i);
-            out->needs_all = true;
-        }
+        add_whole_layers(out, views, mesh, i);
         out->needs_all = out->needs_all || has_fields_of_neighbours(mesh, image);
         for (int layer = 0; layer < image->isosurface_count; layer++)
             add_isosurface(out, views, mesh, image, i, layer, report);

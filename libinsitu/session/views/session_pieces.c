@@ -20,6 +20,7 @@
 #include "session_filled.h"
 #include "session_indexed.h"
 #include "session_interpolation.h"
+#include "session_outer_cells.h"
 #include "session_piece_set.h"
 #include "session_volume_errors.h"
 
@@ -97,10 +98,13 @@ static void measure_part(const mesh_work *w, const session_mesh *mesh, session_c
 {
     unsigned char *cells = marks ? marks->cells : NULL;
     part_work work = {.of = w, .mesh = mesh, .request = {.marks = cells}};
+    if (marks && w->requests.needs_outer) work.request.measured = mesh->finer.outer_faces;
     for (int n = 0; n < w->requests.count && !error->status; n++) {
         const session_error_request *request = &w->requests.items[n];
         if (request->is_shown && !request->volume && (!w->marks_only || marks)) use_part(&work, request, error);
     }
+    for (int64_t cell = 0; work.request.measured && cell < session_nodal_mesh(mesh)->cell_count; cell++)
+        if (work.request.measured[cell]) cells[cell] = 1;
     session_count_finer_bytes(mesh, cells, w->out->bytes);
 }
 
@@ -109,8 +113,11 @@ static void choose_part(const mesh_work *w, const session_mesh *mesh, session_ce
 {
     part_work work = {.of = w, .mesh = mesh, .pieces = &marks->pieces};
     session_begin_piece_set(mesh, marks->cells, w->choice->parts, work.pieces, error);
-    for (int n = 0; n < w->requests.count && !error->status; n++)
-        if (w->requests.items[n].is_shown) use_part(&work, &w->requests.items[n], error);
+    for (int n = 0; n < w->requests.count && !error->status; n++) {
+        const session_error_request *request = &w->requests.items[n];
+        if (request->is_shown && (request->field || request->has_plane)) use_part(&work, request, error);
+    }
+    if (w->requests.needs_outer && !error->status) session_add_outer_pieces(mesh, w->choice->parts, work.pieces, error);
 }
 
 /* Measures the parts of a mesh. If the number of pieces has been chosen already, lists the pieces of refined cells
@@ -246,10 +253,36 @@ static insitu_status estimate_all_volumes(const session_pieces_basis *basis, con
     return status;
 }
 
+/* Returns whether a due image shows the outer surface of a mesh. */
+static bool is_outer_shown(const session_due_views *views, const char *mesh)
+{
+    for (int i = 0; i < views->count; i++) {
+        const scene_image *image = &views->scene->images[i];
+        for (int layer = 0; views->are_due[i] && layer < image->surface_count; layer++)
+            if (scene_field_is_on(&image->surfaces[layer].meshes_field, mesh)) return true;
+    }
+    return false;
+}
+
+/* Finds the outer faces of the meshes whose outer surfaces are shown. Collective. */
+static insitu_status find_outer_cells(const session_pieces_basis *basis, const session_due_views *views,
+                                      const session_finer_choice *choices, base_error *error)
+{
+    insitu_status status = INSITU_OK;
+    for (int m = 0; m < basis->catalogue->mesh_count && !status; m++) {
+        const char *name = basis->catalogue->meshes[m].name;
+        const session_parts parts = session_find_parts(basis->meshes, name);
+        if (choices[m].order > 0 && !choices[m].excluded_count && is_outer_shown(views, name))
+            status = session_find_outer_cells(&parts, basis->are_cells_changed, basis->team, error);
+    }
+    return status ? status : session_agree(basis->team->comm, error);
+}
+
 static insitu_status find_errors(const session_pieces_basis *basis, const session_due_views *views,
                                  session_finer_choice *choices, piece_error *errors, session_report *report,
                                  base_error *error)
 {
+    if (find_outer_cells(basis, views, choices, error)) return error->status;
     fill_fields(basis, views);
     for (int m = 0; m < basis->catalogue->mesh_count && !error->status; m++)
         if (choices[m].order > 0 && !choices[m].excluded_count)

@@ -9,6 +9,7 @@
 typedef struct session_pieces_basis {
     const scene *scene;
     const session_moment *moment;
+    bool are_cells_changed; /* set if cells or positions have changed on some rank since the last choice */
     const session_catalogue *catalogue;
     const session_team *team;
     session_meshes *meshes;
