@@ -1,4 +1,13 @@
-/* This rank's parts of the meshes: the caller's data, data derived from it, and the trees over it. */
+/* This rank's parts of the meshes: the caller's data, data derived from it, and the trees over it. Terms that the
+ * session's code uses:
+ * - part: one rank's part of a mesh; if the rank has several blocks of the mesh, each block is a part;
+ * - piece: one of the linear cells into which a cell of higher order is split (session_split.h);
+ * - finer lattice: additional nodes of a cell of higher order, at which its polynomial is evaluated (session_finer.h);
+ * - shell: a triangle, quad or polygon that is drawn; a shell has no volume;
+ * - drawn cell: a cell that is not a ghost;
+ * - outer surface: the faces that belong to only one of the cells selected by a threshold (session_outer below);
+ * - mesh group: the meshes across which values are averaged at equal vertices (session_catalogue.h);
+ * - tree: bounding volume hierarchy over the drawn cells. */
 #ifndef SESSION_MESH_H
 #define SESSION_MESH_H
 
@@ -215,10 +224,11 @@ enum { SESSION_FINER_COUNTS = 64 };
 /* Nodes of a finer lattice in cells of higher order, at which their polynomials are evaluated (session_finer.h).
  * insitu_report lists them as a copy. */
 typedef struct session_finer {
-    bool is_counted; /* set if `counts` are those of the current cells */
+    bool is_counted; /* set if `counts` were computed for the current cells */
     int64_t counts[SESSION_FINER_COUNTS];
-    int parts; /* number of parts of each edge between two nodes; 0: session_mesh.given is the caller's mesh */
-    /* the sizes of the mesh without finer lattices */
+    int parts; /* number of parts into which each segment between two nodes of an edge is divided; 0: the mesh has no
+                  finer lattices, and session_mesh.given is the caller's mesh */
+    /* sizes and session_mesh.given_counts that the mesh has without finer lattices */
     session_sizes sizes;
     session_counts given_counts;
     session_piece_set pieces;
@@ -311,8 +321,9 @@ typedef struct session_mesh {
     session_mirrored mirrored;
     char *label;          /* name for messages: "m", or "m[17]" for block 17 */
     insitu_mesh original; /* the caller's description */
-    /* the description that is read: as `original`, but with copies of arrays that cannot be read in place, and with
-     * moved coordinates; or the cells of finer lattices */
+    /* The description that is read. It equals `original`, except that arrays that cannot be read in place are replaced
+     * by copies, and that coordinates may have been moved. If the mesh has finer lattices, it describes the cells of
+     * these lattices. */
     insitu_mesh given;
     session_conformed conformed;
     session_topology topology;
@@ -353,9 +364,11 @@ typedef struct session_mesh {
     bool is_needed; /* set if an image of this step draws the mesh */
     bool has_tree;  /* set if `tree` has been built */
     mmbvh tree;     /* tree over the drawn cells, or over some of them (is_partial) */
-    /* set if the tree contains only the candidates of candidates_key, as long as nothing changes */
+    /* set if the tree contains only candidates: the cells that the current images can show according to their values
+     * (plan/session_candidates.h). Such a tree can be used as long as candidates_key, cells and coordinates are the
+     * same */
     bool is_partial;
-    /* set if the bounds of the full tree's nodes enclose only the candidates of candidates_key */
+    /* set if the bounds of the full tree's nodes enclose only the candidates */
     bool are_bounds_partial;
     double built_surface;    /* half the surface area of the mesh's bounds when the tree was built */
     uint64_t candidates_key; /* hash that identifies the candidates of the current images and values */
@@ -422,8 +435,7 @@ bool session_is_aligned(const insitu_array *array);
 /* Returns the caller's array as the grid_array through which meshes are read. Its indices count from 0. */
 grid_array session_grid_array(const insitu_array *array);
 
-/* Returns the vertices' coordinates along an axis. If z is not given, it is an array whose elements are all the same
- * 0. */
+/* Returns the vertices' coordinates along an axis. If z is not given, returns an array all of whose elements are 0. */
 grid_array session_coordinates(const insitu_mesh *mesh, int axis);
 
 /* Returns an array of indices as a grid_array. Its indices count from the mesh's index_base. */
@@ -459,14 +471,16 @@ typedef struct session_parts {
     session_mesh **items;
 } session_parts;
 
-/* Returns the description of a mesh whose cells have the caller's nodes, even if finer lattices are read instead. */
+/* Returns the description of a mesh in which cells have only the caller's nodes, even if finer lattices are read
+ * instead. */
 static inline const insitu_mesh *session_nodal_mesh(const session_mesh *mesh)
 {
     return mesh->finer.parts ? &mesh->finer.nodal : &mesh->given;
 }
 
 session_parts session_find_parts(const session_meshes *meshes, const char *name);
-/* Returns the parts that have the same name as the one at index `first`, which must be the first of them. */
+/* Returns the parts that have the same name as the part at index `first`, which must be the first part with this
+ * name. */
 session_parts session_parts_at(const session_meshes *meshes, int first);
 /* Returns the block with this name and number, or NULL if there is none. */
 session_mesh *session_find_block(const session_meshes *meshes, const char *name, int64_t block);
@@ -488,7 +502,8 @@ session_mesh *session_add_image(session_meshes *meshes, session_mesh *source, in
 /* Returns the image of a part that is mirrored along these axes, or NULL if there is none. */
 session_mesh *session_find_image(const session_meshes *meshes, const session_mesh *source, int mirror_axes);
 void session_remove_image(session_meshes *meshes, session_mesh *image);
-/* Removes a block, or a mesh with all its blocks, with their images. Does nothing if it does not exist. */
+/* Removes a block or, in session_remove_mesh(), a mesh with all its blocks. Mirror images are removed too. Does nothing
+ * if the block or mesh does not exist. */
 void session_remove_block(session_meshes *meshes, const char *name, int64_t block);
 void session_remove_mesh(session_meshes *meshes, const char *name);
 
@@ -508,18 +523,20 @@ void session_drop_fields(session_mesh *mesh);
 void session_drop_copy(session_field *field);
 /* Frees the session's copies of the field's tables of patches and components. */
 void session_drop_field_tables(session_field *field);
-/* Frees the data that depends on the cells, after these have changed. Fields are kept. */
+/* Frees the data that depends on the cells, after the cells have changed. Fields are kept. */
 void session_drop_cell_data(session_meshes *meshes, session_mesh *mesh);
-/* Marks the coordinates of the vertices as changed. The cells are the same. */
+/* Marks the coordinates of the vertices as changed, while the cells' connectivity is unchanged. */
 void session_mark_moved(session_meshes *meshes, session_mesh *mesh);
 /* Frees the moved coordinates, which must not be in use any more. */
 void session_drop_warp(session_mesh *mesh);
 void session_drop_mirrored(session_mirrored *mirrored);
 /* Removes the derived fields, and with them all scalars and thresholds, which refer to fields by index. */
 void session_drop_derived(session_mesh *mesh);
-/* Frees the mesh of outer faces and, if with_faces, the faces themselves. The threshold is kept. */
+/* Frees the mesh that is built on the outer faces and, if with_faces, the list of these faces. The threshold is
+ * kept. */
 void session_drop_outer(session_outer *outer, bool with_faces);
-/* Frees all outer surfaces of a mesh. If the cells are new, thresholds are also removed. */
+/* Frees the data of all outer surfaces of a mesh. are_cells_new: also frees the lists of outer faces, and removes the
+ * outer surfaces with their thresholds. */
 void session_drop_outers(session_mesh *mesh, bool are_cells_new);
 void session_drop_contents(session_mesh *mesh);
 /* Frees all data of a mesh whose description is wrong, except the names of its fields: images that show these fields
@@ -536,8 +553,8 @@ typedef struct session_part_walk {
     session_mesh *part;
     session_mesh *whole;  /* the mesh whose outer faces the part contains; NULL: the part is a mesh of the caller */
     session_outer *outer; /* the outer surface that the part belongs to; NULL: the part is a mesh of the caller */
-    /* state of the iterator: indices of the next mesh, of the mesh whose outer faces are visited, and of its next outer
-     * surface */
+    /* State of the iterator. mesh_index: index of the caller's mesh that is visited next; whole_index: index of the
+     * mesh whose outer surfaces are visited; outer_index: index of the outer surface that is visited next. */
     int mesh_index, whole_index, outer_index;
 } session_part_walk;
 
@@ -550,7 +567,8 @@ static inline const session_mesh *session_source(const session_mesh *mesh)
     return mesh->source ? mesh->source : mesh;
 }
 
-/* Returns the number of cells that the caller gave; a lattice's array of cells may have padding. */
+/* Returns the number of cells that the caller gave. For a lattice, session_mesh.cells may have more cells, as
+ * padding. */
 static inline int64_t session_cell_count(const session_mesh *mesh)
 {
     return mesh->cells.lattice ? mesh->lattice.cells.cell_count : mesh->given.cell_count;
@@ -569,8 +587,8 @@ static inline int64_t session_caller_cell(const session_mesh *mesh, int64_t cell
     return mesh->topology.is_split ? (int64_t)mesh->topology.parents[cell] : cell;
 }
 
-/* Returns the first of the consecutive cells of `cells` that belong to the caller's cell; they end before the first
- * cell of the caller's next one. */
+/* Returns the first of the cells of `cells` that belong to a cell of the caller. They are consecutive, and end before
+ * the first one that belongs to the caller's next cell. */
 static inline int64_t session_first_piece(const session_mesh *mesh, int64_t cell)
 {
     return mesh->topology.is_split ? mesh->topology.first_pieces[cell] : cell;
@@ -588,11 +606,11 @@ static inline int64_t session_vertex_count(const session_mesh *mesh)
     return mesh->discontinuous.is_active ? mesh->discontinuous.corner_count : mesh->cells.vertex_count;
 }
 
-/* Returns the first error of a set call that no step has returned yet; NULL: there is none. */
+/* Returns the first error of an insitu_set_*() call that no step has reported yet; NULL: there is none. */
 const base_error *session_pending_error(const session_meshes *meshes);
 
-/* Stores an error of a set call that cannot be stored with a mesh. field is NULL if the error does not belong to a
- * single field. */
+/* Stores an error of an insitu_set_*() call that cannot be stored with a mesh. field: NULL if the error does not belong
+ * to a single field. */
 void session_store_pending(session_meshes *meshes, const base_error *error, const char *mesh, const char *field);
 void session_drop_pending(session_meshes *meshes);
 
@@ -600,7 +618,7 @@ void session_drop_pending(session_meshes *meshes);
  * holds an error. */
 void session_store_problem(session_field *field, const base_error *problem, base_error *first);
 
-/* Removes a mesh from the list for the rest of the step, so that this rank acts as if it had no part of it. */
+/* Removes a mesh from the list for the rest of the step, so that this rank acts as if it had no part of the mesh. */
 void session_exclude_mesh(session_meshes *meshes, session_mesh *mesh);
 /* Puts the meshes that the step has excluded back into the list. */
 void session_restore_excluded(session_meshes *meshes);
@@ -622,7 +640,8 @@ static inline bool session_has_levels(const insitu_mesh *mesh)
     return l && mesh->cell_count > 0 && (l->refinement[0] || l->refinement[1] || l->refinement[2]);
 }
 
-/* Returns the number of faces that the caller gave. Those of the separate list of boundary faces follow the others. */
+/* Returns the number of faces that the caller gave, including those of the separate list of boundary faces, which are
+ * numbered after the others. */
 static inline int64_t session_face_count(const insitu_mesh *mesh)
 {
     return mesh->face_count + mesh->boundary_face_count;

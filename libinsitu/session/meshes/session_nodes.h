@@ -1,4 +1,6 @@
-/* The types of cells of higher order, and the positions of their nodes in the cell's row of connectivity. */
+/* The types of cells of higher order, and the positions of their nodes in the cell's row of connectivity. The lattice
+ * of a cell of order p is the regular grid of its nodes, whose indices i, j, k along the axes of the reference cell are
+ * 0 .. p. */
 #ifndef SESSION_NODES_H
 #define SESSION_NODES_H
 
@@ -44,7 +46,8 @@ const char *session_order_refused(const session_nodes *of, insitu_vertex_order o
  * the layer below. For a node that a serendipity cell lacks, the result is at least session_nodes.count. */
 int session_node_index(const session_nodes *of, insitu_vertex_order order, int i, int j, int k);
 
-/* Returns whether the lattice of the cell's order has a node i, j, k; each of them is from 0 to the order. */
+/* Returns whether the lattice of the cell's order has a node with the indices i, j, k; each index must be in 0 ..
+ * order. */
 bool session_has_node(const session_nodes *of, int i, int j, int k);
 
 /* Returns the position in the row of connectivity of the n-th node in VTK's order, for cells of order 2. */

@@ -11,8 +11,8 @@ bool session_has_higher_order(const insitu_mesh *given);
  * the caller's cells are invalid. Local. */
 insitu_status session_split_cells(session_mesh *mesh, int threads, base_error *error);
 
-/* Creates a connectivity of the pieces whose entries are not vertices but entries of the caller's connectivity, counted
- * without the unused ends of rows. Local. */
+/* Creates a connectivity of the pieces that contains, instead of vertices, indices of entries of the caller's
+ * connectivity, counted without the unused ends of rows. Local. */
 insitu_status session_split_entries(const session_mesh *mesh, int threads, grid_array *out, base_error *error);
 
 /* Returns the position in the caller's connectivity of an entry that is counted without the unused ends of rows. */

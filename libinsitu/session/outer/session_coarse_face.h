@@ -1,4 +1,5 @@
-/* Triangles and quads of cells on which hanging vertices may lie, and positions on these faces. */
+/* Triangles and quads of cells on which hanging vertices may lie, and positions on these faces. A hanging vertex is a
+ * vertex of a fine cell that lies on a face of a coarser cell without being a corner of this face. */
 #ifndef SESSION_COARSE_FACE_H
 #define SESSION_COARSE_FACE_H
 
@@ -29,7 +30,7 @@ typedef struct session_face_outline {
 
 /* Reads the outline of a face. Returns false if the face is not a triangle or quad of a cell with a volume. */
 bool session_read_outline(const grid *g, const session_face *face, session_face_outline *out);
-/* Returns whether a position in the outline's box may be within `slack` of the face. It returns false if the position
+/* Returns false only if a position in the outline's box is certainly more than `slack` away from the face: the position
  * is beyond all corners of the face, either along its normal or across one of its edges. */
 bool session_may_contain(const session_face_outline *outline, const double position[3], double slack);
 
