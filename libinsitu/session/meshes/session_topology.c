@@ -9,18 +9,13 @@
  * moving mesh.
  *
  *           t3 ------ t2
- *          /|        /|      The base is any face with the right number of vertices (four for a hex and a pyramid,
- * three
- *         / |       / |      for a wedge and a tet). The face that shares an edge with the base is a side. A side that
- * is a
- *        t0 ------ t1 |      quad determines the vertices above the edge's ends: t0 and t1 above a0 and a1. The cell is
- *        | a3 ----|- a2      closed if neighbouring sides have the same vertex above the corner that they share, if the
- *        | /      | /        remaining face is the loop of t0, t1, ... in this order, and if no two vertices are equal.
- * Then
- *        |/       |/         every face has its place, and every edge belongs to two faces. Sides that are triangles
- * have
- *        a0 ----- a1         one vertex above the base, which is the apex of a pyramid or a tet. The directions of the
- *                            faces' loops do not matter.
+ *          /|        /|      The base is any face with the right number of vertices: four for a hex and a pyramid,
+ *         / |       / |      three for a wedge and a tet. A face that shares an edge with the base is a side. A quad
+ *        t0 ------ t1 |      as a side determines the vertices above the edge's ends: t0 and t1 above a0 and a1.
+ *        | a3 ----|- a2      The cell is closed if neighbouring sides have the same vertex above the corner that they
+ *        | /      | /        share, if the remaining face is the loop of t0, t1, ... in this order, and if no two
+ *        |/       |/         vertices are equal. Then every edge belongs to two faces. Triangles as sides have one
+ *        a0 ----- a1         vertex above the base, the apex. The directions of the faces' loops do not matter.
  *
  * If any cell is invalid, no polyhedron of the mesh is recognized, so that session_check.c reports the error in terms
  * of the caller's cells. */

@@ -31,7 +31,7 @@ enum { MOST_TABLES = 4 };
 /* The data that the search stores for one part of the mesh. */
 typedef struct part_cells {
     const grid *grid;
-    /* one byte per cell, nonzero if the cell is beyond the threshold; NULL: there is no threshold */
+    /* one byte per cell, nonzero if the threshold does not select the cell; NULL: there is no threshold */
     unsigned char *is_hidden;
     int64_t first_cell;   /* number of the part's first cell among those of all parts */
     int64_t first_vertex; /* number of the part's first vertex among those of all parts */
@@ -222,8 +222,8 @@ static void add_faces(const xor_table *x, int64_t cell)
     }
 }
 
-/* Adds the vertex's sums in all tables to the sum of its hash. `vertex` is its number among the vertices of all
- * parts. */
+/* Adds the sums of a vertex, in all tables, to the element of hash_sums that belongs to the vertex's hash. vertex:
+ * number of the vertex among the vertices of all parts. */
 static void add_vertex(const face_search *s, int64_t vertex)
 {
     uint64_t sum = 0;
@@ -253,7 +253,7 @@ static void cancel_faces(const face_search *s)
     }
 }
 
-/* The faces found in some of the cells. */
+/* The possible outer faces in some of the cells, with their keys. */
 typedef struct face_list {
     int64_t count, capacity;
     found_face *faces;
@@ -287,7 +287,7 @@ static bool is_open_face(const part_cells *p, const session_face_loop *loop)
     return true;
 }
 
-/* Returns whether the cell may have an outer face, according to the marks of its vertices. */
+/* Returns whether the cell may have an outer face, according to the flags may_be_outer of its vertices. */
 static bool has_open_vertices(const part_cells *p, int64_t cell)
 {
     const grid *g = p->grid;
@@ -417,8 +417,8 @@ static bool make_tables(face_search *s)
     return true;
 }
 
-/* Numbers the cells and vertices of all parts, and finds the cells that are beyond thresholds. Returns false if memory
- * runs out. */
+/* Numbers the cells and vertices of all parts, and finds the cells that thresholds do not select. Returns false if
+ * memory runs out. */
 static bool number_parts(face_search *s)
 {
     s->cells = base_calloc((size_t)s->part_count + 1, sizeof *s->cells);
@@ -457,8 +457,8 @@ static insitu_status search_own_faces(face_search *s, bool by_id, base_error *er
 
 enum { KEY_WORDS = 3 };
 
-/* Returns the home rank of a face whose vertices are all in other ranks' boxes, or -1 if only this rank can have the
- * face. The home is that of the face's first vertex in an order by hashes, which is the same on all ranks. */
+/* Returns the home rank of a face all of whose vertices lie in other ranks' boxes, or -1 if only this rank can have the
+ * face. The home rank is that of the vertex with the least hash, which is the same vertex on all ranks. */
 static int find_face_home(const face_search *s, const session_homes *homes, int64_t number)
 {
     const found_face *face = &s->faces[number];
@@ -479,8 +479,8 @@ static int find_face_home(const face_search *s, const session_homes *homes, int6
                              (int64_t)key.words[0]);
 }
 
-/* Packs the keys of the faces that lie in other ranks' boxes, sorted by their home ranks. *order receives the face of
- * each key. Returns false if memory runs out. */
+/* Packs the keys of the faces that other ranks may have too, sorted by the faces' home ranks. *order receives the face
+ * of each key. Returns false if memory runs out. */
 static bool pack_keys(const face_search *s, const session_homes *homes, int ranks, session_mail *mail, int64_t **order)
 {
     int64_t *next = base_calloc((size_t)ranks + 1, sizeof *next);
@@ -583,7 +583,7 @@ static void mark_borders(const face_search *s)
     }
 }
 
-/* Stores the outer faces that were found with the parts to which they belong. */
+/* Stores the outer faces in the `outer` of the parts to which they belong. */
 static void store_outer_faces(const face_search *s, base_error *error)
 {
     int64_t at = 0;

@@ -10,8 +10,8 @@
 /* Returns whether any mesh contains only shells, over all ranks. */
 bool session_has_shells(const session_catalogue *catalogue);
 
-/* Returns a surface layer that draws the isosurface as contour lines on shells. It refers to data of the layer. height
- * is that of the image in pixels. */
+/* Returns a surface layer that draws an isosurface layer as contour lines on shells. The result points to data of the
+ * isosurface layer. height: height of the image in pixels. */
 scene_surface session_make_shell_layer(const scene_isosurface *layer, int height);
 
 /* Returns whether the surface layer is drawn on the mesh. */

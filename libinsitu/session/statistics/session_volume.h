@@ -8,11 +8,11 @@
 
 /* Buffers of a thread. They must be initialized with {0}. */
 typedef struct volume_buffer {
-    const int64_t *vertices; /* vertices of the cell that was computed last, without duplicates */
+    const int64_t *vertices; /* vertices, without duplicates, of the cell whose volume was computed most recently */
     int vertex_count;
     int64_t corners[GRID_MAX_CELL_VERTICES]; /* memory for the vertices of cells of a fixed size */
     char *bytes;                             /* memory for polyhedra and polygons */
-    size_t size, requested_size;             /* size of `bytes`, and the size that was requested last */
+    size_t size, requested_size;             /* size of `bytes`, and the size of the most recent request */
     bool is_out_of_memory; /* set if the requested memory was not available, so that a volume could not be computed */
 } volume_buffer;
 
