@@ -121,9 +121,8 @@ typedef struct session_mesh_group {
     session_catalogue_mesh **meshes; /* the meshes of the mesh group, sorted by name; owned by the catalogue */
     /* set if the mesh group is a single mesh with global vertex ids; vertices are then equal if their ids are equal */
     bool by_id;
-    uint64_t positions_hash; /* hash of the vertex positions of all its meshes */
-    session_homes
-        own_homes; /* home ranks (session_homes.h) in a mesh group of several meshes; unused if it has one mesh */
+    uint64_t positions_hash;    /* hash of the vertex positions of all its meshes */
+    session_homes own_homes;    /* home ranks, if the mesh group has several meshes; unused if it has one mesh */
     const session_homes *homes; /* points to own_homes, or to the homes of the single mesh */
     session_vertex_groups groups;
     session_hanging hanging;

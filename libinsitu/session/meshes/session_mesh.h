@@ -313,10 +313,10 @@ typedef struct session_misfit {
 typedef struct session_mesh {
     char *name;
     int64_t block; /* the block's number, or SESSION_WHOLE */
-    /* A mesh that the scene mirrors has its mirror images as further parts, in addition to the caller's own parts.
-     * Statistics, counts and errors ignore them. */
-    struct session_mesh
-        *source;     /* for a mirror image: the caller's part that is mirrored; NULL: this part is the caller's */
+    /* For a mirror image: the caller's part that is mirrored; NULL: this part is the caller's. A mesh that the scene
+     * mirrors has its mirror images as further parts, in addition to the caller's own parts. Statistics, counts and
+     * errors ignore mirror images. */
+    struct session_mesh *source;
     int mirror_axes; /* bit i is set if this mirror image is mirrored along axis i; 0: this part is the caller's */
     session_mirrored mirrored;
     char *label;          /* name for messages: "m", or "m[17]" for block 17 */

@@ -6,8 +6,8 @@
 
 typedef struct mesh_tally {
     double lower[3], upper[3];
-    int64_t drawn_count, ghost_count, inverted_count, flat_count,
-        shell_count; /* shells are drawn cells of a type without volume: triangles, quads and polygons */
+    /* numbers of cells; shells are drawn cells of a type without volume: triangles, quads and polygons */
+    int64_t drawn_count, ghost_count, inverted_count, flat_count, shell_count;
     /* sum of the cube roots of the volumes; added block by block, which keeps the rounding error small */
     double size_sum;
 } mesh_tally;

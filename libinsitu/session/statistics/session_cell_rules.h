@@ -24,8 +24,8 @@ typedef struct session_product_rule {
 
 /* The rules of one kind of cell. */
 typedef struct session_cell_rules {
-    session_interpolation
-        nodes; /* the cell's nodes, and all nodes of a complete cell of its order; empty if this kind has no rules */
+    /* the cell's nodes, and all nodes of a complete cell of its order; empty if this kind has no rules */
+    session_interpolation nodes;
     session_nodes lattice; /* same as nodes.complete; for pyramids, which are read as collapsed hexes, that of a hex */
     double *collapse;      /* for pyramids: matrix from nodes.complete to `lattice`; otherwise NULL */
     int line_count;        /* number of factors that are lines, not counting the first one */

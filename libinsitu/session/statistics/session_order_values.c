@@ -171,8 +171,8 @@ static const double flat_share = 0x1p-40;
 
 typedef struct cell_integrals {
     double volume, size; /* integrals of the measure, and of its absolute value */
-    double first,
-        second; /* integrals of v and of v^2, where v is the value's position in the range of values, minus 1/2 */
+    /* integrals of v and of v^2, where v is the value's position in the range of values, minus 1/2 */
+    double first, second;
 } cell_integrals;
 
 static void add_integrals(void *of, int count, const double *measures, const double *values)

@@ -1,12 +1,12 @@
-/* Determines which cells of higher order need finer pieces. Isosurfaces and slices are drawn only from the pieces that
- * they cross. If an isovalue is outside the range of the Bernstein coefficients of a cell, it is also outside the range
- * of each of the cell's faces. The isosurface then crosses none of these faces, however the cells on both sides are
- * divided into pieces. Therefore only cells that may be crossed need finer pieces.
+/* Determines which cells of higher order need finer pieces, that is, linear pieces that are smaller than the distance
+ * between nodes. An isosurface or slice is drawn only from the pieces that it crosses. If an isovalue is outside the
+ * range of the Bernstein coefficients of a cell, it is also outside the range of each of the cell's faces. The
+ * isosurface then crosses none of these faces, however the cells on both sides are divided into pieces. Therefore only
+ * cells that isosurfaces may cross need finer pieces.
  *
- * All cells need finer pieces if faces of pieces are drawn or compared with those of neighbours (outer surfaces,
- * contours of shells), if rays pass from cell to cell (volumes), or if values at vertices are means or derivatives over
- * neighbours.
- */
+ * All cells need finer pieces in three cases: if faces of pieces are drawn, or are compared with faces of neighbouring
+ * cells (outer surfaces, contours of shells); if rays pass from cell to cell (volumes); or if values at vertices are
+ * means or derivatives over neighbouring cells. */
 #include "session_error_requests.h"
 
 #include <math.h>
@@ -121,8 +121,8 @@ static bool is_same_request(const session_error_request *a, const session_error_
     return strcmp(a->field, b->field) == 0 && a->component == b->component;
 }
 
-/* Returns the entry that equals `like`, and adds it if the list does not contain it. If the list is full, returns the
- * entry for positions, and all cells are refined. */
+/* Returns the request that equals `like`; adds it if the list does not contain it. If the list is full, returns the
+ * request for positions, and all cells are refined. */
 static session_error_request *find_request(session_error_requests *requests, const session_due_views *views,
                                            const session_error_request *like)
 {
@@ -229,7 +229,7 @@ static void add_volume(session_error_requests *requests, const session_due_views
     show_request(requests, views, &like, index);
 }
 
-/* Returns whether a layer shows the mesh from all of its cells. */
+/* Returns whether a layer of the image needs all cells of the mesh, because it is a volume or an outer surface. */
 static bool has_whole_layers(const session_catalogue_mesh *mesh, const scene_image *image)
 {
     bool is_any = false;

@@ -4,7 +4,8 @@
 
 #include "session_error_requests.h"
 
-/* The range of a field's values at the nodes of all cells; minus_low is -low. */
+/* The range of a field's values at the nodes of all cells. minus_low is the negated lower end, so that one reduction by
+ * maximum finds both ends. */
 typedef struct session_value_range {
     const scene_field *field;
     double minus_low, high;
@@ -17,7 +18,8 @@ typedef struct session_value_ranges {
     session_value_range *items;
 } session_value_ranges;
 
-/* Finds the ranges. The caller must free *out even after an error. Collective; all ranks return the same status. */
+/* Finds the value ranges of all volumes that need them. The caller must free *out even after an error. Collective; all
+ * ranks return the same status. */
 insitu_status session_find_volume_ranges(const scene *scene, const session_due_views *views,
                                          const session_meshes *meshes, const session_team *team,
                                          session_value_ranges *out, base_error *error);
