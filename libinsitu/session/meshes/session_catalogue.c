@@ -38,14 +38,14 @@ static size_t append_fault(char *text, size_t capacity, size_t at, const base_er
     return fault->status ? append_line(text, capacity, at, 'e', (int)fault->status, 0, fault->message) : at;
 }
 
-/* Properties that this rank's parts of a mesh share; they are written into its table. */
+/* The properties of all of this rank's parts of a mesh together, which the rank's table lists. */
 typedef struct part_summary {
     bool is_given, has_cells, has_ids, is_refined;
     const base_error *problem; /* error of the first part that has one; NULL: no part has an error */
 } part_summary;
 
-/* Summarizes the parts of a mesh. The mesh's vertices have ids if there are parts with cells, and all of these have
- * ids. */
+/* Summarizes this rank's parts of a mesh. The mesh has vertex ids if at least one part has cells, and all parts with
+ * cells have ids. */
 static part_summary summarize_parts(const session_parts *parts)
 {
     part_summary out = {.has_ids = true};
@@ -79,8 +79,8 @@ static bool is_first_with_field(const session_parts *parts, int part, const sess
     return true;
 }
 
-/* Finds an error of a field on any part: its description is invalid, or differs from that on the first part that has
- * the field. */
+/* Finds an error of a field on any part: the field's description is invalid, is missing, or differs from the
+ * description on the first part that has the field. */
 static void find_field_problem(const session_parts *parts, const session_field *first, base_error *problem)
 {
     const insitu_field *as = &first->given;
@@ -171,7 +171,7 @@ static void hash_parts(const session_parts *parts, uint64_t *hash)
     }
 }
 
-/* The hash of names includes errors that only some blocks have, because other ranks must be informed of these. */
+/* Errors that only some blocks have are hashed too, because other ranks must be informed of these errors. */
 uint64_t session_names_hash(const session_meshes *meshes)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
@@ -371,9 +371,10 @@ static bool store_fault(base_error **fault, int rank, insitu_status status, cons
     return *fault != NULL;
 }
 
-/* Records an error that a rank's table contains. field: NULL if the error is one of the whole mesh; mesh: NULL if it is
- * unknown to which mesh the error belongs. Lack of memory is also recorded for the catalogue, because callers usually
- * skip the data that they would have passed next. */
+/* Records an error that a rank's table contains. field: NULL if the error concerns the whole mesh; mesh: NULL if it is
+ * not known to which mesh the error belongs. Lack of memory is also recorded for the whole catalogue, because a caller
+ * whose call has failed for lack of memory usually skips its next calls, so that further meshes and fields may be
+ * missing. */
 static bool record_fault(session_catalogue *catalogue, session_catalogue_mesh *mesh, session_catalogue_field *field,
                          int rank, insitu_status status, const char *message)
 {

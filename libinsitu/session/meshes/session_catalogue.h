@@ -17,7 +17,7 @@ typedef struct session_catalogue_field {
     int differing_rank; /* a rank on which the field has another centring or number of components; -1: there is none */
     int lacking_rank;   /* a rank that has cells of the mesh but not the field; -1: there is none */
     int derived_index;  /* index among the scene's derived fields; -1: the field is the caller's */
-    base_error *fault;  /* error on the lowest rank on which the field has one; NULL: there is none */
+    base_error *fault;  /* error of the field on the lowest rank on which it has an error; NULL: there is none */
 } session_catalogue_field;
 
 /* A hanging vertex: a vertex that lies on a face of a coarser cell without being a corner of this face. Its value is
@@ -25,7 +25,7 @@ typedef struct session_catalogue_field {
 typedef struct session_hanging_vertex {
     int64_t group;      /* index of its group of equal vertices (session_vertex_groups) */
     int64_t corners[4]; /* indices of groups, or of the values received from other ranks */
-    double weights[4];  /* weight of the value at each corner; they sum to 1 */
+    double weights[4];  /* weight of the value at each corner; the weights sum to 1 */
     bool is_received; /* set if `corners` are indices of values received from other ranks, not of groups of this rank */
 } session_hanging_vertex;
 
@@ -73,7 +73,7 @@ typedef struct session_vertex_groups {
     uint64_t positions_hash;
     /* index of each part's first vertex in group_of_vertex, and at the end the total number of vertices */
     int64_t *first_vertices;
-    int64_t *group_of_vertex; /* group of each vertex; -1: it belongs to no drawn cell */
+    int64_t *group_of_vertex; /* group of each vertex; -1: the vertex belongs to no drawn cell */
     int64_t count;            /* number of groups */
     /* for each group, the number of corners of drawn cells in all groups before it; count + 1 entries */
     int64_t *corner_starts;
@@ -82,8 +82,8 @@ typedef struct session_vertex_groups {
     /* Groups whose positions lie in other ranks' bounding boxes, sorted by the ranks that combine their values (home
      * ranks, session_homes.h). There are none if there is only one rank. */
     int64_t shared_count;     /* number of groups whose positions lie in other ranks' boxes */
-    int64_t *shared_groups;   /* index of each of these groups */
-    session_key *shared_keys; /* key by which each of these groups is found on its home rank */
+    int64_t *shared_groups;   /* index of each shared group */
+    session_key *shared_keys; /* key by which each shared group is found on its home rank */
     int64_t *shared_counts;   /* for each rank, the number of shared groups that have this home rank */
 } session_vertex_groups;
 
@@ -190,7 +190,7 @@ void session_mesh_group_parts_free(session_mesh_group_parts *parts);
 
 void session_vertex_groups_free(session_vertex_groups *groups);
 
-/* Returns a hash of this rank's table of names. It is equal on two ranks if their tables are equal. Local. */
+/* Returns a hash of this rank's table of names. Two ranks have the same hash if their tables are equal. Local. */
 uint64_t session_names_hash(const session_meshes *meshes);
 
 /* Adds a field that all ranks with cells of the mesh have. Its name must not exist yet. Returns NULL if memory runs

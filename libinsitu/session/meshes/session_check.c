@@ -33,7 +33,7 @@ typedef struct face_edge {
                                 Indices are those of the caller's connectivity. */
 } face_edge;
 
-/* A buffer of one thread, enlarged when needed. It must be zero-initialized. */
+/* A buffer of one thread, which is enlarged if necessary. It must be zero-initialized. */
 typedef struct edge_buffer {
     face_edge *edges;
     int64_t capacity;
@@ -54,7 +54,7 @@ typedef enum face_fault {
 typedef struct face_fault_details {
     int64_t count;         /* number of the cell's faces */
     int64_t face;          /* number of the faulty face, as stored in the connectivity */
-    int64_t first, end;    /* start and end of the face in the list of faces' vertices */
+    int64_t first, end;    /* start and end of the face's vertices in face_connectivity */
     int64_t vertex, other; /* the faulty vertex, or the two ends of an edge */
     int sharing;           /* number of faces that have the edge */
     double position[3];    /* coordinates of the faulty vertex */
@@ -443,7 +443,7 @@ static insitu_status check_last_offset(const session_mesh *mesh, base_error *err
                      mesh->label, last + base, base ? " + 1" : "", mesh->topology.connectivity_count + base);
 }
 
-/* Largest coordinate for which squares and volumes do not overflow a double. */
+/* Largest allowed coordinate. Squares and volumes of larger coordinates might overflow a double. */
 static const double largest_coordinate = 1e100;
 
 /* Reports the first drawn cell that has a coordinate above the largest allowed one. */

@@ -56,8 +56,8 @@ static double legendre_slope(int p, double x, double *curvature)
     return slope;
 }
 
-/* Gauss-Lobatto points are the ends and the roots of the derivative of Legendre's polynomial, found by Newton's method
- * from Chebyshev's points. */
+/* Gauss-Lobatto points are the ends of the line and the roots of the derivative of Legendre's polynomial. The roots are
+ * found by Newton's method, starting at Chebyshev's points. */
 void session_compute_node_positions(int p, bool is_lobatto, double out[MOST_NODES_OF_LINE])
 {
     for (int i = 0; i <= p; i++) {
@@ -324,8 +324,8 @@ static double distance_between(const double *a, const double *b)
     return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
 }
 
-/* Returns the mean length of the first and the last of the segments into which nodes divide the cell's edges, as a
- * fraction of the length of the edges. */
+/* Returns the mean length of the first and the last of the segments into which the nodes divide each edge of the cell,
+ * as a fraction of the mean length of the edges. */
 static double mean_end_segment(const session_nodes *of, insitu_vertex_order order, const double *positions, int stride)
 {
     const int p = of->order, axes = of->type == GRID_HEX ? 3 : 2;

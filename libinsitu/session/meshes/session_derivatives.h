@@ -8,7 +8,7 @@
 /* The derivatives of one kind of cell. The derivative at node n along axis a consists of the terms from
  * starts[axis_count * n + a] up to the next start. */
 typedef struct session_derivatives {
-    int axis_count;       /* 3; 2 for triangles and quads; 0 for pyramids, whose derivatives are not known */
+    int axis_count;       /* 3; 2 for triangles and quads; 0 for pyramids, whose derivatives are not implemented */
     double first_segment; /* distance between the first two nodes of an edge of length 1 */
     int *starts;
     int *nodes;      /* for each term, the position of its node in the cell's row of connectivity */
@@ -58,7 +58,7 @@ bool session_polynomials_create(const session_mesh *mesh, session_polynomials *o
 void session_polynomials_free(session_polynomials *polynomials);
 
 /* Returns the derivatives of a cell. positions: positions of the cell's nodes, `stride` doubles apart. In quads and
- * hexes of order 3 and more, they show whether nodes are equispaced or Gauss-Lobatto points. */
+ * hexes of order 3 and more, the positions show whether nodes are equispaced or Gauss-Lobatto points. */
 const session_derivatives *session_derivatives_of(const session_polynomials *polynomials, int64_t cell,
                                                   const double *positions, int stride);
 

@@ -30,12 +30,13 @@ typedef struct session_homes {
     bool is_computed; /* set if the other members are up to date */
     bool by_id;       /* set if homes are found by global vertex ids, and not by positions */
     int rank;         /* number of this rank */
-    /* The ranks whose drawn cells' box intersects this rank's box, in ascending order, including this rank. The
-     * relation is symmetric. A rank without cells has no such ranks. Boxes are extended by 2e-5 of the scene's half
-     * diagonal, so that the boxes of a vertex and of a face on which it lies up to rounding intersect. */
+    /* The ranks near this rank, including this rank, in ascending order: ranks whose bounding box of drawn cells
+     * intersects that of this rank. The relation is symmetric. A rank without cells has no near ranks. Boxes are
+     * extended by 2e-5 of the scene's half diagonal, so that the boxes of a vertex and of a face on which it lies up to
+     * rounding intersect. */
     int near_count;
     int *near_ranks;
-    session_box *boxes; /* box of each of these ranks */
+    session_box *boxes; /* bounding box of each near rank */
     /* Used if by_id is set: the ids are divided into ranges. Each range has its first id and the rank that is the home
      * of its ids. */
     int share_count;

@@ -18,14 +18,14 @@
 
 typedef struct session_field {
     insitu_field given; /* the name is a copy owned by the session; the values belong to the caller */
-    /* array of all components or, if each component has its own array (component_arrays), of the first one */
+    /* array of all components or, if each component has its own array (component_arrays), of the first component */
     grid_array values;
     grid_array *component_arrays; /* array of each component; NULL: all components are in `values` */
     int64_t component_stride;     /* distance in bytes between the components of a tuple in `values` */
     base_error problem;           /* error of the last insitu_set_field(), or an error of the values */
     bool is_problem_of_contents;  /* set if the error is an invalid value found by the check of this step */
     bool has_index;     /* set if an index array gives the tuple of each vertex or cell (insitu_field.index) */
-    bool is_copy_stale; /* set if the values or the index have changed since the copy was made */
+    bool is_copy_stale; /* set if the values or the index have changed since `copy` was made */
     /* set if statistics of this step need the field; fields shown by images have scalars instead */
     bool is_in_statistics;
     /* set if given.fill was called in this step; the values are valid unless fill_problem holds an error */
@@ -116,7 +116,7 @@ typedef struct session_scalar {
     session_extremes extremes[SESSION_EXTENTS];
 } session_scalar;
 
-/* A face of a cell, by its index among the cell's faces (session_cell_faces.h). */
+/* A face of a cell. face: index among the cell's faces (session_cell_faces.h). */
 typedef struct session_face {
     int64_t cell;
     int64_t face;
@@ -133,8 +133,9 @@ typedef struct session_threshold {
     double low, high;
 } session_threshold;
 
-/* The faces that belong to only one of the cells selected by a threshold, over all ranks, and a mesh of tets and
- * pyramids that is built on these faces (session_outer_mesh.h). insitu_report lists it as a copy. */
+/* The outer surface of a mesh or of its cells that a threshold selects: the faces that belong to only one of these
+ * cells, over all ranks. It includes a mesh of tets and pyramids that is built on these faces (session_outer_mesh.h).
+ * insitu_report lists it as a copy. */
 typedef struct session_outer {
     session_threshold threshold;
     /* session_scalar.version of the values to which the threshold was applied, if there is a threshold */
@@ -188,8 +189,8 @@ typedef struct session_topology {
 typedef struct session_discontinuous {
     bool is_active; /* set if the mesh is discontinuous; otherwise all other members are empty */
     bool is_made;   /* set if the coordinates are up to date */
-    /* set if cells are split into pieces. `shared_connectivity` is then the caller's connectivity, whose entries are
-     * the corners. */
+    /* Set if cells are split into pieces. `shared_connectivity` is then the caller's connectivity, and each of its
+     * entries is a corner. */
     bool are_corners_entries;
     int64_t corner_count;
     grid_array shared_connectivity; /* connectivity that refers to the vertices that cells share */
@@ -199,7 +200,7 @@ typedef struct session_discontinuous {
     int64_t bytes;
 } session_discontinuous;
 
-/* Bounds and sizes of the drawn cells of a mesh (see the members of session_mesh with the same names). */
+/* Bounds, counts and sizes of the drawn cells of a mesh (see the members of session_mesh with the same names). */
 typedef struct session_sizes {
     double lower[3], upper[3];
     int64_t drawn_count, flat_count;
@@ -211,7 +212,7 @@ typedef struct session_counts {
     int64_t drawn_count, ghost_count, inverted_count, flat_count, shell_count;
 } session_counts;
 
-/* The linear pieces that are made of each cell of higher order. */
+/* The linear pieces of cells of higher order that are made; the other pieces are not drawn. */
 typedef struct session_piece_set {
     /* for each cell, the index of its first word in `bits`; a final entry marks the end. For a cell without words, all
      * pieces are made. NULL: all pieces of all cells are made */
@@ -243,7 +244,8 @@ typedef struct session_finer {
 
 /* A structured block of cells. */
 typedef struct session_lattice {
-    insitu_lattice given; /* given.lattice of the mesh points to it, or is NULL if the mesh is not structured */
+    insitu_lattice given; /* copy of the caller's description; session_mesh.given.lattice points to it, or is NULL if
+                             the mesh is not structured */
     grid_lattice cells;
     /* coordinates along the axes of a uniform or rectilinear lattice. insitu_report lists them as a copy */
     double *axis_coordinates[3];
@@ -258,7 +260,7 @@ typedef struct session_warp {
     uint64_t key;                /* hash of the displacements by which the coordinates were moved */
     char *coordinate_memory;     /* memory of the moved coordinates (session_own_coordinates.h) */
     insitu_array coordinates[3]; /* the moved coordinates; an axis has no data if its coordinates are the caller's */
-    insitu_array unmoved[3];     /* values of session_mesh.given before the vertices were moved */
+    insitu_array unmoved[3];     /* session_mesh.given.coordinates before the vertices were moved */
     /* the caller's lattice without its coordinates along the axes, because moved coordinates are given by vertex */
     insitu_lattice lattice;
     int64_t bytes;
@@ -275,7 +277,7 @@ typedef struct session_mirrored {
     double *axes[3];             /* coordinates along a lattice's axes, owned; NULL: coordinates are given by vertex */
     insitu_lattice lattice;      /* lattice in the image's description */
     int64_t bytes;
-    /* values of these members of the source mesh when the image was made */
+    /* cells_stamp and coordinates_stamp of the source mesh when the image was made */
     int64_t cells_stamp, coordinates_stamp;
 } session_mirrored;
 
@@ -342,14 +344,15 @@ typedef struct session_mesh {
     int field_count;
     session_field *fields;
 
-    /* session_meshes.stamp at the last change of the cells, and at the last change of the coordinates */
+    /* cells_stamp: value of session_meshes.stamp at the last change of the cells; coordinates_stamp: its value at the
+     * last change of the coordinates */
     int64_t cells_stamp, coordinates_stamp;
     bool is_check_stale;       /* set if cells or coordinates have not been checked since they changed */
-    bool is_topology_stale;    /* set if the tree was built for other cells */
-    bool is_geometry_stale;    /* set if the tree was computed for other coordinates */
+    bool is_topology_stale;    /* set if cells have changed since the tree was built */
+    bool is_geometry_stale;    /* set if coordinates have changed since the tree was built or refitted */
     double lower[3], upper[3]; /* bounds of the drawn cells; lower > upper: there are none */
-    /* counts of the cells in `cells`, which may be pieces of the caller's cells; shells are cells that are drawn and
-     * flat */
+    /* Counts of the cells in `cells`, which may be pieces of the caller's cells. Shells are drawn cells that have no
+     * volume because of their type. */
     int64_t drawn_count, flat_count, shell_count;
     session_counts given_counts; /* counts of the caller's cells */
     /* true if all drawn cells of the mesh are shells, on all ranks (session_catalogue_mesh.has_shells_alone) */
@@ -372,7 +375,7 @@ typedef struct session_mesh {
     bool are_bounds_partial;
     double built_surface;    /* half the surface area of the mesh's bounds when the tree was built */
     uint64_t candidates_key; /* hash that identifies the candidates of the current images and values */
-    /* number of steps in which the current (or last) full tree has been used; 0: there was none yet */
+    /* number of steps in which the current full tree, or the most recent one, has been used; 0: there was none yet */
     int full_tree_steps;
     /* seconds spent on partial trees since the cells last changed, minus the time that refits of a full tree would have
      * taken */
@@ -399,7 +402,8 @@ typedef struct session_meshes {
     bool are_names_changed; /* set if names have changed since the ranks last agreed on a catalogue */
     /* set if blocks with levels of refinement have changed since covered cells were computed */
     bool are_levels_changed;
-    int64_t level_box_count; /* number of refined blocks near those of this rank, including its own */
+    int64_t level_box_count; /* number of entries in level_boxes: the refined blocks of this rank, and refined blocks of
+                                other ranks near them */
     session_level_box *level_boxes;
     int64_t stamp; /* incremented by each change of cells or coordinates */
     /* set if the last step that drew an image warped or mirrored meshes; the same on all ranks */
@@ -445,7 +449,7 @@ grid_array session_index_array(const insitu_mesh *mesh, const insitu_array *arra
  * caller may omit the last offset. */
 grid_array session_offset_array(const insitu_mesh *mesh, const insitu_array *array, int64_t count, int64_t entries);
 
-/* Returns the cells as the caller's arrays describe them. */
+/* Returns the grid that reads the cells from the caller's arrays, without the session's changes. */
 grid session_caller_grid(const insitu_mesh *mesh);
 
 /* Allocates count + 1 indices, all 0, of 4 bytes if `largest` fits into them, and otherwise of 8 bytes. Returns false
@@ -465,7 +469,7 @@ static inline void session_store_index(const grid_array *array, int64_t i, int64
 /* Frees an array owned by the session. */
 void session_drop_array(grid_array *array);
 
-/* This rank's parts of a mesh, which are either the mesh itself or its blocks. */
+/* This rank's parts of a mesh: the mesh itself, or the mesh's blocks on this rank. */
 typedef struct session_parts {
     int count; /* 0: this rank has no mesh of this name */
     session_mesh **items;
@@ -544,8 +548,8 @@ void session_drop_contents(session_mesh *mesh);
 void session_refuse_mesh(session_mesh *mesh);
 void session_meshes_free(session_meshes *meshes);
 
-/* Iterator over the meshes that may become parts of an image: the caller's meshes, then the meshes of their outer
- * faces.
+/* Iterator over the meshes that may be drawn as parts of an image: the caller's meshes, then the meshes built on their
+ * outer faces.
  *
  *     for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) use(walk.part); */
 typedef struct session_part_walk {

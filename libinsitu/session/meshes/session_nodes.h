@@ -25,13 +25,15 @@ int session_corner_type(int type);
 /* Returns whether the caller's type is one of INSITU_LAGRANGE_*. */
 bool session_is_lagrange(int type);
 
-/* Returns whether cells of the type, which must not be linear, can have `count` nodes, and stores their description. */
+/* Finds the description of a cell of the type, which must not be linear, with `count` nodes. Returns false if no order
+ * of the type has this number of nodes. */
 bool session_nodes_of(int type, int64_t count, session_nodes *out);
 
 /* Returns the type INSITU_LAGRANGE_* with the same corners as the linear type, or GRID_NO_TYPE if there is none. */
 int session_lagrange_type(int corner_type);
 
-/* Describes the cell with the shape of a linear type that has all nodes of a lattice of this order. */
+/* Returns the description of a complete cell: it has the shape of a linear type, and all nodes of a lattice of this
+ * order. */
 session_nodes session_complete_nodes(int corner_type, int order);
 
 /* Returns the number of nodes of a cell of the type and order, or 0 if there is no such cell. Order 0 stands for the

@@ -29,12 +29,12 @@ typedef struct session_space {
     double origin[3], scale;   /* the renderer's coordinates are (position - origin) * scale */
 } session_space;
 
-/* Computes the global bounds of checked meshes, then the origin and the scale. If these are new, all trees are dropped.
- * Collective. */
+/* Computes the global bounds of checked meshes, then the origin and the scale. If the origin or the scale changes, all
+ * trees are dropped. Collective. */
 insitu_status session_update_space(session_space *space, session_meshes *meshes, MPI_Comm comm, base_error *error);
 
-/* Computes the global bounds as they would be if no mesh had finer lattices (session_finer.h), so that the bounds do
- * not depend on finer lattices. Collective. */
+/* Computes the global bounds, counts and mean size as they would be if no mesh had finer lattices (session_finer.h).
+ * Collective. */
 insitu_status session_find_nodal_extent(const session_meshes *meshes, MPI_Comm comm, session_extent *out,
                                         base_error *error);
 

@@ -17,12 +17,12 @@
 
 enum { LINEAR_TYPES = GRID_POLYHEDRON + 1 };
 
-/* Working data of splitting the caller's cells. */
+/* The state while the caller's cells are split. */
 typedef struct split_work {
     const session_mesh *mesh;
     session_rows rows;
     session_pattern patterns[ROWS_MOST_KINDS]; /* pattern of pieces for each kind of row (type and number of nodes) */
-    bool is_of_type[LINEAR_TYPES];             /* for each type, set if some piece has it */
+    bool is_of_type[LINEAR_TYPES];             /* for each linear type, set if some piece has this type */
     int only_type;                             /* the type of all pieces; 0 if they differ */
     /* first_pieces: for each cell, the index of its first piece; first_entries: for each cell, the index of its first
      * piece's first entry in piece_entries. A last element has the total. first_entries is NULL if all pieces have one
@@ -252,7 +252,7 @@ static void count_pieces(const split_work *w, int64_t cell)
     if (!w->first_entries) return;
     if (of->polygon_count)
         w->first_entries[cell + 1] = count * (of->nodes.type == GRID_QUAD ? 3 : 4);
-    else /* only cells all of whose pieces are made can have pieces of different types */
+    else /* pieces of a cell have different types only if all pieces of the cell are made */
         w->first_entries[cell + 1] =
             count == of->piece_count ? of->piece_size : count * grid_type_vertices(of->types[0]);
 }

@@ -4,7 +4,7 @@
 
 #include "session_mesh.h"
 
-/* Returns whether some cells are of higher order. If types are mixed, it reads the types of all cells. */
+/* Returns whether some cells are of higher order. If the mesh has mixed types, the types of all cells are read. */
 bool session_has_higher_order(const insitu_mesh *given);
 
 /* Creates the mesh's topology of pieces. Returns an error, and creates nothing, if types, counts, offsets or indices of

@@ -264,7 +264,7 @@ MMBVH_INLINE bool tally_one_cell(const session_mesh *mesh, int64_t cell, mesh_ta
     return true;
 }
 
-/* Returns the longest run of cells that starts with this one, in which all cells have one type and their vertices are
+/* Returns the longest run of cells, starting with `cell`, in which all cells have the same type and their vertices are
  * contiguous. Vectorized code can process such a run. */
 MMBVH_INLINE lane_cells find_uniform_run(const session_mesh *mesh, int64_t cell, int64_t end, const fetch_shape shape)
 {
@@ -402,7 +402,8 @@ bool tally_axes(const session_mesh *mesh, mesh_tally *tally)
     return true;
 }
 
-/* Adds some cells of a uniform or rectilinear lattice to the sums. These cells are boxes, or are flat. */
+/* Adds the cells begin .. end - 1 of a uniform or rectilinear lattice to the sums. These cells are boxes, or are
+ * flat. */
 static int64_t tally_lattice_cells(const session_mesh *mesh, int64_t begin, int64_t end, mesh_tally *tally)
 {
     const grid *g = &mesh->cells;

@@ -165,7 +165,8 @@ static insitu_status copy_face_lists(session_mesh *mesh, base_error *error)
 
 /* ---- cells' faces from owner and neighbour -------------------------------------------------------------------- */
 
-/* number that marks a cell of another rank, or the missing cell of a face in a separate list */
+/* number that stands for a cell of another rank, or for the missing cell of a face in the separate list of boundary
+ * faces */
 static const int64_t outside = INT64_MIN;
 
 session_face_sides session_find_face_sides(const insitu_mesh *given)
@@ -333,8 +334,9 @@ static bool are_distinct(const int64_t *vertices, int count)
     return true;
 }
 
-/* Constructs the cell on the given base, with sides of side_size vertices, in VTK's order except for its handedness.
- * Returns false if the faces do not form such a cell. */
+/* Constructs the cell on the given base, whose sides must have side_size vertices. vertices: receives the cell's
+ * vertices in VTK's order, except that the cell may be left-handed. Returns false if the faces do not form such a
+ * cell. */
 static bool build_on_base(const face_ring *rings, int count, int base, int side_size,
                           int64_t vertices[GRID_MAX_CELL_VERTICES])
 {
@@ -411,9 +413,9 @@ static int recognise_polyhedron(const session_mesh *mesh, int64_t cell, int64_t 
 enum { TYPES = GRID_POLYHEDRON + 1 };
 
 typedef struct recognition {
-    bool is_faulty; /* polyhedron_count: number of polyhedra that the caller gave; recognised_count: number of these
-                       polyhedra that are read as another type */
-    /* number of polyhedra that the caller gave, and number of those that are read as another type */
+    bool is_faulty; /* set if some cell is invalid */
+    /* polyhedron_count: number of polyhedra that the caller gave; recognised_count: number of these polyhedra that are
+     * read as another type */
     int64_t polyhedron_count, recognised_count;
     int64_t type_counts[TYPES]; /* for each type, number of cells that are read as this type */
     int64_t entry_count;        /* number of connectivity entries of all cells after recognition */

@@ -74,8 +74,8 @@ static insitu_type moved_type(const insitu_mesh *given, int axis)
     return given->coordinates[given->coordinates[axis].data ? axis : 0].type;
 }
 
-/* Ensures that there is memory for the moved coordinates. *is_new is set if the memory is new. Returns false if memory
- * runs out. Coordinates along z get no memory if they are not given and do not move. */
+/* Ensures that there is memory for the moved coordinates. *is_new is set if memory was allocated. Returns false if
+ * memory runs out. Coordinates along z get no memory if they are not given and do not move. */
 static bool reserve_coordinates(session_mesh *mesh, int component_count, bool *is_new)
 {
     enum { IN_PLANE = 3, ALL = 7 };

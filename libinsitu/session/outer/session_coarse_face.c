@@ -94,8 +94,7 @@ bool session_read_outline(const grid *g, const session_face *face, session_face_
     return true;
 }
 
-/* Returns whether the position, projected on the direction, lies above all corners, or below all corners, by more than
- * `slack`. */
+/* Returns whether, along `direction`, the position lies above all corners or below all corners by more than `slack`. */
 static bool is_beyond(const session_face_outline *f, const double position[3], const double direction[3], double slack)
 {
     const double at = vector3_dot(direction, position), most = slack * sqrt(vector3_dot(direction, direction));

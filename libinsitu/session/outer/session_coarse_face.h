@@ -34,11 +34,12 @@ bool session_read_outline(const grid *g, const session_face *face, session_face_
  * is beyond all corners of the face, either along its normal or across one of its edges. */
 bool session_may_contain(const session_face_outline *outline, const double position[3], double slack);
 
-/* Reads a face. vertices: receives its vertices, in the order of out->corner_positions. Returns false if the face is
- * not a triangle or quad of a cell with a volume, or if its area is 0. */
+/* Reads a face. vertices: receives the face's vertices, in the order of out->corner_positions. Returns false if the
+ * face is not a triangle or quad of a cell with a volume, or if its area is 0. */
 bool session_read_coarse_face(const grid *g, const session_face *face, session_coarse_face *out, int64_t vertices[4]);
 
-/* Writes the face as 64-bit words for another rank; the second function reads it from them. */
+/* session_pack_coarse_face() writes a face as 64-bit words for another rank; session_unpack_coarse_face() reads a face
+ * from these words. */
 void session_pack_coarse_face(const session_coarse_face *face, uint64_t words[SESSION_FACE_WORDS]);
 void session_unpack_coarse_face(const uint64_t words[SESSION_FACE_WORDS], session_coarse_face *out);
 

@@ -226,7 +226,7 @@ static int64_t floor_quotient(int64_t a, int64_t b)
 /* The cells of a coarse box that a fine box overlaps, as index ranges of the coarse level. */
 typedef struct overlap {
     int64_t lower[3], upper[3];             /* cells that the fine box covers wholly or in part */
-    int64_t whole_lower[3], whole_upper[3]; /* cells that the fine box covers wholly along each axis */
+    int64_t whole_lower[3], whole_upper[3]; /* cells that the fine box covers wholly along each of these axes */
     /* an axis along which the fine box covers some cells only in part; -1: there is none */
     int cut_axis;
 } overlap;

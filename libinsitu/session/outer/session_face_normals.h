@@ -1,5 +1,5 @@
-/* Normals of the faces of cells of higher order, by which outer surfaces are lit as curved faces instead of the flat or
- * bilinear faces of pieces. */
+/* Normals of the faces of cells of higher order. Outer surfaces are shaded with these normals as curved faces, instead
+ * of with the normals of the flat or bilinear faces of pieces. */
 #ifndef SESSION_FACE_NORMALS_H
 #define SESSION_FACE_NORMALS_H
 
@@ -7,7 +7,7 @@
 
 typedef struct session_face_normals {
     session_polynomials polynomials;
-    int64_t cell;                           /* the caller's cell that was read last; -1: no cell has been read */
+    int64_t cell; /* the caller's cell that was read most recently; -1: no cell has been read */
     const session_derivatives *derivatives; /* the derivatives of this cell's polynomials */
     double *positions;                      /* x, y and z of the cell's nodes, in the order of its row */
 } session_face_normals;

@@ -44,7 +44,7 @@ typedef struct candidate {
     /* heads of two linked lists of contacts: with the faces on which the vertex lies, and with the faces of which it is
      * a corner; -1: the list is empty */
     int64_t hit_list, corner_list;
-    int64_t face; /* the face on which the vertex hangs; -1: it does not hang */
+    int64_t face; /* index, in hanging_search.faces, of the face on which the vertex hangs; -1: it does not hang */
     double weights[4];
 } candidate;
 
@@ -52,13 +52,14 @@ typedef struct candidate {
 typedef struct contact {
     int64_t face;         /* index of the face in hanging_search.faces */
     int64_t next_contact; /* index of the next element of the list; -1: this is the last one */
-    double weights[4];    /* set if the candidate is not a corner of the face */
+    double weights[4];    /* weights of the face's corners at the candidate's position; not set if the candidate is a
+                             corner of the face */
 } contact;
 
 typedef struct hanging_search {
     const session_hanging_basis *basis;
     const session_team *team;
-    unsigned char *face_states; /* for each face of the borders, its face_state */
+    unsigned char *face_states; /* face_state of each face of the borders */
     int64_t face_count, own_count, candidate_count, face_capacity;
     /* faces of this rank that may touch candidates, then the received faces, then this rank's faces that were read
      * later */
@@ -117,7 +118,7 @@ static bool list_part_faces(const session_mesh_group_parts *parts, int first, in
     return is_done;
 }
 
-/* Finds the outer faces, and their vertices, of this rank's parts of one mesh of the mesh_group. */
+/* Finds the outer faces of this rank's parts of one mesh of the group, and the vertices of these faces. */
 static insitu_status update_mesh_borders(const session_mesh_group *mesh_group, int m,
                                          const session_mesh_group_parts *parts, const session_team *team,
                                          base_error *error)
@@ -418,7 +419,8 @@ static bool add_contact(hanging_search *s, int64_t number, const double weights[
     return true;
 }
 
-/* Adds the face to the candidate's list of hits if the candidate lies on the face. Returns false if memory runs out. */
+/* Adds the face to the candidate's list of hits if the candidate lies on the face and is not one of its corners.
+ * Returns false if memory runs out. */
 static bool test_face_hit(hanging_search *s, int64_t number, candidate *c)
 {
     const session_coarse_face *f = &s->faces[number].face;
@@ -486,8 +488,8 @@ static bool find_contacts(hanging_search *s)
 
 /* ---- results -------------------------------------------------------------------------------------------------- */
 
-/* Requests the values of received faces on which vertices hang: packs the numbers of these faces for the ranks that
- * sent them. *firsts receives, for each such face, the index of its first value among the values that will be
+/* Requests the values of received faces on which vertices hang: packs the message indices of these faces, for the
+ * ranks that sent them. *firsts receives, for each face, the index of its first value among the values that will be
  * received. */
 static bool request_faces(const hanging_search *s, session_mail *requested, int64_t **firsts)
 {
@@ -613,8 +615,8 @@ insitu_status session_update_hanging(const session_hanging_basis *basis, const s
 
 /* ---- values --------------------------------------------------------------------------------------------------- */
 
-/* Sets the value of each hanging vertex to the value that is interpolated at its position on the face. Returns whether
- * a value changed. */
+/* Sets the value of each hanging vertex to the value of the face at the vertex's position, interpolated from the values
+ * at the face's corners. Returns whether a value changed. */
 static bool apply_constraints(const session_hanging *hanging, const double *received, double *means)
 {
     bool is_changed = false;

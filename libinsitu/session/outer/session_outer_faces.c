@@ -33,8 +33,8 @@ typedef struct part_cells {
     const grid *grid;
     /* one byte per cell, nonzero if the threshold does not select the cell; NULL: there is no threshold */
     unsigned char *is_hidden;
-    int64_t first_cell;   /* number of the part's first cell among those of all parts */
-    int64_t first_vertex; /* number of the part's first vertex among those of all parts */
+    int64_t first_cell;   /* index of the part's first cell if the cells of all parts are numbered consecutively */
+    int64_t first_vertex; /* index of the part's first vertex if the vertices of all parts are numbered consecutively */
     uint64_t *hashes;     /* hash of each vertex's position or global id */
     /* one byte per vertex, nonzero if its sum of hashes is not 0, so that an outer face may contain it */
     unsigned char *may_be_outer;
@@ -91,8 +91,8 @@ static int64_t count_part_vertices(const part_cells *p)
 
 /* ---- keys ---------------------------------------------------------------------------------------------------- */
 
-/* Returns whether the face's i-th vertex is new, that is, different from all vertices before it. A repeated vertex is
- * counted once, so that a quad with two corners at the same position is a triangle. */
+/* Returns whether the face's i-th vertex differs from all earlier vertices of the face. A repeated vertex is counted
+ * once, so that a quad with two corners at the same position is a triangle. */
 static inline bool is_first_occurrence(const part_cells *p, const session_face_loop *loop, int64_t i)
 {
     const uint64_t hash = p->hashes[session_face_vertex(loop, i)];
@@ -177,8 +177,8 @@ static void add_face(const xor_table *x, const session_face_loop *loop)
             add_xor(&x->vertex_sums[session_face_vertex(loop, i)], session_mix_bits(sum), x->is_shared);
 }
 
-/* Adds the hashes of all faces of a cell whose type has a table of faces. If two of its vertices have the same hash,
- * its faces have fewer vertices than in the table; then nothing is added and false is returned. */
+/* Adds the hashes of all faces of a cell whose type has a table of faces. If two vertices of the cell have the same
+ * hash, its faces have fewer vertices than in the table; then nothing is added and false is returned. */
 static inline bool add_cell(const xor_table *x, const session_face_table *table, const int64_t *vertices, int count)
 {
     uint64_t hashes[GRID_MAX_CELL_VERTICES], sums[GRID_MAX_CELL_VERTICES] = {0};
@@ -299,7 +299,7 @@ static bool has_open_vertices(const part_cells *p, int64_t cell)
     return open >= 3;
 }
 
-/* Appends the faces of the cell that may be outer faces to the list. */
+/* Appends those faces of the cell to the list that may be outer faces. */
 static void append_open_faces(const face_search *s, int part, int64_t cell, face_list *out)
 {
     const part_cells *p = &s->cells[part];
@@ -510,7 +510,8 @@ static bool pack_keys(const face_search *s, const session_homes *homes, int rank
     return is_done;
 }
 
-/* Computes the reply to each received key, which is the number of its occurrences. Returns false if memory runs out. */
+/* Computes the reply to each received key: the number of times that the key was received. Returns false if memory runs
+ * out. */
 static bool count_received_keys(const session_mail *in, int ranks, session_mail *reply)
 {
     const int64_t count = in->total / KEY_WORDS;

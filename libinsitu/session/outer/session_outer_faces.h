@@ -11,8 +11,8 @@
 typedef struct session_face_part {
     const session_mesh *mesh;
     session_outer *outer; /* receives the faces; its threshold selects the cells */
-    /* one byte per vertex, which the search sets to 1 if the vertex is on a face that only one cell of this rank has;
-     * NULL: not requested */
+    /* one byte per vertex: the search sets it to 1 if the vertex is on a face that belongs to only one cell of this
+     * rank; NULL: not requested */
     unsigned char *is_border;
 } session_face_part;
 

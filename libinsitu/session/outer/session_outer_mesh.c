@@ -122,7 +122,7 @@ typedef struct face_polygon {
     double normal[3]; /* normal that points towards the apexes of the cells built on the face */
 } face_polygon;
 
-/* The mesh under construction. Its arrays have the largest size that the faces may require. */
+/* The state while the outer mesh is built. Its arrays have the largest size that the faces may require. */
 typedef struct outer_work {
     const grid *cells;
     session_outer *out;
@@ -279,8 +279,9 @@ static bool find_common_apex(const face_polygon *p, double out[3])
     return count > 0;
 }
 
-/* Computes the polygon's normal. It points to the side of `inside` or, if `inside` is in the polygon's plane, the
- * normal's component of largest magnitude is positive. Its length is about the polygon's width. */
+/* Computes the polygon's normal. It points to the side of the polygon on which the point `inside` lies. If this point
+ * is in the polygon's plane, the component of largest magnitude is positive. The normal's length is about the polygon's
+ * width. */
 static void find_polygon_normal(face_polygon *p, const double inside[3])
 {
     double towards[3], middle[3] = {0, 0, 0}, sum[3] = {0, 0, 0};
@@ -431,8 +432,8 @@ static outer_counts find_count_bounds(const grid *g, const session_outer *outer,
     return most;
 }
 
-/* Adds the number of entries that the rims of the caller's cells with outer faces need. Some nodes of a rim may lie on
- * no outer face. */
+/* Adds the number of entries that the rims of those cells of the caller need that have outer faces. A rim may need
+ * further vertices, because some of its nodes may lie on no outer face. */
 static void add_rim_bounds(const outer_work *w, const session_outer *outer, outer_counts *most)
 {
     int64_t last = -1;

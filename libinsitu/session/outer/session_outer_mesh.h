@@ -19,8 +19,8 @@
 insitu_status session_make_outer_mesh(const session_mesh *whole, session_outer *outer, bool has_normals,
                                       base_error *error);
 
-/* Returns a field's values on the mesh of outer faces, gathered from its values on the whole mesh. They are allocated
- * by base_alloc(); NULL if memory runs out. */
+/* Returns a field's values on the mesh of outer faces, gathered from its values on the whole mesh. The array is
+ * allocated by base_alloc(); NULL if memory runs out. */
 double *session_gather_outer_values(const session_outer *outer, const grid_field *field);
 
 #endif

@@ -25,7 +25,7 @@ typedef struct patch_faces {
     int64_t count;           /* number of faces of all patches */
     int64_t *first_groups;   /* index of each face's first group, count + 1 entries */
     int64_t *groups;         /* groups of the faces' vertices; -1: the vertex belongs to no drawn cell */
-    unsigned char *is_drawn; /* for each face, set if a drawn cell has it */
+    unsigned char *is_drawn; /* for each face, set if a drawn cell has the face */
 } patch_faces;
 
 /* A face of a patch. */
@@ -277,7 +277,7 @@ static insitu_status check_cell_counts(const cell_search *s, patch_faces *p, bas
     for (int patch = 0; patch < field->patch_count; patch++)
         for (int64_t i = 0; i < field->patches[patch].count; i++, f++) {
             const int64_t key = s->key_of_face[f];
-            if (key < 0) continue; /* the face belongs to no drawn cell, but only to a ghost cell */
+            if (key < 0) continue; /* all cells with this face are ghosts */
             if (s->cell_counts[key] > s->given_counts[key])
                 return fail_at_face(p, patch, i, "is between two cells, not on the boundary", error);
             if (s->cell_counts[key] == 0) return fail_at_face(p, patch, i, "is no face of a cell", error);

@@ -30,7 +30,7 @@ void session_rims_free(session_rims *rims);
 /* Returns the number of nodes of all rims of one of the caller's cells. */
 int64_t session_count_rim_nodes(const session_rims *rims, int64_t cell);
 
-/* Returns the number of the face of the caller's cell on which all of the vertices lie, or -1 if there is none. */
+/* Returns the number of that face of the caller's cell on which all of the vertices lie, or -1 if there is none. */
 int session_find_rim(session_rims *rims, int64_t cell, const int64_t *vertices, int64_t count);
 
 /* Computes the normal, of any length, of a face's plane in the reference cell. It is (0, 0, z) for triangles and

@@ -1,5 +1,5 @@
-/* Draws isosurfaces on shells (triangles, quads and polygons) as contour lines of the isovalues. They are drawn on the
- * outer surface of meshes that contain no other cells. */
+/* Draws isosurfaces on shells (triangles, quads and polygons) as contour lines at the isovalues. The lines are drawn on
+ * the outer surfaces of meshes all of whose cells are shells. */
 #ifndef SESSION_SHELLS_H
 #define SESSION_SHELLS_H
 

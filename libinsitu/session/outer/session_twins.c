@@ -30,7 +30,7 @@ typedef struct twin_search {
     const session_mesh_group_parts *parts;
     const session_team *team;
     int64_t corner_count, vertex_count;
-    face_corner *corners;    /* this rank's corners, followed by the received ones */
+    face_corner *corners;    /* the corners of this rank's outer faces, followed by the received corners */
     border_vertex *vertices; /* vertices of all parts, sorted by part */
     double rounding;
     session_bins bins;

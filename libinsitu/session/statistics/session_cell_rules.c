@@ -65,7 +65,7 @@ static int count_line_points(const session_nodes *of, bool is_bent)
 
 /* ---- functions of nodes ---------------------------------------------------------------------------------------- */
 
-/* Computes Lagrange's polynomials of the nodes on a line, and their slopes, at a point. */
+/* Computes the Lagrange polynomials of the nodes on a line, and their derivatives, at a point. */
 static void find_line_functions(const session_rule_factor *factor, const double *nodes, double at, double *out,
                                 int stride, int slopes)
 {
@@ -82,8 +82,8 @@ static void find_line_functions(const session_rule_factor *factor, const double 
     }
 }
 
-/* Computes Silvester's functions (session_derivatives.c) of the nodes of a triangle or tet at a point, and their slopes
- * along each axis. */
+/* Computes Silvester's functions (session_derivatives.c) of the nodes of a triangle or tet at a point, and their
+ * derivatives along each axis. */
 static void find_simplex_functions(const session_rule_factor *factor, const double at[3], double *out, int stride,
                                    int slopes)
 {
@@ -113,7 +113,7 @@ static void find_simplex_functions(const session_rule_factor *factor, const doub
             }
 }
 
-/* Returns the number of doubles of the functions at one block of points. */
+/* Returns the number of doubles that the functions and their slopes at one block of points take. */
 static size_t count_block(const session_rule_factor *factor)
 {
     return (size_t)(1 + factor->rule.dimensions) * (size_t)factor->node_count * (size_t)factor->width;
@@ -259,8 +259,8 @@ size_t session_cell_rules_work_size(const session_cell_rules *rules)
     return size;
 }
 
-/* Multiplies a matrix of node_count x width with the values of one component, or of three consecutive components, at
- * the nodes. Sums of LANES points stay in registers. */
+/* Multiplies a matrix of node_count x width by the values at the nodes of one component, or of three consecutive
+ * components. The sums of LANES points stay in registers. */
 static inline __attribute__((always_inline)) void multiply_by_matrix(const double *restrict matrix, int node_count,
                                                                      int width, const double *restrict values,
                                                                      const int components,

@@ -1,5 +1,5 @@
 /* Computes the statistics of a step that are written to files, and the conditions of images that are drawn only if a
- * statistic is within bounds. */
+ * statistic lies between given bounds. */
 #ifndef SESSION_EVENTS_H
 #define SESSION_EVENTS_H
 

@@ -40,7 +40,7 @@ typedef struct session_bins {
     double low, high;
 } session_bins;
 
-/* Returns the bin of a value between low and high. */
+/* Returns the bin of a value; values outside the range of the bins belong to the first or the last bin. */
 static inline int find_bin_within(const session_bins *bins, double value)
 {
     return (int)fmin(share_of_range(value, bins->low, bins->high) * bins->count, bins->count - 1);

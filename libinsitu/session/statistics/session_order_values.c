@@ -63,7 +63,7 @@ static void read_caller_values(const order_pass *p, int64_t cell, int count, dou
     }
 }
 
-/* Reads the values at the nodes of the finer lattice that coincide with the cell's own nodes. */
+/* Reads the values at those nodes of the finer lattice that are the cell's own nodes. */
 static void read_lattice_values(const order_pass *p, const session_interpolation *nodes, int64_t cell, double *out)
 {
     const session_nodes *of = &nodes->complete;
@@ -393,7 +393,7 @@ int session_find_caller_nodes(const session_mesh *mesh, int field)
     return mesh->source || of->is_derived || of->given.centring == INSITU_CELL ? -1 : field;
 }
 
-/* Finds the caller's values, and runs the pass over them. */
+/* Runs the pass with the caller's values at nodes or, if they cannot be read, with the session's values. */
 static insitu_status visit_field(order_pass *p, base_error *error)
 {
     if (p->of->given < 0) return run_pass(p, NULL, error);

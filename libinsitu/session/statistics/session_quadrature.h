@@ -7,7 +7,7 @@
 
 enum { QUADRATURE_MOST_POINTS = 128 }; /* maximum number of points along an axis */
 
-/* A rule on the unit simplex, whose coordinates are at least 0 and have a sum of at most 1. */
+/* A rule on the unit simplex: the points whose coordinates are at least 0 and have a sum of at most 1. */
 typedef struct session_quadrature {
     int dimensions;      /* 1: line, 2: triangle, 3: tet */
     int count;           /* number of points */

@@ -65,7 +65,7 @@ static void add_cell(const sum_basis *b, const session_cell_value *cell, int64_t
     if (bin >= 0) add_fixed_point(sums + BINS + 2 * bin, volume);
 }
 
-/* Data of a pass over one mesh. */
+/* The input of a pass over one mesh. */
 typedef struct statistics_pass {
     const session_mesh *mesh;
     const grid *g; /* the mesh's cells */
@@ -134,7 +134,7 @@ typedef struct statistics_work {
     const session_team *team;
     const session_statistics_request *requests;
     int count;
-    bool *are_lobatto; /* for each mesh, whether nodes of its cells of higher order are Gauss-Lobatto points */
+    bool *are_lobatto; /* for each mesh, set if the nodes of its cells of higher order are Gauss-Lobatto points */
     /* for each request and mesh, the values of the caller's cells if the mesh has cells of higher order; otherwise
      * NULL */
     session_cell_value **order_values;
@@ -143,8 +143,8 @@ typedef struct statistics_work {
     double *extremes;
     int64_t *sums; /* MAX_SUMS entries per request. The entry after the sums of all requests is the number of ranks on
                       which memory ran out */
-    /* one buffer per thread; they are large enough after the first pass, since each thread always processes the same
-     * cells */
+    /* One buffer per thread. The buffers are large enough after the first pass, since each thread always processes the
+     * same cells. */
     volume_buffer *buffers;
 } statistics_work;
 

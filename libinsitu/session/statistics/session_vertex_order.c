@@ -24,8 +24,8 @@ enum type_sum { SAMPLED, BOTH_SIGNS, FITTING, TYPE_SUMS = FITTING + ORDERS };
 
 enum cell_sum { DRAWN, FLAT, INVERTED, SHELLS, SPLIT, OF_TYPES, CELL_SUMS = OF_TYPES + JUDGED * TYPE_SUMS };
 
-/* Returns whether the volumes at all corners of the cell have the same sign if its vertices are read in `order` instead
- * of the order in which they are read now. */
+/* Returns whether the volumes at all corners of the cell would have the same sign if `order` were the mesh's
+ * vertex_order. */
 static bool fits_order(const session_mesh *mesh, int64_t cell, int type, insitu_vertex_order order)
 {
     const signed char *read = session_vertex_permutation(mesh->given.vertex_order, type);

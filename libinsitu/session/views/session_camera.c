@@ -216,7 +216,8 @@ static double choose_eye_position(double low, double high, bool is_centred)
     return fmin(fmax(0, low), high);
 }
 
-/* Returns half the height of an orthographic picture, in scene units. */
+/* Returns half the height of an orthographic picture in scene units: the scene's height, if it is given, otherwise
+ * `fitting`. */
 static double find_half_height(const scene_image *image, double fitting)
 {
     return image->camera.height > 0 ? 0.5 * image->camera.height : fitting;

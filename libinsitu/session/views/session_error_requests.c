@@ -163,14 +163,14 @@ static const session_catalogue_field *find_shown(const session_catalogue_mesh *m
     return scene_field_is_on(field, mesh->name) ? session_catalogue_find(mesh, field->name) : NULL;
 }
 
-/* Returns whether the drawn values are the caller's values, which do not depend on other cells. */
+/* Returns whether the layer shows the caller's values, which do not depend on other cells. */
 static bool is_own(const session_catalogue_mesh *mesh, const session_catalogue_field *field, const scene_field *shown)
 {
     return field->derived_index < 0 && !session_is_recentred(shown, field->centring, mesh->is_refined);
 }
 
 /* Returns whether the scalar that the layer shows is a polynomial in each cell: the caller's values at nodes, or one
- * component of these. */
+ * component of these values. */
 static bool is_polynomial(const session_catalogue_mesh *mesh, const session_catalogue_field *field,
                           const scene_field *shown)
 {

@@ -13,7 +13,8 @@ typedef struct session_due_views {
     int count; /* number of images of the scene */
     bool *are_due;
     render_camera *cameras; /* cameras of the images that are due */
-    session_extent extent;  /* bounds of the caller's nodes; empty if no camera, slice or volume needs the bounds */
+    session_extent extent;  /* bounds of the caller's nodes; not computed if no due image needs them for a camera, a
+                               slice or a volume */
 } session_due_views;
 
 /* Computes the cameras of the images that are due at `moment`. If a camera has no direction of view, its image is

@@ -91,8 +91,8 @@ static grid_field make_absent_field(void)
                         .component_count = 1};
 }
 
-/* Stores a part's field for a layer at index `at`, and its ranges if needs_ranges is set. scalar is NULL if the part
- * lacks the field. */
+/* Stores a part's field for a layer at index `at` of the array of fields and, if needs_ranges is set, the field's
+ * ranges. scalar: NULL if the part lacks the field. */
 static void set_scalar_field(session_layers *layers, ptrdiff_t at, const session_mesh *mesh,
                              const session_scalar *scalar, bool needs_ranges)
 {
@@ -118,7 +118,7 @@ static render_field set_layer_field(const session_meshes *meshes, session_layers
     return out;
 }
 
-/* Stores the gradients at the vertices of the parts that have the field, for the isosurface layer with this index. */
+/* Stores the gradients at vertices, for those parts that have the field. index: index of the isosurface layer. */
 static const render_vertex_gradients *set_gradients(const session_meshes *meshes, session_layers *layers, int index,
                                                     const scene_field *field)
 {
@@ -239,7 +239,7 @@ static insitu_status fill_surface(const session_layer_basis *basis, const scene_
 
 /* ---- outer surfaces ------------------------------------------------------------------------------------------ */
 
-/* Returns whether the layer shows the current part, which consists of the outer faces of a mesh. */
+/* Returns whether the layer shows the iterator's current part. The part must be a mesh of outer faces. */
 static bool is_shown(const session_part_walk *walk, const scene_surface *layer)
 {
     return walk->outer && session_surface_is_on(layer, walk->whole) &&

@@ -27,7 +27,7 @@ typedef struct session_layers {
      * per surface for its contour lines */
     grid_field *fields;
     int64_t field_count;
-    render_vertex_gradients *gradients; /* gradients at vertices, part_count entries per isosurface */
+    render_vertex_gradients *gradients; /* gradients at vertices, part_count entries per surface */
     /* arrays of values gathered at outer faces, parallel to `fields`; NULL for other fields */
     double **gathered_values;
     mmbvh_ranges *ranges; /* ranges of the fields, parallel to `fields` */

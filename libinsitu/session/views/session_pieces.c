@@ -33,7 +33,7 @@ typedef struct piece_error {
     bool needs_all; /* same as session_error_requests.needs_all; the same on every rank */
     bool is_shown;  /* true: a due image shows the mesh, or the scene gives a fixed number for all cells; the same on
                        every rank */
-    session_deviation all;                           /* errors of all requests; the counts are those of isosurfaces */
+    session_deviation all; /* errors of all requests; the counts of cells are those of isosurfaces */
     session_finer_bytes bytes[FINER_MOST_PARTS + 1]; /* size of finer lattices on all ranks, for each number of parts */
     double light_error;  /* largest estimate of the error of a pixel in a volume, if cells have one piece between two
                             nodes */
@@ -58,7 +58,8 @@ typedef struct part_work {
     const mesh_work *of;
     const session_mesh *mesh;
     session_deviation_request request;
-    session_piece_set *pieces; /* the set of pieces to which crossed pieces are added; NULL: the request is measured */
+    session_piece_set *pieces; /* the set of pieces to which pieces that the request needs are added; NULL: the errors
+                                  of the request are measured */
 } part_work;
 
 static insitu_status use_request(part_work *work, base_error *error)
@@ -87,7 +88,8 @@ static void use_part(part_work *work, const session_error_request *request, base
     work->request.is_lobatto = w->choice->is_lobatto;
     work->request.marks_only = w->marks_only;
     work->request.values = NULL;
-    /* A slice at the border of the data may be moved by this distance (session_slice_distance()). */
+    /* a slice at the border of the data may be moved by this distance (session_slice_distance()), so that its tolerance
+     * is positive */
     if (request->has_plane)
         work->request.isovalues =
             (session_isovalues){1, &zero, 2 * SESSION_BORDER_SHARE * request->views->extent.half_diagonal};
@@ -363,9 +365,9 @@ static int compare_steps(const void *a, const void *b)
     return x->mesh != y->mesh ? x->mesh - y->mesh : y->parts - x->parts;
 }
 
-/* Reduces the numbers of pieces until the pieces of all meshes together take at most `limit` bytes; the mesh whose
- * pieces take most memory is reduced first. steps: space for FINER_MOST_PARTS steps per mesh. Returns the number of
- * bytes before the reduction. */
+/* Reduces the numbers of pieces until the pieces of all meshes together take at most `limit` bytes. Of all meshes, the
+ * mesh whose pieces take most memory is reduced first. steps: space for FINER_MOST_PARTS steps per mesh. Returns the
+ * number of bytes before the reduction. */
 static double reduce_pieces(int mesh_count, double limit, const piece_error *errors, piece_step *steps,
                             session_finer_choice *choices)
 {

@@ -62,14 +62,15 @@ enum {
 typedef struct volume_errors {
     const session_error_request *request;
     session_transfer transfer;
-    /* for each position in the range, from 0 to 1 in equal steps, the integrals from 0 to the position */
+    /* for each of POSITIONS + 1 equidistant positions in the range, from 0 to 1, the integrals from 0 to the
+     * position */
     double (*integrals)[QUANTITIES];
-    double slopes[2][QUANTITIES]; /* slopes of the integrals outside both ends of the range */
+    double slopes[2][QUANTITIES]; /* slopes of the integrals below and above the range */
     int view_count;               /* number of due views that show the volume */
     int *views;
-    /* For each view, a grid over the picture, and for each cell of the grid the integrals along rays, if there is one
-     * piece between two nodes. They are sums of integers, so that they do not depend on the order of the mesh's cells
-     * or on the partition. */
+    /* For each view and each cell of the grid over its picture, the integrals along rays, for one piece between two
+     * nodes. They are sums of integers, so that they do not depend on the order of the mesh's cells or on the
+     * partition. */
     int64_t *sums;
     int64_t sum_count;
 } volume_errors;
@@ -91,7 +92,8 @@ static session_value_range *find_range(const session_value_ranges *ranges, const
     return NULL;
 }
 
-/* Lists the fields whose ranges are needed. Returns false if memory runs out. */
+/* Lists the fields whose ranges are needed: fields of volumes without a fixed range. Returns false if memory runs
+ * out. */
 static bool list_ranges(const scene *scene, const session_due_views *views, session_value_ranges *out)
 {
     size_t most = 1;
@@ -177,7 +179,7 @@ static double position_of(const render_transfer *t, double value)
     const double low = render_scaled(t->scale, t->threshold, t->low);
     const double high = render_scaled(t->scale, t->threshold, t->high);
     const double at = (render_scaled(t->scale, t->threshold, value) - low) / (high - low);
-    return fmin(fmax(at, -1), 2); /* values that are not positive have no logarithm */
+    return fmin(fmax(at, -1), 2); /* limited, because values that are not positive have no logarithm */
 }
 
 static double find_extinction(const render_transfer *t, double position)
@@ -377,7 +379,7 @@ static void add_cell(void *of, const session_value_cell *cell)
 static double find_pixel_error(const int64_t sums[QUANTITIES], const float background[4])
 {
     const double depth = (double)sums[EXTINCTION] * sum_unit, through = exp(-depth);
-    const double share = depth > 1e-6 ? -expm1(-depth) / depth : 1; /* mean transmittance */
+    const double share = depth > 1e-6 ? -expm1(-depth) / depth : 1; /* mean transmittance along the ray */
     double most = 0;
     for (int c = 0; c < 3; c++) {
         const double light = share * (double)sums[EMISSION + c] * sum_unit + through * (double)background[c];
