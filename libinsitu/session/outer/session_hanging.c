@@ -219,7 +219,7 @@ static bool bin_candidates(hanging_search *s)
     return session_bins_create(&s->bins, s->candidates->position, (int64_t)sizeof *s->candidates, s->candidate_count);
 }
 
-/* Reading this rank's faces. Most faces are excluded by their outlines. -------------------------------------------- */
+/* reading this rank's faces, most of which are excluded by their outlines ------------------------------------------ */
 
 typedef enum face_state {
     FACE_UNREAD,
