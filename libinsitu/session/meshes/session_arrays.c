@@ -1,4 +1,4 @@
-/* The caller's description of an array is checked before any of the array is read. */
+/* Checks the caller's descriptions of arrays (type, alignment, stride and size) before any element is read. */
 #include "session_arrays.h"
 
 #include "grid.h"
@@ -35,8 +35,8 @@ static const char *describe_allowed_types(int kind)
  * lie within it, the product of an index and a stride cannot overflow. */
 static const uint64_t most_bytes = (uint64_t)1 << 48;
 
-/* Checks a stride in bytes. A negative stride is valid: the elements then lie before the first one. A stride of 0 means
- * that the elements are packed. */
+/* Checks a stride in bytes. A negative stride is valid: the other elements then lie before the first one. A stride of 0
+ * means that the elements are packed. */
 static insitu_status check_stride(const void *data, const char *name, int64_t count, int64_t stride, int64_t size,
                                   bool is_any_stride, insitu_status bad, base_error *error)
 {

@@ -2,10 +2,14 @@
  * the same result, whether a picture can be drawn, so that no rank finds in the middle of a collective call that it
  * lacks a field.
  *
- * A rank's table is a text of lines: "m <has cells> <has ids, + 2: has levels> <name>" begins a mesh, "f <components>
- * <centring> <name>" is a field of it, "e <status> 0 <message>" is the fault of the preceding mesh or field, if it has
- * one. If all ranks' tables are equal (the usual case, which the step's one reduction finds by hashes) nothing is
- * exchanged; else all ranks gather all texts. */
+ * Each rank describes its meshes and fields by a table, a text of lines:
+ * - "m <has cells> <bits: 1 has ids, 2 has levels of refinement> <name>" begins a mesh;
+ * - "f <components> <centring> <name>" is a field of this mesh;
+ * - "e <status> 0 <message>" is the error of the preceding mesh or field; meshes and fields without an error lack this
+ * line.
+ *
+ * If all ranks' tables are equal (the usual case, which the step's one reduction detects by hashes of the tables),
+ * nothing is exchanged; else all ranks gather all tables. */
 #include "session_catalogue.h"
 
 #include <inttypes.h>
@@ -20,7 +24,8 @@
 
 /* ---- a rank's table as text ---------------------------------------------------------------------------------- */
 
-/* Writes a line within capacity bytes; returns the size of the text including the line, even if it does not fit. */
+/* Appends a line to the text, which has `at` bytes so far, if it fits within `capacity` bytes. Returns the size of the
+ * text including the line, even if the line does not fit. */
 static size_t append_line(char *text, size_t capacity, size_t at, char kind, int a, int b, const char *name)
 {
     const size_t space = at < capacity ? capacity - at : 0;
@@ -33,14 +38,14 @@ static size_t append_fault(char *text, size_t capacity, size_t at, const base_er
     return fault->status ? append_line(text, capacity, at, 'e', (int)fault->status, 0, fault->message) : at;
 }
 
-/* Properties that this rank's parts of a mesh share; they are written into its table. */
+/* The properties of all of this rank's parts of a mesh together, which the rank's table lists. */
 typedef struct part_summary {
     bool is_given, has_cells, has_ids, is_refined;
     const base_error *problem; /* error of the first part that has one; NULL: no part has an error */
 } part_summary;
 
-/* Summarizes the parts of a mesh. The mesh's vertices have ids if there are parts with cells, and all of these have
- * ids. */
+/* Summarizes this rank's parts of a mesh. The mesh has vertex ids if at least one part has cells, and all parts with
+ * cells have ids. */
 static part_summary summarize_parts(const session_parts *parts)
 {
     part_summary out = {.has_ids = true};
@@ -74,8 +79,8 @@ static bool is_first_with_field(const session_parts *parts, int part, const sess
     return true;
 }
 
-/* Finds an error of a field on any part: its description is invalid, or differs from that on the first part that has
- * the field. */
+/* Finds an error of a field on any part: the field's description is invalid, is missing, or differs from the
+ * description on the first part that has the field. */
 static void find_field_problem(const session_parts *parts, const session_field *first, base_error *problem)
 {
     const insitu_field *as = &first->given;
@@ -166,7 +171,7 @@ static void hash_parts(const session_parts *parts, uint64_t *hash)
     }
 }
 
-/* The hash of names includes errors that only some blocks have, because other ranks must be informed of these. */
+/* Errors that only some blocks have are hashed too, because other ranks must be informed of these errors. */
 uint64_t session_names_hash(const session_meshes *meshes)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
@@ -271,7 +276,8 @@ static session_catalogue_mesh *find_mesh(const session_catalogue *catalogue, con
     return bsearch(&key, catalogue->meshes, (size_t)catalogue->mesh_count, sizeof key, compare_mesh_names);
 }
 
-/* Stores pointers to the names of the meshes in the text, unless names is NULL. Returns their number. */
+/* Finds the names of the meshes in the tables of all ranks; a mesh of several ranks is found several times. `names`
+ * receives pointers into the text, unless it is NULL. Returns the number of names found. */
 static size_t list_names(const char *text, size_t size, const char **names)
 {
     size_t count = 0;
@@ -286,7 +292,7 @@ static size_t list_names(const char *text, size_t size, const char **names)
     return count;
 }
 
-/* Adds the catalogue's meshes, sorted by name, from the tables of all ranks. */
+/* Adds the meshes of all ranks' tables to the catalogue, sorted by name, each mesh once. */
 static bool add_meshes(session_catalogue *catalogue, const char *text, size_t size)
 {
     const size_t count = list_names(text, size, NULL);
@@ -344,7 +350,8 @@ static session_catalogue_field *record_field(session_catalogue_mesh *mesh, bool 
     return field;
 }
 
-/* Called after the last field of a mesh in a rank's table has been read. Records the fields that the rank lacks. */
+/* Records, for a mesh of a rank's table, the fields that other ranks have but this rank lacks. Called after the last
+ * field of the mesh has been read. */
 static void record_missing_fields(session_catalogue_mesh *mesh, bool has_cells, bool has_ids, int rank)
 {
     if (!mesh || !has_cells) return;
@@ -364,9 +371,10 @@ static bool store_fault(base_error **fault, int rank, insitu_status status, cons
     return *fault != NULL;
 }
 
-/* Records an error that a rank's table contains. field: NULL if the error is one of the whole mesh; mesh: NULL if it is
- * unknown to which mesh the error belongs. Lack of memory is also recorded for the catalogue, because callers usually
- * skip the data that they would have passed next. */
+/* Records an error that a rank's table contains. field: NULL if the error concerns the whole mesh; mesh: NULL if it is
+ * not known to which mesh the error belongs. Lack of memory is also recorded for the whole catalogue, because a caller
+ * whose call has failed for lack of memory usually skips its next calls, so that further meshes and fields may be
+ * missing. */
 static bool record_fault(session_catalogue *catalogue, session_catalogue_mesh *mesh, session_catalogue_field *field,
                          int rank, insitu_status status, const char *message)
 {
@@ -569,10 +577,10 @@ insitu_status session_update_catalogue(session_catalogue *catalogue, session_mes
 
 /* ---- homes ----------------------------------------------------------------------------------------------------- */
 
-/* Computes hashes of the stamps at which the cells and the coordinates of this rank's parts of a mesh last changed; 0
- * if this rank has no part. The hashes of all ranks are added up. Bits are mixed first. Without mixing, changes on two
- * ranks could cancel in the sum, because a changed bit could add to one rank's hash what it subtracts from
- * another's. */
+/* Computes two hashes for this rank's parts of a mesh: hashes[0] from the stamps at which their cells last changed,
+ * hashes[1] from the stamps at which their coordinates last changed. Both are 0 if this rank has no part. The caller
+ * adds up the hashes of all ranks. Therefore the bits of each hash are mixed here. Without mixing, changes on two ranks
+ * could cancel in the sum, because a changed bit could add to one rank's hash what it subtracts from another's. */
 static void hash_stamps(const session_parts *parts, int rank, uint64_t hashes[2])
 {
     bool has_any = false;
@@ -590,7 +598,7 @@ static void hash_stamps(const session_parts *parts, int rank, uint64_t hashes[2]
     for (int k = 0; k < 2; k++) hashes[k] = has_any ? session_mix_bits(hashes[k]) : 0;
 }
 
-/* Computes cells_hash and positions_hash of each mesh, which are sums over all ranks of hashes of the stamps. */
+/* Computes cells_hash and positions_hash of each mesh: the sums over all ranks of the hashes of hash_stamps(). */
 static insitu_status update_parts(session_catalogue *catalogue, const session_meshes *meshes, const session_team *team,
                                   base_error *error)
 {

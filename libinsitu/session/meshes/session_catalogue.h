@@ -17,34 +17,35 @@ typedef struct session_catalogue_field {
     int differing_rank; /* a rank on which the field has another centring or number of components; -1: there is none */
     int lacking_rank;   /* a rank that has cells of the mesh but not the field; -1: there is none */
     int derived_index;  /* index among the scene's derived fields; -1: the field is the caller's */
-    base_error *fault;  /* error on the lowest rank on which the field has one; NULL: there is none */
+    base_error *fault;  /* error of the field on the lowest rank on which it has an error; NULL: there is none */
 } session_catalogue_field;
 
-/* A vertex that hangs on a face. Its value is the weighted sum of the values at the face's corners. */
+/* A hanging vertex: a vertex that lies on a face of a coarser cell without being a corner of this face. Its value is
+ * the weighted sum of the values at the face's corners. */
 typedef struct session_hanging_vertex {
     int64_t group;      /* index of its group of equal vertices (session_vertex_groups) */
     int64_t corners[4]; /* indices of groups, or of the values received from other ranks */
-    double weights[4];  /* weight of the value at each corner; they sum to 1 */
-    bool is_received;   /* set if the corners are values received from other ranks, not groups of this rank */
+    double weights[4];  /* weight of the value at each corner; the weights sum to 1 */
+    bool is_received; /* set if `corners` are indices of values received from other ranks, not of groups of this rank */
 } session_hanging_vertex;
 
-/* A vertex that has the same position as other vertices except for rounding, and the position that represents all of
- * these vertices. */
+/* A vertex that coincides with other vertices except for rounding, and the position that represents all of these
+ * vertices. */
 typedef struct session_twin {
     int64_t vertex;     /* index of the vertex in the part */
     double position[3]; /* lexicographically smallest position of the vertex and all vertices that coincide with it */
 } session_twin;
 
-/* The outer faces of a part of a mesh on this rank, and their vertices. Vertices may hang on these faces. The data is
- * kept if only coordinates change. */
+/* The outer faces of a part of a mesh on this rank, and the vertices of outer faces. Other cells' vertices may hang on
+ * these faces. The data is kept if only coordinates change. */
 typedef struct session_border {
     /* session_catalogue_mesh.cells_hash at the time when the border was computed; 0: not computed yet */
     uint64_t cells_hash;
     int64_t face_count, vertex_count;
-    session_face *faces; /* faces that belong to only one cell, counted over all ranks */
-    int64_t *vertices;   /* vertices of the faces that belong to only one cell on this rank; these vertices may hang on
-                            faces */
-    /* number of twins, which are computed again if vertices move (session_hanging.twins_version) */
+    session_face *faces; /* faces that belong to only one cell of the whole mesh, on all ranks */
+    int64_t *vertices; /* vertices of the faces that belong to only one cell of this rank; only these vertices may hang
+                          on faces */
+    /* number of twins; the twins are computed again if vertices move (session_hanging.twins_version) */
     int64_t twin_count;
     session_twin *twins; /* twins of the border's vertices, sorted by vertex */
 } session_border;
@@ -59,7 +60,8 @@ typedef struct session_hanging {
     uint64_t twins_version;  /* version of the vertex coordinates for which the twins of the borders were found */
     int64_t count, total;    /* numbers of hanging vertices on this rank and on all ranks */
     session_hanging_vertex *vertices; /* the hanging vertices; `count` entries */
-    /* number of values sent to each rank, and the groups of these values, sorted by rank */
+    /* sent_counts: number of values sent to each rank; sent_groups: the groups whose values are sent, sorted by the
+     * rank that receives them */
     int64_t *sent_counts, *sent_groups;
     int64_t sent_total; /* number of values sent to all ranks together */
 } session_hanging;
@@ -71,16 +73,17 @@ typedef struct session_vertex_groups {
     uint64_t positions_hash;
     /* index of each part's first vertex in group_of_vertex, and at the end the total number of vertices */
     int64_t *first_vertices;
-    int64_t *group_of_vertex; /* group of each vertex; -1: it belongs to no drawn cell */
+    int64_t *group_of_vertex; /* group of each vertex; -1: the vertex belongs to no drawn cell */
     int64_t count;            /* number of groups */
     /* for each group, the number of corners of drawn cells in all groups before it; count + 1 entries */
     int64_t *corner_starts;
-    session_key_table keys; /* keys of the groups; empty unless a mesh has patches, whose vertices are found by key */
+    session_key_table keys; /* keys of the groups, for the vertices of patches, which are found by key; empty if no mesh
+                               has patches */
     /* Groups whose positions lie in other ranks' bounding boxes, sorted by the ranks that combine their values (home
      * ranks, session_homes.h). There are none if there is only one rank. */
     int64_t shared_count;     /* number of groups whose positions lie in other ranks' boxes */
-    int64_t *shared_groups;   /* index of each of these groups */
-    session_key *shared_keys; /* key by which each of these groups is found on its home rank */
+    int64_t *shared_groups;   /* index of each shared group */
+    session_key *shared_keys; /* key by which each shared group is found on its home rank */
     int64_t *shared_counts;   /* for each rank, the number of shared groups that have this home rank */
 } session_vertex_groups;
 
@@ -89,7 +92,8 @@ typedef struct session_catalogue_mesh {
     int first_rank;  /* lowest rank that has cells of the mesh; -1: there is none */
     bool has_ids;    /* set if all ranks that have cells give global vertex ids */
     bool is_refined; /* set if some block, on any rank, has a level of refinement */
-    /* set if all drawn cells, over all ranks, are shells; computed by session_check_vertex_order() */
+    /* set if all drawn cells, over all ranks, are shells (triangles, quads or polygons); computed by
+     * session_check_vertex_order() */
     bool has_shells_alone;
     /* set if cells, on any rank, are of higher order; computed by session_check_vertex_order() */
     bool has_higher_order;
@@ -103,9 +107,11 @@ typedef struct session_catalogue_mesh {
     /* if the mesh has vertex ids: name of the mesh group that contains only this mesh (session_mesh_group.name);
      * otherwise 0 */
     uint64_t single_group_name;
-    /* hashes, over all ranks, of the stamps of cells and of coordinates; 0: not computed yet */
+    /* sums over all ranks of hashes of the stamps at which cells (cells_hash) and coordinates (positions_hash) last
+     * changed; 0: not computed yet */
     uint64_t cells_hash, positions_hash;
-    /* the home ranks of vertices and faces of this mesh; valid if computed for the current positions_hash */
+    /* the home ranks (session_homes.h) of vertices and faces of this mesh; valid if computed for the current
+     * positions_hash */
     session_homes homes;
 } session_catalogue_mesh;
 
@@ -119,7 +125,7 @@ typedef struct session_mesh_group {
     /* set if the mesh group is a single mesh with global vertex ids; vertices are then equal if their ids are equal */
     bool by_id;
     uint64_t positions_hash;    /* hash of the vertex positions of all its meshes */
-    session_homes own_homes;    /* homes of a mesh group of several meshes; unused if it has one mesh */
+    session_homes own_homes;    /* home ranks, if the mesh group has several meshes; unused if it has one mesh */
     const session_homes *homes; /* points to own_homes, or to the homes of the single mesh */
     session_vertex_groups groups;
     session_hanging hanging;
@@ -137,17 +143,17 @@ typedef struct session_catalogue {
     session_mesh_group **mesh_groups;
 } session_catalogue;
 
-/* Updates the catalogue. is_shared states that all ranks have the same meshes and fields (equal session_names_hash()),
- * and that none has an error. Meshes with an error are excluded from the step. Collective. */
+/* Updates the catalogue. is_shared: all ranks have the same meshes and fields (equal session_names_hash()), and no mesh
+ * or field has an error. Meshes with an error are excluded from the step. Collective. */
 insitu_status session_update_catalogue(session_catalogue *catalogue, session_meshes *meshes, const session_team *team,
                                        bool is_shared, base_error *error);
 void session_catalogue_free(session_catalogue *catalogue);
 
-/* Computes the homes of meshes and mesh groups again if their cells or positions have changed. half_diagonal is that of
- * the scene's bounds. Collective; all ranks return the same status. */
+/* Computes the home ranks (session_homes.h) of meshes and mesh groups again if their cells or positions have changed.
+ * half_diagonal: half of the diagonal of the scene's bounds. Collective; all ranks return the same status. */
 insitu_status session_update_homes(session_catalogue *catalogue, const session_meshes *meshes, double half_diagonal,
                                    const session_team *team, base_error *error);
-/* Marks the homes as unknown. This must be called on all ranks if cells have changed on any rank;
+/* Marks the home ranks as unknown. This must be called on all ranks if cells have changed on any rank;
  * session_update_homes() then finds out which meshes have changed. Local. */
 void session_invalidate_homes(session_catalogue *catalogue);
 
@@ -176,19 +182,18 @@ void session_hanging_free(session_hanging *hanging, bool with_borders);
 typedef struct session_mesh_group_parts {
     int count;                  /* number of this rank's parts */
     const session_mesh **items; /* the parts, owned by session_meshes */
-    int *
-        first_parts; /* index of the first part of each of the mesh group's meshes; one entry more than it has meshes */
+    int *first_parts;           /* for each mesh of the group, index of its first part in `items`; then `count` */
 } session_mesh_group_parts;
 
-/* Lists this rank's parts of the mesh group's meshes. Returns false if memory runs out; then there is nothing to free.
- */
+/* Lists this rank's parts of the mesh group's meshes. Returns false if memory runs out; then nothing needs to be
+ * freed. */
 bool session_list_mesh_group_parts(const session_mesh_group *mesh_group, const session_meshes *meshes,
                                    session_mesh_group_parts *out);
 void session_mesh_group_parts_free(session_mesh_group_parts *parts);
 
 void session_vertex_groups_free(session_vertex_groups *groups);
 
-/* Returns a hash of this rank's table of names. It is equal on two ranks if their tables are equal. Local. */
+/* Returns a hash of this rank's table of names. Two ranks have the same hash if their tables are equal. Local. */
 uint64_t session_names_hash(const session_meshes *meshes);
 
 /* Adds a field that all ranks with cells of the mesh have. Its name must not exist yet. Returns NULL if memory runs

@@ -1,6 +1,6 @@
-/* All other code reads each cell's vertices contiguously, in VTK's order, and kernels process eight such cells at once.
- * If the caller has another order, connectivity is copied, so that these kernels need no further case. Cells that have
- * the same vertex order in both, such as tets, are not copied. */
+/* All other code expects each cell's vertices contiguously and in VTK's order, and kernels process eight such cells at
+ * once. If the caller stores them in another order, the connectivity is copied into VTK's order, so that the kernels
+ * need no further case. Types of cells that have the same order in both conventions, such as tets, are not copied. */
 #include "session_cell_order.h"
 
 #include "region.h"
@@ -61,8 +61,8 @@ static cell_rows make_cell_rows(const session_mesh *mesh)
     return rows;
 }
 
-/* Returns whether all entries fit into 4 bytes. If there are few vertices but an entry does not fit, the entry is an
- * invalid index. The entries are then copied with 8 bytes, so that the error message shows this index. */
+/* Returns whether all entries fit into 4 bytes. An entry that does not fit, in a mesh with few vertices, is an invalid
+ * index. The entries are then copied with 8 bytes, so that the error message shows this index. */
 static bool fit_in_32_bits(const cell_rows *rows, int threads)
 {
     int64_t least = 0, most = 0;
@@ -80,7 +80,8 @@ static bool fit_in_32_bits(const cell_rows *rows, int threads)
     return least >= INT32_MIN && most <= INT32_MAX;
 }
 
-/* Computes the cell's position in the copy; returns false if its offsets are bad. */
+/* Computes the index of the cell's first vertex in the copied connectivity; returns false if the cell's offsets are
+ * bad. */
 static bool locate_cell(const grid *g, int64_t cell, int count, int64_t entries, int64_t *first)
 {
     *first = cell * count;

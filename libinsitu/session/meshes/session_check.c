@@ -25,15 +25,15 @@
 /* ---- polyhedra -----------------------------------------------------------------------------------------------
  *
  * Checks that the faces of a polyhedron are valid and together bound a volume. A ray that enters a cell must leave it,
- * so exactly two faces must meet at every edge. The edges are sorted, so that the two of a pair are adjacent; an edge
- * from a vertex to itself bounds nothing and is skipped. */
+ * so exactly two faces must meet at every edge. The edges of all faces are sorted, so that equal edges follow each
+ * other; an edge from a vertex to itself bounds nothing and is skipped. */
 
 typedef struct face_edge {
-    int64_t low, high, face; /* the edge's vertices, smaller number first, and a face that has the edge; numbers are
-                                those in the caller's connectivity */
+    int64_t low, high, face; /* low, high: the edge's vertices, smaller index first; face: a face that has the edge.
+                                Indices are those of the caller's connectivity. */
 } face_edge;
 
-/* A buffer of one thread, enlarged when needed. It must be zero-initialized. */
+/* A buffer of one thread, which is enlarged if necessary. It must be zero-initialized. */
 typedef struct edge_buffer {
     face_edge *edges;
     int64_t capacity;
@@ -54,7 +54,7 @@ typedef enum face_fault {
 typedef struct face_fault_details {
     int64_t count;         /* number of the cell's faces */
     int64_t face;          /* number of the faulty face, as stored in the connectivity */
-    int64_t first, end;    /* start and end of the face in the list of faces' vertices */
+    int64_t first, end;    /* start and end of the face's vertices in face_connectivity */
     int64_t vertex, other; /* the faulty vertex, or the two ends of an edge */
     int sharing;           /* number of faces that have the edge */
     double position[3];    /* coordinates of the faulty vertex */
@@ -261,7 +261,8 @@ static cell_fault check_cell(const session_mesh *mesh, int64_t cell, edge_buffer
     if (details->type == GRID_POLYGON) return check_polygon(mesh, cell, details);
     const int count = grid_type_vertices(details->type);
     if (count == 0) return BAD_TYPE;
-    /* the padding contains no vertices, and the vertices of all other cells are in range */
+    /* Ghosts of lattices need no check: a ghost that pads the lattice has no vertices, and the vertices of other cells
+     * are in range because they are computed. */
     if (g->lattice && grid_is_ghost(g, cell)) return CELL_GOOD;
     if (g->offsets.data) {
         details->first = grid_array_index(&g->offsets, cell);
@@ -353,8 +354,8 @@ static insitu_status describe_offsets(const session_mesh *mesh, int64_t cell, co
 #pragma GCC diagnostic pop
 }
 
-/* Reports the error of a bad cell, which is checked a second time. If the second check finds no error, memory ran out
- * in the first check. */
+/* Checks a bad cell a second time and reports its error. If the second check finds no error, memory ran out in the
+ * first check. */
 static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base_error *error)
 {
     fault_details details = {0};
@@ -417,8 +418,8 @@ static int64_t check_cells(const session_mesh *mesh, int threads, mesh_tally *ta
         for (int64_t begin = 0; begin < count; begin += BLOCK_CELLS) {
             if (first_bad < count) continue;
             const int64_t end = begin + BLOCK_CELLS < count ? begin + BLOCK_CELLS : count;
-            /* The fast check ends at a bad cell, or at a polygon, which it cannot check; the cells from there on are
-             * checked one by one. */
+            /* The fast check stops at a bad cell, or at a polygon, which it cannot check; the remaining cells of the
+             * block are checked one by one. */
             int64_t at = run ? run(mesh, begin, end, &mine) : begin;
             if (at < end) at = check_cells_one_by_one(mesh, at, end, &buffer, &mine);
             if (at < end) first_bad = at;
@@ -442,7 +443,7 @@ static insitu_status check_last_offset(const session_mesh *mesh, base_error *err
                      mesh->label, last + base, base ? " + 1" : "", mesh->topology.connectivity_count + base);
 }
 
-/* Largest coordinate for which squares and volumes do not overflow a double. */
+/* Largest allowed coordinate. Squares and volumes of larger coordinates might overflow a double. */
 static const double largest_coordinate = 1e100;
 
 /* Reports the first drawn cell that has a coordinate above the largest allowed one. */
@@ -507,7 +508,8 @@ static void find_flat_cells(const grid *g, int threads, uint64_t *flat)
     }
 }
 
-/* Finds the cells without volume, which are omitted from trees. If these cells have changed, the tree is dropped. */
+/* Finds the flat cells, which have no volume and are omitted from the tree. If the set of flat cells has changed, the
+ * tree is dropped. */
 static insitu_status update_flat_cells(session_mesh *mesh, int64_t count, int threads, base_error *error)
 {
     const size_t bytes = (size_t)(mesh->cells.cell_count + 63) / 64 * sizeof *mesh->flat_cells;
@@ -541,12 +543,13 @@ static insitu_status check_cells_of(session_mesh *mesh, int threads, base_error 
     mesh->drawn_count = tally.drawn_count;
     mesh->given_counts = (session_counts){tally.drawn_count, tally.ghost_count, tally.inverted_count, tally.flat_count,
                                           tally.shell_count};
-    /* if cells are refined, only some of the pieces of each cell may have been made */
+    /* If cells of higher order are refined (session_finer.h), the tally lacks the linear pieces that were not made; the
+     * counts of the caller's cells are then stored in `finer`. */
     if (mesh->finer.parts)
         mesh->given_counts = mesh->finer.given_counts;
     else if (mesh->topology.is_split)
         mesh->given_counts = session_count_parents(mesh, tally.inverted_count > 0);
-    /* cell count without the padding of lattices */
+    /* cells that pad a lattice are not counted as ghosts */
     if (mesh->cells.lattice) mesh->given_counts.ghost_count -= mesh->cells.cell_count - session_cell_count(mesh);
     mesh->flat_count = tally.flat_count;
     mesh->shell_count = tally.shell_count;

@@ -38,7 +38,8 @@ static conform_array find_array(insitu_mesh *m, int number)
     }
 }
 
-/* Returns the type in which indices are read, either in place or from a copy. */
+/* Returns the type in which indices of a type are read, in place or from a copy. below: upper bound of valid
+ * indices. */
 static insitu_type index_type(insitu_type type, int64_t below)
 {
     if (type == INSITU_INT64 || type == INSITU_UINT64) return INSITU_INT64;

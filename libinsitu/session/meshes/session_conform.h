@@ -5,18 +5,18 @@
 
 #include "session_mesh.h"
 
-/* Stores the description in mesh->original and, with the copies in place of such arrays, in mesh->given. Copies are
- * allocated here and filled by session_fill_conformed(). Copies of arrays that have not changed, according to the
- * INSITU_CHANGED_* bits of `changed`, are kept. After an error some copies are missing, and the mesh can only be
- * dropped. */
+/* Stores the caller's description in mesh->original. mesh->given receives the same description, in which arrays that
+ * cannot be read in place are replaced by copies. Copies are allocated here and filled by session_fill_conformed().
+ * Copies of arrays that have not changed, according to the INSITU_CHANGED_* bits of `changed`, are kept. After an error
+ * some copies are missing, and the mesh can only be dropped. */
 insitu_status session_conform_mesh(session_mesh *mesh, const insitu_mesh *original, unsigned changed,
                                    base_error *error);
 
 /* Fills the copies from the caller's arrays. Uses all threads. */
 void session_fill_conformed(session_mesh *mesh, int threads);
 
-/* Returns whether the map from numbers to cell types equals the one that was copied. NULL means that there is no
- * map. */
+/* Returns whether a map from the caller's numbers to cell types equals the map of the mesh. map: NULL means that there
+ * is no map. */
 bool session_has_cell_type_map(const session_mesh *mesh, int count, const int *map);
 
 #endif

@@ -1,17 +1,22 @@
-/* Along a line of nodes in a hex's lattice, the polynomial interpolates the values at these nodes. In a tet or triangle
+/* Derivatives of the polynomials of cells of higher order at nodes. The nodes of a cell form its lattice, a grid with
+ * indices i, j, k along the axes of the reference cell.
+ *
+ * Along a line of nodes in a hex's lattice, the polynomial interpolates the values at these nodes. In a tet or triangle
  * with equispaced nodes, the function that is 1 at node (i, j, k, l) of order p = i + j + k + l and 0 at the others is
  *
  *     B_i(p a) B_j(p b) B_k(p c) B_l(p d),   B_n(t) = t (t - 1) ... (t - n + 1) / n!
  *
- * at the barycentric coordinates a, b, c, d (Silvester 1969). A wedge's polynomial is the product of a triangle's and
- * a line's.
+ * at the barycentric coordinates a, b, c, d (Silvester 1969). A wedge's polynomial is the product of a triangle's and a
+ * line's.
  *
  * In finer lattices (session_finer.h) the polynomials have a lower order than the lattice, and are determined by fewer
  * nodes: only those whose indices are multiples of `parts`. Therefore the sums have few terms.
  *
- * The polynomials of serendipity cells are those of complete cells of order 2 whose values at the missing nodes follow
- * from the others: at the middle of a face half the sum of the midpoints around it, less a quarter of that of the
- * corners; at the middle of a hex a quarter of the sum of all midpoints, less a quarter of that of the corners. */
+ * Serendipity cells lack the nodes in the middle of faces and cells. Their polynomials are those of complete cells of
+ * order 2 if the value at a missing node is computed from other nodes. The value at the middle of a face is half the
+ * sum of the values at the midpoints of the face's edges, minus a quarter of the sum of the values at its corners. The
+ * value at the middle of a hex is a quarter of the sum of the values at the midpoints of all edges, minus a quarter of
+ * the sum of the values at all corners. */
 #include "session_derivatives.h"
 
 #include <math.h>
@@ -21,16 +26,17 @@
 
 enum { MOST_NODES_OF_LINE = NODES_MOST_ORDER + 1 };
 
-/* The terms of derivatives while they are computed. They are counted while out->nodes is NULL, and then stored. */
+/* The terms of derivatives while they are computed, in two passes. The first pass only counts the terms, while
+ * out->nodes is NULL; the second pass stores them. */
 typedef struct term_list {
     session_derivatives *out;
     const session_nodes *of;
     insitu_vertex_order order;
     int parts, order_of_polynomial;
     int count;
-    /* [i][j]: derivative at node i of the function of the j-th node that is used */
+    /* [i][j]: derivative at node i of the Lagrange polynomial that is 1 at node j * parts of a line */
     double lines[MOST_NODES_OF_LINE][MOST_NODES_OF_LINE];
-    /* B_n(t / parts) and its derivatives, as defined at the top of this file */
+    /* [n][i]: B_n(i / parts) and its derivative, as defined at the top of this file */
     double values[MOST_NODES_OF_LINE][MOST_NODES_OF_LINE], slopes[MOST_NODES_OF_LINE][MOST_NODES_OF_LINE];
 } term_list;
 
@@ -50,8 +56,8 @@ static double legendre_slope(int p, double x, double *curvature)
     return slope;
 }
 
-/* Gauss-Lobatto points are the ends and the roots of the derivative of Legendre's polynomial, found by Newton's method
- * from Chebyshev's points. */
+/* Gauss-Lobatto points are the ends of the line and the roots of the derivative of Legendre's polynomial. The roots are
+ * found by Newton's method, starting at Chebyshev's points. */
 void session_compute_node_positions(int p, bool is_lobatto, double out[MOST_NODES_OF_LINE])
 {
     for (int i = 0; i <= p; i++) {
@@ -83,7 +89,7 @@ static void derive_lines(term_list *list, bool is_lobatto)
         }
 }
 
-/* Computes B_n and its derivative at multiples t of 1 / parts. */
+/* Computes B_n and its derivative at t = i / parts for all indices i of nodes on a line. */
 static void derive_products(term_list *list)
 {
     for (int n = 0; n <= list->order_of_polynomial; n++)
@@ -125,7 +131,7 @@ static void store_term(term_list *list, int position, double weight)
     list->count++;
 }
 
-/* Adds the terms of the nodes around a node that a serendipity cell lacks. */
+/* Adds the terms that replace the term of a node that a serendipity cell lacks: one for each of the nodes around it. */
 static void add_missing_term(term_list *list, const int at[3], double weight)
 {
     int directions[3][3], step[3];
@@ -153,7 +159,8 @@ static void add_term(term_list *list, int i, int j, int k, double weight)
         add_missing_term(list, (const int[]){i, j, k}, weight);
 }
 
-/* Adds the derivative along an axis of the lattice by the values on the line through the node. */
+/* Adds the terms of the derivative along an axis of the lattice. These are terms of nodes on the line through the node
+ * `at` along this axis. */
 static void add_line(term_list *list, const int at[3], int axis)
 {
     int node[3] = {at[0], at[1], at[2]};
@@ -163,8 +170,9 @@ static void add_line(term_list *list, const int at[3], int axis)
     }
 }
 
-/* Adds the derivative with respect to a barycentric coordinate of a tet or, in layer k of a wedge, of a triangle, times
- * sign. b: the barycentric coordinates of the node times the order; b[2] is 0 in triangles. */
+/* Adds the terms of the derivative with respect to a barycentric coordinate of a tet or, in layer k of a wedge, of a
+ * triangle; the weights are multiplied by `sign`. b: the barycentric coordinates of the node times the order; b[2] is 0
+ * in triangles. */
 static void add_barycentric(term_list *list, const int b[4], int coordinate, int k, double sign)
 {
     const int p = list->order_of_polynomial, parts = list->parts;
@@ -198,7 +206,8 @@ static void add_derivative(term_list *list, const int at[3], int axis)
 
 /* ---- kinds ----------------------------------------------------------------------------------------------------- */
 
-/* Lists the derivatives at all nodes. `nodes_at` contains the lattice indices of each node of the row. */
+/* Lists the terms of the derivatives at all nodes. nodes_at: lattice indices of each node, in the order of the cell's
+ * row of connectivity. */
 static void list_terms(term_list *list, const int (*nodes_at)[3])
 {
     session_derivatives *out = list->out;
@@ -315,8 +324,8 @@ static double distance_between(const double *a, const double *b)
     return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
 }
 
-/* Returns the mean length of the first and the last of the segments into which nodes divide the cell's edges, as a
- * fraction of the length of the edges. */
+/* Returns the mean length of the first and the last of the segments into which the nodes divide each edge of the cell,
+ * as a fraction of the mean length of the edges. */
 static double mean_end_segment(const session_nodes *of, insitu_vertex_order order, const double *positions, int stride)
 {
     const int p = of->order, axes = of->type == GRID_HEX ? 3 : 2;

@@ -8,10 +8,10 @@
 /* The derivatives of one kind of cell. The derivative at node n along axis a consists of the terms from
  * starts[axis_count * n + a] up to the next start. */
 typedef struct session_derivatives {
-    int axis_count;       /* 3; 2 for triangles and quads; 0 for pyramids, whose derivatives are not known */
+    int axis_count;       /* 3; 2 for triangles and quads; 0 for pyramids, whose derivatives are not implemented */
     double first_segment; /* distance between the first two nodes of an edge of length 1 */
     int *starts;
-    int *nodes;      /* for each term, the position of its node in the row */
+    int *nodes;      /* for each term, the position of its node in the cell's row of connectivity */
     double *weights; /* for each term, the weight of the value at its node; weights of a derivative sum to 0 */
 } session_derivatives;
 
@@ -30,8 +30,8 @@ bool session_has_two_spacings(const session_nodes *of);
 /* Computes the positions of the p + 1 nodes of an edge from 0 to 1. */
 void session_compute_node_positions(int p, bool is_lobatto, double out[NODES_MOST_ORDER + 1]);
 
-/* Finds the directions from a node that a serendipity cell lacks to the nodes around it. Returns their number: 2 at the
- * middle of a face, 3 at that of a hex. */
+/* Finds the directions from a node that a serendipity cell lacks to the nodes around it. Returns the number of
+ * directions: 2 at the middle of a face, 3 at the middle of a hex. */
 int session_missing_directions(int type, const int at[3], int directions[3][3]);
 
 /* The derivatives of the polynomials of all cells of a mesh whose cells of higher order are split into linear
@@ -41,11 +41,13 @@ typedef struct session_polynomials {
     const int64_t *first_pieces; /* same as session_topology.first_pieces */
     int64_t cell_count;          /* number of the caller's cells */
     insitu_vertex_order order;
-    /* two entries for each kind of cell: derivatives for equispaced nodes and for Gauss-Lobatto points or, if the mesh
-     * has finer lattices, derivatives at the nodes of refined cells and of all other cells */
+    /* Two entries for each kind of cell. Without finer lattices: the derivatives for equispaced nodes, and those for
+     * Gauss-Lobatto points. With finer lattices: the derivatives at the nodes of refined cells, and those at the nodes
+     * of all other cells. */
     session_derivatives *kinds;
-    /* If the mesh has finer lattices: the rows of the caller's cells, whose kinds number the derivatives, and for each
-     * kind the number of nodes of refined cells. Otherwise the list of kinds is empty. */
+    /* If the mesh has finer lattices: `nodal` has the rows of the caller's cells, and their kinds are the kinds of
+     * `kinds`; refined_counts has the number of nodes of a refined cell of each kind. Otherwise the list of kinds in
+     * `nodal` is empty. */
     session_rows nodal;
     int64_t refined_counts[ROWS_MOST_KINDS];
 } session_polynomials;
@@ -56,7 +58,7 @@ bool session_polynomials_create(const session_mesh *mesh, session_polynomials *o
 void session_polynomials_free(session_polynomials *polynomials);
 
 /* Returns the derivatives of a cell. positions: positions of the cell's nodes, `stride` doubles apart. In quads and
- * hexes of order 3 and more, they show whether nodes are equispaced or Gauss-Lobatto points. */
+ * hexes of order 3 and more, the positions show whether nodes are equispaced or Gauss-Lobatto points. */
 const session_derivatives *session_derivatives_of(const session_polynomials *polynomials, int64_t cell,
                                                   const double *positions, int stride);
 

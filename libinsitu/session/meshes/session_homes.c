@@ -33,8 +33,9 @@ static int compare_ids(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Returns the r-th of P quantiles of this rank's ids, where r is its rank and P the number of ranks. It is estimated
- * from an evenly spaced sample of the ids. The estimate need not be exact, because all ranks use the same result. */
+/* Returns this rank's proposal for the first id of a range of ids: with P ranks, rank r returns the (r + 1/2) / P
+ * quantile of its own ids, estimated from an evenly spaced sample of them. The estimate need not be exact, because all
+ * ranks use the same result. */
 static int64_t sample_quantile(const session_mesh *mesh, const session_team *team)
 {
     const grid_array ids = session_grid_array(&mesh->given.vertex_ids);

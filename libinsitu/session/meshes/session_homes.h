@@ -1,13 +1,14 @@
-/* Determines the home ranks of items that several ranks share, namely vertices and faces on the borders between the
- * ranks' parts of a mesh. The home of an item is a rank near it, which all ranks that have the item can determine
- * without communication. Therefore neither the size of a rank's messages nor the number of their receivers grows with
- * the number of ranks.
+/* Determines home ranks. Several ranks share items: the vertices and faces on the borders between the ranks' parts of a
+ * mesh. The home of an item is the rank that combines the data of all ranks that have the item. It is a rank near the
+ * item, and all ranks that have the item can determine it without communication. Therefore neither the size of a rank's
+ * messages nor the number of their receivers grows with the number of ranks.
  *
- * If items are identified by coordinates, which have the same bits on all ranks, the home is one of the ranks in
- * whose box all of the item's vertices lie, selected by the item's hash. If items are identified by global ids,
+ * If items are identified by coordinates, which are bitwise equal on all ranks, the home is one of the ranks in whose
+ * box all of the item's vertices lie; a hash of the item selects one of them. If items are identified by global ids,
  * their coordinates may differ in the last bits, so the ids are divided among the ranks instead. With P ranks, the
  * range of ids of rank r starts at the r-th of P quantiles of the ids of its own vertices. This range is near the
- * rank's own ids if ranks number their vertices consecutively, and evenly distributed if ids are random. */
+ * rank's own ids if ranks number their vertices consecutively, and the ranges are evenly distributed if ids are
+ * random. */
 #ifndef SESSION_HOMES_H
 #define SESSION_HOMES_H
 
@@ -29,12 +30,13 @@ typedef struct session_homes {
     bool is_computed; /* set if the other members are up to date */
     bool by_id;       /* set if homes are found by global vertex ids, and not by positions */
     int rank;         /* number of this rank */
-    /* The ranks whose drawn cells' box intersects this rank's box, in ascending order, including this rank. The
-     * relation is symmetric. A rank without cells has no such ranks. Boxes are extended by 2e-5 of the scene's half
-     * diagonal, so that the boxes of a vertex and of a face on which it lies up to rounding intersect. */
+    /* The ranks near this rank, including this rank, in ascending order: ranks whose bounding box of drawn cells
+     * intersects that of this rank. The relation is symmetric. A rank without cells has no near ranks. Boxes are
+     * extended by 2e-5 of the scene's half diagonal, so that the boxes of a vertex and of a face on which it lies up to
+     * rounding intersect. */
     int near_count;
     int *near_ranks;
-    session_box *boxes; /* box of each of these ranks */
+    session_box *boxes; /* bounding box of each near rank */
     /* Used if by_id is set: the ids are divided into ranges. Each range has its first id and the rank that is the home
      * of its ids. */
     int share_count;
@@ -44,9 +46,9 @@ typedef struct session_homes {
 
 void session_homes_free(session_homes *homes);
 
-/* Computes the homes. meshes contains this rank's parts, or NULL for a mesh of which it has none; several meshes are
- * treated as one. by_id is allowed only for a single mesh. half_diagonal is that of the scene's bounds. Collective; all
- * ranks return the same status. */
+/* Computes the homes. meshes: this rank's parts, or NULL for a mesh of which this rank has no part; several meshes are
+ * treated as one. by_id is allowed only for a single mesh. half_diagonal: half of the diagonal of the scene's bounds.
+ * Collective; all ranks return the same status. */
 insitu_status session_homes_find(session_homes *homes, const struct session_mesh *const *meshes, int count, bool by_id,
                                  double half_diagonal, const struct session_team *team, base_error *error);
 
@@ -56,8 +58,8 @@ bool session_is_in_box(const session_box *box, const double point[3]);
 /* Returns whether the point lies in the box of another rank. */
 bool session_is_in_other_box(const session_homes *homes, const double point[3]);
 
-/* Returns the home of an item. points are the positions of its vertices (at least one), which lie in this rank's box,
- * and id is the least id of its vertices. Without ids, the home is determined by the hash. */
+/* Returns the home rank of an item. points: positions of the item's vertices (at least one), which lie in this rank's
+ * box. id: least id of its vertices, used if homes are found by ids; otherwise the hash selects the home. */
 int session_find_home(const session_homes *homes, const double (*points)[3], int count, uint64_t hash, int64_t id);
 
 #endif

@@ -6,7 +6,8 @@
  * unit matrix and receives the result. */
 void session_invert_matrix(int count, double *matrix, double *inverse);
 
-/* Multiplies each of `outer` arrays of columns x inner numbers with a matrix of rows x columns. */
+/* Multiplies a matrix of rows x columns by each of `outer` matrices of columns x inner, which are stored one after
+ * another in `in`. `out` receives the `outer` products, each of rows x inner. */
 void session_multiply_matrix(const double *matrix, int rows, int columns, int outer, int inner, const double *in,
                              double *out);
 

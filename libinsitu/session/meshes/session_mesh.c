@@ -447,7 +447,7 @@ static int find_mesh_index(const session_meshes *meshes, const char *name, int64
     return low;
 }
 
-/* larger than any value of mirror_axes */
+/* exceeds each value of mirror_axes, which is a combination of three bits */
 enum { ALL_AXES = 8 };
 
 /* Returns the index after the last part of this name among the sorted meshes. */

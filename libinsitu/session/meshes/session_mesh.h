@@ -1,4 +1,13 @@
-/* This rank's parts of the meshes: the caller's data, data derived from it, and the trees over it. */
+/* This rank's parts of the meshes: the caller's data, data derived from it, and the trees over it. Terms that the
+ * session's code uses:
+ * - part: one rank's part of a mesh; if the rank has several blocks of the mesh, each block is a part;
+ * - piece: one of the linear cells into which a cell of higher order is split (session_split.h);
+ * - finer lattice: additional nodes of a cell of higher order, at which its polynomial is evaluated (session_finer.h);
+ * - shell: a triangle, quad or polygon that is drawn; a shell has no volume;
+ * - drawn cell: a cell that is not a ghost;
+ * - outer surface: the faces that belong to only one of the cells selected by a threshold (session_outer below);
+ * - mesh group: the meshes across which values are averaged at equal vertices (session_catalogue.h);
+ * - tree: bounding volume hierarchy over the drawn cells. */
 #ifndef SESSION_MESH_H
 #define SESSION_MESH_H
 
@@ -9,14 +18,14 @@
 
 typedef struct session_field {
     insitu_field given; /* the name is a copy owned by the session; the values belong to the caller */
-    /* array of all components or, if each component has its own array (component_arrays), of the first one */
+    /* array of all components or, if each component has its own array (component_arrays), of the first component */
     grid_array values;
     grid_array *component_arrays; /* array of each component; NULL: all components are in `values` */
     int64_t component_stride;     /* distance in bytes between the components of a tuple in `values` */
     base_error problem;           /* error of the last insitu_set_field(), or an error of the values */
     bool is_problem_of_contents;  /* set if the error is an invalid value found by the check of this step */
     bool has_index;     /* set if an index array gives the tuple of each vertex or cell (insitu_field.index) */
-    bool is_copy_stale; /* set if the values or the index have changed since the copy was made */
+    bool is_copy_stale; /* set if the values or the index have changed since `copy` was made */
     /* set if statistics of this step need the field; fields shown by images have scalars instead */
     bool is_in_statistics;
     /* set if given.fill was called in this step; the values are valid unless fill_problem holds an error */
@@ -107,7 +116,7 @@ typedef struct session_scalar {
     session_extremes extremes[SESSION_EXTENTS];
 } session_scalar;
 
-/* A face of a cell, by its index among the cell's faces (session_cell_faces.h). */
+/* A face of a cell. face: index among the cell's faces (session_cell_faces.h). */
 typedef struct session_face {
     int64_t cell;
     int64_t face;
@@ -124,8 +133,9 @@ typedef struct session_threshold {
     double low, high;
 } session_threshold;
 
-/* The faces that belong to only one of the cells selected by a threshold, over all ranks, and a mesh of tets and
- * pyramids that is built on these faces (session_outer_mesh.h). insitu_report lists it as a copy. */
+/* The outer surface of a mesh or of its cells that a threshold selects: the faces that belong to only one of these
+ * cells, over all ranks. It includes a mesh of tets and pyramids that is built on these faces (session_outer_mesh.h).
+ * insitu_report lists it as a copy. */
 typedef struct session_outer {
     session_threshold threshold;
     /* session_scalar.version of the values to which the threshold was applied, if there is a threshold */
@@ -179,8 +189,8 @@ typedef struct session_topology {
 typedef struct session_discontinuous {
     bool is_active; /* set if the mesh is discontinuous; otherwise all other members are empty */
     bool is_made;   /* set if the coordinates are up to date */
-    /* set if cells are split into pieces. `shared_connectivity` is then the caller's connectivity, whose entries are
-     * the corners. */
+    /* Set if cells are split into pieces. `shared_connectivity` is then the caller's connectivity, and each of its
+     * entries is a corner. */
     bool are_corners_entries;
     int64_t corner_count;
     grid_array shared_connectivity; /* connectivity that refers to the vertices that cells share */
@@ -190,7 +200,7 @@ typedef struct session_discontinuous {
     int64_t bytes;
 } session_discontinuous;
 
-/* Bounds and sizes of the drawn cells of a mesh (see the members of session_mesh with the same names). */
+/* Bounds, counts and sizes of the drawn cells of a mesh (see the members of session_mesh with the same names). */
 typedef struct session_sizes {
     double lower[3], upper[3];
     int64_t drawn_count, flat_count;
@@ -202,7 +212,7 @@ typedef struct session_counts {
     int64_t drawn_count, ghost_count, inverted_count, flat_count, shell_count;
 } session_counts;
 
-/* The linear pieces that are made of each cell of higher order. */
+/* The linear pieces of cells of higher order that are made; the other pieces are not drawn. */
 typedef struct session_piece_set {
     /* for each cell, the index of its first word in `bits`; a final entry marks the end. For a cell without words, all
      * pieces are made. NULL: all pieces of all cells are made */
@@ -215,10 +225,11 @@ enum { SESSION_FINER_COUNTS = 64 };
 /* Nodes of a finer lattice in cells of higher order, at which their polynomials are evaluated (session_finer.h).
  * insitu_report lists them as a copy. */
 typedef struct session_finer {
-    bool is_counted; /* set if `counts` are those of the current cells */
+    bool is_counted; /* set if `counts` were computed for the current cells */
     int64_t counts[SESSION_FINER_COUNTS];
-    int parts; /* number of parts of each edge between two nodes; 0: session_mesh.given is the caller's mesh */
-    /* the sizes of the mesh without finer lattices */
+    int parts; /* number of parts into which each segment between two nodes of an edge is divided; 0: the mesh has no
+                  finer lattices, and session_mesh.given is the caller's mesh */
+    /* sizes and session_mesh.given_counts that the mesh has without finer lattices */
     session_sizes sizes;
     session_counts given_counts;
     session_piece_set pieces;
@@ -235,7 +246,8 @@ typedef struct session_finer {
 
 /* A structured block of cells. */
 typedef struct session_lattice {
-    insitu_lattice given; /* given.lattice of the mesh points to it, or is NULL if the mesh is not structured */
+    insitu_lattice given; /* copy of the caller's description; session_mesh.given.lattice points to it, or is NULL if
+                             the mesh is not structured */
     grid_lattice cells;
     /* coordinates along the axes of a uniform or rectilinear lattice. insitu_report lists them as a copy */
     double *axis_coordinates[3];
@@ -250,7 +262,7 @@ typedef struct session_warp {
     uint64_t key;                /* hash of the displacements by which the coordinates were moved */
     char *coordinate_memory;     /* memory of the moved coordinates (session_own_coordinates.h) */
     insitu_array coordinates[3]; /* the moved coordinates; an axis has no data if its coordinates are the caller's */
-    insitu_array unmoved[3];     /* values of session_mesh.given before the vertices were moved */
+    insitu_array unmoved[3];     /* session_mesh.given.coordinates before the vertices were moved */
     /* the caller's lattice without its coordinates along the axes, because moved coordinates are given by vertex */
     insitu_lattice lattice;
     int64_t bytes;
@@ -267,7 +279,7 @@ typedef struct session_mirrored {
     double *axes[3];             /* coordinates along a lattice's axes, owned; NULL: coordinates are given by vertex */
     insitu_lattice lattice;      /* lattice in the image's description */
     int64_t bytes;
-    /* values of these members of the source mesh when the image was made */
+    /* cells_stamp and coordinates_stamp of the source mesh when the image was made */
     int64_t cells_stamp, coordinates_stamp;
 } session_mirrored;
 
@@ -305,16 +317,17 @@ typedef struct session_misfit {
 typedef struct session_mesh {
     char *name;
     int64_t block; /* the block's number, or SESSION_WHOLE */
-    /* A mesh that the scene mirrors has its mirror images as further parts, in addition to the caller's own parts.
-     * Statistics, counts and errors ignore them. */
-    struct session_mesh
-        *source;     /* for a mirror image: the caller's part that is mirrored; NULL: this part is the caller's */
+    /* For a mirror image: the caller's part that is mirrored; NULL: this part is the caller's. A mesh that the scene
+     * mirrors has its mirror images as further parts, in addition to the caller's own parts. Statistics, counts and
+     * errors ignore mirror images. */
+    struct session_mesh *source;
     int mirror_axes; /* bit i is set if this mirror image is mirrored along axis i; 0: this part is the caller's */
     session_mirrored mirrored;
     char *label;          /* name for messages: "m", or "m[17]" for block 17 */
     insitu_mesh original; /* the caller's description */
-    /* the description that is read: as `original`, but with copies of arrays that cannot be read in place, and with
-     * moved coordinates; or the cells of finer lattices */
+    /* The description that is read. It equals `original`, except that arrays that cannot be read in place are replaced
+     * by copies, and that coordinates may have been moved. If the mesh has finer lattices, it describes the cells of
+     * these lattices. */
     insitu_mesh given;
     session_conformed conformed;
     session_topology topology;
@@ -333,14 +346,15 @@ typedef struct session_mesh {
     int field_count;
     session_field *fields;
 
-    /* session_meshes.stamp at the last change of the cells, and at the last change of the coordinates */
+    /* cells_stamp: value of session_meshes.stamp at the last change of the cells; coordinates_stamp: its value at the
+     * last change of the coordinates */
     int64_t cells_stamp, coordinates_stamp;
     bool is_check_stale;       /* set if cells or coordinates have not been checked since they changed */
-    bool is_topology_stale;    /* set if the tree was built for other cells */
-    bool is_geometry_stale;    /* set if the tree was computed for other coordinates */
+    bool is_topology_stale;    /* set if cells have changed since the tree was built */
+    bool is_geometry_stale;    /* set if coordinates have changed since the tree was built or refitted */
     double lower[3], upper[3]; /* bounds of the drawn cells; lower > upper: there are none */
-    /* counts of the cells in `cells`, which may be pieces of the caller's cells; shells are cells that are drawn and
-     * flat */
+    /* Counts of the cells in `cells`, which may be pieces of the caller's cells. Shells are drawn cells that have no
+     * volume because of their type. */
     int64_t drawn_count, flat_count, shell_count;
     session_counts given_counts; /* counts of the caller's cells */
     /* true if all drawn cells of the mesh are shells, on all ranks (session_catalogue_mesh.has_shells_alone) */
@@ -355,13 +369,15 @@ typedef struct session_mesh {
     bool is_needed; /* set if an image of this step draws the mesh */
     bool has_tree;  /* set if `tree` has been built */
     mmbvh tree;     /* tree over the drawn cells, or over some of them (is_partial) */
-    /* set if the tree contains only the candidates of candidates_key, as long as nothing changes */
+    /* set if the tree contains only candidates: the cells that the current images can show according to their values
+     * (plan/session_candidates.h). Such a tree can be used as long as candidates_key, cells and coordinates are the
+     * same */
     bool is_partial;
-    /* set if the bounds of the full tree's nodes enclose only the candidates of candidates_key */
+    /* set if the bounds of the full tree's nodes enclose only the candidates */
     bool are_bounds_partial;
     double built_surface;    /* half the surface area of the mesh's bounds when the tree was built */
     uint64_t candidates_key; /* hash that identifies the candidates of the current images and values */
-    /* number of steps in which the current (or last) full tree has been used; 0: there was none yet */
+    /* number of steps in which the current full tree, or the most recent one, has been used; 0: there was none yet */
     int full_tree_steps;
     /* seconds spent on partial trees since the cells last changed, minus the time that refits of a full tree would have
      * taken */
@@ -388,7 +404,8 @@ typedef struct session_meshes {
     bool are_names_changed; /* set if names have changed since the ranks last agreed on a catalogue */
     /* set if blocks with levels of refinement have changed since covered cells were computed */
     bool are_levels_changed;
-    int64_t level_box_count; /* number of refined blocks near those of this rank, including its own */
+    int64_t level_box_count; /* number of entries in level_boxes: the refined blocks of this rank, and refined blocks of
+                                other ranks near them */
     session_level_box *level_boxes;
     int64_t stamp; /* incremented by each change of cells or coordinates */
     /* set if the last step that drew an image warped or mirrored meshes; the same on all ranks */
@@ -424,8 +441,7 @@ bool session_is_aligned(const insitu_array *array);
 /* Returns the caller's array as the grid_array through which meshes are read. Its indices count from 0. */
 grid_array session_grid_array(const insitu_array *array);
 
-/* Returns the vertices' coordinates along an axis. If z is not given, it is an array whose elements are all the same
- * 0. */
+/* Returns the vertices' coordinates along an axis. If z is not given, returns an array all of whose elements are 0. */
 grid_array session_coordinates(const insitu_mesh *mesh, int axis);
 
 /* Returns an array of indices as a grid_array. Its indices count from the mesh's index_base. */
@@ -435,7 +451,7 @@ grid_array session_index_array(const insitu_mesh *mesh, const insitu_array *arra
  * caller may omit the last offset. */
 grid_array session_offset_array(const insitu_mesh *mesh, const insitu_array *array, int64_t count, int64_t entries);
 
-/* Returns the cells as the caller's arrays describe them. */
+/* Returns the grid that reads the cells from the caller's arrays, without the session's changes. */
 grid session_caller_grid(const insitu_mesh *mesh);
 
 /* Allocates count + 1 indices, all 0, of 4 bytes if `largest` fits into them, and otherwise of 8 bytes. Returns false
@@ -455,20 +471,22 @@ static inline void session_store_index(const grid_array *array, int64_t i, int64
 /* Frees an array owned by the session. */
 void session_drop_array(grid_array *array);
 
-/* This rank's parts of a mesh, which are either the mesh itself or its blocks. */
+/* This rank's parts of a mesh: the mesh itself, or the mesh's blocks on this rank. */
 typedef struct session_parts {
     int count; /* 0: this rank has no mesh of this name */
     session_mesh **items;
 } session_parts;
 
-/* Returns the description of a mesh whose cells have the caller's nodes, even if finer lattices are read instead. */
+/* Returns the description of a mesh in which cells have only the caller's nodes, even if finer lattices are read
+ * instead. */
 static inline const insitu_mesh *session_nodal_mesh(const session_mesh *mesh)
 {
     return mesh->finer.parts ? &mesh->finer.nodal : &mesh->given;
 }
 
 session_parts session_find_parts(const session_meshes *meshes, const char *name);
-/* Returns the parts that have the same name as the one at index `first`, which must be the first of them. */
+/* Returns the parts that have the same name as the part at index `first`, which must be the first part with this
+ * name. */
 session_parts session_parts_at(const session_meshes *meshes, int first);
 /* Returns the block with this name and number, or NULL if there is none. */
 session_mesh *session_find_block(const session_meshes *meshes, const char *name, int64_t block);
@@ -490,7 +508,8 @@ session_mesh *session_add_image(session_meshes *meshes, session_mesh *source, in
 /* Returns the image of a part that is mirrored along these axes, or NULL if there is none. */
 session_mesh *session_find_image(const session_meshes *meshes, const session_mesh *source, int mirror_axes);
 void session_remove_image(session_meshes *meshes, session_mesh *image);
-/* Removes a block, or a mesh with all its blocks, with their images. Does nothing if it does not exist. */
+/* Removes a block or, in session_remove_mesh(), a mesh with all its blocks. Mirror images are removed too. Does nothing
+ * if the block or mesh does not exist. */
 void session_remove_block(session_meshes *meshes, const char *name, int64_t block);
 void session_remove_mesh(session_meshes *meshes, const char *name);
 
@@ -510,18 +529,20 @@ void session_drop_fields(session_mesh *mesh);
 void session_drop_copy(session_field *field);
 /* Frees the session's copies of the field's tables of patches and components. */
 void session_drop_field_tables(session_field *field);
-/* Frees the data that depends on the cells, after these have changed. Fields are kept. */
+/* Frees the data that depends on the cells, after the cells have changed. Fields are kept. */
 void session_drop_cell_data(session_meshes *meshes, session_mesh *mesh);
-/* Marks the coordinates of the vertices as changed. The cells are the same. */
+/* Marks the coordinates of the vertices as changed, while the cells' connectivity is unchanged. */
 void session_mark_moved(session_meshes *meshes, session_mesh *mesh);
 /* Frees the moved coordinates, which must not be in use any more. */
 void session_drop_warp(session_mesh *mesh);
 void session_drop_mirrored(session_mirrored *mirrored);
 /* Removes the derived fields, and with them all scalars and thresholds, which refer to fields by index. */
 void session_drop_derived(session_mesh *mesh);
-/* Frees the mesh of outer faces and, if with_faces, the faces themselves. The threshold is kept. */
+/* Frees the mesh that is built on the outer faces and, if with_faces, the list of these faces. The threshold is
+ * kept. */
 void session_drop_outer(session_outer *outer, bool with_faces);
-/* Frees all outer surfaces of a mesh. If the cells are new, thresholds are also removed. */
+/* Frees the data of all outer surfaces of a mesh. are_cells_new: also frees the lists of outer faces, and removes the
+ * outer surfaces with their thresholds. */
 void session_drop_outers(session_mesh *mesh, bool are_cells_new);
 void session_drop_contents(session_mesh *mesh);
 /* Frees all data of a mesh whose description is wrong, except the names of its fields: images that show these fields
@@ -529,8 +550,8 @@ void session_drop_contents(session_mesh *mesh);
 void session_refuse_mesh(session_mesh *mesh);
 void session_meshes_free(session_meshes *meshes);
 
-/* Iterator over the meshes that may become parts of an image: the caller's meshes, then the meshes of their outer
- * faces.
+/* Iterator over the meshes that may be drawn as parts of an image: the caller's meshes, then the meshes built on their
+ * outer faces.
  *
  *     for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) use(walk.part); */
 typedef struct session_part_walk {
@@ -538,8 +559,8 @@ typedef struct session_part_walk {
     session_mesh *part;
     session_mesh *whole;  /* the mesh whose outer faces the part contains; NULL: the part is a mesh of the caller */
     session_outer *outer; /* the outer surface that the part belongs to; NULL: the part is a mesh of the caller */
-    /* state of the iterator: indices of the next mesh, of the mesh whose outer faces are visited, and of its next outer
-     * surface */
+    /* State of the iterator. mesh_index: index of the caller's mesh that is visited next; whole_index: index of the
+     * mesh whose outer surfaces are visited; outer_index: index of the outer surface that is visited next. */
     int mesh_index, whole_index, outer_index;
 } session_part_walk;
 
@@ -552,7 +573,8 @@ static inline const session_mesh *session_source(const session_mesh *mesh)
     return mesh->source ? mesh->source : mesh;
 }
 
-/* Returns the number of cells that the caller gave; a lattice's array of cells may have padding. */
+/* Returns the number of cells that the caller gave. For a lattice, session_mesh.cells may have more cells, as
+ * padding. */
 static inline int64_t session_cell_count(const session_mesh *mesh)
 {
     return mesh->cells.lattice ? mesh->lattice.cells.cell_count : mesh->given.cell_count;
@@ -571,8 +593,8 @@ static inline int64_t session_caller_cell(const session_mesh *mesh, int64_t cell
     return mesh->topology.is_split ? (int64_t)mesh->topology.parents[cell] : cell;
 }
 
-/* Returns the first of the consecutive cells of `cells` that belong to the caller's cell; they end before the first
- * cell of the caller's next one. */
+/* Returns the first of the cells of `cells` that belong to a cell of the caller. They are consecutive, and end before
+ * the first one that belongs to the caller's next cell. */
 static inline int64_t session_first_piece(const session_mesh *mesh, int64_t cell)
 {
     return mesh->topology.is_split ? mesh->topology.first_pieces[cell] : cell;
@@ -590,11 +612,11 @@ static inline int64_t session_vertex_count(const session_mesh *mesh)
     return mesh->discontinuous.is_active ? mesh->discontinuous.corner_count : mesh->cells.vertex_count;
 }
 
-/* Returns the first error of a set call that no step has returned yet; NULL: there is none. */
+/* Returns the first error of an insitu_set_*() call that no step has reported yet; NULL: there is none. */
 const base_error *session_pending_error(const session_meshes *meshes);
 
-/* Stores an error of a set call that cannot be stored with a mesh. field is NULL if the error does not belong to a
- * single field. */
+/* Stores an error of an insitu_set_*() call that cannot be stored with a mesh. field: NULL if the error does not belong
+ * to a single field. */
 void session_store_pending(session_meshes *meshes, const base_error *error, const char *mesh, const char *field);
 void session_drop_pending(session_meshes *meshes);
 
@@ -602,7 +624,7 @@ void session_drop_pending(session_meshes *meshes);
  * holds an error. */
 void session_store_problem(session_field *field, const base_error *problem, base_error *first);
 
-/* Removes a mesh from the list for the rest of the step, so that this rank acts as if it had no part of it. */
+/* Removes a mesh from the list for the rest of the step, so that this rank acts as if it had no part of the mesh. */
 void session_exclude_mesh(session_meshes *meshes, session_mesh *mesh);
 /* Puts the meshes that the step has excluded back into the list. */
 void session_restore_excluded(session_meshes *meshes);
@@ -624,7 +646,8 @@ static inline bool session_has_levels(const insitu_mesh *mesh)
     return l && mesh->cell_count > 0 && (l->refinement[0] || l->refinement[1] || l->refinement[2]);
 }
 
-/* Returns the number of faces that the caller gave. Those of the separate list of boundary faces follow the others. */
+/* Returns the number of faces that the caller gave, including those of the separate list of boundary faces, which are
+ * numbered after the others. */
 static inline int64_t session_face_count(const insitu_mesh *mesh)
 {
     return mesh->face_count + mesh->boundary_face_count;

@@ -125,7 +125,8 @@ static insitu_status check_arrays(const insitu_mesh *mesh, base_error *error)
     return INSITU_OK;
 }
 
-/* Checks arrays of pointers. Their type is that of the elements to which they point. */
+/* Checks the face lists, an array of pointers. The array's type is the type of the elements to which the pointers
+ * point. */
 static insitu_status check_face_lists(const insitu_mesh *mesh, base_error *error)
 {
     const insitu_array *lists = &mesh->face_lists;
@@ -141,8 +142,8 @@ static insitu_status check_face_lists(const insitu_mesh *mesh, base_error *error
     return session_check_pointers(lists, &rule, INSITU_ERROR_MESH, error);
 }
 
-/* Checks that faces are described by owners and neighbours correctly, and that cells are not described in another way
- * as well. */
+/* Checks the arrays of owners and neighbours by which faces may describe cells, and that no other array describes the
+ * cells too. */
 static insitu_status check_face_owners(const insitu_mesh *mesh, base_error *error)
 {
     if (!session_has_owners(mesh)) {
@@ -197,7 +198,7 @@ static insitu_status check_choices(const insitu_mesh *mesh, base_error *error)
     return INSITU_OK;
 }
 
-/* Checks that cells given in rows are not described in another way as well. */
+/* Checks connectivity_row, and that no other array describes the cells if they are given in rows of equal length. */
 static insitu_status check_cell_rows(const insitu_mesh *mesh, base_error *error)
 {
     const long long row = mesh->connectivity_row, vertices = session_cell_nodes(mesh);
@@ -220,8 +221,8 @@ static insitu_status check_cell_rows(const insitu_mesh *mesh, base_error *error)
     return INSITU_OK;
 }
 
-/* Checks that `order` is only given for a mesh of one Lagrange type, in which the number of nodes per cell does not
- * already determine it. */
+/* Checks that `order` is only given if all cells have one Lagrange type and no offsets. Each other type has only one
+ * order, and if offsets are given, the number of nodes determines the order of each cell. */
 static insitu_status check_lagrange_order(const insitu_mesh *mesh, base_error *error)
 {
     const int type = (int)mesh->cell_type;
@@ -244,8 +245,8 @@ static insitu_status check_lagrange_order(const insitu_mesh *mesh, base_error *e
                      mesh->order, type);
 }
 
-/* Checks the description of a mesh of one type of higher order. If offsets are given, each cell's number of nodes is
- * checked later, in a step. */
+/* Checks the description of a mesh whose cells all have one type of higher order. If offsets are given, a step checks
+ * each cell's number of nodes later. */
 static insitu_status check_higher_order(const insitu_mesh *mesh, base_error *error)
 {
     const long long cells = mesh->cell_count, nodes = session_cell_nodes(mesh), count = mesh->connectivity_count;
@@ -316,8 +317,8 @@ static insitu_status check_mesh(const insitu_mesh *mesh, base_error *error)
     return status;
 }
 
-/* Returns whether the cells of two descriptions differ so much that the mesh is a new one, regardless of the changes
- * that the caller declares. */
+/* Returns whether two descriptions differ in counts, types, options, or in the set of arrays that are given. The mesh
+ * then counts as a new one, whatever changes the caller declares. */
 static bool has_other_shape(const insitu_mesh *a, const insitu_mesh *b)
 {
     return a->vertex_count != b->vertex_count || a->cell_count != b->cell_count ||
@@ -360,8 +361,8 @@ static unsigned find_description_changes(const session_mesh *mesh, const insitu_
 
 /* ---- meshes -------------------------------------------------------------------------------------------------- */
 
-/* Makes the mesh read its finer lattices again after the caller has set a new description, unless the lattices no
- * longer fit this description. */
+/* Makes the mesh read its finer lattices (session_finer.h) again after the caller has set a new description, unless
+ * cells or coordinates have changed. In that case the finer lattices are dropped. */
 static void restore_finer_lattices(session_mesh *mesh, unsigned changed)
 {
     if (changed & (INSITU_CHANGED_TOPOLOGY | INSITU_CHANGED_GEOMETRY)) session_drop_finer(&mesh->finer);
@@ -413,7 +414,8 @@ insitu_status session_prefix_error(base_error *error, const char *mesh, const ch
     return base_fail(error, what->status, "mesh \"%s\": %.700s", mesh, what->message);
 }
 
-/* Removes the whole mesh of this name if a block is set, and the blocks of this name if a whole mesh is set. */
+/* Removes the mesh of this name that has no blocks if a block is being set, and all blocks of this name if a mesh
+ * without blocks is being set. */
 static void remove_other_kind(session_meshes *meshes, const char *name, int64_t block)
 {
     const session_parts parts = session_find_parts(meshes, name);

@@ -14,11 +14,12 @@ insitu_status session_set_mesh(session_meshes *meshes, const char *name, int64_t
  * refuse the mesh. Local. */
 void session_store_mesh(session_meshes *meshes, session_mesh *mesh, const insitu_mesh *given, base_error *error);
 
-/* Returns whether cells without z coordinates may be visible, namely as shells in the plane z = 0. */
+/* Returns whether the mesh is allowed to lack z coordinates, because its cells are, or may be, shells in the plane z =
+ * 0. */
 bool session_may_lack_z(const insitu_mesh *mesh);
 
-/* Adds the mesh's name and, if there is a field, the field's name to the beginning of the error's message. Returns the
- * error's status. */
+/* Fails with the status and message of `what`, with the mesh's name and, unless `field` is NULL, the field's name
+ * before the message. Returns the status. */
 insitu_status session_prefix_error(base_error *error, const char *mesh, const char *field, const base_error *what);
 
 #endif

@@ -1,6 +1,5 @@
-/* A mirror image is described like a mesh that the caller sets again whenever its source mesh has changed. It reads the
- * source's arrays, which belong to the caller or are copies owned by the source; only mirrored coordinates are its
- * own. */
+/* A mirror image is set again, as by a caller, whenever its source mesh has changed. It reads the source's arrays,
+ * which belong to the caller or are copies owned by the source; only mirrored coordinates are its own. */
 #include "session_mirror.h"
 
 #include <string.h>
@@ -94,8 +93,8 @@ static bool mirror_lattice(session_mesh *image)
 
 /* ---- the image --------------------------------------------------------------------------------------------------- */
 
-/* Describes the lattice without its levels of refinement, because the image shares the source's flags of covered
- * cells. */
+/* Describes the image's lattice. The description has no levels of refinement, because the image shares the source's
+ * flags of covered cells. */
 static void describe_lattice(session_mesh *image, insitu_mesh *out)
 {
     session_mirrored *m = &image->mirrored;

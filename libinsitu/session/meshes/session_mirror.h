@@ -1,7 +1,7 @@
-/* Mirror images of meshes, which the scene draws beside the meshes themselves. An image is a further part of the mesh,
- * with the source's arrays and mirrored coordinates; left-handed cells become right-handed, and right-handed cells
- * left-handed. The picture is the same as that of one mesh that consists of both parts: vertices in the mirror plane
- * are shared, and no surface is drawn in this plane. */
+/* Mirror images of meshes, which the scene draws in addition to the meshes themselves. An image is a further part of
+ * the mesh, with the source's arrays and mirrored coordinates; left-handed cells become right-handed, and right-handed
+ * cells left-handed. The picture is the same as that of one mesh that consists of both parts: vertices in the mirror
+ * plane are shared, and no surface is drawn in this plane. */
 #ifndef SESSION_MIRROR_H
 #define SESSION_MIRROR_H
 

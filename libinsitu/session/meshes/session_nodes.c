@@ -143,7 +143,7 @@ static int find_least(const int *b, int count)
     return out;
 }
 
-/* Returns the index of a tet's node in VTK's order. b: the node's barycentric coordinates times the order; the last one
+/* Returns the index of a triangle's node in VTK's order. b: the node's barycentric coordinates times the order; b[2]
  * belongs to the first corner. */
 static int number_triangle_node(int order, const int b[3])
 {
@@ -176,7 +176,7 @@ static int number_tet_node(int order, const int b[4])
     return at;
 }
 
-/* Returns the index of a node inside a triangle of order p, if these nodes are numbered row by row. */
+/* Returns the index of a node inside a triangle of order p among all nodes inside it, which are numbered row by row. */
 static int number_inner_triangle_node(int p, int i, int j)
 {
     return i + p * (j - 1) - j * (j + 1) / 2;
@@ -253,8 +253,8 @@ static int number_lexicographic_node(int type, int p, int i, int j, int k)
     }
 }
 
-/* Returns the permutation from VTK's order to the given one, for nodes other than corners; NULL if it is the
- * identity. */
+/* Returns the permutation from VTK's order to the given one for the nodes of a cell of order 2, except its corners;
+ * NULL if it is the identity. */
 static const signed char *quadratic_permutation(int type, insitu_vertex_order order)
 {
     static const signed char gmsh_tet[] = {4, 5, 6, 7, 9, 8};

@@ -1,4 +1,6 @@
-/* The types of cells of higher order, and the positions of their nodes in the cell's row of connectivity. */
+/* The types of cells of higher order, and the positions of their nodes in the cell's row of connectivity. The lattice
+ * of a cell of order p is the regular grid of its nodes, whose indices i, j, k along the axes of the reference cell are
+ * 0 .. p. */
 #ifndef SESSION_NODES_H
 #define SESSION_NODES_H
 
@@ -23,13 +25,15 @@ int session_corner_type(int type);
 /* Returns whether the caller's type is one of INSITU_LAGRANGE_*. */
 bool session_is_lagrange(int type);
 
-/* Returns whether cells of the type, which must not be linear, can have `count` nodes, and stores their description. */
+/* Finds the description of a cell of the type, which must not be linear, with `count` nodes. Returns false if no order
+ * of the type has this number of nodes. */
 bool session_nodes_of(int type, int64_t count, session_nodes *out);
 
 /* Returns the type INSITU_LAGRANGE_* with the same corners as the linear type, or GRID_NO_TYPE if there is none. */
 int session_lagrange_type(int corner_type);
 
-/* Describes the cell with the shape of a linear type that has all nodes of a lattice of this order. */
+/* Returns the description of a complete cell: it has the shape of a linear type, and all nodes of a lattice of this
+ * order. */
 session_nodes session_complete_nodes(int corner_type, int order);
 
 /* Returns the number of nodes of a cell of the type and order, or 0 if there is no such cell. Order 0 stands for the
@@ -44,7 +48,8 @@ const char *session_order_refused(const session_nodes *of, insitu_vertex_order o
  * the layer below. For a node that a serendipity cell lacks, the result is at least session_nodes.count. */
 int session_node_index(const session_nodes *of, insitu_vertex_order order, int i, int j, int k);
 
-/* Returns whether the lattice of the cell's order has a node i, j, k; each of them is from 0 to the order. */
+/* Returns whether the lattice of the cell's order has a node with the indices i, j, k; each index must be in 0 ..
+ * order. */
 bool session_has_node(const session_nodes *of, int i, int j, int k);
 
 /* Returns the position in the row of connectivity of the n-th node in VTK's order, for cells of order 2. */

@@ -7,7 +7,8 @@ static bool has_axis(int axes, int axis)
     return axes >> axis & 1;
 }
 
-/* Returns whether exactly these axes have coordinates, and with these types. */
+/* Returns whether exactly the axes whose bits are set in `axes` have coordinates, and these coordinates have the given
+ * types. */
 static bool have_axes_and_types(const insitu_array coordinates[3], int axes, const insitu_type types[3])
 {
     bool are_so = true;
@@ -37,7 +38,8 @@ bool session_reserve_coordinates(char **memory, insitu_array coordinates[3], int
     for (int axis = 0; axis < 3; axis++) {
         coordinates[axis] = (insitu_array){0};
         if (!*memory || !has_axis(axes, axis)) continue;
-        /* coordinates whose types differ in size are not interleaved: each axis has a separate array */
+        /* coordinates are interleaved only if their types have the same size; otherwise each axis has a separate
+         * array */
         coordinates[axis] = (insitu_array){*memory + offset, types[axis],
                                            has_one_type ? used * largest : session_type_size(types[axis])};
         offset += has_one_type ? largest : count * largest;

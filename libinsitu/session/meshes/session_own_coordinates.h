@@ -1,5 +1,5 @@
-/* Manages the memory of vertex coordinates that the session computes and that replace the caller's. The coordinates of
- * a vertex are interleaved, because loops that read coordinates are fastest if all three have one stride. */
+/* Allocates the vertex coordinates that the session computes and that replace the caller's. The three coordinates of a
+ * vertex are interleaved, because loops that read coordinates are fastest if all three have one stride. */
 #ifndef SESSION_OWN_COORDINATES_H
 #define SESSION_OWN_COORDINATES_H
 

@@ -1,6 +1,7 @@
-/* The distance between samples depends on the mean size of cells, which is computed from volumes. Therefore a volume
- * must depend only on the cell's geometry, and not on the order in which faces and vertices are listed, which may
- * differ between ranks. Volumes may still differ by rounding, but the mean size does not (session_space.c). */
+/* The distance between the samples of volumes depends on the mean size of cells, which is computed from their volumes.
+ * Therefore a cell's volume must depend only on the cell's geometry, and not on the order in which faces and vertices
+ * are listed, which may differ between ranks. Volumes may still differ by rounding, but the mean size does not, because
+ * it is rounded to few bits (session_space.c). */
 #include "session_polyhedron.h"
 
 #include <string.h>
@@ -18,7 +19,8 @@ typedef struct frame_sums {
     double count;
 } frame_sums;
 
-/* Adds a face's vertices to the mean. Consecutive repetitions of a vertex are added once. */
+/* Adds a face's vertices to the sums and the bounds, and updates `least`, the cell's lexicographically first vertex.
+ * Consecutive repetitions of a vertex are added once. */
 static void add_face(const grid *g, int64_t face, frame_sums *sums, double least[3])
 {
     int64_t from, to;
@@ -68,8 +70,8 @@ static void read_relative_corner(const grid *g, int64_t entry, const double mean
     for (int axis = 0; axis < 3; axis++) out[axis] -= mean[axis];
 }
 
-/* Returns the volume of the tet that a triangle forms with a corner of the cell's box; all positions are relative to
- * the mean of the vertices. */
+/* Returns the volume of the tet that a triangle forms with `origin`, the cell's lexicographically first vertex; all
+ * positions are relative to the mean of the vertices. */
 static double tet_volume_from_origin(const double origin[3], double corners[3][3])
 {
     double d[3][3];
@@ -78,7 +80,7 @@ static double tet_volume_from_origin(const double origin[3], double corners[3][3
     return tet_volume(d[0], d[1], d[2]);
 }
 
-/* Returns the entry of a face's vertex with the least index, at which its canonical fan of triangles begins. If the
+/* Returns the entry of a face's lexicographically first vertex, at which its canonical fan of triangles begins. If the
  * face contains that vertex twice, either entry may be returned, because both fans have the same triangles, apart from
  * triangles of area 0. */
 static int64_t least_entry(const grid *g, int64_t from, int64_t to)
@@ -95,8 +97,9 @@ static int64_t least_entry(const grid *g, int64_t from, int64_t to)
     return least;
 }
 
-/* Sums of tet volumes over the triangles of a cell's faces. Each triangle makes one tet with the mean of the cell's
- * vertices (signed), and one with a corner of the cell's box, by which flat cells are found. */
+/* Sums of tet volumes over the triangles of a cell's faces. Each triangle forms one tet with the mean of the cell's
+ * vertices, and one with the cell's lexicographically first vertex. The sum of the latter shows whether the cell is
+ * flat. */
 typedef struct volume_sums {
     int64_t triangle_count;
     double volume_from_mean, volume_from_corner;
@@ -118,7 +121,7 @@ static void add_fan(const grid *g, int64_t face, const double mean[3], const dou
     }
 }
 
-/* Upper bound of the rounding error of the volume of a tet formed by a triangle and a corner in the same plane, as a
+/* Upper bound of the rounding error of the volume of a tet formed by a triangle and a vertex in the same plane, as a
  * fraction of the volume of the cell's bounding box. With u = 2^-53: an edge is computed by three differences, each
  * with an error of u times the box's side (the mean of the vertices cancels). The six products of three edges of a
  * determinant add 9 u, and products and sums another 2 u and 3 u: 6 times 14 u, divided by 6. The bound of 32 u leaves

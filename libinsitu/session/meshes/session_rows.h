@@ -1,4 +1,5 @@
-/* Access to the caller's cells of a mesh whose cells are split into pieces. Each cell is a row of nodes. */
+/* Access to the caller's cells of a mesh whose cells of higher order are split into linear pieces (session_split.h).
+ * The row of a cell is the sequence of entries of the connectivity that list the cell's nodes. */
 #ifndef SESSION_ROWS_H
 #define SESSION_ROWS_H
 
@@ -7,7 +8,7 @@
 
 enum { ROWS_MOST_KINDS = 64 };
 
-/* A type of cell together with a number of nodes per cell. */
+/* A kind of cell: a type together with a number of nodes per cell. */
 typedef struct session_row_kind {
     int type; /* type of the cells as the caller gives it */
     session_nodes nodes;
@@ -15,7 +16,8 @@ typedef struct session_row_kind {
 
 typedef struct session_rows {
     grid cells; /* the caller's cells; without connectivity, entry i refers to vertex i */
-    /* if cells have no offsets: number of nodes of each cell, and number of entries from one cell to the next */
+    /* Used if cells have no offsets. nodes_per_cell: number of nodes of each cell; row_stride: number of entries from
+     * the first node of a cell to the first node of the next cell. */
     int64_t nodes_per_cell, row_stride;
     /* set if the mesh is discontinuous (session_discontinuous), so that each node of each cell is a separate vertex */
     bool is_discontinuous;
@@ -23,9 +25,10 @@ typedef struct session_rows {
     session_row_kind kinds[ROWS_MOST_KINDS];
 } session_rows;
 
-/* Describes the rows of a mesh, whose description must be valid. The list of kinds is empty. */
+/* Describes the rows of a mesh, whose description must be valid. The list of kinds is left empty
+ * (session_list_kinds()). */
 session_rows session_rows_of(const session_mesh *mesh);
-/* Describes the rows of a valid description, as if the mesh were not discontinuous. The list of kinds is empty. */
+/* Describes the rows of a valid description, as if the mesh were not discontinuous. The list of kinds is left empty. */
 session_rows session_caller_rows(const insitu_mesh *given);
 
 static inline int64_t session_row_first(const session_rows *rows, int64_t cell)
@@ -46,7 +49,8 @@ static inline int64_t session_row_vertex(const session_rows *rows, int64_t entry
     return rows->cells.connectivity.data ? grid_array_index(&rows->cells.connectivity, entry) : entry;
 }
 
-/* Returns the number of an entry of connectivity, counted without the unused ends of rows. */
+/* Returns the index of a cell's node among the entries of the connectivity, if unused entries at the ends of rows are
+ * not counted. */
 static inline int64_t session_row_entry(const session_rows *rows, int64_t cell, int node)
 {
     return rows->cells.offsets.data ? session_row_first(rows, cell) + node : cell * rows->nodes_per_cell + node;
@@ -66,7 +70,7 @@ static inline int session_kind_of(const session_rows *rows, int64_t cell)
     return session_find_kind(rows, grid_cell_type(&rows->cells, cell), session_row_size(rows, cell));
 }
 
-/* Lists the kinds of all cells. They must have been split before, so that their types are valid. */
+/* Lists the kinds of all cells. The cells must have been split before, so that their types are known to be valid. */
 void session_list_kinds(session_rows *rows);
 
 #endif

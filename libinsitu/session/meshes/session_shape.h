@@ -8,7 +8,7 @@ typedef struct session_shape {
     /* GRID_* type of a linear cell with a fixed number of corners, that is, neither a polygon nor a polyhedron */
     int type;
     int corner_count, edge_count, face_count;
-    /* Indices i, j, k of each corner in a lattice of order 1, whose axes are the edges at the first corner
+    /* Indices i, j, k of each corner in a lattice of order 1. The axes of the lattice are the edges at the first corner
      * (session_node_index()). */
     signed char corners[8][3];
     signed char edges[12][2]; /* two corners of each edge; edges are in VTK's order of their midpoints */

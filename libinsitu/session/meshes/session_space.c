@@ -1,15 +1,16 @@
-/* All numbers here are results of reductions, so that they are the same on every rank and for every partition. A new
- * origin or scale requires new trees. Therefore the old origin and scale are kept while the bounds change little, even
- * if the mesh moves slightly in every step. */
+/* The bounds, the origin and the scale are computed from results of MPI reductions, so that they are the same on every
+ * rank and for every partition. A new origin or scale requires new trees. Therefore the old origin and scale are kept
+ * while the bounds change little, even if the mesh moves slightly in every step. */
 #include "session_space.h"
 
 #include "session_agree.h"
 
-/* Rounds the mean size to 13 bits, with a relative error of at most 1.6e-4. The sampling distance is derived from it,
- * and the sum over cells has an error of about 1e-12, which depends on the order of cells, of their vertices and of
- * ranks. Remainders of at least 0.382 (2 minus the golden ratio) are rounded up, because this number is far from all
- * fractions of small integers, and the means of regular and refined lattices are such fractions. One half is such a
- * fraction too, so that ordinary rounding would be decided by the error. */
+/* Rounds the mean size of cells to 13 bits, with a relative error of at most 1.6e-4. The sampling distance is derived
+ * from the mean size. The sum of sizes over all cells has an error of about 1e-12, which depends on the order of cells,
+ * of their vertices and of ranks; rounding hides it, unless the mean lies at a threshold of rounding. Remainders of at
+ * least 0.382 (2 minus the golden ratio) are rounded up: this threshold is far from all fractions of small integers,
+ * and the means of regular and refined lattices are such fractions. The usual threshold, one half, is such a fraction
+ * too. */
 static double rounded_size(double size)
 {
     enum { BITS = 13 };
@@ -79,8 +80,8 @@ int session_flat_axis(const session_extent *extent)
     return flat;
 }
 
-/* Returns whether the origin and the scale can be kept: the bounds' centre is inside the old bounds, and the size is at
- * most 4 times and at least 1/8 of the old one. */
+/* Returns whether the old origin and scale can be kept: the centre of the new bounds is inside the old bounds, and the
+ * new bounds' size is at most 4 times and at least 1/8 of the old one. */
 static bool is_space_valid(const session_space *space)
 {
     if (!space->has_origin) return false;

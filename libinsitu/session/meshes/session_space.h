@@ -16,10 +16,10 @@ typedef struct session_extent {
     int rank_count;            /* number of ranks with at least one drawn cell */
 } session_extent;
 
-/* Returns the axis along which the data is flat, or the last one if there are several. Returns -1 if the data is not
- * flat: it has cells with a volume, or its extent along each axis exceeds 1e-6 of the largest extent. That fraction is
- * about sixteen roundings of float32, and 1/30 pixel of the widest picture. Local; the result is the same on every
- * rank. */
+/* Returns the axis along which the data is flat (the last such axis, if there are several), or -1 if the data is not
+ * flat. The data is flat along an axis if no cell has a volume and its extent along the axis is at most 1e-6 of the
+ * largest extent. That fraction is about sixteen roundings of float32, and 1/30 pixel of the widest picture. Local; the
+ * result is the same on every rank. */
 int session_flat_axis(const session_extent *extent);
 
 typedef struct session_space {
@@ -29,12 +29,12 @@ typedef struct session_space {
     double origin[3], scale;   /* the renderer's coordinates are (position - origin) * scale */
 } session_space;
 
-/* Computes the global bounds of checked meshes, then the origin and the scale. If these are new, all trees are dropped.
- * Collective. */
+/* Computes the global bounds of checked meshes, then the origin and the scale. If the origin or the scale changes, all
+ * trees are dropped. Collective. */
 insitu_status session_update_space(session_space *space, session_meshes *meshes, MPI_Comm comm, base_error *error);
 
-/* Computes the global bounds as they would be if no mesh had finer lattices (session_finer.h), so that the bounds do
- * not depend on finer lattices. Collective. */
+/* Computes the global bounds, counts and mean size as they would be if no mesh had finer lattices (session_finer.h).
+ * Collective. */
 insitu_status session_find_nodal_extent(const session_meshes *meshes, MPI_Comm comm, session_extent *out,
                                         base_error *error);
 

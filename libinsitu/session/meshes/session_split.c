@@ -2,8 +2,8 @@
  * their own nodes, once per topology. The pieces of a cell are consecutive, and the number of the cell is stored with
  * each piece, so that ghost flags, cell values, thresholds and counts refer to the caller's cells.
  *
- * The split of serendipity cells depends on the order of their nodes' coordinates (session_pattern.c), so the pieces
- * are computed again when nodes move. The split of other cells depends only on the cell's type and order. */
+ * The split of a serendipity cell depends on the lexicographic order of its nodes' positions (session_pattern.c), so
+ * the pieces are computed again when nodes move. The split of other cells depends only on the cell's type and order. */
 #include "session_split.h"
 
 #include <string.h>
@@ -17,15 +17,16 @@
 
 enum { LINEAR_TYPES = GRID_POLYHEDRON + 1 };
 
-/* Working data of splitting the caller's cells. */
+/* The state while the caller's cells are split. */
 typedef struct split_work {
     const session_mesh *mesh;
     session_rows rows;
     session_pattern patterns[ROWS_MOST_KINDS]; /* pattern of pieces for each kind of row (type and number of nodes) */
-    bool is_of_type[LINEAR_TYPES];             /* for each type, set if some piece has it */
+    bool is_of_type[LINEAR_TYPES];             /* for each linear type, set if some piece has this type */
     int only_type;                             /* the type of all pieces; 0 if they differ */
-    /* index of the first piece and of its first entry, for each cell, and the totals; first_entries is NULL if pieces
-     * have one type */
+    /* first_pieces: for each cell, the index of its first piece; first_entries: for each cell, the index of its first
+     * piece's first entry in piece_entries. A last element has the total. first_entries is NULL if all pieces have one
+     * type. */
     int64_t *first_pieces, *first_entries;
     const session_piece_set *set; /* the pieces that are made of each cell */
     bool stores_entries;          /* set if pieces store entries of the caller's connectivity instead of vertices */
@@ -117,7 +118,7 @@ static void choose_type(split_work *w)
     if (types > 1) w->only_type = 0;
 }
 
-/* Finds the patterns of all cells. Returns an error for the first cell that has none, or has invalid offsets. */
+/* Finds the patterns of all cells. Returns an error for the first cell that has no pattern or has invalid offsets. */
 static insitu_status find_patterns(split_work *w, base_error *error)
 {
     const insitu_mesh *given = &w->mesh->given;
@@ -181,7 +182,8 @@ static insitu_status check_indices(const split_work *w, int threads, base_error 
 
 /* ---- pieces ---------------------------------------------------------------------------------------------------- */
 
-/* Stores the rank of each midpoint of a serendipity cell in the order of coordinates; equal points have equal ranks. */
+/* Computes the rank of each midpoint of a serendipity cell in the lexicographic order of their positions; equal
+ * positions have equal ranks. */
 static void rank_midpoints(const split_work *w, const session_pattern *of, int64_t first, int ranks[27])
 {
     double at[12][3];
@@ -197,7 +199,7 @@ static void rank_midpoints(const split_work *w, const session_pattern *of, int64
     }
 }
 
-/* Iterator over the pieces of a complete cell that are made. */
+/* Iterator over those pieces of a complete cell that are made (session_piece_set). */
 typedef struct piece_walk {
     const uint64_t *words; /* NULL: all pieces are made */
     int count;             /* number of pieces of the pattern */
@@ -207,7 +209,7 @@ typedef struct piece_walk {
 static piece_walk walk_pieces(const split_work *w, const session_pattern *of, int64_t cell)
 {
     const int64_t *first = w->set->first_words;
-    /* pyramids have no words, because all of their pieces are made; these have two types */
+    /* Pyramids have no words. Their pieces have two types, and all of them are made. */
     const bool has_words = first && first[cell] < first[cell + 1] && of->nodes.type != GRID_PYRAMID;
     return (piece_walk){has_words ? w->set->bits + first[cell] : NULL, of->piece_count, 0};
 }
@@ -250,7 +252,7 @@ static void count_pieces(const split_work *w, int64_t cell)
     if (!w->first_entries) return;
     if (of->polygon_count)
         w->first_entries[cell + 1] = count * (of->nodes.type == GRID_QUAD ? 3 : 4);
-    else /* only cells all of whose pieces are made can have pieces of different types */
+    else /* pieces of a cell have different types only if all pieces of the cell are made */
         w->first_entries[cell + 1] =
             count == of->piece_count ? of->piece_size : count * grid_type_vertices(of->types[0]);
 }
@@ -289,8 +291,8 @@ static int64_t entry_count(const split_work *w)
     return w->first_entries ? w->first_entries[cells] : w->first_pieces[cells] * grid_type_vertices(w->only_type);
 }
 
-/* Stores a corner of a piece, which is given by its position in the cell's row: as a vertex, or as an entry of the
- * caller's connectivity. */
+/* Stores a corner of a piece as a vertex or, if stores_entries is set, as an entry of the caller's connectivity. node:
+ * the corner's position in the cell's row. */
 static void store_corner(const split_work *w, int64_t cell, int64_t at, int node)
 {
     const int64_t first = session_row_first(&w->rows, cell);

@@ -4,15 +4,15 @@
 
 #include "session_mesh.h"
 
-/* Returns whether some cells are of higher order. If types are mixed, it reads the types of all cells. */
+/* Returns whether some cells are of higher order. If the mesh has mixed types, the types of all cells are read. */
 bool session_has_higher_order(const insitu_mesh *given);
 
 /* Creates the mesh's topology of pieces. Returns an error, and creates nothing, if types, counts, offsets or indices of
  * the caller's cells are invalid. Local. */
 insitu_status session_split_cells(session_mesh *mesh, int threads, base_error *error);
 
-/* Creates a connectivity of the pieces whose entries are not vertices but entries of the caller's connectivity, counted
- * without the unused ends of rows. Local. */
+/* Creates a connectivity of the pieces that contains, instead of vertices, indices of entries of the caller's
+ * connectivity, counted without the unused ends of rows. Local. */
 insitu_status session_split_entries(const session_mesh *mesh, int threads, grid_array *out, base_error *error);
 
 /* Returns the position in the caller's connectivity of an entry that is counted without the unused ends of rows. */

@@ -165,8 +165,8 @@ void tally_cell(const grid *g, int64_t cell, mesh_tally *tally)
 
 /* ---- corners with different signs ---------------------------------------------------------------------------- */
 
-/* A corner counts as flat if its volume is less than this fraction of the cell's largest one. Hexes with two coincident
- * vertices, and cells with a vertex on a nearly straight edge, have such corners. */
+/* A corner counts as flat if its volume is less than this fraction of the largest volume at a corner of the cell. Hexes
+ * with two coincident vertices, and cells with a vertex on a nearly straight edge, have such corners. */
 static const double least_share = 1e-6;
 
 /* Computes the signed areas at a quad's corners, with respect to the normal at the first corner. */
@@ -264,7 +264,7 @@ MMBVH_INLINE bool tally_one_cell(const session_mesh *mesh, int64_t cell, mesh_ta
     return true;
 }
 
-/* Returns the longest run of cells that starts with this one, in which all cells have one type and their vertices are
+/* Returns the longest run of cells, starting with `cell`, in which all cells have the same type and their vertices are
  * contiguous. Vectorized code can process such a run. */
 MMBVH_INLINE lane_cells find_uniform_run(const session_mesh *mesh, int64_t cell, int64_t end, const fetch_shape shape)
 {
@@ -276,20 +276,20 @@ MMBVH_INLINE lane_cells find_uniform_run(const session_mesh *mesh, int64_t cell,
     int64_t next = cell;
     while (next < end && grid_cell_type(g, next) == type && offsets_are_good(mesh, next, count)) next++;
     if (next > cell) alike.first_entry = fetch_first_entry(g, cell, count, shape);
-    alike.count = next > cell ? next - cell : 1; /* a cell with wrong offsets is processed alone */
+    alike.count = next > cell ? next - cell : 1; /* a cell with bad offsets is a run by itself */
     return alike;
 }
 
-/* Buffer for the connectivity of some cells of a lattice. */
+/* Buffer for the connectivity of consecutive cells in a row of a lattice. */
 enum { ROW_CELLS = 512 };
 typedef struct lattice_row {
     grid cells;
     int32_t vertices[ROW_CELLS * GRID_MAX_CELL_VERTICES];
 } lattice_row;
 
-/* Returns the run of cells of a lattice that begins with this one and stays in one row, and writes their connectivity
- * into the buffer. A cell that is not drawn is a run of length 1, as is each cell of a lattice whose cells are not
- * consecutive along an axis. */
+/* Returns the run of cells of a lattice that begins with `cell` and stays in one row, and writes the run's connectivity
+ * into the buffer. If `cell` is not drawn, or if the lattice's cells are not consecutive along any axis, the run is
+ * this cell only, without connectivity in the buffer. */
 static lane_cells find_row_run(const session_mesh *mesh, int64_t cell, int64_t end, lattice_row *row)
 {
     const grid *g = &mesh->cells;
@@ -314,12 +314,12 @@ static lane_cells find_row_run(const session_mesh *mesh, int64_t cell, int64_t e
     return alike;
 }
 
-/* Adds the first cells of the run to the sums with vectorized code, and returns their number. *alone receives the
- * number of following cells that must be added one by one. */
+/* Adds the first cells of the run to the sums with vectorized code. Returns the number of cells that were added. *alone
+ * receives the number of following cells that must be added one by one. */
 static int64_t tally_lanes(const lane_cells *alike, mesh_tally *t, double *least, int64_t *alone)
 {
     *alone = alike->count;
-    /* cells of a lattice are consecutive only within a row, so that this run has a single cell */
+    /* a run whose grid has a lattice consists of a single cell (find_row_run()) */
     if (alike->count < LANES || alike->g->lattice) return 0;
     lane_run *const run = session_lanes_of(cpu_best_isa(), alike->g, alike->type);
     if (!run) return 0;
@@ -333,9 +333,9 @@ static int64_t tally_lanes(const lane_cells *alike, mesh_tally *t, double *least
     return taken;
 }
 
-/* Adds the cells of a run a second time, each with its own bounding box. This is needed only if the smallest volume is
- * so small, compared to the bounding box of the whole run, that the cell may be flat. Computing all boxes in the first
- * pass would take a thirtieth of its time for a mesh of tets. */
+/* Sums up cells begin .. end - 1 a second time, testing each cell with its own bounding box. This is needed only if the
+ * smallest volume is so small, compared to the common bounding box of these cells, that a cell may be flat. Computing
+ * each cell's box in the first pass would take a thirtieth of its time for a mesh of tets. */
 static mesh_tally tally_run_again(const grid *g, int64_t begin, int64_t end)
 {
     mesh_tally again = tally_empty();
@@ -378,7 +378,9 @@ bool tally_axes(const session_mesh *mesh, mesh_tally *tally)
     const grid *g = &mesh->cells;
     if (!g->coordinates[0].axis || g->ghosts) return false;
     mesh_tally t = tally_empty();
-    /* products over the axes of (positive_count + negative_count), and of (positive_count - negative_count) */
+    /* sized: product over the axes of (positive_count + negative_count), which is the number of cells with a volume;
+     * difference: product over the axes of (positive_count - negative_count), which is the number of right-handed cells
+     * minus the number of left-handed ones */
     int64_t sized = 1, difference = 1;
     t.drawn_count = 1;
     t.size_sum = 1;
@@ -400,7 +402,8 @@ bool tally_axes(const session_mesh *mesh, mesh_tally *tally)
     return true;
 }
 
-/* Adds some cells of a uniform or rectilinear lattice to the sums. These cells are boxes, or are flat. */
+/* Adds the cells begin .. end - 1 of a uniform or rectilinear lattice to the sums. These cells are boxes, or are
+ * flat. */
 static int64_t tally_lattice_cells(const session_mesh *mesh, int64_t begin, int64_t end, mesh_tally *tally)
 {
     const grid *g = &mesh->cells;

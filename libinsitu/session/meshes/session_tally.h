@@ -6,8 +6,8 @@
 
 typedef struct mesh_tally {
     double lower[3], upper[3];
-    int64_t drawn_count, ghost_count, inverted_count, flat_count,
-        shell_count; /* shells are cells that are drawn and flat */
+    /* numbers of cells; shells are drawn cells of a type without volume: triangles, quads and polygons */
+    int64_t drawn_count, ghost_count, inverted_count, flat_count, shell_count;
     /* sum of the cube roots of the volumes; added block by block, which keeps the rounding error small */
     double size_sum;
 } mesh_tally;
@@ -19,7 +19,8 @@ void tally_merge(mesh_tally *sum, const mesh_tally *part);
 void tally_cell(const grid *g, int64_t cell, mesh_tally *tally);
 
 /* Returns whether the volumes at the corners of a hex, wedge or pyramid, or the areas at the corners of a quad, have
- * both signs. This is the case if vertices are stored in another order than the one in which they are read. */
+ * both signs. They have both signs if the caller stores vertices in another order than the order in which they are
+ * read. */
 bool tally_has_both_signs(int type, double points[][3]);
 
 /* Returns the mean of the volumes at the corners of a tet, hex, wedge or pyramid, computed from the positions of its

@@ -1,24 +1,24 @@
 /* All other code reads the faces of each cell, and the vertices of each face. Finite-volume codes store the vertices of
- * each face and, for each face, the cell that owns it and the neighbouring cell. The list of the faces of each cell, in
- * the order of their numbers, is computed here once per topology. The direction of a face's loop does not matter, so
- * faces are not reversed. The faces' vertices are read in place. Only if each face has its own list, or if those of the
- * boundary are in a separate list, they are copied into one.
+ * each face and, for each face, the cell that owns it and the neighbouring cell. From these arrays, the list of the
+ * faces of each cell, sorted by index, is computed here once per topology. The direction of a face's loop of vertices
+ * does not matter, so faces are not reversed. The faces' vertices are read in place, except in two cases: if each face
+ * has its own list of vertices, or if boundary faces are in a separate list, all faces are copied into one list.
  *
  * A polyhedron with six quads may be a hex, which is drawn in a fraction of the time. It is recognized by its faces
  * alone, never by coordinates: therefore the result is the same on all ranks that have the cell, and in all steps of a
  * moving mesh.
  *
  *           t3 ------ t2
- *          /|        /|      The base is any face of the right size. The face on the other side of each of its edges
- *         / |       / |      is a side, which determines the vertices above the edge's ends: t0 and t1 above a0 and
- *        t0 ------ t1 |      a1. The cell is closed if neighbouring sides agree in the vertex above the corner between
- *        | a3 ----|- a2      them, if the remaining face is the loop of the tops in their order, and if no two vertices
- *        | /      | /        are the same. Then every face has its place, and every edge belongs to two faces. It is a
- *        |/       |/         hex if the base has four vertices, and a wedge if it has three. Sides that are triangles
- *        a0 ----- a1         have one top, which is that of a pyramid or a tet. The faces' directions do not matter.
+ *          /|        /|      The base is any face with the right number of vertices: four for a hex and a pyramid,
+ *         / |       / |      three for a wedge and a tet. A face that shares an edge with the base is a side. A quad
+ *        t0 ------ t1 |      as a side determines the vertices above the edge's ends: t0 and t1 above a0 and a1.
+ *        | a3 ----|- a2      The cell is closed if neighbouring sides have the same vertex above the corner that they
+ *        | /      | /        share, if the remaining face is the loop of t0, t1, ... in this order, and if no two
+ *        |/       |/         vertices are equal. Then every edge belongs to two faces. Triangles as sides have one
+ *        a0 ----- a1         vertex above the base, the apex. The directions of the faces' loops do not matter.
  *
- * If any cell is invalid, nothing is recognized in the mesh, so that session_check.c reports the error in the caller's
- * terms. */
+ * If any cell is invalid, no polyhedron of the mesh is recognized, so that session_check.c reports the error in terms
+ * of the caller's cells. */
 #include "session_topology.h"
 
 #include <string.h>
@@ -165,7 +165,8 @@ static insitu_status copy_face_lists(session_mesh *mesh, base_error *error)
 
 /* ---- cells' faces from owner and neighbour -------------------------------------------------------------------- */
 
-/* number that marks a cell of another rank, or the missing cell of a face in a separate list */
+/* number that stands for a cell of another rank, or for the missing cell of a face in the separate list of boundary
+ * faces */
 static const int64_t outside = INT64_MIN;
 
 session_face_sides session_find_face_sides(const insitu_mesh *given)
@@ -294,8 +295,8 @@ static bool read_face_ring(const session_mesh *mesh, int64_t face, face_ring *ri
     return true;
 }
 
-/* Finds an unused face that contains the edge between `ends`, and stores the two vertices next to the edge on that
- * face. Returns its index, or -1 if there is none. */
+/* Finds an unused face that contains the edge between `ends`. above[i] receives the face's other vertex that is
+ * adjacent to ends[i]. Returns the face's index, or -1 if there is none. */
 static int find_side_face(const face_ring *rings, int count, unsigned used, const int64_t ends[2], int64_t above[2])
 {
     for (int f = 0; f < count; f++) {
@@ -312,7 +313,7 @@ static int find_side_face(const face_ring *rings, int count, unsigned used, cons
     return -1;
 }
 
-/* Returns whether the face is the loop of the top vertices, beginning at any of them and in either direction. */
+/* Returns whether the face is the loop of the top vertices, starting at any of these vertices, in either direction. */
 static bool is_loop_of(const face_ring *ring, const int64_t *top, int n)
 {
     if (ring->count != n) return false;
@@ -333,8 +334,9 @@ static bool are_distinct(const int64_t *vertices, int count)
     return true;
 }
 
-/* Constructs the cell on the given base, with sides of side_size vertices, in VTK's order except for its handedness.
- * Returns false if the faces do not form such a cell. */
+/* Constructs the cell on the given base, whose sides must have side_size vertices. vertices: receives the cell's
+ * vertices in VTK's order, except that the cell may be left-handed. Returns false if the faces do not form such a
+ * cell. */
 static bool build_on_base(const face_ring *rings, int count, int base, int side_size,
                           int64_t vertices[GRID_MAX_CELL_VERTICES])
 {
@@ -368,7 +370,7 @@ static void swap_vertices(int64_t *vertices, int i, int j)
 }
 
 /* Reorders the vertices of a left-handed cell so that it becomes right-handed. The handedness is computed from the
- * current positions, since faces may be listed in either direction. Pictures do not depend on it. */
+ * current positions, since faces may be listed in either direction. Pictures do not depend on the handedness. */
 static void make_right_handed(const grid *g, int type, int n, int64_t *vertices)
 {
     double points[GRID_MAX_CELL_VERTICES][3];
@@ -412,10 +414,11 @@ enum { TYPES = GRID_POLYHEDRON + 1 };
 
 typedef struct recognition {
     bool is_faulty; /* set if some cell is invalid */
-    /* number of polyhedra that the caller gave, and number of those that are read as another type */
+    /* polyhedron_count: number of polyhedra that the caller gave; recognised_count: number of these polyhedra that are
+     * read as another type */
     int64_t polyhedron_count, recognised_count;
     int64_t type_counts[TYPES]; /* for each type, number of cells that are read as this type */
-    int64_t entry_count;        /* number of connectivity entries of all cells after the change of types */
+    int64_t entry_count;        /* number of connectivity entries of all cells after recognition */
     unsigned char *types;
 } recognition;
 
@@ -505,8 +508,8 @@ static void store_offsets(const session_mesh *mesh, const recognition *r, const 
     }
 }
 
-/* Writes the cells with the types found, and makes the grid read them. Cells of one type need neither types nor
- * offsets. */
+/* Stores the types, offsets and connectivity of all cells, after recognition, in the mesh's topology. If all cells have
+ * one type, neither types nor offsets are stored. */
 static insitu_status write_cells(session_mesh *mesh, recognition *r, int threads, base_error *error)
 {
     session_topology *t = &mesh->topology;

@@ -28,8 +28,8 @@ typedef struct session_face_sides {
 } session_face_sides;
 
 session_face_sides session_find_face_sides(const insitu_mesh *given);
-/* Stores the two cells of a face. A negative number stands for a missing cell, which is cells[1] if only one is
- * missing. */
+/* Finds the two cells of a face. cells[i] is negative if the cell is missing; if only one cell is missing, it is
+ * cells[1]. */
 void session_cells_of_face(const session_face_sides *sides, int64_t face, int64_t cells[2]);
 
 /* Sets the arrays that the grid reads: the session's own arrays if there are any, otherwise the caller's. Local. */
@@ -38,11 +38,15 @@ void session_read_topology(session_mesh *mesh);
 /* Returns the cell's type in the caller's description. The session may read the cell as another type. */
 int session_caller_type(const session_mesh *mesh, int64_t cell);
 
-/* Computes what the caller's description of the mesh omits, once per topology. These are the faces of cells, from owner
- * and neighbour; a single array of the vertices of all faces, if the caller gives several arrays; the vertices of cells
- * in VTK's order; and tets, hexes, wedges and pyramids that replace polyhedra with the same faces. The grid reads these
- * arrays afterwards. Errors in owner, neighbour and lists of faces are reported here; session_check.c finds all other
- * errors. After an error nothing is stored. Local. */
+/* Computes, once per topology, the arrays that the caller's description of the mesh lacks:
+ * - the faces of each cell, if the caller gives the owner and neighbour of each face;
+ * - a single array of the vertices of all faces, if the caller gives several arrays;
+ * - the linear pieces of cells of higher order;
+ * - the vertices of cells in VTK's order;
+ * - tets, hexes, wedges and pyramids that replace polyhedra with the same faces.
+ *
+ * Afterwards the grid reads these arrays. Errors in owner, neighbour and lists of faces are reported here;
+ * session_check.c finds all other errors. After an error nothing is stored. Local. */
 insitu_status session_make_topology(session_mesh *mesh, int threads, base_error *error);
 
 #endif

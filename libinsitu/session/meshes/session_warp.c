@@ -1,7 +1,8 @@
-/* Moved coordinates have the type of the caller's coordinates. If a lattice has coordinates along its axes, the moved
- * coordinates are stored by vertex instead, in double. A coordinate is computed as x + scale * u in double and rounded
- * once, so that equal vertices of blocks and ranks with equal displacements stay equal. New coordinates are compared
- * with the old ones, so that the mesh is not marked as moved if the field was set again with the same values. */
+/* Moved coordinates have the type of the caller's coordinates, except if a lattice has coordinates along its axes: then
+ * the moved coordinates are stored by vertex, in double. A coordinate is computed as x + scale * u in double and
+ * rounded once, so that vertices of different blocks and ranks remain equal if their positions and displacements are
+ * equal. New coordinates are compared with the old ones, so that the mesh is not marked as moved if the caller has set
+ * the field again with the same values. */
 #include "session_warp.h"
 
 #include <string.h>
@@ -31,7 +32,7 @@ void session_read_warp(session_mesh *mesh)
     mesh->given.lattice = &warp->lattice;
 }
 
-/* Makes the description refer to the caller's coordinates. */
+/* Makes the description refer to the caller's coordinates again. */
 static void restore_coordinates(session_mesh *mesh)
 {
     if (!mesh->warp.is_applied) return;
@@ -73,8 +74,8 @@ static insitu_type moved_type(const insitu_mesh *given, int axis)
     return given->coordinates[given->coordinates[axis].data ? axis : 0].type;
 }
 
-/* Ensures that there is memory for the moved coordinates. *is_new is set if the memory is new. Returns false if memory
- * runs out. Coordinates along z get no memory if they are not given and do not move. */
+/* Ensures that there is memory for the moved coordinates. *is_new is set if memory was allocated. Returns false if
+ * memory runs out. Coordinates along z get no memory if they are not given and do not move. */
 static bool reserve_coordinates(session_mesh *mesh, int component_count, bool *is_new)
 {
     enum { IN_PLANE = 3, ALL = 7 };
@@ -91,10 +92,10 @@ typedef struct moved_axis {
     grid_array from;
     grid_array by; /* displacements along the axis, in the order of the tuples; without data, vertices do not move along
                       the axis */
-    const insitu_array *to; /* receives the moved coordinates; NULL: those along this axis are not stored */
+    const insitu_array *to; /* receives the moved coordinates; NULL: coordinates along this axis are not stored */
 } moved_axis;
 
-/* Stores a vertex's moved coordinate. Returns whether it differs from the one stored before. */
+/* Stores a vertex's moved coordinate. Returns whether it differs from the coordinate stored before. */
 static bool move_coordinate(const moved_axis *axis, double scale, int64_t vertex, int64_t tuple)
 {
     double coordinate = grid_array_number(&axis->from, vertex);

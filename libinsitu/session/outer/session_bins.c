@@ -64,7 +64,7 @@ void session_bins_free(session_bins *bins)
     *bins = (session_bins){0};
 }
 
-/* Sets the iterator to the points of the row of bins at walk->bin. */
+/* Sets the iterator to the points of a row of bins along the first axis, which begins at walk->bin. */
 static void enter_bin_row(session_bin_walk *walk)
 {
     const session_bins *b = walk->bins;

@@ -1,4 +1,5 @@
-/* Sorts points into cubic bins. For points on a surface, the number of bins is about the number of points. */
+/* Sorts points into cubic bins, so that the points near a box are found quickly. If the points lie on a surface, there
+ * are about as many bins as points. */
 #ifndef SESSION_BINS_H
 #define SESSION_BINS_H
 

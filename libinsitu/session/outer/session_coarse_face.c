@@ -43,8 +43,8 @@ static session_box find_bounding_box(const double positions[][3], int count)
     return box;
 }
 
-/* Computes the face's normal, box, area and width. side: 1 if the cell is behind the face, as seen by a viewer towards
- * whom the right-hand normal of the vertex loop points; -1 if it is in front. */
+/* Computes the face's normal, box, area and width. side: 1 if the right-hand normal of the vertex loop points away from
+ * the cell, -1 if it points to the cell. */
 static void measure_face(session_coarse_face *f, double side)
 {
     double a[3], b[3];
@@ -59,8 +59,8 @@ static void measure_face(session_coarse_face *f, double side)
     for (int axis = 0; axis < 3 && f->area > 0; axis++) f->normal[axis] *= side / (2 * f->area);
 }
 
-/* Returns the side of the face on which its cell lies, in the form of measure_face(): 1 if it is behind the face, -1 if
- * it is in front. */
+/* Returns the parameter `side` of measure_face(): 1 if f->normal points away from the cell, -1 if it points to the
+ * cell, 0 if it is perpendicular to the line between the centres of cell and face. */
 static double find_cell_side(const grid *g, int64_t cell, const session_coarse_face *f)
 {
     double sums[3] = {0, 0, 0}, off[3], position[3];
@@ -94,8 +94,7 @@ bool session_read_outline(const grid *g, const session_face *face, session_face_
     return true;
 }
 
-/* Returns whether the position, projected on the direction, lies above all corners, or below all corners, by more than
- * `slack`. */
+/* Returns whether, along `direction`, the position lies above all corners or below all corners by more than `slack`. */
 static bool is_beyond(const session_face_outline *f, const double position[3], const double direction[3], double slack)
 {
     const double at = vector3_dot(direction, position), most = slack * sqrt(vector3_dot(direction, direction));
@@ -185,7 +184,7 @@ bool session_is_at_corner(const session_coarse_face *face, const double position
     return false;
 }
 
-/* Rounds a coordinate to a multiple of 1 / PARTS if it differs from one only by rounding. */
+/* Rounds a coordinate to a multiple of 1 / PARTS if it differs from such a multiple only by rounding. */
 static double round_coordinate(double at)
 {
     const double parts = round(at * PARTS);
@@ -205,8 +204,8 @@ static void evaluate_face(const session_coarse_face *f, const double at[2], doub
     }
 }
 
-/* Computes the coordinates of a position on the face by Newton's method, starting from the face's centre. A triangle is
- * treated as half of a parallelogram. */
+/* Computes the face coordinates, from 0 to 1 along each edge, of a position by Newton's method, starting from the
+ * face's centre. A triangle is treated as half of a parallelogram. */
 static bool solve_face_coordinates(const session_coarse_face *f, const double position[3], double at[2])
 {
     double on[3], slopes[2][3], off[3];

@@ -1,4 +1,5 @@
-/* Triangles and quads of cells on which hanging vertices may lie, and positions on these faces. */
+/* Triangles and quads of cells on which hanging vertices may lie, and positions on these faces. A hanging vertex is a
+ * vertex of a fine cell that lies on a face of a coarser cell without being a corner of this face. */
 #ifndef SESSION_COARSE_FACE_H
 #define SESSION_COARSE_FACE_H
 
@@ -29,15 +30,16 @@ typedef struct session_face_outline {
 
 /* Reads the outline of a face. Returns false if the face is not a triangle or quad of a cell with a volume. */
 bool session_read_outline(const grid *g, const session_face *face, session_face_outline *out);
-/* Returns whether a position in the outline's box may be within `slack` of the face. It returns false if the position
+/* Returns false only if a position in the outline's box is certainly more than `slack` away from the face: the position
  * is beyond all corners of the face, either along its normal or across one of its edges. */
 bool session_may_contain(const session_face_outline *outline, const double position[3], double slack);
 
-/* Reads a face. vertices: receives its vertices, in the order of out->corner_positions. Returns false if the face is
- * not a triangle or quad of a cell with a volume, or if its area is 0. */
+/* Reads a face. vertices: receives the face's vertices, in the order of out->corner_positions. Returns false if the
+ * face is not a triangle or quad of a cell with a volume, or if its area is 0. */
 bool session_read_coarse_face(const grid *g, const session_face *face, session_coarse_face *out, int64_t vertices[4]);
 
-/* Writes the face as 64-bit words for another rank; the second function reads it from them. */
+/* session_pack_coarse_face() writes a face as 64-bit words for another rank; session_unpack_coarse_face() reads a face
+ * from these words. */
 void session_pack_coarse_face(const session_coarse_face *face, uint64_t words[SESSION_FACE_WORDS]);
 void session_unpack_coarse_face(const uint64_t words[SESSION_FACE_WORDS], session_coarse_face *out);
 

@@ -1,7 +1,8 @@
-/* Each rank sends the box of each of its blocks to all ranks near the block. A rank is near a block if the bounding box
- * of all its own blocks intersects the block's box. Boxes are compared in units of cells of the coarsest level. They
- * are sorted into bins by their centres, so that the work grows only with the number of blocks and the number of blocks
- * that cover each. The boxes are kept, because session_drop_faces_between_levels() uses them later. */
+/* Each block of a refined mesh has a box: the range of its cells' indices in its level of refinement. Each rank sends
+ * the boxes of its blocks to all ranks near them. A rank is near a block if the bounding box of all its own blocks
+ * intersects the block's box; boxes are compared in units of cells of the coarsest level. Boxes are sorted into bins by
+ * their centres, so that the work depends only on the number of blocks and on the number of blocks that cover each
+ * block. The boxes are kept, because session_drop_faces_between_levels() uses them later. */
 #include "session_covers.h"
 
 #include <math.h>
@@ -23,7 +24,7 @@ enum { BOX_WORDS = sizeof(session_level_box) / sizeof(uint64_t) };
 /* Boxes sorted into bins by their centres, in units of cells of the coarsest level. */
 typedef struct box_bins {
     int64_t count;
-    int64_t *boxes;            /* for each sorted box, its index in the array that was sorted */
+    int64_t *boxes;            /* for each box in the bins, its index in the array that bin_boxes() was given */
     double (*centres)[3];      /* centre of each box */
     double largest_half_width; /* half of the largest side length of all boxes */
     session_bins bins;
@@ -58,7 +59,7 @@ static session_level_box make_level_box(const session_mesh *mesh, int rank)
     session_level_box out = {SESSION_HASH_BEGIN, mesh->block, rank, {0, 0, 0}, {1, 1, 1}, {1, 1, 1}};
     session_hash_text(&out.mesh, mesh->name);
     for (int axis = 0; axis < 3; axis++) {
-        /* along the axis without cells, all quads are treated as having the same index */
+        /* all quads of a plane lattice have the same index along the axis that has no cells */
         if (!l->cells[axis]) continue;
         out.lower[axis] = l->first[axis] + cells->drawn_first[axis];
         out.upper[axis] = l->first[axis] + cells->drawn_end[axis];
@@ -96,8 +97,8 @@ static bool is_level_block(const session_mesh *mesh)
     return mesh->is_given && session_has_levels(&mesh->given) && mesh->cells.lattice;
 }
 
-/* Computes the bounding box of this rank's refined blocks, in units of cells of the coarsest level. It is extended by
- * one such cell, which is far more than rounding requires. */
+/* Computes the common box of this rank: the bounding box of its refined blocks, in units of cells of the coarsest
+ * level. It is extended by one such cell, which is far more than rounding requires. */
 static session_box common_box(const session_meshes *meshes)
 {
     session_box out = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
@@ -225,8 +226,8 @@ static int64_t floor_quotient(int64_t a, int64_t b)
 /* The cells of a coarse box that a fine box overlaps, as index ranges of the coarse level. */
 typedef struct overlap {
     int64_t lower[3], upper[3];             /* cells that the fine box covers wholly or in part */
-    int64_t whole_lower[3], whole_upper[3]; /* cells that the fine box covers wholly along each axis */
-    /* an axis along which it covers some cells only in part; -1: there is none */
+    int64_t whole_lower[3], whole_upper[3]; /* cells that the fine box covers wholly along each of these axes */
+    /* an axis along which the fine box covers some cells only in part; -1: there is none */
     int cut_axis;
 } overlap;
 
@@ -252,8 +253,8 @@ static bool find_overlap(const session_level_box *coarse, const session_level_bo
     return true;
 }
 
-/* Bits of the bytes in the array of covered cells. IS_CUT: a finer block covers the cell only in part; resolve_cuts()
- * removes this bit. */
+/* Bits of the bytes in the array of covered cells. IS_HIDDEN: a finer block covers the whole cell. IS_CUT: a finer
+ * block covers only part of the cell; resolve_cuts() removes this bit. */
 enum { IS_HIDDEN = 1, IS_CUT = 2 };
 
 /* Iterates over the rows of an overlap's cells along the axis i. */
@@ -336,8 +337,8 @@ static bool next_finer(finer_walk *w)
     return false;
 }
 
-/* Finds the cells of the block that finer blocks cover. *out has one byte per cell, or is NULL if no cell is covered.
- * *has_cuts receives whether a finer block covers cells in part. Returns false if memory runs out. */
+/* Finds the cells of the block that finer blocks cover. *out receives one byte per cell, or NULL if no cell is covered.
+ * *has_cuts receives whether a finer block covers only part of some cell. Returns false if memory runs out. */
 static bool find_covered_cells(const cover_search *s, const session_mesh *mesh, unsigned char **out, bool *has_cuts)
 {
     *out = NULL;
@@ -351,9 +352,9 @@ static bool find_covered_cells(const cover_search *s, const session_mesh *mesh, 
     return true;
 }
 
-/* Removes the marks of cells that a finer block covers in part. A cell that is covered only in part is an error, unless
- * another block covers it wholly. For example, a block that is two levels finer may begin within a cell if a block of
- * the level in between covers the cell. */
+/* Reports a misfit if some cell is covered only in part, because this is an error unless another block covers the whole
+ * cell. For example, a block that is two levels finer is allowed to begin within a cell if a block of the level in
+ * between covers the cell. Then sets all bytes of `covered` to 0 or 1. */
 static void resolve_cuts(const cover_search *s, session_mesh *mesh, unsigned char *covered)
 {
     for (finer_walk w = walk_finer(s, mesh); next_finer(&w) && !mesh->misfit.exists;) {
@@ -364,8 +365,8 @@ static void resolve_cuts(const cover_search *s, session_mesh *mesh, unsigned cha
     for (int64_t cell = 0; cell < mesh->given.cell_count; cell++) covered[cell] = covered[cell] != 0;
 }
 
-/* Adds the caller's own ghost flags. If they have to be read from a copy, the copy is filled here, because otherwise it
- * would be filled later. */
+/* Adds the caller's own ghost flags. If the flags have to be read from a copy, the copy is filled here, because the
+ * session fills copies only later. */
 static void add_caller_ghosts(session_mesh *mesh, int threads, unsigned char *covered)
 {
     const insitu_array *ghosts = &mesh->given.ghosts;
@@ -421,8 +422,8 @@ insitu_status session_update_covers(session_meshes *meshes, const session_team *
 
 /* ---- faces between levels --------------------------------------------------------------------------------------- */
 
-/* Computes the centre of the cell on the other side of the face, if that cell has the same size as the face's cell. The
- * result is in units of cells of the coarsest level. */
+/* Computes the centre of the cell on the other side of a face, under the assumption that this cell has the same size as
+ * the face's cell. The result is in units of cells of the coarsest level. */
 static void find_neighbour_centre(const session_mesh *mesh, const session_level_box *box, const session_face *face,
                                   double out[3])
 {

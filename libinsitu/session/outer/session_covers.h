@@ -15,9 +15,9 @@
  * Collective; all ranks return the same status. */
 insitu_status session_update_covers(session_meshes *meshes, const session_team *team, base_error *error);
 
-/* Removes the outer faces on whose other side there is a block of another level, on any rank. The faces of thresholds
- * and of quads are kept. Ghost flags of the caller are not taken into account, so that a face next to a ghost cell of
- * another level is also removed. Local. */
+/* Removes the outer faces whose other side is in a block of another level, on any rank. The faces of thresholds and of
+ * quads are kept. Ghost flags of the caller are not taken into account, so that a face next to a ghost cell of another
+ * level is also removed. Local. */
 insitu_status session_drop_faces_between_levels(const session_meshes *meshes, const session_face_part *parts, int count,
                                                 base_error *error);
 

@@ -1,5 +1,6 @@
-/* A face lies in a plane of the reference cell. If m is the plane's normal there, and t_0, t_1 and t_2 are the
- * derivatives of positions along the axes of the reference cell, the normal of the curved face is
+/* Normals of the faces of cells of higher order. A face lies in a plane of the reference cell. If m is the plane's
+ * normal there, and t_0, t_1 and t_2 are the derivatives of positions along the axes of the reference cell, the normal
+ * of the curved face is
  *
  *     m_0 t_1 x t_2 + m_1 t_2 x t_0 + m_2 t_0 x t_1.
  *
@@ -39,20 +40,19 @@ static void read_cell(session_face_normals *n, const session_mesh *mesh, int64_t
     n->derivatives = session_derivatives_of(&n->polynomials, cell, n->positions, 3);
 }
 
-/* Returns the position of a vertex in the cell's row, or -1. */
+/* Returns the position of a vertex in the cell's row of connectivity, or -1 if the cell does not have the vertex. */
 static int find_node(const session_rows *rows, int64_t cell, int64_t vertex)
 {
     const int count = (int)session_row_size(rows, cell);
-    const int64_t guess =
-        vertex -
-        session_row_node(rows, cell, 0); /* in finer lattices, the nodes of a cell are numbered consecutively */
+    /* in finer lattices, the nodes of a cell are numbered consecutively */
+    const int64_t guess = vertex - session_row_node(rows, cell, 0);
     if (guess >= 0 && guess < count && session_row_node(rows, cell, (int)guess) == vertex) return (int)guess;
     for (int i = 0; i < count; i++)
         if (session_row_node(rows, cell, i) == vertex) return i;
     return -1;
 }
 
-/* Computes the derivative of positions along an axis at a node. */
+/* Computes the derivative of positions along an axis of the reference cell at a node. */
 static void find_tangent(const session_face_normals *n, int node, int axis, double out[3])
 {
     const session_derivatives *of = n->derivatives;

@@ -1,5 +1,5 @@
-/* Normals of the faces of cells of higher order, by which outer surfaces are lit as curved faces instead of the flat or
- * bilinear faces of pieces. */
+/* Normals of the faces of cells of higher order. Outer surfaces are shaded with these normals as curved faces, instead
+ * of with the normals of the flat or bilinear faces of pieces. */
 #ifndef SESSION_FACE_NORMALS_H
 #define SESSION_FACE_NORMALS_H
 
@@ -7,7 +7,7 @@
 
 typedef struct session_face_normals {
     session_polynomials polynomials;
-    int64_t cell;                           /* the caller's cell that was read last; -1: no cell has been read */
+    int64_t cell; /* the caller's cell that was read most recently; -1: no cell has been read */
     const session_derivatives *derivatives; /* the derivatives of this cell's polynomials */
     double *positions;                      /* x, y and z of the cell's nodes, in the order of its row */
 } session_face_normals;
@@ -20,9 +20,9 @@ void session_face_normals_free(session_face_normals *normals);
 /* Returns whether the normals of a cell's faces can be computed, which is not supported for pyramids. */
 bool session_has_face_normals(session_face_normals *normals, const session_mesh *mesh, int64_t cell);
 
-/* Computes the normal, of any length, of a face of one of the caller's cells at one of its nodes. face: number of the
- * face (session_find_rim()). vertex: the node, as a vertex of session_mesh.cells. Normals at all nodes of a face point
- * to the same side of it. Returns false if the normal is 0 or cannot be computed. */
+/* Computes the normal, of any length, of a face of one of the caller's cells at one of the cell's nodes. face: number
+ * of the face (session_find_rim()). vertex: the node, as a vertex of session_mesh.cells. Normals at all nodes of a face
+ * point to the same side of the face. Returns false if the normal is 0 or cannot be computed. */
 bool session_find_face_normal(session_face_normals *normals, const session_mesh *mesh, int64_t cell, int face,
                               int64_t vertex, double out[3]);
 

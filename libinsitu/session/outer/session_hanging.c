@@ -12,18 +12,20 @@
 #include "session_twins.h"
 #include "vector3.h"
 
-/* Distance, as a fraction of a face's width, within which a vertex is treated as lying on the face. It is larger than
- * the rounding errors of positions in the caller's code. Hanging vertices are at least an eighth of the width apart.
- * The ranks' boxes are extended by the same fraction (session_homes.h). */
+/* Distance, as a fraction of a face's width, within which a vertex is treated as lying on the face. The distance is
+ * larger than the rounding errors of positions in the caller's code. It is much smaller than the distance between
+ * hanging vertices, which are at least an eighth of the width apart. The ranks' boxes are extended by the same fraction
+ * (session_homes.h). */
 static const double relative_slack = 1e-5;
 
-/* A vertex hangs on a face only if the face's area is larger by this factor than those of the faces that have the
- * vertex as a corner. A face that is divided into two parts has twice the area of each part, the smallest ratio that
- * occurs. */
+/* A vertex hangs on a face only if the face's area is larger by this factor than the area of each face that has the
+ * vertex as a corner. The smallest ratio that occurs is 2: a face that is divided into two parts has twice the area of
+ * each part. */
 static const double least_ratio = 1.25;
 
-/* Two faces have opposite orientation if the dot product of their normals is below this. Exactly opposite faces have
- * -1, apart from the curvature of divided faces; walls at right angles have 0, up to rounding. */
+/* Two faces have opposite orientation if the dot product of their normals is below this number. The dot product is -1
+ * for exactly opposite faces, apart from the curvature of divided faces; it is 0, up to rounding, for walls at right
+ * angles. */
 static const double opposite = -0.1;
 
 enum { MOST_ROUNDS = 64 };
@@ -42,7 +44,7 @@ typedef struct candidate {
     /* heads of two linked lists of contacts: with the faces on which the vertex lies, and with the faces of which it is
      * a corner; -1: the list is empty */
     int64_t hit_list, corner_list;
-    int64_t face; /* the face on which the vertex hangs; -1: it does not hang */
+    int64_t face; /* index, in hanging_search.faces, of the face on which the vertex hangs; -1: it does not hang */
     double weights[4];
 } candidate;
 
@@ -50,13 +52,14 @@ typedef struct candidate {
 typedef struct contact {
     int64_t face;         /* index of the face in hanging_search.faces */
     int64_t next_contact; /* index of the next element of the list; -1: this is the last one */
-    double weights[4];    /* set if the candidate is not a corner of the face */
+    double weights[4];    /* weights of the face's corners at the candidate's position; not set if the candidate is a
+                             corner of the face */
 } contact;
 
 typedef struct hanging_search {
     const session_hanging_basis *basis;
     const session_team *team;
-    unsigned char *face_states; /* for each face of the borders, its face_state */
+    unsigned char *face_states; /* face_state of each face of the borders */
     int64_t face_count, own_count, candidate_count, face_capacity;
     /* faces of this rank that may touch candidates, then the received faces, then this rank's faces that were read
      * later */
@@ -101,7 +104,8 @@ bool session_has_twins(const session_mesh_group *mesh_group)
     return mesh_group->count > 1 || (mesh_group->meshes[0]->is_refined && !mesh_group->by_id);
 }
 
-/* Stores the meshes of the parts, and allocates one byte per vertex for each part. Returns false if memory runs out. */
+/* Stores the mesh of each part, and allocates is_border, one byte per vertex of the part. Returns false if memory runs
+ * out. */
 static bool list_part_faces(const session_mesh_group_parts *parts, int first, int count, session_face_part *out)
 {
     bool is_done = true;
@@ -114,7 +118,7 @@ static bool list_part_faces(const session_mesh_group_parts *parts, int first, in
     return is_done;
 }
 
-/* Finds the outer faces, and their vertices, of this rank's parts of one mesh of the mesh_group. */
+/* Finds the outer faces of this rank's parts of one mesh of the group, and the vertices of these faces. */
 static insitu_status update_mesh_borders(const session_mesh_group *mesh_group, int m,
                                          const session_mesh_group_parts *parts, const session_team *team,
                                          base_error *error)
@@ -153,7 +157,7 @@ static bool make_borders(session_hanging *hanging, int count)
     return hanging->borders != NULL;
 }
 
-/* Marks the meshes whose borders were computed for other cells on some rank. */
+/* Marks in `stale` the meshes whose borders are out of date on some rank, because cells have changed since. */
 static insitu_status find_stale_borders(const session_mesh_group *mesh_group, const session_mesh_group_parts *parts,
                                         const session_team *team, int *stale, base_error *error)
 {
@@ -215,7 +219,7 @@ static bool bin_candidates(hanging_search *s)
     return session_bins_create(&s->bins, s->candidates->position, (int64_t)sizeof *s->candidates, s->candidate_count);
 }
 
-/* faces, most of which are excluded by their outlines --------------------------------------------------------- */
+/* reading this rank's faces, most of which are excluded by their outlines ------------------------------------------ */
 
 typedef enum face_state {
     FACE_UNREAD,
@@ -397,8 +401,8 @@ static bool receive_faces(hanging_search *s, const session_mail *in)
 
 /* ---- contacts ------------------------------------------------------------------------------------------------- */
 
-/* Prepends the face with this number to one of a candidate's linked lists, whose first element is *head. Returns false
- * if memory runs out. */
+/* Prepends a face to one of a candidate's linked lists, whose first element is *head. number: index of the face.
+ * Returns false if memory runs out. */
 static bool add_contact(hanging_search *s, int64_t number, const double weights[4], int64_t *head)
 {
     if (s->contact_count == s->contact_capacity) {
@@ -415,7 +419,8 @@ static bool add_contact(hanging_search *s, int64_t number, const double weights[
     return true;
 }
 
-/* Adds the face to the candidate's list of hits if the candidate lies on the face. Returns false if memory runs out. */
+/* Adds the face to the candidate's list of hits if the candidate lies on the face and is not one of its corners.
+ * Returns false if memory runs out. */
 static bool test_face_hit(hanging_search *s, int64_t number, candidate *c)
 {
     const session_coarse_face *f = &s->faces[number].face;
@@ -426,8 +431,8 @@ static bool test_face_hit(hanging_search *s, int64_t number, candidate *c)
     return add_contact(s, number, weights, &c->hit_list);
 }
 
-/* Adds the face to the list of faces that have the candidate as a corner, if this is the case and the candidate lies on
- * some face. Returns false if memory runs out. */
+/* Adds the face to the list of faces that have the candidate as a corner, if the face has it as a corner and the
+ * candidate lies on some face. Returns false if memory runs out. */
 static bool test_face_corner(hanging_search *s, int64_t number, candidate *c)
 {
     const session_coarse_face *f = &s->faces[number].face;
@@ -483,8 +488,8 @@ static bool find_contacts(hanging_search *s)
 
 /* ---- results -------------------------------------------------------------------------------------------------- */
 
-/* Requests the values of received faces on which vertices hang: packs the numbers of these faces for the ranks that
- * sent them. *firsts receives, for each such face, the index of its first value among the values that will be
+/* Requests the values of received faces on which vertices hang: packs the message indices of these faces, for the
+ * ranks that sent them. *firsts receives, for each face, the index of its first value among the values that will be
  * received. */
 static bool request_faces(const hanging_search *s, session_mail *requested, int64_t **firsts)
 {
@@ -523,8 +528,8 @@ static bool store_vertices(const hanging_search *s, const int64_t *firsts, sessi
     return true;
 }
 
-/* Stores which values the other ranks request. `requests` holds, for each rank, indices of faces in the message that
- * this rank sent to it. */
+/* Stores which of this rank's values the other ranks request. `requests` contains, for each rank, indices of faces
+ * within the message that this rank sent to that rank. */
 static bool store_requests(const hanging_search *s, const session_mail *mail, const int64_t *sent,
                            const session_mail *requests, session_hanging *out)
 {
@@ -610,8 +615,8 @@ insitu_status session_update_hanging(const session_hanging_basis *basis, const s
 
 /* ---- values --------------------------------------------------------------------------------------------------- */
 
-/* Sets the value of each hanging vertex to the value that is interpolated at its position on the face. Returns whether
- * a value changed. */
+/* Sets the value of each hanging vertex to the value of the face at the vertex's position, interpolated from the values
+ * at the face's corners. Returns whether a value changed. */
 static bool apply_constraints(const session_hanging *hanging, const double *received, double *means)
 {
     bool is_changed = false;

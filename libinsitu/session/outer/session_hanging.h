@@ -5,14 +5,14 @@
  * same position, so that an isosurface would have gaps. Therefore the vertex takes the value of the face, which is
  * linear or bilinear in the values at its corners.
  *
- * Vertices may hang on faces that belong to only one cell, counted over all ranks' parts of the mesh. The vertices
- * that are tested are the corners of faces that belong to only one cell on this rank. A vertex hangs on a face that
- * contains it if faces with the opposite orientation have this vertex as a corner, and all of these are smaller. In
- * this case the vertex lies between a large cell and small ones. On a wall along which two meshes overlap, however,
- * a large cell and small ones lie on the same side of the vertex. If there are several such faces, the largest one
- * is used. Corners of a face may hang themselves, on still larger faces. The face, and the vertex's position on it,
- * are determined from coordinates alone, with the same result on all ranks, regardless of which mesh of a mesh group
- * has the face. */
+ * Vertices may hang on faces that belong to only one cell of all ranks' parts of the mesh. The vertices that are tested
+ * are the corners of faces that belong to only one cell of this rank. A vertex hangs on a face that contains it if
+ * faces with the opposite orientation have this vertex as a corner, and all of these faces are smaller. Then the vertex
+ * lies between a large cell and small ones. The orientation is tested because of walls along which two meshes overlap:
+ * there, a large cell and small ones lie on the same side of the vertex. If the vertex can hang on several faces, the
+ * largest one is used. Corners of a face may hang themselves, on still larger faces. The face, and the vertex's
+ * position on it, are determined from coordinates alone, with the same result on all ranks, regardless of which mesh of
+ * a mesh group has the face. */
 #ifndef SESSION_HANGING_H
 #define SESSION_HANGING_H
 
@@ -30,8 +30,8 @@ typedef struct session_hanging_basis {
     int64_t group_count;
 } session_hanging_basis;
 
-/* Returns whether vertices of the mesh group whose positions differ only by rounding are treated as equal. This is the
- * case in mesh groups of several meshes, and in meshes with levels of refinement. */
+/* Returns whether vertices of the mesh group are treated as equal if their positions differ only by rounding. They are
+ * treated so in mesh groups of several meshes, and in meshes with levels of refinement. */
 bool session_has_twins(const session_mesh_group *mesh_group);
 
 /* Computes the mesh group's borders, and the twins of its vertices, unless they are up to date. `parts` contains this

@@ -41,10 +41,11 @@ typedef struct part_cells {
     /* for each of the corner cells, its first piece; a final entry marks the end. NULL: the mesh is not split */
     const int64_t *first_pieces;
     session_rims rims; /* the faces on which the pieces' vertices lie, if the mesh is split */
-    /* one byte per cell of the mesh, nonzero if the cell is beyond the threshold; NULL: there is no threshold */
+    /* one byte per cell of the mesh, nonzero if the threshold does not select the cell; NULL: there is no
+     * threshold */
     unsigned char *is_hidden;
-    int64_t first_cell;   /* number of the part's first cell among those of all parts */
-    int64_t first_vertex; /* number of the part's first vertex among those of all parts */
+    int64_t first_cell;   /* index of the part's first cell if the cells of all parts are numbered consecutively */
+    int64_t first_vertex; /* index of the part's first vertex if the vertices of all parts are numbered consecutively */
     uint64_t *hashes;     /* hash of each vertex's position or global id */
     /* one byte per vertex, nonzero if its sum of hashes is not 0, so that an outer face may contain it */
     unsigned char *may_be_outer;
@@ -105,8 +106,8 @@ static int64_t count_part_vertices(const part_cells *p)
 
 /* ---- keys ---------------------------------------------------------------------------------------------------- */
 
-/* Returns whether the face's i-th vertex is new, that is, different from all vertices before it. A repeated vertex is
- * counted once, so that a quad with two corners at the same position is a triangle. */
+/* Returns whether the face's i-th vertex differs from all earlier vertices of the face. A repeated vertex is counted
+ * once, so that a quad with two corners at the same position is a triangle. */
 static inline bool is_first_occurrence(const part_cells *p, const session_face_loop *loop, int64_t i)
 {
     const uint64_t hash = p->hashes[session_face_vertex(loop, i)];
@@ -199,8 +200,8 @@ static void add_face(const xor_table *x, const session_face_loop *loop)
             add_xor(&x->vertex_sums[session_face_vertex(loop, i)], session_mix_bits(sum), x->is_shared);
 }
 
-/* Adds the hashes of all faces of a cell whose type has a table of faces. If two of its vertices have the same hash,
- * its faces have fewer vertices than in the table; then nothing is added and false is returned. */
+/* Adds the hashes of all faces of a cell whose type has a table of faces. If two vertices of the cell have the same
+ * hash, its faces have fewer vertices than in the table; then nothing is added and false is returned. */
 static inline bool add_cell(const xor_table *x, const session_face_table *table, const int64_t *vertices, int count)
 {
     uint64_t hashes[GRID_MAX_CELL_VERTICES], sums[GRID_MAX_CELL_VERTICES] = {0};
@@ -244,8 +245,8 @@ static void add_faces(const xor_table *x, int64_t cell)
     }
 }
 
-/* Adds the vertex's sums in all tables to the sum of its hash. `vertex` is its number among the vertices of all
- * parts. */
+/* Adds the sums of a vertex, in all tables, to the element of hash_sums that belongs to the vertex's hash. vertex:
+ * number of the vertex among the vertices of all parts. */
 static void add_vertex(const face_search *s, int64_t vertex)
 {
     uint64_t sum = 0;
@@ -275,7 +276,7 @@ static void cancel_faces(const face_search *s)
     }
 }
 
-/* The faces found in some of the cells. */
+/* The possible outer faces in some of the cells, with their keys. */
 typedef struct face_list {
     int64_t count, capacity;
     found_face *faces;
@@ -309,7 +310,7 @@ static bool is_open_face(const part_cells *p, const session_face_loop *loop)
     return true;
 }
 
-/* Returns whether the cell may have an outer face, according to the marks of its vertices. */
+/* Returns whether the cell may have an outer face, according to the flags may_be_outer of its vertices. */
 static bool has_open_vertices(const part_cells *p, int64_t cell)
 {
     const grid *g = p->grid;
@@ -321,7 +322,7 @@ static bool has_open_vertices(const part_cells *p, int64_t cell)
     return open >= 3;
 }
 
-/* Appends the faces of the cell that may be outer faces to the list. */
+/* Appends those faces of the cell to the list that may be outer faces. */
 static void append_open_faces(const face_search *s, int part, int64_t cell, face_list *out)
 {
     const part_cells *p = &s->cells[part];
@@ -448,8 +449,8 @@ static bool read_corners(const session_mesh *mesh, part_cells *p)
     return session_corner_cells_create(mesh, &p->corners) && session_rims_create(mesh, &p->rims);
 }
 
-/* Numbers the cells and vertices of all parts, and finds the cells that are beyond thresholds. Returns false if memory
- * runs out. */
+/* Numbers the cells and vertices of all parts, and finds the cells that thresholds do not select. Returns false if
+ * memory runs out. */
 static bool number_parts(face_search *s)
 {
     s->cells = base_calloc((size_t)s->part_count + 1, sizeof *s->cells);
@@ -489,8 +490,8 @@ static insitu_status search_own_faces(face_search *s, bool by_id, base_error *er
 
 enum { KEY_WORDS = 3 };
 
-/* Returns the home rank of a face whose vertices are all in other ranks' boxes, or -1 if only this rank can have the
- * face. The home is that of the face's first vertex in an order by hashes, which is the same on all ranks. */
+/* Returns the home rank of a face all of whose vertices lie in other ranks' boxes, or -1 if only this rank can have the
+ * face. The home rank is that of the vertex with the least hash, which is the same vertex on all ranks. */
 static int find_face_home(const face_search *s, const session_homes *homes, int64_t number)
 {
     const found_face *face = &s->faces[number];
@@ -511,8 +512,8 @@ static int find_face_home(const face_search *s, const session_homes *homes, int6
                              (int64_t)key.words[0]);
 }
 
-/* Packs the keys of the faces that lie in other ranks' boxes, sorted by their home ranks. *order receives the face of
- * each key. Returns false if memory runs out. */
+/* Packs the keys of the faces that other ranks may have too, sorted by the faces' home ranks. *order receives the face
+ * of each key. Returns false if memory runs out. */
 static bool pack_keys(const face_search *s, const session_homes *homes, int ranks, session_mail *mail, int64_t **order)
 {
     int64_t *next = base_calloc((size_t)ranks + 1, sizeof *next);
@@ -542,7 +543,8 @@ static bool pack_keys(const face_search *s, const session_homes *homes, int rank
     return is_done;
 }
 
-/* Computes the reply to each received key, which is the number of its occurrences. Returns false if memory runs out. */
+/* Computes the reply to each received key: the number of times that the key was received. Returns false if memory runs
+ * out. */
 static bool count_received_keys(const session_mail *in, int ranks, session_mail *reply)
 {
     const int64_t count = in->total / KEY_WORDS;
@@ -697,7 +699,7 @@ static void store_part_faces(const face_search *s, int64_t first, int64_t end, s
     session_fail_for_memory(error, capacity * (int64_t)sizeof *outer->faces, "outer faces");
 }
 
-/* Stores the outer faces that were found with the parts to which they belong. */
+/* Stores the outer faces in the parts to which they belong. */
 static void store_outer_faces(const face_search *s, base_error *error)
 {
     int64_t at = 0;

@@ -14,8 +14,8 @@ typedef struct session_face_part {
     /* if `outer` is NULL and the mesh is split: one byte per cell of the caller, which receives a bit mask of the
      * cell's outer faces, in the order of session_shape.faces */
     unsigned char *masks;
-    /* one byte per vertex, which the search sets to 1 if the vertex is on a face that only one cell of this rank has;
-     * NULL: not requested */
+    /* one byte per vertex: the search sets it to 1 if the vertex is on a face that belongs to only one cell of this
+     * rank; NULL: not requested */
     unsigned char *is_border;
 } session_face_part;
 

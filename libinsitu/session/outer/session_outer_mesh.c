@@ -14,8 +14,8 @@
 
 /* ---- one face ------------------------------------------------------------------------------------------------ */
 
-/* A face with three or four corners. Their order depends only on their positions: it begins with the lexicographically
- * smallest corner and continues to the smaller one of its neighbours. */
+/* A face with three or four corners. The order of the corners depends only on their positions: it begins with the
+ * lexicographically smallest corner and continues to the smaller one of its neighbours. */
 typedef struct corner_loop {
     int count;
     int64_t vertices[4];
@@ -74,13 +74,13 @@ static double measure_perimeter(const corner_loop *loop)
 }
 
 /* Smallest distance, as a fraction of a face's width, at which a point is treated as lying on one side of the face's
- * plane. The centre of a shell lies in its plane except for rounding errors. These must not determine the side, because
- * they depend on the vertex at which the shell's list of vertices begins. */
+ * plane. The centre of a shell lies in its plane except for rounding errors. The errors must not determine the side,
+ * because they depend on the vertex at which the shell's list of vertices begins. */
 static const double side_slack = 1e-9;
 
-/* Computes the apex of the cell made on a face. It lies above the centre of the corners, at half of the mean side
- * length, and on the side of `inside` or, if that is in the face's plane, of the loop's own normal. Returns false if
- * the face's area is 0 up to rounding. */
+/* Computes the apex of the cell built on a face. The apex lies above the centre of the corners, at half of the mean
+ * side length, on the same side of the face as the point `inside`. If `inside` lies in the face's plane, the apex lies
+ * on the side to which the loop's own normal points. Returns false if the face's area is 0 up to rounding. */
 static bool find_apex(const corner_loop *loop, const double inside[3], double apex[3])
 {
     double normal[3], towards[3], middle[3] = {0, 0, 0};
@@ -111,45 +111,48 @@ static void find_inside(const grid *g, int64_t cell, double out[3])
 
 /* ---- the mesh ------------------------------------------------------------------------------------------------ */
 
-/* A face with more than four corners, or a concave quad. It is drawn as triangles (polygon.h). Corners that are
- * repeated consecutively are dropped. */
+/* A face with more than four corners, or a concave quad. It is drawn as triangles (polygon.h). Of equal consecutive
+ * corners only one is stored. */
 typedef struct face_polygon {
     int count;
     int64_t *vertices;
     double (*positions)[3];
     int (*triangles)[3];
     void *work_memory;
-    double normal[3]; /* normal that points towards the apexes of the cells made on the face */
+    double normal[3]; /* normal that points towards the apexes of the cells built on the face */
 } face_polygon;
 
-/* The mesh under construction. Its arrays have the largest size that the faces may require. */
+/* The state while the outer mesh is built. Its arrays have the largest size that the faces may require. */
 typedef struct outer_work {
     const grid *cells;
     session_outer *out;
-    /* for each vertex of the whole mesh, its index in the outer mesh; -1: the outer mesh does not contain it yet */
+    /* for each vertex of the whole mesh, its index in the outer mesh; -1: the outer mesh does not have it, or the
+     * current face must not use it (separate_vertices()) */
     int64_t *vertex_map;
     float *heights; /* value of the scalar at each vertex of the outer mesh: 0 on a face, -1 at an apex */
     int64_t vertex_count, cell_count, entry_count, pyramid_count;
     face_polygon polygon; /* buffer with space for the largest polygon */
     int64_t loop_end;     /* number of entries of the stored loops */
-    /* set if cells are split into pieces. The loop of a piece's face is then the rim of the caller's face that contains
-     * it (session_rims.h). */
+    /* Set if cells of higher order are split into pieces. The loop of a piece's face, by which edges are drawn, is then
+     * the rim of the caller's face that contains the piece's face (session_rims.h). */
     bool has_rims;
     session_rims rims;
     const uint32_t *parents; /* for each piece of a split cell, the caller's cell (session_topology.parents) */
     const session_mesh *whole;
     float (*normals)[3];         /* normal at each vertex of the outer mesh; NULL: the mesh has no normals */
     session_face_normals curved; /* computes normals of curved faces; used only if there are normals and rims */
-    /* The caller's cell (parent) and the number of its face that contains the current face; the number is -1 if the
-     * current face lies inside the cell. */
+    /* parent: the caller's cell that contains the current face; face: number of this cell's face that contains the
+     * current face, or -1 if the current face lies inside the cell */
     int64_t parent;
     int face;
     bool is_curved; /* true: the normals of the parent's face can be computed */
-    /* the parent and the face for which vertex_map holds vertices, and the first of these vertices */
+    /* Used if there are normals: vertex_map then has only vertices of faces that lie on face mapped_face of the cell
+     * mapped_parent. first_mapped: index of the first of these vertices in the outer mesh. */
     int64_t mapped_parent, first_mapped;
     int mapped_face;
-    double normal_scale; /* factor by which the normals at these vertices are multiplied; 0: not computed yet */
-    /* for each face of the current cell, the index of its rim's loop; 0: the loop is not stored yet */
+    double normal_scale; /* factor by which the normals at the vertices from first_mapped on are multiplied; 0: not
+                            computed yet */
+    /* for each face of `parent`, the index of its rim's loop in out->loops; 0: the loop is not stored yet */
     int64_t rim_loops[RIMS_MOST_FACES];
 } outer_work;
 
@@ -168,7 +171,9 @@ static int64_t add_copied_vertex(outer_work *w, int64_t origin, const double pos
     return *out;
 }
 
-/* Makes the current face use new vertices, unless it lies on the same curved face as the previous face. */
+/* Used if there are normals, which differ between faces at a common vertex. Removes all vertices from vertex_map, so
+ * that the current face gets vertices of its own, unless it lies on the same curved face of a cell as the previous
+ * face. */
 static void separate_vertices(outer_work *w)
 {
     if (w->is_curved && w->face == w->mapped_face && w->parent == w->mapped_parent) return;
@@ -179,8 +184,8 @@ static void separate_vertices(outer_work *w)
     w->normal_scale = 0;
 }
 
-/* Computes the normal at a corner of the curved face or, if its normals are unknown, of the bilinear patch or triangle.
- * The length of the latter is twice the area of the triangle at the corner. */
+/* Computes the normal of the curved face at a corner. If that is not possible, computes the normal of the bilinear
+ * patch or triangle instead; its length is twice the area of the triangle at the corner. */
 static void find_corner_normal(outer_work *w, const corner_loop *loop, int corner, double out[3])
 {
     const int count = loop->count, next = (corner + 1) % count, last = (corner + count - 1) % count;
@@ -192,9 +197,9 @@ static void find_corner_normal(outer_work *w, const corner_loop *loop, int corne
     vector3_cross(a, b, out);
 }
 
-/* Stores the normals at the corners and at the apex of the cell that was added last; the normal at the apex is not
- * used. All normals of a face are multiplied by the same factor, instead of being normalized: the normals of a face of
- * order 2 are polynomials, which pieces interpolate well only without normalization. */
+/* Stores the normals at the corners and at the apex of the cell that is being added; the normal at the apex is not
+ * used. All normals of a curved face are multiplied by the same factor, instead of being normalized: the normals of a
+ * face of order 2 are polynomials, which pieces interpolate well only without normalization. */
 static void add_normals(outer_work *w, const corner_loop *loop, int64_t apex)
 {
     const int64_t *vertices = w->out->connectivity + w->entry_count - loop->count - 1;
@@ -208,7 +213,7 @@ static void add_normals(outer_work *w, const corner_loop *loop, int64_t apex)
     memcpy(w->normals[apex], w->normals[vertices[0]], sizeof w->normals[apex]);
 }
 
-/* Adds a tet on a triangle, or a pyramid on a quad. Its apex must have been added before. */
+/* Adds a tet on a triangle, or a pyramid on a quad. The apex must have been added before. */
 static void add_cell_below(outer_work *w, const corner_loop *loop, int64_t apex, int64_t origin)
 {
     if (w->normals) separate_vertices(w);
@@ -247,10 +252,10 @@ static bool polygon_triangle(const face_polygon *p, int i, corner_loop *out, dou
     return find_apex(out, inside, apex);
 }
 
-/* Computes one apex for all triangles of the polygon, which is the mean of their own apexes. Their tets then share
- * faces, and a ray along the line between two triangles passes from one tet into the other; with separate apexes it
- * might miss both tets. Returns false if the apex is not well above each triangle, because the triangles are too far
- * from a common plane. */
+/* Computes a common apex for all triangles of the polygon, the mean of the apexes that the triangles would have by
+ * themselves. The tets on the triangles then share faces, and a ray along the line between two triangles passes from
+ * one tet into the other; with separate apexes the ray might miss both tets. Returns false if the apex is not well
+ * above each triangle, because the triangles are too far from a common plane. */
 static bool find_common_apex(const face_polygon *p, double out[3])
 {
     corner_loop loop;
@@ -274,8 +279,9 @@ static bool find_common_apex(const face_polygon *p, double out[3])
     return count > 0;
 }
 
-/* Computes the polygon's normal. It points to the side of `inside` or, if `inside` is in the polygon's plane, the
- * normal's component of largest magnitude is positive. Its length is about the polygon's width. */
+/* Computes the polygon's normal. It points to the side of the polygon on which the point `inside` lies. If this point
+ * is in the polygon's plane, the component of largest magnitude is positive. The normal's length is about the polygon's
+ * width. */
 static void find_polygon_normal(face_polygon *p, const double inside[3])
 {
     double towards[3], middle[3] = {0, 0, 0}, sum[3] = {0, 0, 0};
@@ -299,7 +305,7 @@ static void find_polygon_normal(face_polygon *p, const double inside[3])
     for (int axis = 0; axis < 3; axis++) p->normal[axis] = length > 0 ? sign * sum[axis] / width : 0;
 }
 
-/* Appends the loop around the polygon, and assigns it to the cells from number `first` on. */
+/* Appends the loop around the polygon, and assigns it to the cells from index `first` on. */
 static void add_loop(outer_work *w, const face_polygon *p, int64_t first)
 {
     int64_t *loops = w->out->loops;
@@ -324,7 +330,7 @@ static int64_t add_rim(outer_work *w, int64_t cell, int face)
     return loop;
 }
 
-/* Finds the caller's face on which a piece's face lies. */
+/* Finds the caller's face on which a piece's face lies, and stores it in w->parent and w->face. */
 static void find_parent_face(outer_work *w, int64_t piece, const face_polygon *p)
 {
     w->parent = w->parents[piece];
@@ -333,7 +339,7 @@ static void find_parent_face(outer_work *w, int64_t piece, const face_polygon *p
     w->is_curved = w->normals && w->face >= 0 && session_has_face_normals(&w->curved, w->whole, w->parent);
 }
 
-/* Sets the loop of the cells from number `first` on, which are built on a piece's face, to the rim of the caller's
+/* Sets the loop of the cells from index `first` on, which were built on a piece's face, to the rim of the caller's
  * face. */
 static void set_rim(outer_work *w, int64_t first)
 {
@@ -405,7 +411,8 @@ typedef struct outer_counts {
     int64_t largest_corner_count;    /* largest number of corners of one face */
 } outer_counts;
 
-/* If there are normals, the triangles of a polygon have no common vertices, and its loop has further ones. */
+/* Computes upper bounds of the sizes. entry_count also bounds the number of vertices. If there are normals, the
+ * triangles of a polygon have no common vertices, and the polygon's loop needs further vertices. */
 static outer_counts find_count_bounds(const grid *g, const session_outer *outer, bool has_normals)
 {
     outer_counts most = {0};
@@ -425,8 +432,8 @@ static outer_counts find_count_bounds(const grid *g, const session_outer *outer,
     return most;
 }
 
-/* Adds the number of entries that the rims of the caller's cells with outer faces need. Some nodes of a rim may lie on
- * no outer face. */
+/* Adds the number of entries that the rims of those cells of the caller need that have outer faces. A rim may need
+ * further vertices, because some of its nodes may lie on no outer face. */
 static void add_rim_bounds(const outer_work *w, const session_outer *outer, outer_counts *most)
 {
     int64_t last = -1;

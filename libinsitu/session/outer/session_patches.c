@@ -1,8 +1,10 @@
-/* A face is on the boundary if it belongs to only one cell. In meshes with face owners this is given. In other meshes
- * the faces of all cells are searched: a face's key is a hash of the first three power sums of its vertices' groups,
- * which does not depend on the order of vertices. The number of cells that have a face with this key must equal the
- * number of times that the caller gives the face. Therefore a face between two cells is detected as an error, while a
- * baffle, whose two sides are the same face of such a mesh, may be given once for each side.
+/* A patch is a list of boundary faces with one value per face. A face is on the boundary if it belongs to only one
+ * cell. In meshes with face owners, the owner and neighbour of a face tell whether it does. In other meshes the faces
+ * of all cells are searched: a face's key is a hash of the first three power sums of its vertices' groups, which does
+ * not depend on the order of vertices. The number of cells that have a face with this key must equal the number of
+ * times that the caller gives the face. Therefore a face between two cells is detected as an error, while a baffle (a
+ * wall without thickness inside the mesh) may be given once for each of its sides, because both sides have the same
+ * vertices.
  *
  * The steps are: list the vertex groups and the value of each face of each patch; determine whether a drawn cell has
  * the face; output the pair (group, value) for each vertex. */
@@ -23,10 +25,10 @@ typedef struct patch_faces {
     int64_t count;           /* number of faces of all patches */
     int64_t *first_groups;   /* index of each face's first group, count + 1 entries */
     int64_t *groups;         /* groups of the faces' vertices; -1: the vertex belongs to no drawn cell */
-    unsigned char *is_drawn; /* for each face, set if a drawn cell has it */
+    unsigned char *is_drawn; /* for each face, set if a drawn cell has the face */
 } patch_faces;
 
-/* The vertices around a face. */
+/* A face of a patch. */
 typedef struct patch_face {
     session_face_row row;
     int64_t number; /* number of the face in the mesh, from 0 on; -1: the face is given by its vertices */
@@ -37,8 +39,9 @@ static insitu_status fail_for_memory(int64_t entries, base_error *error)
     return session_fail_for_memory(error, entries * (int64_t)sizeof(int64_t), "faces of patches");
 }
 
-/* Stores an error about a face and returns its status. The message is 'mesh ...: field ...: patch 2: face 17', or 'its
- * face 3', followed by `what`. */
+/* Stores an error about a face and returns its status. The message is 'mesh ...: field ...: patch 2: face 17' for a
+ * face that is given by its number, or '... patch 2: its face 3' for a face that is given by its vertices, followed by
+ * `what`. */
 static insitu_status fail_at_face(const patch_faces *p, int patch, int64_t face, const char *what, base_error *error)
 {
     const insitu_patch *given = &p->field->given.patches[patch];
@@ -186,7 +189,8 @@ static insitu_status check_owners(patch_faces *p, base_error *error)
 typedef struct cell_search {
     session_key_table keys; /* keys of the faces all of whose vertices have groups */
     int64_t *key_of_face;   /* for each face, the index of its key; -1: the face has no key */
-    /* for each key, number of given faces with this key, and number of cells that have such a face */
+    /* for each key: number of the patches' faces with this key (given_counts), and number of cells that have a face
+     * with this key (cell_counts) */
     int64_t *given_counts, *cell_counts;
     unsigned char *is_drawn; /* for each key, set if one of its cells is drawn */
     unsigned char *has_face; /* for each group of vertices, set if a face with a key contains it */
@@ -273,7 +277,7 @@ static insitu_status check_cell_counts(const cell_search *s, patch_faces *p, bas
     for (int patch = 0; patch < field->patch_count; patch++)
         for (int64_t i = 0; i < field->patches[patch].count; i++, f++) {
             const int64_t key = s->key_of_face[f];
-            if (key < 0) continue; /* the face belongs to no drawn cell, but only to a ghost cell */
+            if (key < 0) continue; /* all cells with this face are ghosts */
             if (s->cell_counts[key] > s->given_counts[key])
                 return fail_at_face(p, patch, i, "is between two cells, not on the boundary", error);
             if (s->cell_counts[key] == 0) return fail_at_face(p, patch, i, "is no face of a cell", error);

@@ -1,4 +1,5 @@
-/* Collects the values of a cell field on the boundary, at the vertices of the boundary faces. */
+/* Collects the values of a cell field that the caller gives on boundary faces (patches), as values at the vertices of
+ * these faces. */
 #ifndef SESSION_PATCHES_H
 #define SESSION_PATCHES_H
 
@@ -12,8 +13,8 @@ typedef struct session_vertex_numbers {
     bool by_id;
 } session_vertex_numbers;
 
-/* A list of `count` pairs of a value and a vertex group. Each face adds its value once for each group of its
- * vertices. */
+/* A list of `count` pairs of a value and a vertex group. The value of each face is listed once for each group of the
+ * face's vertices. */
 typedef struct session_patch_values {
     int64_t count;
     int64_t *groups;

@@ -76,8 +76,8 @@ int64_t session_count_rim_nodes(const session_rims *rims, int64_t cell)
     return count;
 }
 
-/* Sets faces_of_vertex for all vertices of the cell or, if are_set is false, clears it. A vertex may occur at several
- * positions of the cell's row. */
+/* Sets faces_of_vertex for all vertices of the cell if are_set is true, and clears it otherwise. A vertex may occur at
+ * several positions of the cell's row. */
 static void set_faces(session_rims *rims, int64_t cell, bool are_set)
 {
     const int kind = session_kind_of(&rims->rows, cell);

@@ -8,7 +8,7 @@
 
 enum { RIMS_MOST_FACES = SHAPE_MOST_FACES, RIMS_MOST_NODES = 4 * NODES_MOST_ORDER };
 
-/* The faces of a kind of cell. Nodes are given by their positions in the cell's row. */
+/* The faces of a kind of cell. Nodes are given by their positions in the cell's row of connectivity. */
 typedef struct session_rim_kind {
     int counts[RIMS_MOST_FACES]; /* number of nodes of each face's rim; 0: the cell does not have this face */
     int nodes[RIMS_MOST_FACES][RIMS_MOST_NODES];
@@ -23,8 +23,8 @@ typedef struct session_rims {
     unsigned char *faces_of_vertex;
 } session_rims;
 
-/* Finds the rims of all kinds of cells of a mesh whose cells are split. Returns false if memory runs out; the caller
- * must free *out in any case. Local. */
+/* Finds the faces and rims of each kind of cell of a mesh whose cells of higher order are split into pieces. Returns
+ * false if memory runs out; the caller must free *out in any case. Local. */
 bool session_rims_create(const session_mesh *mesh, session_rims *out);
 void session_rims_free(session_rims *rims);
 

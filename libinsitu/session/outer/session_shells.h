@@ -1,5 +1,5 @@
-/* Draws isosurfaces on shells (triangles, quads and polygons) as contour lines of the isovalues. They are drawn on the
- * outer surface of meshes that contain no other cells. */
+/* Draws isosurfaces on shells (triangles, quads and polygons) as contour lines at the isovalues. The lines are drawn on
+ * the outer surfaces of meshes all of whose cells are shells. */
 #ifndef SESSION_SHELLS_H
 #define SESSION_SHELLS_H
 
@@ -10,8 +10,8 @@
 /* Returns whether any mesh contains only shells, over all ranks. */
 bool session_has_shells(const session_catalogue *catalogue);
 
-/* Returns a surface layer that draws the isosurface as contour lines on shells. It refers to data of the layer. height
- * is that of the image in pixels. */
+/* Returns a surface layer that draws an isosurface layer as contour lines on shells. The result points to data of the
+ * isosurface layer. height: height of the image in pixels. */
 scene_surface session_make_shell_layer(const scene_isosurface *layer, int height);
 
 /* Returns whether the surface layer is drawn on the mesh. */

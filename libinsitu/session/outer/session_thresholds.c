@@ -91,8 +91,8 @@ void session_mark_outer_fresh(const session_mesh *mesh, session_outer *outer)
     outer->version = scalar ? scalar->version : 0;
 }
 
-/* Hides all pieces of a cell if one of them is hidden, so that a cell of which one value is outside the threshold is
- * hidden completely. */
+/* Hides all pieces of a cell if one of its pieces is hidden, because a cell is hidden if any of its values is outside
+ * the threshold. */
 static void hide_whole_cells(const session_mesh *mesh, unsigned char *is_hidden)
 {
     for (int64_t cell = 0; cell < mesh->given.cell_count; cell++) {

@@ -6,8 +6,8 @@
 #include "scene.h"
 #include "session_mesh.h"
 
-/* Returns the outer faces that a surface layer with this threshold shows on the mesh. Returns NULL if they have not
- * been marked. */
+/* Returns the outer faces that a surface layer with this threshold shows on the mesh. Returns NULL if
+ * session_mark_outer() has not been called for them. */
 session_outer *session_find_outer(const session_mesh *mesh, const scene_threshold *threshold);
 
 /* Marks the outer faces as shown by an image of this step. Returns false if memory runs out. Local. */
@@ -23,8 +23,8 @@ bool session_is_outer_stale(const session_mesh *mesh, const session_outer *outer
 /* Records that the outer faces were computed for the current values of the threshold's field. */
 void session_mark_outer_fresh(const session_mesh *mesh, session_outer *outer);
 
-/* Returns one byte per cell, which is nonzero if the cell is beyond the threshold; a cell with NaN is beyond the
- * threshold too. The array is allocated by base_alloc(); NULL if memory runs out. */
+/* Returns one byte per cell, which is nonzero if the threshold does not select the cell, because a value is outside its
+ * bounds or NaN. The array is allocated by base_alloc(); NULL if memory runs out. */
 unsigned char *session_find_hidden_cells(const session_mesh *mesh, const session_threshold *threshold, int threads);
 
 #endif

@@ -30,7 +30,7 @@ typedef struct twin_search {
     const session_mesh_group_parts *parts;
     const session_team *team;
     int64_t corner_count, vertex_count;
-    face_corner *corners;    /* this rank's corners, followed by the received ones */
+    face_corner *corners;    /* the corners of this rank's outer faces, followed by the received corners */
     border_vertex *vertices; /* vertices of all parts, sorted by part */
     double rounding;
     session_bins bins;
@@ -38,7 +38,7 @@ typedef struct twin_search {
 
 /* ---- corners -------------------------------------------------------------------------------------------------- */
 
-/* Computes the length of the shortest edge at each vertex of the face. */
+/* Updates, at each vertex of the face, the length of the shortest edge at the vertex. */
 static void measure_edges(const grid *g, const session_face *face, double *edges)
 {
     const session_cell_faces faces = session_faces_of_cell(g, face->cell);
@@ -55,7 +55,8 @@ static void measure_edges(const grid *g, const session_face *face, double *edges
     }
 }
 
-/* Appends the corners of a part's outer faces; the array is large enough. Returns false if memory runs out. */
+/* Appends the corners of a part's outer faces to s->corners, which is large enough. Returns false if memory runs
+ * out. */
 static bool add_corners(twin_search *s, const session_mesh *mesh, const session_border *border)
 {
     const grid *g = &mesh->cells;

@@ -1,9 +1,9 @@
 /* Finds twins: vertices of several meshes that coincide up to rounding.
  *
- * Codes compute the vertex positions of each block or level from its own origin and spacing, so that the same vertex
- * differs in its last bits between two meshes. All twins on outer faces are given the lexicographically least of
- * their positions. Vertices are twins if their distance is below 1e-5 of the shortest edge of the faces there, or
- * below the rounding errors of coordinates. */
+ * Codes compute the vertex positions of each block or level from its own origin and spacing, so that the positions of a
+ * vertex in two meshes differ in the last bits. All twins on outer faces are given the lexicographically least of their
+ * positions. Vertices are twins if their distance is below 1e-5 of the shortest edge of faces at one of them, or below
+ * the rounding errors of coordinates. */
 #ifndef SESSION_TWINS_H
 #define SESSION_TWINS_H
 

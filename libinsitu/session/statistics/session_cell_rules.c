@@ -1,7 +1,8 @@
-/* Let p be the order of a cell, J the Jacobian of its map, and f its value. The volume is the integral of det J, and
- * the standard deviation needs the integral of f^2 det J. In a straight cell the map is linear in each factor (a line,
- * a triangle or a tet), otherwise it has the order p. Then f^2 det J is a polynomial of these degrees, for which the
- * rules are exact:
+/* Integrals over cells of higher order by Gauss points. A cell is straight if its map from the reference cell is linear
+ * in each factor of the cell (a line, a triangle or a tet: a wedge is a triangle times a line, a hex is three lines);
+ * other cells are bent. Let p be the order of a cell, J the Jacobian of its map, and f the polynomial of its values.
+ * The volume is the integral of det J, and the standard deviation needs the integral of f^2 det J. The map of a bent
+ * cell has the order p. Then f^2 det J is a polynomial of the following degrees, for which the rules are exact:
  *
  *     factor                  straight   bent
  *     each line of a hex      2 p + 2    5 p - 1
@@ -11,13 +12,13 @@
  *
  * Products of lines are summed factor by factor, so that all of their degrees are affordable: with p = 4 a bent hex has
  * 1000 points and takes some 50 multiplications for each of them. The functions of a tet are not products. With p = 7,
- * the last order of which bent tets are exact, there are 4913 points, at each of which 120 nodes are summed. For higher
- * orders, straight tets are still integrated exactly. In bent tets a rule of degree 33 is used, whose error for
- * analytic functions decreases fast.
+ * the highest order at which bent tets are integrated exactly, there are 4913 points, at each of which 120 nodes are
+ * summed. For higher orders, straight tets are still integrated exactly. In bent tets a rule of degree 33 is used; for
+ * analytic functions, the error of such rules decreases fast with their degree.
  *
- * The area element of a shell is a square root, which no rule integrates exactly unless the shell is flat. Flat
- * shells need the degree 4 p - 1, or 4 p - 2 in a triangle. Rules with 4 p points along each axis have twice that
- * degree, and are affordable in two dimensions. */
+ * The area element of a shell is a square root, which no rule integrates exactly unless the shell is flat. Flat shells
+ * need the degree 4 p - 1, or 4 p - 2 in a triangle. Rules with 4 p points along each axis have twice that degree, and
+ * are affordable in two dimensions. */
 #include "session_cell_rules.h"
 
 #include <math.h>
@@ -29,14 +30,12 @@
 #include "session_shape.h"
 
 enum {
-    LANES = 4,                /* points whose sums are computed together */
-    BLOCK = 32,               /* most points of a block */
-    MOST_FUNCTIONS = 1 << 20, /* most numbers of a factor's functions that are stored */
-    MOST_TET_POINTS =
-        17, /* maximum number of points along an axis of bent tets, unless straight tets of the same order need more */
-    SIZE = 4, /* number of doubles of a tuple: x, y, z and a value */
-    MOST_SIZE =
-        SIZE + 6, /* number of doubles of a tuple together with the derivatives of the position along two lines */
+    LANES = 4,                /* number of points whose sums are computed together */
+    BLOCK = 32,               /* maximum number of points in a block */
+    MOST_FUNCTIONS = 1 << 20, /* largest number of doubles for which a factor's functions are stored */
+    MOST_TET_POINTS = 17, /* maximum number of points along an axis of bent tets; higher if straight tets need more */
+    SIZE = 4,             /* number of doubles of a tuple: x, y, z and a value */
+    MOST_SIZE = SIZE + 6, /* number of doubles of a tuple and of the position's derivatives along two lines */
     AXES = 3
 };
 
@@ -66,7 +65,7 @@ static int count_line_points(const session_nodes *of, bool is_bent)
 
 /* ---- functions of nodes ---------------------------------------------------------------------------------------- */
 
-/* Computes Lagrange's polynomials of the nodes on a line, and their slopes, at a point. */
+/* Computes the Lagrange polynomials of the nodes on a line, and their derivatives, at a point. */
 static void find_line_functions(const session_rule_factor *factor, const double *nodes, double at, double *out,
                                 int stride, int slopes)
 {
@@ -83,8 +82,8 @@ static void find_line_functions(const session_rule_factor *factor, const double 
     }
 }
 
-/* Computes Silvester's functions (session_derivatives.c) of the nodes of a triangle or tet at a point, and their slopes
- * along each axis. */
+/* Computes Silvester's functions (session_derivatives.c) of the nodes of a triangle or tet at a point, and their
+ * derivatives along each axis. */
 static void find_simplex_functions(const session_rule_factor *factor, const double at[3], double *out, int stride,
                                    int slopes)
 {
@@ -114,7 +113,7 @@ static void find_simplex_functions(const session_rule_factor *factor, const doub
             }
 }
 
-/* Returns the number of doubles of the functions at one block of points. */
+/* Returns the number of doubles that the functions and their slopes at one block of points take. */
 static size_t count_block(const session_rule_factor *factor)
 {
     return (size_t)(1 + factor->rule.dimensions) * (size_t)factor->node_count * (size_t)factor->width;
@@ -165,7 +164,8 @@ static bool make_rule(const session_nodes *of, int line_count, bool is_lobatto, 
            (line_count == 0 || make_factor(1, of->order, is_lobatto, count_line_points(of, is_bent), &out->line));
 }
 
-/* Computes the linear functions of the corners at all nodes. */
+/* Computes corner_weights: the values, at all nodes, of the linear functions that are 1 at one corner and 0 at all
+ * other corners. */
 static bool weigh_corners(bool is_lobatto, session_cell_rules *out)
 {
     const session_nodes *of = &out->nodes.complete;
@@ -231,9 +231,10 @@ void session_drop_cell_rules(session_cell_rules *rules)
 
 /* ---- one cell -------------------------------------------------------------------------------------------------- */
 
-/* The state of visiting the points of one cell. Lattices have one array of nodes for each component. Each sum over a
- * line evaluates the components at a point of the line, and adds three components: the derivatives of the position
- * along the line. */
+/* The state while the points of one cell are visited. The polynomials are evaluated factor by factor: lattices[n] has
+ * the nodes of the first factor and of n lines, with one array of numbers for each component. Evaluating it at a point
+ * of the last of these lines gives lattices[n - 1], which has three more components: the derivatives of the position
+ * along that line. */
 typedef struct cell_visit {
     const session_cell_rules *rules;
     const session_product_rule *rule;
@@ -258,8 +259,8 @@ size_t session_cell_rules_work_size(const session_cell_rules *rules)
     return size;
 }
 
-/* Multiplies a matrix of node_count x width with the values of one component, or of three consecutive components, at
- * the nodes. Sums of LANES points stay in registers. */
+/* Multiplies a matrix of node_count x width by the values at the nodes of one component, or of three consecutive
+ * components. The sums of LANES points stay in registers. */
 static inline __attribute__((always_inline)) void multiply_by_matrix(const double *restrict matrix, int node_count,
                                                                      int width, const double *restrict values,
                                                                      const int components,
@@ -297,7 +298,7 @@ static double find_measure(double (*slopes)[AXES][BLOCK], int axes, int point)
                        : cross[0] * s[2][0] + cross[1] * s[2][1] + cross[2] * s[2][2];
 }
 
-/* Visits one block of points of the first factor. weight: product of the weights of the lines' points. */
+/* Visits one block of points of the first factor. weight: product of the weights of the points on the lines. */
 static void visit_block(const cell_visit *v, int first, const double *functions, double weight)
 {
     const session_rule_factor *factor = &v->rule->first;
@@ -328,7 +329,8 @@ static void visit_first(const cell_visit *v, double weight)
     }
 }
 
-/* Sums one component over a line. functions: the values of the nodes' functions at one point, `width` numbers apart. */
+/* Evaluates one component at a point of a line, for `size` positions at once. functions: the values of the line's
+ * functions at the point, line->width doubles apart. */
 static void sum_line(const session_rule_factor *line, const double *functions, size_t size, const double *restrict in,
                      double *restrict out)
 {
@@ -337,7 +339,7 @@ static void sum_line(const session_rule_factor *line, const double *functions, s
         for (size_t i = 0; i < size; i++) out[i] += functions[n * line->width] * in[(size_t)n * size + i];
 }
 
-/* Sums over the last of `lines` lines, at one point of that line's rule. */
+/* Evaluates lattices[lines] at one point of the rule of its last line, and stores the result in lattices[lines - 1]. */
 static void reduce_line(const cell_visit *v, int lines, int point)
 {
     const session_rule_factor *line = &v->rule->line;
@@ -366,8 +368,9 @@ static void visit_points(const cell_visit *v)
     }
 }
 
-/* Returns whether the positions are the linear functions of the corners, up to rounding. In other cells the degree is
- * higher, so that the tolerance must not exceed the rounding error by much. */
+/* Returns whether the cell is straight: the positions of all nodes are linear functions of the corners' positions, up
+ * to rounding. The integrand of any other cell has a higher degree, so that the tolerance must not exceed the rounding
+ * error by much. */
 static bool is_straight(const session_cell_rules *rules, const double *tuples, const double *positions)
 {
     static const double tolerance = 1e-12;

@@ -5,36 +5,34 @@
 #include "session_interpolation.h"
 #include "session_quadrature.h"
 
-/* The functions of nodes on a line, triangle or tet at the points of a rule. A cell's functions are products of
- * these. */
+/* The functions of nodes on a line, triangle or tet, and a quadrature rule at whose points they are evaluated. A cell's
+ * functions are products of such functions. */
 typedef struct session_rule_factor {
     int order, node_count;
     bool is_lobatto; /* set if the nodes of a line are Gauss-Lobatto points */
     session_quadrature rule;
-    int width; /* number of points of a block, except the last one */
-    /* for each block of points: values, then slopes along each axis, as arrays of node_count x width. NULL: the
-     * functions take too much memory and are computed again for each cell */
+    int width; /* number of points in each block; the last block may have fewer */
+    /* for each block of points: values of the functions, then their slopes along each axis, as arrays of node_count x
+     * width. NULL: the functions take too much memory and are computed again for each cell */
     double *functions;
 } session_rule_factor;
 
-/* A product rule. The first factor is a line, a triangle or a tet; further ones are lines. */
+/* A product rule. The first factor is a line, a triangle or a tet; all further factors are lines. */
 typedef struct session_product_rule {
     session_rule_factor first, line;
 } session_product_rule;
 
 /* The rules of one kind of cell. */
 typedef struct session_cell_rules {
-    session_interpolation nodes; /* the cell's nodes, and all nodes of a complete cell of its order; empty if there are
-                                    no rules for this kind */
-    session_nodes
-        lattice; /* same as nodes.complete; for pyramids, which are read as collapsed hexes, the lattice of a hex */
-    double *collapse; /* for pyramids: matrix from nodes.complete to `lattice`; otherwise NULL */
-    int line_count;   /* number of factors that are lines, not counting the first one */
+    /* the cell's nodes, and all nodes of a complete cell of its order; empty if this kind has no rules */
+    session_interpolation nodes;
+    session_nodes lattice; /* same as nodes.complete; for pyramids, which are read as collapsed hexes, that of a hex */
+    double *collapse;      /* for pyramids: matrix from nodes.complete to `lattice`; otherwise NULL */
+    int line_count;        /* number of factors that are lines, not counting the first one */
     int corner_count;
-    double
-        *corner_weights; /* values of the corners' linear functions at all nodes, a matrix of (all nodes) x (corners) */
-    /* rules of straight cells, whose positions are linear in each factor, and of bent ones; shells and pyramids have
-     * only rules of bent cells */
+    double *corner_weights; /* values of the corners' linear functions at all nodes: a matrix of nodes x corners */
+    /* straight: rules of cells whose positions are linear in each factor; bent: rules of other cells. Shells and
+     * pyramids have only the rules `bent`. */
     session_product_rule straight, bent;
 } session_cell_rules;
 

@@ -10,11 +10,10 @@ typedef struct session_cell_value {
     /* true: the value is a polynomial that varies in the cell, so that `mean` may lie outside minimum .. maximum, and
      * each bin gets a part of the cell's volume */
     bool is_integral;
-    double minimum,
-        maximum; /* minimum and maximum of the values at the cell's vertices or nodes, or of its single value */
-    double mean; /* the cell's value, or the mean of its values */
-    double half_deviation; /* half the standard deviation of the value in the cell; the half cannot overflow */
-    double volume;         /* volume, or area of a shell */
+    double minimum, maximum; /* range of the values at the vertices or nodes, or the single value of the cell */
+    double mean;             /* the cell's value, or the mean of its values */
+    double half_deviation;   /* half the standard deviation of the value in the cell; the half cannot overflow */
+    double volume;           /* volume, or area of a shell */
 } session_cell_value;
 
 /* Reads a linear cell. Its mean is the mean of the values at its vertices. */

@@ -66,7 +66,7 @@ static bool condition_holds(const scene_condition *c, const session_statistics *
     return s->cell_count > 0 && value > c->above && value < c->below;
 }
 
-/* Writes all statistics that are due, even if some fail; returns the first error. */
+/* Writes all statistics that are due, even if some cannot be written. *error receives the first error. */
 static void write_due_statistics(session_events *events, const scene *scene, const event_work *w,
                                  const session_event_time *now, base_error *error)
 {

@@ -1,5 +1,5 @@
 /* Computes the statistics of a step that are written to files, and the conditions of images that are drawn only if a
- * statistic is within bounds. */
+ * statistic lies between given bounds. */
 #ifndef SESSION_EVENTS_H
 #define SESSION_EVENTS_H
 
@@ -29,16 +29,17 @@ typedef struct session_valid_events {
 bool session_has_events(const scene *scene, int64_t cycle, bool images);
 bool session_is_statistics_due(const scene_statistics *statistics, int64_t cycle);
 
-/* Computes and writes the statistics that are due, and computes the statistics of images' conditions and stores which
- * conditions hold. Only the events in `valid`, which must be the same on all ranks, are processed. If an event fails,
- * the other events are still processed, and the error is returned afterwards. Collective. */
+/* Computes the statistics that are due and writes them to their files. Also computes the statistics on which images'
+ * conditions depend, and stores which conditions hold. Only the events in `valid`, which must be the same on all ranks,
+ * are processed. If an event fails, the other events are still processed, and the error is returned afterwards.
+ * Collective. */
 insitu_status session_update_events(session_events *events, const scene *scene, session_meshes *meshes,
                                     const session_catalogue *catalogue, const session_team *team,
                                     const session_event_time *now, const session_valid_events *valid,
                                     base_error *error);
 
-/* Returns the images that may be drawn, one bit for each: an image may be drawn if its condition holds, unless it is to
- * be drawn only once and has been drawn before. */
+/* Returns the images that may be drawn in this step, one bit for each. An image may be drawn if its condition holds,
+ * unless the scene draws it only once and it has been drawn before. */
 uint64_t session_drawable_images(const session_events *events, const scene *scene);
 
 #endif

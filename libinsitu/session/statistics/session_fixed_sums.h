@@ -1,6 +1,7 @@
-/* Sums of fractions as integers, which are the same for any order of summation, and histograms of such sums. A sum
- * consists of two words, the multiples of 2^28 and the remainder of 2^52 times the fraction, so that 2^34 fractions can
- * be added. */
+/* Sums of fractions in fixed point, which are the same for any order of summation, and histograms of such sums. A
+ * fraction is multiplied by 2^52 and rounded to an integer. A sum consists of two words: the sum of these integers
+ * divided by 2^28 (rounded down), and the sum of the remainders. Therefore 2^34 fractions can be added without
+ * overflow. */
 #ifndef SESSION_FIXED_SUMS_H
 #define SESSION_FIXED_SUMS_H
 
@@ -27,7 +28,7 @@ static inline double position_in_range(double value, double low, double high)
     return high > low ? (0.5 * value - 0.5 * low) / (0.5 * high - 0.5 * low) : 0;
 }
 
-/* Returns the value's position in the range, limited to 0 .. 1: 0 at low and 1 at high. */
+/* Returns the value's position in the range, 0 at low and 1 at high, limited to 0 .. 1. */
 static inline double share_of_range(double value, double low, double high)
 {
     return fmin(fmax(position_in_range(value, low, high), 0), 1);
@@ -39,13 +40,13 @@ typedef struct session_bins {
     double low, high;
 } session_bins;
 
-/* Returns the bin of a value between low and high. */
+/* Returns the bin of a value; values outside the range of the bins belong to the first or the last bin. */
 static inline int find_bin_within(const session_bins *bins, double value)
 {
     return (int)fmin(share_of_range(value, bins->low, bins->high) * bins->count, bins->count - 1);
 }
 
-/* Returns the bin of a value, or -1 if it is outside. */
+/* Returns the bin of a value, or -1 if the value is outside the range of the bins. */
 static inline int find_bin(const session_bins *bins, double value)
 {
     return value < bins->low || value > bins->high ? -1 : find_bin_within(bins, value);

@@ -1,7 +1,7 @@
-/* The value in a cell is the polynomial through the values at the cell's own nodes. These are the caller's values, or
- * components and magnitudes of them. Derived fields have values at the vertices that are read instead of the caller's
- * nodes. If these vertices are finer lattices with n pieces between two nodes, the values at every n-th point of a
- * lattice are used.
+/* The value in a cell is the polynomial through the values at the cell's own nodes. For a field of the caller, these
+ * are the caller's values, or a component or the magnitude of them. A derived field has values only at the vertices
+ * that are read instead of the caller's nodes. If these vertices form finer lattices with n pieces between two nodes,
+ * the values at every n-th point of a lattice are used, because these points are the cell's own nodes.
  *
  * The functions of pyramids of an order above INTERPOLATION_MOST_PYRAMID are not implemented. Integrals over their
  * linear pieces are added up instead, and a mesh with such pyramids has no finer lattices. The value of a linear cell
@@ -24,23 +24,24 @@
 typedef struct order_pass {
     const session_order_field *of;
     const session_binned_volumes *binned;
-    const session_cell_value *cells;   /* the values of all cells, if `binned` is given */
-    session_cell_value *out;           /* receives the values of all cells, if `binned` is NULL */
-    session_rows rows;                 /* rows of the caller's nodes */
-    session_rows lattice;              /* rows of the nodes that are read */
-    const session_node_values *values; /* the caller's values at nodes; NULL: those of `field` are used */
+    const session_cell_value *cells; /* the values of all cells, if `binned` is given */
+    session_cell_value *out;         /* receives the values of all cells, if `binned` is NULL */
+    session_rows rows;               /* rows of the cells with the caller's nodes */
+    session_rows lattice; /* rows of the cells with the nodes that are read, which may be those of finer lattices */
+    const session_node_values *values; /* the caller's values at nodes; NULL: of->values is read */
     session_cell_rules rules[ROWS_MOST_KINDS];
 } order_pass;
 
 /* Memory of one thread. */
 typedef struct order_buffer {
-    double *tuple, *values, *tuples, *work; /* a tuple of the field, values and tuples at nodes, working memory */
+    double *tuple, *values, *tuples, *work; /* tuple: a tuple of the field; values: values at the nodes of a cell;
+                                               tuples: x, y, z and value at the nodes; work: working memory */
     volume_buffer volume;
 } order_buffer;
 
 /* ---- values at nodes --------------------------------------------------------------------------------------------- */
 
-/* Returns the component of a tuple, or its magnitude, in the same bits as grid_field_value(). */
+/* Returns the component of a tuple, or its magnitude, bitwise equal to the result of grid_field_value(). */
 static double component_of(const grid_field *field, const double *tuple)
 {
     if (field->component >= 0) return tuple[field->component];
@@ -62,7 +63,7 @@ static void read_caller_values(const order_pass *p, int64_t cell, int count, dou
     }
 }
 
-/* Reads the values at the nodes of the finer lattice that coincide with the cell's own nodes. */
+/* Reads the values at those nodes of the finer lattice that are the cell's own nodes. */
 static void read_lattice_values(const order_pass *p, const session_interpolation *nodes, int64_t cell, double *out)
 {
     const session_nodes *of = &nodes->complete;
@@ -106,7 +107,7 @@ static grid_array array_of(const double *data, int stride)
     return (grid_array){.data = (const char *)data, .stride = stride * (int64_t)sizeof *data, .is_wide = true};
 }
 
-/* Reads a linear cell as a mesh of one cell. */
+/* Computes the value of a linear cell by reading it as a mesh of one cell. */
 static session_cell_value find_linear_value(const order_pass *p, const session_interpolation *nodes, int64_t cell,
                                             order_buffer *buffer)
 {
@@ -137,7 +138,7 @@ static bool is_summed(const session_nodes *nodes)
     return nodes->type == GRID_PYRAMID && nodes->order > INTERPOLATION_MOST_PYRAMID;
 }
 
-/* Adds up the pieces of a cell whose functions are not known. */
+/* Adds up the integrals over the linear pieces of a cell whose nodal functions are not implemented. */
 static session_cell_value sum_pieces(const order_pass *p, int64_t cell, order_buffer *buffer)
 {
     const session_mesh *mesh = p->of->mesh;
@@ -169,8 +170,9 @@ static session_cell_value sum_pieces(const order_pass *p, int64_t cell, order_bu
 static const double flat_share = 0x1p-40;
 
 typedef struct cell_integrals {
-    double volume, size;  /* integrals of the measure, and of its absolute value */
-    double first, second; /* integrals of (the value's position in the range, minus 1/2), and of its square */
+    double volume, size; /* integrals of the measure, and of its absolute value */
+    /* integrals of v and of v^2, where v is the value's position in the range of values, minus 1/2 */
+    double first, second;
 } cell_integrals;
 
 static void add_integrals(void *of, int count, const double *measures, const double *values)
@@ -185,14 +187,15 @@ static void add_integrals(void *of, int count, const double *measures, const dou
     }
 }
 
-/* A cell whose values are scaled to their positions, 0 .. 1, in the range of the values at its nodes. */
+/* The range of the values at a cell's nodes. The values are scaled so that this range becomes 0 .. 1. */
 typedef struct scaled_cell {
     bool is_finite;
     double minimum, maximum;
     double box; /* volume of the bounding box of its nodes */
 } scaled_cell;
 
-/* Reads positions and scaled values, so that squares of large values do not overflow. */
+/* Reads the positions and values at a cell's nodes. The values are scaled, so that squares of large values do not
+ * overflow. */
 static scaled_cell read_tuples(const order_pass *p, const session_interpolation *nodes, int64_t cell,
                                order_buffer *buffer)
 {
@@ -256,7 +259,7 @@ static session_cell_value find_value(const order_pass *p, int64_t cell, order_bu
 /* The volumes of one cell in bins. */
 typedef struct cell_bins {
     const session_binned_volumes *binned;
-    double minimum, maximum; /* the range by which the values are scaled */
+    double minimum, maximum; /* range of the values at the cell's nodes, by which values are scaled */
     double total;
     double volumes[SESSION_MAX_BINS];
 } cell_bins;
@@ -390,7 +393,7 @@ int session_find_caller_nodes(const session_mesh *mesh, int field)
     return mesh->source || of->is_derived || of->given.centring == INSITU_CELL ? -1 : field;
 }
 
-/* Finds the caller's values, and runs the pass over them. */
+/* Runs the pass with the caller's values at nodes or, if they cannot be read, with the session's values. */
 static insitu_status visit_field(order_pass *p, base_error *error)
 {
     if (p->of->given < 0) return run_pass(p, NULL, error);

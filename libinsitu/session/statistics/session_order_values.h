@@ -11,10 +11,9 @@
 /* A field on a mesh whose cells are split into pieces. */
 typedef struct session_order_field {
     const session_mesh *mesh;
-    grid_field
-        values;      /* values at the vertices or cells that the session reads instead of the caller's nodes or cells */
-    int given;       /* index of the field whose values at the caller's nodes are read; -1: only `values` are read */
-    bool is_lobatto; /* as in session_make_interpolation() */
+    grid_field values; /* values at the vertices or cells of session_mesh.cells */
+    int given;         /* index of the field whose values at the caller's nodes are read; -1: only `values` are read */
+    bool is_lobatto;   /* as in session_make_interpolation() */
     int threads;
 } session_order_field;
 
@@ -35,8 +34,8 @@ typedef struct session_binned_volumes {
     int64_t *sums;     /* for each bin, a sum in fixed point (session_fixed_sums.h) */
 } session_binned_volumes;
 
-/* Adds the volumes in bins of the cells whose values vary (session_cell_value.is_integral). cells: the values from
- * session_find_order_values(). Parallel. Local. */
+/* Adds the volumes of cells to out->sums, for cells in which the value varies (session_cell_value.is_integral). cells:
+ * the values from session_find_order_values(). Parallel. Local. */
 insitu_status session_bin_order_values(const session_order_field *of, const session_cell_value *cells,
                                        const session_binned_volumes *out, base_error *error);
 

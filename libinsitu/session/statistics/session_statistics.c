@@ -1,6 +1,6 @@
-/* Computes statistics with integer sums, which are the same for any order of summation. A term is the cell's volume as
- * a fraction (0 to 1) of the volume of the largest cell, times 2^52. If there are shells and no cell has a volume,
- * areas are used instead of volumes (session_fixed_sums.h). The error of a term is at most 2^-53 of the volume of the
+/* Computes statistics with integer sums, which are the same for any order of summation (session_fixed_sums.h). A term
+ * is the cell's volume as a fraction (0 to 1) of the volume of the largest cell, times 2^52. If there are shells and no
+ * cell has a volume, areas are used instead of volumes. The error of a term is at most 2^-53 of the volume of the
  * largest cell.
  *
  * The values of the caller's cells of higher order are computed once, in the first pass (session_order_values.h). */
@@ -23,7 +23,7 @@
 
 enum { VOLUME = 1, MOMENT = 3, BINS = 5, MAX_SUMS = BINS + 2 * SESSION_MAX_BINS };
 
-/* Results of earlier passes over the cells, which a pass uses. */
+/* Results of earlier passes over the cells that a pass needs. */
 typedef struct sum_basis {
     const session_statistics *first_pass;
     double largest;          /* volume of the largest cell */
@@ -65,7 +65,7 @@ static void add_cell(const sum_basis *b, const session_cell_value *cell, int64_t
     if (bin >= 0) add_fixed_point(sums + BINS + 2 * bin, volume);
 }
 
-/* Data of a pass over one mesh. */
+/* The input of a pass over one mesh. */
 typedef struct statistics_pass {
     const session_mesh *mesh;
     const grid *g; /* the mesh's cells */
@@ -101,8 +101,8 @@ static void add_cells(const statistics_pass *p, const sum_basis *b, int64_t *sum
     }
 }
 
-/* Layout of the array that is reduced by minimum: minimum of the values, negated maximum, negated largest volume (ENDS
- * entries); first for cells with a volume, then for shells (KINDS). */
+/* Layout of the array that is reduced by MPI_MIN. It has ENDS entries for cells with a volume, and then ENDS entries
+ * for shells (KINDS): minimum of the values, negated maximum of the values, negated largest volume. */
 enum { ENDS = 3, KINDS = 2 };
 
 static void find_cell_extremes(const statistics_pass *p, int64_t cell, double ends[KINDS * ENDS])
@@ -134,15 +134,17 @@ typedef struct statistics_work {
     const session_team *team;
     const session_statistics_request *requests;
     int count;
-    bool *are_lobatto; /* for each mesh, whether nodes of its cells of higher order are Gauss-Lobatto points */
+    bool *are_lobatto; /* for each mesh, set if the nodes of its cells of higher order are Gauss-Lobatto points */
     /* for each request and mesh, the values of the caller's cells if the mesh has cells of higher order; otherwise
      * NULL */
     session_cell_value **order_values;
-    /* KINDS * ENDS entries per request, then one entry that is -1 if memory ran out on a rank, and otherwise 0 */
+    /* KINDS * ENDS entries per request. The last entry of the array is -1 if memory ran out on a rank, and otherwise
+     * 0 */
     double *extremes;
-    int64_t *sums; /* MAX_SUMS entries per request, then the number of ranks on which memory ran out */
-    /* one buffer per thread; they are large enough after the first pass, since each thread always processes the same
-     * cells */
+    int64_t *sums; /* MAX_SUMS entries per request. The entry after the sums of all requests is the number of ranks on
+                      which memory ran out */
+    /* One buffer per thread. The buffers are large enough after the first pass, since each thread always processes the
+     * same cells. */
     volume_buffer *buffers;
 } statistics_work;
 
@@ -300,7 +302,8 @@ static insitu_status find_all_statistics(const statistics_work *w, session_stati
     return status;
 }
 
-/* Finds which nodes of cells of higher order are Gauss-Lobatto points, as for finer pieces. Collective. */
+/* Finds the meshes in which nodes of cells of higher order are Gauss-Lobatto points, by the same rule as for finer
+ * lattices (session_finer.h). Collective. */
 static insitu_status find_spacings(session_meshes *meshes, const session_catalogue *catalogue, MPI_Comm comm,
                                    bool *are_lobatto, base_error *error)
 {

@@ -22,18 +22,20 @@ typedef struct session_statistics {
     int64_t cell_count; /* number of counted cells */
     bool is_of_shells;  /* set if shells are counted, so that areas replace volumes */
     double volume;      /* total volume of the cells */
-    /* range of the values; for a vertex field, the range of the values at vertices, which include all nodes. minimum >
-     * maximum: there are no values */
+    /* Range of the values; for a vertex field, of the values at all vertices, which include all nodes of cells of
+     * higher order. minimum > maximum: there are no values. */
     double minimum, maximum;
-    double mean, deviation; /* mean and standard deviation of the cells' values, or polynomials, weighted by volume */
+    double mean, deviation; /* mean and standard deviation of the cells' values or polynomials, weighted by volume */
     int bin_count;
     double low, high; /* lower bound of the first bin and upper bound of the last one */
-    /* fraction of the volume in each bin, by the cells' values, or by the polynomials' values at quadrature points */
+    /* fraction of the volume in each bin: cells are sorted into bins by their values, or the quadrature points of
+     * polynomials are sorted by the values at the points */
     double bin_fractions[SESSION_MAX_BINS];
 } session_statistics;
 
-/* Computes the statistics of fields over those meshes on which each field is shown and that have it, by three
- * reductions, and one more if there are cells of higher order. Collective. */
+/* Computes the statistics of the requested fields. A field's statistics are over the meshes that have the field and to
+ * which the request's scene_field applies. There are three reductions, and one more if there are cells of higher order.
+ * Collective. */
 insitu_status session_find_statistics(session_meshes *meshes, const session_catalogue *catalogue,
                                       const session_team *team, const session_statistics_request *requests, int count,
                                       session_statistics *out, base_error *error);

@@ -10,7 +10,8 @@
 
 enum { MOST_BYTES = 1 << 28 }; /* maximum size of an existing file to which lines are added; about two million lines */
 
-/* Returns the line of column names without its newline, allocated by base_alloc(); NULL if memory runs out. */
+/* Returns the line of column names without its newline. The line is allocated by base_alloc(); NULL if memory runs
+ * out. */
 static char *make_header(int bin_count, bool is_of_shells)
 {
     static const char solids[] = "cycle,time,cells,volume,minimum,maximum,mean,deviation";
@@ -84,7 +85,7 @@ static insitu_status select_kept_lines(const char *path, file_content *old, new_
     return INSITU_OK;
 }
 
-/* Writes the session's first line, or the first one after the file was removed. */
+/* Writes a line to a file to which this session has not written yet, or which was removed since. */
 static insitu_status begin_file(const char *path, new_lines *lines, base_error *error)
 {
     file_content old;

@@ -1,7 +1,8 @@
-/* Finds meshes whose vertices are stored in another order than the one in which they are read. The volumes at the
- * corners of such a cell have both signs, while in a correct or mirrored cell they all have the same sign. (The sum of
- * the volumes is not useful, because it may have any sign or be 0.) Therefore cells with both signs are counted and,
- * for each possible value of vertex_order, cells that would have a single sign if they were read in that order. */
+/* Finds meshes in which the caller's order of vertices is not the one that vertex_order declares. The volumes at the
+ * corners of a cell whose vertices are read in a wrong order have both signs, while in a correct or mirrored cell they
+ * all have the same sign. (The sum of the volumes is not useful, because it may have any sign or be 0.) Therefore two
+ * numbers are counted: the cells with both signs and, for each possible value of vertex_order, the cells that would
+ * have a single sign if they were read in that order. */
 #include "session_vertex_order.h"
 
 #include "memory.h"
@@ -24,8 +25,8 @@ enum type_sum { SAMPLED, BOTH_SIGNS, FITTING, TYPE_SUMS = FITTING + ORDERS };
 
 enum cell_sum { DRAWN, FLAT, INVERTED, SHELLS, SPLIT, BENT, OF_TYPES, CELL_SUMS = OF_TYPES + JUDGED * TYPE_SUMS };
 
-/* Returns whether the volumes at all corners of the cell have the same sign if its vertices are read in `order` instead
- * of the order in which they are read now. */
+/* Returns whether the volumes at all corners of the cell would have the same sign if `order` were the mesh's
+ * vertex_order. */
 static bool fits_order(const session_mesh *mesh, int64_t cell, int type, insitu_vertex_order order)
 {
     const signed char *read = session_vertex_permutation(mesh->given.vertex_order, type);
@@ -40,8 +41,8 @@ static bool fits_order(const session_mesh *mesh, int64_t cell, int type, insitu_
     return !tally_has_both_signs(type, points);
 }
 
-/* Returns the counts of the cell's type. Returns NULL if the cell is not counted. This is the case if its type has a
- * single order, if it is a ghost, or if the caller gave it as a polyhedron, whose faces determine the order. */
+/* Returns the counts of the cell's type. Returns NULL if the cell is not counted, because its type has only one order,
+ * because it is a ghost, or because the caller gave it as a polyhedron, whose faces determine the order. */
 static int64_t *find_type_sums(const session_mesh *mesh, int64_t cell, int64_t sums[CELL_SUMS])
 {
     const int type = grid_cell_type(&mesh->cells, cell);
@@ -51,8 +52,8 @@ static int64_t *find_type_sums(const session_mesh *mesh, int64_t cell, int64_t s
     return sums + OF_TYPES + at * TYPE_SUMS;
 }
 
-/* Adds the counts of a sample of the mesh's cells. share: number of blocks of the mesh, among which the samples are
- * divided; each block gets at least one sample. */
+/* Adds the counts of a sample of the part's cells. share: number of this rank's parts of the mesh, among which the
+ * samples are divided; each part gets at least one sample. */
 static void sum_orders(const session_mesh *mesh, int share, int64_t sums[CELL_SUMS])
 {
     const int64_t samples = (SAMPLES + share - 1) / share, step = mesh->cells.cell_count / samples + 1;
@@ -94,8 +95,8 @@ static bool is_any_type_inverted(const int64_t sums[CELL_SUMS])
     return is_any;
 }
 
-/* Returns the order with which most sampled cells have a single sign, if this is the case for at least half of the
- * cells of each type; otherwise -1. */
+/* Returns the order with which most sampled cells have a single sign. Returns -1 if there is no order with which, in
+ * each type, at least half of the cells have a single sign. */
 static int find_fitting_order(const int64_t sums[CELL_SUMS])
 {
     int best = -1;
@@ -114,8 +115,8 @@ static int find_fitting_order(const int64_t sums[CELL_SUMS])
     return best;
 }
 
-/* Warns if most cells of a type are inverted at some corners, and names the order that fits most cells, if there is
- * one. Returns whether it has warned. */
+/* Warns if most cells of a type have corners of both signs, and names the order that fits most cells, if there is one.
+ * Returns whether it has warned. */
 static bool warn_of_corners(session_report *report, const char *mesh, const int64_t sums[CELL_SUMS])
 {
     static const char *const words[] = {"VTK's order", "lexicographic order", "DMPlex's order"};

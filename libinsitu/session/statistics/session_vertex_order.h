@@ -1,4 +1,4 @@
-/* Finds meshes whose vertices seem to be in another order than VTK's. */
+/* Finds meshes whose vertices seem to be in another order than the declared one. */
 #ifndef SESSION_VERTEX_ORDER_H
 #define SESSION_VERTEX_ORDER_H
 

@@ -1,4 +1,4 @@
-/* Computes the volume of a cell as it is drawn, or the area of a shell. */
+/* Computes the volume of a cell, with the shape of faces that is drawn, or the area of a shell. */
 #ifndef SESSION_VOLUME_H
 #define SESSION_VOLUME_H
 
@@ -6,13 +6,13 @@
 
 #include "grid.h"
 
-/* Buffers of a thread. They must be initialized with {0}. */
+/* Buffers of one thread. The struct must be initialized with {0}. */
 typedef struct volume_buffer {
-    const int64_t *vertices; /* vertices of the cell that was computed last, without duplicates */
+    const int64_t *vertices; /* vertices, without duplicates, of the cell whose volume was computed most recently */
     int vertex_count;
     int64_t corners[GRID_MAX_CELL_VERTICES]; /* memory for the vertices of cells of a fixed size */
     char *bytes;                             /* memory for polyhedra and polygons */
-    size_t size, requested_size;             /* size of `bytes`, and the size that was requested last */
+    size_t size, requested_size;             /* size of `bytes`, and the size of the most recent request */
     bool is_out_of_memory; /* set if the requested memory was not available, so that a volume could not be computed */
 } volume_buffer;
 
@@ -23,8 +23,8 @@ void session_volume_free(volume_buffer *buffer);
  * possible only for a polyhedron or polygon that is larger than all earlier ones. */
 double session_cell_volume(const grid *g, int64_t cell, volume_buffer *buffer);
 
-/* Returns the area of a shell, projected along the mean normal. For a flat shell this is its whole area, whether it is
- * convex or not. */
+/* Returns the area of a shell's projection along its mean normal. For a flat shell this is its whole area, whether the
+ * shell is convex or not. */
 double session_shell_area(const grid *g, int64_t cell);
 
 #endif

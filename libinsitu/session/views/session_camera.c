@@ -197,8 +197,8 @@ static double find_eye_distance(const camera_fit *fit, double half_diagonal)
     return fmax(back, near->back + 0.01 * half_diagonal);
 }
 
-/* Returns half the height of an orthographic picture in which all data fits. aspect is its width divided by its
- * height. */
+/* Returns half the height of an orthographic picture in which all data fits. aspect: width of the picture divided by
+ * its height. */
 static double fitting_height(const camera_fit *fit, double aspect)
 {
     const double across = (fit->orthographic_reach.right + fit->orthographic_reach.left) /
@@ -216,7 +216,8 @@ static double choose_eye_position(double low, double high, bool is_centred)
     return fmin(fmax(0, low), high);
 }
 
-/* Returns half the height of an orthographic picture, in scene units. */
+/* Returns half the height of an orthographic picture in scene units: the scene's height, if it is given, otherwise
+ * `fitting`. */
 static double find_half_height(const scene_image *image, double fitting)
 {
     return image->camera.height > 0 ? 0.5 * image->camera.height : fitting;
@@ -275,8 +276,7 @@ static bool explicit_camera(const scene_image *image, render_camera *out)
 
 /* ---- defaults from the data ------------------------------------------------------------------------------------ */
 
-/* Directs the camera at flat data, so that the first of the data's two axes points to the right and the second one
- * up. */
+/* Directs the camera at flat data, so that the data's first axis points to the right and its second axis points up. */
 static void face_flat_data(int axis, scene_camera *c)
 {
     static const double towards[3][3] = {{1, 0, 0}, {0, -1, 0}, {0, 0, 1}};

@@ -1,6 +1,6 @@
-/* Finds out whether clips leave anything of the data. The part of the bounds that a set of clips leaves is enclosed in
- * a box. Each clip in turn shrinks the box; this is repeated as long as it shrinks the box further. If the box becomes
- * empty, the clips leave nothing. */
+/* Finds out whether clips remove all data. The region that a set of clips leaves of the data's bounds is enclosed in a
+ * box: each clip in turn shrinks the box, and the whole set is applied eight times, because a clip may shrink the box
+ * further after other clips have shrunk it. If the box becomes empty, the clips leave nothing. */
 #include "session_clips.h"
 
 #include <math.h>

@@ -1,4 +1,4 @@
-/* Converts the clips of an image, which cut away a part of its layers. */
+/* Converts the clips of an image to the renderer's form. Clips cut away parts of layers. */
 #ifndef SESSION_CLIPS_H
 #define SESSION_CLIPS_H
 

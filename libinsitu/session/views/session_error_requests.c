@@ -1,12 +1,12 @@
-/* Determines which cells of higher order need finer pieces. Isosurfaces and slices are drawn only from the pieces that
- * they cross. If an isovalue is outside the range of the Bernstein coefficients of a cell, it is also outside the range
- * of each of the cell's faces. The isosurface then crosses none of these faces, however the cells on both sides are
- * divided into pieces. Therefore only cells that may be crossed need finer pieces.
+/* Determines which cells of higher order need finer pieces, that is, linear pieces that are smaller than the distance
+ * between nodes. An isosurface or slice is drawn only from the pieces that it crosses. If an isovalue is outside the
+ * range of the Bernstein coefficients of a cell, it is also outside the range of each of the cell's faces. The
+ * isosurface then crosses none of these faces, however the cells on both sides are divided into pieces. Therefore only
+ * cells that isosurfaces may cross need finer pieces.
  *
- * All cells need finer pieces if faces of pieces are drawn or compared with those of neighbours (outer surfaces,
- * contours of shells), if rays pass from cell to cell (volumes), or if values at vertices are means or derivatives over
- * neighbours.
- */
+ * All cells need finer pieces in three cases: if faces of pieces are drawn, or are compared with faces of neighbouring
+ * cells (outer surfaces, contours of shells); if rays pass from cell to cell (volumes); or if values at vertices are
+ * means or derivatives over neighbouring cells. */
 #include "session_error_requests.h"
 
 #include <math.h>
@@ -121,8 +121,8 @@ static bool is_same_request(const session_error_request *a, const session_error_
     return strcmp(a->field, b->field) == 0 && a->component == b->component;
 }
 
-/* Returns the entry that equals `like`, and adds it if the list does not contain it. If the list is full, returns the
- * entry for positions, and all cells are refined. */
+/* Returns the request that equals `like`; adds it if the list does not contain it. If the list is full, returns the
+ * request for positions, and all cells are refined. */
 static session_error_request *find_request(session_error_requests *requests, const session_due_views *views,
                                            const session_error_request *like)
 {
@@ -163,14 +163,14 @@ static const session_catalogue_field *find_shown(const session_catalogue_mesh *m
     return scene_field_is_on(field, mesh->name) ? session_catalogue_find(mesh, field->name) : NULL;
 }
 
-/* Returns whether the drawn values are the caller's values, which do not depend on other cells. */
+/* Returns whether the layer shows the caller's values, which do not depend on other cells. */
 static bool is_own(const session_catalogue_mesh *mesh, const session_catalogue_field *field, const scene_field *shown)
 {
     return field->derived_index < 0 && !session_is_recentred(shown, field->centring, mesh->is_refined);
 }
 
 /* Returns whether the scalar that the layer shows is a polynomial in each cell: the caller's values at nodes, or one
- * component of these. */
+ * component of these values. */
 static bool is_polynomial(const session_catalogue_mesh *mesh, const session_catalogue_field *field,
                           const scene_field *shown)
 {

@@ -1,5 +1,5 @@
-/* Lists the isosurfaces, slices and volumes of meshes with cells of higher order that due images show. The error of
- * each is measured (a "request"). Also determines which cells must be refined. */
+/* Lists requests: the isosurfaces, slices and volumes of a mesh with cells of higher order that due images show, and
+ * whose errors are measured. Also determines which cells must be refined. */
 #ifndef SESSION_ERROR_REQUESTS_H
 #define SESSION_ERROR_REQUESTS_H
 
@@ -13,11 +13,13 @@ typedef struct session_due_views {
     int count; /* number of images of the scene */
     bool *are_due;
     render_camera *cameras; /* cameras of the images that are due */
-    session_extent extent;  /* bounds of the caller's nodes; empty if no camera, slice or volume needs the bounds */
+    session_extent extent;  /* bounds of the caller's nodes; not computed if no due image needs them for a camera, a
+                               slice or a volume */
 } session_due_views;
 
-/* Computes the cameras of the images that are due at the moment. If a camera has no direction of view, its image is
- * treated as not due; drawing it returns the error. The caller must free *out even after an error. Collective. */
+/* Computes the cameras of the images that are due at `moment`. If a camera has no direction of view, its image is
+ * treated as not due; drawing the image returns the error. The caller must free *out even after an error.
+ * Collective. */
 insitu_status session_make_due_views(const scene *scene, const session_moment *moment, const session_meshes *meshes,
                                      MPI_Comm comm, session_due_views *out, base_error *error);
 void session_free_due_views(session_due_views *views);
@@ -35,7 +37,7 @@ typedef struct session_error_request {
     bool has_plane;
     session_plane plane;
     const scene_volume *volume; /* the volume whose error is measured; NULL: the request is not for a volume */
-    double allowed;             /* error of the volume's pixels that is allowed in each colour channel */
+    double allowed;             /* allowed error of the volume's pixels in each colour channel */
 } session_error_request;
 
 enum { SESSION_MOST_ERROR_REQUESTS = 256 };
@@ -57,8 +59,8 @@ void session_list_error_requests(const scene *scene, const session_due_views *vi
                                  bool has_shells, session_error_requests *out, session_report *report);
 void session_free_error_requests(session_error_requests *requests);
 
-/* Returns a lower bound of the size, in scene units, of a pixel on a sphere, in the images that show the
- * session_error_request `of`; INFINITY if none of them shows the sphere. */
+/* Returns a lower bound of the size of a pixel, in scene units, at any point of a sphere, in the images that show the
+ * session_error_request `of`; INFINITY if none of these images shows the sphere. */
 double session_error_request_pixel_size(const void *of, const double centre[3], double radius);
 
 #endif

@@ -1,6 +1,7 @@
 /* Converts layers to the renderer's form. A part is a mesh of this rank that has a tree with cells. Each layer has one
- * field per part. If a part does not have the field of a layer, its ranges are NULL, and the renderer skips the part.
- * If a part has the surface but not the field that colours it, the values of the colouring field are NaN. */
+ * field per part. If a part does not have the field of a layer, the part's ranges are NULL, and the renderer skips the
+ * part. If a part has the field of a surface but not the field that colours the surface, the values of the colouring
+ * field are NaN. */
 #include "session_layers.h"
 
 #include <math.h>
@@ -90,8 +91,8 @@ static grid_field make_absent_field(void)
                         .component_count = 1};
 }
 
-/* Stores a part's field for a layer at index `at`, and its ranges if needs_ranges is set. scalar is NULL if the part
- * lacks the field. */
+/* Stores a part's field for a layer at index `at` of the array of fields and, if needs_ranges is set, the field's
+ * ranges. scalar: NULL if the part lacks the field. */
 static void set_scalar_field(session_layers *layers, ptrdiff_t at, const session_mesh *mesh,
                              const session_scalar *scalar, bool needs_ranges)
 {
@@ -117,7 +118,7 @@ static render_field set_layer_field(const session_meshes *meshes, session_layers
     return out;
 }
 
-/* Stores the gradients at the vertices of the parts that have the field, for the isosurface layer with this index. */
+/* Stores the gradients at vertices, for those parts that have the field. index: index of the isosurface layer. */
 static const render_vertex_gradients *set_gradients(const session_meshes *meshes, session_layers *layers, int index,
                                                     const scene_field *field)
 {
@@ -191,8 +192,8 @@ static insitu_status make_lines(const session_layer_basis *basis, const scene_li
     return status;
 }
 
-/* Sets the field of the contour lines of a surface that lies in the meshes' own cells, and computes the lines.
- * Collective. */
+/* Sets the field of the contour lines of an isosurface or of a slice's plane, and computes the lines. The values are
+ * those of the meshes' own cells, unlike the gathered values of outer surfaces. Collective. */
 static insitu_status set_lines(const session_layer_basis *basis, const scene_lines *in, int surface,
                                session_layers *layers, base_error *error)
 {
@@ -202,10 +203,10 @@ static insitu_status set_lines(const session_layer_basis *basis, const scene_lin
     return make_lines(basis, in, field, surface, layers, error);
 }
 
-/* Hits of occlusion rays that are nearer than this fraction of a cell are ignored, because they are on the surface
- * itself: an isosurface is curved within a cell, has an edge between two cells, and extends outward at the faces of
- * polyhedra. A smaller fraction would leave dark spots on the facets of polyhedra; a larger one would remove the
- * shading of hollows (docs/development/decisions/surface.md). */
+/* Hits of occlusion rays that are nearer than this fraction of a cell are ignored, because they are on the same surface
+ * as the ray's origin: an isosurface is curved within a cell, has an edge between two cells, and extends outward at the
+ * faces of polyhedra. A smaller fraction would leave dark spots on the facets of polyhedra; a larger one would remove
+ * the shading of hollows (docs/development/decisions/surface.md). */
 #define OCCLUSION_CONTACT 0.2F
 
 static insitu_status fill_surface(const session_layer_basis *basis, const scene_isosurface *layer, int index,
@@ -238,7 +239,7 @@ static insitu_status fill_surface(const session_layer_basis *basis, const scene_
 
 /* ---- outer surfaces ------------------------------------------------------------------------------------------ */
 
-/* Returns whether the layer shows the current part, which consists of the outer faces of a mesh. */
+/* Returns whether the layer shows the iterator's current part. The part must be a mesh of outer faces. */
 static bool is_shown(const session_part_walk *walk, const scene_surface *layer)
 {
     return walk->outer && session_surface_is_on(layer, walk->whole) &&
@@ -291,8 +292,8 @@ static bool gather_values(const session_mesh *whole, const session_outer *outer,
     return *values != NULL;
 }
 
-/* Stores the values at the outer faces as the layer's field; they are gathered from the values of the cells. Returns
- * false if memory runs out. */
+/* Stores the values at the outer faces as the layer's field. They are gathered from the values of the whole mesh.
+ * Returns false if memory runs out. */
 static bool set_gathered_field(const session_meshes *meshes, session_layers *layers, int slot,
                                const scene_surface *layer, const scene_field *field, render_field *out)
 {

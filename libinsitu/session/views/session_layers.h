@@ -27,7 +27,7 @@ typedef struct session_layers {
      * per surface for its contour lines */
     grid_field *fields;
     int64_t field_count;
-    render_vertex_gradients *gradients; /* gradients at vertices, part_count entries per isosurface */
+    render_vertex_gradients *gradients; /* gradients at vertices, part_count entries per surface */
     /* arrays of values gathered at outer faces, parallel to `fields`; NULL for other fields */
     double **gathered_values;
     mmbvh_ranges *ranges; /* ranges of the fields, parallel to `fields` */
@@ -47,8 +47,8 @@ typedef struct session_layer_basis {
 } session_layer_basis;
 
 /* Computes an image's layers. Collective, because ranges of the data are computed over all ranks. If *error of any rank
- * holds an error on entry, all ranks return it. After an error there is nothing to free. If only this rank lacks memory
- * for colours, *error is set and passed to all ranks in the next phase. */
+ * holds an error on entry, all ranks return it. After an error nothing needs to be freed. If only this rank lacks
+ * memory for colours, only *error is set, and the next phase passes the error to all ranks. */
 insitu_status session_make_layers(const session_layer_basis *basis, const scene_image *image, session_layers *out,
                                   base_error *error);
 

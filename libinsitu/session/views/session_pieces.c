@@ -1,10 +1,11 @@
-/* Chooses the number of linear pieces into which cells of higher order are divided. The error of the pieces decreases
- * with the square of their number along an edge. Therefore each rank computes the largest error, in pixels, that its
- * cells have with one piece between two nodes, one reduction finds the maximum over all ranks, and the number of pieces
- * is computed from this maximum. All cells of a mesh have the same number, so that pieces of neighbours fit together.
+/* Chooses the number of linear pieces between two neighbouring nodes of cells of higher order. The error of the pieces
+ * decreases with the square of this number. Therefore each rank computes the largest error, in pixels, that its cells
+ * have with one piece between two nodes, one reduction finds the maximum over all ranks, and the number of pieces is
+ * computed from this maximum. All cells of a mesh have the same number, so that the pieces of neighbouring cells fit
+ * together.
  *
- * The number does not depend on the partition: errors of cells depend on their own nodes only, cameras fit the
- * bounds of all nodes, and the memory is the sum over all ranks. The set of refined cells does not depend on the
+ * The number does not depend on the partition: the error of a cell depends only on the cell's own nodes, cameras fit
+ * the bounds of all nodes, and the memory is the sum over all ranks. The set of refined cells does not depend on the
  * partition either, because it is determined by the cells' own values and positions. */
 #include "session_pieces.h"
 
@@ -28,16 +29,17 @@ static const double bytes_per_mib = 1048576;
 
 /* ---- errors ------------------------------------------------------------------------------------------------------ */
 
-/* The errors of one mesh, and the numbers of pieces that are chosen by them. */
+/* The errors of one mesh, and the numbers of pieces that are chosen from the errors. */
 typedef struct piece_error {
     bool needs_all; /* same as session_error_requests.needs_all; the same on every rank */
     bool is_shown;  /* true: a due image shows the mesh, or the scene gives a fixed number for all cells; the same on
                        every rank */
-    session_deviation all;                           /* errors of all requests; the counts are those of isosurfaces */
+    session_deviation all; /* errors of all requests; the counts of cells are those of isosurfaces */
     session_finer_bytes bytes[FINER_MOST_PARTS + 1]; /* size of finer lattices on all ranks, for each number of parts */
-    double light_error;  /* largest estimate of the error of a pixel in a volume, if cells have one piece */
+    double light_error;  /* largest estimate of the error of a pixel in a volume, if cells have one piece between two
+                            nodes */
     double light_excess; /* largest quotient of a volume's error and the error that is allowed */
-    int volume_count;    /* number of volumes */
+    int volume_count;    /* number of volumes whose errors were estimated */
     int components;      /* number of components of the fields that images of the scene show */
     int wanted;          /* number of pieces that would be chosen without the limit of memory */
 } piece_error;
@@ -51,12 +53,14 @@ typedef struct mesh_work {
     piece_error *out;
 } mesh_work;
 
-/* The part of a mesh for which a request is measured, or for which pieces are chosen by a request. */
+/* The part of a mesh in which the errors of a request are measured, or in which pieces are selected that a request
+ * needs. */
 typedef struct part_work {
     const mesh_work *of;
     const session_mesh *mesh;
     session_deviation_request request;
-    session_piece_set *pieces; /* the set of pieces to which crossed pieces are added; NULL: the request is measured */
+    session_piece_set *pieces; /* the set of pieces to which pieces that the request needs are added; NULL: the errors
+                                  of the request are measured */
 } part_work;
 
 static insitu_status use_request(part_work *work, base_error *error)
@@ -85,7 +89,8 @@ static void use_part(part_work *work, const session_error_request *request, base
     work->request.is_lobatto = w->choice->is_lobatto;
     work->request.marks_only = w->marks_only;
     work->request.values = NULL;
-    /* A slice at the border of the data may be moved by this distance (session_slice_distance()). */
+    /* a slice at the border of the data may be moved by this distance (session_slice_distance()), so that its tolerance
+     * is positive */
     if (request->has_plane)
         work->request.isovalues =
             (session_isovalues){1, &zero, 2 * SESSION_BORDER_SHARE * request->views->extent.half_diagonal};
@@ -108,7 +113,7 @@ static void measure_part(const mesh_work *w, const session_mesh *mesh, session_c
     session_count_finer_bytes(mesh, cells, w->out->bytes);
 }
 
-/* Lists the pieces of the refined cells. */
+/* Adds the pieces of refined cells that the requests need to the part's set of pieces. */
 static void choose_part(const mesh_work *w, const session_mesh *mesh, session_cell_marks *marks, base_error *error)
 {
     part_work work = {.of = w, .mesh = mesh, .pieces = &marks->pieces};
@@ -120,8 +125,8 @@ static void choose_part(const mesh_work *w, const session_mesh *mesh, session_ce
     if (w->requests.needs_outer && !error->status) session_add_outer_pieces(mesh, w->choice->parts, work.pieces, error);
 }
 
-/* Measures the parts of a mesh. If the number of pieces has been chosen already, lists the pieces of refined cells
- * instead. */
+/* Measures the errors in all parts of a mesh. If the number of pieces has been chosen already, selects the pieces of
+ * refined cells instead. */
 static void use_parts(const mesh_work *w, const char *name, base_error *error)
 {
     const session_parts parts = session_find_parts(w->basis->meshes, name);
@@ -159,8 +164,8 @@ static void use_mesh(const session_pieces_basis *basis, const session_due_views 
     base_free(w);
 }
 
-/* Calls the fill functions of fields that isosurfaces and volumes show. If one fails, the field is not measured, and
- * the plan returns the error. Local, but fill functions may communicate. */
+/* Calls the fill functions of fields that isosurfaces and volumes show. If a fill function fails, its field is not
+ * measured, and the plan of the step returns the error later. Local, but fill functions may communicate. */
 static void fill_fields(const session_pieces_basis *basis, const session_due_views *views)
 {
     base_error unheard = {.status = INSITU_OK};
@@ -291,7 +296,7 @@ static insitu_status find_errors(const session_pieces_basis *basis, const sessio
     return estimate_all_volumes(basis, views, choices, errors, error);
 }
 
-/* Lists the pieces that are made in meshes in which only some cells are refined. */
+/* Selects the pieces that are made in meshes in which only some cells are refined. */
 static insitu_status list_pieces(const session_pieces_basis *basis, const session_due_views *views,
                                  session_finer_choice *choices, piece_error *errors, base_error *error)
 {
@@ -303,9 +308,9 @@ static insitu_status list_pieces(const session_pieces_basis *basis, const sessio
 
 /* ---- numbers of pieces ------------------------------------------------------------------------------------------- */
 
-/* Returns the smallest number of pieces with which the errors of surfaces and of volumes are allowed. If all cells of a
- * mesh are refined, memory and time grow with the cube of this number. More than 2 pieces are then chosen for the error
- * of surfaces only if the scene gives surface_error. */
+/* Returns the smallest number of pieces with which the errors of surfaces and of volumes are within the allowed errors.
+ * If all cells of a mesh are refined, memory and time grow with the cube of this number. In that case more than 2
+ * pieces are chosen for the error of surfaces only if the scene gives surface_error. */
 static int find_pieces(const scene *scene, const session_finer_choice *choice, const piece_error *of)
 {
     enum { MOST_UNASKED = 2 };
@@ -370,8 +375,8 @@ static int count_components(const scene *scene, const session_catalogue_mesh *me
     return count;
 }
 
-/* Returns the number of bytes that the finer pieces of a mesh take, if there are `parts` pieces between two nodes. It
- * does not decrease with `parts`. */
+/* Returns the number of bytes that the finer lattices of a mesh and their values take, if there are `parts` pieces
+ * between two nodes. It does not decrease with `parts`. */
 static double find_bytes(const piece_error *of, int parts)
 {
     const session_finer_bytes *bytes = &of->bytes[parts];
@@ -385,7 +390,7 @@ typedef struct piece_step {
     int mesh, parts;
 } piece_step;
 
-/* Orders steps by decreasing bytes; if these are equal, by mesh, and within a mesh by decreasing number of pieces. */
+/* Sorts steps by decreasing bytes; if bytes are equal, by mesh, and within a mesh by decreasing number of pieces. */
 static int compare_steps(const void *a, const void *b)
 {
     const piece_step *x = a, *y = b;
@@ -393,9 +398,9 @@ static int compare_steps(const void *a, const void *b)
     return x->mesh != y->mesh ? x->mesh - y->mesh : y->parts - x->parts;
 }
 
-/* Reduces the numbers of pieces until the pieces of all meshes together take at most `limit` bytes; the mesh whose
- * pieces take most memory is reduced first. steps: space for FINER_MOST_PARTS steps per mesh. Returns the number of
- * bytes before the reduction. */
+/* Reduces the numbers of pieces until the pieces of all meshes together take at most `limit` bytes. Of all meshes, the
+ * mesh whose pieces take most memory is reduced first. steps: space for FINER_MOST_PARTS steps per mesh. Returns the
+ * number of bytes before the reduction. */
 static double reduce_pieces(int mesh_count, double limit, const piece_error *errors, piece_step *steps,
                             session_finer_choice *choices)
 {

@@ -1,5 +1,5 @@
-/* Computes the renderer's parameters from the view of a scene. All ranks have the same input, so that no communication
- * is needed. */
+/* Computes the renderer's camera, lights, clips and sampling distance from an image of the scene. All ranks have the
+ * same input, so that no communication is needed. */
 #include "session_view.h"
 
 #include <math.h>
@@ -154,7 +154,7 @@ static corner_bounds project_bounds(const session_extent *e, const render_camera
     return b;
 }
 
-/* Returns the reason why no data can be in view; NULL if some data may be. */
+/* Returns the reason why the camera can see no data; NULL if some data may be in view. */
 static const char *find_unseen_reason(const session_extent *e, const render_camera *c)
 {
     const corner_bounds b = project_bounds(e, c);

@@ -12,7 +12,7 @@ typedef struct session_view {
     render_camera camera;
     render_space space;
     render_light lights[RENDER_MAX_LIGHTS];
-    render_occlusion occlusion; /* parameters of ambient occlusion; all 0 if the image has none */
+    render_occlusion occlusion; /* parameters of ambient occlusion and shadows */
     double step;
     int clip_count;
     render_clip clips[RENDER_MAX_CLIPS];

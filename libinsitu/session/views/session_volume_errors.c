@@ -1,18 +1,21 @@
-/* The light of a ray is the integral of c s T over its length. Here c is the colour of the value v, s its extinction,
- * and T the transmittance from the eye. If the value at a point is off by e, the light changes, to first order, by the
- * integral of
+/* The light of a ray is the integral of c s T over the ray's length. Here c is the colour of the value v at a point, s
+ * is its extinction, and T is the transmittance between the eye and the point. If the values are off by e, the light
+ * changes, to first order, by the integral of
  *
  *     (d(c s)/dv - b ds/dv) T e,
  *
- * where b is the light that arrives from behind, between 0 and 1. The mean of the bracket's absolute value over a cell
- * is taken as the variation of c s - b s between the cell's least and largest value, divided by their distance; e is
- * replaced by its root mean square over the cell (session_bound.h). The variation is a convex function of b, so that
- * the values for b = 0 and b = 1 bound it for all b. The result for b = light of a whole ray is used, or the result for
- * b = 0 if it is larger.
+ * where b is the light, between 0 and 1, that arrives at the point from behind: a larger extinction adds c to the
+ * light, but hides a part of b. In a cell, e is replaced by its root mean square over the cell (session_bound.h). The
+ * mean of the bracket's absolute value over the cell is computed as the variation of c s - b s, as a function of v
+ * between the cell's least and largest value, divided by the difference of these values.
+ *
+ * The light b is not known at each point. The variation is a convex function of b, so that linear interpolation between
+ * the variations for b = 0 and for b = 1 gives an upper bound for each b between them. The bound for b = light of the
+ * whole ray is used, or the variation for b = 0 if it is larger.
  *
  * The integrals along rays are found by a grid over the picture. Each cell's integrals over its volume are distributed
- * over the part of the grid that it covers. Let A and D be the integrals of the bracket and of s along a ray. If cells
- * with a large bracket are distributed evenly along the ray, the change of light is A (1 - exp(-D)) / D, and the light
+ * over the cells of the grid that it covers. Let A and D be the integrals of the bracket and of s along a ray. If cells
+ * with a large bracket are distributed evenly along the ray, the change of light is A (1 - exp(-D)) / D. The light
  * itself is computed from the integral of c s in the same way.
  *
  * The result is an estimate. It is too large because errors of opposite signs are added up, and too small because it is
@@ -31,18 +34,19 @@
 #include "vector3.h"
 
 enum {
-    GRID_SIZE = 32,  /* cells of the grid over a picture along both axes */
-    POSITIONS = 1024 /* steps of the tables over the range */
+    GRID_SIZE = 32,  /* number of cells, along each axis, of the grid over a picture */
+    POSITIONS = 1024 /* number of steps of the tables over the range */
 };
 
-/* Sums are integers in this unit. The contribution of a cell is limited to most_of_cell; a cell above the limit is
- * opaque, or its error exceeds any allowed error by far. The sum of 2^23 cells at the limit is below 2^63. */
+/* Sums are integers, in units of sum_unit. The contribution of a cell to a sum is limited to most_of_cell; a cell
+ * above the limit is opaque, or its error exceeds any allowed error by far. The sum of 2^23 cells at the limit is
+ * below 2^63. */
 static const double sum_unit = 1.0 / (1 << 30), most_of_cell = 1024;
-/* Errors in single pixels are larger than the mean over a cell of the grid. In the test session_order_volumes, whose
- * cells are 25 to 55 pixels wide, the error of 99.9 % of the pixels was 0.8 to 2.5 times that mean, and 3 times in one
- * case where the opacity has a steep step. */
+/* Factor from the mean error in a cell of the grid to the error of the worst pixels in it. In the test
+ * session_order_volumes, whose cells are 25 to 55 pixels wide, the error of 99.9 % of the pixels was 0.8 to 2.5 times
+ * that mean, and 3 times in one case where the opacity has a steep step. */
 static const double worst_pixel = 2.75;
-/* Extinction of an opacity of 1, times the unit distance (render_pieces.c). */
+/* Extinction that an opacity of 1 stands for, times the unit distance (render_pieces.c). */
 static const double largest_extinction = 1e6;
 
 /* Indices of the quantities that are integrated over the range of values and along rays. */
@@ -58,14 +62,15 @@ enum {
 typedef struct volume_errors {
     const session_error_request *request;
     session_transfer transfer;
-    /* for each position in the range, from 0 to 1 in equal steps, the integrals from 0 to the position */
+    /* for each of POSITIONS + 1 equidistant positions in the range, from 0 to 1, the integrals from 0 to the
+     * position */
     double (*integrals)[QUANTITIES];
-    double slopes[2][QUANTITIES]; /* slopes of the integrals outside both ends of the range */
+    double slopes[2][QUANTITIES]; /* slopes of the integrals below and above the range */
     int view_count;               /* number of due views that show the volume */
     int *views;
-    /* For each view, a grid over the picture, and for each cell of the grid the integrals along rays, if there is one
-     * piece between two nodes. They are sums of integers, so that they do not depend on the order of the mesh's cells
-     * or on the partition. */
+    /* For each view and each cell of the grid over its picture, the integrals along rays, for one piece between two
+     * nodes. They are sums of integers, so that they do not depend on the order of the mesh's cells or on the
+     * partition. */
     int64_t *sums;
     int64_t sum_count;
 } volume_errors;
@@ -87,7 +92,8 @@ static session_value_range *find_range(const session_value_ranges *ranges, const
     return NULL;
 }
 
-/* Lists the fields whose ranges are needed. Returns false if memory runs out. */
+/* Lists the fields whose ranges are needed: fields of volumes without a fixed range. Returns false if memory runs
+ * out. */
 static bool list_ranges(const scene *scene, const session_due_views *views, session_value_ranges *out)
 {
     size_t most = 1;
@@ -173,7 +179,7 @@ static double position_of(const render_transfer *t, double value)
     const double low = render_scaled(t->scale, t->threshold, t->low);
     const double high = render_scaled(t->scale, t->threshold, t->high);
     const double at = (render_scaled(t->scale, t->threshold, value) - low) / (high - low);
-    return fmin(fmax(at, -1), 2); /* values that are not positive have no logarithm */
+    return fmin(fmax(at, -1), 2); /* limited, because values that are not positive have no logarithm */
 }
 
 static double find_extinction(const render_transfer *t, double position)
@@ -199,7 +205,8 @@ static void find_colour(const render_transfer *t, double position, double out[3]
     }
 }
 
-/* Adds the integrals over a step of the range from one position to another. */
+/* Computes the integrals up to the position `to`: the integrals `before`, up to the position `from`, plus those over
+ * the step between the two positions. */
 static void integrate_step(const render_transfer *t, double from, double to, const double *before, double *after)
 {
     const double extinctions[2] = {find_extinction(t, from), find_extinction(t, to)};
@@ -227,7 +234,7 @@ static void integrate_transfer(const render_transfer *t, volume_errors *out)
     integrate_step(t, 2, 3, none, out->slopes[1]);
 }
 
-/* Returns false if memory runs out; the caller must end the estimate in any case. */
+/* Begins the estimate for a volume. Returns false if memory runs out; the caller must end the estimate in any case. */
 static bool begin_estimate(const session_error_request *request, const session_value_ranges *ranges, volume_errors *out)
 {
     const scene_volume *volume = request->volume;
@@ -276,8 +283,8 @@ static double integral_at(const volume_errors *of, int quantity, double position
     return *before + (at - i) * (*after - *before);
 }
 
-/* Finds the means of all quantities over a cell. All values between the smallest and the largest one are assumed to be
- * equally frequent. */
+/* Computes the means of all quantities over a cell. All values between the smallest and the largest one are assumed to
+ * be equally frequent. */
 static void find_light(const volume_errors *of, const session_value_cell *cell, double out[QUANTITIES])
 {
     static const double least_width = 1e-6;
@@ -294,14 +301,14 @@ static void find_light(const volume_errors *of, const session_value_cell *cell, 
     for (int q = 0; q < EMISSION; q++) out[q] *= error > 0 ? error / (high - low) : 0;
 }
 
-/* The part of a grid that a cell covers: a rectangle, in units of cells of the grid, and the area of one cell of the
- * grid at the depth of the mesh's cell. */
+/* The part of a grid over a picture that a cell of the mesh covers: a rectangle, in units of cells of the grid, and the
+ * area of one cell of the grid at the depth of the mesh's cell. */
 typedef struct covered_part {
     double low[2], high[2], area;
 } covered_part;
 
-/* Finds the part of the grid that the cell covers. If the eye is closer to the cell than the cell's radius, the
- * distance is replaced by the radius. Returns false if the mesh's cell is behind the eye. */
+/* Finds the part of the grid that a cell of the mesh covers. If the cell's depth is smaller than its radius, the depth
+ * is replaced by the radius. Returns false if the cell is behind the eye. */
 static bool project_cell(const render_camera *camera, const session_value_cell *cell, covered_part *out)
 {
     const double half[2] = {camera->half_height * camera->width / camera->height, camera->half_height};
@@ -368,11 +375,11 @@ static void add_cell(void *of, const session_value_cell *cell)
     }
 }
 
-/* Returns the estimate for a cell of a picture's grid. */
+/* Returns the estimated error of the worst pixels in a cell of a picture's grid, the largest of the three channels. */
 static double find_pixel_error(const int64_t sums[QUANTITIES], const float background[4])
 {
     const double depth = (double)sums[EXTINCTION] * sum_unit, through = exp(-depth);
-    const double share = depth > 1e-6 ? -expm1(-depth) / depth : 1; /* mean transmittance */
+    const double share = depth > 1e-6 ? -expm1(-depth) / depth : 1; /* mean transmittance along the ray */
     double most = 0;
     for (int c = 0; c < 3; c++) {
         const double light = share * (double)sums[EMISSION + c] * sum_unit + through * (double)background[c];

@@ -4,7 +4,8 @@
 
 #include "session_error_requests.h"
 
-/* The range of a field's values at the nodes of all cells; minus_low is -low. */
+/* The range of a field's values at the nodes of all cells. minus_low is the negated lower end, so that one reduction by
+ * maximum finds both ends. */
 typedef struct session_value_range {
     const scene_field *field;
     double minus_low, high;
@@ -17,16 +18,17 @@ typedef struct session_value_ranges {
     session_value_range *items;
 } session_value_ranges;
 
-/* Finds the ranges. The caller must free *out even after an error. Collective; all ranks return the same status. */
+/* Finds the value ranges of all volumes that need them. The caller must free *out even after an error. Collective; all
+ * ranks return the same status. */
 insitu_status session_find_volume_ranges(const scene *scene, const session_due_views *views,
                                          const session_meshes *meshes, const session_team *team,
                                          session_value_ranges *out, base_error *error);
 void session_free_volume_ranges(session_value_ranges *ranges);
 
 /* Estimates the largest error of a colour channel in the pixels of all due views that show the volume, if cells of a
- * mesh have one piece between two nodes. If there are n pieces between two nodes, the error is divided by the square of
- * n. The result is the same on every rank and for every partition. parts: this rank's parts of the mesh. is_lobatto: as
- * in session_make_interpolation(). Collective; all ranks return the same status. */
+ * mesh have one piece between two nodes. With n pieces between two nodes, the error is this error divided by the square
+ * of n. The result is the same on every rank and for every partition. parts: this rank's parts of the mesh. is_lobatto:
+ * as in session_make_interpolation(). Collective; all ranks return the same status. */
 insitu_status session_estimate_volume_error(const session_error_request *request, const session_value_ranges *ranges,
                                             const session_parts *parts, bool is_lobatto, const session_team *team,
                                             double *out, base_error *error);
