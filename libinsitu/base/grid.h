@@ -61,8 +61,8 @@ static inline double grid_axis_coordinate(const grid_axis *axis, int64_t n)
     return axis->axis_coordinates[index < axis->count ? index : axis->count - 1];
 }
 
-/* Element types that are read one by one, at any address. Only values of fields and axes may have them; other arrays of
- * such elements are copied before a grid is made. */
+/* Element types that are read one element at a time by memcpy(), at any address. Only values of fields and axes may
+ * have these types; other arrays with such elements are copied before a grid is made. */
 typedef enum grid_unusual_type {
     GRID_USUAL_TYPE = 0, /* the array is aligned, and of type double, float, int64 or int32 */
     GRID_UNUSUAL_FLOAT32,
@@ -95,7 +95,7 @@ typedef struct grid_array {
 
 /* A structured grid (lattice), whose cells are given by three indices instead of connectivity. */
 typedef struct grid_lattice {
-    int64_t cells[3]; /* number of cells along each axis; if it is 0 along one axis, the cells are quads */
+    int64_t cells[3]; /* number of cells along each axis; 0 along one axis: the cells are quads */
     grid_numbering vertex_numbering, cell_numbering;
     int64_t corner_offsets[8]; /* number of each vertex of a cell minus that of its first vertex, in VTK's order */
     int64_t drawn_first[3], drawn_end[3]; /* index range of the cells that are not in ghost layers */

@@ -38,8 +38,8 @@ typedef __mmask16 vm;
 typedef vi vm;
 #endif
 
-/* Returns a vector with x in all lanes. (vf){0} + x would be wrong: compilers may not remove this addition, which turns
- * -0 into 0. */
+/* Returns a vector with x in all lanes. The expression (vf){0} + x would be wrong, because this addition turns -0 into
+ * 0, and compilers may therefore not remove it. */
 SIMD_INLINE vf vf_set(float x)
 {
 #if defined(SIMD_AVX512)
@@ -288,7 +288,7 @@ SIMD_INLINE vf vf_select(vm m, vf a, vf b)
 {
     return (vf)(((vi)a & m) | ((vi)b & ~m));
 }
-/* Return b if either value is NaN, as on x86. */
+/* vf_min() and vf_max() return b if either value is NaN, like the instructions of x86. */
 SIMD_INLINE vf vf_min(vf a, vf b)
 {
     return vf_select(vf_lt(a, b), a, b);
@@ -359,7 +359,7 @@ SIMD_INLINE vf vf_permute(vf v, vi index)
 #endif
 }
 
-/* Returns elements of first or second per lane: an index of SIMD_WIDTH or more selects from second. */
+/* Returns per lane first[index], or second[index - SIMD_WIDTH] if the index is SIMD_WIDTH or more. */
 SIMD_INLINE vf vf_permute_pair(vf first, vf second, vi index)
 {
 #if defined(SIMD_AVX512)
@@ -396,7 +396,7 @@ SIMD_INLINE void vi_store(int32_t out[SIMD_WIDTH], vi a)
     __asm__("" : "+m"(*(int32_t(*)[SIMD_WIDTH])out));
 }
 
-/* Transposes the 4 × 4 matrix that each group of four lanes of the four vectors forms. */
+/* Each group of four lanes of the four vectors forms a 4 × 4 matrix; transposes these matrices. */
 SIMD_INLINE void vf_transpose(vf v[4])
 {
 #if defined(SIMD_AVX512)
@@ -456,7 +456,8 @@ SIMD_INLINE void vf_gather_rows(const float *base, const int32_t index[SIMD_WIDT
 /* A vector of doubles with half as many lanes as a vf, so that two such vectors correspond to one vf. */
 typedef double vd __attribute__((vector_size(SIMD_WIDTH * 4)));
 
-/* Gathers doubles at base + index, in units of float32, for one half of the lanes. */
+/* Gathers one double from the address base + index for each lane of one half, 0 or 1. Indices count floats, not
+ * doubles. */
 SIMD_INLINE vd vd_gather(const float *base, vi index, int half)
 {
 #if defined(SIMD_AVX512)
@@ -526,7 +527,8 @@ SIMD_INLINE void vd_select(vm m, const vd a[2], const vd b[2], vd out[2])
 
 #endif
 
-/* Stores the lanes of v that are set in m successively and returns their number. There must be space for all lanes. */
+/* Stores the lanes of v that are set in m one after the other, and returns their number. `to` must have space for all
+ * lanes. */
 SIMD_INLINE int vf_compress(float *to, vm m, vf v)
 {
 #if defined(SIMD_AVX512)
@@ -600,8 +602,8 @@ SIMD_INLINE vm vm_sign(vi a)
 #endif
 }
 
-/* Return the minimum and maximum of single numbers by the rule of vf_min() and vf_max(), which return b if either value
- * is NaN. fminf() is not used, because it treats NaN differently and takes more than one instruction. */
+/* simd_min() and simd_max() return the minimum and maximum of two numbers by the rule of vf_min() and vf_max(): b if
+ * either number is NaN. fminf() is not used, because it treats NaN differently and takes more than one instruction. */
 SIMD_INLINE float simd_min(float a, float b)
 {
     return a < b ? a : b;

@@ -39,8 +39,9 @@ typedef struct session_cinema {
 /* Stores the first cycle: that of the session's first step, or of the first step after the scene was edited. Local. */
 void session_begin_cinema(session_cinema *cinema, int64_t cycle);
 
-/* Adds a line for a picture that was written for an output with a database. If the run has gone back to an earlier
- * cycle, the lines of this cycle and later cycles are removed. Local. */
+/* Adds a line for a picture that was written for an output with a database. If the picture's cycle is not later than
+ * that of the table's last line, the run has gone back, and the lines of this cycle and of later cycles are removed
+ * first. Local. */
 insitu_status session_record_picture(session_cinema *cinema, const scene *scene, const scene_image *image,
                                      const scene_output *output, const scene_placeholder_values *moment,
                                      base_error *error);

@@ -24,9 +24,9 @@ typedef struct session_report {
     insitu_report public_report; /* the report that the caller reads; its texts are set at the end of a step */
     /* texts of the members of insitu_report with these names */
     session_text copied_why, left_out, warnings, pieces;
-    /* warnings of this rank alone, until session_share_lines() sends those of one rank to all ranks */
+    /* warnings that only this rank has found; session_share_lines() sends those of one rank to all ranks */
     session_text own_warnings;
-    /* number of warnings in `reported`, and number for which it has space */
+    /* reported_count: number of warnings in `reported`; reported_capacity: number of warnings for which it has space */
     int reported_count, reported_capacity;
     uint64_t *reported; /* hashes of warnings that were reported and whose condition still holds, in ascending order */
     /* result of session_unusable_key() when warnings of unusable cells were last reported; 0: there were none */
