@@ -39,7 +39,7 @@ bool file_replace(const char *path, const char *bytes, size_t size, file_failure
 
 /* Appends to a file. If there is no file, or if the path is a link, the failure has is_missing set. Returns false on a
  * failure; the file is then unchanged, unless bytes were partly written and the file system also fails to cut them off.
- * */
+ */
 bool file_append(const char *path, const char *bytes, size_t size, file_failure *failure);
 
 /* Returns whether the path leads to anything. */

@@ -18,7 +18,7 @@ enum {
     AHEAD = 512 /* prefetch distance in entries of the connectivity, because the hardware prefetches too late */
 };
 
-/* Addresses and strides of the mesh's arrays. They are constant during a run of cells. */
+/* Addresses and strides of the mesh's arrays. They are constant during one call of a lane_run function. */
 typedef struct lane_source {
     const char *connectivity, *ghosts;
     /* for each axis, the address of the coordinate with index 0, which is outside of the array if indices begin at 1 */
@@ -43,7 +43,7 @@ typedef struct lane_bounds {
     doubles lower[3], upper[3];
 } lane_bounds;
 
-/* Sums over the cells, per lane. */
+/* The sums, minimum and count over the cells that each lane has processed. */
 typedef struct lane_sizes {
     doubles sums[PARTS];
     doubles least;         /* smallest absolute volume times the type's volume factor (cell_corners.volume_factor) */
