@@ -145,8 +145,8 @@ static bool write_answers(const difference_exchange *d, const session_mail *in, 
     return true;
 }
 
-/* Exchanges requests and answers with other ranks. If an error occurs on one rank, the next exchange passes it to all
- * ranks. */
+/* Exchanges requests and answers with other ranks. If an error occurs on one rank, the next exchange of messages
+ * reports it to all ranks. */
 static insitu_status exchange_round(difference_exchange *d, base_error *error)
 {
     session_mail sent_requests = {0}, received_requests = {0}, sent_answers = {0}, received_answers = {0};

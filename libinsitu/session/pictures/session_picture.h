@@ -22,7 +22,7 @@ float *session_reserve_picture(session_picture *picture, size_t bytes);
 
 void session_drop_picture(session_picture *picture);
 
-/* Copies of the last step's pictures, on rank 0, which the caller can read. */
+/* Copies of the last step's pictures, which the caller can read. They exist on rank 0 only. */
 typedef struct session_kept_pictures {
     bool is_enabled; /* true: pictures are kept, so that all images need depth. The same on every rank */
     int count;

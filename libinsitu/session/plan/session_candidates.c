@@ -17,8 +17,8 @@ _Static_assert((int)SCENE_MAX_SURFACES == (int)RENDER_MAX_ISOVALUES &&
 
 /* visible values -------------------------------------------------------------------------------------------- */
 
-/* Returns whether the scalar already has the interval. Images of a sweep over fields share their isosurfaces, so that
- * an interval may be added several times. */
+/* Returns whether the interval was added to the scalar before. This happens if a scene sweeps over fields, because the
+ * images of the sweep share their isosurfaces. */
 static bool has_interval(const session_scalar *scalar, const mmbvh_interval *interval)
 {
     for (int i = 0; i < scalar->interval_count; i++)
