@@ -15,8 +15,8 @@ static uint64_t mix_bits(uint64_t sum, uint64_t bits)
     return product ^ product >> 29;
 }
 
-/* Computes the checksum in several independent sums, which a CPU computes in parallel. Within one sum, each
- * multiplication would have to wait for the previous one. */
+/* Computes the checksum of contiguous bytes as several independent sums, which a CPU computes in parallel. In a single
+ * sum, each multiplication would depend on the result of the previous one. */
 static uint64_t sum_words(const char *data, int64_t bytes)
 {
     uint64_t lanes[LANES] = {1, 2, 3, 4}, words[LANES];
@@ -74,8 +74,8 @@ static uint64_t sum_field(uint64_t sum, const session_mesh *mesh, const grid_fie
     return sum;
 }
 
-/* Returns the checksum of a scalar. It includes the cells' own values, because if some of these become NaN, the means
- * at their vertices may remain the same. */
+/* Returns the checksum of a scalar. If the scalar's values are means of cell values, the checksum includes the cell
+ * values: if some of these become NaN, the means at their vertices may remain the same. */
 static uint64_t find_checksum(const session_mesh *mesh, const session_scalar *scalar, int threads)
 {
     const grid_field field = session_scalar_field(mesh, scalar);

@@ -14,9 +14,9 @@
 #include "session_mesh.h"
 #include "session_team.h"
 
-/* Makes meshes discontinuous if the scene uses a corner field of the mesh, unless they are already discontinuous with
- * the current coordinates. All other meshes are read with the caller's vertices again. Cells must have been checked.
- * Collective. */
+/* Makes meshes discontinuous if the scene uses a corner field of the mesh. A mesh that is already discontinuous with
+ * the current coordinates is not changed. All other meshes are read with the caller's own vertices. Cells must have
+ * been checked. Collective. */
 insitu_status session_make_discontinuous(session_meshes *meshes, const session_catalogue *catalogue, const scene *scene,
                                          const session_team *team, base_error *error);
 
