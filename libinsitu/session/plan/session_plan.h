@@ -60,8 +60,8 @@ int session_count_due(const scene *scene, const session_moment *moment);
 session_valid_events session_check_event_fields(const session_plan_basis *basis, bool images, base_error *error);
 
 /* Determines which of the due images can be drawn, marks on this rank's meshes and scalars the data that they need, and
- * copies values that have an index. An image that cannot be drawn is not an error of this call, but invalid values are;
- * they are stored in the fields' problems. Collective. */
+ * copies the values of fields that have an index. An image that cannot be drawn is not an error of this call. A field
+ * with invalid values is an error, which is also stored as the field's problem. Collective. */
 insitu_status session_make_plan(const session_plan_basis *basis, session_meshes *meshes, const session_team *team,
                                 session_report *report, session_plan *out, base_error *error);
 

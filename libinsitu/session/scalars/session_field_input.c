@@ -40,7 +40,8 @@ static const char *describe_centring(insitu_centring centring)
     return centring == INSITU_VERTEX ? "vertices" : centring == INSITU_CELL ? "cells" : "corners of cells";
 }
 
-/* Returns whether the field has an index. The address of an empty array may be NULL, so that its type decides. */
+/* Returns whether the field has an index. If the field needs no values, the address of its index may be NULL; then the
+ * index's type shows whether there is one. */
 static bool is_by_index(const session_mesh *mesh, const insitu_field *field)
 {
     return field->index.data || (field->index.type && session_count_field_positions(&mesh->original, field) == 0);
