@@ -9,8 +9,8 @@
 
 enum { cycle_length = 16 };
 
-/* The default cycle of colours. Consecutive colours differ in both hue and lightness. The first ones can also be
- * distinguished by viewers who do not see the difference of red and green. */
+/* The default cycle of colours. Consecutive colours differ in both hue and lightness. Viewers who cannot distinguish
+ * red from green can still distinguish the first colours. */
 static const float cycle[cycle_length][3] = {
     {0.25F, 0.55F, 0.85F}, {0.95F, 0.65F, 0.20F}, {0.20F, 0.65F, 0.50F}, {0.85F, 0.35F, 0.25F},
     {0.95F, 0.88F, 0.35F}, {0.60F, 0.45F, 0.80F}, {0.55F, 0.80F, 0.95F}, {0.88F, 0.55F, 0.75F},
