@@ -17,8 +17,8 @@ static _Thread_local base_error thread_error;
 /* Report that is returned while a fill function runs, since the step's report is incomplete then. */
 static const insitu_report no_report = {.schedule = "", .copied_why = "", .left_out = "", .warnings = "", .pieces = ""};
 
-/* Returns whether a fill function is running, in which the call is not allowed; the error is then recorded. Recording
- * the error is the only change of the session, for which const is cast away. */
+/* Returns whether the call is refused because a fill function is running. In this case the error is recorded in the
+ * session. The cast removes const, because recording the error is the only change of the session. */
 static bool is_in_fill(const insitu_session *session, const char *call)
 {
     return session_refuse_in_fill(&((insitu_session *)(uintptr_t)session)->meshes, call);

@@ -1,7 +1,7 @@
-/* Reads the scene. Rank 0 reads the file, or is given its text, and all ranks parse the same text, so that all have the
- * same scene without exchanging its structs. If the file is edited while the simulation runs, the next step reads it
- * again. If the edited text cannot be parsed, the old scene is kept, and reports contain a warning until the file is
- * corrected. */
+/* Reads the scene. Rank 0 reads the file, or the caller gives rank 0 the text. All ranks parse the same text, so that
+ * all have the same scene without exchanging its structs. If the file is edited while the simulation runs, the next
+ * step reads it again. If the edited text cannot be parsed, the old scene is kept, and reports contain a warning until
+ * the file is corrected. */
 #include "session_scene_file.h"
 
 #include <string.h>

@@ -1,5 +1,5 @@
-/* Holds the scene of a session. The scene is read from a file, and read again if the file is edited, or is given as
- * text. */
+/* Holds the scene of a session. The caller gives the scene as text or as a file. A file is read again when it has been
+ * edited. */
 #ifndef SESSION_SCENE_FILE_H
 #define SESSION_SCENE_FILE_H
 
