@@ -207,8 +207,7 @@ static bool try_to_replace(const folder_and_name *target, const char *temporary,
 {
     const int file = openat(target->folder, temporary, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
     if (file < 0) return false;
-    /* The file is locked, because other writers of pictures delete unlocked temporary files as remains of killed runs.
-     */
+    /* The file is locked because other writers of pictures delete unlocked temporary files as remains of killed runs */
     flock(file, LOCK_EX | LOCK_NB);
     bool is_written = write_all(file, bytes, size);
     int code = errno;

@@ -38,8 +38,7 @@ bool file_read_own(const char *path, size_t limit, file_content *out, file_failu
 bool file_replace(const char *path, const char *bytes, size_t size, file_failure *failure);
 
 /* Appends to a file. If there is no file, or if the path is a link, the failure has is_missing set. Returns false on a
- * failure; the file is then unchanged, unless bytes were partly written and the file system also fails to cut them off.
- */
+ * failure; the file is then unchanged, unless some bytes were written and the file system fails to cut them off. */
 bool file_append(const char *path, const char *bytes, size_t size, file_failure *failure);
 
 /* Returns whether the path leads to anything. */

@@ -1,4 +1,4 @@
-/* Blends a volume's fragments in an order that depends only on the ray, so that the bits are the same on any
+/* Blends a volume's fragments in an order that depends only on the ray, so that the result is bit-identical for any
  * partition. Folding means to blend several fragments into one.
  *
  * The operation "over" is associative, but its rounding errors are not. The positions of the fragments therefore

@@ -3,9 +3,9 @@
  * a define it is plain C with the compiler's generic vectors (4 lanes), which is the reference and runs on any machine.
  *
  * Arithmetic (+ - * /) and comparison are the compiler's own operations on vector types. All of them are exact in the
- * sense of IEEE and never fused (-ffp-contract=off), so that all instruction sets give the same bits. The exceptions
- * are vf_muladd(), which is fused if the hardware supports that, and vf_diff_of_products(), which has two
- * implementations, each with an error of at most 1.5 units in the last place.
+ * sense of IEEE and never fused (-ffp-contract=off), so that the results are bit-identical for all instruction sets.
+ * The exceptions are vf_muladd(), which is fused if the hardware supports that, and vf_diff_of_products(), which has
+ * two implementations, each with an error of at most 1.5 units in the last place.
  *
  * GNU C has no vector ?: outside C++, hence vf_select(). Masks are 16 bits on AVX-512, and integer lanes of 0 and -1
  * otherwise: always use the vm_* functions. */
@@ -388,8 +388,8 @@ SIMD_INLINE void vf_gather_pair(const float *base, vi index, vf *first, vf *seco
 #endif
 }
 
-/* Stores indices in an array for scalar loads. Without this function compilers extract each index from the vector,
- * which takes two instructions per lane. */
+/* Stores indices in an array for scalar loads. Without this function, compilers extract every index from the vector
+ * separately, with two instructions per lane. */
 SIMD_INLINE void vi_store(int32_t out[SIMD_WIDTH], vi a)
 {
     memcpy(out, &a, sizeof a);
@@ -445,8 +445,8 @@ SIMD_INLINE vf vf_load_quarters(const float *base, const int32_t *index)
 #endif
 }
 
-/* Gathers base[index + n] into out[n], for n from 0 to 3. Rows of four are loaded whole and transposed, which takes
- * fewer instructions than gathering their columns. */
+/* Gathers base[index + n] into out[n], for n from 0 to 3. Loads each row of four floats with one instruction and
+ * transposes the rows, because gathering the columns takes more instructions. */
 SIMD_INLINE void vf_gather_rows(const float *base, const int32_t index[SIMD_WIDTH], vf out[4])
 {
     for (int n = 0; n < 4; n++) out[n] = vf_load_quarters(base, index + n);

@@ -1,5 +1,5 @@
 /* Defines the public calls except insitu_step(): they create and destroy a session, and store the caller's input. Each
- * phase of the creation that may fail on one rank alone ends with an agreement of all ranks, so that a session is
+ * phase of the creation that may fail on only some ranks ends with an agreement of all ranks, so that a session is
  * created on all ranks or on none. */
 #include "session.h"
 
@@ -147,7 +147,7 @@ insitu_status insitu_create_fortran(MPI_Fint comm, const char *scene, int is_tex
     return is_text ? insitu_create_from_text(of_c, scene, out) : insitu_create(of_c, scene, out);
 }
 
-/* Stores the error of a failed call, and returns its status. A successful call does not clear the message of the last
+/* Stores the error of a failed call, and returns its status. A successful call does not clear the message of an earlier
  * failed call; the next step clears it. */
 static insitu_status store_error(insitu_session *session, const base_error *error)
 {

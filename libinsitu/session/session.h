@@ -44,7 +44,7 @@ struct insitu_session {
     session_report report;
     bool has_stepped;
     double last_time; /* time of the most recent step */
-    base_error error; /* error of the most recent call that has failed since the last step began */
+    base_error error; /* error of the most recent call that has failed since the most recent step began */
 };
 
 #endif

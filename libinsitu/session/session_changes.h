@@ -1,4 +1,4 @@
-/* Determines what has changed on any rank since the last step, and whether the ranks' input is consistent. */
+/* Determines what has changed on any rank since the previous step, and whether the ranks' input is consistent. */
 #ifndef SESSION_CHANGES_H
 #define SESSION_CHANGES_H
 

@@ -82,8 +82,8 @@ static insitu_status broadcast_attachments(const session_team *team, scene_attac
     return status;
 }
 
-/* Parses the scene on all ranks. Rank 0 parses first and reads the files that the scene names; the other ranks parse
- * the same text and files, which rank 0 sends to them. */
+/* Parses the scene on all ranks. Rank 0 parses first and reads the files that the scene names. It then sends the text
+ * and the files to the other ranks, and they parse these. */
 static insitu_status parse_on_all_ranks(const char *path, const session_team *team, scene_file_text *text, scene *out,
                                         base_error *error)
 {

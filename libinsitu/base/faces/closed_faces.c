@@ -231,8 +231,7 @@ static bool is_crossed_below(const double *const t[3], const double *p)
 }
 
 /* Returns whether a connected piece of the surface is the boundary of a cavity, because it lies inside an odd number of
- * other pieces. The test ray starts at the piece's vertex of smallest x, so that the ray cannot cross the piece itself.
- */
+ * other pieces. The test ray starts at the piece's vertex of smallest x, so that it cannot cross the piece itself. */
 static bool is_cavity(const closed_faces *c, const double (*positions)[3], int piece)
 {
     int smallest = c->vertex_count;

@@ -29,8 +29,7 @@ typedef struct closed_edge {
 } closed_edge;
 
 /* The faces of a polyhedron as lists of entries. An entry is one vertex in the list of one face. A side is the part of
- * a face's boundary from one entry to the next entry of the face, and has the number of the entry at which it begins.
- */
+ * a face's boundary from one entry to the next entry of the face. Its number is the number of its first entry. */
 typedef struct closed_faces {
     int face_count, entry_count, vertex_count, triangle_count, piece_count, table_size;
     int *first_entries;  /* first entry of each face; face_count + 1 elements */

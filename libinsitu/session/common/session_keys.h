@@ -22,7 +22,7 @@ static inline uint64_t session_mix_bits(uint64_t x)
 
 uint64_t session_key_hash(const session_key *key);
 
-/* A hash table of keys, which are numbered 0, 1, ... in the order of their first appearance. */
+/* A hash table of keys. The keys are numbered 0, 1, ... in the order of their first appearance. */
 typedef struct session_key_table {
     session_key *keys; /* array of `count` keys */
     int64_t count;

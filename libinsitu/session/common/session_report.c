@@ -1,5 +1,4 @@
-/* Each reported warning is stored as a hash of its subject (session_warning), so that it is not reported a second time.
- */
+/* Each reported warning is stored as a hash of its subject (session_warning), so that it is not reported again. */
 #include "session_report.h"
 
 #include <stdarg.h>
@@ -110,8 +109,7 @@ static uint64_t warning_key(const session_warning *w)
     return key;
 }
 
-/* Returns the index of the first key in `reported` that is not less than `key`, or reported_count if all keys are less.
- */
+/* Returns the index of the first key in `reported` that is not less than `key`, or reported_count if all are less. */
 static int find_reported(const session_report *report, uint64_t key)
 {
     int begin = 0, end = report->reported_count;

@@ -91,8 +91,8 @@ typedef struct session_warning {
 } session_warning;
 
 /* Adds the warning if its condition holds and it has not been reported yet. session_warn() is for conditions that are
- * the same on every rank. session_warn_locally() is for conditions of one rank, whose warnings are sent to all ranks by
- * session_share_lines(). Local. */
+ * the same on every rank. session_warn_locally() is for conditions that may differ between ranks; session_share_lines()
+ * sends these warnings to all ranks. Local. */
 void session_warn_locally(session_report *report, const session_warning *warning, bool holds, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
 void session_warn(session_report *report, const session_warning *warning, bool holds, const char *format, ...)

@@ -150,8 +150,7 @@ static void start_trial_threads(trial *t, int requested)
     /* OpenMP, too, ignores a stack size that the system rejects */
     if (stack) pthread_attr_setstacksize(&attributes, stack);
     sigfillset(&all);
-    /* new threads inherit the blocked signals, so that signals sent to the caller's process are never delivered to them
-     */
+    /* new threads inherit the blocked signals, so that signals sent to the caller's process never reach them */
     pthread_sigmask(SIG_SETMASK, &all, &old);
     while (t->count < requested &&
            pthread_create(&t->threads[t->count], &attributes, wait_at_gate, &t->exit_mutex) == 0)

@@ -51,8 +51,7 @@ session_decorations *session_copy_decorations(const session_decorations *from);
 void session_free_decorations(session_decorations *decorations);
 
 /* Computes the edges of a box as strokes in the picture, and returns their number. Parts behind the eye are clipped
- * away. An edge is marked as behind the box's content if the camera sees the inner sides of both of its faces. Local.
- */
+ * away. An edge is marked as behind the box's content if the camera sees the inner sides of both its faces. Local. */
 int session_box_strokes(const double lower[3], const double upper[3], const render_camera *camera,
                         insitu_stroke strokes[SESSION_BOX_EDGES]);
 

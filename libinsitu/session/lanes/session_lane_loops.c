@@ -13,7 +13,7 @@
 #include "session_lanes.h"
 
 enum {
-    BLOCK_CELLS = 512, /* number of cells of a block, whose volumes fit into the first-level cache */
+    BLOCK_CELLS = 512, /* number of cells of a block; their volumes fit into the first-level cache */
     PARTS = LANES / LANE_WIDTH,
     AHEAD = 512 /* prefetch distance in entries of the connectivity, because the hardware prefetches too late */
 };
@@ -115,7 +115,7 @@ LANE_INLINE int64_t read_index(const lane_source *s, const char *indices, int i)
     return s->wide_index ? ((const int64_t *)(const void *)indices)[i] : ((const int32_t *)(const void *)indices)[i];
 }
 
-/* Returns whether all indices are valid, which means that neither the index nor (last - index) is negative. */
+/* Returns whether all indices are valid. An index is valid if neither the index nor (last - index) is negative. */
 LANE_INLINE bool are_valid_wide_indices(const int64_t *indices, int count, int64_t base, int64_t last)
 {
     int64_t signs = last;

@@ -382,7 +382,7 @@ static void warn_of_bars(const session_drawing *d)
     }
 }
 
-/* Passes the picture to the writer, which becomes the owner of its memory. Called on rank 0 only. */
+/* Passes the picture to the writer. The writer then owns the picture's memory. Called on rank 0 only. */
 static void queue_picture(const session_drawing *d, const scene_image *image, canvas *c, base_error *error)
 {
     session_files *files = base_calloc(1, sizeof *files);
@@ -481,7 +481,7 @@ static insitu_status make_image_decorations(const session_drawing *d, const scen
     return INSITU_OK;
 }
 
-/* Draws an image. An error that occurs on one rank alone, such as lack of memory, is stored in *error; the next phase,
+/* Draws an image. An error that occurs only on some ranks, such as lack of memory, is stored in *error; the next phase,
  * which computes the layers or the first frame, passes it to all ranks. */
 static insitu_status draw_image(const session_drawing *d, const scene_image *image, base_error *error)
 {

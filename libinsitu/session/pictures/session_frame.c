@@ -122,7 +122,7 @@ static int64_t estimate_turn_pixels(const render_job *job, int64_t fragment_limi
     return pixels > 1 ? (int64_t)pixels : 1;
 }
 
-/* Computes the number of pixels of the next turn from the number of fragments that the busiest rank had in the last
+/* Computes the number of pixels of the next turn from the number of fragments that the busiest rank had in the previous
  * turn. The growth is limited, since the few pixels of a turn may not be representative. Collective; the result is the
  * same on all ranks. */
 static insitu_status update_turn_pixels(const session_frame_target *t, int64_t fragments, int64_t *pixels,

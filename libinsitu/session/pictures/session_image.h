@@ -1,4 +1,4 @@
-/* Writes pictures with the image library libinsitu_image, which is loaded at run time, so that the session is not
+/* Writes pictures with the image library libinsitu_image. The library is loaded at run time, so that the session is not
  * linked to it. */
 #ifndef SESSION_IMAGE_H
 #define SESSION_IMAGE_H
@@ -8,7 +8,7 @@
 #include "error.h"
 #include "insitu/image_output.h"
 
-/* Writes an image with libinsitu_image, which is loaded by the first call in the process. If loading fails, an error is
+/* Writes an image with libinsitu_image. The first call in the process loads this library. If loading fails, an error is
  * returned, and the next call tries again. Local. Thread-safe. */
 insitu_status session_write_image(const insitu_image *image, insitu_image_format format, const char *path,
                                   base_error *error);

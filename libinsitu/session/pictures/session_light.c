@@ -153,7 +153,7 @@ static insitu_status send_requests(const lighting *l, request_list *q, session_m
 
 /* ---- answers ------------------------------------------------------------------------------------------------- */
 
-/* Copies the requests from the message, whose words are not aligned for their types. */
+/* Copies the requests from the message, because the data in the message are not aligned for their types. */
 static bool read_requests(const session_mail *in, render_hit **hits, render_hit_rays **rays)
 {
     const int64_t count = in->total / REQUEST_WORDS;

@@ -1,6 +1,6 @@
 /* Defines the writer of rank 0: a thread that encodes and writes pictures while the simulation continues.
  *
- * Pictures are put into a queue, which holds at most 128 MiB, or a single larger picture; a step that draws more waits
+ * Pictures are put into a queue. It holds at most 128 MiB, or a single larger picture. A step that draws more waits
  * until there is space. Pictures are written in order, and the next step collects the results when it begins. If the
  * scene requests it, or no thread can be started, pictures are written before the step ends.
  *
@@ -64,7 +64,7 @@ session_picture session_writer_reserve(session_writer *writer, size_t bytes);
 /* Returns memory that is no longer used to the writer. Local. */
 void session_writer_release(session_writer *writer, session_picture *memory);
 
-/* Passes files to the writer, which becomes their owner. The thread writes them later; if there is no thread, they are
+/* Passes files to the writer. The writer then owns them. The thread writes them later; if there is no thread, they are
  * written immediately, and an error is stored in *error. Local. */
 void session_writer_queue(session_writer *writer, struct session_files *files, base_error *error);
 

@@ -67,8 +67,8 @@ static bool mark_volume(session_mesh *mesh, const scene_volume *layer)
     return !scalar || add_visible_intervals(scalar, layer);
 }
 
-/* Marks the scalar of distances from a plane as used. Its interval contains the distance at which the slice is drawn,
- * which is about 0 (session_slice_distance()). */
+/* Marks the scalar of distances from a plane as used. Its interval contains the distance at which the slice is drawn.
+ * This distance is about 0 (session_slice_distance()). */
 static bool mark_plane(session_mesh *mesh, const scene_plane *plane, const session_extent *extent)
 {
     const float reach = (float)(2 * SESSION_BORDER_SHARE * extent->half_diagonal);

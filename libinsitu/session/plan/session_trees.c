@@ -2,7 +2,7 @@
  * refit of its bounds (or, if its cost has grown by half, a new tree); new values require a refit of ranges. The ranges
  * of the first scalar with which a mesh is drawn are stored in the nodes themselves, and those of further scalars in
  * separate arrays. If values determine which cells are visible and vertices move in every step, only the bounds of
- * visible nodes are refitted, which are a fifth of all nodes for an isosurface.
+ * visible nodes are refitted. For an isosurface, a fifth of all nodes is visible.
  *
  * A full tree is expensive to build and cheap to keep. A partial tree, over the cells that the images can show, is
  * cheap to build if they show little, but is valid only for the current values. Which is better depends on how long the
@@ -10,9 +10,9 @@
  * the cells last changed reaches the price of the full tree, which is then "bought". This never costs more than twice
  * the best choice in hindsight (Karlin, Manasse, Rudolph and Sleator 1988). Prices are measured in this run.
  *
- * If the last full tree of a mesh was used in only one step, the next tree will probably also be used only once, for
- * example because the caller sets a new mesh at every step. The next tree is then built along a space-filling curve,
- * which takes half the time. It is kept if it is used longer after all. */
+ * If the previous full tree of a mesh was used in only one step, the next tree will probably also be used only once,
+ * for example because the caller sets a new mesh at every step. The next tree is then built along a space-filling
+ * curve, in half the time. It is kept if it is used longer after all. */
 #include "session_trees.h"
 
 #include <math.h>

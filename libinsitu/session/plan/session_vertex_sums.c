@@ -140,7 +140,7 @@ static bool write_requests(const session_vertex_sums *sums, const session_team *
     return true;
 }
 
-/* Ensures that the array has space for the keys that other ranks request, which are stored after this rank's own
+/* Ensures that the array has space for `more` keys that other ranks request. They are stored after this rank's own
  * keys. */
 static bool extend_keys(session_vertex_sums *sums, int64_t more)
 {
@@ -329,9 +329,9 @@ static bool add_sums(const session_vertex_sums *sums, const session_cell_list *l
     return is_done;
 }
 
-/* Computes the sums of gradients in fixed-point integers. The value of their last bit is chosen from the largest bounds
- * over all ranks. If *error of any rank already holds an error, all ranks return this error; an error that occurs after
- * the reduction is only stored in *error. Collective. */
+/* Computes the sums of gradients in fixed-point integers. The value of their lowest bit is chosen from the largest
+ * bounds over all ranks. If *error of any rank already holds an error, all ranks return this error; an error that
+ * occurs after the reduction is only stored in *error. Collective. */
 static insitu_status make_sums(const session_team *team, session_vertex_sums *sums, session_cell_list *lists,
                                base_error *error)
 {

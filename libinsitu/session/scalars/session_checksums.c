@@ -121,8 +121,8 @@ static void warn_of_change(const session_mesh *mesh, session_scalar *scalar, ses
     scalar->may_have_changed = scalar->may_have_changed || has_changed;
 }
 
-/* Computes the checksum of the values and compares it with that of the last picture. Returns whether they are equal;
- * otherwise the data that depends on the values is marked as stale. */
+/* Computes the checksum of the values and compares it with the checksum at the most recently drawn picture. Returns
+ * whether they are equal; otherwise the data that depends on the values is marked as stale. */
 static bool compare_checksum(const session_mesh *mesh, session_scalar *scalar, int threads)
 {
     const uint64_t checksum = find_checksum(mesh, scalar, threads);
@@ -137,9 +137,9 @@ static bool compare_checksum(const session_mesh *mesh, session_scalar *scalar, i
     return false;
 }
 
-/* Compares the checksums of a part's fields. For a block, returns the number of fields that have the values of the last
- * picture. For a mesh without blocks, adds these fields to the report and returns 0. The fields of mirror images are
- * not counted. */
+/* Compares the checksums of a part's fields. For a block, returns the number of fields whose values are the same as at
+ * the most recently drawn picture. For a mesh without blocks, adds these fields to the report and returns 0. The fields
+ * of mirror images are not counted. */
 static int64_t compare_part(const session_mesh *mesh, int threads, session_report *report)
 {
     int64_t unchanged = 0;

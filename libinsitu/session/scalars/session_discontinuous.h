@@ -1,5 +1,5 @@
-/* Discontinuous meshes, in which every cell has its own vertices. They are used for fields with a value at each corner
- * of each cell.
+/* Defines discontinuous meshes. In such a mesh, every cell has its own vertices. Discontinuous meshes are used for
+ * fields with a value at each corner of each cell.
  *
  * All other code finds values by the number of a vertex. Therefore a mesh with a corner field is read as a mesh in
  * which every corner is a vertex. Its coordinates are copied corner by corner, and its connectivity is 0, 1, 2, ....

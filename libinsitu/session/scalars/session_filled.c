@@ -81,7 +81,8 @@ void session_release_filled_arrays(const session_meshes *meshes)
             field->given.values.data = field->given.index.data = NULL;
             field->values.data = NULL;
             field->given.patch_count = 0;
-            /* the field owns the tables of the last step, which must not be passed to the function as the caller's */
+            /* the field owns these tables of the previous step; the fill function must not take them for the caller's
+             * tables */
             field->given.patches = NULL;
             field->given.components = NULL;
         }

@@ -45,7 +45,7 @@ typedef struct node {
     int64_t vertex;
 } node;
 
-/* Two numbers, which are rounded and summed together in one vector register. */
+/* Two numbers that are rounded and summed together in one vector register. */
 typedef double number_pair __attribute__((vector_size(16)));
 typedef int64_t word_pair __attribute__((vector_size(16)));
 

@@ -19,7 +19,7 @@ typedef struct session_gradient_basis {
     const int32_t *sum_indices; /* for each vertex, the index of its sum; -1: it has none */
     double length;              /* a power of two near the size of the scene, the same on all ranks */
     int threads;
-    /* polynomials of the caller's cells, whose gradients are added instead of those of the linear pieces; NULL: all
+    /* polynomials of the caller's cells; their gradients are added instead of the linear pieces' gradients; NULL: all
      * cells are linear */
     const session_polynomials *polynomials;
 } session_gradient_basis;

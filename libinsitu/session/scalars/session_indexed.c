@@ -30,9 +30,11 @@ void session_clear_requested_fields(const session_meshes *meshes)
 }
 
 typedef struct indexed_values {
-    /* the mesh, if it is discontinuous and has values at vertices, which are copied once per corner; otherwise NULL */
+    /* the mesh, if it is discontinuous and the values are at vertices, so that they are copied once per corner;
+     * otherwise NULL */
     const session_mesh *mesh;
-    /* if there is one value per piece of the split cells, the caller's cell of each piece; otherwise NULL */
+    /* if there is one value per linear piece of split cells, the index of the caller's cell of each piece; otherwise
+     * NULL */
     const uint32_t *parents;
     grid_array index;  /* index of the tuple at each position; without data, position i has tuple i */
     grid_field values; /* the caller's tuples */

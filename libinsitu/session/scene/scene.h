@@ -169,8 +169,8 @@ typedef struct scene_isosurface {
     scene_field field;
     int value_count; /* number of isovalues, 1 .. 64 */
     double *values;
-    /* one colour per isovalue, value_count × 3 numbers, linear RGB: the colours that the scene gives, the last of which
-     * is repeated, or colours of the default cycle */
+    /* one colour per isovalue, value_count × 3 numbers, linear RGB. If the scene gives colours, the final one is
+     * repeated for further isovalues; otherwise the default cycle of colours is used */
     float *colours;
     bool has_colour_by;
     scene_field colour_by;
@@ -404,7 +404,7 @@ typedef struct scene_output {
     bool is_inset;       /* set if the picture is laid over the panels of a montage */
     scene_anchor corner; /* corner of an inset */
     int montage;         /* index of the scene's montage that contains the picture; -1: none */
-    /* index of the panel that shows the first view; for an inset, an index after that of the last panel */
+    /* index of the panel that shows the first view; the indices of insets follow those of all panels */
     int first_panel;
 } scene_output;
 

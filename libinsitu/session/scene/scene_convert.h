@@ -97,8 +97,8 @@ insitu_status scene_convert_meshes(const scene_document *d, const char *layer, s
  * path of the mapping with the key `component`. */
 insitu_status scene_convert_component(const scene_document *d, const char *path, const char *text, int *component);
 
-/* Converts a field of a layer. layer: path of the layer, which selects the meshes; path: path of the mapping that names
- * the field. */
+/* Converts a field of a layer. layer: path of the layer, because the layer selects the meshes; path: path of the
+ * mapping that names the field. */
 insitu_status scene_convert_field(const scene_document *d, const char *layer, const char *path, const char *name,
                                   const char *component, scene_field *out);
 
@@ -111,11 +111,11 @@ insitu_status scene_convert_colour_by(const scene_document *d, const char *path,
 insitu_status scene_convert_lines(const scene_document *d, const char *layer, const scene_file_lines *in,
                                   const scene_field *colours, int height, scene_lines *out);
 
-/* Converts a material. If in is NULL, the result is the default material, which is slightly glossy. */
+/* Converts a material. If in is NULL, the result is the default material. It is slightly glossy. */
 scene_material scene_convert_material(const scene_file_material *in);
 
-/* Adds the clips at the path to the image's list, and to the set, which has one bit per entry of the list. in: NULL if
- * there are no clips. */
+/* Adds the clips at the path to the image's list, and sets their bits in the set. Bit i stands for entry i of the list.
+ * in: NULL if there are no clips. */
 insitu_status scene_convert_clip(const scene_document *d, const char *path, const scene_file_clip *in,
                                  scene_image *image, uint32_t *set);
 /* Computes the set of clips that cut a layer: the clips of all layers and the layer's own clips. */

@@ -209,8 +209,8 @@ static const yaml_node_t *find_named(const scene_document *d, const yaml_node_t 
     return NULL;
 }
 
-/* Returns the node at a path, or NULL if there is none. *line receives the line of the node, or of the last node on the
- * path that exists. */
+/* Returns the node at a path, or NULL if there is none. *line receives the line of the node, or of the deepest node of
+ * the path that exists. */
 static const yaml_node_t *find_node(const scene_document *d, const char *path, int *line)
 {
     const yaml_node_t *node = yaml_document_get_root_node((yaml_document_t *)&d->yaml);

@@ -34,7 +34,7 @@ void scene_document_close(scene_document *d);
  * error it is undefined. */
 insitu_status scene_document_read(scene_document *d, scene_file **file);
 
-/* Returns the line (from 1) of a path such as "images[0].size[1]", or of the last node of the path that exists. In a
+/* Returns the line (from 1) of a path such as "images[0].size[1]", or of the deepest node of the path that exists. In a
  * list whose entries have the key `name`, a short name without . and [ may replace the index, as in "fields.speed". */
 int scene_document_line(const scene_document *d, const char *path);
 

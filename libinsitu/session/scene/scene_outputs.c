@@ -31,7 +31,7 @@ typedef struct placeholder {
 
 static const placeholder no_placeholder = {PLACEHOLDER_NONE, 0, 0, 1};
 
-/* Parses the format of "{WORD:0N}", whose colon is text[at]. */
+/* Parses the format of "{WORD:0N}". text[at] is the colon. */
 static placeholder parse_integer_format(const char *text, size_t at, placeholder_kind kind)
 {
     if (text[at + 1] != '0') return no_placeholder;
@@ -41,7 +41,7 @@ static placeholder parse_integer_format(const char *text, size_t at, placeholder
     return (placeholder){kind, (int)digits, 0, at + 2 + count + 1};
 }
 
-/* Parses the format of "{WORD:.Nf}" (or e or g instead of f), whose colon is text[at]. */
+/* Parses the format of "{WORD:.Nf}" (or e or g instead of f). text[at] is the colon. */
 static placeholder parse_real_format(const char *text, size_t at, placeholder_kind kind)
 {
     if (text[at + 1] != '.') return no_placeholder;
@@ -52,7 +52,7 @@ static placeholder parse_real_format(const char *text, size_t at, placeholder_ki
     return (placeholder){kind, (int)digits, conversion, at + 2 + count + 2};
 }
 
-/* Parses the placeholder at the start of the text, which begins with '{'. */
+/* Parses the placeholder at the start of the text. The text begins with '{'. */
 static placeholder parse_placeholder(const char *text)
 {
     static const struct {
