@@ -209,7 +209,7 @@ static insitu_status update_meshes(insitu_session *s, const session_changes *cha
     if (scene->finer_pieces != 1) session_drop_ids(&s->meshes);
     insitu_status status = list_meshes(s, of_names, changes->are_names_shared && !refused->status, error);
     if ((are_cells_changed || of_names) && !status)
-        status = session_check_vertex_order(&s->meshes, &s->catalogue, team->comm, &s->report, error);
+        status = session_check_vertex_order(&s->meshes, &s->catalogue, team, &s->report, error);
     if (!status) status = refine_cells(s, moment, &are_cells_changed, error);
     if (are_cells_changed && !status) status = session_update_space(&s->space, &s->meshes, team->comm, error);
     if (!status) session_check_warps(scene, &s->catalogue, &s->report);

@@ -93,6 +93,9 @@ typedef struct session_catalogue_mesh {
     bool has_shells_alone;
     /* set if cells, on any rank, are of higher order; computed by session_check_vertex_order() */
     bool has_higher_order;
+    /* set if some of these cells, on any rank, are bent (session_straight.h); computed by session_check_vertex_order()
+     */
+    bool has_bent_cells;
     /* error of the mesh; NULL: there is none. The step ignores a mesh with an error, but its fields' names are kept */
     base_error *fault;
     int field_count;

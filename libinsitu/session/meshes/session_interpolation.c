@@ -8,11 +8,16 @@
  *     pyramid    pyramid
  *     triangle   triangle
  *
- * The bits of a sum depend on the order of its terms. So nodes on a face are computed a second time, from the face's
- * nodes alone, in an order that follows from the positions of the face's corners. The origin is the corner with the
+ * The bits of a sum depend on the order of its terms. So nodes on a face are computed a second time, only from the
+ * face's nodes, in an order that follows from the positions of the face's corners. The origin is the corner with the
  * lexicographically smallest position, and the first axis leads to that neighbouring corner whose position is smaller.
- * Then nodes on an edge are computed from the edge's nodes alone, beginning at the end with the smaller position, and
- * corners are copied. All cells that share a face or an edge compute its nodes in the same way, on all ranks.
+ * Then nodes on an edge are computed only from the edge's nodes, beginning at the end with the smaller position, and
+ * the cell's own nodes are copied. All cells that share a face or an edge compute its nodes in the same way, on all
+ * ranks.
+ *
+ * The matrix is the same for all faces with the same number of corners, and for all edges. So the nodes of these faces
+ * or edges are gathered into one array in which each node's tuples of all faces are contiguous, and all faces are
+ * computed by one product of matrices.
  *
  * Each sum adds up differences from its first value, so that a constant is reproduced exactly. */
 #include "session_interpolation.h"
@@ -200,6 +205,105 @@ static void find_positions(const session_nodes *of, insitu_vertex_order order, s
     }
 }
 
+/* ---- faces and edges ---- */
+
+/* The axes of a face or edge: positions of its origin and of the ends of both axes, in a lattice of order 1. The second
+ * axis of an edge has the length 0. */
+typedef struct side_axes {
+    const signed char *origin, *along, *across;
+} side_axes;
+
+static side_axes axes_of(const session_shape *shape, const signed char *side, int corner_count, int turn)
+{
+    const int first = corner_count == 2 ? turn : turn / 2, step = corner_count > 2 && turn % 2 ? corner_count - 1 : 1;
+    const int along = (first + step) % corner_count;
+    const int across = corner_count == 2 ? first : (first + corner_count - step) % corner_count;
+    const signed char(*at)[3] = shape->corners;
+    return (side_axes){at[(int)side[first]], at[(int)side[along]], at[(int)side[across]]};
+}
+
+/* Lists the indices in the cell's lattice of a face's or an edge's nodes. */
+static void list_side(const session_nodes *of, const side_axes *axes, int corner_count, int *out)
+{
+    const int p = of->order;
+    for (int j = 0; j <= (corner_count > 2 ? p : 0); j++)
+        for (int i = 0; i <= (corner_count == 3 ? p - j : p); i++) {
+            int at[3];
+            for (int a = 0; a < 3; a++)
+                at[a] = axes->origin[a] * p + i * (axes->along[a] - axes->origin[a]) +
+                        j * (axes->across[a] - axes->origin[a]);
+            *out++ = find_index(of, at);
+        }
+}
+
+static int count_side_nodes(int corner_count, int order)
+{
+    if (corner_count == 2) return order + 1;
+    return corner_count == 3 ? (order + 1) * (order + 2) / 2 : (order + 1) * (order + 1);
+}
+
+static void add_side(session_interpolation_sides *sides, const signed char *corners)
+{
+    memcpy(sides->corners[sides->count++], corners, (size_t)sides->corner_count);
+}
+
+static bool list_sides(session_interpolation *out, session_interpolation_sides *sides)
+{
+    const session_shape *shape = session_shape_of(out->of.type);
+    sides->turn_count = sides->corner_count == 2 ? 2 : 2 * sides->corner_count;
+    sides->node_count = count_side_nodes(sides->corner_count, out->complete.order);
+    sides->fine_count = count_side_nodes(sides->corner_count, out->fine.order);
+    const int lists = sides->count * sides->turn_count;
+    sides->nodes = base_alloc((size_t)(lists * sides->node_count + 1) * sizeof *sides->nodes);
+    sides->fine_nodes = base_alloc((size_t)(lists * sides->fine_count + 1) * sizeof *sides->fine_nodes);
+    if (!sides->nodes || !sides->fine_nodes) return false;
+    for (int list = 0; list < lists; list++) {
+        const side_axes axes =
+            axes_of(shape, sides->corners[list / sides->turn_count], sides->corner_count, list % sides->turn_count);
+        list_side(&out->complete, &axes, sides->corner_count, sides->nodes + list * sides->node_count);
+        list_side(&out->fine, &axes, sides->corner_count, sides->fine_nodes + list * sides->fine_count);
+    }
+    return true;
+}
+
+static bool list_all_sides(session_interpolation *out)
+{
+    const session_shape *shape = session_shape_of(out->of.type);
+    session_interpolation_sides *quads = &out->sides[0], *triangles = &out->sides[1], *edges = &out->sides[2];
+    quads->corner_count = 4;
+    triangles->corner_count = 3;
+    edges->corner_count = 2;
+    for (int f = 0; f < shape->face_count; f++) add_side(shape->faces[f][3] < 0 ? triangles : quads, shape->faces[f]);
+    for (int e = 0; e < shape->edge_count; e++) add_side(edges, shape->edges[e]);
+    return list_sides(out, quads) && list_sides(out, triangles) && list_sides(out, edges);
+}
+
+/* Returns whether fine nodes at the position `parts * i` of an axis have the value of the cell's node at i. */
+static bool is_own_position(const session_interpolation *of, int parts, int i)
+{
+    const double *row = of->line + parts * i * (of->of.order + 1);
+    for (int m = 0; m <= of->of.order; m++)
+        if (row[m] != (m == i)) return false;
+    return true;
+}
+
+/* Lists the fine nodes that are nodes of the cell: all of them if they are equispaced, and at least the corners. */
+static bool list_own_nodes(session_interpolation *out, int parts)
+{
+    const int p = out->of.order;
+    out->own = base_alloc((size_t)out->complete.count * sizeof *out->own);
+    for (int k = 0; k <= p && out->own; k++)
+        for (int j = 0; j <= p; j++)
+            for (int i = 0; i <= p; i++)
+                if (session_has_node(&out->of, i, j, k) && is_own_position(out, parts, i) &&
+                    is_own_position(out, parts, j) && is_own_position(out, parts, k)) {
+                    int *own = out->own[out->own_count++];
+                    own[0] = find_index(&out->complete, (const int[]){i, j, k});
+                    own[1] = find_index(&out->fine, (const int[]){parts * i, parts * j, parts * k});
+                }
+    return out->own;
+}
+
 bool session_make_completion(const session_nodes *of, insitu_vertex_order order, session_interpolation *out)
 {
     *out = (session_interpolation){.of = *of, .complete = session_complete_nodes(of->type, of->order)};
@@ -213,7 +317,7 @@ bool session_make_interpolation(const session_nodes *of, insitu_vertex_order ord
 {
     if (!session_make_completion(of, order, out)) return false;
     out->fine = session_complete_nodes(of->type, parts * of->order);
-    return make_weights(of, parts, is_lobatto, out);
+    return make_weights(of, parts, is_lobatto, out) && list_all_sides(out) && list_own_nodes(out, parts);
 }
 
 void session_drop_interpolation(session_interpolation *interpolation)
@@ -222,6 +326,11 @@ void session_drop_interpolation(session_interpolation *interpolation)
     base_free(interpolation->line);
     base_free(interpolation->triangle);
     base_free(interpolation->whole);
+    base_free(interpolation->own);
+    for (int n = 0; n < INTERPOLATION_SIDES; n++) {
+        base_free(interpolation->sides[n].nodes);
+        base_free(interpolation->sides[n].fine_nodes);
+    }
     *interpolation = (session_interpolation){0};
 }
 
@@ -230,51 +339,53 @@ void session_drop_interpolation(session_interpolation *interpolation)
 /* The state of interpolating the values of one cell. */
 typedef struct cell_job {
     const session_interpolation *of;
-    const session_shape *shape;
-    const double (*corners)[3];
     int size;        /* number of components */
     double *lattice; /* tuples at the nodes of the complete lattice, in lexicographic order */
     double *spare[2];
     double *out;
 } cell_job;
 
+/* Returns the largest number of nodes that are computed at once: all fine nodes, or those of all faces or edges. */
+static int spare_count(const session_interpolation *of)
+{
+    int most = of->fine.count;
+    for (int n = 0; n < INTERPOLATION_SIDES; n++) {
+        const int count = of->sides[n].count * of->sides[n].fine_count;
+        most = count > most ? count : most;
+    }
+    return most;
+}
+
 size_t session_interpolation_work_size(const session_interpolation *of, int components)
 {
-    return ((size_t)of->complete.count + 2 * (size_t)of->fine.count) * (size_t)components;
+    return ((size_t)of->complete.count + 2 * (size_t)spare_count(of)) * (size_t)components;
 }
 
-/* Computes one row of a product of matrices, number by number, so that sums of short tuples stay in registers. */
-static void apply_row(const double *row, int columns, int inner, const double *in, double *out)
+/* Computes one row of a product of matrices. Each sum has the same terms in the same order, whether it is computed in a
+ * chunk, whose loops the compiler vectorizes, or in the rest. */
+static void apply_row(const double *row, int columns, int inner, const double *restrict in, double *restrict out)
 {
-    for (int s = 0; s < inner; s++) {
-        const double first = in[s];
-        double sum = 0;
-        for (int c = 0; c < columns; c++) sum += row[c] * (in[c * inner + s] - first);
-        out[s] = sum + first;
+    enum { CHUNK = 4 };
+    int s = 0;
+    for (; s + CHUNK <= inner; s += CHUNK) {
+        double sums[CHUNK] = {0};
+        for (int c = 1; c < columns; c++)
+            for (int n = 0; n < CHUNK; n++) sums[n] += row[c] * (in[c * inner + s + n] - in[s + n]);
+        for (int n = 0; n < CHUNK; n++) out[s + n] = sums[n] + in[s + n];
     }
-}
-
-/* Does the same as apply_row() for long tuples, with loops that the compiler can vectorize. Each sum has the same terms
- * in the same order. */
-static void apply_long_row(const double *row, int columns, int inner, const double *restrict in, double *restrict out)
-{
-    for (int s = 0; s < inner; s++) out[s] = 0;
-    for (int c = 0; c < columns; c++)
-        for (int s = 0; s < inner; s++) out[s] += row[c] * (in[c * inner + s] - in[s]);
-    for (int s = 0; s < inner; s++) out[s] += in[s];
+    for (; s < inner; s++) {
+        double sum = 0;
+        for (int c = 1; c < columns; c++) sum += row[c] * (in[c * inner + s] - in[s]);
+        out[s] = sum + in[s];
+    }
 }
 
 /* Multiplies each of `outer` arrays of columns x inner numbers with a matrix of rows x columns. */
 static void multiply_by_matrix(const double *matrix, int rows, int columns, int outer, int inner, const double *in,
                                double *out)
 {
-    enum { SHORT = 6 };
     for (int o = 0; o < outer; o++, in += columns * inner)
-        for (int r = 0; r < rows; r++, out += inner)
-            if (inner <= SHORT)
-                apply_row(matrix + r * columns, columns, inner, in, out);
-            else
-                apply_long_row(matrix + r * columns, columns, inner, in, out);
+        for (int r = 0; r < rows; r++, out += inner) apply_row(matrix + r * columns, columns, inner, in, out);
 }
 
 static double neighbour_value(const cell_job *job, const int at[3], const int step[3], int component)
@@ -322,10 +433,9 @@ static void fill_missing(const cell_job *job, const int at[3])
 void session_complete_tuples(const session_interpolation *of, int components, const double *tuples, double *out)
 {
     const cell_job job = {.of = of, .size = components, .lattice = out};
-    const size_t bytes = (size_t)components * sizeof *tuples;
     for (int n = 0; n < of->complete.count; n++)
-        if (of->positions[n] < of->of.count)
-            memcpy(out + n * components, tuples + of->positions[n] * components, bytes);
+        for (int s = 0; s < components && of->positions[n] < of->of.count; s++)
+            out[n * components + s] = tuples[of->positions[n] * components + s];
     for (int n = 0; n < 27 && !of->of.is_complete; n++) {
         const int at[3] = {n % 3, n / 3 % 3, n / 9};
         if (session_has_node(&of->of, at[0], at[1], at[2]) &&
@@ -362,107 +472,73 @@ static void fill_inside(const cell_job *job)
     }
 }
 
-/* The axes of a face or edge: positions of its origin and of the ends of both axes, in a lattice of order 1. An edge
- * has only the first axis. */
-typedef struct face_axes {
-    int count; /* number of the face's corners */
-    const signed char *origin, *along, *across;
-} face_axes;
-
-/* Returns the index in the cell's lattice of the face's node i, j. */
-static int find_face_node(const session_nodes *of, const face_axes *axes, int i, int j)
+/* Finds how many corners are before each corner in the lexicographic order of positions. */
+static void rank_corners(int count, const double (*corners)[3], int ranks[8])
 {
-    int at[3];
-    for (int a = 0; a < 3; a++)
-        at[a] = axes->origin[a] * of->order + i * (axes->along[a] - axes->origin[a]) +
-                j * (axes->across[a] - axes->origin[a]);
-    return find_index(of, at);
-}
-
-/* Copies tuples from a lattice to an array of the face's nodes if is_read is set, and in the opposite direction
- * otherwise. */
-static void copy_face(const session_nodes *of, const face_axes *axes, int size, bool is_read, double *lattice,
-                      double *face)
-{
-    const int p = of->order;
-    const size_t bytes = (size_t)size * sizeof *face;
-    for (int j = 0; j <= (axes->count > 2 ? p : 0); j++)
-        for (int i = 0; i <= (axes->count == 3 ? p - j : p); i++, face += size) {
-            double *node = lattice + find_face_node(of, axes, i, j) * size;
-            memcpy(is_read ? face : node, is_read ? node : face, bytes);
+    for (int c = 0; c < count; c++) ranks[c] = 0;
+    for (int c = 0; c < count; c++)
+        for (int d = 0; d < c; d++) {
+            const int order = vector3_compare(corners[c], corners[d]);
+            ranks[c] += order > 0;
+            ranks[d] += order < 0;
         }
 }
 
-static void fill_face(const cell_job *job, const face_axes *axes)
+/* Chooses the axes of a face or an edge by the positions of its corners. */
+static int choose_turn(const signed char *side, int corner_count, const int ranks[8])
 {
-    const session_interpolation *of = job->of;
-    const int c = of->of.order + 1, r = of->fine.order + 1, size = job->size;
-    double *a = job->spare[0], *b = job->spare[1];
-    copy_face(&of->complete, axes, size, true, job->lattice, a);
-    if (axes->count == 3) {
-        multiply_by_matrix(of->triangle, r * (r + 1) / 2, c * (c + 1) / 2, 1, size, a, b);
-    } else {
-        multiply_by_matrix(of->line, r, c, axes->count == 4 ? c : 1, size, a, b);
-        if (axes->count == 4) multiply_by_matrix(of->line, r, c, 1, r * size, b, a);
-    }
-    copy_face(&of->fine, axes, size, false, job->out, axes->count == 4 ? a : b);
-}
-
-static bool is_before(const cell_job *job, int a, int b)
-{
-    return vector3_compare(job->corners[a], job->corners[b]) < 0;
-}
-
-/* Chooses the axes of a face by the positions of its corners. */
-static face_axes choose_axes(const cell_job *job, const signed char *face)
-{
-    const int count = face[3] < 0 ? 3 : 4;
     int first = 0;
-    for (int n = 1; n < count; n++)
-        if (is_before(job, face[n], face[first])) first = n;
-    int along = face[(first + 1) % count], across = face[(first + count - 1) % count];
-    if (is_before(job, across, along)) {
-        const int swapped = along;
-        along = across;
-        across = swapped;
-    }
-    const signed char(*at)[3] = job->shape->corners;
-    return (face_axes){count, at[(int)face[first]], at[along], at[across]};
+    for (int n = 1; n < corner_count; n++)
+        if (ranks[(int)side[n]] < ranks[(int)side[first]]) first = n;
+    if (corner_count == 2) return first;
+    const int next = ranks[(int)side[(first + 1) % corner_count]];
+    return 2 * first + (ranks[(int)side[(first + corner_count - 1) % corner_count]] < next);
 }
 
-static void fill_edge(const cell_job *job, const signed char ends[2])
-{
-    const int first = is_before(job, ends[1], ends[0]);
-    const signed char *origin = job->shape->corners[(int)ends[first]];
-    fill_face(job, &(face_axes){2, origin, job->shape->corners[(int)ends[!first]], origin});
-}
-
-static void copy_corner(const cell_job *job, int corner)
+/* Computes the nodes on faces or edges with the same number of corners from the nodes of each of them. */
+static void fill_sides(const cell_job *job, const session_interpolation_sides *sides, const int ranks[8])
 {
     const session_interpolation *of = job->of;
-    const signed char *at = job->shape->corners[corner];
-    const face_axes axes = {1, at, at, at};
-    memcpy(job->out + find_face_node(&of->fine, &axes, 0, 0) * job->size,
-           job->lattice + find_face_node(&of->complete, &axes, 0, 0) * job->size, (size_t)job->size * sizeof *job->out);
+    const int c = of->of.order + 1, r = of->fine.order + 1, size = job->size, all = sides->count * size;
+    double *a = job->spare[0], *b = job->spare[1];
+    int lists[INTERPOLATION_MOST_SIDES];
+    for (int side = 0; side < sides->count; side++) {
+        lists[side] = side * sides->turn_count + choose_turn(sides->corners[side], sides->corner_count, ranks);
+        const int *nodes = sides->nodes + lists[side] * sides->node_count;
+        for (int n = 0; n < sides->node_count; n++)
+            for (int s = 0; s < size; s++) a[n * all + side * size + s] = job->lattice[nodes[n] * size + s];
+    }
+    if (sides->corner_count == 3)
+        multiply_by_matrix(of->triangle, sides->fine_count, sides->node_count, 1, all, a, b);
+    else
+        multiply_by_matrix(of->line, r, c, sides->corner_count == 4 ? c : 1, all, a, b);
+    if (sides->corner_count == 4) {
+        multiply_by_matrix(of->line, r, c, 1, r * all, b, a);
+        b = a;
+    }
+    for (int side = 0; side < sides->count; side++) {
+        const int *nodes = sides->fine_nodes + lists[side] * sides->fine_count;
+        for (int n = 0; n < sides->fine_count; n++)
+            for (int s = 0; s < size; s++) job->out[nodes[n] * size + s] = b[n * all + side * size + s];
+    }
 }
 
 void session_interpolate(const session_interpolation *of, const double (*corners)[3], int components,
                          const double *tuples, double *work, double *out)
 {
-    cell_job job = {.of = of,
-                    .shape = session_shape_of(of->of.type),
-                    .corners = corners,
-                    .size = components,
-                    .lattice = work,
-                    .out = out};
+    if (of->own_count == of->fine.count) {
+        session_complete_tuples(of, components, tuples, out);
+        return;
+    }
+    cell_job job = {.of = of, .size = components, .lattice = work, .out = out};
+    int ranks[8];
     job.spare[0] = work + of->complete.count * components;
-    job.spare[1] = job.spare[0] + of->fine.count * components;
+    job.spare[1] = job.spare[0] + spare_count(of) * components;
     session_complete_tuples(of, components, tuples, work);
     fill_inside(&job);
-    for (int f = 0; f < job.shape->face_count; f++) {
-        const face_axes axes = choose_axes(&job, job.shape->faces[f]);
-        fill_face(&job, &axes);
-    }
-    for (int e = 0; e < job.shape->edge_count; e++) fill_edge(&job, job.shape->edges[e]);
-    for (int c = 0; c < job.shape->corner_count; c++) copy_corner(&job, c);
+    rank_corners(session_shape_of(of->of.type)->corner_count, corners, ranks);
+    for (int n = 0; n < INTERPOLATION_SIDES; n++)
+        if (of->sides[n].count > 0) fill_sides(&job, &of->sides[n], ranks);
+    for (int n = 0; n < of->own_count; n++)
+        for (int s = 0; s < components; s++) out[of->own[n][1] * components + s] = work[of->own[n][0] * components + s];
 }

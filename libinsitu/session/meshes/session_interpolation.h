@@ -6,6 +6,20 @@
 
 #include "session_nodes.h"
 
+enum { INTERPOLATION_SIDES = 3, INTERPOLATION_MOST_SIDES = 12 };
+
+/* The faces of a cell with the same number of corners, or its edges. The nodes of a face can be numbered in several
+ * ways, which begin at each of its corners and follow the face in either direction; those of an edge in two ways. */
+typedef struct session_interpolation_sides {
+    int corner_count;           /* of a face: 4 or 3; of an edge: 2 */
+    int count;                  /* number of these faces or edges of the cell */
+    int turn_count;             /* number of ways to number the nodes of one of them */
+    int node_count, fine_count; /* numbers of nodes of one of them, in the cell's lattice and in the finer one */
+    signed char corners[INTERPOLATION_MOST_SIDES][4];
+    int *nodes;      /* for each face or edge and each way, the indices of its nodes in `complete` */
+    int *fine_nodes; /* the same in `fine` */
+} session_interpolation_sides;
+
 /* The interpolation in one kind of cell. */
 typedef struct session_interpolation {
     session_nodes of;       /* the cell's own nodes */
@@ -17,6 +31,9 @@ typedef struct session_interpolation {
     double *line;   /* weights on an edge: a matrix of (fine nodes of the edge) x (nodes of the edge) */
     double *triangle; /* weights of triangles; NULL if the type of cell has none */
     double *whole;    /* for tets and pyramids: weights, a matrix of (all fine nodes) x (all nodes of `complete`) */
+    session_interpolation_sides sides[INTERPOLATION_SIDES]; /* quads, triangles, edges */
+    int own_count; /* number of the cell's own nodes that are fine nodes, too */
+    int (*own)[2]; /* their indices in `complete` and in `fine` */
 } session_interpolation;
 
 /* Largest order of pyramids that can be interpolated, because a matrix of all of their nodes is inverted. */

@@ -8,6 +8,9 @@
  * first three power sums of the hashes of the face's vertices. Memory is therefore needed for vertices and outer faces,
  * not for all faces.
  *
+ * Cells of higher order are searched as the linear cells with the same corners (session_corner_cells.h). Each outer
+ * face that is found is replaced by the faces of linear pieces that lie on it.
+ *
  * Shells are faces that are always kept. A shell on a cell's outer face replaces it, so that only one is drawn there.
  *
  * A face that occurs once on a rank and lies in another rank's box is sent to its home rank (session_homes.h), which
@@ -21,7 +24,9 @@
 #include "region.h"
 #include "session_agree.h"
 #include "session_cell_faces.h"
+#include "session_corner_cells.h"
 #include "session_neighbours.h"
+#include "session_rims.h"
 #include "session_thresholds.h"
 
 /* Maximum number of tables of sums. If there are more threads, they share tables. A table has one 64-bit word per
@@ -30,8 +35,13 @@ enum { MOST_TABLES = 4 };
 
 /* The data that the search stores for one part of the mesh. */
 typedef struct part_cells {
+    /* the cells that are searched: those of the mesh or, if the mesh is split into pieces, the corner cells */
     const grid *grid;
-    /* one byte per cell, nonzero if the cell is beyond the threshold; NULL: there is no threshold */
+    session_corner_cells corners;
+    /* for each of the corner cells, its first piece; a final entry marks the end. NULL: the mesh is not split */
+    const int64_t *first_pieces;
+    session_rims rims; /* the faces on which the pieces' vertices lie, if the mesh is split */
+    /* one byte per cell of the mesh, nonzero if the cell is beyond the threshold; NULL: there is no threshold */
     unsigned char *is_hidden;
     int64_t first_cell;   /* number of the part's first cell among those of all parts */
     int64_t first_vertex; /* number of the part's first vertex among those of all parts */
@@ -70,7 +80,11 @@ typedef struct face_search {
 
 static void search_free(face_search *s)
 {
-    for (int i = 0; i < s->part_count && s->cells; i++) base_free(s->cells[i].is_hidden);
+    for (int i = 0; i < s->part_count && s->cells; i++) {
+        session_corner_cells_free(&s->cells[i].corners);
+        session_rims_free(&s->cells[i].rims);
+        base_free(s->cells[i].is_hidden);
+    }
     base_free(s->cells);
     base_free(s->hashes);
     base_free(s->vertex_sums);
@@ -122,7 +136,15 @@ static bool make_key(const part_cells *p, const session_face_loop *loop, session
 
 static bool has_faces(const part_cells *p, int64_t cell)
 {
-    return !grid_is_ghost(p->grid, cell) && !(p->is_hidden && p->is_hidden[cell]);
+    if (grid_is_ghost(p->grid, cell)) return false;
+    return !p->is_hidden || !p->is_hidden[p->first_pieces ? p->first_pieces[cell] : cell];
+}
+
+/* Computes the key of a vertex of the searched cells. */
+static session_key find_vertex_key(const face_search *s, int part, int64_t vertex, bool by_id)
+{
+    const int64_t *origins = s->cells[part].corners.origins;
+    return session_vertex_key(s->parts[part].mesh, origins ? origins[vertex] : vertex, by_id);
 }
 
 static void hash_vertices(const face_search *s, bool by_id)
@@ -135,7 +157,7 @@ static void hash_vertices(const face_search *s, bool by_id)
             const int64_t count = count_part_vertices(p);
 #pragma omp for schedule(static) nowait
             for (int64_t v = 0; v < count; v++) {
-                const session_key key = session_vertex_key(s->parts[part].mesh, v, by_id);
+                const session_key key = find_vertex_key(s, part, v, by_id);
                 p->hashes[v] = session_key_hash(&key);
             }
         }
@@ -417,6 +439,15 @@ static bool make_tables(face_search *s)
     return true;
 }
 
+/* Makes a part whose cells are split be searched as corner cells. Returns false if memory runs out. */
+static bool read_corners(const session_mesh *mesh, part_cells *p)
+{
+    if (!mesh->topology.is_split) return true;
+    p->grid = &p->corners.cells;
+    p->first_pieces = mesh->topology.first_pieces;
+    return session_corner_cells_create(mesh, &p->corners) && session_rims_create(mesh, &p->rims);
+}
+
 /* Numbers the cells and vertices of all parts, and finds the cells that are beyond thresholds. Returns false if memory
  * runs out. */
 static bool number_parts(face_search *s)
@@ -427,6 +458,7 @@ static bool number_parts(face_search *s)
         const session_face_part *of = &s->parts[part];
         part_cells *p = &s->cells[part];
         *p = (part_cells){.grid = &of->mesh->cells, .first_cell = s->cell_count, .first_vertex = s->vertex_count};
+        if (!read_corners(of->mesh, p)) return false;
         s->cell_count += p->grid->cell_count;
         s->vertex_count += count_part_vertices(p);
         if (!of->outer->threshold.is_given) continue;
@@ -474,7 +506,7 @@ static int find_face_home(const face_search *s, const session_homes *homes, int6
         if (p->hashes[vertex] < p->hashes[first]) first = vertex;
     }
     grid_vertex(p->grid, first, point[0]);
-    const session_key key = session_vertex_key(s->parts[face->part].mesh, first, homes->by_id);
+    const session_key key = find_vertex_key(s, face->part, first, homes->by_id);
     return session_find_home(homes, (const double(*)[3])point, 1, session_key_hash(&s->keys[number]),
                              (int64_t)key.words[0]);
 }
@@ -571,16 +603,84 @@ static insitu_status search_shared_faces(face_search *s, const session_homes *ho
     return status;
 }
 
+/* ---- faces of the mesh --------------------------------------------------------------------------------------- */
+
+/* Iterator over the faces of the mesh's cells that lie on a found face: the face itself or, if the mesh is split into
+ * pieces, the faces of pieces. */
+typedef struct face_walk {
+    const session_mesh *mesh;
+    part_cells *part;
+    session_face of; /* the found face */
+    session_face next;
+} face_walk;
+
+static face_walk walk_faces(const face_search *s, const found_face *found)
+{
+    part_cells *p = &s->cells[found->part];
+    const session_face first = {p->first_pieces ? p->first_pieces[found->face.cell] : found->face.cell, 0};
+    return (face_walk){s->parts[found->part].mesh, p, found->face, p->first_pieces ? first : found->face};
+}
+
+static bool is_on_found_face(const face_walk *walk, const session_face_loop *loop)
+{
+    int64_t vertices[4];
+    for (int64_t i = 0; i < loop->size; i++) vertices[i] = session_face_vertex(loop, i);
+    return session_find_faces(&walk->part->rims, walk->of.cell, vertices, loop->size) >> walk->of.face & 1;
+}
+
+/* Stores the next face. Returns false if there are no more. */
+static bool next_face(face_walk *walk, session_face *out)
+{
+    const int64_t *first_pieces = walk->part->first_pieces;
+    const int64_t end = first_pieces ? first_pieces[walk->of.cell + 1] : walk->of.cell + 1;
+    while (walk->next.cell < end) {
+        const session_cell_faces faces = session_faces_of_cell(&walk->mesh->cells, walk->next.cell);
+        *out = walk->next;
+        if (!first_pieces) {
+            walk->next.cell++;
+            return true;
+        }
+        for (; walk->next.face < faces.count; walk->next.face++) {
+            const session_face_loop loop = session_face_of(&faces, walk->next.face);
+            *out = walk->next;
+            if (!is_on_found_face(walk, &loop)) continue;
+            walk->next.face++;
+            return true;
+        }
+        walk->next = (session_face){walk->next.cell + 1, 0};
+    }
+    return false;
+}
+
 static void mark_borders(const face_search *s)
 {
     for (int64_t i = 0; i < s->count; i++) {
-        const found_face *face = &s->faces[i];
-        unsigned char *is_border = s->parts[face->part].is_border;
+        unsigned char *is_border = s->parts[s->faces[i].part].is_border;
         if (!is_border) continue;
-        const session_cell_faces faces = session_faces_of_cell(s->cells[face->part].grid, face->face.cell);
-        const session_face_loop loop = session_face_of(&faces, face->face.face);
-        for (int64_t k = 0; k < loop.size; k++) is_border[session_face_vertex(&loop, k)] = 1;
+        face_walk walk = walk_faces(s, &s->faces[i]);
+        for (session_face face; next_face(&walk, &face);) {
+            const session_cell_faces faces = session_faces_of_cell(&walk.mesh->cells, face.cell);
+            const session_face_loop loop = session_face_of(&faces, face.face);
+            for (int64_t k = 0; k < loop.size; k++) is_border[session_face_vertex(&loop, k)] = 1;
+        }
     }
+}
+
+/* Appends the faces of the mesh that lie on a found face. Returns false if memory runs out. */
+static bool append_faces(const face_search *s, const found_face *found, int64_t *capacity, session_outer *outer)
+{
+    face_walk walk = walk_faces(s, found);
+    for (session_face face; next_face(&walk, &face);) {
+        if (outer->face_count == *capacity) {
+            const int64_t more = 2 * *capacity + 64;
+            session_face *faces = base_realloc(outer->faces, (size_t)more * sizeof *faces);
+            if (!faces) return false;
+            outer->faces = faces;
+            *capacity = more;
+        }
+        outer->faces[outer->face_count++] = face;
+    }
+    return true;
 }
 
 /* Stores the outer faces that were found with the parts to which they belong. */
@@ -592,11 +692,16 @@ static void store_outer_faces(const face_search *s, base_error *error)
         int64_t end = at;
         while (end < s->count && s->faces[end].part == part) end++;
         session_drop_outer(outer, true);
-        outer->faces = base_alloc((size_t)(end - at + 1) * sizeof *outer->faces);
-        if (!outer->faces) session_fail_for_memory(error, (end - at) * (int64_t)sizeof *outer->faces, "outer faces");
-        for (int64_t i = at; i < end && outer->faces; i++) outer->faces[i - at] = s->faces[i].face;
-        outer->face_count = outer->faces ? end - at : 0;
-        outer->are_faces_known = outer->faces != NULL;
+        int64_t capacity = end - at + 1;
+        outer->faces = base_alloc((size_t)capacity * sizeof *outer->faces);
+        outer->face_count = 0;
+        bool is_made = outer->faces;
+        for (int64_t i = at; i < end && is_made; i++) is_made = append_faces(s, &s->faces[i], &capacity, outer);
+        outer->are_faces_known = is_made;
+        if (!is_made) {
+            session_drop_outer(outer, true);
+            session_fail_for_memory(error, capacity * (int64_t)sizeof *outer->faces, "outer faces");
+        }
         at = end;
     }
 }

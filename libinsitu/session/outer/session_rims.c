@@ -119,7 +119,7 @@ static void set_faces(session_rims *rims, int64_t cell, bool are_set)
     }
 }
 
-int session_find_rim(session_rims *rims, int64_t cell, const int64_t *vertices, int64_t count)
+unsigned session_find_faces(session_rims *rims, int64_t cell, const int64_t *vertices, int64_t count)
 {
     unsigned faces = (1U << RIMS_MOST_FACES) - 1;
     if (rims->cell != cell) {
@@ -128,5 +128,11 @@ int session_find_rim(session_rims *rims, int64_t cell, const int64_t *vertices, 
         rims->cell = cell;
     }
     for (int64_t i = 0; i < count; i++) faces &= rims->faces_of_vertex[vertices[i]];
+    return faces;
+}
+
+int session_find_rim(session_rims *rims, int64_t cell, const int64_t *vertices, int64_t count)
+{
+    const unsigned faces = session_find_faces(rims, cell, vertices, count);
     return faces ? __builtin_ctz(faces) : -1;
 }

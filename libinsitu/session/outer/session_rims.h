@@ -30,6 +30,9 @@ void session_rims_free(session_rims *rims);
 /* Returns the number of nodes of all rims of one of the caller's cells. */
 int64_t session_count_rim_nodes(const session_rims *rims, int64_t cell);
 
+/* Returns a bit mask of the faces of the caller's cell on which all of the vertices lie. */
+unsigned session_find_faces(session_rims *rims, int64_t cell, const int64_t *vertices, int64_t count);
+
 /* Returns the number of the face of the caller's cell on which all of the vertices lie, or -1 if there is none. */
 int session_find_rim(session_rims *rims, int64_t cell, const int64_t *vertices, int64_t count);
 

@@ -69,7 +69,7 @@ bool session_has_smooth_normals(const scene_isosurface *layer, const session_cat
 bool session_has_curved_faces(const session_catalogue *catalogue)
 {
     for (int m = 0; m < catalogue->mesh_count; m++)
-        if (catalogue->meshes[m].has_higher_order) return true;
+        if (catalogue->meshes[m].has_bent_cells) return true;
     return false;
 }
 

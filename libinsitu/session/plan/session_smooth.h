@@ -23,8 +23,8 @@ bool session_is_smooth(const session_plan *plan, const session_catalogue *catalo
  * gradients at nodes are. The result is the same on all ranks. */
 bool session_has_smooth_normals(const scene_isosurface *layer, const session_catalogue *catalogue);
 
-/* Returns whether outer surfaces have normals at vertices. This is the case if some mesh has cells of higher order,
- * because the faces of such cells may be curved. The result is the same on every rank. */
+/* Returns whether outer surfaces have normals at vertices. This is the case if some mesh has bent cells of higher
+ * order, because the faces of such cells may be curved. The result is the same on every rank. */
 bool session_has_curved_faces(const session_catalogue *catalogue);
 
 #endif

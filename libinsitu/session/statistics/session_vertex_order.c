@@ -7,6 +7,7 @@
 #include "memory.h"
 #include "session_agree.h"
 #include "session_cell_order.h"
+#include "session_straight.h"
 #include "session_tally.h"
 #include "session_topology.h"
 
@@ -21,7 +22,7 @@ static const int judged[JUDGED] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID, GRID_QUAD
  * whose corner volumes would have a single sign. */
 enum type_sum { SAMPLED, BOTH_SIGNS, FITTING, TYPE_SUMS = FITTING + ORDERS };
 
-enum cell_sum { DRAWN, FLAT, INVERTED, SHELLS, SPLIT, OF_TYPES, CELL_SUMS = OF_TYPES + JUDGED * TYPE_SUMS };
+enum cell_sum { DRAWN, FLAT, INVERTED, SHELLS, SPLIT, BENT, OF_TYPES, CELL_SUMS = OF_TYPES + JUDGED * TYPE_SUMS };
 
 /* Returns whether the volumes at all corners of the cell have the same sign if its vertices are read in `order` instead
  * of the order in which they are read now. */
@@ -66,7 +67,7 @@ static void sum_orders(const session_mesh *mesh, int share, int64_t sums[CELL_SU
     }
 }
 
-static void sum_cells(const session_meshes *meshes, const char *name, int64_t sums[CELL_SUMS])
+static void sum_cells(const session_meshes *meshes, const char *name, int threads, int64_t sums[CELL_SUMS])
 {
     const session_parts parts = session_find_parts(meshes, name);
     for (int i = 0; i < parts.count; i++) {
@@ -78,6 +79,7 @@ static void sum_cells(const session_meshes *meshes, const char *name, int64_t su
         sums[INVERTED] += part->cells.lattice ? 0 : part->given_counts.inverted_count;
         sums[SHELLS] += part->given_counts.shell_count;
         sums[SPLIT] += part->topology.is_split;
+        sums[BENT] += part->topology.is_split && session_has_bent_cells(part, threads);
         if (!part->topology.is_split)
             sum_orders(part, parts.count, sums); /* pieces of split cells are always in VTK's order */
     }
@@ -155,24 +157,25 @@ static void warn_of_order(session_report *report, const char *mesh, const int64_
         mesh, inverted, drawn);
 }
 
-insitu_status session_check_vertex_order(const session_meshes *meshes, session_catalogue *catalogue, MPI_Comm comm,
-                                         session_report *report, base_error *error)
+insitu_status session_check_vertex_order(const session_meshes *meshes, session_catalogue *catalogue,
+                                         const session_team *team, session_report *report, base_error *error)
 {
     const size_t words = (size_t)catalogue->mesh_count * CELL_SUMS;
     int64_t *sums = base_calloc(words, sizeof *sums);
     if (!sums) session_fail_for_memory(error, (int64_t)(words * sizeof *sums), "counts of cells");
-    insitu_status status = session_agree(comm, error);
+    insitu_status status = session_agree(team->comm, error);
     for (int m = 0; m < catalogue->mesh_count && !status; m++)
-        sum_cells(meshes, catalogue->meshes[m].name, sums + m * CELL_SUMS);
+        sum_cells(meshes, catalogue->meshes[m].name, team->threads, sums + m * CELL_SUMS);
     if (!status)
-        status = session_check_mpi(error, MPI_Allreduce(MPI_IN_PLACE, sums, (int)words, MPI_INT64_T, MPI_SUM, comm),
-                                   "MPI_Allreduce");
+        status = session_check_mpi(
+            error, MPI_Allreduce(MPI_IN_PLACE, sums, (int)words, MPI_INT64_T, MPI_SUM, team->comm), "MPI_Allreduce");
     for (int m = 0; m < catalogue->mesh_count && !status; m++) {
         const int64_t *of_mesh = sums + m * CELL_SUMS;
         const session_parts parts = session_find_parts(meshes, catalogue->meshes[m].name);
         const bool has_shells_alone = of_mesh[DRAWN] == 0 && of_mesh[SHELLS] > 0;
         catalogue->meshes[m].has_shells_alone = has_shells_alone;
         catalogue->meshes[m].has_higher_order = of_mesh[SPLIT] > 0;
+        catalogue->meshes[m].has_bent_cells = of_mesh[BENT] > 0;
         for (int i = 0; i < parts.count; i++) parts.items[i]->has_shells_alone = has_shells_alone;
         warn_of_order(report, catalogue->meshes[m].name, of_mesh);
     }

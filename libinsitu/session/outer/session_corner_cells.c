@@ -1,0 +1,93 @@
+#include "session_corner_cells.h"
+
+#include "memory.h"
+#include "session_rows.h"
+#include "session_shape.h"
+
+/* Finds the positions of a cell's corners in its row, for each kind of row. */
+static void find_corners(const session_rows *rows, insitu_vertex_order order, int corners[ROWS_MOST_KINDS][8])
+{
+    for (int i = 0; i < rows->kind_count; i++) {
+        const session_nodes *of = &rows->kinds[i].nodes;
+        const session_shape *shape = session_shape_of(of->type);
+        for (int c = 0; c < shape->corner_count; c++) {
+            const signed char *at = shape->corners[c];
+            corners[i][c] = session_node_index(of, order, of->order * at[0], of->order * at[1], of->order * at[2]);
+        }
+    }
+}
+
+static bool allocate(int64_t cells, int64_t vertices, session_corner_cells *out)
+{
+    out->origins = base_alloc(((size_t)vertices + 1) * sizeof *out->origins);
+    out->coordinates = base_alloc(((size_t)vertices + 1) * 3 * sizeof *out->coordinates);
+    out->connectivity = base_alloc(((size_t)vertices + 1) * sizeof *out->connectivity);
+    out->offsets = base_alloc(((size_t)cells + 1) * sizeof *out->offsets);
+    out->types = base_alloc((size_t)cells + 1);
+    return out->origins && out->coordinates && out->connectivity && out->offsets && out->types;
+}
+
+/* Adds the cell's corners. Returns the new number of vertices. */
+static int64_t add_cell(const session_mesh *mesh, const session_rows *rows, const int *corners, int64_t cell, int type,
+                        int64_t vertex, session_corner_cells *out)
+{
+    out->offsets[cell] = vertex;
+    out->types[cell] = (unsigned char)type;
+    for (int c = 0; c < grid_type_vertices(type); c++, vertex++) {
+        out->origins[vertex] = session_row_node(rows, cell, corners[c]);
+        out->connectivity[vertex] = vertex;
+        grid_vertex(&mesh->cells, out->origins[vertex], out->coordinates + 3 * vertex);
+    }
+    return vertex;
+}
+
+static void describe_grid(const session_rows *rows, int64_t vertices, session_corner_cells *out)
+{
+    const int64_t size = (int64_t)sizeof(int64_t);
+    out->cells = (grid){.vertex_count = vertices,
+                        .cell_count = rows->cells.cell_count,
+                        .cell_types = (const char *)out->types,
+                        .cell_types_stride = 1,
+                        .cell_types_bytes = 1,
+                        .ghosts = rows->cells.ghosts,
+                        .ghosts_stride = rows->cells.ghosts_stride,
+                        .ghosts_bytes = rows->cells.ghosts_bytes};
+    out->cells.connectivity =
+        (grid_array){.data = (const char *)out->connectivity, .stride = size, .is_wide = true, .is_integer = true};
+    out->cells.offsets =
+        (grid_array){.data = (const char *)out->offsets, .stride = size, .is_wide = true, .is_integer = true};
+    for (int axis = 0; axis < 3; axis++)
+        out->cells.coordinates[axis] =
+            (grid_array){.data = (const char *)(out->coordinates + axis), .stride = 3 * size, .is_wide = true};
+}
+
+bool session_corner_cells_create(const session_mesh *mesh, session_corner_cells *out)
+{
+    session_rows rows = session_rows_of(mesh);
+    int corners[ROWS_MOST_KINDS][8];
+    int64_t vertices = 0;
+    *out = (session_corner_cells){.origins = NULL};
+    session_list_kinds(&rows);
+    find_corners(&rows, mesh->given.vertex_order, corners);
+    for (int64_t cell = 0; cell < rows.cells.cell_count; cell++)
+        vertices += grid_type_vertices(rows.kinds[session_kind_of(&rows, cell)].nodes.type);
+    if (!allocate(rows.cells.cell_count, vertices, out)) return false;
+    vertices = 0;
+    for (int64_t cell = 0; cell < rows.cells.cell_count; cell++) {
+        const int kind = session_kind_of(&rows, cell);
+        vertices = add_cell(mesh, &rows, corners[kind], cell, rows.kinds[kind].nodes.type, vertices, out);
+    }
+    out->offsets[rows.cells.cell_count] = vertices;
+    describe_grid(&rows, vertices, out);
+    return true;
+}
+
+void session_corner_cells_free(session_corner_cells *cells)
+{
+    base_free(cells->origins);
+    base_free(cells->coordinates);
+    base_free(cells->connectivity);
+    base_free(cells->offsets);
+    base_free(cells->types);
+    *cells = (session_corner_cells){.origins = NULL};
+}
