@@ -5,8 +5,8 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Returns the number of bytes of the control character at which the text begins, or 0 if it begins with none. Control
- * characters are those of ASCII, and those of Latin 1's second block in UTF-8. */
+/* Returns the size in bytes of the control character at the start of the text, or 0 if the text starts with another
+ * character. Control characters are those of ASCII, and U+0080 to U+009F in UTF-8. */
 static size_t count_control_bytes(const unsigned char *text)
 {
     if (text[0] < ' ' || text[0] == 0x7f) return 1;

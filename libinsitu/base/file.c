@@ -207,7 +207,7 @@ static bool try_to_replace(const folder_and_name *target, const char *temporary,
 {
     const int file = openat(target->folder, temporary, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
     if (file < 0) return false;
-    /* locked, because other writers of pictures delete unlocked temporary files, which killed runs have left */
+    /* The file is locked because other writers of pictures delete unlocked temporary files as remains of killed runs */
     flock(file, LOCK_EX | LOCK_NB);
     bool is_written = write_all(file, bytes, size);
     int code = errno;
@@ -222,8 +222,8 @@ static bool try_to_replace(const folder_and_name *target, const char *temporary,
     return false;
 }
 
-/* Replaces the file. Tries again if another process has deleted the temporary file in the belief that a killed run
- * had left it. */
+/* Replaces the file. Tries again if another process has deleted the temporary file because it took it for the remains
+ * of a killed run. */
 static bool replace_file(const folder_and_name *target, const char *bytes, size_t size, file_failure *failure)
 {
     for (int i = 0; i < TRIES; i++) {

@@ -1,7 +1,7 @@
-/* Reads, replaces and appends to files; the library itself accesses files only through these functions. Only regular
- * files are opened, so that no call blocks on a pipe or reads a device without end. Pictures follow the same rules
- * (adaptors/image/picture_file.cpp): a new file replaces the old one by renaming, so that no reader sees a partial file
- * and no symbolic link is followed. */
+/* Reads, replaces and appends to files. The library itself accesses files only through these functions. They open only
+ * regular files, so that no call blocks on a pipe or reads a device without end. A new file replaces the old one by
+ * renaming, so that no reader sees a partial file and no symbolic link is followed. Pictures are written by the same
+ * rules (adaptors/image/picture_file.cpp). */
 #ifndef BASE_FILE_H
 #define BASE_FILE_H
 
@@ -11,7 +11,8 @@
 
 /* The reason why a call failed. */
 typedef struct file_failure {
-    /* set if there is no such file, or if the existing one must not be used but file_replace() would replace it */
+    /* set if there is no such file, or if the existing file must not be read or extended but file_replace() may replace
+     * it */
     bool is_missing;
     bool is_out_of_memory; /* set if memory ran out */
     char reason[128];      /* text for messages, such as "Permission denied" */
@@ -24,11 +25,11 @@ typedef struct file_content {
 } file_content;
 
 /* Reads a file that the user names, of at most limit bytes. Symbolic links are followed. Returns false on a failure:
- * *out->text is NULL, and out->stamp is the status of the file if there is one. */
+ * out->text is NULL, and out->stamp is the status of the file if there is one. */
 bool file_read(const char *path, size_t limit, file_content *out, file_failure *failure);
 
-/* Reads, like file_read(), a file that the library itself writes and continues. A link that does not lead to a regular
- * file counts as missing, because file_replace() replaces the link itself. */
+/* Reads, like file_read(), a file that the library itself has written and appends to. A link that does not lead to a
+ * regular file counts as missing, because file_replace() replaces the link itself. */
 bool file_read_own(const char *path, size_t limit, file_content *out, file_failure *failure);
 
 /* Replaces a file by these bytes, and creates missing folders. If the path is a link, the link is replaced and its
@@ -36,8 +37,8 @@ bool file_read_own(const char *path, size_t limit, file_content *out, file_failu
  * unchanged. */
 bool file_replace(const char *path, const char *bytes, size_t size, file_failure *failure);
 
-/* Appends to a file. If there is none, or the path is a link, the failure has is_missing set. Returns false on a
- * failure: the file is unchanged, unless the file system cannot even cut off bytes that were partly written. */
+/* Appends to a file. If there is no file, or if the path is a link, the failure has is_missing set. Returns false on a
+ * failure; the file is then unchanged, unless some bytes were written and the file system fails to cut them off. */
 bool file_append(const char *path, const char *bytes, size_t size, file_failure *failure);
 
 /* Returns whether the path leads to anything. */

@@ -13,7 +13,8 @@
 
 typedef struct fragment {
     uint32_t pixel; /* number of the pixel, y * width + x, with y = 0 at the top */
-    float t_in;     /* the ray's parameter, (depth - depth_origin) * scale (render.h), of the first sample or the hit */
+    /* t = (depth - depth_origin) * scale (render.h) of the first sample or of the hit, along the pixel's ray */
+    float t_in;
     float t_out; /* t of the last sample, or slightly before the last cell's end (kernel_segments.h); for a hit equal to
                     t_in */
     float colour[3];     /* premultiplied linear RGB */
@@ -27,9 +28,9 @@ typedef struct fragment {
  * a volume have the kind FRAGMENT_VOLUME. Hits have FRAGMENT_SURFACE + surface id (0, 1, ...). */
 enum { FRAGMENT_VOLUME = 0, FRAGMENT_EARLY = 1, FRAGMENT_LATE = 2, FRAGMENT_LAYER = 4, FRAGMENT_SURFACE = 16 };
 
-/* Returns whether a fragment changes the picture. The transmittance of a faint fragment rounds to 1, but its light
- * is still visible. If a rank dropped such a fragment, its picture would differ from that of a rank that has folded
- * it with others (fragment_fold.h). */
+/* Returns whether a fragment changes the picture. The transmittance of a faint fragment rounds to 1, but its light is
+ * still visible. If a rank dropped its faint fragments, its pictures would differ from those of a rank that has folded
+ * the fragments with others (fragment_fold.h). */
 static inline bool fragment_shows(const fragment *f)
 {
     return f->transmittance < 1 || f->colour[0] != 0 || f->colour[1] != 0 || f->colour[2] != 0;

@@ -17,9 +17,9 @@ static int find_common_height(int32_t a, int32_t b)
     return a == b ? 0 : 32 - __builtin_clz((uint32_t)(a ^ b));
 }
 
-/* Folds fragments with a stack of nodes that may receive further fragments. heights[d] is the height of the lowest node
- * that contains both open[d] and open[d - 1]. These heights decrease from the second entry on, so that the stack has at
- * most one entry per halving. */
+/* The stack open[] holds the nodes that may still receive fragments. heights[d] is the height of the lowest node that
+ * contains both open[d] and open[d - 1]. These heights decrease from the second entry on, so that the stack has at most
+ * one entry per halving. */
 fragment fragment_fold(const fragment *sorted, int64_t count)
 {
     fragment open[FRAGMENT_HALVINGS + 2];
@@ -44,7 +44,7 @@ fragment fragment_fold(const fragment *sorted, int64_t count)
 
 /* ---- folding on one rank ----------------------------------------------------------------------------------------- */
 
-/* The state of folding a rank's fragments of one interval. */
+/* The state of folding a rank's fragments in one interval of t. */
 typedef struct fold_part {
     float begin, end; /* range of t in which the rank has all fragments */
     fragment *out;    /* the folded fragments */

@@ -1,4 +1,4 @@
-/* Blends a volume's fragments in an order that depends only on the ray, so that the bits are the same on any
+/* Blends a volume's fragments in an order that depends only on the ray, so that the result is bit-identical for any
  * partition. Folding means to blend several fragments into one.
  *
  * The operation "over" is associative, but its rounding errors are not. The positions of the fragments therefore
@@ -30,8 +30,9 @@ enum { FRAGMENT_INTERVALS = 8, FRAGMENT_HALVINGS = 15 };
 #define FRAGMENT_DARK_OF_RANK 1e-7f
 #define FRAGMENT_DARK 1.01e-7f
 
-/* Returns the leaf that contains t; leaves increase with t. The leaves of one interval differ only in the lowest
- * FRAGMENT_HALVINGS bits. All depths beyond a thousand scenes are in one leaf. */
+/* Returns the number of the leaf that contains t; the numbers increase with t. The leaves of one interval differ only
+ * in the lowest FRAGMENT_HALVINGS bits. All t above 1024, about a thousand times the scene's depth, are in one leaf,
+ * and so are all t below -1024. */
 static inline int32_t fragment_leaf(float t)
 {
     const float most = 1024, at = t < -most ? -most : t < most ? t : most; /* this form of a clamp also replaces NaN */
@@ -43,8 +44,8 @@ static inline int32_t fragment_interval_number(float t)
     return fragment_leaf(t) >> FRAGMENT_HALVINGS;
 }
 
-/* Folds the fragments of one interval to one fragment. They must be in order, without a surface among them; count >=
- * 1. */
+/* Folds the fragments of one interval to one fragment. They must be sorted (fragment_order.h) and must not contain a
+ * surface; count >= 1. */
 fragment fragment_fold(const fragment *sorted, int64_t count);
 
 /* Folds the fragments of one interval on a rank that has all of the pixel's fragments from depth `begin` to depth

@@ -1,5 +1,5 @@
-/* The order of a pixel's fragments: by depth, at equal depth surfaces before volumes, and then by all other bits, so
- * that fragments that compare equal are identical. */
+/* Defines the order of a pixel's fragments: by depth, at equal depth surfaces before volumes, and then by all other
+ * bits. Fragments that compare equal are therefore identical. */
 #ifndef BASE_FRAGMENT_ORDER_H
 #define BASE_FRAGMENT_ORDER_H
 
@@ -8,7 +8,8 @@
 
 #include "fragment.h"
 
-/* Returns bits of the float that, as an unsigned integer, increase with its value, for all floats including NaN. */
+/* Maps a float to an unsigned integer, so that the order of the integers is that of the floats. NaN has a position in
+ * the order too. */
 static inline uint32_t fragment_sortable_bits(float value)
 {
     uint32_t bits;

@@ -36,9 +36,9 @@ typedef struct grid_numbering {
     double inverse_outer[3];  /* 1 / outer; 0 along the axis of the largest stride */
 } grid_numbering;
 
-/* Returns the index of number n along an axis. Each quotient is rounded down from (n + 1/2) / stride, which is at least
- * 1/2 / stride away from the next integer; the two roundings move it by at most n / stride * 2^-52, which is less if
- * n < 2^51. */
+/* Returns the index of number n along an axis. Each quotient (n + 1/2) / stride is rounded down. It is at least 1/2 /
+ * stride away from the next integer. The two rounding errors change it by at most n / stride * 2^-52, and therefore by
+ * less than this distance if n < 2^51. */
 static inline int64_t grid_index_along(const grid_numbering *of, int axis, int64_t n)
 {
     const double whole = (double)n, outer = (double)(int64_t)((whole + 0.5) * of->inverse_outer[axis]);
@@ -61,8 +61,8 @@ static inline double grid_axis_coordinate(const grid_axis *axis, int64_t n)
     return axis->axis_coordinates[index < axis->count ? index : axis->count - 1];
 }
 
-/* Element types that are read one by one, at any address. Only values of fields and axes may have them; other arrays of
- * such elements are copied before a grid is made. */
+/* Element types that are read one element at a time by memcpy(), at any address. Only values of fields and axes may
+ * have these types; other arrays with such elements are copied before a grid is made. */
 typedef enum grid_unusual_type {
     GRID_USUAL_TYPE = 0, /* the array is aligned, and of type double, float, int64 or int32 */
     GRID_UNUSUAL_FLOAT32,
@@ -93,9 +93,9 @@ typedef struct grid_array {
     const grid_axis *axis;
 } grid_array;
 
-/* A structured grid (lattice), whose cells are given by three indices instead of connectivity. */
+/* A structured grid (lattice). It has no connectivity: three indices determine a cell. */
 typedef struct grid_lattice {
-    int64_t cells[3]; /* number of cells along each axis; if it is 0 along one axis, the cells are quads */
+    int64_t cells[3]; /* number of cells along each axis; 0 along one axis: the cells are quads */
     grid_numbering vertex_numbering, cell_numbering;
     int64_t corner_offsets[8]; /* number of each vertex of a cell minus that of its first vertex, in VTK's order */
     int64_t drawn_first[3], drawn_end[3]; /* index range of the cells that are not in ghost layers */
@@ -122,7 +122,7 @@ typedef struct grid {
     const grid_lattice *lattice; /* if not NULL, replaces connectivity, offsets and cell_types */
     /* a bit per cell, set if the cell has no volume and is not drawn; NULL: there are no such cells */
     const uint64_t *flat;
-    /* The faces of polyhedra, which cells share. face_count is 0 if there are no polyhedra. */
+    /* The faces of polyhedra. Two cells can share a face. face_count is 0 if there are no polyhedra. */
     int64_t face_count;
     grid_array face_offsets;      /* index of each face's first entry in face_connectivity; face_count + 1 entries */
     grid_array face_connectivity; /* vertex indices of the faces, in cyclic order */
@@ -201,8 +201,8 @@ static inline int64_t grid_offset_end(const grid_array *offsets, int64_t i)
     return i + 1 == offsets->implied_end_count ? offsets->implied_end : grid_array_index(offsets, i + 1);
 }
 
-/* Returns the number of vertices of a cell type; 0 for unknown types, and for polyhedra and polygons, which have
- * different numbers of vertices. */
+/* Returns the number of vertices of a cell type; 0 for unknown types, and for polyhedra and polygons, because their
+ * number of vertices varies. */
 static inline int grid_type_vertices(int cell_type)
 {
     switch (cell_type) {
@@ -272,8 +272,8 @@ static inline bool grid_lattice_is_drawn(const grid_lattice *l, int64_t cell)
     return grid_lattice_is_cell(l, cell);
 }
 
-/* Stores the cell's vertex indices in VTK's order and returns their number, which is 0 for polyhedra and polygons: use
- * grid_walk for these. */
+/* Stores the cell's vertex indices in VTK's order and returns their number. For polyhedra and polygons it stores
+ * nothing and returns 0: use grid_walk for these. */
 static inline int grid_cell_vertices(const grid *g, int64_t cell, int64_t vertices[GRID_MAX_CELL_VERTICES])
 {
     const int count = grid_type_vertices(grid_cell_type(g, cell));

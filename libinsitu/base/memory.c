@@ -27,9 +27,9 @@ static int should_fail(void)
     return atomic_fetch_sub(&fail_countdown, 1) == 1;
 }
 
-/* Allocates a block with space for `bytes` bytes, of which `counted` are counted. The space is at least 64 bytes even
- * for an empty block, so that its address lies within its own memory, so that leak checkers recognize the pointer to
- * it. */
+/* Allocates a block with space for `bytes` bytes, of which `counted` are added to the count of held bytes. Even an
+ * empty block has a space of 64 bytes: its address then lies within its own memory, and leak checkers recognize the
+ * pointer to it. */
 static void *make_block(size_t bytes, size_t counted)
 {
     if (should_fail()) return NULL;

@@ -13,9 +13,9 @@ void *base_alloc(size_t bytes);
 /* Returns memory for count × size bytes, all 0, aligned to 64 bytes; NULL on failure. */
 void *base_calloc(size_t count, size_t size);
 
-/* base_reserve() allocates a block without counting its bytes, because memory that has not been written to is not
- * used. base_set_used_bytes() then states how many of its bytes are in use, and counts these. base_realloc() of the
- * block does not keep its contents before base_set_used_bytes() has been called. */
+/* base_reserve() allocates a block without counting its bytes, because memory that has not been written to takes no
+ * physical memory. base_set_used_bytes() then sets how many of its bytes are in use, and counts them. Before this call,
+ * base_realloc() does not keep the contents of the block. */
 void *base_reserve(size_t bytes);
 void base_set_used_bytes(void *block, size_t bytes);
 
@@ -38,7 +38,8 @@ void *base_arena_alloc(base_arena *from, size_t bytes);
 /* Returns a copy of a C string, or NULL on failure. */
 char *base_strdup(const char *text);
 
-/* Return the number of bytes that are allocated now, and the maximum since base_memory_reset_peak(). */
+/* base_memory_held() returns the number of bytes that are allocated now, base_memory_peak() their maximum since the
+ * last base_memory_reset_peak(). */
 int64_t base_memory_held(void);
 int64_t base_memory_peak(void);
 void base_memory_reset_peak(void);

@@ -21,8 +21,8 @@
  * 10 µs. */
 enum { REGION_ITEMS = 8192 };
 
-/* Sets a worker's floating-point environment to the default, and moves the worker off the core of the region's first
- * thread. */
+/* Sets a worker's floating-point environment to the default. Moves a worker that runs on the core of the region's first
+ * thread to another core. */
 void region_enter(void);
 
 /* Restores a worker's own floating-point environment. */

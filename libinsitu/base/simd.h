@@ -3,9 +3,9 @@
  * a define it is plain C with the compiler's generic vectors (4 lanes), which is the reference and runs on any machine.
  *
  * Arithmetic (+ - * /) and comparison are the compiler's own operations on vector types. All of them are exact in the
- * sense of IEEE and never fused (-ffp-contract=off), so that all instruction sets give the same bits. The exceptions
- * are vf_muladd(), which is fused if the hardware supports that, and vf_diff_of_products(), which has two
- * implementations, each with an error of at most 1.5 units in the last place.
+ * sense of IEEE and never fused (-ffp-contract=off), so that the results are bit-identical for all instruction sets.
+ * The exceptions are vf_muladd(), which is fused if the hardware supports that, and vf_diff_of_products(), which has
+ * two implementations, each with an error of at most 1.5 units in the last place.
  *
  * GNU C has no vector ?: outside C++, hence vf_select(). Masks are 16 bits on AVX-512, and integer lanes of 0 and -1
  * otherwise: always use the vm_* functions. */
@@ -38,8 +38,8 @@ typedef __mmask16 vm;
 typedef vi vm;
 #endif
 
-/* Returns a vector with x in all lanes. (vf){0} + x would be wrong: compilers may not remove this addition, which turns
- * -0 into 0. */
+/* Returns a vector with x in all lanes. The expression (vf){0} + x would be wrong, because this addition turns -0 into
+ * 0, and compilers may therefore not remove it. */
 SIMD_INLINE vf vf_set(float x)
 {
 #if defined(SIMD_AVX512)
@@ -288,7 +288,7 @@ SIMD_INLINE vf vf_select(vm m, vf a, vf b)
 {
     return (vf)(((vi)a & m) | ((vi)b & ~m));
 }
-/* Return b if either value is NaN, as on x86. */
+/* vf_min() and vf_max() return b if either value is NaN, like the instructions of x86. */
 SIMD_INLINE vf vf_min(vf a, vf b)
 {
     return vf_select(vf_lt(a, b), a, b);
@@ -359,7 +359,7 @@ SIMD_INLINE vf vf_permute(vf v, vi index)
 #endif
 }
 
-/* Returns elements of first or second per lane: an index of SIMD_WIDTH or more selects from second. */
+/* Returns per lane first[index], or second[index - SIMD_WIDTH] if the index is SIMD_WIDTH or more. */
 SIMD_INLINE vf vf_permute_pair(vf first, vf second, vi index)
 {
 #if defined(SIMD_AVX512)
@@ -388,15 +388,15 @@ SIMD_INLINE void vf_gather_pair(const float *base, vi index, vf *first, vf *seco
 #endif
 }
 
-/* Stores indices in an array for scalar loads. Without this function compilers extract each index from the vector,
- * which takes two instructions per lane. */
+/* Stores indices in an array for scalar loads. Without this function, compilers extract every index from the vector
+ * separately, with two instructions per lane. */
 SIMD_INLINE void vi_store(int32_t out[SIMD_WIDTH], vi a)
 {
     memcpy(out, &a, sizeof a);
     __asm__("" : "+m"(*(int32_t(*)[SIMD_WIDTH])out));
 }
 
-/* Transposes the 4 × 4 matrix that each group of four lanes of the four vectors forms. */
+/* Each group of four lanes of the four vectors forms a 4 × 4 matrix; transposes these matrices. */
 SIMD_INLINE void vf_transpose(vf v[4])
 {
 #if defined(SIMD_AVX512)
@@ -445,8 +445,8 @@ SIMD_INLINE vf vf_load_quarters(const float *base, const int32_t *index)
 #endif
 }
 
-/* Gathers base[index + n] into out[n], for n from 0 to 3. Rows of four are loaded whole and transposed, which takes
- * fewer instructions than gathering their columns. */
+/* Gathers base[index + n] into out[n], for n from 0 to 3. Loads each row of four floats with one instruction and
+ * transposes the rows, because gathering the columns takes more instructions. */
 SIMD_INLINE void vf_gather_rows(const float *base, const int32_t index[SIMD_WIDTH], vf out[4])
 {
     for (int n = 0; n < 4; n++) out[n] = vf_load_quarters(base, index + n);
@@ -456,7 +456,8 @@ SIMD_INLINE void vf_gather_rows(const float *base, const int32_t index[SIMD_WIDT
 /* A vector of doubles with half as many lanes as a vf, so that two such vectors correspond to one vf. */
 typedef double vd __attribute__((vector_size(SIMD_WIDTH * 4)));
 
-/* Gathers doubles at base + index, in units of float32, for one half of the lanes. */
+/* Gathers one double from the address base + index for each lane of one half, 0 or 1. Indices count floats, not
+ * doubles. */
 SIMD_INLINE vd vd_gather(const float *base, vi index, int half)
 {
 #if defined(SIMD_AVX512)
@@ -526,7 +527,8 @@ SIMD_INLINE void vd_select(vm m, const vd a[2], const vd b[2], vd out[2])
 
 #endif
 
-/* Stores the lanes of v that are set in m successively and returns their number. There must be space for all lanes. */
+/* Stores the lanes of v that are set in m one after the other, and returns their number. `to` must have space for all
+ * lanes. */
 SIMD_INLINE int vf_compress(float *to, vm m, vf v)
 {
 #if defined(SIMD_AVX512)
@@ -600,8 +602,8 @@ SIMD_INLINE vm vm_sign(vi a)
 #endif
 }
 
-/* Return the minimum and maximum of single numbers by the rule of vf_min() and vf_max(), which return b if either value
- * is NaN. fminf() is not used, because it treats NaN differently and takes more than one instruction. */
+/* simd_min() and simd_max() return the minimum and maximum of two numbers by the rule of vf_min() and vf_max(): b if
+ * either number is NaN. fminf() is not used, because it treats NaN differently and takes more than one instruction. */
 SIMD_INLINE float simd_min(float a, float b)
 {
     return a < b ? a : b;

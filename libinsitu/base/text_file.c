@@ -22,7 +22,7 @@ void c_locale_leave(c_locale *numbers)
 
 /* ---- texts in memory ------------------------------------------------------------------------------------------- */
 
-/* Ensures that there is space for `more` more bytes and a NUL. */
+/* Ensures that there is space for `more` further bytes and a NUL. Returns false if memory has run out. */
 static bool reserve_bytes(text_output *out, size_t more)
 {
     if (out->is_incomplete) return false;

@@ -29,14 +29,14 @@ void text_print(text_output *out, const char *format, ...) __attribute__((format
 
 typedef void text_writer(text_output *out, const void *what);
 
-/* Replaces a file as file_replace() does; its text is the output of write(), with numbers in the C locale. */
+/* Replaces a file as file_replace() does by the text that write() produces, with numbers in the C locale. */
 bool text_file_replace(const char *path, text_writer *write, const void *what, file_failure *failure);
 
-/* Appends the output of write() to a file, like file_append(), with numbers in the C locale. */
+/* Appends the text that write() produces to a file, as file_append() does, with numbers in the C locale. */
 bool text_file_append(const char *path, text_writer *write, const void *what, file_failure *failure);
 
-/* Keeps only lines that start with an integer below `number`, and moves them to the start of the text. Returns the
- * number of bytes of the kept lines. An incomplete last line is removed. */
+/* Keeps only the lines that start with an integer below `number`, and moves them to the start of the text. Returns the
+ * number of bytes of the kept lines. If the text ends without a newline, its last line is incomplete and is removed. */
 size_t text_keep_below(char *text, long long number);
 
 #endif

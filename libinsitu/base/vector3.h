@@ -17,7 +17,7 @@ static inline void vector3_cross(const double a[3], const double b[3], double ou
     out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-/* Returns the length of v, which is correct even if squares overflow. */
+/* Returns the length of v. The result is correct even if the squares of the components overflow. */
 static inline double vector3_length(const double v[3])
 {
     return hypot(hypot(v[0], v[1]), v[2]);

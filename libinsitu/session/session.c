@@ -1,5 +1,5 @@
 /* Defines the public calls except insitu_step(): they create and destroy a session, and store the caller's input. Each
- * phase of the creation that may fail on one rank alone ends with an agreement of all ranks, so that a session is
+ * phase of the creation that may fail on only some ranks ends with an agreement of all ranks, so that a session is
  * created on all ranks or on none. */
 #include "session.h"
 
@@ -17,8 +17,8 @@ static _Thread_local base_error thread_error;
 /* Report that is returned while a fill function runs, since the step's report is incomplete then. */
 static const insitu_report no_report = {.schedule = "", .copied_why = "", .left_out = "", .warnings = "", .pieces = ""};
 
-/* Returns whether a fill function is running, in which the call is not allowed; the error is then recorded. Recording
- * the error is the only change of the session, for which const is cast away. */
+/* Returns whether the call is refused because a fill function is running. In this case the error is recorded in the
+ * session. The cast removes const, because recording the error is the only change of the session. */
 static bool is_in_fill(const insitu_session *session, const char *call)
 {
     return session_refuse_in_fill(&((insitu_session *)(uintptr_t)session)->meshes, call);
@@ -147,7 +147,7 @@ insitu_status insitu_create_fortran(MPI_Fint comm, const char *scene, int is_tex
     return is_text ? insitu_create_from_text(of_c, scene, out) : insitu_create(of_c, scene, out);
 }
 
-/* Stores the error of a failed call, and returns its status. A successful call does not clear the message of the last
+/* Stores the error of a failed call, and returns its status. A successful call does not clear the message of an earlier
  * failed call; the next step clears it. */
 static insitu_status store_error(insitu_session *session, const base_error *error)
 {

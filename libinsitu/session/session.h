@@ -1,5 +1,5 @@
 /* Defines the parts of a session. The code of each part uses only those parts whose headers it includes, and a function
- * gets as parameters only the parts that it may access. The public calls, the step and its first reduction alone access
+ * gets as parameters only the parts that it may access. Only the public calls, the step and its first reduction access
  * the whole session. */
 #ifndef SESSION_SESSION_H
 #define SESSION_SESSION_H
@@ -43,8 +43,8 @@ struct insitu_session {
     session_events events;
     session_report report;
     bool has_stepped;
-    double last_time; /* time of the last step */
-    base_error error; /* error of the last call that failed since the last step began */
+    double last_time; /* time of the most recent step */
+    base_error error; /* error of the most recent call that has failed since the most recent step began */
 };
 
 #endif

@@ -39,7 +39,7 @@ enum change_word {
     CHANGE_WORDS
 };
 
-/* Exceeds every rank; used to pack a rank and another number into one word. */
+/* Larger than any rank number. A rank r and a number n are packed into one word as n * rank_limit + r. */
 static const int64_t rank_limit = (int64_t)1 << 32;
 
 static int64_t bits_from_double(double value)

@@ -1,4 +1,4 @@
-/* Determines what has changed on any rank since the last step, and whether the ranks' input is consistent. */
+/* Determines what has changed on any rank since the previous step, and whether the ranks' input is consistent. */
 #ifndef SESSION_CHANGES_H
 #define SESSION_CHANGES_H
 
@@ -10,8 +10,9 @@ typedef struct session_changes {
     int64_t cycle, lowest_cycle;
     double time;     /* time of the step on rank 0 */
     int failed_rank; /* lowest rank on which an insitu_set_*() call has failed; -1: none */
-    /* each is true if, on some rank, the scene file was edited, cells or coordinates have changed, or names of meshes
-     * or fields have changed, respectively */
+    /* each is set if the change has happened on some rank. is_scene_changed: the scene file was edited;
+     * are_cells_changed: cells or coordinates have changed; are_names_changed: names of meshes or fields have
+     * changed. */
     bool is_scene_changed, are_cells_changed, are_names_changed;
     bool are_levels_changed;     /* set if blocks with levels of refinement have changed on some rank */
     bool are_names_shared;       /* set if all ranks have the same tables of names */

@@ -1,7 +1,7 @@
-/* Reads the scene. Rank 0 reads the file, or is given its text, and all ranks parse the same text, so that all have the
- * same scene without exchanging its structs. If the file is edited while the simulation runs, the next step reads it
- * again. If the edited text cannot be parsed, the old scene is kept, and reports contain a warning until the file is
- * corrected. */
+/* Reads the scene. Rank 0 reads the file, or the caller gives rank 0 the text. All ranks parse the same text, so that
+ * all have the same scene without exchanging its structs. If the file is edited while the simulation runs, the next
+ * step reads it again. If the edited text cannot be parsed, the old scene is kept, and reports contain a warning until
+ * the file is corrected. */
 #include "session_scene_file.h"
 
 #include <string.h>
@@ -82,8 +82,8 @@ static insitu_status broadcast_attachments(const session_team *team, scene_attac
     return status;
 }
 
-/* Parses the scene on all ranks. Rank 0 parses first and reads the files that the scene names; the other ranks parse
- * the same text and files, which rank 0 sends to them. */
+/* Parses the scene on all ranks. Rank 0 parses first and reads the files that the scene names. It then sends the text
+ * and the files to the other ranks, and they parse these. */
 static insitu_status parse_on_all_ranks(const char *path, const session_team *team, scene_file_text *text, scene *out,
                                         base_error *error)
 {

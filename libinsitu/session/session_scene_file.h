@@ -1,5 +1,5 @@
-/* Holds the scene of a session. The scene is read from a file, and read again if the file is edited, or is given as
- * text. */
+/* Holds the scene of a session. The caller gives the scene as text or as a file. A file is read again when it has been
+ * edited. */
 #ifndef SESSION_SCENE_FILE_H
 #define SESSION_SCENE_FILE_H
 
@@ -12,7 +12,7 @@ typedef struct session_scene_file {
     char *path;        /* path of the file, the same on every rank; SESSION_SCENE_TEXT if the scene was given as text */
     bool is_text;      /* set on rank 0 if the scene was given as text, so that no file can be edited */
     scene scene;       /* the parsed scene, the same on every rank */
-    char *warning;     /* reason why the last edit of the file was refused; NULL if it was accepted */
+    char *warning;     /* reason why the most recent edit of the file was refused; NULL if it was accepted */
     bool has_stamp;    /* set on rank 0 if `stamp` is valid */
     struct stat stamp; /* state of the file (stat()) when it was last read; valid if has_stamp is set */
 } session_scene_file;

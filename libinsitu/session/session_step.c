@@ -41,7 +41,7 @@ static double milliseconds_since(double start)
     return 1e3 * (MPI_Wtime() - start);
 }
 
-/* Reads the edited scene, and frees everything that was created for images of the old one. If the new scene divides
+/* Reads the edited scene, and frees all data that was created for images of the old scene. If the new scene divides
  * cells of higher order into other pieces, cells are marked as changed. */
 static void reload_scene(insitu_session *s, session_changes *changes)
 {
@@ -138,7 +138,8 @@ static insitu_status name_derived(insitu_session *s, base_error *error)
 }
 
 /* Updates the catalogue of all ranks' meshes and fields if names are new, adds the derived fields to it, and creates
- * the mesh groups (session_mesh_groups.h). An error of the latter is only stored in *error. Collective. */
+ * the mesh groups (session_mesh_groups.h). If creating the groups fails, the error is only stored in *error.
+ * Collective. */
 static insitu_status list_meshes(insitu_session *s, bool are_names_new, bool is_shared, base_error *error)
 {
     insitu_status status = INSITU_OK;
@@ -148,8 +149,8 @@ static insitu_status list_meshes(insitu_session *s, bool are_names_new, bool is_
     return status;
 }
 
-/* Warps and mirrors the meshes for which the scene requests it. *are_cells_changed is set to true if this changes cells
- * or coordinates on any rank. Collective. */
+/* Warps and mirrors the meshes for which the scene requests it. *are_cells_changed is set if this changes cells or
+ * coordinates on any rank. Collective. */
 static insitu_status transform_meshes(insitu_session *s, bool *are_cells_changed, base_error *error)
 {
     const scene *scene = &s->scene_file.scene;

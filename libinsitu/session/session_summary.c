@@ -1,4 +1,5 @@
-/* Computes the bytes and counts of the report at the end of a step, instead of tracking them during the step. */
+/* Computes the sizes and counts of the report. They are computed at the end of a step, instead of being tracked during
+ * the step. */
 #include "session_summary.h"
 
 #include <stdarg.h>
@@ -49,8 +50,8 @@ static int64_t patch_bytes(const insitu_field *field)
     return bytes;
 }
 
-/* Maximum number of reasons for which a mesh's data is copied, and maximum size of a reason's text. The bytes of a
- * mesh's blocks are added up per reason. */
+/* MOST_REASONS: maximum number of reasons for which data of a mesh is copied; REASON_SIZE: maximum size of a reason's
+ * text in bytes. For each reason, the bytes of all blocks of a mesh are added up. */
 enum { MOST_REASONS = 24, REASON_SIZE = 512 };
 
 typedef struct copied_reasons {
@@ -220,7 +221,8 @@ static int64_t count_tree_cells(const session_mesh *mesh)
                                    : mesh->tree.cell_count;
 }
 
-/* Reports the fields that no image uses. All blocks of a mesh have the same fields, and each field is reported once. */
+/* Reports the data of a mesh that pictures leave out: fields and meshes that no image uses, and cells that trees do not
+ * contain. All blocks of a mesh have the same fields, and each field is reported one time. */
 static void report_left_out(session_report *out, const session_parts *parts)
 {
     const session_mesh *first = parts->items[0];

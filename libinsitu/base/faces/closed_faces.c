@@ -113,7 +113,8 @@ void closed_edges_empty(closed_faces *c)
     for (int i = 0; i < 2 * c->table_size; i++) c->edges[i].low = -1;
 }
 
-/* Orients the faces that can be reached across edges from the first face consistently with it. */
+/* Orients all faces that are connected with the face `first` by shared edges, so that they are consistent with it.
+ * These faces are one piece of the surface; its number is stored for each of them. */
 static void orient_piece(closed_faces *c, int first)
 {
     int height = 0;
@@ -196,7 +197,7 @@ bool closed_face_is_patch(const closed_faces *c, int face, const double (*positi
 
 /* ---- outward orientation ----------------------------------------------------------------------------------------- */
 
-/* Returns six times the volume of the tet of the triangle v and the centre. The sign depends on the direction in
+/* Returns six times the volume of the tet between the triangle v and the centre. The sign depends on the direction in
  * which the three vertices run. */
 static double tet_volume(const double (*p)[3], const int *v, const double *centre)
 {
@@ -229,8 +230,8 @@ static bool is_crossed_below(const double *const t[3], const double *p)
     return t[0][0] - (n[1] * (p[1] - t[0][1]) + n[2] * (p[2] - t[0][2])) / n[0] < p[0];
 }
 
-/* Returns whether a connected piece of the surface lies inside an odd number of other pieces. The test ray starts at
- * the piece's vertex of smallest x, so that the ray cannot cross the piece itself. */
+/* Returns whether a connected piece of the surface is the boundary of a cavity, because it lies inside an odd number of
+ * other pieces. The test ray starts at the piece's vertex of smallest x, so that it cannot cross the piece itself. */
 static bool is_cavity(const closed_faces *c, const double (*positions)[3], int piece)
 {
     int smallest = c->vertex_count;

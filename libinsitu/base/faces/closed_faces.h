@@ -1,10 +1,11 @@
-/* The faces of one polyhedron. Its vertices are numbered, and its faces are oriented consistently, cut into triangles
- * and oriented outward.
+/* Reads the faces of one polyhedron, numbers its vertices from 0, orients its faces consistently, cuts them into
+ * triangles, and orients them outward.
  *
  * The result does not depend on how the caller's mesh lists the faces: they may begin at any vertex and run in either
- * direction. Faces that share an edge are oriented so that they run along it in opposite directions, one connected
- * piece of the surface after the other (a cell with a cavity has more than one piece). The sign of the sum of a piece's
- * volumes then gives its outward direction, and a piece inside an odd number of other pieces is reversed. */
+ * direction. Faces that share an edge are oriented so that they run along it in opposite directions. The faces that are
+ * connected by shared edges form a piece of the surface; a cell with a cavity has more than one piece, and each is
+ * oriented separately. The sign of the sum of a piece's tet volumes then shows whether the piece is oriented outward. A
+ * piece inside an odd number of other pieces bounds a cavity and is oriented the opposite way. */
 #ifndef BASE_CLOSED_FACES_H
 #define BASE_CLOSED_FACES_H
 
@@ -21,14 +22,14 @@ typedef struct closed_triangle {
     double volume;
 } closed_triangle;
 
-/* An edge of the polyhedron, with the sides (see closed_faces) that run along it. */
+/* An edge of the polyhedron. Each face at the edge has one side (see closed_faces) that runs along it. */
 typedef struct closed_edge {
     int low, high; /* numbers of the two vertices; low is -1 in an unused entry */
-    int side[2];   /* entries at which the sides along the edge begin; -1: there is no such side */
+    int side[2];   /* entries at which the two faces' sides along the edge begin; -1: there is no such face */
 } closed_edge;
 
-/* The faces of a polyhedron as lists of entries. An entry is a vertex of a face; a side connects an entry with the next
- * entry of the face. */
+/* The faces of a polyhedron as lists of entries. An entry is one vertex in the list of one face. A side is the part of
+ * a face's boundary from one entry to the next entry of the face. Its number is the number of its first entry. */
 typedef struct closed_faces {
     int face_count, entry_count, vertex_count, triangle_count, piece_count, table_size;
     int *first_entries;  /* first entry of each face; face_count + 1 elements */
@@ -62,14 +63,14 @@ size_t closed_faces_lay_out(closed_faces *c, char *memory);
  * single vertex has no entries. */
 void closed_faces_read(closed_faces *c, const grid *g, int64_t cell);
 
-/* Orients the faces of each piece consistently with the first face in the list. */
+/* Orients the faces of each connected piece consistently with the first face of the piece in the list. */
 void closed_faces_orient(closed_faces *c);
 
 /* Cuts the faces into triangles (polygon.h). positions are indexed by vertex number. A triangle that has the same
  * vertex at two corners has no area and is left out. */
 void closed_faces_triangulate(closed_faces *c, const double (*positions)[3]);
 
-/* Computes the volumes of the triangles, and orients the pieces outward. */
+/* Computes the volumes of the tets between the triangles and the centre, and orients the pieces outward. */
 void closed_faces_orient_outward(closed_faces *c, const double (*positions)[3], const double centre[3]);
 
 /* Returns whether the face is intersected as a bilinear patch: it has four vertices, and none of its corners is
@@ -77,7 +78,7 @@ void closed_faces_orient_outward(closed_faces *c, const double (*positions)[3], 
 bool closed_face_is_patch(const closed_faces *c, int face, const double (*positions)[3]);
 
 /* closed_edges_empty() clears the hash table of edges. closed_edges_find() returns the index of the edge between two
- * vertices, which is added without sides if it is new. */
+ * vertices. If the edge is not in the table, it is added, as yet without adjacent faces. */
 void closed_edges_empty(closed_faces *c);
 int closed_edges_find(closed_faces *c, int a, int b);
 

@@ -94,8 +94,8 @@ static bool scale_positions(polygon_work *w, const double (*p)[3])
 
 /* ---- fans ----------------------------------------------------------------------------------------------------- */
 
-/* Returns whether the polygon can be cut into a fan from its first corner. *normal: the polygon's normal, whose length
- * is twice the area. */
+/* Returns whether the polygon can be cut into a fan from its first corner. `normal` receives the polygon's normal; its
+ * length is twice the polygon's area. */
 static bool is_fan(const polygon_work *w, double normal[3])
 {
     double area[3];
@@ -160,7 +160,7 @@ static void project_to_plane(polygon_work *w, const double normal[3])
     }
 }
 
-/* Returns twice the area of a triangle, which is positive if the triangle runs counterclockwise. */
+/* Returns twice the signed area of a triangle: it is positive if the triangle runs counterclockwise. */
 static double triangle_area(const polygon_work *w, int a, int b, int c)
 {
     const double *p = w->projection[a], *q = w->projection[b], *r = w->projection[c];
@@ -173,8 +173,8 @@ static bool are_coincident(const polygon_work *w, int a, int b)
     return p[0] == q[0] && p[1] == q[1] && p[2] == q[2];
 }
 
-/* Returns whether an edge at the corner `again` leads into the angle between the edges at the corner `tip`, which has
- * the same position. a and c are the neighbours of `tip`. */
+/* The corners `again` and `tip` have the same position. Returns whether an edge at `again` leads into the angle between
+ * the edges from `tip` to its neighbours a and c. */
 static bool enters_corner(const polygon_work *w, int a, int tip, int c, int again)
 {
     const int ends[2] = {w->previous[again], w->next[again]};
@@ -213,8 +213,8 @@ static int find_ear(const polygon_work *w, int first)
     return -1;
 }
 
-/* Tests all corners again and returns an ear. A corner may have become an ear because another one, which was inside its
- * triangle, has been cut off. */
+/* Tests all remaining corners for ears again, and returns an ear or -1. Cutting off a corner can turn another corner
+ * into an ear if the first one was inside the triangle of the other. */
 static int find_ear_again(polygon_work *w, int first)
 {
     int i = first;
@@ -223,7 +223,7 @@ static int find_ear_again(polygon_work *w, int first)
     return find_ear(w, first);
 }
 
-/* Returns a corner that is collinear with its two neighbours. */
+/* Returns a corner that is collinear with its two neighbours, or -1 if there is none. */
 static int find_collinear_corner(const polygon_work *w, int first)
 {
     int i = first;

@@ -123,7 +123,7 @@ static void add_picture(table_line *line, const scene_image *image, const scene_
 
 /* ---- tables ---------------------------------------------------------------------------------------------------- */
 
-/* Removes the lines of this cycle and of later ones from the table. */
+/* Removes the lines of the cycle `cycle` and of later cycles from the table. */
 static void drop_lines_from_cycle(session_table *t, int64_t cycle)
 {
     const char *end = t->size ? memchr(t->text, '\n', t->size) : NULL;
@@ -132,7 +132,7 @@ static void drop_lines_from_cycle(session_table *t, int64_t cycle)
     t->size = header + text_keep_below(t->text + header, cycle);
 }
 
-/* Copies the lines of the folder's existing table that belong to cycles before `cycle`. */
+/* Copies those lines of the table file in the folder that belong to cycles before `cycle`. */
 static insitu_status copy_earlier_lines(session_table *t, const file_content *old, int64_t cycle, base_error *error)
 {
     const scene_database *database = t->database;
@@ -237,7 +237,7 @@ static void write_script_line(text_output *out, const char *line, size_t size)
     }
 }
 
-/* Writes data.js: a call of a function of the page, whose argument is the list of the lines as strings. */
+/* Writes data.js: a call of the page's function cinemaTable() with an array of strings, one per line of the table. */
 static void write_script(text_output *out, const void *what)
 {
     const session_table *t = what;

@@ -1,8 +1,10 @@
-/* Cinema databases of Spec D, which are folders of pictures. The session writes three more files to each folder.
+/* Writes Cinema databases of Spec D. A database is a folder of pictures. The session writes three more files to the
+ * folder.
  *
- * data.csv is the table: a line of column names, then one line per picture, with its parameters first and its file
- * last. data.js contains the same lines as a script, because a browser lets a page that was opened from a disk load
- * scripts, but not read other files. index.html is a page that shows the pictures listed in data.js.
+ * data.csv is the table: a line of column names, then one line per picture, with its parameters in the first columns
+ * and its file in the final column. data.js contains the same lines as a script, because a browser lets a page that was
+ * opened from a disk load scripts, but not read other files. index.html is a page that shows the pictures listed in
+ * data.js.
  *
  * A table is kept in memory and written as a whole at the end of each step that adds a line. It is written to a new
  * file that then replaces the old one, so that the file is complete even if the run is killed. A line has about 60
@@ -39,8 +41,9 @@ typedef struct session_cinema {
 /* Stores the first cycle: that of the session's first step, or of the first step after the scene was edited. Local. */
 void session_begin_cinema(session_cinema *cinema, int64_t cycle);
 
-/* Adds a line for a picture that was written for an output with a database. If the run has gone back to an earlier
- * cycle, the lines of this cycle and later cycles are removed. Local. */
+/* Adds a line for a picture that was written for an output with a database. If the picture's cycle is not later than
+ * that of the table's final line, the run has gone back, and the lines of this cycle and of later cycles are removed
+ * first. Local. */
 insitu_status session_record_picture(session_cinema *cinema, const scene *scene, const scene_image *image,
                                      const scene_output *output, const scene_placeholder_values *moment,
                                      base_error *error);

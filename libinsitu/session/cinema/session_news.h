@@ -1,10 +1,10 @@
 /* Writes report.json into each database of the scene. The file contains the state of a run for programs that observe
- * the run, such as insitu-view: the last step's cycle, time and error, the scene's state with the error of its last
- * edit, the scene's parameters, and the last warnings (docs/live.md).
+ * the run, such as insitu-view: the cycle, time and error of the most recent step, the scene's state with the error of
+ * its most recent edit, the scene's parameters, and the most recent warnings (docs/live.md).
  *
- * Rank 0 composes the text at the end of a step that has warnings or errors, or has drawn pictures. The writing
- * thread writes the file after the step's pictures. The file is not written to a database whose folder does not
- * exist yet, which is the case before its first picture. */
+ * Rank 0 composes the text at the end of a step that has warnings or errors, or has drawn pictures. The writing thread
+ * writes the file after the step's pictures. Before the first picture of a database is written, its folder does not
+ * exist, and the file is not written to it. */
 #ifndef SESSION_NEWS_H
 #define SESSION_NEWS_H
 
@@ -25,7 +25,7 @@ typedef struct session_news {
     /* text of warning i, at index i % SESSION_NEWS_LINES; NULL: there was no memory for the text */
     char *lines[SESSION_NEWS_LINES];
     int64_t cycles[SESSION_NEWS_LINES]; /* cycle in which the warning at this index was added */
-    /* error of the last step that has failed or has drawn pictures; empty if that step had no error */
+    /* error of the most recent step that has failed or has drawn pictures; empty if that step had no error */
     base_error error;
 } session_news;
 
@@ -36,7 +36,7 @@ typedef struct session_news_scene {
     /* state of the file when it was last read, whether it was accepted or not; NULL: there is no file */
     const struct stat *stamp;
     const char *pieces;  /* insitu_report.pieces; NULL: the report has no such text */
-    const char *refusal; /* reason why the last edit of the scene was refused; NULL: it was accepted */
+    const char *refusal; /* reason why the most recent edit of the scene was refused; NULL: it was accepted */
 } session_news_scene;
 
 /* Stores a step's error and its warnings. Must be called before the step's warnings include the error of a refused

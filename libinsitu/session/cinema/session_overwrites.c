@@ -5,8 +5,8 @@
 #include "memory.h"
 #include "session_hash.h"
 
-/* Computes a hash of a path that ignores "./" and repeated slashes, so that different paths to the same file have equal
- * hashes. The result is never 0. */
+/* Computes a hash of a path. The components "." and repeated slashes are ignored, so that different paths to the same
+ * file have equal hashes. The result is never 0. */
 static uint64_t hash_path(const char *path)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
@@ -38,8 +38,8 @@ static const scene_image *find_image_with_output(const scene *scene, int output)
     return &scene->images[image];
 }
 
-/* Returns the index of the output whose last picture was written to this file, or -1 if there is none. A picture of the
- * same output at the same cycle is ignored, because the step was repeated in that case. */
+/* Returns the index of the output that has most recently written to this file, or -1 if there is none. A picture that
+ * the output `output` itself wrote at the same cycle is ignored, because the step was repeated in that case. */
 static int find_last_writer(const session_overwrites *all, uint64_t file, int output, long long cycle)
 {
     for (int i = 0; i < all->count; i++)
@@ -47,7 +47,7 @@ static int find_last_writer(const session_overwrites *all, uint64_t file, int ou
     return -1;
 }
 
-/* Returns the last part of the warning, which advises how to avoid the overwriting. */
+/* Returns the advice at the end of the warning: how to avoid the overwriting. */
 static const char *overwrite_advice(const scene_image *image, const scene_image *before, bool is_same_output)
 {
     if (is_same_output) return "put {cycle} into its path to keep a picture of each step";

@@ -8,7 +8,7 @@
 #include "scene.h"
 #include "session_report.h"
 
-/* The last picture that an output has written. */
+/* The picture that an output has written most recently. */
 typedef struct session_written {
     uint64_t file; /* hash of the picture's path; 0: no picture has been written yet */
     long long cycle;
@@ -16,7 +16,7 @@ typedef struct session_written {
 
 typedef struct session_overwrites {
     int count;                   /* number of outputs of the scene, over all views, isovalues and fields */
-    session_written *last_files; /* for each output, the last picture that it has written */
+    session_written *last_files; /* for each output, the picture that it has written most recently */
 } session_overwrites;
 
 /* Records the files that the image with this index has written at this cycle and time. If a path was already used for

@@ -17,7 +17,7 @@ int session_share_of_cores(const int32_t *may_run, const int32_t *rank_counts, i
     double share = 0;
     for (int k = 0; k < cores; k++)
         if (may_run[k]) share += 1 / (double)rank_counts[k];
-    share += 1e-6; /* rounding may make the sum of eight eighths slightly less than one */
+    share += 1e-6; /* added because rounding can make the sum of eight eighths slightly less than one */
     return share > 1 ? (int)share : 1;
 }
 

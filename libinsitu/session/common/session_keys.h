@@ -5,13 +5,13 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Key of a vertex, which is a global id, or the bits of three coordinates. Vertices with equal keys are treated as the
+/* Key of a vertex: its global id, or the bits of its three coordinates. Vertices with equal keys are treated as the
  * same vertex. */
 typedef struct session_key {
     uint64_t words[3];
 } session_key;
 
-/* Mixes the bits of a word, so that each of them affects all bits of the result. */
+/* Mixes the bits of a 64-bit number, so that each bit of x affects all bits of the result. */
 static inline uint64_t session_mix_bits(uint64_t x)
 {
     x += 0x9e3779b97f4a7c15u;
@@ -22,7 +22,7 @@ static inline uint64_t session_mix_bits(uint64_t x)
 
 uint64_t session_key_hash(const session_key *key);
 
-/* A hash table of keys, which are numbered 0, 1, ... in the order of their first appearance. */
+/* A hash table of keys. The keys are numbered 0, 1, ... in the order of their first appearance. */
 typedef struct session_key_table {
     session_key *keys; /* array of `count` keys */
     int64_t count;
@@ -32,8 +32,8 @@ typedef struct session_key_table {
 
 /* Creates a table with space for `most` keys. Returns false if memory runs out; then there is nothing to free. */
 bool session_keys_create(session_key_table *table, int64_t most);
-/* Finds the key's number. session_keys_find() returns -1 if the key is missing; session_keys_add() adds it in this
- * case. */
+/* session_keys_find() returns the number of a key, or -1 if the table does not contain the key. session_keys_add() adds
+ * the key in this case and returns its new number. */
 int64_t session_keys_find(const session_key_table *table, const session_key *key);
 int64_t session_keys_add(session_key_table *table, const session_key *key);
 void session_keys_free(session_key_table *table);

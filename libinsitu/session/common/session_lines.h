@@ -6,15 +6,15 @@
 #include "session_report.h"
 #include "session_team.h"
 
-/* Returns a number that the ranks reduce by maximum. From the result, session_reporting_rank() determines the lowest
- * rank that has warnings. Local. */
+/* Encodes whether this rank has warnings as a number. The ranks compute the maximum of these numbers; from the maximum,
+ * session_reporting_rank() determines the lowest rank that has warnings. Local. */
 int session_reporting_word(const session_report *report, const session_team *team);
 /* Returns the lowest rank that has warnings, from the maximum of session_reporting_word() over all ranks; -1 if no rank
  * has warnings. Local. */
 int session_reporting_rank(int word, const session_team *team);
 
-/* Adds the warnings of the rank `root` to the reports of all ranks. Warnings of other ranks, which mostly have the same
- * warnings, are dropped. Collective. */
+/* Adds the warnings of the rank `root` to the reports of all ranks. Warnings of the other ranks are dropped, because
+ * they are mostly the same as those of `root`. Collective. */
 insitu_status session_share_lines(session_report *report, int root, const session_team *team, base_error *error);
 
 #endif

@@ -1,4 +1,4 @@
-/* A warning that has been reported is stored as a hash of its subject, so that it is not reported a second time. */
+/* Each reported warning is stored as a hash of its subject (session_warning), so that it is not reported again. */
 #include "session_report.h"
 
 #include <stdarg.h>
@@ -109,7 +109,7 @@ static uint64_t warning_key(const session_warning *w)
     return key;
 }
 
-/* Returns the index of the first key that is not less than `key`; reported_count if there is none. */
+/* Returns the index of the first key in `reported` that is not less than `key`, or reported_count if all are less. */
 static int find_reported(const session_report *report, uint64_t key)
 {
     int begin = 0, end = report->reported_count;

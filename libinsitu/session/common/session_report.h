@@ -24,9 +24,9 @@ typedef struct session_report {
     insitu_report public_report; /* the report that the caller reads; its texts are set at the end of a step */
     /* texts of the members of insitu_report with these names */
     session_text copied_why, left_out, warnings, pieces;
-    /* warnings of this rank alone, until session_share_lines() sends those of one rank to all ranks */
+    /* warnings that only this rank has found; session_share_lines() sends those of one rank to all ranks */
     session_text own_warnings;
-    /* number of warnings in `reported`, and number for which it has space */
+    /* reported_count: number of warnings in `reported`; reported_capacity: number of warnings for which it has space */
     int reported_count, reported_capacity;
     uint64_t *reported; /* hashes of warnings that were reported and whose condition still holds, in ascending order */
     /* result of session_unusable_key() when warnings of unusable cells were last reported; 0: there were none */
@@ -91,8 +91,8 @@ typedef struct session_warning {
 } session_warning;
 
 /* Adds the warning if its condition holds and it has not been reported yet. session_warn() is for conditions that are
- * the same on every rank. session_warn_locally() is for conditions of one rank, whose warnings are sent to all ranks by
- * session_share_lines(). Local. */
+ * the same on every rank. session_warn_locally() is for conditions that may differ between ranks; session_share_lines()
+ * sends these warnings to all ranks. Local. */
 void session_warn_locally(session_report *report, const session_warning *warning, bool holds, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
 void session_warn(session_report *report, const session_warning *warning, bool holds, const char *format, ...)

@@ -74,7 +74,8 @@ static void create_exit_key(void)
     has_key = pthread_key_create(&key, count_thread_end) == 0;
 }
 
-/* Returns the number of threads that are known to exist for the calling thread. */
+/* Returns the number of threads, including the caller, that exist for parallel regions of the calling thread. Returns 1
+ * if another thread made the previous call or if threads have ended since, because the number is then unknown. */
 static int count_living_threads(const session_threads *threads)
 {
     const bool is_same = threads->count > 0 && pthread_equal(threads->caller, pthread_self());
@@ -149,7 +150,7 @@ static void start_trial_threads(trial *t, int requested)
     /* OpenMP, too, ignores a stack size that the system rejects */
     if (stack) pthread_attr_setstacksize(&attributes, stack);
     sigfillset(&all);
-    /* new threads inherit the blocked signals, so that they never receive the caller's */
+    /* new threads inherit the blocked signals, so that signals sent to the caller's process never reach them */
     pthread_sigmask(SIG_SETMASK, &all, &old);
     while (t->count < requested &&
            pthread_create(&t->threads[t->count], &attributes, wait_at_gate, &t->exit_mutex) == 0)

@@ -17,17 +17,17 @@
  * 99 and 122 kB. The stack frames of AVX-512 kernels are a quarter larger. */
 enum { SESSION_WORKER_STACK = 256 << 10, SESSION_CALLER_STACK = 320 << 10 };
 
-/* The number of threads that exist, or that could be started in a trial, for the caller's thread that made the last
- * call. */
+/* The threads available to the caller's thread that most recently called insitu_step(). They exist already, or could be
+ * started in a trial. */
 typedef struct session_threads {
-    int count; /* number of threads; 0: not tried yet */
+    int count; /* number of threads, including the caller's thread; 0: not tried yet */
     pthread_t caller;
     int64_t ended_count; /* number of threads of any team that had ended when `count` was determined */
 } session_threads;
 
-/* Returns whether this rank requests more threads than the number that it could start in the last trial. scene_threads
- * is the number set in the scene; if it is 0, the rank requests its share of the cores, or OpenMP's maximum if that is
- * lower. Local. */
+/* Returns whether this rank must make a new trial: it requests more threads than are available, another thread of the
+ * caller calls, or threads have ended. scene_threads is the number set in the scene; if it is 0, the rank requests its
+ * share of the cores, or OpenMP's maximum if that is lower. Local. */
 bool session_lacks_threads(const session_threads *threads, int scene_threads, int cores);
 
 /* Determines how many threads can be started, and sets team->threads. Warns if there are fewer than requested. If

@@ -282,7 +282,7 @@ static void write_label(const scene_decorations *scene, int bar, const session_c
     if (unit) snprintf(label + length, size - length, " [%s]", unit);
 }
 
-/* Returns whether an earlier colour bar has the same field, colours and numbers, as happens if several layers show one
+/* Returns whether an earlier colour bar has the same field, colours and ticks. This happens if several layers show one
  * field. */
 static bool is_repeated_bar(const session_decorations *d, int bar)
 {
@@ -305,7 +305,7 @@ typedef struct bar_basis {
     const session_catalogue *catalogue;
 } bar_basis;
 
-/* Adds the colour bar of a layer, unless an earlier bar is equal. */
+/* Adds the colour bar of a layer, unless an equal bar has been added already. */
 static void add_bar(session_decorations *d, const bar_basis *basis, const scene_field *field,
                     const scene_colour_map *map, const session_transfer *transfer)
 {
@@ -356,7 +356,7 @@ static void hash_colours(uint64_t *hash, const float *colours, int count)
     if (colours) session_hash_bytes(hash, colours, 3 * (size_t)count * sizeof *colours);
 }
 
-/* Returns a hash of the words, colours and numbers of all bars. */
+/* Returns a hash of the labels, colours and ticks of all colour bars. */
 static uint64_t hash_bars(const insitu_decorations *d)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
@@ -436,7 +436,7 @@ session_decorations *session_make_decorations(const scene_image *image, const se
     return NULL;
 }
 
-/* Changes the pointers of a copied struct so that they refer to the copy's own members. */
+/* Changes the pointers in a bitwise copy of a struct, so that they refer to the copy's own members. */
 static void redirect_pointers(session_decorations *copy)
 {
     insitu_decorations *const both[2] = {&copy->decorations, &copy->background};

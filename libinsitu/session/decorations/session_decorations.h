@@ -1,5 +1,5 @@
-/* Computes the decorations of an image, which are the texts and lines drawn in addition to its data, in the form that
- * the image library expects. */
+/* Computes the decorations of an image in the form that the image library expects. Decorations are the texts and lines
+ * that are drawn in addition to the image's data. */
 #ifndef SESSION_DECORATIONS_H
 #define SESSION_DECORATIONS_H
 
@@ -27,7 +27,7 @@ typedef struct session_decorations {
     /* buffers for the boxes of the outline and for the lines of the rulers */
     insitu_stroke *strokes;
     insitu_label ruler_labels[SESSION_RULER_LABELS]; /* numbers and axis names along the rulers */
-    uint64_t bars_hash; /* hash of the words, colours and numbers of the bars; equal bars have equal hashes */
+    uint64_t bars_hash; /* hash of the labels, colours and ticks of the colour bars; equal bars have equal hashes */
 } session_decorations;
 
 /* The data from which decorations are computed. */
@@ -40,7 +40,7 @@ typedef struct session_decoration_basis {
     const session_catalogue *catalogue;
 } session_decoration_basis;
 
-/* Returns the decorations of an image, for which the scene must request some. Returns NULL if memory runs out.
+/* Returns the decorations of an image. The scene must request some for this image. Returns NULL if memory runs out.
  * Local. */
 session_decorations *session_make_decorations(const scene_image *image, const session_decoration_basis *basis);
 
@@ -50,8 +50,8 @@ session_decorations *session_copy_decorations(const session_decorations *from);
 /* Frees the decorations. decorations may be NULL. */
 void session_free_decorations(session_decorations *decorations);
 
-/* Computes the edges of a box as seen by the camera; parts behind the eye are clipped away. Returns their number. An
- * edge is marked as behind the box's content if the inner sides of both of its faces are seen. Local. */
+/* Computes the edges of a box as strokes in the picture, and returns their number. Parts behind the eye are clipped
+ * away. An edge is marked as behind the box's content if the camera sees the inner sides of both its faces. Local. */
 int session_box_strokes(const double lower[3], const double upper[3], const render_camera *camera,
                         insitu_stroke strokes[SESSION_BOX_EDGES]);
 

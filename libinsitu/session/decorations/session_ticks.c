@@ -133,7 +133,8 @@ static void add_tick(const session_scale *s, double value, insitu_tick *ticks, i
     (*count)++;
 }
 
-/* Adds ticks at the powers of ten, with the given sign, from the smallest to the largest one in the range. */
+/* Adds ticks at the powers of ten in the range, multiplied by `sign`, and at 2 and 5 times these powers if the choice
+ * includes them. */
 static void add_decades(const session_scale *s, double sign, decade_choice choice, insitu_tick *ticks, int *count)
 {
     const double largest = fmax(fabs(s->low), fabs(s->high));

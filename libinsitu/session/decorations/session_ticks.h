@@ -1,4 +1,4 @@
-/* Computes the ticks of an axis, which are at round numbers. */
+/* Computes the ticks of an axis or of a colour bar. Ticks are at round numbers. */
 #ifndef SESSION_TICKS_H
 #define SESSION_TICKS_H
 
@@ -23,9 +23,9 @@ typedef struct session_scale {
  * distinguish neighbours, unless the scale sets the number of digits. Local. */
 int session_make_ticks(const session_scale *scale, int most, insitu_tick ticks[SESSION_MAX_TICKS]);
 
-/* Does the same as session_make_ticks() for a range that is divided into `bands` bands of equal width. If each band
- * contains one integer of a linear range, as for ids, the ticks are in the centres of the bands, or of every n-th band.
- * Local. */
+/* Computes ticks like session_make_ticks() for a range that is divided into `bands` bands of equal width. If the scale
+ * is linear and each band contains one integer, as for ids, the ticks are in the centres of the bands, or of every n-th
+ * band. Local. */
 int session_make_band_ticks(const session_scale *scale, int bands, int most, insitu_tick ticks[SESSION_MAX_TICKS]);
 
 /* Computes the single tick of a range whose values are all equal, in its middle. Returns 1. Local. */

@@ -1,5 +1,5 @@
 /* Defines constants for the vectorized code for cells: the corners from which a cell's volume is computed, and the
- * first approximation of the cube root of the volume, which is the cell's size. */
+ * first approximation of the volume's cube root. This root is the cell's size. */
 #ifndef SESSION_CORNERS_H
 #define SESSION_CORNERS_H
 

@@ -13,12 +13,12 @@
 #include "session_lanes.h"
 
 enum {
-    BLOCK_CELLS = 512, /* number of cells of a block, whose volumes fit into the first-level cache */
+    BLOCK_CELLS = 512, /* number of cells of a block; their volumes fit into the first-level cache */
     PARTS = LANES / LANE_WIDTH,
     AHEAD = 512 /* prefetch distance in entries of the connectivity, because the hardware prefetches too late */
 };
 
-/* Addresses and strides of the mesh's arrays. They are constant during a run of cells. */
+/* Addresses and strides of the mesh's arrays. They are constant during one call of a lane_run function. */
 typedef struct lane_source {
     const char *connectivity, *ghosts;
     /* for each axis, the address of the coordinate with index 0, which is outside of the array if indices begin at 1 */
@@ -43,7 +43,7 @@ typedef struct lane_bounds {
     doubles lower[3], upper[3];
 } lane_bounds;
 
-/* Sums over the cells, per lane. */
+/* The sums, minimum and count over the cells that each lane has processed. */
 typedef struct lane_sizes {
     doubles sums[PARTS];
     doubles least;         /* smallest absolute volume times the type's volume factor (cell_corners.volume_factor) */
@@ -115,7 +115,7 @@ LANE_INLINE int64_t read_index(const lane_source *s, const char *indices, int i)
     return s->wide_index ? ((const int64_t *)(const void *)indices)[i] : ((const int32_t *)(const void *)indices)[i];
 }
 
-/* Returns whether all indices are valid, which means that neither the index nor (last - index) is negative. */
+/* Returns whether all indices are valid. An index is valid if neither the index nor (last - index) is negative. */
 LANE_INLINE bool are_valid_wide_indices(const int64_t *indices, int count, int64_t base, int64_t last)
 {
     int64_t signs = last;

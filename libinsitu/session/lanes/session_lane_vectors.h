@@ -120,8 +120,8 @@ LANE_INLINE floats floats_max(floats a, floats b)
 #endif
 }
 
-/* Converts floats to doubles. It is not a built-in conversion, because gcc 12 would convert eight floats in two
- * halves. */
+/* Converts floats to doubles. On AVX-512 an intrinsic replaces the built-in conversion, because gcc 12 compiles the
+ * latter to two conversions of four floats each. */
 LANE_INLINE doubles doubles_from_floats(floats v)
 {
 #if defined(__AVX512F__)

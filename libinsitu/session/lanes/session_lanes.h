@@ -1,7 +1,8 @@
-/* Processes cells of one type with vector instructions, eight at a time, when a mesh is checked: tests whether their
- * indices are in range, and computes their bounds, volumes and sizes. This module depends only on grids.
+/* Processes cells of one type with vector instructions, eight cells at a time, when a mesh is checked. It tests whether
+ * the cells' vertex indices are in range, and computes the bounds, volumes and sizes of the cells. This module depends
+ * only on grids.
  *
- * The loops (session_lane_loops.c) are compiled once per instruction set. Sums have the same bits for all instruction
+ * The loops (session_lane_loops.c) are compiled once per instruction set. Sums are bit-identical for all instruction
  * sets: there is one sum for each of the eight lanes, and fused multiply-add instructions are not used. */
 #ifndef SESSION_LANES_H
 #define SESSION_LANES_H
@@ -21,7 +22,7 @@ typedef struct lane_cells {
 
 typedef struct lane_sums {
     double lower[3], upper[3]; /* bounds of the vertices */
-    double least;              /* least absolute volume of a cell */
+    double least;              /* smallest absolute volume of a cell */
     double size_sum;           /* sum of the cube roots of the volumes */
     int64_t inverted_count;    /* number of cells with a negative volume */
 } lane_sums;

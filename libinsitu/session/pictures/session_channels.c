@@ -49,8 +49,8 @@ static insitu_status draw_surface_numbers(const session_frame_target *target, co
     return status;
 }
 
-/* Returns a copy of the job without volumes and clips, in which all surfaces are opaque. `surfaces` is a buffer for the
- * copied surfaces. */
+/* Returns a copy of the job without volumes, in which all surfaces are opaque and a ray is traced through the centre of
+ * every pixel. `surfaces` is a buffer for the copied surfaces. */
 static render_job make_opaque_job(const render_job *job, render_surface_layer *surfaces)
 {
     render_job out = *job;
@@ -67,7 +67,7 @@ static render_job make_opaque_job(const render_job *job, render_surface_layer *s
 
 /* ---- numbers ------------------------------------------------------------------------------------------------- */
 
-/* For each isovalue of the job: the index of its layer in the scene, and its index within the layer. */
+/* For each surface of the job: the number of its layer in the scene, and its index within the layer. */
 typedef struct surface_numbers {
     int count;
     float layer[RENDER_MAX_ISOVALUES], surface[RENDER_MAX_ISOVALUES];
@@ -81,8 +81,8 @@ static void add_surface_numbers(surface_numbers *n, int layer, int surfaces)
     }
 }
 
-/* Lists the numbers of all surfaces of the image. If has_shells is set, each isosurface layer also has contour lines on
- * shells, which are one more surface of the job. */
+/* Lists the layer number and the index within the layer for all surfaces of the image. If has_shells is set, each
+ * isosurface layer also has contour lines on shells, which are one more surface of the job. */
 static surface_numbers number_surfaces(const scene_image *image, bool has_shells)
 {
     surface_numbers out = {0};
@@ -96,7 +96,8 @@ static surface_numbers number_surfaces(const scene_image *image, bool has_shells
     return out;
 }
 
-/* Converts each pixel from (value, number of the isovalue, 0, opacity) to (value, layer, surface). */
+/* Converts each pixel from (value, number of the surface in the job, 0, opacity) to (value, number of the layer, index
+ * of the surface within the layer, opacity). */
 static void convert_surface_numbers(const scene_image *image, bool has_shells, float *values, int threads)
 {
     const surface_numbers numbers = number_surfaces(image, has_shells);

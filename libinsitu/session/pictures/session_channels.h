@@ -1,5 +1,5 @@
-/* Computes the additional channels that an EXR file may contain besides colours and depth: the normal, the value and
- * the numbers of the nearest surface. */
+/* Computes the additional channels that an EXR file may contain besides colours and depth. They describe the nearest
+ * surface at each pixel: its normal, its value, the number of its layer, and its index within the layer. */
 #ifndef SESSION_CHANNELS_H
 #define SESSION_CHANNELS_H
 
@@ -13,7 +13,8 @@
 enum { SESSION_CHANNELS = 6 };
 
 typedef struct session_channels {
-    /* 4 floats per pixel, on rank 0 only; the last float of `values` is the number of the surface */
+    /* 4 floats per pixel, on rank 0 only. normals: the three components of the normal; values: the value, the number of
+     * the layer, and the index of the surface within the layer. The fourth float belongs to no channel. */
     float *normals, *values;
     insitu_channel items[SESSION_CHANNELS];
 } session_channels;

@@ -1,5 +1,5 @@
-/* Determines whether an image needs a deep picture, which stores all samples of each pixel, and manages its memory on
- * rank 0. */
+/* Determines whether an image needs a deep picture, and manages its memory on rank 0. A deep picture stores all samples
+ * of each pixel, sorted by depth. */
 #ifndef SESSION_DEEP_H
 #define SESSION_DEEP_H
 

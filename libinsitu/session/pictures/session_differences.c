@@ -28,15 +28,18 @@ typedef struct difference_exchange {
     const render_job *job;
     render_pending_list *list;
     int rank, ranks;
-    int64_t round_hits, rounds; /* number of hits of this rank per round; number of rounds, the same on all ranks */
-    /* ranks that may have samples for this rank's hits, and the bounding boxes of all ranks' cells */
+    /* round_hits: number of this rank's hits per round; rounds: number of rounds, the same on all ranks */
+    int64_t round_hits, rounds;
+    /* near_ranks: the near_count ranks that may have samples for this rank's hits; boxes: bounding box of each rank's
+     * cells */
     int near_count;
     int *near_ranks;
     render_box *boxes;
-    /* the first hit of the current round, the number of its hits, and their samples */
+    /* first: index of the first hit of the current round; count: number of hits of the round; samples: the samples
+     * around each hit of the round */
     int64_t first, count;
     render_difference_samples *samples;
-    int64_t *requested_hits; /* for each sent request, in the order of the message, the index of its hit in the round */
+    int64_t *requested_hits; /* for each sent request, in the order of the message: index of its hit in the round */
 } difference_exchange;
 
 /* ---- data shared by all ranks -------------------------------------------------------------------------------- */
@@ -69,8 +72,8 @@ static insitu_status share_ranges(difference_exchange *d, base_error *error)
     return INSITU_OK;
 }
 
-/* Lists the ranks whose boxes are near enough to have samples for this rank's hits. Hits lie in this rank's own box, so
- * that the distance of their samples from this box is at most the largest sampling distance. */
+/* Lists the ranks whose boxes are near enough to contain samples for this rank's hits. The hits lie in this rank's own
+ * box, so that the distance of their samples from this box is at most the largest sampling distance. */
 static void keep_near_ranks(difference_exchange *d)
 {
     const render_box *own = &d->boxes[d->rank];
@@ -127,7 +130,8 @@ static bool write_requests(difference_exchange *d, session_mail *out)
     return true;
 }
 
-/* Computes the answers to received requests in *in. The words of a message have the alignment of a request's type. */
+/* Computes the answers to the requests in *in. Requests are read in place, because the words of a message are aligned
+ * for their type. */
 static bool write_answers(const difference_exchange *d, const session_mail *in, session_mail *out, base_error *error)
 {
     const int64_t count = in->total / REQUEST_WORDS;
@@ -141,8 +145,8 @@ static bool write_answers(const difference_exchange *d, const session_mail *in, 
     return true;
 }
 
-/* Exchanges requests and answers with other ranks. If an error occurs on one rank, the next exchange passes it to all
- * ranks. */
+/* Exchanges requests and answers with other ranks. If an error occurs on one rank, the next exchange of messages
+ * reports it to all ranks. */
 static insitu_status exchange_round(difference_exchange *d, base_error *error)
 {
     session_mail sent_requests = {0}, received_requests = {0}, sent_answers = {0}, received_answers = {0};

@@ -8,10 +8,10 @@
 #include "fragment.h"
 #include "render.h"
 
-/* Computes the lighting of the hits in job->waiting, whose normals are not known yet, from the samples of all ranks;
- * adds the hits to the fragments, and frees the list. The time taken is added to *ms. If tracing has failed on this
- * rank, *error contains the error. Collective; all ranks return the same status. An error that occurs on this rank at
- * the very end is only stored in *error, and passed to all ranks in the next phase. */
+/* Computes the normals and the lighting of the hits in job->waiting from the samples of all ranks, adds the hits to the
+ * fragments, and frees the list. The time taken is added to *ms. If tracing has failed on this rank, *error contains
+ * the error. Collective; all ranks return the same status. An error that occurs on this rank after the last exchange of
+ * messages is only stored in *error; the next phase passes it to all ranks. */
 insitu_status session_light_by_differences(MPI_Comm comm, const render_job *job, fragment_list *fragments, double *ms,
                                            base_error *error);
 

@@ -1,6 +1,7 @@
-/* Draws all due images one after the other, frame by frame, and frees the memory of each before the next begins.
+/* Draws all due images one after the other, frame by frame, and frees the memory of each image before the next image
+ * begins.
  *
- * If an error, such as lack of memory, may occur on one rank alone, all ranks agree on a status before the next
+ * If an error, such as lack of memory, may occur on only some ranks, all ranks agree on a status before the next
  * collective call. An image that fails is skipped, and the next one is drawn; the step returns the first error. */
 #include "session_draw.h"
 
@@ -24,14 +25,15 @@
 /* Maximum number of fragments that a rank stores at once for pixels in which cells overlap. They take 64 MiB. */
 enum { overlap_fragments = 1 << 21 };
 
-/* The pictures on rank 0: the current frame, and the sum of frames if there are several. Other ranks only have their
- * size. */
+/* The pictures on rank 0: the current frame, and the sum of the frames if there are several. On other ranks, only the
+ * sizes of the pictures are set. */
 typedef struct canvas {
     image frame;
     /* block that holds the pixels of `frame`; the writer becomes its owner when the picture is passed to it */
     session_picture memory;
     float *depth; /* depth of the first frame, which is kept here while further frames are drawn without depth */
-    /* if only pixels at edges are drawn several times: current frame and sums of frames, for these pixels only */
+    /* If only pixels at edges are drawn several times: samples: the current frame, of which only these pixels are
+     * drawn; edges: numbers of these pixels; edge_sums: sums over the frames for these pixels. */
     image samples;
     int64_t edge_count, *edges;
     double *edge_sums;
@@ -285,8 +287,8 @@ static insitu_status share_edges(frames_basis *b, unsigned char **pixels, base_e
     return session_check_mpi(error, MPI_Bcast(*pixels, (int)bytes, MPI_BYTE, 0, team->comm), "MPI_Bcast");
 }
 
-/* Draws the image's frames, each with other sample positions in the pixels. If only edges are drawn, the job contains
- * only their pixels. */
+/* Draws the image's frames. The sample positions in the pixels differ from frame to frame. If only pixels at edges are
+ * drawn, job->pixels is the set of these pixels. */
 static insitu_status draw_samples(frames_basis *b, const scene_image *image, render_job *job, base_error *error)
 {
     canvas *c = b->canvas;
@@ -301,9 +303,9 @@ static insitu_status draw_samples(frames_basis *b, const scene_image *image, ren
     return status;
 }
 
-/* Draws all frames of an image. If there are no volumes, the picture is drawn once through the pixels' centres, and
- * then several times at edges only. If there are volumes and depth is needed, a frame through the pixels' centres is
- * drawn first, only for its depth. */
+/* Draws all frames of an image. If there are no volumes, one frame is drawn with rays through the pixels' centres, and
+ * then several frames of only the pixels at edges. If there are volumes and depth is needed, a frame with rays through
+ * the pixels' centres is drawn first, and only its depth is used. */
 static insitu_status draw_all_frames(frames_basis *b, const scene_image *image, render_job *job, base_error *error)
 {
     canvas *c = b->canvas;
@@ -357,7 +359,7 @@ static scene_placeholder_values make_placeholder_values(const session_drawing *d
     return scene_placeholder_values_of(image, d->cycle, d->report->public_report.time);
 }
 
-/* Compares the picture's colour bars with those of this step's earlier pictures in the same montage. */
+/* Compares the picture's colour bars with those of the first picture that this step has drawn for the same montage. */
 static void compare_bars(const session_drawing *d, const scene_image *image, const session_decorations *decorations)
 {
     for (int i = 0; i < image->output_count && decorations && d->shared_bars; i++) {
@@ -380,7 +382,7 @@ static void warn_of_bars(const session_drawing *d)
     }
 }
 
-/* Passes the picture to the writer, which becomes the owner of its memory. Called on rank 0 only. */
+/* Passes the picture to the writer. The writer then owns the picture's memory. Called on rank 0 only. */
 static void queue_picture(const session_drawing *d, const scene_image *image, canvas *c, base_error *error)
 {
     session_files *files = base_calloc(1, sizeof *files);
@@ -427,8 +429,8 @@ static insitu_status write_outputs(const session_drawing *d, const scene_image *
 
 /* ---- images -------------------------------------------------------------------------------------------------- */
 
-/* Finds the areas of the picture that insets will cover. If several of the image's files have insets, the areas are
- * those of the first such file. Returns the number of areas. */
+/* Finds the areas of the picture that insets of its montage will cover. If several of the image's files have insets,
+ * the areas are those of the first such file. Returns the number of areas. */
 static int find_covered(const scene *scene, const scene_image *image, insitu_rectangle covered[SCENE_ANCHORS])
 {
     int count = 0;
@@ -442,7 +444,7 @@ static int find_covered(const scene *scene, const scene_image *image, insitu_rec
 }
 
 /* Warns on rank 0 of texts that cannot be drawn as they are written. Their layout is computed here only so that the
- * warnings are reported in this step; the writing thread computes it again. */
+ * warnings are reported in this step; the writing thread computes the layout a second time. */
 static void warn_of_words(const session_drawing *d, const scene_image *image, const session_decorations *decorations)
 {
     insitu_word_faults faults;
@@ -479,7 +481,7 @@ static insitu_status make_image_decorations(const session_drawing *d, const scen
     return INSITU_OK;
 }
 
-/* Draws an image. An error that occurs on one rank alone, such as lack of memory, is stored in *error; the next phase,
+/* Draws an image. An error that occurs only on some ranks, such as lack of memory, is stored in *error; the next phase,
  * which computes the layers or the first frame, passes it to all ranks. */
 static insitu_status draw_image(const session_drawing *d, const scene_image *image, base_error *error)
 {
@@ -512,7 +514,8 @@ static insitu_status draw_image(const session_drawing *d, const scene_image *ima
     return status;
 }
 
-/* Writes, on rank 0, the tables of databases, with lines for all pictures of the step, and the montages. Collective. */
+/* Writes the montages and the tables of databases on rank 0. The tables contain lines for all pictures of the step.
+ * Collective. */
 static void write_tables(const session_drawing *d, base_error *first)
 {
     base_error reason = {.status = INSITU_OK};

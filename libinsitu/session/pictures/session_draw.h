@@ -15,8 +15,8 @@
 #include "session_team.h"
 #include "session_writer.h"
 
-/* Compares, during a step, the colour bars of a montage's pictures, if the scene requests that they share their
- * bars. */
+/* Comparison of the colour bars of a montage's pictures during a step. It is used if the scene requests that the
+ * pictures share their bars. */
 typedef struct session_shared_bars {
     const char *path;    /* path of the output, with placeholders; NULL: no picture has been drawn yet */
     uint64_t hash;       /* session_decorations.bars_hash of the first picture */

@@ -46,7 +46,8 @@ static void write_output(session_files *files, const scene_output *output)
                                                                            : &decorations->background};
     base_error reason = {0};
     if (output->montage >= 0) {
-        if (session_add_panel(files->montages, files->scene, &files->image, output, &picture, decorations, path, &reason))
+        if (session_add_panel(files->montages, files->scene, &files->image, output, &picture, decorations, path,
+                              &reason))
             base_fail(&files->error, reason.status, "image \"%s\": %.900s", files->image.name, reason.message);
         return;
     }
@@ -65,7 +66,7 @@ static double read_clock_milliseconds(void)
     return 1e3 * (double)now.tv_sec + 1e-6 * (double)now.tv_nsec;
 }
 
-/* Writes the files that follow the pictures of a step: montages and the tables of databases. */
+/* Writes the files that are written after all pictures of a step: montages and the tables of databases. */
 static void write_tables(session_files *files)
 {
     base_error reason = {0};

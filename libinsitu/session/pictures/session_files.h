@@ -1,5 +1,5 @@
-/* A drawn picture with all data that is needed to write its files, which may happen after the step that drew it has
- * ended. */
+/* A drawn picture with all data that is needed to write its files. The files may be written after the end of the step
+ * that has drawn the picture. */
 #ifndef SESSION_FILES_H
 #define SESSION_FILES_H
 
@@ -15,7 +15,7 @@
 #include "session_picture.h"
 #include "session_report.h"
 
-/* A picture that is to be written. Used on rank 0 only. */
+/* An element of the writer's queue: usually a picture that is to be written. Used on rank 0 only. */
 typedef struct session_files {
     struct session_files *next; /* next element in a list of the writer (session_writer.h) */
     const scene *scene;         /* the scene of the image; it must exist until the files are written */

@@ -1,12 +1,12 @@
 /* Draws a frame, and draws the pixels in which cells overlap a second time.
  *
  * Fragments that overlap cannot be sorted by depth, and the positions of their samples are no longer known when
- * compositing finds the overlap. Therefore compositing sends the set of these pixels to all ranks, and the pixels
+ * compositing finds the overlap. Therefore compositing sends the set of pixels with overlaps to all ranks. These pixels
  * are traced again with every sample as a separate fragment (render.h), composited into a second picture, and copied
  * into the first. A mesh with a few overlapping cells causes only a few such pixels. Two meshes that fill the same
  * space may cause a thousand fragments in each of a million pixels. Such pixels are drawn in several passes, called
- * turns. Each turn has as many pixels as the busiest rank can store fragments for. If segments of several volumes
- * are drawn, all pixels are drawn in this way at once. */
+ * turns. Each turn has as many pixels as the busiest rank can store fragments for. If segments of several volumes are
+ * drawn, all pixels are drawn in turns, and the first pass is omitted. */
 #include "session_frame.h"
 
 #include <math.h>
@@ -31,7 +31,7 @@ static void add_to_frame(session_frame *frame, const render_statistics *rendered
     frame->composite_ms += composite_ms;
 }
 
-/* Draws a frame if only one rank has cells: it is composited while it is traced (comp_tiles.h). */
+/* Draws a frame if there is only one rank: it is composited while it is traced (comp_tiles.h). */
 static insitu_status draw_alone(const session_frame_target *t, const render_job *job, image *out, session_frame *frame,
                                 comp_overlaps *overlaps, base_error *error)
 {
@@ -64,8 +64,8 @@ static insitu_status trace_fragments(const session_frame_target *t, const render
     return session_light_by_differences(t->comm, &traced, fragments, &rendered->surface_ms, error);
 }
 
-/* Computes the lighting of the fragments. All turns of a frame use the same occluders, because their jobs differ only
- * in their pixels. */
+/* Computes the lighting of the fragments. All turns of a frame use the same occluders, because the jobs of the turns
+ * differ only in the set of their pixels. */
 static insitu_status light_fragments(const session_frame_target *t, const render_job *job, fragment_list *fragments,
                                      session_frame *frame, render_statistics *rendered, base_error *error)
 {
@@ -122,7 +122,7 @@ static int64_t estimate_turn_pixels(const render_job *job, int64_t fragment_limi
     return pixels > 1 ? (int64_t)pixels : 1;
 }
 
-/* Computes the number of pixels of the next turn from the number of fragments that the busiest rank had in the last
+/* Computes the number of pixels of the next turn from the number of fragments that the busiest rank had in the previous
  * turn. The growth is limited, since the few pixels of a turn may not be representative. Collective; the result is the
  * same on all ranks. */
 static insitu_status update_turn_pixels(const session_frame_target *t, int64_t fragments, int64_t *pixels,
@@ -144,8 +144,8 @@ static insitu_status update_turn_pixels(const session_frame_target *t, int64_t f
  * pixels in dense regions. */
 typedef struct turn_order {
     int width, height, squares_per_row; /* size of the picture in pixels, and number of squares in a row of squares */
-    /* number of squares, and difference between the numbers of consecutive squares in the order; the two have no common
-     * divisor */
+    /* squares: number of squares; stride: difference between the numbers of consecutive squares in the order. The two
+     * numbers have no common divisor. */
     int64_t squares, stride;
 } turn_order;
 
@@ -179,8 +179,8 @@ static int64_t pixel_in_turn_order(const turn_order *order, int64_t k)
     return x < order->width && y < order->height ? y * order->width + x : -1;
 }
 
-/* Stores in `taken` the next pixels of the set `from`, at most `most`, in the order of drawing from position `first`
- * on. Returns the position at which to continue. */
+/* Stores in `taken` the next pixels of the set `from`, at most `most`, starting at position `first` of the turn order.
+ * Returns the position at which the next turn continues. */
 static int64_t select_turn_pixels(const image *out, const unsigned char *from, int64_t first, int64_t most,
                                   unsigned char *taken)
 {
@@ -285,9 +285,10 @@ static insitu_status draw_overlaps(const session_frame_target *t, const render_j
     return status;
 }
 
-/* Returns whether all pixels must be drawn with separate fragments. Segments of several volumes overlap on every pixel.
- * Samples of several volumes are rounded differently depending on whether a rank or compositing blends them. If
- * pictures must be reproducible, all samples are therefore blended by compositing. */
+/* Returns whether all pixels must be drawn with separate fragments. This is the case for segments of several volumes,
+ * which overlap in every pixel. It is also the case for samples of several volumes if pictures must be reproducible:
+ * whether a rank or compositing blends such samples affects their rounding, and therefore compositing must blend them
+ * all. */
 static bool is_mixed_throughout(const render_job *job)
 {
     return (job->integration == RENDER_SEGMENTS || job->reproducible) && job->volume_count > 1;

@@ -1,12 +1,13 @@
-/* Loads the image library at run time, by its full path, so that no other library of the same name is used. It is
- * searched in the folder of the object that contains this code (libinsitu), and then in the lib folder beside it, where
- * it is if a program in bin links libinsitu statically. If neither folder contains it, the dynamic loader searches for
- * it, unless LD_LIBRARY_PATH would make it search the working directory. The library stays loaded until the process
- * ends: C++ libraries with threads and static objects cannot be unloaded safely.
+/* Loads the image library at run time, by its full path, so that no other library of the same name is used. The library
+ * is searched for in the folder of the object that contains this code (libinsitu), and then in the lib folder beside
+ * that folder, because a program in bin may link libinsitu statically. If neither folder contains the library, the
+ * dynamic loader searches for it, unless LD_LIBRARY_PATH would make it search the working directory. The library stays
+ * loaded until the process ends: C++ libraries with threads and static objects cannot be unloaded safely.
  *
- * Some library that OpenImageIO uses starts threads when it is loaded. These threads sleep, but could receive the
- * simulation's signals and run its handlers, so that they are started with all signals blocked. Other libraries end the
- * process if their constructors cannot allocate memory, so that nothing is loaded unless enough memory is available. */
+ * Some library that OpenImageIO uses starts threads when it is loaded. These threads sleep, but they could receive the
+ * simulation's signals and run its handlers. Therefore they are started with all signals blocked. Other libraries end
+ * the process if their constructors cannot allocate memory. Therefore nothing is loaded unless enough memory is
+ * available. */
 #define _GNU_SOURCE 1 /* makes dlfcn.h declare dladdr1() */
 #include "session_image.h"
 
@@ -48,7 +49,7 @@ static void *open_library(const char *path, char *why, size_t size)
     return NULL;
 }
 
-/* Determines the folder of the object that contains this code, by its path when it was loaded. */
+/* Determines the folder of the object that contains this code, from the path by which the object was loaded. */
 static bool find_own_folder(char folder[PATH_MAX])
 {
     Dl_info object;
@@ -71,8 +72,8 @@ static void *open_library_beside(const char *own_folder, const char *between, ch
     return length > 0 && (size_t)length < sizeof path ? open_library(path, why, size) : NULL;
 }
 
-/* Returns whether LD_LIBRARY_PATH makes the loader search the working directory: an entry that is empty or relative
- * refers to the working directory or a folder below it. */
+/* Returns whether LD_LIBRARY_PATH makes the loader search the working directory. This is so if an entry is empty or a
+ * relative path: it then refers to the working directory or to a folder below it. */
 static bool searches_working_directory(void)
 {
     const char *entries = getenv("LD_LIBRARY_PATH");

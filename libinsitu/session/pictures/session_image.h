@@ -1,4 +1,4 @@
-/* Writes pictures with the image library libinsitu_image, which is loaded at run time, so that the session is not
+/* Writes pictures with the image library libinsitu_image. The library is loaded at run time, so that the session is not
  * linked to it. */
 #ifndef SESSION_IMAGE_H
 #define SESSION_IMAGE_H
@@ -8,7 +8,7 @@
 #include "error.h"
 #include "insitu/image_output.h"
 
-/* Writes an image with libinsitu_image, which is loaded by the first call in the process. If loading fails, an error is
+/* Writes an image with libinsitu_image. The first call in the process loads this library. If loading fails, an error is
  * returned, and the next call tries again. Local. Thread-safe. */
 insitu_status session_write_image(const insitu_image *image, insitu_image_format format, const char *path,
                                   base_error *error);
@@ -16,8 +16,9 @@ insitu_status session_write_image(const insitu_image *image, insitu_image_format
 /* Draws the image with its decorations into its place in a larger picture (image_output.h). Local. Thread-safe. */
 insitu_status session_place_image(const insitu_image *image, const insitu_place *place, base_error *error);
 
-/* Loads the image library before the first picture is written. Errors are ignored, because writing the picture returns
- * them again. Returns the time taken in milliseconds; 0 if the library was already loaded. Local. Thread-safe. */
+/* Loads the image library before the first picture is written. Errors are ignored, because writing the picture will
+ * return the same error. Returns the time taken in milliseconds; 0 if the library was already loaded. Local.
+ * Thread-safe. */
 double session_load_image_library(void);
 
 /* Finds the reasons why a picture's texts cannot be drawn (image_output.h). Only the size and the decorations of the

@@ -1,8 +1,8 @@
 /* Computes shadows and ambient occlusion over all ranks. The rank that has a hit computes its lighting. This rank first
  * traces the hit's shadow and occlusion rays in its own cells, which block most of the rays. Then it sends requests to
- * the ranks whose bounding box an unblocked ray intersects. A request consists of the hit and the set of its unblocked
- * rays, 32 bytes in all; the other rank computes the rays from the hit in the same way. The answer is the set of rays
- * that are still unblocked, 8 or 16 bytes.
+ * the ranks whose bounding boxes are intersected by rays that are not blocked yet. A request consists of the hit and
+ * the set of its unblocked rays, 32 bytes in all; the other rank computes the rays from the hit in the same way. The
+ * answer is the set of rays that are still unblocked, 8 or 16 bytes.
  *
  *     rank A   hits -> own cells -> unblocked rays -> requests to ranks by their boxes ...... all answers -> colours
  *     rank B                                          requests -> own cells -> unblocked rays -> answers
@@ -19,14 +19,14 @@
 
 enum { ROUND_HITS = 1 << 16 };
 
-/* Sizes in 8-byte words of a request, which consists of a hit and the set of its rays to trace, and of its answer,
- * which is a set of rays. */
+/* Sizes of messages in 8-byte words. A request consists of a hit and the set of its rays to trace; an answer is a set
+ * of rays. */
 enum {
     REQUEST_WORDS = sizeof(render_hit) / 8 + sizeof(render_hit_rays) / 8,
     ANSWER_WORDS = sizeof(render_hit_rays) / 8
 };
 
-/* The state of a round: the hits of this rank that are processed in this round, and the rays of each hit that are not
+/* The state of a round: the hits of this rank that are processed in the round, and for each hit the rays that are not
  * blocked yet. */
 typedef struct lighting {
     MPI_Comm comm;
@@ -41,8 +41,8 @@ typedef struct lighting {
     render_hit_rays *rays;
 } lighting;
 
-/* The requests in the order of the hits that need them. For each request: the rank to which it is sent, the hit and its
- * rays. message_order sorts the requests by rank. */
+/* The requests in the order of the hits that need them. Element i of the arrays describes request i. ranks: the rank to
+ * which it is sent; hits: the index of its hit; rays: the rays to trace. */
 typedef struct request_list {
     int64_t count, capacity;
     int *ranks;
@@ -153,7 +153,7 @@ static insitu_status send_requests(const lighting *l, request_list *q, session_m
 
 /* ---- answers ------------------------------------------------------------------------------------------------- */
 
-/* Copies the requests from the message, whose words are not aligned for their types. */
+/* Copies the requests from the message, because the data in the message are not aligned for their types. */
 static bool read_requests(const session_mail *in, render_hit **hits, render_hit_rays **rays)
 {
     const int64_t count = in->total / REQUEST_WORDS;
@@ -168,7 +168,7 @@ static bool read_requests(const session_mail *in, render_hit **hits, render_hit_
     return true;
 }
 
-/* Computes the answers to the requests in *in, and stores them in place of the requests. */
+/* Computes the answers to the requests in *in, and overwrites the requests with the answers. */
 static insitu_status answer_requests(const lighting *l, session_mail *in, base_error *error)
 {
     render_hit *hits = NULL;
@@ -214,8 +214,8 @@ static insitu_status exchange_requests(lighting *l, base_error *error)
 
 /* ---- rounds -------------------------------------------------------------------------------------------------- */
 
-/* Collects the hits among the fragments from index `first` on, until the round is full. Hits that need no rays are lit
- * immediately. Returns the index of the fragment at which to continue. */
+/* Collects the hits among the fragments from index `first` on, until the round is full. The lighting of hits that need
+ * no rays is computed immediately. Returns the index of the fragment at which the next round continues. */
 static int64_t collect_hits(lighting *l, fragment_list *fragments, int64_t first)
 {
     static const render_hit_rays none = {0, 0, 0};

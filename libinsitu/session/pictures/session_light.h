@@ -9,10 +9,10 @@
 #include "render.h"
 #include "render_light.h"
 
-/* Computes the lighting of the fragments that have the value RENDER_UNLIT, from the light that is not blocked by opaque
- * surfaces of any rank. *occluders are the occluders of this rank. They are created if *occluders is NULL, can be used
- * again for jobs that differ only in their pixels, and must be freed by the caller. The time taken is added to *ms.
- * Collective; all ranks return the same status. */
+/* Computes the lighting of the fragments that were traced with RENDER_UNLIT, from the light that is not blocked by
+ * opaque surfaces of any rank. *occluders are the occluders of this rank. They are created if *occluders is NULL, can
+ * be used again for jobs that differ only in their pixels, and must be freed by the caller. The time taken is added to
+ * *ms. Collective; all ranks return the same status. */
 insitu_status session_light_fragments(MPI_Comm comm, const render_job *job, render_occluders **occluders,
                                       fragment_list *fragments, double *ms, base_error *error);
 

@@ -57,7 +57,7 @@ int session_find_covered(const scene_montage *montage, int panel, insitu_rectang
     return count;
 }
 
-/* Allocates the montage's pixels, which are transparent at first. */
+/* Allocates the pixels of the montage, which are initially transparent. */
 static insitu_status begin_montage(session_montages *montages, const scene *scene, int index, base_error *error)
 {
     if (!montages->items) {
@@ -99,8 +99,8 @@ static size_t row_size(int width)
     return 4 * (size_t)width * sizeof(float);
 }
 
-/* Stores a picture without decorations in its panel, and a copy of its decorations, which are drawn after the last
- * picture of the step. */
+/* Stores a picture without decorations in its panel, and a copy of its decorations. The decorations will be drawn after
+ * the last picture of the step. */
 static insitu_status keep_panel(const scene_montage *of, session_montage *m, int panel, const insitu_image *picture,
                                 const session_decorations *decorations, base_error *error)
 {
@@ -112,8 +112,8 @@ static insitu_status keep_panel(const scene_montage *of, session_montage *m, int
     return INSITU_OK;
 }
 
-/* Stores a copy of a picture without decorations, and a copy of its decorations, until the inset is drawn over the
- * panels. */
+/* Stores copies of an inset's picture without decorations and of its decorations. They are kept until the inset is
+ * drawn over the panels. */
 static insitu_status keep_inset(const scene_montage *of, session_inset *inset, const scene_output *output,
                                 const insitu_image *picture, const session_decorations *decorations, base_error *error)
 {
@@ -126,7 +126,7 @@ static insitu_status keep_inset(const scene_montage *of, session_inset *inset, c
     return INSITU_OK;
 }
 
-/* Draws a picture into its panel, with decorations placed so that insets do not cover them. */
+/* Draws a picture into its panel. Decorations are placed so that insets do not cover them. */
 static insitu_status draw_panel(const scene_montage *of, session_montage *m, int panel, const insitu_image *picture,
                                 base_error *error)
 {

@@ -1,5 +1,5 @@
-/* Draws montages, which are several pictures (panels) side by side in one file, and insets, which are pictures over the
- * corners of a montage.
+/* Draws montages and insets. A montage consists of several pictures (panels) side by side in one file. An inset is a
+ * picture over a corner of a montage.
  *
  * The writing thread receives a step's pictures one after the other. It draws the decorations of each panel and copies
  * the panel into its place. A panel remains transparent if its picture is not due or could not be drawn. After the last

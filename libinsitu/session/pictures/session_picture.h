@@ -1,4 +1,4 @@
-/* Manages the memory of pictures on rank 0. The memory of the last picture is used again for the next one, because
+/* Manages the memory of pictures on rank 0. The memory of the previous picture is reused for the next picture, because
  * allocating new pages takes as long as filling them. */
 #ifndef SESSION_PICTURE_H
 #define SESSION_PICTURE_H
@@ -22,7 +22,7 @@ float *session_reserve_picture(session_picture *picture, size_t bytes);
 
 void session_drop_picture(session_picture *picture);
 
-/* Copies of the last step's pictures, on rank 0, which the caller can read. */
+/* Copies of the most recent step's pictures, for the caller to read. They exist on rank 0 only. */
 typedef struct session_kept_pictures {
     bool is_enabled; /* true: pictures are kept, so that all images need depth. The same on every rank */
     int count;

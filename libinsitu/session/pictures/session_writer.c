@@ -107,8 +107,8 @@ static void keep_memory(session_writer *w, session_picture *memory)
     session_drop_picture(memory);
 }
 
-/* Takes a kept block of at least `bytes` bytes. If none is large enough, *memory stays empty, and one of the kept
- * blocks, which is too small, is freed. The mutex must be held. */
+/* Takes a kept block of at least `bytes` bytes. If all kept blocks are smaller, *memory stays empty, and one of the
+ * kept blocks is freed. The mutex must be held. */
 static void reuse_memory(session_writer *w, size_t bytes, session_picture *memory)
 {
     int small = -1;

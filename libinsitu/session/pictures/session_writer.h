@@ -1,6 +1,6 @@
 /* Defines the writer of rank 0: a thread that encodes and writes pictures while the simulation continues.
  *
- * Pictures are put into a queue, which holds at most 128 MiB, or a single larger picture; a step that draws more waits
+ * Pictures are put into a queue. It holds at most 128 MiB, or a single larger picture. A step that draws more waits
  * until there is space. Pictures are written in order, and the next step collects the results when it begins. If the
  * scene requests it, or no thread can be started, pictures are written before the step ends.
  *
@@ -42,7 +42,7 @@ typedef struct session_writer {
     struct session_writer *next; /* next writer of this process */
 } session_writer;
 
-/* Initializes the writer. Nothing is started. Local. */
+/* Initializes the writer. No thread is started. Local. */
 void session_writer_create(session_writer *writer);
 
 /* Loads the image library and starts the thread if the scene has pictures, unless this has already been done. No thread
@@ -50,29 +50,30 @@ void session_writer_create(session_writer *writer);
  * loading took. Local. */
 double session_writer_begin(session_writer *writer, const scene *scene);
 
-/* Returns whether pictures are written after the step: session_writer_begin() has started the thread, or will start it
- * for this scene. Local. */
+/* Returns whether pictures are written by the thread after the step: session_writer_begin() has started the thread, or
+ * will start it for this scene. Local. */
 bool session_writer_is_behind(const session_writer *writer, const scene *scene);
 
 /* Records an error that occurred when a picture was passed to the writer. The next step returns it. Local. */
 void session_writer_record_error(session_writer *writer, int64_t cycle, const base_error *error);
 
-/* Returns memory of at least `bytes` bytes for a picture, uninitialized. Blocks until the queue has space. pixels is
- * NULL if memory runs out even after everything in the queue has been written. Local. */
+/* Returns uninitialized memory of at least `bytes` bytes for a picture. Blocks until the queue has space. The member
+ * pixels of the result is NULL if memory runs out even after all queued files have been written. Local. */
 session_picture session_writer_reserve(session_writer *writer, size_t bytes);
 
 /* Returns memory that is no longer used to the writer. Local. */
 void session_writer_release(session_writer *writer, session_picture *memory);
 
-/* Passes files to the writer, which becomes their owner. They are written by the thread or, if there is none,
- * immediately; errors of the latter are stored in *error. Local. */
+/* Passes files to the writer. The writer then owns them. The thread writes them later; if there is no thread, they are
+ * written immediately, and an error is stored in *error. Local. */
 void session_writer_queue(session_writer *writer, struct session_files *files, base_error *error);
 
 /* Collects the results of the thread: adds the time that the thread has used to the report, and its errors to the
  * writer's `failure`. Local. */
 void session_writer_collect(session_writer *writer, session_report *report);
 
-/* Returns the first error, together with the number of further ones, and clears them. Local. */
+/* Returns the first error that no step has returned yet, with the number of further errors in its message, and clears
+ * all of them. Local. */
 base_error session_writer_failure(session_writer *writer);
 
 /* Blocks until all files are written. Local. */

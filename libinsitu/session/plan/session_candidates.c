@@ -17,8 +17,8 @@ _Static_assert((int)SCENE_MAX_SURFACES == (int)RENDER_MAX_ISOVALUES &&
 
 /* visible values -------------------------------------------------------------------------------------------- */
 
-/* Returns whether the scalar already has the interval. Images of a sweep over fields share their isosurfaces, so that
- * an interval may be added several times. */
+/* Returns whether the interval was added to the scalar before. This happens if a scene sweeps over fields, because the
+ * images of the sweep share their isosurfaces. */
 static bool has_interval(const session_scalar *scalar, const mmbvh_interval *interval)
 {
     for (int i = 0; i < scalar->interval_count; i++)
@@ -67,8 +67,8 @@ static bool mark_volume(session_mesh *mesh, const scene_volume *layer)
     return !scalar || add_visible_intervals(scalar, layer);
 }
 
-/* Marks the scalar of distances from a plane as used. Its interval contains the distance at which the slice is drawn,
- * which is about 0 (session_slice_distance()). */
+/* Marks the scalar of distances from a plane as used. Its interval contains the distance at which the slice is drawn.
+ * This distance is about 0 (session_slice_distance()). */
 static bool mark_plane(session_mesh *mesh, const scene_plane *plane, const session_extent *extent)
 {
     const float reach = (float)(2 * SESSION_BORDER_SHARE * extent->half_diagonal);

@@ -1,5 +1,5 @@
-/* Determines the candidates: the cells that the due images can show, according to the cells' values. A partial tree
- * contains only the candidates. */
+/* Determines the candidates of a mesh. These are the cells that the due images can show, according to the cells'
+ * values. A partial tree contains only the candidates. */
 #ifndef SESSION_CANDIDATES_H
 #define SESSION_CANDIDATES_H
 
@@ -12,8 +12,8 @@
 bool session_mark_needed_data(session_meshes *meshes, const scene_image *const *images, int count,
                               const session_extent *extent);
 
-/* Returns whether values alone determine which cells may be visible. If so, *key becomes a hash of the scalars and
- * their intervals, which select the candidates by their values. Otherwise any cell may be visible. */
+/* Returns whether the candidates can be selected by the cells' values. If so, *key becomes a hash of the scalars and of
+ * the intervals of their visible values. Otherwise any cell may be visible. Local. */
 bool session_find_candidates(const session_mesh *mesh, uint64_t *key);
 /* Selects the candidates, and counts for each scalar the cells that have a value which is not finite. Parallel.
  * Local. */

@@ -5,9 +5,9 @@
  *     a gradient, or a quantity computed from one:  sums over the cells around each vertex and over all ranks
  *         (session_vertex_sums.h), over all meshes that share the field, so that blocks show no seam
  *
- * The values are copies owned by the session, packed, with 4 bytes per value if all values on which they depend have
- * 4 bytes, else with 8. A hash of the versions of these values determines whether the copies are up to date; they
- * are recomputed if it has changed on any rank. */
+ * Derived values are stored in memory of the session, without gaps. They take 4 bytes each if all values on which they
+ * depend have 4 bytes, else 8. A hash of the versions of the input values determines whether the derived values are up
+ * to date; they are computed again if the hash has changed on any rank. */
 #include "session_derive.h"
 
 #include <omp.h>
@@ -34,7 +34,7 @@ typedef struct derive_work {
     int derived_index;
     int recentring_count;
     session_recentring *recentrings;
-    int *stale; /* for each recentring or mesh, nonzero if its values are out of date */
+    int *stale; /* for each recentring, and later for each mesh, nonzero if its values are out of date */
 } derive_work;
 
 /* ---- meshes and inputs of a derived field ---------------------------------------------------------------------- */
@@ -76,13 +76,13 @@ static bool next_visited_part(const derive_work *w, part_visit *v)
     return false;
 }
 
-/* Returns the component that the input of a derived field uses, in the format of grid_field.component. */
+/* Returns the component of an input that the derived field uses, as a value of grid_field.component. */
 static int input_component(const scene_field *input, int component_count)
 {
     return input->component == SCENE_COMPONENT_ONLY ? 0 : session_resolve_component(input, component_count);
 }
 
-/* Returns whether the input's values on the mesh must first be recentred to vertices. */
+/* Returns whether the input's cell values on the mesh must first be converted to vertex values (recentred). */
 static bool is_recentred(const derive_work *w, const session_catalogue_mesh *mesh, const scene_field *input)
 {
     const session_catalogue_field *field = find_field(w, mesh), *from = session_catalogue_find(mesh, input->name);
@@ -96,7 +96,7 @@ static uint64_t find_mesh_group_name(const session_catalogue_mesh *mesh, const s
 
 /* ---- cell values recentred to vertices ------------------------------------------------------------------------- */
 
-/* Adds a scalar for the recentred values to one of this rank's parts of the mesh. */
+/* Adds a scalar to this rank's part of a mesh. The scalar will hold the input's cell values converted to vertices. */
 static bool add_to_part(const session_catalogue_mesh *mesh, session_mesh *part, const scene_field *input, int component)
 {
     const int index = part->is_given ? session_find_field(part, input->name) : -1;
@@ -158,7 +158,7 @@ static session_scalar *find_recentred(const derive_work *w, const session_catalo
                                      : NULL;
 }
 
-/* Returns a hash of everything that determines the derived values on one of this rank's parts. */
+/* Returns a hash of all data that determine the derived values on one of this rank's parts. */
 static uint64_t hash_sources(const derive_work *w, const session_catalogue_mesh *mesh, const session_mesh *part)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
@@ -409,8 +409,8 @@ static void store_gradients(const derive_work *w, const session_vertex_sums *sum
     }
 }
 
-/* Lists the scalars whose gradients are computed: the components of a vector. A vector with two components has no third
- * scalar. */
+/* Lists the scalars whose gradients are computed, and returns their number. They are the components of a vector, 2 or
+ * 3, or the scalar inputs of the derived field. */
 static int list_scalars(const derive_work *w, const session_catalogue_mesh *mesh, const session_mesh *part,
                         grid_field out[SESSION_GRADIENTS])
 {
@@ -423,8 +423,8 @@ static int list_scalars(const derive_work *w, const session_catalogue_mesh *mesh
     return count;
 }
 
-/* Returns the first of the mesh group's meshes on which the field has no fault. The vector has the same number of
- * components on all such meshes. */
+/* Returns the first mesh of the group on which the field has no fault. A vector has the same number of components on
+ * all meshes without a fault. */
 static const session_catalogue_mesh *find_first_faultless(const derive_work *w, const session_mesh_group *mesh_group)
 {
     int i = 0;
@@ -432,8 +432,8 @@ static const session_catalogue_mesh *find_first_faultless(const derive_work *w, 
     return i < mesh_group->count ? mesh_group->meshes[i] : NULL;
 }
 
-/* Returns the number of scalars whose gradients are computed; ranks without a part of the mesh need this number,
- * too. */
+/* Returns the number of scalars whose gradients are computed. Ranks without a part of the meshes need this number as
+ * well. */
 static int count_scalars(const derive_work *w, const session_mesh_group *mesh_group)
 {
     if (!session_needs_vector(w->derived)) return w->derived->input_count;
@@ -457,8 +457,8 @@ static insitu_status begin_sums(const derive_work *w, const session_mesh_group *
     return session_key_all_vertices(sums, error);
 }
 
-/* Computes the gradients over the meshes of a mesh_group. Collective; an error of this rank at the very end is stored
- * only in *error. */
+/* Computes the gradients over the meshes of a group. Collective. An error of this rank after the last communication is
+ * only stored in *error. */
 static insitu_status derive_mesh_group(const derive_work *w, const session_mesh_group *mesh_group, base_error *error)
 {
     session_vertex_sums sums = {.by_id = mesh_group->by_id, .field_count = count_scalars(w, mesh_group)};
@@ -483,7 +483,7 @@ static bool is_mesh_group_stale(const derive_work *w, const session_mesh_group *
     return is_stale;
 }
 
-/* Computes the gradients of each mesh group of the meshes with the field, unless they are up to date. */
+/* Computes the gradients of the field for each group of meshes on which it exists, unless they are up to date. */
 static insitu_status derive_mesh_groups(const derive_work *w, base_error *error)
 {
     const session_catalogue *catalogue = w->basis->catalogue;

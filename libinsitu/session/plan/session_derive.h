@@ -16,8 +16,8 @@ typedef struct session_derive_basis {
 } session_derive_basis;
 
 /* Computes the values of derived fields that are out of date on any rank. needed: one bit per derived field. The fields
- * on which they depend must have been filled and copied, and must also be in `needed` if they are derived. Collective;
- * all ranks return the same status. */
+ * on which these derived fields depend must have been filled and copied; those of them that are derived must also be in
+ * `needed`. Collective; all ranks return the same status. */
 insitu_status session_compute_derived(const session_derive_basis *basis, uint64_t needed, base_error *error);
 
 #endif

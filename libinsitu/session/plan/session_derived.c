@@ -19,8 +19,8 @@ static uint64_t derived_field_bit(const scene *scene, const scene_field *field)
     return derived < 0 ? 0 : (uint64_t)1 << derived;
 }
 
-/* Adds, to the set of needed fields, those on which they depend. A field depends only on fields before it in the
- * list. */
+/* Adds to the set of needed fields the derived fields on which they depend. A field depends only on fields before it in
+ * the scene's list. */
 static uint64_t add_source_bits(const scene *scene, uint64_t needed)
 {
     for (int i = scene->derived_count - 1; i >= 0; i--)
@@ -100,7 +100,7 @@ static insitu_status refuse_components(const derived_on_mesh *at, const scene_fi
                      OF(at), name, found->component_count, at->mesh->name, name, name);
 }
 
-/* Checks that a vector has the same number of components on all meshes of a mesh_group. */
+/* Checks that a vector has the same number of components on the meshes before at->mesh in the catalogue. */
 static insitu_status check_other_meshes(const derived_on_mesh *at, const scene_field *input,
                                         const session_catalogue_field *found, base_error *error)
 {

@@ -1,6 +1,6 @@
 /* Finds layers that show nothing. Trees contain the ranges of their cells' values, rounded outward to float32. A layer
- * that shows no value within these ranges may be empty. Only in this case, the exact range of all cells is computed
- * once to decide this. */
+ * that shows no value within these ranges may be empty. The exact range of all cells' values is computed only for such
+ * layers, because all values must be read for it. */
 #include "session_empty_layers.h"
 
 #include <math.h>
@@ -43,7 +43,7 @@ enum { BATCH = 128 };
 
 /* Some consecutive layers of the plan, which are processed together. */
 typedef struct layer_batch {
-    int first, next; /* number of the first layer in the batch, and of the next one to be listed */
+    int first, next; /* first: number of the first layer in the batch; next: number of the layer that is listed next */
     int count;       /* number of layers in the batch */
     planned_layer layers[BATCH];
 } layer_batch;
@@ -78,9 +78,10 @@ static void list_thresholds(const scene_image *image, layer_batch *batch)
             list_layer(batch, (planned_layer){.image = image, .surface = &image->surfaces[n], .number = n});
 }
 
-/* Lists the layers of the batch, and returns the number of all layers. Each layer is listed once, although pictures
- * share layers: views of an image share all layers, pictures of a sweep over fields share isosurfaces, of a sweep over
- * isovalues volumes, and of a sweep over planes both. All these pictures share thresholds. */
+/* Lists the layers of the batch, and returns the number of all layers. Each layer is listed once, although several
+ * pictures may share it. All views of an image share all layers. The pictures of a sweep over fields share isosurfaces,
+ * those of a sweep over isovalues share volumes, and those of a sweep over planes share both. All pictures of an image
+ * share thresholds. */
 static int list_layers(const session_plan *plan, layer_batch *batch)
 {
     for (int i = 0; i < plan->image_count; i++) {
@@ -107,7 +108,7 @@ static void widen_range(double low, double high, field_range *range)
     range->negated_high = fmin(range->negated_high, -high);
 }
 
-/* Widens the range by the range of the tree's root, which contains all visible values. */
+/* Widens the range by the range of the tree's root. It contains all visible values of the mesh. */
 static void add_root_range(const session_mesh *mesh, const session_scalar *scalar, field_range *range)
 {
     if (!mesh->is_needed || !mesh->has_tree || mesh->tree.node_count == 0) return;
@@ -115,7 +116,8 @@ static void add_root_range(const session_mesh *mesh, const session_scalar *scala
     widen_range((double)*(const float *)(const void *)root.low, (double)*(const float *)(const void *)root.high, range);
 }
 
-/* Widens the range by the scalar's range over this kind of cells, which is computed if necessary. */
+/* Widens the range by the scalar's range over the cells of this kind. The scalar's range is computed unless it is known
+ * already. */
 static void add_extent_range(const session_mesh *mesh, session_scalar *scalar, int threads, session_extent_kind kind,
                              field_range *range)
 {
@@ -284,8 +286,8 @@ static void warn_of_threshold(session_report *report, const planned_layer *layer
                  -layer->range.negated_high);
 }
 
-/* Warns of an empty layer. If the field has no value at all, no warning is added here, because another warning explains
- * it. */
+/* Warns of an empty layer. If no cell has a value of the field, no warning is added here, because another warning
+ * explains this. */
 static void warn_of_layer(session_report *report, const planned_layer *layer)
 {
     const bool has_values = layer->range.low <= -layer->range.negated_high || !layer->is_unreported;

@@ -1,5 +1,5 @@
-/* Warns of layers that show nothing: isovalues that no cell has, volumes that are transparent at all values, thresholds
- * that exclude all cells. */
+/* Warns of layers that show nothing: isosurfaces that no cell crosses, volumes that are transparent at all values, and
+ * surfaces whose thresholds exclude all cells. */
 #ifndef SESSION_EMPTY_LAYERS_H
 #define SESSION_EMPTY_LAYERS_H
 

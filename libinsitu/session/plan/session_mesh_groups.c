@@ -5,8 +5,8 @@
 #include "session_hash.h"
 #include "session_scalars.h"
 
-/* The purpose for which meshes are grouped: values of a layer's field, or gradients of a derived field, are averaged
- * over the group. */
+/* The purpose for which meshes are grouped. Either the values of a layer's field or the gradients of a derived field
+ * are averaged over the group. */
 typedef struct group_purpose {
     const scene_field *field; /* field of a layer; NULL if the meshes are those of a derived field */
     int derived_index;        /* index of the derived field; -1: none */
@@ -52,8 +52,9 @@ static bool add_single_group(session_catalogue *catalogue, session_catalogue_mes
     return true;
 }
 
-/* Computes the name of the group of all meshes without global ids for this purpose; it is 0 if there are none. Adds the
- * group if it is new. A mesh with ids forms a group by itself. Returns false if memory runs out. */
+/* Forms the group of all meshes without global ids for this purpose, unless it exists already, and computes its name, a
+ * hash of the names of its meshes. The name is 0 if there are no such meshes. Each mesh with ids forms a group by
+ * itself. Returns false if memory runs out. */
 static bool group_meshes(session_catalogue *catalogue, const group_purpose *purpose, uint64_t *mesh_group_name)
 {
     uint64_t hash = SESSION_HASH_BEGIN;

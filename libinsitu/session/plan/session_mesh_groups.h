@@ -1,8 +1,8 @@
 /* Creates mesh groups. A mesh group is a set of meshes across which values are averaged at equal vertices.
  *
  * Some codes describe each level of refinement, or each block, as a separate mesh, and isosurfaces must have no seam
- * between these. Meshes are in one group if one layer shows the same field on them. If each material has a separate
- * mesh and layer, the meshes are in different groups, and the field is not averaged across the border between
+ * between these meshes. Meshes are in one group if one layer shows the same field on them. If each material has a
+ * separate mesh and layer, the meshes are in different groups, and the field is not averaged across the border between
  * materials. */
 #ifndef SESSION_MESH_GROUPS_H
 #define SESSION_MESH_GROUPS_H

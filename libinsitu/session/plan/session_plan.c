@@ -1,6 +1,6 @@
-/* The plan: trees, recentred values and ranges are computed only if an image of this step uses them. All ranks have the
- * same catalogue, which determines whether an image can be drawn. Therefore all ranks make the same plan without
- * communication. */
+/* Makes the plan of a step: trees, recentred values and ranges are computed only if an image of this step uses them.
+ * All ranks have the same catalogue, and only the catalogue determines whether an image can be drawn. Therefore all
+ * ranks make the same plan without communication. */
 #include "session_plan.h"
 
 #include <math.h>
@@ -71,7 +71,7 @@ static bool is_on_any_mesh(const session_catalogue *catalogue, const char *name)
     return false;
 }
 
-/* Writes "did you mean" and the most similar field name; "" if none is similar. */
+/* Writes "did you mean" and the most similar field name to `words`, or "" if no name is similar. */
 static void write_suggestion(const session_catalogue *catalogue, const char *name, char words[300])
 {
     const char *candidates[256];
@@ -84,7 +84,8 @@ static void write_suggestion(const session_catalogue *catalogue, const char *nam
     if (meant) snprintf(words, 300, " (did you mean %.255s?)", meant);
 }
 
-/* Refuses a derived field that exists on no mesh, and names the input that no mesh has. */
+/* Stores the error that a derived field exists on no mesh, and names the input that no mesh has. Returns the error's
+ * status; INSITU_OK if the field is not a derived one. */
 static insitu_status refuse_missing_input(const session_plan_basis *basis, const scene_field *field, base_error *error)
 {
     char names[NAMES_SIZE], meant[300];
@@ -216,7 +217,8 @@ static void warn_of_grey(const session_catalogue *catalogue, const scene_image *
     }
 }
 
-/* Checks the field of a layer's contour lines on the meshes of the layer, which are those listed in the field `on`. */
+/* Checks the field of a layer's contour lines on the meshes on which the layer is drawn. These are the meshes of the
+ * field `on`. */
 static insitu_status check_lines(const session_plan_basis *basis, const scene_lines *lines, const scene_field *on,
                                  base_error *error)
 {
@@ -469,8 +471,8 @@ static bool lacks_outputs(const session_plan_basis *basis, const scene_image *im
     return is_lacking;
 }
 
-/* Selects the images that are due and can be drawn. Views of an orbit share their layers, and therefore the layers'
- * warnings. */
+/* Selects the images that are due and can be drawn. The views of an orbit have the same layers, so that the layers are
+ * checked, and warned of, only for the first view. */
 static void select_images(const session_plan_basis *basis, session_report *report, session_plan *plan)
 {
     bool is_drawable = false;

@@ -12,7 +12,7 @@
 typedef struct session_recentring {
     session_mesh_group *mesh_group;
     const char *field;
-    int component; /* number of the component, in the format of grid_field.component */
+    int component; /* number of the component, as in grid_field.component */
 } session_recentring;
 
 /* The images to draw and the data that they need; the same on every rank. Borrows from the scene and the catalogue. */
@@ -54,13 +54,14 @@ bool session_is_due(const scene_image *image, const session_moment *moment);
 /* Returns the number of images that are due, without regard to conditions. Local. */
 int session_count_due(const scene *scene, const session_moment *moment);
 
-/* Finds the statistics that are due and, if `images` is set, the conditions of images. Keeps those whose fields exist.
- * The first fault is stored in *error. Local, the same on every rank. */
+/* Checks the fields of the statistics that are due and, if `images` is set, of the conditions of images. Returns the
+ * sets of statistics and images whose fields exist. The first error is stored in *error. Local, the same on every
+ * rank. */
 session_valid_events session_check_event_fields(const session_plan_basis *basis, bool images, base_error *error);
 
 /* Determines which of the due images can be drawn, marks on this rank's meshes and scalars the data that they need, and
- * copies values that have an index. An image that cannot be drawn is not an error of this call, but invalid values are;
- * they are stored in the fields' problems. Collective. */
+ * copies the values of fields that have an index. An image that cannot be drawn is not an error of this call. A field
+ * with invalid values is an error, which is also stored as the field's problem. Collective. */
 insitu_status session_make_plan(const session_plan_basis *basis, session_meshes *meshes, const session_team *team,
                                 session_report *report, session_plan *out, base_error *error);
 

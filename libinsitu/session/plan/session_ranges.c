@@ -70,7 +70,7 @@ static double value_from_order(uint64_t order)
     return value;
 }
 
-/* Returns the position of the lowest bit of the digit that a pass determines. The last pass has only 9 bits left. */
+/* Returns the position of the lowest bit of the digit that a pass determines. In the last pass only 9 bits are left. */
 static int pass_shift(int pass)
 {
     return pass + 1 < PASSES ? 64 - DIGIT_BITS * (pass + 1) : 0;
@@ -82,7 +82,8 @@ static uint64_t known_bits_mask(int pass)
     return pass ? ~UINT64_C(0) << pass_shift(pass - 1) : 0;
 }
 
-/* Maximum number of values that a pass stores for the next ones, and the first pass that may store values. */
+/* MOST_KEPT: maximum number of values that a pass stores for the next passes; FIRST_KEPT: number of the first pass that
+ * may store values. */
 enum { MOST_KEPT = 4096, FIRST_KEPT = 2 };
 
 typedef struct weighted_value {
@@ -118,8 +119,9 @@ static void keep_value(const weighted_value *value, kept_values *kept)
     if (at < MOST_KEPT) kept->values[at] = *value;
 }
 
-/* For each of the two percentiles whose known leading bits the value has, adds the value's weight to the sum of its
- * next digit. Returns whether it was added for any. */
+/* Compares the leading bits of a value with the known bits of the two percentiles. If they are equal for a percentile,
+ * adds the value's weight to the count of its next digit for this percentile. Returns whether the weight was added to
+ * any count. */
 static bool count_value(const digit_count *of, const weighted_value *value, int64_t counts[2 * DIGITS])
 {
     const uint64_t known = known_bits_mask(of->pass);
@@ -140,7 +142,7 @@ typedef struct counted_cells {
     const session_cell_value *values; /* if some cells are of higher order; otherwise NULL */
 } counted_cells;
 
-/* Returns false if the mesh does not have the scalar. */
+/* Finds the cells of one mesh, and their values of a field. Returns false if the mesh does not have the field. */
 static bool find_cells(const session_meshes *meshes, int index, const scene_field *field, const digit_count *of,
                        counted_cells *out)
 {
@@ -288,8 +290,8 @@ static insitu_status find_kind(const session_meshes *meshes, const session_team 
     return status || least[LACKING] == 0 ? status : session_agree(team->comm, error);
 }
 
-/* Returns the digit of the value with the given rank (a sum of weights, counted from 0). *rank receives the value's
- * rank among the values with this digit. */
+/* Returns the digit of the value at the position *rank of the sorted values. Positions are in units of weight, from 0.
+ * *rank becomes the value's position among the values with this digit. */
 static int find_digit(const int64_t counts[DIGITS], int64_t *rank)
 {
     int digit = 0;
@@ -297,8 +299,8 @@ static int find_digit(const int64_t counts[DIGITS], int64_t *rank)
     return digit;
 }
 
-/* Returns the rank of a percentile, in units of weight. The total may exceed the integers that a double can
- * represent. */
+/* Returns the position of a percentile among the sorted values, in units of weight. The position is limited to total -
+ * 1, because the total may be too large for an exact conversion to double. */
 static int64_t find_rank(double percent, int64_t total)
 {
     const int64_t rank = (int64_t)fmax(ceil(percent / 100 * (double)total), 1) - 1;

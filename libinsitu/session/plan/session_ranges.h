@@ -20,8 +20,8 @@ insitu_status session_find_extremes(const session_meshes *meshes, const session_
                                     const session_range_subject *of, double *low, double *high, base_error *error);
 
 /* Computes the range of a layer's field over all ranks' drawn cells, as the colour map requires (extremes, percentiles
- * or symmetric). SCENE_RANGE_RUN yields the range of this step alone. low > high: there are no values. The result has
- * the same bits on any partition. Collective. */
+ * or symmetric). For SCENE_RANGE_RUN, this is the range of this step only. low > high: there are no values. The result
+ * is bit-identical for any partition. Collective. */
 insitu_status session_find_range(const session_meshes *meshes, const session_team *team, const scene_field *field,
                                  const scene_colour_map *map, double *low, double *high, base_error *error);
 

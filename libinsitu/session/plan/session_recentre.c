@@ -1,8 +1,8 @@
-/* Recentring computes values at vertices. The value at a vertex is the mean over the caller's cells that have this
- * vertex, on all ranks. It has the same bits for any partition. (For corner fields, the mean is over the corners at
- * this vertex; for values at vertices of refined blocks, over all vertices at the same position.) If the field has
- * values on faces of the boundary, a vertex of such faces gets the mean of the faces' values instead, even if these
- * faces are on other ranks.
+/* Recentring computes values at vertices. The value at a vertex is the mean of the values of the caller's cells that
+ * have this vertex, on all ranks. The result is bit-identical for any partition. For corner fields, the mean is over
+ * the corners at this vertex; for values at vertices of refined blocks, it is over all vertices at the same position.
+ * If the field has values on faces of the boundary, a vertex of such faces gets the mean of the values of these faces
+ * instead, even if the faces are on other ranks.
  *
  * Rounding of a sum depends on the order of its terms, so that adding partial sums of ranks would make the result
  * depend on the partition. Instead, the individual values of all ranks are gathered and added by sum_values(), whose
@@ -57,8 +57,8 @@ typedef struct recentring {
     session_mesh_group *mesh_group;
     session_mesh_group_parts list;
     mesh_part *parts; /* for each part in the list, its field and the scalar that gets the means */
-    /* index of each group's first value if faces of the boundary have values; otherwise those in mesh_group->groups are
-     * used */
+    /* index of each group's first value if faces of the boundary have values; NULL: no face has a value, and
+     * corner_starts in mesh_group->groups is used */
     int64_t *starts;
     value_groups values; /* the values to be averaged, by group of mesh_group->groups */
 } recentring;
@@ -87,11 +87,12 @@ static void groups_free(value_groups *groups)
     *groups = (value_groups){0};
 }
 
-/* Returns the sum of finite values, each multiplied by scale; the bits of the sum do not depend on the order of the
- * values. A value is rounded to a multiple of a unit that is coarse enough for sums of such multiples to be exact; the
- * rest of it, which is exact too, is rounded to a multiple of a finer unit (Rump, Ogita and Oishi, Accurate
- * floating-point summation, 2008, section 3). For 100 values, the remainder that is neglected is below 2^-85 of the
- * largest value. Therefore the sum is rounded correctly, unless it is so close to the middle between two doubles. */
+/* Returns the sum of finite values, each multiplied by scale. The bits of the sum do not depend on the order of the
+ * values. Each value is split into a multiple of a unit and a remainder. The unit is so coarse that sums of its
+ * multiples are exact. The remainder, which is exact too, is rounded to a multiple of a finer unit (Rump, Ogita and
+ * Oishi, Accurate floating-point summation, 2008, section 3). For 100 values, the part that is neglected is below 2^-85
+ * of the largest value. Therefore the sum is rounded correctly, unless the exact sum is as close as this to the middle
+ * between two doubles. */
 static double sum_values(const double *values, int64_t count, double largest, double scale)
 {
     double sums[2] = {0, 0};
@@ -107,7 +108,8 @@ static double sum_values(const double *values, int64_t count, double largest, do
     return sums[0] + sums[1];
 }
 
-/* Returns the mean. The mean of equal values is exactly their value. */
+/* Returns the mean of the values, or NaN if there are none. If all values are equal, the result is exactly this
+ * value. */
 static double find_mean(const double *values, int64_t count)
 {
     double largest = 0;
@@ -135,7 +137,7 @@ static void groups_average(value_groups *groups, int threads)
 
 /* ---- this rank's values ---------------------------------------------------------------------------------------- */
 
-/* The groups of a cell's vertices without duplicates. If values at vertices of split cells are averaged, the list
+/* The groups of a cell's vertices, without duplicates. If values at vertices of split cells are averaged, the list
  * contains the vertices instead of their groups. */
 typedef struct cell_groups {
     int64_t count, capacity;
@@ -279,7 +281,7 @@ static bool add_part_values(recentring *r, int part, int threads)
     return !is_lost;
 }
 
-/* Replaces the values in groups of boundary faces by the values of these faces alone. */
+/* Adds the values of boundary faces to their groups. These groups are marked, so that they get no values of cells. */
 static void set_face_values(const session_patch_values *faces, value_groups *values)
 {
     for (int64_t i = 0; i < faces->count; i++) {
@@ -368,7 +370,8 @@ static void average_own_values(recentring *r, const session_team *team, base_err
 
 /* ---- groups that several ranks have ---------------------------------------------------------------------------- */
 
-/* number of words of a record before its values: the key, and the count, whose bit FACE_VALUES marks values of faces */
+/* number of words in a record before its values: three for the key, and one for the number of values, in which the bit
+ * FACE_VALUES is set if the values are those of boundary faces */
 enum { RECORD_HEAD = 4 };
 #define FACE_VALUES (UINT64_C(1) << 63)
 
@@ -456,7 +459,7 @@ static bool gather_records(const session_mail *in, const int64_t *groups, int64_
     return true;
 }
 
-/* Stores, in the reply, the mean for the key of each record. */
+/* Merges the records by key. For each record, the reply receives the mean of all values with the record's key. */
 static bool merge_records(const session_mail *in, int ranks, int threads, session_mail *reply)
 {
     session_key_table keys = {0};

@@ -94,7 +94,7 @@ static bool read_line(session_image_ranges *ranges, const char *text)
     return true;
 }
 
-/* Reads the ranges from the lines of the text, in which line ends are replaced by NUL. */
+/* Reads the ranges from the lines of the text. Line ends in the text are replaced by NUL. */
 static insitu_status read_lines(session_image_ranges *ranges, const file_content *content, base_error *error)
 {
     char *line = content->text, *const end = content->text + content->size;

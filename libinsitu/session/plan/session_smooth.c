@@ -1,5 +1,6 @@
-/* Computes smooth normals without a seam: gradients at the vertices of the cells that an isosurface crosses, over all
- * ranks (session_vertex_sums.h). */
+/* Computes smooth normals that are continuous across the borders between ranks. They are interpolated from gradients at
+ * the vertices of the cells that an isosurface crosses; these gradients are means over the cells of all ranks
+ * (session_vertex_sums.h). */
 #include "session_smooth.h"
 
 #include <string.h>
@@ -211,9 +212,9 @@ static void free_work(smooth_work *work)
 
 /* ---- one item ------------------------------------------------------------------------------------------------ */
 
-/* Numbers the vertices of the part whose gradients this rank needs. Other vertices have no sum, or only one for other
- * ranks. key_indices[vertex] becomes the vertex's number or -1, and sum_of[n] becomes the index of the sum of vertex
- * number n. Returns the number of these vertices. */
+/* Numbers the vertices of the part whose gradients this rank needs. The other vertices have no sum, or a sum that only
+ * other ranks need. key_indices[vertex] becomes the vertex's number or -1, and sum_of[n] becomes the index of the sum
+ * of vertex number n. Returns the number of numbered vertices. */
 static int64_t number_gradients(session_sum_part *part, int64_t own_count, int32_t *sum_of)
 {
     int64_t count = 0;

@@ -5,11 +5,11 @@
 #include "session_plan.h"
 #include "session_team.h"
 
-/* Computes, for the isosurfaces of the plan that have smooth normals, the gradients at the vertices of the cells that
- * these isosurfaces cross. Each gradient is computed from the cells around the vertex on all ranks, with the same bits
- * on any partition. Vertices are matched by the same keys as in recentring. extent: the global bounds. The homes of the
- * catalogue's meshes must be up to date. An error that occurs on this rank at the very end is stored only in *error,
- * and is shared in the next phase. Collective; apart from that, all ranks return the same status. */
+/* Computes the gradients at the vertices of the cells that isosurfaces with smooth normals cross. Each gradient is
+ * computed from the cells around the vertex on all ranks, and is bit-identical for any partition. Vertices are matched
+ * by the same keys as in recentring. extent: the global bounds. The homes of the catalogue's meshes must be up to date.
+ * Collective. All ranks return the same status. An error that occurs on this rank after the last communication is only
+ * stored in *error, and the next phase passes it to all ranks. */
 insitu_status session_find_smooth_gradients(const session_plan *plan, const session_catalogue *catalogue,
                                             const session_meshes *meshes, const session_team *team,
                                             const session_extent *extent, base_error *error);
@@ -23,8 +23,8 @@ bool session_is_smooth(const session_plan *plan, const session_catalogue *catalo
  * gradients at nodes are. The result is the same on all ranks. */
 bool session_has_smooth_normals(const scene_isosurface *layer, const session_catalogue *catalogue);
 
-/* Returns whether outer surfaces have normals at vertices, because some mesh has bent cells of higher order, whose
- * faces may be curved. The result is the same on every rank. */
+/* Returns whether outer surfaces have normals at vertices. This is the case if some mesh has bent cells of higher
+ * order, because the faces of such cells may be curved. The result is the same on every rank. */
 bool session_has_curved_faces(const session_catalogue *catalogue);
 
 #endif

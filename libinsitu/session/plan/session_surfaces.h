@@ -5,10 +5,10 @@
 #include "session_plan.h"
 #include "session_team.h"
 
-/* Finds the outer faces of each mesh, which are kept until its cells change. Builds this rank's meshes on these faces,
- * so that their trees can be built. The homes of the catalogue's meshes must be up to date. An error that occurs on
- * this rank at the very end is stored only in *error, and is shared in the next phase. Collective; apart from that, all
- * ranks return the same status. */
+/* Finds the outer faces of each mesh whose surface the plan shows, and builds this rank's meshes on these faces, so
+ * that trees can be built for them. The faces of a mesh are kept until its cells change. The homes of the catalogue's
+ * meshes must be up to date. Collective. All ranks return the same status. An error that occurs on this rank after the
+ * last communication is only stored in *error, and the next phase passes it to all ranks. */
 insitu_status session_update_surfaces(const session_plan *plan, const session_catalogue *catalogue,
                                       const session_meshes *meshes, const session_team *team, base_error *error);
 

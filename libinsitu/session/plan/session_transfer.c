@@ -13,18 +13,19 @@
 
 enum { band_entries = 16 };
 
-/* Limits of the width of a range, as fractions of its larger end, below which the range is treated as a single value.
- * least_of_data is for ranges from the data, because means over cells and ranks have rounding errors of a few times
- * 2^-53. A range that the scene gives may be as narrow as its digits allow, because values are stored relative to its
- * low end in double. */
+/* least_of_data: a range that is computed from the data is treated as a single value if its width is below this
+ * fraction of its larger end, because means over cells and ranks have rounding errors of a few times 2^-53. A range
+ * that the scene gives may be as narrow as its digits allow, because values are stored relative to its low end in
+ * double. widest_log: maximum ratio of the ends of a logarithmic range. */
 static const double least_of_data = 64 * DBL_EPSILON, widest_log = 1e30;
 
-/* Width of the range that a constant field gets, as a fraction of the field's value. */
+/* Width of the range that is used for a constant field, as a fraction of the field's value: constant_linear for a
+ * linear scale, constant_scaled for other scales. */
 static const double constant_linear = 1e-6, constant_scaled = 1e-3;
 
-/* With a logarithmic scale, values are stored relative to 0 in float32. In a range narrower than this fraction of its
- * larger end, the rounding would be visible. Such a range gets a linear scale instead, which changes positions in the
- * map by at most an eighth of this fraction, 1.3e-4. */
+/* With a logarithmic scale, values are stored relative to 0 in float32. If a range were narrower than this fraction of
+ * its larger end, the rounding of values would be visible. A linear scale is used for such a range instead; this
+ * changes positions in the map by at most an eighth of this fraction, 1.3e-4. */
 static const double straight = 1e-3;
 
 static double larger_magnitude(double low, double high)

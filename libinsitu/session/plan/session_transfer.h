@@ -9,8 +9,8 @@ typedef struct session_transfer {
     render_transfer transfer;                         /* the transfer function; it points into this struct */
     double opacity_values[RENDER_MAX_OPACITY_POINTS]; /* value of the field at each point of the opacity curve */
     float opacities[RENDER_MAX_OPACITY_POINTS];       /* opacity at each of these values */
-    /* values at the ends of the colour map; the transfer function's range is larger if a volume shows values outside of
-     * [low, high] */
+    /* values at the ends of the colour map. The range of the transfer function is larger if a volume has colours for
+     * values outside of [low, high]. */
     double low, high;
     bool is_constant; /* set if all values are equal; the value is then in the middle of low and high */
     double constant;
@@ -27,8 +27,8 @@ bool session_transfer_allocates(const scene_colour_map *map, const scene_volume 
 void session_transfer_free(session_transfer *transfer);
 
 /* Computes the intervals of values in which a volume is not transparent, and returns their number. If the colour map's
- * range is yet to be computed from the data, the result is all values, or none if the volume is transparent everywhere.
- * Local, the same on every rank. */
+ * range is not fixed, it depends on the data; the result is then all values, or none if the volume's opacity is 0 at
+ * all values. Local, the same on every rank. */
 int session_visible_intervals(const scene_volume *volume, mmbvh_interval out[RENDER_MAX_INTERVALS]);
 
 /* Returns whether the values of a range are so close to each other that their rounding is visible in float32, even

@@ -2,7 +2,7 @@
  * refit of its bounds (or, if its cost has grown by half, a new tree); new values require a refit of ranges. The ranges
  * of the first scalar with which a mesh is drawn are stored in the nodes themselves, and those of further scalars in
  * separate arrays. If values determine which cells are visible and vertices move in every step, only the bounds of
- * visible nodes are refitted, which are a fifth of all nodes for an isosurface.
+ * visible nodes are refitted. For an isosurface, a fifth of all nodes is visible.
  *
  * A full tree is expensive to build and cheap to keep. A partial tree, over the cells that the images can show, is
  * cheap to build if they show little, but is valid only for the current values. Which is better depends on how long the
@@ -10,9 +10,9 @@
  * the cells last changed reaches the price of the full tree, which is then "bought". This never costs more than twice
  * the best choice in hindsight (Karlin, Manasse, Rudolph and Sleator 1988). Prices are measured in this run.
  *
- * If the last full tree of a mesh was used in only one step, the next tree will probably also be used only once, for
- * example because the caller sets a new mesh at every step. The next tree is then built along a space-filling curve,
- * which takes half the time. It is kept if it is used longer after all. */
+ * If the previous full tree of a mesh was used in only one step, the next tree will probably also be used only once,
+ * for example because the caller sets a new mesh at every step. The next tree is then built along a space-filling
+ * curve, in half the time. It is kept if it is used longer after all. */
 #include "session_trees.h"
 
 #include <math.h>
@@ -177,8 +177,8 @@ static bool is_decayed(const session_mesh *mesh)
     return tree > worst_cost * built;
 }
 
-/* Lists the intervals of values that are shown, for each scalar; nodes of the tree outside of them are invisible. The
- * tree's ranges must be up to date. */
+/* Lists for each scalar the intervals of its values that are shown. Nodes of the tree whose values lie outside of these
+ * intervals are invisible. The tree's ranges must be up to date. */
 static int list_visible(const session_mesh *mesh, mmbvh_visible *out)
 {
     int count = 0;
@@ -211,8 +211,8 @@ static insitu_status refit_bounds(const tree_update *u, session_mesh *mesh, bool
     return is_decayed(mesh) ? build_and_refit(u, mesh, error) : INSITU_OK;
 }
 
-/* Updates the bounds. As long as the candidates are the same, only bounds of visible nodes must be valid. If the
- * candidates have changed and vertices no longer move, all bounds are refitted once. */
+/* Updates the bounds. While the candidates are the same as in the previous step, only bounds of visible nodes must be
+ * valid. If the candidates have changed and vertices no longer move, all bounds are refitted one time. */
 static insitu_status update_bounds(const tree_update *u, session_mesh *mesh, bool are_values_new, base_error *error)
 {
     uint64_t key;
@@ -362,9 +362,9 @@ static insitu_status update_tree(const tree_update *u, session_mesh *mesh, base_
     return status;
 }
 
-/* Updates some of the parts on one thread. If a mesh has many small blocks, a parallel region for each would cost more
- * than it saves; therefore each part is updated by one thread if there are several parts per thread. In this case the
- * seconds per cell are not measured. */
+/* The data with which one thread updates some of the parts. If a mesh has many small blocks, a parallel region for each
+ * block would cost more than it saves. Therefore each part is updated by one thread if there are several parts per
+ * thread. In this case the seconds per cell are not measured. */
 typedef struct thread_update {
     tree_update update;
     session_trees trees;
@@ -412,7 +412,7 @@ static insitu_status update_on_threads(const tree_update *u, session_mesh *const
     return error->status;
 }
 
-/* Lists the parts that are needed and returns their number; only counts them if parts is NULL. */
+/* Lists the needed parts and returns their number. If parts is NULL, they are only counted. */
 static int list_needed(const session_meshes *meshes, session_mesh **parts)
 {
     int count = 0;

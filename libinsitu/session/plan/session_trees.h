@@ -1,4 +1,5 @@
-/* Builds and updates the trees over this rank's meshes and the ranges of their scalars. */
+/* Builds and updates the trees over the cells of this rank's meshes, and the ranges of values that the trees
+ * contain. */
 #ifndef SESSION_TREES_H
 #define SESSION_TREES_H
 
@@ -20,8 +21,9 @@ typedef struct session_trees {
     bool is_parent_stale;
 } session_trees;
 
-/* Builds or refits the trees of the marked meshes that are out of date. choice: which kind of tree the scene requests.
- * Adds the times to the report. Local; the next reduction sends errors to all ranks. */
+/* Updates the trees of the meshes that are marked as needed: builds or refits those that are out of date. choice: the
+ * kind of tree that the scene requests. Adds the times to the report. Local; the next reduction passes errors to all
+ * ranks. */
 insitu_status session_update_trees(session_trees *trees, const session_meshes *meshes, const session_space *space,
                                    scene_tree choice, const session_team *team, insitu_report *report,
                                    base_error *error);

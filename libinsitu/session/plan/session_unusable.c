@@ -5,8 +5,8 @@
 #include "session_hash.h"
 #include "session_scalars.h"
 
-/* Iterator over the fields of the plan's isosurfaces and volumes. Views of an image share their layers, so that each
- * layer is visited once. */
+/* Iterator over the fields of the plan's isosurfaces and volumes. Views of an image have the same layers, so that only
+ * the first view is visited. */
 typedef struct field_walk {
     const session_plan *plan;
     int image; /* index of the image whose fields are visited next */

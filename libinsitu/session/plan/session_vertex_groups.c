@@ -19,9 +19,9 @@ static session_key key_of_point(const double position[3])
     return key;
 }
 
-/* Assigns groups to the vertices of a part's drawn cells. While this runs, the i-th twin has the preliminary value -2 -
- * i in group_of_vertex. If vertices are equal by id, one_vertex receives the number of one vertex of each group;
- * otherwise it is NULL. */
+/* Assigns groups to the vertices of a part's drawn cells. A twin is a vertex that is equal to another vertex except for
+ * rounding (session_twins.h). While this function runs, group_of_vertex contains -2 - i for the i-th twin. If vertices
+ * are equal by id, one_vertex receives the number of one vertex of each group; otherwise it is NULL. */
 static void group_part(const groups_basis *basis, int part, session_vertex_groups *out, int64_t *one_vertex)
 {
     const session_mesh *mesh = basis->parts[part];
@@ -48,7 +48,7 @@ static void group_part(const groups_basis *basis, int part, session_vertex_group
 }
 
 /* Groups the vertices of all parts. If vertices are grouped by id, *one_vertex receives an array with the number of one
- * vertex of each group. */
+ * vertex of each group. Returns false if memory runs out. */
 static bool group_vertices(const groups_basis *basis, session_vertex_groups *out, int64_t **one_vertex)
 {
     out->first_vertices = base_calloc((size_t)basis->part_count + 1, sizeof *out->first_vertices);

@@ -3,10 +3,10 @@
  *
  *     shared: keys inside another rank's box  --(keys)-->  that rank adds them to its own
  *     local:  every vertex with one of these keys; the cells around them; their sums (session_gradients.h)
- *     shared: <--(sums)--, in whole numbers, which add up in any order
+ *     shared: <--(sums)--, as integers, so that the order of addition does not matter
  *
- * If a mesh is cut into blocks, few vertices lie in other ranks' boxes; if each rank has cells everywhere, each sends
- * requests to all others. */
+ * If a mesh is cut into compact blocks, few vertices lie in other ranks' boxes. If the cells of each rank are scattered
+ * over the whole domain, each rank sends requests to all others. */
 #include "session_vertex_sums.h"
 
 #include <math.h>
@@ -112,8 +112,8 @@ static bool find_key_positions(const session_vertex_sums *sums, double (**out)[3
     return true;
 }
 
-/* Packs the keys that lie in each other rank's box into messages. *numbers: the index of each key, in the order of the
- * messages. */
+/* For each other rank, packs the keys whose vertices lie in the rank's box into a message. *numbers receives the index
+ * of each packed key, in the order of the messages. */
 static bool write_requests(const session_vertex_sums *sums, const session_team *team, const session_homes *homes,
                            const double (*positions)[3], session_mail *out, int64_t **numbers)
 {
@@ -140,7 +140,7 @@ static bool write_requests(const session_vertex_sums *sums, const session_team *
     return true;
 }
 
-/* Ensures that the array has space for the keys that other ranks request, which are stored after this rank's own
+/* Ensures that the array has space for `more` keys that other ranks request. They are stored after this rank's own
  * keys. */
 static bool extend_keys(session_vertex_sums *sums, int64_t more)
 {
@@ -243,9 +243,9 @@ static bool filter_create(const session_key_table *keys, key_filter *out)
     return out->bits != NULL;
 }
 
-/* Finds the key of each vertex that has one: one of this rank's own keys, which several vertices along a crack may
- * share, or a requested key. If only some pieces of cells of higher order are made, most vertices belong to no piece
- * and are not searched. */
+/* Stores in key_indices the index of each vertex's key, or -1 if the vertex has none. The key is one of this rank's own
+ * keys or a requested key; several vertices along a crack may have the same key. If only some pieces of cells of higher
+ * order are made, most vertices belong to no piece and are not searched. */
 static void find_entries(const session_vertex_sums *sums, session_sum_part *part, const key_filter *filter, int threads)
 {
     const bool is_marked = part->mesh->finer.pieces.first_words != NULL;
@@ -287,8 +287,8 @@ static session_gradient_basis make_gradient_basis(const session_vertex_sums *sum
                                     .polynomials = part->polynomials};
 }
 
-/* Finds the polynomials of a part whose cells are split. It does nothing if a field is recentred from cells, because
- * the means at nodes are not values of a polynomial. */
+/* Finds the polynomials of a part whose cells are split into pieces. If a field is recentred from cells, none are
+ * needed, because the means at nodes are not values of a polynomial. */
 static bool make_polynomials(const session_vertex_sums *sums, session_sum_part *part)
 {
     bool is_polynomial = part->mesh->topology.is_split;
@@ -329,9 +329,9 @@ static bool add_sums(const session_vertex_sums *sums, const session_cell_list *l
     return is_done;
 }
 
-/* Computes the sums of gradients in fixed-point integers, whose unit follows from the largest bounds over all ranks. If
- * *error of any rank already holds an error, all ranks return this error; an error that occurs after the reduction is
- * only stored in *error. Collective. */
+/* Computes the sums of gradients in fixed-point integers. The value of their lowest bit is chosen from the largest
+ * bounds over all ranks. If *error of any rank already holds an error, all ranks return this error; an error that
+ * occurs after the reduction is only stored in *error. Collective. */
 static insitu_status make_sums(const session_team *team, session_vertex_sums *sums, session_cell_list *lists,
                                base_error *error)
 {

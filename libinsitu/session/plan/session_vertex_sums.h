@@ -38,9 +38,9 @@ typedef struct session_vertex_sums {
 /* Assigns a key to every vertex of a cell that is not a ghost. Local. */
 insitu_status session_key_all_vertices(session_vertex_sums *sums, base_error *error);
 
-/* Computes the sums of this rank's keys over all ranks. Keys and entries must be set. A rank that has failed before
- * calls this with its error in *error. An error at the very end is stored only in *error. Collective; apart from that,
- * all ranks return the same status. */
+/* Computes the sums of this rank's keys over all ranks. The keys, and key_indices of each part, must be set. A rank
+ * that has failed before calls this function with its error in *error. Collective. All ranks return the same status. An
+ * error that occurs after the last exchange of messages is only stored in *error. */
 insitu_status session_find_sums(const session_homes *homes, const session_team *team, const session_extent *extent,
                                 session_vertex_sums *sums, base_error *error);
 

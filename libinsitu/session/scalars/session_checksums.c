@@ -15,8 +15,8 @@ static uint64_t mix_bits(uint64_t sum, uint64_t bits)
     return product ^ product >> 29;
 }
 
-/* Computes the checksum in several independent sums, which a CPU computes in parallel. Within one sum, each
- * multiplication would have to wait for the previous one. */
+/* Computes the checksum of contiguous bytes as several independent sums, which a CPU computes in parallel. In a single
+ * sum, each multiplication would depend on the result of the previous one. */
 static uint64_t sum_words(const char *data, int64_t bytes)
 {
     uint64_t lanes[LANES] = {1, 2, 3, 4}, words[LANES];
@@ -74,8 +74,8 @@ static uint64_t sum_field(uint64_t sum, const session_mesh *mesh, const grid_fie
     return sum;
 }
 
-/* Returns the checksum of a scalar. It includes the cells' own values, because if some of these become NaN, the means
- * at their vertices may remain the same. */
+/* Returns the checksum of a scalar. If the scalar's values are means of cell values, the checksum includes the cell
+ * values: if some of these become NaN, the means at their vertices may remain the same. */
 static uint64_t find_checksum(const session_mesh *mesh, const session_scalar *scalar, int threads)
 {
     const grid_field field = session_scalar_field(mesh, scalar);
@@ -121,8 +121,8 @@ static void warn_of_change(const session_mesh *mesh, session_scalar *scalar, ses
     scalar->may_have_changed = scalar->may_have_changed || has_changed;
 }
 
-/* Computes the checksum of the values and compares it with that of the last picture. Returns whether they are equal;
- * otherwise the data that depends on the values is marked as stale. */
+/* Computes the checksum of the values and compares it with the checksum at the most recently drawn picture. Returns
+ * whether they are equal; otherwise the data that depends on the values is marked as stale. */
 static bool compare_checksum(const session_mesh *mesh, session_scalar *scalar, int threads)
 {
     const uint64_t checksum = find_checksum(mesh, scalar, threads);
@@ -137,9 +137,9 @@ static bool compare_checksum(const session_mesh *mesh, session_scalar *scalar, i
     return false;
 }
 
-/* Compares the checksums of a part's fields. For a block, returns the number of fields that have the values of the last
- * picture. For a mesh without blocks, adds these fields to the report and returns 0. The fields of mirror images are
- * not counted. */
+/* Compares the checksums of a part's fields. For a block, returns the number of fields whose values are the same as at
+ * the most recently drawn picture. For a mesh without blocks, adds these fields to the report and returns 0. The fields
+ * of mirror images are not counted. */
 static int64_t compare_part(const session_mesh *mesh, int threads, session_report *report)
 {
     int64_t unchanged = 0;

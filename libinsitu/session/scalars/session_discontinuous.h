@@ -1,5 +1,5 @@
-/* Discontinuous meshes, in which every cell has its own vertices. They are used for fields with a value at each corner
- * of each cell.
+/* Defines discontinuous meshes. In such a mesh, every cell has its own vertices. Discontinuous meshes are used for
+ * fields with a value at each corner of each cell.
  *
  * All other code finds values by the number of a vertex. Therefore a mesh with a corner field is read as a mesh in
  * which every corner is a vertex. Its coordinates are copied corner by corner, and its connectivity is 0, 1, 2, ....
@@ -14,9 +14,9 @@
 #include "session_mesh.h"
 #include "session_team.h"
 
-/* Makes meshes discontinuous if the scene uses a corner field of the mesh, unless they are already discontinuous with
- * the current coordinates. All other meshes are read with the caller's vertices again. Cells must have been checked.
- * Collective. */
+/* Makes meshes discontinuous if the scene uses a corner field of the mesh. A mesh that is already discontinuous with
+ * the current coordinates is not changed. All other meshes are read with the caller's own vertices. Cells must have
+ * been checked. Collective. */
 insitu_status session_make_discontinuous(session_meshes *meshes, const session_catalogue *catalogue, const scene *scene,
                                          const session_team *team, base_error *error);
 

@@ -66,7 +66,8 @@ static session_scalar *add_distance(session_mesh *mesh, const scene_plane *plane
     return scalar;
 }
 
-/* Moves the point of a plane that passes through the centre of the data, if the data's bounds have changed. */
+/* Updates the point of a plane that is defined relative to the centre of the data, if the data's bounds have
+ * changed. */
 static void recentre_plane(session_scalar *scalar, const scene_plane *plane, const session_extent *extent)
 {
     double point[3];

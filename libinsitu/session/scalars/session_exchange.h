@@ -1,4 +1,4 @@
-/* Exchanges words between all ranks. */
+/* Exchanges messages of 8-byte words between all ranks. */
 #ifndef SESSION_EXCHANGE_H
 #define SESSION_EXCHANGE_H
 
@@ -9,7 +9,7 @@
 #include "error.h"
 #include "session_keys.h"
 
-/* 8-byte words that are sent to or received from each rank, in the order of ranks. */
+/* The words that a rank sends to all ranks, or receives from all ranks. A word has 8 bytes. */
 typedef struct session_mail {
     int64_t *counts; /* number of words for each rank */
     uint64_t *words; /* the words for all ranks, in the order of ranks */

@@ -40,7 +40,8 @@ static const char *describe_centring(insitu_centring centring)
     return centring == INSITU_VERTEX ? "vertices" : centring == INSITU_CELL ? "cells" : "corners of cells";
 }
 
-/* Returns whether the field has an index. The address of an empty array may be NULL, so that its type decides. */
+/* Returns whether the field has an index. If the field needs no values, the address of its index may be NULL; then the
+ * index's type shows whether there is one. */
 static bool is_by_index(const session_mesh *mesh, const insitu_field *field)
 {
     return field->index.data || (field->index.type && session_count_field_positions(&mesh->original, field) == 0);
@@ -248,8 +249,8 @@ static bool is_same_layout(const insitu_field *a, const insitu_field *b)
            a->component_count == b->component_count && are_same_components(a, b) && are_same_patches(a, b);
 }
 
-/* Replaces the field's tables of patches and components by copies of the given tables, which may be those that the
- * field already owns. Returns false if memory runs out. */
+/* Replaces the field's tables of patches and components by copies of the given tables. The given tables may be the
+ * tables that the field already owns. Returns false if memory runs out. */
 static bool copy_tables(session_field *field, const insitu_field *given, base_error *error)
 {
     const size_t components = given->components ? (size_t)given->component_count : 0;
@@ -313,7 +314,7 @@ static void set_value_arrays(const session_mesh *mesh, session_field *field, con
 }
 
 /* Stores a field's description. The tables of patches and components must have been copied before, unless is_same is
- * set, which means that all values have the same addresses as before. */
+ * set, because all values have the same addresses as before. */
 static void store_field(session_meshes *meshes, session_mesh *mesh, int index, const insitu_field *given, bool is_same)
 {
     session_field *field = &mesh->fields[index];
@@ -373,8 +374,8 @@ static insitu_status refuse_field(session_meshes *meshes, session_mesh *mesh, co
     return base_fail(error, INSITU_ERROR_FIELD, "field \"%s\": its mesh \"%s\" was refused", name, mesh->label);
 }
 
-/* Reports that the mesh or block does not exist. If a block is requested but the name belongs to a whole mesh, or vice
- * versa, the message says so. */
+/* Reports that the mesh or block does not exist. The message states if a block is requested of a mesh without blocks,
+ * or no block of a mesh with blocks. */
 static void refuse_missing_mesh(const session_meshes *meshes, const char *name, int64_t block, const char *field,
                                 base_error *error)
 {

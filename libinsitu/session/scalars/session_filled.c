@@ -28,7 +28,7 @@ static insitu_status call_fill(session_meshes *meshes, const session_mesh *mesh,
                      given->name, (int)status, insitu_status_name(status));
 }
 
-/* A call that has failed is not repeated in this step; its error is returned again. */
+/* If the call of the fill function has failed, it is not repeated in this step; the same error is returned. */
 insitu_status session_fill_field(session_meshes *meshes, session_mesh *mesh, int index, base_error *error)
 {
     session_field *field = &mesh->fields[index];
@@ -81,7 +81,8 @@ void session_release_filled_arrays(const session_meshes *meshes)
             field->given.values.data = field->given.index.data = NULL;
             field->values.data = NULL;
             field->given.patch_count = 0;
-            /* the field owns the tables of the last step, which must not be passed to the function as the caller's */
+            /* the field owns these tables of the previous step; the fill function must not take them for the caller's
+             * tables */
             field->given.patches = NULL;
             field->given.components = NULL;
         }

@@ -1,4 +1,4 @@
-/* Fields whose values are computed by a fill function of the caller, in the steps that need them. */
+/* Computes the values of fields by the caller's fill functions, in the steps that need these values. */
 #ifndef SESSION_FILLED_H
 #define SESSION_FILLED_H
 
@@ -15,7 +15,7 @@ insitu_status session_fill_fields(session_meshes *meshes, const session_catalogu
  * error of that call. Local, but the function may communicate. */
 insitu_status session_fill_field(session_meshes *meshes, session_mesh *mesh, int index, base_error *error);
 
-/* Ends the step. Afterwards the session does not read the filled arrays any more. */
+/* Must be called at the end of a step. Afterwards the session does not read the arrays that fill functions have set. */
 void session_release_filled_arrays(const session_meshes *meshes);
 
 #endif

@@ -1,10 +1,10 @@
 /* Every corner of a cell contributes the gradient of the linear function that interpolates the value at the corner and
  * the values at the other ends of its three edges. The apex of a pyramid has four edges, and contributes one gradient
- * for each three of them. A corner of a polyhedron's face contributes one gradient, which is computed from the two
+ * for each triple of them. A corner of a polyhedron's face contributes one gradient, which is computed from the two
  * edges at the corner and the line to the cell's centre. The value at the centre is assumed to be the mean of the
- * vertices' values. At a corner of a shell the gradient is computed from its two edges and the normal, along which the
- * field is assumed to be constant. Therefore the gradient of a linear field is exact everywhere, and gradients at
- * vertices on a boundary are computed from the cells on one side.
+ * vertices' values. At a corner of a shell the gradient is computed from its two edges and the shell's normal; the
+ * field is assumed to be constant along the normal. Therefore the gradient of a linear field is exact at all vertices,
+ * and gradients at vertices on a boundary are computed from the cells on one side.
  *
  * A cell of higher order contributes at each of its nodes the gradient of its polynomial there. In this case the
  * derivatives of the position along the axes of the reference cell replace the edges, and the derivatives of the field
@@ -16,14 +16,14 @@
  * this weight, errors of first order cancel in a mesh whose cells double their size at a vertex. The product of weight
  * and gradient is a sum of cross products, so that no division by a determinant is needed.
  *
- * Edges are sorted by coordinates, and each corner's numbers are rounded to integers before they are summed.
- * Therefore the result does not depend on the order of cells, of their vertices, or of ranks. The unit of the
- * integers follows from bounds that are the same on all ranks. Let R be the largest difference of values along an
- * edge and l the least length of a corner. Then no weight exceeds 3^-1.5 / l, and no weighted gradient exceeds R /
- * l²: a cross product of two edges is at most half of the sum of their squares, so that three of them, times
- * differences of at most R, sum to at most R l². The last bit is 2^-86 of the bound, so that fields that change
- * little from vertex to vertex keep the precision of doubles. Corners shorter than 2^-32 of the scene are ignored,
- * since a unit for them would be too coarse for all others. A sum can contain 2^19 corners at one vertex. */
+ * Edges are sorted by coordinates, and each corner's numbers are rounded to integers before they are summed. Therefore
+ * the result does not depend on the order of cells, of their vertices, or of ranks. The value of the integers' last bit
+ * is chosen from bounds that are the same on all ranks. Let R be the largest difference of values along an edge, and l
+ * the least length of a corner. Then no weight exceeds 3^-1.5 / l, and no weighted gradient exceeds R / l²: a cross
+ * product of two edges is at most half of the sum of their squares, so that three of them, times differences of at most
+ * R, sum to at most R l². The last bit is 2^-86 of the bound, so that fields that change little from vertex to vertex
+ * keep the precision of doubles. Corners shorter than 2^-32 of the scene are ignored, because the bounds for them would
+ * make the last bit too coarse for all other corners. A sum can contain 2^19 corners at one vertex. */
 #include "session_gradients.h"
 
 #include <omp.h>
@@ -45,12 +45,12 @@ typedef struct node {
     int64_t vertex;
 } node;
 
-/* Two numbers, which are rounded and summed together in one vector register. */
+/* Two numbers that are rounded and summed together in one vector register. */
 typedef double number_pair __attribute__((vector_size(16)));
 typedef int64_t word_pair __attribute__((vector_size(16)));
 
-/* The destination of the contributions of corners: the sums or, if `sums` is NULL, the bounds from which the unit of
- * the sums is derived. */
+/* What the contributions of corners are added to: the fixed-point sums or, if `sums` is NULL, the bounds from which the
+ * value of the sums' last bit is chosen. */
 typedef struct target {
     const session_gradient_basis *basis;
     int64_t *sums;
@@ -96,7 +96,7 @@ static void add_atomically(int64_t *to, word_pair words)
     }
 }
 
-/* Adds numbers to the words of a sum, two numbers at a time. */
+/* Rounds numbers to pairs of a high and a low word, and adds these to the words of a sum, two numbers at a time. */
 static inline __attribute__((always_inline)) void add_numbers(const target *to, int32_t entry,
                                                               const number_pair *numbers, int pairs)
 {
@@ -153,9 +153,9 @@ static inline __attribute__((always_inline)) void bound_corner(target *to, doubl
     if (1 / squares > to->bounds.largest_inverse_square) to->bounds.largest_inverse_square = 1 / squares;
 }
 
-/* Adds the contribution of a corner, given by its three sorted edges and the differences of the fields along them. If
- * two edges are exchanged, the signs of both the sum and the determinant change, so that the gradient remains the
- * same. */
+/* Adds the contribution of a corner. It is given by the corner's three sorted edges, and by the differences of the
+ * fields along them. If two edges are exchanged, the signs of both the sum and the determinant change, so that the
+ * gradient remains the same. */
 static inline __attribute__((always_inline)) void add_edge_gradient(target *to, int64_t vertex, const double edge[3][3],
                                                                     const double rise[3][SESSION_GRADIENTS],
                                                                     int field_count)
@@ -394,7 +394,7 @@ static bool is_summed(const session_gradient_basis *basis, int64_t cell)
                             : grid_is_drawn(basis->cells, cell);
 }
 
-/* Returns whether one of the caller's cells, which has a polynomial, is drawn and has a node with a sum. */
+/* Returns whether one of the caller's cells is drawn and has a node with a sum. The cells have polynomials. */
 static bool has_row_entry(const session_gradient_basis *basis, int64_t cell)
 {
     const session_polynomials *p = basis->polynomials;

@@ -1,5 +1,5 @@
-/* Computes gradients of fields at vertices from the cells around them. The results have the same bits for any order of
- * the cells and any distribution over ranks. */
+/* Computes gradients of fields at vertices from the cells around each vertex. The results are bit-identical for any
+ * order of the cells and any distribution over ranks. */
 #ifndef SESSION_GRADIENTS_H
 #define SESSION_GRADIENTS_H
 
@@ -19,14 +19,15 @@ typedef struct session_gradient_basis {
     const int32_t *sum_indices; /* for each vertex, the index of its sum; -1: it has none */
     double length;              /* a power of two near the size of the scene, the same on all ranks */
     int threads;
-    /* polynomials of the caller's cells, whose gradients are added instead of those of the linear pieces; NULL: all
+    /* polynomials of the caller's cells; their gradients are added instead of the linear pieces' gradients; NULL: all
      * cells are linear */
     const session_polynomials *polynomials;
 } session_gradient_basis;
 
-/* Returns the number of numbers in a sum. A sum over the cells around a vertex consists of integer words, so that
- * adding two sums word by word is exact and does not depend on the order. First come the high words of the three
- * components for each scalar, of the weights, and of padding; then the low words follow in the same order. */
+/* Returns how many numbers a sum over the cells around a vertex consists of. Each number is stored as a high and a low
+ * integer word, so that adding two sums word by word is exact and does not depend on the order. The high words come
+ * first: three components for each scalar, then the weight, and padding to an even number. The low words follow in the
+ * same order. */
 static inline int session_count_sum_numbers(int field_count)
 {
     return field_count == 1 ? 4 : field_count == 2 ? 8 : 10;
@@ -37,8 +38,7 @@ static inline int session_sum_words(int field_count)
     return 2 * session_count_sum_numbers(field_count);
 }
 
-/* Bounds of the numbers that cells add to sums. For several grids or ranks, the maximum of each member must be
- * computed. */
+/* Bounds of the numbers that cells add to sums. The bounds for several grids or ranks are the maxima of each member. */
 typedef struct session_gradient_bounds {
     double largest_difference; /* largest difference of a field's values along an edge of a corner */
     /* largest value of 1 / (sum of the squares of a corner's edges, in units of `length`); 0: there are no corners */
@@ -60,12 +60,12 @@ bool session_list_cells(const session_gradient_basis *basis, session_cell_list *
 bool session_bound_gradients(const session_gradient_basis *basis, const session_cell_list *list,
                              session_gradient_bounds *out);
 
-/* Returns an array of one byte per sum, which holds the number of the thread that adds to the sum. It is allocated by
- * base_alloc(); NULL if memory runs out. Local. */
+/* Returns an array with one byte per sum, in which session_add_gradients() records the number of the thread that adds
+ * to the sum. It is allocated by base_alloc(); NULL if memory runs out. Local. */
 unsigned char *session_sum_owners(int64_t sum_count, int threads);
 
-/* Adds the cells' contributions to the sums, which have session_sum_words() words each. bounds are those over all grids
- * and ranks; owners belongs to the sums and is shared by all grids. Returns false if memory runs out. Local. */
+/* Adds the cells' contributions to the sums. Each sum has session_sum_words() words. bounds: the bounds over all grids
+ * and ranks; owners: the array for these sums, shared by all grids. Returns false if memory runs out. Local. */
 bool session_add_gradients(const session_gradient_basis *basis, const session_cell_list *list,
                            const session_gradient_bounds *bounds, unsigned char *owners, int64_t *sums);
 

@@ -30,14 +30,17 @@ void session_clear_requested_fields(const session_meshes *meshes)
 }
 
 typedef struct indexed_values {
-    /* the mesh, if it is discontinuous and has values at vertices, which are copied once per corner; otherwise NULL */
+    /* the mesh, if it is discontinuous and the values are at vertices, so that they are copied once per corner;
+     * otherwise NULL */
     const session_mesh *mesh;
-    /* if there is one value per piece of the split cells, the caller's cell of each piece; otherwise NULL */
+    /* if there is one value per linear piece of split cells, the index of the caller's cell of each piece; otherwise
+     * NULL */
     const uint32_t *parents;
-    grid_array index;                /* index of the tuple at each position; without data, position i has tuple i */
-    grid_field values;               /* the caller's tuples */
-    int64_t row_length, used_length; /* number of positions in a row, and how many of them are read */
-    int64_t count, position_count;   /* number of tuples, and number of positions that have a tuple */
+    grid_array index;  /* index of the tuple at each position; without data, position i has tuple i */
+    grid_field values; /* the caller's tuples */
+    /* row_length: number of positions in a row; used_length: how many of them are read */
+    int64_t row_length, used_length;
+    int64_t count, position_count; /* count: number of tuples; position_count: number of positions that have a tuple */
     bool keeps_type; /* set if values are copied in their own type; otherwise they are converted to double */
 } indexed_values;
 

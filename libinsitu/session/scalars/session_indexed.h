@@ -1,4 +1,4 @@
-/* Copies fields whose values are stored in another order than the mesh's vertices or cells. */
+/* Copies fields whose values are stored in another order than that of the mesh's vertices or cells. */
 #ifndef SESSION_INDEXED_H
 #define SESSION_INDEXED_H
 
@@ -11,14 +11,15 @@ void session_request_field(const session_meshes *meshes, const scene_field *fiel
 /* Removes all marks that session_request_field() has set. Local. */
 void session_clear_requested_fields(const session_meshes *meshes);
 
-/* Copy values according to their index, unless the copy is up to date. session_copy_requested() copies the fields that
- * statistics need, and clears their marks. session_copy_used() copies the fields of scalars in use, and the fields from
- * which derived fields are computed. Must be called before the values are read. Local. */
+/* Both functions copy values into the order of the mesh by their index, unless the copy is up to date.
+ * session_copy_requested() copies the fields that statistics need, and clears their marks. session_copy_used() copies
+ * the fields of scalars in use, and the fields from which derived fields are computed. They must be called before the
+ * values are read. Local. */
 insitu_status session_copy_requested(const session_meshes *meshes, int threads, base_error *error);
 insitu_status session_copy_used(const session_meshes *meshes, int threads, base_error *error);
 
-/* Passes the caller's values at the nodes of cells of higher order to a function, unless the field has no values there
- * or a fault. Returns what the function returns. Local. */
+/* Passes the caller's values at the nodes of cells of higher order to the function `use`. If the field has no values at
+ * nodes, or has a fault, `use` is not called. Returns the status of `use`. Local. */
 typedef insitu_status session_use_values(void *of, const session_node_values *values, base_error *error);
 insitu_status session_read_nodes(const session_mesh *mesh, int field, session_use_values *use, void *of,
                                  base_error *error);

@@ -17,8 +17,8 @@ enum { ALL_AXES = 7 };
 
 /* ---- fields ------------------------------------------------------------------------------------------------------ */
 
-/* The fill function of a mirror image's field, which returns the values of the source's field. The source's field is
- * filled first. */
+/* The fill function of a mirror image's field. It fills the source's field first, and returns the values of that
+ * field. */
 static insitu_status copy_source_values(void *of_image, insitu_field *field)
 {
     session_mesh *image = of_image;

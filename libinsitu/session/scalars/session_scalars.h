@@ -1,12 +1,12 @@
-/* The scalars by which layers are drawn. A scalar is a component or the magnitude of a field, as given or recentred to
- * vertices, or the vertices' distance from a plane. */
+/* Finds and computes the scalars by which layers are drawn. A scalar is a component or the magnitude of a field, as
+ * given or recentred to vertices, or the vertices' distance from a plane. */
 #ifndef SESSION_SCALARS_H
 #define SESSION_SCALARS_H
 
 #include "scene.h"
 #include "session_mesh.h"
 
-/* Returns the component that a layer shows, in the form of grid_field.component. */
+/* Returns the component that a layer shows, as a value of grid_field.component. */
 int session_resolve_component(const scene_field *field, int component_count);
 
 /* Returns whether a field of this centring is drawn with values at vertices that the session computes. For cell fields
@@ -26,8 +26,8 @@ session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field 
 session_scalar *session_find_recentred(const session_mesh *mesh, const char *field, int component,
                                        uint64_t mesh_group_name);
 
-/* Returns the mesh's field, or a component of it, with the values given by the caller, in the order of the vertices or
- * cells. */
+/* Returns the mesh's field, or a component of it, with the values that the caller has given, in the order of the
+ * vertices or cells. */
 grid_field session_caller_field(const session_mesh *mesh, int field, int component);
 
 /* Returns whether the field's values are read from the session's copy, in the order of the vertices, cells or corners,

@@ -14,8 +14,8 @@ void session_curl(const double g[3][3], double out[3])
     out[2] = g[1][0] - g[0][1];
 }
 
-/* Returns the Q criterion. The difference between the squares of the rotation rate and the strain rate equals minus the
- * trace of the gradient's square, so that only products of its entries are summed. */
+/* Returns the Q criterion. The square of the rotation rate minus the square of the strain rate equals minus the trace
+ * of the gradient's square. Therefore it suffices to sum products of the gradient's entries. */
 double session_q_criterion(const double g[3][3])
 {
     const double squares = (g[0][0] * g[0][0] + g[1][1] * g[1][1]) + g[2][2] * g[2][2];

@@ -22,8 +22,8 @@ typedef struct warp_step {
     base_fail((error), INSITU_ERROR_FIELD, "%s:%d: meshes.%.200s.warp.field: " format, (step)->scene_path,             \
               (warp)->field_line, (warp)->mesh, __VA_ARGS__)
 
-/* Returns whether displacements along x and y suffice, which is the case if all cells are shells of one type, or if no
- * z coordinates are given. */
+/* Returns whether displacements along x and y suffice. This is the case if all cells are shells of one type, or if no z
+ * coordinates are given. */
 static bool is_of_shells(const insitu_mesh *mesh)
 {
     return session_may_lack_z(mesh) && (!mesh->coordinates[2].data || !mesh->cell_types.data);
@@ -56,7 +56,7 @@ static insitu_status check_field(const warp_step *step, const scene_warp *warp, 
                   has_two ? "2 or 3" : "3");
 }
 
-/* Returns a hash of everything that determines the displacements. */
+/* Returns a hash of all data that determine the displacements. */
 static uint64_t hash_displacement(const scene_warp *warp, const session_field *field)
 {
     uint64_t hash = SESSION_HASH_BEGIN;

@@ -6,15 +6,15 @@
 #include "session_catalogue.h"
 #include "session_report.h"
 
-/* Moves the vertices of the meshes that the scene warps, if the mesh, the field or the scene has changed. It must be
- * called before the check of the meshes, which returns errors in these fields. scene_path is used in messages. Local,
- * but fill functions may communicate. */
+/* Moves the vertices of the meshes that the scene warps, if the mesh, the field or the scene has changed. Errors in
+ * these fields are stored with the meshes; the check of the meshes, which must follow, returns them. scene_path is used
+ * in messages. Local, but fill functions may communicate. */
 void session_update_warps(const scene *scene, const char *scene_path, session_meshes *meshes, int threads);
 
 /* Warns if a mesh that the scene warps does not exist, and if gradients are computed on a warped mesh. Local. */
 void session_check_warps(const scene *scene, const session_catalogue *catalogue, session_report *report);
 
-/* The ways in which the scene changes a mesh. */
+/* The kinds of transforms by which the scene changes a mesh. */
 typedef enum session_transform { SESSION_WARP = 0, SESSION_MIRROR } session_transform;
 
 /* Warns if the scene names a mesh that exists on no rank. Local. */

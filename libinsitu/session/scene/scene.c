@@ -1,5 +1,5 @@
-/* Reads a scene. The document is checked against the schema and stored in the schema's structs (scene_schema.h). The
- * schema's structs are converted into a struct scene, in which all defaults are filled in and all colours are linear.
+/* Reads a scene. The document is checked against the schema and stored in the schema's structs (scene_schema.h). These
+ * structs are then converted to a struct scene, in which all defaults are filled in and all colours are linear.
  *
  * strtod() reads numbers according to the locale, and a simulation may run in a locale with a decimal comma. Therefore
  * the thread is switched to the C locale while a scene is read, and back afterwards. */
@@ -38,8 +38,8 @@ static void convert_background(const scene_file_image *in, float background[4])
     background[3] = alpha;
 }
 
-/* Returns whether the scene does not specify how volumes are sampled. Every key except method and max_error specifies
- * it, even a key that applies only to samples. */
+/* Returns whether the scene leaves the sampling of volumes to the defaults. All keys of `sampling` except reproducible
+ * and max_seconds specify the sampling, even those that apply only to samples. */
 static bool is_sampling_unspecified(const scene_file_sampling *in)
 {
     return !in->method && !in->max_error && !in->step && !in->step_cells && !in->jitter && !in->frames;
@@ -214,8 +214,8 @@ bool scene_field_is_on(const scene_field *field, const char *mesh)
     return field->mesh_count == 0;
 }
 
-/* Returns whether the name of an entry selects the mesh and is longer than `found`, which is the longest such name so
- * far, or NULL. */
+/* Returns whether the entry with this name selects the mesh and has a longer name than the best entry so far. found:
+ * the name of that entry, or NULL. */
 static bool is_nearer(const char *name, const char *found, const char *mesh)
 {
     return scene_name_stands_for(name, mesh) && (!found || strlen(name) > strlen(found));

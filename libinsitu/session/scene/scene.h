@@ -169,8 +169,8 @@ typedef struct scene_isosurface {
     scene_field field;
     int value_count; /* number of isovalues, 1 .. 64 */
     double *values;
-    /* one colour per isovalue, value_count × 3 numbers, linear RGB: the colours that the scene gives, the last of which
-     * is repeated, or colours of the default cycle */
+    /* one colour per isovalue, value_count × 3 numbers, linear RGB. If the scene gives colours, the final one is
+     * repeated for further isovalues; otherwise the default cycle of colours is used */
     float *colours;
     bool has_colour_by;
     scene_field colour_by;
@@ -244,7 +244,7 @@ enum { SCENE_MAX_CLIPS = 32 };
  * SCENE_MAX_VOLUMES: maximum number of volumes of an image. */
 enum { SCENE_MAX_SURFACES = 64, SCENE_MAX_VOLUMES = 4 };
 
-/* A half space, box or sphere by which layers are clipped. The part of a layer outside of it is cut away or, if
+/* A half space, box or sphere by which layers are clipped. The part of a layer outside of this body is cut away or, if
  * is_outside is set, the part inside of it. */
 typedef struct scene_clip {
     scene_clip_kind kind;
@@ -296,8 +296,8 @@ typedef struct scene_camera_point {
 typedef struct scene_camera {
     /* set if eye and focal point are computed from the bounds of all data, with the camera looking along -direction */
     bool is_automatic;
-    /* each is true if the scene gives the key with this name; if the data is flat, missing keys are chosen from the
-     * data (session_camera.h) */
+    /* each is set if the scene gives the camera's key of this name (direction, up, fit, projection); if the data is
+     * flat, missing keys are chosen from the data (session_camera.h) */
     bool has_direction, has_up, has_fit, has_projection;
     bool has_bounds; /* automatic camera: set if the bounds below replace those of the data */
     double lower[3], upper[3];
@@ -350,7 +350,8 @@ typedef enum scene_notation { SCENE_SHORTEST, SCENE_FIXED, SCENE_SCIENTIFIC } sc
 
 typedef struct scene_number_form {
     scene_notation notation;
-    /* set if the scene gives the number of digits; otherwise there are as many as distinguish neighbouring ticks */
+    /* set if the scene gives the number of digits; otherwise as many digits are written as are needed to distinguish
+     * neighbouring ticks */
     bool has_digits;
     int digits; /* number of digits after the decimal point, 0 .. 12 */
 } scene_number_form;
@@ -403,7 +404,7 @@ typedef struct scene_output {
     bool is_inset;       /* set if the picture is laid over the panels of a montage */
     scene_anchor corner; /* corner of an inset */
     int montage;         /* index of the scene's montage that contains the picture; -1: none */
-    /* index of the panel that shows the first view; for an inset, an index after that of the last panel */
+    /* index of the panel that shows the first view; the indices of insets follow those of all panels */
     int first_panel;
 } scene_output;
 
@@ -434,7 +435,7 @@ typedef struct scene_montage {
 typedef struct scene_database {
     char *path;      /* path of the folder, relative to rank 0's working directory, without a slash at its end */
     int first_image; /* index in the scene file of the first image that writes to the database */
-    /* each is true if the table has the column with this name */
+    /* each is set if the table has a column for images, orbits, isovalues, planes or fields */
     bool has_images, has_orbits, has_isovalues, has_planes, has_fields;
 } scene_database;
 
@@ -511,7 +512,7 @@ typedef struct scene_image {
     /* distance between samples in mean cell sizes, where the size of a cell is the cube root of its volume */
     double step_cells;
     bool jitter;          /* whether samples are offset randomly per pixel; true by default */
-    bool is_reproducible; /* whether volumes must be the same to the last bit on any partition */
+    bool is_reproducible; /* whether the picture of volumes must be bit-identical for any partition */
     int frames;           /* number of frames that are averaged, 1 .. 4096, a multiple of antialias; 1 by default */
     /* number of sample positions in a pixel, which successive frames use in turn: 1 (default), 2, 4, 8 or 16. Without
      * volumes, only pixels at edges get more than one frame. */
@@ -539,9 +540,9 @@ typedef enum scene_field_role {
  * fields of each layer in the order of scene_field_role. */
 typedef struct scene_field_walk {
     const scene_image *image;
-    int position; /* position of the next field; used by scene_next_field() alone */
+    int position; /* position of the next field; used only by scene_next_field() */
     scene_layer_kind kind;
-    scene_field_role role; /* role of the field that was returned last */
+    scene_field_role role; /* role of the most recently returned field */
 } scene_field_walk;
 
 /* Returns the next field, or NULL after the last one. Only `image` must be set when an iteration begins. */
@@ -566,8 +567,8 @@ static inline bool scene_has_words(const scene_image *image)
            (d->title || d->words_count || d->has_bars || d->has_rulers || d->has_axes || d->has_scale_bar);
 }
 
-/* The cells over which trees are built: all cells, only those that images can show, or whichever of these costs
- * less. */
+/* The cells over which trees are built: SCENE_TREE_FULL: all cells; SCENE_TREE_PARTIAL: only cells that images can
+ * show; SCENE_TREE_AUTO: whichever of these costs less. */
 typedef enum scene_tree { SCENE_TREE_AUTO, SCENE_TREE_FULL, SCENE_TREE_PARTIAL } scene_tree;
 
 /* The order in which ranks exchange fragments for blending; the constants are those of comp_schedule. */

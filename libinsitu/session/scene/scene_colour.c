@@ -1,6 +1,6 @@
-/* Reads the keys that describe how values are mapped to colours; all kinds of layers use the same keys. A colour map is
- * stored as a table, which is reversed and divided into bands here if the scene requests it, so that other code need
- * not distinguish built-in maps, files and lists of colours. */
+/* Reads the keys that describe how values are mapped to colours. All kinds of layers use the same keys. A colour map is
+ * stored as a table. If the scene requests it, the table is reversed and divided into bands here, so that other code
+ * need not distinguish built-in maps, files and lists of colours. */
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -19,7 +19,7 @@ __attribute__((format(printf, 2, 3))) static void format_path(char path[path_siz
     va_end(arguments);
 }
 
-/* Maximum ratio of the ends of a logarithmic range; the exponents of float32 limit it. */
+/* Maximum ratio of the ends of a logarithmic range. The exponents of float32 do not allow a larger ratio. */
 static const double widest_log_range = 1e30;
 
 /* ---- tables ---------------------------------------------------------------------------------------------------- */

@@ -109,7 +109,8 @@ static insitu_status read_space(const colour_file *f, const yaml_node_t *node, c
     return fail_at_node(f, node, "ColorSpace: expected one of RGB, HSV, Lab, CIELAB, Diverging and Step");
 }
 
-/* Reads the colours of bands: red, green and blue of each band in turn. */
+/* Reads the colours of bands from a list of numbers: red, green and blue of the first band, then of the second band,
+ * and so on. */
 static insitu_status read_bands(const colour_file *f, const yaml_node_t *list, scene_colour_points *out)
 {
     const int numbers = list->type == YAML_SEQUENCE_NODE ? count_items(list) : 0;

@@ -38,8 +38,8 @@ insitu_status scene_count_pictures(const scene_document *d, const scene_file *in
 insitu_status scene_apply_sweep(const scene_document *d, const char *path, const scene_file_image *in,
                                 scene_image *out);
 
-/* Converts the parts of a camera that give it several positions: its orbit or its path. path: path of the camera in the
- * file. */
+/* These functions convert the keys of a camera that give it several positions: its orbit or its path. path: path of the
+ * camera in the file. */
 insitu_status scene_convert_orbit(const scene_document *d, const char *path, const scene_file_camera *in,
                                   scene_camera *out);
 insitu_status scene_convert_path(const scene_document *d, const char *path, const scene_file_camera *in,
@@ -77,7 +77,7 @@ void scene_free_field(scene_field *field);
  * the text; path: path of the mapping with this key. */
 insitu_status scene_check_placeholders(const scene_document *d, const char *path, const char *key, const char *text);
 
-/* Converts the keys, of the mapping at the path, that describe how values are mapped to colours. */
+/* Converts the keys that describe how values are mapped to colours. path: path of the mapping with these keys. */
 insitu_status scene_convert_colour_map(const scene_document *d, const char *path, const scene_file_colour_map *in,
                                        scene_colour_map *out);
 
@@ -86,8 +86,8 @@ insitu_status scene_convert_colour_map(const scene_document *d, const char *path
 insitu_status scene_read_colour_file(const scene_attachment *file, const char *file_name, const char *name,
                                      scene_colour_points *out, base_error *error);
 
-/* Copies the texts of a list into a new array of the same length. The caller must free it even after an error. If path
- * is NULL, the array is empty. */
+/* Copies the texts of the list at the path into a new array of the same length. The caller must free the array even
+ * after an error. If path is NULL, the array is empty. */
 insitu_status scene_copy_texts(const scene_document *d, const char *path, char ***out, int *out_count);
 
 /* Converts the list of mesh names of a layer. layer: path of the layer in the file. */
@@ -97,8 +97,8 @@ insitu_status scene_convert_meshes(const scene_document *d, const char *layer, s
  * path of the mapping with the key `component`. */
 insitu_status scene_convert_component(const scene_document *d, const char *path, const char *text, int *component);
 
-/* Converts a field of a layer. layer: path of the layer, which selects the meshes; path: path of the mapping that names
- * the field. */
+/* Converts a field of a layer. layer: path of the layer, because the layer selects the meshes; path: path of the
+ * mapping that names the field. */
 insitu_status scene_convert_field(const scene_document *d, const char *layer, const char *path, const char *name,
                                   const char *component, scene_field *out);
 
@@ -111,14 +111,14 @@ insitu_status scene_convert_colour_by(const scene_document *d, const char *path,
 insitu_status scene_convert_lines(const scene_document *d, const char *layer, const scene_file_lines *in,
                                   const scene_field *colours, int height, scene_lines *out);
 
-/* Converts a material. If in is NULL, the result is the default material, which is slightly glossy. */
+/* Converts a material. If in is NULL, the result is the default material. It is slightly glossy. */
 scene_material scene_convert_material(const scene_file_material *in);
 
-/* Adds the clips at the path to the image's list, and to the set, which has one bit per entry of the list. in: NULL if
- * there are no clips. */
+/* Adds the clips at the path to the image's list, and sets their bits in the set. Bit i stands for entry i of the list.
+ * in: NULL if there are no clips. */
 insitu_status scene_convert_clip(const scene_document *d, const char *path, const scene_file_clip *in,
                                  scene_image *image, uint32_t *set);
-/* Computes the set of clips that cut a layer, which consists of the clips of all layers and the layer's own clips. */
+/* Computes the set of clips that cut a layer: the clips of all layers and the layer's own clips. */
 insitu_status scene_convert_layer_clip(const scene_document *d, const char *layer, const scene_file_clip *in,
                                        scene_image *image, uint32_t *set);
 /* Converts the plane with this index in the list `planes` of the mapping at the path. */

@@ -1,5 +1,5 @@
-/* Reads derived fields, which the session computes from other fields. Each has a name, and may depend on other derived
- * fields, but not on itself. */
+/* Reads derived fields. The session computes these fields from other fields. Each derived field has a name, and may
+ * depend on other derived fields, but not on itself. */
 #include <stdio.h>
 #include <string.h>
 
@@ -86,8 +86,8 @@ static insitu_status read_references(const scene_document *d, const char *path, 
     return status;
 }
 
-/* Reads the field of the keys `field` and `magnitude`, and stores its scalar as an expression that consists of this
- * field alone. */
+/* Reads the field of the keys `field` and `magnitude`. Its scalar is stored as an expression that consists only of this
+ * field. */
 static insitu_status read_scalar(const scene_document *d, const char *path, int component, scene_derived *out)
 {
     const char *text = NULL;
@@ -179,12 +179,13 @@ int scene_find_derived(const scene *s, const char *name)
     return -1;
 }
 
-/* A depth-first search from a derived field to those on which it depends, which sorts the fields. */
+/* The state of a depth-first search along dependencies. It sorts the derived fields so that each comes after the fields
+ * on which it depends. */
 typedef struct search {
     const scene_document *d;
     scene *s;
-    /* path of the search: the field at which the search began, and the chain of dependencies from this field to the
-     * current one */
+    /* the fields on the path of the search: the field at which the search began, and the chain of dependencies from it
+     * to the current field */
     int path[SCENE_MAX_DERIVED], length;
     int order[SCENE_MAX_DERIVED], count; /* indices of the sorted fields, and their number */
     bool is_done[SCENE_MAX_DERIVED];

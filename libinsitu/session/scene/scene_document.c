@@ -1,7 +1,7 @@
-/* Reads a scene file twice: first as events, to reject dangerous input before memory is allocated for it (deep nesting,
- * and aliases, by which a few lines can expand to billions of nodes), and then as a tree. The tree is checked against
- * the schema in this file, because a message needs the value, its key and its line, which are available together only
- * here. The same traversal stores correct values in the schema's structs. */
+/* Reads a scene file twice. The first pass reads it as events, to reject dangerous input before memory is allocated for
+ * it: deep nesting, and aliases, by which a few lines can expand to billions of nodes. The second pass reads it as a
+ * tree. The tree is checked against the schema in this file, because a message needs the value, its key and its line,
+ * and all three are known only here. The check also stores correct values in the schema's structs. */
 #include "scene_document.h"
 
 #include <ctype.h>
@@ -209,8 +209,8 @@ static const yaml_node_t *find_named(const scene_document *d, const yaml_node_t 
     return NULL;
 }
 
-/* Returns the node at a path, or NULL if there is none. *line receives the line of the node, or of the last node on the
- * path that exists. */
+/* Returns the node at a path, or NULL if there is none. *line receives the line of the node, or of the deepest node of
+ * the path that exists. */
 static const yaml_node_t *find_node(const scene_document *d, const char *path, int *line)
 {
     const yaml_node_t *node = yaml_document_get_root_node((yaml_document_t *)&d->yaml);
@@ -373,8 +373,8 @@ static bool read_number(const char *text, double *number)
     return end != text && !*end && isfinite(*number);
 }
 
-/* Writes a question that suggests why a value is empty: an unquoted #ff0000 is a comment, or keys below it lack their
- * indentation. */
+/* Writes a question that suggests why a value is empty: an unquoted #ff0000 is a YAML comment, or the keys below the
+ * value lack their indentation. */
 static void suggest_for_empty_value(const scene_document *d, const yaml_node_t *node, const cyaml_schema_value_t *value,
                                     char question[question_size])
 {
@@ -517,8 +517,9 @@ static bool is_scalar_right(const yaml_node_t *node, const cyaml_schema_value_t 
     }
 }
 
-/* Makes `count` values available at *to. If the schema has a pointer there, allocates memory for the values and stores
- * its address in the pointer. If *to is NULL, nothing is stored: the value is read from the document later. */
+/* Makes *to the address at which `count` values are stored. If the schema has a pointer at *to, memory for the values
+ * is allocated, and its address is stored in the pointer. If *to is NULL, nothing is stored: the value is read from the
+ * document later. */
 static bool allocate_values(scene_document *d, const cyaml_schema_value_t *value, int count, void **to)
 {
     if (!*to || !(value->flags & CYAML_FLAG_POINTER)) return true;
@@ -552,7 +553,8 @@ static insitu_status store_scalar(scene_document *d, const yaml_node_t *node, co
 static insitu_status check_value(scene_document *d, const char *path, const yaml_node_t *node,
                                  const cyaml_schema_value_t *value, const scene_key *key, void *to);
 
-/* Writes the path of an entry of a list, which contains the entry's name if it has one, and otherwise its index. */
+/* Writes the path of an entry of a list. The last part of the path is the entry's name if it has one, and otherwise its
+ * index. */
 static void write_item_path(const scene_document *d, const char *path, const yaml_node_t *list, const scene_key *key,
                             int index, char out[path_size])
 {
@@ -675,8 +677,8 @@ static insitu_status check_named(scene_document *d, const char *path, const yaml
     return status;
 }
 
-/* Writes a question that suggests where an unknown key belongs: at the top of the file, or in the only mapping below
- * this one that has such a key. */
+/* Writes a question that suggests where an unknown key is allowed: at the top of the file, or in the only child mapping
+ * that has a key of this name. */
 static void suggest_place(const yaml_node_t *name, const scene_mapping *mapping, char question[question_size])
 {
     const char *text = name->type == YAML_SCALAR_NODE ? node_text(name) : "", *holder = NULL;

@@ -1,4 +1,4 @@
-/* Defines a scene file as a tree of YAML nodes with their lines. The functions find errors, compose messages about
+/* Represents a scene file as a tree of YAML nodes with their lines. The functions find errors, compose messages about
  * them, and store correct values in the schema's structs. */
 #ifndef SCENE_SCENE_DOCUMENT_H
 #define SCENE_SCENE_DOCUMENT_H
@@ -21,9 +21,9 @@ typedef struct scene_document {
     scene_block *blocks; /* memory blocks that hold the schema's structs */
 } scene_document;
 
-/* Reads a text, which is borrowed, into *d. It must be one YAML document of bounded size and depth, without anchors,
+/* Reads a text into *d. The text is borrowed. It must be one YAML document of bounded size and depth, without anchors,
  * aliases and tags. After an error there is nothing to close. From this call until the document is closed, the thread's
- * locale must have a decimal point, because numbers are read in it. */
+ * locale must have a decimal point, because numbers are read in this locale. */
 insitu_status scene_document_open(scene_document *d, const char *text, size_t size, const char *file_name,
                                   base_error *error);
 
@@ -34,22 +34,23 @@ void scene_document_close(scene_document *d);
  * error it is undefined. */
 insitu_status scene_document_read(scene_document *d, scene_file **file);
 
-/* Returns the line (from 1) of a path such as "images[0].size[1]", or of the last node of the path that exists. In a
+/* Returns the line (from 1) of a path such as "images[0].size[1]", or of the deepest node of the path that exists. In a
  * list whose entries have the key `name`, a short name without . and [ may replace the index, as in "fields.speed". */
 int scene_document_line(const scene_document *d, const char *path);
 
 bool scene_is_plain_name(const char *name);
 
-/* Stores the texts at a path, which is a single text or a list of texts, borrowed from the document. At most `most` are
- * stored. Returns their full number; 0 if there is no node at the path. */
+/* Stores pointers to the texts of the node at a path, at most `most` of them. The node must be a text or a list of
+ * texts; the document owns the texts. Returns how many texts the node has, even if this is more than `most`; 0 if there
+ * is no node at the path. */
 int scene_document_texts(const scene_document *d, const char *path, const char **texts, int most);
 
-/* Does the same as scene_document_texts() for the keys of the mapping at the path, which must be names that the scene
- * defines. */
+/* Stores pointers to the keys of the mapping at a path, in the same way as scene_document_texts(). The keys must be
+ * names that the scene defines. */
 int scene_document_names(const scene_document *d, const char *path, const char **names, int most);
 
-/* The kind of the node at a path, and its value if it is a number. After the checks, the node has the type that the
- * schema requires for its key. */
+/* scene_document_kind() returns the kind of the node at a path. scene_document_number() returns its value if it is a
+ * number, otherwise 0. After the document has been checked, a node has a type that the schema allows for its key. */
 typedef enum scene_node { SCENE_NOTHING, SCENE_SCALAR, SCENE_LIST, SCENE_MAPPING } scene_node;
 scene_node scene_document_kind(const scene_document *d, const char *path);
 /* Returns the length of the list at a path; 0 if there is no list. */

@@ -36,8 +36,9 @@ enum { FUNCTIONS = sizeof functions / sizeof *functions };
 typedef struct parser {
     const char *text, *cursor;
     scene_expression *expression;
-    int nesting_depth; /* number of open brackets and signs at the current position (nesting depth), which is limited */
-    int stack_count;   /* number of stack entries in use after the instructions emitted so far */
+    /* number of brackets and signs that are open at the current position; it is limited to MOST_NESTED */
+    int nesting_depth;
+    int stack_count; /* number of stack entries in use after the instructions emitted so far */
     scene_parse_result result;
     char *fault;
 } parser;
@@ -183,7 +184,7 @@ static bool parse_component(parser *p, const char *name, int *component)
                 length > 20 ? 20 : length, word);
 }
 
-/* Reads a name, with or without quotes, that begins at p->at. */
+/* Reads a name, with or without quotes, that begins at p->cursor. */
 static bool parse_name(parser *p, char name[NAME_SIZE])
 {
     const char quote = *p->cursor == '"' || *p->cursor == '\'' ? *p->cursor : '\0';

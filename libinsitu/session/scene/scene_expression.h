@@ -1,5 +1,5 @@
 /* Defines expressions of fields, such as "sqrt(u.x^2 + u.y^2) / a". A text is compiled into a program for a stack
- * machine, which evaluates a block of points at a time. */
+ * machine. The machine evaluates the program for a block of points at a time. */
 #ifndef SCENE_SCENE_EXPRESSION_H
 #define SCENE_SCENE_EXPRESSION_H
 
@@ -63,8 +63,8 @@ scene_parse_result scene_parse_expression(const char *text, scene_expression *ou
 
 void scene_expression_free(scene_expression *expression);
 
-/* Runs the program for `count` points, at most SCENE_BLOCK. inputs: `count` values of each input. stack: space for
- * depth × SCENE_BLOCK numbers, whose first `count` numbers receive the results. */
+/* Runs the program for `count` points, at most SCENE_BLOCK. inputs: for each input, an array of `count` values. stack:
+ * space for depth × SCENE_BLOCK numbers; its first `count` numbers receive the results. */
 void scene_evaluate(const scene_expression *expression, const double *const *inputs, int count, double *stack);
 
 #endif

@@ -82,7 +82,7 @@ insitu_status scene_convert_colour_by(const scene_document *d, const char *path,
 
 /* ---- iteration over fields --------------------------------------------------------------------------------------- */
 
-/* Returns the layer's contour lines; NULL for a volume, which has none. */
+/* Returns the layer's contour lines, or NULL for a volume, because volumes have none. */
 static scene_lines *find_layer_lines(const scene_image *image, scene_layer_kind kind, int layer)
 {
     switch (kind) {

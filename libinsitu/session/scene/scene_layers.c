@@ -9,8 +9,8 @@
 
 enum { cycle_length = 16 };
 
-/* The default cycle of colours. Consecutive colours differ in both hue and lightness. The first ones can also be
- * distinguished by viewers who do not see the difference of red and green. */
+/* The default cycle of colours. Consecutive colours differ in both hue and lightness. Viewers who cannot distinguish
+ * red from green can still distinguish the first colours. */
 static const float cycle[cycle_length][3] = {
     {0.25F, 0.55F, 0.85F}, {0.95F, 0.65F, 0.20F}, {0.20F, 0.65F, 0.50F}, {0.85F, 0.35F, 0.25F},
     {0.95F, 0.88F, 0.35F}, {0.60F, 0.45F, 0.80F}, {0.55F, 0.80F, 0.95F}, {0.88F, 0.55F, 0.75F},
@@ -166,7 +166,7 @@ static const char *layer_word(const scene_file_layer *layer)
     return layer->volume ? "volume" : layer->slice ? "slice" : layer->surface ? "surface" : "isosurface";
 }
 
-/* Converts the clips of a layer, which must be the last converted layer of its kind. */
+/* Converts the clips of a layer. This must be the most recently converted layer of its kind. */
 static insitu_status convert_layer_clip(const scene_document *d, const char *path, const scene_file_layer *in,
                                         scene_image *out)
 {
@@ -184,7 +184,7 @@ static insitu_status convert_layer_clip(const scene_document *d, const char *pat
                              "the first volume is clipped differently, expected one clip for all volumes of an image");
 }
 
-/* Stores the index of a layer, which must be the last converted layer of its kind. */
+/* Stores the index of a layer. This must be the most recently converted layer of its kind. */
 static void set_layer_number(const scene_file_layer *in, int number, scene_image *out)
 {
     if (in->isosurface) out->isosurfaces[out->isosurface_count - 1].number = number;

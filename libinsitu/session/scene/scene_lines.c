@@ -36,7 +36,7 @@ static insitu_status convert_values(const scene_document *d, const char *path, c
     return INSITU_OK;
 }
 
-/* If the scene gives contour lines without a field, uses the field that colours the layer. */
+/* Handles contour lines for which the scene gives no field: uses the field that colours the layer. */
 static insitu_status use_field_of_colours(const scene_document *d, const char *layer, const char *path,
                                           const scene_file_lines *in, const scene_field *colours, scene_lines *out)
 {

@@ -7,8 +7,8 @@
 
 static const char *const axis_names[3] = {"x", "y", "z"};
 
-/* Writes the path of an entry of the mapping: uses the entry's name if the name contains no special characters, and
- * otherwise the entry's index. */
+/* Writes the path of an entry of the mapping `meshes`. The path contains the entry's name if the name has no special
+ * characters, and otherwise the entry's index. */
 static void write_path(const char *name, int index, char path[SCENE_PATH_SIZE])
 {
     if (scene_is_plain_name(name))
@@ -30,7 +30,7 @@ static insitu_status convert_warp(const scene_document *d, const char *path, con
     return warp->mesh && warp->field ? INSITU_OK : scene_fail_for_memory(d);
 }
 
-/* Reads the axes along which a mesh is mirrored if the scene gives only axes, so that the mirror planes are at 0. */
+/* Reads a mirror for which the scene gives only axes. Its mirror planes are at the coordinate 0. */
 static insitu_status read_axes(const scene_document *d, const char *path, scene_mirror *out)
 {
     const char *texts[3];

@@ -22,7 +22,8 @@ typedef enum placeholder_kind {
 
 typedef struct placeholder {
     placeholder_kind kind;
-    /* minimum number of digits of an integer, or number of digits of another number; -1: as few digits as needed */
+    /* for an integer: its minimum number of digits; for other numbers: the number of digits after the point or of
+     * significant digits; -1: as few digits as needed */
     int digits;
     char conversion; /* format of a number that is not whole: 'f', 'e' or 'g'; 't' for a text; 0 for a whole number */
     size_t length;   /* number of bytes of the placeholder in the pattern */
@@ -30,7 +31,7 @@ typedef struct placeholder {
 
 static const placeholder no_placeholder = {PLACEHOLDER_NONE, 0, 0, 1};
 
-/* Parses the format of "{WORD:0N}", whose colon is text[at]. */
+/* Parses the format of "{WORD:0N}". text[at] is the colon. */
 static placeholder parse_integer_format(const char *text, size_t at, placeholder_kind kind)
 {
     if (text[at + 1] != '0') return no_placeholder;
@@ -40,7 +41,7 @@ static placeholder parse_integer_format(const char *text, size_t at, placeholder
     return (placeholder){kind, (int)digits, 0, at + 2 + count + 1};
 }
 
-/* Parses the format of "{WORD:.Nf}" (or e or g instead of f), whose colon is text[at]. */
+/* Parses the format of "{WORD:.Nf}" (or e or g instead of f). text[at] is the colon. */
 static placeholder parse_real_format(const char *text, size_t at, placeholder_kind kind)
 {
     if (text[at + 1] != '.') return no_placeholder;
@@ -51,7 +52,7 @@ static placeholder parse_real_format(const char *text, size_t at, placeholder_ki
     return (placeholder){kind, (int)digits, conversion, at + 2 + count + 2};
 }
 
-/* Parses the placeholder at the start of the text, which begins with '{'. */
+/* Parses the placeholder at the start of the text. The text begins with '{'. */
 static placeholder parse_placeholder(const char *text)
 {
     static const struct {
@@ -83,8 +84,8 @@ static int write_number(const placeholder *p, double value, int fewest, char *ou
     return snprintf(out, size, "%.*g", p->digits < 0 ? fewest : p->digits, value);
 }
 
-/* Writes the placeholder's value to out, which has space for `size` bytes, and returns its length. If out is NULL and
- * size 0, only computes the length. */
+/* Writes the placeholder's value to `out`, which has space for `size` bytes, and returns its length. If `out` is NULL
+ * and `size` is 0, only the length is computed. */
 static int write_value(const placeholder *p, const scene_placeholder_values *moment, char *out, size_t size)
 {
     switch (p->kind) {
@@ -98,8 +99,8 @@ static int write_value(const placeholder *p, const scene_placeholder_values *mom
     }
 }
 
-/* Writes the expanded text to out, which has space for `size` bytes, and returns its length. If out is NULL and size 0,
- * only computes the length. */
+/* Writes the expanded text to `out`, which has space for `size` bytes, and returns its length. If `out` is NULL and
+ * `size` is 0, only the length is computed. */
 static size_t expand_pattern(const char *pattern, const scene_placeholder_values *moment, char *out, size_t size)
 {
     size_t length = 0;
@@ -261,8 +262,8 @@ insitu_status scene_convert_outputs(const scene_document *d, const char *path, c
 
 /* ---- no two outputs may be the same file ------------------------------------------------------------------------- */
 
-/* Cycle for which paths are expanded and compared. It has so many digits that {cycle} and {cycle:03} give equal
- * paths. */
+/* Cycle that is inserted into paths before they are compared. It has so many digits that {cycle} and {cycle:03} give
+ * equal paths. */
 static const long long sample_cycle = 123456789012345678;
 static const double sample_time = 0.5;
 
@@ -273,7 +274,8 @@ scene_placeholder_values scene_placeholder_values_of(const scene_image *image, i
                                       image->isovalue, image->swept_field};
 }
 
-/* The path of an output's file, and the output's index among all outputs of the scene. */
+/* The path of an output's file, and the output's position: the index of its image, its index in the image, and its
+ * index among all outputs of the scene. */
 typedef struct written_file {
     char *path;
     int image, output, output_index;
@@ -286,7 +288,7 @@ static int compare_files(const void *a, const void *b)
     return order ? order : first->output_index - second->output_index;
 }
 
-/* Returns the name of a placeholder by which the paths of two pictures of one image would differ. */
+/* Returns the name of a placeholder that would make the paths of these two pictures of an image differ. */
 static const char *missing_placeholder(const scene_variant *a, const scene_variant *b)
 {
     if (a->view != b->view) return "view";
@@ -314,7 +316,7 @@ static const scene_output *find_output(const scene *s, const written_file *file)
     return &s->images[file->image].outputs[file->output];
 }
 
-/* Returns an error for the first output that has the same file as an earlier one, unless both are pictures of one
+/* Returns an error for the first output whose path equals that of an earlier output, unless both outputs belong to a
  * montage. files: sorted by path. */
 static insitu_status check_files(const scene_document *d, const scene *s, const written_file *files, int count)
 {

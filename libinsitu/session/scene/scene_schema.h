@@ -331,13 +331,14 @@ typedef struct scene_mapping {
 
 enum { SCENE_MAX_BYTES = 1 << 20, SCENE_MAX_DEPTH = 16 };
 
-/* Limits of names. libcyaml has no type for "a name or a list of names", for values of several forms, or for mappings
- * whose keys the scene defines. In the schema these are marked by CYAML_IGNORE, and are read from the document
- * (scene_document_texts(), scene_document_kind(), scene_document_names()). Keys that the scene defines have at most
- * SCENE_KEY_BYTES bytes. */
+/* Limits of names. libcyaml has no type for three kinds of values: a name or a list of names, a value of several forms,
+ * and a mapping whose keys the scene defines. The schema marks these by CYAML_IGNORE, and they are read from the
+ * document (scene_document_texts(), scene_document_kind(), scene_document_names()). Keys that the scene defines have at
+ * most SCENE_KEY_BYTES bytes. */
 enum { SCENE_NAME_BYTES = 255, SCENE_MAX_NAMES = 64, SCENE_KEY_BYTES = 63 };
 
-/* The top-level mapping of a file, which is read into a scene_file, and the same mapping as a value of the schema. */
+/* scene_top: the top-level mapping of a file, which is read into a scene_file; scene_top_value: the same mapping as a
+ * value of the schema. */
 extern const scene_mapping scene_top;
 extern const cyaml_schema_value_t scene_top_value;
 

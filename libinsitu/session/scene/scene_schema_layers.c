@@ -31,7 +31,7 @@ static const cyaml_strval_t interpolation_words[] = {{"cell", SCENE_BY_CELL}, {"
     "each cell shows its own values, unless this is `vertex`."
 #define RANGE_DEFAULT "`data`"
 
-/* Declares a value of several forms, which is read from the document. */
+/* Declares a value that may have several forms. Such a value is read from the document. */
 #define FORMS(key) CYAML_FIELD_IGNORE(key, OPTIONAL)
 #define TAKES(list) .forms = (list), .form_count = (int)CYAML_ARRAY_LEN(list)
 
@@ -227,7 +227,7 @@ DEFINE_MAPPING(colour_by, "colour_by", COLOUR_BY_KEYS);
       .default_text = "`[0.1, 0.1, 0.1]`", .low = 0, .high = 1)
 DEFINE_MAPPING(lines, "lines", LINES_KEYS);
 
-/* Declares the key that lists the layers of this type. */
+/* Declares the key `lines` of a layer of this type. */
 #define LINES_KEY(X, type)                                                                                             \
     X(CYAML_FIELD_MAPPING_PTR("lines", OPTIONAL, type, lines, lines_fields),                                           \
       .help = "Contour lines, at places of the surface where a field has given values.", .default_text = "none",       \

@@ -1,6 +1,6 @@
-/* Defines macros by which the schema's files define their lists of keys. Each mapping has one list, which gives each
- * key both as a field of libcyaml's header and as a scene_key. The reader, the checks, the error messages and
- * docs/scene.md are all derived from these lists, so that they always agree. */
+/* Defines macros for the lists of keys in the schema's files. Each mapping has one list, in which each key is given
+ * both as a field of libcyaml's header and as a scene_key. The reader, the checks, the error messages and docs/scene.md
+ * are all derived from these lists, so that they always agree. */
 #ifndef SCENE_SCHEMA_LISTS_H
 #define SCENE_SCHEMA_LISTS_H
 
@@ -33,7 +33,8 @@
     CYAML_FIELD_ENUM_PTR(key, CHOICE_FLAGS, type, member, words, CYAML_ARRAY_LEN(words))
 #define CHOICE_FLAGS (POINTER | CYAML_FLAG_STRICT)
 
-/* Declares a value that several of the schema's files use; a file may leave it unused. */
+/* Declares a value that several of the schema's files may use. The attribute is needed because a file may leave it
+ * unused. */
 #define SHARED static const __attribute__((unused)) cyaml_schema_value_t
 SHARED number = {CYAML_VALUE_FLOAT(CYAML_FLAG_DEFAULT, double)};
 SHARED whole_number = {CYAML_VALUE_INT(CYAML_FLAG_DEFAULT, int)};

@@ -177,8 +177,8 @@ static void expand_outputs(rewrite *r, int *value)
     }
 }
 
-/* Expands `true` to an empty mapping, which means that all its keys have default values. If the value is `false`,
- * *value becomes 0, which removes the pair of key and value. */
+/* Expands `true` to an empty mapping. In such a mapping all keys have their default values. If the value is `false`,
+ * *value becomes 0; the caller then removes the pair of the key and the value. */
 static void expand_switch(rewrite *r, int *value)
 {
     const char *text = node_text(r, *value);
@@ -299,8 +299,8 @@ const char *scene_shorthand_words(const char *key, size_t length)
     return NULL;
 }
 
-/* Replaces the first word `from` of a text by the word `to`, which must be at least as long. Words of the text are
- * separated by underscores. */
+/* Replaces a word of a text: the first occurrence of `from` becomes `to`, which must be at least as long. Words of the
+ * text are separated by underscores. */
 static void replace_word(char *text, size_t size, const char *from, const char *to)
 {
     char *at = strstr(text, from);
@@ -349,8 +349,8 @@ static void expand_mapping(rewrite *r, int number)
     if (r->has_memory) find_node_by_index(r, number)->data.mapping.pairs.top = kept;
 }
 
-/* Returns the number of the top-level mapping with this key, whose entries have names that the scene defines; 0 if
- * there is no such mapping. */
+/* Returns the number of the node that is the value of this key at the top of the file; 0 if the file does not have the
+ * key. It is used for mappings whose keys are names that the scene defines. */
 static int find_named_mapping(const rewrite *r, const char *name)
 {
     const yaml_node_t *root = find_node_by_index(r, 1);
@@ -410,7 +410,7 @@ static bool is_same_word(const char *a, const char *b)
     return !*a && !*b;
 }
 
-/* Words that other programs use, each with the corresponding word of the schema. */
+/* Words that other programs use, each followed by the corresponding word of the schema. */
 static const char *const synonyms[][2] = {{"resolution", "size"},
                                           {"width", "size"},
                                           {"height", "size"},

@@ -7,17 +7,17 @@
 #include <yaml.h>
 
 /* Rewrites the document's short forms in place. New nodes keep the lines of the nodes that they replace, so that
- * messages still name the correct lines. Everything else remains unchanged, and is checked by the schema. Returns false
- * if memory runs out. */
+ * messages still contain the correct lines. Everything else remains unchanged; the schema checks it later. Returns
+ * false if memory runs out. */
 bool scene_expand_shorthand(yaml_document_t *document);
 
 /* Returns a description of the short forms that the value of a key may have, such as "true or false", or NULL if it has
  * none. */
 const char *scene_shorthand_words(const char *key, size_t length);
 
-/* Returns the candidate that was probably meant by the word: the schema's equivalent of a word of other programs, or
- * the candidate with the fewest edits (insertion, removal or replacement of a letter, exchange of two neighbouring
- * letters), if at most a third of the letters differ. Returns NULL if there is none. */
+/* Returns the candidate that was probably meant by the word. This is the schema's equivalent of a word of other
+ * programs, or the candidate with the fewest edits (insertion, removal or replacement of a letter, exchange of two
+ * neighbouring letters), if at most a third of the letters differ. Returns NULL if there is none. */
 const char *scene_nearest_word(const char *word, const char *const *candidates, int count);
 
 #endif

@@ -1,8 +1,8 @@
-/* Finds the mistake in a text that is not valid YAML. libyaml reports the position at which it could not continue,
- * which is often several lines behind the mistake, and in terms of the grammar. Its report is therefore only used to
- * select the lines to examine. These are the lines from the start of the structure that could not be completed to the
- * reported position. They are searched for common mistakes, beginning with those that can be identified most reliably.
- * Any other mistake is reported in libyaml's words. */
+/* Finds the mistake in a text that is not valid YAML. libyaml reports the position at which it could not continue, in
+ * terms of the grammar. This position is often several lines behind the mistake. The report is therefore only used to
+ * select the lines to examine: the lines from the start of the structure that could not be completed to the reported
+ * position. They are searched for common mistakes, beginning with those that can be identified most reliably. Any other
+ * mistake is reported in libyaml's words. */
 #include "scene_syntax.h"
 
 #include <ctype.h>
@@ -59,8 +59,8 @@ static bool has_content(text_line l)
     return l.indent < l.length && l.start[l.indent] != '#';
 }
 
-/* Stores the message and the line of the error. Always returns true, so that a rule that has found an error can return
- * the result of this call. */
+/* Stores the message and the line of the error. Always returns true, so that a rule can return the result of this call
+ * when it has found an error. */
 __attribute__((format(printf, 3, 4))) static bool set_fault(const fault *f, size_t line, const char *format, ...)
 {
     va_list arguments;
@@ -86,8 +86,8 @@ static bool report_tab_indent(const fault *f, text_line l)
                      quoted_length(l.length - l.indent), l.start + l.indent);
 }
 
-/* Returns whether the character at p is within quotes or is a quotation mark that begins or ends a text. *quote is the
- * quotation mark that is open before p, or 0, and is updated. */
+/* Returns whether the character at p is within quotes, or is a quotation mark that begins or ends a quoted text. *quote
+ * is the quotation mark that is open before p, or 0; it is updated. */
 static bool is_in_quotes(text_line l, const char *p, char *quote)
 {
     const bool begins = p == l.start || strchr(" \t[{,:", p[-1]);
@@ -209,7 +209,8 @@ static bool report_unclosed_quote_above(const fault *f, text_line l)
                      quoted_length((size_t)(opened.start + opened.length - quote)), quote);
 }
 
-/* Reports the last earlier line that ends with an opening bracket, which is never closed. */
+/* Reports the last of the earlier lines that end with an opening bracket, because this bracket is most likely the one
+ * that is not closed. */
 static bool report_open_brackets(const fault *f)
 {
     bool is_reported = false;
@@ -256,7 +257,7 @@ static bool is_list_item(text_line l)
 
 /* Returns the earlier line with a key or list item whose indentation is nearest to that of this line. Keys in a list
  * item are indented by 2 more than the item, so that this indentation is also tested. *expected receives the
- * indentation that this line should have. */
+ * indentation that this line should probably have. */
 static text_line find_nearest_indent(const fault *f, text_line l, size_t *expected)
 {
     text_line nearest = l;
@@ -274,7 +275,8 @@ static text_line find_nearest_indent(const fault *f, text_line l, size_t *expect
     return nearest;
 }
 
-/* Reports the line above if this line cannot continue it, because it lacks a colon, or a blank after its hyphen. */
+/* Reports the previous line if this line cannot continue it, because the previous line lacks a colon, or a blank after
+ * its hyphen. */
 static bool report_incomplete_line(const fault *f, text_line l)
 {
     const char *problem = f->parser->problem ? f->parser->problem : "";

@@ -5,8 +5,8 @@
 #include "memory.h"
 #include "scene_convert.h"
 
-/* Finds a control character, which a database must not contain: each picture must be exactly one line of the table, so
- * that an incomplete line can be recognised. */
+/* Returns the first control character of the text, or NULL. A database must not contain control characters, so that
+ * each picture is exactly one line of the table and an incomplete line can be recognised. */
 static const char *find_control(const char *text)
 {
     for (; text && *text; text++)
@@ -80,7 +80,8 @@ static bool is_in_folder(const scene_output *output, const char *folder)
     return output->folder_bytes == (int)length + 1 && strncmp(output->path, folder, length) == 0;
 }
 
-/* Returns the database of the output's folder, which is added if there is none yet; -1 if memory ran out. */
+/* Returns the index of the database with the output's folder. If there is none yet, it is added. Returns -1 if memory
+ * runs out. */
 static int find_database(scene *s, const scene_image *image, const scene_output *output)
 {
     for (int i = 0; i < s->database_count; i++)

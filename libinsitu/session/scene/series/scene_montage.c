@@ -8,7 +8,8 @@
 #include "memory.h"
 #include "scene_convert.h"
 
-/* Returns the output's path, expanded for a sample cycle and time, by which outputs are compared (scene_outputs.c). */
+/* Returns the output's path, expanded for a sample cycle and time. Outputs are the same file if these paths are equal
+ * (scene_outputs.c). */
 static char *name_at_sample(const scene_image *image, const scene_output *output, int view)
 {
     scene_placeholder_values moment = scene_placeholder_values_of(image, 123456789012345678, 0.5);
@@ -44,7 +45,7 @@ static int find_montage(const scene *s, const char *name)
     return found;
 }
 
-/* Returns the index of the montage of this name, which is added if there is none yet; -1 if memory ran out. */
+/* Returns the index of the montage of this name. If there is none yet, it is added. Returns -1 if memory runs out. */
 static int find_or_add_montage(scene *s, const scene_image *image, const scene_output *output, char *name)
 {
     const int found = find_montage(s, name), height = image->height * output->rows;
@@ -155,7 +156,7 @@ static insitu_status check_inset(const scene_document *d, const char *path, cons
     return INSITU_OK;
 }
 
-/* Puts an inset over the panels of the montage of this name. */
+/* Places an inset over the panels of the montage of this name. */
 static insitu_status add_inset(const scene_document *d, const char *path, scene *s, const scene_image *image,
                                scene_output *output, const char *name)
 {
@@ -174,7 +175,7 @@ static insitu_status add_inset(const scene_document *d, const char *path, scene 
     return INSITU_OK;
 }
 
-/* Puts a picture, or all views of an orbit, into the next panels of the montage of this name. Takes ownership of the
+/* Places a picture, or all views of an orbit, in the next panels of the montage of this name. Takes ownership of the
  * name. */
 static insitu_status add_panels(const scene_document *d, const char *path, scene *s, const scene_image *image,
                                 scene_output *output, char *name)

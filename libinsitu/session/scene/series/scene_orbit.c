@@ -1,4 +1,4 @@
-/* Reads an orbit, which is a number of circles of views around the data. Each view is an automatic camera with its own
+/* Reads an orbit: one or several circles of views around the data. Each view is an automatic camera with its own
  * direction. */
 #include <math.h>
 #include <stdio.h>

@@ -24,7 +24,7 @@ static void list_numbers(const scene_camera_point *p, double out[NUMBERS_OF_POIN
     out[9] = p->angle;
 }
 
-/* Times and values of four successive points, of which the first and the last may be missing. */
+/* Times and values of four successive points. The first and the last point may be missing. */
 typedef struct cubic_points {
     double times[4], values[4];
     bool has_first, has_last;

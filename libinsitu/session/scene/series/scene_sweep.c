@@ -16,7 +16,7 @@ static bool is_over_planes(const scene_file_image *in)
     return in->sweep && in->sweep->planes && *in->sweep->planes;
 }
 
-/* Finds the image's first isosurface; returns how many isosurfaces there are. */
+/* Stores the image's first isosurface in *found, and returns how many isosurfaces the image has. */
 static int find_isosurface(const scene_file_image *in, const scene_file_isosurface **found)
 {
     int count = 0;
@@ -123,7 +123,7 @@ static bool replace_colours(scene_field *field, scene_lines *lines, const char *
     return replace_field(field, name, line) && (!lines->is_of_colours || replace_field(&lines->field, name, line));
 }
 
-/* Replaces the field in all layers that are coloured by a field; *count is the number of these layers. */
+/* Replaces the field in all layers that are coloured by a field. *count receives the number of these layers. */
 static bool replace_fields(scene_image *image, const char *name, int line, int *count)
 {
     bool is_done = true;
