@@ -1,4 +1,4 @@
-/* The serial SAH builder of one subtree, whose data fit in a core's cache. */
+/* The serial SAH builder of one subtree. The data of a subtree fit in a core's cache. */
 #ifndef MMBVH_SUBTREE_H
 #define MMBVH_SUBTREE_H
 
