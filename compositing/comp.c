@@ -183,7 +183,8 @@ static insitu_status gather_deep(composition *c, insitu_status status, base_erro
     return status;
 }
 
-/* Composites. *has_overlaps receives a nonzero value on all ranks if any rank found overlaps, and otherwise 0. */
+/* Composites the fragments. *has_overlaps receives a nonzero value on all ranks if any rank found overlaps, and
+ * otherwise 0. */
 static insitu_status composite_fragments(composition *c, fragment_list *items, int64_t *has_overlaps, base_error *error)
 {
     comp_statistics *const statistics = c->statistics;

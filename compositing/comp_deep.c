@@ -127,7 +127,7 @@ static void copy_own_samples(deep_image *out, const comp_deep_list *lists, int c
     }
 }
 
-/* The numbers of pixels and samples that each rank sends. Only rank 0 uses it. */
+/* The numbers of pixels and samples that each rank sends. Only rank 0 uses this struct. */
 typedef struct deep_inbox {
     int ranks;
     int64_t (*counts)[2];    /* for each rank, the numbers of pixels and of samples that it sends */

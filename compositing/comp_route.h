@@ -9,11 +9,11 @@
  *
  *     direct send   one round, of all ranks
  *     by nodes      a round within each node, then one among the ranks that have the same number on their nodes
- *     radix-k       a round within each node, then rounds of at most k
- *     binary swap   rounds of two, whatever the nodes
+ *     radix-k       a round within each node, then rounds of at most k ranks
+ *     binary swap   rounds of two ranks, which may be on different nodes
  *
- * Ranks whose places follow those of the owners send all their fragments to a partner before the first round; an
- * owner has at most one such partner. */
+ * Ranks whose places follow those of the owners send all their fragments to a partner before the first round; an owner
+ * has at most one such partner. */
 #ifndef COMP_COMP_ROUTE_H
 #define COMP_COMP_ROUTE_H
 
@@ -54,7 +54,7 @@ typedef struct comp_route {
  * round of COMP_RADIX. */
 comp_route comp_route_of(comp_schedule schedule, int ranks, comp_nodes nodes, int radix);
 
-/* Convert a rank to its place, and a place to its rank. */
+/* comp_route_position() converts a rank to its place, and comp_route_rank() a place to its rank. */
 int comp_route_position(const comp_route *route, int rank);
 int comp_route_rank(const comp_route *route, int place);
 

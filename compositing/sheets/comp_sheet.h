@@ -102,8 +102,8 @@ const unsigned char *comp_sheet_read_head(const unsigned char *in, comp_sheet_he
  * end of the packed data. */
 const unsigned char *comp_sheet_read(const unsigned char *in, int words, comp_sheet *sheet);
 
-/* Pack and unpack a sheet with the given instruction set, which the processor must have. The packed bytes are the same
- * for every instruction set. */
+/* comp_sheet_write_by() packs, and comp_sheet_read_by() unpacks, a sheet with the given instruction set, which the
+ * processor must have. The packed bytes are the same for every instruction set. */
 unsigned char *comp_sheet_write_by(cpu_isa isa, const comp_sheet *sheet, int words, unsigned char *out);
 const unsigned char *comp_sheet_read_by(cpu_isa isa, const unsigned char *in, int words, comp_sheet *sheet);
 

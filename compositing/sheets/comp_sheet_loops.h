@@ -11,10 +11,10 @@
 typedef struct sheet_plan {
     int rows, count;
     bool is_sparse; /* the sheet is compacted before packing; fresh and source are then not set */
-    /* for each row that contains pixels: its index in the strip, and its number of pixels */
+    /* for each row that contains pixels: row: its index in the strip; number: its number of pixels */
     uint8_t row[COMP_ROWS], number[COMP_ROWS];
     uint16_t mask[COMP_ROWS], fresh[COMP_ROWS];
-    uint8_t source[COMP_ROWS][COMP_LANES]; /* for each fresh lane: the lane whose last value predicts it */
+    uint8_t source[COMP_ROWS][COMP_LANES]; /* for each fresh lane: the lane whose most recent value predicts it */
 } sheet_plan;
 
 typedef struct comp_sheet_loops {
