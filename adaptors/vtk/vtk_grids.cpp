@@ -28,7 +28,8 @@
 namespace
 {
 
-/* The number of points along each axis that has more than one: three axes, or two for a flat grid. */
+/* The number of points along each axis that has more than one point. There are three such axes, or two in a flat
+ * grid. */
 struct lattice {
     int64_t row_points = 1, row_count = 1, layer_count = 1;
 
@@ -38,7 +39,7 @@ struct lattice {
     int64_t cells() const { return (row_points - 1) * (row_count - 1) * (is_flat() ? 1 : layer_count - 1); }
 };
 
-/* Returns false if data is not a structured data set with at least two such axes. */
+/* Returns false if data is not a structured data set with cells along at least two axes. */
 bool find_lattice(vtkDataSet *data, lattice &l)
 {
     int64_t cells[3], axes[3] = {1, 1, 1};
