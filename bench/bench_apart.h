@@ -1,4 +1,4 @@
-/* Runs a peer in a process of its own, as it may crash or never end. */
+/* Runs a peer in a process of its own, because the peer may crash or never end. */
 #ifndef BENCH_APART_H
 #define BENCH_APART_H
 

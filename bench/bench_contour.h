@@ -1,5 +1,5 @@
-/* Isosurfaces of VTK as a peer: extraction by vtkContour3DLinearGrid in parallel, then rendering by OpenGL, with Mesa
-   if there is no GPU. */
+/* Measures VTK's isosurfaces as a peer: extraction by vtkContour3DLinearGrid in parallel, then rendering by OpenGL,
+ * with Mesa if there is no GPU. */
 #ifndef BENCH_CONTOUR_H
 #define BENCH_CONTOUR_H
 
@@ -46,12 +46,12 @@ void bench_contour_set(bench_contour *contour, const float *xyz, const float *va
 
 bench_triangles bench_contour_extract(bench_contour *contour, const double *isovalues, int count);
 
-/* Draws the last extraction and waits until OpenGL has finished. The first call includes VTK's preparations. Nothing is
- * read back. */
+/* Draws the triangles of the most recent bench_contour_extract(), and waits until OpenGL has finished. The first call
+ * includes VTK's preparations. No pixels are read back. */
 void bench_contour_draw(bench_contour *contour);
 
-/* Reads the depths of the last picture along the camera's axis, row-major with the top row first; infinity in empty
- * pixels. */
+/* Reads the depths of the most recently drawn picture along the camera's axis, row-major with the top row first;
+ * infinity in empty pixels. */
 void bench_contour_read(bench_contour *contour, float *depths);
 
 #ifdef __cplusplus

@@ -1,5 +1,5 @@
-/* IceT's compositing (Debian's paraview-dev) of the same pictures, as a peer. Each rank has one RGBA image of floats,
- * with depths or with a given order of the ranks. */
+/* Composites the same pictures by IceT (Debian's package paraview-dev), as a peer. Each rank has one RGBA image of
+ * floats, with depths or with a given order of the ranks. */
 #ifndef BENCH_ICET_H
 #define BENCH_ICET_H
 
@@ -14,7 +14,7 @@ typedef struct bench_icet bench_icet;
    row is first. */
 typedef struct bench_icet_picture {
     int width, height;
-    const float *rgba, *depth; /* depth NULL: blended in `order` */
+    const float *rgba, *depth; /* if depth is NULL, the pictures are blended in `order` */
     const int *order;          /* ranks, from front to back */
     int viewport[4];           /* x, y, width, height of the rectangle of pixels that are not empty */
 } bench_icet_picture;
