@@ -35,7 +35,7 @@ static const wave_cell_shape wave_pyramid_shape = {5,
                                                    {{0, 3, 2, 1}, {0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}},
                                                    {0.1875, 0.1875, 0.1875, 0.1875, 0.25}};
 
-/* Returns NULL for any other type. */
+/* Returns the shape of a cell type, or NULL for any other type. */
 static inline const wave_cell_shape *wave_cell_shape_of(int type)
 {
     switch (type) {
