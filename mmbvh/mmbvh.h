@@ -19,7 +19,7 @@
 
 enum {
     MMBVH_MAX_LEAF = 7,
-    /* maximum depth of a leaf, where the root has depth 1; also the maximum size of a traversal's stack */
+    /* maximum depth of a leaf (the root has depth 1); also the maximum size of a traversal's stack */
     MMBVH_MAX_DEPTH = 80
 };
 
@@ -54,7 +54,7 @@ typedef struct mmbvh {
     int64_t node_count;          /* number of nodes; 0 if there are no cells */
     uint32_t *cells;             /* cell indices (or mesh indices in a parent tree), leaf by leaf */
     int64_t cell_count;
-    double origin[3]; /* origin of the tree's coordinates, which are (position - origin) * scale */
+    double origin[3]; /* origin of the tree's coordinates; a position has the coordinates (position - origin) * scale */
     double scale;
     double built_cost; /* SAH cost (mmbvh_cost()) when the tree was built */
     double area;       /* sum, over all nodes, of half the surface area of the box times the number of tests in the node
@@ -111,7 +111,7 @@ typedef struct mmbvh_ranges {
     int64_t stride; /* number of bytes from one node's range to the next */
 } mmbvh_ranges;
 
-/* A list of cells in ascending order, which owns its memory; free it with mmbvh_selection_free(). */
+/* A list of cells in ascending order. It owns its memory; free it with mmbvh_selection_free(). */
 typedef struct mmbvh_selection {
     uint32_t *cells;
     int64_t count;
@@ -127,7 +127,7 @@ typedef struct mmbvh_options {
 
 /* Builds a tree over the grid's cells, except ghosts and flat cells, with the ranges of the field; if field is NULL,
  * all ranges are (-inf, +inf). Parallel; the tree is the same for any number of threads. On success *out owns its
- * memory, which mmbvh_free() frees. On an error *out is zeroed. */
+ * memory; free it with mmbvh_free(). On an error *out is zeroed. */
 insitu_status mmbvh_build(const grid *g, const grid_field *field, const double origin[3], double scale,
                           const mmbvh_options *options, mmbvh *out, base_error *error);
 

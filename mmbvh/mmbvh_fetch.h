@@ -51,8 +51,8 @@ MMBVH_INLINE int fetch_vertex_count(const grid *g, int64_t cell, const fetch_sha
     return grid_type_vertices(shape == FETCH_BY_CELL ? grid_cell_type(g, cell) : g->cell_type);
 }
 
-/* Returns the index of a cell's first entry in the connectivity; in a lattice, which has no connectivity, the index of
- * the cell's first vertex. */
+/* Returns the index of a cell's first entry in the connectivity. A lattice has no connectivity; for a lattice, returns
+ * the index of the cell's first vertex. */
 MMBVH_INLINE int64_t fetch_first_entry(const grid *g, int64_t cell, int count, const fetch_shape shape)
 {
     if (shape == FETCH_LATTICE) return grid_lattice_first(g->lattice, cell);
@@ -98,7 +98,7 @@ MMBVH_INLINE void fetch_values(const grid *g, const grid_array *values, int64_t 
         out[i] = values->data + fetch_vertex(g, first, i < count ? i : count - 1, shape, wide_index) * stride;
 }
 
-/* Reads a cell's values, which are floats. Returns whether all are finite. */
+/* Reads a cell's values from an array of floats. Returns whether all values are finite. */
 MMBVH_INLINE bool fetch_cell_floats(const grid *g, const grid_array *values, int64_t cell, const fetch_shape shape,
                                     const bool wide_index, const bool is_packed, vec4 out[2])
 {
@@ -117,8 +117,8 @@ typedef struct fetch_lane_range {
     vec2 low, high;
 } fetch_lane_range;
 
-/* Reads a cell's values, which are doubles, and computes their lane-wise minima and maxima. Returns whether all values
- * are finite. */
+/* Reads a cell's values from an array of doubles, and computes their lane-wise minima and maxima. Returns whether all
+ * values are finite. */
 MMBVH_INLINE bool fetch_cell_doubles(const grid *g, const grid_array *values, int64_t cell, const fetch_shape shape,
                                      const bool wide_index, const bool is_packed, fetch_lane_range *out)
 {

@@ -17,8 +17,8 @@ enum { WORD_CELLS = 64, BLOCK_WORDS = 64 };
 
 typedef struct selector selector;
 
-/* Sets the bits of the matching cells in [begin, end), whose length is a multiple of 64 except at the end of the grid.
- * Returns the number of cells with non-finite values. */
+/* Sets the bits of the matching cells in [begin, end). The length of this range is a multiple of 64, except at the end
+ * of the grid. Returns the number of cells with non-finite values. */
 typedef int64_t (*selector_run)(const selector *s, int64_t begin, int64_t end);
 
 struct selector {

@@ -34,8 +34,8 @@ struct sweep {
     const bounds_source *source; /* reads the cells' boxes in a sweep of bounds */
     mmbvh_ranges ranges;         /* receives the results of a sweep of ranges */
     int64_t range_max;           /* maximum number of nodes per run; 0: no limit other than the size of a task */
-    /* set if the change of area is measured; allowed only if the nodes already have bounds, which the sweep then
-     * updates */
+    /* set if the change of area is measured; allowed only in a refit, in which all nodes have bounds before the
+     * sweep */
     bool measures_area;
     /* number of visible parts of the tree; if not 0, the sweep visits only the root and the children of nodes in these
      * parts */

@@ -127,7 +127,7 @@ static inline float round_up(double x)
     return 0.0f - round_down(-x);
 }
 
-/* Returns round_down() of (a - origin) * scale, which is computed in double. */
+/* Returns round_down((a - origin) * scale) per lane, computed in double. */
 static inline vec4 vec4_transform_down(vec4 a, const double origin[4], double scale)
 {
 #if defined(__SSE2__)
