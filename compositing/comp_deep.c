@@ -1,6 +1,6 @@
 /* Fragments are converted to samples by comp_merge_intervals(), so that deep pictures are blended by the same rule as
- * flat ones. Rank 0 receives from each owner first the number of samples of each pixel, and then the samples, which it
- * stores directly at their final position. */
+ * flat ones. Rank 0 receives from each owner first the number of samples of each pixel, and then the samples. It stores
+ * the samples directly at their final position. */
 #include "comp_deep.h"
 
 #include <string.h>

@@ -68,7 +68,7 @@ int32_t comp_claim_priority(uint32_t block, int rank, int64_t fragments)
 {
     if (fragments <= 0) return 0;
     const uint32_t drawn = hash_word(hash_word(block + 1) + (uint32_t)rank);
-    /* random number between 0 and 1, which may be rounded to 1 */
+    /* random number between 0 and 1; it may be rounded to 1 */
     const float u = ((float)(drawn >> 8) + 0.5f) * 0x1p-24f;
     const float chance = 4 * logf((float)fragments) - logf(-logf(u < 1 ? u : 0x1.fffffep-1f));
     /* the priority in steps of 1/16, from 0 to about 1800 */

@@ -1,7 +1,7 @@
-/* Merges the fragments of the strips that a rank owns. Most pixels have one fragment, or only hits of opaque surfaces;
- * only the nearest hit is visible. A strip's fragments are therefore joined in a sheet (comp_sheet.h), 16 pixels at a
- * time, and blended there. Pixels in which several fragments must be blended are called mixed: their fragments are
- * listed and merged by comp_merge_pixel().
+/* Merges the fragments of the strips that a rank owns. Most pixels have one fragment, or have no other fragments than
+ * hits of opaque surfaces, so that the nearest hit hides the others. A strip's fragments are therefore joined in a
+ * sheet (comp_sheet.h), 16 pixels at a time, and blended there. Pixels in which several fragments must be blended are
+ * called mixed: their fragments are listed and merged by comp_merge_pixel().
  *
  * Fragments behind an opaque surface are dropped, even if volumes in front of the surface arrive later, because they
  * are invisible. */

@@ -32,7 +32,7 @@ struct comp_tile_scratch {
     /* array of int64_t with one entry per pixel and a final one: the index in `order` of each pixel's first fragment */
     buffer starts;
     buffer order;           /* array of int64_t: indices of fragments, sorted by pixel */
-    buffer pixel_fragments; /* copies of one pixel's fragments, which are sorted there */
+    buffer pixel_fragments; /* copies of one pixel's fragments; they are sorted in this buffer */
     int64_t fragments;
     double seconds;
     char padding[64]; /* padding that prevents two threads from writing to the same cache line */

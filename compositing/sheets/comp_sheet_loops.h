@@ -1,5 +1,6 @@
-/* The table of loops over the rows of a sheet (comp_sheet_table.c), which are compiled once per instruction set. Only
- * static inline code may be shared between these objects; tests/house_kernels.sh checks this. */
+/* The table of the loops over the rows of a sheet. The loops are compiled once per instruction set
+ * (comp_sheet_table.c). Only static inline code may be shared between the resulting objects; tests/house_kernels.sh
+ * checks this. */
 #ifndef COMP_COMP_SHEET_LOOPS_H
 #define COMP_COMP_SHEET_LOOPS_H
 

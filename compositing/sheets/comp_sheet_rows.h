@@ -236,7 +236,7 @@ typedef struct word_residuals {
     uint8_t nibbles[2][COMP_ROWS];
 } word_residuals;
 
-/* Returns the residuals of the first row, where each value is predicted from its left neighbour. */
+/* Returns the residuals of the first row. Each value of this row is predicted from its left neighbour. */
 ROWS_INLINE lanes first_row_residuals(lanes values, unsigned mask)
 {
     uint32_t own[COMP_LANES + 1];
