@@ -9,7 +9,7 @@
 
 /* The two interpretations of a transfer function's opacity a per unit distance. */
 typedef enum accuracy_opacity {
-    ACCURACY_OPACITY,   /* extinction -ln(1 - a), where a is linear between the knots: libinsitu, VTK's image mappers */
+    ACCURACY_OPACITY,   /* extinction -ln(1 - a); a is linear between the knots: libinsitu, VTK's image mappers */
     ACCURACY_EXTINCTION /* extinction that is linear between the knots: VTK's mappers of unstructured grids */
 } accuracy_opacity;
 

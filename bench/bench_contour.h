@@ -38,7 +38,8 @@ typedef struct bench_contour bench_contour;
 bench_contour *bench_contour_create(const bench_contour_mesh *mesh, const bench_contour_view *view, int threads);
 void bench_contour_destroy(bench_contour *contour);
 
-/* Returns whether an X server provides a window to draw in. Creates the OpenGL context, which is not timed. */
+/* Returns whether an X server provides a window to draw in. Creates the OpenGL context, so that this is not timed
+ * later. */
 bool bench_contour_can_draw(bench_contour *contour);
 
 /* Sets new coordinates and values of the mesh. */

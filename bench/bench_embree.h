@@ -17,8 +17,8 @@ void bench_embree_destroy(bench_embree *embree);
  * binned SAH (MEDIUM) otherwise. */
 void bench_embree_build(bench_embree *embree, const float *xyz, int64_t triangle_count, bool is_fast);
 
-/* Traces a ray for each pixel, in packets of 16 = 4 × 4. `depths` gets the hit's depth along the camera's axis, or
- * infinity; `normals` gets the triangle's normal (pixels × 3, of any length and either sign). */
+/* Traces a ray for each pixel, in packets of 16 = 4 × 4. `depths` receives the hit's depth along the camera's axis, or
+ * infinity. `normals` receives the triangle's normal (pixels × 3, of any length and either sign). */
 void bench_embree_trace(bench_embree *embree, const render_camera *camera, float *depths, float *normals);
 
 /* A ray with a direction of length 1 that ends at the distance `far`. */

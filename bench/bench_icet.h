@@ -26,7 +26,7 @@ void bench_icet_free(bench_icet *icet);
 const char *bench_icet_strategy(int strategy);
 
 /* Composites to rank 0. Returns the number of bytes that this rank sent, or -1 if the strategy does not support the
- * picture. On rank 0, *rgba becomes the picture, which is valid until the next call. */
+ * picture. On rank 0, *rgba receives the picture; it is valid until the next call. */
 double bench_icet_composite(bench_icet *icet, int strategy, const bench_icet_picture *picture, const float **rgba);
 
 #endif

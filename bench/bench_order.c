@@ -62,7 +62,7 @@ static data_cells make_split_hexes(int side, double bend)
     return cells_of(&split);
 }
 
-/* Initializes a drawing, which takes ownership of the arrays of `cells`, and makes its second values. */
+/* Initializes a drawing, and makes its second values. The drawing takes ownership of the arrays of `cells`. */
 static void create_drawing(bench_drawing *d, const bench_scene *scene, const char *name, data_cells cells)
 {
     *d = (bench_drawing){.scene = scene, .subject = scene->subject, .cells = cells, .values = {cells.values}};

@@ -34,10 +34,10 @@ void bench_routes_run(bench_routes *routes, const double *isovalues, int count, 
 /* Prints and removes the collected times. The names of the measures begin with `name`, the name of the layer. */
 void bench_routes_print(bench_routes *routes, const char *name);
 
-/* Compares the depths in the alternatives' most recent pictures with `depths`. It has one depth for each of the
- * camera's pixels, infinity in empty pixels. Prints the number of pixels that only one of the two pictures covers, and
- * the difference of the depths in pixels that both cover. Writes the depths as PNG files to `folder`, unless it is
- * NULL. */
+/* Compares the depths in the alternatives' most recent pictures with `depths`. The array `depths` has one depth for
+ * each of the camera's pixels, infinity in empty pixels. Prints the number of pixels that only one of the two pictures
+ * covers, and the difference of the depths in pixels that both cover. Writes the depths as PNG files to `folder`,
+ * unless it is NULL. */
 void bench_routes_compare(bench_routes *routes, const float *depths, const char *name, const char *folder);
 
 #endif

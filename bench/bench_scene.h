@@ -73,8 +73,8 @@ void bench_scene_integral_error(bench_scene *scene, const char *name);
 /* Returns the pixels in which errors are measured. */
 const bench_pixels *bench_scene_pixels(bench_scene *scene);
 
-/* Returns the colours of the exact volume integral at the chosen pixels for a transfer function: count × 4 numbers,
- * which the caller frees. */
+/* Returns the colours of the exact volume integral at the chosen pixels for a transfer function: count × 4 numbers. The
+ * caller frees them. */
 double *bench_scene_integrals(bench_scene *scene, const render_transfer *transfer);
 
 /* Returns the statistics of the errors of `rgba` against the integrals. The error of a pixel is the largest difference

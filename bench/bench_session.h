@@ -94,7 +94,7 @@ const float *const *bench_session_coordinates(const bench_session *session);
 const float *bench_session_values(const bench_session *session);
 const float *bench_session_velocities(const bench_session *session);
 
-/* Prints the times as a measure such as "isosurface new values", and those of the step's parts. */
+/* Prints the times of the steps as a measure such as "isosurface new values", and the times of the parts of a step. */
 void bench_session_print(bench_session *session);
 
 /* Draws the current arrays in a separate session. Returns the depths, width × height, infinity in empty pixels; the

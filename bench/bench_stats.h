@@ -47,7 +47,7 @@ typedef struct bench_series {
 /* Waits until the threads of the previous operation have stopped spinning, and returns the starting time. */
 double bench_start_timer(void);
 
-/* Adds a time to the series, unless number is 0, which is the number of the warm-up run. */
+/* Adds a time to the series, unless number is 0 (the warm-up run). */
 void bench_add_sample(double seconds, int number, bench_series *series);
 
 /* Adds the time since `began` to the series, and returns it. */

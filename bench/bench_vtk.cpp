@@ -3,9 +3,9 @@
  * Debian's VTK draws through X and OpenGL. Its ray casters run on the CPU and finally show their picture as a texture,
  * so the X server may be Xvfb. Whole renders are timed. An empty render precedes them and creates the OpenGL context.
  *
- * The ray cast mapper stores only 8 bits per channel. So the same rays are cast once more, untimed, by the same
- * function and integrator, for colours in float. Z-sweep stores a float image, the fixed-point mapper 15 bits, and
- * projected tetrahedra have the precision of the frame buffer. */
+ * The ray cast mapper stores only 8 bits per channel. Therefore the same rays are cast a second time, untimed, by the
+ * same function and integrator, to obtain colours in float. Z-sweep stores a float image, the fixed-point mapper 15
+ * bits, and projected tetrahedra have the precision of the frame buffer. */
 #include "bench_vtk.h"
 #include "bench_vtk_mesh.h"
 
@@ -123,7 +123,7 @@ void set_projected(peer &p, vtkUnstructuredGrid *grid)
     p.mapper = mapper;
 }
 
-/* Sets points outside the mesh to the value of the lowest knot, which has no opacity. */
+/* Sets points outside the mesh to the value of the lowest knot. The opacity is 0 at this value. */
 void clear_outside(vtkImageData *image, const char *mask_name, double value)
 {
     vtkDataArray *values = image->GetPointData()->GetArray("f"), *mask = image->GetPointData()->GetArray(mask_name);

@@ -6,7 +6,7 @@
 
 #ifdef __cplusplus
 extern "C" {
-/* The initializers in this header leave out members that are 0; g++ would warn of them. */
+/* The C headers included here have initializers that leave out members that are 0; g++ would warn of them. */
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wmissing-field-initializers"
 #endif

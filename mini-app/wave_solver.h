@@ -37,7 +37,7 @@ typedef struct wave_solver {
 /* Sums, and the maximum of the pressure, over the cells of all ranks. */
 typedef struct wave_totals {
     double volume;
-    double mass;   /* sum of V p / K, which is the injected volume */
+    double mass;   /* sum of V p / K: the injected volume */
     double energy; /* sum of V (p^2 / 2K + rho u^2 / 2) */
     double peak;   /* maximum of the pressure |p| */
 } wave_totals;

@@ -1,6 +1,6 @@
-/* The Blueprint adaptor: it determines which meshes a node contains and what has changed in them, and makes all ranks
- * agree on errors. A session reads borrowed arrays during a step; therefore the adaptor keeps the arrays that it
- * allocated for a mesh, in known_mesh, until that mesh is set again. */
+/* The Blueprint adaptor: it determines which meshes a Conduit node contains and which of their data have changed, and
+ * makes all ranks agree on errors. A session reads borrowed arrays during a step; therefore the adaptor keeps the
+ * arrays that it allocated for a mesh, in known_mesh, until that mesh is set again. */
 #include "insitu/blueprint.h"
 
 #include <stdio.h>
@@ -47,8 +47,8 @@ static _Thread_local char create_error[256];
 
 /* ---- known meshes ----------------------------------------------------------------------------------------------- */
 
-/* Finds a known mesh by its name and number. The search begins behind the one found last, because domains are set in
- * the same order every step, and there may be thousands. */
+/* Finds a known mesh by its name and number. The search begins after the mesh that was found most recently, because
+ * domains are set in the same order every step, and there may be thousands of them. */
 static known_mesh *find_known_mesh(insitu_blueprint *adaptor, const char *name, int64_t number)
 {
     for (int i = 0; i < adaptor->known_count; i++) {

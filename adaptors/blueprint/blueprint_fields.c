@@ -1,5 +1,6 @@
-/* Reads fields, including ghost flags. On a lattice all vertex arrays must have the same strides, and so must all cell
- * arrays. The topology states the strides of vertex arrays; the first element field states those of cell arrays. */
+/* Reads fields, including ghost flags. On a lattice (structured grid) all vertex arrays must have the same strides, and
+ * all cell arrays must have the same strides. The topology states the strides of vertex arrays; the first element field
+ * states those of cell arrays. */
 #include "blueprint_hash.h"
 #include "blueprint_mesh.h"
 
@@ -342,7 +343,7 @@ bool blueprint_read_ghosts(const node *domain, const char *topology, blueprint_m
 
 /* ---- values ----------------------------------------------------------------------------------------------------- */
 
-/* Describes the field's components in an array, which the caller must free. Returns NULL on an error. */
+/* Describes the field's components in a new array; the caller must free it. Returns NULL on an error. */
 static insitu_array *read_values(const blueprint_field *field, const blueprint_mesh *mesh, int *count)
 {
     const int64_t children = node_child_count(&field->values_node);

@@ -59,7 +59,7 @@ static common_lattice lattice_of_block(const uniform_block *block)
     return out;
 }
 
-/* ---- lists of them ---------------------------------------------------------------------------------------------- */
+/* ---- lists of common lattices ----------------------------------------------------------------------------------- */
 
 /* Finds the item of a mesh. The blocks of a mesh are added one after the other, so the search begins with the last item
  * of the list. */

@@ -49,8 +49,8 @@ void node_log_free(node_log *log);
 
 bool node_has(const node *parent, const char *path);
 
-/* Finds the node at the path, which may have several components. Returns false if it does not exist; this is not an
- * error. */
+/* Finds the node at the path. The path may have several components. Returns false if the node does not exist; this is
+ * not an error. */
 bool node_find(const node *parent, const char *path, node *out);
 
 /* Does the same as node_find(), but a missing node is an error. */
@@ -59,7 +59,7 @@ bool node_require(const node *parent, const char *path, node *out);
 int64_t node_child_count(const node *parent);
 void node_child(const node *parent, int64_t number, node *out);
 
-/* Reads a string, which belongs to the node. Returns false and sets the error if there is no string at the path. */
+/* Reads a string; it belongs to the node. Returns false and sets the error if there is no string at the path. */
 bool node_string(const node *parent, const char *path, const char **out);
 
 /* node_integer() and node_real() read a number. If the number is missing, *out does not change; this is an error only

@@ -84,7 +84,7 @@ template <typename T> bool borrow(vtkDataArray *array, array_view &view)
     return borrow_aos<T>(array, view) || borrow_soa<T>(array, view);
 }
 
-/* Copies values of VTK's type From to type To, which must represent them all. */
+/* Copies values of VTK's type From to type To. To must represent all values of From. */
 template <typename From, typename To> bool convert(vtkDataArray *array, held_arrays &held, array_view &view)
 {
     auto *typed = vtkAOSDataArrayTemplate<From>::FastDownCast(array);

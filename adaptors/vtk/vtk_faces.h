@@ -1,5 +1,5 @@
-/* Reads the polyhedra of a vtkUnstructuredGrid. VTK lists all faces of each cell (its face stream); libinsitu needs
- * each face once, and cells that refer to their faces. */
+/* Reads the polyhedra of a vtkUnstructuredGrid. VTK lists all faces of each cell (its face stream); libinsitu needs a
+ * list with each face one time, and cells that refer to their faces by index. */
 #ifndef VTK_FACES_H
 #define VTK_FACES_H
 

@@ -76,7 +76,7 @@ template <typename Array> vtkSmartPointer<vtkCellArray> list_cells(const lattice
 
 void set_lattice(const lattice &l, vtkUnstructuredGrid *grid)
 {
-    /* The largest offset is eight times the number of cells, which is smaller than the number of points. */
+    /* The largest offset is eight times the number of cells. There are fewer cells than points. */
     const bool is_small = l.points() < std::numeric_limits<int32_t>::max() / 8;
     grid->SetCells(l.is_flat() ? VTK_QUAD : VTK_HEXAHEDRON,
                    is_small ? list_cells<vtkTypeInt32Array>(l) : list_cells<vtkTypeInt64Array>(l));
