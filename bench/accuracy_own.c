@@ -1,5 +1,5 @@
-/* Measures libinsitu at each of its settings. The time of a frame is that from the trees to the finished pixels,
- * including compositing on one rank. */
+/* Measures libinsitu at each of its settings. The time of a frame begins when the trees are built, and ends when the
+ * pixels are finished. It includes compositing on one rank. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,8 +17,8 @@ typedef struct studio {
     accuracy_scene scene;
     fragment_list fragments;
     float *image;   /* size × size × 4 */
-    float *chosen;  /* count × 4: chosen pixels of the last frame */
-    double *depths; /* count: depths of these pixels */
+    float *chosen;  /* count × 4: colours of the chosen pixels (accuracy_reference.h) in the most recent frame */
+    double *depths; /* count: depths of the chosen pixels */
     int count;
 } studio;
 
@@ -74,7 +74,7 @@ static void destroy_studio(studio *s)
     free(s->depths);
 }
 
-/* Merges the fragments of each pixel. Those of a pixel are contiguous, as one rank makes them all. */
+/* Merges the fragments of each pixel. The fragments of a pixel are contiguous, because one rank makes them all. */
 static void merge_fragments(studio *s)
 {
     const float nothing[4] = {0, 0, 0, 0};
@@ -164,7 +164,8 @@ static void measure_group_rows(studio *s)
     s->scene.job.sample_group = 64;
 }
 
-/* Measures means over frames with different jitter. The time of a mean is the sum of its frames' times. */
+/* Measures the mean of the first 1, 2, 4, ... frames, which differ in their jitter. The time of a mean is the sum of
+ * its frames' times. */
 static void measure_frame_rows(studio *s)
 {
     const size_t channels = 4 * (size_t)s->count;

@@ -1,4 +1,5 @@
-/* Measures the peers. A peer that crashes or exceeds its time gets a row that states this. */
+/* Measures the peers, which are VTK's volume mappers. A peer that crashes or exceeds its time gets a row that states
+ * this. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,7 +11,7 @@ typedef struct peer {
     const char *method, *setting;
     bench_vtk_mapper mapper;
     accuracy_opacity meaning;
-    int coarser; /* resample: number of times that the finest resolution is halved */
+    int coarser; /* only for VTK resample: number of times that the finest resolution is halved */
 } peer;
 
 static const peer peers[] = {

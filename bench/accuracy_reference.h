@@ -1,14 +1,15 @@
-/* Computes the true values of a subject's chosen pixels in double, and the error of a picture against them. The
- * brute-force renderer finds the hits of isosurfaces; volumes are integrated adaptively through every cell. */
+/* Computes the true colours and depths of a subject (accuracy_subject.h) in a few chosen pixels of its picture, in
+ * double, and the error of a picture against them. The brute-force renderer of the tests finds the hits of isosurfaces;
+ * volumes are integrated adaptively through every cell. */
 #ifndef ACCURACY_TRUTH_H
 #define ACCURACY_TRUTH_H
 
 #include "accuracy_subject.h"
 #include "bench_error.h"
 
-/* Interpretations of an opacity a per unit distance. */
+/* The two interpretations of a transfer function's opacity a per unit distance. */
 typedef enum accuracy_opacity {
-    ACCURACY_OPACITY,   /* extinction -ln(1 - a), where a is linear between the knots: libinsitu, VTK's image mappers */
+    ACCURACY_OPACITY,   /* extinction -ln(1 - a); a is linear between the knots: libinsitu, VTK's image mappers */
     ACCURACY_EXTINCTION /* extinction that is linear between the knots: VTK's mappers of unstructured grids */
 } accuracy_opacity;
 
@@ -26,16 +27,18 @@ typedef struct accuracy_error {
      * cannot decide (`ambiguous` of reference_ray). */
     int pixels;
     /* Volumes: error of linear premultiplied red, green, blue and opacity. Surfaces: error of depth, relative to the
-     * size of the true hit's cell, if both hit the same sheet. */
+     * size of the true hit's cell, over the pixels in which it is at most 1. */
     double rms, max;
-    /* Surfaces: pixels in which only one of the two hits, or whose depths differ by more than a cell. */
+    /* Surfaces: number of pixels in which only the picture or only the reference has a hit, or in which the depths
+     * differ by more than the size of a cell. */
     int wrong;
     /* Surfaces: largest |field at the hit - isovalue|, divided by the range of the cell's values; NaN for meshes with
      * polyhedra. */
     double residual;
 } accuracy_error;
 
-/* These compute the error of a picture from its values in the chosen pixels; rgba: count × 4. */
+/* accuracy_volume_error() and accuracy_surface_error() compute the error of a picture from its values in the chosen
+ * pixels: rgba (count × 4) or depths (count). */
 accuracy_error accuracy_volume_error(const accuracy_reference *truth, accuracy_opacity meaning, const float *rgba);
 accuracy_error accuracy_surface_error(const accuracy_reference *truth, const double *depths);
 

@@ -1,4 +1,4 @@
-/* Measures the time and the error of libinsitu at each of its settings, and of its peers. */
+/* Measures the time and the error of libinsitu at each of its settings, and of its peers (VTK's volume mappers). */
 #ifndef ACCURACY_ROWS_H
 #define ACCURACY_ROWS_H
 
@@ -6,10 +6,12 @@
 
 /* The amount of work of a run. */
 typedef struct accuracy_effort {
-    /* Width and height in pixels of the picture, and of the blocks of which one pixel each is compared. */
+    /* size: width and height of the picture in pixels; block: width and height of a block in pixels. One pixel of each
+     * block is compared. */
     int size, block;
-    int runs;         /* largest number of timed frames of a row */
-    double seconds;   /* least time of a row, with at least 3 frames; a row ends after four times this */
+    int runs; /* largest number of timed frames of a row */
+    /* minimum time of a row's timed frames; a row has at least 3 frames, unless they take four times this time */
+    double seconds;
     int frames;       /* largest number of frames to average */
     int resolution;   /* points along the longest axis of the finest image that VTK samples */
     int peer_seconds; /* time after which a peer is stopped, in seconds */
@@ -30,8 +32,8 @@ void accuracy_measure_surface_rows(const accuracy_context *context); /* prints n
 void accuracy_measure_volume_rows(const accuracy_context *context);
 void accuracy_measure_peer_rows(const accuracy_context *context);
 
-/* One row. `first` is the time from the mesh in memory to the first picture, and `frames` are those of further frames,
- * in seconds. */
+/* One row. `first` is the time from the mesh in memory to the first picture; `frames` are the times of further frames.
+ * Both are in seconds. */
 typedef struct accuracy_row {
     const char *layer, *method;
     char setting[32];

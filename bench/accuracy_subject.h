@@ -12,15 +12,15 @@ typedef struct accuracy_view {
     double eye[3], focal[3], up[3];
 } accuracy_view;
 
-/* A subject. Its opacity and colour have the same evenly spaced knots: VTK's integrators divide cells at the knots of
- * both, and a long colour table, which does not slow libinsitu, would slow VTK down. */
+/* A subject. Its opacity and colour have the same evenly spaced knots, because VTK's integrators divide cells at the
+ * knots of both. A long colour table would slow VTK down, but not libinsitu. */
 typedef struct accuracy_subject {
     char name[64];
     test_mesh mesh;
     test_view view; /* the mesh as simulations store it: float32 coordinates and values, int32 indices */
     mmbvh tree;
     accuracy_view look;
-    double degrees; /* full angle of view of the square picture, which the bounds just fill */
+    double degrees; /* full angle of view of the square picture: the smallest angle that contains the mesh's bounds */
     double isovalue;
     double knots[ACCURACY_KNOTS];
     float opacities[ACCURACY_KNOTS], colours[3 * ACCURACY_KNOTS];
@@ -36,8 +36,8 @@ typedef struct accuracy_subject {
 bool accuracy_subject_create(const char *name, int size, accuracy_subject *out);
 void accuracy_subject_free(accuracy_subject *subject);
 
-/* A render job of the subject, whose tree must have been built, with all that the job points to. It must not be
- * moved. */
+/* A render job of the subject, and everything that the job points to. The subject's tree must have been built. The
+ * struct must not be moved, because it contains pointers to its own members. */
 typedef struct accuracy_scene {
     render_job job;
     render_part part;
@@ -47,15 +47,16 @@ typedef struct accuracy_scene {
     render_volume_layer volume;
 } accuracy_scene;
 
-/* Sets the scene to the opaque isosurface, with robust roots, or to the volume, with samples at a distance of one
- * cell. */
+/* accuracy_scene_create_surface() sets the scene to the opaque isosurface, with robust roots;
+ * accuracy_scene_create_volume() sets it to the volume, with samples at a distance of one cell. */
 void accuracy_scene_create_surface(accuracy_scene *scene, const accuracy_subject *subject);
 void accuracy_scene_create_volume(accuracy_scene *scene, const accuracy_subject *subject);
 
 /* Returns the cube root of the volume of a cell's bounding box. */
 double accuracy_box_size(const grid *cells, int64_t cell);
 
-/* Returns whether every cell is linear along a ray, or piecewise linear with pieces that the kernels distinguish. */
+/* Returns whether, in every cell, the field is linear along a ray (tets), or piecewise linear with pieces that the
+ * kernels distinguish (polyhedra). */
 bool accuracy_is_linear(const accuracy_subject *subject);
 
 #endif

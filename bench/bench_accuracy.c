@@ -1,5 +1,6 @@
-/* Measures time against error of isosurfaces and volumes at every setting that trades one for the other, and of VTK's
- * volume mappers on the same meshes, cameras and transfer functions. Prints CSV, with one row for each setting. */
+/* Measures the time and the error of isosurfaces and volumes at every setting that trades time for error. VTK's volume
+ * mappers are measured on the same meshes, cameras and transfer functions. Prints CSV, with one row for each
+ * setting. */
 #include <stdio.h>
 
 #include <getopt.h>

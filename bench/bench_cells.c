@@ -15,14 +15,16 @@ static const float everything_opacities[2] = {0.05f, 0.3f};
 typedef struct picture {
     const char *name;
     bool is_surface, shows_everything;
-    bool from_afar;   /* also drawn as by one of a thousand ranks */
+    bool from_afar;   /* also measured by measure_thousand(), which draws the mesh as one of a thousand ranks would */
     double max_error; /* 0: integrates samples */
-    double step;      /* as a multiple of the benchmark's step, half of a cube's side */
-    double unit;      /* unit distance of the opacity; 0: the benchmark's */
+    /* distance of samples, as a multiple of the benchmarks' default, which is half the side of one of the mesh's
+     * cubes */
+    double step;
+    double unit; /* unit distance of the opacity; 0: the benchmarks' default, bench_unit_distance */
 } picture;
 
-/* Unit distance of the dense volume: a ray has lost its light after a tenth of its path through the cube, at 25 to 180
- * optical depths per unit of length. */
+/* Unit distance of the dense volume: nearly all light of a ray is absorbed in the first tenth of its path through the
+ * cube; the optical depth is 25 to 180 per unit of length. */
 static const double dense_unit = 0.002;
 
 static const picture pictures[PICTURES] = {
@@ -80,8 +82,9 @@ static void time_frame(bench_scene *s, int number, bench_series *series)
     bench_stop_timer(began, number, series);
 }
 
-/* Prints the error of the dense volume. If all light is lost between two samples, their sum is far from the integral,
- * so samples are compared with the same samples in double. */
+/* Prints the error of the dense volume. If nearly all light is absorbed between two samples, the sum over the samples
+ * is far from the integral. A frame made from samples is therefore compared with the same samples computed in
+ * double. */
 static void print_dense_error(bench_scene *s, const picture *p)
 {
     free(s->integrals); /* integrals of the usual transfer function */
@@ -153,7 +156,7 @@ static void measure_layouts(bench_scene *first, const bench_command *command)
     for (int l = 0; l < LAYOUTS; l++) bench_scene_free(&scenes[l]);
 }
 
-/* Counts the cells whose values overlap a range, which a picture shows. */
+/* Counts the cells that a picture shows: those whose range of values overlaps the given range. */
 static double count_visible_cells(const bench_scene *s, double low, double high)
 {
     const grid *g = &s->view.cells;
@@ -172,7 +175,7 @@ static double count_visible_cells(const bench_scene *s, double low, double high)
     return (double)count;
 }
 
-/* Measures the time from a step's values to the picture, which includes refitting the tree's ranges. */
+/* Measures the time from a step's new values to the picture. It includes refitting the tree's ranges. */
 static void time_new_values(bench_scene *s, int number, bench_series *series)
 {
     const double began = bench_start_timer();

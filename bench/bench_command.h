@@ -22,7 +22,7 @@ typedef struct bench_command {
 } bench_command;
 
 /* Parses the command line, and prints the head of the CSV unless --no-head is given. `about` describes the program for
- * --help; `last` is the last kind of mesh that the program supports. Returns false and sets the status if help is
+ * --help. The program supports the kinds of meshes from 0 to `last`. Returns false and sets the status if help is
  * requested or the command line is invalid. */
 bool bench_command_parse(int argc, char **argv, const char *about, test_mesh_kind last, bench_command *command);
 

@@ -138,8 +138,9 @@ static void make_picture(const fragment_list *list, bool is_surface, int width, 
 /* The measurements of one compositing method. */
 typedef struct measure {
     char name[32];
-    bench_series series, cpu;     /* time of the slowest rank; CPU time of all ranks, including waiting */
-    double bytes, messages, peak; /* sums over all ranks of bytes and messages; the largest peak */
+    bench_series series, cpu; /* series: time of the slowest rank; cpu: CPU time of all ranks, including waiting */
+    /* bytes, messages: sums over all ranks; peak: largest peak memory of a rank, in bytes */
+    double bytes, messages, peak;
     bool can;
 } measure;
 

@@ -1,6 +1,6 @@
 /* Configures VTK for speed: it merges no points and computes no normals and scalars, so its default flat shading uses
  * the triangles' own normals. The grid borrows the caller's arrays, the window and its context are kept, and a new
- * surface replaces the last one. */
+ * surface replaces the previous one. */
 #include "bench_contour.h"
 
 #include <cmath>
@@ -34,7 +34,7 @@ struct bench_contour {
     vtkNew<vtkFloatArray> xyz, values;
     vtkNew<vtkUnstructuredGrid> grid;
     vtkNew<vtkContour3DLinearGrid> filter;
-    vtkNew<vtkPolyData> surface; /* last result of the filter */
+    vtkNew<vtkPolyData> surface; /* most recent result of the filter */
     vtkNew<vtkPolyDataMapper> mapper;
     vtkNew<vtkActor> actor;
     vtkNew<vtkRenderer> renderer;

@@ -1,5 +1,5 @@
-/* Isosurfaces of VTK as a peer: extraction by vtkContour3DLinearGrid in parallel, then rendering by OpenGL, with Mesa
-   if there is no GPU. */
+/* Measures VTK's isosurfaces as a peer: extraction by vtkContour3DLinearGrid in parallel, then rendering by OpenGL,
+ * with Mesa if there is no GPU. */
 #ifndef BENCH_CONTOUR_H
 #define BENCH_CONTOUR_H
 
@@ -38,7 +38,8 @@ typedef struct bench_contour bench_contour;
 bench_contour *bench_contour_create(const bench_contour_mesh *mesh, const bench_contour_view *view, int threads);
 void bench_contour_destroy(bench_contour *contour);
 
-/* Returns whether an X server provides a window to draw in. Creates the OpenGL context, which is not timed. */
+/* Returns whether an X server provides a window to draw in. Creates the OpenGL context, so that this is not timed
+ * later. */
 bool bench_contour_can_draw(bench_contour *contour);
 
 /* Sets new coordinates and values of the mesh. */
@@ -46,12 +47,12 @@ void bench_contour_set(bench_contour *contour, const float *xyz, const float *va
 
 bench_triangles bench_contour_extract(bench_contour *contour, const double *isovalues, int count);
 
-/* Draws the last extraction and waits until OpenGL has finished. The first call includes VTK's preparations. Nothing is
- * read back. */
+/* Draws the triangles of the most recent bench_contour_extract(), and waits until OpenGL has finished. The first call
+ * includes VTK's preparations. No pixels are read back. */
 void bench_contour_draw(bench_contour *contour);
 
-/* Reads the depths of the last picture along the camera's axis, row-major with the top row first; infinity in empty
- * pixels. */
+/* Reads the depths of the most recently drawn picture along the camera's axis, row-major with the top row first;
+ * infinity in empty pixels. */
 void bench_contour_read(bench_contour *contour, float *depths);
 
 #ifdef __cplusplus

@@ -1,5 +1,5 @@
-/* Uses Embree in the way that its documentation recommends as fastest: static scenes of one geometry, coherent packets
- * of 16 rays, and nodes from the builder's thread-local allocators. Embree gets as many threads as libinsitu. */
+/* Uses Embree as its documentation recommends for the highest speed: static scenes of one geometry, coherent packets of
+ * 16 rays, and nodes from the builder's thread-local allocators. Embree gets as many threads as libinsitu. */
 #include "bench_embree.h"
 
 #include <math.h>

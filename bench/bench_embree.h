@@ -1,4 +1,4 @@
-/* Embree as a peer, which traces rays in a triangle mesh and builds trees over the bounding boxes of cells. */
+/* Measures Embree as a peer: it traces rays in a triangle mesh, and builds trees over the bounding boxes of cells. */
 #ifndef BENCH_EMBREE_H
 #define BENCH_EMBREE_H
 
@@ -12,16 +12,16 @@ typedef struct bench_embree bench_embree;
 bench_embree *bench_embree_create(int threads);
 void bench_embree_destroy(bench_embree *embree);
 
-/* Builds the acceleration structure of triangles that share no vertices, and replaces the last one. xyz: triangle_count
- * × 9, borrowed, followed by 4 readable bytes. Uses Morton codes (RTC_BUILD_QUALITY_LOW) if is_fast, and binned SAH
- * (MEDIUM) otherwise. */
+/* Builds the acceleration structure of triangles that share no vertices, and replaces the previous structure. xyz:
+ * triangle_count × 9, borrowed, followed by 4 readable bytes. Uses Morton codes (RTC_BUILD_QUALITY_LOW) if is_fast, and
+ * binned SAH (MEDIUM) otherwise. */
 void bench_embree_build(bench_embree *embree, const float *xyz, int64_t triangle_count, bool is_fast);
 
-/* Traces a ray for each pixel, in packets of 16 = 4 × 4. `depths` gets the hit's depth along the camera's axis, or
- * infinity; `normals` gets the triangle's normal (pixels × 3, of any length and either sign). */
+/* Traces a ray for each pixel, in packets of 16 = 4 × 4. `depths` receives the hit's depth along the camera's axis, or
+ * infinity. `normals` receives the triangle's normal (pixels × 3, of any length and either sign). */
 void bench_embree_trace(bench_embree *embree, const render_camera *camera, float *depths, float *normals);
 
-/* A ray whose direction has length 1, and which ends at the distance `far`. */
+/* A ray with a direction of length 1 that ends at the distance `far`. */
 typedef struct bench_embree_ray {
     float origin[3], direction[3], far;
 } bench_embree_ray;
@@ -38,11 +38,11 @@ typedef enum bench_embree_builder {
 /* Stores the bounding boxes of all cells in Embree's format. */
 void bench_embree_set_cells(bench_embree *embree, const grid *cells);
 
-/* Runs rtcBuildBVH on a copy of the boxes, which it sorts in place. The memory of the last such build is reused.
- * Returns the time in seconds without that of the copy. */
+/* Runs rtcBuildBVH on a copy of the boxes, because the builder sorts them in place. The memory of the previous build is
+ * reused. Returns the time in seconds, excluding the copy. */
 double bench_embree_build_cells(bench_embree *embree, bench_embree_builder builder);
 
-/* Returns the SAH cost of the last tree, which must be binary, by the definition of mmbvh_cost(). */
+/* Returns the SAH cost of the most recently built tree, as mmbvh_cost() defines it. The tree must be binary. */
 double bench_embree_cost(const bench_embree *embree);
 
 #endif

@@ -191,8 +191,8 @@ static int find_chosen_pixel(const bench_pixels *all, uint32_t pixel)
     return column < all->columns && row < all->rows && all->pixels[i].pixel == pixel ? i : -1;
 }
 
-/* Merges the fragments of the chosen pixels. The kernels' depths are the rays' parameters t, which are converted to
- * depths along the camera's axis. */
+/* Merges the fragments of the chosen pixels. The kernels' depths are values of the rays' parameter t; they are
+ * converted to depths along the camera's axis. */
 void bench_pixels_merge(const bench_pixels *all, const render_space *space, const fragment_list *fragments, float *rgba,
                         double *depths)
 {

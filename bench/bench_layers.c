@@ -1,6 +1,6 @@
-/* Measures the cost of slices, outer surfaces, clips, edges and antialiasing, or of derived fields, contour lines,
- * warps, mirrors, planes and montages. Whole steps with new values are measured in turns with VTK's pipeline to the
- * same picture from the same values, in one process. Prints CSV. */
+/* Measures the cost of slices, outer surfaces, clips, edges and antialiasing, or (with "flow") of derived fields,
+ * contour lines, warps, mirrors, planes and montages. Whole steps with new values are measured. VTK's pipelines make
+ * the same pictures from the same values; they are measured in turns with libinsitu, in one process. Prints CSV. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -21,7 +21,7 @@ enum { MOST_PICTURES = 12 };
 
 typedef struct bench_group {
     const char *program;
-    bool is_by_part; /* also print the parts of a step, whose times in the report are wall-clock times */
+    bool is_by_part; /* also print the wall-clock time of each part of a step, as it is in the report */
     int count;
     bench_pair pairs[MOST_PICTURES];
 } bench_group;
@@ -38,8 +38,8 @@ static const bench_group layers = {"bench_layers",
                                     {BENCH_SMOOTH, BENCH_LAYER_NONE},
                                     {BENCH_DIFFERENCES, BENCH_LAYER_NONE}}};
 
-/* The slice, the surface and the isosurface are measured once more in this group, in turns with their versions with
- * contour lines. */
+/* This group measures the slice, the surface and the isosurface too, in turns with their versions with contour
+ * lines. */
 static const bench_group flow = {"bench_layers flow",
                                  false,
                                  12,

@@ -1,7 +1,7 @@
-/* VTK's pipelines to slices, outer surfaces and pictures derived from them, as peers: vtk3DLinearGridPlaneCutter,
- * vtkGeometryFilter, vtkGradientFilter, vtkContourFilter, vtkWarpVector and vtkReflectionFilter, on as many threads as
- * each can use, then OpenGL, with Mesa if there is no GPU. The pictures are those of bench_session.h: coloured by the
- * field without lighting, and isosurfaces with lighting. */
+/* Measures VTK's pipelines for slices, outer surfaces and pictures derived from them, as peers:
+ * vtk3DLinearGridPlaneCutter, vtkGeometryFilter, vtkGradientFilter, vtkContourFilter, vtkWarpVector and
+ * vtkReflectionFilter, on as many threads as each can use, then OpenGL, with Mesa if there is no GPU. The pictures are
+ * those of bench_session.h: coloured by the field without lighting, and isosurfaces with lighting. */
 #ifndef BENCH_LAYERS_VTK_H
 #define BENCH_LAYERS_VTK_H
 
@@ -33,7 +33,7 @@ bool bench_layers_vtk_is_available(void);
 
 typedef struct bench_layers_vtk bench_layers_vtk;
 
-/* The parameters of the pictures, which bench_session.h defines. */
+/* The parameters of the pictures. bench_session.h defines their values. */
 typedef struct bench_layers_parameters {
     double
         plane[3]; /* normal of the plane through the origin that slices, or that cuts off the side to which it points */

@@ -1,6 +1,6 @@
-/* Measures rays from the hits of an isosurface, towards a light and into the hemisphere, in turns with the frame that
- * finds the hits, and with Embree, which traces the same rays in the triangles that VTK extracts. All are measured in
- * one process. Prints CSV. */
+/* Measures rays from the hits of an isosurface, towards a light and into the hemisphere. They are measured in turns
+ * with the frame that finds the hits, and with Embree, in one process. Embree traces the same rays in the triangles
+ * that VTK extracts. Prints CSV. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,7 +13,8 @@
 
 enum { SAMPLES = 16 };
 
-/* The radius is a sixth of the mesh's side, about a tenth of its diagonal, which is a scene's default. */
+/* The radius of the sky's occlusion is a sixth of the mesh's side. This is about a tenth of the mesh's diagonal, as in
+ * scenes by default. */
 static const render_occlusion shadows = {1, 0, 1}, sky = {0, SAMPLES, 1.0 / 3};
 
 /* The rays of one kind, shadow or occlusion rays. */
@@ -138,8 +139,8 @@ static void print_rate(const lit *l, const kind *k, const char *what, bench_seri
     bench_print_number(&l->scene.subject, measure, "Mrays/s", 1e-3 * (double)k->rays / stats.median);
 }
 
-/* Prints the share of rays for which Embree's result differs. Its surface is a different one if cells are not tets, and
- * it rounds differently. */
+/* Prints the share of rays that Embree finds blocked, for comparison with libinsitu's share. The shares may differ: if
+ * cells are not tets, the triangles are a different surface, and Embree rounds differently. */
 static void print_agreement(const lit *l, const kind *k)
 {
     int64_t theirs = 0;

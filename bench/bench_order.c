@@ -1,6 +1,6 @@
-/* Measures cells of higher order: hexes of 27 nodes beside the linear hexes that a caller could split them into,
- * quadratic tets beside vtkTessellatorFilter at equal error, and a real mesh with the default settings. The field is
- * the squared distance from the origin, except on the real mesh. Prints CSV. */
+/* Measures cells of higher order: hexes of 27 nodes, compared with the linear hexes into which a caller could split
+ * them; quadratic tets, compared with vtkTessellatorFilter at equal error; and a real mesh with the default settings.
+ * The field is the squared distance from the origin, except on the real mesh. Prints CSV. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,18 +16,18 @@
 
 enum { WIDTH = 800, HEIGHT = 600, PHASES = 2, WARM_UP = 8, FINER = 2, MOST_PIECES = 4 };
 
-/* How far vertices of bent hexes are moved. */
+/* Distance by which the vertices of bent hexes are moved. */
 static const double bend_of_hexes = 0.05;
 
-/* What a session draws. */
+/* The mesh, the field and the scene that one session draws. */
 typedef struct bench_drawing {
     const bench_scene *scene;
     bench_subject subject;
     data_cells cells;
-    double *values[PHASES]; /* [0]: of the cells */
-    char keys[32];          /* lines of the scene before its images */
+    double *values[PHASES]; /* [0]: the values of `cells`; [1]: values that are 1 % larger */
+    char keys[32];          /* lines of the scene file that precede its images */
     const char *layer;
-    bool is_real; /* has the camera of the real mesh, and no new values */
+    bool is_real; /* set if the mesh is the real one: it has a camera of its own, and its values do not change */
 } bench_drawing;
 
 typedef struct bench_times {
@@ -49,8 +49,8 @@ static data_cells make_cells(const char *name, int side, double bend)
     return cells_of(&m);
 }
 
-/* Makes the linear hexes between nodes at a FINER part of the distance of those of the hexes of 27 nodes, which are as
- * many as the library can make with FINER pieces. */
+/* Makes linear hexes whose vertices are FINER times as dense along each axis as the nodes of the hexes of 27 nodes.
+ * There are as many of them as the library makes linear pieces with `finer_pieces: FINER`. */
 static data_cells make_split_hexes(int side, double bend)
 {
     const order_kind kind = {"hex", INSITU_LAGRANGE_HEX, INSITU_ORDER_LEXICOGRAPHIC, 2 * FINER};
@@ -62,7 +62,7 @@ static data_cells make_split_hexes(int side, double bend)
     return cells_of(&split);
 }
 
-/* Takes the cells, and makes second values, which are 1 % larger. */
+/* Initializes a drawing, and makes its second values. The drawing takes ownership of the arrays of `cells`. */
 static void create_drawing(bench_drawing *d, const bench_scene *scene, const char *name, data_cells cells)
 {
     *d = (bench_drawing){.scene = scene, .subject = scene->subject, .cells = cells, .values = {cells.values}};
@@ -117,7 +117,7 @@ static void set_values(insitu_session *session, const bench_drawing *d, int phas
     bench_require_success(d->scene, session, insitu_set_field(session, "cells", &field));
 }
 
-/* Takes the first step of a new session, which replaces *session. */
+/* Replaces *session by a new session, and measures its first step. */
 static void take_first_step(const bench_drawing *d, int number, insitu_session **session, bench_times *times)
 {
     insitu_destroy(session);
@@ -161,7 +161,7 @@ static void print_number(const bench_drawing *d, const char *name, const char *w
     bench_print_number(&d->subject, measure, unit, number);
 }
 
-/* Prints the number of all linear pieces, which only the report's text contains. */
+/* Prints the number of all linear pieces. Only the text copied_why of the report contains this number. */
 static void print_pieces_made(const bench_drawing *d, const char *name, const insitu_report *report)
 {
     const char *at = strstr(report->copied_why, " linear pieces of its cells");
@@ -197,8 +197,9 @@ static void measure_hexes(const bench_scene *scene, int runs, const char *name, 
     for (int form = 0; form < 2; form++) free_drawing(&drawings[form]);
 }
 
-/* Returns the largest error in the middle of a piece's edge, which is a quarter of its squared length. In half of the
- * tets, the longest edge is a diagonal of an octahedron, from (0, 0, 0) to (1, 2, 1) in a lattice with spacing h. */
+/* Returns the largest error of linear interpolation in the middle of an edge of a linear piece. It is a quarter of the
+ * edge's squared length, because the field is the squared distance from the origin. In half of the tets, the longest
+ * edge is a diagonal of an octahedron, from (0, 0, 0) to (1, 2, 1) in a lattice with spacing h. */
 static double error_of_pieces(int side, int pieces)
 {
     const double h = 1.0 / (side * pieces);

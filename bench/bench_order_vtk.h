@@ -1,4 +1,5 @@
-/* vtkTessellatorFilter as a peer: it makes linear tets of quadratic ones, as finely as the error of a field needs. */
+/* Measures vtkTessellatorFilter as a peer: it divides quadratic tets into linear ones, as finely as a bound of the
+ * field's error requires. */
 #ifndef BENCH_ORDER_VTK_H
 #define BENCH_ORDER_VTK_H
 
@@ -19,7 +20,8 @@ void bench_tessellator_destroy(bench_tessellator *tessellator);
 /* Makes all linear cells anew. */
 void bench_tessellator_update(bench_tessellator *tessellator);
 
-/* These return the number of the linear cells, and the squared length of their longest edge. */
+/* bench_tessellator_cell_count() returns the number of linear cells; bench_tessellator_longest_squared() returns the
+ * squared length of their longest edge. */
 int64_t bench_tessellator_cell_count(bench_tessellator *tessellator);
 double bench_tessellator_longest_squared(bench_tessellator *tessellator);
 

@@ -8,7 +8,8 @@
 #include "bench_scene.h"
 #include "memory.h"
 
-/* Measures the speed of act() in units per second over all runs. One run before them is not counted. */
+/* Measures the speed of act() in units per second over all runs. A warm-up run precedes these runs and is not
+ * counted. */
 static bench_stats measure_speed(bench_scene *scene, int runs, void (*act)(bench_scene *), double units)
 {
     double speeds[BENCH_MAX_RUNS];

@@ -158,13 +158,14 @@ static void compare_depths(bench_routes *r, const float *own, const float *their
     snprintf(measure, sizeof measure, "%s %s coverage difference", name, peer);
     bench_print_number(r->subject, measure, "share", either ? (double)one / (double)either : 0);
     bench_stats depth = bench_compute_stats(differences, both);
-    if (both) depth.high = differences[(int64_t)both * 99 / 100]; /* above it, at silhouettes, sheets differ */
+    /* the largest 1 % are left out, because at silhouettes the two hits may be on different sheets of the surface */
+    if (both) depth.high = differences[(int64_t)both * 99 / 100];
     snprintf(measure, sizeof measure, "%s %s depth difference", name, peer);
     bench_print(r->subject, measure, "scene (max: of 99%)", depth);
     free(differences);
 }
 
-/* Writes depths as greys: black at 1.5 behind the scene's centre, white at 1.5 in front of it. */
+/* Writes depths as grey levels: black at a distance of 1.5 behind the scene's centre, white at 1.5 in front of it. */
 static void write_depths(const bench_routes *r, const float *depths, const char *folder, const char *name)
 {
     const int64_t count = (int64_t)r->camera->width * r->camera->height;

@@ -14,8 +14,8 @@ typedef struct bench_routes {
     bench_contour *contour;
     bench_embree *embree;
     bool has_window;
-    float *depths, *normals; /* last picture of Embree */
-    int64_t triangles;       /* number of triangles of the last extraction */
+    float *depths, *normals; /* of Embree's most recent picture */
+    int64_t triangles;       /* number of triangles of the most recent extraction */
     bench_series extract, first, later, build_low, build_medium, trace_low, trace_medium;
     bench_series vtk;                       /* sum of extract and first */
     bench_series embree_low, embree_medium; /* sums of extract, build and trace */
@@ -28,15 +28,16 @@ void bench_routes_free(bench_routes *routes);
 void bench_routes_set(bench_routes *routes, const float *const coordinates[3], int64_t vertex_count,
                       const float *values);
 
-/* Runs and times all alternatives once; run number 0 is the warm-up, whose times are dropped. */
+/* Runs and times all alternatives one time. Run number 0 is the warm-up; its times are dropped. */
 void bench_routes_run(bench_routes *routes, const double *isovalues, int count, int number);
 
-/* Prints and removes the collected times. `name`, the layer's, precedes the names of the measures. */
+/* Prints and removes the collected times. The names of the measures begin with `name`, the name of the layer. */
 void bench_routes_print(bench_routes *routes, const char *name);
 
-/* Compares the last pictures of the alternatives with these depths, one for each of the camera's pixels, infinity in
- * empty pixels. Prints the number of pixels that only one of the two shows, and the difference of depths in pixels that
- * both show. Writes the depths as PNG files to `folder`, unless it is NULL. */
+/* Compares the depths in the alternatives' most recent pictures with `depths`. The array `depths` has one depth for
+ * each of the camera's pixels, infinity in empty pixels. Prints the number of pixels that only one of the two pictures
+ * covers, and the difference of the depths in pixels that both cover. Writes the depths as PNG files to `folder`,
+ * unless it is NULL. */
 void bench_routes_compare(bench_routes *routes, const float *depths, const char *name, const char *folder);
 
 #endif

@@ -143,8 +143,8 @@ void bench_scene_frame(bench_scene *s)
     require_success(s, render_frame(&s->job, &s->fragments, NULL, &s->error));
 }
 
-/* Returns the chosen pixels, which are chosen by the first call, as not every benchmark needs them. A big mesh gets
- * fewer pixels, because the reference intersects each pixel's ray with every cell near any of them. */
+/* Returns the chosen pixels. The first call chooses them, because not every benchmark needs them. A big mesh gets fewer
+ * pixels, because the reference intersects each pixel's ray with every cell near any of them. */
 const bench_pixels *bench_scene_pixels(bench_scene *s)
 {
     const int block = s->job.camera.height / (s->subject.cells < BIG_MESH ? ROWS : ROWS / 2);

@@ -33,7 +33,7 @@ typedef struct bench_scene {
     mmbvh tree;
     fragment_list fragments;
     bench_pixels *pixels; /* NULL until an error is computed */
-    double *integrals;    /* integrals of `pixels`, × 4; NULL until they are computed */
+    double *integrals;    /* exact colours of the volume in `pixels`: count × 4; NULL until they are computed */
     render_job job;       /* camera, space, light, and a step of half a cube's side; no layers */
     render_part part;
     mmbvh_ranges ranges;
@@ -51,19 +51,21 @@ void bench_scene_free(bench_scene *scene);
 /* Sets another size of pictures. */
 void bench_scene_resize(bench_scene *scene, int width, int height);
 
-/* Builds the tree again, as for a new mesh. */
+/* Builds the tree anew, as for a new mesh. */
 void bench_scene_build(bench_scene *scene);
 
-/* Sets the layers of frames to `count` isosurfaces, or to the volume. */
+/* bench_scene_show_surfaces() sets the layers of frames to `count` isosurfaces; bench_scene_show_volume() sets them to
+ * the volume. */
 void bench_scene_show_surfaces(bench_scene *scene, int count);
 void bench_scene_show_volume(bench_scene *scene);
 
 /* Draws a frame into fragments. */
 void bench_scene_frame(bench_scene *scene);
 
-/* Prints the error of the last frame, which shows one isosurface or the volume, as measures whose names begin with
- * `name`. A volume is compared with the same samples in double, which shows the effect of rounding and missed samples,
- * or with the integral, which shows the error of the step. */
+/* The following functions print the error of the most recent frame, as measures whose names begin with `name`.
+ * bench_scene_surface_error() is for a frame with one isosurface. The others are for the volume:
+ * bench_scene_sample_error() compares it with the same samples in double, which shows the effect of rounding and missed
+ * samples; bench_scene_integral_error() compares it with the integral, which shows the error of the step. */
 void bench_scene_surface_error(bench_scene *scene, const char *name);
 void bench_scene_sample_error(bench_scene *scene, const char *name);
 void bench_scene_integral_error(bench_scene *scene, const char *name);
@@ -71,11 +73,12 @@ void bench_scene_integral_error(bench_scene *scene, const char *name);
 /* Returns the pixels in which errors are measured. */
 const bench_pixels *bench_scene_pixels(bench_scene *scene);
 
-/* Returns the volume's integrals at the chosen pixels for a transfer function: count × 4, which the caller frees. */
+/* Returns the colours of the exact volume integral at the chosen pixels for a transfer function: count × 4 numbers. The
+ * caller frees them. */
 double *bench_scene_integrals(bench_scene *scene, const render_transfer *transfer);
 
-/* Returns the pixels' differences from the integrals, each the largest of the four channels, over pixels whose integral
- * is not 0. */
+/* Returns the statistics of the errors of `rgba` against the integrals. The error of a pixel is the largest difference
+ * of its four channels. Pixels whose integral is 0 are left out. */
 bench_stats bench_scene_pixel_error(const bench_scene *scene, const double *integrals, const float *rgba);
 
 /* A table that a program prints for each mesh. */

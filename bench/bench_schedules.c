@@ -1,5 +1,6 @@
 /* Computes schedules of compositing (comp_cost.h) for any number of ranks: the messages, bytes and time of the rank
- * that sends most, for a picture in which a block partition has P^(1/3) layers. Prints CSV; does not use MPI.
+ * that sends most, for a picture in which a block partition over P ranks has P^(1/3) layers of fragments. Prints CSV;
+ * does not use MPI.
  *
  *     bench_schedules [RANKS_PER_NODE] */
 #include <math.h>
@@ -9,8 +10,8 @@
 #include "comp_cost.h"
 #include "comp_grid.h"
 
-/* Returns the load for 1920 × 1080 pixels, of which the object covers half. The busiest rank has twice the mean
- * load. */
+/* Returns the load for 1920 × 1080 pixels. The object covers half of the pixels, and the busiest rank has twice the
+ * mean load. */
 static comp_load make_load(int ranks)
 {
     const double covered = 0.5 * 1920 * 1080, layers = cbrt(ranks);

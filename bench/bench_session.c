@@ -7,8 +7,8 @@
 
 #include "session_image.h"
 
-/* Least and largest number of steps before the measured ones. Unless each step has a new mesh, steps are taken until
- * the session no longer builds trees, as it builds the full tree only after some steps. */
+/* Smallest and largest number of steps before the measured ones. Unless each step has a new mesh, steps are taken until
+ * the session no longer builds trees, because it builds the full tree only after some steps. */
 enum { WARM_UP = 8, MOST_WARM_UP = 60 };
 
 static const char *const part_names[BENCH_PARTS] = {"prepare", "build", "refit", "trace", "composite"};
@@ -16,7 +16,7 @@ static const char *const part_names[BENCH_PARTS] = {"prepare", "build", "refit",
 const double bench_plane[3] = {0.4, 0.6, 0.7};
 const double bench_range[2] = {-1.5, 1.5}, bench_vortex = 30, bench_warp = 0.02, bench_mirror = 1;
 
-/* The depths of the last picture; NULL if it has none. */
+/* The depths of the most recent picture; NULL if it has none. */
 static float *caught_depths;
 
 bool session_writes_behind;
@@ -114,7 +114,7 @@ static bool has_velocities(bench_picture picture)
     return needs_q_criterion(picture) || picture == BENCH_LINED_ISOSURFACE || picture == BENCH_WARPED;
 }
 
-/* Returns an ABC flow with a shifted phase. */
+/* Returns the velocities of an ABC flow at the vertices. The flow's phase is shifted by `shift`. */
 static float *make_velocities(const grid *g, double shift)
 {
     float *out = malloc(3 * (size_t)g->vertex_count * sizeof *out);
@@ -262,8 +262,8 @@ void bench_write_camera(FILE *file)
             bench_up[1], bench_up[2], bench_degrees);
 }
 
-/* Writes an image with the layer of this picture. `part` is the number of the image in a montage, whose pictures have
- * half the width and height, or -1 if the image is not in a montage. */
+/* Writes an image with the layer of this picture. `part` is the number of the image in a montage, or -1 if the image is
+ * not in a montage. The images of a montage have half the width and height. */
 static void write_image(const bench_session *s, bench_picture picture, int part, const char *ending, FILE *file)
 {
     const render_camera *camera = &s->scene->job.camera;

@@ -1,6 +1,7 @@
-/* Whole steps of a session, through the public interface only, as a simulation takes them: the benchmarks' mesh on one
- * rank, with the same kind of change at every step. insitu_step() is timed from its call to the finished picture on
- * rank 0. The picture is not written: this module defines session_write_image() in place of the library's. */
+/* Takes whole steps of a session as a simulation does, through the public interface only. The mesh is that of the
+ * benchmarks, on one rank, and the same kind of data changes at every step. insitu_step() is timed from its call to the
+ * finished picture on rank 0. The picture is not written: this module defines session_write_image() in place of the
+ * library's. */
 #ifndef BENCH_SESSION_H
 #define BENCH_SESSION_H
 
@@ -9,11 +10,11 @@
 #include "bench_scene.h"
 #include "insitu/insitu.h"
 
-/* What changes from step to step. */
+/* The data that change from step to step. */
 typedef enum bench_change {
     BENCH_NEW_VALUES,
     BENCH_MOVED_VERTICES,
-    BENCH_NEW_MESH, /* and new fields */
+    BENCH_NEW_MESH, /* a new mesh with new fields */
     BENCH_CHANGE_COUNT
 } bench_change;
 
@@ -46,8 +47,8 @@ enum { BENCH_LINE_COUNT = 10, BENCH_PLANE_COUNT = 16, BENCH_VIEWS = 4 };
 
 extern const double bench_plane[3];
 
-/* The range of the colours, the isovalue of the Q criterion, the scale of displacements, and the position of the
- * mirror. */
+/* bench_range: range of the colours; bench_vortex: isovalue of the Q criterion; bench_warp: scale of the displacements;
+ * bench_mirror: x coordinate of the mirror plane */
 extern const double bench_range[2], bench_vortex, bench_warp, bench_mirror;
 
 const char *bench_picture_name(bench_picture picture);
@@ -62,9 +63,10 @@ typedef struct bench_session {
     insitu_session *session;
     insitu_mesh mesh;
     insitu_field field;
-    float *coordinates[2][3], *values[2]; /* [0]: of the scene */
+    float *coordinates[2][3], *values[2]; /* two states; [0] is that of the scene */
     float *velocities[2];                 /* vertices × 3; NULL if the picture needs none */
-    int place, phase;                     /* indices of the current coordinates and values */
+    /* place: index of the current coordinates; phase: index of the current values and velocities */
+    int place, phase;
     int64_t cycle;
     bench_series whole, parts[BENCH_PARTS];
     int64_t bytes_trees, bytes_peak;
@@ -79,24 +81,24 @@ void bench_require_success(const bench_scene *scene, insitu_session *session, in
 /* Writes the line of a scene file with the benchmarks' camera. */
 void bench_write_camera(FILE *file);
 
-/* Creates a session and takes the warm-up steps, so that the session has found out what changes and what does not. The
- * scene is borrowed, and MPI must be initialized. */
+/* Creates a session and takes the warm-up steps, in which the session detects what changes and what does not. The scene
+ * is borrowed, and MPI must be initialized. */
 void bench_session_create(bench_session *session, const bench_scene *scene, bench_picture picture, bench_change change);
 void bench_session_free(bench_session *session);
 
-/* Changes the mesh or field and takes a step; step number 0 is the warm-up, whose time is dropped. */
+/* Changes the mesh or field and takes a step. Step number 0 is a warm-up; its time is dropped. */
 void bench_session_step(bench_session *session, int number);
 
-/* These return the arrays that are currently set. */
+/* The following functions return the arrays that are currently set. */
 const float *const *bench_session_coordinates(const bench_session *session);
 const float *bench_session_values(const bench_session *session);
 const float *bench_session_velocities(const bench_session *session);
 
-/* Prints the times as a measure such as "isosurface new values", and those of the step's parts. */
+/* Prints the times of the steps as a measure such as "isosurface new values", and the times of the parts of a step. */
 void bench_session_print(bench_session *session);
 
-/* Draws the current arrays once more in a session of its own. Returns the depths, width × height, infinity in empty
- * pixels; the caller frees them. */
+/* Draws the current arrays in a separate session. Returns the depths, width × height, infinity in empty pixels; the
+ * caller frees them. */
 float *bench_session_depths(const bench_session *session);
 
 #endif

@@ -35,7 +35,7 @@ static void start_spinner(void)
 
 static const char *const places[2] = {"alone", "beside a spinning process"};
 
-/* Measures a turn and adds its time to series[place]. The spinning process runs if place is 1. */
+/* Measures the mean time of STEPS steps, and adds it to series[place]. The spinning process runs if place is 1. */
 static void measure_once(bench_session *session, int place, int number, bench_series series[2])
 {
     double sum = 0;

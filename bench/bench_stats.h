@@ -9,7 +9,7 @@ typedef struct bench_stats {
     double median, low, high;
 } bench_stats;
 
-/* Sorts the values and computes their statistics, which are all 0 for count 0. */
+/* Sorts the values and computes their statistics. All statistics are 0 if count is 0. */
 bench_stats bench_compute_stats(double *values, int count);
 
 /* Returns the seconds of a monotonic clock. */
@@ -26,26 +26,28 @@ typedef struct bench_subject {
     int64_t cells;
 } bench_subject;
 
-/* Print the head line of the CSV, and a line of it, to stdout. Numbers have 6 digits. */
+/* bench_print_head() prints the head line of the CSV to stdout, and bench_print() prints one of its other lines.
+ * Numbers have 6 digits. */
 void bench_print_head(void);
 void bench_print(const bench_subject *subject, const char *measure, const char *unit, bench_stats stats);
 
 /* Prints a measure that consists of one number. */
 void bench_print_number(const bench_subject *subject, const char *measure, const char *unit, double number);
 
-/* The times of one of several operations. These are run in turns, so that other work of the machine affects all of them
- * equally. */
+/* Largest number of times in a series. */
 enum { BENCH_MAX_RUNS = 100 };
 
+/* The times of one operation. Operations that are compared are run in turns, so that other work of the machine affects
+ * all of them equally. */
 typedef struct bench_series {
     int count;
     double seconds[BENCH_MAX_RUNS];
 } bench_series;
 
-/* Waits until the threads of the last operation have stopped spinning, and returns the starting time. */
+/* Waits until the threads of the previous operation have stopped spinning, and returns the starting time. */
 double bench_start_timer(void);
 
-/* Adds a time to the series, unless number is 0, the warm-up. */
+/* Adds a time to the series, unless number is 0 (the warm-up run). */
 void bench_add_sample(double seconds, int number, bench_series *series);
 
 /* Adds the time since `began` to the series, and returns it. */

@@ -1,5 +1,5 @@
 /* Measures the time to a picture: whole steps in turns with the alternatives that a user has, in one process. The
- * alternatives begin with the mesh, whether the values, the vertices or the whole mesh are new. Prints CSV. */
+ * alternatives always begin with the mesh, even if only the values or the vertices are new. Prints CSV. */
 #include <stdio.h>
 #include <stdlib.h>
 

@@ -16,8 +16,7 @@ enum { VOLUME_WIDTH = 640, VOLUME_HEIGHT = 360, GROUPS = 6, STEPS = 6 };
 
 static const int groups[GROUPS] = {1, 4, 8, 16, 24, 32};
 
-/* Steps as multiples of a cube's side. As in table 4.3, they are from a quarter to one and a half of the other tables'
- * step. */
+/* Steps as multiples of a cube's side. As in table 4.3, they are 0.25 to 1.5 times the step of the other tables. */
 static const double steps[STEPS] = {0.125, 0.25, 0.375, 0.5, 0.625, 0.75};
 
 static const struct {

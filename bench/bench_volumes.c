@@ -1,10 +1,10 @@
-/* Measures volumes: whole steps and frames, and VTK's mappers of unstructured grids, which draw in separate processes,
- * one after the other in the same run. Pictures are square, and samples are at a distance of half a cube's side. Prints
- * CSV.
+/* Measures whole steps and frames with volumes, and VTK's mappers of unstructured grids on the same volumes. VTK draws
+ * in separate processes. Libinsitu and VTK are measured one after the other in the same run. Pictures are square, and
+ * samples are at a distance of half a cube's side. Prints CSV.
  *
  * Between the knots, VTK's mappers interpolate the extinction linearly, but libinsitu the opacity. VTK also divides
- * cells at the knots of the colours, so it gets colours only at the knots of the opacity. Its error is measured against
- * the integral of VTK's own function. */
+ * cells at the knots of the colours, so it gets colours only at the knots of the opacity. The error of VTK's pictures
+ * is measured against the integral of the function that VTK interpolates. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,7 +15,8 @@
 #include "bench_command.h"
 #include "bench_session.h"
 
-/* DENSE opacities between two knots approximate a linear extinction to (ln 2 / 256)^2 / 8 = 9.2e-7. */
+/* DENSE opacities between two knots approximate a linear extinction with an error of at most (ln 2 / 256)^2 / 8 =
+ * 9.2e-7. */
 enum {
     SIZE = 1080,
     DENSE = 256,
@@ -134,7 +135,7 @@ static void measure_steps(bench_scene *scene, int runs)
     }
 }
 
-/* Measures only frames, and their error. If max_error is 0, no error is requested. */
+/* Measures only frames, and their error. If max_error is 0, no bound of the error is requested. */
 static void measure_frames(bench_scene *scene, const char *name, render_integration integration, double max_error,
                            int runs)
 {

@@ -1,11 +1,11 @@
 /* Draws by VTK's volume mappers.
  *
  * Debian's VTK draws through X and OpenGL. Its ray casters run on the CPU and finally show their picture as a texture,
- * so the X server may be Xvfb. Whole renders are timed, after a first empty one that creates the context.
+ * so the X server may be Xvfb. Whole renders are timed. An empty render precedes them and creates the OpenGL context.
  *
- * The ray cast mapper stores only 8 bits per channel. So the same rays are cast once more, untimed, by the same
- * function and integrator, for colours in float. Z-sweep stores a float image, the fixed-point mapper 15 bits, and
- * projected tetrahedra have the precision of the frame buffer. */
+ * The ray cast mapper stores only 8 bits per channel. Therefore the same rays are cast a second time, untimed, by the
+ * same function and integrator, to obtain colours in float. Z-sweep stores a float image, the fixed-point mapper 15
+ * bits, and projected tetrahedra have the precision of the frame buffer. */
 #include "bench_vtk.h"
 #include "bench_vtk_mesh.h"
 
@@ -78,7 +78,7 @@ double read_seconds()
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-/* Converts a grid to tets, as the ray caster and projected tetrahedra support no other cells. */
+/* Converts a grid to tets, because the ray caster and projected tetrahedra support no other cells. */
 vtkSmartPointer<vtkUnstructuredGrid> convert_to_tets(vtkUnstructuredGrid *grid)
 {
     if (grid->IsHomogeneous() && grid->GetNumberOfCells() > 0 && grid->GetCellType(0) == VTK_TETRA) return grid;
@@ -123,7 +123,7 @@ void set_projected(peer &p, vtkUnstructuredGrid *grid)
     p.mapper = mapper;
 }
 
-/* Sets points outside the mesh to the value of the lowest knot, which has no opacity. */
+/* Sets points outside the mesh to the value of the lowest knot. The opacity is 0 at this value. */
 void clear_outside(vtkImageData *image, const char *mask_name, double value)
 {
     vtkDataArray *values = image->GetPointData()->GetArray("f"), *mask = image->GetPointData()->GetArray(mask_name);
@@ -148,7 +148,7 @@ void set_resample(peer &p, vtkUnstructuredGrid *grid)
     vtkImageData *image = sampler->GetOutput();
     clear_outside(image, sampler->GetMaskArrayName(), p.request.knots[0]);
     auto mapper = vtkSmartPointer<vtkFixedPointVolumeRayCastMapper>::New();
-    image->GetPointData()->RemoveArray("vtkGhostType"); /* draws blanked points, which are transparent */
+    image->GetPointData()->RemoveArray("vtkGhostType"); /* so that blanked points are drawn too; they are transparent */
     image->GetCellData()->Initialize();
     mapper->SetInputData(image);
     mapper->AutoAdjustSampleDistancesOff();

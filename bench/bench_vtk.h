@@ -6,7 +6,7 @@
 
 #ifdef __cplusplus
 extern "C" {
-/* C initializes members that are not named to 0. */
+/* The C headers included here have initializers that leave out members that are 0; g++ would warn of them. */
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wmissing-field-initializers"
 #endif
@@ -32,13 +32,14 @@ typedef struct bench_vtk_request {
     int resolution; /* points along the longest axis of the sampled image */
     double eye[3], focal[3], up[3], degrees;
     int size; /* width and height in pixels */
-    /* Opacity and colour by value, linear between the knots. Each mapper interprets opacity in its own way. */
+    /* Opacity and colour by value, linear between the knots. Mappers interpret the opacity in different ways. */
     int knot_count;
     const double *knots, *opacities;
     const float *colours; /* knot_count × 3 */
     double unit_distance;
     double sample_distance; /* only for the fixed-point mapper */
-    int runs;               /* frames to time after the first; fewer, but at least one, once `seconds` have passed */
+    /* number of frames to time after the first; fewer, but at least one, if they take longer than `seconds` */
+    int runs;
     double seconds;
     int pixel_count;
     const int *pixels; /* pixel_count × 2: x and y; y = 0 at the top */
@@ -52,9 +53,9 @@ typedef struct bench_vtk_result {
     double frames[BENCH_VTK_MAX_RUNS]; /* seconds of each further picture */
 } bench_vtk_result;
 
-/* Draws. rgba gets pixel_count × 4, premultiplied, in the mapper's precision. Returns false if there is no X server for
- * a window, or if VTK reports that the mapper is not supported. VTK may also crash, so call this in a process of its
- * own. */
+/* Draws the picture. rgba receives pixel_count × 4 numbers, premultiplied, in the mapper's precision. Returns false if
+ * there is no X server for a window, or if VTK reports that the mapper is not supported. VTK may also crash, so this
+ * function should be called in a process of its own. */
 bool bench_vtk_draw(const bench_vtk_request *request, bench_vtk_result *result, float *rgba);
 
 /* Reads a .vtu file of tets, hexes, wedges and pyramids with a scalar point field. Returns false if the file cannot be

@@ -175,7 +175,7 @@ static insitu_status gather_deep(composition *c, insitu_status status, base_erro
     if (!status) {
         status =
             comp_deep_gather(c->group->comm, lists, c->grid.threads, c->out->deep, &c->statistics->sent_bytes, error);
-        c->statistics->has_failed = status != INSITU_OK; /* the caller reports the reason, which is in *error */
+        c->statistics->has_failed = status != INSITU_OK; /* the caller reports the reason in *error */
     } else if (lists) {
         comp_deep_free(lists, c->grid.threads);
     }
@@ -183,7 +183,8 @@ static insitu_status gather_deep(composition *c, insitu_status status, base_erro
     return status;
 }
 
-/* Composites. *has_overlaps receives a nonzero value on all ranks if any rank found overlaps, and otherwise 0. */
+/* Composites the fragments. *has_overlaps receives a nonzero value on all ranks if any rank found overlaps, and
+ * otherwise 0. */
 static insitu_status composite_fragments(composition *c, fragment_list *items, int64_t *has_overlaps, base_error *error)
 {
     comp_statistics *const statistics = c->statistics;

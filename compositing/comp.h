@@ -36,9 +36,10 @@ typedef struct comp_group {
     comp_claims *claims; /* buffer for the agreement on owners, created by comp_claims_create() */
 } comp_group;
 
-/* Blends one pixel's fragments in place: they are sorted by (t_in, surface before volume, then bits) and blended front
- * to back over background (linear premultiplied RGBA). out_rgba receives 4 floats, out_depth the nearest surface's t_in
- * or +infinity. Local. The result of this function defines the picture; faster code must give the same result. */
+/* Blends one pixel's fragments in place: they are sorted by t_in, at equal t_in with surfaces before volumes, and then
+ * by all other bits of a fragment (fragment_order.h). They are then blended front to back over background (linear
+ * premultiplied RGBA). out_rgba receives 4 floats, out_depth the nearest surface's t_in or +infinity. Local. The result
+ * of this function defines the picture; faster code must give the same result. */
 void comp_merge_pixel(fragment *items, int64_t count, const float background[4], float out_rgba[4], float *out_depth);
 
 /* Does the same as comp_merge_pixel() for volume fragments that ranks have partly folded. Folding combines all volume

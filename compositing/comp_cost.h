@@ -38,8 +38,8 @@ comp_cost comp_cost_of(const comp_route *route, const comp_load *load, const com
 /* Returns the route with the lowest estimated time. */
 comp_route comp_cheapest_route(int ranks, comp_nodes nodes, const comp_load *load, const comp_machine *machine);
 
-/* Returns the number of messages that the rank with this place (its number in comp_route.h) sends in all rounds of a
- * route, if all rounds are dense and no message must be split. */
+/* Returns the number of messages that the rank at this place (its number in the route, comp_route.h) sends in all
+ * rounds of the route, if all rounds are dense and no message must be split. */
 int64_t comp_route_messages(const comp_route *route, int place);
 
 #endif

@@ -1,6 +1,6 @@
 /* Fragments are converted to samples by comp_merge_intervals(), so that deep pictures are blended by the same rule as
- * flat ones. Rank 0 receives from each owner first the number of samples of each pixel, and then the samples, which it
- * stores directly at their final position. */
+ * flat ones. Rank 0 receives from each owner first the number of samples of each pixel, and then the samples. It stores
+ * the samples directly at their final position. */
 #include "comp_deep.h"
 
 #include <string.h>
@@ -127,7 +127,7 @@ static void copy_own_samples(deep_image *out, const comp_deep_list *lists, int c
     }
 }
 
-/* The numbers of pixels and samples that each rank sends. Only rank 0 uses it. */
+/* The numbers of pixels and samples that each rank sends. Only rank 0 uses this struct. */
 typedef struct deep_inbox {
     int ranks;
     int64_t (*counts)[2];    /* for each rank, the numbers of pixels and of samples that it sends */

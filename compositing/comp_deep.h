@@ -1,7 +1,7 @@
 /* Deep images contain all samples of every pixel, sorted by depth, in addition to the flat picture.
  *
- * The owner of a pixel converts its fragments to samples, which are sorted and split so that they do not overlap, and
- * sends them to rank 0. Blending the samples front to back gives the picture without its background. */
+ * The owner of a pixel converts the pixel's fragments to samples. It sorts and splits the samples so that they do not
+ * overlap, and sends them to rank 0. Blending the samples front to back gives the picture without its background. */
 #ifndef COMP_COMP_DEEP_H
 #define COMP_COMP_DEEP_H
 
@@ -31,8 +31,9 @@ void comp_deep_add(comp_deep_list *list, fragment *sorted, int64_t count, bool i
 /* Frees the lists' samples. The pointers in a list may be NULL. */
 void comp_deep_free(comp_deep_list *lists, int count);
 
-/* Sends every rank's lists to out on rank 0, where they replace the earlier samples of these pixels. The lists are
- * freed. Collective; returns the same on all ranks. *sent_bytes is increased by the number of bytes sent to rank 0. */
+/* Sends every rank's lists to rank 0. In `out` on rank 0, they replace the earlier samples of their pixels. The lists
+ * are freed. Collective; returns the same on all ranks. *sent_bytes is increased by the number of bytes sent to rank
+ * 0. */
 insitu_status comp_deep_gather(MPI_Comm comm, comp_deep_list *lists, int list_count, deep_image *out,
                                int64_t *sent_bytes, base_error *error);
 

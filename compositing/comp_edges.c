@@ -5,13 +5,13 @@
 #include "memory.h"
 #include "region.h"
 
-/* Number of rows in a chunk, which one thread processes. The thread also marks pixels in the first row of the next
- * chunk, which another thread may process at the same time. */
+/* Number of rows in a chunk. One thread processes a chunk, and also marks pixels in the first row of the next chunk.
+ * Another thread may process the next chunk at the same time. */
 enum { ROWS = 32 };
 
 /* Compares two rows of pixels, and stores one byte per channel, nonzero if the channel differs. An sRGB code is nearly
  * proportional to the square root of linear light. The test |sqrt(a) - sqrt(b)| > c is replaced by (a - b)^2 > 2 c^2 (a
- * + b), which needs no square root. */
+ * + b) to avoid square roots. */
 static void compare_rows(const float *restrict a, const float *restrict b, int64_t pixels, unsigned char *restrict out)
 {
     const float limit = 0.0018f;

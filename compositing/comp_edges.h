@@ -1,4 +1,4 @@
-/* Finds the pixels at edges of a picture, for example to antialias only these. */
+/* Finds the pixels at edges of a picture, for example so that only these pixels are antialiased. */
 #ifndef COMP_EDGES_H
 #define COMP_EDGES_H
 

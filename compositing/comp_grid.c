@@ -1,9 +1,10 @@
 /* Chooses the owners of blocks. A rank must pack and send the fragments of blocks that other ranks own, while each
- * finished pixel is sent to rank 0 whoever owns it. The best owner of a block is therefore a rank with many fragments
- * in it, because these need not be sent. If the rank with the most fragments always became the owner, a rank with
- * slightly more fragments everywhere would own all blocks. The owner is therefore chosen at random, with a probability
- * proportional to the fourth power of the rank's number of fragments. A rank with three quarters of the fragments has a
- * probability of 0.99 against a rank with one quarter; ranks with similar numbers own about the same number of blocks.
+ * finished pixel is sent to rank 0 regardless of its owner. The best owner of a block is therefore a rank with many
+ * fragments in it, because these need not be sent. If the rank with the most fragments always became the owner, a rank
+ * with slightly more fragments in every block would own all blocks. The owner is therefore chosen at random, with a
+ * probability proportional to the fourth power of the rank's number of fragments. A rank with three quarters of the
+ * fragments has a probability of 0.99 against a rank with one quarter; ranks with similar numbers own about the same
+ * number of blocks.
  *
  * The random choice takes one maximum over all ranks (the Gumbel trick): the owner is the rank with the largest 4 ln n
  * - ln(-ln u), where n is its number of fragments, and u a random number between 0 and 1 that depends on the block and
@@ -67,7 +68,7 @@ int32_t comp_claim_priority(uint32_t block, int rank, int64_t fragments)
 {
     if (fragments <= 0) return 0;
     const uint32_t drawn = hash_word(hash_word(block + 1) + (uint32_t)rank);
-    /* random number between 0 and 1, which may be rounded to 1 */
+    /* random number between 0 and 1; it may be rounded to 1 */
     const float u = ((float)(drawn >> 8) + 0.5f) * 0x1p-24f;
     const float chance = 4 * logf((float)fragments) - logf(-logf(u < 1 ? u : 0x1.fffffep-1f));
     /* the priority in steps of 1/16, from 0 to about 1800 */

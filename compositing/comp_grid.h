@@ -112,7 +112,7 @@ static inline int32_t comp_priority_with_rank(int32_t priority, int rank)
     return (int32_t)(((uint32_t)priority & ~0xfffffu) | ((uint32_t)rank & 0xfffff));
 }
 
-/* Combines the claim with the combined claim of other ranks. */
+/* Adds a claim to *sum, the combined claim of other ranks. */
 static inline void comp_claim_add(const comp_claim *claim, comp_claim *sum)
 {
     const uint32_t fragments = sum->fragments + claim->fragments;

@@ -1,9 +1,9 @@
 /* Defines how fragments are merged: how one pixel's fragments, from any ranks and in any order, become one colour.
  *
- * The order is total, down to the last bit of a fragment: fragments that compare equal are identical. The result of
- * blending, whose rounding depends on the order, therefore depends only on the set of fragments. If depths differ, only
- * depth determines the order; if a surface and a volume begin at the same depth, the surface is in front, because it is
- * the nearer end of an interval.
+ * The order is total, down to the last bit of a fragment: fragments that compare equal are identical. The rounding of
+ * blending depends on the order. Because the order is total, the result depends only on the set of fragments. If depths
+ * differ, only depth determines the order; if a surface and a volume begin at the same depth, the surface is in front,
+ * because it is the nearer end of an interval.
  *
  * Samples at the same position have no order: their media are mixed there. Together they absorb 1 - T1 T2 ... Tn, which
  * is less than the sum of their separate absorptions. Each sample contributes in proportion to its own absorption. This
@@ -87,9 +87,9 @@ static int64_t count_coincident_samples(const fragment *sorted, int64_t count)
     return n;
 }
 
-/* The state of a pass over the sorted samples at one position, which determines the samples to blend. If a volume has
- * one sample at the end of a cell and another at the start of a cell, the cells are neighbours whose common face was
- * rounded to two positions. One of the two samples is then left out. */
+/* The state of a pass over the sorted samples at one position. The pass determines which samples are blended. If a
+ * volume has one sample at the end of a cell and another at the start of a cell, the cells are neighbours whose common
+ * face was rounded to two positions. One of the two samples is then left out. */
 typedef struct sample_pass {
     uint32_t layer; /* the volume whose samples are counted */
     /* number of samples at the start of their cell that no sample at a cell's end has matched yet */
@@ -120,8 +120,8 @@ static bool are_of_one_volume(const fragment *samples, int64_t count)
 }
 
 /* Relative tolerance between the depths that two cells compute for their common face; it is relative to the depth or to
- * 1, whichever is larger. The value is RENDER_FACE_ERROR of render/rays/render_face_error.h, which compositing may not
- * include. */
+ * 1, whichever is larger. The value is RENDER_FACE_ERROR of render/rays/render_face_error.h; compositing may not
+ * include that header. */
 static const float face_error = 4e-6f;
 
 /* Advances *next to the first fragment that does not begin in front of t by more than rounding. Returns the larger of
@@ -185,7 +185,7 @@ static bool has_length(const fragment *f)
     return f->kind < FRAGMENT_SURFACE && f->t_out > f->t_in;
 }
 
-/* Optical depth that stands for that of an opaque medium, which is infinite. */
+/* Finite value that is used as the optical depth of an opaque medium; the true value is infinite. */
 static const double opaque_depth = 1e6;
 
 /* Blends the mixture of the intervals between the depths `from` and `to`. All intervals must span these depths. */
@@ -339,9 +339,9 @@ static int64_t count_folded(const fragment *sorted, int64_t count)
     return n;
 }
 
-/* Returns whether `next` is invisible behind the fragments blended so far; `before` is the last of these. If `next` is
- * in a later interval than `before`, a transmittance of at most FRAGMENT_DARK counts as 0, because ranks may have
- * omitted fragments of later intervals (fragment_fold.h). */
+/* Returns whether `next` is invisible behind the fragments blended so far; `before` is the last blended fragment. If
+ * `next` is in a later interval than `before`, a transmittance of at most FRAGMENT_DARK counts as 0, because ranks may
+ * have omitted fragments of later intervals (fragment_fold.h). */
 static bool is_hidden_behind(float transmittance, const fragment *before, const fragment *next)
 {
     return transmittance == 0 || (transmittance <= FRAGMENT_DARK &&

@@ -1,7 +1,7 @@
-/* Merges the fragments of the strips that a rank owns. Most pixels have one fragment, or only hits of opaque surfaces,
- * of which the nearest is visible. A strip's fragments are therefore joined in a sheet (comp_sheet.h), 16 pixels at a
- * time, and blended there. Pixels in which several fragments must be blended are called mixed: their fragments are
- * listed and merged by comp_merge_pixel().
+/* Merges the fragments of the strips that a rank owns. Most pixels have one fragment, or have no other fragments than
+ * hits of opaque surfaces, so that the nearest hit hides the others. A strip's fragments are therefore joined in a
+ * sheet (comp_sheet.h), 16 pixels at a time, and blended there. Pixels in which several fragments must be blended are
+ * called mixed: their fragments are listed and merged by comp_merge_pixel().
  *
  * Fragments behind an opaque surface are dropped, even if volumes in front of the surface arrive later, because they
  * are invisible. */
@@ -18,11 +18,11 @@ typedef struct merge_scratch {
     comp_sheet joined; /* sheet of the fragments joined so far, one per pixel */
     comp_sheet other;  /* the sheet that is joined next */
     comp_sheet pixels; /* the finished pixels */
-    /* the fragments of mixed pixels except the one in `joined`, and all fragments of mixed pixels; their .pixel is the
-     * index in the strip */
+    /* remaining: the fragments of mixed pixels except the one in `joined`; listed: all fragments of mixed pixels. Their
+     * .pixel is the index in the strip. */
     fragment_list remaining, listed;
     uint16_t mixed[COMP_ROWS]; /* bit mask per row: the mixed pixels */
-    /* number of fragments of each mixed pixel, and the index in `listed` at which they end */
+    /* counts: number of fragments of each mixed pixel; ends: the index in `listed` at which they end */
     uint32_t counts[COMP_STRIP_PIXELS], ends[COMP_STRIP_PIXELS];
     comp_writer writer;
 } merge_scratch;
@@ -128,8 +128,8 @@ static uint32_t next_mixed_pixel(const merge_scratch *m, uint32_t from)
     return COMP_STRIP_PIXELS;
 }
 
-/* Lists all fragments of mixed pixels by pixel; those of pixel k begin at ends[k] on return. Returns false if memory
- * ran out. */
+/* Lists all fragments of mixed pixels by pixel. On return, the fragments of pixel k begin at index ends[k]. Returns
+ * false if memory ran out. */
 static bool list_mixed_pixels(merge_scratch *m)
 {
     uint32_t sum = 0;

@@ -9,11 +9,11 @@
  *
  *     direct send   one round, of all ranks
  *     by nodes      a round within each node, then one among the ranks that have the same number on their nodes
- *     radix-k       a round within each node, then rounds of at most k
- *     binary swap   rounds of two, whatever the nodes
+ *     radix-k       a round within each node, then rounds of at most k ranks
+ *     binary swap   rounds of two ranks, regardless of nodes
  *
- * Ranks whose places follow those of the owners send all their fragments to a partner before the first round; an
- * owner has at most one such partner. */
+ * Ranks whose places follow those of the owners send all their fragments to a partner before the first round; an owner
+ * has at most one such partner. */
 #ifndef COMP_COMP_ROUTE_H
 #define COMP_COMP_ROUTE_H
 
@@ -33,7 +33,7 @@ typedef enum comp_schedule {
     COMP_SCHEDULE_COUNT
 } comp_schedule;
 
-/* The distribution of ranks over nodes: every node has the same number of ranks, which are numbered either
+/* The distribution of ranks over nodes: every node has the same number of ranks, and the ranks are numbered either
  * consecutively or cyclically over the nodes. In any other distribution `ranks` is 1. */
 typedef struct comp_nodes {
     int ranks; /* number of ranks per node */
@@ -46,7 +46,7 @@ typedef struct comp_route {
     comp_nodes nodes;
     int round_count;
     int radix[COMP_MOST_ROUNDS];
-    /* largest number of ranks in a dense round; at most COMP_MAX_DENSE_RANKS, which comp_route_of() sets */
+    /* largest number of ranks in a dense round; comp_route_of() sets it to the maximum, COMP_MAX_DENSE_RANKS */
     int max_dense_ranks;
 } comp_route;
 
@@ -54,11 +54,11 @@ typedef struct comp_route {
  * round of COMP_RADIX. */
 comp_route comp_route_of(comp_schedule schedule, int ranks, comp_nodes nodes, int radix);
 
-/* Convert a rank to its place, and a place to its rank. */
+/* comp_route_position() converts a rank to its place, and comp_route_rank() a place to its rank. */
 int comp_route_position(const comp_route *route, int rank);
 int comp_route_rank(const comp_route *route, int place);
 
-/* Returns the distance between partners of the round, which is the product of the radices of earlier rounds. */
+/* Returns the distance between partners of the round: the product of the radices of earlier rounds. */
 int comp_route_stride(const comp_route *route, int round);
 
 static inline int comp_route_digit(const comp_route *route, int round, int stride, int place)

@@ -32,7 +32,7 @@ struct comp_tile_scratch {
     /* array of int64_t with one entry per pixel and a final one: the index in `order` of each pixel's first fragment */
     buffer starts;
     buffer order;           /* array of int64_t: indices of fragments, sorted by pixel */
-    buffer pixel_fragments; /* copies of one pixel's fragments, which are sorted there */
+    buffer pixel_fragments; /* copies of one pixel's fragments; they are sorted in this buffer */
     int64_t fragments;
     double seconds;
     char padding[64]; /* padding that prevents two threads from writing to the same cache line */
@@ -141,8 +141,8 @@ static uint32_t index_in_area(const comp_tiles *tiles, const pixel_area *area, u
     return row * (uint32_t)area->width + (from - row * width);
 }
 
-/* Sorts the indices of fragments by pixel: those of pixel k of the area are order[starts[k]] .. order[starts[k + 1] -
- * 1]. */
+/* Sorts the indices of fragments by pixel. The fragments of pixel k of the area have the indices order[starts[k]] to
+ * order[starts[k + 1] - 1]. */
 static void sort_by_pixel(const comp_tiles *tiles, const pixel_area *area, const fragment *items, int64_t count,
                           int64_t *starts, int64_t *order)
 {
@@ -174,8 +174,8 @@ static void blend_pixel(const comp_tiles *tiles, int64_t pixel, fragment *items,
         comp_add_overlap(tiles->overlaps, (uint32_t)pixel);
 }
 
-/* Blends and stores a tile whose pixels have at most one fragment each. Returns false if a pixel has two; then the
- * whole tile must be stored again. */
+/* Blends and stores a tile whose pixels have at most one fragment each. Returns false if a pixel has two or more; the
+ * caller must then store the whole tile anew. */
 static bool blend_singles(const comp_tiles *tiles, const pixel_area *area, fragment *items, int64_t count)
 {
     const int64_t pixels = (int64_t)area->width * area->height;

@@ -21,13 +21,13 @@ typedef struct comp_tiles {
 insitu_status comp_tiles_begin(comp_tiles *tiles, const float background[4], int threads, bool finds_overlaps,
                                image *out, base_error *error);
 
-/* A fragment_callback (fragment.h), whose state is `tiles`: blends the fragments of a tile and stores its pixels in
- * out. The result is bitwise equal to that of comp_composite() for these fragments. Tiles must lie within out and not
- * overlap. */
+/* A fragment_callback (fragment.h) with a comp_tiles as its state: blends the fragments of a tile and stores its pixels
+ * in out. The result is bitwise equal to that of comp_composite() for these fragments. Tiles must lie within out and
+ * not overlap. */
 bool comp_tiles_blend(void *tiles, int thread, const pixel_area *area, fragment *items, int64_t count);
 
-/* Ends the tiles. statistics receives the number of blended fragments and the time of the slowest thread; overlaps,
- * which may be NULL, receives the pixels whose fragments overlap. */
+/* Ends the tiles. statistics receives the number of blended fragments and the time of the slowest thread. overlaps
+ * receives the pixels whose fragments overlap; it may be NULL. */
 void comp_tiles_end(comp_tiles *tiles, comp_overlaps *overlaps, comp_statistics *statistics);
 
 #endif

@@ -20,8 +20,8 @@ typedef struct wave_halo {
 bool wave_halo_create(const wave_mesh *mesh, MPI_Comm comm, int value_bytes, wave_halo *halo);
 void wave_halo_free(wave_halo *halo);
 
-/* Sets the values of every halo cell to those of its owner. Component k of cell c is element c * cell_stride + k *
- * component_stride. Collective. */
+/* Sets the values of every halo cell to the values on the cell's owner. Component k of cell c is element c *
+ * cell_stride + k * component_stride. Collective. */
 void wave_halo_exchange(wave_halo *halo, void *values, int64_t cell_stride, int64_t component_stride);
 
 #endif

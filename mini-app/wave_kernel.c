@@ -17,9 +17,8 @@
  * sides, so ranks exchange only the four jumps of each cell. In one dimension this is Fromm's scheme. In the
  * first-order scheme, j = q and P = 0.
  *
- * Each cell loops over its own faces, so every flux is computed twice, but no two cells write to the same address.
- * Each sum is computed in the order of the cell's faces, so that every cell's result has the same bits on any
- * partition. */
+ * Each cell loops over its own faces, so every flux is computed twice, but no two cells write to the same address. Each
+ * sum is computed in the order of the cell's faces, so that every cell's result is bit-identical on any partition. */
 #include "wave_kernel.h"
 
 #include <stddef.h>

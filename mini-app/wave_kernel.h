@@ -15,7 +15,7 @@ typedef struct wave_values {
     int64_t stride, component_stride;
 } wave_values;
 
-/* The arrays on which the passes work. Those marked "real" are float or double and those marked "index" are int32 or
+/* The arrays on which the passes work. Arrays marked "real" are float or double, and arrays marked "index" are int32 or
  * int64, depending on the table of passes. */
 typedef struct wave_grid {
     int32_t own_cells, own_vertices;

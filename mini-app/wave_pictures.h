@@ -19,7 +19,7 @@ typedef struct wave_pictures {
     uint8_t *ghosts;   /* one ghost flag per cell; NULL unless halo cells are passed */
     bool is_mesh_set;  /* true if the mesh has been set on the session */
     int images;        /* number of images drawn so far */
-    int message_count; /* number of errors and warnings printed so far, which are stored as hashes */
+    int message_count; /* number of errors and warnings printed so far; `messages` contains their hashes */
     uint64_t messages[WAVE_MESSAGES_MAX];
 } wave_pictures;
 
@@ -31,8 +31,8 @@ void wave_pictures_open(const wave_options *options, const wave_mesh *mesh, cons
  * none. Local. */
 void wave_pictures_steer(wave_pictures *pictures, wave_source *source);
 
-/* Passes the arrays and draws the images that are due. Returns this rank's report, which is zero without a session.
- * Collective. */
+/* Passes the arrays and draws the images that are due. Returns this rank's report; without a session, all its members
+ * are 0. Collective. */
 insitu_report wave_pictures_step(wave_pictures *pictures, int64_t cycle, double time);
 
 /* Closes the session. Collective. */

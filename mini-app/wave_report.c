@@ -63,7 +63,7 @@ void wave_report_step(wave_report *report, int64_t cycle, double time, double si
     fflush(stdout);
 }
 
-/* Terminates the text behind its leading YAML scalar: at the closing quote, or before a comma, a blank or a closing
+/* Ends the text after the YAML scalar at its beginning: at the closing quote, or before a comma, a blank or a closing
  * brace that was not opened in the scalar ("{cycle}" contains both braces). */
 static void cut_scalar(char *text)
 {

@@ -30,14 +30,14 @@ typedef struct wave_solver {
     double *volume;            /* volume of each own cell */
     int32_t source_cell_count; /* number of own cells within the source's ball */
     int32_t *source_cells;
-    double *source_rates; /* for each of these cells: change of pressure per unit time for a source rate of 1 */
+    double *source_rates; /* for each cell of source_cells: change of pressure per unit time for a source rate of 1 */
     double time_step, time;
 } wave_solver;
 
-/* Sums over all ranks. */
+/* Sums, and the maximum of the pressure, over the cells of all ranks. */
 typedef struct wave_totals {
     double volume;
-    double mass;   /* sum of V p / K, which is the injected volume */
+    double mass;   /* sum of V p / K: the injected volume */
     double energy; /* sum of V (p^2 / 2K + rho u^2 / 2) */
     double peak;   /* maximum of the pressure |p| */
 } wave_totals;
@@ -47,7 +47,8 @@ typedef struct wave_totals {
 bool wave_solver_create(const wave_setup *setup, const wave_mesh *mesh, MPI_Comm comm, wave_solver *solver);
 void wave_solver_free(wave_solver *solver);
 
-/* Set or return the pressure and velocity of an own cell. Values may be set only before wave_solver_start(). Local. */
+/* wave_solver_set() sets, and wave_solver_get() returns, the pressure and velocity of an own cell. Values may be set
+ * only before wave_solver_start(). Local. */
 void wave_solver_set(wave_solver *solver, int32_t cell, const double state[4]);
 void wave_solver_get(const wave_solver *solver, int32_t cell, double state[4]);
 void wave_solver_centroid(const wave_solver *solver, int32_t cell, double xyz[3]);

@@ -19,7 +19,7 @@
 
 enum {
     MMBVH_MAX_LEAF = 7,
-    /* maximum depth of a leaf, where the root has depth 1; also the maximum size of a traversal's stack */
+    /* maximum depth of a leaf (the root has depth 1); also the maximum size of a traversal's stack */
     MMBVH_MAX_DEPTH = 80
 };
 
@@ -41,8 +41,10 @@ typedef enum mmbvh_layout {
 } mmbvh_layout;
 
 typedef enum mmbvh_builder {
-    MMBVH_SAH,   /* the builder by the binned surface area heuristic */
-    MMBVH_MORTON /* along a space-filling curve: several times faster to build, slower to traverse */
+    MMBVH_SAH, /* the binned surface area heuristic (SAH) */
+    /* the order of cells along a Morton curve: the tree is built several times faster than by SAH, and is slower to
+     * traverse */
+    MMBVH_MORTON
 } mmbvh_builder;
 
 typedef struct mmbvh {
@@ -52,7 +54,7 @@ typedef struct mmbvh {
     int64_t node_count;          /* number of nodes; 0 if there are no cells */
     uint32_t *cells;             /* cell indices (or mesh indices in a parent tree), leaf by leaf */
     int64_t cell_count;
-    double origin[3]; /* origin of the tree's coordinates, which are (position - origin) * scale */
+    double origin[3]; /* origin of the tree's coordinates; a position has the coordinates (position - origin) * scale */
     double scale;
     double built_cost; /* SAH cost (mmbvh_cost()) when the tree was built */
     double area;       /* sum, over all nodes, of half the surface area of the box times the number of tests in the node
@@ -63,8 +65,9 @@ typedef struct mmbvh {
     int64_t unusable_cells;
 } mmbvh;
 
-/* Functions that read nodes of either layout; traversals use them instead of the arrays. The box is in elements 0 to 2
- * of lower and upper; element 3 is scratch, so that whole vectors can be stored. */
+/* The following functions read nodes of either layout; traversals use them instead of the arrays. mmbvh_node_box()
+ * stores the box in elements 0 to 2 of lower and upper. It may overwrite element 3, so that whole vectors can be
+ * stored. */
 static inline void mmbvh_node_box(const mmbvh *tree, int64_t index, float lower[4], float upper[4])
 {
     if (tree->compact) {
@@ -103,12 +106,12 @@ int64_t mmbvh_bytes(const mmbvh *tree);
 /* The ranges of one field for all nodes: either those stored in the nodes (stride 24 or 40), or an array of pairs
  * outside the tree (stride 8). */
 typedef struct mmbvh_ranges {
-    const char *low; /* address of node 0's lower end of the range */
+    const char *low; /* address of the lower end of node 0's range */
     const char *high;
     int64_t stride; /* number of bytes from one node's range to the next */
 } mmbvh_ranges;
 
-/* A list of cells in ascending order, which owns its memory; free it with mmbvh_selection_free(). */
+/* A list of cells in ascending order. It owns its memory; free it with mmbvh_selection_free(). */
 typedef struct mmbvh_selection {
     uint32_t *cells;
     int64_t count;
@@ -124,7 +127,7 @@ typedef struct mmbvh_options {
 
 /* Builds a tree over the grid's cells, except ghosts and flat cells, with the ranges of the field; if field is NULL,
  * all ranges are (-inf, +inf). Parallel; the tree is the same for any number of threads. On success *out owns its
- * memory, which mmbvh_free() frees. On an error *out is zeroed. */
+ * memory; free it with mmbvh_free(). On an error *out is zeroed. */
 insitu_status mmbvh_build(const grid *g, const grid_field *field, const double origin[3], double scale,
                           const mmbvh_options *options, mmbvh *out, base_error *error);
 
@@ -133,8 +136,8 @@ typedef struct mmbvh_interval {
     float low, high;
 } mmbvh_interval;
 
-/* A query for the cells whose range, rounded to float, intersects one of the intervals. The other cells are
- * invisible. */
+/* A query matches the cells whose range of field values, rounded to float, intersects at least one of the intervals.
+ * Cells that match no query are invisible. */
 typedef struct mmbvh_query {
     const grid_field *field;
     int interval_count;

@@ -219,7 +219,7 @@ item_grid item_grid_make(const double lower[3], const double upper[3])
         has_extent[axis] = extent > 0 && extent < INFINITY;
         longest = has_extent[axis] && extent > longest ? extent : longest;
         grid.origin[axis] = lower[axis];
-        /* The grid is the finest useful one if its steps are below the precision of the nodes' bounds, which are
+        /* The grid is the finest useful one if its steps are below the precision of the nodes' bounds. The bounds are
          * floats. */
         if (extent > far * 0x1p-22) grid.is_finest = false;
     }

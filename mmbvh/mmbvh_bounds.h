@@ -48,8 +48,8 @@ static inline void bounds_transform(const bounds_source *source, fetch_box *box)
  * coordinates are finite, but is larger than necessary if some vertices belong to no cell. */
 fetch_box bounds_estimate(const bounds_source *source, int threads);
 
-/* Computes the boxes of items, whose indices must be set. Extends *set by the items. Extends *exact by the boxes in the
- * source's coordinates; exact may be NULL. */
+/* Computes the boxes of `count` items. The indices of the items must be set before the call. Extends *set by the items.
+ * Extends *exact by the boxes in the source's coordinates; exact may be NULL. */
 void bounds_fill_items(const bounds_source *source, const item_grid *grid, item *items, int64_t count, item_set *set,
                        fetch_box *exact);
 

@@ -1,5 +1,5 @@
 /* Fast access to cells. The accessors of grid.h check the element type of an array at every element. Here the types are
- * constants of inlined functions, and are checked once per pass over the cells. */
+ * constant parameters of inlined functions, so that they are checked only one time in a pass over the cells. */
 #ifndef MMBVH_FETCH_H
 #define MMBVH_FETCH_H
 
@@ -12,7 +12,7 @@
 #define MMBVH_INLINE static inline __attribute__((always_inline))
 
 /* The five cases of how a cell's vertices are found: all cells are tets, all are hexes, all have the same other type,
- * cells have different types, or cells form a lattice. */
+ * cells have different types, or the cells form a lattice (a structured grid). */
 typedef enum fetch_shape {
     FETCH_TETS,
     FETCH_HEXES,
@@ -51,8 +51,8 @@ MMBVH_INLINE int fetch_vertex_count(const grid *g, int64_t cell, const fetch_sha
     return grid_type_vertices(shape == FETCH_BY_CELL ? grid_cell_type(g, cell) : g->cell_type);
 }
 
-/* Returns the index of a cell's first entry in the connectivity; in a lattice, which has no connectivity, the index of
- * the cell's first vertex. */
+/* Returns the index of a cell's first entry in the connectivity. A lattice has no connectivity; for a lattice, returns
+ * the index of the cell's first vertex. */
 MMBVH_INLINE int64_t fetch_first_entry(const grid *g, int64_t cell, int count, const fetch_shape shape)
 {
     if (shape == FETCH_LATTICE) return grid_lattice_first(g->lattice, cell);
@@ -98,7 +98,7 @@ MMBVH_INLINE void fetch_values(const grid *g, const grid_array *values, int64_t 
         out[i] = values->data + fetch_vertex(g, first, i < count ? i : count - 1, shape, wide_index) * stride;
 }
 
-/* Reads a cell's values, which are floats. Returns whether all are finite. */
+/* Reads a cell's values from an array of floats. Returns whether all values are finite. */
 MMBVH_INLINE bool fetch_cell_floats(const grid *g, const grid_array *values, int64_t cell, const fetch_shape shape,
                                     const bool wide_index, const bool is_packed, vec4 out[2])
 {
@@ -117,8 +117,8 @@ typedef struct fetch_lane_range {
     vec2 low, high;
 } fetch_lane_range;
 
-/* Reads a cell's values, which are doubles, and computes their lane-wise minima and maxima. Returns whether all values
- * are finite. */
+/* Reads a cell's values from an array of doubles, and computes their lane-wise minima and maxima. Returns whether all
+ * values are finite. */
 MMBVH_INLINE bool fetch_cell_doubles(const grid *g, const grid_array *values, int64_t cell, const fetch_shape shape,
                                      const bool wide_index, const bool is_packed, fetch_lane_range *out)
 {
@@ -274,7 +274,7 @@ MMBVH_INLINE void extend_box_by_cells(fetch_box *box, const grid *g, const uint3
     unite_boxes(box, &floats);
 }
 
-/* Transforms a box to a node's coordinates and rounds it outward. Because rounding is monotonic, this gives the same
+/* Transforms a box to the tree's coordinates and rounds it outward. Because rounding is monotonic, this gives the same
  * box as rounding each vertex. */
 MMBVH_INLINE void round_box_outward(const fetch_box *box, const double origin[3], double scale, float *lower,
                                     float *upper)
@@ -285,7 +285,7 @@ MMBVH_INLINE void round_box_outward(const fetch_box *box, const double origin[3]
     }
 }
 
-/* Does the same as round_box_outward() for a box of floats; the results have the same bits. Lane 3 of the input is
+/* Does the same as round_box_outward() for a box of floats; the results are bit-identical. Lane 3 of the input is
  * ignored. */
 MMBVH_INLINE void round_float_box_outward(const fetch_float_box *float_box, const double origin[3], double scale,
                                           vec4 *lower, vec4 *upper)
@@ -306,8 +306,8 @@ static inline bool fetch_can_read_boxes(const grid *g)
            c[0].stride == c[2].stride;
 }
 
-/* Extends the box by a cell of a uniform or rectilinear lattice, whose coordinates are finite. Comparisons take half as
- * long as fmin() and fmax(), which are calls. */
+/* Extends the box by a cell of a uniform or rectilinear lattice. Comparisons suffice because the lattice's coordinates
+ * are finite; they take half as long as the function calls fmin() and fmax(). */
 static inline void extend_box_by_lattice_cell(fetch_box *box, const grid_lattice *l, int64_t cell)
 {
     for (int axis = 0; axis < 3; axis++) {
@@ -366,7 +366,8 @@ static inline void fetch_box_any_cell(fetch_box *box, const grid *g, int64_t cel
     }
 /* clang-format on */
 
-/* Does the same as FETCH_INSTANCES for floats only; the table is indexed by [shape][wide_index]. */
+/* Does the same as FETCH_INSTANCES for floats only. The table of the instances is FETCH_FLOAT_TABLE(prefix), indexed by
+ * [shape][wide_index]. */
 #define FETCH_FLOAT_INSTANCES(DEFINE, prefix)                                                                          \
     FETCH_EACH_SHAPE(FETCH_FLOAT_SHAPE_INSTANCES, DEFINE, prefix)                                                      \
     DEFINE(prefix##_lattice_4, FETCH_LATTICE, false, false)

@@ -87,7 +87,8 @@ static inline lanes item_extent(lanes box)
 }
 
 /* Returns the terms xy + yz and zx of half the surface area, for two boxes whose extents are in lanes 0 to 2 and 4 to
- * 6. Lanes 3 and 7 are ignored. */
+ * 6. Lanes 0 and 1 of the result belong to the first box, lanes 2 and 3 to the second one. Lanes 3 and 7 of the extents
+ * are ignored. */
 static inline ivec4 item_area_terms(lanes extents)
 {
     const lanes turned = __builtin_shufflevector(extents, extents, 1, 2, 0, 3, 5, 6, 4, 7);

@@ -1,4 +1,4 @@
-/* Vectors of eight 16-bit integers, which every supported processor has without compiler flags. */
+/* Vectors of eight 16-bit integers. Every supported processor has them without compiler flags. */
 #ifndef MMBVH_LANES_H
 #define MMBVH_LANES_H
 
@@ -47,7 +47,7 @@ static inline lanes lanes_multiply_high(lanes a, lanes factor)
 #endif
 }
 
-/* Returns lanes 0 to 3 as signed integers. */
+/* Returns lanes 0 to 3, converted to signed 32-bit integers. */
 static inline ivec4 lanes_lower(lanes a)
 {
 #if defined(__SSE2__)
@@ -57,13 +57,14 @@ static inline ivec4 lanes_lower(lanes a)
 #endif
 }
 
-/* Returns lanes 4 to 7 as signed integers. */
+/* Returns lanes 4 to 7, converted to signed 32-bit integers. */
 static inline ivec4 lanes_upper(lanes a)
 {
     return lanes_lower(lanes_swap(a));
 }
 
-/* Packs two vectors of integers into lanes 0 to 3 and 4 to 7. The integers must fit into 16 bits, signed. */
+/* Packs two vectors of 32-bit integers into lanes 0 to 3 (a) and 4 to 7 (b). The integers must be in the range of
+ * int16_t. */
 static inline lanes lanes_pack(ivec4 a, ivec4 b)
 {
 #if defined(__SSE2__)

@@ -6,8 +6,8 @@
 #include "mmbvh_store.h"
 #include "mmbvh_sweep.h"
 
-/* Returns half the surface area of a box times the number of tests in the node, which is the number of cells of a leaf,
- * or two for the children's boxes. Lane 3 of the box must be 0. */
+/* Returns half the surface area of a node's box times the number of tests in the node. A leaf tests each of its cells;
+ * an inner node tests the boxes of its two children. Lane 3 of the box must be 0. */
 static inline double node_area(const mmbvh *tree, int64_t node, vec4 lower, vec4 upper)
 {
     const vec4 d = upper - lower;
@@ -34,7 +34,8 @@ static inline void store_measured(const sweep *s, int64_t node, vec4 lower, vec4
     }
 }
 
-/* Stores the union of the children's boxes. If the sweep visited only one child, that child's box is used alone. */
+/* Stores the union of the children's boxes. If the sweep visited only one of the children, the node gets the box of
+ * that child. */
 static inline void store_children(const sweep *s, int64_t node, int64_t pair, int64_t *outside_grid,
                                   double *area_change)
 {

@@ -43,8 +43,7 @@ static int64_t find_right_subtree(const sweep *s, int64_t first, int64_t end)
     return mmbvh_node_count(s->tree, first + 1) ? end : mmbvh_node_ref(s->tree, first + 1);
 }
 
-/* Sweeps a pair and its descendants, which are nodes [first, end), on one thread, at most s->range_max nodes at a
- * time. */
+/* Sweeps a pair and its descendants, nodes [first, end), on one thread, at most s->range_max nodes at a time. */
 static sweep_sum sweep_pair_serially(const sweep *s, int64_t first, int64_t end)
 {
     if (!s->range_max || end - first <= s->range_max) return sweep_range_with_followers(s, first, end);
@@ -55,7 +54,7 @@ static sweep_sum sweep_pair_serially(const sweep *s, int64_t first, int64_t end)
     return sweep_add(sweep_add(left, right), sweep_range_with_followers(s, first, first + 2));
 }
 
-/* Sweeps a pair and its descendants, which are nodes [first, end), in parallel tasks of at most TASK_NODES nodes. */
+/* Sweeps a pair and its descendants, nodes [first, end), in parallel tasks of at most TASK_NODES nodes. */
 static sweep_sum sweep_pair_in_tasks(const sweep *s, int64_t first, int64_t end)
 {
     if (end - first <= TASK_NODES) return sweep_pair_serially(s, first, end);

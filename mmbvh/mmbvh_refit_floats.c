@@ -1,6 +1,6 @@
 /* Computes bounds, and optionally ranges, if coordinates and values are floats, as they are in most meshes. A vertex is
  * one vector: its position in lanes 0 to 2, its value in lane 3. The cells of up to PART_NODES nodes are read in one
- * pass, whatever the sizes of their leaves. */
+ * pass, regardless of the number of cells in each leaf. */
 #include "mmbvh_bounds.h"
 #include "mmbvh_measure.h"
 
@@ -92,7 +92,7 @@ MMBVH_INLINE void store_leaf(const sweep *s, part *p, int64_t node, int64_t firs
     vec4 lower, upper;
     round_float_box_outward(&all, tree->origin, tree->scale, &lower, &upper);
     store_measured(s, node, lower, upper, &p->outside_grid, &p->area_change);
-    /* adding 0 makes a negative zero positive, as the bounds of other meshes are */
+    /* adding 0 makes a negative zero positive, as rounding does for other meshes */
     if (pass.with_values) set_range(s, node, (range){all.lower[3] + 0.0f, all.upper[3] + 0.0f});
 }
 

@@ -22,12 +22,12 @@ bool rows_can_read(const grid *g, const grid_field *field)
            !field->source_cells && grid_lattice_row_axis(g->lattice) >= 0;
 }
 
-/* Compute the smaller (low) and the larger (high) of two numbers, per lane. */
+/* The smaller and the larger of two numbers. */
 #define SMALLER(a, b) ((a) < (b) ? (a) : (b))
 #define LARGER(a, b) ((a) > (b) ? (a) : (b))
 
-/* Computes the range over four rows' values at each position. nonfinite stays 0 if all values are finite, and becomes
- * NaN otherwise. */
+/* Computes the range over four rows' values at each position along the rows. nonfinite stays 0 if all values at the
+ * position are finite, and becomes NaN otherwise. */
 #define ROW_RANGES(number, to, rows, stride, count)                                                                    \
     for (int64_t n = 0; n < (count); n++) {                                                                            \
         const number a = *(const number *)(const void *)((rows)[0] + n * (stride));                                    \
@@ -62,8 +62,8 @@ DEFINE_RANGES(double_ranges, double, row_doubles)
 
 enum { EXTENT_LANES = 16 };
 
-/* Computes the range of an array; returns false if a number is not finite. nonfinite is 0 while all numbers are finite,
- * otherwise NaN. */
+/* Defines a function that computes the range of an array, and returns false if a number is not finite. nonfinite is 0
+ * while all numbers are finite, otherwise NaN. */
 #define DEFINE_EXTENT(name, number)                                                                                    \
     static bool name(const char *data, int64_t count, float *low, float *high)                                         \
     {                                                                                                                  \

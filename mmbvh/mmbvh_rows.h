@@ -19,8 +19,9 @@ typedef struct rows_ranges {
  * of a lattice, and the values are floats or doubles at vertices. */
 bool rows_can_read(const grid *g, const grid_field *field);
 
-/* Computes the ranges of the next drawn cells of one row, whose numbers are at least `from` and less than `end`.
- * Padding and ghost layers are skipped, but ghost flags are not checked. Returns false if there are no such cells. */
+/* Computes the ranges of the next drawn cells of one row, among the cells with numbers from `from` to `end` - 1. Cells
+ * in the padding and in ghost layers are skipped, but ghost flags are not checked. Returns false if there are no such
+ * cells. */
 bool rows_read(const grid *g, const grid_field *field, int64_t from, int64_t end, rows_ranges *out);
 
 /* Computes the range of the values at all vertices, rounded to the nearest float. Returns false if the values are not

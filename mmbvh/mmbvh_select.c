@@ -17,8 +17,8 @@ enum { WORD_CELLS = 64, BLOCK_WORDS = 64 };
 
 typedef struct selector selector;
 
-/* Sets the bits of the matching cells in [begin, end), whose length is a multiple of 64 except at the end of the grid.
- * Returns the number of cells with non-finite values. */
+/* Sets the bits of the matching cells in [begin, end). The length of this range is a multiple of 64, except at the end
+ * of the grid. Returns the number of cells with non-finite values. */
 typedef int64_t (*selector_run)(const selector *s, int64_t begin, int64_t end);
 
 struct selector {
@@ -84,7 +84,7 @@ typedef struct pass_constants {
     bool wide_index, wide_number, is_packed;
 } pass_constants;
 
-/* Returns the address of the value at vertex number `at` of a cell. */
+/* Returns the address of the value at the cell's vertex with the local index `at`. */
 MMBVH_INLINE uintptr_t value_address(const selector *s, int64_t cell, int at, const pass_constants pass,
                                      const int64_t stride)
 {
@@ -183,7 +183,7 @@ MMBVH_INLINE int64_t mark_matching_cells(const selector *s, int64_t begin, int64
     return unusable;
 }
 
-/* Does the same as mark(), four cells at a time. All cells must have the same type. */
+/* Does the same as mark_matching_cells(), four cells at a time. All cells must have the same type. */
 MMBVH_INLINE int64_t mark_four_at_once(const selector *s, int64_t begin, int64_t end, matcher match,
                                        const pass_constants pass)
 {
@@ -268,8 +268,8 @@ static uint64_t row_bits(const selector *s, const rows_ranges *r)
     return packed_bits(intersects, r->count);
 }
 
-/* Sets the bits of a lattice's cells, row by row. A row's bits may fall into two words; both are in the block of this
- * thread. */
+/* Sets the bits of a lattice's cells, row by row. The bits of a row may fall into two words; only this thread writes to
+ * either of them. */
 static int64_t mark_rows(const selector *s, int64_t begin, int64_t end)
 {
     const grid *g = s->g;
@@ -348,8 +348,8 @@ static void list_bits(const uint64_t *bits, int64_t begin, int64_t end, uint32_t
             *out++ = (uint32_t)(WORD_CELLS * i + __builtin_ctzll(word));
 }
 
-/* Lists the cells whose bits are set. Each thread counts the cells in its part of the words, and then writes them
- * behind those of the earlier parts. */
+/* Lists the cells whose bits are set. The words of the bit set are divided into one part per thread. Each thread counts
+ * the cells of its part, and then writes them after the cells of the earlier parts. */
 static bool list_cells(const uint64_t *bits, int64_t words, int threads, mmbvh_selection *out)
 {
     int64_t *ends = base_calloc((size_t)threads + 1, sizeof *ends);

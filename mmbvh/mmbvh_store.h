@@ -14,15 +14,15 @@ static inline void store_link(const mmbvh *tree, int64_t index, int64_t ref, int
     tree->nodes[index].count = (unsigned)count & 7;
 }
 
-/* Returns the grid of the compact layout over a box, which must be finite. */
+/* Returns the grid of the compact layout over a box. The box must be finite. */
 mmbvh_grid store_make_grid(const float lower[3], const float upper[3]);
 
-/* Corrects the node's stored box, which store_compact() has rounded inward: extends it one step at a time until it
- * contains the given box. Returns false if the given box is not within the grid. */
+/* Corrects a node's box that store_compact() has rounded inward: extends it one step at a time until it contains the
+ * given box. Returns false if the given box is not within the grid. */
 bool store_compact_slowly(const mmbvh *tree, int64_t index, vec4 lower, vec4 upper);
 
-/* Stores the smallest box representable in the grid that contains lanes 0 to 2; lane 3 must be 0. Returns false if the
- * box is not within the grid. */
+/* Stores the smallest representable box that contains the given box. The given box is in lanes 0 to 2; lane 3 must be
+ * 0. Returns false if the given box is not within the grid. */
 static inline bool store_compact(const mmbvh *tree, int64_t index, vec4 lower, vec4 upper)
 {
     mmbvh_compact_node *node = &tree->compact[index];

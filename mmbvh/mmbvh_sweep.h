@@ -14,7 +14,9 @@ typedef struct sweep sweep;
 typedef struct bounds_source bounds_source;
 
 typedef struct sweep_sum {
-    int64_t count;      /* number of unusable cells, or of boxes that the nodes cannot represent */
+    /* sweep that computes ranges: number of unusable cells; sweep of bounds only: number of boxes that the nodes cannot
+     * represent */
+    int64_t count;
     double area_change; /* change of the tree's area (mmbvh.area), if the sweep measures it */
 } sweep_sum;
 
@@ -32,16 +34,19 @@ struct sweep {
     const bounds_source *source; /* reads the cells' boxes in a sweep of bounds */
     mmbvh_ranges ranges;         /* receives the results of a sweep of ranges */
     int64_t range_max;           /* maximum number of nodes per run; 0: no limit other than the size of a task */
-    bool measures_area; /* set if the change of area is measured; only for a sweep of bounds of nodes that already have
-                           bounds */
-    int visible_count;  /* number of visible parts; if not 0, only their nodes and these nodes' children are swept */
+    /* set if the change of area is measured; allowed only in a refit, in which all nodes have bounds before the
+     * sweep */
+    bool measures_area;
+    /* number of visible parts of the tree; if not 0, the sweep visits only the root and the children of nodes in these
+     * parts */
+    int visible_count;
     const mmbvh_visible *visible;
     const sweep *follower; /* another sweep of the same tree, or NULL; it processes each group of nodes directly after
                               this sweep, while they are in the cache */
 };
 
-/* Sweeps the whole tree. Returns the sum of the results of all calls of `run` (of the last follower, if there are any).
- * The rounding of the sum does not depend on the number of threads. */
+/* Sweeps the whole tree. Returns the sum of the results of all calls of `run`; if the sweep has followers, of the last
+ * follower's `run`. The rounding of the sum does not depend on the number of threads. */
 sweep_sum sweep_tree(const sweep *s, int threads);
 
 /* Returns a sweep that computes the ranges of the field; if field is NULL, they are infinite. */

@@ -106,15 +106,16 @@ static inline vec4 vec4_from_int(ivec4 a)
 #endif
 }
 
-/* Round a double to the nearest float that is not above, or not below, x. Outside the range of float the result is the
- * largest finite float or infinity, whichever is in the direction of rounding. A zero result is always positive, so
- * that equal bounds have equal bits. */
+/* round_down() rounds a double to the nearest float that is not above x, round_up() to the nearest float that is not
+ * below x. Outside the range of float the result is the largest finite float or infinity, whichever is in the direction
+ * of rounding. A zero result is always positive, so that equal bounds are bitwise equal. */
 static inline float round_down(double x)
 {
     float f = (float)x;
     uint32_t bits;
     memcpy(&bits, &f, sizeof bits);
-    /* added to the bits, this moves the result one float towards -inf: the bits of negative floats grow towards -inf */
+    /* adding `step` to the bits moves the result to the next float towards -inf: the bits of positive floats decrease
+     * towards -inf, those of negative floats increase */
     const uint32_t step = bits >> 31 ? 1u : UINT32_MAX;
     bits += (double)f > x ? step : 0u; /* f is never +0 if it exceeds x: a tiny negative x rounds to -0 */
     memcpy(&f, &bits, sizeof f);
@@ -126,7 +127,7 @@ static inline float round_up(double x)
     return 0.0f - round_down(-x);
 }
 
-/* Returns round_down() of (a - origin) * scale, which is computed in double. */
+/* Returns round_down((a - origin) * scale) per lane, computed in double. */
 static inline vec4 vec4_transform_down(vec4 a, const double origin[4], double scale)
 {
 #if defined(__SSE2__)
@@ -138,7 +139,9 @@ static inline vec4 vec4_transform_down(vec4 a, const double origin[4], double sc
     const __m128d over01 = _mm_cmpgt_pd(_mm_cvtps_pd(nearest), x01);
     const __m128d over23 = _mm_cmpgt_pd(_mm_cvtps_pd(_mm_movehl_ps(nearest, nearest)), x23);
     const ivec4 over = (ivec4)_mm_shuffle_ps((__m128)over01, (__m128)over23, 0x88);
-    const ivec4 sign = (ivec4)nearest >> 31; /* the bits of negative floats grow towards -inf */
+    /* all ones for a negative float; towards -inf, the bits of negative floats increase and those of positive floats
+     * decrease */
+    const ivec4 sign = (ivec4)nearest >> 31;
     return (vec4)((ivec4)nearest + (over & ~(sign + sign))) + 0.0f;
 #else
     vec4 placed;

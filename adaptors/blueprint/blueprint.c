@@ -1,6 +1,6 @@
-/* The Blueprint adaptor: it determines which meshes a node contains and what has changed in them, and makes all ranks
- * agree on errors. A session reads borrowed arrays during a step; therefore the adaptor keeps the arrays that it
- * allocated for a mesh, in known_mesh, until that mesh is set again. */
+/* The Blueprint adaptor: it determines which meshes a Conduit node contains and which of their data have changed, and
+ * makes all ranks agree on errors. A session reads borrowed arrays during a step; therefore the adaptor keeps the
+ * arrays that it allocated for a mesh, in known_mesh, until that mesh is set again. */
 #include "insitu/blueprint.h"
 
 #include <stdio.h>
@@ -47,8 +47,8 @@ static _Thread_local char create_error[256];
 
 /* ---- known meshes ----------------------------------------------------------------------------------------------- */
 
-/* Finds a known mesh by its name and number. The search begins behind the one found last, because domains are set in
- * the same order every step, and there may be thousands. */
+/* Finds a known mesh by its name and number. The search begins after the mesh that was found most recently, because
+ * domains are set in the same order every step, and there may be thousands of them. */
 static known_mesh *find_known_mesh(insitu_blueprint *adaptor, const char *name, int64_t number)
 {
     for (int i = 0; i < adaptor->known_count; i++) {
@@ -61,8 +61,8 @@ static known_mesh *find_known_mesh(insitu_blueprint *adaptor, const char *name, 
     return NULL;
 }
 
-/* Finds a block with cells that has been set for the next step, or returns NULL. The search goes back from the mesh
- * that was set last, because the domains of a node have the same topologies. */
+/* Finds a block with cells that has been set for the next step, or returns NULL. The search runs backwards from the
+ * mesh that was set most recently, because the domains of a node have the same topologies. */
 static const known_mesh *find_pending_block(const insitu_blueprint *adaptor, const char *name)
 {
     for (int i = 1; i <= adaptor->known_count; i++) {
@@ -170,7 +170,8 @@ static void reuse_owned_arrays(blueprint_mesh *mesh, known_mesh *known)
 }
 
 /* Passes the mesh to the session. The known mesh takes over the arrays that the adaptor allocated. A uniform block is
- * placed on the lattice on which the ranks agreed in the last step, which is usually that of the next step too. */
+ * placed on the lattice on which the ranks agreed in the last step; the ranks usually agree on the same lattice in the
+ * next step. */
 static insitu_status set_known_mesh(insitu_blueprint *adaptor, blueprint_mesh *mesh, known_mesh *known)
 {
     const mesh_target target = target_of(adaptor, known);
@@ -209,7 +210,7 @@ static bool pass_mesh(insitu_blueprint *adaptor, const node *domain, const node 
 }
 
 /* Sets a mesh, or a block of the mesh of this name. The blocks of a mesh must have the same fields. A block with other
- * fields than the blocks before it becomes a mesh of its own, which has the number in its name. */
+ * fields than the blocks before it becomes a mesh of its own, and the block's number is added to the name. */
 static bool pass_block(insitu_blueprint *adaptor, const node *domain, const node *topology, blueprint_mesh *mesh,
                        const char *name, int64_t number)
 {
@@ -323,8 +324,8 @@ static insitu_status mpi_failure(insitu_blueprint *adaptor)
     return fail(adaptor, INSITU_ERROR_MPI, "insitu_blueprint_step: MPI returned an error");
 }
 
-/* Computes the largest cycle and time over all ranks, finds the lowest rank with an error, or -1, and whether the
- * condition is true on any rank. */
+/* Computes the largest cycle and the largest time over all ranks. *failed_rank receives the lowest rank with an error,
+ * or -1 if there is none. *condition is set to true on all ranks if it is true on any rank. */
 static insitu_status reduce_state(insitu_blueprint *adaptor, int *failed_rank, bool *condition)
 {
     int rank, ranks;
@@ -375,9 +376,8 @@ static named_lattices list_lattices(insitu_blueprint *adaptor)
     return list;
 }
 
-/* Lets the ranks agree on the lattices of their blocks. `list` contains this rank's lattices; the adaptor takes it
- * over. Collective.
- * */
+/* Makes the ranks agree on the lattices of their blocks. `list` contains this rank's lattices; the adaptor takes
+ * ownership of it. Collective. */
 static insitu_status agree_on_lattices(insitu_blueprint *adaptor, named_lattices *list)
 {
     named_lattices common;

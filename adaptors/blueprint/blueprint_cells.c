@@ -1,6 +1,6 @@
-/* Reads unstructured topologies. Blueprint's cells and faces use VTK's vertex order, and polyhedra are lists of faces,
- * which are lists of vertices, as in insitu_mesh. Blueprint's offsets have no final entry, and may be missing if there
- * are sizes. */
+/* Reads unstructured topologies. Blueprint's cells and faces use VTK's vertex order. As in insitu_mesh, a polyhedron is
+ * a list of faces, and a face is a list of vertices. Blueprint's offsets have no final entry, and may be missing if
+ * there are sizes. */
 #include "blueprint_mesh.h"
 
 #include <stdio.h>
@@ -58,7 +58,7 @@ static bool require_integers(const node *parent, const char *path, node_array *o
 typedef struct row_list {
     node_array connectivity, sizes, offsets;
     int64_t count; /* number of lists in connectivity */
-    int vertices;  /* length of each list; 0 if the lists have different lengths, which are in sizes */
+    int vertices;  /* length of each list; 0 if the lists have different lengths, which are then given by `sizes` */
 } row_list;
 
 static int64_t row_size(const row_list *rows, int64_t i)
@@ -113,7 +113,7 @@ static bool read_rows(const node *of, row_list *rows, owned_arrays *owned)
     return check_offsets(of, rows);
 }
 
-/* Reads the faces of polyhedra, which may be polygonal, all of one shape, or mixed. */
+/* Reads the faces of polyhedra. The faces may be polygonal, all of one shape, or of mixed shapes. */
 static bool read_faces(const node *topology, blueprint_mesh *out)
 {
     node faces;

@@ -1,5 +1,6 @@
-/* Reads fields, including ghost flags. On a lattice all vertex arrays must have the same strides, and so must all cell
- * arrays. The topology states the strides of vertex arrays; the first element field states those of cell arrays. */
+/* Reads fields, including ghost flags. On a lattice (structured grid) all vertex arrays must have the same strides, and
+ * all cell arrays must have the same strides. The topology states the strides of vertex arrays; the first element field
+ * states those of cell arrays. */
 #include "blueprint_hash.h"
 #include "blueprint_mesh.h"
 
@@ -44,8 +45,8 @@ static bool belongs_to(const node *field, const char *topology)
     return strcmp(name, topology) == 0;
 }
 
-/* Finds the values and association of a field. Returns false if the field is invalid, which sets the error, or is left
- * out, which is reported only if reports_left_out. */
+/* Finds the values and association of a field. Returns false if the field is invalid or left out. An invalid field sets
+ * the error; a field that is left out is reported only if reports_left_out is set. */
 static bool find_field(const node *field, blueprint_field *out, bool reports_left_out)
 {
     const char *association;
@@ -173,8 +174,8 @@ static bool read_component(const node *values, const blueprint_mesh *mesh, const
 
 /* ---- ghosts ----------------------------------------------------------------------------------------------------- */
 
-/* Returns new flags of the mesh's cells, owned by the adaptor: 1 where `flags` has a bit of the mask, otherwise 0. NULL
- * if memory ran out. */
+/* Returns new flags of the mesh's cells, owned by the adaptor: 1 if the cell's entry in `flags` has a bit of the mask,
+ * otherwise 0. Returns NULL if memory ran out. */
 static unsigned char *make_flags(const node *of, blueprint_mesh *mesh, const insitu_array *flags, int64_t mask)
 {
     unsigned char *own = owned_arrays_add(of, &mesh->owned, mesh->mesh.cell_count);
@@ -217,9 +218,9 @@ static void find_inner_cells(const insitu_array *flags, const int64_t strides[3]
 }
 
 /* Returns the bitwise or of the cells' flags. If the block has a level of refinement, the lattice's interior is first
- * reduced to exclude the ghost layers, whose flags have a bit of the mask, and only flags in the interior are read.
- * This is because a block hides the coarser cells below its interior, but must not hide the cells below its ghost
- * layers. */
+ * reduced so that it excludes the ghost layers (the cells whose flags have a bit of the mask), and only flags in the
+ * interior are read. The reason is that a block hides the coarser cells below its interior, but must not hide those
+ * below its ghost layers. */
 static int64_t read_flag_bits(const insitu_array *flags, int64_t mask, blueprint_mesh *mesh)
 {
     insitu_lattice *l = &mesh->lattice;
@@ -342,7 +343,7 @@ bool blueprint_read_ghosts(const node *domain, const char *topology, blueprint_m
 
 /* ---- values ----------------------------------------------------------------------------------------------------- */
 
-/* Describes the field's components in an array, which the caller must free. Returns NULL on an error. */
+/* Describes the field's components in a new array; the caller must free it. Returns NULL on an error. */
 static insitu_array *read_values(const blueprint_field *field, const blueprint_mesh *mesh, int *count)
 {
     const int64_t children = node_child_count(&field->values_node);

@@ -35,7 +35,7 @@ static uint64_t hash_bytes(const char *data, int64_t bytes)
     return blueprint_mix_hash(blueprint_mix_hash(lanes[0], lanes[1]), blueprint_mix_hash(lanes[2], lanes[3]));
 }
 
-/* Same as hash_bytes(), for elements of a given size and stride. The function is inlined so that the size is a
+/* Does the same as hash_bytes() for elements of a given size and stride. The function is inlined so that the size is a
  * constant. */
 static inline uint64_t hash_elements(const char *data, int64_t count, int64_t stride, size_t size)
 {

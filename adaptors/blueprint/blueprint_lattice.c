@@ -59,9 +59,10 @@ static common_lattice lattice_of_block(const uniform_block *block)
     return out;
 }
 
-/* ---- lists of them ---------------------------------------------------------------------------------------------- */
+/* ---- lists of common lattices ----------------------------------------------------------------------------------- */
 
-/* Finds the item of a mesh. Blocks of one mesh follow each other, so that the search begins with the last item. */
+/* Finds the item of a mesh. The blocks of a mesh are added one after the other, so the search begins with the last item
+ * of the list. */
 static named_lattice *find_item(const named_lattices *list, uint64_t mesh)
 {
     for (int i = list->count - 1; i >= 0; i--)
@@ -105,7 +106,8 @@ void named_lattices_free(named_lattices *list)
 typedef struct lattice_exchange {
     MPI_Comm comm;
     int ranks;
-    int *bytes, *starts; /* for each rank: number of bytes of its items, and position of the first one */
+    /* for each rank: bytes: size of its items in bytes; starts: offset of its first item in bytes */
+    int *bytes, *starts;
     named_lattice *all;
 } lattice_exchange;
 
@@ -168,8 +170,8 @@ bool named_lattices_agree(MPI_Comm comm, const named_lattices *own, named_lattic
 
 /* ---- a block in its lattice ------------------------------------------------------------------------------------- */
 
-/* Moves the origin along an axis to the common one. If a block states its first index, its origin must already equal
- * the common one, except for rounding. Returns false if the block does not lie on the lattice. */
+/* Moves the block's origin along an axis to the common origin. If a block states its first index, its origin must
+ * already equal the common origin, except for rounding. Returns false if the block does not lie on the lattice. */
 static bool place_axis(const uniform_block *block, const common_lattice *common, int axis, insitu_lattice *out)
 {
     const double spacing = block->lattice.spacing[axis];

@@ -1,7 +1,8 @@
-/* The lattice that the uniform blocks of a mesh have in common, on all ranks. Nodes state the position of each block in
- * floating point. However, equal vertices of different blocks are recognized by bitwise equal coordinates, so that all
- * blocks must compute their coordinates from one origin (insitu_lattice). Nodes state levels of refinement only as
- * numbers, so that the refinement ratios must be computed from the spacings of all blocks. */
+/* The lattice (structured grid) that the uniform blocks of a mesh have in common on all ranks. Conduit nodes state the
+ * position of each block in floating point. However, equal vertices of different blocks are recognized by bitwise equal
+ * coordinates, so that all blocks must compute their coordinates from one origin (insitu_lattice). Conduit nodes state
+ * levels of refinement only as numbers, so that the refinement ratios must be computed from the spacings of all
+ * blocks. */
 #ifndef BLUEPRINT_LATTICE_H
 #define BLUEPRINT_LATTICE_H
 
@@ -29,7 +30,7 @@ typedef struct named_lattices {
     int count;
 } named_lattices;
 
-/* Returns the mesh as a uniform block, before it is placed. */
+/* Returns the mesh as a uniform block that has not been placed on a common lattice yet. */
 uniform_block uniform_block_of(const blueprint_mesh *mesh);
 
 /* Extends the mesh's common lattice by a block; adds the mesh if it is not in the list. Returns false if memory runs

@@ -125,7 +125,7 @@ bool node_string(const node *parent, const char *path, const char **out)
 
 /* ---- arrays ----------------------------------------------------------------------------------------------------- */
 
-/* Converts a Conduit type id (3 to 12) to an insitu_type. Returns 0 for other ids, which are not numeric. */
+/* Converts a Conduit type id (3 to 12) to an insitu_type. Returns 0 for all other ids, because they are not numeric. */
 static int find_type(int64_t id)
 {
     static const unsigned char types[] = {0,

@@ -49,20 +49,21 @@ void node_log_free(node_log *log);
 
 bool node_has(const node *parent, const char *path);
 
-/* Finds the node at the path, which may have several components. Returns false if it does not exist; this is not an
- * error. */
+/* Finds the node at the path. The path may have several components. Returns false if the node does not exist; this is
+ * not an error. */
 bool node_find(const node *parent, const char *path, node *out);
 
-/* Same as node_find(), but a missing node is an error. */
+/* Does the same as node_find(), but a missing node is an error. */
 bool node_require(const node *parent, const char *path, node *out);
 
 int64_t node_child_count(const node *parent);
 void node_child(const node *parent, int64_t number, node *out);
 
-/* Reads a string, which belongs to the node. Returns false and sets the error if there is no string at the path. */
+/* Reads a string; it belongs to the node. Returns false and sets the error if there is no string at the path. */
 bool node_string(const node *parent, const char *path, const char **out);
 
-/* These read a number. If it is missing, *out does not change; this is an error only if is_required. */
+/* node_integer() and node_real() read a number. If the number is missing, *out does not change; this is an error only
+ * if is_required is set. */
 bool node_integer(const node *parent, const char *path, bool is_required, int64_t *out);
 bool node_real(const node *parent, const char *path, bool is_required, double *out);
 
@@ -74,8 +75,8 @@ bool node_integers(const node *parent, const char *path, int64_t out[3], int *co
  * along each axis, as for an array without padding; parent is NULL if all are missing. A count of 0 is treated as 1. */
 void node_strides(const node *parent, const char *path, const int64_t counts[3], int64_t strides[3]);
 
-/* These describe the array of the node, or of the node at the path. They return false and set the error if it is not an
- * array of numbers. */
+/* node_read_array() describes the array of the node, node_require_array() that of the node at the path. They return
+ * false and set the error if the node is not an array of numbers. */
 bool node_read_array(const node *of, node_array *out);
 bool node_require_array(const node *parent, const char *path, node_array *out);
 

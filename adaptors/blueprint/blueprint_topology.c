@@ -1,5 +1,5 @@
-/* Reads coordsets and topologies. Uniform, rectilinear and structured ones become lattices, which need no list of
- * cells. */
+/* Reads coordsets and topologies. Uniform, rectilinear and structured topologies become lattices. A lattice needs no
+ * list of cells. */
 #include "blueprint_mesh.h"
 
 #include <string.h>
@@ -8,8 +8,8 @@ static const char *const index_names[3] = {"i", "j", "k"};
 
 /* ---- lattices --------------------------------------------------------------------------------------------------- */
 
-/* Stores the number of vertices along each axis, which must be at least 1. A topology whose cells have fewer than two
- * dimensions is left out. */
+/* Stores the number of vertices along each axis; each number must be at least 1. A topology whose cells have fewer than
+ * two dimensions is left out. */
 static bool set_vertex_counts(const node *of, const char *path, const int64_t counts[3], blueprint_mesh *out)
 {
     int flat = 0;

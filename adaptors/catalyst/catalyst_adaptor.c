@@ -22,7 +22,7 @@ static struct catalyst_state {
     bool has_initialized_mpi;
     insitu_status status; /* status of the last call to Catalyst's API */
     char message[NODE_MESSAGE + 64];
-    char last_left_out[2048]; /* last report about left out items that was printed to stderr */
+    char last_left_out[2048]; /* most recent report about left out items that was printed to stderr */
     int parameter_count;
     requested_parameter parameters[PARAMETERS];
 } state;
@@ -61,7 +61,8 @@ static bool is_yaml(const char *path)
     return dot && (strcmp(dot, ".yaml") == 0 || strcmp(dot, ".yml") == 0);
 }
 
-/* Returns the first scene in catalyst/scripts, which is a path or a node with a filename. NULL if there is none. */
+/* Returns the path of the first scene in catalyst/scripts, or NULL if there is none. A script is either a path, or a
+ * node with a filename. */
 static const char *find_script(const node *root)
 {
     node scripts, script, file;
@@ -105,7 +106,7 @@ static bool find_parameters(const node *root)
     return true;
 }
 
-/* Makes an error in the node of any rank an error on all ranks. */
+/* Turns an error in the node of any rank into an error on all ranks. */
 static insitu_status agree_on_error(MPI_Comm comm, const node_log *log)
 {
     int worst = (int)log->status;

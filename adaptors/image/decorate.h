@@ -6,7 +6,8 @@
 
 #include "insitu/image_output.h"
 
-/* Blends the image's background behind rgba, which is a copy of its pixels, and draws its decorations over them. */
+/* Blends the image's background behind rgba and draws its decorations over rgba. On entry rgba is a copy of the image's
+ * pixels. */
 void decorate(const insitu_image &image, std::vector<float> &rgba);
 
 /* Reports text that decorate() leaves out or draws differently: missing fonts, missing glyphs, or lack of space. */

@@ -79,7 +79,7 @@ class srgb_codes
   private:
     static constexpr int CODES = 256, BINS = 4096;
 
-    /* Returns the smallest number with the code, found by bisection down to adjacent doubles. */
+    /* Returns the smallest linear value that has this code, found by bisection down to adjacent doubles. */
     static double least_of(int code)
     {
         double below = 0, least = 1;
@@ -113,8 +113,8 @@ template <typename code> void encode_pixel(const float *pixel, std::size_t chann
     if (channels == 4) out[3] = code_of<code>(alpha);
 }
 
-/* Encodes to sRGB codes that are not premultiplied, with alpha if channels is 4. Equal neighbouring pixels, which are
- * frequent in the background, are encoded once. */
+/* Encodes to sRGB codes that are not premultiplied, with alpha if channels is 4. A pixel that equals its predecessor,
+ * as is frequent in the background, is copied from it instead of being encoded. */
 template <typename code> std::vector<code> encode(const insitu_image &image, std::size_t channels)
 {
     std::vector<code> codes(pixel_count(image) * channels);

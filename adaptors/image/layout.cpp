@@ -30,8 +30,8 @@ double pixels(double share, int size)
     return std::ceil(share * size);
 }
 
-/* Returns the text sizes to try, in descending order from the given one. No size is below the legible minimum, except a
- * given one. */
+/* Returns the text sizes to try, in descending order from the given one. No size is below the legible minimum SMALLEST,
+ * unless the given size is. */
 std::vector<int> sizes_from(double size)
 {
     std::vector<int> out;
@@ -104,8 +104,8 @@ bool find_free_bounds(const layout_state &s, insitu_anchor at, double width, dou
 
 /* ---- lines of text ---------------------------------------------------------------------------------------------- */
 
-/* Returns the number of bytes at the beginning of a word that fit in the width. Only whole UTF-8 characters count, and
- * at least one is returned. */
+/* Returns the number of bytes at the beginning of a word that fit in the width. Only whole UTF-8 characters are
+ * counted. The result covers at least one character, even if it does not fit. */
 std::size_t bytes_that_fit(const layout_state &s, const std::string &word, int size, double available_width)
 {
     const double width = s.measure(word, size);
@@ -275,7 +275,8 @@ block make_bar(const layout_state &s, const bar_group &g, std::size_t n, const a
     return b;
 }
 
-/* Finds the range of heights in a vertical strip, around the middle of the picture, that other blocks leave free. */
+/* Finds the range of heights that other blocks leave free in the vertical strip from x0 to x1. The range is the one
+ * around the middle of the picture. */
 void free_height(const layout_state &s, double x0, double x1, double &top, double &bottom)
 {
     top = s.y0, bottom = s.y1;

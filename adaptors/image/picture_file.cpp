@@ -90,7 +90,8 @@ void remove_stale_files(int folder)
     }
 }
 
-/* Removes old temporary files of a folder, once per process, because reading a folder with many pictures is slow. */
+/* Removes old temporary files of a folder, one time per process and folder, because reading a folder with many pictures
+ * is slow. */
 void remove_stale_files_once(int folder)
 {
     static std::set<std::pair<dev_t, ino_t>> cleaned_folders;

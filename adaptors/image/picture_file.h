@@ -1,8 +1,9 @@
 /* Writes a picture's file atomically: it appears complete or not at all.
  *
- * The bytes are written to a temporary file in the picture's folder, which is then renamed. The temporary file cannot
- * belong to another process, because it has a random name and is created exclusively. It is locked while its writer
- * runs, so that temporary files of killed runs can be distinguished from those being written. */
+ * The bytes are written to a temporary file in the picture's folder, and the temporary file is then renamed. The
+ * temporary file cannot belong to another process, because it has a random name and is created exclusively. It is
+ * locked while its writer runs, so that temporary files of killed runs can be distinguished from those being
+ * written. */
 #ifndef ADAPTORS_PICTURE_FILE_H
 #define ADAPTORS_PICTURE_FILE_H
 

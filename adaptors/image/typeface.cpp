@@ -1,4 +1,4 @@
-/* FreeType reports a lack of memory by error codes, which are converted to std::bad_alloc. Glyphs are hinted, so that
+/* FreeType reports a lack of memory by error codes; they are converted to std::bad_alloc. Glyphs are hinted, so that
  * they align with pixels and are sharp in small sizes. */
 #include "typeface.h"
 

@@ -45,8 +45,9 @@ class typeface
 
     FT_LibraryRec_ *library_ = nullptr;
     FT_FaceRec_ *face_ = nullptr;
-    std::string name_, file_,
-        unreadable_; /* name and path of the font, and path of the first file that could not be read as a font */
+    /* name_: name of the font; file_: path of the font; unreadable_: path of the first file that could not be read as a
+     * font */
+    std::string name_, file_, unreadable_;
     bool is_from_system_ = false;
     mutable std::map<std::pair<int, unsigned>, int> advances_; /* cache of glyph advances, by size and glyph */
     std::set<char32_t> missing_;

@@ -86,8 +86,8 @@ constexpr size_t longest_list =
 constexpr unsigned char hiding_bits =
     vtkDataSetAttributes::DUPLICATECELL | vtkDataSetAttributes::HIDDENCELL | vtkDataSetAttributes::REFINEDCELL;
 
-/* Sets the ghost flags. VTK's byte has bits that hide a cell and bits that only describe it. VTK's own array is used if
- * it contains only the former, and no array is set if nothing is hidden. */
+/* Sets the ghost flags. VTK's byte has bits that hide a cell and bits that only describe it. If VTK's own array
+ * contains only hiding bits, it is used unchanged. If nothing is hidden, no array is set. */
 void set_ghosts(vtkDataSet *grid, const vtkSmartPointer<vtkUnsignedCharArray> &ghosts, const cell_list &cells,
                 const std::string &what, conversion_log &log, mesh_part &p)
 {
@@ -398,8 +398,8 @@ void set_data(insitu_vtk_adaptor *adaptor, part_map &parts, const std::string &n
                                                  " is not taken, expected a vtkDataSet or a composite of them"};
 }
 
-/* Removes the parts that an earlier call set and this one did not. If a whole mesh has been replaced by blocks of the
- * same name, nothing must be removed from the session. */
+/* Removes the parts that an earlier call set and the current call did not set. If a whole mesh has been replaced by
+ * blocks of the same name, nothing must be removed from the session. */
 void remove_parts_not_set(insitu_vtk_adaptor *adaptor, part_map &parts, const std::set<part_key> &keys)
 {
     for (auto it = parts.begin(); it != parts.end();) {

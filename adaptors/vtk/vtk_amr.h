@@ -1,4 +1,4 @@
-/* The levels of overlapping AMR as levels of refinement of one mesh. */
+/* Converts the levels of overlapping AMR to levels of refinement of one mesh. */
 #ifndef VTK_AMR_H
 #define VTK_AMR_H
 
@@ -13,7 +13,7 @@ class vtkOverlappingAMR;
 namespace insitu_vtk
 {
 
-/* For each level, the number of its cells along one cell of level 0, for each axis. */
+/* For each level and axis: the number of the level's cells along one cell of level 0. */
 using amr_refinements = std::vector<std::array<int64_t, 3>>;
 
 /* Finds the refinement of each level. Returns an empty list if boxes, spacings or ratios are not set, or if a box

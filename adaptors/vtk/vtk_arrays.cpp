@@ -5,9 +5,9 @@
  *     SOA   x0 x1 ... | y0 y1 ... | z0 z1 ...    tuple stride 1, component stride is the distance between blocks
  *
  * A field has a single component stride, so the blocks of an SOA array can be borrowed only if they are equally spaced
- * in memory. Coordinates are three separate arrays, whose blocks may be anywhere. All other arrays (shorts, characters,
- * unsigned integers, bits, arrays computed on access) are copied: integers to an integer type that represents every
- * value, if there is one, otherwise to double. */
+ * in memory. Coordinates are passed as three separate arrays, so that their blocks may be anywhere in memory. All other
+ * arrays (shorts, characters, unsigned integers, bits, arrays computed on access) are copied: integers to an integer
+ * type that represents every value, if there is one, otherwise to double. */
 #include "vtk_arrays.h"
 
 #include <cstring>
@@ -84,7 +84,7 @@ template <typename T> bool borrow(vtkDataArray *array, array_view &view)
     return borrow_aos<T>(array, view) || borrow_soa<T>(array, view);
 }
 
-/* Copies values of VTK's type From to type To, which must represent them all. */
+/* Copies values of VTK's type From to type To. To must represent all values of From. */
 template <typename From, typename To> bool convert(vtkDataArray *array, held_arrays &held, array_view &view)
 {
     auto *typed = vtkAOSDataArrayTemplate<From>::FastDownCast(array);

@@ -64,7 +64,7 @@ array_view view_array(vtkDataArray *array, const std::string &what, held_arrays 
 void view_points(vtkDataArray *points, const std::string &what, held_arrays &held, conversion_log &log,
                  insitu_array coordinates[3]);
 
-/* Copies the tuples source[0], source[1], ... of a view to a packed array, which `held` owns. */
+/* Copies the tuples source[0], source[1], ... of a view to a packed array that `held` owns. */
 array_view gather(const array_view &view, const std::vector<int64_t> &source, held_arrays &held);
 
 } // namespace insitu_vtk

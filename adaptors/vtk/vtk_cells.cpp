@@ -188,8 +188,8 @@ struct new_size {
     bool is_one_to_one = true;
 };
 
-/* The cells that are converted to polyhedra, in VTK's order. has[i] is true if VTK's cell i is such a cell and all its
- * faces are valid. */
+/* The cells that are converted to polyhedra, in VTK's order. has_faces[i] is true if VTK's cell i is such a cell and
+ * all its faces are valid. */
 struct cells_with_faces {
     face_list faces;
     std::vector<bool> has_faces;

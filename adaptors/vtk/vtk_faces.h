@@ -1,5 +1,5 @@
-/* Reads the polyhedra of a vtkUnstructuredGrid. VTK lists all faces of each cell (its face stream); libinsitu needs
- * each face once, and cells that refer to their faces. */
+/* Reads the polyhedra of a vtkUnstructuredGrid. VTK lists all faces of each cell (its face stream); libinsitu needs a
+ * list with each face one time, and cells that refer to their faces by index. */
 #ifndef VTK_FACES_H
 #define VTK_FACES_H
 
@@ -33,9 +33,9 @@ class face_list
     bool add_stream(vtkUnstructuredGrid *grid, int64_t cell);
     void add_prism(const int64_t *points, int sides);
 
-    std::vector<int64_t> starts{0}, face_points,
-        sorted; /* offsets of the faces; the points of all faces, in order around each face; the same points, sorted
-                   within each face */
+    /* starts: offsets of the faces; face_points: the points of all faces, in order around each face; sorted: the same
+     * points, sorted within each face */
+    std::vector<int64_t> starts{0}, face_points, sorted;
     std::unordered_multimap<uint64_t, int64_t> by_points;
     std::vector<int64_t> cell_starts{0}, cells;
 };

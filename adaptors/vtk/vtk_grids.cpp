@@ -28,7 +28,8 @@
 namespace
 {
 
-/* The number of points along each axis that has more than one: three axes, or two for a flat grid. */
+/* The number of points along each axis that has more than one point. There are three such axes, or two in a flat
+ * grid. */
 struct lattice {
     int64_t row_points = 1, row_count = 1, layer_count = 1;
 
@@ -38,7 +39,7 @@ struct lattice {
     int64_t cells() const { return (row_points - 1) * (row_count - 1) * (is_flat() ? 1 : layer_count - 1); }
 };
 
-/* Returns false if data is not a structured data set with at least two such axes. */
+/* Returns false if data is not a structured data set with cells along at least two axes. */
 bool find_lattice(vtkDataSet *data, lattice &l)
 {
     int64_t cells[3], axes[3] = {1, 1, 1};
@@ -75,7 +76,7 @@ template <typename Array> vtkSmartPointer<vtkCellArray> list_cells(const lattice
 
 void set_lattice(const lattice &l, vtkUnstructuredGrid *grid)
 {
-    /* The largest offset is eight times the number of cells, which is smaller than the number of points. */
+    /* The largest offset is eight times the number of cells. There are fewer cells than points. */
     const bool is_small = l.points() < std::numeric_limits<int32_t>::max() / 8;
     grid->SetCells(l.is_flat() ? VTK_QUAD : VTK_HEXAHEDRON,
                    is_small ? list_cells<vtkTypeInt32Array>(l) : list_cells<vtkTypeInt64Array>(l));

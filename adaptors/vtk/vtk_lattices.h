@@ -1,5 +1,5 @@
-/* Converts images, rectilinear and curvilinear grids to lattices, which use VTK's own arrays and need no list of
- * cells. */
+/* Converts images, rectilinear and curvilinear grids to lattices (structured grids). A lattice uses VTK's own arrays
+ * and needs no list of cells. */
 #ifndef VTK_LATTICES_H
 #define VTK_LATTICES_H
 

@@ -8,11 +8,11 @@ import accuracy_results
 import page
 
 TARGETS = ["1e-1", "1e-2", "1e-3", "1e-4", "1e-5"]
-ASKED = 10  # times as fast as each of VTK's mappers
+ASKED = 10  # required speedup over each of VTK's mappers
 
 
 class Comparison(NamedTuple):
-    """A setting of VTK's, and our cheapest one that is off by no more, if there is one."""
+    """A setting of VTK, and libinsitu's fastest setting whose error is not larger; ours is None if there is none."""
     mesh: accuracy_results.Mesh
     peer: accuracy_results.Setting
     ours: Optional[accuracy_results.Setting]
@@ -31,7 +31,7 @@ class Comparison(NamedTuple):
 
     @property
     def text(self):
-        """How many times as fast a frame and the first picture are."""
+        """The speedups of a frame and of the first picture over VTK, as text."""
         if not self.peer.is_drawn:
             return self.peer.status
         return f"{bold_where_slower(self.frame)} / {bold_where_slower(self.first)}" if self.ours else "none is so near"
@@ -51,7 +51,7 @@ def all_comparisons(meshes):
 
 
 class Standing:
-    """All comparisons, and as a table: a row for each mesh, a column for each of VTK's mappers and settings."""
+    """All comparisons, also as a table with a row for each mesh and a column for each of VTK's mappers and settings."""
 
     def __init__(self, comparisons):
         self.comparisons = comparisons
@@ -61,7 +61,8 @@ class Standing:
             self.rows.setdefault(str(c.mesh), {})[c.peer_label] = c
 
     def _least(self, what, is_image):
-        """Return the least ratio on each mesh, of mappers that draw cells or of resampled images."""
+        """Return the smallest speedup on each mesh: over resampled images if is_image, otherwise over mappers of
+        cells."""
         ahead = [[getattr(c, what) for c in row.values() if c.ours and (c.peer.method == "VTK resample") == is_image]
                  for row in self.rows.values()]
         return [min(ratios) for ratios in ahead if ratios]
@@ -74,7 +75,7 @@ class Standing:
 
     @property
     def reached(self):
-        """The number of meshes on which all mappers that draw cells are the asked times as slow."""
+        """The number of meshes on which libinsitu is at least ASKED times as fast as all mappers that draw cells."""
         least = zip(self._least("frame", False), self._least("first", False))
         return sum(frame >= ASKED and first >= ASKED for frame, first in least)
 
@@ -85,12 +86,12 @@ def span(ratios):
 
 
 def greatest_share(meshes):
-    """Return the greatest error of max_error, as a share of what was asked for."""
+    """Return the largest error of max_error, divided by the requested error."""
     return max((s.most / float(s.value) for mesh in meshes for s in mesh.of("max_error") if s.is_drawn), default=0)
 
 
 def ladder(meshes):
-    """Return the entries of the ladder's table by our settings, method by method: a list of texts, one a mesh."""
+    """Return the rows of the table of our settings, method by method: by label, a list with one text per mesh."""
     ours = [(column, mesh, setting) for column, mesh in enumerate(meshes) for setting in mesh.volumes
             if not setting.is_peer and not (setting.is_repeated and setting.method == "frames")]
     methods = list(dict.fromkeys(setting.method for _, _, setting in ours))
@@ -103,7 +104,7 @@ def ladder(meshes):
 
 
 class Surface(NamedTuple):
-    """A setting of isosurfaces, with the frames of the thesis's traversals, which have the same errors."""
+    """A setting of isosurfaces, and the frame times of the thesis's traversals (packets and SPMD), as text."""
     mesh: accuracy_results.Mesh
     setting: accuracy_results.Setting
     packets: str
@@ -111,7 +112,7 @@ class Surface(NamedTuple):
 
 
 def traversal(mesh, setting, way):
-    """Return the time of one of the thesis's traversals, with its largest error where that is another."""
+    """Return the time of one of the thesis's traversals, followed by its largest error if its errors differ."""
     for other in mesh.of(f"{setting.method} {way}"):
         if other.value == setting.value:
             frame = page.write_number(other.frame)
@@ -120,7 +121,7 @@ def traversal(mesh, setting, way):
 
 
 def all_surfaces(meshes):
-    """Settings that have the errors of the robust one, to the digit, are left out."""
+    """Return all settings of isosurfaces, except those whose printed errors equal the errors of the robust setting."""
     surfaces = []
     for mesh in meshes:
         robust = [setting.errors for setting in mesh.of("robust")]

@@ -1,5 +1,5 @@
 #!/usr/bin/python3 -B
-"""Draws error over time, a panel a mesh, as FOLDER/accuracy_*.png: accuracy_figures.py FOLDER CSV ..."""
+"""Draws the error over the time, one panel per mesh, as FOLDER/accuracy_*.png: accuracy_figures.py FOLDER CSV ..."""
 
 import pathlib
 import sys
@@ -15,12 +15,13 @@ except ImportError:
 import accuracy_results
 import page
 
-HALF_STEP = 1 / 510  # of 8 bits, in mid-tones
+HALF_STEP = 1 / 510  # half a step of an 8-bit channel, in mid-tones
 
 
 class Series(NamedTuple):
-    """The settings that one line joins, or that points stand for. value: "" for all settings of the method. names(mesh,
-    setting): what stands beside a point, offset from it in points."""
+    """The settings that one line joins, or that points represent. value: "" for all settings of the method.
+    names(mesh, setting): the text beside a point. offset: offset of the text from the point, in typographic
+    points."""
     title: str
     method: str
     style: dict
@@ -79,7 +80,7 @@ SURFACE_SERIES = [
 
 
 def draw_series(axes, mesh, series, floor):
-    """Errors below the axis stand on its floor."""
+    """Draw a series. Errors below `floor` are drawn at `floor`."""
     settings = [s for s in mesh.of(series.method) if s.is_drawn and series.value in ("", s.value)]
     errors = [max(setting.most, floor) for setting in settings]
     axes.plot([setting.frame for setting in settings], errors, **series.style)
@@ -97,7 +98,7 @@ def draw_panel(axes, mesh, all_series, bottom):
              ylim=(bottom, 1.5))
     for series in all_series:
         draw_series(axes, mesh, series, 2 * bottom)
-    # Names stand to the right of their points.
+    # The names are to the right of their points and need space.
     low, high = axes.get_xlim()
     axes.set_xlim(low / 1.3, high * 1.5)
     axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))

@@ -1,4 +1,4 @@
-"""What bench_accuracy measured: a mesh at a size of picture, and a row of errors and times for each setting."""
+"""The results of bench_accuracy: for each mesh and size of picture, the errors and times of each setting."""
 
 import page
 
@@ -17,7 +17,7 @@ class Setting:
         self.is_volume = self.layer == VOLUME
         self.is_peer = self.method.startswith("VTK")
         self.is_drawn = self.status == "ok"
-        # Another row has the same picture.
+        # Set if another row has the same picture.
         self.is_repeated = self.method == "sample group" or (self.method == "frames" and self.value == "1")
 
 
@@ -42,11 +42,12 @@ class Mesh:
 
     @property
     def is_linear(self):
-        """Cells whose field is linear are one segment each, whatever its length."""
+        """True if the field is linear in all cells: each cell is then one segment for any step, so there is one
+        setting."""
         return len(self.of("segments")) == 1
 
     def label(self, setting):
-        """What a table calls the setting."""
+        """Return the name of the setting in tables."""
         value = setting.value
         if setting.method == "samples":
             return f"samples, step of {cell_count(value)}"
@@ -61,7 +62,7 @@ class Mesh:
         return setting.method if value == "-" else f"{setting.method}, {value}"
 
     def cheapest(self, rms, most):
-        """Return our fastest setting of volumes that is off by no more than these; None where there is none."""
+        """Return our fastest setting of volumes whose errors are at most rms and most, or None if there is none."""
         near = [setting for setting in self.volumes if setting.is_drawn and not setting.is_peer
                 and not setting.is_repeated and setting.rms <= rms and setting.most <= most]
         return min(near, key=lambda setting: setting.frame, default=None)
@@ -94,7 +95,8 @@ class Results:
         self.meshes = list(meshes.values())
 
     def figures(self):
-        """Return the meshes of each figure by its name: those that have the finest setting, four a figure."""
+        """Return the meshes of each figure by the figure's name: meshes with the finest setting, at most four a
+        figure."""
         volumes = [mesh for mesh in self.meshes if any(setting.value == "1/16" for setting in mesh.of("samples"))]
         surfaces = [mesh for mesh in self.meshes if any(setting.value == "1/8" for setting in mesh.of("segments"))]
         figures = {"accuracy_lattices": volumes[:4], "accuracy_grids": volumes[4:8],

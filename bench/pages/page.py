@@ -1,4 +1,4 @@
-"""What the pages of the benchmarks share: the rows of CSV files, numbers as a page writes them, and templates."""
+"""Shared code of the benchmarks' pages: reads the rows of CSV files, formats numbers, and fills templates."""
 
 import csv
 import math
@@ -13,11 +13,11 @@ except ImportError:
 
 
 class PageError(Exception):
-    """A page cannot be drawn; the message names the file, the line and the column that are at fault."""
+    """A page cannot be drawn; the message names the file, the line and the column that contain the error."""
 
 
 class Row:
-    """A line of a CSV file, whose columns are asked for by name."""
+    """A line of a CSV file. Its columns are accessed by name."""
 
     def __init__(self, place, names, values):
         if len(names) != len(values):
@@ -65,12 +65,13 @@ def _lines(path):
 
 
 def is_of_section(comment):
-    """Say whether a comment tells of one section's date, load or duration, not of the machine."""
+    """Return whether a comment describes the date, load or duration of one section, and not the machine."""
     return comment.startswith(("measured ", "load average")) or re.fullmatch(r"\d+ s", comment) is not None
 
 
 def read_newest_first(paths):
-    """Return (path, rows, comments) of the files, those without a date last and in the order of their names here."""
+    """Return (path, rows, comments) of the files, newest first. Files without a date are last, in the order of
+    `paths`."""
     return sorted(((path, *read_csv(path)) for path in paths), key=lambda file: _date(file[2]), reverse=True)
 
 
@@ -79,7 +80,7 @@ def _date(comments):
 
 
 def write_number(x):
-    """Three digits, and no more than three decimals; a dash for what is not a number."""
+    """Return x with three digits and at most three decimals, or a dash if it is not a number."""
     if math.isnan(x):
         return "-"
     if x == 0:
@@ -91,7 +92,7 @@ def write_number(x):
 
 
 def fill_template(name, **values):
-    """Return the page that a template of this folder makes of the values."""
+    """Return the page that a template of this folder makes from the values."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(pathlib.Path(__file__).parent), undefined=jinja2.StrictUndefined,
         trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True)
@@ -100,7 +101,7 @@ def fill_template(name, **values):
 
 
 def run(program, arguments):
-    """Print what program(arguments) returns, or say in one line why there is no page."""
+    """Print the page that program(arguments) returns, or exit with one line that states why there is no page."""
     try:
         sys.stdout.reconfigure(encoding="utf-8")
         sys.stdout.write(program(arguments))

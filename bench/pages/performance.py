@@ -1,8 +1,9 @@
 #!/usr/bin/python3 -B
 """Prints a page drawn from CSV files: performance.py PAGE [--partial] CSV ...
 
-PAGE is "performance" for docs/performance.md, or "measurements" for docs/development/measurements.md. If a measure stands
-in several files the newest one counts. All sections must be there; --partial leaves out those that no file has.
+PAGE is "performance" for docs/performance.md, or "measurements" for docs/development/measurements.md. If several
+files contain a measure, the newest one counts. All sections must exist; --partial leaves out sections that no
+file contains.
 """
 
 import sys
@@ -17,7 +18,8 @@ WIDTHS = {"avx512": "16, AVX-512", "avx2": "8, AVX2", "sse4.2": "4, SSE4.2", "pl
 
 
 class Hexes:
-    """How hexes are drawn, for which no bar was set: beside Embree, and beside the tets of the same lattices."""
+    """Times of hexes, for which no bar was set, as ratios to Embree's times and to those of tets of the same
+    lattices."""
 
     def __init__(self, results):
         self.trace = span(mesh.embree_trace() / mesh.median("isosurface trace") for mesh in results["peers"].meshes
@@ -32,8 +34,8 @@ class Hexes:
 
 
 class Disagreement(NamedTuple):
-    """The pixels in which hit or miss differs from the reference, and those of them whose rays meet several roots in a
-    cell."""
+    """wrong: number of pixels in which hit or miss differs from the reference. ambiguous: number of these pixels
+    whose rays meet several roots in a cell. checked: number of all compared pixels."""
     wrong: int
     ambiguous: int
     checked: int
@@ -46,7 +48,8 @@ def count_disagreements(programs):
 
 
 class Agreement(NamedTuple):
-    """How far a peer's picture of a surface is from ours: a share of the pixels, and depths in sides of a cube."""
+    """The difference of a peer's picture of a surface from ours: a share of the pixels, and depths in sides of a
+    cube."""
     peer: str
     mesh: Mesh
     coverage: float
@@ -67,7 +70,7 @@ def all_agreements(meshes):
 
 
 def beside(mesh, ours, theirs, most=None):
-    """Return the ratio of two measures, bold if it is above `most`, and both."""
+    """Return the ratio of two measures, bold if it is above `most`, and both measures."""
     ours, theirs = mesh.median(ours), mesh.median(theirs)
     if not ours or not theirs:
         return NONE
@@ -82,7 +85,7 @@ class FlowRow(NamedTuple):
     peer: str
 
     def text(self, mesh):
-        """Return the ratio of our time to VTK's, and both."""
+        """Return the ratio of our time to VTK's time, and both times."""
         return beside(mesh, f"{self.name} new values", f"{self.name} vtk")
 
 
@@ -107,7 +110,7 @@ class Scaling(NamedTuple):
 
 
 def all_scalings(results):
-    """With all threads, then with one."""
+    """Return the scalings with all threads, followed by those with one thread."""
     scalings = []
     for threads in sorted({results.most_threads(), 1}, reverse=True):
         for isa, lanes in WIDTHS.items():

@@ -1,4 +1,4 @@
-"""What was asked of speed and memory, and how we stand to it."""
+"""The required speeds and sizes in memory (bars), and how the measured figures compare with them (claims)."""
 
 from typing import NamedTuple
 
@@ -7,7 +7,8 @@ from performance_results import NONE, Mesh
 
 
 class Bar(NamedTuple):
-    """What was asked. The ratio of ours over the peer's is to be the limit at least, or else at most."""
+    """A requirement: the ratio of our figure to the peer's must be at least limit if is_least, otherwise at most
+    limit."""
     name: str
     unit: str
     peer: str
@@ -47,7 +48,7 @@ THREADS_2 = Bar("Isosurface, 2 threads", "Mrays/s", "1 thread", LEAST, 1.9)
 
 
 class Claim(NamedTuple):
-    """How we stand to a bar on a mesh."""
+    """A measured ratio on one mesh, compared with a bar."""
     bar: Bar
     mesh: Mesh
     figures: str
@@ -72,7 +73,7 @@ def figures(*numbers):
 
 
 def claim(bar, mesh, ours, theirs, work=None):
-    """Return [claim] of two times or costs, or [] where one is missing. With work the figures are speeds."""
+    """Return [claim] of two times or costs, or [] if one is missing. If work is given, the figures are speeds."""
     if not ours or not theirs:
         return []
     shown = figures(work / ours, work / theirs) if work else figures(ours, theirs)
@@ -80,7 +81,7 @@ def claim(bar, mesh, ours, theirs, work=None):
 
 
 def claim_measure(bar, mesh, measure, asked):
-    """As claim(), of a measure beside the figure that was asked for."""
+    """Do the same as claim() for a measure and the required figure."""
     ours = mesh.median(measure)
     return [Claim(bar, mesh, figures(ours), ours / asked)] if ours else []
 
@@ -114,7 +115,8 @@ def claim_volumes(mesh):
 
 
 def claim_scaling(bar, better, worse):
-    """Return [claim] of one program's first mesh over another program's, or []."""
+    """Return [claim] that compares the first mesh of `better` with the same mesh of `worse`, or [] if one is
+    missing."""
     if not better.meshes:
         return []
     mesh = better.meshes[0]
@@ -150,7 +152,7 @@ def all_claims(results):
 
 
 class Standing:
-    """All claims, and as a table: a row for each bar, a column for each mesh."""
+    """All claims, also as a table with a row for each bar and a column for each mesh."""
 
     def __init__(self, claims):
         self.claims = claims
@@ -161,7 +163,7 @@ class Standing:
             self.rows.setdefault(claim.bar, {})[str(claim.mesh)] = claim
 
     def span(self, words):
-        """Return the least and the greatest ratio of the claims whose bar's name or peer has the words."""
+        """Return the smallest and the largest ratio of the claims whose bar's name or peer contains `words`."""
         return span(claim.ratio for claim in self.claims if words in claim.bar.name or words in claim.bar.peer)
 
 
@@ -171,5 +173,5 @@ def span(ratios):
 
 
 def span_of_speeds(meshes, ours, theirs):
-    """Return how many times as fast ours is, where both times were taken."""
+    """Return the range of the factors by which ours is faster than theirs, on meshes with both times."""
     return span(mesh.median(theirs) / mesh.median(ours) for mesh in meshes if mesh.has(ours) and mesh.has(theirs))

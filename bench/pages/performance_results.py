@@ -1,4 +1,4 @@
-"""What the programs of bench/run but bench_accuracy measured: programs, their meshes and the measures of each."""
+"""The results of all programs of bench/run except bench_accuracy: programs, their meshes, and the measures of each."""
 
 from typing import NamedTuple
 
@@ -20,7 +20,7 @@ class Measure(NamedTuple):
 
 
 class Mesh:
-    """What one program measured on one mesh: kind is "tets" or "hexes", of n^3 cubes."""
+    """The measures of one program on one mesh. kind: "tets" or "hexes"; n: the mesh has n^3 cubes."""
 
     def __init__(self, kind, n, cells):
         self.kind, self.n, self.cells = kind, n, cells
@@ -33,37 +33,37 @@ class Mesh:
         return name in self.measures
 
     def median(self, name):
-        """Return the median of a measure; None where it was not taken."""
+        """Return the median of a measure, or None if it was not measured."""
         measure = self.measures.get(name)
         return measure and measure.median
 
     def least(self, *names):
-        """Return the least median of the measures that were taken; None where none was."""
+        """Return the smallest median of the measures that were taken, or None if none was taken."""
         return min((self.measures[name].median for name in names if name in self.measures), default=None)
 
     def embree_trace(self):
-        """Return the median of the faster of Embree's trees; None where there is none."""
+        """Return the smaller median of the trace times with Embree's two trees, or None if there is none."""
         return self.least("isosurface embree trace low", "isosurface embree trace medium")
 
     def text(self, name):
         return page.write_number(self.median(name)) if name in self.measures else NONE
 
     def spread(self, name):
-        """The median, with the least and the greatest where there are several."""
+        """Return the median as text, with the smallest and the largest value if there are several."""
         measure = self.measures.get(name)
         if measure is None or measure.count < 2:
             return self.text(name)
         return f"{self.text(name)} ({page.write_number(measure.low)}–{page.write_number(measure.high)})"
 
     def error(self, name, scale=1):
-        """The median and the greatest, times scale."""
+        """Return the median and the largest value as text, multiplied by scale."""
         measure = self.measures.get(name)
         if measure is None:
             return NONE
         return f"{page.write_number(scale * measure.median)} ({page.write_number(scale * measure.high)})"
 
     def depth_error(self, *names):
-        """As error(), of lengths in the scene, in sides of a cube; once where all are alike."""
+        """Return error() of the depth errors, in units of a cube's side; equal texts appear only one time."""
         return "; ".join(dict.fromkeys(self.error(f"{name} depth error", self.n / 2) for name in names))
 
 
@@ -75,7 +75,7 @@ class Program:
         self.meshes = []
 
     def find(self, kind, n):
-        """Return the mesh; one without measures where the program did not have it."""
+        """Return the mesh, or a mesh without measures if the program did not measure it."""
         return next((mesh for mesh in self.meshes if (mesh.kind, mesh.n) == (kind, n)), Mesh(kind, n, 0))
 
     def add(self, kind, n, cells):
@@ -87,7 +87,7 @@ class Program:
 
 
 class Results:
-    """What the files hold: programs by their names, those of scaling with their instruction set and threads."""
+    """The programs in the files, by name. Names in the scaling section include the instruction set and the threads."""
 
     def __init__(self, paths):
         self.programs = {}
@@ -112,7 +112,7 @@ class Results:
         return self.programs.get(name, Program())
 
     def most_threads(self):
-        """Return the most threads of scaling's rows; 0 where it has none."""
+        """Return the largest number of threads in the rows of scaling, or 0 if there are none."""
         return max((program.threads for name, program in self.programs.items() if name.startswith("scaling")),
                    default=0)
 

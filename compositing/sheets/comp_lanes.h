@@ -1,5 +1,5 @@
-/* Defines the vector of a strip's row: 16 numbers of 32 bits. The compiler splits it into registers of the instruction
- * set's width. */
+/* Defines a vector for one row of a strip: 16 numbers of 32 bits. The compiler splits the vector into registers of the
+ * instruction set's width. */
 #ifndef COMP_COMP_LANES_H
 #define COMP_COMP_LANES_H
 

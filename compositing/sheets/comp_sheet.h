@@ -5,13 +5,13 @@
  * above it or by linear extrapolation from the two values above it, and the residual is stored. Residuals are
  * differences of integers modulo 2^32, so that nothing is rounded and NaN keeps its bits. A row is a vector, so that 16
  * pixels are packed or unpacked at once. All residuals of a row are stored with the same number of nibbles (half
- * bytes), which is the smallest number that the largest residual fits in:
+ * bytes): the smallest number that suffices for the largest residual of the row. The format of a packed sheet is:
  *
  *     header | masks of rows with gaps | word 1: first value, nibble counts of rows, residuals | word 2 ...
  *
- * A word is one of the 32-bit members of a fragment or pixel. A word with the same value in all pixels is stored
- * once. A word that equals the preceding word in all pixels is not stored; examples are t_out of hits, which equals
- * t_in, and the channels of a grey pixel. */
+ * A word is one of the 32-bit members of a fragment or pixel. A word with the same value in all pixels is stored once.
+ * A word that equals the preceding word in all pixels is not stored; examples are t_out of hits, which equals t_in, and
+ * the channels of a grey pixel. */
 #ifndef COMP_COMP_SHEET_H
 #define COMP_COMP_SHEET_H
 
@@ -102,8 +102,8 @@ const unsigned char *comp_sheet_read_head(const unsigned char *in, comp_sheet_he
  * end of the packed data. */
 const unsigned char *comp_sheet_read(const unsigned char *in, int words, comp_sheet *sheet);
 
-/* Pack and unpack a sheet with the given instruction set, which the processor must have. The packed bytes are the same
- * for every instruction set. */
+/* comp_sheet_write_by() packs, and comp_sheet_read_by() unpacks, a sheet with the given instruction set, which the
+ * processor must have. The packed bytes are the same for every instruction set. */
 unsigned char *comp_sheet_write_by(cpu_isa isa, const comp_sheet *sheet, int words, unsigned char *out);
 const unsigned char *comp_sheet_read_by(cpu_isa isa, const unsigned char *in, int words, comp_sheet *sheet);
 

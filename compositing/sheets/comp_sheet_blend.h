@@ -18,8 +18,8 @@ enum { WORD_T_IN = 0, WORD_COLOUR = 2, WORD_TRANSMITTANCE = 5, WORD_KIND = 6, WO
 
 /* ---- joining ---------------------------------------------------------------------------------------------------- */
 
-/* Returns the lanes in the mask `both` whose fragment of `other` is in front of that of `all`. Equal depths and NaN are
- * compared by fragment_compare(). */
+/* Returns the lanes in the mask `both` in which the fragment of `other` is nearer than the fragment of `all`. Equal
+ * depths and NaN are compared by fragment_compare(). */
 ROWS_INLINE lanes nearer_lanes(const comp_sheet *all, const comp_sheet *other, int at, unsigned both)
 {
     const float_lanes old = (float_lanes)load_lanes(&all->words[WORD_T_IN][at]);
@@ -102,7 +102,7 @@ ROWS_INLINE void store_quad(float *to, quad value, bool is_aligned)
 }
 
 /* Transposes four pixels from one vector per channel to RGBA, and stores them. If is_aligned is set, the stores bypass
- * the caches, since the picture is larger than these. */
+ * the caches, because the picture is larger than the caches. */
 ROWS_INLINE void store_four(const quad in[4], float *rgba, bool is_aligned)
 {
     const quad a = __builtin_shufflevector(in[0], in[1], 0, 4, 1, 5),

@@ -1,5 +1,6 @@
-/* The table of loops over the rows of a sheet (comp_sheet_table.c), which are compiled once per instruction set. Only
- * static inline code may be shared between these objects; tests/house_kernels.sh checks this. */
+/* The table of the loops over the rows of a sheet. The loops are compiled once per instruction set
+ * (comp_sheet_table.c). Only static inline code may be shared between the resulting objects; tests/house_kernels.sh
+ * checks this. */
 #ifndef COMP_COMP_SHEET_LOOPS_H
 #define COMP_COMP_SHEET_LOOPS_H
 
@@ -11,10 +12,10 @@
 typedef struct sheet_plan {
     int rows, count;
     bool is_sparse; /* the sheet is compacted before packing; fresh and source are then not set */
-    /* for each row that contains pixels: its index in the strip, and its number of pixels */
+    /* for each row that contains pixels: row: its index in the strip; number: its number of pixels */
     uint8_t row[COMP_ROWS], number[COMP_ROWS];
     uint16_t mask[COMP_ROWS], fresh[COMP_ROWS];
-    uint8_t source[COMP_ROWS][COMP_LANES]; /* for each fresh lane: the lane whose last value predicts it */
+    uint8_t source[COMP_ROWS][COMP_LANES]; /* for each fresh lane: the lane whose most recent value predicts it */
 } sheet_plan;
 
 typedef struct comp_sheet_loops {

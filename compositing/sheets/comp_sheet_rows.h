@@ -5,8 +5,9 @@
 #include "comp_lanes.h"
 #include "comp_sheet_loops.h"
 
-/* The ways to store a word. The first two predict a word by linear extrapolation from the two rows above, or as equal
- * to the row above. The others store one value for all pixels, or nothing because the word equals the preceding one. */
+/* The methods of storing a word. WORD_LINEAR predicts each value by linear extrapolation from the two rows above, and
+ * WORD_CONSTANT as equal to the row above. WORD_UNIFORM stores one value for all pixels. WORD_REPEATED stores nothing,
+ * because the word equals the preceding word. */
 enum word_kind { WORD_LINEAR, WORD_CONSTANT, WORD_UNIFORM, WORD_REPEATED };
 
 /* Returns the nearest lane in `known` to the left of `lane`, or the nearest to the right if there is none. */
@@ -47,8 +48,8 @@ static void make_plan(const uint16_t masks[COMP_ROWS], sheet_plan *plan)
     if (plan->rows && !plan->is_sparse) find_fresh_lanes(plan);
 }
 
-/* The state of the prediction: for each lane its last value, and the difference between the last value and the one
- * before it. */
+/* The state of the prediction for each lane. last: the value of the nearest row above that has a pixel in the lane;
+ * slope: the difference between `last` and the value before it. */
 typedef struct prediction {
     lanes last, slope;
 } prediction;
@@ -100,8 +101,9 @@ static inline unsigned nibble_count(uint32_t greatest)
 }
 
 /* Returns the number of bytes of `count` residuals with `nibbles` nibbles each. A residual is stored in up to three
- * arrays: its 2-byte part, its 1-byte part and its half-byte part. A part exists if its bit is set in `nibbles`.
- * Residuals of 8 nibbles are stored as they are. In the array of half bytes, lanes i and i + 8 share a byte. */
+ * arrays: its 2-byte part, its 1-byte part and its half-byte part. A part exists if its bit (4, 2 or 1) is set in
+ * `nibbles`. Residuals of 8 nibbles are stored as they are. In the array of half bytes, lanes i and i + 8 share a
+ * byte. */
 static inline size_t packed_bytes(unsigned nibbles, int count)
 {
     const int pairs = count < COMP_LANES / 2 ? count : COMP_LANES / 2;
@@ -109,7 +111,7 @@ static inline size_t packed_bytes(unsigned nibbles, int count)
     return (nibbles & 4) / 2 * (size_t)count + (nibbles & 2) / 2 * (size_t)count + (nibbles & 1) * (size_t)pairs;
 }
 
-/* Packs `count` residuals; the lanes behind them must be 0. */
+/* Packs the first `count` residuals; the other lanes must be 0. */
 ROWS_INLINE unsigned char *pack_residuals(lanes residuals, unsigned nibbles, int count, unsigned char *out)
 {
     if (nibbles == 8) {
@@ -124,7 +126,7 @@ ROWS_INLINE unsigned char *pack_residuals(lanes residuals, unsigned nibbles, int
     uint64_t low, high;
     memcpy(&low, &half, sizeof low);
     memcpy(&high, (const unsigned char *)&half + sizeof low, sizeof high);
-    low |= high << 4; /* the lanes behind `count` are 0, so nothing is overwritten */
+    low |= high << 4; /* the lanes from `count` on are 0, so nothing is overwritten */
     memcpy(out, &twos, sizeof twos);
     out += (nibbles & 4) / 2 * (size_t)count;
     memcpy(out, &ones, sizeof ones);
@@ -133,7 +135,7 @@ ROWS_INLINE unsigned char *pack_residuals(lanes residuals, unsigned nibbles, int
     return out + (nibbles & 1) * (size_t)pairs;
 }
 
-/* Unpacks `count` residuals; the lanes behind them are undefined. */
+/* Unpacks `count` residuals; the other lanes are undefined. */
 ROWS_INLINE const unsigned char *unpack_residuals(const unsigned char *in, unsigned nibbles, int count,
                                                   lanes *residuals)
 {
@@ -183,7 +185,8 @@ ROWS_INLINE lanes expand_lanes(lanes from, unsigned mask)
     return load_lanes(gapped);
 }
 
-/* Compress and expand a row in memory. All 16 values of `from` may be read, and all 16 values of `to` written. */
+/* compress_row() and expand_row() do the same as compress_lanes() and expand_lanes() for a row in memory. They may read
+ * all 16 values of their input and write all 16 values of their output. */
 ROWS_INLINE void compress_row(const uint32_t *row, unsigned mask, uint32_t *to)
 {
 #if defined(__AVX512F__)
@@ -233,7 +236,7 @@ typedef struct word_residuals {
     uint8_t nibbles[2][COMP_ROWS];
 } word_residuals;
 
-/* Returns the residuals of the first row, where each value is predicted from its left neighbour. */
+/* Returns the residuals of the first row. Each value of this row is predicted from its left neighbour. */
 ROWS_INLINE lanes first_row_residuals(lanes values, unsigned mask)
 {
     uint32_t own[COMP_LANES + 1];

@@ -8,11 +8,11 @@
 
 /* Maximum number of children per node of the gather tree. Owners send along a tree of places (comp_route.h): within a
  * compute node every place sends to the node's first place; the first places form a heap with up to COMP_GATHER_FAN
- * children each. Without information about compute nodes each rank is treated as one. */
+ * children each. Without information about compute nodes each rank is treated as a node of its own. */
 enum { COMP_GATHER_FAN = 64 };
 
-/* These functions return the place to which the given place (>= 1) sends, and the number of places that send to the
- * given place. */
+/* comp_gather_parent() returns the place to which the given place (>= 1) sends; comp_gather_children() returns the
+ * number of places that send to the given place. */
 int comp_gather_parent(const comp_route *route, int place);
 int comp_gather_children(const comp_route *route, int place);
 

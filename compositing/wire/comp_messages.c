@@ -218,8 +218,8 @@ static void receive_sparse(round *r)
     check_mpi(r, code);
 }
 
-/* Marks the last message to a rank as the one after which no more follow. Returns false if there is no message to the
- * rank. */
+/* Marks the last message to a rank as final (flag 0), and the earlier ones as followed by more (flag 1). Returns false
+ * if there is no message to the rank. */
 static bool mark_last(const comp_messages *out, int rank)
 {
     comp_message *last = NULL;

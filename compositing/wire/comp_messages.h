@@ -54,7 +54,7 @@ typedef struct comp_writer {
  * all bytes that are still to be written; it determines the size of a new message. */
 unsigned char *comp_writer_reserve(comp_writer *writer, uint32_t owner, size_t bytes, size_t expected);
 
-/* Adds the data between the reserved space's start and `end`, which contains `records` records, to the parcel. */
+/* Adds the data from the start of the reserved space to `end` to the parcel. The data contain `records` records. */
 void comp_writer_commit(comp_writer *writer, unsigned char *end, uint32_t records);
 
 /* Buffers allocated before the rounds, so that a rank can take part in them even if it runs out of memory later. */
@@ -72,13 +72,14 @@ typedef struct comp_transport {
 insitu_status comp_transport_open(MPI_Comm comm, comp_transport *out, base_error *error);
 void comp_transport_close(comp_transport *transport);
 
-/* Runs one round: sends the messages in `out`; *in receives the messages of other ranks, which the caller must free.
+/* Runs one round: sends the messages in `out`; *in receives the messages of other ranks; the caller must free them.
  * `status` is this rank's status before the call; if it is an error, nothing is sent and received messages are
  * discarded. Returns this rank's own status. Collective. */
 insitu_status comp_messages_round(comp_transport *transport, const comp_route *route, int round, comp_messages *out,
                                   comp_messages *in, insitu_status status, base_error *error);
 
-/* Sends all fragments of ranks that cannot own pixels to their partners, which are owners, before the first round. */
+/* Before the first round, ranks that cannot own pixels send all their fragments to their partners. The partners are
+ * owners. */
 insitu_status comp_messages_to_owners(comp_transport *transport, const comp_route *route, comp_messages *out,
                                       comp_messages *in, insitu_status status, base_error *error);
 

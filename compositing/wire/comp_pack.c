@@ -5,8 +5,8 @@
 #include "memory.h"
 #include "region.h"
 
-/* Estimated number of bytes per fragment, which determines the size of a new message. Fragments of most pictures take
- * fewer. */
+/* Estimated number of bytes per fragment. It determines the size of a new message. Fragments of most pictures take
+ * fewer bytes. */
 enum { EXPECTED_BYTES = 16 };
 
 static insitu_status fail_for_memory(base_error *error, const char *what)

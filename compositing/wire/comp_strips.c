@@ -159,8 +159,8 @@ static void sort_pixel(const fragment **order, uint32_t count)
     }
 }
 
-/* Lists the strip's fragments sorted by pixel; those of pixel k begin at ends[k] on return. Returns false if memory ran
- * out. */
+/* Lists the strip's fragments sorted by pixel. On return, the fragments of pixel k begin at index ends[k]. Returns
+ * false if memory ran out. */
 static bool list_pixels(const comp_strips *s, uint32_t strip, comp_layers *layers)
 {
     const int64_t count = comp_strips_count(s, strip);

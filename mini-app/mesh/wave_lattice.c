@@ -1,9 +1,11 @@
 /* Cubes are split so that the cells of neighbouring cubes always share whole faces:
  *
  *   tets      six around the diagonal 000-111 (Kuhn): every face of the cube is split along the diagonal from its
- * lowest to its highest corner hex       one: no face is split wedges    two, extruded along z: the z faces are split
- * as for tets, the x and y faces are not split pyramids  six around a vertex in the centre. A face that must be split
- * for the neighbour becomes two tets instead: these cubes are the transition between all other kinds.
+ *             lowest to its highest corner
+ *   hex       one: no face is split
+ *   wedges    two, extruded along z: the z faces are split as for tets, the x and y faces are not split
+ *   pyramids  six around a vertex in the centre. A face that must be split for the neighbour becomes two tets
+ *             instead: these cubes are the transition between all other kinds.
  *
  * A mixed lattice contains, from below: hexes, one layer of pyramid cubes, tets, wedges (both need the same split of
  * the z faces between them), another layer of pyramid cubes, and hexes. A third of the hexes are replaced by pyramid
@@ -95,7 +97,7 @@ static bool neighbour_wants_split(const wave_lattice *lattice, const int ijk[3],
 
 static int cut_tets(const int64_t v[8], wave_cell *cells)
 {
-    /* Each tet has the edges of a path from corner 0 to corner 6, which follows the three axes in one of six orders.
+    /* Each tet has the edges of a path from corner 0 to corner 6. The path follows the three axes in one of six orders.
      * Tets of odd orders are mirrored. */
     static const int8_t path[6][2] = {{1, 2}, {3, 7}, {4, 5}, {2, 3}, {7, 4}, {5, 1}};
     for (int t = 0; t < 6; ++t) {
@@ -116,7 +118,8 @@ static int cut_pyramids(const wave_lattice *lattice, const int ijk[3], const int
 {
     int count = 0;
     for (int f = 0; f < 6; ++f) {
-        /* The diagonal must begin at the corner with the smallest id, which differs between the faces of the table. */
+        /* The diagonal must begin at the corner with the smallest id. The index of this corner differs between the
+         * faces of the table. */
         int64_t q[4];
         int least = 0;
         for (int i = 0; i < 4; ++i) {

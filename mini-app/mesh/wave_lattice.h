@@ -25,7 +25,7 @@ enum {
 
 typedef struct wave_cell {
     uint8_t type;      /* cell type, one of WAVE_TYPE_* */
-    int64_t vertex[8]; /* ids; those of lattice vertices come before those of cube centres */
+    int64_t vertex[8]; /* global ids; the ids of lattice vertices are smaller than those of cube centres */
 } wave_cell;
 
 wave_lattice wave_lattice_make(const int size[3], wave_cells cells, double jitter);

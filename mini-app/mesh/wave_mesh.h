@@ -1,6 +1,6 @@
-/* One rank's part of the mesh: its own cells, followed by the halo, which consists of cells of other ranks that share a
- * vertex with one of this rank's cells. Everything is computed from the partition by index arithmetic, so both sides of
- * every exchange compute the same lists without communication. */
+/* One rank's part of the mesh: its own cells, followed by the halo. The halo consists of the cells of other ranks that
+ * share a vertex with one of this rank's cells. Everything is computed from the partition by index arithmetic, so both
+ * sides of every exchange compute the same lists without communication. */
 #ifndef WAVE_MESH_H
 #define WAVE_MESH_H
 
@@ -19,10 +19,13 @@ typedef struct wave_link {
 typedef struct wave_mesh {
     wave_partition partition;
     int rank;
-    int32_t own_cells, cells;       /* number of own cells, which come first, and of all cells including the halo */
-    int32_t own_vertices, vertices; /* vertices of own cells come first, then those that only halo cells use */
-    int64_t *cell_ids;              /* global id of each cell */
-    int64_t *vertex_ids;            /* global id of each vertex */
+    /* own_cells: number of own cells, which come first; cells: number of all cells, including the halo */
+    int32_t own_cells, cells;
+    /* own_vertices: number of vertices of own cells, which come first; vertices: number of all vertices, including
+     * those that only halo cells use */
+    int32_t own_vertices, vertices;
+    int64_t *cell_ids;    /* global id of each cell */
+    int64_t *vertex_ids;  /* global id of each vertex */
     uint8_t *walls;       /* for each vertex the walls on which it lies, as wave_lattice_walls() returns them */
     uint8_t uniform_type; /* type of all cells; 0 if they are mixed */
     uint8_t *types;       /* type of each cell; NULL if all have uniform_type */
@@ -61,7 +64,7 @@ static inline int64_t wave_mesh_index(const wave_mesh *mesh, const void *array, 
 /* Returns the shape of a cell, and its vertices as local indices. */
 const wave_cell_shape *wave_mesh_cell(const wave_mesh *mesh, int32_t cell, int32_t vertex[8]);
 
-/* Returns the index in neighbours of an own cell's first face. */
+/* Returns the index of an own cell's first face in `neighbours`. */
 static inline int64_t wave_mesh_first_face(const wave_mesh *mesh, int32_t cell)
 {
     if (mesh->face_offsets) return mesh->face_offsets[cell];

@@ -13,7 +13,8 @@ typedef struct wave_cell_shape {
     int vertex_count, face_count;
     int face_size[6];  /* number of vertices of each face: 3 or 4 */
     int8_t face[6][4]; /* indices of the cell's vertices around each face */
-    double centre[8];  /* weight of each vertex in the centroid, which is exact for affine images of the regular cell */
+    /* weight of each vertex in the centroid; the centroid is exact for affine images of the regular cell */
+    double centre[8];
 } wave_cell_shape;
 
 static const wave_cell_shape wave_tet_shape = {
@@ -35,7 +36,7 @@ static const wave_cell_shape wave_pyramid_shape = {5,
                                                    {{0, 3, 2, 1}, {0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}},
                                                    {0.1875, 0.1875, 0.1875, 0.1875, 0.25}};
 
-/* Returns NULL for any other type. */
+/* Returns the shape of a cell type, or NULL for any other type. */
 static inline const wave_cell_shape *wave_cell_shape_of(int type)
 {
     switch (type) {

@@ -1,7 +1,7 @@
 /* Binned surface area heuristic (SAH), used by the parallel top of the tree and by the serial subtrees. Items are
  * sorted into bins by centroid along all three axes at the same time; every border between two bins of an axis is a
- * candidate plane. Maxima and counts do not depend on the order of the items, so bins filled by different threads merge
- * to the same bits. */
+ * candidate plane. Maxima and counts do not depend on the order of the items. Therefore the bins of several threads can
+ * be merged in any order, with bit-identical results. */
 #ifndef MMBVH_BINS_H
 #define MMBVH_BINS_H
 

@@ -114,8 +114,8 @@ static void fill_keys(const build *b, int chunk, fetch_box *exact)
     morton_make_keys(&b->source, b->coder, keys, count, exact);
 }
 
-/* Computes the items or Morton keys of all cells, quantized by a grid over the box, which is in the tree's
- * coordinates. */
+/* Computes the items or Morton keys of all cells. Positions are quantized by a grid over the given box; the box is in
+ * the tree's coordinates. */
 static void quantize_cells(build *b, const fetch_box *box)
 {
     b->grid = item_grid_make(box->lower, box->upper);

@@ -16,9 +16,11 @@ enum {
     /* number of chunks per thread; there are several, so that other threads can take chunks of a delayed one */
     SORT_CHUNKS = 4,
     SORT_CHUNKS_MAX = 64,
-    SORT_LARGE = 16, /* parts with more than 1/SORT_LARGE of all keys are sorted by all threads together */
+    /* a group of keys with equal digits is sorted by all threads together if it has more than 1/SORT_LARGE of all
+     * keys */
+    SORT_LARGE = 16,
     SORT_LARGE_MIN = 16384,
-    SORT_INSERTED = 24, /* parts with at most this many keys are sorted by insertion */
+    SORT_INSERTED = 24, /* groups with at most this many keys are sorted by insertion */
     SORT_LEFT_BITS = 2  /* log2 of the number of keys per digit, if they are spread evenly */
 };
 
@@ -185,7 +187,7 @@ typedef struct digit_counts {
 } digit_counts;
 
 typedef struct sorting {
-    int64_t large; /* parts with more keys than this are sorted by all threads together */
+    int64_t large; /* groups of keys with more keys than this are sorted by all threads together */
     int chunks, threads;
     digit_counts *counts; /* numbers of keys per chunk and digit */
 } sorting;
@@ -324,8 +326,8 @@ bool morton_sort(const morton_coder *coder, uint64_t *keys, uint64_t *other, int
 
 /* ---- the tree --------------------------------------------------------------------------------------------------- */
 
-/* Returns the number of keys whose highest differing bit is 0. The keys must be in ascending order, and at least
- * two. */
+/* Returns the number of keys in which the highest bit that differs between the keys is 0. There must be at least two
+ * keys, in ascending order. */
 static int64_t find_split(const uint64_t *keys, int64_t count)
 {
     const int bit = count_significant_bits(keys[0] ^ keys[count - 1]) - 1;

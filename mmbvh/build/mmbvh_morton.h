@@ -1,5 +1,5 @@
-/* Builds trees along a space-filling curve. Cells are sorted by a Morton key, which interleaves the bits of their
- * centroids; a node is split where the highest differing bit of its keys changes. */
+/* Builds trees along a space-filling curve. Cells are sorted by Morton keys, in which the bits of a cell's centroid are
+ * interleaved. A node is split where the highest bit that differs between its keys changes. */
 #ifndef MMBVH_MORTON_H
 #define MMBVH_MORTON_H
 
