@@ -132,8 +132,8 @@ static void encoded_sheets_decode_unchanged(void **context)
     free_pair(&p);
 }
 
-/* Checks columns of depths of a plane, exact in float32: only the first two rows have residuals, so that besides half a
- * byte for each row and word little is sent. */
+/* Checks columns of depths of a plane that are exact in float32. Only the first two rows have residuals, so that little
+ * is sent besides half a byte for each row and word. */
 static void straight_edges_compress_to_half_a_byte_per_row(void **context)
 {
     (void)context;
