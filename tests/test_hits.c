@@ -22,8 +22,8 @@ typedef struct tally {
     /* residual: largest residual of a hit; depth: largest error of depth in cells, minus what an error of the field of
      * 1e-6 explains */
     double residual, depth;
-    double raw;             /* largest error of depth of hits that are not tangent, in cells */
-    double moved;           /* largest error of depth of all hits, relative to compute_depth_uncertainty() */
+    double raw;   /* largest error of depth of hits that are not tangent, in cells */
+    double moved; /* largest error of depth of all hits, relative to compute_depth_uncertainty() */
 } tally;
 
 static int list_hits(const drawn_frame *drawn, int64_t pixel, const fragment *hits[REFERENCE_MAX_HITS])

@@ -12,7 +12,7 @@ typedef struct hanging {
     int n, side;
     test_hanging_shape shape;
     test_function *f;
-    int64_t line;      /* number of lattice points along an axis of the finest lattice */
+    int64_t line; /* number of lattice points along an axis of the finest lattice */
     /* index of the mesh's vertex for each point of the finest lattice; -1 if it is not created yet */
     int64_t *vertices;
     test_mesh *mesh;

@@ -11,7 +11,11 @@
 #include "mmbvh.h"
 #include "test_meshes.h"
 
-enum { SIDE = 7, LARGE_SIDE = 15 /* LARGE_SIDE: a mesh with enough cells for several blocks on each of several threads */, QUERIES = 5 };
+enum {
+    SIDE = 7,
+    LARGE_SIDE = 15 /* LARGE_SIDE: a mesh with enough cells for several blocks on each of several threads */,
+    QUERIES = 5
+};
 
 /* Intervals of the queries: one isovalue, several isovalues, the ranges in which a transfer function is not
  * transparent, and the least and the greatest of all values, each of which only one vertex has. */
