@@ -7,7 +7,7 @@
 #include "test_meshes.h"
 
 typedef enum chord_aim {
-    CHORD_RANDOM,       /* rays anywhere, in tiles of any size */
+    CHORD_RANDOM,       /* rays at random positions, in tiles of any size */
     CHORD_TO_VERTICES,  /* rays through a cell's vertices, exactly or nearly */
     CHORD_TO_EDGES,     /* rays through points on a cell's edges */
     CHORD_TO_FACES,     /* rays through points on a cell's faces */

@@ -9,7 +9,7 @@ struct conduit_node_impl {
     int id;
     char *data;
     int64_t count, stride;
-    void *owned; /* the data, if the node owns it */
+    void *owned; /* the data if the node owns it, else NULL */
     int child_count;
     conduit_node **children;
 };

@@ -19,8 +19,8 @@ void heap_start_failing(int64_t n, bool is_for_good);
 /* Ends the failures. Returns the number of allocations requested since heap_start_failing(). */
 int64_t heap_stop_failing(void);
 
-/* Between heap_pause() and heap_resume() the thread's allocations neither count nor fail. Pairs of them may be
- * nested. */
+/* Between heap_pause() and heap_resume(), allocations of the calling thread neither count nor fail. Pairs of them may
+ * be nested. */
 void heap_pause(void);
 void heap_resume(void);
 

@@ -10,9 +10,8 @@
 void integrate_in_double(const render_transfer *t, double length, double v_in, double v_out, double out[4]);
 void integrate_in_float(const render_transfer *t, double length, double v_in, double v_out, double out[4]);
 
-/* For each range of values, computes the four numbers of kernel_light_variation, which bound how much an error of the
- * field can change the light: its variation and cost, the maximum of the extinction, and the maximum of the
- * extinction's slope. */
+/* For each range of values, computes the four members of kernel_light_variation: variation, cost, extinction,
+ * steepness. They bound how much an error of the field can change the light. */
 void integral_variations(const render_transfer *t, int count, const double (*ranges)[2], double (*out)[4]);
 
 #endif

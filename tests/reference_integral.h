@@ -13,9 +13,9 @@ typedef struct reference_integral reference_integral;
 reference_integral *reference_integral_create(const render_job *job, double tolerance);
 void reference_integral_free(reference_integral *scene);
 
-/* Computes the colour of a pixel over the background, including hits, which are sorted by depth; the last hit may be
- * opaque. If the job clips its volumes, the caller passes a transparent hit at each depth at which the ray enters or
- * leaves a clip, so that the ray is cut there too. */
+/* Computes the colour of a pixel over the background, including hits. The hits are sorted by depth, and the last one
+ * may be opaque. If the job clips its volumes, the caller passes a transparent hit at each depth at which the ray
+ * enters or leaves a clip, so that the ray is cut there too. */
 void reference_integral_trace(const reference_integral *scene, int x, int y, const float background[4],
                               const reference_hit *hits, int hit_count, double rgba[4]);
 

@@ -13,7 +13,7 @@ typedef struct loop {
     bool is_backward;
     int number[REFERENCE_MAX_CORNERS];
     double place[REFERENCE_MAX_CORNERS][3];
-    double normal[3], area; /* unit normal, and twice the polygon's area */
+    double normal[3], area; /* normal: unit normal; area: twice the polygon's area */
 } loop;
 
 static double signed_area_along_normal(const double *normal, const double *a, const double *b, const double *c)

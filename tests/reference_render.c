@@ -16,7 +16,7 @@
 typedef struct event {
     double depth;
     bool is_sample;
-    int order; /* surface id or volume layer */
+    int order; /* of a hit: surface id; of a sample: index of the volume layer */
     double transmittance;
     double error_bound; /* for a hit: cell size times conditioning, the scale of the depth's rounding error */
     reference_hit hit;  /* for a sample only the colour is set */
@@ -47,7 +47,7 @@ typedef struct camera_cell {
     int64_t index;
     int64_t vertices[REFERENCE_MAX_VERTICES];
     reference_cell cell;
-    reference_crossing ends[2]; /* the ends of the current interval */
+    reference_crossing ends[2]; /* ends of the interval that is traced at present */
     double size;
 } camera_cell;
 

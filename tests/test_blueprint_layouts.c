@@ -140,8 +140,8 @@ static void make_hex_cells(layout_case *l, const int64_t counts[3])
     }
 }
 
-/* Makes a uniform grid. first: index of the block's first vertex along x in the whole mesh, which the node states as
- * elements/origin. */
+/* Makes a uniform grid. first: index of the block's first vertex along x in the whole mesh; the node states this index
+ * as elements/origin. */
 static void make_uniform_grid(layout_case *l, int dimensions, int64_t first)
 {
     static const char *const paths[4][3] = {

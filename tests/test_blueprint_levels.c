@@ -13,7 +13,7 @@
 
 enum { MOST_BOXES = 16, SIDE = 8, SIZE = 120 };
 
-/* A view along z that shows exactly the mesh, whose width is 0.8. */
+/* A view along z that shows exactly the mesh. The width of picture and mesh is 0.8. */
 static const char scene[] =
     "images:\n  - name: a\n    size: [120, 120]\n    background: [0, 0, 0, 0]\n    camera: {position: [0.4, 0.4, 5], "
     "focal: [0.4, 0.4, 0], up: [0, 1, 0], projection: orthographic, height: 0.8}\n    layers:\n"

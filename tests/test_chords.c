@@ -173,7 +173,7 @@ static double compute_depth(const render_job *job, float t)
     return (double)t / job->space.scale + job->space.depth_origin;
 }
 
-/* Returns whether all unshared ends are at allowed depths. */
+/* Returns whether all unshared ends are at depths that the bounds of chord_hull.h allow. */
 static bool is_paired(const render_job *job, const chord_ray *r, const chord_interval *ray_intervals, int count)
 {
     float lone[2 * CHORD_MAX_INTERVALS];

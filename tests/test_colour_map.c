@@ -85,9 +85,9 @@ static void colour_map_codes_match_published_codes(void **state)
     }
 }
 
-/* Checks Moreland's map, which is computed by a formula. The published colours at its ends must match to half a code.
- * The published middle is the middle of a table of 257 entries; it lies between two entries of the library's table of
- * 256 and must match to one code more. */
+/* Checks Moreland's map. The library computes it by a formula. The published colours at its ends must match to half a
+ * code. The published middle is the middle of a table of 257 entries; it lies between two entries of the library's
+ * table of 256 and must match to one code more. */
 static void colour_map_matches_published_colours(void **state)
 {
     (void)state;

@@ -59,7 +59,7 @@ static void set_scale_case(render_transfer *t, const scale_case *l)
     if (!l->is_banded) t->colours = colour_map_table("viridis", &t->colour_count);
 }
 
-/* value_error: error of the value at the hit by the rounding of depth, coordinates and values to float32, which is 4e-6
+/* value_error: error of the value at the hit by the rounding of depth, coordinates and values to float32. It is 4e-6
  * for lengths and values near 1; the fixture bounds depths by the same number. The colours at value - value_error and
  * value + value_error bound the error of the colour. A pixel is skipped if the colour jumps between these two values,
  * at the edge of a band or of the range. */

@@ -322,8 +322,8 @@ static int find_block_winner(uint32_t block, const int64_t *fragments, int ranks
 }
 
 /* Checks that the probability p of a rank to win a block is proportional to the fourth power of its number of
- * fragments. In n draws a rank must win pn times, with a tolerance of five standard deviations sqrt(n p (1 - p)), which
- * all but one case of a million meet, plus p n / 16, because priorities are rounded to 1/16 of p. */
+ * fragments. In n draws a rank must win pn times, with a tolerance of five standard deviations sqrt(n p (1 - p)),
+ * exceeded in one case of a million, plus p n / 16, because priorities are rounded to 1/16 of p. */
 static void owner_probability_follows_fragment_count(void **context)
 {
     (void)context;

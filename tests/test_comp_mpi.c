@@ -320,7 +320,7 @@ static void smooth_surfaces_compress_to_a_third(void **context)
                       "composite succeeds");
     int64_t own[2] = {statistics.sent_bytes, statistics.sent_messages}, all[2];
     MPI_Allreduce(own, all, 2, MPI_INT64_T, MPI_SUM, comm);
-    /* number of pixels sent to their owners, which is also the number of pixels sent to rank 0 */
+    /* number of pixels sent to their owners; as many finished pixels are sent to rank 0 */
     const double travelled = (double)WIDTH * HEIGHT * (rank_count - 1) / rank_count;
     assert_everywhere(rank_count == 1 ? all[0] == 0
                                       : (double)all[0] < 2 * MOST_BYTES * travelled + 64.0 * (double)all[1],

@@ -265,7 +265,7 @@ static void check_route_to_owner(const comp_route *route, int from, int owner)
     for (int round = 0; round < route->round_count; round++) {
         const int to = find_next_position(route, round, at, owner), stride = comp_route_stride(route, round);
         assert_in_range(to, 0, route->owners - 1);
-        /* The sender is a partner of the receiver. */
+        /* The sender must be a partner of the receiver. */
         assert_int_equal(comp_route_partner(route, round, stride, to, comp_route_digit(route, round, stride, at)), at);
         at = to;
     }

@@ -50,7 +50,7 @@ static double get_line_coverage(const render_camera *c, const image *picture, co
 
 /* Checks the coverage of the pixels at VTK's points. A point is at most half of a pixel's diagonal (0.71) from the
  * pixel's middle, and a line is 1.5 pixels wide, so it covers at least 1.25 - 0.71 of the pixel. VTK cuts the polygon
- * of a hex into triangles, which moves lines of this field by at most 0.1 of a pixel on 40 cubes. At sharp turns of a
+ * of a hex into triangles. On 40 cubes this moves lines of this field by at most 0.1 of a pixel. At sharp turns of a
  * line, at a saddle or near an extremum, the lines of neither program are straight, so 1 of 1000 points may be off the
  * line. */
 static void check_kind(test_mesh_kind kind, int type, fixture_camera camera)

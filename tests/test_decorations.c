@@ -106,8 +106,8 @@ static void bands_of_ids_are_centred_on_the_ids(void **state)
     }
 }
 
-/* Returns the distance of a point from the renderer's ray through a position in the picture, which is in continuous
- * pixel coordinates. */
+/* Returns the distance of a point from the renderer's ray through a position in the picture. The position is in
+ * continuous pixel coordinates. */
 static double distance_from_ray(const render_camera *c, const double pixel[2], const double point[3])
 {
     double base[3], direction[3], right[3], down[3], unused[3], along = 0, length = 0, square = 0;

@@ -148,9 +148,9 @@ static void name_case(const hanging_case *c, char *name, size_t size)
 
 /* ---- volumes ------------------------------------------------------------------------------------------------- */
 
-/* Compares the picture with the adaptive integral in double, which leaves no visible gap by rounding. Rays in the plane
- * of a face, such as those along x, must be left out, because the integral does not decide on which side of the face
- * they are. */
+/* Compares the picture with the adaptive integral. In double, rounding leaves no visible gap. Rays in the plane of a
+ * face, such as those along x, must be left out, because the integral does not decide on which side of the face they
+ * are. */
 static bool is_as_integrated(const test_mesh *mesh, const drawing *d, fixture_camera camera, const image *drawn,
                              const char *what)
 {

@@ -12,7 +12,7 @@
 #include <cmocka.h>
 
 static const double three_values[3] = {-0.6, 0.3, 0.95};
-static const double depth_allowed = 1e-5; /* in cells */
+static const double depth_allowed = 1e-5; /* largest error of depth, in cells */
 static const test_mesh_kind kinds[4] = {TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS, TEST_TETS};
 
 /* Counts and largest errors over the rays and hits of a test. */
@@ -327,8 +327,8 @@ static void set_axis_lights(render_fixture *f, render_light lights[3])
     f->surfaces[0].material = (render_material){.ambient = 0, .diffuse = 1, .specular = 0, .shininess = 1};
 }
 
-/* Returns the largest difference between the fragment's colour and the colour of the gradient's direction, which is
- * oriented towards the eye. */
+/* Returns the largest difference between the fragment's colour and the colour that the gradient's direction, oriented
+ * towards the eye, has in these lights. */
 static double compute_normal_error(const render_fixture *f, const fragment *hit, const double gradient[3])
 {
     const int width = f->job.camera.width;

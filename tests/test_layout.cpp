@@ -176,9 +176,9 @@ void text_at_right_is_beside_the_colour_bar(void **)
     assert_int_equal(places.blocks.size(), 2);
 }
 
-/* Checks a picture whose corner is covered by another picture, which has a height of a third, four fifths or all of the
- * picture's height. The colour bar must be at least 0.4 of the picture's height long. It must be below or above the
- * covering picture if there is enough space, and next to it otherwise. */
+/* Checks a picture one of whose corners is covered by another picture. The height of the covering picture is a third,
+ * four fifths or all of the picture's height. The colour bar must be at least 0.4 of the picture's height long. It must
+ * be below or above the covering picture if there is enough space, and next to it otherwise. */
 void colour_bars_avoid_covered_corners(void **)
 {
     const std::vector<insitu_colour_bar> bars = {make_bar("Temperature [K]")};

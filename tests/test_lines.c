@@ -255,8 +255,9 @@ static const test_layout layouts[2] = {{.wide_coordinates = true, .wide_values =
                                        {.is_interleaved = true}};
 
 /* Compares the lines of a frame with the reference. The root mean square error of a pixel must be below 0.02: the
- * kernels use a ramp one pixel wide for lines in all directions, whose error is up to 0.06 for diagonal lines, because
- * their exact ramp is wider. The sum of the coverage, which is the width times the length, must agree to 0.01. */
+ * kernels use a ramp one pixel wide for lines in all directions. Its error is up to 0.06 for diagonal lines, because
+ * the exact ramp of a diagonal line is wider. The sum of the coverage, which is the width times the length, must agree
+ * to 0.01. */
 static void check_frame(const truth *t, const lines_frame *frame, const char *kind, int set)
 {
     drawn_frame drawn;

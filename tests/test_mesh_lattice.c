@@ -1,8 +1,8 @@
 /* Makes lattices cube by cube. The corners of a cube are numbered by bits (bit 0: +x, bit 1: +y, bit 2: +z). Tets and
- * wedges split the faces of a cube along the diagonal from the lowest to the highest corner, which is the same for both
- * cubes at a face. The mixed mesh is conforming. A cube of even parity is a hex, two wedges or six tets. A cube of odd
- * parity has only even neighbours: it has a pyramid on each face that is a quad of the neighbour, and two tets on each
- * face that is two triangles of the neighbour. */
+ * wedges split the faces of a cube along the diagonal from the lowest to the highest corner, so that both cubes at a
+ * face use the same diagonal. The mixed mesh is conforming. A cube of even parity is a hex, two wedges or six tets. A
+ * cube of odd parity has only even neighbours: it has a pyramid on each face that is a quad of the neighbour, and two
+ * tets on each face that is two triangles of the neighbour. */
 #include "test_mesh_make.h"
 
 const char *test_mesh_kind_name(test_mesh_kind kind)

@@ -1,4 +1,4 @@
-/* Functions for generators of test meshes. They fill the arrays of a test_mesh, which must be large enough. */
+/* Functions for generators of test meshes. They fill the arrays of a test_mesh; these arrays must be large enough. */
 #ifndef TEST_MESH_MAKE_H
 #define TEST_MESH_MAKE_H
 

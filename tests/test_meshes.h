@@ -79,7 +79,7 @@ const char *test_polyhedron_name(test_polyhedron_shape shape);
 void test_mesh_make_polyhedron(test_polyhedron_shape shape, test_function *f, test_mesh *out);
 
 /* Stores cells of the four types as polyhedra with the same vertices and faces. Neighbours share faces. share: fraction
- * of cells, which are chosen by a hash; 1 means all cells. */
+ * of cells that become polyhedra, chosen by a hash; 1 means all cells. */
 void test_mesh_to_polyhedra(test_mesh *mesh, double share);
 
 void test_mesh_set_values(test_mesh *mesh, test_function *f);

@@ -172,7 +172,8 @@ static void interface_reflects_and_transmits_by_its_impedances(void **state)
         }
         print_message("cells %d: error %.4f behind an interface\n", kind, error / whole);
         /* The pulse is 6.4 cubes wide; the plane pulses of the tests above have errors of 0.01 at 4.8 cubes and 0.002
-         * at 9.6. The reconstruction smears the kink at the interface over two cells, which doubles the error. */
+         * at 9.6. The error is twice as large here, because the reconstruction smears the kink at the interface over
+         * two cells. */
         assert_true(error / whole <= 0.02);
         free_model(&m);
     }

@@ -99,8 +99,8 @@ static node_view compute_leaf_by_brute_force(const lattice *l, const mmbvh *tree
 }
 
 /* Checks that a box is hardly larger than expected. The compact layout rounds a lower bound down to a whole step, and
- * by one step more if the quotient is rounded in the wrong direction. It rounds an extent, which is measured from the
- * stored lower bound, up by at most 1/256 of itself and 16 steps. */
+ * by one step more if the quotient is rounded in the wrong direction. It measures an extent from the stored lower bound
+ * and rounds it up by at most 1/256 of itself and 16 steps. */
 static void assert_tight_box(const mmbvh *tree, const node_view *node, const node_view *expected)
 {
     for (int axis = 0; axis < 3; axis++) {
@@ -292,7 +292,7 @@ static void no_field_gives_infinite_ranges(void **state)
     free_lattice(&l);
 }
 
-/* Checks a mesh of 29,791 hexes, whose tree has more nodes than one task of a refit processes. */
+/* Checks a mesh of 29,791 hexes: its tree has more nodes than one task of a refit processes. */
 static void refitted_ranges_equal_a_fresh_build(void **state)
 {
     (void)state;

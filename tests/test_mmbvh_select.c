@@ -128,7 +128,7 @@ static void selection_supports_all_field_kinds(void **state)
         test_view view;
         test_view_create(&mesh, (test_layout){false}, &view);
         const int64_t count =
-            /* enough values for cells and for vertices */
+            /* number of values, enough for a field in cells and for one at vertices */
             mesh.cell_count > mesh.vertex_count ? mesh.cell_count : mesh.vertex_count;
         double *vectors = malloc((size_t)count * 3 * sizeof *vectors);
         int32_t *integers = malloc((size_t)count * sizeof *integers);

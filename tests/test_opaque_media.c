@@ -86,11 +86,11 @@ static void compare_integrals(render_fixture *f, double most, const char *what)
     if (!(worst <= most)) fail_msg("%s: off by %g", what, worst);
 }
 
-/* Compares pictures with the reference. The kernels skip what would change the colour of a ray, which is at most 1, by
- * less than 1e-7. A change a thousand times as large, nearly 1e-4, would be detected: it is about ten times the error
- * of samples (fixture_usual_bounds). For segments, values at their ends have an error of up to 4e-7 of the transfer
- * function's domain (docs/development/decisions/volume.md), and colours have this error times the number of table
- * entries. */
+/* Compares pictures with the reference. Colours are at most 1, and the kernels skip what would change the colour of a
+ * ray by less than 1e-7. A change a thousand times as large, nearly 1e-4, would be detected: it is about ten times the
+ * error of samples (fixture_usual_bounds). For segments, values at their ends have an error of up to 4e-7 of the
+ * transfer function's domain (docs/development/decisions/volume.md), and colours have this error times the number of
+ * table entries. */
 static void skipping_hidden_cells_changes_no_picture(void **state)
 {
     (void)state;

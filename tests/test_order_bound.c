@@ -1,5 +1,5 @@
 /* Compares the bounds of the difference between a cell of higher order and its linear pieces (the linear cells into
- * which it is split) with brute force. The polynomials of the cell are sums of powers, whose values, positions and
+ * which it is split) with brute force. The polynomials of the cell are sums of powers, so that values, positions and
  * gradients are computed in closed form. The pieces are those of the pattern by which the library splits cells. */
 #include <math.h>
 #include <setjmp.h>

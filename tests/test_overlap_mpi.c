@@ -312,8 +312,8 @@ static void compare_partitions(const test_mesh *mesh, const drawing *d, bool wit
         if (overlaps < FEWEST || alone < FEWEST)
             fprintf(stderr, "%s, scene %d: %d pixels overlap, %d alone\n", what, (int)d->scene, (int)overlaps,
                     (int)alone);
-        /* Segments of several volumes are drawn with separate fragments in the first drawing, which does not report
-         * overlaps. */
+        /* Segments of several volumes are drawn with separate fragments in the first drawing already. No overlaps are
+         * reported then. */
         const bool is_found = (overlaps >= FEWEST && alone >= FEWEST) || (d->max_error > 0 && d->scene == TWO_VOLUMES);
         good = is_found && (rank_count == 1 || same_images(&whole, &ours, d, what));
         /* The reference is slow. It is compared on one rank only, since the picture is the same on any number of

@@ -1,5 +1,5 @@
-/* Checks that any number of ranks gives the same image. Each rank draws its part of a mesh, which is distributed in
- * blocks, randomly or as a checkerboard, with its own numbering of vertices, and the pictures are composited. Rank 0
+/* Checks that any number of ranks gives the same image. The cells of a mesh are distributed in blocks, randomly or as a
+ * checkerboard. Each rank draws its part with its own numbering of vertices, and the pictures are composited. Rank 0
  * draws the whole mesh by itself and compares the pictures. Surfaces must be bit-identical in depth and colour. Volumes
  * by samples, by exact segments and by segments under max_error must agree to 1e-6, because fragments are blended in
  * different groups. The test includes ranks without a cell, ranks without a mesh, and ranks that have the cells of

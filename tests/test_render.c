@@ -302,8 +302,8 @@ static void single_cells_match_the_reference(void **state)
 {
     (void)state;
     static const double values[3] = {-0.25, 0.1, 0.35};
-    /* Rounding to float32 is 6e-8 of a sliver's length, which is 1e-3 of its thickness. The margin and the tolerance of
-     * depth follow from this error. */
+    /* Rounding to float32 changes positions by 6e-8 of a sliver's length, or 1e-3 of its thickness. The margin and the
+     * tolerance of depth follow from this error. */
     static const fixture_bounds thin = {.depth = 1e-2, .colour = 2, .excluded = 1, .margin = 1e-3};
     for (test_cell_shape shape = 0; shape < TEST_SHAPE_COUNT; shape++)
         for (fixture_camera camera = 0; camera < CAMERA_INSIDE; camera++) {

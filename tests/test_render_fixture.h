@@ -41,7 +41,7 @@ typedef struct render_fixture {
  * camera is outside the mesh. */
 void fixture_create(render_fixture *f, const test_mesh *meshes, int count, test_layout layout, double cell_size,
                     double scale, const double offset[3]);
-/* Creates the usual fixture: one mesh in [-1, 1]^3 with coordinates in double. */
+/* Creates the usual fixture: one lattice of n^3 cubes in [-1, 1]^3 with coordinates in double. */
 void fixture_create_lattice(render_fixture *f, test_mesh_kind kind, int n, double jitter, test_function *field);
 void fixture_free(render_fixture *f);
 

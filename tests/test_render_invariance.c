@@ -260,7 +260,7 @@ static double depth_difference(const drawn_frame *a, const drawn_frame *b)
 
 /* Checks cells whose vertices are reordered by a symmetry of the cell. The faces are the same, so exactly the same rays
  * hit them. The map inside has other coordinates and rounds differently: t has an error of about 1e-7 times the
- * conditioning, which is up to 30 among 61 × 47 rays. */
+ * conditioning. The conditioning is up to 30 among 61 × 47 rays. */
 static void reordered_cells_draw_the_same(void **state)
 {
     (void)state;

@@ -2,7 +2,7 @@
  * time, so this program starts itself to check the selection; with an argument it only prints the selected set. The
  * sets differ in the width of a packet, which must not change any result, and in fused multiply-adds, which change
  * roundings: t by about 6e-8 times the conditioning, and a colour by this error times the slopes of shading. The usual
- * run draws each scene from one camera, which changes with the kind of mesh. The long run draws from all cameras. */
+ * run draws each scene from a single camera, another one for each kind of mesh. The long run draws from all cameras. */
 #include "test_effort.h"
 #include "test_render_fixture.h"
 

@@ -139,7 +139,8 @@ static void random_points(double from[3], double to[3])
 }
 
 /* Aims the rays of all lanes: near the first ray, from 1e-7 to 1e-1 off, or anywhere. Half of the near rays are almost
- * parallel to the depth axis, because the bounds of a cell are made for such rays, which are those of a tile. */
+ * parallel to the depth axis, because the bounds of a cell are made for the rays of a tile, which are almost parallel
+ * to this axis. */
 static void aim_all_rays(bundle *b, bool is_near)
 {
     const double lean = is_near && draw_uniform(0, 1) < 0.5 ? pow(10, draw_uniform(-3, -1)) : 1;

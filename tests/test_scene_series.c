@@ -320,7 +320,7 @@ static void camera_paths_interpolate_positions_and_stop_at_ends(void **state)
     scene_free(&s);
 }
 
-/* Checks a path with two positions, which is interpolated by cycles. At the fraction s of the cycles, the camera must
+/* Checks a path with two positions that is interpolated by cycles. At the fraction s of the cycles, the camera must
  * have moved by 3 s^2 - 2 s^3 of the distance. */
 static void camera_paths_of_two_positions_ease_in_and_out(void **state)
 {

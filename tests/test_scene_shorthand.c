@@ -145,7 +145,7 @@ static void short_forms_equal_their_full_forms(void **context)
     }
 }
 
-/* Checks colour names in a map's list of colours, which is read from the document by paths. */
+/* Checks colour names in a map's list of colours. The parser reads this list from the document by paths. */
 static void colours_of_maps_have_names(void **context)
 {
     (void)context;

@@ -25,12 +25,12 @@ static double compute_ramp_fraction(int field, uint64_t vertex, uint64_t seed)
     return field == 2 ? test_uniform_between(0, 100 * seed + 5, 0.1, 0.9) : share;
 }
 
-/* Returns a bound of the change of light if a value has an error of 4e-7 of the domain, which is the error of values of
- * polyhedra in float32. The error of the opacity a is this error times the ramp's slope, and that of the extinction,
+/* Returns a bound of the change of light if a value has an error of 4e-7 of the domain (the error of values of
+ * polyhedra in float32). The error of the opacity a is this error times the ramp's slope, and that of the extinction,
  * -log(1 - a), is larger by at most 1 / (1 - a).
  *
- * For light, let the extinction k have the error dk(s). With the transmittance T(s) up to s, the light L = int c k T ds
- * has the error int dk (c T - int_s c k T) ds, whose bracket is at most T for colours c in [0, 1]. So the error of
+ * * For light, let the extinction k have the error dk(s). With the transmittance T(s) up to s, the light L = int c k T
+ * ds has the error int dk (c T - int_s c k T) ds, whose bracket is at most T for colours c in [0, 1]. So the error of
  * light is at most int dk T ds. This is at most dk times the length, and at most the largest dk / k, because int k T ds
  * <= 1. */
 static double bound_rounding(const step_function *function, double width, double unit)
@@ -82,8 +82,8 @@ static void verify_ramp(test_cell_shape shape, ramp_scene scene, double width, u
     if (scene == POLYHEDRON) fprintf(stderr, "%.2g off in all; beyond what rounding may do, ", raw);
 }
 
-/* Checks the ramps of all widths and cell types. The usual run draws a quarter of the seeds, which includes each kind
- * of field and changes with the width and the cell type. */
+/* Checks the ramps of all widths and cell types. The usual run draws a quarter of the seeds, with each kind of field;
+ * it is another quarter for each width and cell type. */
 static void verify_ramps(ramp_scene scene)
 {
     static const char *const how[] = {"", " cut by a surface", " as polyhedron"};

@@ -77,8 +77,8 @@ static void set_segments(render_fixture *f, double step, double max_error)
 }
 
 /* Tolerance of exact segments. The integral of a segment has an error of 4.4e-7 of the light that it absorbs
- * (kernel_integral.h), which adds up to at most 1 over a ray. The ends of segments are exact (kernel_exact.h), and sums
- * of light are compensated. */
+ * (kernel_integral.h), and the absorbed light adds up to at most 1 over a ray. The ends of segments are exact
+ * (kernel_exact.h), and sums of light are compensated. */
 #define EXACT 1e-6
 
 static void tets_are_exact_for_every_camera(void **state)
@@ -127,8 +127,8 @@ static void begin_random_tet(uint64_t seed, test_mesh *mesh, render_fixture *f)
 
 /* Checks random tets, including slivers, with random functions and unit distances from 1e-3 to 1e4 of the tet's size.
  * Optical depths are from 1e-8 to more than 1e3, and opacities have steps or rise to 0.99 within a tenth of the range
- * of the tet's values. If the ends of segments were rounded to float32, they would be off by 1e-7, which would be
- * magnified to 3.7e-6. */
+ * of the tet's values. If the ends of segments were rounded to float32, their error of 1e-7 would be magnified to
+ * 3.7e-6. */
 static void random_tets_are_exact(void **state)
 {
     static const double most[3] = {0.5, 0.9, 0.99};
@@ -459,7 +459,8 @@ static void all_overlapping_meshes_are_visible(void **state)
 }
 
 /* Checks that the result of a ray is bit-identical whatever other rays and cells are in its packet: pixels must depend
- * neither on the border of the picture nor on the order of cells, which changes the order of the tree's leaves. */
+ * neither on the border of the picture nor on the order of cells (another order of cells gives another order of the
+ * tree's leaves). */
 static void pictures_do_not_depend_on_the_order_of_cells(void **state)
 {
     (void)state;
