@@ -1,5 +1,6 @@
-/* Chooses cameras and rays at a mesh (chord_aim.h). A ray to a point is exact in double; float32 then rounds the ray
- * and the point. If the point is the middle of the tile, both are exact in float32, and deciding on which side of the
+/* Chooses cameras and rays that meet a mesh (chord_aim.h). A ray through a point is exact in double. Its rounding to
+ * float32 moves the ray by up to half a unit in the last place, so the ray passes the point on either side. If the
+ * point projects to the middle of the tile, ray and point are exact in float32 too, and the test on which side of the
  * point the ray passes is a tie. */
 #include "chord_aim.h"
 
@@ -123,7 +124,8 @@ static void choose_point_on_face(const face_loop *face, chord_aim aim, uint64_t 
     interpolate_points(out, c, draw_uniform(counter, 0, 1), out);
 }
 
-/* Computes a point outside the mesh on the line from b through a, at the given distance from a. */
+/* Computes the eye: the point at the given distance from a on the line from b through a, beyond a. It is outside the
+ * mesh. */
 static void move_eye_back(const double *a, const double *b, double distance, double eye[3])
 {
     double square = 0;
@@ -131,8 +133,9 @@ static void move_eye_back(const double *a, const double *b, double distance, dou
     for (int k = 0; k < 3; k++) eye[k] = a[k] - distance * (b[k] - a[k]) / sqrt(square);
 }
 
-/* Sets a camera whose eye lies on the line of the face's first edge, or in the plane of its first three vertices. Every
- * second camera also looks along that line, so that orthographic rays run along it too. */
+/* Sets a camera in the plane of a face. The eye lies on the line through the face's first edge (CHORD_ALONG_EDGES) or
+ * in the plane of its first three vertices (CHORD_ALONG_FACES). Half of the cameras also look along this line or plane,
+ * so that orthographic rays run along it too. */
 static void set_camera_along_face(const face_loop *face, chord_aim aim, render_camera *camera, uint64_t *counter)
 {
     double to[3], eye[3], focal[3];
@@ -164,7 +167,7 @@ static void aim_anywhere(const render_camera *camera, uint64_t *counter, chord_r
                 rays->centre_y + draw_uniform(counter, -half, half));
 }
 
-/* Aims rays from the eye at most 45 degrees off the view direction. */
+/* Adds rays around a random direction that is at most about 45 degrees off the view direction. */
 static void make_ray_directions_positive(uint64_t *counter, chord_rays *rays)
 {
     rays->centre_x = draw_uniform(counter, -0.9, 0.9);
@@ -174,7 +177,8 @@ static void make_ray_directions_positive(uint64_t *counter, chord_rays *rays)
                 rays->centre_y + draw_uniform(counter, -0.1, 0.1));
 }
 
-/* Aims half of the rays at the point itself, and the others past it by 1e-9 to 1e-3. */
+/* Adds a ray through the point itself (half of the rays) or past it, at a distance of 1e-9 to 1e-3 in the image plane.
+ * The first ray also chooses the tile's middle: the point's projection, or a position within 0.05 of it. */
 static void aim_at(const render_camera *camera, const double p[3], uint64_t *counter, chord_rays *rays)
 {
     double x, y;
@@ -200,8 +204,8 @@ static void aim_at_cell(const test_mesh *mesh, int64_t cell, chord_aim aim, cons
     }
 }
 
-/* Aims rays at vertices, edges and inner points of a face that the camera sees as a line, so that every ray meets the
- * face along that line. */
+/* Sets a camera that sees a face as a line, and aims rays at the face's vertices, edges and inner points. Every ray
+ * then meets the face along that line. */
 static void aim_along(const test_mesh *mesh, int64_t cell, chord_aim aim, uint64_t *counter, render_camera *camera,
                       chord_rays *rays)
 {
@@ -217,8 +221,8 @@ static void aim_along(const test_mesh *mesh, int64_t cell, chord_aim aim, uint64
     aim_at_cell(mesh, cell, (chord_aim)(CHORD_TO_VERTICES + draw_uniform_index(counter, 3)), camera, counter, rays);
 }
 
-/* Aims along an axis or a diagonal of a face or of the cube, in either direction; eyes of perspective cameras lie on
- * lattice lines. Rays are an eighth of a cube apart and begin on a lattice plane. */
+/* Aims rays along an axis or a diagonal of a face or of the cube, in either direction. Eyes of perspective cameras lie
+ * on lattice lines. Rays are an eighth of a cube's side apart, and the first rays lie on lattice planes. */
 static void aim_by_lattice(int n, uint64_t *counter, render_camera *camera, chord_rays *rays)
 {
     const double side = 2.0 / n;

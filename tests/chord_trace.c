@@ -13,7 +13,7 @@
 
 typedef struct chord_state {
     chord_rays *rays;
-    int first; /* number of lane 0's ray */
+    int first; /* index of the ray in lane 0 */
 } chord_state;
 
 static void chord_store_intervals(const chord_state *state, vm mask, vf t_in, vf t_out)
@@ -66,7 +66,7 @@ static void chord_trace_cell(kernel_packet *p, const chord_state *state, const g
     for (int n = 0; n < intervals; n++) chord_store_intervals(state, list[n].mask, list[n].t_in, list[n].t_out);
 }
 
-/* Returns whether a ray may meet a node's box, which is extended by more than all rounding. */
+/* Returns whether a ray may meet a node's box. The box is enlarged by more than all rounding errors. */
 static bool chord_meets_box(const double base[3], const double direction[3], const float lower[4], const float upper[4])
 {
     double from = -1e30, to = 1e30;

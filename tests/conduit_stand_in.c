@@ -9,7 +9,7 @@ struct conduit_node_impl {
     int id;
     char *data;
     int64_t count, stride;
-    void *owned; /* the data, if the node owns it */
+    void *owned; /* the data if the node owns it, else NULL */
     int child_count;
     conduit_node **children;
 };
@@ -49,7 +49,7 @@ void conduit_node_destroy(conduit_node *node)
     free(node);
 }
 
-/* Returns the child with the first name of the path; *rest is the rest of the path. */
+/* Returns the child whose name is the first component of the path; *rest receives the remaining path. */
 static conduit_node *first_child(const conduit_node *node, const char *path, const char **rest)
 {
     const size_t length = strcspn(path, "/");

@@ -1,6 +1,6 @@
-/* Replaces the few functions of Conduit's C API that the adaptors call, under the same names, since Debian has no
- * package of Conduit. A node is a name, children, or an array in the test's memory. On a missing path or a node of
- * another type Conduit throws an exception; this replacement ends the process. */
+/* Defines the functions of Conduit's C API that the adaptors call, with the same names, since Debian has no package of
+ * Conduit. A node has a name and either children or an array in the test's memory. If a path is missing or a node has
+ * another type, Conduit throws an exception, and this replacement ends the process. */
 #ifndef CONDUIT_STAND_IN_H
 #define CONDUIT_STAND_IN_H
 #define CONDUIT_NODE_H /* the include guard of Conduit's own header */
@@ -11,7 +11,7 @@ typedef int64_t conduit_index_t;
 typedef struct conduit_node_impl conduit_node;
 typedef struct conduit_datatype_impl conduit_datatype;
 
-/* Conduit's numbers of data types. */
+/* Conduit's identifiers of data types. */
 enum {
     STAND_IN_EMPTY = 0,
     STAND_IN_OBJECT = 1,
@@ -32,7 +32,7 @@ enum {
 conduit_node *conduit_node_create(void);
 void conduit_node_destroy(conduit_node *node);
 
-/* Returns the node at the path and creates missing nodes. */
+/* Returns the node at the path; creates the nodes that do not exist yet. */
 conduit_node *conduit_node_fetch(conduit_node *node, const char *path);
 conduit_node *conduit_node_fetch_existing(conduit_node *node, const char *path);
 conduit_node *conduit_node_child(conduit_node *node, conduit_index_t number);
@@ -50,7 +50,7 @@ void conduit_node_set_path_char8_str(conduit_node *node, const char *path, const
 void conduit_node_set_path_int64(conduit_node *node, const char *path, int64_t value);
 void conduit_node_set_path_float64(conduit_node *node, const char *path, double value);
 
-/* Makes the array in memory the data of the node at the path; a stride of 0 means packed. Conduit has no such
+/* Stores a pointer to the array as the data of the node at the path; a stride of 0 means packed. Conduit has no such
  * function. */
 void stand_in_set_array(conduit_node *node, const char *path, int id, const void *data, int64_t count, int64_t stride);
 /* Exchanges the contents of two nodes but not their names. */
@@ -59,8 +59,8 @@ void stand_in_swap(conduit_node *a, conduit_node *b);
 void stand_in_set_zero_stride(conduit_node *node, const char *path);
 /* Removes the node at the path. */
 void stand_in_remove(conduit_node *node, const char *path);
-/* Copies all arrays into one block of memory, one after the other from an odd address on, as Conduit's compact nodes
- * are. */
+/* Copies all arrays of the tree into one block of memory without gaps, from an odd address on, as in Conduit's compact
+ * nodes. */
 void stand_in_pack(conduit_node *node);
 int64_t stand_in_size(int id);
 

@@ -26,7 +26,7 @@ bool heap_can_fail(void)
 
 #else
 
-/* The C library's own allocators. */
+/* Allocators of the GNU C library under their internal names. */
 void *__libc_malloc(size_t size);
 void *__libc_calloc(size_t count, size_t size);
 void *__libc_realloc(void *block, size_t size);
@@ -38,7 +38,8 @@ static _Thread_local struct {
     int64_t count, fails_at;
 } heap;
 
-/* Address ranges of the code of libgomp, libomp and the loader, whose allocations neither count nor fail. */
+/* Address ranges of the code of libgomp, libomp and the loader. Allocations called from there neither count nor
+ * fail. */
 enum { MOST_RANGES = 16 };
 static struct {
     uintptr_t begin, end;

@@ -1,7 +1,7 @@
-/* A heap that runs out on demand, for all libraries of the process: the test program's malloc() and related functions
- * replace the C library's, and operator new calls them. Allocations within MPI, by libgomp and by the loader neither
- * count nor fail, because their failure would end the process. Only allocations of the thread that armed the heap count
- * and fail. */
+/* A heap whose allocations fail on demand, in all libraries of the process. malloc() and the related functions of the
+ * test program replace those of the C library, and operator new calls them. Only allocations of the thread that armed
+ * the heap count and fail. Allocations by MPI, libgomp and the loader neither count nor fail, because such a failure
+ * would end the process. */
 #ifndef TEST_FAILING_HEAP_H
 #define TEST_FAILING_HEAP_H
 
@@ -12,14 +12,15 @@
 extern "C" {
 #endif
 
-/* Makes this thread's n-th allocation from now on fail (1: the next one), and all later ones too if is_for_good. */
+/* Makes this thread's n-th allocation from now on fail (1: the next one). If is_for_good is set, all later ones fail
+ * too. */
 void heap_start_failing(int64_t n, bool is_for_good);
 
 /* Ends the failures. Returns the number of allocations requested since heap_start_failing(). */
 int64_t heap_stop_failing(void);
 
-/* Between heap_pause() and heap_resume() the thread's allocations neither count nor fail. Pairs of them may be
- * nested. */
+/* Between heap_pause() and heap_resume(), allocations of the calling thread neither count nor fail. Pairs of them may
+ * be nested. */
 void heap_pause(void);
 void heap_resume(void);
 

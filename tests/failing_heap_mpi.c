@@ -1,5 +1,5 @@
-/* Excludes MPI's own allocations from the failing heap (failing_heap.h): wraps every MPI function that the library
- * calls and that may allocate, and calls it by its profiling name while the heap is paused. */
+/* Excludes MPI's own allocations from the failing heap (failing_heap.h). Wraps every MPI function that the library
+ * calls and that may allocate; the wrapper pauses the heap and calls the function by its profiling name. */
 #include <mpi.h>
 
 #include "failing_heap.h"

@@ -1,16 +1,17 @@
-/* The kernels' integral of a segment, compiled on floats and on doubles. */
+/* The kernels' integral of light along a segment, compiled for float (integral_floats.c) and for double
+ * (integral_doubles.c). */
 #ifndef INTEGRAL_DOUBLE_H
 #define INTEGRAL_DOUBLE_H
 
 #include "render.h"
 
-/* Computes rgb and transmittance of a segment of the given length in unit distances; values are in the transfer
- * function's domain. */
+/* Compute the colour (rgb) and the transmittance of a segment: the kernels integrate in double or in float. length is
+ * in unit distances of the transfer function, and the values at both ends are in the transfer function's domain. */
 void integrate_in_double(const render_transfer *t, double length, double v_in, double v_out, double out[4]);
 void integrate_in_float(const render_transfer *t, double length, double v_in, double v_out, double out[4]);
 
-/* Computes, for each range of values, how much an error of the field can change the light: the variation of the light,
- * its maximum, and the maxima of the extinction and of its slope (kernel_light_variation). */
+/* For each range of values, computes the four members of kernel_light_variation: variation, cost, extinction,
+ * steepness. They bound how much an error of the field can change the light. */
 void integral_variations(const render_transfer *t, int count, const double (*ranges)[2], double (*out)[4]);
 
 #endif

@@ -1,5 +1,5 @@
-/* Compiles the integral a second time, on doubles and with as many Gauss nodes as doubles resolve, so that its error is
- * the method's, not the arithmetic's. Vectors of two doubles replace simd.h. */
+/* Compiles the kernels' integral a second time, for double and with as many Gauss nodes as double can resolve. Its
+ * error is then the error of the method, not of the arithmetic. Vectors of two doubles replace simd.h. */
 #define KERNEL_REAL_IS_DOUBLE
 #define BASE_SIMD_H
 #define render_pieces_build pieces_build_of_doubles

@@ -1,4 +1,4 @@
-/* Computes the integral with the scalar kernels, on floats. */
+/* Computes the integral in float with the scalar kernels. */
 #include <stdlib.h>
 
 #include "integral_double.h"

@@ -1,6 +1,5 @@
-/* picture_difference BEFORE AFTER: compares the pixels of two pictures bit by bit. The compression of the files and
- * their times do not count. Prints how many pixels differ and by how much at most, and returns 1 if any pixel
- * differs. */
+/* picture_difference BEFORE AFTER: compares the pixels of two picture files bitwise, but not the files' compression and
+ * time stamps. Prints the number of pixels that differ and their largest difference. Returns 1 if any pixel differs. */
 #include <OpenImageIO/imageio.h>
 
 #include <cmath>
@@ -48,7 +47,8 @@ int main(int argc, char **argv)
         different++;
         for (size_t c = i; c < i + channels; c++) {
             const double by = std::fabs(static_cast<double>(before.pixels[c]) - static_cast<double>(after.pixels[c]));
-            if (by > most) most = by; /* not counted if a depth is infinite in one of the pictures */
+            /* the comparison is false for NaN, if a depth is infinite in one of the pictures */
+            if (by > most) most = by;
         }
     }
     if (different) std::printf("%zu pixels, by %.3g at most\n", different, most);

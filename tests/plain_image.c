@@ -1,5 +1,6 @@
-/* An image library that writes plain numbers, for tests that compare pictures of many runs: loading OpenImageIO takes
- * longer than such a run. The file contains the picture's floats, then its depths if there are any. */
+/* A replacement of the image library that writes pixels without a format, for tests that compare the pictures of many
+ * runs: loading OpenImageIO takes longer than such a run. The file contains the picture's floats, then its depths if
+ * there are any. */
 #include <stdio.h>
 
 #include "insitu/image_output.h"

@@ -1,5 +1,5 @@
-/* A library with the image library's name that a test puts into the working directory: a session that loads it by
- * mistake fails to write its picture. */
+/* A library that has the name of the image library and that a test copies into the working directory. A session that
+ * loads it by mistake fails to write its picture. */
 #include <stdio.h>
 
 #include "insitu/image_output.h"

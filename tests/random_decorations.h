@@ -1,5 +1,5 @@
-/* Draws random decorations of a picture: all anchors, any number of bars, texts from empty to long, small and large
- * sizes, and corners that other pictures cover. */
+/* Makes random decorations of a picture: all anchors, any number of colour bars, texts from empty to long, small and
+ * large sizes, and corners that are covered by other pictures. */
 #ifndef TEST_RANDOM_DECORATIONS_H
 #define TEST_RANDOM_DECORATIONS_H
 
@@ -23,7 +23,7 @@ class random_decorations
     int draw_integer(int low, int high) { return std::uniform_int_distribution<int>(low, high)(random_); }
     double draw_real(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random_); }
 
-    /* Returns random decorations, which are valid until the next call. */
+    /* Returns random decorations. They are valid until the next call. */
     const insitu_decorations &make_decorations(int width, int height)
     {
         texts_.clear();
@@ -107,7 +107,8 @@ class random_decorations
         std::snprintf(what_.scale_bar.text, sizeof what_.scale_bar.text, "%s", make_random_text(8));
     }
 
-    /* Covers each corner with a probability of one half, by a rectangle close to its edges, as in a montage. */
+    /* Covers each corner with a probability of one half. The covering rectangle is close to the picture's edges, as in
+     * a montage. */
     void make_covered(int width, int height)
     {
         for (int corner = 0; corner < 4; corner++) {

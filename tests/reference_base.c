@@ -14,7 +14,7 @@ void *reference_reallocate(void *block, size_t bytes)
     return p;
 }
 
-/* Computes the scale's function by its definition. */
+/* Maps a value to the scale of the transfer function (linear, log or symlog) by the scale's definition. */
 static double apply_scale(const render_transfer *t, double value)
 {
     const double size = fabs(value) / t->threshold;

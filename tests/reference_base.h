@@ -1,4 +1,4 @@
-/* Functions that the reference's parts share. */
+/* Functions that all files of the reference renderer share. */
 #ifndef REFERENCE_BASE_H
 #define REFERENCE_BASE_H
 
@@ -6,10 +6,10 @@
 
 #include "render.h"
 
-/* Reallocates the block as realloc() does, but ends the process if memory runs out. */
+/* Reallocates a block of memory like realloc(), but ends the process if memory runs out. */
 void *reference_reallocate(void *block, size_t bytes);
 
-/* Return opacity and colour of a value as render.h defines them. */
+/* Returns the opacity of a value as render.h defines it. reference_colour() computes its colour. */
 double reference_opacity(const render_transfer *t, double value);
 /* Returns the value's position in the colour table, not clamped. */
 double reference_transfer_position(const render_transfer *t, double value);

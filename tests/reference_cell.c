@@ -1,14 +1,14 @@
-/* A cell in double.
+/* Computes one cell in double (reference_cell.h).
  *
- * Crossings: the line is sheared upright by x - base - slope z, after which it is the z axis. A triangle is crossed if
- * the origin of the xy plane is inside the triangle's projection by the even-odd rule, which counts the triangle's
- * edges that the positive u axis crosses. An edge gets the same result from both of its triangles (its end below the
- * axis comes first), and in a closed surface every edge belongs to two triangles, so the number of crossings is even
- * whatever the rounding.
+ * Crossings: all points are sheared by x - base - slope z, so that the line becomes the z axis. The line crosses a
+ * triangle if the origin of the xy plane is inside the triangle's projection by the even-odd rule, which counts the
+ * triangle's edges that the positive x axis crosses. Both triangles at an edge compute the same result for it, because
+ * the end of the edge below the axis is always taken first. In a closed surface every edge belongs to two triangles, so
+ * the number of crossings is even in spite of rounding.
  *
- * Interior: one Newton solver inverts the isoparametric map of every cell type, given its shape functions. A pyramid's
- * map is singular at its apex but homogeneous about it: the point is moved along its line from the apex to the height
- * of the base's centre, the map is inverted there, and the weight of the base is scaled back. */
+ * Interior: one Newton solver inverts the isoparametric map of every cell type, given the type's shape functions. The
+ * map of a pyramid is singular at its apex but homogeneous about it: the point is moved along its line from the apex to
+ * the height of the base's centre, the map is inverted there, and the weight of the base is scaled back. */
 #include "reference_cell.h"
 
 #include "grid.h"
@@ -41,7 +41,7 @@ bool reference_box_is_near(const reference_box *box, const reference_line *line,
 
 typedef struct cell_faces {
     int count;
-    int vertices[6][4]; /* the fourth is -1 for a triangle */
+    int vertices[6][4]; /* vertices of the cell; the fourth is -1 for a triangle */
 } cell_faces;
 
 static const cell_faces *get_cell_faces(int type)
@@ -61,7 +61,8 @@ static bool precedes_point(const double *a, const double *b)
     return false;
 }
 
-/* Splits the face into its triangles: one, or two along the diagonal from the vertex that is smallest. */
+/* Splits the face into one triangle, or into two along the diagonal from its vertex with the lexicographically smallest
+ * coordinates. */
 static int split_face(const reference_cell *cell, const int *face, int triangles[2][3])
 {
     if (face[3] < 0) {
@@ -89,7 +90,7 @@ static long double cross_product(const double *a, const double *b)
     return (long double)a[0] * (long double)b[1] - (long double)a[1] * (long double)b[0];
 }
 
-/* Returns whether the positive u axis crosses the edge. */
+/* Returns whether the positive x axis crosses the edge from a to b. */
 static bool axis_crosses(const double *a, const double *b)
 {
     if ((a[1] >= 0) == (b[1] >= 0)) return false;
@@ -101,7 +102,8 @@ static double edge_length(const double *a, const double *b)
     return hypot(a[0] - b[0], a[1] - b[1]);
 }
 
-/* Computes the barycentric coordinates of the line in a triangle; they are 1/3 each if the triangle is seen edge-on. */
+/* Computes the barycentric coordinates of the line's intersection with a triangle. They are 1/3 each if the triangle is
+ * seen edge-on. */
 static void triangle_weights(const reference_cell *cell, const reference_line *line, const int *triangle,
                              double weights[3])
 {
@@ -135,7 +137,7 @@ static double clamp_unit(double u)
     return u < 0 ? 0 : u > 1 ? 1 : u;
 }
 
-/* Given w, computes the u of a + u b + w c + u w d = 0 from the better conditioned of its two equations. */
+/* Solves a + u b + w c + u w d = 0 for u, given w, by the better conditioned of the two equations. */
 static double solve_for_u(const double *a, const double *b, const double *c, const double *d, double w)
 {
     const double x = b[0] + w * d[0], y = b[1] + w * d[1];
@@ -144,7 +146,7 @@ static double solve_for_u(const double *a, const double *b, const double *c, con
     return below != 0 ? -(a[axis] + w * c[axis]) / below : 0.5;
 }
 
-/* Returns how far a + u b + w c + u w d is from 0, relative to the size of the quad. */
+/* Returns the magnitude of a + u b + w c + u w d relative to the size of the quad. */
 static double bilinear_residual(const double *a, const double *b, const double *c, const double *d, double u, double w)
 {
     double residual = 0, size = 0;
@@ -159,9 +161,9 @@ typedef struct patch_point {
     double u, w, beyond;
 } patch_point;
 
-/* Finds the two (u, w) with a + u b + w c + u w d = 0, and how far they are outside the unit square: eliminating u
- * leaves a quadratic in w. For a quad with two corners at the same position, one of the roots is no solution. Returns
- * how many are inside the square. */
+/* Finds the two solutions (u, w) of a + u b + w c + u w d = 0 and their distances outside the unit square. Eliminating
+ * u leaves a quadratic equation in w. If two corners of the quad have the same position, one of the roots is not a
+ * solution. Returns the number of solutions inside the square. */
 static int solve_bilinear(const double *a, const double *b, const double *c, const double *d, patch_point points[2])
 {
     const double qa = (double)cross_product(d, c), qb = (double)(cross_product(b, c) + cross_product(d, a)),
@@ -201,10 +203,10 @@ static int find_patch_points(const reference_cell *cell, const reference_line *l
     return solve_bilinear(a, b, c, d, points);
 }
 
-/* Replaces the `count` crossings of a quad's triangles by those of its patch. A ray through one triangle meets the
- * patch once; a ray through both or none meets it twice or not at all, since the patch is smooth where the triangles
- * have a fold. Returns the number of crossings; sets is_folded for a ray that meets both triangles but not the
- * patch. */
+/* Replaces the `count` crossings of a quad's two triangles by those of its bilinear patch. A ray that crosses one
+ * triangle crosses the patch once. A ray that crosses both or none crosses the patch twice or not at all, because the
+ * patch is smooth at the diagonal where the triangles have a fold. Returns the number of crossings. Sets is_folded if
+ * the ray crosses both triangles but not the patch. */
 static int move_to_patch(const reference_cell *cell, const reference_line *line, const int *face,
                          reference_crossing crossings[2], int count, bool *is_folded)
 {
@@ -334,7 +336,7 @@ double reference_edge_distance(const reference_cell *cell, const reference_line 
     return least;
 }
 
-/* ---- a polyhedron along a line ---- */
+/* ---- the field of a polyhedron along a line ---- */
 
 static bool interpolate_on_line(const reference_cell *cell, const reference_line *line, double z, const double *values,
                                 double *value)
@@ -343,8 +345,8 @@ static bool interpolate_on_line(const reference_cell *cell, const reference_line
     return reference_polyhedron_interpolate(cell, point, values, value, NULL);
 }
 
-/* Returns the value from which the profile starts at a crossing; inward is the sign of the direction to the other
- * crossing. */
+/* Returns the profile's value at a crossing. The profile is the field along the ray (reference_profile_value); inward
+ * is the sign of the direction towards the other crossing. */
 static double profile_end(const reference_cell *cell, const reference_line *line, const reference_crossing *end,
                           const double *values, double inward)
 {
@@ -353,7 +355,7 @@ static double profile_end(const reference_cell *cell, const reference_line *line
     const double face = reference_face_value(cell, line, end, values, &is_folded);
     if (end->triangle < 0) return face;
     const double triangle = triangle_value(cell, line, cell->poly.triangles[end->triangle], values);
-    /* Evaluates the sum slightly inside: the error is 1e-10 of the field's change along z. */
+    /* Evaluates the sum over tets slightly inside the cell. The error is 1e-10 of the field's change along z. */
     if (!interpolate_on_line(cell, line, end->z_triangle + 1e-10 * inward, values, &sum)) sum = triangle;
     return face + (sum - triangle);
 }
@@ -381,8 +383,9 @@ int reference_profile_breaks(const reference_cell *cell, const reference_line *l
     return count;
 }
 
-/* Computes the sum at a sheet, on a side that has one. A piece between two triangles of a quad whose patch the ray does
- * not meet is in no tet; the field on it is linear between its sheets. */
+/* Computes the sum over tets next to a sheet, on the side where it exists. If the ray crosses both triangles of a quad
+ * but not the quad's patch, the interval between the two triangles is in no tet, and the field is linear there between
+ * its sheets. */
 static bool interpolate_at_sheet(const reference_cell *cell, const reference_line *line, double z, double aside,
                                  const double *values, double *value)
 {
@@ -399,14 +402,15 @@ bool reference_profile_value(const reference_cell *cell, const reference_line *l
     int next = 1;
     while (next < count - 1 && breaks[next] <= z) next++;
     const double before = breaks[next - 1], behind = breaks[next];
-    /* At a triangle the profile is the sum itself. */
+    /* If the cell's face at this end is a triangle, the profile equals the sum over tets. */
     const bool is_first = next == 1 && cell->poly.is_patch[ends[0].face];
     const bool is_last = next == count - 1 && cell->poly.is_patch[ends[1].face];
     if (!is_first && !is_last) {
         const double inner = 1e-9 * length, held = fmin(fmax(z, ends[0].z + inner), ends[1].z - inner);
         if (interpolate_on_line(cell, line, held, values, value)) return true;
     }
-    /* Evaluates the sums slightly inside the piece, since a sheet may lie in the face at the other end. */
+    /* Evaluates the sums slightly inside the interval between two sheets, since a sheet may lie in the face at the
+     * interval's other end. */
     const double aside = 1e-9 * (behind - before);
     bool is_good = true;
     if (next == 1)
@@ -421,7 +425,7 @@ bool reference_profile_value(const reference_cell *cell, const reference_line *l
     return is_good;
 }
 
-/* A vertex's weight and its derivatives with respect to the parameters. */
+/* A vertex's weight n and its derivatives d with respect to the parameters. */
 typedef struct shape_function {
     double n, d[3];
 } shape_function;
@@ -434,7 +438,7 @@ static void tet_shape(const double *p, shape_function *s)
     s[3] = (shape_function){p[2], {0, 0, 1}};
 }
 
-/* Returns the bilinear weight of corner i of the unit square; corners are numbered around the square. */
+/* Returns the bilinear weight of corner i of the unit square at (r, s). Corners are numbered around the square. */
 static shape_function square_shape(int i, double r, double s)
 {
     const bool right = i == 1 || i == 2, upper = i >= 2;
@@ -442,7 +446,8 @@ static shape_function square_shape(int i, double r, double s)
     return (shape_function){a * b, {right ? b : -b, upper ? a : -a, 0}};
 }
 
-/* Multiplies a weight of the base by a weight along the height. */
+/* Multiplies a shape function of the base by a weight along the height, whose value is `height` and whose derivative is
+ * `slope`. */
 static shape_function multiply_by_height(shape_function base, double height, double slope)
 {
     return (shape_function){base.n * height, {base.d[0] * height, base.d[1] * height, base.n * slope}};
@@ -482,7 +487,7 @@ static void cell_shape(int type, const double *p, shape_function *s)
     }
 }
 
-/* Solves for x of the 3 × 3 system whose columns are a, b, c, by Cramer's rule. */
+/* Solves the 3 × 3 system a x[0] + b x[1] + c x[2] = right by Cramer's rule. Returns whether it has a solution. */
 static bool solve3(const double *a, const double *b, const double *c, const double *right, double x[3])
 {
     const double *m[3] = {a, b, c};
@@ -498,8 +503,9 @@ static bool solve3(const double *a, const double *b, const double *c, const doub
     return true;
 }
 
-/* Computes the map's columns dP/dparameter and the remainder point - P(parameter). type and count are the cell's; they
- * are constants where this function is inlined, so that the compiler unrolls the loops. */
+/* Computes the columns dP/dparameter of the map's Jacobian and the remainder point - P(parameter). type and count are
+ * those of the cell. They are passed as constants, and the function is inlined, so that the compiler unrolls the
+ * loops. */
 static inline __attribute__((always_inline)) void evaluate_map(const reference_cell *cell, int type, int count,
                                                                const double *parameter, const double *point,
                                                                double columns[3][3], double left[3])
@@ -540,7 +546,7 @@ solve_by_newton_in_cell_type(const reference_cell *cell, int type, int count, co
         if (!solve3(columns[0], columns[1], columns[2], left, move)) return false;
         const double length = length3(move), limit = length > 0.5 && type != GRID_TET ? 0.5 / length : 1;
         for (int k = 0; k < 3; k++) parameter[k] += limit * move[k];
-        /* Newton's error falls as the square of the step: the next one would be below 1e-16. */
+        /* Newton's error decreases as the square of the step: the next step would be below 1e-16. */
         if (length3(left) <= tolerance || length < 1e-9) return isfinite(length);
     }
     return false;
@@ -562,9 +568,9 @@ static double distance_outside_cell(const double *parameter)
                 fmax(distance_outside_unit_interval(parameter[1]), distance_outside_unit_interval(parameter[2])));
 }
 
-/* Inverts the map by Newton's method from the last solution, which is close if the point is the next one along a ray,
- * then from the cell's centre, and from other starts if these fail or lead far outside. Of several solutions it returns
- * the one nearest to the cell. */
+/* Inverts the map by Newton's method. The starting points are tried in this order: the previous solution of this
+ * thread, which is close if the point is the next one along a ray; the cell's centre; and the other starts, until a
+ * solution is less than 0.1 outside the cell. Returns the solution that is nearest to the cell. */
 static bool invert_map(const reference_cell *cell, const double *point, double parameter[3])
 {
     static _Thread_local double starts[10][3] = {{0.5, 0.5, 0.5},  {0.4, 0.4, 0.5}, {0.1, 0.1, 0.1}, {0.9, 0.05, 0.1},
@@ -582,8 +588,8 @@ static bool invert_map(const reference_cell *cell, const double *point, double p
     return isfinite(best);
 }
 
-/* Moves the point along its line from the apex to the height of the base's centre; scale is the factor of its distance
- * from the apex. */
+/* Moves the point along its line from the apex to the height of the base's centre. scale receives the factor by which
+ * the distance from the apex changes. */
 static bool project_from_apex(const reference_cell *cell, const double *point, double moved[3], double *scale)
 {
     const double *apex = cell->position[4];

@@ -1,9 +1,12 @@
-/* Integrates adaptively. The ray is cut at every depth at which a cell begins or ends or a polyhedron's profile bends,
- * because only there may a peak be too narrow for any sample. Between cuts all cells, of all volume layers, emit and
- * absorb together: extinctions add up, and so do emissions. Boole's rule integrates an interval as a whole and in
- * halves; if the two results differ by more than the tolerance, each half is integrated in turn. The ray is also cut
- * where the field reaches a control point of the opacity, which may last too short for any sampling: these depths are
- * searched between samples and the extremes next to them. Kinks of the colours are found by halving. */
+/* Integrates the light of volumes adaptively. The ray is cut at every depth at which a cell begins or ends or a
+ * polyhedron's profile bends (reference_cell.h), because only there may a peak be too narrow for any sample. Between
+ * two cuts all cells of all volume layers emit and absorb together: their extinctions add up, and so do their
+ * emissions. Boole's rule integrates an interval as a whole and in two halves. If the two results differ by more than
+ * the tolerance, each half is integrated in turn.
+ *
+ * The ray is also cut where the field reaches a control point of the opacity, since the field may stay beyond it for
+ * too short a distance for any sampling. These depths are searched between samples and the extremes next to them. Kinks
+ * of the colours are found by halving. */
 #include "reference_integral.h"
 
 #include "reference_base.h"
@@ -34,12 +37,12 @@ typedef struct cell_interval {
     reference_crossing ends[2];
 } cell_interval;
 
-/* The effect of an interval on light: its colour C and transmittance T. */
+/* Colour C and transmittance T of an interval of the ray. */
 typedef struct light {
     double colour[3], transmittance;
 } light;
 
-/* The integrand at a depth. */
+/* The integrand at one depth. */
 typedef struct sample {
     double extinction, emission[3]; /* per unit of z */
 } sample;
@@ -138,8 +141,8 @@ static sample compute_sample(const active_intervals *c, double z)
     return sum;
 }
 
-/* Integrates by Boole's rule: both integrals use the quartic through five samples, whose optical depth up to each
- * sample is exact. */
+/* Integrates five equidistant samples by Boole's rule. The extinction and the emission are replaced by the quartics
+ * through the samples; the optical depth up to each sample is the exact integral of its quartic. */
 static light integrate_by_boole(const sample s[5], double width)
 {
     static const double up_to[5][5] = {{0, 0, 0, 0, 0},
@@ -171,7 +174,8 @@ static double light_difference(const light *a, const light *b)
     return most;
 }
 
-/* s holds the samples at both ends, the quarters and the middle. */
+/* Integrates the light between two depths to the tolerance. s holds the samples at both ends, at the quarters and in
+ * the middle. */
 static light integrate_adaptively(const active_intervals *c, double from, double to, const sample s[5],
                                   double tolerance, int depth)
 {
@@ -261,7 +265,7 @@ static int compare_numbers(const void *left, const void *right)
     return (a > b) - (a < b);
 }
 
-/* Finds the depths at which the interval begins, bends and ends; returns their number. */
+/* Finds the depths at which the interval begins, bends and ends. Returns the number of depths. */
 static int find_interval_cuts(const cell_interval *s, const reference_line *line, double z[REFERENCE_MAX_BREAKS])
 {
     z[0] = s->z_in;
@@ -288,8 +292,8 @@ static void add_depth(places *list, double z)
     list->z[list->count++] = z;
 }
 
-/* Adds the last depth before the value reaches x and the first one after it, so that the ends of each part are on the
- * same side of x. */
+/* Adds the two depths between which the value crosses x, found by bisection: the value is on one side of x up to the
+ * first depth, and on the other side from the second depth on. */
 static void add_crossing(const cell_interval *s, const reference_line *line, double low, double high, double x,
                          places *out)
 {
@@ -305,7 +309,7 @@ static void add_crossing(const cell_interval *s, const reference_line *line, dou
     add_depth(out, high);
 }
 
-/* Returns the greatest (sign 1) or least (sign -1) value between two depths, by golden section. */
+/* Returns the greatest (sign 1) or the least (sign -1) value between two depths, by golden-section search. */
 static double find_extreme_value(const cell_interval *s, const reference_line *line, double low, double high,
                                  double sign)
 {
@@ -337,8 +341,8 @@ static void add_crossings(const cell_interval *s, const reference_line *line, do
     }
 }
 
-/* Adds the depths at which the interval, which does not bend between from and to, reaches a control point of the
- * opacity. */
+/* Adds the depths at which the field reaches a control point of the opacity, between two depths from and to between
+ * which the profile does not bend. */
 static void add_points(const cell_interval *s, const reference_line *line, double from, double to, places *out)
 {
     enum { SAMPLES = 48 };
@@ -356,7 +360,8 @@ static void add_points(const cell_interval *s, const reference_line *line, doubl
     for (int i = 0; i <= count; i++) value[i] = interpolate_value(s, line, from + (to - from) * i / count);
     double last = from;
     for (int i = 0; i <= count; i++) {
-        /* Searches for an extreme near sample i; near the first and the last sample the interval may hide it. */
+        /* Searches for an extreme near sample i. Near the first and the last sample, the extreme may lie between that
+         * sample and its only neighbour. */
         const int before = i ? i - 1 : 0, after = i < count ? i + 1 : count;
         const bool is_top = value[i] >= fmax(value[before], value[after]);
         const bool is_bottom = value[i] <= fmin(value[before], value[after]);
@@ -398,7 +403,7 @@ static void find_active(active_intervals *c, const cell_interval *list, int64_t 
         if (list[i].z_in <= from && list[i].z_out >= to) c->active[c->count++] = &list[i];
 }
 
-/* Returns whether the job's clips of volumes keep the ray's point at depth z. */
+/* Returns whether no clip that the job applies to volumes removes the point of the ray at depth z. */
 static bool is_depth_unclipped(const active_intervals *c, double z)
 {
     const render_job *job = c->scene->job;

@@ -3,16 +3,17 @@
 #include <math.h>
 #include <string.h>
 
-/* Fractions of the area that count as rounding: fan_slack for fans, the other for collinear corners. */
+/* Areas below these fractions of the polygon's area count as rounding. fan_slack: for the triangles of a fan;
+ * line_slack: for corners on a line. */
 static const double fan_slack = 0x1p-20, line_slack = 1e-14;
 
-/* The remaining polygon, in the order in which ears are cut. */
+/* The polygon that remains after some ears are cut off. Its corners are in the order in which ears are tested. */
 typedef struct loop {
     int count;
     bool is_backward;
     int number[REFERENCE_MAX_CORNERS];
     double place[REFERENCE_MAX_CORNERS][3];
-    double normal[3], area; /* unit normal, and twice the polygon's area */
+    double normal[3], area; /* normal: unit normal; area: twice the polygon's area */
 } loop;
 
 static double signed_area_along_normal(const double *normal, const double *a, const double *b, const double *c)
@@ -25,7 +26,8 @@ static double signed_area_along_normal(const double *normal, const double *a, co
     return sum;
 }
 
-/* Makes the loop from the rotation, forward or backward, whose list of coordinates is lexicographically least. */
+/* Makes the loop of corners. It begins at the corner, and runs in the direction, for which the list of coordinates is
+ * lexicographically least. */
 static void make_loop(const double (*corners)[3], int count, loop *out)
 {
     int best[2] = {0, 1};
@@ -84,7 +86,7 @@ static bool is_ear(const loop *l, int tip)
                 return false;
             continue;
         }
-        for (int side = 1; side < n; side += n - 2) { /* the neighbours of the other corner at the same position */
+        for (int side = 1; side < n; side += n - 2) { /* neighbours of another corner at the same position */
             const int end = (i + side) % n;
             if (corner_area(l, a, tip, end) > line_slack && corner_area(l, tip, c, end) > line_slack) return false;
         }

@@ -1,5 +1,4 @@
-/* The triangles of a polygon by the letter of their definition (libinsitu/base/faces/polygon.h), by brute force in
- * double. */
+/* Triangulates a polygon literally by the definition (libinsitu/base/faces/polygon.h), by brute force in double. */
 #ifndef REFERENCE_POLYGON_H
 #define REFERENCE_POLYGON_H
 
@@ -7,11 +6,11 @@
 
 enum { REFERENCE_MAX_CORNERS = 400 };
 
-/* Writes the triangles as numbers of corners and returns how many there are: count - 2, each oriented as the polygon
- * is. */
+/* Writes the triangles as indices of corners and returns the number of triangles, count - 2. Each triangle has the
+ * orientation of the polygon. */
 int reference_polygon_triangulate(const double (*corners)[3], int count, int (*triangles)[3]);
 
-/* Returns whether a quad has one corner that points inwards. */
+/* Returns whether exactly one corner of a quad points inwards. */
 bool reference_is_concave_quad(const double (*corners)[3]);
 
 #endif

@@ -1,9 +1,10 @@
-/* A polyhedron in double, by the letter of its definition: every face is cut into triangles as reference_polygon.h
- * defines, every triangle makes a tet with the centre, and the field at a point is the sum, over the tets that contain
- * the point, of sign times linear field. The signs follow from oriented faces: one face is taken as it is, any face
- * that shares a directed edge with it in the same direction is flipped, and so on until nothing changes. Then each
- * connected piece is oriented to have a positive volume, or a negative one if its first vertex is inside the other
- * pieces. */
+/* The field of a polyhedron in double, computed literally by its definition. Every face is cut into triangles
+ * (reference_polygon.h), and every triangle makes a tet with the centre. The field at a point is the sum of sign times
+ * linear field over the tets that contain the point.
+ *
+ * The signs follow from the orientations of faces. One face is taken as it is; every face that shares a directed edge
+ * with it in the same direction is flipped, and so on until no face changes. Then each connected component of faces is
+ * oriented to have a positive volume, or a negative volume if its first vertex is inside the other components. */
 #include "reference_polyhedron.h"
 
 #include "reference_polygon.h"
@@ -21,9 +22,9 @@ static double determinant3(const double *a, const double *b, const double *c)
     return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
 }
 
-/* Returns 1 if the faces run along a common edge in opposite directions, -1 if in the same direction, 0 if they have
- * none in common. An edge from a vertex to itself has no direction and does not count: collapsed faces share such edges
- * with their neighbours. */
+/* Returns 1 if the two faces run along a common edge in opposite directions, -1 if in the same direction, and 0 if they
+ * have no common edge. An edge from a vertex to itself has no direction and does not count: collapsed faces share such
+ * edges with their neighbours. */
 static int compare_orientations(const reference_polyhedron *p, int one, int other)
 {
     for (int i = 0; i < p->face_size[one]; i++)
@@ -37,7 +38,7 @@ static int compare_orientations(const reference_polyhedron *p, int one, int othe
     return 0;
 }
 
-/* Computes for each face turn, 1 or -1, and piece, the first face of its connected piece. */
+/* Orients faces. turn: 1, or -1 if the face is flipped; piece: first face of the face's connected component. */
 static void orient_faces(const reference_polyhedron *p, int *turn, int *piece)
 {
     for (int face = 0; face < p->face_count; face++) turn[face] = 0;
@@ -66,7 +67,7 @@ static void add_triangles(reference_cell *cell)
     for (int face = 0; face < p->face_count; face++) {
         double corners[REFERENCE_MAX_SIDES][3];
         int cut[REFERENCE_MAX_SIDES][3], size = 0, loop[REFERENCE_MAX_SIDES];
-        for (int i = 0; i < p->face_size[face]; i++) { /* consecutive copies of a vertex count once */
+        for (int i = 0; i < p->face_size[face]; i++) { /* consecutive copies of a vertex count as one vertex */
             const int vertex = p->faces[face][i],
                       before = p->faces[face][(i + p->face_size[face] - 1) % p->face_size[face]];
             if (vertex == before) continue;
@@ -83,8 +84,8 @@ static void add_triangles(reference_cell *cell)
     }
 }
 
-/* Returns whether the point is inside the surface of the pieces other than `mine`, by a ray in an arbitrary
- * direction. */
+/* Returns whether the point is inside the surface of the connected components other than `mine`. Counts the crossings
+ * of a ray in an arbitrary direction. */
 static bool is_inside_other_pieces(const reference_cell *cell, const int *piece, int mine, const double *point)
 {
     static const double direction[3] = {0.5377, 0.1834, -0.7621};
@@ -166,8 +167,8 @@ void reference_polyhedron_setup(reference_cell *cell)
     }
 }
 
-/* Computes barycentric coordinates of a point in tet i, those of the triangle's vertices first, then the centre's;
- * slopes holds their gradients. */
+/* Computes the barycentric coordinates of a point in tet i, for the triangle's vertices and then for the centre. slopes
+ * receives their gradients. Returns false if the tet has no volume. */
 static bool tet_coordinates(const reference_cell *cell, int i, const double point[3], double lambda[4],
                             double slopes[4][3])
 {
@@ -196,7 +197,7 @@ static bool tet_coordinates(const reference_cell *cell, int i, const double poin
     return true;
 }
 
-/* Computes the sum at a point; returns the signed number of tets that contain it. */
+/* Computes the sum over the tets that contain the point. Returns the sum of these tets' signs. */
 static int sum_over_tets(const reference_cell *cell, const double point[3], const double *values, double *value,
                          double gradient[3])
 {
@@ -219,7 +220,8 @@ static int sum_over_tets(const reference_cell *cell, const double point[3], cons
     return cover;
 }
 
-/* On a sheet, rounding may put a point into none or two of its tets; then a point slightly farther is used instead. */
+/* Computes the sum at the point. On a sheet between two tets, rounding may put the point into none or both of them;
+ * then the sum at a point slightly beside it is used. */
 bool reference_polyhedron_interpolate(const reference_cell *cell, const double point[3], const double *values,
                                       double *value, double gradient[3])
 {

@@ -5,12 +5,13 @@
 #include "grid.h"
 #include "reference_cell.h"
 
-/* Reads the faces of a polyhedral cell of the grid and its distinct vertices. Ends the process if the cell is too
- * large. */
+/* Reads the faces and the distinct vertices of a polyhedral cell of the grid. Ends the process if the cell has too
+ * many. */
 void reference_polyhedron_read(const grid *g, int64_t index, reference_cell *cell,
                                int64_t vertices[REFERENCE_MAX_VERTICES]);
 
-/* Evaluates the interpolant at a point of a polyhedron, as reference_interpolate() does for other cells. */
+/* Evaluates the interpolant at a point of a polyhedron. Returns false if no sum over tets is found (reference_cell.h).
+ * gradient may be NULL. */
 bool reference_polyhedron_interpolate(const reference_cell *cell, const double point[3], const double *values,
                                       double *value, double gradient[3]);
 

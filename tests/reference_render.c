@@ -1,7 +1,8 @@
-/* The brute-force renderer. It transforms vertices to camera coordinates in double once. Then, for each ray, every cell
- * that is not a ghost and whose sheared box contains the ray gives its intervals [z_in, z_out). Each interval gives
- * hits of the surface layers and the samples of the volume layers it owns. All of them are gathered, sorted by depth
- * and blended. Cells that the ray misses contribute only to the margins. */
+/* The brute-force renderer. It transforms all vertices to camera coordinates in double one time. Then, for each ray, it
+ * computes the intervals [z_in, z_out) of every cell that is not a ghost and whose sheared box contains the ray. An
+ * interval contains hits of the surface layers and the samples of the volume layers at depths in [z_in, z_out). All
+ * hits and samples of a ray are gathered, sorted by depth and blended. Cells that the ray misses contribute only to the
+ * margins. */
 #include "reference_render.h"
 
 #include "reference_base.h"
@@ -15,10 +16,10 @@
 typedef struct event {
     double depth;
     bool is_sample;
-    int order; /* surface id or volume layer */
+    int order; /* of a hit: surface id; of a sample: index of the volume layer */
     double transmittance;
-    double error_bound; /* of a hit: cell size × conditioning, the scale of the error of depth from rounding */
-    reference_hit hit;  /* of a sample: only the colour is set */
+    double error_bound; /* for a hit: cell size times conditioning, the scale of the depth's rounding error */
+    reference_hit hit;  /* for a sample only the colour is set */
 } event;
 
 struct reference_scene {
@@ -32,7 +33,7 @@ typedef struct trace {
     const reference_scene *scene;
     reference_line line;
     double direction[3]; /* in world coordinates; its component along forward is 1 */
-    double length;       /* length of direction if distances are measured along the ray, else 1 */
+    double length;       /* length of `direction` if distances are measured along the ray, else 1 */
     double jitter;
     int64_t count, capacity;
     event *events;
@@ -46,7 +47,7 @@ typedef struct camera_cell {
     int64_t index;
     int64_t vertices[REFERENCE_MAX_VERTICES];
     reference_cell cell;
-    reference_crossing ends[2]; /* the ends of the current interval */
+    reference_crossing ends[2]; /* ends of the interval that is traced at present */
     double size;
 } camera_cell;
 
@@ -135,7 +136,8 @@ static void shade_hit(const trace *t, const render_material *m, const double bas
         normalize_vector(half);
         const double cosine = reference_dot(normal, light->direction), facing = fmax(0, cosine);
         const double shine = cosine > 0 ? pow(fmax(0, reference_dot(normal, half)), (double)m->shininess) : 0;
-        const bool has_normal = reference_dot(normal, normal) > 0; /* without a normal the ray is ambiguous */
+        /* a normal of length 0 means that the ray is ambiguous */
+        const bool has_normal = reference_dot(normal, normal) > 0;
         if (m->specular > 0 && has_normal) lower_margin(&t->out->light_margin, fabs(cosine));
         for (int c = 0; c < 3; c++) {
             diffuse[c] += (double)light->colour[c] * (double)m->diffuse * facing;
@@ -162,7 +164,8 @@ static double value_along(trace *t, const camera_cell *c, const double *values, 
     return value;
 }
 
-/* Finds the root between the interval's ends by bisection; side_in is the side of iso at z_in. */
+/* Finds the depth of the root between the interval's ends by bisection. side_in: whether the value at z_in is at least
+ * iso. */
 static double bisect_root(trace *t, const camera_cell *c, const double *values, double iso, double z_in, double z_out,
                           bool side_in)
 {
@@ -178,7 +181,7 @@ static double bisect_root(trace *t, const camera_cell *c, const double *values, 
     return 0.5 * (low + high);
 }
 
-/* ---- every crossing ---- */
+/* ---- all crossings of a surface ---- */
 
 typedef struct crossing_search {
     trace *t;
@@ -192,7 +195,7 @@ static double relative_value_along_ray(const crossing_search *a, double z)
     return value_along(a->t, a->c, a->values, z) - a->iso;
 }
 
-/* Finds the depth in [low, high] at which side times the field is least, by golden section. */
+/* Finds the depth in [low, high] at which `side` times the field is least, by golden-section search. */
 static double find_minimum(const crossing_search *a, double low, double high, double side)
 {
     const double golden = 0.6180339887498949;
@@ -218,8 +221,8 @@ static double find_minimum(const crossing_search *a, double low, double high, do
 
 enum { CROSSING_PIECES = 24 };
 
-/* Computes depths between which the field passes the isovalue at most once: evenly spaced ones, and the bottom of every
- * dip towards the isovalue between two depths on the same side. */
+/* Computes depths between which the field crosses the isovalue at most once: evenly spaced depths, and the minimum of
+ * every dip towards the isovalue between two neighbouring depths on the same side. */
 static int find_crossing_depths(const crossing_search *a, double z_in, double z_out, double *z, double *v)
 {
     double at[CROSSING_PIECES + 1], f[CROSSING_PIECES + 1];
@@ -233,7 +236,7 @@ static int find_crossing_depths(const crossing_search *a, double z_in, double z_
         v[n++] = f[i];
         const int before = i > 0 ? i - 1 : 0, behind = i + 2 <= CROSSING_PIECES ? i + 2 : CROSSING_PIECES;
         if (i == CROSSING_PIECES || (f[i] < 0) != (f[i + 1] < 0)) continue;
-        /* A dip is a piece on both sides of which the slopes have opposite signs. */
+        /* A dip is an interval at whose two ends the slopes have opposite signs. */
         const double side = f[i] < 0 ? -1 : 1;
         const bool falls = before == i || side * (f[i] - f[before]) <= 0;
         const bool rises = behind == i + 1 || side * (f[behind] - f[i + 1]) >= 0;
@@ -246,8 +249,8 @@ static int find_crossing_depths(const crossing_search *a, double z_in, double z_
     return n;
 }
 
-/* Finds the depths at which a polyhedron's profile bends; between two of them it is linear. Rounding decides the side
- * of a bend near the isovalue. */
+/* Finds the depths at which a polyhedron's profile bends; the profile is linear between two of them. A bend whose value
+ * is near the isovalue lowers the margin, since rounding decides on which side of the isovalue it is. */
 static int find_profile_depths(const crossing_search *a, double z[REFERENCE_MAX_BREAKS], double v[REFERENCE_MAX_BREAKS])
 {
     const int count = reference_profile_breaks(&a->c->cell, &a->t->line, a->c->ends, z);
@@ -302,7 +305,7 @@ static reference_hit *add_hit(trace *t, const camera_cell *c, const render_surfa
     e->hit.opacity = (double)layer->opacity;
     e->transmittance = 1 - e->hit.opacity;
     double z = depth;
-    if (c->cell.type == GRID_POLYHEDRON) { /* a quad's patch may lie outside the tets */
+    if (c->cell.type == GRID_POLYHEDRON) { /* a quad's patch may lie outside the tets, where the field is not defined */
         const double inner = 1e-9 * (c->ends[1].z_triangle - c->ends[0].z_triangle);
         z = fmin(fmax(depth, c->ends[0].z_triangle + inner), c->ends[1].z_triangle - inner);
     }
@@ -313,8 +316,8 @@ static reference_hit *add_hit(trace *t, const camera_cell *c, const render_surfa
     const double crossing_search =
         reference_dot(e->hit.normal, t->direction) / sqrt(reference_dot(t->direction, t->direction));
     for (int axis = 0; axis < 3 && crossing_search > 0; axis++) e->hit.normal[axis] = -e->hit.normal[axis];
-    /* A ray that enters and leaves a polyhedron through one quad's patch without meeting the quad's triangles is
-     * outside of its tets: the field there is defined along the ray, from patch to patch, but not across it. */
+    /* A ray may enter and leave a polyhedron through the patch of one quad without meeting the quad's triangles. It is
+     * then outside of the tets: the field is defined along the ray, from patch to patch, but not across it. */
     const bool has_gradient = crossing_search != 0;
     if (!has_gradient) t->out->ambiguous = true;
     e->hit.conditioning = has_gradient ? 1 / fabs(crossing_search) : 1;
@@ -324,12 +327,13 @@ static reference_hit *add_hit(trace *t, const camera_cell *c, const render_surfa
     return &e->hit;
 }
 
-/* Adds all crossings. If the interpolant at a face is on another side of the isovalue than the face's value, the
- * crossing is at the face. */
+/* Adds all crossings of a surface in a cell. If the isovalue is between the face's value and the interpolant's value at
+ * the same face, the crossing is placed on the face. */
 static void cross_all_cells(trace *t, const camera_cell *c, const render_surface_layer *layer, int value_index,
                             int surface, const double *values, const reference_crossing ends[2], const double face[2])
 {
-    double z[REFERENCE_MAX_BREAKS], v[REFERENCE_MAX_BREAKS], low, high; /* more elements than the fence needs */
+    /* both functions below write to these arrays; the profile needs more elements */
+    double z[REFERENCE_MAX_BREAKS], v[REFERENCE_MAX_BREAKS], low, high;
     crossing_search a = {t, c, values, layer->values[value_index], 0};
     compute_value_range(values, c->cell.count, &low, &high);
     if (a.iso > high || a.iso < low || ends[1].z < 0) return;
@@ -350,8 +354,8 @@ static void cross_all_cells(trace *t, const camera_cell *c, const render_surface
         if (is_polyhedron) lower_margin_near_sheets(t, c, depth);
         if (depth < 0) continue;
         reference_hit *hit = add_hit(t, c, layer, value_index, surface, values, depth);
-        /* The last piece of a profile ends on a quad's patch, which may lie outside the tets, so that the tets'
-         * gradient does not give the slope of the piece. */
+        /* The last interval of a profile ends on a quad's patch. The patch may lie outside the tets, so the tets'
+         * gradient does not give the slope in this interval. */
         if (is_polyhedron && is_inner) hit->slowness = a.range * (z[i] - z[i - 1]) / (fabs(v[i] - v[i - 1]) * c->size);
     }
 }
@@ -469,7 +473,7 @@ static void load_cell(const reference_scene *scene, int part, int64_t index, cam
     c->size = longest > 0 ? cbrt(volume) : 1;
 }
 
-/* Returns whether the ray passes through the sheared box of the cell, widened by a margin. */
+/* Returns whether the ray passes through the cell's box, which is sheared along the ray and widened by a margin. */
 static bool is_cell_near_ray(const trace *t, int part, int64_t index)
 {
     const grid *g = t->scene->job->parts[part].cells;
@@ -519,8 +523,9 @@ static void blend_event(double rgb[3], double *transmittance, const event *e)
     *transmittance *= e->transmittance;
 }
 
-/* Merges samples of several volumes at the same depth into the last of them, whose index is returned: the light that
- * all of them absorb is divided among them in proportion to what each would absorb alone. */
+/* Merges samples of several volumes at the same depth into the last of them. The light that all of them absorb together
+ * is divided among them in proportion to what each would absorb without the others. Returns the index of the merged
+ * sample. */
 static int64_t gather_samples(event *events, int64_t count, int64_t i)
 {
     int64_t last = i;
@@ -538,7 +543,7 @@ static int64_t gather_samples(event *events, int64_t count, int64_t i)
     return last;
 }
 
-/* Lowers the margin for a sample and a hit at nearly the same depth, since rounding may swap them. */
+/* Lowers the margin for a sample and a hit at nearly the same depth, since rounding may exchange their order. */
 static void lower_margins_between_events(const event *events, int64_t count, double *margin)
 {
     for (int64_t i = 0; i + 1 < count; i++)

@@ -1,4 +1,4 @@
-/* A cell and the rays of a packet for the tests of the root finder, which compile the kernels' headers. */
+/* One cell and one packet of rays, for the tests of the root finder. These tests compile the kernels' headers. */
 #ifndef ROOT_BUNDLE_H
 #define ROOT_BUNDLE_H
 
@@ -39,7 +39,7 @@ static inline void bundle_initialize(bundle *b)
     b->packet.t_far = vf_set(INFINITY);
 }
 
-/* Transforms a cell whose type, count, world and values are set: tile space equals world space. */
+/* Transforms a cell whose type, count, world and values are set. Tile space equals world space here. */
 static inline void bundle_transform_cell(bundle *b)
 {
     kernel_cell_order(&b->cell);
@@ -51,14 +51,14 @@ static inline void bundle_transform_cell(bundle *b)
     }
 }
 
-/* Returns a beam that contains all directions of the packet. */
+/* Returns a beam that contains the directions of all rays of the packet. */
 static inline kernel_beam bundle_compute_beam(const kernel_packet *p)
 {
     const vf most = vf_max(vf_abs(p->slope_x), vf_abs(p->slope_y));
     return (kernel_beam){.spread = vf_reduce_max(most)};
 }
 
-/* Computes the packet's intervals in the cell and the cell's bounds; returns the number of intervals. */
+/* Computes the packet's intervals in the cell and the bounds of the cell. Returns the number of intervals. */
 static inline int bundle_find_intervals(bundle *b, kernel_interval list[KERNEL_MAX_CELL_INTERVALS],
                                         kernel_curved *curved)
 {
@@ -67,7 +67,7 @@ static inline int bundle_find_intervals(bundle *b, kernel_interval list[KERNEL_M
     return kernel_curved_intervals(&b->packet, &b->cell, b->packet.active, list);
 }
 
-/* Finds the first hits on all rays, and the number of hits of each. */
+/* Finds the first hit on each ray and the number of hits on each ray. Returns the mask of rays with a hit. */
 static inline vm bundle_find_hits(bundle *b, const kernel_curved *curved, const kernel_interval *i, vf *t, vf *hits)
 {
     const kernel_rays rays = kernel_packet_rays(&b->packet);

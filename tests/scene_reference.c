@@ -1,5 +1,6 @@
-/* Prints docs/scene.md from the schema that reads scene files. If a file's name is given, reports the first difference
- * from that file and fails if there is one. `ninja scene_docs` writes the page anew. */
+/* Prints docs/scene.md from the schema that the scene parser uses. If a file name is given as an argument, compares the
+ * output with that file, reports the first difference and fails if there is one. `ninja scene_docs` writes the page
+ * anew. */
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -184,7 +185,7 @@ enum { MOST_MAPPINGS = 128 };
 static const scene_mapping *shown[MOST_MAPPINGS];
 static int shown_count;
 
-/* Prints each mapping with its path in the file once, in the order in which a reader meets it. */
+/* Prints each mapping once, with its path in the scene file, in the order in which mappings appear on the page. */
 static void print_mapping(FILE *to, const scene_mapping *mapping, const char *path)
 {
     for (int i = 0; i < shown_count; i++) {

@@ -1,10 +1,13 @@
-/* Replaces sched_yield() for the ranks of tests, of which there are more than cores: a rank sleeps while others keep
- * the cores busy. A rank that waits for a message calls sched_yield() in a loop. Linux's EEVDF scheduler (since 6.6)
- * lets such a rank run again only after the slices of all busy processes, milliseconds after its message arrived: next
- * to two busy processes, a test of many steps on 3 ranks took 115 to 155 s, and takes 16 to 22 s if its ranks sleep. On
- * idle cores sched_yield() returns at once, and sleeping would cost a third of the time. So each thread measures its
- * calls of sched_yield(): after a slow one, it sleeps in the following calls, and then measures again. MPICH on UCX
- * never yields, but calls ucp_worker_progress() in its loop: here, a call of it that moves no message yields. */
+/* Replaces sched_yield() for tests that run more ranks than cores: a rank that waits sleeps while other ranks use the
+ * cores. A rank that waits for a message calls sched_yield() in a loop. Linux's EEVDF scheduler (since 6.6) schedules
+ * such a rank again only after the time slices of all busy processes, milliseconds after its message arrived. With two
+ * busy processes on the machine, a test of many steps on 3 ranks took 115 to 155 s; it takes 16 to 22 s if waiting
+ * ranks sleep.
+ *
+ * On idle cores sched_yield() returns at once, and sleeping would slow tests down by a third. Therefore each thread
+ * measures the duration of its calls of sched_yield(): after a slow call, it sleeps in the next calls, and then
+ * measures again. MPICH on UCX never yields but calls ucp_worker_progress() in its loop; a call of
+ * ucp_worker_progress() that moves no message yields here. */
 #define _GNU_SOURCE 1
 #include <dlfcn.h>
 #include <sched.h>

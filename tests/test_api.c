@@ -1,4 +1,4 @@
-/* Tests only the installed interface: the public header and the shared library, which writes real picture files. */
+/* Tests the installed interface: uses only the public header and the shared library, and writes real picture files. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -48,7 +48,7 @@ static void write_scene(const char *output)
     write_scene_of("writing: step\n", output);
 }
 
-/* Submits one hex for each rank, side by side along y. */
+/* The hex that submit_plane() submits on each rank. The hexes of the ranks lie side by side along y. */
 static float corners[8][3], values[8];
 static const int32_t indices[8] = {0, 1, 2, 3, 4, 5, 6, 7};
 
@@ -106,7 +106,7 @@ static void picture_is_written_to_the_path_of_the_scene(void **context)
 static void folder_that_cannot_be_written_is_named(void **context)
 {
     (void)context;
-    /* The path of the folder names a regular file: creating the folder fails for root too. */
+    /* The path of the output folder is a regular file, so that creating the folder fails even for root. */
     char output[2048];
     snprintf(output, sizeof output, "%s/a.png", scene_name);
     write_scene(output);
@@ -120,8 +120,8 @@ static void folder_that_cannot_be_written_is_named(void **context)
     insitu_destroy(&session);
 }
 
-/* Checks pictures that are written in the background: the steps go on, and one of them reports for which cycle a
- * picture was not written. Failures that no step has reported are reported at the end. */
+/* Checks errors of pictures that are written in the background. A later step reports for which cycle a picture was not
+ * written, and steps continue. Failures that no step has reported are reported when the session is destroyed. */
 static void picture_that_is_not_written_is_reported_later(void **context)
 {
     (void)context;
@@ -168,7 +168,8 @@ static void callers_error_handler_stays(void **context)
     everywhere(found == ours && handled == 0);
     MPI_Errhandler_free(&found);
     int nowhere = 0;
-    MPI_Send(&nowhere, 1, MPI_INT, rank_count + 5, 0, comm); /* the caller's own error reaches the caller's handler */
+    /* an error of the caller's own call must reach the caller's error handler */
+    MPI_Send(&nowhere, 1, MPI_INT, rank_count + 5, 0, comm);
     everywhere(handled == 1);
     insitu_destroy(&session);
     MPI_Errhandler_free(&ours);
@@ -185,7 +186,7 @@ static void sessions_of_split_communicators_are_independent(void **context)
     snprintf(output, sizeof output, "%s/api_np%d_{cycle}.exr", folder, rank_count);
     write_scene(output);
     const insitu_status status = insitu_create(half, scene_name, &session);
-    MPI_Comm_free(&half); /* the session has its own communicator */
+    MPI_Comm_free(&half); /* the session uses its own duplicate of the communicator */
     everywhere(status == INSITU_OK);
     submit_plane(session);
     everywhere(insitu_step(session, own_rank % 2, 0) == INSITU_OK);
@@ -235,7 +236,7 @@ static void scene_text_draws_same_pictures_as_scene_file(void **context)
     everywhere(insitu_create(MPI_COMM_WORLD, scene_name, &session) == INSITU_OK);
     submit_and_draw(session);
     snprintf(text, sizeof text, scene_words, output[1]);
-    /* Rank 0's text is used, and is not read after the call. */
+    /* Only rank 0's text is used, and it is not read after the call returns. */
     const insitu_status status = insitu_create_from_text(MPI_COMM_WORLD, own_rank ? NULL : text, &session);
     memset(text, '!', sizeof text);
     everywhere(status == INSITU_OK);
@@ -243,7 +244,7 @@ static void scene_text_draws_same_pictures_as_scene_file(void **context)
     everywhere(own_rank != 0 || are_same_files(names[0], names[1]));
 }
 
-/* Draws the plane x = 0.4, seen along x from a distance of 5, in an image without and one with decorations. */
+/* Draws the plane x = 0.4, seen along x from a distance of 5, in two images: one without and one with decorations. */
 static const char kept_words[] =
     "images:\n"
     "  - {name: plain, size: [24, 16], every: 2, background: [1, 0, 0], camera: {position: [5.4, %g, 0.5],\n"
@@ -260,7 +261,7 @@ static bool is_plane_picture(const insitu_picture *p)
     const int middle = 8 * p->width + 12;
     return p->width == 24 && p->height == 16 && memcmp(p->rgba, background, sizeof background) == 0 &&
            isinf(p->depth[0]) && memcmp(p->rgba + 4 * middle, background, sizeof background) != 0 &&
-           /* float32 rounding of a few operations */
+           /* tolerance: float32 rounding of a few operations */
            p->rgba[4 * middle + 3] == 1 && fabs(p->depth[middle] - 5.0) < 5e-6;
 }
 
@@ -276,7 +277,7 @@ static void pictures_are_kept_in_memory_if_requested(void **context)
     everywhere(insitu_create_from_text(MPI_COMM_WORLD, text, &session) == INSITU_OK);
     submit_plane(session);
     everywhere(insitu_step(session, 0, 0) == INSITU_OK && !insitu_last_pictures(session, &count) && count == 0);
-    everywhere(insitu_keep_pictures(session, own_rank == 0) == INSITU_OK); /* rank 0's argument is used */
+    everywhere(insitu_keep_pictures(session, own_rank == 0) == INSITU_OK); /* only rank 0's argument is used */
     everywhere(insitu_step(session, 2, 0) == INSITU_OK);
     const insitu_picture *p = insitu_last_pictures(session, &count);
     everywhere(count == here && !p == !here);
@@ -300,7 +301,7 @@ static void wrong_scene_text_is_reported_with_its_line(void **context)
     everywhere(insitu_create_from_text(MPI_COMM_WORLD, NULL, &session) == INSITU_ERROR_ARGUMENT && !session);
     everywhere(strstr(insitu_error(NULL), "insitu_create_from_text: no scene is given"));
     everywhere(insitu_create_from_text(MPI_COMM_NULL, text, &session) == INSITU_ERROR_ARGUMENT);
-    /* The text is longer than the limit of a scene: it must be refused, not truncated. */
+    /* The text is longer than the limit of scene texts. It must be refused, not truncated. */
     const size_t size = (size_t)5 << 20;
     char *comment = malloc(size);
     memset(comment, '#', size);
@@ -356,7 +357,7 @@ int main(int argc, char **argv)
     write_scene("unused.png");
     failed += insitu_create(MPI_COMM_WORLD, scene_name, &late) != INSITU_OK;
     MPI_Finalize();
-    /* destroyed after MPI_Finalize(): must not crash */
+    /* The session is destroyed after MPI_Finalize(). insitu_destroy() must return an error and not crash. */
     failed += insitu_destroy(&late) != INSITU_OK || late || !is_refused;
     return failed;
 }

@@ -1,6 +1,7 @@
-/* Checks that nodes of the Mesh Blueprint draw the same pictures, to the bit, as the same meshes passed by the public
- * header, in every layout, also packed at odd addresses, and that nothing is copied that the header can describe. Wrong
- * nodes are reported with their path, with the same status on all ranks. */
+/* Checks that meshes passed as Mesh Blueprint nodes are drawn bit-identically to the same meshes passed by the public
+ * header, in every layout and also if the arrays are packed at odd addresses. Checks that nothing is copied if the
+ * header can describe the node's arrays. Wrong nodes must be reported with their path and with the same status on all
+ * ranks. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -21,7 +22,7 @@ static const char scene[] =
     "      - surface: {colour_by: {field: radial}, opacity: 0.4}\n"
     "      - volume: {field: vel, component: magnitude, range: [0, 20], opacity: [[0, 0.3], [1, 0]]}\n"
     "    outputs: [{path: a.png}]\n";
-/* A scene without the field vel, which some layouts do not have. */
+/* The scene for layouts without the field vel: it uses only braid and radial. */
 static const char scene_of_two[] = "images:\n"
                                    "  - name: a\n"
                                    "    size: [48, 36]\n"
@@ -52,7 +53,7 @@ static void expect_set_succeeds(doorway *d, const char *name, const conduit_node
     everywhere(status == INSITU_OK);
 }
 
-/* Draws the mesh passed by the public header; *copied is the number of bytes copied for it. */
+/* Draws the mesh passed by the public header. *copied receives the number of bytes copied for it. */
 static caught_picture draw_by_header(const char *path, const layout_case *layout, int64_t *copied)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, path);
@@ -103,8 +104,8 @@ static void each_layout_draws_same_picture_as_header(void **state)
     }
 }
 
-/* Checks types that are read in place: adaptor and session together copy no more than for the public header's
- * arrays. */
+/* Checks layouts whose arrays the session can read in place: the adaptor and the session together copy no more bytes
+ * than if the same arrays are passed by the public header. */
 static void arrays_described_by_the_header_are_not_copied(void **state)
 {
     (void)state;
@@ -135,7 +136,7 @@ static void arrays_described_by_the_header_are_not_copied(void **state)
 
 /* ---- several domains, names and steps --------------------------------------------------------------------------- */
 
-/* Moves the contents of the node child to parent's path; parent then owns them. */
+/* Moves the contents of `child` to the node at parent's path. parent then owns them. */
 static void move_child_node(conduit_node *parent, const char *path, conduit_node *child)
 {
     conduit_node *at = conduit_node_fetch(parent, path);
@@ -143,7 +144,7 @@ static void move_child_node(conduit_node *parent, const char *path, conduit_node
     conduit_node_destroy(child);
 }
 
-/* Submits the mesh by the public header, as a block. */
+/* Submits the mesh by the public header as a block with the given number. */
 static bool submit_block(insitu_session *session, const char *name, int64_t number, const layout_case *layout)
 {
     insitu_mesh mesh = layout->mesh;
@@ -154,7 +155,7 @@ static bool submit_block(insitu_session *session, const char *name, int64_t numb
     return is_set;
 }
 
-/* Draws two domains, which are moved into one node. */
+/* Draws the two domains a and b as children of one node. */
 static caught_picture draw_both(const char *path, layout_case *a, layout_case *b, insitu_blueprint_report *report)
 {
     conduit_node *both = conduit_node_create();
@@ -171,8 +172,8 @@ static caught_picture draw_both(const char *path, layout_case *a, layout_case *b
     return pop_caught_picture();
 }
 
-/* Checks that a lattice and a list of cells become blocks of one mesh. If their fields differ, the second becomes a
- * mesh of its own. */
+/* Checks that a domain that is a lattice and a domain that is a list of cells become two blocks of one mesh. If their
+ * fields differ, the second domain becomes a separate mesh. */
 static void domains_are_blocks_of_one_mesh(void **state)
 {
     (void)state;
@@ -204,7 +205,7 @@ static void domains_are_blocks_of_one_mesh(void **state)
     }
 }
 
-/* Checks a mesh that is first one node, then a list of domains, then one node again. */
+/* Checks a mesh that is passed as a single domain, then as a list of domains, then as a single domain again. */
 static void mesh_changes_to_blocks_and_back(void **state)
 {
     (void)state;
@@ -232,7 +233,7 @@ static void mesh_changes_to_blocks_and_back(void **state)
     layout_free(&a);
 }
 
-/* Checks a rank without domains, and then a mesh that disappears on all ranks. */
+/* Checks a mesh of which one rank has no domain, and then a mesh that is removed on all ranks. */
 static void meshes_are_added_and_removed(void **state)
 {
     (void)state;
@@ -268,8 +269,8 @@ static void meshes_are_added_and_removed(void **state)
     layout_free(&b);
 }
 
-/* Checks that new coordinates, values and flags in the same arrays are detected, and that no tree is built if they are
- * unchanged. */
+/* Checks that the session detects new coordinates, values and flags in the same arrays, and that it builds no tree if
+ * the arrays are unchanged. */
 static void changed_arrays_are_detected(void **state)
 {
     (void)state;
@@ -301,7 +302,7 @@ static void changed_arrays_are_detected(void **state)
         }
 }
 
-/* Checks that steps without state/cycle continue counting from the last one. */
+/* Checks steps whose node has no state/cycle: the cycle is then that of the previous step plus 1. */
 static void cycles_are_counted(void **state)
 {
     (void)state;

@@ -1,4 +1,4 @@
-/* A session with a Blueprint adaptor. */
+/* A session together with a Blueprint adaptor. */
 #ifndef TEST_BLUEPRINT_DOOR_H
 #define TEST_BLUEPRINT_DOOR_H
 
@@ -10,7 +10,7 @@ typedef struct doorway {
     insitu_blueprint *adaptor;
 } doorway;
 
-/* Opens a session of the scene at path, and its adaptor. Collective. */
+/* Opens a session with the scene at `path`, and an adaptor of the session. Collective. */
 doorway open_adaptor_session(const char *path);
 void close_adaptor_session(doorway *d);
 

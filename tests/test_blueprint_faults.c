@@ -1,5 +1,6 @@
-/* Checks faulty nodes: each is refused with the path of its error, on the last rank alone, and the step returns the
- * error with the same status on all ranks and draws nothing. After the node is corrected, the next step draws. */
+/* Checks faulty nodes. Only the last rank passes a faulty node. The node is refused there with the path of its error;
+ * the step then returns the same status on all ranks and draws nothing. After the node is corrected, the next step
+ * draws. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,18 +16,18 @@ static const char scene[] = "images:\n"
                             "    layers: [{surface: {colour_by: {field: radial}}}]\n"
                             "    outputs: [{path: a.png}]\n";
 
-/* The replacement of a part of a node. */
+/* What a node_fault stores at its path instead of the correct value. */
 typedef enum fault_kind {
     REMOVED,
-    A_WORD,     /* the text of the case */
-    A_NUMBER,   /* an int64, the number of the case */
-    A_REAL,     /* a float64, the number of the case */
-    SHORT,      /* an array without its last element */
-    FLOATS,     /* float64 instead of integers */
-    AN_OBJECT,  /* a node of children */
-    NO_ADDRESS, /* an array without memory */
-    NO_STRIDE,  /* an array of stride 0 */
-    ENTRY       /* the array with the entry at the case's index set to the number */
+    A_WORD,     /* the text node_fault::word */
+    A_NUMBER,   /* node_fault::number as an int64 */
+    A_REAL,     /* node_fault::number as a float64 */
+    SHORT,      /* the array without its last element */
+    FLOATS,     /* the array as float64 instead of integers */
+    AN_OBJECT,  /* a node with children */
+    NO_ADDRESS, /* an array whose address is NULL */
+    NO_STRIDE,  /* an array with stride 0 */
+    ENTRY       /* the array with the element at index node_fault::place set to node_fault::number */
 } fault_kind;
 
 typedef struct node_fault {
@@ -35,7 +36,7 @@ typedef struct node_fault {
     const char *word;
     int64_t number, place;
     insitu_status status;
-    /* the part of the message after the path; it may itself begin with the path of another entry, before ": " */
+    /* the part of the message after the path; may begin with the path of a second entry, before ": " */
     const char *reported;
 } node_fault;
 
@@ -128,9 +129,9 @@ static const node_fault faults[] = {
 };
 enum { FAULTS = sizeof faults / sizeof faults[0] };
 
-static const int64_t *replaced; /* an array to be freed, or NULL */
+static const int64_t *replaced; /* an array that corrupt_node() has replaced and that the test must free, or NULL */
 
-/* Replaces the array by a copy with one different entry, or of another type. */
+/* Replaces the array by a copy of type `id`, with the fault's entry set if the fault is an ENTRY. */
 static void replace_array(conduit_node *node, const node_fault *f, int id)
 {
     conduit_node *at = conduit_node_fetch_existing(node, f->path);
@@ -195,7 +196,7 @@ static bool check_message(const char *message, const node_fault *f, const char *
     return is_well;
 }
 
-/* Checks that the adaptor draws the corrected node as if the wrong one had never been passed. */
+/* Checks that the adaptor draws the corrected node as if the faulty node had never been passed. */
 static void draw_corrected_node(insitu_session *session, insitu_blueprint *adaptor, const conduit_node *node)
 {
     discard_pictures();
@@ -240,7 +241,7 @@ static void wrong_nodes_are_reported_on_all_ranks(void **state)
     everywhere(FAULTS >= 60);
 }
 
-/* Checks wrong contents of arrays, which the session detects: its message names the mesh and the cell. */
+/* Checks faulty contents of arrays. The session detects the fault, so the message names the mesh and the cell. */
 static void wrong_indices_are_reported_on_all_ranks(void **state)
 {
     (void)state;

@@ -15,7 +15,7 @@ static void *allocate_for_case(layout_case *l, int64_t count, size_t size)
     return made;
 }
 
-/* Returns a copy of the integers in another type. */
+/* Returns a copy of the integers, converted to the type `id`. */
 static void *convert_integers(layout_case *l, const int64_t *from, int64_t count, int id)
 {
     char *made = allocate_for_case(l, count, (size_t)stand_in_size(id));
@@ -67,7 +67,8 @@ static void store_field_header(layout_case *l, const char *name, const char *ass
     conduit_node_set_path_char8_str(l->node, path, "mesh");
 }
 
-/* Adds the three fields; in the node each component of vel is in an allocation of its own. positions: vertices × 3. */
+/* Adds the fields braid, radial and vel. In the node, each component of vel has its own allocation. positions: vertices
+ * × 3. */
 static void add_fields(layout_case *l, const double *positions, int64_t vertices, int64_t cells)
 {
     static const char *const parts[3] = {"fields/vel/values/u", "fields/vel/values/v", "fields/vel/values/w"};
@@ -99,7 +100,8 @@ static void store_topology(layout_case *l, const char *type, const char *of_coor
     conduit_node_set_path_char8_str(l->node, "topologies/mesh/coordset", "coords");
 }
 
-/* Stores interleaved coordinates in the node and the header's mesh; two-dimensional if there is no z. */
+/* Stores interleaved coordinates in the node and in the public header's mesh. They are two-dimensional if has_z is
+ * false. */
 static void store_coordinates(layout_case *l, const double *positions, int64_t vertices, bool has_z)
 {
     static const char *const paths[3] = {"coordsets/coords/values/x", "coordsets/coords/values/y",
@@ -138,7 +140,8 @@ static void make_hex_cells(layout_case *l, const int64_t counts[3])
     }
 }
 
-/* first is the index of the block's first vertex in the whole mesh, which the node states as elements/origin. */
+/* Makes a uniform grid. first: index of the block's first vertex along x in the whole mesh; the node states this index
+ * as elements/origin. */
 static void make_uniform_grid(layout_case *l, int dimensions, int64_t first)
 {
     static const char *const paths[4][3] = {
@@ -251,7 +254,7 @@ static void make_structured_shell(layout_case *l)
     make_structured_grid(l, 2, true);
 }
 
-/* Stores the values of a field in a padded array, whose other elements are NaN. */
+/* Stores the values of a field in a padded array. Elements outside the block are NaN. */
 static void store_padded_values(layout_case *l, int field, const int64_t counts[3], const int64_t offsets[3],
                                 const int64_t strides[3], int64_t length)
 {
@@ -273,8 +276,8 @@ static void store_padded_values(layout_case *l, int field, const int64_t counts[
     store_integers(l, path, STAND_IN_INT64, strides, 3);
 }
 
-/* Makes a block whose array of vertices is 8 x 7 x 6 with i fastest, and whose array of cells has k fastest;
- * coordinates outside the block are set too. */
+/* Makes a strided block: it is a part of an array of 8 x 7 x 6 vertices in which i varies fastest, and of an array of
+ * cells in which k varies fastest. Coordinates outside the block are set too. */
 static void make_strided(layout_case *l)
 {
     const int64_t counts[3] = {5, 4, 3}, cells[3] = {4, 3, 2}, offsets[3] = {2, 1, 2}, strides[3] = {1, 8, 56};
@@ -303,8 +306,9 @@ static void make_strided(layout_case *l)
 
 /* ---- unstructured in two dimensions ------------------------------------------------------------------------------ */
 
-/* Lists quads; if both has_triangles and has_quads, every second one is split into two triangles. Stores the sizes as
- * the layout requires. */
+/* Lists the cells of a plane of 12 quads. If has_triangles and has_quads are both set, every second quad is split into
+ * two triangles; if only has_triangles is set, every quad is. Stores the sizes and types of cells as the layout
+ * requires. Returns the number of cells. */
 static int64_t list_plane(layout_case *l, bool has_triangles, bool has_quads, int64_t *connectivity, int64_t *sizes,
                           int64_t *types)
 {
@@ -387,7 +391,7 @@ static void make_polygons_without_offsets(layout_case *l)
 
 /* ---- unstructured in three dimensions ---------------------------------------------------------------------------- */
 
-/* Copies an array of a test_mesh into memory that the case owns. */
+/* Copies an array of a test_mesh into memory owned by the case. */
 static void *copy_to_case(layout_case *l, const void *from, int64_t count, size_t size)
 {
     void *made = allocate_for_case(l, count, size);
@@ -419,7 +423,8 @@ static void store_faces(layout_case *l, const test_mesh *m, int id)
     store_rows(l, "subelements", id, m->face_offsets, m->face_count);
 }
 
-/* Stores the shapes by numbers of the code's own: VTK's plus the shift. */
+/* Stores the shape of each cell as a number and the map of numbers to shapes' names. The numbers are those of VTK plus
+ * `shift`, since a simulation may use any numbers. */
 static void store_shapes(layout_case *l, const test_mesh *m, int64_t shift, int id)
 {
     static const char *const names[] = {"tet", "hex", "wedge", "pyramid", "polyhedral"};
@@ -437,9 +442,9 @@ static void store_shapes(layout_case *l, const test_mesh *m, int64_t shift, int 
 typedef struct solid_kind {
     test_mesh_kind kind;
     const char *shape;
-    double polyhedra;    /* fraction of cells that become polyhedra */
-    int64_t shape_shift; /* added to the numbers of shapes in mixed meshes */
-    int id;              /* type of the integers */
+    double polyhedra;    /* fraction of cells that are stored as polyhedra */
+    int64_t shape_shift; /* added to VTK's number of each shape in mixed meshes */
+    int id;              /* type of the integers in the node (STAND_IN_*) */
 } solid_kind;
 
 static void make_solid(layout_case *l, const solid_kind *of)
@@ -486,7 +491,7 @@ SOLID(make_mixed_shorts, TEST_MIXED, "mixed", 0, 7, STAND_IN_INT16)
 
 /* ---- ghosts and fields ------------------------------------------------------------------------------------------- */
 
-/* Adds an array with the flag `mark` for a third of the cells and `other` for the rest. */
+/* Adds an array of flags: `mark` for a third of the cells and `other` for the rest. */
 static void store_ghosts(layout_case *l, const char *name, int id, int64_t mark, int64_t other)
 {
     char path[256];
@@ -509,7 +514,7 @@ static void make_ghosts_of_vtk(layout_case *l)
     store_ghosts(l, "vtkGhostType", STAND_IN_UINT8, 1, 0);
 }
 
-/* Bit 16, which marks cells at the border of the domain, hides nothing. */
+/* Bit 16 marks cells at the border of the domain and must hide nothing. */
 static void make_ghosts_of_bits(layout_case *l)
 {
     make_uniform(l);
@@ -529,7 +534,7 @@ static void make_ghosts_with_name(layout_case *l)
     conduit_node_set_path_char8_str(l->node, "state/metadata/vtk_fields/halo/attribute_type", "Ghosts");
 }
 
-/* Makes interleaved components of vel, and integers of two bytes for braid and of one byte for radial. */
+/* Stores vel as interleaved components, braid as integers of two bytes and radial as integers of one byte. */
 static void make_fields_of_integers(layout_case *l)
 {
     static const char *const parts[3] = {"fields/vel/values/u", "fields/vel/values/v", "fields/vel/values/w"};
@@ -545,7 +550,7 @@ static void make_fields_of_integers(layout_case *l)
                            l->mesh.vertex_count, 3 * (int64_t)sizeof(double));
 }
 
-/* Makes a domain some of whose cells, those of a window, are drawn by another domain. */
+/* Makes a domain with a nestset: the cells in its window are drawn by another domain. */
 static void make_covered(layout_case *l)
 {
     make_rectilinear(l);
@@ -569,7 +574,8 @@ static void make_covered(layout_case *l)
     l->mesh.ghosts = (insitu_array){flags, INSITU_UINT8, 0};
 }
 
-/* ---- all --------------------------------------------------------------------------------------------------------- */
+/* ---- list of all layouts
+ * ------------------------------------------------------------------------------------------ */
 
 const layout_kind layout_kinds[] = {
     {"uniform", make_uniform, false},

@@ -1,6 +1,6 @@
-/* Small meshes as nodes of the Mesh Blueprint, in the layouts of Conduit's generator of examples, each with the same
- * mesh in the public header's form. The fields braid and vel are at vertices, radial is at elements. Rank r has the
- * block that begins at x = 20 r, or its part of a test_mesh. */
+/* Small meshes as Mesh Blueprint nodes, in the layouts of Conduit's generator of examples. Each comes with the same
+ * mesh described by the public header. The fields braid and vel are at vertices, and radial is at elements. On rank r,
+ * a lattice is the block that begins at x = 20 r, and an unstructured mesh is the rank's part of a test_mesh. */
 #ifndef TEST_BLUEPRINT_LAYOUTS_H
 #define TEST_BLUEPRINT_LAYOUTS_H
 
@@ -9,7 +9,7 @@
 
 enum { LAYOUT_ARRAYS = 64, LAYOUT_SIDE = 3 };
 
-/* A node and the same mesh in the public header's form. */
+/* A node and the same mesh described by the public header. */
 typedef struct layout_case {
     conduit_node *node;
     insitu_mesh mesh;
@@ -25,7 +25,8 @@ typedef void layout_function(layout_case *out);
 typedef struct layout_kind {
     const char *name;
     layout_function *make;
-    bool is_copied; /* the adaptor must copy something, because the header cannot describe the node's arrays */
+    /* whether the adaptor must copy arrays, because the public header cannot describe those of the node */
+    bool is_copied;
 } layout_kind;
 
 extern const layout_kind layout_kinds[];
@@ -34,7 +35,7 @@ extern const int layout_kind_count;
 void layout_make(const layout_kind *kind, layout_case *out);
 void layout_free(layout_case *layout);
 
-/* Passes the mesh and its fields to the session by the public header. */
+/* Passes the mesh of the public header and its fields to the session. */
 insitu_status layout_submit(insitu_session *session, const char *name, const layout_case *layout);
 
 #endif

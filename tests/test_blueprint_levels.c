@@ -1,6 +1,6 @@
-/* Checks domains of the Mesh Blueprint as blocks of one mesh: uniform domains whose positions are rounded, and levels
- * of refinement with and without ghost layers. The pictures must equal those of the public header's blocks to the bit,
- * no pixel of a sphere may show the background, and nothing may be copied. */
+/* Checks Mesh Blueprint domains that become blocks of one mesh: uniform domains whose positions are rounded, and levels
+ * of refinement with and without ghost layers. The pictures must be bit-identical to those of blocks passed by the
+ * public header, no pixel inside the picture of a sphere may show the background, and nothing may be copied. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,19 +13,19 @@
 
 enum { MOST_BOXES = 16, SIDE = 8, SIZE = 120 };
 
-/* A view along z; the domain is 0.8 wide. */
+/* A view along z that shows exactly the mesh. The width of picture and mesh is 0.8. */
 static const char scene[] =
     "images:\n  - name: a\n    size: [120, 120]\n    background: [0, 0, 0, 0]\n    camera: {position: [0.4, 0.4, 5], "
     "focal: [0.4, 0.4, 0], up: [0, 1, 0], projection: orthographic, height: 0.8}\n    layers:\n"
     "      - isosurface: {field: f, values: [0.3]}\n    outputs: [{path: a.exr}]\n";
-/* A transparent surface, in which a wall between two domains would show. */
+/* A scene with a transparent surface: it would show a wall between two domains. */
 static const char scene_of_surfaces[] =
     "images:\n  - name: a\n    size: [120, 120]\n    camera: {automatic: {direction: [1, 0.7, 0.9]}}\n    layers:\n"
     "      - surface: {colour_by: {field: f, interpolate: vertex}, opacity: 0.3}\n    outputs: [{path: a.exr}]\n";
 
 /* ---- boxes ------------------------------------------------------------------------------------------------------- */
 
-/* A domain, in cells of the coarsest level; the whole mesh has SIDE of these along each axis. */
+/* A domain in units of cells of the coarsest level. The whole mesh has SIDE of these cells along each axis. */
 typedef struct box {
     int level, lower[3], upper[3];
 } box;
@@ -33,12 +33,12 @@ typedef struct box {
 typedef enum layer_kind { NO_LAYER, BY_ASCENT, BY_VTK } layer_kind;
 
 typedef struct plan {
-    int refinement[3]; /* cells per coarsest cell, for each level */
+    int refinement[3]; /* refinement: number of cells per coarsest cell along an axis, for each level */
     double corner;     /* lower coordinate of the whole mesh along each axis */
-    double width;      /* width of a cell of the coarsest level; no power of two, so that positions are rounded */
+    double width;      /* width of a cell of the coarsest level; not a power of two, so that positions are rounded */
     bool is_of_cells;
     bool has_first;  /* domains state elements/origin */
-    bool has_layers; /* some domains have ghost layers, whose values are wrong */
+    bool has_layers; /* some domains have ghost layers, in which the values are wrong */
     bool has_levels; /* domains state their level */
     int count;
     box boxes[MOST_BOXES];
@@ -60,7 +60,8 @@ static void add_shifted_boxes(plan *p)
     add_box(p, 0, 4, 5, 0, 4, 3, 8);
 }
 
-/* Adds eight boxes of the coarsest level, and refined boxes in their middle, next to each other and at the border. */
+/* Adds eight boxes of the coarsest level, and refined boxes over them: in the middle, next to each other and at the
+ * border. If is_moved is set, the finest box lies elsewhere. */
 static void add_boxes(plan *p, bool is_moved)
 {
     p->count = 0;
@@ -80,13 +81,14 @@ static double compute_spacing(const plan *p, const box *b)
     return p->width / p->refinement[b->level];
 }
 
-/* Returns the position that a simulation states: the corner plus a multiple of the spacing, rounded. */
+/* Returns the position that a simulation states for a domain: the mesh's lower corner plus a multiple of the spacing,
+ * rounded. layer: number of ghost layers. */
 static double compute_stated_position(const plan *p, const box *b, int axis, int layer)
 {
     return p->corner + compute_spacing(p, b) * (b->lower[axis] * p->refinement[b->level] - layer);
 }
 
-/* Returns the origin of the whole lattice as a domain implies it. */
+/* Returns the origin of the whole lattice that follows from the domain's stated position. */
 static double compute_lattice_origin(const plan *p, const box *b, int axis, int layer)
 {
     const double spacing = compute_spacing(p, b), at = compute_stated_position(p, b, axis, layer);
@@ -98,7 +100,8 @@ static layer_kind get_ghost_layer(const plan *p, int number)
     return p->has_layers ? (layer_kind)(number % 3) : NO_LAYER;
 }
 
-/* Returns the smallest origin implied by domains of the coarsest level; domains with ghost layers begin farther out. */
+/* Returns the smallest of the origins that follow from the domains of the coarsest level. Domains with ghost layers
+ * begin farther out. */
 static double find_common_origin(const plan *p, int axis)
 {
     double least = INFINITY;
@@ -108,8 +111,7 @@ static double find_common_origin(const plan *p, int axis)
     return least;
 }
 
-/* ---- a domain in both forms ---------------------------------------------------------------------------------------
- */
+/* ---- a domain for both interfaces: the Blueprint node and the public header ---- */
 
 typedef struct domain {
     insitu_lattice lattice;
@@ -137,7 +139,7 @@ static void measure_domain(const plan *p, int number, domain *out)
     }
 }
 
-/* Makes a domain whose field is the distance from the middle of the whole mesh, and -40 in ghost layers. */
+/* Makes a domain whose field is the distance from the middle of the whole mesh. In ghost layers the field is -40. */
 static void make_domain(const plan *p, int number, domain *out)
 {
     measure_domain(p, number, out);
@@ -276,8 +278,9 @@ static caught_picture draw_by_header(const char *path, const plan *p, const doma
     return pop_caught_picture();
 }
 
-/* Returns the number of background pixels inside the sphere. Its radius is 3 cells of the coarsest level, and the
- * surface inside a cell is less than one cell off. */
+/* Returns the number of background pixels inside the picture of the sphere. The sphere's radius is 3 cells of the
+ * coarsest level, and the isosurface is off by less than one cell, so all pixels within 2 cells of the middle must be
+ * covered. */
 static int count_holes(const caught_picture *picture)
 {
     int holes = 0;
@@ -289,7 +292,7 @@ static int count_holes(const caught_picture *picture)
     return holes;
 }
 
-/* Draws the domains and compares the picture with that of blocks passed by the public header. */
+/* Draws the domains through the adaptor and compares the picture with that of blocks passed by the public header. */
 static void draw_and_compare(doorway *d, const char *path, const plan *p, bool is_sphere)
 {
     domain domains[MOST_BOXES];
@@ -342,7 +345,7 @@ static void levels_draw_same_picture_as_blocks(void **state)
     }
 }
 
-/* Checks boxes that change from step to step; if they do not change, no tree is built. */
+/* Checks boxes that change between steps. If they do not change, no tree is built. */
 static void moved_levels_are_drawn(void **state)
 {
     (void)state;
@@ -357,8 +360,8 @@ static void moved_levels_are_drawn(void **state)
     close_adaptor_session(&d);
 }
 
-/* Compares the domains with one block of the whole mesh on the first rank, passed by the public header: isosurfaces do
- * not depend on the partition, and a wall between domains would show in a transparent surface. */
+/* Compares the domains with a single block of the whole mesh that the first rank passes by the public header.
+ * Isosurfaces do not depend on the partition, and a transparent surface would show a wall between domains. */
 static void domains_of_one_level_have_no_seam(void **state)
 {
     (void)state;
@@ -400,7 +403,7 @@ static void domains_of_one_level_have_no_seam(void **state)
     }
 }
 
-/* Checks that a domain whose cells are no fraction of the coarsest cells is reported by name, and is drawn together
+/* Checks a domain whose cells are no integer fraction of the coarsest cells: it is reported by name and drawn together
  * with the cells that it overlaps. */
 static void domains_that_fit_no_level_are_reported(void **state)
 {

@@ -1,5 +1,5 @@
-/* Checks the implementation of Catalyst's API on a replacement of Conduit's functions: where it looks for its scene,
- * which channels it draws, what it reports, and that errors are the same on all ranks. */
+/* Checks the implementation of Catalyst's API, linked with a replacement of Conduit's functions: where it finds its
+ * scene, which channels it draws, what it reports, and that errors are the same on all ranks. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -48,7 +48,7 @@ static conduit_node *make_initialize_node(void)
     return node;
 }
 
-/* Returns the adaptor's results in a new node. */
+/* Stores the adaptor's results in a new node and returns it. */
 static conduit_node *fetch_results(void)
 {
     conduit_node *node = conduit_node_create();
@@ -74,7 +74,7 @@ static double read_number(conduit_node *node, const char *path)
     return conduit_datatype_id(conduit_node_dtype(at)) == STAND_IN_INT64 ? (double)whole : real;
 }
 
-/* Moves a mesh into the node as a channel. */
+/* Moves the node of a layout into the node of a channel. */
 static void store_channel(conduit_node *node, const char *channel, const char *type, const char *data, layout_case *l)
 {
     char path[256];
@@ -127,7 +127,7 @@ static void scenes_are_read_from_the_node(void **state)
     everywhere(initialize_adaptor(node) == INSITU_ERROR_MESH);
 }
 
-/* Checks channels of one mesh, of several meshes and of domains; a rank may have no data. */
+/* Checks channels that contain one mesh, several meshes and domains. A rank may have no data for a channel. */
 static void channels_are_drawn(void **state)
 {
     (void)state;

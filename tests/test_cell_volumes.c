@@ -1,6 +1,6 @@
-/* Checks volumes of single cells (session_volume.h) against quadrature in double and closed forms: random bent hexes,
- * wedges and pyramids in either orientation; polyhedra that are not star-shaped or have a hole or a cavity, with faces
- * in any order. */
+/* Checks the volumes of single cells (session_volume.h). Randomly bent hexes, wedges and pyramids of either orientation
+ * are compared with quadrature in double. Polyhedra that are not star-shaped or that have a hole or a cavity, with
+ * their faces in any order, are compared with closed forms. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -15,13 +15,13 @@
 
 /* ---- quadrature ------------------------------------------------------------------------------------------------ */
 
-enum { POINTS = 4 /* Gauss-Legendre points per axis: exact up to degree 7 along each axis */ };
+enum { POINTS = 4 /* number of Gauss-Legendre points per axis: exact up to degree 7 along each axis */ };
 static const double nodes[POINTS] = {0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970263};
 static const double weights[POINTS] = {0.17392742256872692, 0.32607257743127307, 0.32607257743127307,
                                        0.17392742256872692};
 
-/* Maps a point of the unit cube into the cell: the map is trilinear for hexes; for wedges the triangle is a collapsed
- * square; for pyramids the base shrinks towards the apex. */
+/* Maps a point of the unit cube into the cell. The map is trilinear for hexes. For wedges, the triangle is a collapsed
+ * square; for pyramids, the base shrinks towards the apex. */
 static void map_to_cell(int type, double (*p)[3], const double at[3], double out[3])
 {
     const double u = at[0], v = at[1], w = at[2];
@@ -36,8 +36,8 @@ static void map_to_cell(int type, double (*p)[3], const double at[3], double out
     }
 }
 
-/* Computes the determinant of the map's derivatives, by differences that are exact because the maps are linear along
- * each axis. */
+/* Computes the determinant of the map's derivatives. Differences give the derivatives exactly, because the map is
+ * linear along each axis. */
 static double compute_jacobian_determinant(int type, double (*p)[3], const double at[3])
 {
     double d[3][3];
@@ -66,7 +66,7 @@ static double integrate_volume(int type, double (*p)[3])
 
 /* ---- volumes --------------------------------------------------------------------------------------------------- */
 
-/* Returns the volume of the mesh's only cell. All vertices of the mesh are the cell's, and each must be found once. */
+/* Returns the volume of the mesh's only cell. Checks that each vertex of the mesh is found in the cell one time. */
 static double compute_mesh_volume(const test_mesh *mesh)
 {
     const test_layout wide = {.wide_coordinates = true, .wide_indices = true, .wide_values = true, .with_types = true};
@@ -81,7 +81,8 @@ static double compute_mesh_volume(const test_mesh *mesh)
     return volume;
 }
 
-/* Sums of a few hundred products of numbers of order 1 are off by less than 1e-13. */
+/* Compares two volumes. The tolerance of 1e-12 covers rounding: sums of a few hundred products of numbers of order 1
+ * are off by less than 1e-13. */
 static void assert_nearly_equal(double volume, double expected)
 {
     if (fabs(volume - expected) <= 1e-12) return;
@@ -119,7 +120,7 @@ static double shape_volume(const test_mesh *mesh, test_polyhedron_shape shape)
     double places[16][3], sum = 0;
     memcpy(places, mesh->coordinates, 3 * (size_t)mesh->vertex_count * sizeof(double));
     if (shape == TEST_CAVITY) return integrate_volume(GRID_HEX, places) - integrate_volume(GRID_HEX, places + 8);
-    /* sheared upright prisms; the area of the base follows from its corners */
+    /* The other shapes are sheared upright prisms. The area of the base is computed from its corners. */
     const int around = shape == TEST_L_PRISM ? 6 : 8;
     for (int i = 0; i < around; i++) {
         const double *a = places[i], *b = places[(i + 1) % around];
@@ -143,7 +144,7 @@ static void volumes_of_concave_polyhedra_match_closed_forms(void **state)
         }
 }
 
-/* Checks a square frame: the cell's centre is in its hole and sees the inner faces from behind. */
+/* Checks a square frame: the cell's centre is in the hole, and the inner faces are seen from behind from there. */
 static void volumes_of_rings_match_closed_forms(void **state)
 {
     (void)state;

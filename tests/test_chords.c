@@ -1,14 +1,15 @@
-/* Checks that a ray's intervals in the cells of a mesh add up to its chord of the mesh's hull, and that every end
- * inside the hull is shared by exactly two intervals, to the bit: no gap, no overlap.
+/* Checks that the intervals of a ray in the cells of a mesh add up to the ray's chord (chord_hull.h), and that every
+ * end of an interval inside the hull is bitwise shared by exactly two intervals: no gap, no overlap.
  *
- * Meshes are exact and jittered lattices of every cell type, and finer pieces of straight and bent cells of higher
- * order. Their hull is the cube [-1, 1]^3. Rays are random, aimed at vertices, edges and faces, along edges and faces,
- * and along the lattice.
+ * Meshes are exact and jittered lattices of every cell type, and linear pieces of straight and bent cells of higher
+ * order. The hull of all meshes is the cube [-1, 1]^3. Rays are random, aimed at vertices, edges and faces, along edges
+ * and faces, and along the lattice.
  *
- * Every ray is traced twice: set up alone, with all its edge functions projected (as differences for normals need), and
- * as one ray of a tile, with edge functions by the edges' lines if these are accurate enough (as in frames). The tile
- * is as wide as the distance between its rays: a thousandth of a cell to several cells. chord_hull.h derives the bounds
- * of the sum and of the ends. */
+ * Every ray is traced twice. First it is traced as a single ray: all edge functions are computed from projected
+ * vertices, as for the differences that yield normals. Then it is traced as one ray of a tile: edge functions are
+ * evaluated as affine functions in the image plane, as in frames, unless these are too inaccurate. The tile is as wide
+ * as the distance between its rays: a thousandth of a cell to several cells. chord_hull.h derives the tolerances of the
+ * sum and of the ends. */
 #include "chord_aim.h"
 #include "chord_hull.h"
 #include "cpu.h"
@@ -32,9 +33,9 @@ enum { SIDE = 4 };
 
 static const double length_allowed = 1e-6;
 
-/* The maximum overlap of two intervals of a ray. Two faces that meet at a vertex are each rounded to float32, by a few
- * times 6e-8. By that much the interval of one cell may reach into the next cell's, or end before it, if a concave cell
- * has several intervals there. */
+/* The longest overlap of two intervals of a ray that is allowed. Two faces that meet at a vertex are each rounded to
+ * float32, by a few times 6e-8. If a concave cell has several intervals near the vertex, the interval of one cell may
+ * reach into the next cell's interval, or end before it, by this rounding. */
 static const double doubled_allowed = 5e-7;
 
 static int64_t rays_wanted = 300000;
@@ -59,9 +60,10 @@ typedef enum chord_mesh {
     MESH_POLYHEDRA, /* concave polyhedra with triangular faces */
     MESH_MIXED,
     MESH_QUAD_POLYHEDRA, /* hexes stored as polyhedra */
-    MESH_BESIDE,         /* the mixed mesh, with every second cell a polyhedron */
+    MESH_BESIDE,         /* the mixed mesh in which every second cell is stored as a polyhedron */
     MESH_HONEYCOMB,      /* hexagonal prisms */
-    MESH_REFINED,        /* pieces of cells of higher order, of the first refined_kind; the others follow */
+    /* linear pieces of cells of higher order: the first refined_kind; the meshes of the other kinds follow */
+    MESH_REFINED,
     MESH_COUNT = MESH_REFINED + REFINED_MIXED + 1
 } chord_mesh;
 
@@ -101,23 +103,26 @@ static void make_mesh(chord_mesh kind, double jitter, test_mesh *out)
     if (kind == MESH_BESIDE) test_mesh_to_polyhedra(out, 0.5);
 }
 
-/* The jitter, as a fraction of a cube's side. Up to this value cells are valid; at 0.3 quads pass through neighbouring
- * faces, and cells really overlap (docs/development/hard-cases.md). */
+/* The jitter as a fraction of a cube's side. With a jitter up to 0.2 all cells are valid. At 0.3, quads pass through
+ * neighbouring faces, and cells really overlap (docs/development/hard-cases.md). */
 static const double jitter_wanted = 0.2;
 
 /* ---- a ray ---- */
 
-/* Counts and worst errors of a test's rays. Lengths are in sides of the hull. */
+/* Counts and largest errors over the rays of a test. Lengths are in units of the hull's side. */
 typedef struct tally {
     int64_t rays, met, ray_intervals;
     int64_t slanted, touching; /* a ray counts in at most one of them */
-    int64_t unpaired;          /* rays with an unshared end that is not allowed */
+    int64_t unpaired;          /* rays that have an unshared end at a depth that is not allowed */
     int64_t off;
-    int64_t doubled, gaps;  /* rays on which intervals overlap by rounding, or have gaps between them */
-    double worst_length;    /* error of length of rays that are neither slanted nor touching */
-    double worst_slanted;   /* error of length of slanted rays, as a fraction of the change by hull_shift */
-    double worst_bracketed; /* of all rays: length outside the chords of the shrunk and the swollen hull */
-    double worst_doubled;   /* the longest overlap of two intervals */
+    /* doubled: number of rays on which intervals overlap by rounding; gaps: number of rays with gaps between
+     * intervals */
+    int64_t doubled, gaps;
+    double worst_length;  /* largest error of length among rays that are neither slanted nor touching */
+    double worst_slanted; /* largest error of length among slanted rays, as a fraction of the change by hull_shift */
+    /* largest length, over all rays, outside the range between the chords of the shrunk and the swollen hull */
+    double worst_bracketed;
+    double worst_doubled; /* the longest overlap of two intervals */
     double worst_gap;
 } tally;
 
@@ -134,7 +139,7 @@ static int compare_floats(const void *left, const void *right)
     return (a > b) - (a < b);
 }
 
-/* Finds the ends that are not shared by two intervals, sorted; returns their number. */
+/* Finds the sorted ends that are not shared by two intervals. Returns their number. */
 static int find_unshared_ends(const chord_interval *ray_intervals, int count, float lone[2 * CHORD_MAX_INTERVALS])
 {
     float ends[2 * CHORD_MAX_INTERVALS];
@@ -152,7 +157,8 @@ static int find_unshared_ends(const chord_interval *ray_intervals, int count, fl
     return alone;
 }
 
-/* Clips intervals at depth near, since parts behind the eye's plane do not count. Returns how many remain. */
+/* Clips intervals at the depth `near`, since what is behind the eye's plane does not count. Returns the number of
+ * remaining intervals. */
 static int clip_intervals(chord_interval *ray_intervals, int count, float near)
 {
     int left = 0;
@@ -167,7 +173,7 @@ static double compute_depth(const render_job *job, float t)
     return (double)t / job->space.scale + job->space.depth_origin;
 }
 
-/* Returns whether all unshared ends are at allowed depths. */
+/* Returns whether all unshared ends are at depths that the bounds of chord_hull.h allow. */
 static bool is_paired(const render_job *job, const chord_ray *r, const chord_interval *ray_intervals, int count)
 {
     float lone[2 * CHORD_MAX_INTERVALS];
@@ -180,7 +186,7 @@ static bool is_paired(const render_job *job, const chord_ray *r, const chord_int
     return true;
 }
 
-/* Records the longest overlap and the longest gap of the sorted intervals; on rays that run within the hull's surface
+/* Records the longest overlap and the longest gap of the sorted intervals. On rays that run within the hull's surface,
  * only gaps inside the shrunk hull count. */
 static void verify_neighbours(const render_job *job, const chord_ray *r, const chord_interval *ray_intervals, int count,
                               tally *t)
@@ -258,7 +264,8 @@ static void trace_rays(const render_job *job, kernel_thread *thread, chord_rays 
     render_unprepare(&frame);
 }
 
-/* The first tally counts rays that are set up alone, the second the same rays as rays of one tile. */
+/* Traces rays through a mesh. tallies[0] counts rays that are traced as single rays, tallies[1] the same rays traced as
+ * rays of one tile. */
 static void verify_mesh(chord_mesh kind, double jitter, chord_aim aim, int64_t count, tally tallies[2])
 {
     static const double value[1] = {0};
@@ -318,10 +325,10 @@ static void add_tally(tally *sum, const tally *t)
     sum->worst_gap = fmax(sum->worst_gap, t->worst_gap);
 }
 
-/* Bounds the fraction of slanted rays, and of rays that run within the hull's surface, for each aim. A bound is the
- * measured fraction plus about a tenth, plus the rays of one camera, in case rays are few. The fractions are not small,
- * since a fifth of all edges and faces belong to the hull, and rays to them and their vertices come from any
- * direction. */
+/* Checks that few rays are slanted and few run within the hull's surface, for each aim. A bound is the measured
+ * fraction plus about a tenth of it, plus the rays of one camera in case there are few rays. The fractions are not
+ * small, because a fifth of all edges and faces belong to the hull, and rays come to them and to their vertices from
+ * any direction. */
 static void assert_few_at_the_surface(chord_aim aim, const tally *t)
 {
     static const double slanted_most[CHORD_AIM_COUNT] = {
@@ -410,7 +417,7 @@ static void rays_from_inside_add_up_to_their_chords(void **state)
     verify_aim(CHORD_FROM_INSIDE, "from inside");
 }
 
-/* The command's argument is the number of rays. */
+/* The command's argument is the number of rays to trace. */
 int main(int argc, char **argv)
 {
     if (fixture_isa_is_unavailable()) return 77;

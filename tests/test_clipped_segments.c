@@ -1,6 +1,7 @@
-/* Checks volumes by segments under max_error that are clipped by spheres which rays graze: the part of a ray that a
- * sphere keeps or removes may be as short as 1e-4 of the sphere's radius, and may begin and end anywhere in a cell. The
- * reference is the adaptive integral in double, cut at the closed-form intersections of line and sphere. */
+/* Checks segments of volumes under max_error that are clipped by spheres which rays only graze. The interval of a ray
+ * that a sphere keeps or removes may be as short as 1e-4 of the sphere's radius, and it may begin and end anywhere in a
+ * cell. The reference is the adaptive integral in double, cut at the intersections of line and sphere in closed
+ * form. */
 #include "reference_integral.h"
 #include "test_effort.h"
 #include "test_render_fixture.h"
@@ -14,8 +15,8 @@
 
 enum { SIDE = 13 };
 
-/* Makes a sphere whose surface the pixel's ray passes at a random fraction of the radius below it, and computes the
- * depths at which the ray meets the sphere. */
+/* Makes a sphere that the pixel's ray grazes: the ray's greatest depth below the surface is a random fraction of the
+ * radius, from 1e-11 to a half. Computes the depths at which the ray enters and leaves the sphere. */
 static void make_grazed_sphere(const render_camera *camera, int pixel, uint64_t seed, render_clip *clip,
                                double depths[2])
 {
@@ -36,7 +37,7 @@ static void make_grazed_sphere(const render_camera *camera, int pixel, uint64_t 
     depths[1] = nearest + half;
 }
 
-/* Returns the error of a random picture of the mesh, at the pixel whose ray grazes the sphere. */
+/* Draws a random picture of the mesh. Returns the error at the pixel whose ray grazes the sphere. */
 static double measure_error(test_mesh_kind kind, uint64_t seed, double max_error)
 {
     render_fixture f;
@@ -53,7 +54,7 @@ static double measure_error(test_mesh_kind kind, uint64_t seed, double max_error
     f.transfer.low = -1;
     f.job.integration = RENDER_SEGMENTS;
     f.job.max_error = max_error;
-    f.job.extent = 3.5; /* the diagonal of the cube is shorter */
+    f.job.extent = 3.5; /* any length not below the cube's diagonal, about 3.46 */
     make_grazed_sphere(&f.job.camera, pixel, seed, &clip, depths);
     f.job.clips = &clip;
     f.job.clip_count = 1;
@@ -89,9 +90,9 @@ static void grazed_spheres_keep_max_error(void **state)
         }
 }
 
-/* Returns the error in a medium of constant density, so dense that the short path inside a grazed sphere absorbs
- * between a tenth and nearly all of the light. If the ends of the path were each rounded to float32, its length would
- * be off by as much as a hundredth. The reference is the exponential of the path's length in closed form. */
+/* Returns the error in a medium of constant density. The medium is so dense that the short path inside a grazed sphere
+ * absorbs between a tenth and nearly all of the light. If both ends of the path were rounded to float32, its length
+ * would be off by as much as a hundredth. The reference is the exponential of the path's length in closed form. */
 static double measure_error_in_fog(test_mesh_kind kind, uint64_t seed)
 {
     static const float half[1] = {0.5f};
@@ -103,7 +104,7 @@ static double measure_error_in_fog(test_mesh_kind kind, uint64_t seed)
     fixture_create_lattice(&f, kind, 3, 0.2, test_linear_field);
     fixture_set_camera(&f, (fixture_camera)(seed / 2 % 2), SIDE, SIDE);
     fixture_set_volume(&f, 1);
-    make_grazed_sphere(&f.job.camera, pixel, 2 * seed, &clip, depths); /* the clip keeps the inside */
+    make_grazed_sphere(&f.job.camera, pixel, 2 * seed, &clip, depths); /* the clip keeps the inside of the sphere */
     render_camera_ray(&f.job.camera, pixel % SIDE, pixel / SIDE, base, d);
     const double length = (depths[1] - depths[0]) * sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
     const double depth = test_uniform_between(4, seed, 0.1, 4);

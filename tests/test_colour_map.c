@@ -1,5 +1,5 @@
-/* Checks colour maps: the published colours at the ends and in the middle, monotonic lightness of the maps that promise
- * it, and the sRGB curve. */
+/* Checks colour maps: the published colours at the ends and in the middle, the monotonic lightness of the maps that are
+ * documented as monotonic, and the sRGB curve. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -39,8 +39,9 @@ static const float *find_colour_table(const char *name)
     return table;
 }
 
-/* The published tables in 8-bit codes: the FNV-1a hash of all 768 codes, and entry 128. They come from matplotlib 3.6.3
- * (the ColorBrewer maps from its interpolation between keys); batlow comes from Scientific Colour Maps 7.0.1. */
+/* The published tables as 8-bit codes: the FNV-1a hash of all 768 codes, and entry 128. They are taken from matplotlib
+ * 3.6.3 (ColorBrewer maps are interpolated by matplotlib between keys); batlow is taken from Scientific Colour Maps
+ * 7.0.1. */
 static const struct published {
     const char *name;
     uint64_t hash;
@@ -84,8 +85,9 @@ static void colour_map_codes_match_published_codes(void **state)
     }
 }
 
-/* Moreland's map has a formula. Its published ends and middle are met to half a code, and the middle of its table of
- * 257 entries, which lies between two entries of ours, to one code more. */
+/* Checks Moreland's map. The library computes it by a formula. The published colours at its ends must match to half a
+ * code. The published middle is the middle of a table of 257 entries; it lies between two entries of the library's
+ * table of 256 and must match to one code more. */
 static void colour_map_matches_published_colours(void **state)
 {
     (void)state;
@@ -131,8 +133,8 @@ static void colour_map_steps_are_small(void **state)
         const float *table = find_colour_table(name);
         for (int i = 0; i < 3 * 255; i++) {
             assert_true(table[i] >= 0 && table[i] <= 1);
-            /* a mistyped key or a hue that runs in the wrong direction jumps by tens of codes; sRGB is steepest in the
-             * dark, where the green of cool_to_warm ends */
+            /* A mistyped key or a hue that runs in the wrong direction makes a jump of tens of codes. The limit of 12
+             * codes follows from the steepest part of sRGB, in the dark, where the green of cool_to_warm ends. */
             const double step = fabs(encode_srgb(table[i + 3]) - encode_srgb(table[i]));
             if (!(step < 12)) fail_msg("%s jumps by %g codes at %d", name, step, i / 3);
         }

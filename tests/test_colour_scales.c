@@ -1,6 +1,6 @@
-/* Checks colours of values. Surfaces without any light show the map's own colours, compared in closed form for every
- * scale, in bands, and outside of the range. Volumes with logarithmic scales are compared with the reference
- * integral. */
+/* Checks colours of values. Surfaces without lights show the map's own colours, which are compared with closed forms
+ * for every scale, in bands of colour and outside of the range. Volumes with logarithmic scales are compared with the
+ * reference integral. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -29,7 +29,7 @@ typedef struct scale_case {
     bool is_banded, has_outside;
 } scale_case;
 
-/* Cases of scales and ranges; the field of the colours ranges from -1.4 to 1.6. */
+/* Cases of scales and ranges. The field that selects the colours ranges from -1.4 to 1.6. */
 static const scale_case scale_cases[] = {
     {"linear", -0.4, 0.7, RENDER_LINEAR, 0, false, false},
     {"outside", -0.4, 0.7, RENDER_LINEAR, 0, false, true},
@@ -59,13 +59,13 @@ static void set_scale_case(render_transfer *t, const scale_case *l)
     if (!l->is_banded) t->colours = colour_map_table("viridis", &t->colour_count);
 }
 
-/* The value at the hit is off by the rounding of the depth and of the cell's coordinates and values in float32: 4e-6
- * for lengths and values near 1, which is also the fixture's bound of depths. The colours at both ends of that range of
- * values bound the error of the colour. A pixel is skipped if a jump of the colour lies between them (of bands, or to
- * the outside colours). */
+/* value_error: error of the value at the hit by the rounding of depth, coordinates and values to float32. It is 4e-6
+ * for lengths and values near 1; the fixture bounds depths by the same number. The colours at value - value_error and
+ * value + value_error bound the error of the colour. A pixel is skipped if the colour jumps between these two values,
+ * at the edge of a band or of the range. */
 static const double value_error = 4e-6, colour_error = 3e-6;
 
-/* Compares a pixel's colour with the reference; returns false if the pixel is skipped. */
+/* Compares a pixel's colour with the reference. Returns false if the pixel is skipped. */
 static bool check_pixel(const render_transfer *t, double value, const float drawn[3], const char *what)
 {
     double at[3], low[3], high[3];
@@ -206,8 +206,9 @@ static const scale_case volume_looks[] = {
     {"symlog", -10, 1e3, RENDER_SYMLOG, 0.1, false, false},
 };
 
-/* Samples have the bound of other transfer functions, plus one for the rounding of the position in the colour table,
- * 3e-7 of the scale's value, which changes the colour by less than 1e-5. */
+/* Compares volumes integrated by samples with the reference. The tolerance is that of other transfer functions plus the
+ * effect of rounding the position in the colour table: 3e-7 of the scale's value, which changes the colour by less than
+ * 1e-5. */
 static void sampled_volumes_match_the_reference(void **state)
 {
     (void)state;
@@ -225,9 +226,10 @@ static void sampled_volumes_match_the_reference(void **state)
     }
 }
 
-/* In segments, colours are linear between 256 entries. Over 12 decades an entry spans 0.11 of ln, and neighbouring
- * colours differ by 0.03; the chord is off by 0.11 / 8 of that, 4e-4. The extinction has a relative error of 1e-4, and
- * so has the light. Apart from that, tets are exact and other cells keep max_error. */
+/* Compares volumes integrated by segments with the reference. Colours are linear between 256 entries. Over 12 decades
+ * an entry spans 0.11 in the natural logarithm of the value, and neighbouring colours differ by 0.03; linear
+ * interpolation is off by 0.11 / 8 of this difference, 4e-4. The extinction, and therefore the light, has a relative
+ * error of 1e-4. Apart from these errors, tets are exact and other cells keep max_error. */
 static void integrated_volumes_keep_their_error(void **state)
 {
     (void)state;
@@ -263,7 +265,7 @@ static void integrated_volumes_keep_their_error(void **state)
 
 static double decades, constant;
 
-/* A field that spans the decades up to 1 within [-1, 1]^3. */
+/* A field whose values in [-1, 1]^3 span the given number of decades, up to 1. */
 static double decades_field(const double p[3])
 {
     return pow(10, decades * 0.5 * (test_linear_field(p) / 1.61 - 1)); /* 1.61 is the maximum of test_linear_field */
@@ -283,8 +285,8 @@ typedef struct random_ramp {
     render_transfer transfer;
 } random_ramp;
 
-/* Makes a ramp of two to six control points that is piecewise linear along the scale, more often than not with an
- * opacity of 0 or 1 at its ends. No cell is longer than 20 unit distances. */
+/* Makes a random ramp of opacity with two to six control points. It is piecewise linear along the scale and usually has
+ * an opacity of 0 or 1 at its ends. No cell is longer than 20 unit distances. */
 static void make_ramp(random_ramp *r, uint64_t seed, double unit)
 {
     const bool is_log = test_uniform(0, seed) < 0.5;
@@ -340,9 +342,9 @@ static double measure_ramp_error(test_mesh_kind kind, test_function *field, uint
     return worst;
 }
 
-/* Checks max_error for random ramps. The error of a ramp adds up along a ray, most of all in a cell of a single value.
- * Polyhedra have values in single precision (docs/development/error_budget.md, narrow ramps): at the foot of a ramp
- * that begins at 1e-6 of the range they were off by 1.6e-3 under a max_error of 1e-3. */
+/* Checks that random ramps keep max_error. Errors of a ramp add up along a ray, most of all in a cell with a single
+ * value. Polyhedra have values in single precision (docs/development/error_budget.md, narrow ramps): at the foot of a
+ * ramp that begins at 1e-6 of the range, their error was 1.6e-3 under a max_error of 1e-3. */
 static void ramps_along_scales_keep_max_error(void **state)
 {
     (void)state;

@@ -1,5 +1,6 @@
-/* Checks compositing without MPI: the merge rule against a reference in double and closed forms, the owners of blocks
- * for more ranks than a machine has, and the strips of the picture, on which both are based. */
+/* Checks compositing without MPI: the rule that merges the fragments of a pixel, against a reference in double and
+ * closed forms; the owners of blocks, for more ranks than a machine has; and the division of the picture into strips
+ * and blocks. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -64,8 +65,9 @@ static int compare_depths(const void *a, const void *b)
     return (of_a > of_b) - (of_a < of_b);
 }
 
-/* Each step of the blend rounds a product and a sum of colour and a product of transmittance, all at most 1: three half
- * units for each step, and three for the background. */
+/* Returns the tolerance for blending `count` fragments. Each step of the blend rounds a product and a sum of colour and
+ * a product of transmittance, all at most 1. That makes three half units in the last place for each step and three for
+ * the background. */
 static double compute_tolerance(int count)
 {
     return 3.0 * (count + 1) * half_ulp;
@@ -106,7 +108,8 @@ static void merge_matches_double_reference(void **context)
         double expected[4];
         for (int i = 0; i < count; i++) {
             items[i] = random_fragment();
-            items[i].t_in = (float)(i * 37 % 101) + 0.5f * draw_unit(); /* all are distinct, since 101 is prime */
+            /* all depths are distinct, since 101 is prime */
+            items[i].t_in = (float)(i * 37 % 101) + 0.5f * draw_unit();
             items[i].t_out = items[i].t_in + (items[i].kind < FRAGMENT_SURFACE ? 0.4f : 0);
             if (items[i].kind >= FRAGMENT_SURFACE) nearest = fminf(nearest, items[i].t_in);
         }
@@ -124,7 +127,7 @@ static void transmittance_of_equal_slabs_is_a_power(void **context)
         fragment items[most_fragments];
         float rgba[4], depth;
         for (int i = 0; i < count; i++) {
-            const float q = 0.96875f; /* so that 1 - q is exact */
+            const float q = 0.96875f; /* 1 - q is exact in float */
             const float t = (float)((i * 7) % count);
             items[i] = (fragment){.t_in = t, .t_out = t + 1, .colour = {1 - q, 0, (1 - q) / 2}, .transmittance = q};
         }
@@ -224,8 +227,8 @@ static void joining_adjacent_segments_changes_only_rounding(void **context)
     }
 }
 
-/* Returns a fragment with ties of every kind: equal depths, both zeros, fragments that differ in one field only, and
- * equal fragments. */
+/* Returns a fragment that often ties with others: equal depths, zeros of both signs, fragments that differ in one
+ * member only, and equal fragments. */
 static fragment make_tied_fragment(void)
 {
     fragment f = random_fragment();
@@ -261,12 +264,12 @@ static void permutations_give_the_same_bits(void **context)
 
 /* ---- owners of blocks ---------------------------------------------------------------------------------------- */
 
-/* Checks that every pixel has one number in one strip, that strips lie inside the picture, and that the number of
- * blocks is bounded and blocks contain all strips. */
+/* Checks that every pixel has exactly one position in exactly one strip, that strips lie inside the picture, that the
+ * number of blocks is bounded, and that every strip belongs to a block. */
 static void check_grid(uint32_t width, uint32_t height, int ranks)
 {
     const comp_grid grid = comp_grid_of(width, height, ranks);
-    const uint32_t every = grid.strips / 5000000 + 1; /* of many strips only a sample is checked */
+    const uint32_t every = grid.strips / 5000000 + 1; /* only a sample is checked if there are many strips */
     uint64_t area = 0;
     assert_true(grid.blocks >= 1 && grid.blocks <= comp_max_blocks(ranks));
     assert_true(ranks == 1 ||
@@ -306,7 +309,7 @@ static void strips_share_all_pixels(void **context)
         for (size_t n = 0; n < sizeof ranks / sizeof *ranks; n++) check_grid(sizes[i][0], sizes[i][1], ranks[n]);
 }
 
-/* Returns the rank that wins a block, given the fragments of each rank in it. */
+/* Returns the rank that wins the block, given the number of fragments that each rank has in it. */
 static int find_block_winner(uint32_t block, const int64_t *fragments, int ranks)
 {
     int32_t greatest = 0;
@@ -318,9 +321,9 @@ static int find_block_winner(uint32_t block, const int64_t *fragments, int ranks
     return comp_priority_rank(greatest);
 }
 
-/* Checks that the chance of a rank to win a block is proportional to the fourth power of its fragments. Of n draws with
- * chance p a rank must win pn, to within five standard deviations sqrt(n p (1 - p)), which all but one of a million
- * cases meet, plus 1/16 of the chance, to which priorities are rounded. */
+/* Checks that the probability p of a rank to win a block is proportional to the fourth power of its number of
+ * fragments. In n draws a rank must win pn times, with a tolerance of five standard deviations sqrt(n p (1 - p)),
+ * exceeded in one case of a million, plus p n / 16, because priorities are rounded to 1/16 of p. */
 static void owner_probability_follows_fragment_count(void **context)
 {
     (void)context;
@@ -339,7 +342,7 @@ static void owner_probability_follows_fragment_count(void **context)
     }
 }
 
-/* Shapes in pictures of height 1 centred at 0: the covered part of a row at height y is lower <= |x| < upper. */
+/* The covered part of a row of a shape: lower <= |x| < upper. Pictures have height 1 and are centred at 0. */
 typedef struct interval {
     double lower, upper;
 } interval;
@@ -383,7 +386,8 @@ static void claim_span(const comp_grid *grid, uint32_t y, double from, double to
     }
 }
 
-/* Sets claims with a fragment in each covered pixel, and no priorities. Returns the number of covered pixels. */
+/* Sets the claims of a shape: one fragment in each covered pixel and no priorities. Returns the number of covered
+ * pixels. */
 static int64_t set_claims_of_shape(const comp_grid *grid, span_function *span_of)
 {
     int64_t covered = 0;
@@ -402,9 +406,9 @@ static int64_t set_claims_of_shape(const comp_grid *grid, span_function *span_of
     return covered;
 }
 
-/* Balances the claims, whose priorities are set. Checks that no fragment is lost, that ranks which won nothing own
- * nothing, and that no rank has more than the mean of the owners plus the fragments of the fullest block. Returns the
- * fragments of the busiest owner over the mean of all ranks. */
+/* Balances the claims, whose priorities must be set. Checks that no fragment is lost, that a rank which won no
+ * fragments before owns none afterwards, and that no rank owns more than the mean over the owners plus the fragments of
+ * the fullest block. Returns the largest number of fragments of a rank divided by the mean over all ranks. */
 static double check_levels(uint32_t blocks, int ranks)
 {
     static uint64_t won[MOST_RANKS], owned[MOST_RANKS], loads[MOST_RANKS];
@@ -433,10 +437,10 @@ static double check_levels(uint32_t blocks, int ranks)
     return all ? (double)busiest * ranks / (double)all : 1;
 }
 
-/* Checks that if all ranks have the same fragments, each owns the mean to a tenth: in pictures 1000 to 4096 wide, of
- * which at least an eighth is covered, for up to a thousand ranks. Any rank may win a block then. A block has at least
- * 16 pixels: if there are fewer than ten blocks per rank on average, no rank has more than the mean plus one block
- * (check_levels()). */
+/* Checks that if all ranks have the same fragments, each rank owns the mean to a tenth. Pictures are 1000 to 4096
+ * pixels wide, at least an eighth of each is covered, and there are up to a thousand ranks. Any rank may then win a
+ * block. A block has at least 16 pixels: if there are fewer than ten blocks per rank on average, no rank owns more than
+ * the mean plus one block (check_levels()). */
 static void equal_fragments_of_all_ranks_are_balanced_over_owners(void **context)
 {
     (void)context;
@@ -467,15 +471,15 @@ static void equal_fragments_of_all_ranks_are_balanced_over_owners(void **context
     assert_int_equal(uneven, 0);
 }
 
-/* Distributes a block's `count` fragments: even ranks have fragments in all of the picture, odd ranks only in a part of
- * it. */
+/* Distributes a block's `count` fragments. Even ranks have fragments in all blocks; odd ranks have none in half of the
+ * blocks. */
 static void distribute_fragments(uint32_t block, int64_t count, int ranks, int64_t *have)
 {
     for (int r = 0; r < ranks; r++) have[r] = r % 2 && (block >> 5) % 2 ? 0 : count;
 }
 
-/* Checks that the numbers of fragments that ranks own differ by at most a tenth if the ranks have different parts of
- * the picture, and blocks are assigned by the ranks' priorities. */
+/* Checks that the numbers of fragments that ranks own differ by at most a tenth if the ranks draw different parts of
+ * the picture. Priorities of the ranks decide which blocks they win. */
 static void different_fragments_of_ranks_are_balanced_over_owners(void **context)
 {
     (void)context;
@@ -497,8 +501,8 @@ static void different_fragments_of_ranks_are_balanced_over_owners(void **context
     }
 }
 
-/* Sets priorities of all ranks at their positions in the route, and checks that the positions share the blocks to a
- * tenth. */
+/* Sets random priorities, assigns the winning ranks to their positions in the route, and checks that each position owns
+ * the mean number of fragments to a tenth. */
 static void check_folded(const comp_route *route)
 {
     const comp_grid grid = comp_grid_of(1920, 1080, route->ranks);
@@ -510,13 +514,20 @@ static void check_folded(const comp_route *route)
     assert_true(check_levels(grid.blocks, route->owners) <= 1.1);
 }
 
-/* Checks the same balance for routes with fewer owners than ranks: owners that have a partner win more blocks than
- * others. */
+/* Checks the balance of fragments on routes that have fewer owners than ranks. A position that stands for two ranks
+ * wins more blocks than the others. */
 static void fragments_are_balanced_with_fewer_owners_than_ranks(void **context)
 {
     (void)context;
-    static const int ranks[][2] = {{3, 1},  {5, 1},   {7, 1},   {12, 4},
-                                   {33, 3}, {100, 4}, {191, 1}, {996, 12}}; /* ranks, and ranks of a node */
+    static const int ranks[][2] = {{3, 1},
+                                   {5, 1},
+                                   {7, 1},
+                                   {12, 4},
+                                   /* ranks: number of ranks, and number of ranks per node */
+                                   {33, 3},
+                                   {100, 4},
+                                   {191, 1},
+                                   {996, 12}};
     int folded = 0;
     state = 23;
     for (size_t n = 0; n < sizeof ranks / sizeof *ranks; n++)
@@ -529,25 +540,25 @@ static void fragments_are_balanced_with_fewer_owners_than_ranks(void **context)
     assert_true(folded >= 20);
 }
 
-/* Returns the rank that wins block b of `blocks`. */
+/* Returns the rank that wins block b of `blocks` blocks, by one of six unfair rules. */
 static int get_unfair_winner(int how, uint32_t b, uint32_t blocks, int ranks)
 {
     const uint32_t count = (uint32_t)ranks;
     switch (how) {
-    /* one rank has almost all blocks, the others one each */
+    /* rank 0 has almost all blocks, the others one each */
     case 0: return (int)(b < count ? b : 0);
     case 1:
-        return (int)(b < count ? 0 : b % count); /* the first blocks all belong to one rank */
-    /* consecutive blocks, most for the first ranks */
+        return (int)(b < count ? 0 : b % count); /* rank 0 has the first `count` blocks */
+    /* each rank has consecutive blocks, the first ranks have the most */
     case 2: return (int)((uint64_t)b * b / blocks * count / blocks);
-    case 3: return (int)(draw_random() % (1 + draw_random() % count)); /* a few ranks often, the others rarely */
-    case 4: return ranks - 1;                                          /* one rank has all blocks */
+    case 3: return (int)(draw_random() % (1 + draw_random() % count)); /* low ranks often win, high ranks rarely */
+    case 4: return ranks - 1;                                          /* the last rank has all blocks */
     default: return (int)(draw_random() % count);
     }
 }
 
-/* Returns the fragments of block b: the same for all; few except in one block; any number; none in most; more than the
- * counter holds. */
+/* Returns the number of fragments in block b by one of six rules: equal in all blocks; 1 except in one block; random; 0
+ * in most blocks; near the largest number that the counter holds; none. */
 static uint32_t get_unfair_fragment_count(int how, uint32_t b, uint32_t blocks)
 {
     switch (how) {
@@ -560,7 +571,7 @@ static uint32_t get_unfair_fragment_count(int how, uint32_t b, uint32_t blocks)
     }
 }
 
-/* Checks that the bound of check_levels() holds whichever ranks win and however many fragments there are. */
+/* Checks that check_levels() holds for any winners and any numbers of fragments. */
 static void uneven_shares_are_balanced(void **context)
 {
     (void)context;
@@ -579,7 +590,8 @@ static void uneven_shares_are_balanced(void **context)
                 }
 }
 
-/* Checks that claims add up in any order, also if there are more fragments than the counter holds. */
+/* Checks that the sum of claims does not depend on their order, even if there are more fragments than the counter
+ * holds. */
 static void claims_add_in_any_order(void **context)
 {
     (void)context;
@@ -594,7 +606,8 @@ static void claims_add_in_any_order(void **context)
 
 /* ---- strips -------------------------------------------------------------------------------------------------- */
 
-/* The fragments unpacked from received sheets. */
+/* The fragments that were unpacked from received sheets. A sheet is a message unit: at most one fragment for each pixel
+ * of a strip. */
 typedef struct received_sheets {
     const comp_grid *grid;
     fragment *items;
@@ -617,7 +630,7 @@ static int compare_all_bits(const void *a, const void *b)
     return memcmp(a, b, sizeof(fragment));
 }
 
-/* Checks that all fragments of a list are sent in sheets of their strips, for any number of threads; a strip sends as
+/* Checks that all fragments of a list are sent in sheets of their strips, for any number of threads. A strip needs as
  * many sheets as its fullest pixel has fragments. */
 static void sheets_contain_all_fragments(void **context)
 {
@@ -629,7 +642,7 @@ static void sheets_contain_all_fragments(void **context)
     state = 11;
     for (int threads = 1; threads <= 4; threads += 3)
         for (int spread = 1; spread <= 1000; spread *= 10) {
-            comp_grid grid = comp_grid_of(101, 67, threads); /* a grid for four ranks has shorter strips */
+            comp_grid grid = comp_grid_of(101, 67, threads); /* the grid for four ranks has shorter strips */
             comp_strips strips;
             received_sheets h = {&grid, back, 0, 0};
             grid.threads = threads;
@@ -668,8 +681,8 @@ static void pixels_outside_the_image_are_detected(void **context)
     }
 }
 
-/* Checks samples at the same depth: together, in any order, they absorb all light that does not pass every one of them,
- * and each contributes colour in proportion to its own absorption. */
+/* Checks samples of several volumes at the same depth. Together, in any order, they absorb all light that does not pass
+ * every one of them, and each contributes colour in proportion to its own absorption. */
 static void samples_at_one_depth_share_absorption(void **context)
 {
     (void)context;
@@ -706,8 +719,8 @@ static fragment make_fragment(const medium *m)
     return f;
 }
 
-/* Integrates all media together, in small steps between multiples of 1/8, at which all begin and end; a surface is at
- * depth 4. */
+/* Integrates all media together. Steps end at multiples of 1/8, at which all media begin and end. A surface is at depth
+ * 4. */
 static void mix_media(const medium *media, int count, const fragment *surface, double rgba[4])
 {
     double through = 1;
@@ -727,8 +740,8 @@ static void mix_media(const medium *media, int count, const fragment *surface, d
     rgba[3] = 1 - through;
 }
 
-/* Checks that overlapping volume fragments are mixed. Rounding T and C to float errs by 3e-8, and so changes the
- * optical depth, at most 2 for each medium, by up to e^2 times that: 3e-7 for each medium. */
+/* Checks that overlapping volume fragments are mixed. Rounding T and C to float makes an error of 3e-8. The optical
+ * depth of a medium is at most 2, so its error is up to e^2 times as large: 3e-7 for each medium. */
 static void overlapping_segments_are_mixed(void **context)
 {
     (void)context;
@@ -755,9 +768,10 @@ static void overlapping_segments_are_mixed(void **context)
     }
 }
 
-/* Checks a ray through a fine and a coarse mesh, which has one long interval over many short ones in a row. The time
- * must be proportional to their number: a quadratic algorithm would take minutes. All intervals mix the same two media,
- * so the result is one medium of their sum; a sum of so many errs by less than 1e-9, the floats by less than 3e-7. */
+/* Checks a ray through a fine and a coarse mesh: one long interval overlaps many short ones in a row. The time must be
+ * proportional to the number of intervals; a quadratic algorithm would take minutes. All short intervals mix the same
+ * two media, so the result equals one medium whose extinction is the sum. The sum over so many intervals has an error
+ * below 1e-9, rounding to float one below 3e-7. */
 static void many_short_segments_within_a_long_one_merge_fast(void **context)
 {
     (void)context;
@@ -765,7 +779,7 @@ static void many_short_segments_within_a_long_one_merge_fast(void **context)
     const float clear = 0.99999f;
     fragment *items = calloc(SHORT + 1, sizeof *items);
     for (int i = 0; i < SHORT; i++) {
-        fragment *f = &items[(int64_t)i * 7919 % SHORT]; /* in a shuffled order */
+        fragment *f = &items[(int64_t)i * 7919 % SHORT]; /* in shuffled order */
         *f = (fragment){.t_in = (float)i, .t_out = (float)(i + 1), .transmittance = clear};
         f->colour[0] = 1 - clear;
     }
@@ -783,7 +797,8 @@ static void many_short_segments_within_a_long_one_merge_fast(void **context)
     free(items);
 }
 
-/* Checks that if rounding gives a sample to two neighbouring cells, the one behind counts, in any order of the two. */
+/* Checks that a sample at the common face of two cells counts one time. If rounding gives it to both cells, the
+ * fragment of the cell behind is kept, in either order. */
 static void samples_of_neighbours_count_once(void **context)
 {
     (void)context;
@@ -820,18 +835,19 @@ static void overlaps_are_found_only_before_a_volume_ends(void **context)
         {2, {{.t_in = 2, .t_out = 3, .transmittance = 0.5f}, {.t_in = 0, .t_out = 1, .transmittance = 0.5f}}, false},
         {2, {{.t_in = 1, .t_out = 3, .transmittance = 0.5f}, {.t_in = 0, .t_out = 1, .transmittance = 0.5f}}, true},
         {2, {{.t_in = 1, .t_out = 1, .transmittance = 0.5f}, {.t_in = 1, .t_out = 1, .transmittance = 1}}, true},
-        /* inside a long interval, behind a short one */
+        /* inside a long interval and behind a short one */
         {3,
          {{.t_in = 0, .t_out = 9, .transmittance = 0.5f},
           {.t_in = 1, .t_out = 2, .transmittance = 0.5f},
           {.t_in = 4, .t_out = 5, .transmittance = 0.5f}},
          true},
-        /* surfaces in front of a volume, inside it, at its last sample and behind it; two surfaces at the same depth */
+        /* a surface in front of a volume, inside it, at its end and behind it; two surfaces at the same depth */
         {2, {{.t_in = 1, .t_out = 2, .transmittance = 0.5f}, {1, 1, 1, {0}, 0.5f, S}}, false},
         {2, {{.t_in = 1, .t_out = 2, .transmittance = 0.5f}, {0, 1.5f, 1.5f, {0}, 0.5f, S}}, true},
         {2, {{.t_in = 1, .t_out = 2, .transmittance = 0.5f}, {0, 2, 2, {0}, 0, S}}, true},
         {2, {{.t_in = 1, .t_out = 2, .transmittance = 0.5f}, {0, 3, 3, {0}, 0, S}}, false},
-        /* a surface where a volume begins, within rounding; a volume that began in front of it still overlaps */
+        /* a surface at the depth at which a volume begins, within rounding; it still overlaps a volume that begins in
+         * front of it */
         {2, {{.t_in = 1, .t_out = 2, .transmittance = 0.5f}, {0, 1.000003f, 1.000003f, {0}, 0.5f, S}}, false},
         {2, {{.t_in = 1, .t_out = 2, .transmittance = 0.5f}, {0, 1.00001f, 1.00001f, {0}, 0.5f, S}}, true},
         {2, {{.t_in = 8, .t_out = 9, .transmittance = 0.5f}, {0, 8.00002f, 8.00002f, {0}, 0.5f, S}}, false},
@@ -846,18 +862,18 @@ static void overlaps_are_found_only_before_a_volume_ends(void **context)
           {.t_in = 0.999999f, .t_out = 2, .transmittance = 0.5f}},
          false},
         {2, {{0, 1, 1, {0}, 0.5f, S}, {0, 1, 1, {0}, 0.5f, S + 1}}, false},
-        /* fragments behind an opaque one are invisible */
+        /* fragments behind an opaque one are invisible, so they do not overlap */
         {3,
          {{0, 1, 1, {0}, 0, S},
           {.t_in = 2, .t_out = 4, .transmittance = 0.5f},
           {.t_in = 3, .t_out = 5, .transmittance = 0.5f}},
          false},
-        /* an overlap shorter than rounding */
+        /* an overlap shorter than the rounding of depths */
         {2,
          {{.t_in = 0, .t_out = 2, .transmittance = 0.5f}, {.t_in = 1, .t_out = 0.99f, .transmittance = 0.5f}},
          false},
-        /* samples of cells whose common face is rounded to two depths; samples of cells at the same position; samples
-         * next to those of another volume */
+        /* samples of two cells whose common face is rounded to two depths; samples of two cells at the same position;
+         * samples at the depth of another volume's samples */
         {2, {{0, 1, 1, {0}, 0.5f, V + LATE}, {0, 1, 1, {0}, 0.5f, V + EARLY}}, false},
         {2, {{0, 1, 1, {0}, 0.5f, V + LATE}, {0, 1, 1, {0}, 0.5f, V}}, true},
         {2, {{0, 1, 1, {0}, 0.5f, V + LATE}, {0, 1, 1, {0}, 0.5f, V + LATE}}, true},
@@ -873,7 +889,7 @@ static void overlaps_are_found_only_before_a_volume_ends(void **context)
 
 enum { LARGEST_TILE = 20 };
 
-/* The fragments of a picture: pixels have none, one or many, in any order within a tile. */
+/* The fragments of a picture. A pixel has none, one or many, in any order within its tile. */
 typedef struct tiled {
     image picture;
     fragment *items; /* grouped by tile */
@@ -887,7 +903,8 @@ static int64_t draw_count(int most)
     return draw_random() % 3 ? (int64_t)(draw_random() % (uint32_t)(most + 1)) : 0;
 }
 
-/* Returns a fragment of a volume that may overlap others, or be a sample at the same depth. */
+/* Returns a volume fragment whose depths are rounded, so that it may overlap other fragments or be a sample at the same
+ * depth. */
 static fragment make_crowded_fragment(uint32_t pixel)
 {
     fragment f = random_fragment();
@@ -926,7 +943,7 @@ static void free_tiled(tiled *t)
     free(t->items);
 }
 
-/* Merges the fragments of one pixel by the merge rule; returns whether they overlap. */
+/* Merges the fragments of one pixel by the merge rule. Returns whether they overlap. */
 static bool merge_pixel(const tiled *t, uint32_t pixel, float rgba[4], float *depth)
 {
     fragment own[most_fragments];

@@ -1,7 +1,7 @@
-/* Checks compositing across ranks: however a set of fragments is distributed, rank 0's picture equals, bit for bit, the
- * serial merge of the union; and a failure on one rank is reported on all ranks. Every rank generates the whole set and
- * keeps its share. Results are reduced before they are asserted, so that a failing rank does not leave the others
- * waiting. */
+/* Checks compositing on several ranks. However a set of fragments is distributed over the ranks, the picture on rank 0
+ * must be bit-identical to the serial merge of all fragments, and a failure on one rank must be reported on all ranks.
+ * Every rank generates the whole set and keeps its own fragments. Results are reduced over the ranks before they are
+ * asserted, so that a failing rank does not leave the others waiting. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -52,8 +52,8 @@ static void assert_everywhere(bool well, const char *what)
     assert_true(all);
 }
 
-/* Makes a fragment whose depth repeats among others, so that ties occur; most pixels of a large image have none or a
- * few. */
+/* Makes fragment i. Depths are integers below 50, so that ties occur. Most pixels of a large image have no fragment or
+ * a few. */
 static fragment make_fragment(uint32_t i, uint32_t seed, uint32_t pixel_count)
 {
     const uint32_t key = hash_number(seed) + 16 * i;
@@ -66,8 +66,8 @@ static fragment make_fragment(uint32_t i, uint32_t seed, uint32_t pixel_count)
     return f;
 }
 
-/* Makes a fragment as make_fragment() does, but depending on the seed all, every second or none are hits of an opaque
- * surface. */
+/* Makes fragment i. Depending on the seed, all, half or none of the fragments are hits of an opaque surface; the others
+ * are those of make_fragment(). */
 static fragment make_some_fragment(uint32_t i, uint32_t seed, uint32_t pixel_count)
 {
     fragment f = make_fragment(i, seed, pixel_count);
@@ -133,11 +133,11 @@ static bool are_same_images(const image *a, const image *b)
 
 typedef struct setting {
     fragment_list own;
-    image expected, out; /* they have arrays on rank 0 only */
-    int64_t count;       /* number of fragments of all ranks */
+    image expected, out; /* with pixels on rank 0 only */
+    int64_t count;       /* number of fragments on all ranks */
 } setting;
 
-/* Makes fragment i of the whole set. */
+/* Makes fragment i of the set of all ranks. */
 typedef fragment fragment_maker(uint32_t i, uint32_t seed, uint32_t pixel_count);
 
 static setting make_setting_from_fragments(fragment_maker *make, int width, int height, uint32_t count,
@@ -171,18 +171,18 @@ static void free_setting(setting *s)
     free_image(&s->out);
 }
 
-/* Selects the schedule by the turn, with dense or sparse rounds. Nodes are simulated: any number of ranks that divides
- * all may form a node. */
+/* Selects a schedule, dense or sparse rounds, and nodes by the bits of `turn`. Nodes are simulated: a node has any
+ * number of ranks that divides the number of all ranks. */
 static void set_schedule(uint32_t turn)
 {
     group.schedule = (comp_schedule)(COMP_DIRECT + turn % (COMP_SCHEDULE_COUNT - 1));
     group.nodes = (comp_nodes){1, false};
-    group.max_dense_ranks = turn / 4 % 2; /* with 1, all rounds are sparse */
+    group.max_dense_ranks = turn / 4 % 2; /* with 1, no round is dense, so all are sparse */
     for (int n = 2; n < rank_count && turn / 8 % 2; n++)
         if (rank_count % n == 0) group.nodes = (comp_nodes){n, turn / 16 % 2};
 }
 
-/* Returns the bytes allocated for the list. */
+/* Returns the number of bytes allocated for the list. */
 static int64_t get_allocated_bytes(const fragment_list *list)
 {
     return list->items ? list->capacity * (int64_t)sizeof *list->items : 0;
@@ -209,7 +209,7 @@ static void composite_equals_serial_merge(void **context)
     (void)context;
     const int sizes[][2] = {{1, 1}, {1, 7}, {65, 3}, {101, 67}, {257, 131}};
     const uint32_t counts[] = {0, 1, 2, 50, 3000, 60000};
-    /* the largest count is skipped for many ranks, since each generates all fragments */
+    /* the largest count is skipped if there are many ranks, since each rank generates all fragments */
     const size_t count_end = sizeof counts / sizeof *counts - (rank_count > 8);
     uint32_t seed = 1;
     for (size_t s = 0; s < sizeof sizes / sizeof *sizes; s++)
@@ -224,8 +224,8 @@ static void composite_equals_serial_merge(void **context)
     }
 }
 
-/* Marks pixels in which any two fragments overlap, by testing every pair; nothing is opaque here. Sorts the fragments
- * by pixel. */
+/* Sorts the fragments by pixel and marks the pixels in which two fragments overlap, by testing every pair. No fragment
+ * is opaque here. */
 static void find_overlaps(fragment *all, uint32_t count, unsigned char *pixels)
 {
     uint32_t first = 0;
@@ -281,7 +281,7 @@ static void overlaps_are_reported_on_all_ranks(void **context)
                 check_overlaps(sizes[s][0], sizes[s][1], counts[c], how, seed++);
 }
 
-/* Checks images with more strips than blocks. With few fragments, an owner has strips in which no rank has a
+/* Checks images with more strips than blocks. If there are few fragments, an owner has strips in which no rank has a
  * fragment. */
 static void large_image_equals_serial_merge(void **context)
 {
@@ -291,8 +291,8 @@ static void large_image_equals_serial_merge(void **context)
     check_compositing(5003, 3, 700, distribute_blocks, 1003);
 }
 
-/* Returns a fragment of a smooth curved surface; each rank has such fragments in whole rows, as in a tile of a
- * picture. */
+/* Returns the fragment of a smooth curved surface at a pixel. Each rank has such fragments in whole rows, as in a tile
+ * of a picture. */
 static fragment make_smooth_fragment(uint32_t pixel, int width)
 {
     const float x = (float)(pixel % (uint32_t)width) / 500, y = (float)(pixel / (uint32_t)width) / 500;
@@ -302,9 +302,9 @@ static fragment make_smooth_fragment(uint32_t pixel, int width)
     return f;
 }
 
-/* Checks the size of messages. A hit has 32 bytes in memory and a finished pixel 24. For a smooth surface only the
- * depth and three colours are sent, each in one or two bytes and two bits, at most 9 bytes together, plus the headers
- * of messages and blocks. */
+/* Checks the size of messages. A hit takes 32 bytes in memory and a finished pixel 24 bytes. For a smooth surface, only
+ * the depth and three colours are sent, each in one or two bytes plus two bits: at most 9 bytes together, plus the
+ * headers of messages and blocks. */
 static void smooth_surfaces_compress_to_a_third(void **context)
 {
     (void)context;
@@ -320,7 +320,7 @@ static void smooth_surfaces_compress_to_a_third(void **context)
                       "composite succeeds");
     int64_t own[2] = {statistics.sent_bytes, statistics.sent_messages}, all[2];
     MPI_Allreduce(own, all, 2, MPI_INT64_T, MPI_SUM, comm);
-    /* pixels sent to owners, and those sent to rank 0 */
+    /* number of pixels sent to their owners; as many finished pixels are sent to rank 0 */
     const double travelled = (double)WIDTH * HEIGHT * (rank_count - 1) / rank_count;
     assert_everywhere(rank_count == 1 ? all[0] == 0
                                       : (double)all[0] < 2 * MOST_BYTES * travelled + 64.0 * (double)all[1],
@@ -329,8 +329,9 @@ static void smooth_surfaces_compress_to_a_third(void **context)
     if (own_rank == 0) free_image(&s.out);
 }
 
-/* Compares the computed number of messages of each schedule with the messages sent: without fragments, one for each
- * partner and round, and one up the tree from each owner except rank 0. */
+/* Compares the predicted number of messages of each schedule with the number of messages sent. Without fragments, a
+ * rank sends one message to each partner in each round, and each owner except rank 0 sends one message up the gather
+ * tree. */
 static void messages_match_the_predicted_count(void **context)
 {
     (void)context;
@@ -351,8 +352,8 @@ static void messages_match_the_predicted_count(void **context)
     set_schedule(0);
 }
 
-/* Makes the n-th allocation of the victim fail, while it composites a copy of the list. Returns whether the status is
- * the same on all ranks and the error has a message, and whether the picture was drawn. */
+/* Makes the n-th allocation of the rank `victim` fail while it composites a copy of the list. Checks that the status is
+ * the same on all ranks and that the error has a message. Returns whether the picture was drawn. */
 static bool composite_without_allocation(setting *s, int victim, int64_t n)
 {
     const int64_t held = base_memory_held();
@@ -372,9 +373,9 @@ static bool composite_without_allocation(setting *s, int victim, int64_t n)
     return status == INSITU_OK;
 }
 
-/* Checks that every allocation of every rank fails once; after the last one the picture is right again. Up to 8 ranks,
- * rank 0 and the last rank fail at each allocation and the ranks between share the numbers; with more ranks, four of
- * them share the numbers. */
+/* Makes every allocation of compositing fail one time and checks the error; if no allocation fails, the picture must be
+ * right. With up to 8 ranks, each allocation fails on rank 0 and on the last rank, and the ranks between them take
+ * turns. With more ranks, every fifth rank is tested at every fourth allocation. */
 static void failed_allocation_is_an_error_on_all(void **context)
 {
     (void)context;

@@ -1,5 +1,6 @@
-/* Checks messages without MPI: sheets of any contents are decoded bit for bit; routes lead every fragment from every
- * rank to its owner, and every pixel to rank 0, for more ranks than any available machine has. */
+/* Checks the contents and the routes of messages, without MPI. Sheets (blocks of pixels as they are sent) with any
+ * contents are decoded bitwise. Routes lead every fragment from every rank to its owner, and every pixel to rank 0, for
+ * more ranks than any available machine has. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -26,7 +27,8 @@ static uint32_t draw_random(void)
     return (uint32_t)(state >> 32);
 }
 
-/* The kinds of values in a word of a record. */
+/* How the values of a 32-bit word are filled over the pixels of a sheet. AS_BEFORE repeats the preceding word of the
+ * same pixel. */
 enum filling { ANY_BITS, SMOOTH, CONSTANT, AS_BEFORE, NOT_A_NUMBER, FILLING_COUNT };
 
 static uint32_t get_float_bits(float value)
@@ -48,7 +50,7 @@ static uint32_t make_filled_value(enum filling how, int i, int k, uint32_t befor
     }
 }
 
-/* Sets masks with full rows, rows with gaps, and empty rows; the masks of a sparse sheet have few pixels. */
+/* Sets the masks of covered pixels to full rows, rows with gaps, or mixtures with empty rows. */
 static void fill_masks(comp_sheet *sheet)
 {
     const uint32_t how = draw_random() % 4;
@@ -72,7 +74,8 @@ static void fill_sheet(comp_sheet *sheet)
     }
 }
 
-/* Counts the words that differ among the first `words` of each pixel; differing masks count as one. */
+/* Returns the number of 32-bit words that differ among the first `words` of each pixel. Any difference of masks counts
+ * as one word. */
 static int count_differences(const comp_sheet *a, const comp_sheet *b, int words)
 {
     int count = memcmp(a->masks, b->masks, sizeof a->masks) != 0;
@@ -101,8 +104,8 @@ static void free_pair(sheet_pair *p)
     base_free(p->bytes);
 }
 
-/* Checks that sheets of any contents are decoded to the bit by each instruction set, whichever encoded them, and that
- * the encoded bytes are equal. */
+/* Checks that sheets with any contents are decoded bitwise by each instruction set, whichever instruction set encoded
+ * them, and that all instruction sets encode to the same bytes. */
 static void encoded_sheets_decode_unchanged(void **context)
 {
     (void)context;
@@ -129,8 +132,8 @@ static void encoded_sheets_decode_unchanged(void **context)
     free_pair(&p);
 }
 
-/* Checks columns of depths of a plane, exact in float32: only the first two rows have residuals, so that besides half a
- * byte for each row and word little is sent. */
+/* Checks columns of depths of a plane that are exact in float32. Only the first two rows have residuals, so that little
+ * is sent besides half a byte for each row and word. */
 static void straight_edges_compress_to_half_a_byte_per_row(void **context)
 {
     (void)context;
@@ -142,13 +145,14 @@ static void straight_edges_compress_to_half_a_byte_per_row(void **context)
             p.sheet->words[w][k] =
                 get_float_bits(1 + (float)(w + 1) * 0x1p-12f * (float)(k / COMP_LANES + 2 * k % COMP_LANES));
     const int64_t length = comp_sheet_write(p.sheet, COMP_WORDS, p.bytes) - p.bytes;
-    /* The header, and for each word its first value, half a byte for each row, and two rows of at most four bytes a
-     * pixel. */
+    /* The header; for each word its first value, half a byte for each row, and two rows with at most four bytes for
+     * each pixel. */
     assert_true(length <= COMP_SHEET_HEAD + COMP_WORDS * (4 + COMP_ROWS / 2 + 2 * 4 * COMP_LANES));
     free_pair(&p);
 }
 
-/* Checks sheets of opaque hits, some at equal depths: the nearest hit remains, by the merge rule. */
+/* Checks the merge of sheets of opaque hits, some of them at equal depths: the nearest hit by the merge rule is
+ * kept. */
 static void nearest_hits_are_kept_by_merge(void **context)
 {
     (void)context;
@@ -179,7 +183,7 @@ static void nearest_hits_are_kept_by_merge(void **context)
     free_pair(&p);
 }
 
-/* Fills a sheet with fragments that contain no NaN or infinity: blending these gives bits that depend on the
+/* Fills a sheet with fragments without NaN or infinity, because blending NaN or infinity gives bits that depend on the
  * compiler. */
 static void fill_numbers(comp_sheet *sheet)
 {
@@ -198,8 +202,8 @@ static void fill_numbers(comp_sheet *sheet)
 
 enum { WIDE = 40, HIGH = 50 };
 
-/* Stores a picture, colours and then depths, whose rightmost and lowest strips are cut off. Every second strip has no
- * depths. */
+/* Stores a picture strip by strip with the given loops: all colours, then all depths. The rightmost and lowest strips
+ * extend beyond the picture and are cut off. Every second strip has no depths. */
 static void store_with_loops(const comp_sheet_loops *loops, const comp_sheet *pixels, const float background[4],
                              int ranks, float *stored)
 {
@@ -213,7 +217,7 @@ static void store_with_loops(const comp_sheet_loops *loops, const comp_sheet *pi
     }
 }
 
-/* Checks that joining, blending and storing give the same bits with each instruction set. */
+/* Checks that joining, blending and storing are bit-identical for all instruction sets. */
 static void sheet_merge_loops_agree(void **context)
 {
     (void)context;
@@ -223,7 +227,7 @@ static void sheet_merge_loops_agree(void **context)
         plain_stored[5 * WIDE * HIGH] __attribute__((aligned(64)));
     const comp_sheet_loops *const plain = comp_sheet_loops_of(CPU_PLAIN);
     for (int trial = 0; trial < 300; trial++) {
-        const int ranks = trial % 3 ? 1 + trial % 16 : 1; /* grids of more ranks have shorter strips */
+        const int ranks = trial % 3 ? 1 + trial % 16 : 1; /* grids for more ranks have shorter strips */
         uint16_t plain_left[COMP_ROWS], left[COMP_ROWS];
         fill_numbers(&first);
         fill_numbers(&other);
@@ -248,7 +252,7 @@ static void sheet_merge_loops_agree(void **context)
 
 /* ---- routes -------------------------------------------------------------------------------------------------- */
 
-/* Returns the position that has the fragment for the owner after the round. */
+/* Returns the position in the route that holds the owner's fragments after the round. */
 static int find_next_position(const comp_route *route, int round, int place, int owner)
 {
     const int stride = comp_route_stride(route, round);
@@ -261,7 +265,7 @@ static void check_route_to_owner(const comp_route *route, int from, int owner)
     for (int round = 0; round < route->round_count; round++) {
         const int to = find_next_position(route, round, at, owner), stride = comp_route_stride(route, round);
         assert_in_range(to, 0, route->owners - 1);
-        /* The sender is a partner of the receiver. */
+        /* The sender must be a partner of the receiver. */
         assert_int_equal(comp_route_partner(route, round, stride, to, comp_route_digit(route, round, stride, at)), at);
         at = to;
     }
@@ -304,7 +308,7 @@ static void check_gather(int ranks, comp_nodes nodes, comp_schedule schedule)
     assert_non_null(children);
     for (int place = 1; place < route.owners; place++) {
         const int parent = comp_gather_parent(&route, place);
-        assert_in_range(parent, 0, place - 1); /* so that every path to the root ends at 0 */
+        assert_in_range(parent, 0, place - 1); /* every path towards the root ends at position 0 */
         children[parent]++;
     }
     for (int place = 0; place < route.owners; place++) {
@@ -324,8 +328,8 @@ static void gather_uses_a_tree(void **context)
                 check_gather(counts[i], (comp_nodes){node, false}, s);
 }
 
-/* Checks that the chosen route costs no more than any schedule, that few ranks send directly, and that with up to
- * 100,000 ranks, each with its share of a picture, no rank sends more than a few hundred messages. */
+/* Checks that the chosen route costs no more than any schedule's route and that ranks send directly if there are few.
+ * With up to 100,000 ranks, each with its share of a picture, no rank may send more than a few hundred messages. */
 static void the_cheapest_route_is_chosen(void **context)
 {
     (void)context;
@@ -344,7 +348,7 @@ static void the_cheapest_route_is_chosen(void **context)
     }
 }
 
-/* Checks that a round of direct send among eight ranks costs what the model states, term by term. */
+/* Compares the cost of one round of direct sends among eight ranks with the cost model, term by term. */
 static void route_costs_match_the_model(void **context)
 {
     (void)context;

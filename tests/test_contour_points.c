@@ -1,4 +1,4 @@
-/* Checks that the points of VTK's contour lines on a plane lie on pixels that our lines cover. */
+/* Checks that the points of VTK's contour lines on a plane lie on pixels that the library's contour lines cover. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -24,14 +24,14 @@ static double distance_field(const double p[3])
     return normal[0] * p[0] + normal[1] * p[1] + normal[2] * p[2] - 0.1;
 }
 
-/* test_wave_field() stretched by two: its wavelength is 42 cells. */
+/* test_wave_field() stretched by two, so that its wavelength is 42 cells. */
 static double wave_field(const double p[3])
 {
     return test_wave_field((const double[]){p[0] / 2, p[1] / 2, p[2] / 2});
 }
 
-/* Returns how much of the point's pixel lines cover, from 0 to 1; -1 if the point is outside the picture, or so near to
- * the border of the cube that the pixel's middle may not be on the plane. */
+/* Returns the fraction of the point's pixel that lines cover. Returns -1 if the point is outside the picture, or so
+ * near to the border of the cube that the pixel's middle may not be on the plane. */
 static double get_line_coverage(const render_camera *c, const image *picture, const double point[3])
 {
     const double size = 2 * c->half_height / c->height;
@@ -48,10 +48,11 @@ static double get_line_coverage(const render_camera *c, const image *picture, co
     return (double)picture->rgba[4 * ((int)row * c->width + (int)column)];
 }
 
-/* Checks the coverage at VTK's points. A point is at most half of a pixel's diagonal from the pixel's middle, so a line
- * 1.5 pixels wide covers at least 1.25 - 0.71 of the pixel. VTK cuts a hex's polygon into triangles; on 40 cubes that
- * moves lines of this field by at most 0.1 of a pixel. At sharp turns of a line, at a saddle or near an extremum,
- * neither line is straight: 1 of 1000 points may be off the line. */
+/* Checks the coverage of the pixels at VTK's points. A point is at most half of a pixel's diagonal (0.71) from the
+ * pixel's middle, and a line is 1.5 pixels wide, so it covers at least 1.25 - 0.71 of the pixel. VTK cuts the polygon
+ * of a hex into triangles. On 40 cubes this moves lines of this field by at most 0.1 of a pixel. At sharp turns of a
+ * line, at a saddle or near an extremum, the lines of neither program are straight, so 1 of 1000 points may be off the
+ * line. */
 static void check_kind(test_mesh_kind kind, int type, fixture_camera camera)
 {
     test_mesh mesh, values;

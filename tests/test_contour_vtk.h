@@ -1,4 +1,4 @@
-/* VTK's contour lines on a plane through a mesh of hexes or tets, for comparison. */
+/* Computes VTK's contour lines on a plane through a mesh of hexes or tets, for comparison with the library's lines. */
 #ifndef TEST_CONTOUR_VTK_H
 #define TEST_CONTOUR_VTK_H
 
@@ -8,9 +8,9 @@
 extern "C" {
 #endif
 
-/* Cuts the mesh by the plane through origin and finds the contour lines of the values. Stores 5 points of each of their
- * segments, including the ends, in memory from malloc() that the caller frees. type: 10 or 12. Returns the number of
- * points, or -1 if memory runs out. */
+/* Cuts the mesh by the plane through `origin` and computes the contour lines of the values. Stores 5 points of each
+ * line segment, including its ends, in memory from malloc() that the caller frees. type: 10 (tets) or 12 (hexes).
+ * Returns the number of points, or -1 if memory runs out. */
 int64_t test_vtk_contour(int64_t vertex_count, const double *coordinates, int64_t cell_count, int type,
                          const int64_t *connectivity, const double *field, const double origin[3],
                          const double normal[3], int value_count, const double *values, double **points);

@@ -1,20 +1,21 @@
-/* Checks a ray's single crossing by contraction (kernel_contraction.h) against brute force in double: hexes, wedges and
- * pyramids from parallelepipeds to cells that are strongly bent, flat, tiny, or far from the origin, each with a ray of
- * its own. The kernels' headers are compiled here for the scalar instruction set.
+/* Checks the search for the single crossing of a ray by contraction (kernel_contraction.h) against brute force in
+ * double. Cells are hexes, wedges and pyramids, from parallelepipeds to cells that are strongly bent, flat, tiny or far
+ * from the origin, each with its own ray. The kernels' headers are compiled here for the scalar instruction set.
  *
- * Reference: a ray's intervals in the cell are reference_crossings(), and in each the field is sampled at many depths;
- * between two samples of different sign, bisection finds the root. If the kernel decides that there is one crossing, it
- * must be the only one and at its depth; if it decides that there is none, there must be none.
+ * Reference: reference_crossings() gives a ray's intervals in the cell. In each interval the field is sampled at many
+ * depths; between two samples of different sign, bisection finds the root. If the kernel decides that there is one
+ * crossing, there must be exactly one, at the same depth. If the kernel decides that there is none, there must be none.
  *
  * Depth: the last step of Newton's method begins at most KERNEL_CONTRACTION_END from the root, in the cell's
  * coordinates. The second derivative of f is at most about 4 K (the first derivative of the iteration is K at the
- * domain's corners, and 0 in the middle), so with K < 0.9 the step leaves 2 K / (1 - K) (1e-4)^2 = 1.8e-7 of r, which
- * is the same fraction of the cell's extent along the ray; t is rounded by half a unit, twice.
+ * domain's corners, and 0 in the middle). So with K < 0.9 the error after the step is 2 K / (1 - K) (1e-4)^2 = 1.8e-7
+ * of r, which is the same fraction of the cell's extent along the ray. t is rounded twice, each time by half a unit in
+ * the last place.
  *
- * The test also checks quads of the same cells that kernel_curved_nonconvex_quads() takes to look convex along all rays
- * of a box: seen along each of many rays in float32, all corners of such a quad turn in one direction in double; and if
- * the signs of the quad's edges are known, its two triangles and its patch give the same result for the ray as the
- * edges alone. */
+ * The test also checks quads of the same cells that kernel_curved_nonconvex_quads() classifies as convex along all rays
+ * of a box. Seen along each of many rays in float32, all corners of such a quad must turn in one direction in double.
+ * If the signs of the quad's edges are certain, its two triangles and its bilinear patch must give the same result for
+ * the ray as the edges by themselves. */
 #include "kernel_bounds.h"
 #include "kernel_contraction.h"
 #include "kernel_quad.h"
@@ -44,7 +45,7 @@ typedef enum shape { AFFINE, JITTERED, BENT, FLAT, TINY, FAR, SHAPE_COUNT } shap
 
 static const char *const shape_names[SHAPE_COUNT] = {"affine", "jittered", "bent", "flat", "tiny", "far"};
 
-/* One cell for each lane, each with its own ray. */
+/* One cell and one ray in each lane. at: coordinates x, y, z and values of the vertices. */
 typedef struct batch {
     int type;
     float at[4][8][SIMD_WIDTH];
@@ -59,7 +60,7 @@ static double shape_size(shape s)
     return s == TINY ? 1e-4 : s == FAR ? 0.008 : pow(10, draw_uniform(-2.5, -0.5));
 }
 
-/* Makes the columns of a random rotation, scaled by the extents of the cell. */
+/* Computes the columns of a random rotation, scaled by the extents of the cell. */
 static void random_axes(const double extent[3], double axes[3][3])
 {
     double q[4], sum = 0;
@@ -100,8 +101,8 @@ static void place_cell_vertices(batch *b, shape s, int lane)
     }
 }
 
-/* Sets values that are nearly linear or far from it, relative to an isovalue within their range, as
- * kernel_cell_relative() does. */
+/* Sets values that are nearly linear or far from linear in the position. The values are relative to a random isovalue
+ * within their range and scaled to a maximum of 1, as by kernel_cell_relative(). */
 static void place_cell_values(batch *b, int lane)
 {
     const int count = grid_type_vertices(b->type);
@@ -134,7 +135,7 @@ static void choose_point_near_cell(const batch *b, int lane, double point[3])
     }
 }
 
-/* Aims a ray of the beam through a point near the cell. */
+/* Makes a ray of the beam through a random point near the cell. */
 static void aim_ray(batch *b, int lane)
 {
     double point[3];
@@ -195,9 +196,10 @@ typedef struct truth {
     const reference_cell *cell;
     const reference_line *line;
     const double *values;
-    bool has_failed; /* the map could not be inverted at some depth, near a pyramid's apex: the ray is not compared */
+    /* whether the map could not be inverted at some depth, near a pyramid's apex; such a ray is not compared */
+    bool has_failed;
     int roots;
-    double t; /* depth of the last root */
+    double t; /* depth of the root found most recently */
 } truth;
 
 static double evaluate_reference(truth *r, double t)
@@ -220,7 +222,7 @@ static double bisect_reference_root(truth *r, double low, double high, bool rise
     return 0.5 * (low + high);
 }
 
-/* Finds all roots in the cell. */
+/* Finds all roots of the field on the ray in the cell. */
 static void find_reference_roots(truth *r)
 {
     reference_crossing ends[REFERENCE_MAX_CROSSINGS];
@@ -239,7 +241,7 @@ static void find_reference_roots(truth *r)
     }
 }
 
-/* ---- the comparison ---- */
+/* ---- comparison of the kernel with the reference ---- */
 
 typedef struct count {
     int64_t rays, contracting, one, none, wrong, off, failed;
@@ -320,11 +322,11 @@ static void decided_crossings_match_the_reference(void **state)
 enum { BOX_RAYS = 12 };
 
 typedef struct quad_counts {
-    int64_t quads, convex, turned, wrong; /* counts of quads, once for each ray */
+    int64_t quads, convex, turned, wrong; /* counts of quads; each quad counts one time for each ray */
 } quad_counts;
 
-/* Computes the slopes of a direction along which three consecutive vertices of a quad are seen nearly collinear;
- * returns false if no such slopes are small. */
+/* Computes slopes of a direction along which three consecutive vertices of a random quad are seen nearly collinear.
+ * Returns false if the random face is a triangle or the slopes are not small. */
 static bool aim_along_grazed_edge(const batch *b, int lane, double slope[2])
 {
     const kernel_shape *shape = kernel_cell_shape(b->type);
@@ -345,7 +347,8 @@ static bool aim_along_grazed_edge(const batch *b, int lane, double slope[2])
     return fabs(slope[own]) < 1;
 }
 
-/* Aims the rays of a box, most of them at its corners. */
+/* Makes rays whose slopes lie in a box, eight of them at its corners, and computes the bounds of their slopes and
+ * origins. */
 static void aim_box(batch *b, kernel_rays rays[BOX_RAYS], vf slope[2][2], vf origin[2][2])
 {
     double middle[SIMD_WIDTH][2], half[SIMD_WIDTH];
@@ -397,8 +400,8 @@ static vi evaluate_edge(const vf x[8], const vf y[8], int a, int b, vf *least)
     return vi_from_bits(e);
 }
 
-/* Returns the rays on which the signs of all edges of the quad are certain but give another result than its triangles
- * and its patch. */
+/* Returns the rays on which the signs of all edges of the quad are certain but give another result than the quad's
+ * triangles and patch. */
 static vm find_wrong_quads(const vf x[8], const vf y[8], const signed char *loop)
 {
     vf least = vf_set(INFINITY);
@@ -463,7 +466,7 @@ static void quads_classified_as_convex_are_convex(void **state)
         }
 }
 
-/* The command's argument is the number of rays. */
+/* The command's argument is the number of rays to trace. */
 int main(int argc, char **argv)
 {
     if (argc > 1) rays_wanted = atoll(argv[1]);

@@ -50,7 +50,8 @@ int64_t *read_integers(const insitu_array &a, int64_t count)
     return out;
 }
 
-/* Meshes of tests have linear cells: a quadratic cell becomes the linear cell of its corners, which come first. */
+/* Replaces quadratic cells by the linear cells of their corners, which come first in the connectivity, because a
+ * test_mesh has linear cells only. */
 void convert_to_linear_cells(test_mesh *mesh)
 {
     static const struct {

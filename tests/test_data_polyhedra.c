@@ -1,6 +1,6 @@
-/* Compares the Voronoi cells of INSITU_TEST_DATA, 8,000 polyhedra of up to 21 faces, with the brute-force renderer:
- * surfaces, samples and segments. Their vertices are also moved, so that their faces are not plane, and they are
- * compared with the same field on the cells' own tets. Returns 77 if INSITU_TEST_DATA is not set. */
+/* Compares pictures of the Voronoi cells of INSITU_TEST_DATA, 8,000 polyhedra with up to 21 faces, with the brute-force
+ * renderer: surfaces, samples and segments. Then moves the vertices so that faces are not plane, and compares the
+ * polyhedra with the same field on the tets of which they consist. Returns 77 if INSITU_TEST_DATA is not set. */
 #include "reference_integral.h"
 #include "test_data_mesh.h"
 #include "test_effort.h"
@@ -17,7 +17,7 @@
 
 static test_mesh mesh;
 static int width,
-    /* height of the picture that is compared with brute force over all cells, usually for a third of the rays */
+    /* height of the picture; brute force tests all cells, usually for a third of the rays */
     height;
 
 static void cells_fixture(render_fixture *f)
@@ -44,8 +44,8 @@ static void surfaces_and_samples_match_the_reference(void **state)
     }
 }
 
-/* Checks segments against the integral. They are exact on tets, and so on polyhedra: the bound is 1e-6 as in
- * test_segments.c, whose rays cross as many cells. */
+/* Compares volumes integrated by segments with the adaptive integral. Segments are exact on tets, and therefore on
+ * polyhedra. The tolerance is 1e-6 as in test_segments.c, whose rays cross as many cells. */
 static void segments_match_the_integral(void **state)
 {
     (void)state;
@@ -70,7 +70,8 @@ static void segments_match_the_integral(void **state)
     fixture_free(&f);
 }
 
-/* Moves vertices by up to 1 % of a cell along each axis. This test runs last, because it changes the mesh. */
+/* Checks polyhedra with curved faces: moves vertices by up to 1 % of a cell along each axis. This test must be the last
+ * one, because it changes the mesh. */
 static void moved_polyhedra_match_their_split_tets(void **state)
 {
     (void)state;

@@ -1,13 +1,15 @@
-/* Checks max_error on the real grids of INSITU_TEST_DATA: each is drawn by segments with max_error 1e-2, 1e-3 and 1e-4,
- * with two transfer functions, and compared with the adaptive integral in double over all cells, in linear light. The
- * usual run draws each grid with one of the two functions alternately; grids with known pixels are drawn with both.
+/* Checks max_error on the real grids of INSITU_TEST_DATA. Each grid is drawn by segments with max_error 1e-2, 1e-3 and
+ * 1e-4, with two transfer functions, and compared, in linear light, with the adaptive integral in double over all
+ * cells. The usual run draws each grid with one of the two functions alternately; grids with known pixels (see below)
+ * are drawn with both.
  *
- * test_data_volumes [pixels [name]]: `pixels` is the number of pixels of a picture that are compared, 0: all. Half of
- * them are the pixels in which the pictures differ most from each other, where errors are largest; the others are
- * chosen at random among pixels that are not empty; pixels that were once wrong are added. Returns 77 if
- * INSITU_TEST_DATA is not set.
+ * test_data_volumes [pixels [name]]: `pixels` is the number of pixels of a picture that are compared; 0 means all. Half
+ * of them are the pixels in which the pictures with different max_error differ most, because errors are largest there.
+ * The other half is chosen at random among pixels that are not empty. Pixels that were wrong in the past are added.
+ * Returns 77 if INSITU_TEST_DATA is not set.
  *
- * The ray's cells are found by their projections, so that brute force need not test half a million others. */
+ * Cells that a ray cannot meet, by the bounds of their projections, are hidden for the reference, so that brute force
+ * need not test half a million cells. */
 #include <mpi.h>
 
 #include "colour_map.h"
@@ -37,7 +39,7 @@ typedef struct data_set {
     double eye[3], focal[3], up[3];
 } data_set;
 
-/* These numbers are listed in the data's README. */
+/* The grids, fields and ranges that the data's README lists. */
 static const data_set sets[] = {
     {"bluntfin_hex",
      "Density",
@@ -121,8 +123,8 @@ static const data_set sets[] = {
     {"tiny_QuadraticWedge", "DistanceToCenter", 0.3, 1.74, {4.85923918, 3.57282612, 5.82404897}, {1, 1, 1}, {0, 1, 0}},
 };
 
-/* Pixels that are always compared. They show pentahexa: prisms whose base is one vertex and whose faces have either
- * orientation. */
+/* Known pixels: they were wrong in the past and are always compared. They show pentahexa: prisms whose base has
+ * collapsed to one vertex and whose faces have either orientation. */
 typedef struct known_pixel {
     const char *file;
     int x, y;
@@ -132,7 +134,8 @@ static const known_pixel known[] = {{"pentahexa", 34, 24}, {"pentahexa", 35, 27}
 
 enum { KNOWN = sizeof known / sizeof known[0] };
 
-/* The opacities: the default of a scene, and shells, which are steep ramps of low opacity, as users draw them. */
+/* The two opacity functions: the default of a scene, and shells, which are steep ramps of low opacity as users draw
+ * them. */
 typedef struct opacity_shape {
     const char *name, *map;
     int count;
@@ -148,17 +151,18 @@ static const opacity_shape shapes[] = {
 static int pixel_count;
 static const char *only;
 
-/* ---- a set under test ---------------------------------------------------------------------------------------- */
+/* ---- a grid under test ------------------------------------------------------------------------------------------ */
 
 typedef struct subject {
     render_fixture f;
     double diagonal;
     double opacity_values[8];
-    unsigned char *ghosts; /* the ghost flags of the grid, one byte for each cell */
+    unsigned char *ghosts; /* ghost flags of the grid's cells, one byte each */
     int rectangle_count;
     /* for each cell the rectangle of pixels whose rays may meet it: first and last x, first and last y */
     int (*rectangles)[4];
-    unsigned char *folded; /* for each pixel, whether its ray may meet a folded cell, which has no unique value */
+    /* for each pixel, whether its ray may meet a folded cell, which has no unique value at a point */
+    unsigned char *folded;
 } subject;
 
 static void compute_bounds(const test_mesh *mesh, double lower[3], double upper[3])
@@ -184,8 +188,8 @@ static void set_transfer(subject *s, const data_set *set, const opacity_shape *s
     t->colours = colour_map_table(shape->map, &t->colour_count);
 }
 
-/* Computes the rectangle of pixels whose rays may meet the cell: the bounds of its projection, widened by a pixel on
- * each side. */
+/* Computes the rectangle of pixels whose rays may meet the cell: the bounds of the cell's projection, widened by a
+ * pixel on each side. */
 static void project_cell_bounds(const render_camera *c, const grid *g, int64_t cell, int out[4])
 {
     const double per_slope = 0.5 * c->height / c->half_height;
@@ -214,7 +218,7 @@ static void project_cell_bounds(const render_camera *c, const grid *g, int64_t c
     }
 }
 
-/* Each corner with its three neighbours, in right-handed order if the cell is right-handed. */
+/* Each corner followed by its three neighbours. They are in right-handed order if the cell is right-handed. */
 static const signed char hex_corners[8][4] = {{0, 1, 3, 4}, {1, 2, 0, 5}, {2, 3, 1, 6}, {3, 0, 2, 7},
                                               {4, 7, 5, 0}, {5, 4, 6, 1}, {6, 5, 7, 2}, {7, 6, 4, 3}};
 static const signed char wedge_corners[6][4] = {{0, 1, 2, 3}, {1, 2, 0, 4}, {2, 0, 1, 5},
@@ -230,8 +234,8 @@ static double corner_volume(double p[][3], const signed char corner[4])
            e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0]);
 }
 
-/* Returns whether the cell is inverted at some but not all corners. Its map is then not one-to-one, and the solver
- * decides which of several values it has at a point: there is no reference to compare with. */
+/* Returns whether the cell is inverted at some corners but not at all. The cell's map is then not one-to-one, and the
+ * solver decides which of several values the field has at a point, so there is no reference to compare with. */
 static bool is_folded(const grid *g, int64_t cell)
 {
     const int type = grid_cell_type(g, cell);
@@ -306,7 +310,8 @@ static void subject_free(subject *s)
     free(s->folded);
 }
 
-/* Hides cells that the pixel's ray cannot meet; if of_folded, also hides all cells that are not folded. */
+/* Hides, by ghost flags, the cells that the pixel's ray cannot meet. If of_folded is set, also hides all cells that are
+ * not folded. */
 static void hide_others(subject *s, int pixel, bool of_folded)
 {
     const int x = pixel % WIDTH, y = pixel / WIDTH;
@@ -325,8 +330,8 @@ static void compute_reference_pixel(subject *s, int pixel, bool of_folded, doubl
     reference_integral_free(scene);
 }
 
-/* Returns whether the ray meets a folded cell, or a face whose patch is folded there. The folded cells are drawn as a
- * fog of constant density to see whether the ray meets any. */
+/* Returns whether the ray meets a folded cell, or a face whose patch is folded at the ray. To find out whether the ray
+ * meets a folded cell, only folded cells are drawn, as a fog of constant density. */
 static bool lacks_reference(subject *s, int pixel)
 {
     double rgba[4];
@@ -384,7 +389,7 @@ static int compare_pixels(const void *left, const void *right)
     return at_a != at_b ? (at_a > at_b ? -1 : 1) : a - b;
 }
 
-/* Fills pixels with the pixels to compare; returns their number. */
+/* Chooses the pixels to compare. Returns their number. */
 static int choose_pixels(const data_set *set, const picture *pictures, int pixels[PIXELS + KNOWN])
 {
     int shown = 0;
@@ -406,17 +411,17 @@ static int choose_pixels(const data_set *set, const picture *pictures, int pixel
 
 /* ---- the test ------------------------------------------------------------------------------------------------ */
 
-/* Returns how many of the pixels may lack a reference. Only the crushed can has folded cells, which at most a seventh
- * of all its pixels meet (63 of 612, and 58 of 459); but the half of a sample in which pictures differ most may all be
- * such pixels. */
+/* Returns the largest allowed number of pixels without a reference. Only the crushed can has folded cells, and at most
+ * a seventh of all its pixels show them (63 of 612, and 58 of 459). In a sample of pixels, however, all of the half in
+ * which pictures differ most may show folded cells. */
 static int get_most_unreferenced_pixels(const data_set *set, int count)
 {
     if (strcmp(set->file, "can_2") != 0) return 0;
     return pixel_count == 0 ? count / 7 : count * 3 / 4;
 }
 
-/* Returns whether the picture is empty: before the impact the can's field is 0 everywhere, where the shells are
- * transparent. */
+/* Returns whether the picture is empty: before the impact (can_0) the field is 0 in all cells, and the opacity function
+ * `shells` is 0 at this value. */
 static bool is_picture_empty(const data_set *set, const opacity_shape *shape)
 {
     return strcmp(set->file, "can_0") == 0 && strcmp(shape->name, "shells") == 0;

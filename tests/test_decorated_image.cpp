@@ -1,4 +1,4 @@
-/* Checks decorations drawn over a picture: their positions, what they hide, and the colours of bars. */
+/* Checks decorations drawn over a picture: their positions, what they hide, and the colours of colour bars. */
 #include <cmath>
 #include <csetjmp>
 #include <cstdarg>
@@ -19,7 +19,7 @@ namespace
 
 const int width = 320, height = 240;
 
-/* Returns a picture that is premultiplied grey with this opacity everywhere. */
+/* Returns a picture in which all pixels have the same premultiplied grey and the same opacity. */
 std::vector<float> make_grey_picture(float grey, float alpha)
 {
     std::vector<float> rgba(static_cast<std::size_t>(4 * width * height));
@@ -60,8 +60,8 @@ void picture_is_blended_over_its_background(void **)
         assert_true(std::fabs(out[i] - (i % 4 == 3 ? 1 : 0.125F + 0.75F * 0.25F)) < 1e-6F);
 }
 
-/* Checks that a line in front of the picture has its own colour, and that a line behind it shows, over the background,
- * as far as the picture transmits light. Pixels off the lines must not change. */
+/* Checks that a line in front of the picture has its own colour. A line behind the picture is drawn over the background
+ * and is visible as far as the picture transmits light. Pixels beside the lines must not change. */
 void strokes_are_before_or_behind_the_picture(void **)
 {
     const insitu_stroke strokes[] = {{{0, 50.5}, {width, 50.5}, false}, {{0, 100.5}, {width, 100.5}, true}};
@@ -77,7 +77,8 @@ void strokes_are_before_or_behind_the_picture(void **)
     assert_true(pixel_channel(hidden, 160, 100) == 0.5F);
 }
 
-/* Checks that a line's total light is its length times its width in any direction, since its edges are antialiased. */
+/* Checks that the total light of a line is its length times its width in any direction, because its edges are
+ * antialiased. */
 void slanted_strokes_are_as_bright_as_straight_ones(void **)
 {
     for (int degrees = 0; degrees < 180; degrees += 7) {
@@ -90,12 +91,13 @@ void slanted_strokes_are_as_bright_as_straight_ones(void **)
         double sum = 0;
         const std::vector<float> out = draw_decorated(make_grey_picture(0, 0), d);
         for (std::size_t i = 0; i < out.size(); i += 4) sum += out[i];
-        /* A tent profile one pixel wide on either side sums to 180; the round ends add at most one each. */
+        /* The line is 180 long. Its profile across is a tent that is one pixel wide on either side, so the sum is 180;
+         * each round end adds at most one. */
         assert_true(sum > 178 && sum < 183);
     }
 }
 
-/* Checks the colours in the tallest column of the bar. */
+/* Checks that a column of pixels in the bar shows the bar's colours, over more than a third of the picture's height. */
 void a_bar_has_the_colours_of_its_map(void **)
 {
     const float colours[] = {0.1F, 0.2F, 0.9F, 0.3F, 0.8F, 0.1F, 0.9F, 0.1F, 0.2F};
@@ -152,7 +154,7 @@ void bands_are_of_equal_height(void **)
                 count += pixel_channel(out, x, y, band) == 0.9F && pixel_channel(out, x, y, (band + 1) % 3) == 0;
             rows[band] = count > rows[band] ? count : rows[band];
         }
-    /* The frame covers a row of the outer bands, and a border between bands may divide a row. */
+    /* The frame covers a row of the outer bands, and the border between two bands may lie inside a row. */
     assert_true(rows[1] > 30 && std::abs(rows[0] - rows[1]) <= 2 && std::abs(rows[2] - rows[1]) <= 2);
 }
 

@@ -1,4 +1,5 @@
-/* Checks ticks at round numbers, and the edges of the domain's box as the camera sees them. */
+/* Checks the decorations that a session computes: ticks at round numbers, the edges of the domain's box as the camera
+ * sees them, rulers and scale bars. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -21,7 +22,7 @@ static void ticks_are_at_round_numbers(void **state)
     static const struct {
         session_scale scale;
         int most;
-        const char *words; /* texts of all ticks, from the lowest */
+        const char *words; /* texts of all ticks, lowest first */
     } cases[] = {
         {{RENDER_LINEAR, 0, 0, 1, {0}}, 6, "0 0.2 0.4 0.6 0.8 1.0"},
         {{RENDER_LINEAR, 0, -1, 1, {0}}, 6, "-1.0 -0.5 0 0.5 1.0"},
@@ -52,7 +53,8 @@ static void ticks_are_at_round_numbers(void **state)
     }
 }
 
-/* Checks that a tick's text is its value, to the last printed digit, and that its position is that of the value. */
+/* Checks that a tick's text is its value to the last printed digit, and that its position on the bar is that of the
+ * value. */
 static void ticks_are_at_the_positions_of_their_values(void **state)
 {
     (void)state;
@@ -67,7 +69,8 @@ static void ticks_are_at_the_positions_of_their_values(void **state)
         assert_in_range(count, 1, most);
         for (int n = 0; n < count; n++) {
             const double value = scale.low + ticks[n].place * 2 * half;
-            /* Round numbers are at least a fifth of the range over `most` apart; texts are exact to a tenth of that. */
+            /* Round numbers are at least a fifth of the range / `most` apart, and texts are exact to a tenth of this
+             * distance. */
             assert_true(fabs(strtod(ticks[n].text, NULL) - value) < 0.02 * half / most + 1e-12 * size);
             if (n) assert_true(strcmp(ticks[n].text, ticks[n - 1].text) != 0 && ticks[n].place > ticks[n - 1].place);
         }
@@ -76,14 +79,14 @@ static void ticks_are_at_the_positions_of_their_values(void **state)
 
 /* ---- the box ------------------------------------------------------------------------------------------------- */
 
-/* Checks that value i of 0 .. 3 in four bands lies in band i, [i / 4, (i + 1) / 4) of the bar, although its position in
- * the range is i / 3. */
+/* Checks the ticks of ids in colour bands: of the values 0 to 3 in four bands, value i lies in band i, the part [i / 4,
+ * (i + 1) / 4) of the bar, although its position in the range is i / 3. */
 static void bands_of_ids_are_centred_on_the_ids(void **state)
 {
     (void)state;
     static const struct {
         double low, high;
-        int bands, count, first; /* a count of 0 means no ids */
+        int bands, count, first; /* count: number of ticks at ids, 0 if the bands are not ids */
     } cases[] = {{0, 3, 4, 4, 0}, {1, 5, 5, 5, 1},       {-0.5, 3.5, 4, 4, 0}, {7, 7 + 63, 64, 11, 7},
                  {0, 3, 5, 0, 0}, {0.25, 3.25, 4, 0, 0}, {0, 4, 4, 0, 0},      {0, 1e-3, 4, 0, 0}};
     for (size_t n = 0; n < sizeof cases / sizeof *cases; n++) {
@@ -103,7 +106,8 @@ static void bands_of_ids_are_centred_on_the_ids(void **state)
     }
 }
 
-/* Returns how far a point is from the renderer's ray through a position in the picture (continuous pixels). */
+/* Returns the distance of a point from the renderer's ray through a position in the picture. The position is in
+ * continuous pixel coordinates. */
 static double distance_from_ray(const render_camera *c, const double pixel[2], const double point[3])
 {
     double base[3], direction[3], right[3], down[3], unused[3], along = 0, length = 0, square = 0;
@@ -162,8 +166,9 @@ static void edges_are_drawn_where_rays_meet_them(void **state)
     }
 }
 
-/* Checks the number of edges behind the data. A box seen over a corner has three of them, over an edge five, and face
- * on eight: the far face's four and the four that lead away from the eye. From inside all twelve are behind. */
+/* Checks the number of edges behind the data. A box seen over a corner has three of them, a box seen over an edge five.
+ * A box seen face on has eight: the four edges of the far face and the four that lead away from the eye. If the eye is
+ * inside the box, all twelve are behind the data. */
 static void edges_that_data_hides_are_reported(void **state)
 {
     (void)state;
@@ -179,17 +184,18 @@ static void edges_that_data_hides_are_reported(void **state)
     insitu_stroke strokes[SESSION_BOX_EDGES];
     assert_true(render_camera_look_at(&c, inside, focal, up, 40, 64, 64));
     const int count = session_box_strokes(lower, upper, &c, strokes);
-    assert_in_range(count, 3, 11); /* edges behind the eye are left out; edges that cross the eye's plane are clipped */
+    /* edges behind the eye are omitted, and edges that cross the eye's plane are clipped */
+    assert_in_range(count, 3, 11);
     for (int i = 0; i < count; i++) {
         assert_true(strokes[i].is_behind);
         for (int a = 0; a < 2; a++) assert_true(isfinite(strokes[i].from[a]) && isfinite(strokes[i].to[a]));
     }
 }
 
-/* ---- lengths -------------------------------------------------------------------------------------------------- */
+/* ---- rulers and scale bars ------------------------------------------------------------------------------------ */
 
-/* Checks the position of an axis's name: numbers along an edge leave no room for the name at their height, so it must
- * be equally far from the two nearest ticks. */
+/* Checks the position of an axis's name. It must be equally far from the two nearest ticks, because the numbers at the
+ * ticks leave no space for it beside them. */
 static void check_name(const insitu_label *name, const insitu_stroke *ticks, int count)
 {
     double nearest = INFINITY, next = INFINITY;
@@ -201,8 +207,8 @@ static void check_name(const insitu_label *name, const insitu_stroke *ticks, int
     if (fabs(name->away[0]) > fabs(name->away[1]) && count > 1) assert_true(nearest > 1 && next - nearest < 1e-9);
 }
 
-/* Checks that the ray through a tick meets the edge at the coordinate that its number states, and that texts are
- * outside of the ticks. */
+/* Checks that the ray through a tick meets the edge at the coordinate that the tick's text states, and that texts are
+ * placed outwards. */
 static void check_rulers(const render_camera *c, const double lower[3], const double upper[3])
 {
     insitu_decorations all = {0};
@@ -250,8 +256,9 @@ static void rulers_are_aligned_with_their_numbers(void **state)
     }
 }
 
-/* Checks that rays through both ends of the bar, moved to the middle of the picture, are as far apart at the point's
- * depth as the number states, and that the bar's length is a tenth to a fifth of the picture. */
+/* Checks scale bars. If the bar is moved to the middle of the picture, the rays through its two ends must be as far
+ * apart, at the depth of the focal point, as the bar's text states. The bar's length must be a tenth to a fifth of the
+ * picture's width. */
 static void scale_bars_have_the_stated_length(void **state)
 {
     (void)state;

@@ -1,5 +1,6 @@
-/* Checks that the deep file of a run, flattened by OpenImageIO as oiiotool --flatten does, equals the flat file of the
- * same run: transparent isosurfaces and a volume, on any number of ranks, written in the background. */
+/* Checks the deep file of a run: after OpenImageIO has flattened it, as `oiiotool --flatten` does, it must equal the
+ * flat file of the same run. The scenes have transparent isosurfaces and a volume; files are written in the background,
+ * on any number of ranks. */
 #include <OpenImageIO/imagebuf.h>
 #include <OpenImageIO/imagebufalgo.h>
 #include <insitu/insitu.h>
@@ -22,10 +23,10 @@ extern "C" {
 namespace
 {
 
-std::string folder; /* output folder, separate for each number of ranks */
+std::string folder; /* output folder; each number of ranks has its own */
 int own_rank, rank_count;
 
-/* A slab of hexes for each rank, along x. */
+/* Size in cells of a rank's slab of hexes. The slabs of the ranks are side by side along x. */
 enum { NX = 3, NY = 10, NZ = 10 };
 
 struct slab {
@@ -75,7 +76,8 @@ void submit_slab(insitu_session *session, const slab &s)
     assert_int_equal(insitu_set_field(session, "slab", &field), INSITU_OK);
 }
 
-/* Draws one picture. Each file has its own name, because OpenImageIO caches files that it has read. */
+/* Draws one picture into a flat and a deep file. Each picture needs its own file names, because OpenImageIO caches
+ * files that it has read. */
 void draw_picture(const std::string &name, const std::string &layers)
 {
     const std::string scene = folder + "/scene.yaml";
@@ -91,8 +93,8 @@ void draw_picture(const std::string &name, const std::string &layers)
     assert_int_equal(insitu_destroy(&session), INSITU_OK);
 }
 
-/* Compares the flattened deep file with the flat file. The roundings are 2^-24 of values of at most 1: for each sample
- * three in compositing, one in A, and three in OpenImageIO. */
+/* Compares the flattened deep file with the flat file. The tolerance is a number of roundings by 2^-24 of values of at
+ * most 1: for each sample three in compositing, one in A, and three in OpenImageIO. */
 void compare_flattened_file(const std::string &name)
 {
     if (own_rank != 0) return;

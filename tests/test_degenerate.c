@@ -1,7 +1,7 @@
 /* Checks degenerate polyhedra: faces that repeat a vertex, have no area or consist of one point, and cells without
- * volume. The same cell stored in another form is drawn to the same bits, cells without volume change no bit, and
- * everything else agrees with the reference. docs/development/hard-cases.md lists all cases; test_session_faces.c
- * checks those that are refused. */
+ * volume. If a cell is stored in another form, the picture must be bit-identical; cells without volume change no bit of
+ * the picture; all other pictures must agree with the reference. docs/development/hard-cases.md lists all cases.
+ * test_session_faces.c checks those that are refused. */
 #include "reference_integral.h"
 #include "test_effort.h"
 #include "test_mesh_make.h"
@@ -17,7 +17,7 @@
 
 static const double values[2] = {-0.2, 0.3};
 
-/* The scenes: an opaque surface, transparent surfaces in a sampled volume, and a volume by segments. */
+/* The scenes: an opaque surface; transparent surfaces in a volume drawn by samples; a volume drawn by segments. */
 typedef enum scene_kind { OPAQUE, SURFACES_IN_SAMPLES, SEGMENTS, SCENE_COUNT } scene_kind;
 
 static void open_scene(render_fixture *f, const test_mesh *mesh, scene_kind scene, fixture_camera camera, int width,
@@ -48,7 +48,8 @@ static void draw_mesh(const test_mesh *mesh, scene_kind scene, fixture_camera ca
 
 /* ---- other forms of a mesh ------------------------------------------------------------------------------------- */
 
-/* Returns a mesh with the vertices and values of another and without cells, with room for additional ones. */
+/* Returns a mesh with the vertices and values of `from` and without cells. It has space for additional vertices, faces
+ * and cells. */
 static test_mesh begin_copy(const test_mesh *from)
 {
     test_mesh mesh;
@@ -105,8 +106,8 @@ static void complete_copy(test_mesh *mesh, test_mesh *copy)
 
 typedef void rewriting(test_mesh *mesh);
 
-/* Repeats vertices in two of three faces, twice or three times, including the first one at the end: a quad then has up
- * to seven entries. Both cells of a face share the changed face. */
+/* Repeats vertices in two of three faces: one vertex is repeated, up to three times, and the first vertex also stands
+ * at the end. A quad then has up to seven entries. Both cells at a face share the changed face. */
 static void repeat_vertices(test_mesh *mesh)
 {
     test_mesh copy = begin_copy(mesh);
@@ -123,8 +124,8 @@ static void repeat_vertices(test_mesh *mesh)
     complete_copy(mesh, &copy);
 }
 
-/* Adds for every vertex a face that consists of this vertex only. A cell gets the face of the first vertex of its first
- * face, so that cells share some of them. */
+/* Adds for every vertex a face that consists of this vertex only. Each cell receives the face of the first vertex of
+ * its first face, so that cells share some of these faces. */
 static void add_point_faces(test_mesh *mesh)
 {
     test_mesh copy = begin_copy(mesh);
@@ -137,7 +138,7 @@ static void add_point_faces(test_mesh *mesh)
     complete_copy(mesh, &copy);
 }
 
-/* Reverses the orientation of all faces, or of every second one. */
+/* Reverses the orientation of all faces. */
 static void reverse_faces(test_mesh *mesh)
 {
     for (int64_t face = 0; face < mesh->face_count; face++)
@@ -164,7 +165,7 @@ static void reverse_every_second_cell(test_mesh *mesh)
 
 /* ---- cells without volume next to others ----------------------------------------------------------------------- */
 
-/* Adds a flat cell: a face of a cell twice, as front and back, closed by two faces that are points. */
+/* Adds a flat cell: a face of another cell as front and as back, closed by two faces that are single points. */
 static void add_pillow(test_mesh *mesh, int64_t face)
 {
     const int64_t *loop = mesh->face_connectivity + mesh->face_offsets[face];
@@ -176,7 +177,7 @@ static void add_pillow(test_mesh *mesh, int64_t face)
     test_mesh_add_polyhedron(mesh, faces, 4);
 }
 
-/* Adds a bent cell without volume: two faces of a cell, each twice, as front and back. */
+/* Adds a bent cell without volume: two faces of another cell, each as front and as back. */
 static void add_bent_pillow(test_mesh *mesh, int64_t one, int64_t other)
 {
     int64_t faces[4] = {one, other};
@@ -198,8 +199,8 @@ static void add_tet(test_mesh *mesh, const int64_t v[4])
     test_mesh_add_polyhedron(mesh, faces, 4);
 }
 
-/* Adds a tet of new vertices that are all at one vertex's position, or on the line from that vertex to another at
- * quarters of its length. */
+/* Adds a tet with new vertices at quarters of the line from one vertex to another. If both are the same vertex, all
+ * four vertices have its position. */
 static void add_new_tet(test_mesh *mesh, int64_t from, int64_t to)
 {
     int64_t v[4];
@@ -238,9 +239,11 @@ static void add_flat_cells(test_mesh *mesh)
     complete_copy(mesh, &copy);
 }
 
-/* ---- the same bits --------------------------------------------------------------------------------------------- */
+/* ---- pictures that must be bit-identical
+ * ---------------------------------------------------------------------------- */
 
-/* Makes a mesh of polyhedra from tets, of hexes of which half or all become polyhedra, or of mixed cells. */
+/* Makes a mesh of polyhedra. kind 0: from tets; 1 and 2: from hexes, of which half or all become polyhedra; 3: from
+ * mixed cells, of which half become polyhedra. */
 static void make_mesh(int kind, double jitter, test_mesh *mesh)
 {
     static const test_mesh_kind kinds[4] = {TEST_POLYHEDRA, TEST_HEXES, TEST_HEXES, TEST_MIXED};
@@ -292,18 +295,19 @@ static void polyhedra_without_volume_change_no_pixel(void **state)
     assert_same_bits(add_flat_cells);
 }
 
-/* ---- the reference --------------------------------------------------------------------------------------------- */
+/* ---- pictures that must agree with the reference
+ * ---------------------------------------------------------------------- */
 
-/* Compares pictures of surfaces and samples, and for segments the integral of every ray: values in float32 err by about
- * 1e-6, and so does the length of a segment in a steep part of the transfer function (see
- * sums_through_spokes_match_the_reference). */
+/* Compares surfaces and samples with the brute-force renderer, and segments with the adaptive integral on every ray.
+ * The tolerance of 1e-5 for segments covers values in float32, which have an error of about 1e-6, and the same error of
+ * a segment's length in a steep part of the transfer function (see sums_through_spokes_match_the_reference). */
 static void assert_reference(const test_mesh *mesh, fixture_camera camera, const char *what)
 {
     render_fixture f;
     drawn_frame drawn;
     open_scene(&f, mesh, SURFACES_IN_SAMPLES, camera, 49, 43);
-    /* The sheets of a face without area lie in one plane; a hit on them is equally near to an edge of a tet, and is
-     * excluded. */
+    /* The sheets (triangles between two of the polyhedron's tets) at a face without area lie in one plane. A hit on
+     * them is also near to an edge of a tet, and is excluded. */
     fixture_bounds bounds = fixture_usual_bounds;
     bounds.excluded = 3e-3;
     const fixture_outcome o = fixture_compare_with_reference(&f, &bounds, what);
@@ -329,7 +333,7 @@ static void assert_reference(const test_mesh *mesh, fixture_camera camera, const
     fixture_free(&f);
 }
 
-/* An edge between two vertices, and the vertex in its middle. */
+/* An edge between two vertices, and the vertex in the middle of the edge. */
 typedef struct split_edge {
     int64_t low, high, middle, face; /* face: the face without area along the edge */
 } split_edge;
@@ -359,7 +363,8 @@ static split_edge *find_split(split_edges *edges, test_mesh *mesh, int64_t a, in
     return e;
 }
 
-/* Returns whether the middle of the edge is a vertex of the face. The answer is the same for both cells of the face. */
+/* Returns whether the face contains the vertex in the middle of the edge that begins at vertex `low`. The result is the
+ * same for both cells at the face. */
 static bool face_has_middle(int64_t face, int64_t low)
 {
     return test_uniform((uint64_t)(face * 1000 + low), 4) < 0.5;
@@ -377,8 +382,8 @@ static void add_middle_to_face(const test_mesh *mesh, int64_t face, split_edges 
     test_mesh_add_face(copy, loop, count);
 }
 
-/* Adds to a cell a face without area for each edge of which only one of the cell's two faces has the middle as a
- * vertex. */
+/* Adds faces without area to a cell: one for each edge at which only one of the cell's two faces contains the edge's
+ * middle. */
 static int add_flat_faces_to_cell(const test_mesh *mesh, int64_t cell, split_edges *edges, test_mesh *copy,
                                   int64_t more[32])
 {
@@ -403,7 +408,8 @@ static int add_flat_faces_to_cell(const test_mesh *mesh, int64_t cell, split_edg
     return count;
 }
 
-/* Adds vertices in the middle of edges; returns how many cells have faces without area, which neighbours share. */
+/* Adds vertices in the middle of edges. Neighbouring cells share the faces without area that this requires. Returns the
+ * number of cells with such faces. */
 static int add_edge_middles(test_mesh *mesh)
 {
     test_mesh copy = begin_copy(mesh);
@@ -421,9 +427,11 @@ static int add_edge_middles(test_mesh *mesh)
     return cells;
 }
 
-/* Checks vertices in the middle of edges that some faces do not have, with the edge's value there; in jittered lattices
- * they are off the edges by rounding. With other values, the field as defined jumps at the face without area, and a
- * ray's profile may take either side up to the next sheet: then the picture must only consist of finite numbers. */
+/* Checks vertices in the middle of edges that only some of the faces at the edge contain. First their values are the
+ * means of the edge's ends, and pictures must agree with the reference; in jittered lattices these vertices are off the
+ * edges by rounding. Then they have other values: the field as defined jumps at the face without area, and a ray's
+ * profile (the field along the ray) may take the value of either side up to the next sheet, so the picture must only
+ * consist of finite numbers. */
 static void faces_without_area_match_the_reference(void **state)
 {
     (void)state;
@@ -445,7 +453,8 @@ static void faces_without_area_match_the_reference(void **state)
         }
 }
 
-/* Checks two tets with one common face, which passes a vertex twice, at the point where the tets touch. */
+/* Checks a polyhedron of two tets that touch at one vertex. They have one common face, which passes this vertex
+ * twice. */
 static void face_with_a_repeated_vertex_matches_the_reference(void **state)
 {
     (void)state;
@@ -467,9 +476,9 @@ static void face_with_a_repeated_vertex_matches_the_reference(void **state)
     }
 }
 
-/* Checks that a flat cell alone, with its own vertices and values, is invisible in volumes. Its field may differ in
- * front of and behind it, and a surface is then visible between both, as in the sliver whose limit the flat cell is;
- * but all numbers are finite. */
+/* Checks a single flat cell with its own vertices and values. It must be invisible in volumes. Its field may have
+ * different values in front of and behind the cell; a surface is then visible between them, as in the thin cell whose
+ * limit the flat cell is. All numbers must be finite. */
 static void flat_polyhedra_are_finite(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
-/* Compares quantities derived from gradients of an ABC flow, away from the border, with the closed form and with VTK's
- * gradient filter: on hexes and tets, regular and jittered. Q is interpolated as in a slice. With INSITU_TEST_WHOLE the
- * test includes the finest grids, and measures the time. */
+/* Compares quantities derived from gradients of an ABC flow, away from the border, with closed forms and with VTK's
+ * gradient filter. Grids are hexes and tets, regular and jittered. Q is interpolated as in a slice. With
+ * INSITU_TEST_WHOLE the test includes the finest grids and also measures time. */
 #include <math.h>
 #include <mpi.h>
 #include <stdio.h>
@@ -40,7 +40,7 @@ typedef struct sample_sums {
     int64_t count;
 } sample_sums;
 
-/* Adds the errors at a point. The curl of the flow is k times the flow itself. */
+/* Adds the errors at a point. The exact curl of the flow is k times the velocity. */
 static void add_sample(const double p[3], const double values[6], sample_sums *sums)
 {
     double u[3];
@@ -57,7 +57,7 @@ static void add_sample(const double p[3], const double values[6], sample_sums *s
     sums->count++;
 }
 
-/* Computes the weights of a hex's or tet's corners at one of eight inner points. */
+/* Computes interpolation weights of a hex's or a tet's corners at one of eight inner points. */
 static void find_weights(int corners, int place, double weights[8])
 {
     static const int bits[8] = {0, 1, 3, 2, 4, 5, 7, 6};
@@ -72,7 +72,8 @@ static void find_weights(int corners, int place, double weights[8])
     for (int i = 0; i < corners; i++) weights[i] /= sum;
 }
 
-/* nodes has 6 numbers for each vertex. */
+/* Sums the errors at eight points in each cell away from the border. nodes: the six numbers at each vertex that
+ * add_sample() compares. */
 static sample_sums compare_with_exact(const test_mesh *mesh, const double (*nodes)[6])
 {
     sample_sums sums = {0};
@@ -146,7 +147,8 @@ static float *make_velocity(const test_mesh *mesh)
     return velocity;
 }
 
-/* Relative errors: of our Q, of VTK's Q, and of the vorticity; and the divergence over the size of the vorticity. */
+/* Relative errors. ours: of the library's Q; vtks: of VTK's Q; curl: of the vorticity; divergence: divergence divided
+ * by the magnitude of the vorticity. */
 typedef struct grid_errors {
     double ours, vtks, curl, divergence;
 } grid_errors;
@@ -201,7 +203,8 @@ static void q_criterion_is_as_accurate_as_vtks(void **state)
         }
 }
 
-/* Returns the time of a step with new velocities for a slice of Q, at all vertices: the minimum over several steps. */
+/* Returns the time that a step with new velocities takes to compute Q at all vertices for a slice. It is the minimum
+ * over several steps. */
 static double time_q_criterion(const test_mesh *mesh, const float *velocity)
 {
     static const char scene[] = "threads: 1\nfields: {q: {q_criterion: u}}\nimages: [{name: a, size: [8, 8], layers: "
@@ -218,8 +221,8 @@ static double time_q_criterion(const test_mesh *mesh, const float *velocity)
     return least;
 }
 
-/* Compares the time with VTK's. The bounds are the library's own targets; both run on one thread, one after the
- * other. */
+/* Compares the library's time with VTK's. The bounds are the library's own targets. Both run on one thread, not at the
+ * same time. */
 static void q_criterion_takes_less_time_than_vtks(void **state)
 {
     (void)state;

@@ -1,4 +1,4 @@
-/* VTK's gradient filter on a mesh of hexes or tets, for comparison. */
+/* Runs VTK's gradient filter on a mesh of hexes or tets, for comparison with the library's gradients. */
 #ifndef TEST_DERIVED_VTK_H
 #define TEST_DERIVED_VTK_H
 
@@ -8,8 +8,8 @@
 extern "C" {
 #endif
 
-/* Computes Q at the vertices on one thread. type: 10 or 12; velocity: vertex_count × 3; q: vertex_count. Returns the
- * time of the filter in seconds, the minimum over `runs` runs. */
+/* Computes Q at the vertices on one thread. type: 10 (tets) or 12 (hexes); velocity: vertex_count × 3; q: vertex_count.
+ * Returns the filter's time in seconds, the minimum over `runs` runs. */
 double test_vtk_q_criterion(int64_t vertex_count, const double *coordinates, int64_t cell_count, int type,
                             const int64_t *connectivity, const float *velocity, int runs, double *q);
 

@@ -1,8 +1,8 @@
-/* Checks a mesh whose faces are not plane: the dual of a tet mesh. Its isosurfaces must equal those of the same field
- * on the tets of its cells' triangles and centres, drawn as tets, in every pixel that rounding does not decide. Cells
- * that are not star-shaped are left out, because their tets overlap. Faces of four vertices are split for this
- * comparison, because rays intersect unsplit quads on bilinear patches; with unsplit faces, all cells agree with the
- * reference. */
+/* Checks a mesh whose faces are not plane: the dual of a tet mesh. Every polyhedron consists of the tets between the
+ * triangles of its faces and its centre. Isosurfaces of the mesh must equal those of the same field on these tets,
+ * drawn as a tet mesh, in every pixel except those that rounding decides. Cells that are not star-shaped are left out,
+ * because their tets overlap. Faces with four vertices are split into triangles for this comparison, because rays
+ * intersect unsplit quads on bilinear patches. With unsplit faces, all cells are compared with the reference. */
 #include "test_mesh_dual.h"
 #include "test_own_tets.h"
 #include "test_render_fixture.h"
@@ -16,7 +16,7 @@
 
 static int cubes = 8, width = 320, height = 240;
 
-/* Makes a dual mesh; noise is added to the values of the wave. */
+/* Makes a dual mesh with the wave field and adds noise to the values. */
 static void make_dual(int n, double noise, test_mesh *out)
 {
     test_mesh_make_dual(n, 0.15, test_wave_field, out);
@@ -38,7 +38,7 @@ static void dual_cells_match_their_split_tets(void **state)
         assert_true(t.pixels > width * height / 10);
         assert_int_equal(t.missing, 0);
         assert_int_equal(t.added, 0);
-        /* Few pixels and cells are left out: of the 7,471 cells of the long run 258 are not star-shaped. */
+        /* The test leaves out few pixels and cells: of the 7,471 cells of the long run, 258 are not star-shaped. */
         assert_true(1000 * t.in_band < t.pixels && 25 * t.ghosts < mesh.cell_count);
         test_mesh_free(&mesh);
     }

@@ -1,5 +1,5 @@
-/* The effort of a test: the usual part, which covers each kind of case, or the whole, with ./test --long. CMake's
- * insitu_add_split_test() registers both. */
+/* The effort of a test: the usual run covers each kind of case, and the whole run, ./test --long, all cases. CMake's
+ * insitu_add_split_test() registers a test for both runs. */
 #ifndef TEST_EFFORT_H
 #define TEST_EFFORT_H
 
@@ -12,7 +12,7 @@ static inline bool test_is_long_run(void)
     return whole && whole[0] == '1';
 }
 
-/* Returns the number of cases to run. */
+/* Returns the number of cases: `usual` in the usual run, `whole` in the long run. */
 static inline int test_case_count(int usual, int whole)
 {
     return test_is_long_run() ? whole : usual;

@@ -1,5 +1,6 @@
-/* Checks that folding a ray's samples or segments gives the same bits however they are distributed over ranks, and
- * however many of them each rank folds before sending, and that the result is that of the "over" operator in double. */
+/* Checks that folding (blending adjacent fragments of a ray into one before they are sent) gives bit-identical results
+ * however samples or segments are distributed over ranks, and however many of them each rank folds. Checks that the
+ * result equals the "over" operator in double. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -22,8 +23,8 @@ static double random_number(void)
     return (double)(state_of_chance >> 8) / 16777216.0;
 }
 
-/* A ray of adjacent segments, whose lengths are a millionth to a tenth of the scene; some are left out, some are
- * surfaces. */
+/* A ray of adjacent segments. Their lengths are between a millionth and a tenth of the scene's. Some segments are left
+ * out, and some are surfaces instead. */
 typedef struct ray {
     fragment items[MOST];
     int owners[MOST];
@@ -44,12 +45,13 @@ static void make_ray(ray *r, double density, double gap, double surface)
             f->kind = is_surface ? FRAGMENT_SURFACE : FRAGMENT_VOLUME;
             for (int c = 0; c < 3; c++) f->colour[c] = (1 - clear) * (float)random_number();
         }
-        /* a second surface at the same depth must still have a defined order */
+        /* the next surface begins at another depth, so that the order of the two is defined */
         t = is_surface ? nextafterf(t, 2) : end;
     }
 }
 
-/* Distributes runs of consecutive fragments over the ranks. */
+/* Distributes fragments over the ranks in runs of consecutive fragments. change: probability that a run ends at a
+ * fragment. */
 static void distribute_fragments(ray *r, double change)
 {
     int owner = 0;
@@ -59,8 +61,8 @@ static void distribute_fragments(ray *r, double change)
     }
 }
 
-/* Computes the fragments that the rank sends: for each connected run between surfaces, the fold of each tree node that
- * the rank has completely. */
+/* Computes the fragments that a rank sends. Each run of adjacent segments of the rank between surfaces is folded: one
+ * fragment results for each node of the tree over depth whose segments all belong to the run. */
 static int64_t fold_for_rank(const ray *r, int rank, fragment *out)
 {
     int64_t count = 0;
@@ -107,8 +109,8 @@ static void blend_in_double(const ray *r, double rgba[4])
 }
 
 /* Compares the result with blending in double. A fragment adds a product and a sum of colours and a product of
- * transmittances, which affects all fragments behind it: three roundings of 2^-24 of values of at most 1. Dark segments
- * may be left out. */
+ * transmittances. The latter affects all fragments behind it. That makes three roundings by 2^-24 of values of at most
+ * 1 for each fragment. Dark segments may be left out, so the tolerance also includes FRAGMENT_DARK. */
 static void verify_pixel(const ray *r, const float rgba[4])
 {
     double expected[4];

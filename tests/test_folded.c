@@ -1,8 +1,8 @@
-/* Checks cells whose maps are folded: a point then has several solutions or none, and there is no reference to compare
- * with. But the picture must consist of finite numbers, it must depend neither on how the simulation numbers a cell's
- * vertices nor on the rank that has the cell, and the report must count the inverse maps without a solution. For cells
- * that are not folded that count is 0. The usual run draws every second pair of a camera and a scene for each kind of
- * cell. */
+/* Checks cells whose maps are folded. A point in such a cell has several solutions of the inverse map or none, and
+ * there is no reference to compare with. But the picture must consist of finite numbers, and it must depend neither on
+ * how the simulation numbers a cell's vertices nor on the rank that has the cell. The report must count the inverse
+ * maps without a solution; for cells that are not folded, this count is 0. The usual run draws every second pair of a
+ * camera and a scene for each kind of cell. */
 #include "test_effort.h"
 #include "test_render_fixture.h"
 
@@ -18,7 +18,8 @@ enum { SIDE = 4, RANKS = 7, WIDTH = 45, HEIGHT = 39 };
 static const test_mesh_kind kinds[4] = {TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS, TEST_MIXED};
 static const double values[3] = {-0.3, 0.1, 0.4};
 
-/* Moves vertices by up to 1.33 cells: most cells are then inverted somewhere. */
+/* Makes a lattice and moves its vertices by up to 1.33 cells along each axis, so that the maps of most cells are
+ * inverted somewhere. */
 static void make_tangled_mesh(test_mesh_kind kind, test_mesh *out)
 {
     test_mesh_make_lattice(kind, SIDE, 0.2, test_wave_field, out);
@@ -87,8 +88,9 @@ static void folded_cells_give_finite_pixels(void **state)
     assert_true(failures > 1000);
 }
 
-/* Draws on seven ranks, each with its own numbering of cells and vertices and its own order within cells. Surfaces
- * agree to the bit, separate samples to the rounding of "over". */
+/* Draws the mesh on seven simulated ranks. Each rank has its own numbering of cells and vertices and its own order of
+ * vertices within cells. Compared with a single rank, surfaces are bit-identical, and separate samples agree up to the
+ * rounding of the "over" operator. */
 static void draw_distributed(const test_mesh *mesh, scene_kind scene, drawn_frame *out)
 {
     render_fixture parts[RANKS];
@@ -146,8 +148,8 @@ static void inverse_maps_of_valid_cells_converge(void **state)
                 test_mesh_make_lattice(kinds[k], SIDE, 0.2, test_wave_field, &mesh);
                 set_up_frame(&f, &mesh, camera, scene);
                 fixture_draw(&f, &drawn);
-                /* Along x, rays lie in faces and edges at the border of the mesh, where a pyramid's map has no inverse
-                 * at its apex. */
+                /* Rays along x lie in faces and edges at the border of the mesh and meet the apexes of pyramids, where
+                 * a pyramid's map has no inverse. */
                 const int64_t allowed =
                     camera == CAMERA_ALONG_X && kinds[k] == TEST_PYRAMIDS ? drawn.list.count / 50 : 0;
                 if (drawn.statistics.map_failures > allowed)

@@ -1,5 +1,5 @@
-/* Checks text beyond ASCII: compares it in a picture with the glyphs that FreeType renders for each code point, set
- * next to each other with the font's kerning. */
+/* Checks text beyond ASCII: compares the text in a picture with the glyphs that FreeType renders for each code point.
+ * The reference sets the glyphs next to each other with the font's kerning. */
 #include <ft2build.h>
 #include FT_FREETYPE_H
 
@@ -33,7 +33,7 @@ struct phrase {
     std::vector<char32_t> characters;
 };
 
-/* The code points are written by hand, so that the test needs no decoder of its own. */
+/* Texts and their code points. Code points are written by hand, so that the test needs no UTF-8 decoder. */
 const phrase phrases[] = {
     {"T [\u00b0C]", {'T', ' ', '[', 0xB0, 'C', ']'}},
     {"0.5 \u00b5m", {'0', '.', '5', ' ', 0xB5, 'm'}},
@@ -49,7 +49,7 @@ const phrase phrases[] = {
     {"Gr\u00f6\u00dfe AV", {'G', 'r', 0xF6, 0xDF, 'e', ' ', 'A', 'V'}},
 };
 
-/* Draws white letters on opaque black. */
+/* Draws the text by the library, in white letters on opaque black. */
 std::vector<float> draw_text(const char *text, std::string &warning)
 {
     const insitu_words words{text, INSITU_TOP_LEFT, 1};
@@ -71,7 +71,7 @@ std::vector<float> draw_text(const char *text, std::string &warning)
     return red;
 }
 
-/* Renders the text by FreeType, from `left` on this baseline. */
+/* Renders the text by FreeType. The text begins at x = left on the given baseline. */
 class freetype_reference
 {
   public:
@@ -127,7 +127,8 @@ double largest_difference(const std::vector<float> &a, const std::vector<float> 
     return worst;
 }
 
-/* Finds the block of text near the corner; all its pixels must equal FreeType's up to roundings of a few 2^-24. */
+/* Searches for the position of the text near the corner at which all pixels equal FreeType's rendering, up to roundings
+ * of a few 2^-24. */
 void expect_glyphs(const char *text, const std::vector<char32_t> &characters, std::string &warning)
 {
     freetype_reference reference;
@@ -148,7 +149,7 @@ void text_beyond_ascii_matches_freetype_glyphs(void **)
     }
 }
 
-/* Checks a missing glyph: DejaVuSans has no Chinese characters and draws glyph 0, a box. */
+/* Checks a character for which DejaVuSans has no glyph: a Chinese one. Glyph 0, a box, must be drawn. */
 void missing_glyph_gives_a_box_and_a_warning(void **)
 {
     std::string warning;

@@ -1,7 +1,8 @@
-/* Checks hanging nodes: where a cell's face coincides with four or sixteen faces of smaller cells, each side computes
- * depths from its own vertices, and rounding leaves gaps and overlaps between them. They must not be visible: no pixel
- * is reported as one in which cells overlap, no ray passes between cells, and the picture is the same on any number of
- * ranks. Results are reduced before they are asserted, so that a failing rank does not leave the others waiting. */
+/* Checks hanging nodes, at which a face of a large cell coincides with four or sixteen faces of smaller cells. The
+ * cells on both sides compute depths from their own vertices, and rounding leaves gaps and overlaps between them. These
+ * must not be visible: no pixel is reported as one in which cells overlap, no ray passes between the cells, and the
+ * picture is the same on any number of ranks. Results are reduced over the ranks before they are asserted, so that a
+ * failing rank does not leave the others waiting. */
 #include "memory.h"
 #include "reference_integral.h"
 #include "session_frame.h"
@@ -22,10 +23,10 @@ static int my_rank, rank_count;
 
 typedef struct drawing {
     const char *name;
-    double max_error; /* 0: the volume is sampled, or there is none and only surfaces are drawn */
-    float opacity;    /* of surfaces; 0: no surfaces */
+    double max_error; /* 0: the volume is drawn by samples, or only surfaces are drawn */
+    float opacity;    /* opacity of the surfaces; 0: there are no surfaces */
     bool has_volume;
-    int value_count; /* of surfaces; 0: no surfaces */
+    int value_count; /* number of surfaces; 0: there are no surfaces */
 } drawing;
 
 static const drawing volumes[] = {
@@ -83,7 +84,7 @@ static int64_t draw_whole(const test_mesh *mesh, const drawing *d, fixture_camer
     return overlaps;
 }
 
-/* Draws as the session does: every rank draws its share. */
+/* Draws as a session does: every rank draws its part of the mesh. */
 static int64_t draw_distributed(const test_mesh *mesh, test_partition_kind partition, const drawing *d,
                                 fixture_camera camera, image *out)
 {
@@ -121,7 +122,7 @@ typedef struct hanging_case {
     test_mesh_kind kind;
     int side;
     test_hanging_shape shape;
-    bool is_polyhedral; /* the cells are polyhedra, given by their faces */
+    bool is_polyhedral; /* whether the cells are stored as polyhedra, by their faces */
 } hanging_case;
 
 static const hanging_case cases[] = {
@@ -147,8 +148,9 @@ static void name_case(const hanging_case *c, char *name, size_t size)
 
 /* ---- volumes ------------------------------------------------------------------------------------------------- */
 
-/* Compares the picture with the integral in double, in which rounding leaves no visible gap. For rays in the plane of a
- * face, such as those along x, the integral cannot decide the side. */
+/* Compares the picture with the adaptive integral. In double, rounding leaves no visible gap. Rays in the plane of a
+ * face, such as those along x, must be left out, because the integral does not decide on which side of the face they
+ * are. */
 static bool is_as_integrated(const test_mesh *mesh, const drawing *d, fixture_camera camera, const image *drawn,
                              const char *what)
 {
@@ -167,8 +169,8 @@ static bool is_as_integrated(const test_mesh *mesh, const drawing *d, fixture_ca
     return worst <= d->max_error;
 }
 
-/* Compares pictures of different partitions. "Over" rounds differently if fragments are grouped differently, by up to
- * 1e-6. */
+/* Compares the pictures that all ranks draw together and that rank 0 draws from the whole mesh. The tolerance is 1e-6,
+ * because "over" rounds differently if fragments are grouped differently. */
 static bool is_one_picture(const test_mesh *mesh, test_partition_kind partition, const drawing *d,
                            fixture_camera camera, const char *what)
 {
@@ -212,8 +214,8 @@ static void hanging_nodes_do_not_count_as_overlaps(void **state)
 
 /* ---- surfaces ------------------------------------------------------------------------------------------------ */
 
-/* Computes the depth at which the ray of a pixel meets the plane on which test_linear_field() has the value. Returns
- * whether that point is well inside the mesh: all shapes contain the ball of radius 0.5. */
+/* Computes the depth at which the ray of a pixel meets the plane on which test_linear_field() has the given value.
+ * Returns whether this point is well inside the mesh: within the ball of radius 0.5, which all shapes contain. */
 static bool intersects_plane(const render_camera *camera, int p, double value, double *depth)
 {
     double base[3], direction[3], end[3], distance = 0;
@@ -229,7 +231,7 @@ static bool intersects_plane(const render_camera *camera, int p, double value, d
     return *depth > 0 && distance < 0.25;
 }
 
-/* Checks that the isosurface of a linear field is a plane without holes, for all cell types. */
+/* Checks that the isosurface of a linear field is a plane without holes. */
 static bool is_plane_whole(const hanging_case *c, fixture_camera camera)
 {
     static const drawing plane = {"plane", 0, 1, false, 1};
@@ -271,11 +273,12 @@ static void surfaces_continue_across_hanging_nodes(void **state)
     assert_everywhere(good);
 }
 
-/* ---- other faces -------------------------------------------------------------------------------------------- */
+/* ---- hanging nodes off the coarse face
+ * -------------------------------------------------------------------------------- */
 
 /* Checks refinement that moves hanging nodes off the coarse face, so that cells do overlap. Any number of ranks must
- * detect that, and pictures agree to max_error: whether an overlap that is almost transparent is detected depends on
- * the partition. */
+ * detect the overlap. Pictures agree only to max_error, because whether an overlap that is almost transparent is
+ * detected depends on the partition. */
 static void nodes_off_the_coarse_face_count_as_overlaps(void **state)
 {
     (void)state;

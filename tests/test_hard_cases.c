@@ -12,7 +12,7 @@
 static const double values[2] = {-0.2, 0.3};
 static const test_mesh_kind kinds[5] = {TEST_TETS, TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS, TEST_MIXED};
 
-/* The scenes: an opaque surface, transparent surfaces in a sampled volume, and a volume by segments. */
+/* The scenes: an opaque surface; transparent surfaces in a volume drawn by samples; a volume drawn by segments. */
 typedef enum scene_kind { OPAQUE, SURFACES_IN_SAMPLES, SEGMENTS, SCENE_COUNT } scene_kind;
 
 static void draw_mesh(const test_mesh *mesh, scene_kind scene, fixture_camera camera, drawn_frame *out)
@@ -28,12 +28,12 @@ static void draw_mesh(const test_mesh *mesh, scene_kind scene, fixture_camera ca
     fixture_free(&f);
 }
 
-/* How cells lose their volume: only a point, an edge or a face of a cell's vertices remains, and replaces the
- * others. */
+/* How cells lose their volume: all vertices of a cell are replaced by those of one point, one edge or one face of the
+ * cell. */
 typedef enum collapse { TO_A_POINT, TO_AN_EDGE, TO_A_FACE, COLLAPSE_COUNT } collapse;
 
-/* Returns the index of the vertex that replaces vertex i. TO_A_FACE leaves the cell's first face with all its corners,
- * so that the cell is that face twice. */
+/* Returns the index of the vertex that replaces vertex i. TO_A_FACE keeps all corners of the cell's first face, so that
+ * the cell consists of this face twice. */
 static int find_replacing_vertex(int type, collapse how, int i)
 {
     static const int tet[4] = {0, 1, 2, 2}, pyramid[5] = {0, 1, 1, 0, 4};
@@ -49,7 +49,7 @@ static void *grow_array(void *block, int64_t count, size_t size)
     return larger;
 }
 
-/* Adds, for every third cell, a cell without volume made of the same vertices. */
+/* Adds, for every third cell, a cell without volume that has the same vertices except the replaced ones. */
 static void add_collapsed(test_mesh *mesh)
 {
     const int64_t cells = mesh->cell_count, most = cells + cells / 3 + 1;

@@ -1,6 +1,6 @@
 /* Ambient occlusion rays as docs/development/decisions/surface.md defines them, implemented independently of the
- * library: a spiral of equal steps in area on the disk under the hemisphere, whose rotation and start depend on the
- * pixel. */
+ * library. Directions are points of a spiral on the disk under the hemisphere, with equal areas between its steps. The
+ * spiral's rotation and start depend on the pixel. */
 #ifndef TEST_HEMISPHERE_H
 #define TEST_HEMISPHERE_H
 
@@ -9,7 +9,8 @@
 
 #include "render.h"
 
-/* Computes the direction of sample k of `samples` above the normal n, for a pixel of a picture of the given width. */
+/* Computes the direction of sample k of `samples` samples above the normal n, for a pixel of a picture of the given
+ * width. */
 static inline void test_hemisphere_direction(uint32_t pixel, uint32_t width, int samples, int k, const double n[3],
                                              double out[3])
 {

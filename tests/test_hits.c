@@ -1,5 +1,5 @@
-/* Checks positions and normals of robust roots in whole frames: on warped lattices of hexes, wedges and pyramids, on
- * ill-shaped single cells, and against closed forms. */
+/* Checks the positions and normals of hits that the robust root finder computes in whole frames: on warped lattices of
+ * hexes, wedges and pyramids, in ill-shaped single cells, and against closed forms. */
 #include "test_effort.h"
 #include "test_render_fixture.h"
 
@@ -12,16 +12,18 @@
 #include <cmocka.h>
 
 static const double three_values[3] = {-0.6, 0.3, 0.95};
-static const double depth_allowed = 1e-5; /* in cells */
+static const double depth_allowed = 1e-5; /* largest error of depth, in cells */
 static const test_mesh_kind kinds[4] = {TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS, TEST_TETS};
 
-/* Counts and worst errors of a test's rays and hits. */
+/* Counts and largest errors over the rays and hits of a test. */
 typedef struct tally {
-    bool is_opaque; /* set if only each ray's first hit is drawn */
+    bool is_opaque; /* set if only the first hit of each ray is drawn */
     int64_t rays, hits, excluded, folded, different, beyond, tangent;
-    double residual, depth; /* the largest errors */
-    double raw;             /* largest error of depth of hits that are not tangent, in cells */
-    double moved;           /* largest error of depth of all hits, relative to compute_depth_uncertainty() */
+    /* residual: largest residual of a hit; depth: largest error of depth in cells, minus what an error of the field of
+     * 1e-6 explains */
+    double residual, depth;
+    double raw;   /* largest error of depth of hits that are not tangent, in cells */
+    double moved; /* largest error of depth of all hits, relative to compute_depth_uncertainty() */
 } tally;
 
 static int list_hits(const drawn_frame *drawn, int64_t pixel, const fragment *hits[REFERENCE_MAX_HITS])
@@ -32,25 +34,28 @@ static int list_hits(const drawn_frame *drawn, int64_t pixel, const fragment *hi
     return count;
 }
 
-/* Returns the residual allowed at a hit. The hit's float32 t is off by half a unit in the last place of 1 in scaled
- * units, and so is the depth of each vertex; the slope turns these errors into values. */
+/* Returns the residual (the field minus the isovalue, relative to the cell's range) that is allowed at a hit. t in
+ * float32 has an error of half a unit in the last place of 1 in scaled units, and so has the depth of each vertex. The
+ * field's slope turns these errors into values. */
 static double compute_allowed_residual(const render_fixture *f, double slope)
 {
     return 1e-6 + (3e-8 + 3e-8) / f->job.space.scale * fabs(slope);
 }
 
-/* Returns how far float32 may move a hit along its ray, in cells. Along the ray, t and the cell's vertices are each off
- * by half a unit in the last place of 1 in scaled units, 3e-8. Across the ray a vertex is off by 3e-8 along both axes,
- * 4.2e-8 together, which the angle between ray and surface turns into depth. The field is off by half a unit of its
- * values and as much in their sum, 6e-8 of their range, which the slope turns into depth. */
+/* Returns the distance in cells by which float32 may move a hit along its ray. Along the ray, t and the cell's vertices
+ * each have an error of half a unit in the last place of 1 in scaled units, 3e-8. Across the ray, a vertex has an error
+ * of 3e-8 along both axes, 4.2e-8 together, which the angle between ray and surface turns into depth. The field has an
+ * error of half a unit in the last place of its values and as much in their sum, 6e-8 of their range, which the slope
+ * turns into depth. */
 static double compute_depth_uncertainty(const render_fixture *f, const reference_hit *truth, double slope)
 {
     const double scaled_cell = f->cell_size * f->job.space.scale;
     return (6e-8 + 4.2e-8 * truth->conditioning) / scaled_cell + 6e-8 / (fabs(slope) * f->cell_size);
 }
 
-/* Checks that a hit is within 1e-5 cells of the reference, unless the ray is so nearly tangent to the surface that
- * rounding alone may move the hit farther. That happens at slopes of the field below about 0.03 ranges per cell. */
+/* Checks that a hit is within 1e-5 cells of the reference. Rays that are so nearly tangent to the surface that rounding
+ * may move the hit farther are only counted; this happens if the slope of the field is below about 0.03 ranges per
+ * cell. */
 static void verify_depth(const render_fixture *f, const reference_hit *truth, double depth, double slope, tally *t)
 {
     const double off = fabs(depth - truth->depth) / f->cell_size, moved = compute_depth_uncertainty(f, truth, slope);
@@ -70,7 +75,7 @@ static void verify_hit(const render_fixture *f, const reference_scene *scene, in
     t->hits++;
     t->beyond += residual > 1e-6;
     t->residual = fmax(t->residual, residual - compute_allowed_residual(f, slope) + 1e-6);
-    /* The slope turns an error of the field of 1e-6 ranges into this error of depth. */
+    /* Error of depth that an error of the field of 1e-6 ranges causes at this slope. */
     const double grazing = 1e-6 / fabs(slope) / f->cell_size;
     t->depth = fmax(t->depth, fabs(depth - truth->depth) / f->cell_size - grazing);
     verify_depth(f, truth, depth, slope, t);
@@ -122,7 +127,7 @@ static void print_tally(const char *what, const tally *t)
            (int)t->beyond, t->raw, t->moved, (int)t->tangent);
 }
 
-/* Adds many surfaces: they have many silhouettes, where rays meet a surface twice at nearly the same depth. */
+/* Adds 16 surfaces, to have many silhouettes, where rays meet a surface twice at nearly the same depth. */
 static void add_many_surfaces(render_fixture *f)
 {
     static const float black[48];
@@ -137,15 +142,16 @@ static void add_robust(render_fixture *f, float opacity)
     fixture_add_surface(f, three_values, 3, opacity);
 }
 
-/* Checks that the rays close to another decision are at most the fixture's fraction, 0.2 % (test_render_fixture.c), and
- * that no cell is folded: lattices are jittered by 0.2, so that corners stay on their side of the opposite faces. */
+/* Checks that at most 0.2 % of the rays are excluded because rounding could change their result, the same fraction as
+ * in test_render_fixture.c. Checks that no cell is folded: the lattices are jittered by 0.2, so that corners stay on
+ * their side of the opposite faces. */
 static void assert_few_excluded(const tally *t)
 {
     if (500 * t->excluded > t->rays) fail_msg("%d of %d rays excluded", (int)t->excluded, (int)t->rays);
     assert_int_equal(t->folded, 0);
 }
 
-/* Checks the errors of depth; one hit in one_in may be tangent. */
+/* Checks the errors of depth. At most one hit in `one_in` may be tangent. */
 static void assert_depths(const tally *t, int64_t one_in)
 {
     assert_true(t->depth <= depth_allowed);
@@ -161,11 +167,11 @@ static void robust_hits_are_on_the_surface(void **state)
         for (fixture_camera camera = 0; camera < CAMERA_PLANE; camera++) {
             render_fixture f;
             tally t = {.rays = 0};
-            /* the usual run draws one or two cameras for each kind */
+            /* the usual run draws every second camera for each kind of cell */
             if (!test_is_long_run() && (k + (int)camera) % 2) continue;
             fixture_create_lattice(&f, kinds[k], kinds[k] == TEST_PYRAMIDS ? 3 : 4, 0.2, test_wave_field);
             fixture_set_camera(&f, camera, 53, 45);
-            add_robust(&f, 0.4f); /* transparent, so that all crossings are drawn, not only the first */
+            add_robust(&f, 0.4f); /* surfaces are transparent, so that all crossings are drawn, not only the first */
             verify_frame(&f, 1e-6, &t);
             print_tally(test_mesh_kind_name(kinds[k]), &t);
             assert_true(t.hits > 600);
@@ -179,9 +185,9 @@ static void robust_hits_are_on_the_surface(void **state)
 
 /* ---- cuboids ---- */
 
-/* Makes a mesh of cuboids, or of cuboids, wedges, pyramids and tets, between planes at uneven distances, some a
- * thousandth of others. If random, the value of each vertex is random, so that many rays meet a surface twice or three
- * times in a cell. */
+/* Makes a mesh of cuboids, or of cuboids, wedges, pyramids and tets, between planes at uneven distances; some distances
+ * are a thousandth of others. If `random` is set, the value of each vertex is random, so that many rays meet a surface
+ * twice or three times in a cell. */
 static void make_cuboids(test_mesh_kind kind, bool random, uint64_t seed, test_mesh *out)
 {
     static const double planes[5] = {-1, -0.3, -0.2995, 0.4, 1};
@@ -214,7 +220,7 @@ static void verify_cuboids(test_mesh_kind kind, bool random, tally *t)
         }
 }
 
-/* Checks opaque surfaces in cuboids, which have their own code (kernel_cuboids.h). */
+/* Checks opaque surfaces in cuboids, for which the kernels have special code (kernel_cuboids.h). */
 static void opaque_hits_in_cuboids_match_the_reference(void **state)
 {
     (void)state;
@@ -228,7 +234,8 @@ static void opaque_hits_in_cuboids_match_the_reference(void **state)
         assert_true(t.hits > 3500);
         assert_int_equal(t.different, 0);
         assert_depths(&t, 250);
-        /* across thin cells random values change so fast that the rounding of a vertex changes them by up to 1e-3 */
+        /* With random values the residual is not checked: across thin cells, values change so fast that the rounding of
+         * a vertex changes them by up to 1e-3. */
         if (turn == 0) assert_true(t.residual <= 1e-6);
         assert_few_excluded(&t);
     }
@@ -254,8 +261,8 @@ static void make_ill_shaped(ill_shaped kind, uint64_t seed, test_mesh *out)
         const double amount = kind == ILL_SHAPED_WARPED || kind == ILL_SHAPED_APEX ? 0.2 : 0.1;
         for (uint64_t a = 0; a < 3; a++) p[a] += test_uniform_between(3 * i + a, seed, -amount, amount);
         out->values[i] = test_uniform_between(i, seed + 1000, -1, 1.5);
-        /* Moves a corner inwards almost to the plane of its neighbours, which makes dents on both sides of its edges.
-         * Beyond that plane the hex's map would fold, and a point would have several values. */
+        /* Moves a corner inwards almost into the plane of its three neighbours, which dents the three faces at the
+         * corner. Beyond this plane the hex's map would fold, and a point would have several values. */
         if (kind == ILL_SHAPED_CONCAVE && i == 6)
             for (uint64_t a = 0; a < 3; a++) p[a] = test_uniform_between(a, seed + 2000, 0.24, 0.3);
         if (kind == ILL_SHAPED_WEDGE && i >= 3) {
@@ -280,7 +287,7 @@ static void robust_hits_in_ill_shaped_cells_match_the_reference(void **state)
             fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
                            (const double[]){0, 0, 0});
             fixture_set_camera(&f, seed % 2 ? CAMERA_ORTHOGRAPHIC : CAMERA_OUTSIDE, 31, 29);
-            /* The camera is close to the apex, whose neighbourhood fills the middle of the picture. */
+            /* The camera is close to the apex, so that the cell near the apex fills the picture's middle. */
             if (kind == ILL_SHAPED_APEX)
                 assert_true(render_camera_look_at(&f.job.camera, (const double[]){2.4, 1.6, 3.0},
                                                   mesh.coordinates + 3 * 4, (const double[]){0, 1, 0}, 2, 31, 29));
@@ -300,8 +307,8 @@ static void robust_hits_in_ill_shaped_cells_match_the_reference(void **state)
 
 /* ---- normals ---- */
 
-/* Sets white diffuse surfaces under a red, a green and a blue light from three sides of the eye: a hit's colour is then
- * its normal in the axes of the lights, without the negative components. */
+/* Sets white diffuse surfaces and a red, a green and a blue light from three sides of the eye. The colour of a hit is
+ * then its normal in the axes of the lights, without negative components. */
 static void set_axis_lights(render_fixture *f, render_light lights[3])
 {
     static const float white[9] = {1, 1, 1, 1, 1, 1, 1, 1, 1};
@@ -320,7 +327,8 @@ static void set_axis_lights(render_fixture *f, render_light lights[3])
     f->surfaces[0].material = (render_material){.ambient = 0, .diffuse = 1, .specular = 0, .shininess = 1};
 }
 
-/* Returns the difference between the fragment's colour and the colour of the gradient, oriented towards the eye. */
+/* Returns the largest difference between the fragment's colour and the colour that the gradient's direction, oriented
+ * towards the eye, has in these lights. */
 static double compute_normal_error(const render_fixture *f, const fragment *hit, const double gradient[3])
 {
     const int width = f->job.camera.width;
@@ -339,10 +347,11 @@ static double compute_normal_error(const render_fixture *f, const fragment *hit,
     return off;
 }
 
-/* Compares a normal with the field's gradient. The kernels compute the gradient from differences of float32 values and
- * positions, each off by half a unit, 6e-8, of the cell's range and size; eight of them and the cell's distortion give
- * 2e-6 of range / size, relative to the gradient's length. The position is off by 1e-6 cells, which second derivatives
- * of one or two ranges turn into the same error again. If the surface is seen edge-on, either side may face the eye. */
+/* Compares the normal of a hit with the field's gradient. The kernels compute the gradient from differences of float32
+ * values and positions. Each has an error of half a unit in the last place, 6e-8 of the cell's range and size. Eight
+ * such errors and the cell's distortion make 2e-6 of range / size, relative to the gradient's length. The position has
+ * an error of 1e-6 cells, and second derivatives of one or two ranges turn it into an equal error of the gradient. If
+ * the surface is seen edge-on, either side may face the eye. */
 static void verify_normal(const render_fixture *f, const reference_scene *scene, const reference_hit *truth,
                           const fragment *hit, int64_t *checked)
 {
@@ -402,10 +411,11 @@ static void add_differences(render_fixture *f, const double *values, int count, 
     set_axis_lights(f, lights);
 }
 
-/* Checks differences of a linear field. Isoparametric cells represent it exactly, so all differences, including
- * one-sided ones at the border, give its gradient. A sample errs by about 5e-7 of the field's range of 3; a difference
- * over half of a cell of 2/3, at a slope of 0.9, errs by about 1e-5 of the slope. Within half a cell of warped faces,
- * the polyhedron's field is continued outside the cell's domain, where it is linear too. */
+/* Checks normals by central differences of a linear field. Isoparametric cells represent it exactly, so all
+ * differences, including one-sided ones at the border, give its gradient. A sample has an error of about 5e-7 of the
+ * field's range of 3. A difference over half a cell, whose size is 2/3, at a slope of 0.9, therefore has an error of
+ * about 1e-5 of the slope. Within half a cell of warped faces, a polyhedron's field is continued outside of its tets,
+ * where it is linear too. */
 static void differences_of_a_linear_field_are_exact(void **state)
 {
     (void)state;
@@ -435,7 +445,7 @@ static double quadratic_field(const double p[3])
     return p[0] * p[0] + 0.5 * p[1] * p[1] + 0.7 * p[2] * p[2] + 0.3 * p[0] * p[1];
 }
 
-/* Returns the mean error of normals against the field's own gradient at the hit. */
+/* Returns the mean error of normals, compared with the exact gradient of the quadratic field at the hit. */
 static double measure_quadratic_error(int n, render_normal normal, double difference)
 {
     static const double value[1] = {0.3};
@@ -462,10 +472,10 @@ static double measure_quadratic_error(int n, render_normal normal, double differ
     return sum;
 }
 
-/* Checks the order of differences. The trilinear interpolant of a quadratic field has the same error in every cell of a
- * lattice. So differences over a whole cell are those of the quadratic field itself, which are exact up to rounding,
- * far better than second order. Differences over half a cell have an error of the order of the cell's size, like the
- * cell's own gradient, but smaller. */
+/* Checks the order of accuracy of differences. The trilinear interpolant of a quadratic field has the same error in
+ * every cell of a lattice. So differences over a whole cell equal those of the quadratic field itself, which are exact
+ * up to rounding, far better than second order. Differences over half a cell have an error of the order of the cell's
+ * size. So has the cell's own gradient, but its error is larger. */
 static void differences_of_a_quadratic_field_are_of_second_order(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
-/* Checks homes of vertices that ranks share (session_homes.h) for many ranks, by arithmetic without MPI: all ranks that
- * have a vertex compute the same home, which is one of their neighbours; so a rank sends to few others, however many
- * ranks there are. */
+/* Checks homes of vertices that several ranks share (session_homes.h): the home is the rank that collects the vertex's
+ * data. Many ranks are simulated without MPI. All ranks that have a vertex must compute the same home, and the home
+ * must be one of their neighbours, so that a rank sends to few others, however many ranks there are. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -12,7 +12,8 @@
 
 enum { SIDE = 12, RANKS = SIDE * SIDE * SIDE, MOST_NEAR = 27, MOST_SHARES = 64 };
 
-/* Rank (i, j, k) of a block partition, which has the unit cube there, and its neighbours including itself. */
+/* Rank (i, j, k) of a block partition. It has the unit cube at (i, j, k). near, boxes: its neighbours including
+ * itself. */
 typedef struct block_rank {
     session_homes homes;
     int near[MOST_NEAR];
@@ -44,8 +45,8 @@ static uint64_t hash_position(const double point[3])
     return h ^ h >> 29;
 }
 
-/* Checks every vertex on a block's faces, on a lattice of eighths: all neighbours that have the vertex must compute the
- * same home. Returns the number of distinct homes. */
+/* Checks every vertex on the faces of a block, on a lattice of eighths: all neighbours that have the vertex must
+ * compute the same home as the block's rank. Returns the number of distinct homes. */
 static int count_homes(const block_rank *own, block_rank *neighbours, int neighbour_count, int64_t *shared)
 {
     bool is_home[RANKS] = {false};
@@ -91,7 +92,8 @@ static void home_ranks_by_coordinates_agree_on_all_ranks(void **state)
     }
 }
 
-/* Checks homes by id: a share includes its first id, and ids below the first share belong to it too. */
+/* Checks homes by id. The home of a vertex is the owner of the share that contains its id. A share begins with its
+ * first id, and ids below the first share belong to the first share. */
 static void home_ranks_by_id_match_partition_owners(void **state)
 {
     (void)state;

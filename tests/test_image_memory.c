@@ -1,6 +1,6 @@
-/* Checks that if memory runs out while a picture is written, the result is an error or the same file, and the next
- * picture is written as if nothing had happened. The image library fills tables at the first picture, so each try has
- * its own process. */
+/* Checks that if memory runs out while a picture is written, the result is an error or the correct file, and that the
+ * next picture is written correctly. The image library fills tables when it writes its first picture, so each attempt
+ * has its own process. */
 #define _GNU_SOURCE 1 /* for memmem() */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -24,7 +24,7 @@
 enum { WIDTH = 40, HEIGHT = 30, MOST_BYTES = 1 << 17, SECONDS = 60 };
 
 static const char *folder = "test_image_memory_files";
-static int stride = 41; /* distance between the allocations that are tried */
+static int stride = 41; /* distance between the indices of allocations that fail */
 static float rgba[4 * WIDTH * HEIGHT], depth[WIDTH * HEIGHT];
 
 typedef struct picture_case {
@@ -82,7 +82,7 @@ static insitu_status write_picture(const picture_case *c, base_error *error)
     return session_write_image(&image, c->format, path, error);
 }
 
-/* Clears the time of writing, which EXR stores in seconds: a text that follows its length. */
+/* Clears the time of writing in the file's header. EXR stores it as a text after the text's length, to the second. */
 static void clear_date(file_bytes *file)
 {
     static const char before[] = "capDate\0string";
@@ -124,7 +124,7 @@ static void remove_picture(const picture_case *c)
     unlink(path);
 }
 
-/* ---- one process for each try ---------------------------------------------------------------------------------- */
+/* ---- one process for each attempt ------------------------------------------------------------------------------ */
 
 typedef enum verdict { GOOD, REFUSED, OTHER_PICTURE, OTHER_ERROR, LEFT_FILES, NEXT_FAILED } verdict;
 
@@ -134,7 +134,8 @@ typedef struct outcome {
     char message[256];
 } outcome;
 
-/* Memory is limited by the failing heap from its n-th allocation on, or by the process's address space. */
+/* A shortage of memory. n: index of the allocation that fails by the failing heap; if n is 0, the address space of the
+ * process is limited to its present size plus `spare` bytes. */
 typedef struct shortage {
     int64_t n;
     rlim_t spare;
@@ -184,7 +185,7 @@ static verdict classify_outcome(const picture_case *c, const file_bytes *expecte
     return status ? REFUSED : GOOD;
 }
 
-/* Writes the picture in a child process. Returns false if the child was terminated. */
+/* Writes the picture in a child process. Returns false if a signal terminated the child. */
 static bool try_in_child(const picture_case *c, const file_bytes *expected, const shortage *s, outcome *out)
 {
     int pipe_ends[2], status = 0;
@@ -220,7 +221,7 @@ static void write_expected_file(const picture_case *c, file_bytes *expected)
     remove_picture(c);
 }
 
-/* Returns whether the picture was written; fails the test for any other outcome than a picture or an error. */
+/* Returns whether the picture was written. Fails the test if the outcome is neither a correct picture nor an error. */
 static bool check_shortage(const picture_case *c, const file_bytes *expected, const shortage *s, outcome *out)
 {
     const bool is_alive = try_in_child(c, expected, s, out);
@@ -240,8 +241,8 @@ static void failed_allocation_gives_same_picture_or_error(void **context)
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         outcome out;
         int64_t n = 1;
-        /* OpenEXR's writer of deep rows crashes at one allocation among a thousand: the image library calls it only if
-         * there is memory to spare. */
+        /* OpenEXR's writer of deep rows crashes if one allocation among a thousand fails. The image library therefore
+         * calls the writer only if enough memory is left, and deep files are not tested here. */
         if (cases[i].format == INSITU_DEEP_EXR) continue;
         int refused = 0;
         write_expected_file(&cases[i], &expected);
@@ -250,7 +251,7 @@ static void failed_allocation_gives_same_picture_or_error(void **context)
             if (out.allocations < n) break; /* n is beyond the last allocation */
         }
         assert_true(n > 500);
-        assert_true(refused > 0); /* at least the first allocation, that of the picture itself, is fatal to it */
+        assert_true(refused > 0); /* at least the first allocation, of the picture itself, must cause an error */
     }
 }
 
@@ -291,7 +292,7 @@ int main(int argument_count, char **arguments)
     make_samples();
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) remove_picture(&cases[i]);
     mkdir(folder, 0777);
-    /* Loads the image library by a call with an invalid picture, which it refuses. */
+    /* Loads the image library by a call with an invalid picture. The library refuses the picture. */
     base_error error = {0};
     const insitu_image nothing = {.rgba = NULL};
     if (session_write_image(&nothing, INSITU_PNG8, "none.png", &error) != INSITU_ERROR_ARGUMENT) {

@@ -1,5 +1,6 @@
-/* Tests the image adaptor, loaded as libinsitu loads it: by the dynamic loader. Files are read back by OpenImageIO and
- * compared with the pixels, through the sRGB curve in double if the format uses it. */
+/* Tests the image library, which is loaded by the dynamic loader as libinsitu loads it. Reads files by OpenImageIO and
+ * compares them with the pixels. If the format uses the sRGB curve, the expected value is computed by the curve in
+ * double. */
 #include <OpenImageIO/deepdata.h>
 #include <OpenImageIO/imagebuf.h>
 #include <OpenImageIO/imagebufalgo.h>
@@ -36,7 +37,7 @@ namespace fs = std::filesystem;
 namespace
 {
 
-fs::path folder; /* folder of this run, empty at its start */
+fs::path folder; /* folder of this run; empty at the start */
 
 struct picture {
     int width, height;
@@ -59,7 +60,7 @@ float make_number(std::size_t i)
     return static_cast<float>(hash_number(static_cast<std::uint32_t>(i)) >> 8) / 16777216.0F;
 }
 
-/* Makes premultiplied colours of every alpha, or opaque ones; some are slightly outside [0, 1], as highlights are. */
+/* Makes premultiplied colours, with any alpha or opaque. Some are slightly outside [0, 1], as highlights are. */
 picture make_picture(int width, int height, bool opaque)
 {
     const std::size_t count = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
@@ -120,7 +121,7 @@ void check_png(const picture &p, insitu_image_format format, OIIO::TypeDesc type
     assert_int_equal(spec.nchannels, channels);
     const double largest = std::numeric_limits<code>::max();
     const double half =
-        /* rounding to the nearest code; the double arithmetic of both sides is far more accurate */
+        /* rounding to the nearest code; the double arithmetic of the library and of the test is far more accurate */
         0.5 + 1e-9 * largest;
     for (std::size_t i = 0; i < p.depth.size(); i++) {
         const double alpha = p.rgba[4 * i + 3];
@@ -142,7 +143,7 @@ void png8_is_within_half_a_code(void **)
     }
 }
 
-/* Checks floats at the border between two codes and next to it on both sides, and a ramp from 0 to 1. */
+/* Checks the floats at which the code changes and their neighbours on both sides, and a ramp from 0 to 1. */
 void png8_is_exact_where_codes_change(void **)
 {
     std::vector<float> values;
@@ -229,7 +230,7 @@ void exr_is_bitwise(void **)
     }
 }
 
-/* Any number of samples for each pixel, none in the first one. */
+/* A picture with any number of samples in each pixel, and none in the first. */
 struct deep_picture {
     int width, height;
     std::vector<insitu_deep_sample> samples;
@@ -302,7 +303,8 @@ void deep_exr_is_bitwise(void **)
     }
 }
 
-/* Composites front to back in double: each sample's colour times the transmittance of the samples in front of it. */
+/* Compares a flattened pixel with compositing front to back in double: the sum of each sample's colour times the
+ * transmittance of the samples in front of it. */
 void check_flat_pixel(const deep_picture &p, std::size_t i, const float *flat)
 {
     double expected[4] = {0, 0, 0, 0};
@@ -311,12 +313,12 @@ void check_flat_pixel(const deep_picture &p, std::size_t i, const float *flat)
         const double through = 1 - expected[3];
         for (std::size_t c = 0; c < 4; c++) expected[c] += through * static_cast<double>(sample.rgba[c]);
     }
-    /* Each sample is rounded three times, for numbers of at most 1, and its transmittance once. */
+    /* Each sample is rounded three times, with numbers of at most 1, and its transmittance one time. */
     const double bound = 4 * std::ldexp(1.0, -24) * p.counts[i];
     for (std::size_t c = 0; c < 4; c++) assert_true(std::fabs(static_cast<double>(flat[c]) - expected[c]) <= bound);
 }
 
-/* Checks that flattening by the function of oiiotool --flatten gives the same picture. */
+/* Checks that the function by which oiiotool --flatten works flattens the deep file to the expected picture. */
 void deep_exr_is_flattened_by_openimageio(void **)
 {
     const deep_picture p = make_deep_picture(64, 33);
@@ -350,7 +352,7 @@ void writing_does_not_change_the_picture(void **)
     assert_int_equal(spec.width, 5);
 }
 
-/* Checks paths that cannot be written. Root may write anywhere, so no case depends on permissions. */
+/* Checks paths that cannot be written. No case depends on permissions, because root may write anywhere. */
 void unwritable_paths_are_reported(void **)
 {
     const fs::path in = folder / "unwritable";
@@ -380,7 +382,7 @@ void unwritable_paths_are_reported(void **)
     assert_int_equal(count_files(in), before);
 }
 
-/* Simulates a full disk: no file of this process may grow beyond 4 KiB. */
+/* Checks a full disk. It is simulated by a limit of 4 KiB for files of this process. */
 void full_disk_is_reported_and_leaves_the_old_picture(void **)
 {
     const fs::path in = folder / "full";
@@ -413,8 +415,8 @@ std::size_t count_others(const fs::path &in, const std::string &name)
     return count;
 }
 
-/* Checks the longest legal file name: an earlier temporary name was the picture's plus a suffix, and would be too
- * long. */
+/* Checks the longest legal file name. The temporary file must not be named by the picture's name plus a suffix, which
+ * would be too long; an earlier version did so. */
 void longest_legal_name_is_written(void **)
 {
     const fs::path in = folder / "long";
@@ -427,7 +429,8 @@ void longest_legal_name_is_written(void **)
     assert_int_equal(count_files(in), 2);
 }
 
-/* Checks an attack: someone with write access to the folder plants links with the former name of the temporary file. */
+/* Checks an attack: someone with write access to the folder plants a link that has the name which temporary files had
+ * in earlier versions. */
 void writing_does_not_follow_planted_links(void **)
 {
     const fs::path in = folder / "planted", victim = folder / "victim";
@@ -442,8 +445,8 @@ void writing_does_not_follow_planted_links(void **)
     assert_int_equal(count_others(in, "a.png"), 1);
 }
 
-/* Makes files with temporary names (one left by a killed run, one that is being written, a link and a pipe) and files
- * with other names. */
+/* Checks that only the temporary file left by a killed run is removed. The folder also contains files with temporary
+ * names (one that is still being written, a link and a pipe) and files with other names; all of these must stay. */
 void files_of_killed_runs_are_removed(void **)
 {
     const fs::path in = folder / "left";
@@ -476,8 +479,8 @@ void pipe_at_the_picture_path_is_reported(void **)
     assert_int_equal(count_files(in), 1);
 }
 
-/* Checks a picture at a position inside a larger one: it is blended over its background, as in its own file, and pixels
- * around it do not change. It is refused if it exceeds the columns of the larger one. */
+/* Checks a picture that is written into a region of a larger picture: it is blended over its background, as in its own
+ * file, and pixels around it do not change. It is refused if it extends beyond the columns of the larger picture. */
 void images_are_written_into_regions_of_a_picture(void **)
 {
     const int width = 7, height = 5, larger = 20, rows = 9, left = 4, top = 3;
@@ -515,7 +518,7 @@ void invalid_arguments_are_rejected(void **)
     insitu_image_format unknown = INSITU_PNG8;
     const int number_of_none = 7;
     static_assert(sizeof unknown == sizeof number_of_none, "an enum is an int");
-    std::memcpy(&unknown, &number_of_none, sizeof unknown); /* an invalid number, which C callers may pass */
+    std::memcpy(&unknown, &number_of_none, sizeof unknown); /* an invalid number, which C callers may pass by mistake */
     assert_int_equal(write_image(p.make_view(false), unknown, folder / "n.png", error), INSITU_ERROR_ARGUMENT);
     assert_int_equal(write_image(p.make_view(false), INSITU_PNG8, "", error), INSITU_ERROR_ARGUMENT);
     assert_int_equal(write_image(p.make_view(false), INSITU_DEEP_EXR, folder / "n.exr", error), INSITU_ERROR_ARGUMENT);

@@ -1,6 +1,6 @@
-/* Compares the integral of a segment with high precision, for random transfer functions, values and lengths. The oracle
- * splits at every control point of the function in long double, computes the optical depth in closed form (the integral
- * of -ln u is u - u ln u) and the colour by adaptive Simpson quadrature. */
+/* Compares the integral of a segment with a reference of high precision, for random transfer functions, values and
+ * lengths. The reference splits the segment at every control point of the function in long double, computes the optical
+ * depth in closed form (the integral of -ln u is u - u ln u) and the colour by adaptive Simpson quadrature. */
 #include "integral_double.h"
 #include "test_meshes.h"
 
@@ -23,12 +23,14 @@ typedef struct random_transfer {
     float opacities[MAX_POINTS], colours[3 * MAX_COLOURS];
 } random_transfer;
 
-/* A piece between control points of the function: opacity and colour are linear in s in [0, 1]. */
+/* A part of a segment between two control points of the transfer function. Opacity and colour are linear in s in [0,
+ * 1]. */
 typedef struct piece {
     long double a0, a1, c0[3], c1[3], length;
 } piece;
 
-/* Returns a multiple of 1/1024, which is the same in float, so that both builds use the same function. */
+/* Returns a random multiple of 1/1024, which is exact in float, so that the float and the double build use the same
+ * function. */
 static double draw_coarse_number(uint64_t index, uint64_t seed)
 {
     return floor(1024 * test_uniform(index, seed)) / 1024;
@@ -57,7 +59,7 @@ static void make_transfer(random_transfer *r, uint64_t seed, double most)
     t->opacities = r->opacities;
 }
 
-/* ---- the oracle ---- */
+/* ---- the reference ---- */
 
 static long double evaluate_opacity_near(const render_transfer *t, long double middle, long double x)
 {
@@ -79,12 +81,12 @@ static long double evaluate_colour(const render_transfer *t, long double x, int 
     return low + (place - i) * (high - low);
 }
 
-/* Returns the optical depth from 0 to s. */
+/* Returns the optical depth of a part from 0 to s. */
 static long double compute_optical_depth(const piece *p, long double s)
 {
     const long double u0 = 1 - p->a0, u1 = u0 - s * (p->a1 - p->a0), change = u0 - u1;
     if (fabsl(change) < 1e-4L * u0) {
-        /* Gauss quadrature with three nodes: the remainder is of sixth order. */
+        /* Gauss quadrature with three nodes: the error is of sixth order in `change`. */
         const long double r = sqrtl(0.15L), m = 0.5L;
         return -p->length * s *
                (5 * logl(u0 - (m - r) * change) + 8 * logl(u0 - m * change) + 5 * logl(u0 - (m + r) * change)) / 18;
@@ -131,7 +133,7 @@ static int collect_cuts(const render_transfer *t, long double v0, long double v1
     return count;
 }
 
-/* Computes rgb, transmittance and optical depth into out; the tolerance is relative to the depth. */
+/* Computes colour (rgb), transmittance and optical depth into out. The tolerance is relative to the optical depth. */
 static void integrate_exactly(const render_transfer *t, double length, double v_in, double v_out, long double tolerance,
                               long double out[5])
 {
@@ -140,7 +142,8 @@ static void integrate_exactly(const render_transfer *t, double length, double v_
     const int count = collect_cuts(t, v0, v1, cuts);
     for (int i = 0; i < 5; i++) out[i] = 0;
     for (int i = 0; i + 1 < count; i++) {
-        if (cuts[i] == cuts[i + 1]) continue; /* at a control point with infinite extinction there is no integral */
+        /* at a control point with infinite extinction the integrand is not defined */
+        if (cuts[i] == cuts[i + 1]) continue;
         const long double x0 = v0 + cuts[i] * (v1 - v0), x1 = v0 + cuts[i + 1] * (v1 - v0), m = 0.5L * (x0 + x1);
         piece p = {.a0 = evaluate_opacity_near(t, m, x0), .a1 = evaluate_opacity_near(t, m, x1)};
         p.length = (long double)length * (cuts[i + 1] - cuts[i]);
@@ -158,8 +161,8 @@ static void integrate_exactly(const render_transfer *t, double length, double v_
     out[3] = expl(-out[4]);
 }
 
-/* Computes how the light depends on the field's value x, with colour b behind: the derivatives (s (c - b))' of the
- * three channels and s' (for alpha), then s and |s'|. */
+/* Computes how the light depends on the field's value x, in front of a background of colour b; s is the extinction and
+ * c the colour. out: the derivatives (s (c - b))' for the three channels, s' for alpha, then s and |s'|. */
 static void differentiate_by_brute_force(const render_transfer *t, long double x, long double b, long double out[6])
 {
     const long double step = 1e-6L, a = evaluate_opacity_near(t, x, x), clear = 1 - a;
@@ -176,7 +179,8 @@ static void differentiate_by_brute_force(const render_transfer *t, long double x
     out[5] = fabsl(slope);
 }
 
-/* Computes what kernel_light_variation bounds, by brute force from many values of the range and several b. */
+/* Computes the four numbers that kernel_light_variation bounds, by brute force from many values in the range and
+ * several background colours. */
 static void find_variation_by_brute_force(const render_transfer *t, double low, double high, double out[4])
 {
     enum { VALUES = 300, BEHIND = 4 };
@@ -209,7 +213,8 @@ static void find_variation_by_brute_force(const render_transfer *t, double low, 
 
 typedef void integral(const render_transfer *t, double length, double v_in, double v_out, double out[4]);
 
-/* Returns the largest error, relative to the optical depth if that is below 1, over the requested decades of depth. */
+/* Compares an integral with the reference for `count` random cases. Returns the largest error, relative to the optical
+ * depth if that is below 1. deepest and shallowest receive the largest and the smallest optical depth. */
 static double find_largest_error(integral *of, int count, double most, double tolerance, double *deepest,
                                  double *shallowest)
 {
@@ -269,7 +274,7 @@ static void float_integral_is_within_the_bound(void **state)
     }
 }
 
-/* Checks opacity 1 at control points, where the extinction is infinite but its integral is finite. */
+/* Checks opacity 1 at control points. The extinction is infinite there, but its integral is finite. */
 static void opaque_points_are_integrated(void **state)
 {
     (void)state;
@@ -280,7 +285,8 @@ static void opaque_points_are_integrated(void **state)
         r.transfer.opacity_count = 3;
         r.values[0] = 0.125, r.values[1] = 0.5, r.values[2] = 0.75;
         r.opacities[0] = 0.25f, r.opacities[1] = 1, r.opacities[2] = 0;
-        /* A quarter of the segments begin or end at the pole itself, and some hardly leave it. */
+        /* A quarter of the segments begin or end exactly at the control point with opacity 1, and some segments stay
+         * close to it. */
         const double near = 0.5 + (draw_coarse_number(2, (uint64_t)n + 9) - 0.5) * (n % 16 < 4 ? 1.0 / 4096 : 1);
         const double other = n % 4 ? draw_coarse_number(1, (uint64_t)n + 9) : 0.5;
         const double v_in = n % 8 ? other : near, v_out = n % 8 ? near : other;
@@ -308,8 +314,9 @@ static void opacity_of_one_absorbs_all_light(void **state)
     assert_true(found[3] < 1e-7);
 }
 
-/* Checks that no bound is below the variation over the range's own values, and that none is above the variation over a
- * range wider by two of 128 bins at either end, times 1.25 plus the overestimate of interval arithmetic within a bin.
+/* Checks the bounds of the light's variation. No bound may be below the brute-force result over the range itself. The
+ * bound of the variation may exceed the brute-force variation over a wider range by at most a quarter of the
+ * derivative's maximum. The range is wider by two of 128 bins at either end, and at its upper end by another quarter.
  * Values beyond all bins belong to the bin at that end. */
 static void light_variation_bounds_hold(void **state)
 {

@@ -1,12 +1,12 @@
-/* Checks that every partition of a mesh gives the same picture, for the product of
+/* Checks that every partition of a mesh gives the same picture, for all combinations of
  *
  *     ranks (of mpiexec) x block, Morton, random, checkerboard, a rank without cells x 0 to 2 layers of ghost cells
  *     x hexes, tets, polyhedra, mixed cells x the images below
  *
- * Each part has its own order of cells' vertices and faces. Rank 0 draws the whole mesh alone and compares. Surfaces
- * are the same to the bit, in depth and colour, and so are volumes with the reproducible option, also faint ones; other
- * volumes agree to 1e-6, which compositing guarantees. For all images the test reports how often they are the same to
- * the bit and the largest difference. */
+ * Each part has its own order of cells' vertices and faces. Rank 0 draws the whole mesh by itself and compares the
+ * pictures. Surfaces must be bit-identical in depth and colour, and so must volumes with the reproducible option,
+ * including faint ones. Other volumes must agree to 1e-6, which compositing guarantees. For each image the test reports
+ * how many pictures are bit-identical and the largest difference. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -25,7 +25,7 @@ typedef struct image_case {
     const char *name;
     promise promise;
     const char *layers, *sampling;
-    const char *more; /* additional lines of the image; NULL: none */
+    const char *more; /* additional lines of the image, or NULL */
 } image_case;
 
 #define CLEAR "      - isosurface: {field: f, values: [-0.2, 0.3], opacity: 0.4}\n"
@@ -71,12 +71,12 @@ static const image_case listed[] = {
 };
 enum { LISTED = sizeof listed / sizeof *listed, MOST_FAINT = 20, MOST_CASES = LISTED + MOST_FAINT };
 
-/* The listed images, followed from LISTED on by volumes of random faint opacities. */
+/* The listed images; from index LISTED on, volumes with random faint opacities. */
 static image_case cases[MOST_CASES];
 static int case_count;
 
-/* Returns a layer with opacities from 1e-9 to 1e-3 per cell at five random values: the transmittance of most segments
- * rounds to 1, but their emission is visible. */
+/* Returns a volume layer with opacities from 1e-9 to 1e-3 per cell at five random values. The transmittance of most
+ * segments rounds to 1, but their emission is visible. */
 static const char *make_faint_layer(int which)
 {
     static char texts[MOST_FAINT][256];
@@ -131,7 +131,8 @@ static const char *const distribution_names[DEALINGS] = {"block", "Morton", "ran
 static const test_mesh_kind kinds[] = {TEST_HEXES, TEST_TETS, TEST_POLYHEDRA, TEST_MIXED};
 enum { KINDS = sizeof kinds / sizeof *kinds };
 
-/* Calls visit for each vertex of the cell, more than once for vertices that its faces share. */
+/* Calls visit for each vertex of the cell. A vertex that several faces of a polyhedron share is visited several
+ * times. */
 static void for_each_vertex(const test_mesh *mesh, int64_t cell, void (*visit)(void *state, int64_t vertex),
                             void *state)
 {
@@ -216,7 +217,7 @@ static void find_vertex(void *state, int64_t vertex)
     set->found = set->found || set->has[vertex];
 }
 
-/* Adds the cells that share a vertex with the selected cells. */
+/* Selects the cells that share a vertex with cells that are already selected. */
 static void add_neighbour_layer(const test_mesh *mesh, unsigned char *taken)
 {
     vertex_set set = {.has = calloc((size_t)mesh->vertex_count, 1)};
@@ -231,7 +232,7 @@ static void add_neighbour_layer(const test_mesh *mesh, unsigned char *taken)
     free(set.has);
 }
 
-/* A part of the mesh with a field at vertices and one at cells. */
+/* A part of the mesh with one field at vertices and one in cells. */
 typedef struct input {
     session_input vertices;
     double *cell_values;
@@ -305,11 +306,11 @@ static void submit_and_step(insitu_session *session, const input *in, int cycle)
     everywhere(status == INSITU_OK);
 }
 
-/* Sums over all pictures of an image. */
+/* Sums over all pictures of an image. same: number of bit-identical pictures; worst: largest difference of a colour. */
 typedef struct tally {
-    int pictures, same, depths; /* depths: pixels whose depth differs */
+    int pictures, same, depths; /* depths: number of pixels whose depth differs */
     double worst;
-    int64_t codes[2]; /* 8-bit channels of a PNG that are off by one, and by more */
+    int64_t codes[2]; /* number of 8-bit channels of a PNG that differ by one, and by more */
 } tally;
 
 static tally tallies[MOST_CASES];
@@ -385,7 +386,7 @@ static bool verify_mesh(insitu_session *session, int kind, int side, const test_
     return are_well;
 }
 
-/* Draws the pictures of the whole mesh on rank 0. */
+/* Draws the pictures of the whole mesh on this rank, without the others. */
 static void draw_whole(const char *scene, const test_mesh *mesh, caught_picture *out)
 {
     static int cycle;

@@ -1,5 +1,5 @@
-/* Checks positions of decorations: random ones in pictures of 200 x 200 to 8192 x 4320, and typical cases of users.
- * Rectangles are checked, not pixels. */
+/* Checks the positions of decorations: random decorations in pictures of 200 x 200 to 8192 x 4320 pixels, and typical
+ * decorations of users. The test compares rectangles, not pixels. */
 #include <algorithm>
 #include <cmath>
 #include <csetjmp>
@@ -38,7 +38,8 @@ bool are_disjoint(const area &a, const area &b)
     return a.x1 <= b.x0 || b.x1 <= a.x0 || a.y1 <= b.y0 || b.y1 <= a.y0;
 }
 
-/* Returns the box of a line of text: in DejaVuSans capitals and digits reach 0.73 of the size above the baseline. */
+/* Returns the bounding box of a line of text. In DejaVuSans, capitals and digits are 0.73 of the font size high above
+ * the baseline. */
 area compute_line_box(const placed_line &line, int size)
 {
     return {line.x, line.baseline - 0.73 * size, line.x + measure_text_width(line.text, size), line.baseline};
@@ -66,7 +67,8 @@ bool is_decoration(const block &b)
     return b.kind != block_kind::covered;
 }
 
-/* Checks that each decoration is either placed once or reported as left out; labels may be missing. */
+/* Checks that each decoration is either placed one time or reported as left out. Labels are not counted, because they
+ * may be missing. */
 void check_all_are_reported(const layout &places, const insitu_decorations &what)
 {
     int wanted = what.bar_count + (what.scale_bar.length > 0) + what.has_axes;
@@ -77,7 +79,7 @@ void check_all_are_reported(const layout &places, const insitu_decorations &what
                      wanted);
 }
 
-/* Checks that no block lies below the pictures that cover parts of this one. */
+/* Checks that the block does not overlap the areas of this picture that other pictures cover. */
 void check_covered(const block &b, const insitu_decorations &what)
 {
     for (int i = 0; i < what.covered_count; i++) {
@@ -146,7 +148,7 @@ void four_colour_bars_fit_with_their_numbers(void **)
     }
 }
 
-/* Checks that a long label is wrapped and the bar stays in the right third. */
+/* Checks that a long label is wrapped and that the bar stays in the right third of the picture. */
 void a_label_of_many_letters_is_wrapped(void **)
 {
     const std::string word(60, 'w');
@@ -174,8 +176,9 @@ void text_at_right_is_beside_the_colour_bar(void **)
     assert_int_equal(places.blocks.size(), 2);
 }
 
-/* Checks a picture that covers a corner, with a height of a third, four fifths or all of the picture below: the bar
- * must be below or above it, with at least 0.4 of the height, if there is space, and next to it otherwise. */
+/* Checks a picture one of whose corners is covered by another picture. The height of the covering picture is a third,
+ * four fifths or all of the picture's height. The colour bar must be at least 0.4 of the picture's height long. It must
+ * be below or above the covering picture if there is enough space, and next to it otherwise. */
 void colour_bars_avoid_covered_corners(void **)
 {
     const std::vector<insitu_colour_bar> bars = {make_bar("Temperature [K]")};
@@ -208,7 +211,7 @@ void colour_bars_avoid_covered_corners(void **)
         }
 }
 
-/* Checks 20 bars with letters a fifth of the picture high, which do not fit. */
+/* Checks that decorations which do not fit are reported: 20 bars whose letters have a fifth of the picture's height. */
 void decorations_that_do_not_fit_are_reported(void **)
 {
     const std::vector<insitu_colour_bar> bars(20, make_bar("pressure"));

@@ -1,7 +1,8 @@
-/* Compares rays from hits with brute force in double: each ray is made the only ray of a picture whose eye is the ray's
- * origin, and the roots in every cell are computed. The test covers all kinds of cells and every instruction set; rays
- * towards lights and into the hemisphere; with and without excluding surfaces nearer than half a cell. Rays on which
- * rounding may decide are excluded, and are few. */
+/* Compares secondary rays, which begin at hits of surfaces, with brute force in double. For the comparison, each ray
+ * becomes the only ray of a picture whose eye is the ray's origin, and the roots in every cell are computed. The test
+ * covers all kinds of cells and every instruction set, rays towards lights and into the hemisphere, with and without
+ * ignoring surfaces nearer than half a cell. Rays whose result may depend on rounding are excluded; there must be
+ * few. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -90,7 +91,7 @@ static void grow_box(const double place[3], double low[3], double high[3])
     }
 }
 
-/* Returns the cube root of the volume of the cell's box. */
+/* Returns the cube root of the volume of the cell's bounding box. */
 static double compute_cell_size(const test_mesh *mesh, int64_t cell)
 {
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
@@ -106,8 +107,9 @@ static double compute_cell_size(const test_mesh *mesh, int64_t cell)
     return cbrt((high[0] - low[0]) * (high[1] - low[1]) * (high[2] - low[2]));
 }
 
-/* Computes by brute force whether the ray meets a surface in front: 1, 0, or -1 if rounding may decide. Roots of the
- * hit's own surface lie behind the origin by the offset of the origin minus the error of the hit. */
+/* Computes by brute force whether the ray meets a surface in front of its origin. Returns 1 if it does, 0 if not, -1 if
+ * the result may depend on rounding. The root at the hit itself lies behind the origin, because the origin is lifted
+ * off the surface by more than the error of the hit. */
 static int is_blocked_by_brute_force(const render_fixture *f, const test_mesh *mesh, const double start[3],
                                      const double d[3], double reach)
 {
@@ -120,7 +122,7 @@ static int is_blocked_by_brute_force(const render_fixture *f, const test_mesh *m
     double focal[3];
     bool is_met = false;
     for (int a = 0; a < 3; a++) focal[a] = start[a] + d[a];
-    clear.opacity = 0.5F; /* transparent, so that all hits are found, not only the first */
+    clear.opacity = 0.5F; /* surfaces are transparent, so that all hits are found, not only the first */
     job.surfaces = &clear;
     job.paint = RENDER_LIGHT;
     assert_true(render_camera_look_at(&job.camera, start, focal, across, 40, 1, 1));

@@ -1,6 +1,6 @@
 /* Compares contour lines on surfaces with closed forms. The position of a level's line in the picture follows from the
- * formulas of the surface and the field alone. The coverage of a pixel by a strip of the line's width is found by
- * counting points of the pixel that are nearer to the line than half the width. */
+ * formulas of the surface and of the field. The reference for the coverage of a pixel is the fraction of points in the
+ * pixel that are nearer to the line than half the line's width. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -33,7 +33,7 @@ static double square_radius(const double p[3])
     return p[0] * p[0] + p[1] * p[1] + p[2] * p[2] - 0.64;
 }
 
-/* Returns the depth at which a ray meets the plane (or, below, the sphere). */
+/* Returns the depth at which a ray meets the plane. */
 static double plane_depth(const double base[3], const double direction[3])
 {
     const double along = normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2];
@@ -62,17 +62,17 @@ typedef struct lines_case {
     test_function *field;
     fixture_camera camera;
     float width;
-    int cubes;     /* cubes of the lattice along an axis */
-    double jitter; /* jitter of its vertices */
+    int cubes;     /* number of the lattice's cubes along an axis */
+    double jitter; /* jitter of the lattice's vertices */
     int count;
     double values[4];
 } lines_case;
 
-/* The cases. A linear field is linear in every cell, and so is the distance from a plane: cells may have any size. For
- * the other fields the cells' interpolants have an error: on 40 cubes an eighth of the second derivative along a tet's
- * longest edge, 0.09, times the square of its length. That is 4e-4 for the quadratic field, whose slope is at least
- * 0.6, and 2e-3 for the square of the radius, whose slope is 1.6. A pixel is 0.03 of the scene, so that lines are off
- * by up to 0.02 and 0.04 of a pixel. */
+/* The cases. A linear field is represented exactly in every cell, and so is the distance from a plane, so that cells
+ * may have any size. For the other fields, the interpolants of cells have an error. On 40 cubes, it is an eighth of the
+ * second derivative along a tet's longest edge, times the square of this edge's length, 0.09. That makes 4e-4 for the
+ * quadratic field, whose slope is at least 0.6, and 2e-3 for the square of the radius, whose slope is 1.6. A pixel is
+ * 0.03 of the scene, so that lines are off by up to 0.02 and 0.04 of a pixel. */
 static const lines_case cases[] = {
     {"a linear field on a plane",
      distance_field,
@@ -114,12 +114,12 @@ enum { CASES = sizeof cases / sizeof *cases };
 typedef struct truth {
     const lines_case *of;
     render_camera camera;
-    /* coverage; -1 if the surface or the cube ends nearby, or two lines are close to each other */
+    /* coverage of each pixel; -1 if the surface or the cube ends near the pixel */
     double cover[PIXELS];
 } truth;
 
-/* Returns the field at a position in the picture, whose origin is the middle of the first pixel; NaN outside the
- * surface and near the border of the cube. */
+/* Returns the field at a position in the picture. The position is measured in pixels from the middle of the first
+ * pixel. Returns NaN outside the surface and outside the cube. */
 static double evaluate_field(const truth *t, double x, double y)
 {
     render_camera camera = t->camera;
@@ -136,7 +136,8 @@ static double evaluate_field(const truth *t, double x, double y)
     return t->of->field(at);
 }
 
-/* Returns the distance of a position from the line of a level, by Newton's method along the gradient in the picture. */
+/* Returns the distance from a position in the picture to the line of a level, found by Newton's method along the
+ * gradient in the picture. */
 static double line_distance(const truth *t, double level, double x, double y)
 {
     const double h = 1e-3;
@@ -151,8 +152,9 @@ static double line_distance(const truth *t, double level, double x, double y)
     return hypot(px - x, py - y);
 }
 
-/* Returns the fraction of points in the pixel that lie in the strip. No point is farther than half a pixel's diagonal
- * from the pixel's middle. */
+/* Returns the fraction of points in the pixel that lie within half the line's width. It is 0 without any search if the
+ * pixel's middle is farther away than that plus one pixel, since no point is farther than half a diagonal from the
+ * middle. */
 static double compute_exact_coverage(const truth *t, double level, double x, double y)
 {
     const double reach = 0.5 * (double)t->of->width, middle = line_distance(t, level, x, y);
@@ -200,7 +202,7 @@ typedef struct lines_frame {
     render_lines lines;
 } lines_frame;
 
-/* Creates a frame with white lines on black, on cells of the given kind. */
+/* Creates a frame that shows white lines on a black surface, with cells of the given kind. */
 static void create_frame(lines_frame *out, const lines_case *of, test_mesh_kind kind, test_layout layout)
 {
     test_mesh lines;
@@ -252,9 +254,10 @@ static lines_error compare_coverage(const truth *t, const drawn_frame *drawn)
 static const test_layout layouts[2] = {{.wide_coordinates = true, .wide_values = true, .wide_indices = true},
                                        {.is_interleaved = true}};
 
-/* Checks the lines of a frame. The root mean square error of a pixel must be below 0.02. The kernels use a ramp one
- * pixel wide for every direction of a line; it is off by up to 0.06 for diagonal lines, whose exact ramp is wider. The
- * sum of the coverage must be the width times the length. */
+/* Compares the lines of a frame with the reference. The root mean square error of a pixel must be below 0.02: the
+ * kernels use a ramp one pixel wide for lines in all directions. Its error is up to 0.06 for diagonal lines, because
+ * the exact ramp of a diagonal line is wider. The sum of the coverage, which is the width times the length, must agree
+ * to 0.01. */
 static void check_frame(const truth *t, const lines_frame *frame, const char *kind, int set)
 {
     drawn_frame drawn;
@@ -271,7 +274,7 @@ static void check_frame(const truth *t, const lines_frame *frame, const char *ki
     drawn_frame_free(&drawn);
 }
 
-/* Checks a case on all kinds of cells; on fine lattices only tets and hexes. */
+/* Checks a case on all kinds of cells. Fine lattices are drawn with tets and hexes only. */
 static void check_case(const lines_case *of)
 {
     truth *t = NULL;
@@ -292,7 +295,8 @@ static void line_coverage_matches_exact_strips(void **state)
     for (int i = 0; i < CASES; i++) check_case(&cases[i]);
 }
 
-/* Checks that the whole mesh and the parts of three ranks, for every partition, give the same bits. */
+/* Checks that the picture of the whole mesh and the pictures composited from three ranks, for every partition, are
+ * bit-identical. */
 static void lines_are_the_same_on_any_partition(void **state)
 {
     (void)state;

@@ -1,4 +1,4 @@
-/* Changes meshes: rounds, mirrors, renumbers, rotates and moves them. */
+/* Functions that change meshes: round, mirror, renumber, reorder and transform them. */
 #include "test_mesh_make.h"
 
 #include <stdlib.h>
@@ -10,8 +10,8 @@ void test_mesh_round_to_float(test_mesh *mesh)
     for (int64_t i = 0; i < mesh->vertex_count; i++) mesh->values[i] = (double)(float)mesh->values[i];
 }
 
-/* Symmetries of a kind of cell as reorderings of its vertices: they generate all symmetries, and the first is a
- * mirror. */
+/* Symmetries of a cell type as permutations of its vertices. They generate all symmetries of the type, and the first is
+ * a mirror image. */
 typedef struct symmetry {
     int count;
     int order[3][8];
@@ -41,7 +41,7 @@ void test_mesh_mirror_cells(test_mesh *mesh, bool every_second)
             reorder_vertices(mesh, cell, get_symmetries(mesh->types[cell])->order[0]);
 }
 
-/* Returns a random permutation of 0 .. count - 1. */
+/* Returns a random permutation of 0 to count - 1. */
 static int64_t *make_permutation(int64_t count, uint64_t seed)
 {
     int64_t *order = test_allocate(count, sizeof *order);
@@ -53,7 +53,8 @@ static int64_t *make_permutation(int64_t count, uint64_t seed)
     return order;
 }
 
-/* Adds the faces of old in another order and with renumbered vertices; returns the new number of each face. */
+/* Adds the faces of the old mesh to the new one in another order and with renumbered vertices. Returns the new index of
+ * each face. */
 static int64_t *shuffle_faces(const test_mesh *old, const int64_t *vertex_to, uint64_t seed, test_mesh *mesh)
 {
     int64_t *face_from = make_permutation(old->face_count, seed),
@@ -114,7 +115,7 @@ static void reverse_items(int64_t *items, int64_t count)
     for (int64_t i = 0; i < count / 2; i++) swap_indices(&items[i], &items[count - 1 - i]);
 }
 
-/* Rotates a list to another first entry, and depending on the seed reverses it. */
+/* Rotates a cyclic list by a random number of entries. Depending on the seed, also reverses it. */
 static void rotate_loop(int64_t *items, int64_t count, uint64_t seed)
 {
     const int64_t by = (int64_t)(test_hash(1, seed) % (uint64_t)count);

@@ -10,7 +10,7 @@
 
 enum { MOST_POINTS = 22, MOST_TRIANGLES = 2 * MOST_POINTS - 4 };
 
-/* Directions and the triangles of their convex hull, oriented outwards. */
+/* Directions, and the triangles of their convex hull with outward orientation. */
 typedef struct hull {
     int point_count, triangle_count;
     double points[MOST_POINTS][3];
@@ -44,8 +44,8 @@ static void random_direction(uint64_t index, uint64_t seed, double out[3])
     out[2] = z;
 }
 
-/* Spreads the points: they must not all be in one half space, nor too close to each other, because the hull would not
- * contain the origin, or would have slivers. */
+/* Chooses directions that are spread over the sphere. They must not be too close to each other, because the hull would
+ * have slivers. */
 static void spread_points(hull *h, uint64_t seed)
 {
     double least = 1.9 / sqrt(h->point_count);
@@ -69,7 +69,7 @@ static void triangle_normal(const hull *h, const int *t, double out[3])
     normalize_vector(out);
 }
 
-/* Returns whether all points of the hull are behind the triangle's plane. */
+/* Returns whether the triangle is part of the hull: all other points are behind its plane. */
 static bool is_outside(const hull *h, const int *t, const double *normal)
 {
     for (int i = 0; i < h->point_count; i++)
@@ -95,7 +95,7 @@ static void find_triangles(hull *h)
                 }
 }
 
-/* Makes a valid hull around the origin. */
+/* Makes a hull that is closed and contains the origin. */
 static void make_hull(uint64_t seed, hull *h)
 {
     bool is_good = false;
@@ -109,7 +109,8 @@ static void make_hull(uint64_t seed, hull *h)
     }
 }
 
-/* Lists the triangles around a point: the corner after the point in one triangle leads to the next triangle. */
+/* Lists the triangles around a point in cyclic order: the last corner of a triangle is the first corner of the next
+ * one. Returns their number. */
 static int list_triangles_around(const hull *h, int point, int64_t out[MOST_TRIANGLES])
 {
     int first = -1, next = -1, count = 0;
@@ -161,7 +162,7 @@ void test_mesh_make_random_polyhedron(test_random_polyhedron kind, uint64_t seed
 enum { MOST_AROUND = 16, MOST_EDGES = 32 };
 
 typedef struct edge {
-    int64_t ends[2]; /* -1: an empty slot of the table */
+    int64_t ends[2]; /* -1 if the slot of the table is empty */
     int tet_count;
     int64_t tets[MOST_AROUND];
 } edge;
@@ -169,7 +170,7 @@ typedef struct edge {
 typedef struct tet_mesh {
     int n;
     int64_t point_count, tet_count, table_size;
-    double (*points)[3]; /* the corners of the lattice, followed by the centres of the cubes */
+    double (*points)[3]; /* corners of the lattice, followed by the centres of the cubes */
     int64_t (*tets)[4];
     edge *table;
 } tet_mesh;
@@ -196,8 +197,8 @@ static void place_points(tet_mesh *m, double jitter)
     }
 }
 
-/* Adds two tets between the centre of a cube and its face across an axis, on the given side. A hash of the face chooses
- * the diagonal that splits it, so that the neighbouring cube uses the same one. */
+/* Adds two tets between the centre of a cube and the cube's face across an axis on the given side. A hash of the face
+ * chooses the diagonal that splits the face, so that the neighbouring cube uses the same diagonal. */
 static void add_face_tets(tet_mesh *m, const int cube[3], int axis, int side, int64_t centre)
 {
     int64_t around[4];
@@ -263,7 +264,7 @@ static bool are_adjacent_tets(const int64_t *one, const int64_t *other)
     return common == 3;
 }
 
-/* Sorts the edge's tets into their order around it. */
+/* Sorts the tets at an edge into cyclic order around the edge. */
 static void order_around(const tet_mesh *m, edge *e)
 {
     for (int i = 0; i + 1 < e->tet_count; i++)
@@ -286,7 +287,8 @@ static bool is_inner_point(const tet_mesh *m, int64_t point)
     return true;
 }
 
-/* Adds a face for each edge with an inner point, and lists it for both ends: faces[MOST_EDGES point ...]. */
+/* Adds a face of the dual for each edge of which an end is an inner point. Lists the face for both ends; the list of a
+ * point begins at faces[MOST_EDGES * point]. */
 static void add_dual_faces(const tet_mesh *m, test_mesh *out, int64_t *faces, int *counts)
 {
     for (int64_t i = 0; i < m->table_size; i++) {
@@ -336,7 +338,7 @@ void test_mesh_make_dual(int n, double jitter, test_function *f, test_mesh *out)
     free(counts);
 }
 
-/* ---- both kinds ---- */
+/* ---- random polyhedra and duals ---- */
 
 void test_mesh_split_quads(test_mesh *mesh)
 {

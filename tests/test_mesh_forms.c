@@ -36,7 +36,7 @@ bool formed_mesh_has_corners(mesh_form form)
     return form < MESH_POLYHEDRA || form == MESH_SHELLS;
 }
 
-/* ---- the part -------------------------------------------------------------------------------------------------- */
+/* ---- the part of the mesh ------------------------------------------------------------------------------------- */
 
 static test_mesh_kind get_mesh_kind(mesh_form form)
 {
@@ -44,7 +44,7 @@ static test_mesh_kind get_mesh_kind(mesh_form form)
     return form <= MESH_ROWS ? kinds[form] : TEST_MIXED;
 }
 
-/* Makes a mesh whose cells are the faces of polyhedra; some of them are polygons. */
+/* Turns a mesh of polyhedra into a mesh whose cells are the faces of the polyhedra: triangles, quads and polygons. */
 static void make_mesh_of_faces(test_mesh *part)
 {
     const int64_t count = part->face_count;
@@ -79,7 +79,7 @@ static void make_part(formed_mesh *m)
     if (m->form == MESH_SHELLS) make_mesh_of_faces(&m->part);
 }
 
-/* ---- the forms ------------------------------------------------------------------------------------------------- */
+/* ---- descriptions of the part in each form --------------------------------------------------------------------- */
 
 static void describe_tets(formed_mesh *m)
 {
@@ -98,7 +98,7 @@ static void describe_hexes(formed_mesh *m)
     m->ids = test_allocate(m->part.vertex_count, sizeof *m->ids);
     for (int64_t v = 0; v < m->part.vertex_count; v++) {
         const double *p = m->part.coordinates + 3 * v;
-        int64_t id = 0; /* distinct vertices of a lattice are more than a hundredth apart */
+        int64_t id = 0; /* vertices of the lattice are more than a hundredth apart, so that ids are distinct */
         for (int axis = 0; axis < 3; axis++) id = 1000 * id + (int64_t)(100 * (p[axis] + 2));
         m->ids[v] = id;
     }
@@ -158,8 +158,8 @@ void formed_mesh_resize_fields(formed_mesh *m)
     if (m->mesh.cell_count == 0 || m->mesh.face_count == 0) m->fields[FORMED_C].patch_count = 0;
 }
 
-/* Defines the patch of the boundary: the last faces in the order of owners are on the boundary of the part; the patch
- * is one of them that is also on the boundary of the whole mesh. */
+/* Defines a boundary patch with one face. In the order of owners, the last faces are on the boundary of the rank's
+ * part; the patch is one of them that is also on the boundary of the whole mesh. */
 static void describe_patch(formed_mesh *m)
 {
     const int64_t *offsets = m->faces.offsets;
@@ -205,7 +205,7 @@ static void describe_fields(formed_mesh *m)
     formed_mesh_resize_fields(m);
 }
 
-/* ---- the whole ------------------------------------------------------------------------------------------------- */
+/* ---- creation and submission ----------------------------------------------------------------------------------- */
 
 void formed_mesh_create(mesh_form form, int side, int rank, int count, formed_mesh *out)
 {

@@ -1,6 +1,6 @@
-/* Makes meshes with hanging nodes (test_mesh_hanging.h): vertices are on the lattice of the smallest cells, and are
- * created when a cell first needs them. A vertex on a cube's boundary is an interpolation of the cube's corners, the
- * same for all cubes around it, because the map of a cube is bilinear on its faces. */
+/* Makes meshes with hanging nodes (test_mesh_hanging.h). All vertices lie on the lattice of the smallest cells and are
+ * created when a cell first uses them. The position of a vertex on the boundary of a cube is interpolated from the
+ * cube's corners. It is the same for all cubes at this vertex, because the map of a cube is bilinear on its faces. */
 #include "test_mesh_hanging.h"
 
 #include <stdlib.h>
@@ -12,8 +12,9 @@ typedef struct hanging {
     int n, side;
     test_hanging_shape shape;
     test_function *f;
-    int64_t line;      /* number of vertices of the finest lattice along an axis */
-    int64_t *vertices; /* number of the mesh's vertex by index in that lattice; -1: not created yet */
+    int64_t line; /* number of lattice points along an axis of the finest lattice */
+    /* index of the mesh's vertex for each point of the finest lattice; -1 if it is not created yet */
+    int64_t *vertices;
     test_mesh *mesh;
 } hanging;
 
@@ -32,7 +33,7 @@ static void map_cube_to_ball(const double p[3], double out[3])
     }
 }
 
-/* Rotates about the axis (1, 2, 3) by an angle of cosine 0.8, and scales by 0.55. */
+/* Rotates about the axis (1, 2, 3) by an angle whose cosine is 0.8, and scales by 0.55. */
 static void rotate_position(const double p[3], double out[3])
 {
     const double length = sqrt(14), axis[3] = {1 / length, 2 / length, 3 / length};
@@ -54,13 +55,13 @@ static void map_position(const hanging *h, const double p[3], double out[3])
         memcpy(out, p, 3 * sizeof *out);
 }
 
-/* Computes the position of a lattice point of the finest lattice in the cube [-1, 1]^3. */
+/* Computes the position of a point of the finest lattice in the cube [-1, 1]^3. */
 static void compute_lattice_position(const hanging *h, const int64_t at[3], double out[3])
 {
     for (int a = 0; a < 3; a++) out[a] = 2.0 * (double)at[a] / (double)(h->n * h->side) - 1;
 }
 
-/* Interpolates position and value at a lattice point from the corners of its cube. */
+/* Interpolates the position and the value at a lattice point from the corners of the cube that contains it. */
 static void interpolate_in_cube(const hanging *h, const int64_t at[3], double position[3], double *value)
 {
     int64_t cube[3];
@@ -99,7 +100,8 @@ static int64_t find_or_add_vertex(hanging *h, const int64_t at[3])
     return *vertex;
 }
 
-/* Adds the cells of a cube that begins at `at` and is `width` cubes of the finest lattice wide. */
+/* Adds the cells of a cube whose lowest corner is the lattice point `at` and whose side is `width` steps of the finest
+ * lattice. */
 static void add_cells(hanging *h, test_mesh_kind kind, const int64_t at[3], int width)
 {
     int64_t corners[8];

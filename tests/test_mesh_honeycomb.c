@@ -1,7 +1,8 @@
 /* Makes hexagonal prisms (test_mesh_honeycomb.h).
  *
- * A layer is a wall of bricks, whose every second row is shifted by half a brick. A corner of a row's bricks is in the
- * middle of an edge of the neighbouring row, and is moved towards that row, which makes the bricks hexagons:
+ * A layer of prisms is a wall of bricks. Every second row of bricks is shifted by half a brick, so that a corner of a
+ * brick is in the middle of an edge in the neighbouring row. The corner is moved towards that row, which makes the
+ * bricks hexagons:
  *
  *      |     |     |                \   / \   /
  *      +--+--+--+--+                 \ /   \ /
@@ -16,7 +17,7 @@
 
 enum { MAX_CORNERS = 6 };
 
-/* A brick's corners in order around it, as indices in a level of vertices. */
+/* The corners of a brick in cyclic order, as indices of vertices in one level (defined below). */
 typedef struct brick {
     int count;
     int64_t corners[MAX_CORNERS];
@@ -24,7 +25,9 @@ typedef struct brick {
 
 typedef struct wall {
     int n;
-    int64_t columns, level; /* number of vertices in a line between rows, and in a level between layers */
+    /* columns: number of vertices on the line between two rows of bricks; level: number of vertices in the plane
+     * between two layers of bricks */
+    int64_t columns, level;
     brick *bricks;
     int64_t brick_count;
 } wall;
@@ -39,8 +42,8 @@ static void *allocate_array(int64_t count, size_t size)
     return p;
 }
 
-/* Makes the brick between columns low and high of a row; a line on the hull has no corners of other bricks in the
- * middle of its edges. */
+/* Makes the brick between the columns low and high of a row. The corners in the middle of its edges belong to bricks of
+ * the neighbouring rows; lines on the hull have none. */
 static brick make_brick(const wall *w, int row, int64_t low, int64_t high)
 {
     brick b = {.count = 0};
@@ -69,7 +72,7 @@ static void place_vertex(const wall *w, int layer, int line, int64_t column, dou
     p[0] = (double)column * side / 2 - 1;
     p[1] = line * side - 1;
     p[2] = layer * side - 1;
-    /* Moves up a vertex at which the row above has a corner, which is in even columns of even rows. */
+    /* Moves a vertex up if the row above has a corner there (line + column is even), else down. */
     if (inner_row && inner_column) p[1] += (line + column) % 2 ? -0.15 * side : 0.15 * side;
     if (inner_row && inner_column && layer > 0 && layer < w->n)
         for (uint64_t a = 0; a < 3; a++) p[a] += jitter * side * (2 * test_uniform(index + a, 9) - 1);
@@ -91,8 +94,8 @@ static int64_t add_face(test_mesh *mesh, const int64_t *vertices, int count)
     return mesh->face_count - 1;
 }
 
-/* Returns the quad above an edge of a brick, adding it only once for the two bricks that share it. first is the number
- * of the layer's first quad. */
+/* Returns the quad above an edge of a brick. If no brick of this layer has added the quad yet, adds it. first: index of
+ * the layer's first quad. */
 static int64_t find_or_add_side_face(const wall *w, int layer, int64_t a, int64_t b, int64_t first, test_mesh *out)
 {
     const int64_t low = layer * w->level + (a < b ? a : b), high = layer * w->level + (a < b ? b : a);
@@ -111,7 +114,7 @@ static void add_layer(const wall *w, int layer, test_mesh *out)
         for (int k = 0; k < b->count; k++)
             out->connectivity[out->connectivity_count++] =
                 find_or_add_side_face(w, layer, b->corners[k], b->corners[(k + 1) % b->count], first, out);
-        /* The horizontal faces were added first, level by level. */
+        /* The horizontal faces have the lowest indices, level by level. */
         out->connectivity[out->connectivity_count++] = layer * w->brick_count + i;
         out->connectivity[out->connectivity_count++] = (layer + 1) * w->brick_count + i;
         out->types[out->cell_count++] = GRID_POLYHEDRON;

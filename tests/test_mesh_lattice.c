@@ -1,8 +1,8 @@
-/* Makes lattices cube by cube from the corners of a cube, numbered by bits (bit 0: +x, bit 1: +y, bit 2: +z). Tets and
- * wedges split the faces of a cube along the diagonal from the lowest to the highest corner, which is the same seen
- * from both sides. The mixed mesh is conforming: a cube of even parity is a hex, two wedges or six tets; a cube of odd
- * parity has only even neighbours, and has a pyramid on each face that is a quad of the neighbour, and two tets on each
- * face that is two triangles. */
+/* Makes lattices cube by cube. The corners of a cube are numbered by bits (bit 0: +x, bit 1: +y, bit 2: +z). Tets and
+ * wedges split the faces of a cube along the diagonal from the lowest to the highest corner, so that both cubes at a
+ * face use the same diagonal. The mixed mesh is conforming. A cube of even parity is a hex, two wedges or six tets. A
+ * cube of odd parity has only even neighbours: it has a pyramid on each face that is a quad of the neighbour, and two
+ * tets on each face that is two triangles of the neighbour. */
 #include "test_mesh_make.h"
 
 const char *test_mesh_kind_name(test_mesh_kind kind)
@@ -26,7 +26,7 @@ static void lattice_vertices(test_mesh *mesh, int n, double jitter)
             }
 }
 
-/* The six faces of a cube whose corners are numbered by bits, each in order around. */
+/* The six faces of a cube; the corners of each face are in cyclic order. */
 static const int cube_faces[6][4] = {{0, 2, 6, 4}, {1, 3, 7, 5}, {0, 1, 5, 4},
                                      {2, 3, 7, 6}, {0, 1, 3, 2}, {4, 5, 7, 6}};
 
@@ -57,7 +57,8 @@ void test_mesh_add_cube(test_mesh *mesh, test_mesh_kind kind, const int64_t *cor
         add_tets(mesh, corners);
 }
 
-/* Connects the cube's face (from cube_faces) to its centre: by two tets if is_split, else by a pyramid. */
+/* Connects a face of the cube (one of cube_faces) to the cube's centre, by two tets if is_split is set, else by a
+ * pyramid. */
 static void close_face(test_mesh *mesh, const int64_t *corners, int64_t centre, const int face[4], bool is_split)
 {
     const int64_t v[5] = {corners[face[0]], corners[face[1]], corners[face[2]], corners[face[3]], centre};
@@ -77,7 +78,7 @@ static int64_t add_centre(test_mesh *mesh, const int64_t *corners)
     return test_mesh_add_vertex(mesh, p);
 }
 
-/* Returns the kind of the cube of even parity at a position of the mixed mesh: 0 for a hex, 1 for wedges, 2 for
+/* Returns the type of an even cube of the mixed mesh, by a hash of its position: 0 for a hex, 1 for wedges, 2 for
  * tets. */
 static int choose_mixed_cell_type(const int place[3])
 {

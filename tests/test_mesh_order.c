@@ -45,9 +45,10 @@ const int order_kind_count = sizeof order_kinds / sizeof order_kinds[0];
 
 /* ---- nodes between corners ------------------------------------------------------------------------------------- */
 
-/* The corners that each node beyond the corners is in the middle of, as letters: "ab" between corners 0 and 1. */
+/* Nodes of a cell that are not corners. A word lists the corners of which the node is the mean, as letters: "ab" is the
+ * middle between corners 0 and 1. */
 typedef struct node_list {
-    insitu_cell_type type; /* the linear one */
+    insitu_cell_type type; /* the linear cell type */
     insitu_vertex_order layout;
     const char *nodes;
 } node_list;
@@ -91,7 +92,7 @@ static int get_listed_node_count(insitu_cell_type type)
     }
 }
 
-/* Weights of the corners, for each node. */
+/* Weights of the corners for each node of a cell. */
 typedef struct node_weights {
     int count;
     double of[216][8];
@@ -145,7 +146,8 @@ static void make_loop_nodes(const order_kind *kind, node_weights *out)
 
 /* ---- cells in a cube ------------------------------------------------------------------------------------------- */
 
-/* Corners of a cube's cells: 0..7 by bits along x, y, z; 8 its middle. */
+/* Lists the cells of a cube. Corners are 0 to 7 by bits along x, y, z; 8 is the cube's middle. Returns the number of
+ * cells. */
 static int get_cells_of_cube(insitu_cell_type linear, const signed char (**cells)[8])
 {
     static const signed char hex[1][8] = {{0, 1, 3, 2, 4, 5, 7, 6}};
@@ -158,11 +160,12 @@ static int get_cells_of_cube(insitu_cell_type linear, const signed char (**cells
     return linear == INSITU_TET || linear == INSITU_PYRAMID ? 6 : linear == INSITU_WEDGE ? 2 : 1;
 }
 
-/* Places are whole numbers of 1 / units of a cube's side. */
+/* Makes an order_mesh. Node positions are integers in units of 1 / `units` of a cube's side; across: number of such
+ * positions along an axis. */
 typedef struct maker {
     order_mesh *out;
     int units, across;
-    int64_t *numbers; /* of places; -1: none yet */
+    int64_t *numbers; /* index of the vertex at each position; -1 if it is not created yet */
     double bend;
 } maker;
 

@@ -1,4 +1,4 @@
-/* Distributes cells to ranks, and makes a rank's part of a mesh. */
+/* Assigns cells to ranks, and extracts the part of a rank from a mesh. */
 #include "test_mesh_make.h"
 
 #include <math.h>
@@ -43,7 +43,7 @@ void test_partition_cells(const test_mesh *mesh, test_partition_kind kind, int n
     }
 }
 
-/* Returns the part's number of a vertex, which is assigned at its first use. */
+/* Returns the index of a vertex in the part. A vertex is added to the part when it is used for the first time. */
 static int64_t find_or_add_part_vertex(const test_mesh *mesh, int64_t *local, int64_t v, test_mesh *out)
 {
     if (local[v] >= 0) return local[v];

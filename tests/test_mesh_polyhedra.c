@@ -1,4 +1,4 @@
-/* Makes polyhedra of other cells, with faces shared between them. */
+/* Makes polyhedra from other cells. Neighbouring polyhedra share faces. */
 #include "test_mesh_make.h"
 
 #include <stdlib.h>
@@ -14,11 +14,11 @@ const test_faces *test_faces_of(int type)
     return type == GRID_TET ? &tet : type == GRID_HEX ? &hex : type == GRID_WEDGE ? &wedge : &pyramid;
 }
 
-/* Table of faces by their vertices in any order; each face is added once. */
+/* A hash table of faces, found by their vertices in any order. Each face is added one time. */
 typedef struct face_table {
     test_mesh *mesh;
     int64_t size;
-    int64_t (*keys)[4]; /* sorted vertices; -1 in the first: an empty slot */
+    int64_t (*keys)[4]; /* sorted vertices of the face; the first is -1 if the slot is empty */
     int64_t *faces;
     int64_t (*cells)[2];
 } face_table;
@@ -39,7 +39,7 @@ static void face_table_free(face_table *t)
     free(t->cells);
 }
 
-/* Finds a cell's face in the table, and records the cell there. */
+/* Finds or adds a cell's face in the table and records the cell there. Returns the slot. */
 static int64_t face_table_find(face_table *t, const int64_t *vertices, int count, int64_t cell)
 {
     int64_t key[4] = {INT64_MAX, INT64_MAX, INT64_MAX, INT64_MAX};
@@ -94,13 +94,13 @@ void test_mesh_to_polyhedra(test_mesh *mesh, double share)
     test_mesh_free(&old);
 }
 
-/* Tets that are joined to one polyhedron, and the faces of its surface. */
+/* Tets that are joined into one polyhedron, and the faces on its surface. */
 enum { GROUP_TETS = 6 };
 
 typedef struct tet_group {
     int count, face_count;
     int64_t tets[GROUP_TETS];
-    int64_t faces[4 * GROUP_TETS]; /* slots in the table */
+    int64_t faces[4 * GROUP_TETS]; /* slots of the face table */
 } tet_group;
 
 static void group_toggle(tet_group *g, int64_t face)
@@ -113,7 +113,7 @@ static void group_toggle(tet_group *g, int64_t face)
     g->faces[g->face_count++] = face;
 }
 
-/* Returns whether every edge of the surface has two faces. */
+/* Returns whether every edge of the group's surface belongs to exactly two faces. */
 static bool group_is_closed(const tet_group *g, const face_table *t)
 {
     for (int i = 0; i < g->face_count; i++)
@@ -135,7 +135,7 @@ static void group_add(tet_group *g, const int64_t (*faces_of)[4], int64_t tet)
     for (int i = 0; i < 4; i++) group_toggle(g, faces_of[tet][i]);
 }
 
-/* Adds a neighbouring tet to the group, if there is one that leaves the surface closed. */
+/* Adds a neighbouring tet with which the surface remains closed. Returns false if there is none. */
 static bool group_grow(tet_group *g, const face_table *t, const int64_t (*faces_of)[4], const bool *is_taken)
 {
     for (int i = 0; i < g->face_count; i++)

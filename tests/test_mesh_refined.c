@@ -20,13 +20,13 @@ static const order_kind hex_20 = {"hex 20", INSITU_QUADRATIC_HEX, INSITU_ORDER_V
 static const order_kind hex_27 = {"hex 27", INSITU_TRIQUADRATIC_HEX, INSITU_ORDER_VTK, 2};
 static const order_kind wedge_18 = {"wedge 18", INSITU_BIQUADRATIC_WEDGE, INSITU_ORDER_VTK, 2};
 
-/* Nodes of finer lattices, cell by cell. */
+/* A mesh of cells of order ORDER that is made by refining quadratic cells. Each cell has its own nodes. */
 typedef struct fine_nodes {
     insitu_mesh mesh;
     double *coordinates;
 } fine_nodes;
 
-/* Interpolates the nodes of a cell. */
+/* Interpolates the nodes of the finer lattice in a cell and adds them. */
 static void refine_cell(const session_interpolation *of, const order_mesh *mesh, int64_t cell, fine_nodes *out)
 {
     double nodes[27][3], corners[8][3];
@@ -42,8 +42,8 @@ static void refine_cell(const session_interpolation *of, const order_mesh *mesh,
     free(work);
 }
 
-/* Refines the cells in columns of cubes along z: all (column is -1), those with an even number, or those with an odd
- * one. */
+/* Refines the cells in columns of cubes along z: all columns if `column` is -1, else the even (0) or the odd ones
+ * (1). */
 static void refine_cells(const order_kind *kind, int side, double bend, int column, fine_nodes *out)
 {
     order_mesh mesh;
@@ -67,7 +67,7 @@ static void refine_cells(const order_kind *kind, int side, double bend, int colu
     order_mesh_free(&mesh);
 }
 
-/* Adds the pieces of the finer lattices, and frees these. */
+/* Adds the linear pieces between the nodes to the mesh. Frees the nodes. */
 static void add_pieces(fine_nodes *nodes, test_mesh *out)
 {
     static const int in_order[GRID_MAX_CELL_VERTICES] = {0, 1, 2, 3, 4, 5, 6, 7};

@@ -1,4 +1,4 @@
-/* The linear pieces of cells of higher order that fill the cube [-1, 1]^3. */
+/* Meshes of the linear pieces into which cells of higher order are split. They fill the cube [-1, 1]^3. */
 #ifndef TEST_MESH_REFINED_H
 #define TEST_MESH_REFINED_H
 
@@ -12,9 +12,10 @@ typedef enum refined_kind {
     REFINED_MIXED
 } refined_kind;
 
-/* Makes side^3 cubes of quadratic cells, with two pieces between two nodes: tets of 10 nodes, hexes of 20 or 27, wedges
- * of 18, or columns of the last two in turn. bend: how far nodes inside and on the faces of the cube are moved. Each
- * cell has vertices of its own, as the library has them. */
+/* Makes side^3 cubes of quadratic cells, each edge between two neighbouring nodes divided into two pieces. Cells are
+ * tets of 10 nodes, hexes of 20 or 27 nodes, wedges of 18 nodes, or columns of 27-node hexes and wedges in turn. bend:
+ * distance by which nodes inside and on the faces of the cube are moved. Each cell has its own vertices, as in the
+ * library. */
 void test_mesh_make_refined(refined_kind kind, int side, double bend, test_function *f, test_mesh *out);
 
 #endif

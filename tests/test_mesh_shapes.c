@@ -1,4 +1,4 @@
-/* Makes single cells, valid and degenerate. */
+/* Makes meshes with a single cell, valid or degenerate. */
 #include "test_mesh_make.h"
 
 #include <math.h>

@@ -1,4 +1,4 @@
-/* Makes a grid of a mesh in a chosen layout. */
+/* Makes a grid from a test_mesh in a chosen layout. */
 #include "test_mesh_make.h"
 
 #include <math.h>

@@ -1,4 +1,4 @@
-/* Basic functions of all meshes for tests and benchmarks. */
+/* Basic functions of test meshes: random numbers, fields, allocation, and adding of elements. */
 #include "test_mesh_make.h"
 
 #include <math.h>

@@ -1,5 +1,5 @@
-/* Checks the mini-app's mesh: the cells fill the box without gaps or overlaps, whole faces meet whole faces, and no
- * cell of a partition is missing or occurs twice. */
+/* Checks the mini-app's mesh. The cells must fill the box without gaps or overlaps, each face must coincide with one
+ * face of the neighbour, and every cell must belong to exactly one rank of a partition. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -50,7 +50,8 @@ static void check_box(const wave_lattice *lattice)
         }
     }
     double box = h * h * h * (double)wave_lattice_cube_count(lattice);
-    /* Each volume is rounded by about 20 operations on terms of about h^2 times the rounding of a position (2 eps). */
+    /* The rounding error of a volume comes from about 20 operations on terms of about h^2 times the rounding of a
+     * position (2 eps). */
     assert_true(fabs(sum - box) <= 40 * h * h * 2.3e-16 * mesh.own_cells + 1e-15 * box * mesh.own_cells);
     wave_mesh_free(&mesh);
 }
@@ -68,7 +69,8 @@ static void cells_of_every_kind_fill_the_box(void **state)
     }
 }
 
-/* Computes the centroid of a cell with flat faces, by tets from vertex 0 over each face's triangles. */
+/* Computes the centroid of a cell with flat faces. The cell is divided into tets between vertex 0 and the triangles of
+ * each face. */
 static void compute_exact_centroid(const wave_cell_shape *shape, double x[8][3], double centroid[3])
 {
     double volume = 0, e[3][3];
@@ -105,7 +107,7 @@ static void centroids_of_flat_cells_are_exact(void **state)
                 for (int i = 0; i < shape->vertex_count; ++i) wave_lattice_vertex(&lattice, cells[c].vertex[i], x[i]);
                 wave_cell_measure(shape, (const double(*)[3])x, cells[c].vertex, &g);
                 compute_exact_centroid(shape, x, exact);
-                /* about 50 roundings of coordinates of at most 2 */
+                /* tolerance: about 50 roundings of coordinates of at most 2 */
                 for (int a = 0; a < 3; ++a) assert_true(fabs(g.centroid[a] - exact[a]) <= 50 * 2 * 2.3e-16);
             }
         }
@@ -125,7 +127,8 @@ static void mixed_mesh_has_all_four_types(void **state)
     assert_true(seen[10] && seen[12] && seen[13] && seen[14]);
 }
 
-/* Checks the count of unmatched faces, on which the other tests rely: a hex next to tets has faces without a match. */
+/* Checks that unmatched faces are counted, on which the other tests rely: a cell whose face coincides with no other
+ * face must be counted. */
 static void unmatched_faces_are_counted(void **state)
 {
     (void)state;
@@ -134,7 +137,7 @@ static void unmatched_faces_are_counted(void **state)
     wave_partition partition = wave_partition_make(&lattice, WAVE_BLOCK, 1);
     wave_mesh mesh;
     assert_true(wave_mesh_create(&partition, 0, 4, &mesh));
-    /* Give the first tet vertices that no other cell has. */
+    /* Changes a vertex of the first tet, so that its faces match no face of another cell. */
     int32_t *connectivity = mesh.connectivity;
     free(mesh.neighbours);
     connectivity[0] = connectivity[1];
@@ -177,7 +180,7 @@ static void partitions_give_each_cell_to_one_rank(void **state)
     }
 }
 
-/* Checks that the cells which a sends to b are those which b receives from a, in the same order. */
+/* Checks that the cells that rank a sends to rank b are those that b receives from a, in the same order. */
 static void sends_match_receives_of_other_ranks(void **state)
 {
     (void)state;

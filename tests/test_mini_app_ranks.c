@@ -1,5 +1,5 @@
-/* Checks the mini-app on several ranks: each cell of each partition has, to the bit, the state that a single rank
- * computes. */
+/* Checks the mini-app on several ranks: the state of each cell, for each partition, must be bit-identical to the state
+ * that a single rank computes. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -47,7 +47,8 @@ static int compare_ids(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Counts cells (including the halo) and own vertices whose state or position differs from that in the whole mesh. */
+/* Returns the number of cells (including the halo) and own vertices of a part whose state or position differs from that
+ * in the whole mesh. */
 static int count_differences(const model *part, const model *whole)
 {
     int differences = 0;
@@ -80,7 +81,7 @@ static void compare_partitions(wave_cells cells, wave_partition_kind kind, const
     free_model(&part);
     free_model(&whole);
     assert_int_equal(differences, 0);
-    assert_true(peak > 1e-3); /* the wave is not zero, so that the comparison means something */
+    assert_true(peak > 1e-3); /* the wave is not zero, so that the comparison is not trivially true */
 }
 
 static void every_partition_computes_the_same_bits(void **state)
@@ -104,7 +105,8 @@ static void other_arrays_and_walls_compute_the_same_bits(void **state)
     }
 }
 
-/* Checks that vertices which ranks share are drawn at the same position: the library matches them by their bits. */
+/* Checks that vertices which ranks share have bitwise equal positions after they are moved, because the library matches
+ * them by these bits. */
 static void moved_shared_vertices_stay_equal(void **state)
 {
     (void)state;

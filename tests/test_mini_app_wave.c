@@ -20,7 +20,7 @@ typedef struct model {
     wave_solver solver;
 } model;
 
-/* Returns a setup with speed and density 1 everywhere. */
+/* Returns a setup whose speed and density are 1 in all cells. */
 static wave_setup make_uniform_setup(int order)
 {
     const wave_medium uniform = {.count = 1, .bottom = {-INFINITY}, .speed = {1}, .density = {1}};
@@ -41,8 +41,8 @@ static void free_model(model *m)
     wave_mesh_free(&m->mesh);
 }
 
-/* Returns a pulse along x that is an exact solution, travelling at speed 1 with u = p / Z. At 5 widths it is e^-12.5 of
- * its height. */
+/* Returns the pressure of a pulse along x that is an exact solution: it travels at speed 1 with u = p / Z. At a
+ * distance of 5 widths it is e^-12.5 of its height. */
 static double exact_pulse(double x, double time)
 {
     double r = (x + 0.35 - time) / 0.12;
@@ -60,7 +60,7 @@ static void set_pulse(model *m)
     wave_solver_start(&m->solver);
 }
 
-/* Returns the mean of |p - exact| over the box at time 0.6, divided by the pulse's own mean. */
+/* Returns the mean of |p - exact| over the box at time 0.6, divided by the mean of |exact|. */
 static double measure_pulse_error(int n, wave_cells cells, int order)
 {
     const int size[3] = {n, 4, 4};
@@ -94,8 +94,9 @@ static void check_order(wave_cells cells, int order, double least, double most_e
     assert_true(e[2] <= most_error);
 }
 
-/* Checks the order of Fromm's scheme, which is 2. On the other cells the value at a vertex is exact only for linear
- * functions, which limits the order to 2 too; between kinds of cells and at walls it is locally of first order. */
+/* Checks the order of Fromm's scheme, which is 2. On cells other than hexes, the value at a vertex is exact only for
+ * linear functions, which also limits the order to 2. Between different cell types and at walls the scheme is locally
+ * of first order. */
 static void plane_wave_converges_with_order_2_on_hexes(void **state)
 {
     (void)state;
@@ -120,7 +121,8 @@ static void plane_wave_converges_on_pyramids(void **state)
     check_order(WAVE_PYRAMIDS, 2, 1.8, 0.02);
 }
 
-/* Checks the order of Godunov's scheme, which is 1; it is approached from below as the pulse is flattened less. */
+/* Checks the order of Godunov's scheme, which is 1. The measured order approaches 1 from below, as finer grids flatten
+ * the pulse less. */
 static void plane_wave_converges_with_order_1_by_the_first_order_scheme(void **state)
 {
     (void)state;
@@ -132,8 +134,9 @@ static double bell_function(double r)
     return exp(-0.5 * r * r);
 }
 
-/* Returns a downward pulse after 0.8 time units: half of it was reflected at z = -1, where the impedance changes from 1
- * to 3 (R = (3 - 1) / (3 + 1)), and 1 + R of its pressure was transmitted, faster and so stretched by 1.5. */
+/* Returns the pressure of a pulse that travelled downwards for 0.8 time units. At z = -1 the impedance changes from 1
+ * to 3: R = (3 - 1) / (3 + 1), one half, of the pressure was reflected, and 1 + R of it was transmitted. The
+ * transmitted pulse is faster, and therefore longer by a factor of 1.5. */
 static double exact_transmitted_pulse(double z)
 {
     double width = 0.08;
@@ -168,20 +171,21 @@ static void interface_reflects_and_transmits_by_its_impedances(void **state)
             whole += m.solver.volume[c] * exact_transmitted_pulse(x[2]);
         }
         print_message("cells %d: error %.4f behind an interface\n", kind, error / whole);
-        /* The width is 6.4 cubes; the plane pulses above have errors of 0.01 at 4.8 and 0.002 at 9.6 cubes. The
-         * reconstruction smears the kink at the interface over two cells, which doubles the error. */
+        /* The pulse is 6.4 cubes wide; the plane pulses of the tests above have errors of 0.01 at 4.8 cubes and 0.002
+         * at 9.6. The error is twice as large here, because the reconstruction smears the kink at the interface over
+         * two cells. */
         assert_true(error / whole <= 0.02);
         free_model(&m);
     }
 }
 
-/* Checks a step of first order on two cubes of different materials, one on top of the other: it solves the Riemann
- * problem between them and the mirrored ones at the two far walls, by the formula. */
+/* Checks a first-order step on two cubes of different materials, one on top of the other. Compares the result with the
+ * formula of the Riemann problem between the two cubes, and between each cube and its mirror image at the far wall. */
 static void one_step_solves_riemanns_problem(void **state)
 {
     (void)state;
     const int size[3] = {1, 1, 2};
-    /* the lower cube, the upper cube */
+    /* each array: the lower cube, then the upper cube */
     const double c[2] = {1.5, 1}, rho[2] = {2, 1}, p[2] = {0.3, -0.7}, u[2] = {0.4, 0.25};
     wave_setup setup = make_uniform_setup(1);
     model m;
@@ -199,7 +203,7 @@ static void one_step_solves_riemanns_problem(void **state)
     for (int32_t i = 0; i < 2; ++i) {
         double q[4], out = i ? -1 : 1, wall = p[i] - out * rho[i] * c[i] * u[i], k = rho[i] * c[i] * c[i];
         wave_solver_get(&m.solver, i, q);
-        /* cubes of edge 1; about 30 roundings of values of at most 4.5 */
+        /* the edge of a cube is 1; tolerance: about 30 roundings of values of at most 4.5 */
         assert_true(fabs(q[0] - (p[i] - dt * k * out * u_star)) <= 30 * 4.5 * 2.3e-16);
         assert_true(fabs(q[3] - (u[i] - dt / rho[i] * out * (p_star - wall))) <= 30 * 4.5 * 2.3e-16);
         assert_true(fabs(q[1]) + fabs(q[2]) <= 30 * 4.5 * 2.3e-16);
@@ -207,7 +211,7 @@ static void one_step_solves_riemanns_problem(void **state)
     free_model(&m);
 }
 
-/* Sets a Gaussian pressure at rest, slightly off the middle. */
+/* Sets a Gaussian pressure, slightly off the middle of the box, with velocity 0. */
 static void set_bump(model *m, double sharpness)
 {
     for (int32_t c = 0; c < m->mesh.own_cells; ++c) {
@@ -220,10 +224,10 @@ static void set_bump(model *m, double sharpness)
     wave_solver_start(&m->solver);
 }
 
-/* Checks that mass is conserved in a box with rigid walls: every flux leaves one cell and enters another, with the same
- * area and, up to the rounding from the vertices' order, the same value. A step rounds V p / K of each cell by about 60
- * eps of the terms, which are about as large as the cell's own value; the errors of the 100 steps have random signs,
- * but the bound assumes equal signs. */
+/* Checks that mass is conserved in a box with rigid walls. Every flux leaves one cell and enters another with the same
+ * area and the same value, up to rounding that depends on the order of vertices. A step rounds V p / K of each cell by
+ * about 60 eps of the terms, which are about as large as the cell's own value. The errors of the 100 steps have random
+ * signs, but the tolerance assumes equal signs. */
 static void mass_is_conserved_between_rigid_walls(void **state)
 {
     (void)state;
@@ -245,8 +249,8 @@ static void mass_is_conserved_between_rigid_walls(void **state)
     }
 }
 
-/* Checks that the source adds the volume it promises: nothing by the end of the wavelet; half way, the integral of its
- * rate. */
+/* Checks that the source adds the integral of its rate to the volume. It is measured half way through the wavelet,
+ * because the integral over the whole wavelet is 0. */
 static void source_adds_the_stated_volume(void **state)
 {
     (void)state;
@@ -262,13 +266,13 @@ static void source_adds_the_stated_volume(void **state)
         injected += m.solver.time_step * wave_source_rate(&setup.source, m.solver.time + 0.5 * m.solver.time_step);
         wave_solver_step(&m.solver);
     }
-    /* The ball is sampled at cell centres no farther apart than its radius: its sum is 1 to within 2 exp(-2 pi^2) per
-     * axis, and 1.6e-5 is cut off at 5 radii. */
+    /* The source is a ball, sampled at cell centres whose distance is at most its radius. The sum of the samples is 1
+     * to within 2 exp(-2 pi^2) per axis, and the ball is cut off at 5 radii, which omits 1.6e-5. */
     assert_true(fabs(wave_solver_totals(&m.solver).mass / injected - 1) < 1e-4);
     free_model(&m);
 }
 
-/* Checks the controls of a source: a factor on its rate, and repetition of its pulse. */
+/* Checks the parameters that steer a source: a factor on its rate, and the repetition of its pulse. */
 static void source_follows_steering_parameters(void **state)
 {
     (void)state;
@@ -283,14 +287,15 @@ static void source_follows_steering_parameters(void **state)
         const double time = i * 0.0625, rate = wave_source_rate(&once, time);
         assert_true(rate != 0);
         assert_true(fabs(wave_source_rate(&strong, time) - 2 * rate) <= 0);
-        assert_true(fabs(wave_source_rate(&again, time + 6) - rate) <= 0); /* times are sums of powers of 2 */
+        /* times are sums of powers of 2, so that they are exact */
+        assert_true(fabs(wave_source_rate(&again, time + 6) - rate) <= 0);
         assert_true(fabs(wave_source_rate(&once, time + 6)) < 1e-30);
     }
 }
 
 /* Checks that energy does not increase. Upwind fluxes only dissipate: for the first-order scheme within its time step
- * this is a theorem, for any cells and any layers. For the second-order scheme there is no proof; it must not gain
- * energy over the run. */
+ * this is proved, for any cells and any layers. For the second-order scheme there is no proof; the test checks that it
+ * gains no energy over the run. */
 static void energy_does_not_increase(void **state)
 {
     (void)state;
@@ -317,9 +322,9 @@ static void energy_does_not_increase(void **state)
     }
 }
 
-/* Checks absorbing walls: such a wall reflects (1 - cos t) / (1 + cos t) of a wave that arrives at an angle t to its
- * normal: from the middle of the box at most 0.27 (in the corners), which is 0.02 to 0.03 of the energy over all
- * directions. Rigid walls reflect everything, and only the scheme dissipates. */
+/* Checks absorbing walls. They reflect (1 - cos t) / (1 + cos t) of a wave that arrives at an angle t to their normal.
+ * For waves from the middle of the box, this is at most 0.27 (in the corners), or 0.02 to 0.03 of the energy over all
+ * directions. Rigid walls reflect all energy, and only the scheme dissipates. */
 static void absorbing_walls_do_not_reflect_a_wave(void **state)
 {
     (void)state;
@@ -339,7 +344,7 @@ static void absorbing_walls_do_not_reflect_a_wave(void **state)
     }
 }
 
-/* Returns the signed volume of a tet at its drawn positions. */
+/* Returns the signed volume of a tet whose vertices are at the displaced positions that are drawn. */
 static double compute_drawn_volume(const model *m, int32_t cell)
 {
     const float *x = m->solver.grid.coordinates.values;
@@ -354,8 +359,8 @@ static double compute_drawn_volume(const model *m, int32_t cell)
            6;
 }
 
-/* Checks that the default displacement of vertices is visible and inverts no cell: the pictures are to show a wave, not
- * torn cells. */
+/* Checks that the default displacement of vertices is large enough to be visible and inverts no cell, because pictures
+ * should show a wave and not torn cells. */
 static void moving_mesh_inverts_no_cells(void **state)
 {
     (void)state;
@@ -405,7 +410,7 @@ static void float_result_is_near_double_result(void **state)
         peak[i] = wave_solver_totals(&m.solver).peak;
         free_model(&m);
     }
-    /* 50 steps of about 60 roundings of 6e-8, of values of at most 1 */
+    /* tolerance: 50 steps with about 60 roundings by 6e-8 of values of at most 1 */
     assert_true(fabs(peak[0] - peak[1]) <= 50 * 60 * 6e-8);
 }
 

@@ -1,5 +1,5 @@
-/* Compares the tree with brute force over all cells in double, after building and refitting, and checks lack of memory,
- * for both layouts and both builders. */
+/* Compares the tree with brute force over all cells in double, after building and after refitting. Also checks failed
+ * allocations. All tests run for both layouts and both builders. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -16,7 +16,7 @@
 
 static const double no_shift[3] = {0, 0, 0};
 
-static mmbvh_options variant; /* the layout and the builder that all tests of a group use */
+static mmbvh_options variant; /* layout and builder of the current group of tests */
 
 static mmbvh_options make_thread_options(int threads)
 {
@@ -35,7 +35,7 @@ static mmbvh build_with_threads(const lattice *l, const grid_field *field, int t
     return tree;
 }
 
-/* Computes the box of a cell in the tree's coordinates, in double. */
+/* Computes the box of a cell in the tree's coordinates in double. */
 static void compute_cell_box(const lattice *l, const mmbvh *tree, int64_t cell, double lower[3], double upper[3])
 {
     int64_t vertices[GRID_MAX_CELL_VERTICES];
@@ -53,7 +53,7 @@ static void compute_cell_box(const lattice *l, const mmbvh *tree, int64_t cell, 
     }
 }
 
-/* Rounds down by functions of the C library, not by the tree's own. */
+/* Rounds down by functions of the C library, not by those of the tree. */
 static float round_down_to_float(double x)
 {
     const float f = (float)x;
@@ -66,7 +66,7 @@ static float round_up_to_float(double x)
     return (double)f < x ? nextafterf(f, INFINITY) : f;
 }
 
-/* Computes a leaf's box and range by brute force. */
+/* Computes a leaf's box and range of values by brute force. */
 static node_view compute_leaf_by_brute_force(const lattice *l, const mmbvh *tree, const grid_field *field,
                                              int64_t index)
 {
@@ -98,9 +98,9 @@ static node_view compute_leaf_by_brute_force(const lattice *l, const mmbvh *tree
     return leaf;
 }
 
-/* Checks a box's excess. The compact layout rounds a lower bound down to a whole step, and one step more if the
- * quotient is rounded in the wrong direction. It rounds an extent, measured from the stored lower bound, up by at most
- * 1/256 of itself and 16 steps. */
+/* Checks that a box is hardly larger than expected. The compact layout rounds a lower bound down to a whole step, and
+ * by one step more if the quotient is rounded in the wrong direction. It measures an extent from the stored lower bound
+ * and rounds it up by at most 1/256 of itself and 16 steps. */
 static void assert_tight_box(const mmbvh *tree, const node_view *node, const node_view *expected)
 {
     for (int axis = 0; axis < 3; axis++) {
@@ -113,7 +113,7 @@ static void assert_tight_box(const mmbvh *tree, const node_view *node, const nod
     }
 }
 
-/* Checks that boxes are no larger than necessary; mmbvh_check proves that they contain their cells. */
+/* Checks that boxes are no larger than necessary. mmbvh_check() checks that they contain their cells. */
 static void assert_tight(const lattice *l, const mmbvh *tree, const grid_field *field)
 {
     for (int64_t i = 0; i < tree->node_count; i++) {
@@ -172,7 +172,7 @@ static void shifted_and_scaled_bounds_are_rounded_outward(void **state)
     free_lattice(&l);
 }
 
-/* Checks 178,746 tets: enough that the root itself is split in chunks by several threads. */
+/* Checks a mesh of 178,746 tets, which is large enough that several threads split the root in chunks. */
 static void same_bytes_for_any_number_of_threads(void **state)
 {
     (void)state;
@@ -198,7 +198,7 @@ static void ghosts_are_not_in_the_tree(void **state)
     l.ghosts = calloc((size_t)l.g.cell_count, 3);
     int64_t ghosts = 0;
     for (int64_t cell = 0; cell < l.g.cell_count; cell++) {
-        /* makes the bounds of the remaining cells smaller than those of all cells */
+        /* makes the bounds of the cells that are not ghosts smaller than those of all cells */
         const bool outer = cell < l.g.cell_count / 3;
         l.ghosts[3 * cell] = outer || hash_to_unit_interval((uint64_t)cell) < 0.4 ? 2 : 0;
         ghosts += l.ghosts[3 * cell] != 0;
@@ -220,7 +220,7 @@ static void ghosts_are_not_in_the_tree(void **state)
     free_lattice(&l);
 }
 
-/* Sets the values of some vertices to NaN or infinity; returns how many cells have such a vertex. */
+/* Sets the values of some vertices to NaN or infinity. Returns the number of cells that have such a vertex. */
 static int64_t corrupt_vertex_values(lattice *l)
 {
     for (int64_t v = 0; v < l->g.vertex_count; v++) {
@@ -292,7 +292,7 @@ static void no_field_gives_infinite_ranges(void **state)
     free_lattice(&l);
 }
 
-/* Checks 29,791 hexes: more nodes than one task of a refit processes. */
+/* Checks a mesh of 29,791 hexes: its tree has more nodes than one task of a refit processes. */
 static void refitted_ranges_equal_a_fresh_build(void **state)
 {
     (void)state;
@@ -313,7 +313,8 @@ static void refitted_ranges_equal_a_fresh_build(void **state)
     free_lattice(&l);
 }
 
-/* Checks every kind and layout, with zeros of both signs, and in doubles with numbers that are not exact in float. */
+/* Checks refitted ranges for every kind of cell and every layout. Values include zeros of both signs and, if values are
+ * double, numbers that are not exact in float. */
 static void refitted_ranges_are_tight_in_every_layout(void **state)
 {
     (void)state;
@@ -369,7 +370,7 @@ static void refitted_bounds_contain_moved_vertices_tightly(void **state)
     }
 }
 
-/* Checks that the pairs of a second field are the ranges that the nodes would have if the tree were refitted to that
+/* Checks that the ranges computed for a second field equal the ranges of the nodes of a tree that is refitted to this
  * field. */
 static void assert_pairs_equal_refit(lattice *l, const mmbvh *tree, const grid_field *field)
 {
@@ -404,11 +405,11 @@ static void additional_fields_have_separate_ranges(void **state)
                         .component_stride = 8,
                         .component_count = 3,
                         .component = 1};
-    assert_pairs_equal_refit(&l, &tree, &field); /* for a component of a vector at the vertices */
+    assert_pairs_equal_refit(&l, &tree, &field); /* a component of a vector at the vertices */
     field.component = -1;
-    assert_pairs_equal_refit(&l, &tree, &field); /* for the magnitude of the vector */
+    assert_pairs_equal_refit(&l, &tree, &field); /* the magnitude of the vector */
     field.is_cell_centred = true;
-    assert_pairs_equal_refit(&l, &tree, &field); /* for a field at the cells */
+    assert_pairs_equal_refit(&l, &tree, &field); /* a field in cells */
     field.component = 2;
     assert_pairs_equal_refit(&l, &tree, &field);
 
@@ -423,7 +424,7 @@ static void additional_fields_have_separate_ranges(void **state)
     free_lattice(&l);
 }
 
-/* Makes `count` cells, all the same tet; the vertices are those of a single cube. */
+/* Makes `count` cells that are all the same tet. The vertices are those of a single cube. */
 static lattice make_coincident(int64_t count)
 {
     lattice l = make_lattice(1, LATTICE_TETS, (lattice_layout){0});
@@ -443,8 +444,8 @@ static void coincident_cells_are_split_in_halves(void **state)
         mmbvh tree = build_with_threads(&l, &l.field, 2);
         const mmbvh_statistics s = assert_proved(&tree, &l.g, &l.field);
         const int64_t halvings = counts[i] > 7 ? (int64_t)ceil(log2((double)counts[i] / 7)) : 0;
-        /* Along the space-filling curve, coinciding cells are ordered by their number and split down to four
-         * consecutive ones. */
+        /* In the order of the space-filling curve, cells at the same position are ordered by their index. They are
+         * split until a leaf has four consecutive cells. */
         const int64_t most = variant.builder == MMBVH_SAH ? halvings : (int64_t)ceil(log2((double)counts[i] + 1)) - 2;
         assert_true(s.depth <= (most > 0 ? most : 0) + 1);
         assert_int_equal(s.leaves, counts[i] == 0 ? 0 : counts[i] <= 7 ? 1 : s.leaves);
@@ -454,8 +455,9 @@ static void coincident_cells_are_split_in_halves(void **state)
     }
 }
 
-/* Checks the depth for boxes on the six half axes, each 17 times nearer to the origin than the previous one: a plane
- * between 16 equal bins separates hardly more than one of the 174. copies is the number of copies of each box. */
+/* Checks the depth of the tree for 174 boxes on the six half axes. Each box is 17 times nearer to the origin than the
+ * previous one on its half axis, so that a plane between 16 equal bins separates hardly more than one box. copies:
+ * number of copies of each box. */
 static void assert_depth_of_shrinking_boxes(int64_t copies)
 {
     enum { STEPS = 29, PLACES = 6 * STEPS };
@@ -473,7 +475,7 @@ static void assert_depth_of_shrinking_boxes(int64_t copies)
     base_error error = {0};
     mmbvh_statistics s = {0};
     if (mmbvh_check(&tree, NULL, NULL, &s, &error)) fail_msg("%s", error.message);
-    /* otherwise the trees are not deep enough to test the limit */
+    /* if the tree were less deep, it would not test the limit of the depth */
     assert_true(variant.builder != MMBVH_SAH || s.depth > MMBVH_MAX_DEPTH - 32);
     mmbvh_free(&tree);
     free(lower);
@@ -485,11 +487,11 @@ static void depth_is_bounded_where_cells_shrink_without_end(void **state)
 {
     (void)state;
     assert_depth_of_shrinking_boxes(1);
-    assert_depth_of_shrinking_boxes(2000); /* deep while several threads still build */
+    assert_depth_of_shrinking_boxes(2000); /* the upper levels, which several threads build together, are deep too */
 }
 
-/* Checks boxes of which every seventh, the sample from which the first planes are chosen, lies at 0, and the others at
- * random positions between 1 and 2. */
+/* Checks boxes for which the sample of every seventh box, from which the first split planes are chosen, finds no plane:
+ * the sampled boxes lie at 0, and the others at random positions between 1 and 2. */
 static void split_planes_are_found_if_sampling_finds_none(void **state)
 {
     (void)state;
@@ -510,8 +512,8 @@ static void split_planes_are_found_if_sampling_finds_none(void **state)
     }
 }
 
-/* Checks refitting with one cell far off on either side: one of the root's children is a leaf, the other has all other
- * cells, in either order. */
+/* Checks refitting if one cell is far away, on either side. One child of the root is then a leaf with this cell, and
+ * the other contains all other cells. */
 static void refit_updates_siblings_of_leaves(void **state)
 {
     (void)state;
@@ -567,7 +569,8 @@ static void parent_tree_contains_every_mesh(void **state)
     }
 }
 
-/* Checks that a traversal which enters only boxes that contain a point reaches every cell whose own box contains it. */
+/* Checks that a traversal that enters only boxes which contain a point reaches every cell whose own box contains the
+ * point. */
 static void point_query_finds_every_cell(void **state)
 {
     (void)state;
@@ -578,7 +581,7 @@ static void point_query_finds_every_cell(void **state)
         double p[3];
         for (int axis = 0; axis < 3; axis++)
             p[axis] = 10 * hash_to_unit_interval((uint64_t)(1000 + 3 * n + axis)) - 0.5;
-        if (n < 50) grid_vertex(&l.g, 13 * n, p); /* also at the corners of boxes */
+        if (n < 50) grid_vertex(&l.g, 13 * n, p); /* the first points are vertices, which lie at corners of boxes */
         memset(met, 0, (size_t)l.g.cell_count * sizeof *met);
         int64_t stack[MMBVH_MAX_DEPTH + 1] = {0};
         for (int height = 1; height > 0;) {
@@ -603,9 +606,9 @@ static void point_query_finds_every_cell(void **state)
     free_lattice(&l);
 }
 
-/* Checks that the tree is efficient: on a lattice of n^3 cubes a ray crosses about 1.5 n of them (the mean chord of a
- * cube is 2/3 of its side, and the ray crosses planes of cells on three axes); a tree that tests 60 boxes and cells for
- * each of them would be useless. */
+/* Checks that the tree is efficient. On a lattice of n^3 cubes a ray crosses about 1.5 n cubes: the mean chord of a
+ * cube is 2/3 of its side, and the ray crosses planes between cells on three axes. A tree that tests 60 boxes and cells
+ * for each crossed cube would be useless. */
 static void cost_grows_with_the_side_not_the_cells(void **state)
 {
     (void)state;
@@ -631,15 +634,16 @@ static void cost_of_a_tree_matches_manual_computation(void **state)
                            {.upper = {1, 2, 1}, .count = 3},
                            {.lower = {2, 0, 0}, .upper = {4, 1, 1}, .count = 2, .ref = 3}};
     const mmbvh tree = {.nodes = nodes, .node_count = 3, .cell_count = 5, .scale = 1};
-    /* Half areas are 14, 5 and 5; the cost is 1 for the root's box, 2 for the pair, and the cells by their probability.
-     * All terms are exact to 1e-15. */
+    /* Half of the boxes' surface areas are 14, 5 and 5. The cost is 1 for the root's box, 2 for the pair of children,
+     * and the number of cells of each leaf times the leaf's probability. All terms are exact to 1e-15. */
     assert_true(fabs(mmbvh_cost(&tree, NULL) - (3 + (3 * 5 + 2 * 5) / 14.0)) < 1e-14);
 }
 
 static void failed_allocations_return_an_error_without_a_leak(void **state)
 {
     (void)state;
-    lattice l = make_lattice(22, LATTICE_TETS, (lattice_layout){0}); /* 63,888 tets: enough for a top and subtrees */
+    /* 63,888 tets: enough for a tree whose top and subtrees are built separately */
+    lattice l = make_lattice(22, LATTICE_TETS, (lattice_layout){0});
     for (int threads = 1; threads <= 2; threads++) {
         const int64_t held = base_memory_held(), before = base_memory_allocations();
         mmbvh tree = build_with_threads(&l, &l.field, threads);
@@ -702,7 +706,7 @@ int main(void)
         cmocka_unit_test(failed_allocations_return_an_error_without_a_leak),
         cmocka_unit_test(wrong_arguments_are_refused),
     };
-    /* test_mmbvh_layout checks that both layouts contain the same tree, for either builder. */
+    /* test_mmbvh_layout checks that both layouts contain the same tree for either builder. */
     static const mmbvh_options variants[] = {{.layout = MMBVH_COMPACT, .builder = MMBVH_SAH},
                                              {.layout = MMBVH_REFERENCE, .builder = MMBVH_SAH},
                                              {.layout = MMBVH_COMPACT, .builder = MMBVH_MORTON}};

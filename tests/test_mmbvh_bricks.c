@@ -1,5 +1,6 @@
-/* Checks trees over lattices whose cells are given by their indices: mmbvh_check() proves them, the ranges of their
- * leaves equal brute force over the cells, also if values are not finite, and small boxes fill their leaves. */
+/* Checks trees over lattices whose cells are addressed by lattice indices instead of connectivity. mmbvh_check() must
+ * find no error; the ranges of leaves must equal brute force over the cells, even if values are not finite; and leaves
+ * over small boxes must be full. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -13,7 +14,8 @@
 
 static const double no_shift[3] = {0, 0, 0};
 
-/* A rectilinear lattice, its values as floats and doubles, and the padding of its arrays, which contains NaN. */
+/* A rectilinear lattice with its values as float and as double. Their arrays are padded, and the padding contains
+ * NaN. */
 typedef struct subject {
     grid_lattice lattice;
     grid g;
@@ -36,7 +38,7 @@ static grid_numbering make_numbering(const int64_t counts[3], int64_t padding, b
         stride = outer;
     }
     *length = stride;
-    for (int axis = 0; axis < 3; axis++) /* the axis of the largest stride has no outer stride */
+    for (int axis = 0; axis < 3; axis++) /* the axis with the largest stride has no outer stride */
         if (out.outer[axis] == (double)stride) out.outer[axis] = out.inverse_outer[axis] = 0;
     return out;
 }
@@ -65,7 +67,7 @@ static void set_values(subject *s, int turn)
             }
 }
 
-/* Makes a lattice; layers is the number of ghost layers on each side. */
+/* Makes a lattice. layers: number of ghost layers on each side. */
 static void make_padded_lattice(const int64_t cells[3], int64_t padding, bool is_reversed, int64_t layers, subject *s)
 {
     static const signed char hex[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
@@ -113,7 +115,7 @@ static grid_field make_field(const subject *s, bool is_wide)
         .values = {.data = data, .stride = size, .is_wide = is_wide}, .component_stride = size, .component_count = 1};
 }
 
-/* Checks that the range of each leaf is that of its cells with finite values, rounded outward. */
+/* Checks that the range of each leaf is the range of its cells with finite values, rounded outward to float. */
 static void assert_ranges(const subject *s, const mmbvh *tree, const grid_field *field)
 {
     int64_t unusable = 0;
@@ -171,9 +173,9 @@ static void brick_trees_are_valid_with_tight_ranges(void **state)
     check_lattice((const int64_t[]){12, 11, 10}, 3, true, 1);
 }
 
-/* Checks the memory of trees over small boxes, whose leaves have 3 x 2 x 1 cells even if sides are powers of two. With
- * 24 bytes per node and 4 per cell, leaves of 6 cells take 12 bytes per cell; the remainders of the sides take less
- * than another 12. */
+/* Checks the memory of trees over small boxes. Leaves must have 3 x 2 x 1 cells even if the box's sides are powers of
+ * two. With 24 bytes per node and 4 bytes per cell, leaves of 6 cells take 12 bytes per cell; the smaller leaves at the
+ * ends of the sides take less than another 12. */
 static void small_boxes_fill_their_leaves(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-/* Checks mmbvh_check() on trees that violate one invariant at a time: each violation is detected, and is reported as
- * that one. */
+/* Checks mmbvh_check() on trees that violate one invariant each: the violation must be detected, and the error must
+ * name it. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -14,7 +14,7 @@
 typedef struct fixture {
     lattice l;
     mmbvh tree;
-    int64_t leaf;  /* a leaf with two cells or more */
+    int64_t leaf;  /* a leaf with at least two cells */
     int64_t inner; /* an inner node below the root */
 } fixture;
 
@@ -73,7 +73,8 @@ static void cell_that_is_not_there_is_found(void **state)
 static void missing_cell_is_found(void **state)
 {
     fixture *f = *state;
-    mmbvh_node *last = &f->tree.nodes[f->tree.node_count - 1]; /* everything before the last node stays valid */
+    /* all leaves and nodes before the last node stay valid */
+    mmbvh_node *last = &f->tree.nodes[f->tree.node_count - 1];
     assert_true(last->count > 1);
     last->count--;
     f->tree.cell_count--;
@@ -205,7 +206,7 @@ static void wrong_count_of_unusable_cells_is_found(void **state)
     assert_found(f, "unusable");
 }
 
-/* Makes a comb: every left child is a leaf of one cell, and the tree is one level too deep. */
+/* Makes a tree that is one level too deep: every left child is a leaf of one cell. */
 static void too_deep_a_tree_is_found(void **state)
 {
     (void)state;

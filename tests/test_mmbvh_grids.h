@@ -1,5 +1,5 @@
-/* Grids for the tests of the tree: jittered lattices of tets, hexes, wedges or a mixture, in any layout that a grid may
- * have. */
+/* Grids for the tests of the tree: jittered lattices of tets, hexes, wedges or a mixture of types, in any memory layout
+ * that a grid may have. */
 #ifndef TEST_MMBVH_GRIDS_H
 #define TEST_MMBVH_GRIDS_H
 
@@ -15,8 +15,8 @@ typedef enum lattice_kind { LATTICE_TETS, LATTICE_HEXES, LATTICE_WEDGES, LATTICE
 
 typedef struct lattice_layout {
     bool wide_coordinates, wide_indices, wide_values;
-    /* all arrays have gaps between their elements; else they are packed, and coordinates in float are stored axis by
-     * axis */
+    /* Whether all arrays have gaps between their elements. Otherwise they are packed, and float coordinates are stored
+     * axis by axis. */
     bool strided;
 } lattice_layout;
 
@@ -26,7 +26,7 @@ typedef struct lattice {
     char *coordinates, *connectivity, *offsets, *types, *ghosts, *values;
 } lattice;
 
-/* Returns a number in [0, 1) that depends only on the bits of i. */
+/* Returns a pseudorandom number in [0, 1) that depends only on i. */
 static inline double hash_to_unit_interval(uint64_t i)
 {
     i = (i ^ (i >> 30)) * 0xbf58476d1ce4e5b9u;
@@ -70,7 +70,8 @@ static inline void make_points(lattice *l, int n, lattice_layout layout)
     g->vertex_count = side * side * side;
     const bool is_apart = !layout.wide_coordinates && !layout.strided;
     const int64_t size = layout.wide_coordinates ? 8 : 4, stride = (layout.strided ? 5 : is_apart ? 1 : 3) * size;
-    const int64_t next = is_apart ? g->vertex_count * size : size; /* bytes from one axis to the next */
+    /* distance in bytes between the coordinates of two axes */
+    const int64_t next = is_apart ? g->vertex_count * size : size;
     l->coordinates = calloc((size_t)g->vertex_count, (size_t)(is_apart ? 3 * stride : stride));
     l->field.values = make_array(&l->values, g->vertex_count, layout.wide_values, false, layout.strided);
     l->field.component_count = 1;
@@ -90,7 +91,7 @@ static inline void make_points(lattice *l, int n, lattice_layout layout)
     }
 }
 
-/* Corners are numbered by bits x, y, z. */
+/* Corners of a cube are numbered by bits x, y, z. */
 static const signed char lattice_tets[6][4] = {{0, 1, 3, 7}, {0, 3, 2, 7}, {0, 2, 6, 7},
                                                {0, 6, 4, 7}, {0, 4, 5, 7}, {0, 5, 1, 7}};
 static const signed char lattice_hex[8] = {0, 1, 3, 2, 4, 5, 7, 6};
@@ -129,7 +130,8 @@ static inline void write_cube(lattice_writer *w, lattice_kind kind, int64_t cube
     }
 }
 
-/* Makes n x n x n cubes: 6 tets each, or a hex, or 2 wedges, or alternately tets, a hex, two wedges, three pyramids. */
+/* Makes n x n x n cubes. Each consists of 6 tets, a hex, or 2 wedges; in the mixture, cubes consist in turn of tets, a
+ * hex, two wedges, and three pyramids. */
 static inline lattice make_lattice(int n, lattice_kind kind, lattice_layout layout)
 {
     lattice l = {0};

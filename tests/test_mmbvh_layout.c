@@ -1,5 +1,6 @@
-/* Checks what layouts and builders guarantee in addition to a valid tree: boxes of 24 bytes that contain their cells
- * tightly, quantization grids that fit the mesh, resolution of cells of very different sizes, and memory. */
+/* Checks what layouts and builders guarantee in addition to a valid tree: boxes of compact nodes (24 bytes) contain
+ * their cells tightly, quantization grids fit the mesh, cells of very different sizes are distinguished, and memory is
+ * bounded. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -25,9 +26,10 @@ static mmbvh build_tree(const lattice *l, mmbvh_layout layout, mmbvh_builder bui
     return tree;
 }
 
-/* Checks random boxes in a random grid: sizes and distances from 1e-9 to 1e9, from the whole grid to a point. The
- * stored box must contain the given one; its lower bound is off by a step and one for rounding, its extent by 1/256 and
- * a sixteenth of a step (mmbvh_compact.h). */
+/* Checks the rounding of random boxes in random quantization grids. Sizes and distances are from 1e-9 to 1e9, and boxes
+ * are as large as the grid or as small as a point. The stored box must contain the given one. Its lower bound may be
+ * off by one step, plus one for rounding; its extent may be too large by 1/256 of itself and a sixteenth of a step
+ * (mmbvh_compact.h). */
 static void compact_box_is_conservative_and_tight(void **state)
 {
     (void)state;
@@ -86,8 +88,8 @@ static void box_beyond_the_grid_is_refused(void **state)
     }
 }
 
-/* Checks that both layouts have the same nodes, leaf for leaf, with the same ranges to the bit, and that each compact
- * box contains that of the other layout. */
+/* Checks that both layouts have the same nodes with bitwise equal ranges and the same leaves, and that each box of the
+ * compact layout contains that of the reference layout. */
 static void layouts_represent_the_same_tree(void **state)
 {
     (void)state;
@@ -129,7 +131,7 @@ static void infinite_boxes_use_the_reference_layout(void **state)
     mmbvh_free(&tree);
 }
 
-/* Counts the cells tested by a traversal of the nodes whose boxes contain the point. */
+/* Returns the number of cells in leaves whose boxes, and those of all their ancestors, contain the point. */
 static int64_t count_cells_tested(const mmbvh *tree, const double p[3])
 {
     int64_t tested = 0, stack[MMBVH_MAX_DEPTH + 1] = {0};
@@ -145,10 +147,10 @@ static int64_t count_cells_tested(const mmbvh *tree, const double p[3])
     return tested;
 }
 
-/* Checks hexes of size 1, of which the ten in the middle of each side are shrunk to 2e-5: all ten together are smaller
- * than a step of the builder's first grid, 9 / 32767. A point in a cell of a jittered lattice is in the boxes of a few
- * leaves; without a finer grid the 1000 cells that are small on all axes have the same position, and a leaf contains
- * any four of them. */
+/* Checks hexes of side 1 of which the ten in the middle of each axis are shrunk to a side of 2e-5. These ten together
+ * are smaller than a step of the builder's first grid, 9 / 32767. Without a finer grid, the 1000 cells that are shrunk
+ * along all axes would have the same position, and a leaf would contain any four of them. With a finer grid, a point in
+ * a cell is in the boxes of a few leaves only. */
 static void cells_of_very_different_sizes_are_distinguished(void **state)
 {
     (void)state;
@@ -158,14 +160,14 @@ static void cells_of_very_different_sizes_are_distinguished(void **state)
         for (int64_t v = 0; v < l.g.vertex_count; v++) {
             double p[3];
             grid_vertex(&l.g, v, p);
-            /* Vertices 5 to 14 of a side are shrunk towards the middle. */
+            /* Shrinks the vertices 5 to 14 along each axis towards the middle. */
             for (int axis = 0; axis < 3; axis++) {
                 const double x = p[axis];
                 const double y = x < 5 ? x : x > 15 ? x - 10 + 2e-4 : 5 + (x - 5) * 2e-5;
                 set_number(&l.g.coordinates[axis], v, y);
             }
         }
-        /* Shuffles the cells, so that their numbers do not depend on their positions. */
+        /* Shuffles the cells, so that their indices do not depend on their positions. */
         for (int64_t cell = l.g.cell_count - 1; cell > 0; cell--) {
             const int64_t other = (int64_t)(hash_to_unit_interval(seed++) * (double)(cell + 1));
             for (int k = 0; k < 8; k++) {
@@ -184,15 +186,16 @@ static void cells_of_very_different_sizes_are_distinguished(void **state)
                 p[axis] = 5 + 2e-4 * (0.1 + 0.8 * hash_to_unit_interval(3 * n + axis));
             tested += count_cells_tested(&tree, p);
         }
-        /* On a side, a jittered hex's box is 1.3 to 1.6 times its cell, and a leaf's box half as much again: a point is
-         * in about 4 leaves of 4 cells. The compact boxes have steps as large as a cell. */
+        /* On each axis, the box of a jittered hex is 1.3 to 1.6 times as large as the cell, and the box of a leaf half
+         * as large again, so that a point is in about 4 leaves of 4 cells. Compact boxes are not checked, because their
+         * steps are as large as a cell. */
         assert_true(layout == MMBVH_COMPACT || tested < 1000 * 20);
         mmbvh_free(&tree);
         free_lattice(&l);
     }
 }
 
-/* Checks a vertex without cells that is a million times farther away than all others. */
+/* Checks a vertex that belongs to no cell and is a million times farther away than all others. */
 static void vertices_of_no_cell_do_not_coarsen_the_tree(void **state)
 {
     (void)state;
@@ -210,7 +213,8 @@ static void vertices_of_no_cell_do_not_coarsen_the_tree(void **state)
         const mmbvh_options options = {.builder = (mmbvh_builder)builder};
         assert_int_equal(mmbvh_build(&far, &l.field, no_shift, 1, &options, &tree, NULL), INSITU_OK);
         assert_proved(&tree, &far, &l.field);
-        /* The origins of the grids differ by a rounding of the guess, and so may one or two planes. */
+        /* The origins of the grids differ by a rounding of the estimated bounds, and therefore one or two split planes
+         * may differ too. */
         assert_true(fabs(tree.built_cost / tight.built_cost - 1) < 0.01);
         assert_memory_equal(&tree.grid, &tight.grid, sizeof tree.grid);
         mmbvh_free(&tree);
@@ -228,8 +232,8 @@ static void scale_mesh(lattice *l, double scale)
     }
 }
 
-/* Checks a mesh that grows a thousandfold and shrinks again: the tree's grid is adapted, and the tree's cost stays the
- * same. */
+/* Checks a mesh that grows a thousandfold and shrinks again. The quantization grid must be adapted, and the cost of the
+ * tree must stay the same. */
 static void refit_follows_a_mesh_that_grows_and_shrinks(void **state)
 {
     (void)state;
@@ -240,7 +244,7 @@ static void refit_follows_a_mesh_that_grows_and_shrinks(void **state)
         scale_mesh(&l, scales[i]);
         assert_int_equal(mmbvh_refit_bounds(&tree, &l.g, &(mmbvh_options){.threads = 2}), INSITU_OK);
         const mmbvh_statistics s = assert_proved(&tree, &l.g, &l.field);
-        /* Boxes are rounded differently on another grid: by 1/256 of an extent on three axes. */
+        /* Boxes are rounded differently on another grid: by 1/256 of an extent along three axes. */
         assert_true(fabs(s.cost / tree.built_cost - 1) < 3.0 / 256);
     }
     set_number(&l.g.coordinates[0], 5, INFINITY);
@@ -249,8 +253,8 @@ static void refit_follows_a_mesh_that_grows_and_shrinks(void **state)
     free_lattice(&l);
 }
 
-/* Checks that a tree built along the space-filling curve costs at most half more than one by the surface area
- * heuristic. */
+/* Checks that a tree built along the space-filling curve costs at most 1.5 times as much as one built by the surface
+ * area heuristic. */
 static void morton_builder_costs_little_more_than_plane_builder(void **state)
 {
     (void)state;
@@ -264,8 +268,8 @@ static void morton_builder_costs_little_more_than_plane_builder(void **state)
     }
 }
 
-/* Checks that the tree of 178,746 tets takes 16 bytes per cell, and that building it takes at most 2.5 times as
- * much. */
+/* Checks that the tree of 178,746 tets takes at most 16 bytes per cell, and that building it takes at most 2.5 times as
+ * much memory. */
 static void tree_memory_is_within_the_stated_bounds(void **state)
 {
     (void)state;

@@ -1,4 +1,4 @@
-/* Functions by which tests read and corrupt nodes of either layout. */
+/* Functions with which tests read and corrupt the nodes of a tree in either layout. */
 #ifndef TEST_MMBVH_NODES_H
 #define TEST_MMBVH_NODES_H
 

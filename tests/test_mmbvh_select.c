@@ -1,4 +1,4 @@
-/* Compares the selection of visible cells with brute force over all cells in double: for every kind of cell and layout,
+/* Compares the selection of visible cells with brute force over all cells in double, for every kind of cell and layout,
  * with ghosts and with values that are not finite. */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -11,10 +11,14 @@
 #include "mmbvh.h"
 #include "test_meshes.h"
 
-enum { SIDE = 7, LARGE_SIDE = 15 /* enough cells for several blocks of several threads */, QUERIES = 5 };
+enum {
+    SIDE = 7,
+    LARGE_SIDE = 15 /* LARGE_SIDE: a mesh with enough cells for several blocks on each of several threads */,
+    QUERIES = 5
+};
 
-/* The queries: one isovalue, several isovalues, the ranges that a transfer function shows, and the least and greatest
- * of all values, which only one vertex has. */
+/* Intervals of the queries: one isovalue, several isovalues, the ranges in which a transfer function is not
+ * transparent, and the least and the greatest of all values, each of which only one vertex has. */
 static const mmbvh_interval at_one[] = {{0.25f, 0.25f}}, at_three[] = {{-1, -1}, {0.1f, 0.1f}, {0.9f, 0.9f}},
                             in_two[] = {{-0.4f, -0.3f}, {1, INFINITY}}, at_least[] = {{-2, -2}}, at_most[] = {{2, 2}};
 
@@ -27,7 +31,7 @@ static void make_queries(const grid_field *field, mmbvh_query queries[QUERIES])
     queries[4] = (mmbvh_query){field, 1, at_most};
 }
 
-/* Makes a mesh in which every fifth cell is a ghost, and one of two hundred values is not finite. */
+/* Makes a mesh in which every fifth cell is a ghost and one of two hundred values is not finite. */
 static test_mesh make_mesh(test_mesh_kind kind, int side)
 {
     test_mesh mesh;
@@ -43,7 +47,7 @@ static test_mesh make_mesh(test_mesh_kind kind, int side)
     return mesh;
 }
 
-/* Returns -1 if the cell is unusable, else whether the query selects it. */
+/* Returns -1 if the cell has a value that is not finite, 1 if the query selects the cell, else 0. */
 static int select_by_brute_force(const test_view *view, const mmbvh_query *query, int64_t cell)
 {
     double low = (double)INFINITY, high = -(double)INFINITY;
@@ -60,7 +64,7 @@ static int select_by_brute_force(const test_view *view, const mmbvh_query *query
     return 0;
 }
 
-/* Compares the selected cells; returns their number. */
+/* Compares the selected cells with those selected by brute force. Returns their number. */
 static int64_t assert_selects(const test_view *view, const mmbvh_query *queries, int count)
 {
     mmbvh_selection selection;
@@ -114,8 +118,8 @@ static void only_cells_that_may_be_visible_are_selected(void **state)
     }
 }
 
-/* Checks components, magnitudes, values at cells, integers, and doubles whose rounding to float decides the
- * selection. */
+/* Checks components and magnitudes of vectors, values in cells, integers, and double values whose selection depends on
+ * the rounding to float. */
 static void selection_supports_all_field_kinds(void **state)
 {
     (void)state;
@@ -124,7 +128,7 @@ static void selection_supports_all_field_kinds(void **state)
         test_view view;
         test_view_create(&mesh, (test_layout){false}, &view);
         const int64_t count =
-            /* enough values for cells and for vertices */
+            /* number of values, enough for a field in cells and for one at vertices */
             mesh.cell_count > mesh.vertex_count ? mesh.cell_count : mesh.vertex_count;
         double *vectors = malloc((size_t)count * 3 * sizeof *vectors);
         int32_t *integers = malloc((size_t)count * sizeof *integers);

@@ -1,4 +1,4 @@
-/* Checks that any Morton keys are sorted in ascending order, by comparison with qsort(). */
+/* Compares the order of sorted Morton keys with that of qsort(), for various distributions of keys. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -11,7 +11,7 @@
 #include "memory.h"
 #include "mmbvh_morton.h"
 
-enum { COUNT = 300000 /* so many that the keys of several digits exceed what one thread sorts alone */ };
+enum { COUNT = 300000 /* large enough that several digits have more keys than one thread sorts by itself */ };
 
 static uint64_t draw_random(uint64_t *state)
 {
@@ -29,7 +29,7 @@ static int compare_keys(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Makes a code of the given number of bits; a mesh may use any part of the codes. */
+/* Makes a Morton code with at most the given number of bits, since a mesh may use any range of codes. */
 typedef uint64_t code_maker(uint64_t random, int64_t i, int bits);
 
 static uint64_t make_uniform_code(uint64_t random, int64_t i, int bits)
@@ -38,13 +38,14 @@ static uint64_t make_uniform_code(uint64_t random, int64_t i, int bits)
     return random & ((UINT64_C(1) << bits) - 1);
 }
 
-/* Returns codes of cells that get smaller towards a corner: half of the keys are in half of the box, and so on. */
+/* Makes codes of a mesh that is refined towards a corner: half of the cells are in one half of the box, half of these
+ * in a quarter, and so on. */
 static uint64_t make_refined_code(uint64_t random, int64_t i, int bits)
 {
     return make_uniform_code(random, i, bits) >> (random >> 58) % (unsigned)bits;
 }
 
-/* Returns codes that, except for one, are all in the lower half of the bits. */
+/* Makes codes that use only the lower half of the bits, except for one code. */
 static uint64_t make_outlier_code(uint64_t random, int64_t i, int bits)
 {
     return i ? make_uniform_code(random, i, bits) >> bits / 2 : (UINT64_C(1) << bits) - 1;

@@ -1,5 +1,5 @@
-/* Compares bounds that are refitted only for visible nodes with brute force over the visible cells, and with a whole
- * refit. */
+/* Compares bounds that are refitted only for visible nodes with brute force over the visible cells, and with a refit of
+ * all nodes. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -13,7 +13,8 @@
 
 static const double no_shift[3] = {0, 0, 0};
 
-/* The subject has two visibilities: by the nodes' own ranges, and by the pairs of a second field. */
+/* A tree with two criteria of visibility: the nodes' own ranges in two intervals, and the ranges (pairs) of a second
+ * field in a third interval. */
 typedef struct subject {
     lattice l;
     mmbvh tree;
@@ -22,7 +23,7 @@ typedef struct subject {
     mmbvh_visible visible[2];
 } subject;
 
-/* Moves vertices inwards, so that the grid of the compact layout still contains the mesh. */
+/* Moves vertices inwards, so that the quantization grid of the compact layout still contains the mesh. */
 static void move_vertices(lattice *l, double by)
 {
     for (int64_t v = 0; v < l->g.vertex_count; v++) {
@@ -41,7 +42,7 @@ static subject make_subject(lattice_kind kind, lattice_layout layout, mmbvh_layo
     s.pairs = malloc((size_t)s.tree.node_count * 2 * sizeof *s.pairs);
     for (int64_t i = 0; i < s.tree.node_count; i++) {
         const node_view node = read_node(&s.tree, i);
-        s.pairs[2 * i] = node.lower[2]; /* the range of a field that equals the height */
+        s.pairs[2 * i] = node.lower[2]; /* the range of a field whose value is the height */
         s.pairs[2 * i + 1] = node.upper[2];
     }
     return s;
@@ -82,7 +83,7 @@ static void extend_bounds(node_view *to, const node_view *by)
     }
 }
 
-/* Computes the box of a leaf's cells at their current positions. */
+/* Computes the bounding box of a leaf's cells at their current positions. */
 static node_view compute_leaf_box(const subject *s, int64_t leaf)
 {
     node_view box = read_node(&s->tree, leaf);
@@ -101,9 +102,8 @@ static node_view compute_leaf_box(const subject *s, int64_t leaf)
     return box;
 }
 
-/* Traverses the visible nodes below a node and checks that their bounds are contained in its own; returns their bounds.
- * Single precision and the compact layout need a slack, relative to the mesh's size: 2 of its 2^20 steps and 1/256 of
- * the box, which is as wide as a leaf. */
+/* Checks, for all visible nodes below a node, that a node's bounds contain its cells or its visible children. Returns
+ * the bounds of the node's cells. visited receives the number of visited nodes. */
 static node_view assert_bounds_contain_subtree(const subject *s, int64_t i, int64_t *visited)
 {
     ++*visited;
@@ -124,7 +124,8 @@ static node_view assert_bounds_contain_subtree(const subject *s, int64_t i, int6
     return held;
 }
 
-/* Checks that any number of threads makes the same tree and computes the same area, since sums have a fixed order. */
+/* Checks that any number of threads refits to the same tree and computes the same area, because sums are computed in a
+ * fixed order. */
 static void assert_same_with_any_threads(const subject *s, const mmbvh *before)
 {
     mmbvh again = *before;
@@ -172,7 +173,7 @@ static void check_visible_refit(subject *s)
     int64_t visited = 0;
     move_vertices(&s->l, 0.02);
     choose_visible(s);
-    /* Visibilities refer to each tree's own ranges, which are the same. */
+    /* The trees are copies with the same ranges, so the criteria of visibility apply to each of them. */
     assert_int_equal(
         mmbvh_refit_visible_bounds(&s->tree, &s->l.g, s->visible, 2, &(mmbvh_options){.threads = 2}, &is_whole),
         INSITU_OK);
@@ -182,7 +183,7 @@ static void check_visible_refit(subject *s)
     assert_int_equal(mmbvh_refit_bounds(&whole, &s->l.g, &(mmbvh_options){.threads = 2}), INSITU_OK);
     assert_true(visited > 100 && visited < s->tree.node_count);
     assert_true(count_stale(s, &before, &whole) > s->tree.node_count / 10);
-    /* A whole refit updates also the nodes that were skipped. */
+    /* A refit of all nodes must also update the nodes that were skipped. */
     assert_int_equal(mmbvh_refit_bounds(&s->tree, &s->l.g, &(mmbvh_options){.threads = 2}), INSITU_OK);
     assert_same_nodes(&s->tree, &whole);
     assert_int_equal(mmbvh_check(&s->tree, &s->l.g, &s->l.field, NULL, NULL), INSITU_OK);
@@ -203,8 +204,8 @@ static void only_visible_bounds_are_refitted(void **state)
         }
 }
 
-/* Checks that the area which refits keep up to date equals that of a pass over all nodes: n sums of positive doubles
- * and as many differences are off by at most 2 n 2^-53 of the largest sum. */
+/* Checks that the area that refits update incrementally equals the area computed over all nodes. n sums of positive
+ * double numbers and as many differences have an error of at most 2 n 2^-53 of the largest sum. */
 static void refit_updates_the_visible_area(void **state)
 {
     (void)state;

@@ -1,7 +1,7 @@
-/* Checks volumes that absorb all light before their end: what lies behind is skipped, invisibly. The medium is black in
- * front and white behind, so that light that is missing would show unless it is negligible. Pictures are compared with
- * brute force in double, and with the same cells on several ranks. A further test checks that fewer cells are
- * transformed. */
+/* Checks volumes that absorb all light in front of their end, so that the kernels skip the cells behind without visible
+ * change. The medium is black in front and white behind: if light that is not negligible were missing, the picture
+ * would change. Pictures are compared with brute force in double, and with pictures of the same cells on several ranks.
+ * One test checks that fewer cells are transformed. */
 #include "reference_integral.h"
 #include "test_effort.h"
 #include "test_render_fixture.h"
@@ -20,14 +20,15 @@ typedef enum method { SAMPLES, SEGMENTS, MAX_ERROR, METHOD_COUNT } method;
 static const char *const method_names[METHOD_COUNT] = {"samples", "segments", "max_error"};
 static const double max_error = 1e-2;
 
-/* A field from 0 at the mesh's corner next to the eye of CAMERA_OUTSIDE to 1 at the opposite corner. */
+/* A field that is 0 at the mesh's corner next to the eye of CAMERA_OUTSIDE and 1 at the opposite corner. */
 static double front_to_back_field(const double position[3])
 {
     return 0.5 - (2.4 * position[0] + 1.6 * position[1] + 3 * position[2]) / (2 * (2.4 + 1.6 + 3));
 }
 
-/* Sets a medium with a constant extinction, an optical depth of `depth` through a distance of 1; it is black up to the
- * middle plane, and white behind it. At that plane rays have any fraction of their light from all to none. */
+/* Sets a medium with a constant extinction: the optical depth of a distance of 1 is `depth`. Its colour is black up to
+ * the middle plane and white behind it. Rays arrive at this plane with any fraction of their light, from all to
+ * none. */
 static void set_medium(render_fixture *f, method how, double depth)
 {
     static const float opacity = 0.5f;
@@ -54,7 +55,7 @@ static void set_up_frame(render_fixture *f, test_mesh_kind kind, int n, method h
     set_medium(f, how, depth);
 }
 
-/* The traversals: cells are found for the whole picture, or for each tile. */
+/* The traversals: cells are searched for the whole picture at a time, or for each tile. */
 static const render_traversal traversals[2] = {RENDER_BINNED, RENDER_TILES};
 
 static void compare_samples(render_fixture *f, const char *what)
@@ -85,10 +86,11 @@ static void compare_integrals(render_fixture *f, double most, const char *what)
     if (!(worst <= most)) fail_msg("%s: off by %g", what, worst);
 }
 
-/* Compares pictures with the reference. The kernels skip what would change a ray of colours up to 1 by less than 1e-7.
- * A thousand times as much, nearly 1e-4, would be detected: it is about ten times the error of samples
- * (fixture_usual_bounds). For segments, values at their ends are off by up to 4e-7 of the function's domain
- * (docs/development/decisions/volume.md), and colours by that times the number of table entries. */
+/* Compares pictures with the reference. Colours are at most 1, and the kernels skip what would change the colour of a
+ * ray by less than 1e-7. A change a thousand times as large, nearly 1e-4, would be detected: it is about ten times the
+ * error of samples (fixture_usual_bounds). For segments, values at their ends have an error of up to 4e-7 of the
+ * transfer function's domain (docs/development/decisions/volume.md), and colours have this error times the number of
+ * table entries. */
 static void skipping_hidden_cells_changes_no_picture(void **state)
 {
     (void)state;
@@ -107,8 +109,8 @@ static void skipping_hidden_cells_changes_no_picture(void **state)
         }
 }
 
-/* Compares pictures of several ranks. A rank skips only what is behind its own cells, which is less than one rank skips
- * that has all cells. */
+/* Compares the picture that several ranks draw together with the picture of one rank. A rank skips only what is behind
+ * its own cells, so the ranks skip less than one rank that has all cells. */
 static void ranks_skip_cells_behind_their_own_cells(void **state)
 {
     (void)state;
@@ -162,9 +164,10 @@ static int64_t count_cells_placed(test_mesh_kind kind, render_traversal traversa
     return placed;
 }
 
-/* Checks that cells are skipped. Three of a ray's 24 cells or more absorb all light. A window as deep as memory allows
- * contains all cells. Windows whose depth depends on the light are at least four cells deep, and a slanted face takes
- * two to three cells in a tile; the first tile has a deep window. */
+/* Checks that a dense medium needs less than 0.6 of the cells of a thin one. The first three or more of a ray's 24
+ * cells absorb all light. More cells are transformed for two reasons: with binned traversal, a window of depths
+ * contains all cells if memory allows, and the first tile has a deep window; other windows are at least four cells
+ * deep, and a slanted face takes two to three cells in a tile. */
 static void few_cells_of_opaque_media_are_transformed(void **state)
 {
     static const test_mesh_kind kinds[] = {TEST_TETS, TEST_HEXES, TEST_MIXED};

@@ -1,7 +1,6 @@
-/* The bounds of the difference between polynomials and their linear pieces, against brute force: polynomials are sums
- * of powers, of which values, positions and gradients are computed in closed form, and pieces are those of the pattern
- * by which cells are split.
- */
+/* Compares the bounds of the difference between a cell of higher order and its linear pieces (the linear cells into
+ * which it is split) with brute force. The polynomials of the cell are sums of powers, so that values, positions and
+ * gradients are computed in closed form. The pieces are those of the pattern by which the library splits cells. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -20,7 +19,7 @@
 
 enum { MOST_POWER = 8, POWERS = MOST_POWER + 1, MOST_NODES = 729, MOST_PARTS = 3 };
 
-/* A kind of cell with the polynomials that it contains. */
+/* A kind of cell: its nodes define the polynomials that it represents. */
 typedef struct bound_kind {
     const char *name;
     session_nodes nodes;
@@ -35,7 +34,7 @@ static double random_number(void)
 
 /* ---- polynomials ------------------------------------------------------------------------------------------------- */
 
-/* Four sums of powers of the reference coordinates: a position and a field. */
+/* Four functions as sums of powers of the reference coordinates: the three coordinates of the position, and a field. */
 typedef struct cell_functions {
     int order;
     double weights[4][POWERS][POWERS][POWERS];
@@ -58,7 +57,7 @@ static bool is_in_polynomial_space(const session_nodes *of, const int q[3])
     }
 }
 
-/* Computes a function at a point, or its derivative along an axis if that is not negative. */
+/* Computes the value of a function at a point, or its derivative along an axis if axis is not negative. */
 static double evaluate_function(const cell_functions *of, int function, const double at[3], int axis)
 {
     double powers[3][POWERS], sum = 0;
@@ -74,7 +73,7 @@ static double evaluate_function(const cell_functions *of, int function, const do
     return sum;
 }
 
-/* Adds random terms of order 2 and more. fall: by how much terms fall with each power. */
+/* Adds random terms of order 2 and more to a function. fall: factor by which terms decrease with each order. */
 static void add_terms(const session_nodes *of, int function, double size, double fall, cell_functions *out)
 {
     for (int i = 0; i < POWERS * POWERS * POWERS; i++) {
@@ -115,11 +114,12 @@ static void make_tuples(const bound_kind *kind, const cell_functions *of, double
     }
 }
 
-/* The pieces of a cell with so many parts between two nodes. */
+/* A cell that is cut into linear pieces, with `parts` pieces between two neighbouring nodes. */
 typedef struct cut_cell {
-    int order; /* of the finer lattice */
+    int order; /* order of the finer lattice of nodes */
     session_pattern pattern;
-    double (*places)[3]; /* reference coordinates of the nodes */
+    /* reference coordinates of the finer lattice's nodes; tuples: position and field at the nodes */
+    double (*places)[3];
     double (*tuples)[4];
 } cut_cell;
 
@@ -147,7 +147,7 @@ static void free_cut(cut_cell *of)
     free(of->tuples);
 }
 
-/* Finds a random point of a piece, in coordinates along its edges at the first corner. */
+/* Chooses a random point of a piece. Its coordinates are measured along the piece's edges from the first corner. */
 static void choose_point_in_piece(int type, double out[3])
 {
     const bool is_flat = type == GRID_TRIANGLE || type == GRID_QUAD;
@@ -158,7 +158,7 @@ static void choose_point_in_piece(int type, double out[3])
     } while (sum > 1);
 }
 
-/* Finds the weights of the corners with which a piece interpolates. */
+/* Computes the weights with which a piece interpolates between its corners. */
 static void compute_corner_weights(int type, const double at[3], double weights[8])
 {
     const session_shape *shape = session_shape_of(type);
@@ -176,7 +176,7 @@ static void compute_corner_weights(int type, const double at[3], double weights[
     }
 }
 
-/* A point of a piece: its reference coordinates, and the interpolated tuple. */
+/* A point of a piece: its reference coordinates, and the interpolated position and field. */
 typedef struct piece_point {
     double at[3], tuple[4];
 } piece_point;
@@ -196,7 +196,8 @@ static piece_point interpolate_in_piece(const cut_cell *of, int type, const int 
 
 /* ---- bounds of positions ----------------------------------------------------------------------------------------- */
 
-/* Returns the bound of the lattice that gives the smallest one. */
+/* Returns the bound of a cell; the error of the surface is the smallest one that any level of subdivision of the bound
+ * gives. */
 static session_cell_bound compute_smallest_bound(const bound_kind *kind, const cell_functions *of,
                                                  const session_isovalues *isovalues)
 {
@@ -217,7 +218,7 @@ static session_cell_bound compute_smallest_bound(const bound_kind *kind, const c
     return out;
 }
 
-/* Returns the largest distance between positions of pieces and of the polynomial at random points. */
+/* Returns the largest distance between the positions that pieces and the polynomial assign to random points. */
 static double largest_shift(const cell_functions *functions, const cut_cell *of, int points)
 {
     double worst = 0;
@@ -267,7 +268,8 @@ static const struct named_shape {
               {"wedge", GRID_WEDGE, 4},
               {"hex", GRID_HEX, 4}};
 
-/* The kinds that are tested: all shapes with all of their nodes, serendipity cells, and Gauss-Lobatto points. */
+/* Lists the kinds that are tested: all cell types with all of their nodes, serendipity cells, and hexes with
+ * Gauss-Lobatto nodes. Returns their number. */
 static int list_kinds(bound_kind *out)
 {
     int count = 0;
@@ -304,8 +306,8 @@ static void positions_are_within_the_bound(void **state)
 
 /* ---- bounds of isosurfaces --------------------------------------------------------------------------------------- */
 
-/* Computes the derivatives of the position along the axes, as columns of a matrix, and the field's gradient. Returns
- * the determinant. */
+/* Computes the inverse of the matrix whose columns are the derivatives of the position along the axes, and the field's
+ * gradient. Returns the matrix's determinant. */
 static double find_gradient(const cell_functions *of, const double at[3], double inverse[3][3], double gradient[3])
 {
     double m[3][3], slopes[3];
@@ -327,8 +329,8 @@ static double find_gradient(const cell_functions *of, const double at[3], double
     return determinant;
 }
 
-/* Goes from a point of the cell along the field's gradient until the polynomial has the value. Returns the distance of
- * the place from `from`; infinite if the way does not end. */
+/* Moves a point of the cell along the field's gradient to the position at which the polynomial has the value. Returns
+ * the distance of this position from `from`, or infinity if the iteration does not converge. */
 static double distance_to_surface(const cell_functions *of, const double start[3], double value, const double from[3])
 {
     double at[3] = {start[0], start[1], start[2]}, rest = INFINITY, square = 0;
@@ -344,8 +346,8 @@ static double distance_to_surface(const cell_functions *of, const double start[3
     return fabs(rest) < 1e-12 ? sqrt(square) : INFINITY;
 }
 
-/* Finds a point of a piece, between two points, at which the interpolated field has the value. Returns false if there
- * is none. */
+/* Finds a point of a piece at which the interpolated field has the value, by bisection between two random points.
+ * Returns false if the field does not cross the value between them. */
 static bool find_crossing(const cut_cell *of, int type, const int *corners, double value, piece_point *out)
 {
     double ends[2][3], middle[3];
@@ -361,8 +363,8 @@ static bool find_crossing(const cut_cell *of, int type, const int *corners, doub
     return true;
 }
 
-/* Returns the largest distance between the surface of pieces and that of the polynomial at random points; -1 if there
- * are none. */
+/* Returns the largest distance between the isosurface of the pieces and that of the polynomial, over random points.
+ * Returns -1 if there are no points. */
 static double largest_distance(const cell_functions *functions, const cut_cell *of, double value)
 {
     double worst = -1;
@@ -379,10 +381,10 @@ static double largest_distance(const cell_functions *functions, const cut_cell *
     return worst;
 }
 
-/* What was found in the cells of a kind. */
+/* Results over the cells of a kind. unbounded: cells whose bound is not smaller than the cell. */
 typedef struct surface_tally {
     int crossed, unbounded;
-    double least, most; /* bound / largest distance */
+    double least, most; /* least and most: smallest and largest ratio of the bound to the largest distance */
 } surface_tally;
 
 static void check_surface(const bound_kind *kind, const cell_functions *of, surface_tally *tally)
@@ -408,7 +410,7 @@ static void check_surface(const bound_kind *kind, const cell_functions *of, surf
     }
 }
 
-/* A field that is mostly linear in a cell that is stretched along an axis and bent. */
+/* Makes a cell that is bent and stretched along an axis, with a field that is mostly linear. */
 static void make_surface(const bound_kind *kind, double curved, double fall, cell_functions *out)
 {
     *out = (cell_functions){.order = kind->nodes.order};
@@ -447,10 +449,11 @@ static void isosurfaces_are_within_the_bound(void **state)
     free(of);
 }
 
-/* ---- other cells ------------------------------------------------------------------------------------------------- */
+/* ---- other cases
+ * -------------------------------------------------------------------------------------------------- */
 
-/* The field is 0 at all nodes but the middle ones, and so at most 0.25 between nodes: it is less than its nodes say
- * only where they are. */
+/* Checks an isovalue between the values at nodes. The field (x - 0.3)^2 has an extremum between its nodes, so that its
+ * values at the nodes do not show that it crosses 0.01. */
 static void crossings_between_nodes_are_found(void **state)
 {
     (void)state;
@@ -469,7 +472,7 @@ static void crossings_between_nodes_are_found(void **state)
     free(of);
 }
 
-/* Positions that are linear have no error, nor has a linear field. */
+/* Checks that the bound is 0 if positions and field are linear. */
 static void linear_cells_have_no_error(void **state)
 {
     (void)state;

@@ -1,5 +1,6 @@
-/* Derivatives of cells' polynomials at nodes, against closed forms: on straight cells, the sums of values of any
- * polynomial that the cell has are its gradient times those of places. */
+/* Compares the derivatives of cells' polynomials at nodes with closed forms. A derivative is a weighted sum of values
+ * at nodes. On straight cells, this sum of any polynomial of the cell must equal the polynomial's gradient times the
+ * same sum of positions. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -22,7 +23,7 @@ static double zero_field(const double p[3])
 
 /* ---- polynomials ------------------------------------------------------------------------------------------------- */
 
-/* The product of powers of x + 0.3, y + 0.4 and z + 0.5, and its gradient. */
+/* Returns the product of powers of x + 0.3, y + 0.4 and z + 0.5, and computes its gradient. */
 static double evaluate_monomial(const double at[3], const int powers[3], double gradient[3])
 {
     double value = 1;
@@ -34,7 +35,7 @@ static double evaluate_monomial(const double at[3], const int powers[3], double 
     return value;
 }
 
-/* Which monomials the cell's polynomials contain. */
+/* Returns whether the cell's polynomials contain the monomial with the powers q. */
 static bool is_in_polynomial_space(const session_nodes *of, const int q[3])
 {
     const int p = of->order, plane = q[0] + q[1];
@@ -50,10 +51,12 @@ static bool is_in_polynomial_space(const session_nodes *of, const int q[3])
     }
 }
 
-/* Sums of at most 125 terms, each rounded by 1e-16 of weights up to 10 times powers of up to 1.8^12. */
+/* Tolerance: at most 125 terms are summed, each rounded by 1e-16 of a weight of up to 10 times powers of up to
+ * 1.8^12. */
 #define ROUNDING 1e-9
 
-/* The largest error of a derivative at any node of any polynomial, in a cell whose nodes are at `places`. */
+/* Returns the largest error, at any node, of the derivatives of the monomial with the given powers. The nodes of the
+ * cell are at `places`. */
 static double find_error(const session_nodes *of, const session_derivatives *d, const double (*places)[3],
                          const int powers[3])
 {
@@ -82,7 +85,8 @@ static double find_largest_error(const session_nodes *of, const session_derivati
     return worst;
 }
 
-/* Returns the volume of the box of a node's derivatives of places, or the area of their parallelogram. */
+/* Returns the volume of the parallelepiped (or the area of the parallelogram) spanned by the derivatives of the
+ * position at a node. */
 static double compute_box_volume(const session_derivatives *d, int node, const double (*places)[3])
 {
     double e[3][3] = {{0}};
@@ -94,7 +98,7 @@ static double compute_box_volume(const session_derivatives *d, int node, const d
                 e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0]));
 }
 
-/* volume: that of the box. */
+/* Checks the derivatives at all nodes. volume: expected result of compute_box_volume(). */
 static void check_derivatives(const char *name, const session_nodes *of, const session_derivatives *d,
                               const double (*places)[3], double volume)
 {
@@ -106,7 +110,7 @@ static void check_derivatives(const char *name, const session_nodes *of, const s
 
 /* ---- cells ------------------------------------------------------------------------------------------------------- */
 
-/* Moves nodes that are equispaced in a cube of [-1, 1]^3 to Gauss-Lobatto points. */
+/* Moves nodes that are equidistant in the cube [-1, 1]^3 to Gauss-Lobatto points. */
 static void move_nodes_to_lobatto_points(int p, double *coordinates, int64_t count)
 {
     const double of3[4] = {-1, -1 / sqrt(5), 1 / sqrt(5), 1}, of4[5] = {-1, -sqrt(3. / 7), 0, sqrt(3. / 7), 1};
@@ -116,7 +120,8 @@ static void move_nodes_to_lobatto_points(int p, double *coordinates, int64_t cou
     }
 }
 
-/* All cells of a cube, each of whose boxes has the cube's volume; is_lobatto: hexes of Gauss-Lobatto points. */
+/* Checks the derivatives of all cells in one cube. The parallelepiped of derivatives has the volume of the cube.
+ * is_lobatto: cells are hexes with Gauss-Lobatto nodes. */
 static void check_kind(const order_kind *kind, bool is_lobatto)
 {
     order_mesh mesh;
@@ -157,7 +162,7 @@ static void lobatto_points_are_recognised(void **state)
     }
 }
 
-/* Quads and triangles, in the plane z = 0, whose nodes are in rows; and the quad of eight nodes. */
+/* Checks quads and triangles in the plane z = 0 whose nodes are in rows, and the quad of eight nodes. */
 static void shells_have_their_derivatives(void **state)
 {
     (void)state;
@@ -186,8 +191,9 @@ static void shells_have_their_derivatives(void **state)
     session_drop_derivatives(&d);
 }
 
-/* In a lattice whose edges have `parts` times as many nodes, polynomials of the lower order have their derivatives,
- * each from as few nodes as determine them. */
+/* Checks derivatives on a finer lattice, with `parts` times as many nodes along an edge as polynomials of the lower
+ * order need. The derivatives of these polynomials must be exact, and each must use only as many nodes as determine
+ * it. */
 static void finer_lattices_have_derivatives(void **state)
 {
     (void)state;
@@ -206,7 +212,7 @@ static void finer_lattices_have_derivatives(void **state)
         assert_true(session_make_derivatives(&of, INSITU_ORDER_LEXICOGRAPHIC, false, parts, &d));
         session_nodes coarse = session_complete_nodes(type, p);
         const int most = 2 * coarse.count * d.axis_count * of.count;
-        coarse.count = of.count; /* derivatives at all nodes of polynomials of the lower order */
+        coarse.count = of.count; /* checks derivatives at all nodes, of polynomials of the lower order */
         check_derivatives("finer lattice", &coarse, &d, (const double(*)[3])places, 1);
         assert_true(d.starts[d.axis_count * of.count] <= most);
         session_drop_derivatives(&d);

@@ -1,6 +1,7 @@
-/* Integrals over cells of higher order. Rules are exact for all monomials of their degree. Cells whose positions and
- * values are all polynomials that the kind of cell has, with random coefficients, have the integrals that a tensor
- * product of Gauss points gives in the cube that they fill together. */
+/* Checks integrals over cells of higher order. Quadrature rules must be exact for all monomials of their degree. Then
+ * positions and values of cells are polynomials with random coefficients that the kind of cell represents. The sums
+ * over the cells that fill a cube must equal the integrals that a tensor product of Gauss points gives over the whole
+ * cube. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -19,17 +20,17 @@ static double zero_field(const double p[3])
     return p[0];
 }
 
-/* ---- rules ------------------------------------------------------------------------------------------------------- */
+/* ---- quadrature rules -------------------------------------------------------------------------------------------- */
 
-/* The integral over the unit simplex is a! b! c! / (a + b + c + dimensions)! (Dirichlet). */
+/* Returns the integral of a monomial over the unit simplex: a! b! c! / (a + b + c + dimensions)! (Dirichlet). */
 static double integrate_monomial(int dimensions, const int powers[3])
 {
     const int all = powers[0] + powers[1] + powers[2] + dimensions;
     return exp(lgamma(powers[0] + 1) + lgamma(powers[1] + 1) + lgamma(powers[2] + 1) - lgamma(all + 1));
 }
 
-/* Powers of up to 2 n - 1 multiply the rounding errors of points, of some 1e-16, by their number, and lgamma() loses as
- * many digits. */
+/* Checks a rule with per_axis points along each axis. The tolerance covers two errors of equal size: powers of up to 2
+ * n - 1 multiply the rounding errors of points, about 1e-16, by the power, and lgamma() loses as many digits. */
 static void check_rule(int dimensions, int per_axis)
 {
     session_quadrature rule;
@@ -63,7 +64,7 @@ static void rules_are_exact_for_their_degree(void **state)
 
 enum { MOST_TERMS = 8 * 8 * 8, FUNCTIONS = 4 };
 
-/* Three positions and a value, as sums of monomials. */
+/* The three coordinates of the position and a value, as sums of monomials. */
 typedef struct polynomials {
     int count;
     int powers[MOST_TERMS][3];
@@ -85,8 +86,8 @@ static double random_number(unsigned *seed)
     return (*seed >> 8) * 0x1p-23 - 1;
 }
 
-/* bend: how large the terms of positions are. Terms of n powers are divided by as many, so that maps have an inverse.
- */
+/* Makes random polynomials. bend: size of the terms of positions. Terms of total power n are divided by (1 + n)^2, so
+ * that the maps have an inverse. */
 static void make_polynomials(const session_nodes *of, double bend, unsigned seed, polynomials *out)
 {
     const int size = of->order + 1;
@@ -119,7 +120,7 @@ static double evaluate_term(const int powers[3], const double at[3], int derived
     return value;
 }
 
-/* derived: the axis along which the derivative is taken, or -1 */
+/* Evaluates a function, or its derivative along the axis `derived` if derived is not negative. */
 static double evaluate_function(const polynomials *of, int function, const double at[3], int derived)
 {
     double sum = 0;
@@ -141,7 +142,8 @@ static void add_points(void *of, int count, const double *measures, const double
     }
 }
 
-/* Integrates over the cube from -1 to 1 with so many points along each axis, and analytic derivatives. */
+/* Integrates over the cube [-1, 1]^3 with the given number of Gauss points along each axis and with derivatives in
+ * closed form. */
 static integrals integrate_cube(const polynomials *of, int points)
 {
     integrals out = {0};
@@ -167,8 +169,8 @@ static integrals integrate_cube(const polynomials *of, int points)
     return out;
 }
 
-/* Sums of up to 1e5 points and 512 nodes, each rounded by 1e-16, whose rounding errors add up at random; the squares of
- * values are up to some ten times their mean. */
+/* Compares two integrals. The tolerance covers the rounding by 1e-16 in sums over up to 1e5 points and 512 nodes. The
+ * rounding errors add up randomly, and the squares of values are up to about ten times their mean. */
 static bool is_nearly_equal(double sum, double expected, double size)
 {
     return fabs(sum - expected) <= 1e-12 * size;
@@ -184,7 +186,8 @@ static void check_integrals(const char *name, const integrals *sums, const integ
              expected->volume, expected->first, expected->second);
 }
 
-/* Places are the nodes of `cells` cells in the cube before they are moved. */
+/* Compares the sum of the integrals of `cells` cells with the integral over the cube. places: positions of the cells'
+ * nodes in the cube before they are moved. */
 static void check_cells(const char *name, const session_cell_rules *rules, const double *places, int cells,
                         const polynomials *of)
 {
@@ -236,7 +239,7 @@ static void cell_integrals_match_their_polynomials(void **state)
     }
 }
 
-/* ---- other orders ------------------------------------------------------------------------------------------------ */
+/* ---- Gauss-Lobatto nodes and high orders ------------------------------------------------------------------------- */
 
 static void cells_between_lobatto_points_are_exact(void **state)
 {
@@ -263,7 +266,7 @@ static void cells_between_lobatto_points_are_exact(void **state)
     }
 }
 
-/* Bent tets of order 7 are the last ones whose rule is exact. Six of them fill the cube. */
+/* Checks bent tets of order 7, the highest order for which the rule is exact. Six of them fill the cube. */
 static void bent_tets_of_order_7_are_exact(void **state)
 {
     (void)state;
@@ -287,9 +290,9 @@ static void bent_tets_of_order_7_are_exact(void **state)
     check_kind("tet 7", &nodes, INSITU_ORDER_LEXICOGRAPHIC, false, places[0], 6);
 }
 
-/* Checks the volumes of straight tets of order 12, whose functions are computed for each cell because they are too many
- * to be stored. The interpolation between equispaced nodes of order 12 multiplies the rounding errors of the values by
- * about 100. */
+/* Checks the volumes of straight tets of orders up to 12. Functions of order 12 have too many values to be stored, and
+ * are computed for each cell. Interpolation between equidistant nodes of order 12 multiplies the rounding errors of
+ * values by about 100. */
 static void volumes_of_high_order_cells_are_exact(void **state)
 {
     (void)state;

@@ -1,7 +1,6 @@
-/* The values of cells' polynomials between their nodes, against closed forms: on straight cells, those of any
- * polynomial that the cell has. A cell that is described from another corner and along other axes has the same bits on
- * all faces.
- */
+/* Compares the values of cells' polynomials between their nodes with closed forms: straight cells must reproduce every
+ * polynomial that they represent. If the same cell is described from another corner and along other axes, the values on
+ * its faces must be bit-identical. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -36,7 +35,7 @@ static double evaluate_monomial(const double at[3], const int powers[3])
     return value;
 }
 
-/* Which monomials the cell's polynomials contain. */
+/* Returns whether the cell's polynomials contain the monomial with the powers q. */
 static bool is_in_polynomial_space(const session_nodes *of, const int q[3])
 {
     const int p = of->order, plane = q[0] + q[1];
@@ -51,15 +50,18 @@ static bool is_in_polynomial_space(const session_nodes *of, const int q[3])
     }
 }
 
-/* Sums of at most 125 terms, in three turns, each rounded by 1e-16 of weights up to 2 times powers of up to 1.8^12. */
+/* Tolerance: at most 125 terms are summed, in three passes, each rounded by 1e-16 of a weight of up to 2 times powers
+ * of up to 1.8^12. */
 #define ROUNDING 1e-11
 
-/* Interpolates places and a monomial, and checks both: places lie on the finer lattice of the straight cell. */
+/* Interpolates the positions of nodes and a monomial. Checks that the positions lie on the finer lattice of the
+ * straight cell and that the values equal the monomial. */
 static void check_monomial(const session_interpolation *of, const double (*places)[3], const int powers[3],
                            const char *name)
 {
     static double tuples[MOST_NODES][4], fine[MOST_NODES][4], room[3 * 4 * MOST_NODES];
-    static const int corner_of_axis[2][3] = {{1, 2, 3}, {1, 3, 4}}; /* tets and wedges; hexes and pyramids */
+    /* indices for tets and wedges; for hexes and pyramids */
+    static const int corner_of_axis[2][3] = {{1, 2, 3}, {1, 3, 4}};
     double corners[8][3], worst = 0;
     const int p = of->fine.order, is_box = of->of.type == GRID_HEX || of->of.type == GRID_PYRAMID;
     for (int c = 0; c < grid_type_vertices(of->of.type); c++)
@@ -88,7 +90,7 @@ static void check_monomial(const session_interpolation *of, const double (*place
     assert_true(worst < ROUNDING);
 }
 
-/* Moves nodes that are equispaced in a cube of [-1, 1]^3 to Gauss-Lobatto points of order 4. */
+/* Moves nodes that are equidistant in the cube [-1, 1]^3 to Gauss-Lobatto points of order 4. */
 static void move_nodes_to_lobatto_points(order_mesh *mesh)
 {
     const double of4[5] = {-1, -sqrt(3. / 7), 0, sqrt(3. / 7), 1};
@@ -96,7 +98,7 @@ static void move_nodes_to_lobatto_points(order_mesh *mesh)
         mesh->coordinates[i] = of4[lround((mesh->coordinates[i] + 1) * 2)];
 }
 
-/* Every cell of a cube. */
+/* Checks all monomials in all cells of one cube. */
 static void check_kind(const order_kind *kind, int parts, bool is_lobatto)
 {
     order_mesh mesh;
@@ -131,9 +133,10 @@ static void polynomials_are_reproduced(void **state)
     check_kind(&(order_kind){"hex 4, Gauss-Lobatto", INSITU_LAGRANGE_HEX, INSITU_ORDER_LEXICOGRAPHIC, 4}, 3, true);
 }
 
-/* ---- turned cells ------------------------------------------------------------------------------------------------ */
+/* ---- rotated cells
+ * ------------------------------------------------------------------------------------------------ */
 
-/* Stores the permutation of this number of `count` things. */
+/* Stores the permutation with the index `number` of 0 to count - 1. */
 static void make_permutation(int number, int count, int out[4])
 {
     for (int n = 0; n < count; n++) out[n] = n;
@@ -150,7 +153,8 @@ static int count_rotations(int type)
     return type == GRID_HEX ? 48 : type == GRID_TET ? 24 : 12;
 }
 
-/* Finds where a node of a lattice of order p is if the cell is described in one of the ways in which it can be. */
+/* Computes the lattice position that a node has if the cell is described in another way: from another corner and along
+ * other axes. number: index of the description, below count_rotations(); p: order of the lattice. */
 static void rotate_node(int type, int number, int p, const int at[3], int out[3])
 {
     int order[4];
@@ -179,7 +183,8 @@ static double random_number(void)
     return rand() / (RAND_MAX + 1.0);
 }
 
-/* Compares the fine nodes of a cell with those of the same cell as it is turned. */
+/* Compares the fine nodes of a cell with random nodes with those of the same cell in another description. On faces they
+ * must be bit-identical, inside equal to 1e-12. */
 static void check_rotated_cell(const session_interpolation *of, insitu_vertex_order order, int number, const char *name)
 {
     static double tuples[2][200][4], fine[2][MOST_NODES][4], room[3 * 4 * MOST_NODES];
@@ -232,7 +237,7 @@ static void rotated_cells_have_the_same_bits_on_faces(void **state)
     }
 }
 
-/* Constants have the same bits at all nodes, so that flat outer faces stay flat. */
+/* Checks that a constant has bitwise equal values at all nodes, so that flat outer faces stay flat. */
 static void constants_are_exact(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
-/* VTK's own cells tell where each of their nodes is: those of Lagrange cells of orders 1 to 6, and of all quadratic
- * cells. Our places of nodes must be theirs. For hexes in the order before VTK 9.1, which VTK 9.1 turns round as it
- * reads files of the old version, the two edges upwards from corners 2 and 3 are swapped. */
+/* Compares the positions of nodes in cells of higher order with those that VTK's own cell classes report, for Lagrange
+ * cells of orders 1 to 6 and for all quadratic cells. Hexes in the order of VTK before version 9.1 differ: their two
+ * vertical edges at corners 2 and 3 are exchanged. VTK 9.1 exchanges them when it reads files of the old version. */
 #include <cmath>
 #include <cstdio>
 #include <vector>
@@ -22,7 +22,7 @@ extern "C" {
 
 #include <cmocka.h>
 
-/* A header of C's, whose initializers name some members alone. */
+/* A header in C whose initializers name only some members. */
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wmissing-field-initializers"
 #pragma GCC diagnostic ignored "-Wold-style-cast"
@@ -33,7 +33,7 @@ extern "C" {
 namespace
 {
 
-/* Calls use with i, j, k and the place in reference coordinates of every node on the lattice. */
+/* Calls `use` with the lattice position i, j, k of every node. */
 template <typename Use> void for_each_node(const session_nodes &of, Use use)
 {
     const int p = of.order;
@@ -53,7 +53,7 @@ void expect_node_position(int type, const session_nodes &of, const double *their
     const int place = session_node_index(&of, INSITU_ORDER_VTK, i, j, k), p = of.order;
     double at[3] = {static_cast<double>(i) / p, static_cast<double>(j) / p, static_cast<double>(k) / p};
     if (of.type == GRID_PYRAMID) {
-        /* VTK's reference pyramid has its apex over the middle; its nodes on edges are halfway. */
+        /* VTK's reference pyramid has its apex above the middle of the base. */
         const double middle = 0.5 * k / p;
         at[0] = p == k ? 0.5 : at[0] + middle;
         at[1] = p == k ? 0.5 : at[1] + middle;
@@ -111,7 +111,8 @@ void quadratic_nodes_match_vtk(void **)
     }
 }
 
-/* As VTK converts old files: the nodes in edges 10 and 11 change places, and nothing else. */
+/* Checks that the old order of hexes differs from the new one only by the exchange of the nodes on edges 10 and 11, as
+ * in VTK's conversion of old files. */
 void old_hexes_have_two_edges_swapped(void **)
 {
     for (int p = 2; p <= 5; p++) {
@@ -128,7 +129,7 @@ void old_hexes_have_two_edges_swapped(void **)
     }
 }
 
-/* Every node has one place, whatever the order. */
+/* Checks that every node has exactly one index in every order. */
 void node_positions_are_permutations(void **)
 {
     const insitu_vertex_order orders[] = {INSITU_ORDER_LEXICOGRAPHIC, INSITU_ORDER_GMSH, INSITU_ORDER_EXODUS};

@@ -1,7 +1,7 @@
-/* The pieces of cells of higher order, by brute force: they have the volume of their cells, all of one hand; and each
- * of their faces is that of exactly two pieces, by its nodes, or of one on the border of the whole. So there is no gap
- * and no overlap between cells, whichever way they lie: coordinates are turned and mirrored in all 48 ways, as
- * serendipity cells are cut by their order. */
+/* Checks, by brute force, the linear pieces into which cells of higher order are split. Pieces must have the volume of
+ * their cells and the same orientation. Each of their faces, compared by its nodes, must belong to exactly two pieces,
+ * or to one piece on the border of the mesh. So there is no gap and no overlap between cells. Coordinates are rotated
+ * and mirrored in all 48 possible ways, because the split of serendipity cells depends on the order of coordinates. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -24,7 +24,7 @@ static double zero_field(const double p[3])
     return p[0];
 }
 
-/* Axes in one of six orders, each with one of two signs. */
+/* Permutes the axes in one of six orders and gives each axis one of two signs. */
 static void permute_axes(order_mesh *mesh, int way)
 {
     static const signed char orders[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}};
@@ -36,7 +36,7 @@ static void permute_axes(order_mesh *mesh, int way)
 }
 
 typedef struct face_key {
-    int64_t vertices[4]; /* in rising order; -1 first where there are three */
+    int64_t vertices[4]; /* in ascending order; the first is -1 if the face is a triangle */
 } face_key;
 
 static int compare_numbers(const void *a, const void *b)
@@ -113,7 +113,8 @@ static void check_faces_match(const order_mesh *mesh, const grid *g, const char 
     free(keys);
 }
 
-/* Volumes of pieces with flat faces add up to the cube's but for rounding. */
+/* Checks that the volumes of pieces with flat faces add up to the volume of the cube, 8, up to rounding, and that all
+ * have the same sign. */
 static void check_volumes_add_up(const grid *g, bool is_mirrored)
 {
     double sum = 0;
@@ -152,7 +153,7 @@ static void pieces_fill_their_cells(void **state)
     (void)state;
     for (int k = 0; k < order_kind_count; k++)
         for (int way = 0; way < WAYS; way++) {
-            if (order_kinds[k].order > 2 && way) continue; /* cut by nothing that turns */
+            if (order_kinds[k].order > 2 && way) continue; /* the split of other cells does not depend on coordinates */
             cut_and_verify(&order_kinds[k], way, 0);
             cut_and_verify(&order_kinds[k], way, 0.08);
         }

@@ -1,8 +1,8 @@
-/* Checks cells that overlap, on any number of ranks: each cell adds its own sample. The meshes are two lattices inside
- * each other, and lattices with displaced vertices. Distributed over ranks at random, they must give the picture of one
- * rank and that of the brute-force renderer, which collects the samples of all cells without using their neighbours.
- * Meshes that do not overlap must not have a single pixel that is drawn twice. Results are reduced before they are
- * asserted, so that a failing rank does not leave the others waiting. */
+/* Checks cells that overlap, on any number of ranks: each cell contributes its own sample. The meshes are two lattices,
+ * one inside the other, and lattices with displaced vertices. If cells are distributed randomly over the ranks, the
+ * picture must equal that of one rank and that of the brute-force renderer, which collects the samples of all cells
+ * independently of each other. Meshes without overlaps must not have any pixel that is drawn twice. Results are reduced
+ * over the ranks before they are asserted, so that a failing rank does not leave the others waiting. */
 #include "memory.h"
 #include "reference_integral.h"
 #include "session_frame.h"
@@ -65,7 +65,7 @@ static void append_mesh(test_mesh *mesh, test_mesh *more)
     test_mesh_free(more);
 }
 
-/* Makes a lattice, and inside it a smaller one of the next kind with another field. */
+/* Makes a lattice, and inside it a smaller lattice of the next kind of cells with another field. */
 static void make_interpenetrating_lattices(test_mesh_kind kind, test_mesh *out)
 {
     test_mesh inner;
@@ -75,8 +75,8 @@ static void make_interpenetrating_lattices(test_mesh_kind kind, test_mesh *out)
     append_mesh(out, &inner);
 }
 
-/* Makes a lattice in which every third vertex is displaced: cells are inverted, and overlap neighbours and their
- * neighbours. */
+/* Makes a lattice in which every third vertex is displaced, so that some cells are inverted and overlap their
+ * neighbours and the neighbours of those. */
 static void make_tangled_lattice(test_mesh_kind kind, test_mesh *out)
 {
     test_mesh_make_lattice(kind, SIDE, 0.2, test_wave_field, out);
@@ -94,8 +94,8 @@ typedef struct drawing {
     fixture_camera camera;
     int frame;
     int64_t fragment_limit;
-    double max_error; /* > 0: volumes are drawn by segments */
-    bool is_stepped;  /* the opacity has steps */
+    double max_error; /* error allowed to volumes drawn by segments; 0: volumes are drawn by samples */
+    bool is_stepped;  /* whether the opacity has steps */
 } drawing;
 
 static const double surface_values[2] = {-0.2, 0.3};
@@ -110,7 +110,7 @@ typedef struct staged {
     render_volume_layer volumes[2];
 } staged;
 
-/* Whether scenes with surfaces only use normals by differences. */
+/* Whether surfaces have normals by differences. Volumes are not drawn then. */
 static bool is_by_differences;
 
 static void set_up_frame(staged *s, const test_mesh *mesh, const drawing *d)
@@ -146,7 +146,7 @@ static void set_up_frame(staged *s, const test_mesh *mesh, const drawing *d)
     s->f.job.volume_count = 2;
 }
 
-static session_frame frame; /* the last frame that was drawn */
+static session_frame frame; /* the frame that was drawn most recently */
 
 static int64_t draw_mesh(const test_mesh *mesh, const drawing *d, MPI_Comm comm, bool is_alone, image *out)
 {
@@ -172,7 +172,7 @@ static void free_image(image *picture)
     free(picture->depth);
 }
 
-/* Draws as the session does: every rank draws its share. */
+/* Draws as a session does: every rank draws its part of the mesh. */
 static int64_t draw_distributed(const test_mesh *mesh, test_partition_kind partition, const drawing *d, image *out)
 {
     test_mesh share;
@@ -194,10 +194,11 @@ static void assert_everywhere(bool is_well)
 
 /* ---- comparisons --------------------------------------------------------------------------------------------- */
 
-/* Compares two pictures. Samples at the same position are mixed identically on any ranks; elsewhere "over" rounds
- * differently if fragments are grouped differently, by up to 1e-6. Segments may differ more: the partition decides
- * whether a pixel with a transparent overlap is drawn twice, and the second drawing cuts rays at other positions. Both
- * pictures are within max_error of the integral; the measured difference was 2.7e-6 for 1e-3. */
+/* Compares two pictures. Samples at the same position are mixed identically on any number of ranks. At all other
+ * positions, "over" rounds differently by up to 1e-6 if fragments are grouped differently. Segments may differ more:
+ * whether a pixel with a transparent overlap is drawn twice depends on the partition, and the second drawing cuts rays
+ * at other positions. Both pictures are within max_error of the integral; for a max_error of 1e-3, the measured
+ * difference was 2.7e-6. */
 static bool same_images(const image *whole, const image *other, const drawing *d, const char *what)
 {
     int depths = 0;
@@ -216,7 +217,7 @@ static bool same_images(const image *whole, const image *other, const drawing *d
     return !depths && colour <= bound;
 }
 
-/* Returns whether rounding may change one of the ray's decisions. */
+/* Returns whether the reference's result for the ray may depend on rounding. */
 static bool is_doubtful(const reference_ray *ray)
 {
     const double margin = fixture_usual_bounds.margin;
@@ -224,9 +225,9 @@ static bool is_doubtful(const reference_ray *ray)
            ray->sample_margin < margin || ray->eye_margin < margin;
 }
 
-/* Compares with the brute-force renderer, in the usual run every fifth pixel of a picture 67 pixels wide. Overlapping
- * cells have many surfaces and faces in a pixel: up to a tenth of the rays may be doubtful, most of which are
- * map_failed or ambiguous. */
+/* Compares a picture with the brute-force renderer. The usual run compares every fifth pixel. Overlapping cells have
+ * many surfaces and faces in a pixel, so up to a tenth of the rays may be doubtful; most of these are map_failed or
+ * ambiguous. */
 static bool is_as_counted(const test_mesh *mesh, const drawing *d, const image *drawn, const char *what)
 {
     staged s;
@@ -255,8 +256,9 @@ static bool is_as_counted(const test_mesh *mesh, const drawing *d, const image *
     return !wrong && doubtful <= PIXELS / every / 10;
 }
 
-/* Compares every seventeenth pixel with the integral, in the usual run every 151st: max_error must hold for each whose
- * reference, computed to a thousandth of it, is not doubtful. */
+/* Compares every seventeenth pixel (in the usual run every 151st) with the adaptive integral. The error must not exceed
+ * max_error in any of these pixels, except where the reference is doubtful. The reference is computed with a tolerance
+ * of a thousandth of max_error. */
 static bool is_as_integrated(const test_mesh *mesh, const drawing *d, const image *drawn, const char *what)
 {
     staged s;
@@ -288,11 +290,12 @@ static bool is_as_integrated(const test_mesh *mesh, const drawing *d, const imag
     return is_well;
 }
 
-/* If opaque surfaces hide most of a mesh, about 50 pixels overlap; in other scenes hundreds and more do. */
+/* The least number of overlapping pixels in a scene. If opaque surfaces hide most of a mesh, about 50 pixels overlap;
+ * in the other scenes hundreds or more do. */
 enum { FEWEST = 30 };
 
-/* Returns whether a case is drawn. By default every fourth case is drawn on one rank, and every sixth one, different
- * cases, on 2, 3 and 7 ranks. */
+/* Returns whether a case is drawn. The usual run draws every fourth case on one rank, and every sixth case on 2, 3 and
+ * 7 ranks, other cases for each of them. */
 static bool is_case_selected(int kind, int scene)
 {
     return test_is_long_run() || (kind + scene + rank_count) % (rank_count == 1 ? 4 : 6) == 0;
@@ -309,10 +312,12 @@ static void compare_partitions(const test_mesh *mesh, const drawing *d, bool wit
         if (overlaps < FEWEST || alone < FEWEST)
             fprintf(stderr, "%s, scene %d: %d pixels overlap, %d alone\n", what, (int)d->scene, (int)overlaps,
                     (int)alone);
-        /* Segments of several volumes are drawn with separate fragments from the start, which reports no overlaps. */
+        /* Segments of several volumes are drawn with separate fragments in the first drawing already. No overlaps are
+         * reported then. */
         const bool is_found = (overlaps >= FEWEST && alone >= FEWEST) || (d->max_error > 0 && d->scene == TWO_VOLUMES);
         good = is_found && (rank_count == 1 || same_images(&whole, &ours, d, what));
-        /* The reference is slow, and one comparison suffices, since the picture is the same on any number of ranks. */
+        /* The reference is slow. It is compared on one rank only, since the picture is the same on any number of
+         * ranks. */
         if (with_reference && (rank_count == 1 || test_is_long_run()))
             good = (d->max_error > 0 ? is_as_integrated : is_as_counted)(mesh, d, &ours, what) && good;
         if (rank_count > 1) free_image(&whole);
@@ -351,7 +356,7 @@ static void segments_of_nested_lattices_match_integration(void **state)
     }
 }
 
-/* Checks two fields in the cells of one mesh. */
+/* Checks two volumes with different fields in the cells of one mesh. */
 static void segments_of_two_volumes_match_integration(void **state)
 {
     (void)state;
@@ -366,8 +371,8 @@ static void segments_of_two_volumes_match_integration(void **state)
     }
 }
 
-/* Checks displaced lattices. Inverted hexes have no inverse map that both sides of a face would find: only tets are
- * compared with the reference. */
+/* Checks lattices with displaced vertices. Only tets are compared with the reference, because inverted hexes have no
+ * inverse map that gives the same result on both sides of a face. */
 static void tangled_lattices_are_same_on_any_ranks(void **state)
 {
     (void)state;
@@ -383,8 +388,9 @@ static void tangled_lattices_are_same_on_any_ranks(void **state)
     }
 }
 
-/* Returns whether the last frame took no more turns than fragment_limit requires: the number of pixels of a turn grows
- * at most eightfold, and a turn may make half of the fragments that the previous turn predicted. */
+/* Returns whether the most recent frame was drawn in as few turns as fragment_limit allows: from one turn to the next,
+ * the number of pixels grows at most eightfold, and a turn may make only half of the fragments that are predicted from
+ * the previous turn. */
 static bool is_pass_count_minimal(int64_t fragment_limit)
 {
     int64_t most = 0;
@@ -392,7 +398,7 @@ static bool is_pass_count_minimal(int64_t fragment_limit)
     return frame.turns > 1 && frame.turns <= 4 + 2 * (int)(most / fragment_limit);
 }
 
-/* Checks that turns only change the time at which a pixel is drawn. */
+/* Checks that a picture drawn in several turns is bit-identical to the picture drawn in one turn. */
 static void draw_in_passes(const test_mesh *mesh, drawing d, int64_t fragment_limit)
 {
     image at_once, in_turns;
@@ -408,8 +414,8 @@ static void draw_in_passes(const test_mesh *mesh, drawing d, int64_t fragment_li
     assert_everywhere(is_few && is_same);
 }
 
-/* Checks pictures drawn in turns. Rays of samples make as many fragments as estimated before the first turn, those of
- * segments far fewer. */
+/* Checks pictures drawn in turns. The number of fragments of sampled rays is that estimated before the first turn;
+ * segments make far fewer. */
 static void number_of_passes_changes_no_bit(void **state)
 {
     (void)state;
@@ -420,8 +426,8 @@ static void number_of_passes_changes_no_bit(void **state)
     test_mesh_free(&mesh);
 }
 
-/* Checks normals by differences: if several cells contain a sample point, the least of their values is used, on
- * whichever ranks they are. */
+/* Checks normals by differences. If several cells contain a sample point, the least of their values must be used, on
+ * whichever ranks the cells are. */
 static void differences_among_overlapping_cells_are_the_same_bits(void **state)
 {
     static const test_mesh_kind kinds[] = {TEST_HEXES, TEST_TETS, TEST_MIXED};
@@ -452,11 +458,11 @@ static void check_no_overlap(const test_mesh *mesh, test_partition_kind partitio
         for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++) {
             image drawn;
             const drawing d = {scene, camera, (int)camera, MANY, max_error, false};
-            /* A known limitation: a hit that rounding puts behind the face at its cell's end is inside the next cell's
-             * segment, and if that belongs to another rank, the pixel is drawn twice and counts. Two volumes are mixed
-             * in all pixels. */
+            /* A known limitation: rounding may put a hit behind the face at the end of its cell, and therefore inside
+             * the segment of the next cell. If that cell belongs to another rank, the pixel is drawn twice and counts
+             * as overlapping. Two volumes are mixed in all pixels. */
             if (scene != VOLUME && max_error > 0) continue;
-            /* The usual run draws each scene from every other camera. */
+            /* The usual run draws each scene from every second camera. */
             if (!test_is_long_run() && max_error == 0 && ((int)scene + (int)camera + rank_count) % 2) continue;
             const int64_t overlaps = draw_distributed(mesh, partition, &d, &drawn);
             free_image(&drawn);
@@ -481,7 +487,7 @@ static void conforming_meshes_have_no_overlap(void **state)
         }
 }
 
-/* Checks that a cell which a ray crosses twice does not count as two cells at the same point. */
+/* Checks that a cell that a ray crosses twice does not count as two overlapping cells. */
 static void a_cell_does_not_overlap_itself(void **state)
 {
     (void)state;

@@ -1,4 +1,4 @@
-/* Compares polyhedra with the tets that they consist of (test_own_tets.h). */
+/* Compares polyhedra with the tets of which they consist (test_own_tets.h). */
 #include "test_own_tets.h"
 
 #include "reference_cell.h"
@@ -78,8 +78,8 @@ static void draw_surface(const test_mesh *mesh, double cell_size, const double *
     fixture_draw(f, out);
 }
 
-/* Returns, computed in double, whether the ray passes so near to an edge, or to the isovalue at a face of a tet, that
- * rounding may decide. */
+/* Returns whether the ray passes so near to an edge, or its value at a face of a tet is so near to the isovalue, that
+ * the result may depend on rounding. Computed in double. */
 static bool is_in_band(const reference_scene *scene, int x, int y)
 {
     reference_ray ray;

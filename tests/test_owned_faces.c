@@ -41,7 +41,8 @@ static void make_narrow(owned *o, int64_t faces, int32_t base)
     for (int64_t i = 0; i < o->offsets[faces]; i++) o->narrow_vertices[i] = (int32_t)o->vertices[i] + base;
 }
 
-/* In the separate list of boundary faces, the last face belongs to no cell and repeats the first vertex. */
+/* Makes the arrays for FORM_APART. In the separate list of boundary faces, one more face at the end belongs to no cell
+ * and has no vertices. */
 static void make_apart(owned *o, int64_t cells, int32_t base)
 {
     for (int64_t face = 0; face < o->middle; face++) {

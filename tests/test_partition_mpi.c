@@ -1,8 +1,9 @@
-/* Checks that any number of ranks gives the same image: each rank draws its part of a mesh, distributed in blocks, at
- * random or as a checkerboard, with its own numbering of vertices, and compositing makes the picture; rank 0 draws the
- * whole mesh alone and compares. Surfaces have the same bits in depth and colours. Volumes by samples, by exact
- * segments and by segments under max_error agree within 1e-6, because fragments are blended in different groups. Ranks
- * without a cell, ranks without a mesh, and ranks that have the others' cells as ghosts are included. */
+/* Checks that any number of ranks gives the same image. The cells of a mesh are distributed in blocks, randomly or as a
+ * checkerboard. Each rank draws its part with its own numbering of vertices, and the pictures are composited. Rank 0
+ * draws the whole mesh by itself and compares the pictures. Surfaces must be bit-identical in depth and colour. Volumes
+ * by samples, by exact segments and by segments under max_error must agree to 1e-6, because fragments are blended in
+ * different groups. The test includes ranks without a cell, ranks without a mesh, and ranks that have the cells of
+ * other ranks as ghosts. */
 #include "comp.h"
 #include "memory.h"
 #include "test_effort.h"
@@ -19,7 +20,7 @@
 typedef struct scene {
     const char *name;
     fixture_camera camera;
-    float opacity; /* opacity of its surfaces; 0: it has none */
+    float opacity; /* opacity of the surfaces; 0: there are no surfaces */
     bool has_volume;
     render_integration integration;
     double max_error;
@@ -44,7 +45,7 @@ enum { SCENE_COUNT = sizeof scenes / sizeof scenes[0] };
 enum { WIDTH = 67, HEIGHT = 51, PIXELS = WIDTH * HEIGHT, SIDE = 4 };
 
 static int my_rank, rank_count;
-static double worst[SCENE_COUNT]; /* on rank 0 only */
+static double worst[SCENE_COUNT]; /* largest difference of each scene; set on rank 0 only */
 
 static void draw_mesh(const test_mesh *mesh, const scene *scene, MPI_Comm comm, bool is_alone, image *out)
 {
@@ -59,7 +60,7 @@ static void draw_mesh(const test_mesh *mesh, const scene *scene, MPI_Comm comm, 
     if (scene->has_volume) fixture_set_volume(&f, 0.3);
     f.job.integration = scene->integration;
     f.job.max_error = scene->max_error;
-    f.job.extent = 3.5; /* the diagonal of the cube is shorter */
+    f.job.extent = 3.5; /* any length not below the cube's diagonal, about 3.46 */
     f.job.is_alone = is_alone;
     assert_int_equal(render_frame(&f.job, &list, NULL, &error), INSITU_OK);
     out->width = WIDTH;
@@ -101,7 +102,8 @@ static bool same_images(const image *whole, const image *other, const scene *sce
     return !depths && colour <= bound;
 }
 
-/* Makes this rank's share of the mesh; with ghosts, all cells, of which those of other ranks are ghosts. */
+/* Makes this rank's part of the mesh. If `ghosts` is set, the part has all cells, and those of other ranks are
+ * ghosts. */
 static void extract_rank_cells(const test_mesh *mesh, const int *owners, bool ghosts, test_mesh *out)
 {
     int *all = calloc((size_t)mesh->cell_count, sizeof *all);
@@ -129,8 +131,8 @@ static void compare_with_whole(const test_mesh *mesh, const int *owners, bool gh
     assert_true(good);
 }
 
-/* Returns whether a case is drawn. By default each scene of each kind is drawn on one rank, and in each partition on
- * one of 2, 3, 4 and 7 ranks. */
+/* Returns whether a case is drawn. In the usual run, each scene with each kind of mesh is drawn on one rank, and with
+ * each partition on one of the numbers of ranks 2, 3, 4 and 7. */
 static bool is_case_selected(test_partition_kind partition, test_mesh_kind kind, int scene)
 {
     if (rank_count == 1) return partition == TEST_RANDOM;
@@ -170,7 +172,7 @@ static void checkerboard_partition_draws_the_whole_image(void **state)
     compare_partition(TEST_CHECKERBOARD);
 }
 
-/* Checks ranks without cells: the last rank has all cells, or there are fewer cells than ranks. */
+/* Checks ranks without cells: first the last rank has all cells, then there are fewer cells than ranks. */
 static void ranks_without_cells_participate(void **state)
 {
     (void)state;

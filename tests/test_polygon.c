@@ -1,8 +1,8 @@
-/* Checks polygons cut into triangles (polygon.h): each point of a polygon is in exactly one triangle and no other point
- * is in any, compared with the polygon's winding number; the triangles do not depend on the first corner or the
- * direction of the list; they equal those of the reference; and convex polygons are fans. The polygons are random
- * simple ones, combs, spirals, holes at the end of a bridge, polygons with collinear or repeated corners, and polygons
- * bent out of their plane. */
+/* Checks the triangulation of polygons (polygon.h). Each point inside a polygon, by its winding number, must be in
+ * exactly one triangle, and no point outside in any. The triangles must not depend on the first corner or on the
+ * direction of the list of corners, must equal those of the reference, and must form a fan if the polygon is convex.
+ * The polygons are random simple ones, combs, spirals, polygons with a hole at the end of a bridge, with collinear or
+ * repeated corners, and polygons bent out of their plane. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -32,7 +32,7 @@ static void add_vertex(polygon *p, double x, double y)
 
 /* ---- polygons ------------------------------------------------------------------------------------------------- */
 
-/* Makes a star-shaped polygon with spikes around the origin. */
+/* Makes a star-shaped polygon around the origin with spikes. */
 static void make_star(uint64_t seed, int count, polygon *p)
 {
     for (int i = 0; i < count; i++) {
@@ -51,7 +51,7 @@ static void make_comb(int teeth, polygon *p)
     }
     add_vertex(p, teeth, 0);
     add_vertex(p, teeth, -1);
-    for (int i = teeth - 1; i >= 0; i--) add_vertex(p, i, -1); /* collinear corners */
+    for (int i = teeth - 1; i >= 0; i--) add_vertex(p, i, -1); /* adds collinear corners */
 }
 
 static void make_spiral(int turns, polygon *p)
@@ -65,14 +65,15 @@ static void make_spiral(int turns, polygon *p)
         }
 }
 
-/* Makes a square with a square hole; a bridge leads to the hole and back. */
+/* Makes a square with a square hole. The list of corners passes along a bridge to the hole and back. */
 static void make_bridge(polygon *p)
 {
     static const double at[10][2] = {{0, 0}, {4, 0}, {4, 4}, {0, 4}, {0, 0}, {1, 1}, {1, 3}, {3, 3}, {3, 1}, {1, 1}};
     for (int i = 0; i < 10; i++) add_vertex(p, at[i][0], at[i][1]);
 }
 
-/* Makes an L with corners repeated two and three times, and with corners in the middle of edges. */
+/* Makes an L-shaped polygon in which some corners are repeated two or three times and some lie in the middle of
+ * edges. */
 static void make_irregular_polygon(polygon *p)
 {
     static const double at[14][2] = {{0, 0}, {1, 0}, {2, 0}, {2, 0}, {2, 1}, {1.5, 1}, {1, 1},
@@ -80,7 +81,8 @@ static void make_irregular_polygon(polygon *p)
     for (int i = 0; i < 14; i++) add_vertex(p, at[i][0], at[i][1]);
 }
 
-/* Makes polygon number `which`: the U and the dart of our examples, then the polygons of the functions above. */
+/* Makes the polygon with the index `which`: a U, a dart (a quad with one concave corner), then the polygons of the
+ * functions above. */
 static void make_polygon(int which, polygon *p)
 {
     static const double u[8][2] = {{0, 0}, {3, 0}, {3, 3}, {2, 3}, {2, 1}, {1, 1}, {1, 3}, {0, 3}};
@@ -105,8 +107,8 @@ static void make_polygon(int which, polygon *p)
 
 enum { POLYGONS = 300 };
 
-/* Moves the polygon into space by a rotation that depends on `which`, and, if bent, off its plane by up to a tenth of a
- * unit. */
+/* Moves the polygon into space by a rotation that depends on `which`. If is_bent is set, also moves corners off the
+ * plane by up to 0.1. */
 static void embed_in_space(int which, bool is_bent, polygon *p)
 {
     const double a = 0.7 * which, b = 1.1 * which;
@@ -149,7 +151,7 @@ static double polygon_area(const polygon *p)
     return sum;
 }
 
-/* Returns how often the loop winds around the point. */
+/* Returns the winding number of the loop around the point. */
 static int compute_winding_number(const double (*loop)[2], const int *numbers, int count, const double at[2])
 {
     int turns = 0;
@@ -163,7 +165,8 @@ static int compute_winding_number(const double (*loop)[2], const int *numbers, i
     return turns;
 }
 
-/* Checks that random points, none of which is on an edge, are covered once. */
+/* Checks that random points are covered by as many triangles as their winding number states. No random point is on an
+ * edge. */
 static void assert_covered_once(const polygon *p, const cut *c, int which)
 {
     double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
@@ -199,21 +202,24 @@ static void polygons_are_covered_once(void **state)
             embed_in_space(which, bent, &p);
             cut_polygon(&p, &c);
             for (int i = 0; i < c.count; i++) sum += triangle_area(&p, c.triangles[i]);
-            assert_true(fabs(sum - polygon_area(&p)) <= 1e-12 * p.count); /* roundings of numbers of at most 60 */
-            /* Bent polygons are triangulated with another normal: along this one a thin triangle may be reversed. */
+            /* tolerance: roundings of numbers of at most 60 */
+            assert_true(fabs(sum - polygon_area(&p)) <= 1e-12 * p.count);
+            /* Bent polygons are triangulated along another normal than the plane's. Along the plane's normal, a thin
+             * triangle may be reversed. */
             if (!bent) assert_covered_once(&p, &c, which);
         }
 }
 
-/* ---- the same triangles ---------------------------------------------------------------------------------------- */
+/* ---- triangles that must be equal
+ * --------------------------------------------------------------------------------- */
 
 static int compare_triangles(const void *a, const void *b)
 {
     return memcmp(a, b, 9 * sizeof(double));
 }
 
-/* Lists the triangles by their coordinates, sorted within each triangle and then among triangles. Triangles without
- * area are skipped, since they depend on which of the corners at the same position is used. */
+/* Lists the coordinates of the triangles, sorted within each triangle and then among triangles. Triangles without area
+ * are skipped, because they depend on which of several corners at the same position is used. */
 static int list_sorted_triangles(const polygon *p, const cut *c, double (*out)[9])
 {
     int count = 0;

@@ -1,15 +1,17 @@
-/* Checks robust roots in polyhedra on random rays: every crossing is found, and every hit is a crossing. The reference
- * is brute force in double over the tets that the cell's triangles span with its centre: each tet is clipped to the
- * ray, and inside the cell the field is the sum over the tets at the point, each with its sign.
+/* Checks the roots that the kernels find in polyhedra, on random rays: every crossing must be found, and every hit must
+ * be a crossing. The reference is brute force in double over the tets between the triangles of the cell's faces and its
+ * centre. Each ray is clipped to each tet; inside the cell, the field is the sum of the fields of the tets at the
+ * point, each with its sign.
  *
- * What rounding may decide: positions are off by about 3e-6 of the scene in total. Vertices are off by half a unit in
- * the last place of 1 along each axis (1e-7), and crossings of sheets by the roundings of their weights, 2.4e-7 along
- * the ray and four times as much across (kernel_cell.h); if tets overlap, sums are evaluated up to 16 times 2.4e-7 next
- * to a sheet. So values are off by that times the field's slope, and by about ten roundings of their own, 2e-6 of their
- * range: this is the band. A crossing is certain if the field passes from outside the band on one side to outside the
- * band on the other side within one interval of the ray in the cell. Each certain crossing must have a hit, and each
- * hit must be where the field is within the band. Rays that pass an edge of the cell at less than the error of
- * positions may miss the cell or not, and do not count. */
+ * Tolerances: positions have a total error of about 3e-6 of the scene. Vertices are rounded by half a unit in the last
+ * place of 1 along each axis (1e-7). Crossings of sheets (triangles between two tets) have the rounding of their
+ * weights, 2.4e-7 along the ray and four times as much across (kernel_cell.h). If tets overlap, sums are evaluated up
+ * to 16 times 2.4e-7 beside a sheet. So values have an error of 3e-6 times the field's slope, plus about ten roundings
+ * of their own, 2e-6 of their range. The band is the range of values within this error of the isovalue. A crossing is
+ * certain if the field passes from outside the band on one side to outside the band on the other side, within one
+ * interval of the ray in the cell. Each certain crossing must have a hit, and each hit must be at a depth at which the
+ * field is within the band. Rays whose distance from an edge of the cell is less than the error of positions do not
+ * count, because they may miss the cell or not. */
 #include "reference_cell.h"
 #include "reference_polyhedron.h"
 #include "test_mesh_dual.h"
@@ -27,15 +29,16 @@ enum { WIDTH = 40, HEIGHT = 25, MOST_POINTS = 16 * REFERENCE_MAX_TRIANGLES };
 
 static int64_t wanted_rays = 30000;
 
-/* A linear function of the position, given by its gradient. */
+/* A linear function of the position: its value at the origin and its gradient. */
 typedef struct linear {
     double at_origin, gradient[3];
 } linear;
 
 typedef struct tet {
-    linear inside[4]; /* at least 0 inside the tet: the last of them is 0 on triangle 0 */
+    /* barycentric coordinates: at least 0 inside the tet; the last one is 0 on the tet's outer triangle */
+    linear inside[4];
     linear value;
-    double slope; /* length of the gradient */
+    double slope; /* magnitude of the gradient */
     int sign;
 } tet;
 
@@ -48,14 +51,16 @@ typedef struct subject {
     bool is_star_shaped;
 } subject;
 
-/* The part of a ray in a tet, from z[0] to z[1] with the values v; is_face: this end is on the cell's surface. */
+/* The interval of a ray in a tet, from depth z[0] to z[1] with the values v[0] and v[1]. is_face: whether this end is
+ * on the cell's surface. */
 typedef struct interval {
     double z[2], v[2], slope;
     bool is_face[2];
     int sign;
 } interval;
 
-/* The field along an interval in the cell; a jump is two points at the same depth. */
+/* The field along an interval of the ray in the cell, linear between its points. A jump is stored as two points at the
+ * same depth. */
 typedef struct path {
     int count;
     double z[MOST_POINTS], v[MOST_POINTS];
@@ -73,8 +78,7 @@ static double evaluate_linear(const linear *f, const double p[3])
     return f->at_origin + f->gradient[0] * p[0] + f->gradient[1] * p[1] + f->gradient[2] * p[2];
 }
 
-/* Makes the linear function that is 1 at apex and 0 on the triangle of the others; returns false if the tet has no
- * volume. */
+/* Makes the linear function that is 1 at apex and 0 on the triangle `base`. Returns false if the tet has no volume. */
 static bool make_weight(const double *apex, const double *const base[3], linear *out)
 {
     double d[3][3], volume = 0;
@@ -170,7 +174,7 @@ static reference_line make_pixel_line(const render_camera *camera, int x, int y)
     return line;
 }
 
-/* Restricts f to the line: its value there is value + slope z. */
+/* Restricts f to the line. On the line, f is value + slope z. */
 static void restrict_to_line(const linear *f, const reference_line *line, double *value, double *slope)
 {
     *value = evaluate_linear(f, (const double[3]){line->base[0], line->base[1], 0});
@@ -207,7 +211,7 @@ static double interpolate_in_interval(const interval *s, double z)
     return s->v[0] + (z - s->z[0]) / (s->z[1] - s->z[0]) * (s->v[1] - s->v[0]);
 }
 
-/* Computes the ray's intervals in the tets, and their ends in order. */
+/* Computes the ray's intervals in all tets and the sorted depths of their ends. Returns the number of intervals. */
 static int find_intervals(const subject *s, const reference_line *line, interval *ray_intervals, double *ends)
 {
     int count = 0;
@@ -217,7 +221,7 @@ static int find_intervals(const subject *s, const reference_line *line, interval
     return count;
 }
 
-/* Returns the value of the face that the ray meets at z. */
+/* Returns the value on the face that the ray meets at depth z. */
 static double find_face_value(const interval *ray_intervals, int count, double z)
 {
     double nearest = (double)INFINITY, value = 0;
@@ -239,7 +243,8 @@ static void add_point(path *p, double z, double v)
     p->v[p->count++] = v;
 }
 
-/* Adds the field from one end of a tet to the next, if the part between them is inside the cell. */
+/* Adds the field between two consecutive ends of tets to the path. Returns false if this part of the ray is not inside
+ * the cell. */
 static bool add_piece(const interval *ray_intervals, int count, double z0, double z1, path *p)
 {
     const double middle = 0.5 * (z0 + z1);
@@ -261,7 +266,7 @@ static bool add_piece(const interval *ray_intervals, int count, double z0, doubl
     return true;
 }
 
-/* Makes the next interval in the cell, from end number *next on; returns false if there is none. */
+/* Finds the next interval of the ray in the cell, from the end with index *next on. Returns false if there is none. */
 static bool make_next_path(const interval *ray_intervals, int count, const double *ends, int *next, path *p)
 {
     p->count = 0;
@@ -273,7 +278,7 @@ static bool make_next_path(const interval *ray_intervals, int count, const doubl
     return p->count > 0;
 }
 
-/* Removes the part of the path behind the eye. */
+/* Removes what is behind the eye from the path. */
 static void cut_at_eye(path *p)
 {
     int first = 0;
@@ -306,7 +311,7 @@ typedef struct verify {
     tally *t;
 } verify;
 
-/* Returns whether there is a hit in [from, to], widened by the error of positions. */
+/* Returns whether there is a hit between the two depths, which are widened by the error of positions. */
 static bool has_hit(const verify *j, const ray_hits *hits, double from, double to)
 {
     for (int i = 0; i < hits->count; i++)
@@ -314,7 +319,7 @@ static bool has_hit(const verify *j, const ray_hits *hits, double from, double t
     return false;
 }
 
-/* Marks the hits that are near a depth at which the path comes within the band. */
+/* Marks the hits near which the path enters the band. */
 static void mark_hits(const verify *j, const path *p, double band, ray_hits *hits)
 {
     for (int i = 0; i < hits->count; i++)
@@ -328,8 +333,8 @@ static void mark_hits(const verify *j, const path *p, double band, ray_hits *hit
         }
 }
 
-/* Checks that each certain crossing of the path has a hit; for an opaque surface, in which a hit hides the rest, only
- * the first one. */
+/* Checks that each certain crossing of the path has a hit. If the surface is opaque, only the first crossing is
+ * checked, because its hit hides the others. Returns whether the search may continue. */
 static bool verify_path(const verify *j, const path *p, double band, const ray_hits *hits)
 {
     const bool is_inner = (p->v[0] >= j->iso) == (p->v[p->count - 1] >= j->iso);
@@ -354,7 +359,8 @@ static bool verify_path(const verify *j, const path *p, double band, const ray_h
     return true;
 }
 
-/* Returns the width of the band. If tets overlap, the slopes of a sum's terms add up, usually three of them. */
+/* Returns half the width of the band. If tets overlap, the slopes of the terms of a sum add up, usually of three
+ * terms. */
 static double compute_error_band(const verify *j, const interval *ray_intervals, int count)
 {
     double steepest = 0;
@@ -395,7 +401,7 @@ static void list_hits(const render_fixture *f, const drawn_frame *drawn, int64_t
 
 /* ---- frames ---- */
 
-/* Sets a camera at a random side, sometimes inside the mesh or orthographic. */
+/* Sets a random camera. Some cameras are inside the mesh, and some are orthographic. */
 static void set_random_camera(render_fixture *f, uint64_t seed)
 {
     const double angle = test_uniform_between(0, seed, 0, 6.283), height = test_uniform_between(1, seed, -0.9, 0.9);
@@ -475,7 +481,7 @@ static void random_polyhedra_miss_no_crossing(void **state)
     }
 }
 
-/* Checks concave polyhedra, also prisms whose bases are moved out of their planes. */
+/* Checks concave polyhedra, including prisms whose bases are not plane. */
 static void concave_polyhedra_miss_no_crossing(void **state)
 {
     tally t = {.rays = 0};
@@ -495,7 +501,7 @@ static void concave_polyhedra_miss_no_crossing(void **state)
     assert_none_missed("concave cells", &t);
 }
 
-/* Returns whether the field passes the value on the ray. */
+/* Returns whether the field on the ray is above the value at some depth. */
 static bool is_value_crossed(const subject *s, const reference_line *line, double value)
 {
     static interval ray_intervals[REFERENCE_MAX_TRIANGLES];
@@ -509,9 +515,9 @@ static bool is_value_crossed(const subject *s, const reference_line *line, doubl
     return false;
 }
 
-/* Makes a prism shaped as a hook with its centre in its stem: the tets of the hook's two sides, one of them with a
- * negative sign, reach through the stem. Values are -1 on the inner side, else 1, and the sum at the stem's wall is
- * about 1 + 1.5 / 4 + 0.5 / 6. */
+/* Makes a prism in the shape of a hook whose centre is in its stem. The tets at the two sides of the hook, one of them
+ * with a negative sign, extend through the stem. Values are -1 on the inner side, else 1, so that the sum at the stem's
+ * wall is about 1 + 1.5 / 4 + 0.5 / 6. */
 static void make_hook(test_mesh *out)
 {
     static const double base[8][2] = {{-1.2, -0.5}, {0, -0.5},   {0, 0.3},   {0.3, 0.3},
@@ -525,8 +531,8 @@ static void make_hook(test_mesh *out)
     test_mesh_split_quads(out);
 }
 
-/* Checks that a sum over overlapping tets beyond the range of the vertices' values shows no surface: no tree finds the
- * cell for an isovalue there, by definition. */
+/* Checks an isovalue that no vertex reaches but that the sum over overlapping tets exceeds. No surface may be drawn: by
+ * definition, the tree does not find the cell for an isovalue beyond the range of its vertices' values. */
 static void sums_beyond_the_vertices_show_no_surface(void **state)
 {
     static const double value = 1.1;

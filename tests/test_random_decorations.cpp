@@ -1,5 +1,5 @@
-/* Draws random decorations over pictures of 1 to 2200 pixels a side. A picture that takes more than ten seconds ends
- * the test by SIGALRM; colours must stay finite. */
+/* Draws random decorations over pictures whose sides have 1 to 2200 pixels. Colours must be finite. If a picture takes
+ * more than ten seconds, SIGALRM ends the test. */
 #include <cmath>
 #include <csetjmp>
 #include <cstdarg>
@@ -20,7 +20,7 @@ extern "C" {
 namespace
 {
 
-/* Prints the case first, so that the last line identifies a case that hangs. */
+/* Draws the decorations. Prints the case first, so that the last line of output identifies a case that does not end. */
 void draw_and_check(int width, int height, const insitu_decorations &what)
 {
     std::vector<float> rgba(4 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
@@ -43,7 +43,8 @@ void random_decorations_are_drawn_in_time(void **)
     }
 }
 
-/* Checks a former error: blocks that touched up to rounding pushed each other forever, at one height in twenty. */
+/* Checks that a former error does not return: text and axes that touched, up to rounding, pushed each other away in an
+ * endless loop, at one picture height in twenty. */
 void text_over_axes_is_drawn_at_every_height(void **)
 {
     const insitu_words words[] = {{"run 42", INSITU_BOTTOM_LEFT, 1}, {"t = 0.5", INSITU_BOTTOM_LEFT, 1}};

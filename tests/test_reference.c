@@ -1,4 +1,4 @@
-/* Checks the reference renderer, which the kernels are compared with, against closed forms. */
+/* Compares the reference renderer, which is the reference for the kernels, with closed forms. */
 #include "reference_cell.h"
 #include "reference_render.h"
 #include "test_meshes.h"
@@ -9,8 +9,8 @@
 #include <string.h>
 #include <cmocka.h>
 
-/* Adds a vertex to a single cell seen by a camera at the origin that looks along z: camera coordinates equal world
- * coordinates. */
+/* Adds a vertex to a cell. The camera is at the origin and looks along z, so that camera coordinates equal world
+ * coordinates. Returns the vertex's index in the cell. */
 static int add_vertex(const test_mesh *mesh, int64_t v, int64_t *met, reference_cell *cell, double *values)
 {
     int at = 0;
@@ -80,7 +80,8 @@ static void crossings_of_unit_hex_match_slab_test(void **state)
     test_mesh_free(&mesh);
 }
 
-/* Returns a line that is random, passes through a vertex, or passes through a point of an edge. */
+/* Returns a line that is random, that passes through a vertex, or that passes through the middle between two
+ * vertices. */
 static reference_line make_aimed_line(const reference_cell *cell, uint64_t i)
 {
     reference_line line = random_line(i);
@@ -111,7 +112,8 @@ static void crossings_of_every_shape_are_even(void **state)
     }
 }
 
-/* Checks that the intervals of a conforming lattice follow each other along a ray without gap or overlap. */
+/* Checks that the intervals of the cells of a conforming lattice follow each other along a ray without gaps and
+ * overlaps. */
 static void intervals_of_lattices_tile_the_ray(void **state)
 {
     (void)state;
@@ -121,7 +123,7 @@ static void intervals_of_lattices_tile_the_ray(void **state)
         for (uint64_t i = 0; i < 40; i++) {
             reference_line line = random_line(i);
             if (i % 4 == 0)
-                line = (reference_line){{0.5 * (double)(i / 16) - 0.5, 0}, {0, 0}}; /* along lattice planes */
+                line = (reference_line){{0.5 * (double)(i / 16) - 0.5, 0}, {0, 0}}; /* along planes of the lattice */
             double length = 0, low = 0, high = 0;
             for (int64_t index = 0; index < mesh.cell_count; index++) {
                 reference_cell cell;
@@ -142,7 +144,7 @@ static void intervals_of_lattices_tile_the_ray(void **state)
     }
 }
 
-/* Computes a point inside the cell: the mean of the vertices moved towards one of them. */
+/* Computes a point inside the cell, as a random weighted mean of the vertices. */
 static void choose_inner_point(const reference_cell *cell, uint64_t i, double point[3])
 {
     double total = 0;
@@ -165,7 +167,8 @@ static void linear_field_is_exact_in_every_cell(void **state)
         double values[REFERENCE_MAX_VERTICES];
         test_mesh_make_single_cell(shape, test_linear_field, &mesh);
         load_cell(&mesh, 0, &cell, values);
-        /* The error of the gradient is the rounding of values (1e-16) over the smallest extent (1e-4). */
+        /* The error of the gradient is the rounding of values (1e-16) divided by the smallest extent of the cell
+         * (1e-4). */
         const double bound = shape == TEST_SLIVER_TET ? 1e-11 : 1e-12;
         for (uint64_t i = 0; i < 300; i++) {
             double point[3], value, gradient[3];
@@ -178,8 +181,8 @@ static void linear_field_is_exact_in_every_cell(void **state)
     }
 }
 
-/* Loads a prism of which one base is a single vertex, with all its faces: a hexagon of one vertex and quads of three
- * distinct vertices; the bits of turns decide their orientation. */
+/* Loads a hexagonal prism of which one base has collapsed to a single vertex. All faces remain: a hexagon that repeats
+ * this vertex, and quads with three distinct vertices. The bits of turns select the orientation of each quad. */
 static void load_collapsed_prism(unsigned turns, reference_cell *cell, double values[REFERENCE_MAX_VERTICES])
 {
     reference_polyhedron *p = &cell->poly;
@@ -205,8 +208,8 @@ static void load_collapsed_prism(unsigned turns, reference_cell *cell, double va
     reference_polyhedron_setup(cell);
 }
 
-/* Checks that such prisms are pyramids: an edge from a vertex to itself has no direction that could orient its
- * faces. */
+/* Checks that prisms with a collapsed base behave as pyramids. An edge from a vertex to itself has no direction, so it
+ * must not be used to orient faces. */
 static void collapsed_prisms_are_pyramids(void **state)
 {
     (void)state;
@@ -248,8 +251,8 @@ static void trilinear_field_is_exact_in_a_box(void **state)
     test_mesh_free(&mesh);
 }
 
-/* Checks the gradient of any field against central differences: their error is h²·f''' ~ 1e-9, and rounding is 1e-15 /
- * h ~ 1e-10. */
+/* Compares the gradient of a field that is not linear with central differences. Their error is h²·f''' ~ 1e-9, and
+ * their rounding is 1e-15 / h ~ 1e-10. */
 static void gradient_agrees_with_differences(void **state)
 {
     (void)state;
@@ -278,8 +281,7 @@ static void gradient_agrees_with_differences(void **state)
     }
 }
 
-/* Checks that on plane faces the face's value is the limit of the values inside, and that two cells agree on a shared
- * face to the bit. */
+/* Checks that the value on a plane face is the limit of the values inside the cell. */
 static void face_values_are_continuous_with_the_interior(void **state)
 {
     (void)state;
@@ -302,7 +304,7 @@ static void face_values_are_continuous_with_the_interior(void **state)
                 const double point[3] = {line.base[0] + line.slope[0] * c[k].z, line.base[1] + line.slope[1] * c[k].z,
                                          c[k].z};
                 assert_true(reference_interpolate(&cell, point, values, &value, NULL));
-                /* Near a collapsed vertex the inverse of the map loses half of the digits. */
+                /* Near a collapsed vertex, the inverse map loses half of the digits. */
                 assert_true(fabs(face - value) < (s < 4 ? 1e-11 : 1e-6));
             }
         }
@@ -361,7 +363,7 @@ static void set_up_frame(frame_fixture *f, test_mesh_kind kind, bool is_orthogra
     if (is_orthographic) f->job.camera.half_height = 1.5;
 }
 
-/* Computes the interval of the ray inside the cube [-1, 1]^3. */
+/* Computes the interval of the ray inside the cube [-1, 1]^3. Returns whether the ray meets the cube. */
 static bool cube_interval(const double *base, const double *direction, double *low, double *high)
 {
     *low = 0;
@@ -394,13 +396,13 @@ static void isosurface_of_a_linear_field_is_its_plane(void **state)
             if (!inside) continue;
             hits++;
             if (ray.ambiguous) {
-                /* On a warped face the face's value is that of the bilinear patch, from which the two triangles differ
-                 * by up to a tenth of a cell here: a root between patch and triangles is moved to the face. */
+                /* On a warped face, the face's value is that of the bilinear patch. The patch and the two triangles
+                 * differ by up to a tenth of a cell here, and a root between them is moved to the face. */
                 assert_true(fabs(ray.hits[0].depth - z) < 0.1 * 2 / 3 * ray.hits[0].conditioning);
                 ambiguous++;
                 continue;
             }
-            /* Bisection stops at 2^-36 of a cell. */
+            /* Bisection ends at an interval of 2^-36 of a cell. */
             assert_true(fabs(ray.hits[0].depth - z) < 2e-11);
             const double scale = (slope > 0 ? -1 : 1) / sqrt(0.83);
             assert_true(fabs(ray.hits[0].normal[0] - 0.3 * scale) < 1e-12);

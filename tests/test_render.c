@@ -1,5 +1,5 @@
-/* Compares the kernels with the reference for every ray: all kinds of cells, cameras outside and inside, opaque and
- * transparent surfaces, volumes, and both. */
+/* Compares the kernels with the reference for every ray: all kinds of cells, cameras outside and inside, opaque
+ * surfaces, transparent surfaces, volumes, and surfaces together with volumes. */
 #include "test_effort.h"
 #include "test_render_fixture.h"
 
@@ -15,8 +15,8 @@ static const double one_value[1] = {0.3};
 static const double four_values[4] = {-0.9, -0.2, 0.3, 1.1};
 static const double linear_values[3] = {-0.6, 0.1, 0.5};
 
-/* Bounds the fraction of rays with several roots in a cell, or on which a warped face contradicts the interior of the
- * cell. */
+/* Checks that the fraction of ambiguous rays is at most `share`: rays with several roots in a cell, or on which the
+ * value on a warped face contradicts the interior of the cell. */
 static void assert_few_ambiguous(const fixture_outcome *o, double share)
 {
     if ((double)o->ambiguous > share * (double)o->rays) fail_msg("%d of %d ambiguous", (int)o->ambiguous, (int)o->rays);
@@ -29,7 +29,7 @@ static const char *make_case_name(test_mesh_kind kind, fixture_camera camera, co
     return name;
 }
 
-/* Returns the side of the lattice, which is smaller for kinds with many cells per cube. */
+/* Returns the number of cubes along a side of the lattice. It is smaller for kinds with many cells per cube. */
 static int choose_lattice_side(test_mesh_kind kind)
 {
     return kind == TEST_HEXES ? 6 : kind == TEST_WEDGES ? 5 : 4;
@@ -52,7 +52,7 @@ static void surface_matches_the_reference_for_every_kind_and_camera(void **state
         }
 }
 
-/* Returns whether a case is drawn. By default each kind of mesh is drawn from one or two of the cameras. */
+/* Returns whether a case is drawn. The usual run draws each kind of mesh from one or two of the cameras. */
 static bool is_case_selected(test_mesh_kind kind, fixture_camera camera, int variant)
 {
     return test_is_long_run() || ((int)kind + (int)camera + variant) % 3 == 0;
@@ -91,8 +91,8 @@ static void transparent_surfaces_before_an_opaque_one_match_the_reference(void *
     }
 }
 
-/* Checks lights behind the scene, which shine along surfaces that face away from them: half way between the eye and
- * such a light there are normals too, but there must be no highlight. */
+/* Checks lights behind the scene that shine almost along surfaces which face away from them. Some normals point half
+ * way between the eye and such a light, but there must be no highlight. */
 static void lights_behind_surfaces_leave_them_dark(void **state)
 {
     (void)state;
@@ -152,7 +152,8 @@ static double short_wave_field(const double p[3])
     return test_wave_field((const double[]){2 * p[0], 2 * p[1], 2 * p[2]});
 }
 
-/* Checks rays that cross more surfaces than a packet can store: their volume fragments end at every sample. */
+/* Checks rays that cross more surfaces than a packet can store. The volume fragments of these rays end at every
+ * sample. */
 static void volume_between_many_surfaces_matches_the_reference(void **state)
 {
     static const float colours[48] = {0.8f, 0.2f, 0.1f};
@@ -193,9 +194,9 @@ static double linear_field_along_ray(const render_camera *camera, int pixel, dou
     return 0.3 * d[0] - 0.7 * d[1] + 0.5 * d[2];
 }
 
-/* Checks that the surface of a linear field is its plane, in cells with plane faces and in warped ones. Positions and
- * values in float32 err by a few 6e-8 of the mesh's size (values are at most 1.6); the ray's slope turns that into
- * depth. */
+/* Checks that the isosurface of a linear field is its plane, in cells with plane faces and in warped cells. Positions
+ * and values in float32 have an error of a few times 6e-8 of the mesh's size (values are at most 1.6). The ray's slope
+ * turns this error into an error of depth. */
 static void compare_plane(test_mesh_kind kind, fixture_camera camera, bool is_warped)
 {
     render_fixture f;
@@ -224,8 +225,8 @@ static void linear_surface_is_a_plane_in_every_kind(void **state)
             for (int is_warped = 0; is_warped < 2; is_warped++) compare_plane(kind, camera, is_warped);
 }
 
-/* Checks that no sample is lost or counted twice at a face, an edge or a vertex, also on lattice lines: with constant
- * opacity every ray's transmittance follows from the number of samples in the cube. */
+/* Checks that no sample is lost or counted twice at a face, an edge or a vertex, including rays along lattice lines. If
+ * the opacity is constant, the transmittance of a ray follows from the number of samples in the cube. */
 static void constant_volume_counts_every_sample_once(void **state)
 {
     (void)state;
@@ -249,7 +250,7 @@ static void constant_volume_counts_every_sample_once(void **state)
                     low = fmax(low, fmin(a, b));
                     high = fmin(high, fmax(a, b));
                 }
-                /* Within rounding of the cube's border a ray or sample may be inside or outside. */
+                /* Within rounding of the cube's border, a ray or a sample may be inside or outside. */
                 if (fabs(high - low) < 1e-5 || (camera == CAMERA_ALONG_X && (fabs(base[1]) == 1 || fabs(base[2]) == 1)))
                     continue;
                 const double length = f.job.camera.is_orthographic ? 1 : sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
@@ -266,7 +267,7 @@ static void constant_volume_counts_every_sample_once(void **state)
         }
 }
 
-/* Checks that rays through the vertices, along the edges and in the faces of a lattice meet the surface of a linear
+/* Checks that rays through the vertices, along the edges and in the faces of a lattice meet the isosurface of a linear
  * field exactly once. */
 static void lattice_lines_have_no_holes(void **state)
 {
@@ -301,8 +302,8 @@ static void single_cells_match_the_reference(void **state)
 {
     (void)state;
     static const double values[3] = {-0.25, 0.1, 0.35};
-    /* The rounding to float32 is 6e-8 of a sliver's length and 1e-3 of its thickness, from which the margins and bounds
-     * of depth follow. */
+    /* Rounding to float32 changes positions by 6e-8 of a sliver's length, or 1e-3 of its thickness. The margin and the
+     * tolerance of depth follow from this error. */
     static const fixture_bounds thin = {.depth = 1e-2, .colour = 2, .excluded = 1, .margin = 1e-3};
     for (test_cell_shape shape = 0; shape < TEST_SHAPE_COUNT; shape++)
         for (fixture_camera camera = 0; camera < CAMERA_INSIDE; camera++) {
@@ -321,8 +322,8 @@ static void single_cells_match_the_reference(void **state)
         }
 }
 
-/* Checks surfaces that lie along a sliver, of a field across its thickness: hits must be inside the sliver, in pixels
- * where the sliver is certain. */
+/* Checks isosurfaces that lie along a sliver, of a field that varies across its thickness. In pixels that certainly
+ * show the sliver, hits must be inside it. */
 static void surfaces_along_slivers_match_the_reference(void **state)
 {
     (void)state;
@@ -363,8 +364,9 @@ static void left_handed_cells_match_the_reference(void **state)
     }
 }
 
-/* Checks meshes far from the origin, in double: the picture must be the same relative to the cells. The double
- * coordinates are rounded by 5.8e6 · 1e-16 = 6e-10 for cells of 2000 / 4, and those of the camera by as much. */
+/* Checks meshes in double that are far from the origin: relative to the cells, the picture must be the same as near the
+ * origin. Double coordinates are rounded by 5.8e6 · 1e-16 = 6e-10, for cells of size 2000 / 4, and the coordinates of
+ * the camera by as much. */
 static void far_coordinates_match_the_reference(void **state)
 {
     (void)state;
@@ -420,8 +422,8 @@ static void two_volumes_share_their_light(void **state)
     }
 }
 
-/* Checks values at cells: a volume of blocks. A sample near a face may belong to either cell, which the margin
- * excludes: 2 · 1e-6 of each of about 20 cells on a ray. */
+/* Checks values in cells: each cell of the volume has a constant value. A sample near a face may belong to either cell.
+ * Such rays are excluded by the margin, 2e-6 for each of about 20 cells on a ray. */
 static void cell_centred_volume_matches_the_reference(void **state)
 {
     (void)state;
@@ -447,7 +449,7 @@ static void cell_centred_volume_matches_the_reference(void **state)
         }
 }
 
-/* A field of very large values: the transfer function and the isovalue scale with them. */
+/* A field of very large values. The transfer function and the isovalue are scaled like the field. */
 static double huge_wave_field(const double p[3])
 {
     return 1e30 * test_wave_field(p);
@@ -517,7 +519,7 @@ static void one_pixel_images_match_the_reference(void **state)
     }
 }
 
-/* Replaces the tree by one whose nodes have the reference layout. */
+/* Replaces the fixture's tree by one with nodes of the reference layout. */
 static void build_reference_layout(render_fixture *f)
 {
     base_error error = {0};
@@ -528,7 +530,7 @@ static void build_reference_layout(render_fixture *f)
     f->ranges[0] = mmbvh_own_ranges(&f->trees[0]);
 }
 
-/* Checks cells smaller than pixels: tiles then traverse the trees themselves and skip what is hidden. */
+/* Checks cells that are smaller than pixels. Tiles then traverse the trees by themselves and skip hidden cells. */
 static void surfaces_of_cells_smaller_than_pixels_match_the_reference(void **state)
 {
     (void)state;
@@ -575,7 +577,8 @@ int main(void)
         cmocka_unit_test(one_pixel_images_match_the_reference),
         cmocka_unit_test(surfaces_of_cells_smaller_than_pixels_match_the_reference),
     };
-    /* Tests that draw by themselves, run with each instruction set. */
+    /* These tests draw without the comparison that uses all instruction sets, so they are run for each instruction
+     * set. */
     const struct CMUnitTest of_a_set[] = {
         cmocka_unit_test(volume_between_many_surfaces_matches_the_reference),
         cmocka_unit_test(constant_volume_counts_every_sample_once),

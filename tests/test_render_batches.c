@@ -1,8 +1,8 @@
-/* Checks tets of meshes without clips, hexes, wedges and pyramids, which tiles trace in batches of one cell per lane
- * (kernel_batch.h, kernel_curved_batch.h). They must give the same bits as cells traced one by one, as are those of a
- * layer with its own clips. Cells cover some pixels, many, or one; the last cells are next to each other in one vector,
- * and may hit the same pixel. The usual run draws each scene from every third camera, alternating, so that each kind is
- * drawn from each camera. */
+/* Checks batches, in which tiles trace one cell per lane (kernel_batch.h, kernel_curved_batch.h): tets of meshes
+ * without clips, hexes, wedges and pyramids. Pictures must be bit-identical to those whose cells are traced one by one,
+ * which a layer with its own clips enforces. A cell covers one pixel, some or many. The last cells of a mesh share a
+ * vector, and several of them may hit the same pixel. The usual run draws each scene from every third camera,
+ * alternately, so that each kind of cells is drawn from each camera. */
 #include "test_effort.h"
 #include "test_render_fixture.h"
 
@@ -33,7 +33,8 @@ static void create_fixture(render_fixture *f, const test_mesh *meshes, int count
 static void compare_with_single_cells(render_fixture *f)
 {
     drawn_frame batches, alone;
-    /* A box that contains everything. It clips one layer only, since a clip of all layers would cut the rays. */
+    /* A box that contains all meshes. It clips one layer only, since a clip of all layers would cut the rays
+     * themselves. */
     const render_clip everything = {.kind = RENDER_CLIP_BOX, .lower = {-1e6, -1e6, -1e6}, .upper = {1e6, 1e6, 1e6}};
     fixture_draw(f, &batches);
     f->job.clips = &everything;
@@ -71,7 +72,8 @@ static void batches_draw_same_picture_as_single_cells(void **state)
         for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++)
             for (int turn = 0; turn < 2 * (int)(sizeof kinds / sizeof *kinds); turn++) {
                 const int jittered = turn % 2;
-                /* not 0, because opaque surfaces in cuboids have their own code (kernel_cuboids.h, test_hits.c) */
+                /* not 0, because the kernels have special code for opaque surfaces in cuboids (kernel_cuboids.h), which
+                 * test_hits.c checks */
                 const double jitter = jittered ? 0.2 : 1e-4;
                 render_fixture f;
                 test_mesh mesh;
@@ -84,8 +86,8 @@ static void batches_draw_same_picture_as_single_cells(void **state)
             }
 }
 
-/* Checks cells with any order of vertices, in arrays of all layouts; some have an edge without length, so that some
- * quads collapse to triangles and some triangles to an edge. */
+/* Checks cells whose vertices are in any order, in arrays of all layouts. Some cells have an edge of length 0, so that
+ * quads collapse to triangles and triangles to edges. */
 static void cell_numbering_changes_no_batch(void **state)
 {
     static const test_mesh_kind kinds[] = {TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS, TEST_MIXED};
@@ -109,7 +111,7 @@ static void cell_numbering_changes_no_batch(void **state)
         }
 }
 
-/* Checks that all cells of a batch belong to one mesh and one layer. */
+/* Checks scenes with several meshes and layers: all cells of a batch must belong to one mesh and one layer. */
 static void batches_contain_one_mesh_and_layer(void **state)
 {
     (void)state;
@@ -130,7 +132,7 @@ static void batches_contain_one_mesh_and_layer(void **state)
         }
 }
 
-/* Checks ties: each hit occurs twice. */
+/* Checks hits at equal depths: each hit occurs twice. */
 static void hits_at_equal_depth_are_kept(void **state)
 {
     (void)state;
@@ -147,8 +149,8 @@ static void hits_at_equal_depth_are_kept(void **state)
     }
 }
 
-/* Checks cells with values of extreme size, from tiny ones to NaN: they are traced one by one, and mixed with other
- * cells in one vector. */
+/* Checks cells with extreme values, from tiny ones to NaN. They are traced one by one although other cells in the same
+ * vector are traced in a batch. */
 static void unusual_values_are_handled_one_by_one(void **state)
 {
     static const float opacity[1] = {0.3f};
@@ -165,18 +167,19 @@ static void unusual_values_are_handled_one_by_one(void **state)
         create_fixture(&f, &mesh, 1, 7, CAMERA_OUTSIDE);
         if (as_volume) {
             fixture_set_volume(&f, 0.1);
-            f.transfer.opacity_count = 1; /* the same opacity for all values, however large */
+            f.transfer.opacity_count = 1; /* the opacity is the same for all values, however large */
             f.transfer.opacities = opacity;
         } else {
-            fixture_add_surface(&f, values, 1, 1); /* with two isovalues, many hits would be tied */
+            /* a single isovalue, because with two many hits would have equal depths */
+            fixture_add_surface(&f, values, 1, 1);
         }
         compare_with_single_cells(&f);
         test_mesh_free(&mesh);
     }
 }
 
-/* Checks contour lines, drawn over the colours of isovalues and over a colour map; the order of a cell's vertices is
- * that of their coordinates, whatever order the mesh has. */
+/* Checks contour lines over the colours of isovalues and over a colour map. The kernels sort a cell's vertices by their
+ * coordinates, so the order of vertices in the mesh must not matter. */
 static void lines_of_batches_match_single_cells(void **state)
 {
     static const test_mesh_kind kinds[] = {TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS, TEST_MIXED};
@@ -199,7 +202,7 @@ static void lines_of_batches_match_single_cells(void **state)
             .field = {&view.field, f.ranges}, .count = 3, .values = levels, .width = 2, .colours = white};
         f.surfaces[0].lines = &lines;
         if (turn % 4 > 1) {
-            fixture_set_volume(&f, 0.3); /* the surface uses its colours */
+            fixture_set_volume(&f, 0.3); /* the surface uses the colours of this volume's transfer function */
             f.job.volume_count = 0;
             f.surfaces[0].colour_field = (render_field){&view.field, f.ranges};
             f.surfaces[0].colour_map = &f.transfer;

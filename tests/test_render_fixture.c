@@ -1,10 +1,10 @@
-/* Frames for the tests of the renderer.
+/* Draws frames for the tests of the renderer and compares them with the reference.
  *
- * A ray is compared unless the reference reports that rounding may change one of its decisions: it passes within margin
- * of an edge of a cell, a face value is within margin of an isovalue, a sample of a cell's end, or a hit of the eye.
- * Other rays are excluded, and their fraction is bounded. Rays on which a cell has several roots, or on which a warped
- * face contradicts the interior (its value is that of the bilinear patch, its position that of the two triangles), are
- * compared for hit or miss but not for depth. */
+ * A ray is compared unless rounding may change the reference's result: the ray is within margin of an edge of a cell, a
+ * face's value is within margin of an isovalue, a sample is within margin of an end of a cell, or a hit is within
+ * margin of the eye. All other rays are excluded, and their fraction is bounded. Some rays are ambiguous: a cell has
+ * several roots, or a warped face contradicts the interior of its cell (its value is that of the bilinear patch, its
+ * position that of the two triangles). For ambiguous rays, only hit or miss is compared, not the depth. */
 #include "test_render_fixture.h"
 
 #include "comp.h"
@@ -22,9 +22,9 @@
 
 const float fixture_background[4] = {0.05f, 0.1f, 0.15f, 0.5f};
 
-/* The margin: float32 rounds positions near 1 by 6e-8, which is about 2e-7 of cells of 1/3; a few such errors give
- * 1e-6. A pixel's ray meets about 20 cells of 12 edges: the excluded fraction, 20 · 12 · 2e-6 · (1 / pixels of a cell's
- * width), is below 1e-3. */
+/* The usual bounds. Margin: float32 rounds positions near 1 by 6e-8, which is about 2e-7 of cells of size 1/3; a few
+ * such errors make 1e-6. Excluded: a pixel's ray meets about 20 cells with 12 edges each, so the excluded fraction, 20
+ * · 12 · 2e-6 · (1 / width of a cell in pixels), is below 1e-3. */
 const fixture_bounds fixture_usual_bounds = {.depth = 1e-5, .colour = 1e-5, .excluded = 2e-3, .margin = 1e-6};
 
 static const float surface_colours[4][3] = {
@@ -57,7 +57,8 @@ void fixture_create(render_fixture *f, const test_mesh *meshes, int count, test_
         const insitu_status status = mmbvh_build(&f->views[i].cells, &f->fields[i], offset, f->job.space.scale,
                                                  &(mmbvh_options){.threads = 1}, &f->trees[i], &error);
         if (status != INSITU_OK) fail_msg("mmbvh_build: %s", error.message);
-        /* A part whose tree has no nodes needs non-NULL ranges to have the field. */
+        /* A field exists only if its ranges are not NULL. A tree without nodes has no ranges, so any other numbers are
+         * used. */
         f->ranges[i] = mmbvh_own_ranges(&f->trees[i]);
         if (!f->ranges[i].low) f->ranges[i] = mmbvh_pair_ranges((const float *)tent_opacities);
         f->parts[i] = (render_part){&f->views[i].cells, &f->trees[i], NULL};
@@ -113,8 +114,8 @@ void fixture_set_camera(render_fixture *f, fixture_camera camera, int width, int
     assert_true(render_camera_look_at(c, eye, focal, (const double[]){0, 1, 0}, angle, width, height));
     if (camera != CAMERA_OUTSIDE && camera != CAMERA_INSIDE) {
         c->is_orthographic = true;
-        /* Along x, pixels are a sixteenth wide, so that their centres are on lattice planes for n = 4 and images of odd
-         * height. */
+        /* With this camera, the side of a pixel is 1/16, so that the middles of pixels are on lattice planes for n = 4
+         * and images of odd height. */
         c->half_height = (camera == CAMERA_ALONG_X ? height / 32.0 : 1.5) * f->scale;
     }
     for (int axis = 0; axis < 3; axis++) depth += c->forward[axis] * (f->offset[axis] - c->eye[axis]);
@@ -286,7 +287,7 @@ double drawn_frame_difference(const drawn_frame *a, const drawn_frame *b)
     return worst;
 }
 
-/* ---- against the reference ---- */
+/* ---- comparison with the reference ---------------------------------------------------------------------------- */
 
 typedef struct comparison {
     const render_fixture *f;
@@ -296,15 +297,16 @@ typedef struct comparison {
     fixture_outcome outcome;
 } comparison;
 
-/* A highlight ends abruptly where its light is below the surface; the side of the light is certain only up to the error
- * of a normal, the rounding of float32. */
+/* Returns whether a ray is excluded because rounding may change its result. The margin of lights is one reason: a
+ * highlight ends abruptly where its light is below the surface, and on which side the light is depends on the rounding
+ * of the normal to float32. */
 static bool is_excluded(const reference_ray *ray, double margin)
 {
     return ray->light_margin < margin || ray->edge_margin < margin || ray->value_margin < margin ||
            ray->sample_margin < margin || ray->eye_margin < margin;
 }
 
-/* Lists the pixel's surface fragments up to the first opaque one. */
+/* Lists the surface fragments of a pixel up to the first opaque one. Returns their number. */
 static int list_surface_fragments(const drawn_frame *drawn, int64_t pixel, const fragment *hits[REFERENCE_MAX_HITS])
 {
     int count = 0;
@@ -343,10 +345,10 @@ static void compare_hits(comparison *c, int x, int y, const reference_ray *ray)
     c->outcome.hits += count > 0;
     double worst = 0;
     for (int i = 0; same && i < count; i++) {
-        /* Positions and values in float32 err by half a unit in the last place of 1, 6e-8 · 2 / cell size, about 4e-7
-         * cells; on a grazing ray the conditioning turns an error across the surface into one of depth. From a
-         * conditioning of 20 on, the error exceeds the bound. A value has two roundings of 6e-8 of the range, at the
-         * ends of its piece, which a slowly varying field turns into depth. */
+        /* Positions and values in float32 have an error of half a unit in the last place of 1, 6e-8 · 2 / cell size,
+         * about 4e-7 cells. On a grazing ray, the conditioning turns an error across the surface into an error of
+         * depth; from a conditioning of 20 on, it exceeds the bound. A value is rounded twice by 6e-8 of the range, at
+         * the two ends of its interval, and a slowly varying field turns this into an error of depth. */
         const double grazing =
             fmax(fmax(5e-7 * ray->hits[i].conditioning, 1.2e-7 * ray->hits[i].slowness) - c->bounds->depth, 0);
         const double off = fabs(fixture_scene_depth(c->f, hits[i]->t_in) - ray->hits[i].depth);
@@ -385,7 +387,7 @@ static void compare_ray(comparison *c, const reference_ray *ray, int x, int y)
     if (!ray->ambiguous) compare_colour(c, x, y, ray);
 }
 
-/* Computes the reference of each ray once and compares it with all instruction sets. */
+/* Computes the reference of each ray one time and compares the frames of all instruction sets with it. */
 static void compare_rays(const render_job *job, comparison *sets, int count)
 {
     reference_scene *scene = reference_create(job);

@@ -1,6 +1,6 @@
-/* Checks that pictures do not change with threads, groups of samples, the order and numbering of cells and vertices,
- * layouts, the distribution of cells to parts and ranks, and ghosts; values that are not finite may change only their
- * own cells. */
+/* Checks what must not change pictures: the number of threads, the size of groups of samples, the order and numbering
+ * of cells and vertices, memory layouts, the distribution of cells to parts and ranks, and ghosts. Values that are not
+ * finite may only change their own cells. */
 #include "memory.h"
 #include "pixel_set.h"
 #include "test_render_fixture.h"
@@ -59,12 +59,13 @@ static void threads_do_not_change_a_bit(void **state)
     }
 }
 
-/* ---- tile by tile -------------------------------------------------------------------------------------------- */
+/* ---- tiles passed one by one ----------------------------------------------------------------------------------- */
 
 typedef struct received_tiles {
     fragment_list list;
-    unsigned char pixels[64 * 64]; /* how many tiles contained the pixel */
-    int width, refuse_after;       /* number of tiles after which further ones are refused; negative: never */
+    unsigned char pixels[64 * 64]; /* for each pixel the number of tiles that contained it */
+    /* refuse_after: number of tiles after which further tiles are refused; negative: none is refused */
+    int width, refuse_after;
     bool has_stray_pixel;
 } received_tiles;
 
@@ -112,7 +113,8 @@ static void compare_tiles_with_list(render_fixture *f)
     base_free(list.items);
 }
 
-/* Checks that every pixel is in one tile, and that the tile contains everything that the list has of it. */
+/* Checks that every pixel is in exactly one tile, and that the tile contains the same fragments of the pixel as the
+ * list. */
 static void tiles_have_the_fragments_of_the_list(void **state)
 {
     (void)state;
@@ -148,8 +150,8 @@ static void refused_tiles_end_the_frame(void **state)
     assert_int_equal(base_memory_held(), held);
 }
 
-/* Draws with cells found for the whole picture, and with cells found for each tile. Both must meet the same cells, or
- * at least the same cells with a hit or samples. */
+/* Draws with cells that are found for the whole picture, and with cells that are found for each tile. Both must find
+ * the same cells, or at least the same among the cells with a hit or samples. */
 static void draw_by_traversals(render_fixture *f)
 {
     drawn_frame drawn[2];
@@ -162,7 +164,7 @@ static void draw_by_traversals(render_fixture *f)
     for (int i = 0; i < 2; i++) drawn_frame_free(&drawn[i]);
 }
 
-/* Compares traversals for cells of ten pixels and of three, with some pixels left out. */
+/* Compares the traversals for cells that cover ten pixels and three pixels. Some pixels are excluded. */
 static void compare_traversals(test_mesh_kind kind, int n, scene_kind scene, fixture_camera camera, bool all)
 {
     enum { WIDTH = 61, HEIGHT = 47 };
@@ -195,8 +197,8 @@ static void traversals_do_not_change_a_bit(void **state)
         }
 }
 
-/* Checks sizes of groups, which only decide how many samples are gathered before they are blended: only the rounding of
- * the blend may differ. */
+/* Checks sizes of groups of samples. They only decide how many samples are gathered before they are blended, so
+ * pictures may differ only by the rounding of blending. */
 static void sample_groups_draw_the_same(void **state)
 {
     (void)state;
@@ -243,7 +245,8 @@ static void order_and_numbering_do_not_change_a_bit(void **state)
         }
 }
 
-/* Returns the largest difference of depth, in t; infinite if one has a hit and the other has none. */
+/* Returns the largest difference of depth in units of t. Returns infinity if only one of the pictures has a hit in some
+ * pixel. */
 static double depth_difference(const drawn_frame *a, const drawn_frame *b)
 {
     double worst = 0;
@@ -255,9 +258,9 @@ static double depth_difference(const drawn_frame *a, const drawn_frame *b)
     return worst;
 }
 
-/* Checks cells reordered by one of their symmetries: they have the same faces, so exactly the same rays hit them. The
- * map inside has other coordinates and rounds differently: t is off by about 1e-7 times the conditioning, which is up
- * to 30 among 61 × 47 rays. */
+/* Checks cells whose vertices are reordered by a symmetry of the cell. The faces are the same, so exactly the same rays
+ * hit them. The map inside has other coordinates and rounds differently: t has an error of about 1e-7 times the
+ * conditioning. The conditioning is up to 30 among 61 × 47 rays. */
 static void reordered_cells_draw_the_same(void **state)
 {
     (void)state;
@@ -315,7 +318,8 @@ static void layouts_do_not_change_a_bit(void **state)
 
 /* ---- parts and ranks ---- */
 
-/* Distributes the mesh's cells. With ghosts, every part has all cells, of which those of other parts are ghosts. */
+/* Distributes the cells of the mesh to parts. If `ghosts` is set, every part has all cells, and the cells of other
+ * parts are ghosts. */
 static void distribute_cells(const test_mesh *mesh, test_partition_kind partition, int n, int parts, bool ghosts,
                              test_mesh *out)
 {
@@ -334,8 +338,8 @@ static void distribute_cells(const test_mesh *mesh, test_partition_kind partitio
     free(owners);
 }
 
-/* Compares pictures up to rounding. Volumes are blended in different groups: each fragment's colour is rounded by 6e-8,
- * and a pixel has about 30. */
+/* Compares pictures up to rounding. Volumes are blended in different groups: the colour of each fragment is rounded by
+ * 6e-8, and a pixel has about 30 fragments. */
 static void assert_same_to_rounding(const drawn_frame *whole, const drawn_frame *parts, scene_kind scene)
 {
     drawn_frame_assert_same_depths(whole, parts);
@@ -376,8 +380,8 @@ static void compare_distributed(test_mesh_kind kind, scene_kind scene, test_part
     test_mesh_free(&mesh);
 }
 
-/* Draws two overlapping meshes with windows of three samples, so that most cells are in several windows, and with one
- * window of all samples. Tets in 4-byte arrays are read by vector instructions. */
+/* Draws two overlapping meshes in two ways: with windows of three samples, so that most cells are in several windows,
+ * and with one window for all samples. Tets in 4-byte arrays are read by vector instructions. */
 static void compare_volume_traversals(test_mesh_kind kind, scene_kind scene, fixture_camera camera, test_layout layout)
 {
     render_fixture f;
@@ -412,9 +416,9 @@ static void parts_and_ranks_draw_the_whole_picture(void **state)
                 compare_distributed(kind, scene, partition, 2 + ((int)kind + (int)partition) % 4, false);
 }
 
-/* Checks samples exactly on the faces between ranks: the eye is 3.125 from the middle of a lattice of half units, and
- * samples are at (k + 1/2) / 4, all exact in float32. There are eight samples between x = 1 and x = -1; the one on the
- * first face counts, the one on the last does not. */
+/* Checks samples that lie exactly on faces between ranks. The distance of the eye from the middle of a lattice of half
+ * units is 3.125, and samples are at depths (k + 1/2) / 4; all these numbers are exact in float32. Eight samples must
+ * count between x = 1 and x = -1: the one on the first face counts, the one on the last face does not. */
 static void samples_on_faces_have_one_owner(void **state)
 {
     (void)state;
@@ -514,7 +518,7 @@ static bool contains_plane_vertex(const test_mesh *mesh, int64_t cell)
     return false;
 }
 
-/* Draws by samples, by exact segments, or by segments under max_error; way is 0, 1 or 2. */
+/* Draws by samples (way 0), by exact segments (1), or by segments under max_error (2). */
 static void draw_opaque_ends(const test_mesh *mesh, scene_kind scene, int way, drawn_frame *out)
 {
     static const float opaque_ends[3] = {0.6f, 0.1f, 0.5f};
@@ -523,13 +527,14 @@ static void draw_opaque_ends(const test_mesh *mesh, scene_kind scene, int way, d
     f.transfer.opacities = opaque_ends;
     f.job.integration = way ? RENDER_SEGMENTS : RENDER_SAMPLES;
     f.job.max_error = way == 2 ? 1e-3 : 0;
-    /* the extent of the mesh with and without these cells: the allowed error per length must be equal */
+    /* The same extent for the mesh with and without these cells, so that the allowed error per length is equal. */
     f.job.extent = 3.5;
     fixture_draw(&f, out);
     fixture_free(&f);
 }
 
-/* Checks that cells with a NaN or an infinity are treated as missing, to the bit. */
+/* Checks that pictures with cells that have a NaN or an infinite value are bit-identical to pictures without these
+ * cells. */
 static void cells_with_infinite_values_are_skipped(void **state)
 {
     (void)state;
@@ -564,7 +569,8 @@ static double constant_field(const double p[3])
     return 0.3;
 }
 
-/* Checks that a constant field equal to an isovalue has no surface: its side does not change anywhere. */
+/* Checks that a constant field equal to an isovalue has no surface, because it is on the same side of the isovalue in
+ * all cells. */
 static void constant_equal_to_the_isovalue_has_no_surface(void **state)
 {
     (void)state;
@@ -580,8 +586,8 @@ static void constant_equal_to_the_isovalue_has_no_surface(void **state)
     }
 }
 
-/* The field is x: whole planes of vertices have the isovalue 0 exactly. A ray through an edge that lies in the surface
- * crosses cells where the value is zero up to rounding, on either side: its hits are an odd number at the same
+/* The field is x, so that all vertices in a plane have exactly the isovalue 0. A ray through an edge that lies in the
+ * surface crosses cells whose value is zero up to rounding, on either side: it has an odd number of hits at the same
  * depth. */
 static double plane_field(const double p[3])
 {
@@ -597,7 +603,7 @@ static void isovalue_at_vertices_gives_no_hole(void **state)
             render_fixture f;
             drawn_frame drawn;
             int met = 0, several = 0;
-            if (camera == CAMERA_INSIDE) continue; /* this camera looks away from the plane */
+            if (camera == CAMERA_INSIDE) continue; /* this camera does not see the plane */
             fixture_create_lattice(&f, kind, 4, 0, plane_field);
             fixture_set_camera(&f, camera, 43, 41);
             fixture_add_surface(&f, zero, 1, 0.5f);
@@ -634,7 +640,8 @@ static void jitter_is_uniform_per_pixel_and_frame(void **state)
             sum += a;
             product += (a - 0.5) * (b - 0.5);
         }
-    /* For 10,000 uniform numbers: the mean within 4 sigma of 0.0029, the correlation within 4 sigma of 1/12/100. */
+    /* Tolerances are 4 standard deviations, which are 0.0029 for the mean and 1/12/100 for the correlation of 10,000
+     * uniform numbers. */
     assert_true(fabs(sum / 10000 - 0.5) < 0.012);
     assert_true(fabs(product / 10000) < 0.0034);
 }

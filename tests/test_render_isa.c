@@ -1,8 +1,8 @@
-/* Compares every instruction set with the scalar kernels. The set that INSITU_ISA names is selected once per process,
- * so this program runs itself to check the selection: with an argument it prints the selected set. The sets differ in
- * the width of a packet, which must change nothing, and in fused multiply-adds, which change roundings: t by about 6e-8
- * times the conditioning, a colour by as much times the slopes of shading. The usual run draws each scene from one
- * camera, which changes with the kind of mesh; the whole test draws from all cameras. */
+/* Compares every instruction set with the scalar kernels. A process selects the set that INSITU_ISA names only one
+ * time, so this program starts itself to check the selection; with an argument it only prints the selected set. The
+ * sets differ in the width of a packet, which must not change any result, and in fused multiply-adds, which change
+ * roundings: t by about 6e-8 times the conditioning, and a colour by this error times the slopes of shading. The usual
+ * run draws each scene from a single camera, another one for each kind of mesh. The long run draws from all cameras. */
 #include "test_effort.h"
 #include "test_render_fixture.h"
 
@@ -24,8 +24,8 @@ enum {
 
 static const char *program;
 
-/* Sets segments with steps and a narrow ramp of the opacity: they are halved in double (kernel_cell_segments.h), ray by
- * ray, from the caller's coordinates. */
+/* Sets an opacity with steps and a narrow ramp. Segments in which they lie are bisected in double
+ * (kernel_cell_segments.h), ray by ray, from the caller's coordinates. */
 static void set_steps(render_fixture *f)
 {
     static const double values[6] = {-0.7, -0.15, -0.15, 0.3, 0.301, 0.7};
@@ -50,7 +50,7 @@ static void draw_scene(int frame, float *numbers)
     if (scene == 3) set_steps(&f);
     if (scene == 4) {
         f.job.integration = RENDER_SEGMENTS;
-        /* rays are integrated in parts (kernel_local_segments.h) */
+        /* rays are integrated in several intervals (kernel_local_segments.h) */
         f.job.max_error = frame / SCENES % CAMERA_PLANE ? 1e-3 : 1e-4;
     }
     fixture_draw(&f, &drawn);
@@ -67,7 +67,8 @@ static bool is_case_selected(int frame)
     return test_is_long_run() || (kind + scene) % CAMERA_PLANE == camera;
 }
 
-/* Returns the largest difference of numbers first .. last; infinite if only one of them is infinite. */
+/* Returns the largest difference of the numbers with indices from first to last - 1. Returns infinity if one number is
+ * infinite and the other is not. */
 static double find_largest_difference(const float *a, const float *b, int first, int last)
 {
     double worst = 0;
@@ -98,7 +99,7 @@ static void every_isa_draws_the_scalar_picture(void **state)
     }
 }
 
-/* Computes the set that INSITU_ISA selects in a process. */
+/* Starts this program to find the instruction set that INSITU_ISA = isa selects. */
 static void find_selected_isa(const char *isa, char used[16])
 {
     char command[600];

@@ -1,5 +1,5 @@
-/* Compares polyhedra with the reference (also along the lines at which many of a cell's tets meet), with the same cells
- * stored as tets and hexes, next to hexes, and distributed over ranks. */
+/* Compares polyhedra with the reference, including rays along the lines at which many of a cell's tets meet; with the
+ * same cells stored as tets and hexes; beside hexes; and distributed over ranks. */
 #include "reference_integral.h"
 #include "test_render_fixture.h"
 
@@ -27,7 +27,8 @@ static const char *make_case_name(const char *what, fixture_camera camera)
     return name;
 }
 
-/* Compares prisms on concave bases, spikes, and a cell with a cavity. */
+/* Compares a single polyhedron with the reference: a prism with a concave base, an octahedron with spikes, or a cell
+ * with a cavity. */
 static void compare_shape(test_polyhedron_shape shape, fixture_camera camera, bool is_linear)
 {
     test_mesh mesh;
@@ -55,8 +56,9 @@ static void shapes_match_the_reference(void **state)
 
 enum { AIMED_RAYS = 600 };
 
-/* Makes a picture of one pixel, whose ray comes from a random direction and passes through a point on the line from a
- * random vertex to the mean of all vertices, where the sheets of all of the vertex's edges meet. */
+/* Makes a picture of one pixel. Its ray comes from a random direction and passes through a random point of a spoke: the
+ * line from a random vertex to the mean of all vertices, at which the sheets (triangles between two of the cell's tets)
+ * of all edges of the vertex meet. */
 static void aim_at_spoke(render_fixture *f, const test_mesh *mesh, uint64_t ray)
 {
     const uint64_t vertex = (uint64_t)(test_uniform(ray, 1) * (double)mesh->vertex_count);
@@ -71,11 +73,11 @@ static void aim_at_spoke(render_fixture *f, const test_mesh *mesh, uint64_t ray)
     assert_true(render_camera_look_at(&f->job.camera, eye, target, (const double[]){0, 0, 1}, 1, 1, 1));
 }
 
-/* Checks sums over overlapping tets. The field is a sum over the tets that contain the point, and rounding may swap the
- * ends of neighbouring tets, as it does on rays through the line that many of them share. A wrong sum would be off by
- * another tet's value, a few tenths; values in float32 err by about 1e-6, and so does the length of a segment in a
- * steep part of the transfer function. Since the field is continuous, the ray's own rounding changes the sum by no more
- * than that. */
+/* Checks sums over overlapping tets on rays through a spoke. The field is a sum over the tets that contain the point,
+ * and rounding may exchange the ends of neighbouring tets on such rays. A wrong sum would be off by the value of
+ * another tet, a few tenths. The tolerance covers values in float32, which have an error of about 1e-6, and the same
+ * error of a segment's length in a steep part of the transfer function. The rounding of the ray itself does not change
+ * the sum by more, because the field is continuous. */
 static void sums_through_spokes_match_the_reference(void **state)
 {
     static const test_polyhedron_shape shapes[3] = {TEST_L_PRISM, TEST_BENT_SPIKES, TEST_CAVITY};
@@ -130,8 +132,8 @@ static void set_volume(render_fixture *f)
     fixture_set_volume(f, 0.3);
 }
 
-/* Sets a volume in which every sample has the same weight: alpha then depends only on the number of samples inside
- * cells, and so on the cells' intervals. */
+/* Sets a volume in which every sample has the same weight. Alpha then depends only on the number of samples inside
+ * cells, that is on the cells' intervals. */
 static void set_constant_volume(render_fixture *f)
 {
     fixture_set_volume(f, 0.07);
@@ -178,8 +180,8 @@ static void tets_passed_as_polyhedra_match_tets(void **state)
     }
 }
 
-/* Checks that intervals have the same bits whichever of a face's cells is a polyhedron, so that no sample is lost or
- * counted twice. */
+/* Checks that intervals are bit-identical whichever of the two cells at a face is a polyhedron, so that no sample is
+ * lost or counted twice. */
 static void intervals_of_polyhedra_match_typed_cells(void **state)
 {
     (void)state;
@@ -210,8 +212,8 @@ static void polyhedra_beside_other_cells_match_the_reference(void **state)
             }
 }
 
-/* Checks linear fields, which are exact also with warped faces: the bound is that of
- * linear_surface_is_a_plane_in_every_kind. */
+/* Checks the isosurface of a linear field, which polyhedra represent exactly even if their faces are warped. The
+ * tolerance is that of linear_surface_is_a_plane_in_every_kind. */
 static void linear_surface_of_warped_polyhedra_is_a_plane(void **state)
 {
     (void)state;
@@ -241,8 +243,8 @@ static void linear_surface_of_warped_polyhedra_is_a_plane(void **state)
 
 enum { RANKS = 7 };
 
-/* Draws the mesh on several ranks. If is_turned, each cell's vertices are reordered too, on which polyhedra do not
- * depend (the inverse map of a hex does). */
+/* Draws the mesh on several simulated ranks. If is_turned is set, each cell's vertices are reordered too. Polyhedra do
+ * not depend on this order, but the inverse map of a hex does. */
 static void draw_distributed(const test_mesh *mesh, bool is_turned, scene_set *set, drawn_frame *out)
 {
     render_fixture parts[RANKS];
@@ -264,7 +266,7 @@ static void draw_distributed(const test_mesh *mesh, bool is_turned, scene_set *s
     free(owners);
 }
 
-/* Checks cells that are distributed at random over seven ranks, each with its own order of cells, vertices and
+/* Checks cells that are distributed randomly over seven ranks. Each rank has its own order of cells, vertices and
  * faces. */
 static void random_cell_owners_change_no_pixel(void **state)
 {
@@ -288,7 +290,7 @@ static void random_cell_owners_change_no_pixel(void **state)
     }
 }
 
-/* Under valgrind only the tests that match a pattern are run. */
+/* With an argument, runs only the tests whose names match this pattern, for runs under valgrind. */
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {

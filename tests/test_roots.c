@@ -1,13 +1,13 @@
-/* Checks the robust root finder on random cubics: rays through a unit hex with random values, also values constructed
- * to have double and triple roots, against the exact cubic in long double. The kernels' headers are compiled here for
- * the scalar instruction set.
+/* Compares the robust root finder with exact cubics in long double. Rays pass through a unit hex with random values, on
+ * which the field is a cubic; some values are constructed so that the cubic has a double or a triple root. The kernels'
+ * headers are compiled here for the scalar instruction set.
  *
- * What rounding may decide: the eight coefficients of the field are sums of up to 8 values of at most 1, rounded to
- * float32 (half a unit of 1, 3 of 2, 3 of 4 and 1 of 8: 27 · 6e-8 = 1.6e-6), its evaluation rounds about ten times at
- * the size of its terms (6e-7 · 2), and coordinates are off by 2e-7 at slopes of at most about 4. So float32 cannot
- * decide the sign of F if |F| is below band = 4e-6. A crossing is certain if the cubic passes from outside the band on
- * one side to outside it on the other: the first hit must not be farther than that, and at every hit |F| must be within
- * the band. */
+ * Tolerance: the eight coefficients of the field are sums of up to 8 values of at most 1, rounded to float32 (by half a
+ * unit in the last place of 1, of 2 for three, of 4 for three and of 8 for one coefficient: 27 · 6e-8 = 1.6e-6).
+ * Evaluating the field rounds about ten times at the size of its terms (6e-7 · 2). Coordinates have an error of 2e-7,
+ * at slopes of at most about 4. So float32 cannot decide the sign of F if |F| is below band = 4e-6. A crossing is
+ * certain if the cubic passes from outside the band on one side to outside the band on the other side. The first hit
+ * must not be farther than the first certain crossing, and |F| must be within the band at every hit. */
 #include <math.h>
 
 #include "kernel_cell.h"
@@ -42,7 +42,7 @@ static void get_hex_corner(int i, int corner[3])
     corner[2] = i >= 4;
 }
 
-/* Returns the field on the ray of a lane as a polynomial of t. */
+/* Returns the coefficients of the field on the ray of a lane as a polynomial of t. */
 static cubic expand_cubic(const bundle *b, int lane)
 {
     const long double base[3] = {(long double)b->packet.origin_x[lane], (long double)b->packet.origin_y[lane], 0};
@@ -66,7 +66,7 @@ static long double evaluate_cubic(const cubic *g, long double t)
     return ((g->c[3] * t + g->c[2]) * t + g->c[1]) * t + g->c[0];
 }
 
-/* Finds where g, which is monotonic between low and high, passes v. */
+/* Returns the t at which g reaches v. g must be monotonic between low and high. */
 static long double find_monotonic_root(const cubic *g, long double low, long double high, long double v)
 {
     const bool rises = evaluate_cubic(g, high) > evaluate_cubic(g, low);
@@ -80,7 +80,7 @@ static long double find_monotonic_root(const cubic *g, long double low, long dou
     return high;
 }
 
-/* Computes the ends of the pieces on which g is monotonic; returns how many ends there are, 2 to 4. */
+/* Computes the ends of the intervals in which g is monotonic. Returns the number of ends, 2 to 4. */
 static int find_monotonic_ends(const cubic *g, long double low, long double high, long double ends[4])
 {
     const long double a = 3 * g->c[3], b = g->c[2], c = g->c[1], root = sqrtl(fmaxl(b * b - a * c, 0));
@@ -101,7 +101,7 @@ static int find_monotonic_ends(const cubic *g, long double low, long double high
 
 typedef struct truth {
     bool certain;
-    long double certain_t; /* the first hit must not be farther than this */
+    long double certain_t; /* end of the first certain crossing, which the first hit must not exceed */
     int count;
     long double roots[3];
 } truth;
@@ -127,7 +127,7 @@ static truth find_exact_root(const cubic *g, long double low, long double high)
     return out;
 }
 
-/* Chooses two random points in the cube at different heights. */
+/* Chooses two random points in the unit cube whose heights are not nearly equal. */
 static void random_points(double from[3], double to[3])
 {
     do {
@@ -138,8 +138,9 @@ static void random_points(double from[3], double to[3])
     } while (fabs(to[2] - from[2]) < 0.2);
 }
 
-/* Aims rays near the first one, from 1e-7 to 1e-1 off, or anywhere. Bounds are made for rays around the depth axis, as
- * those of a tile are: half of the near ones are such rays. */
+/* Aims the rays of all lanes: near the first ray, from 1e-7 to 1e-1 off, or anywhere. Half of the near rays are almost
+ * parallel to the depth axis, because the bounds of a cell are made for the rays of a tile, which are almost parallel
+ * to this axis. */
 static void aim_all_rays(bundle *b, bool is_near)
 {
     const double lean = is_near && draw_uniform(0, 1) < 0.5 ? pow(10, draw_uniform(-3, -1)) : 1;
@@ -159,7 +160,7 @@ static void aim_all_rays(bundle *b, bool is_near)
     }
 }
 
-/* Scales the values in float32 to a maximum of 1, as kernel_cell_relative() does. */
+/* Rounds the values to float32 after scaling them to a maximum of 1, as kernel_cell_relative() does. */
 static void normalize_values(double values[8])
 {
     double largest = 0;
@@ -167,7 +168,7 @@ static void normalize_values(double values[8])
     for (int i = 0; i < 8; i++) values[i] = (double)(float)(values[i] / largest);
 }
 
-/* Shifts the values so that the cubic of ray 0 has an extreme whose value is miss. */
+/* Shifts the values so that the cubic on ray 0 has an extreme with the value `miss`; 0 makes a double root. */
 static void make_double_root(bundle *b, double miss)
 {
     const cubic g = expand_cubic(b, 0);
@@ -177,8 +178,8 @@ static void make_double_root(bundle *b, double miss)
     for (int i = 0; i < 8; i++) b->values[i] -= v + miss;
 }
 
-/* Adds to the values a constant, a multiple of x and one of x y, so that the cubic of ray 0 has a triple root, or, with
- * spread, three close ones. */
+/* Adds a constant, a multiple of x and a multiple of x y to the values, so that the cubic on ray 0 has a triple root at
+ * `place`, or three roots at distances of `spread`. */
 static void make_triple_root(bundle *b, double place, double spread)
 {
     const cubic g = expand_cubic(b, 0);
@@ -202,7 +203,7 @@ static void make_bundle(bundle *b, int64_t n)
     const double small = (draw_uniform(0, 1) < 0.5 ? -1 : 1) * pow(10, draw_uniform(-9, -1));
     memset(b, 0, sizeof *b);
     aim_all_rays(b, kind >= 4);
-    /* The values of kind 3 mostly increase along the rays, so that many cells are known to be monotonic. */
+    /* The values of kind 3 mostly increase along the rays, so that the kernels find that many cells are monotonic. */
     for (int i = 0; i < 8; i++) b->values[i] = draw_uniform(-1, 1) + (kind == 1 ? 0.6 : 0);
     for (int i = 0; i < 8 && kind == 3; i++) b->values[i] = 0.2 * b->values[i] + (i < 4 ? -0.7 : 0.7);
     if (kind == 4 || kind == 5) make_double_root(b, kind == 4 ? small : 0);
@@ -239,8 +240,8 @@ static void verify_robust(count *c, const cubic *g, const truth *t, bool hit, lo
 
 typedef struct rates {
     count robust;
-    int64_t monotone; /* number of packets in whose cells the field is known to be monotonic along all rays */
-    /* number of rays for which the robust search found a wrong number of further crossings */
+    int64_t monotone; /* number of packets for which the kernels find that the field is monotonic along all rays */
+    /* number of rays for which the number of further crossings is wrong */
     int64_t further_crossings;
 } rates;
 
@@ -260,7 +261,7 @@ static void verify_bundle(bundle *b, rates *r)
             const cubic g = expand_cubic(b, lane);
             const truth truth = find_exact_root(&g, (long double)list[n].t_in[lane], (long double)list[n].t_out[lane]);
             verify_robust(&r->robust, &g, &truth, hit >> lane & 1, (long double)t[lane]);
-            /* Crossings alternate, so their number is odd if the signs at both faces differ. */
+            /* Crossings alternate in direction, so their number is odd if the signs at both faces differ. */
             if (((int)hits[lane] & 1) != (int)(vm_bits(change) >> lane & 1)) r->further_crossings++;
         }
     }
@@ -286,7 +287,7 @@ static void robust_misses_no_first_root(void **state)
     assert_int_equal(b.thread.map_failures, 0);
 }
 
-/* The command's argument is the number of cubics. */
+/* The command's argument is the number of cubics to test. */
 int main(int argc, char **argv)
 {
     if (argc > 1) cubics = atoll(argv[1]);

@@ -1,21 +1,21 @@
-/* Checks the robust root finder on rays that are curved in the cell's own coordinates: through warped, concave and
- * twisted hexes, twisted wedges and pyramids near their apex, also with values constructed to have double and triple
- * roots, against the reference's inverse map in double. The kernels' headers are compiled here for the scalar
- * instruction set.
+/* Compares the robust root finder with the reference's inverse map in double, on rays that are curved in the cell's own
+ * coordinates: through warped, concave and twisted hexes, twisted wedges, and pyramids near their apex. Some values are
+ * constructed so that the field has a double or a triple root on a ray. The kernels' headers are compiled here for the
+ * scalar instruction set.
  *
- * Reference: the field along a ray is no polynomial, but smooth. It is halved into pieces until on each piece the cubic
- * through the values and slopes at both ends has the value and slope of the middle to 1e-9; there it errs by even less.
- * Between the ends of the pieces and the extremes of the cubics the field is then monotonic to 1e-9, and bisection
- * finds where it passes a level.
+ * Reference: the field along a ray is not a polynomial, but smooth. The ray is bisected into intervals until, in each,
+ * the cubic through the values and slopes at both ends agrees with the value and the slope in the middle to 1e-9;
+ * everywhere else in the interval its error is smaller. Between the ends of the intervals and the extremes of the
+ * cubics, the field is then monotonic to 1e-9, and bisection finds the depth at which it reaches a level.
  *
- * What rounding may decide: a polynomial with eight coefficients c at coordinates in [0, 1] is evaluated in float32
- * with one rounding (6e-8) of each coefficient and up to six of the sums and products of each term: it errs by 7 * 6e-8
- * sum |c|. The polynomials of the field and of the three coordinates have this error; the ray's point is also rounded
- * three times at a size of 1.5, and by the rounding of t. An error of the position changes the value by the field's
- * gradient times that error. (Newton's method ends below a step of 5e-5, which leaves 1e-8.) band is the sum of these
+ * Tolerance: a polynomial with eight coefficients c at coordinates in [0, 1] is evaluated in float32 with one rounding
+ * (6e-8) of each coefficient and up to six of the sums and products of each term, so its error is 7 * 6e-8 sum |c|. The
+ * polynomials of the field and of the three coordinates have this error. The ray's point is also rounded three times at
+ * a size of 1.5, and by the rounding of t. An error of the position changes the value by the field's gradient times
+ * this error. (Newton's method ends below a step of 5e-5, after which the error is 1e-8.) The band is the sum of these
  * errors for each cell and ray: float32 cannot decide the sign of a field below it. A crossing is certain if the field
- * passes from outside the band on one side to outside it on the other: the first hit must not be farther than that, and
- * at every hit the field must be within the band. */
+ * passes from outside the band on one side to outside the band on the other side. The first hit must not be farther
+ * than the first certain crossing, and the field must be within the band at every hit. */
 #include "reference_cell.h"
 #include "root_bundle.h"
 #include "test_meshes.h"
@@ -47,10 +47,10 @@ typedef struct ray_profile {
     const reference_cell *cell;
     const double *values;
     reference_line line;
-    double steepest[3]; /* largest magnitude of each component of the gradient */
+    double steepest[3]; /* largest magnitude of each component of the gradient along the ray */
     bool has_failed;
     int count;
-    knot knots[PROFILE_MAX]; /* the field is monotonic from each knot to the next */
+    knot knots[PROFILE_MAX]; /* the field is monotonic between two consecutive knots */
 } ray_profile;
 
 static knot ray_profile_evaluate(ray_profile *c, double t)
@@ -69,7 +69,7 @@ static void ray_profile_add(ray_profile *c, knot k)
     c->knots[c->count++] = k;
 }
 
-/* Adds the extremes of the cubic between knots a and b, then b. */
+/* Adds the extremes of the cubic between the knots a and b, then adds b. */
 static void ray_profile_add_piece(ray_profile *c, knot a, knot b)
 {
     const double h = b.t - a.t, d0 = a.slope * h, d1 = b.slope * h, rise = b.f - a.f;
@@ -111,7 +111,7 @@ static void ray_profile_trace(ray_profile *c, double low, double high)
     ray_profile_halve(c, first, ray_profile_evaluate(c, high), 0);
 }
 
-/* Finds where the field passes v between two knots. */
+/* Returns the depth between two knots at which the field reaches v. */
 static double ray_profile_find_crossing(ray_profile *c, const knot *from, const knot *to, double v)
 {
     const bool rises = to->f > from->f;
@@ -126,7 +126,7 @@ static double ray_profile_find_crossing(ray_profile *c, const knot *from, const 
     return high;
 }
 
-/* Returns whether there is a certain crossing; *t is the depth that the first hit must not exceed. */
+/* Returns whether there is a certain crossing. *t receives the depth that the first hit must not exceed. */
 static bool ray_profile_find_certain_crossing(ray_profile *c, double band, double *t)
 {
     int side = 0;
@@ -172,13 +172,13 @@ static void place_vertices(bent kind, reference_cell *cell)
         double p[3];
         for (int a = 0; a < 3; a++) p[a] = unit[i][a] + draw_uniform(-amounts[kind], amounts[kind]);
         if ((kind == BENT_TWISTED || kind == BENT_WEDGE) && unit[i][2] > 0) rotate_point(p, angle);
-        /* Moves a corner almost to the plane of its neighbours. */
+        /* Moves a corner almost into the plane of its three neighbours. */
         for (int a = 0; a < 3 && kind == BENT_CONCAVE && i == 6; a++) p[a] = dent + draw_uniform(0, 0.1);
         for (int a = 0; a < 3; a++) cell->position[i][a] = cell->world[i][a] = (double)(float)p[a];
     }
 }
 
-/* Computes the position of a point of a hex or wedge, which is linear in each of its coordinates. */
+/* Computes the position of a point of a hex or wedge from its coordinates r. The map is linear in each coordinate. */
 static void compute_cell_position(const reference_cell *cell, const double r[3], double out[3])
 {
     const int base = cell->count / 2;
@@ -213,7 +213,7 @@ static double compute_jacobian_determinant(const reference_cell *cell, const dou
     return sum;
 }
 
-/* Returns whether the cell is not folded, nor nearly so: in folded cells a point has several values, or none. */
+/* Returns whether the cell is neither folded nor nearly folded. In folded cells a point has several values or none. */
 static bool is_solid(const reference_cell *cell)
 {
     enum { STEPS = 5 };
@@ -228,8 +228,8 @@ static bool is_solid(const reference_cell *cell)
 
 /* ---- rays and values ---- */
 
-/* Chooses two points at different heights; in a pyramid the ray between them passes the apex at a distance of 1e-4 to
- * 1e-1. */
+/* Chooses two points at different heights. In a pyramid, the distance from the apex to the ray between the points is
+ * 1e-4 to 1e-1. */
 static void random_points(const reference_cell *cell, double from[3], double to[3])
 {
     do {
@@ -244,7 +244,7 @@ static void random_points(const reference_cell *cell, double from[3], double to[
     } while (fabs(to[2] - from[2]) < 0.2);
 }
 
-/* Aims rays near the first one, from 1e-7 to 1e-1 off, or anywhere. */
+/* Aims the rays of all lanes near the first ray, from 1e-7 to 1e-1 off, or anywhere. */
 static void aim_all_rays(bundle *b, const reference_cell *cell, bool is_near)
 {
     double from[3], to[3];
@@ -268,7 +268,7 @@ static reference_line make_lane_line(const bundle *b, int lane)
                             {(double)b->packet.slope_x[lane], (double)b->packet.slope_y[lane]}};
 }
 
-/* Traces ray 0 through the cell; returns false if it misses. */
+/* Traces ray 0 through the cell. Returns false if it misses the cell. */
 static bool trace_first(const bundle *b, const reference_cell *cell, ray_profile *c)
 {
     reference_crossing ends[REFERENCE_MAX_CROSSINGS];
@@ -283,7 +283,7 @@ static void shift_values(bundle *b, const reference_cell *cell, double level, do
     for (int i = 0; i < cell->count; i++) b->values[i] += level + slope * cell->position[i][2];
 }
 
-/* Shifts the values so that the field on ray 0 has an extreme whose value is miss. */
+/* Shifts the values so that the field on ray 0 has an extreme with the value `miss`; 0 makes a double root. */
 static void make_double_root(bundle *b, const reference_cell *cell, ray_profile *c, double miss)
 {
     if (!trace_first(b, cell, c)) return;
@@ -294,8 +294,9 @@ static void make_double_root(bundle *b, const reference_cell *cell, ray_profile 
         }
 }
 
-/* Makes a triple root, or three close ones. Every cell can represent t as a field. Adding a multiple of t and a
- * constant makes the field 0 at its steepest or flattest point on ray 0, with the given slope there. */
+/* Makes a triple root or three close roots on ray 0. Every cell can represent t as a field. A constant and a multiple
+ * of t are added to the values, so that the field is 0 and has the given slope at its steepest or flattest point on the
+ * ray. */
 static void make_triple_root(bundle *b, const reference_cell *cell, ray_profile *c, double slope)
 {
     if (!trace_first(b, cell, c)) return;
@@ -317,7 +318,7 @@ static void make_triple_root(bundle *b, const reference_cell *cell, ray_profile 
     }
 }
 
-/* Scales the values in float32 to a maximum of 1, as kernel_cell_relative() does. */
+/* Rounds the values to float32 after scaling them to a maximum of 1, as kernel_cell_relative() does. */
 static void normalize_values(double *values, int count)
 {
     double largest = 0;
@@ -344,11 +345,11 @@ static void make_bundle(bundle *b, reference_cell *cell, ray_profile *scratch, b
     bundle_transform_cell(b);
 }
 
-/* ---- the comparison ---- */
+/* ---- comparison of the kernels with the reference ---- */
 
 typedef struct count {
     int64_t rays, certain, missed, off, differing, inverse_failures;
-    double worst, worst_band; /* largest residual relative to the band; largest band */
+    double worst, worst_band; /* worst: largest residual relative to the band; worst_band: largest band */
 } count;
 
 static double sum_lanes(const vf c[8])
@@ -383,8 +384,8 @@ static void verify_ray(count *n, const kernel_map *map, ray_profile *c, double l
     n->off += residual > 1;
 }
 
-/* Counts rays whose first crossing, or number of crossings, differs if they are traced alone: the result of a ray must
- * not depend on the others of its packet. */
+/* Returns the number of rays whose first crossing or number of crossings changes if each ray is traced without the
+ * others: the result of a ray must not depend on the other rays of its packet. */
 static int64_t count_differences_if_traced_alone(bundle *b, const kernel_curved *curved, const kernel_interval *i, vf t,
                                                  vf hits)
 {
@@ -450,7 +451,7 @@ static void curved_rays_miss_no_first_root(void **state)
     }
 }
 
-/* The command's argument is the number of rays. */
+/* The command's argument is the number of rays to trace. */
 int main(int argc, char **argv)
 {
     if (argc > 1) rays_wanted = atoll(argv[1]);

@@ -1,5 +1,5 @@
-/* Checks scene files: the result of a valid file, all defaults, and the messages about invalid ones. Invalid files are
- * one valid file with one line replaced, so that only this line can cause the message. */
+/* Checks the scene parser: the result of a valid file, all defaults, and the messages about invalid files. Each invalid
+ * file is the same valid file with one line replaced, so that only this line can cause the message. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -18,14 +18,14 @@
 #include "scene.h"
 #include "scene_document.h"
 
-/* Converts by sRGB's definition, in double, independent of the library's. */
+/* Converts a colour by the definition of sRGB, in double and independently of the library. */
 static double convert_srgb_to_linear(double s)
 {
     return s <= 0.04045 ? s / 12.92 : pow((s + 0.055) / 1.055, 2.4);
 }
 
-/* The float32 roundings of a colour: sRGB to float, pow, multiplication by a factor, each within 2^-24 relative; the
- * slope of the curve is < 2.5. */
+/* Tolerance of a colour for its roundings to float32: sRGB to float, pow, and multiplication by a factor, each within
+ * 2^-24 relative; the slope of the curve is below 2.5. */
 #define COLOUR_TOLERANCE 1e-6
 
 static void assert_nearly_equal(double value, double expected, double tolerance)
@@ -189,7 +189,7 @@ static const char every_key[] =
     "parameters: {inflow: 2.5, _k-2: -1e-3, values: 3, color: 4, axis: 5}\n"
     "schedule: radix\n";
 
-/* Keys that cannot be combined with others of the file above. */
+/* Keys that must not be combined with other keys of the file above. */
 static const char excluding_keys[] = "surface_error: 0.5\n"
                                      "images:\n"
                                      "- {name: a, layers: [volume: {field: p}], outputs: [{path: a.png}]}\n";
@@ -213,7 +213,7 @@ static void check_vector(const double v[3], double x, double y, double z)
     assert_nearly_equal(v[2], z, 1e-15);
 }
 
-/* Checks that the map has the whole table, to the bit. */
+/* Checks that the colours of the map are bitwise equal to the table with the given name. */
 static void check_built_in(const scene_colour_map *map, const char *name)
 {
     int count = 0;
@@ -417,13 +417,13 @@ static void scene_image_defaults_hold(void **state)
         const double *d = image->lights[i].direction;
         assert_false(image->lights[i].is_in_world);
         assert_nearly_equal(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], 1, 1e-15);
-        assert_true(d[2] > 0); /* the light comes from the eye's side */
+        assert_true(d[2] > 0); /* the light comes from the side of the eye */
     }
     assert_int_equal(image->outputs[0].format, SCENE_PNG8);
     scene_free(&s);
 }
 
-/* Checks the integration method for a scene's sampling keys and its number of volumes. */
+/* Checks the integration method that follows from the sampling keys of a scene and its number of volumes. */
 static void sampling_method_follows_the_keys(void **state)
 {
     (void)state;
@@ -485,9 +485,9 @@ static void clips_are_read_for_images_and_layers(void **state)
     check_vector(clips[2].centre, 1, -2, 3);
     assert_true(clips[3].kind == SCENE_CLIP_BOX && !clips[3].is_outside);
     assert_true(image->isosurfaces[0].clips == 3 && image->isosurfaces[1].clips == 7);
-    assert_true(image->volumes[0].clips == 7); /* identical spheres are stored once */
+    assert_true(image->volumes[0].clips == 7); /* identical spheres are stored one time */
     assert_true(image->slices[0].clips == 11);
-    assert_true(image->surfaces[0].clips == 3); /* the image's box clips all layers */
+    assert_true(image->surfaces[0].clips == 3); /* the box of the image clips all layers */
     assert_int_equal(s.images[1].clip_count, 0);
     scene_free(&s);
 }
@@ -512,7 +512,7 @@ static void statistics_and_conditions_are_read(void **state)
     scene_free(&s);
 }
 
-/* Checks that `meshes` maps each mesh's name to its warp. */
+/* Checks that the key `meshes` maps each mesh's name to its warp. */
 static void warps_are_read_per_mesh(void **state)
 {
     (void)state;
@@ -563,8 +563,8 @@ static void mirrors_are_read_per_mesh(void **state)
     scene_free(&s);
 }
 
-/* Checks parameters by their names. These names are the scene's own: they have no short forms and no alternative
- * spellings. */
+/* Checks parameters, which are addressed by their names. The scene defines these names, so they have no short forms and
+ * no alternative spellings. */
 static void parameters_are_read_by_their_names(void **state)
 {
     (void)state;
@@ -617,7 +617,7 @@ static void surface_colours_are_read(void **state)
     scene_free(&s);
 }
 
-/* Checks entries of the list that stand for many planes: at offsets, or spread over the data. */
+/* Checks list entries that define several planes: by offsets, or spread evenly over the data. */
 static void several_planes_are_read(void **state)
 {
     (void)state;
@@ -643,7 +643,8 @@ static void several_planes_are_read(void **state)
     scene_free(&s);
 }
 
-/* Checks normals of any length, including components whose squares underflow or overflow. */
+/* Checks that normals of any length are normalized, including those with components whose squares underflow or
+ * overflow. */
 static void slices_have_planes_of_unit_normals(void **state)
 {
     (void)state;
@@ -689,7 +690,7 @@ static void contour_lines_use_the_colour_field(void **state)
     const scene_lines *slice = &s.images[0].slices[0].lines, *iso = &s.images[0].isosurfaces[0].lines;
     const scene_lines *outer = &s.images[0].surfaces[0].lines;
     assert_true(slice->is_given && slice->is_of_colours && !slice->has_values && slice->count == 7);
-    assert_string_equal(slice->field.name, "w"); /* the field that the sweep sets */
+    assert_string_equal(slice->field.name, "w"); /* the field set by the sweep */
     assert_true(slice->field.component == 1 && slice->field.mesh_count == 1 && slice->field.at_vertices);
     /* 0.1 in sRGB, converted to linear light */
     assert_true(slice->width == 2 && fabsf(slice->colours[20] - 0.0100228F) < 1e-6F);
@@ -799,9 +800,9 @@ enum { good_line_count = sizeof good_lines / sizeof *good_lines };
 #define AT "{position: [0, 0, 5], focal: [0, 0, 0]}"
 
 static const struct bad_file {
-    int line; /* number of the line that is replaced */
+    int line; /* number of the line that is replaced, counted from 1 */
     const char *by;
-    int reported; /* number of the line in the message */
+    int reported; /* number of the line that the message must state */
     const char *words[3];
 } bad_files[] = {
     {1,
@@ -1299,7 +1300,7 @@ static void scene_huge_file_is_refused(void **state)
     test_free(text);
 }
 
-/* Checks every prefix of a valid file: most are errors; none may crash or leak. */
+/* Checks every prefix of a valid file. Most prefixes are errors; none may crash or leak memory. */
 static void scene_truncated_files_fail_cleanly(void **state)
 {
     (void)state;
@@ -1502,7 +1503,7 @@ static void schema_keys_have_help_and_defaults(void **state)
     check_mapping(&scene_top);
 }
 
-/* The command's argument is the folder of examples. */
+/* The command's argument is the folder of the example scenes. */
 int main(int argument_count, char **arguments)
 {
     const struct CMUnitTest tests[] = {

@@ -1,4 +1,5 @@
-/* Checks colours of values in a scene: tables from lists and files, changes to them, and errors. */
+/* Checks the colours of values in a scene: colour tables from lists and from files, modifications of tables, and error
+ * messages. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -28,8 +29,8 @@ static double convert_linear_to_srgb(float linear)
     return l <= 0.0031308 ? 12.92 * l : 1.055 * pow(l, 1 / 2.4) - 0.055;
 }
 
-/* The float32 roundings of a colour: sRGB to float, pow, the mean of two, each within 2^-24 relative; the slope of the
- * curve is < 2.5. */
+/* Tolerance of a colour for its roundings to float32: sRGB to float, pow, and the mean of two colours, each within
+ * 2^-24 relative; the slope of the curve is below 2.5. */
 #define COLOUR_TOLERANCE 1e-6
 
 static void check_colour(const float c[3], double r, double g, double b)
@@ -40,7 +41,8 @@ static void check_colour(const float c[3], double r, double g, double b)
             fail_msg("channel %d is %.9g, expected %.9g", i, (double)c[i], expected[i]);
 }
 
-/* ---- a folder of files ---- */
+/* ---- files that the parser may read
+ * ------------------------------------------------------------------------------- */
 
 #define POINTS "\"RGBPoints\": [10, 0, 0, 0, 20, 1, 0, 0, 30, 1, 1, 1]"
 
@@ -87,7 +89,7 @@ static insitu_status read_stored(const char *path, char **text, int64_t *size, b
     return base_fail(error, INSITU_ERROR_SCENE, "%s: cannot be read: no such file", path);
 }
 
-/* Parses a scene with the given keys after "field: f" of a surface's colour_by. */
+/* Parses a scene in which the given keys follow "field: f" in the colour_by of an isosurface. */
 static insitu_status parse_colour_keys(const char *keys, scene_attachments *files, scene *s, base_error *error)
 {
     char text[2048];
@@ -134,8 +136,8 @@ static void every_map_is_found_by_its_name(void **state)
     }
 }
 
-/* Checks a table made from a list: every other entry is a colour of the list; between them colours are linear in
- * sRGB. */
+/* Checks a colour table made from a list: every second entry is a colour of the list, and the entries between are
+ * interpolated linearly in sRGB. */
 static void colour_lists_are_interpolated_to_tables(void **state)
 {
     (void)state;
@@ -170,8 +172,8 @@ static void maps_are_reversed_and_cut_into_bands(void **state)
         assert_memory_equal(get_table_entry(map, i), viridis + 3 * (255 - i), 3 * sizeof(float));
     map = parse_colour_map(", discrete: 6, map: grey");
     assert_true(map->is_banded && map->count == 6);
-    for (int i = 0; i < 6; i++)
-        check_colour(get_table_entry(map, i), i / 5.0, i / 5.0, i / 5.0); /* entries 0, 51, 102, ... */
+    for (int i = 0; i < 6; i++) /* the six colours are entries 0, 51, 102, ... of the table */
+        check_colour(get_table_entry(map, i), i / 5.0, i / 5.0, i / 5.0);
     map = parse_colour_map(", discrete: 6, map: grey, reversed: true");
     for (int i = 0; i < 6; i++) check_colour(get_table_entry(map, i), 1 - i / 5.0, 1 - i / 5.0, 1 - i / 5.0);
     map = parse_colour_map(", discrete: 1, map: {colours: [[0, 0, 0], [0, 1, 0], [0, 0, 1]]}");
@@ -208,8 +210,8 @@ static void sources_of_ranges_are_read(void **state)
     assert_true(r->is_fixed && r->low == -1 && r->high == 1e9);
 }
 
-/* Checks tables from ParaView's files. The greys of CIELAB are those of sRGB; its lightness is 116 cbrt(Y) - 16 for a
- * luminance Y. */
+/* Checks colour tables made from ParaView's files. The greys of CIELAB are those of sRGB; the lightness is 116 cbrt(Y)
+ * - 16 for a luminance Y. */
 static void paraview_colour_maps_become_tables(void **state)
 {
     (void)state;
@@ -241,8 +243,8 @@ static void paraview_colour_maps_become_tables(void **state)
     check_colour(get_table_entry(map, 1), 1, 0.5, 1);
     map = parse_colour_map(", map: {file: several.json, name: uneven}");
     check_colour(get_table_entry(map, 256), 1, 0, 0);
-    /* The middle of Moreland's own map has a lightness of 88, that of the file 88.1: the difference is less than a
-     * code. */
+    /* The lightness in the middle of the library's Moreland map is 88, that of the file 88.1. This difference is less
+     * than one code. */
     const float *moreland = colour_map_table("cool_to_warm", &count);
     map = parse_colour_map(", map: {file: several.json, name: moreland}");
     for (int i = 0; i < 3; i++) {
@@ -253,7 +255,8 @@ static void paraview_colour_maps_become_tables(void **state)
     }
 }
 
-/* Checks that one rank reads the files and that all other ranks parse its copy. */
+/* Checks that each file is read one time and kept, and that a second parse, as on the other ranks, uses the kept text
+ * and reads no file. */
 static void colour_files_are_read_once_and_reused(void **state)
 {
     (void)state;
@@ -263,7 +266,7 @@ static void colour_files_are_read_once_and_reused(void **state)
     reads = 0;
     const char *keys = ", map: {file: one.json}}\n  - volume:\n      {field: f, map: {file: ../maps/one.json}";
     assert_int_equal(parse_colour_keys(keys, &files, &s, &error),
-                     INSITU_ERROR_SCENE); /* another path, at which there is no file */
+                     INSITU_ERROR_SCENE); /* a path at which there is no file */
     assert_non_null(strstr(error.message, "maps/scene.yaml:9: images[0].layers[1].volume.map.file: "
                                           "maps/../maps/one.json: cannot be read: no such file"));
     keys = ", map: {file: one.json}}\n  - volume:\n      {field: f, map: {file: one.json, name: red}";
@@ -283,7 +286,7 @@ static void colour_files_are_read_once_and_reused(void **state)
     assert_non_null(strstr(error.message, "no file can be read here"));
 }
 
-/* Keys of line 7, and texts that the message must contain after "maps/scene.yaml:7:
+/* Keys of line 7, and two texts that the message must contain after "maps/scene.yaml:7:
  * images[0].layers[0].isosurface.colour_by." */
 static const char *const bad_keys[][3] = {
     {", map: jet", "map: \"jet\" is not allowed (did you mean turbo?), expected one of viridis, plasma",
@@ -387,7 +390,7 @@ static void volumes_reject_surface_keys(void **state)
     }
 }
 
-/* Checks that each failed allocation of the library is reported as such, and leaks nothing. */
+/* Checks that each failed allocation is reported as an error and leaks no memory. */
 static void failed_allocations_are_errors_without_a_leak(void **state)
 {
     (void)state;

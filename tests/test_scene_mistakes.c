@@ -1,5 +1,5 @@
-/* Checks mistakes that newcomers make in scenes, one for each row: each message must name the file, the line of the
- * error, the key, what was found there and what to write instead. */
+/* Checks mistakes that newcomers make in scenes. Each message must name the file, the line of the error, the key, what
+ * was found there and what to write instead. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -11,7 +11,7 @@
 
 #include "scene.h"
 
-/* The correct scene. */
+/* The scene without mistakes. Each mistake replaces some of its lines. */
 static const char *const lines[] = {
     "images:",
     "  - name: heat",
@@ -31,10 +31,12 @@ static const char *const lines[] = {
 enum { line_count = sizeof lines / sizeof *lines };
 
 typedef struct mistake {
-    int line, count; /* first replaced line, counted from 1, and number of replaced lines */
+    int line, count; /* line: first replaced line, counted from 1; count: number of replaced lines */
     const char *by;
-    int at;               /* number of the line in the message */
-    const char *words[3]; /* the key, unless the text is no YAML; what was found; what to write instead */
+    int at; /* number of the line that the message must state */
+    /* texts that the message must contain: the key (unless the text is not YAML), what was found, and what to write
+     * instead */
+    const char *words[3];
 } mistake;
 
 static const mistake mistakes[] = {
@@ -1235,7 +1237,7 @@ static void scene_without_mistakes_is_accepted(void **state)
     scene_free(&s);
 }
 
-/* Checks the time to find a mistake after many lines: the search must read each line only a few times. */
+/* Checks the time to find a mistake after many lines: the parser must read each line only a few times. */
 static void mistake_after_many_lines_is_found(void **state)
 {
     (void)state;

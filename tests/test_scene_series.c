@@ -1,5 +1,5 @@
-/* Checks scenes that make many pictures: the positions of an orbit's views, the variants of a sweep, camera paths, and
- * databases. */
+/* Checks scenes that make many pictures: positions of the views of an orbit, variants of a sweep, camera paths, and
+ * image databases. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -13,7 +13,7 @@
 #include "memory.h"
 #include "scene.h"
 
-/* Error of sines and cosines of angles in degrees, converted to radians: a few times 2^-53. */
+/* Error of the sine and cosine of an angle that is converted from degrees to radians: a few times 2^-53. */
 #define ANGLE_TOLERANCE 1e-15
 
 static void parse_good(const char *text, scene *s)
@@ -71,7 +71,7 @@ static void orbits_go_around_coordinate_axes(void **state)
     }
 }
 
-/* Checks the angles between the views and with the axis, for any axis. */
+/* Checks, for an axis in any direction, the angles between the views and the angles between the views and the axis. */
 static void orbits_are_circles_about_any_axis(void **state)
 {
     (void)state;
@@ -137,7 +137,7 @@ static void sweeps_make_each_combination_once(void **state)
         assert_int_equal(image->isosurfaces[0].value_count, 1);
         assert_true(image->isosurfaces[0].values[0] == value + 1 && image->isovalue == value + 1);
         assert_true(image->isosurfaces[0].colours[value == 0 ? 0 : 1] == 1);
-        /* both views of a variant share their layers */
+        /* both views of a variant have the same layers */
         assert_true(image->isosurfaces == s.images[i - i % 2].isosurfaces);
         assert_true(scene_is_first_variant(image) == (i == 0));
         const scene_placeholder_values moment = scene_placeholder_values_of(image, 5, 0);
@@ -225,7 +225,7 @@ static void grid_cells_are_numbered(void **state)
     scene_free(&s);
 }
 
-/* Returns whether the montage has this inset and no other. */
+/* Returns whether the montage has this inset and no others. */
 static bool has_inset(const scene_montage *m, scene_anchor corner, int x, int y, int width, int height)
 {
     int count = 0;
@@ -234,8 +234,7 @@ static bool has_inset(const scene_montage *m, scene_anchor corner, int x, int y,
     return count == 1 && r->x == x && r->y == y && r->width == width && r->height == height;
 }
 
-/* Checks insets: their frames are a four-hundredth of 480 pixels wide, and the margins next to them a fiftieth of 480,
- * rounded up. */
+/* Checks insets. Their frames are 480 / 400 pixels wide, and the margins beside them 480 / 50, both rounded up. */
 static void insets_cover_the_corners_of_grids(void **state)
 {
     (void)state;
@@ -264,8 +263,8 @@ static void insets_cover_the_corners_of_grids(void **state)
     scene_free(&s);
 }
 
-/* Checks the width of strips of bars: text of 0.03 of the height has 0.03 * 24 * 9 = 6.48 pixels; text of 0.1 has
- * 21.6. */
+/* Checks the width of the strips with colour bars. Text whose size is 0.03 of the height needs 0.03 * 24 * 9 = 6.48
+ * pixels; text of size 0.1 needs 21.6. */
 static void colour_bar_strips_fit_their_labels(void **state)
 {
     (void)state;
@@ -289,7 +288,8 @@ static void colour_bar_strips_fit_their_labels(void **state)
     }
 }
 
-/* ---- paths ----------------------------------------------------------------------------------------------------- */
+/* ---- camera paths
+ * -------------------------------------------------------------------------------------------------- */
 
 static const char moving[] = "angle: 30, path: [{time: 1, position: [0, 0, 8], focal: [0, 0, 0]}, "
                              "{time: 2, position: [4, 0, 8], focal: [0, 1, 0], angle: 50}, "
@@ -320,7 +320,8 @@ static void camera_paths_interpolate_positions_and_stop_at_ends(void **state)
     scene_free(&s);
 }
 
-/* Checks that between two positions, interpolated by cycles, the camera has moved 3 s^2 - 2 s^3 of the distance. */
+/* Checks a path with two positions that is interpolated by cycles. At the fraction s of the cycles, the camera must
+ * have moved by 3 s^2 - 2 s^3 of the distance. */
 static void camera_paths_of_two_positions_ease_in_and_out(void **state)
 {
     (void)state;
@@ -331,16 +332,16 @@ static void camera_paths_of_two_positions_ease_in_and_out(void **state)
     for (int cycle = 0; cycle < 40; cycle++) {
         const double share = fmin(fmax((cycle - 10) / 20.0, 0), 1), way = share * share * (3 - 2 * share);
         const scene_camera at = scene_camera_at(&s.images[0].camera, cycle, 1e9);
-        check_vector(at.eye, way, 5 * way, 8); /* a coordinate that does not change stays the same to the bit */
+        check_vector(at.eye, way, 5 * way, 8); /* a coordinate that does not change must remain bitwise equal */
         check_vector(at.focal, 0, 0, -2 * way);
         assert_true(at.eye[2] == 8);
     }
     scene_free(&s);
 }
 
-/* Checks that the slope is the same on both sides of each position, by differences, and that the path stays between
- * neighbouring positions. The second derivative of a cubic is below 12 times its rise, so a difference over h is off by
- * less than 6 h of the rise. */
+/* Checks, by differences, that the slope is the same on both sides of each position, and that the path stays between
+ * neighbouring positions. The second derivative of a cubic is below 12 times its rise, so a difference over h has an
+ * error of less than 6 h times the rise. */
 static void camera_paths_are_smooth_without_overshoot(void **state)
 {
     (void)state;
@@ -367,7 +368,8 @@ static void camera_paths_are_smooth_without_overshoot(void **state)
         }
         assert_true(at.angle >= 30 && at.angle <= 50 && at.eye[2] == 8);
     }
-    /* x rises by 4 in 1, then by 2 in 3: the slope at the position between them is 12 / (7 / 4 + 5 / (2 / 3)). */
+    /* x rises by 4 in a time of 1, then by 2 in a time of 3. The slope at the position between them is 12 / (7 / 4 + 5
+     * / (2 / 3)). */
     assert_nearly_equal(scene_camera_at(c, 0, 1.5).eye[0], 2 - 12 / (1.75 + 7.5) / 8, 1e-14);
     scene_free(&s);
 }

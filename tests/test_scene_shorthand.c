@@ -1,5 +1,5 @@
-/* Checks that short forms of a scene mean the same as their full forms, and that messages suggest the nearest word for
- * misspelt ones. */
+/* Checks that short forms of scene keys have the same result as their full forms, and that messages about misspelt
+ * words suggest the nearest word. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -55,7 +55,7 @@ static void print_layers(char *to, const scene_image *image)
     }
 }
 
-/* Prints all values that have short forms. */
+/* Prints all values of an image that have short forms. */
 static void print_image(char *to, const scene_image *image)
 {
     *to = '\0';
@@ -145,7 +145,7 @@ static void short_forms_equal_their_full_forms(void **context)
     }
 }
 
-/* Checks the names of maps' colours, which are read from the document by their paths. */
+/* Checks colour names in a map's list of colours. The parser reads this list from the document by paths. */
 static void colours_of_maps_have_names(void **context)
 {
     (void)context;
@@ -198,7 +198,8 @@ static void dissimilar_words_get_no_suggestion(void **context)
 {
     (void)context;
     static const char *const keys[] = {"field", "values", "opacity", "colour_by"};
-    assert_string_equal(scene_nearest_word("vlaues", keys, 4), "values"); /* exchanging two letters is one edit */
+    /* the exchange of two letters counts as one edit */
+    assert_string_equal(scene_nearest_word("vlaues", keys, 4), "values");
     assert_string_equal(scene_nearest_word("opacty", keys, 4), "opacity");
     assert_null(scene_nearest_word("threshold", keys, 4));
     assert_null(scene_nearest_word("", keys, 4));

@@ -1,9 +1,11 @@
-/* Checks max_error in strongly bent cells with fields that its approximation represents worst: the polynomial through
- * the field's values at a ray's ends, quarters and middle (kernel_local_budget.h). In random cells, values are chosen
- * so that along the picture's middle ray these five values reveal as little as possible of the field between them:
+/* Checks max_error in strongly bent cells with fields that the kernels approximate worst. The approximation is the
+ * polynomial through the field's values at a ray's ends, quarters and middle (kernel_local_budget.h). In random cells,
+ * values are chosen so that these five values on the middle ray of the picture reveal as little as possible of the
+ * field between them:
  *
- *     LEVEL   the polynomial is a cubic, as for cells that are hardly bent, and its mean is as far off as possible
- *     BLIND   it is the chord of the ends, but the field is not: for hexes only, as others have too few values for that
+ *     LEVEL   the polynomial is a cubic, as for cells that are hardly bent, and its mean has the largest error
+ *     BLIND   the polynomial is the straight line between the ends, but the field is not; only for hexes, because the
+ *             other cells have too few values for this case
  *     ANY     the values are random
  *
  * The reference is the integral in double. */
@@ -26,10 +28,10 @@ typedef enum bend_aim { LEVEL, BLIND, ANY, AIMS } bend_aim;
 static const test_cell_shape shapes[SHAPES] = {TEST_UNIT_HEX, TEST_UNIT_WEDGE, TEST_UNIT_PYRAMID};
 static const char *const aim_names[AIMS] = {"level", "blind", "any"};
 
-/* ---- the five values along a ray, as linear functions of the values at the vertices ---- */
+/* ---- the five values on a ray, as linear functions of the values at the vertices ---- */
 
-/* The deviation of the field from the chord of its ends, for a value of 1 at each vertex: at the quarters and the
- * middle, and its mean. */
+/* For each vertex, the deviation of the field from the straight line between its values at the ray's ends, if the value
+ * is 1 at this vertex and 0 at the others. off: at the quarters and in the middle; mean: mean deviation on the ray. */
 typedef struct chord_deviations {
     int count;
     double off[3][8], mean[8];
@@ -49,8 +51,8 @@ static void load_cell(const render_fixture *f, const test_mesh *mesh, reference_
         }
 }
 
-/* Returns whether the edges at every corner are right-handed. Then no part of the cell is inverted, and the field has
- * one value at each point. */
+/* Returns whether the edges at each corner are right-handed. No part of the cell is inverted then, and the field has a
+ * single value at each point. */
 static bool is_unfolded(const test_mesh *mesh)
 {
     static const int hex[8][4] = {{0, 1, 3, 4}, {1, 2, 0, 5}, {2, 3, 1, 6}, {3, 0, 2, 7},
@@ -74,10 +76,11 @@ static bool is_unfolded(const test_mesh *mesh)
     return true;
 }
 
-/* The orthographic camera's ray through the middle of the picture. */
+/* The ray of the orthographic camera through the middle of the picture. */
 static const reference_line middle_line = {{0, 0}, {0, 0}};
 
-/* Computes the deviations; returns false if the ray does not cross the cell once, from one face to another. */
+/* Computes the deviations on the middle ray. Returns false if the ray does not cross the cell exactly one time, from
+ * one face to another. */
 static bool sample_deviations(const reference_cell *cell, chord_deviations *out)
 {
     reference_crossing ends[REFERENCE_MAX_CROSSINGS];
@@ -94,7 +97,7 @@ static bool sample_deviations(const reference_cell *cell, chord_deviations *out)
         }
         for (int n = 0; n <= PLACES; n++) {
             const double share = (double)n / PLACES, off = field[n] - (field[0] + share * (field[PLACES] - field[0]));
-            mean += off * (n % 2 ? 4 : 2) / (3 * PLACES); /* Simpson's rule; both ends have a deviation of 0 */
+            mean += off * (n % 2 ? 4 : 2) / (3 * PLACES); /* Simpson's rule; the deviation is 0 at both ends */
             if (n % (PLACES / 4) == 0 && n > 0 && n < PLACES) out->off[4 * n / PLACES - 1][i] = off;
         }
         out->mean[i] = mean;
@@ -110,7 +113,8 @@ static void subtract_projection(int count, const double b[8], double a[8])
     for (int i = 0; i < count && bb > 1e-24; i++) a[i] -= ab / bb * b[i];
 }
 
-/* Computes values within 0 .. 1 for which the functions of the aim are 0 and the mean is off by the most. */
+/* Computes values in [0, 1] for which the functions that the aim requires to be 0 are 0, and the mean deviation is
+ * largest. */
 static void aim_values(const chord_deviations *looks, bend_aim aim, double *values)
 {
     double found[3][8], largest = 0;
@@ -134,7 +138,7 @@ static void aim_values(const chord_deviations *looks, bend_aim aim, double *valu
 
 /* ---- pictures ---- */
 
-/* Draws one cell; returns false if the middle ray is unsuitable for the aim. */
+/* Draws one cell and measures its errors. Returns false if the middle ray is not suitable for the aim. */
 static bool verify_cell(test_cell_shape shape, bend_aim aim, uint64_t seed, double worst[3])
 {
     test_mesh mesh;
@@ -165,8 +169,9 @@ static bool verify_cell(test_cell_shape shape, bend_aim aim, uint64_t seed, doub
     return is_seen;
 }
 
-/* Hexes that are too bent for tracing in lanes, whose fields bend at one end of the ray: their largest deviation from
- * the chord does not bound their deviation in parts. */
+/* Seeds of hexes that are too strongly bent to be traced in lanes and whose fields bend near one end of the ray. The
+ * largest deviation of the field from the straight line does not bound the deviations in the parts into which the ray
+ * is divided. */
 static const uint64_t hard_seeds[] = {188, 1349};
 
 static void max_error_is_kept_if_samples_miss_the_bend(void **state)

@@ -1,5 +1,6 @@
-/* Checks errors of segments' ends, which steep functions and dense media magnify: in tets so thin that their ends are
- * equal in float32, and in cells of every kind with random functions, alone and cut by surfaces. */
+/* Checks errors of the ends of segments, which steep transfer functions and dense media magnify. Cells are tets so thin
+ * that both ends of a segment are equal in float32, and cells of every kind with random functions, with and without
+ * surfaces that cut the segments. */
 #include "comp.h"
 #include "reference_integral.h"
 #include "test_render_fixture.h"
@@ -14,7 +15,7 @@
 
 enum { SIDE = 9, PIXELS = SIDE * SIDE, LAYERS = 8 };
 
-/* Computes the colours of the reference picture; NaN if rounding may decide otherwise. */
+/* Computes the colours of the reference picture. They are NaN in pixels whose result may depend on rounding. */
 static void compute_reference(const render_fixture *f, double rgba[4 * PIXELS])
 {
     reference_integral *scene = reference_integral_create(&f->job, 1e-9);
@@ -45,13 +46,13 @@ static void set_segments(render_fixture *f, double max_error)
 {
     fixture_set_volume(f, 1);
     f->job.integration = RENDER_SEGMENTS;
-    f->job.extent = 3.5; /* the scene's own diagonal is shorter */
+    f->job.extent = 3.5; /* any length not below the scene's diagonal */
     f->job.max_error = max_error;
 }
 
 /* ---- thin tets ---- */
 
-/* Makes a slab of layers of tets, seen from above. Coordinates near 0.7 are rounded by 6e-8. */
+/* Makes a slab of several layers of tets, seen from above. Its coordinates are near 0.7 and are rounded by 6e-8. */
 static void make_layers(double thickness, test_mesh *out)
 {
     test_mesh_make_lattice(TEST_TETS, LAYERS, 0, test_wave_field, out);
@@ -62,11 +63,12 @@ static void make_layers(double thickness, test_mesh *out)
     }
 }
 
-/* Checks that thin tets are not lost. Positions on a ray are distinct if they differ by at least 6e-8, and cells at the
- * same position are in any order. So the light of one cell may be attenuated by the optical depth of the others there,
- * 6e-8 / thickness of the whole, which is about 1, instead of attenuating theirs. The error is that times the
- * difference of their colours, a tenth at most. If segments whose ends are equal were left out, the slab would lose a
- * few percent of layers of 1e-6, and half of those of 1e-7. */
+/* Checks that thin tets are not lost. Positions on a ray are distinct only if they differ by at least 6e-8, and cells
+ * at the same position are blended in any order. So the light of one cell may be attenuated by the optical depth of the
+ * others at the same position, instead of attenuating their light. This optical depth is 6e-8 / thickness of the whole
+ * depth, which is about 1. The error is this fraction times the difference of the colours, at most a tenth. If segments
+ * whose ends are equal were left out, the slab would lose a few percent of layers with a thickness of 1e-6, and half of
+ * those of 1e-7. */
 static void thin_tets_are_not_lost(void **state)
 {
     (void)state;
@@ -98,8 +100,8 @@ static double quadratic_field(const double p[3])
     return 0.5 + 0.35 * sin(2.1 * p[0] + 0.3) * cos(1.7 * p[1]) + 0.3 * sin(2.3 * p[2] + p[0]);
 }
 
-/* Finds the largest error for each max_error, 1e-2 to 1e-4, of one mesh and function. Returns whether the function has
- * a step. */
+/* Finds the largest errors for max_error 1e-2, 1e-3 and 1e-4, for one mesh and one function. Returns whether the
+ * function has a step. */
 static bool verify_mesh(const test_mesh *mesh, uint64_t seed, bool step, float opacity, double worst[3])
 {
     static const double values[2] = {0.35, 0.6};
@@ -122,9 +124,9 @@ static bool verify_mesh(const test_mesh *mesh, uint64_t seed, bool step, float o
     return function.values[1] == function.values[2];
 }
 
-/* Checks dense media. At the border of a medium, positions in float32 are off by 1.2e-7, and light by that times the
- * extinction: the measured error is 5e-8 of the optical depth across the scene, which is at most 800 here. On tets,
- * whose ends are exact, and inside media, the error is far less than allowed. */
+/* Checks max_error in dense media. At the border of a medium, positions in float32 have an error of 1.2e-7, and light
+ * has this error times the extinction: the measured error is 5e-8 of the optical depth across the scene, which is at
+ * most 800 here. On tets, whose ends are exact, and inside media, the error is far below max_error. */
 static void max_error_is_kept_in_dense_media(void **state)
 {
     static const float opacities[3] = {0, 0.4f, 1};

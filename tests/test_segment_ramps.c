@@ -1,7 +1,7 @@
-/* Checks max_error if the opacity has a very narrow ramp and the field stays within it. Then rounding a value or the
- * ramp's ends to float32, by 3e-8 of the function's domain, changes the opacity much: by a tenth in a ramp a millionth
- * of the domain wide. The test draws single cells whose field is within the ramp and slightly beyond it, or constant,
- * or partly at the end of the ramp. */
+/* Checks max_error if the opacity has a very narrow ramp and the field stays within the ramp. Rounding a value or an
+ * end of the ramp to float32, by 3e-8 of the function's domain, then changes the opacity a lot: by a tenth if the ramp
+ * is a millionth of the domain wide. The test draws single cells whose field is within the ramp and slightly beyond it,
+ * constant, or partly at the end of the ramp. */
 #include "test_effort.h"
 #include "test_step_fixture.h"
 
@@ -16,8 +16,8 @@
 enum { SIDE = 7, WIDTHS = 5, FIELDS = 3, SEEDS = 4 };
 static const double widths[WIDTHS] = {9e-3, 1e-3, 1e-4, 1e-5, 1e-6};
 
-/* Returns a vertex's value as a fraction of the ramp: from a third below to a third above it; or the ramp's lower end
- * for half of the vertices (a hex's lower quad); or one value for all. */
+/* Returns a vertex's value as a fraction of the ramp. field 0: from a third below the ramp to a third above it; 1: the
+ * ramp's lower end for half of the vertices (the lower quad of a hex); 2: one value for all vertices. */
 static double compute_ramp_fraction(int field, uint64_t vertex, uint64_t seed)
 {
     const double share = test_uniform_between(vertex, 100 * seed + 5, -0.3, 1.3);
@@ -25,28 +25,31 @@ static double compute_ramp_fraction(int field, uint64_t vertex, uint64_t seed)
     return field == 2 ? test_uniform_between(0, 100 * seed + 5, 0.1, 0.9) : share;
 }
 
-/* Bounds how much light changes if a value is off by 4e-7 of the domain, which is the error of polyhedra's values in
- * float32. Opacity a is off by that times its slope, and extinction, -log(1 - a), by at most 1 / (1 - a) times that.
- * For light, let extinction k be off by dk(s). With the transmittance T(s) up to s, light L = int c k T ds is off by
- * int dk (c T - int_s c k T) ds, whose bracket is at most T for colours c in [0, 1]. So light is off by at most int dk
- * T ds, which is at most dk times the length, and at most the largest dk / k, since int k T ds <= 1. */
+/* Returns a bound of the change of light if a value has an error of 4e-7 of the domain (the error of values of
+ * polyhedra in float32). The error of the opacity a is this error times the ramp's slope, and that of the extinction,
+ * -log(1 - a), is larger by at most 1 / (1 - a).
+ *
+ * * For light, let the extinction k have the error dk(s). With the transmittance T(s) up to s, the light L = int c k T
+ * ds has the error int dk (c T - int_s c k T) ds, whose bracket is at most T for colours c in [0, 1]. So the error of
+ * light is at most int dk T ds. This is at most dk times the length, and at most the largest dk / k, because int k T ds
+ * <= 1. */
 static double bound_rounding(const step_function *function, double width, double unit)
 {
     const double a = (double)function->opacities[1], b = (double)function->opacities[2], way = 1.8 * 1.24 * sqrt(3);
     const double off = 4e-7 * fabs(b - a) / width, seen = off / (1 - fmax(a, b)) * way / unit;
-    /* (1 - a) -log(1 - a) has one maximum, so its minimum is at an end. */
+    /* (1 - a) -log(1 - a) has one maximum inside, so its minimum is at an end. */
     const double share = fmin((1 - a) * -log1p(-a), (1 - b) * -log1p(-b));
     return share > 0 ? fmin(seen, off / share) : seen;
 }
 
-/* The scenes: the cell alone, cut by a surface, or as a polyhedron. */
+/* The scenes: a cell by itself, a cell cut by a surface, a cell stored as a polyhedron. */
 typedef enum ramp_scene { ALONE, CUT, POLYHEDRON } ramp_scene;
 
-/* Fraction of the light that the surface which cuts the cell absorbs. */
+/* Fraction of the light that the surface absorbs which cuts the cell. */
 #define FILM 1e-7f
 
-/* Finds the largest error for each max_error, for seeds first, first + every and so on. Ramps do not begin at numbers
- * that are exact in float32. */
+/* Finds the largest error for each max_error, over the seeds first, first + every, and so on. The ends of the ramps are
+ * numbers that are not exact in float32. */
 static void verify_ramp(test_cell_shape shape, ramp_scene scene, double width, uint64_t first, uint64_t every,
                         double worst[3])
 {
@@ -79,8 +82,8 @@ static void verify_ramp(test_cell_shape shape, ramp_scene scene, double width, u
     if (scene == POLYHEDRON) fprintf(stderr, "%.2g off in all; beyond what rounding may do, ", raw);
 }
 
-/* The usual run draws a quarter of the seeds, which includes each sort of field; the quarter changes with the width and
- * shape. */
+/* Checks the ramps of all widths and cell types. The usual run draws a quarter of the seeds, with each kind of field;
+ * it is another quarter for each width and cell type. */
 static void verify_ramps(ramp_scene scene)
 {
     static const char *const how[] = {"", " cut by a surface", " as polyhedron"};
@@ -102,8 +105,8 @@ static void fields_within_narrow_ramps_keep_max_error(void **state)
     verify_ramps(ALONE);
 }
 
-/* Checks cells that are cut by a surface which transmits all but a ten-millionth of the light: the picture must be the
- * same. */
+/* Checks cells that are cut by a surface that absorbs only a ten-millionth of the light. The errors must be as small as
+ * without the surface. */
 static void clipped_fields_within_narrow_ramps_keep_max_error(void **state)
 {
     (void)state;

@@ -1,8 +1,8 @@
-/* Checks max_error if the opacity has a step: a cell's field is curved along a ray, and may barely reach the step or
- * return through it within the cell. Sampling would miss the small amount of light beyond the step, or get its length
- * wrong. The cells are single ones, warped at random, and ones whose rays pass the step by a given amount; functions
- * have steps or ramps almost as steep. The usual run compares every other pixel of a picture, and uses grazing rays in
- * one type of cell for each width, alternating. */
+/* Checks max_error if the opacity has a step. The field of a cell is curved along a ray, and may barely reach the step
+ * or pass it and return within the cell. Sampling would miss the small amount of light beyond the step, or find a wrong
+ * length of it. Cells are single ones that are warped randomly, and ones whose rays pass the step by a given amount.
+ * Functions have steps, or ramps almost as steep as steps. The usual run compares every second pixel of a picture, and
+ * uses grazing rays in one cell type for each width of the ramps, alternately. */
 #include "reference_cell.h"
 #include "test_effort.h"
 #include "test_step_fixture.h"
@@ -19,7 +19,7 @@
 
 enum { SAMPLES = 1000 };
 
-/* Computes the field along the ray of a picture of one pixel; returns how many of the samples are inside the cell. */
+/* Computes the field at samples on the ray of a picture of one pixel. Returns the number of samples inside the cell. */
 static int sample_values_on_ray(const render_fixture *f, const test_mesh *mesh, int type, double values[SAMPLES])
 {
     const render_camera *camera = &f->job.camera;
@@ -53,8 +53,8 @@ static int sample_values_on_ray(const render_fixture *f, const test_mesh *mesh, 
     return SAMPLES;
 }
 
-/* Computes the largest value within the ray's interval, or the smallest (sign -1): that of the parabola through three
- * samples. Returns false if it is at an end, or hardly differs from that at an end. */
+/* Computes the largest value (sign 1) or the smallest value (sign -1) on the ray, from the parabola through three
+ * samples. Returns false if the extreme is at an end of the ray, or hardly differs from the value at an end. */
 static bool find_extreme_value(const double values[SAMPLES], double sign, double *at)
 {
     int best = 0;
@@ -67,9 +67,10 @@ static bool find_extreme_value(const double values[SAMPLES], double sign, double
     return sign * (*at - values[0]) > 0.01 && sign * (*at - values[SAMPLES - 1]) > 0.01;
 }
 
-/* ---- a hex whose error was once 2.8e-3 ---- */
+/* ---- a hex whose error was 2.8e-3 in the past ---- */
 
-/* Compares the hex's picture for a ramp of the opacity at 0.6, or a step. */
+/* Compares pictures of this hex, for an opacity with a ramp of the given width at 0.6, or with a step if the width is
+ * 0. */
 static void verify_hex(step_function function, fixture_camera camera, double width, double unit)
 {
     test_mesh mesh;
@@ -95,9 +96,9 @@ static void hexes_that_barely_reach_a_step_keep_max_error(void **state)
             verify_hex((step_function){.opacities = {0, 0, 0.9f, 0.9f}}, camera, 0, units[k]);
 }
 
-/* Checks a cubic. Along the middle ray, the hex's diagonal, the field is 0.2 - 0.4 s + 3 s^2 - 2 s^3: it falls to 0.186
- * and rises to 0.8. At this minimum its deviation from the chord is less than a sixth of that at a quarter, the half
- * and three quarters. */
+/* Checks a cubic. On the middle ray, which is the hex's diagonal, the field is 0.2 - 0.4 s + 3 s^2 - 2 s^3: it falls to
+ * 0.186 and rises to 0.8. At this minimum, the deviation of the field from the straight line between its ends is less
+ * than a sixth of the deviation at the quarters and in the middle. */
 static void cubics_that_dip_below_a_step_keep_max_error(void **state)
 {
     static const double values[8] = {0.2, 0.2 / 3, 2.8 / 3, 0.2 / 3, 0.2 / 3, 2.8 / 3, 0.8, 2.8 / 3};
@@ -114,7 +115,7 @@ static void cubics_that_dip_below_a_step_keep_max_error(void **state)
         for (int a = 0; a < 3; a++) {
             const double edges[3][3] = {{1 / 3.0, 0.5, 0}, {1 / 3.0, -0.25, 0.43}, {1 / 3.0, -0.25, -0.43}};
             const int corner[3] = {i % 4 == 1 || i % 4 == 2, i % 4 / 2, i / 4};
-            /* Shift rays so that they avoid the corners themselves. */
+            /* Shifts rays so that they do not pass exactly through corners. */
             double along[3] = {-0.5, 1e-4, 2e-4};
             for (int e = 0; e < 3; e++)
                 for (int k = 0; k < 3; k++) along[k] += corner[e] * edges[e][k];
@@ -130,8 +131,8 @@ static void cubics_that_dip_below_a_step_keep_max_error(void **state)
     test_mesh_free(&mesh);
 }
 
-/* Returns how far beyond 0.6 the field of the hex rises on the ray of a picture of one pixel, with the eye moved
- * sideways and up; NaN if its maximum is at an end. */
+/* Returns the amount by which the field of the hex rises above 0.6 on the ray of a picture of one pixel, with the eye
+ * moved sideways and up. Returns NaN if the maximum of the field is at an end of the ray. */
 static double compute_rise_above_step(render_fixture *f, const test_mesh *mesh, double sideways, double up)
 {
     static double values[SAMPLES];
@@ -143,7 +144,7 @@ static double compute_rise_above_step(render_fixture *f, const test_mesh *mesh, 
     return most - 0.6;
 }
 
-/* Moves the eye to where the maximum of the field is 0.6 plus past. */
+/* Moves the eye to a position at which the maximum of the field on the ray is 0.6 plus `past`. */
 static void move_eye_past_step(render_fixture *f, const test_mesh *mesh, double past)
 {
     const double step = 0.05;
@@ -197,7 +198,8 @@ static void rays_that_barely_reach_a_step_keep_max_error(void **state)
 
 enum { KINDS = 4, SEEDS = 12 };
 
-/* By default a sixth of the seeds is drawn; the selection changes with the kind. */
+/* Checks random cells and functions with steps. The usual run draws a sixth of the seeds; the selection changes with
+ * the kind of cells. */
 static void random_cells_with_steps_keep_max_error(void **state)
 {
     const uint64_t every = (uint64_t)test_case_count(6, 1);
@@ -212,7 +214,7 @@ static void random_cells_with_steps_keep_max_error(void **state)
                 step_make_cell(step_shapes[kind], 16 * seed + (uint64_t)kind, &mesh);
                 if (polyhedra) test_mesh_to_polyhedra(&mesh, 1);
                 step_fixture_create(&f, &mesh, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, STEP_SIDE);
-                /* The optical depth across the cell is from 2 to 900. */
+                /* The optical depth across the cell is between 2 and 900. */
                 fixture_set_function(&f, &function, 100 * seed + 9, true, seed % 3 ? 0.5 : 0.9,
                                      pow(10, test_uniform_between(0, 100 * seed + 10, -2.2, 0)));
                 assert_true(function.values[1] == function.values[2]);
@@ -229,13 +231,13 @@ static void random_cells_with_steps_keep_max_error(void **state)
 
 /* ---- rays that graze a step ---- */
 
-/* Rays pass the step by 1e-2 of the function's domain down to less than float32 resolves; the last one does not reach
- * it. */
+/* Amounts by which rays pass the step, from 1e-2 of the function's domain to less than float32 resolves. On the last
+ * ray, the field does not reach the step. */
 enum { PASSES = 9 };
 static const double passes[PASSES] = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 3e-7, 1e-7, 1e-8, -1e-7};
 
-/* Checks a cell's field that passes a step upwards, or (sign -1) downwards, by each of the amounts. Returns whether the
- * field has such an extreme. */
+/* Checks a field that passes a step by each of the amounts, upwards (sign 1) or downwards (-1). Returns false if the
+ * field has no such extreme. */
 static bool check_grazed_step(render_fixture *f, const double values[SAMPLES], double sign, double width,
                               double worst[PASSES][3])
 {
@@ -251,7 +253,7 @@ static bool check_grazed_step(render_fixture *f, const double values[SAMPLES], d
     return true;
 }
 
-enum { GRAZED = 3 }; /* hexes, wedges and pyramids; along a ray in a tet the field is linear */
+enum { GRAZED = 3 }; /* hexes, wedges and pyramids; in a tet the field on a ray is linear */
 
 static void check_grazing_rays(int kind, int rays, double width)
 {
@@ -306,10 +308,11 @@ static void steep_ramps_keep_max_error(void **state)
                            dense ? 0.005 : 0.1);
 }
 
-/* ---- the same cuts of rays everywhere ---- */
+/* ---- the same intervals of rays in lanes and in single cells ---- */
 
-/* Checks that cells traced in lanes cut a ray as single cells do. Next to a transparent surface, which is invisible
- * here, cells are traced one by one: only the order of segments that begin at the same depth may differ. */
+/* Checks that cells traced in lanes divide a ray at the same depths as cells traced one by one. Cells are traced one by
+ * one if there is a transparent surface, which is invisible here. Only the order of segments that begin at the same
+ * depth may differ. */
 static void lanes_are_split_like_single_cells(void **state)
 {
     static const double nowhere = 1e6;
@@ -336,7 +339,7 @@ static void lanes_are_split_like_single_cells(void **state)
     }
 }
 
-/* The optional argument selects the tests to run, by cmocka's pattern. */
+/* The optional argument is cmocka's pattern of the tests to run. */
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {

@@ -1,5 +1,6 @@
-/* Compares volumes by segments with the adaptive integral: tets are exact, other cells are of second order, and
- * max_error is kept; with surfaces, on parts of the mesh, and with every instruction set. */
+/* Compares volumes drawn by segments with the adaptive integral. Tets must be exact, other cells must converge with
+ * second order, and max_error must be kept. Scenes include surfaces and parts of the mesh, and are drawn with every
+ * instruction set. */
 #include "comp.h"
 #include "reference_integral.h"
 #include "test_effort.h"
@@ -13,7 +14,7 @@
 #include <string.h>
 #include <cmocka.h>
 
-/* Returns the reference of a fixture's picture: width * height * 4 numbers. In the usual run only every other pixel is
+/* Returns the reference picture of a fixture: width * height * 4 numbers. In the usual run only every second pixel is
  * computed, and the others are NaN. */
 static double *compute_reference(const render_fixture *f)
 {
@@ -35,8 +36,8 @@ static double *compute_reference(const render_fixture *f)
     return rgba;
 }
 
-/* Returns the largest difference of a channel and computes the mean of all; pixels whose reference is NaN do not
- * count. */
+/* Returns the largest difference of a channel and computes the mean of all differences. Pixels whose reference is NaN
+ * do not count. */
 static double find_largest_error_of_isa(const render_fixture *f, const double *truth, double *mean)
 {
     drawn_frame drawn;
@@ -54,7 +55,7 @@ static double find_largest_error_of_isa(const render_fixture *f, const double *t
     return worst;
 }
 
-/* Returns the largest error of all instruction sets, as find_largest_error_of_isa() does for one. */
+/* Returns the largest error over all instruction sets, and computes the largest mean error. */
 static double find_largest_error(const render_fixture *f, const double *truth, double *mean)
 {
     double worst = 0, most = 0;
@@ -75,9 +76,9 @@ static void set_segments(render_fixture *f, double step, double max_error)
     f->job.max_error = max_error;
 }
 
-/* Bound of the error of exact segments: the integral of a segment errs by 4.4e-7 of what it absorbs
- * (kernel_integral.h), which adds up to at most 1 over a ray; the ends are exact (kernel_exact.h), and sums of light
- * are compensated. */
+/* Tolerance of exact segments. The integral of a segment has an error of 4.4e-7 of the light that it absorbs
+ * (kernel_integral.h), and the absorbed light adds up to at most 1 over a ray. The ends of segments are exact
+ * (kernel_exact.h), and sums of light are compensated. */
 #define EXACT 1e-6
 
 static void tets_are_exact_for_every_camera(void **state)
@@ -96,21 +97,21 @@ static void tets_are_exact_for_every_camera(void **state)
     }
 }
 
-/* Returns the number of random tets, by default 32: a multiple of 16, so that all combinations of steps, slivers and
- * cameras occur. */
+/* Returns the number of random tets. It is a multiple of 16 (in the usual run 32), so that all combinations of steps,
+ * slivers and cameras occur. */
 static uint64_t random_tets(void)
 {
     return (uint64_t)test_case_count(32, 80);
 }
 
-/* Returns whether the opacity has a step: for one of four groups of seeds, so that steps occur with slivers and other
- * tets and with every camera. */
+/* Returns whether the opacity has a step. One of four groups of seeds has steps, so that steps occur with slivers and
+ * with other tets and with every camera. */
 static bool has_step(uint64_t seed)
 {
     return seed / 4 % 4 == 0;
 }
 
-/* Creates a tet and its fixture; every fifth tet is a sliver. */
+/* Creates a random tet and its fixture. Every fifth tet is a sliver. */
 static void begin_random_tet(uint64_t seed, test_mesh *mesh, render_fixture *f)
 {
     const bool is_sliver = seed % 5 == 0;
@@ -124,9 +125,10 @@ static void begin_random_tet(uint64_t seed, test_mesh *mesh, render_fixture *f)
     set_segments(f, 1, 0);
 }
 
-/* Checks random tets, including slivers, with random functions and unit distances from 1e-3 to 1e4 of the tet's size:
- * optical depths from 1e-8 to more than 1e3, and opacities that have steps or rise to 0.99 within a tenth of the tet's
- * values. Ends in float32 would be off by 1e-7, magnified to 3.7e-6. */
+/* Checks random tets, including slivers, with random functions and unit distances from 1e-3 to 1e4 of the tet's size.
+ * Optical depths are from 1e-8 to more than 1e3, and opacities have steps or rise to 0.99 within a tenth of the range
+ * of the tet's values. If the ends of segments were rounded to float32, their error of 1e-7 would be magnified to
+ * 3.7e-6. */
 static void random_tets_are_exact(void **state)
 {
     static const double most[3] = {0.5, 0.9, 0.99};
@@ -193,7 +195,8 @@ static void surfaces_split_segments(void **state)
     }
 }
 
-/* Computes errors for steps of 1/4, 1/8 ... of a cell; returns the order observed between the first and the last. */
+/* Computes the mean errors for steps of 1/4, 1/8 ... of a cell. Returns the order of convergence from the first to the
+ * last step. */
 static double measure_convergence_order(render_fixture *f, const double *truth, render_integration how, int halvings)
 {
     double first = 0, last = 0;
@@ -221,16 +224,17 @@ static void segments_converge_on_jittered_hexes(void **state)
     const double segments = measure_convergence_order(&f, truth, RENDER_SEGMENTS, 4),
                  samples = measure_convergence_order(&f, truth, RENDER_SAMPLES, 5);
     fprintf(stderr, "observed orders: segments %.2f, samples %.2f\n", segments, samples);
-    /* The order is third at the transfer function's control points, fourth elsewhere. It is first in the intervals that
-     * are shorter than a step and are not cut, of which each halving leaves half. */
+    /* The order is 3 in segments that contain a control point of the transfer function, and 4 in the others. It is 1 in
+     * intervals that are shorter than a step and are not divided; each halving of the step leaves half of these
+     * intervals. */
     assert_true(segments >= 2.5);
     assert_true(samples >= 0.95);
     free(truth);
     fixture_free(&f);
 }
 
-/* Checks the tets and functions of random_tets_are_exact() with an allowed error: by preintegration, in parts, and
- * exactly, alternating. */
+/* Checks the tets and functions of random_tets_are_exact() with an allowed error. They are integrated by
+ * preintegration, in several intervals, and exactly, alternately. */
 static void random_tets_keep_max_error(void **state)
 {
     enum { DIGITS = 4 };
@@ -258,8 +262,8 @@ static void random_tets_keep_max_error(void **state)
     }
 }
 
-/* Compares pictures of tiles with those of single cells. Rays, cells and segments are the same: only the order of
- * segments that begin at the same depth may differ. */
+/* Compares pictures whose cells are traced in tiles with those whose cells are traced one by one. Rays, cells and
+ * segments are the same. Only the order of segments that begin at the same depth may differ. */
 static void verify_tiles(test_mesh_kind kind, int side, bool with_surface, double max_error)
 {
     static const double value = 0.5, nowhere = 1e6;
@@ -268,15 +272,15 @@ static void verify_tiles(test_mesh_kind kind, int side, bool with_surface, doubl
     double worst = 0;
     test_mesh mesh;
     test_mesh_make_lattice(kind, side, 0.2, test_wave_field, &mesh);
-    /* Arrays have 4-byte elements, so that several tets are transformed at once. */
+    /* Arrays have 4-byte elements, so that several tets are transformed at the same time. */
     fixture_create(&f, &mesh, 1, (test_layout){.is_interleaved = with_surface}, 2.0 / side, 1,
                    (const double[]){0, 0, 0});
     test_mesh_free(&mesh);
     fixture_set_camera(&f, CAMERA_OUTSIDE, 61, 47);
-    set_segments(&f, 0.02, max_error); /* more parts than a window can store */
+    set_segments(&f, 0.02, max_error); /* so many segments that a window cannot store them */
     if (with_surface) fixture_add_surface(&f, &value, 1, 1);
-    /* Next to a transparent surface, which is invisible here, tets are traced one by one, and rays in other cells are
-     * searched for cuts. */
+    /* Because of a transparent surface, which is invisible here, tets are traced one by one, and the depths at which
+     * rays must be divided are searched in other cells. */
     fixture_add_surface(&f, &nowhere, 1, 0.5f);
     fixture_draw(&f, &drawn[0]);
     f.job.surface_count--;
@@ -302,15 +306,15 @@ static void lanes_match_single_cells(void **state)
         for (int with_surface = 0; with_surface < 2; with_surface++) verify_tiles(kind, 9, with_surface, 0);
 }
 
-/* Checks segments with ends in float32: tiles trace tets of few pixels one ray-tet pair per lane
- * (kernel_tile_segments.h). A ray crosses more tets than a window can store. */
+/* Checks segments whose ends are in float32: tiles trace tets that cover few pixels with one pair of ray and tet per
+ * lane (kernel_tile_segments.h). A ray crosses more tets than a window can store. */
 static void small_tets_are_the_same_in_lanes(void **state)
 {
     (void)state;
     for (int with_surface = 0; with_surface < 2; with_surface++) verify_tiles(TEST_TETS, 20, with_surface, 1e-2);
 }
 
-/* The usual run draws each kind from one of the cameras. */
+/* Checks max_error for every kind of cells. The usual run draws each kind from one of the cameras. */
 static void max_error_is_kept_on_every_kind(void **state)
 {
     (void)state;
@@ -334,8 +338,8 @@ static void max_error_is_kept_on_every_kind(void **state)
         }
 }
 
-/* Checks cells distributed over ranks, each drawn alone, with all fragments merged: only the rounding of "over" may
- * differ. */
+/* Checks cells that are distributed over ranks. Each rank is drawn by itself, and all fragments are merged. Only the
+ * rounding of "over" may differ. */
 static void parts_draw_the_whole_picture(void **state)
 {
     static const double values[2] = {-0.2, 0.3};
@@ -380,8 +384,8 @@ static void parts_draw_the_whole_picture(void **state)
             }
 }
 
-/* Checks values far outside of the function's domain, which files use for missing values: they are clamped to 1e18
- * widths of the domain. */
+/* Checks values far outside of the function's domain, which some files contain in place of missing values. The kernels
+ * clamp them to 1e18 times the width of the domain. */
 static void values_of_any_magnitude_keep_max_error(void **state)
 {
     static const double odd[] = {3e31, -3e31, 3e38, -3e38};
@@ -411,7 +415,7 @@ static void values_of_any_magnitude_keep_max_error(void **state)
         }
 }
 
-/* Checks more meshes at the same position than a window can store: none may be dropped. All have the same constant
+/* Checks more meshes at the same position than a window can store. None may be dropped. All have the same constant
  * opacity. */
 static void all_overlapping_meshes_are_visible(void **state)
 {
@@ -445,7 +449,7 @@ static void all_overlapping_meshes_are_visible(void **state)
         drawn_frame_free(&drawn);
         fixture_free(&f);
     }
-    /* The bound is 100 times the logarithm of a number that is rounded by 6e-8. */
+    /* The tolerance is 100 times the error of the logarithm of a number that is rounded by 6e-8. */
     for (int p = 0; p < 23 * 21; p++) assert_true(fabs(COPIES * log(clear[0][p]) - log(clear[1][p])) < 3e-5);
     free(many.offsets);
     free(many.connectivity);
@@ -454,8 +458,9 @@ static void all_overlapping_meshes_are_visible(void **state)
     test_mesh_free(&mesh);
 }
 
-/* Checks that a ray has the same bits whatever else is in its packet: pixels depend neither on the picture's border nor
- * on the order of the cells, which changes the order of the tree's leaves. */
+/* Checks that the result of a ray is bit-identical whatever other rays and cells are in its packet: pixels must depend
+ * neither on the border of the picture nor on the order of cells (another order of cells gives another order of the
+ * tree's leaves). */
 static void pictures_do_not_depend_on_the_order_of_cells(void **state)
 {
     (void)state;
@@ -490,7 +495,8 @@ int main(void)
         cmocka_unit_test(max_error_is_kept_on_every_kind),
         cmocka_unit_test(random_tets_keep_max_error),
     };
-    /* Tests that draw by themselves, run with each instruction set. */
+    /* These tests draw without the comparison that uses all instruction sets, so they are run for each instruction
+     * set. */
     const struct CMUnitTest of_a_set[] = {
         cmocka_unit_test(lanes_match_single_cells),
         cmocka_unit_test(small_tets_are_the_same_in_lanes),

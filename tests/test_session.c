@@ -1,5 +1,5 @@
-/* Checks a session's life on any number of ranks: what is built when, what is borrowed or copied, empty ranks, scenes
- * edited during a run, ranks that disagree, and lack of memory. */
+/* Checks the life of a session on any number of ranks: what is built in which step, what is borrowed or copied, ranks
+ * without cells, scenes edited during a run, ranks with different arguments, and failed allocations. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -70,7 +70,7 @@ static void unchanged_input_rebuilds_nothing(void **context)
     const insitu_report *report = insitu_last_report(session);
     everywhere(report->build_ms == 0 && report->refit_ms == 0);
     everywhere(own_rank != 0 || are_same_pictures(&first, &caught[0]));
-    same.field.changed = INSITU_CHANGED_VALUES; /* what the caller states, although no values changed */
+    same.field.changed = INSITU_CHANGED_VALUES; /* the caller's statement is used, although no values changed */
     everywhere(submit_input(session, &same) == INSITU_OK);
     step_draws(session, 2, 1);
     everywhere(report->build_ms == 0 && report->refit_ms == 0);
@@ -86,7 +86,7 @@ static void unchanged_input_rebuilds_nothing(void **context)
     insitu_destroy(&session);
 }
 
-/* Checks that a single changed value on one rank, at any index, is detected. */
+/* Checks that the session detects a single changed value on one rank, at any index. */
 static void changed_values_are_detected(void **context)
 {
     (void)context;
@@ -108,8 +108,8 @@ static void changed_values_are_detected(void **context)
     insitu_destroy(&session);
 }
 
-/* Checks that if everything is moved and scaled by powers of two, the picture stays the same, and its depth is
- * scaled. */
+/* Checks that the picture stays the same and its depth is scaled if the mesh and the camera are moved and scaled by
+ * powers of two. */
 static void moved_mesh_draws_the_moved_picture(void **context)
 {
     (void)context;
@@ -133,7 +133,7 @@ static void moved_mesh_draws_the_moved_picture(void **context)
     test_free(coordinates);
 }
 
-/* ---- borrowed and copied ------------------------------------------------------------------------------------- */
+/* ---- arrays borrowed or copied -------------------------------------------------------------------------------- */
 
 static insitu_array make_array(const grid_array *a)
 {
@@ -227,8 +227,8 @@ static int64_t sum_over_ranks(int64_t value)
     return sum;
 }
 
-/* Checks the count of left-handed cells. Half of the lattice's pyramids are left-handed from the start: their bases are
- * numbered in the same way on both sides of a cube. */
+/* Checks the number of left-handed cells. Half of the lattice's pyramids are left-handed from the beginning, because
+ * their bases are numbered in the same direction on opposite sides of a cube. */
 static void mirrored_cells_are_counted(void **context)
 {
     (void)context;
@@ -302,7 +302,7 @@ static void cells_on_one_rank_are_drawn(void **context)
         insitu_mesh_defaults(&none);
         if (own_rank == holder)
             everywhere(submit_input(session, &all) == INSITU_OK);
-        else /* odd ranks have an empty mesh, even ranks have none */
+        else /* odd ranks have an empty mesh, even ranks have no mesh */
             everywhere(insitu_set_mesh(session, "m", own_rank % 2 ? &none : NULL) == INSITU_OK);
         step_draws(session, holder, 1);
         everywhere(own_rank != 0 || count_covered_pixels(&caught[0]) > 20);
@@ -318,7 +318,8 @@ static void cells_on_one_rank_are_drawn(void **context)
     input_free(&all);
 }
 
-/* Checks that if every rank's part is divided into two meshes with separate names, the picture is that of one mesh. */
+/* Checks that the picture of two meshes with different names, into which every rank's part is divided, is that of one
+ * mesh. */
 static void several_meshes_draw_one_picture(void **context)
 {
     (void)context;
@@ -350,7 +351,8 @@ static bool has_overlap_warning(const insitu_session *session)
     return strstr(insitu_last_report(session)->warnings, "where cells overlap") != NULL;
 }
 
-/* Checks two meshes at the same position, both on one rank or distributed: one picture, and a warning on every rank. */
+/* Checks two meshes at the same position, both on one rank or distributed over the ranks. The pictures must be the
+ * same, and every rank must have a warning. */
 static void overlapping_meshes_draw_one_picture(void **context)
 {
     (void)context;
@@ -372,7 +374,8 @@ static void overlapping_meshes_draw_one_picture(void **context)
             everywhere(!has_part || insitu_set_field(session, name, &in[i].field) == INSITU_OK);
         }
         step_draws(session, turn, 1);
-        everywhere(has_overlap_warning(session) == (turn == 0)); /* the warning is given once */
+        /* the warning is given only in the first of these steps */
+        everywhere(has_overlap_warning(session) == (turn == 0));
         if (own_rank != 0 || turn) continue;
         first = caught[0];
         caught_count = 0;
@@ -387,7 +390,8 @@ static void overlapping_meshes_draw_one_picture(void **context)
     everywhere(insitu_set_mesh(session, "tets", &distributed[1].mesh) == INSITU_OK);
     everywhere(insitu_set_field(session, "tets", &distributed[1].field) == INSITU_OK);
     step_draws(session, 3, 1);
-    everywhere(has_overlap_warning(session)); /* and again after the overlap has disappeared and returned */
+    /* the warning is given again after the overlap has disappeared and returned */
+    everywhere(has_overlap_warning(session));
     free(first.rgba);
     free(first.depth);
     insitu_destroy(&session);
@@ -447,9 +451,9 @@ static void missing_component_is_reported(void **context)
     insitu_destroy(&session);
 }
 
-/* Checks images that are due at multiples of a quarter, at times that are sums of 0.1: the tenth time is less than 1 by
- * a rounding, and counts as 1. A step that passes several multiples draws once, and a step without progress in time
- * draws nothing. */
+/* Checks images that are due at times that are multiples of a quarter. Times are sums of 0.1: the tenth is less than 1
+ * by a rounding, and counts as 1. A step that passes several multiples draws one time, and a step whose time does not
+ * increase draws nothing. */
 static void images_are_drawn_when_their_time_has_passed(void **context)
 {
     (void)context;
@@ -528,7 +532,7 @@ static void edited_scene_is_used_unless_it_is_invalid(void **context)
     insitu_destroy(&session);
 }
 
-/* Checks images without outputs: they are drawn if the caller keeps pictures in memory; otherwise a warning says that
+/* Checks images without outputs. They are drawn if the caller keeps pictures in memory. Otherwise a warning states that
  * they are not drawn. */
 static void images_without_outputs_are_kept_in_memory(void **context)
 {
@@ -581,7 +585,8 @@ static insitu_status submit_two_meshes(insitu_session *session, insitu_field *ce
     return status ? status : insitu_set_field(session, "m", cells);
 }
 
-/* Checks a pipe as scene: opening a pipe without a writer would block forever. */
+/* Checks a scene file that is replaced by a named pipe during a run. The session must not open the pipe, because
+ * opening a pipe without a writer would block forever. */
 static void missing_scene_file_is_reported(void **context)
 {
     (void)context;
@@ -626,8 +631,8 @@ static void memory_is_freed(void **context)
     everywhere(session == NULL && base_memory_held() == before);
 }
 
-/* Checks that the memory of the last picture is used again for the next one, larger or smaller, and that no old pixels
- * show. */
+/* Checks that the memory of the previous picture is reused for the next one, whether it is larger or smaller, and that
+ * no old pixels show. */
 static void picture_memory_is_kept_to_a_limit(void **context)
 {
     (void)context;
@@ -659,8 +664,8 @@ static void picture_memory_is_kept_to_a_limit(void **context)
     insitu_destroy(&session);
 }
 
-/* Makes allocation n of a set and a step fail, on one rank or on all; afterwards everything must be as if it had not
- * failed. */
+/* Makes the n-th allocation while a mesh is set or a step is made fail, on one rank or on all. Afterwards the session
+ * must draw as if the allocation had not failed. */
 static void failed_allocation_returns_an_error(void **context)
 {
     (void)context;
@@ -688,7 +693,8 @@ static void failed_allocation_returns_an_error(void **context)
                 break;
             }
             failures += status != INSITU_OK;
-            if (status != INSITU_OK && status != INSITU_ERROR_FIELD) /* the field of a refused mesh may fail too */
+            /* the field of a refused mesh may be refused too */
+            if (status != INSITU_OK && status != INSITU_ERROR_FIELD)
                 check_reported_everywhere(session, status, INSITU_ERROR_MEMORY, "memory");
             everywhere(submit_two_meshes(session, &cells) == INSITU_OK);
             step_draws(session, n, 1);
@@ -696,7 +702,7 @@ static void failed_allocation_returns_an_error(void **context)
         }
         everywhere(failures > 20);
     }
-    /* Only texts of the report may have grown. */
+    /* Only texts of the report may have become longer. */
     everywhere(base_memory_held() <= before + 4096);
     if (own_rank == 0) free(first.rgba), free(first.depth);
     insitu_destroy(&session);
