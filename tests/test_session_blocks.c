@@ -160,7 +160,7 @@ static bool set_list(insitu_session *session, const cell_arrays *a)
 typedef struct block {
     /* first: index in the whole mesh of the first cell; cells: number of cells; with ghost layers */
     int number, first[3], cells[3];
-    int own_first[3], own_end[3];   /* range of the cells without ghost layers, as indices in the block */
+    int own_first[3], own_end[3]; /* range of the cells without ghost layers, as indices in the block */
     cell_arrays a;
     int64_t *ids; /* ids of the block's vertices in the whole mesh */
 } block;

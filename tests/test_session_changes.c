@@ -144,8 +144,7 @@ static void reallocated_vertices_are_drawn_at_new_positions(void **context)
     double *moved = malloc(count * sizeof *moved);
     assert_non_null(moved);
     /* so far away that the session replaces its coordinate space by the one of a fresh session */
-    for (size_t i = 0; i < count; i++)
-        moved[i] = 64 * input.part.coordinates[i];
+    for (size_t i = 0; i < count; i++) moved[i] = 64 * input.part.coordinates[i];
     insitu_mesh_interleaved(&now.mesh, moved, INSITU_FLOAT64);
     check_picture(&now, false);
     free(moved);

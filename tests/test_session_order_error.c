@@ -97,7 +97,7 @@ static bool is_drawn_as(const drawn_report *of, int count, const char *images, c
 
 /* How the hits of a picture compare with the sphere. Distances are in pixels. */
 typedef struct sphere_hits {
-    double farthest;    /* largest distance of a hit from the sphere */
+    double farthest; /* largest distance of a hit from the sphere */
     /* missed: number of rays without a hit that pass inside the sphere by more than the bound; beyond: number of rays
      * with a hit that pass outside it by more than the bound */
     int missed, beyond;

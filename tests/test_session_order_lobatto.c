@@ -1,9 +1,10 @@
 /* Checks spectral elements as simulation codes pass them: bent hexes of order 4 and 7 with nodes at Gauss-Lobatto
  * points, without shared nodes or connectivity, dealt to ranks at random. With the default settings of a scene, no hit
  * may be farther from the isosurface of the cells' polynomials than the error bound that the report states, and no ray
- * may continue beyond this surface by more than the bound. The polynomials are evaluated in double, as sums over all
- * nodes of a cell. The reference coordinates of a point on a ray are found by Newton's method, which starts from the
- * inverse of the map that bends the mesh. */
+ * may continue beyond this surface by more than the bound.
+ *
+ * The polynomials are evaluated in double, as sums over all nodes of a cell. The reference coordinates of a point on a
+ * ray are found by Newton's method, which starts from the inverse of the map that bends the mesh. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

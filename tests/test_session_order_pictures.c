@@ -1,7 +1,9 @@
 /* Compares pictures of quadratic tets, drawn with the default settings of a scene, with the isosurfaces of the cells'
  * polynomials. At most 1 pixel in 1000 may be missed, and the median of the distances along rays may be at most 0.1
- * pixel. In straight cells the field along a ray is a quadratic polynomial, whose first root in each cell is computed.
- * Bent cells are divided into small tets, 24 between two nodes: their hits are first guesses for Newton's method, which
+ * pixel.
+ *
+ * In straight cells the field along a ray is a quadratic polynomial, whose first root in each cell is computed. Bent
+ * cells are divided into small tets, 24 between two nodes: their hits are first guesses for Newton's method, which
  * finds the hits of the polynomials. Cells from files in INSITU_TEST_DATA are not tested if this variable is not
  * set. */
 #include <math.h>

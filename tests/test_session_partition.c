@@ -2,8 +2,9 @@
  * of all ranks, so that the picture of all ranks must be the one that rank 0 draws of the whole mesh alone. Each rank
  * lists its cells in an order of its own: vertices and cells are permuted, the vertices of a face begin at another
  * vertex and run in the opposite direction, and a polyhedron's faces are permuted. The volume of a cell with warped
- * faces depends on how each face is divided into triangles, and this division must not depend on the order. The allowed
- * difference is that of compositing, 1e-6, because fragments are blended in other groups. */
+ * faces depends on how each face is divided into triangles, and this division must not depend on the order.
+ *
+ * The allowed difference is that of compositing, 1e-6, because fragments are blended in other groups. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

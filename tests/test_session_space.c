@@ -1,10 +1,12 @@
 /* Checks that a scene's position and size do not change the picture: far from the origin, as in projected coordinates
  * of maps, and a million times smaller or larger, if the camera and all lengths of the scene file are changed in the
- * same way. An integer offset of coordinates that are multiples of 2^-24 is exact, so that only the rounding of the
- * eye's position can differ. A factor of 1e6 is not a power of two, so that all float32 numbers are rounded
- * differently. In double, this changes no pixel by 1e-12; if vertices are rounded to float32, it changes no pixel by
- * 1e-7. Errors of hits matter more: if the field at the hit is off by 3e-8, a pixel whose ray grazes a hex changes by
- * 7e-7. Therefore the robust hit finder computes the residuals of its last step in double. */
+ * same way.
+ *
+ * An integer offset of coordinates that are multiples of 2^-24 is exact, so that only the rounding of the eye's
+ * position can differ. A factor of 1e6 is not a power of two, so that all float32 numbers are rounded differently. In
+ * double, this changes no pixel by 1e-12; if vertices are rounded to float32, it changes no pixel by 1e-7. Errors of
+ * hits matter more: if the field at the hit is off by 3e-8, a pixel whose ray grazes a hex changes by 7e-7. Therefore
+ * the robust hit finder computes the residuals of its last step in double. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

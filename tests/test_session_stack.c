@@ -1,7 +1,9 @@
 /* Checks that the calling thread and the worker threads use less stack in a step than the sizes that the step requires
  * (session_threads.h). The stacks are filled with a pattern before a step, and the pattern is searched for the part
- * that was overwritten afterwards. If SMALL_STACKS is set in the environment, OpenMP's stacks are too small: the step
- * must fail and state a sufficient size. If TOLD_STACKS is set, the stacks have this sufficient size. */
+ * that was overwritten afterwards.
+ *
+ * If SMALL_STACKS is set in the environment, OpenMP's stacks are too small: the step must fail and state a sufficient
+ * size. If TOLD_STACKS is set, the stacks have this sufficient size. */
 #define _GNU_SOURCE
 #include <omp.h>
 #include <pthread.h>

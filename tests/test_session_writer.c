@@ -111,7 +111,7 @@ static void simulation_continues_while_pictures_are_pending(void **state)
     for (int cycle = 0; cycle < 4; cycle++) {
         everywhere(insitu_step(session, cycle, 0.5) == INSITU_OK);
         const insitu_report *report = insitu_last_report(session);
-        const int waiting = cycle + 1 + cycle / 2 + 1; /* image a at every other cycle, b at each cycle */
+        const int waiting = cycle + 1 + cycle / 2 + 1; /* image a is due every other cycle, b each cycle */
         everywhere(report->pictures_waiting == (own_rank ? 0 : waiting) && report->background_ms == 0);
     }
     everywhere(caught_count == 0);

@@ -1,8 +1,10 @@
 /* Checks meshes of every form and fields with random errors, on one rank or on all ranks: in counts, strides, NULL
  * pointers, types, alignment, indices, offsets, coordinates, values and options, and missing arrays. Each step must
  * either return the same error on all ranks, or draw its pictures. After the input is corrected, the next step must
- * draw the same as the first step. The library must be able to detect each error, so no error describes an array as
- * longer than its memory: counts and elements are made smaller, or so large that no array of this size can exist. */
+ * draw the same as the first step.
+ *
+ * The library must be able to detect each error, so no error describes an array as longer than its memory: counts and
+ * elements are made smaller, or so large that no array of this size can exist. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -32,7 +34,7 @@ static int64_t draw_random(dice *d, int64_t sides)
 typedef struct input_array {
     insitu_array *array;
     insitu_array truth;
-    int64_t count;              /* correct number of elements */
+    int64_t count; /* correct number of elements */
     /* are_indices: elements are indices; is_table: elements are pointers, or the sizes of lists */
     bool are_indices, is_table;
 } input_array;
