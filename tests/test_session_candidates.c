@@ -201,10 +201,11 @@ static double compute_tree_cost(const insitu_session *session)
     return mmbvh_cost(&session->meshes.items[0]->tree, &(mmbvh_options){.threads = 1});
 }
 
-/* Checks the fast building of trees that serve one step only. For the session `still` the caller states that nothing
- * has changed, so that its first tree, built by the surface area heuristic, is kept. The session `moving` rebuilds its
- * tree in every step that changes cells: along a space-filling curve from the second step on, but by the heuristic
- * again after a tree was kept for a step. Pictures of both sessions must be bit-identical. */
+/* Checks the fast building of trees that are used for one step only. The mesh is submitted to two sessions in each
+ * step. To the session `still` it is declared unchanged, so that this session keeps its first tree, built by the
+ * surface area heuristic. The session `moving` rebuilds its tree in each step in which the mesh is declared as changed:
+ * along a space-filling curve from the second step on, but by the heuristic after a tree was kept for a step. Pictures
+ * of both sessions must be bit-identical. */
 static void trees_of_one_step_are_built_fast(void **context)
 {
     (void)context;

@@ -275,7 +275,8 @@ static void wrong_order_can_be_corrected(void **state)
         free_drawing(&drawn);
     }
     insitu_destroy(&session);
-    reorder_cells(&in.part, INSITU_ORDER_LEXICOGRAPHIC); /* back to the wrong order */
+    /* exchanges the vertices back, so that the declared order is wrong */
+    reorder_cells(&in.part, INSITU_ORDER_LEXICOGRAPHIC);
     drawing drawn = draw_input(&in);
     everywhere(drawn.is_warned);
     free_drawing(&drawn);

@@ -50,7 +50,7 @@ typedef struct moved_array {
     size_t bytes; /* size of an element */
     int64_t at;   /* index of the different element */
     element value;
-    const char *words; /* text of the error */
+    const char *words; /* text that the error message contains */
 } moved_array;
 
 static const moved_array moved_arrays[] = {
@@ -143,7 +143,7 @@ static void reallocated_vertices_are_drawn_at_new_positions(void **context)
     const size_t count = 3 * (size_t)input.part.vertex_count;
     double *moved = malloc(count * sizeof *moved);
     assert_non_null(moved);
-    /* so far away that the session replaces its coordinate space by the one of a fresh session */
+    /* so far away that the session changes the origin of its coordinates, as a fresh session chooses it */
     for (size_t i = 0; i < count; i++) moved[i] = 64 * input.part.coordinates[i];
     insitu_mesh_interleaved(&now.mesh, moved, INSITU_FLOAT64);
     check_picture(&now, false);

@@ -402,7 +402,7 @@ static void take_picture_set(picture_set *set)
 {
     set->count = caught_count;
     memcpy(set->items, caught, sizeof caught);
-    caught_count = 0; /* the pictures now belong to the set */
+    caught_count = 0; /* the caught pictures now belong to the set */
 }
 
 static void free_pictures(picture_set *set)

@@ -82,9 +82,10 @@ static const counted_scene scenes[] = {
     {"transparent isosurfaces", "      - isosurface: {field: f, values: [-0.2, 0.1], opacity: 0.5}\n", 6},
     {"volume",
      "      - volume: {field: f, map: viridis, range: [-1, 1], opacity: [[0, 0], [1, 0.5]], unit_distance: 1}\n", 6},
-    /* One more call: it finds out how the plane intersects the cells. */
+    /* One more call than for an isosurface: it finds out how the plane intersects the cells. */
     {"slice", "      - slice: {field: f, range: [-1, 1], planes: [{normal: [1, 2, 3]}]}\n", 7},
-    /* Two more calls: the extremes of the values. Percentiles take more: whether cells with a volume count, and six
+    /* Two more calls than for an isosurface: one for the plane, one for the extremes of the values. Percentiles take
+     * eight more: one for the plane, one that finds out whether cells with a volume count, and one for each of six
      * digits. */
     {"slice by its extremes", "      - slice: {field: f, planes: [{normal: [1, 2, 3]}]}\n", 8},
     {"slice by percentiles", "      - slice: {field: f, range: {percentile: [2, 98]}, planes: [{normal: [1, 2, 3]}]}\n",

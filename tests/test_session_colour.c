@@ -70,7 +70,7 @@ static int compare_values(const void *left, const void *right)
 typedef struct truth {
     double least, most, least_positive;
     int64_t count, positive;
-    double *middles; /* middle of the range of each cell's values, sorted */
+    double *middles; /* sorted middles of the ranges of cells: half the sum of a cell's least and greatest value */
 } truth;
 
 static truth compute_exact_ranges(void)

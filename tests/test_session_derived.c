@@ -146,7 +146,7 @@ typedef struct expected_value {
 } expected_value;
 
 /* Computes the Q criterion, lambda2 and the strain rate directly from the symmetric part S and the antisymmetric part W
- * of the gradient. */
+ * of the velocity gradient. */
 static void find_tensors(double *q, double *lambda2, double *strain)
 {
     double s[3][3], w[3][3], m[3][3] = {{0}}, of_s = 0, of_w = 0;

@@ -268,7 +268,7 @@ static void cell_values_continue_across_triangles(void **state)
 /* ---- which meshes are one -------------------------------------------------------------------------------------- */
 
 /* A box with the given number of hexes along each axis, which are dealt to the ranks in turn. All cells have the value
- * `value`, except those of the lowest layer along z, which have `rest`. */
+ * `value`, except that the lowest layer along z has `rest`. */
 typedef struct box {
     double lower[3], upper[3];
     int counts[3];

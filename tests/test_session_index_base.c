@@ -114,7 +114,7 @@ static void one_based_indices_draw_same_pictures_as_zero_based(void **state)
     check_index_base(TEST_HEXES, true);
 }
 
-/* Checks errors in the connectivity of the last rank, one after the other. */
+/* Checks errors in indices, offsets and index_base, one after another, on the last rank only. */
 static void errors_report_one_based_indices(void **state)
 {
     (void)state;

@@ -30,7 +30,7 @@ static const char conditional_scene[] = SCENE("    when: {field: f, above: -5}\n
 /* ---- fields --------------------------------------------------------------------------------------------------- */
 
 typedef struct form {
-    bool at_cells, is_narrow; /* float and int32, with other numbers between the elements of the index */
+    bool at_cells, is_narrow; /* is_narrow: values are float and indices int32, which are separated by other numbers */
     int components, base;
 } form;
 

@@ -18,7 +18,9 @@
 #include "session_tally.h"
 #include "test_meshes.h"
 
-enum { SIDE = 7 /* cells for a block and part of another, but no multiple of eight hexes */, LAYOUTS = 16 };
+/* SIDE: chosen so that the cells fill a block and a part of another one, and the number of hexes is no multiple of
+ * eight. */
+enum { SIDE = 7, LAYOUTS = 16 };
 
 /* The largest rounding error of a cell's volume, as a fraction of the volume of the cell's bounding box. It is derived
  * in session_tally.c. */

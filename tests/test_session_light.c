@@ -235,7 +235,7 @@ static int is_blocked_by_corner(const corner *c, const double from[3], const dou
 
 typedef struct sky {
     int pixels, wrong, undecided_rays;
-    double sum; /* sum of the unoccluded fractions as drawn */
+    double sum; /* sum over the pixels of the fraction of rays that are not occluded, as drawn */
 } sky;
 
 /* Compares pictures lit by ambient light only: `drawn` must be `plain`, the picture without occlusion, times the
@@ -323,9 +323,9 @@ static double valley_field(const double p[3])
     return p[2] - fabs(p[0]);
 }
 
-/* Checks ambient occlusion in valleys. Cells are up to half a unit wide. Parts of an isosurface nearer than a fifth of
- * the ray's cell need not occlude (session_layers.c), but everything farther must. Pixels in which the valley's other
- * side is just beyond that distance are counted as near, and must be darkened too. */
+/* Checks ambient occlusion in valleys. Cells are up to half a unit wide. Parts of an isosurface that are nearer than a
+ * fifth of a cell's width need not occlude (session_layers.c), but everything farther must. This includes the pixels
+ * counted as `near`, for which the valley's other side is just beyond that distance. */
 static void ambient_occlusion_darkens_valleys(void **context)
 {
     static const double root = 0.70710678118654752;

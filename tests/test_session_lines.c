@@ -72,7 +72,7 @@ static caught_picture draw_lines(MPI_Comm comm, const char *scene, const session
     return picture;
 }
 
-/* Counts the pixels in which two pictures differ. */
+/* Returns the number of pixels in which two pictures differ. */
 static int count_differing_pixels(const caught_picture *a, const caught_picture *b)
 {
     int count = 0;

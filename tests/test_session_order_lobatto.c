@@ -342,7 +342,8 @@ typedef struct ray_tally {
 static void follow_ray(const lobatto_mesh *m, int pixel, double from, double to, double bound, ray_tally *t)
 {
     const int steps = (int)ceil((to - from) / (0.5 * PIXEL));
-    double side = 0; /* side of the isosurface on which the ray was when it was last farther away than the bound */
+    /* side of the isosurface on which the ray is at its first point that is farther away than the bound */
+    double side = 0;
     for (int n = 1; n < steps; n++) {
         double position[3];
         cell_point p;

@@ -39,7 +39,8 @@ static const scene_case scenes[] = {
     {"segments", IMAGE(VOLUME, "    sampling: {method: segments}\n")},
     {"two volumes", IMAGE(VOLUME DENSE, "")},
 };
-enum { FIRST_SAMPLED = 4, SCENES = sizeof scenes / sizeof *scenes }; /* scenes from this one on use the default step */
+/* FIRST_SAMPLED: index of the first scene that uses the default step */
+enum { FIRST_SAMPLED = 4, SCENES = sizeof scenes / sizeof *scenes };
 
 /* ---- meshes -------------------------------------------------------------------------------------------------- */
 

@@ -125,7 +125,7 @@ typedef struct part_input {
     insitu_field field;
     double *values; /* values of cells */
     insitu_patch patches[MOST_FACES];
-    double wide[PATCHES][2 * MOST_FACES]; /* only every second element is used */
+    double wide[PATCHES][2 * MOST_FACES]; /* only every second element is used, so that the array has a stride */
     float narrow[PATCHES][MOST_FACES];
     int64_t vertices[PATCHES][8 * MOST_FACES], offsets[PATCHES][MOST_FACES + 1], numbers[PATCHES][MOST_FACES];
     int64_t counts[PATCHES];

@@ -91,7 +91,8 @@ static void add_corner_gradient(gradients *g, const test_mesh *mesh, const int64
 
 static void add_cell_gradients(gradients *g, const test_mesh *mesh, int type, const int64_t *cell)
 {
-    static const int around[8] = {0, 1, 3, 2, 4, 5, 7, 6}; /* maps a hex's vertices to three bits, and back */
+    /* maps a hex's vertex to its corner of the unit cube, as three bits, and back */
+    static const int around[8] = {0, 1, 3, 2, 4, 5, 7, 6};
     for (int i = 0; i < 8 && type == INSITU_HEX; i++)
         add_corner_gradient(g, mesh, cell, i, around[around[i] ^ 1], around[around[i] ^ 2], around[around[i] ^ 4]);
     for (int i = 0; i < 4 && type == INSITU_TET; i++)

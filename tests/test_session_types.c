@@ -356,8 +356,8 @@ static void separate_components_draw_the_same_picture(void **state)
     }
 }
 
-/* Checks that a field is read correctly if it is set a second time, unchanged or although nothing requires it, whether
- * its table of components is reused or newly allocated. */
+/* Checks that a field is read correctly if it is set in each step with the same values, declared as changed or
+ * unchanged, and if the caller overwrites the table of components after the call. */
 static void components_can_be_set_again(void **state)
 {
     (void)state;

@@ -23,9 +23,9 @@ static double signed_distance(const double position[3])
     return normal[0] * position[0] + normal[1] * position[1] + normal[2] * position[2] - 0.1;
 }
 
-/* Checks that hits are on the plane. The size of a cell is a quarter of half the cube's side. The fixture's bound on
- * errors of depths, 2e-6 cells or 5e-7 × conditioning, is then below 1e-5 in the scene for rays that meet the plane at
- * an angle of more than a few degrees. */
+/* Checks that hits are on the plane. A cell is a quarter as wide as half the cube. The fixture's bound on errors of
+ * depths, 2e-6 cells or 5e-7 × conditioning, is then below 1e-5 in the scene for rays that meet the plane at an angle
+ * of more than a few degrees. */
 static void assert_on_plane(const render_fixture *f, const drawn_frame *drawn, const char *what)
 {
     int64_t hits = 0;
