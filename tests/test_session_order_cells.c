@@ -70,8 +70,8 @@ static double squared_distance_from_segment(const double at[2], const double a[2
     return pow(d[0] - s * e[0], 2) + pow(d[1] - s * e[1], 2);
 }
 
-/* The edges of eight cubes on their common face z = 1, as segments between nodes or finer pieces, with the diagonals of
- * tets and wedges there. */
+/* The edges of eight cubes on the face z = 1 of the cube that they fill, as segments between nodes or finer pieces,
+ * with the diagonals of tets and wedges there. */
 typedef struct edge_list {
     int count;
     double ends[512][2][2];

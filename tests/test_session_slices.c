@@ -139,7 +139,7 @@ static void several_planes_are_exact(void **state)
                              {{1, 1, 1}, 0},
                              {{1, 1, 1}, 2},
                              {{0, -1, 0}, -0.75},
-                             /* the first three planes are 2/3 sqrt(3) apart; distances are divided by n */
+                             /* the first three planes are 2/3 sqrt(3) apart; the distances here are divided by n */
                              {{0, -1, 0}, 0.25}};
     session_input whole = {0};
     bool is_well = true;
