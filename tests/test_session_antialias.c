@@ -1,6 +1,6 @@
-/* Checks antialiasing: pixels at edges are the mean of their samples, compared with the closed form of a plane's
- * colours; all others are the sample at their centre to the bit, and so is the depth; on any number of ranks the
- * picture is the same. */
+/* Checks antialiasing. Pixels at edges must be the mean of their samples, which is computed in closed form for a
+ * plane's colours. All other pixels, and the depths of all pixels, must be bit-identical to those of the picture with
+ * one sample per pixel. The picture must not depend on the number of ranks. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -23,7 +23,8 @@ enum { SIDE = 4, WIDTH = 48, HEIGHT = 36, PIXELS = WIDTH * HEIGHT };
 
 /* ---- samples ------------------------------------------------------------------------------------------------- */
 
-/* Checks that there is one sample in each column and row of the grid, so that their mean is the centre. */
+/* Checks that the samples lie at the centres of the cells of a grid of count x count cells in the pixel, exactly one in
+ * each column and one in each row, so that their mean is the pixel's centre. */
 static void samples_are_spread_evenly(void **state)
 {
     (void)state;
@@ -42,8 +43,9 @@ static void samples_are_spread_evenly(void **state)
 
 /* ---- the reference ------------------------------------------------------------------------------------------- */
 
-/* Adds the colour that the ray through a position in the picture sees: that of the plane inside the cube. Returns false
- * near the plane's border. */
+/* Adds the exact colour of the position (x, y) in the picture to sum: the colour of the plane inside the cube, or
+ * nothing if the ray misses it. Returns false if the ray passes within 1e-4 of the border of the plane's section,
+ * because rounding then decides whether it hits. */
 static bool add_exact_sample(const render_camera *c, double x, double y, double sum[4])
 {
     static const double normal[3] = {1. / 3, 2. / 3, -2. / 3};
@@ -71,8 +73,10 @@ static bool add_exact_sample(const render_camera *c, double x, double y, double 
     return fabs(outside) > 1e-4;
 }
 
-/* Returns whether a pixel is the mean of its samples. The tolerance is that of a depth near 5 in single precision,
- * divided by a cosine of at least 0.1, times the field's slope of 1 in 3.2 and the table's slope of at most 12. */
+/* Returns whether a pixel is the mean of `count` samples, or has a sample too close to the border of the plane's
+ * section to decide. The tolerance is the error 5 x 3e-7 of a depth near 5 in single precision, divided by a cosine of
+ * at least 0.1, times the slope of the field relative to the range, 1 / 3.2, times the slope of the colour table, at
+ * most 12. */
 static bool is_mean(const float *rgba, int pixel, int count)
 {
     render_camera camera;
@@ -92,7 +96,8 @@ static bool is_mean(const float *rgba, int pixel, int count)
 
 /* ---- pictures ------------------------------------------------------------------------------------------------ */
 
-/* Draws one picture; scene is a file that write_scene() made on all ranks. */
+/* Draws one picture and stores the number of traced rays. The scene is a file made by write_scene(), which all ranks
+ * must have called. */
 static caught_picture draw_picture(MPI_Comm comm, const char *scene, const session_input *in, int64_t *rays)
 {
     insitu_session *session = open_session(comm, scene);
@@ -105,8 +110,8 @@ static caught_picture draw_picture(MPI_Comm comm, const char *scene, const sessi
     return picture;
 }
 
-/* Checks a picture of count samples against plain, the picture with one sample for each pixel. rays is the number of
- * traced rays, from which the number of edge pixels follows. */
+/* Returns whether a picture of count samples is right, compared with plain, the picture with one sample per pixel. rays
+ * is the number of traced rays: one for each pixel, and count more for each edge pixel. */
 static bool is_exact_mean(const caught_picture *picture, const caught_picture *plain, int count, int64_t rays)
 {
     unsigned char edges[PIXELS / 8] = {0};
@@ -150,8 +155,8 @@ static void edges_are_sample_means_and_other_pixels_are_unchanged(void **state)
     input_free(&whole);
 }
 
-/* Compares the pictures of all ranks and of one; worst is the largest allowed difference of a channel. Depths must be
- * the same to the bit. */
+/* Compares the picture that all ranks draw together with the one that rank 0 draws from the whole mesh. worst is the
+ * largest allowed difference of a colour channel; depths must be bit-identical. */
 static void check_on_ranks(const char *text, test_mesh_kind kind, double worst)
 {
     const char *scene = write_scene(text);

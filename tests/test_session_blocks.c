@@ -1,6 +1,6 @@
-/* Checks blocks of one mesh: lattices and lists of cells, with ghost layers, distributed over ranks, are drawn as the
- * same cells in one list: without a seam in means, normals, derived fields, outer surfaces, volumes and statistics. The
- * cells of the list are distributed over the same ranks by another rule. */
+/* Checks meshes that consist of blocks (lattices, or lists of cells with ghost layers) distributed over ranks. They
+ * must be drawn as the same cells in a single list, without seams between blocks in means, normals, derived fields,
+ * outer surfaces, volumes and statistics. The cells of the list are distributed over the same ranks by another rule. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -121,7 +121,7 @@ static bool set_fields(insitu_session *session, int64_t number, const cell_array
     return set(session, number, &field) == INSITU_OK;
 }
 
-/* Makes a list of every rank_count-th cell, from number own_rank on. */
+/* Makes this rank's part of the list of all cells: groups of 5 consecutive cells are dealt to the ranks in turn. */
 static void make_list(cell_arrays *a)
 {
     create_arrays(a, LINE * LINE * LINE, CELLS * CELLS * CELLS);
@@ -158,8 +158,9 @@ static bool set_list(insitu_session *session, const cell_arrays *a)
 /* ---- blocks ------------------------------------------------------------------------------------------------------ */
 
 typedef struct block {
-    int number, first[3], cells[3]; /* including the ghost layer, as indices in the whole mesh */
-    int own_first[3], own_end[3];   /* excluding the ghost layer, as indices in the block */
+    /* first: index in the whole mesh of the first cell; cells: number of cells; with ghost layers */
+    int number, first[3], cells[3];
+    int own_first[3], own_end[3]; /* range of the cells without ghost layers, as indices in the block */
     cell_arrays a;
     int64_t *ids; /* ids of the block's vertices in the whole mesh */
 } block;
@@ -171,7 +172,7 @@ static bool is_own_cell(const block *b, const int at[3])
     return true;
 }
 
-/* Fills a block; values in ghost layers are wrong on purpose. */
+/* Fills a block's arrays. Cells in ghost layers have a wrong value, so that pictures differ if it is used. */
 static void fill_block(block *b)
 {
     const int wide[3] = {b->cells[0] + 1, b->cells[1] + 1, b->cells[2] + 1};
@@ -192,7 +193,7 @@ static void fill_block(block *b)
             b->a.hexes[8 * cell + i] =
                 at[0] + corners[i][0] + wide[0] * (at[1] + corners[i][1] + wide[1] * (at[2] + corners[i][2]));
         b->a.c[cell] = is_own_cell(b, at) ? compute_cell_value(whole) : -40;
-        b->a.ghosts[cell] = is_own_cell(b, at) ? 0 : 0x10000; /* its lowest byte is 0 */
+        b->a.ghosts[cell] = is_own_cell(b, at) ? 0 : 0x10000; /* a flag whose lowest byte is 0 */
     }
 }
 
@@ -214,8 +215,8 @@ static void make_block(int number, block *b)
 
 static bool with_ids, are_in_slabs;
 
-/* Passes the block as a uniform lattice, a curvilinear lattice, or a list of cells with flags, depending on its
- * number. */
+/* Passes the block to the session as a uniform lattice, a curvilinear lattice, or a list of cells with ghost flags,
+ * depending on its number. */
 static insitu_status set_block(insitu_session *session, const block *b, unsigned changed)
 {
     insitu_lattice lattice = {.origin = {-1, -0.75, -0.5}, .spacing = {0.15, 0.1, 0.13}};
@@ -254,8 +255,8 @@ static bool submit_block(insitu_session *session, const block *b, unsigned chang
     return set_block(session, b, changed) == INSITU_OK && set_fields(session, b->number, &b->a, set_field_of_block);
 }
 
-/* Returns the rank that has a block. Of several ranks the last one has none; or each rank has the blocks of slabs, so
- * that ranks share vertices only where slabs meet. */
+/* Returns the rank that owns a block. If are_in_slabs is set, each rank owns slabs of blocks, so that ranks share
+ * vertices only at the borders of slabs. Otherwise the last of three or more ranks owns no block. */
 static int get_block_owner(int number)
 {
     if (are_in_slabs) return number % distribute[0] % rank_count;
@@ -349,7 +350,8 @@ static void vertex_ids_connect_blocks(void **state)
     with_ids = are_in_slabs = false;
 }
 
-/* Checks blocks that move to other ranks at every step, while some stay. */
+/* Checks blocks that are removed and added: those with odd numbers move to another rank at every step, the others
+ * stay. */
 static void blocks_are_added_and_removed(void **state)
 {
     (void)state;
@@ -371,7 +373,7 @@ static void blocks_are_added_and_removed(void **state)
     insitu_destroy(&session);
 }
 
-/* Checks that a mesh is whole or consists of blocks, depending on which is set last. */
+/* Checks that the most recent call decides whether a mesh is a single list of cells or consists of blocks. */
 static void whole_and_blocks_replace_each_other(void **state)
 {
     cell_arrays list;
@@ -423,7 +425,8 @@ static void wrong_calls_are_reported_at_once(void **state)
     insitu_destroy(&session);
 }
 
-/* Checks one faulty block; after it is corrected, the picture equals the reference. */
+/* Checks that a fault of one block is reported on all ranks, and that the picture equals the reference after the fault
+ * is corrected. */
 static void faults_of_one_block_are_reported_on_all_ranks(void **state)
 {
     const int corrupted = 5;

@@ -1,4 +1,4 @@
-/* Checks automatic cameras: the sphere or box that they fit is inside the frame and fills it. */
+/* Checks automatic cameras: the sphere or the box to which a camera is fitted lies inside the frame and fills it. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -39,8 +39,8 @@ static scene_image random_image(void)
     return image;
 }
 
-/* Computes the bounds of the extent in the picture, whose borders are -1 and 1; returns false if a corner is not in
- * front of the eye. */
+/* Computes the bounds of the extent's corners in the picture, in coordinates that are -1 and 1 at the picture's
+ * borders. Returns false if a corner is not in front of the eye. */
 static bool compute_projected_bounds(const render_camera *c, const session_extent *e, double low[2], double high[2])
 {
     const double half[2] = {c->half_height * c->width / c->height, c->half_height};
@@ -64,7 +64,8 @@ static bool compute_projected_bounds(const render_camera *c, const session_exten
     return are_before;
 }
 
-/* Returns whether the eye is as close to the nearest corner as allowed: a hundredth of the half diagonal. */
+/* Returns whether the eye has the smallest allowed distance from the nearest corner: a hundredth of the half
+ * diagonal. */
 static bool is_close(const render_camera *c, const session_extent *e)
 {
     double nearest = INFINITY;
@@ -76,8 +77,9 @@ static bool is_close(const render_camera *c, const session_extent *e)
     return nearest < 0.0101 * e->half_diagonal;
 }
 
-/* Checks fitted boxes: the tighter of width and height is filled from border to border, the other is inside and
- * centred. The bound is the rounding of bounds up to a thousand times as far from the origin as they are large. */
+/* Checks cameras fitted to boxes: along the tighter of width and height the box reaches both borders; along the other
+ * it is inside and centred. The tolerance allows for the rounding of bounds that are up to a thousand times as far from
+ * the origin as they are large. */
 static void check_box(bool is_orthographic)
 {
     srand(11);
@@ -111,14 +113,15 @@ static void a_box_fills_an_orthographic_frame(void **state)
     check_box(true);
 }
 
-/* Returns the fraction of half a side that decorations leave free: a colour bar takes 6.5 heights of text, a title 2.4,
- * a ruler 3. */
+/* Returns the fraction of half a side of the picture that decorations leave free. words: number of heights of text that
+ * the decorations take, 6.5 for a colour bar, 2.4 for a title, 3 for a ruler; size: height of the text in pixels. */
 static double fraction_left_by_decorations(double words, double size, int pixels)
 {
     return fmax(0.95 - 2 * words * size / pixels, 0.5);
 }
 
-/* Checks that the data reaches both borders of the tighter side and crosses none. */
+/* Checks that the data reaches both borders of the free space along the tighter of width and height, and crosses no
+ * border. */
 static void decorations_keep_their_space(void **state)
 {
     (void)state;
@@ -151,7 +154,7 @@ static void decorations_keep_their_space(void **state)
     }
 }
 
-/* Checks that the sphere around the bounds, seen from the eye, does not overlap the space of bars and texts, is as
+/* Checks the sphere around the data's bounds, seen from the eye: it does not overlap the space of bars and texts, is as
  * large as possible, and is off-centre only if necessary. */
 static void sphere_does_not_overlap_decorations(void **state)
 {
@@ -184,7 +187,7 @@ static void sphere_does_not_overlap_decorations(void **state)
         double half[2] = {camera.half_height * camera.width / camera.height, camera.half_height};
         bool is_filled[2];
         for (int side = 0; side < 4; side++) {
-            /* The distance of the centre from the border's plane, divided by the radius. */
+            /* Distance of the sphere's centre from the plane through the eye and the border, divided by the radius. */
             const double x = side % 2 ? -centre[side / 2] : centre[side / 2], edge = most[side] * half[side / 2];
             ends[side] = camera.is_orthographic ? (edge - x) / extent.half_diagonal
                                                 : (edge * centre[2] - x) / hypot(1, edge) / extent.half_diagonal;
@@ -216,14 +219,15 @@ static void zoom_and_height_scale_the_view(void **state)
     assert_true(fabs(camera.half_height - 1 / 0.95 / 2) < 1e-12);
     image.camera.height = 7;
     assert_true(session_make_camera(&extent, &image, &camera) && camera.half_height == 3.5);
-    /* With both projections the picture of an explicit camera has the same size at the focal point. */
+    /* The picture of an explicit camera has the same size at the focal point with both projections. */
     image.camera = (scene_camera){
         .eye = {1, 1, 11}, .focal = {1, 1, 1}, .up = {0, 1, 0}, .angle = 90, .zoom = 1, .is_orthographic = true};
     assert_true(session_make_camera(&extent, &image, &camera));
     assert_true(camera.is_orthographic && fabs(camera.half_height - 10) < 1e-12);
 }
 
-/* Returns whether the picture's axes are two axes of the data: the first points right and the second up. */
+/* Returns whether the camera is orthographic and looks along this axis, so that two axes of the data point exactly
+ * right and up in the picture. */
 static bool is_faced(const session_extent *extent, const scene_image *image, int axis)
 {
     static const int right[3] = {1, 0, 0}, up[3] = {2, 2, 1};
@@ -246,7 +250,7 @@ static void flat_data_is_seen_from_the_front(void **state)
         image.camera =
             (scene_camera){.is_automatic = true, .angle = 40, .zoom = 1, .direction = {1, 0.8, 1.2}, .up = {0, 1, 0}};
         for (int a = 0; a < 3; a++) extent.upper[a] = a == axis ? 0 : 2 + a;
-        extent.half_diagonal = 4; /* the size does not matter */
+        extent.half_diagonal = 4; /* the camera's direction does not depend on the size */
         assert_true(session_flat_axis(&extent) == axis && is_faced(&extent, &image, axis));
         extent.upper[axis] = 1.9e-6; /* less than a millionth of the size 2 */
         assert_true(is_faced(&extent, &image, axis));
@@ -259,7 +263,8 @@ static void flat_data_is_seen_from_the_front(void **state)
     }
 }
 
-/* Checks that each key that the scene gives is used, and that the others are derived from the data. */
+/* Checks that each key given in the scene overrides what is derived from flat data, while all other settings of the
+ * camera are still derived. */
 static void scene_keys_override_the_view_of_flat_data(void **state)
 {
     (void)state;

@@ -1,5 +1,6 @@
-/* Checks trees over the candidates, which are the cells that can be visible: they give the same pictures, bit for bit,
- * as full trees, whatever changes during a run. Also checks the choice between both. */
+/* Checks trees over candidates only, which are the cells that can be visible. Their pictures must be bit-identical to
+ * those of full trees, which contain all cells, whatever changes during a run. Also checks the automatic choice between
+ * partial and full trees. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -23,8 +24,8 @@
 
 static const test_mesh_kind kinds[] = {TEST_TETS, TEST_MIXED, TEST_POLYHEDRA};
 
-/* Opens a session with the given choice of trees. The choice is not in the scene file, because sessions with several
- * choices read the same file, and read it again after a change. */
+/* Opens a session that builds the given kind of tree. The kind is not in the scene file, because sessions of several
+ * kinds read the same file, and reload it after a change. */
 static insitu_session *open_tree(scene_tree tree, const char *scene)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
@@ -32,7 +33,7 @@ static insitu_session *open_tree(scene_tree tree, const char *scene)
     return session;
 }
 
-/* Makes a step of both sessions, whose meshes are set, and checks that the pictures are the same. */
+/* Makes a step of both sessions, in which meshes are already set, and checks that their pictures are bit-identical. */
 static void step_and_compare(insitu_session *full, insitu_session *other, int64_t cycle)
 {
     discard_pictures();
@@ -70,7 +71,8 @@ static void shift_values(session_input *in, double by)
     for (int64_t i = 0; i < in->part.vertex_count; i++) in->part.values[i] += by;
 }
 
-/* Compares trees for new values, moved vertices, a NaN, new cells, and a step without any change. */
+/* Compares trees of the given kind with full trees: for new values, moved vertices, a NaN, new cells, and a step
+ * without any change. */
 static void compare_trees(scene_tree tree, const char *images, test_mesh_kind kind)
 {
     const char *scene = write_scene(images);
@@ -111,8 +113,8 @@ static void partial_trees_draw_same_picture_as_full_trees(void **context)
         }
 }
 
-/* Checks partial trees: only values in an interval 0.1 wide are visible, a slice of the cells; the report states how
- * many cells are left out. */
+/* Checks that partial trees contain the visible cells only: those whose values overlap an interval of width 0.1. The
+ * report must state how many cells are left out. */
 static void partial_trees_contain_the_visible_cells(void **context)
 {
     (void)context;
@@ -138,8 +140,9 @@ static void partial_trees_contain_the_visible_cells(void **context)
     input_free(&in);
 }
 
-/* Checks the choice of trees. As long as the cells change at every step, trees are partial. When they stop changing,
- * the accumulated extra cost of partial trees reaches the cost of a full tree, which is then built and kept. */
+/* Checks the automatic choice of trees. As long as the cells change at every step, trees are partial. When cells stop
+ * changing, the accumulated extra cost of partial trees reaches the cost of a full tree, which is then built and
+ * kept. */
 static void static_cells_get_a_full_tree(void **context)
 {
     (void)context;
@@ -191,16 +194,18 @@ static void full_trees_are_built_if_most_cells_are_visible(void **context)
     input_free(&in);
 }
 
-/* Returns the cost of traversing the tree, which is higher for a tree along a space-filling curve than for one by the
- * surface area heuristic. */
+/* Returns the cost of traversing the tree. The cost is higher if the tree is built along a space-filling curve than if
+ * it is built by the surface area heuristic. */
 static double compute_tree_cost(const insitu_session *session)
 {
     return mmbvh_cost(&session->meshes.items[0]->tree, &(mmbvh_options){.threads = 1});
 }
 
-/* Checks trees of a single step. The caller states to one of two sessions that nothing has changed: its first tree, by
- * the surface area heuristic, is kept. The other session rebuilds its tree at each step, along a curve from the second
- * step on, and by the heuristic again after a tree that was kept for a step. The pictures must always be the same. */
+/* Checks the fast building of trees that are used for one step only. The mesh is submitted to two sessions in each
+ * step. To the session `still` it is declared unchanged, so that this session keeps its first tree, built by the
+ * surface area heuristic. The session `moving` rebuilds its tree in each step in which the mesh is declared as changed:
+ * along a space-filling curve from the second step on, but by the heuristic after a tree was kept for a step. Pictures
+ * of both sessions must be bit-identical. */
 static void trees_of_one_step_are_built_fast(void **context)
 {
     (void)context;
@@ -232,14 +237,14 @@ static void move_vertices_periodically(session_input *in, double by)
     }
 }
 
-/* Compares moving meshes: cells stay and vertices move, with or without new values; then only values are new, which may
- * make cells visible whose bounds were not refitted. A second session rebuilds its trees at each step. Images a and b
- * are due alternately from cycle 2 on. */
+/* Compares moving meshes with a second session that rebuilds its trees at each step. First the vertices move while the
+ * cells stay, with or without new values; then only values change, which can make cells visible whose bounds were not
+ * refitted. Images a and b are due alternately from cycle 2 on. */
 static void compare_moving(const char *images, test_mesh_kind kind)
 {
     static const struct {
         double sway, change;
-        bool is_partial; /* whether bounds may be partial, if refits skip nodes */
+        bool is_partial; /* whether refits may skip nodes, so that some bounds are out of date */
     } steps[] = {{0, 0, false},      {0.05, 0, true}, {0.05, 0, true}, {0.05, 0.1, true},
                  {0, 0.3, false},    {0, 0.2, false}, {-0.1, 0, true}, {0, 0, true},
                  {0.05, -0.2, true}, {0, 0, true},    {0, 0.1, false}};
@@ -275,10 +280,10 @@ static void moving_vertices_draw_same_picture_as_new_trees(void **context)
             if (test_is_long_run() || (i + kind) % 3 == 0) compare_moving(images[i], kinds[kind]);
 }
 
-/* Checks that bounds refitted for one image are not used for another. The visible cells differ from step to step
- * although values stay: two images with different layers of the mesh are due alternately. The mesh drifts upwards, and
- * the camera looks at the position of b's surface at cycle 9: with the bounds from a step that drew only a, it would be
- * below the picture. */
+/* Checks that bounds refitted for one image are not used for another. Two images with different layers of the mesh are
+ * due alternately, so that the visible cells differ from step to step although values stay. The mesh drifts upwards,
+ * and the camera of b looks at the position of b's surface at cycle 9: with the bounds from a step that drew only a,
+ * the surface would be below the picture. */
 #define CAMERA "    camera: {position: [2.3, 0, 0.56], focal: [0, 0, 0.56], up: [0, 0, 1], angle: 1.7}\n"
 static void bounds_of_one_image_are_not_used_for_another(void **context)
 {

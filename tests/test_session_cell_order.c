@@ -1,6 +1,7 @@
-/* Checks cells whose vertices are in another order than VTK's, or are the first of longer rows, as finite-element codes
- * store them: they give the pictures of the same cells in VTK's order, to the bit. The report states what is copied for
- * that, no more is copied than necessary, and an error on one rank is reported on all. */
+/* Checks cells as finite-element codes store them: with vertices in another order than VTK's, or with vertices that are
+ * the first entries of longer rows of indices. Pictures must be bit-identical to those of the same cells in VTK's
+ * order. The report must state what is copied for the conversion, no more may be copied than necessary, and an error on
+ * one rank must be reported on all. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -21,8 +22,8 @@ static const char scene_text[] =
 
 /* ---- orders --------------------------------------------------------------------------------------------------- */
 
-/* Returns the index, in the given order, of VTK's n-th vertex, from its position in the unit cell and the direction
- * around a face. */
+/* Returns the position, in the given order, of the vertex that is n-th in VTK's order. It follows from the vertex's
+ * position in the unit cell and the direction in which an order goes around a face. */
 static int find_vertex_position(insitu_vertex_order order, int type, int n)
 {
     const int x = n % 4 == 1 || n % 4 == 2, y = n % 4 / 2, z = n / 4;
@@ -53,7 +54,7 @@ static const insitu_cell_type type_of_kind[] = {[TEST_TETS] = INSITU_TET,
                                                 [TEST_WEDGES] = INSITU_WEDGE,
                                                 [TEST_PYRAMIDS] = INSITU_PYRAMID};
 
-/* The arrays that the description is changed to. */
+/* Copies of arrays in another layout, to which the mesh description is changed to point. */
 typedef struct moved {
     void *connectivity;
     float *coordinates, *values;
@@ -73,8 +74,8 @@ static void store_index(const moved *m, bool is_narrow, int64_t i, int64_t value
         ((int64_t *)m->connectivity)[i] = value;
 }
 
-/* Moves connectivity of one type without offsets into rows of ROW entries; the entries after the vertices are no
- * indices. The last row is shorter. */
+/* Copies connectivity of one type without offsets, into rows of ROW entries if the layout has rows. Entries after a
+ * cell's vertices are invalid indices. The last row ends after the cell's vertices. */
 static void move_connectivity(session_input *in, layout how, moved *m)
 {
     const test_mesh *part = &in->part;
@@ -158,7 +159,7 @@ static void free_drawing(drawing *d)
     for (int i = 0; i < PICTURES; i++) free(d->pictures[i].rgba), free(d->pictures[i].depth);
 }
 
-/* Returns whether any cell is reordered in this order. */
+/* Returns whether the part has any cell whose vertices are in another order than VTK's. */
 static bool has_reordered(const test_mesh *part, insitu_vertex_order order)
 {
     bool turned = false;
@@ -204,8 +205,8 @@ static void every_order_and_layout_draws_the_same(void **state)
     }
 }
 
-/* Checks hexes of which half are given by their faces: these are recognised as hexes, next to those in another
- * order. */
+/* Checks hexes of which half are given by their faces: the library must recognise these polyhedra as hexes, beside
+ * hexes whose vertices are in another order. */
 static void recognised_cells_work_with_any_order(void **state)
 {
     (void)state;
@@ -227,7 +228,7 @@ static void recognised_cells_work_with_any_order(void **state)
     input_free(&in);
 }
 
-/* Checks the lower quads of hexes as shells in a table of nodes. */
+/* Checks the lower quads of hexes, drawn as shells: each quad is the first 4 entries of a row of 8 indices. */
 static void quads_are_shells_in_any_order(void **state)
 {
     (void)state;
@@ -254,8 +255,8 @@ static void quads_are_shells_in_any_order(void **state)
     input_free(&in);
 }
 
-/* Checks a wrong order and its correction: the wrong order gives a warning; with the correct one the cells are drawn,
- * whatever the caller states about changes. A mesh that moves keeps its copy. */
+/* Checks a wrong order of vertices and its correction. The wrong order gives a warning; after the correction the cells
+ * are drawn, whatever the caller states about changes. A mesh whose vertices move keeps its reordered copy. */
 static void wrong_order_can_be_corrected(void **state)
 {
     (void)state;
@@ -274,7 +275,8 @@ static void wrong_order_can_be_corrected(void **state)
         free_drawing(&drawn);
     }
     insitu_destroy(&session);
-    reorder_cells(&in.part, INSITU_ORDER_LEXICOGRAPHIC); /* back to the wrong order */
+    /* exchanges the vertices back, so that the declared order is wrong */
+    reorder_cells(&in.part, INSITU_ORDER_LEXICOGRAPHIC);
     drawing drawn = draw_input(&in);
     everywhere(drawn.is_warned);
     free_drawing(&drawn);
@@ -337,7 +339,7 @@ static void set_large_vertex_in_row(session_input *in)
     in->mesh.vertex_order = INSITU_ORDER_LEXICOGRAPHIC;
     ((int64_t *)corrupted.connectivity)[3 * ROW + 2] = -5;
 }
-/* If it were truncated to 4 bytes, it would be a valid index. */
+/* Sets an index out of range that would be a valid one if it were truncated to 4 bytes. */
 static void set_far_vertex_in_row(session_input *in)
 {
     use_rows(in);

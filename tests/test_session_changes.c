@@ -1,4 +1,5 @@
-/* Checks that arrays which a caller states are unchanged, but which have another address, are read again. */
+/* Checks that an array is read again if its address has changed, even if the caller states that the array is
+ * unchanged. */
 #include <math.h>
 #include <stddef.h>
 #include <stdlib.h>
@@ -16,7 +17,8 @@ static const char scene_text[] = "images:\n"
                                  "      - path: a_{cycle}.exr\n";
 
 static session_input input;
-static const char *scene; /* written once, because sessions discard their state after an edit */
+/* name of the scene file, which is written once, because sessions discard their state after an edit */
+static const char *scene;
 
 static void create_input(void)
 {
@@ -41,14 +43,14 @@ typedef union element {
     unsigned char byte;
 } element;
 
-/* An array of the mesh that is passed again at another address, with one different element. */
+/* An array of the mesh that is passed a second time, at another address and with one different element. */
 typedef struct moved_array {
     const char *name;
     size_t place; /* offset of its insitu_array in insitu_mesh */
     size_t bytes; /* size of an element */
     int64_t at;   /* index of the different element */
     element value;
-    const char *words; /* text of the error */
+    const char *words; /* text that the error message contains */
 } moved_array;
 
 static const moved_array moved_arrays[] = {
@@ -71,7 +73,8 @@ static int64_t get_element_count(const insitu_mesh *mesh, size_t place)
     return mesh->vertex_count;
 }
 
-/* Copies the array into its own memory; coordinates stay interleaved, so that the last element is one number. */
+/* Copies the array to memory of its own. Coordinates stay interleaved, so that the copy ends after one number of the
+ * last element. */
 static char *copy_elsewhere(insitu_mesh *mesh, const moved_array *moved)
 {
     insitu_array *array = (insitu_array *)((char *)mesh + moved->place);
@@ -104,7 +107,8 @@ static void corrupted_reallocated_arrays_are_reported(void **context)
 
 /* ---- other pictures ------------------------------------------------------------------------------------------- */
 
-/* Checks that the picture of the session's next step equals that of a session which gets everything as it now is. */
+/* Checks that the picture of the session's next step equals that of a fresh session, to which all present arrays are
+ * passed. */
 static void check_next_picture(insitu_session *session, const session_input *now, insitu_session *fresh)
 {
     const size_t pixels = (size_t)48 * 36;
@@ -118,8 +122,8 @@ static void check_next_picture(insitu_session *session, const session_input *now
     free(first.depth);
 }
 
-/* Checks the picture if something has moved to another address. Only the mesh, or only the field, is set again, as
- * unchanged; now is the moved input. */
+/* Checks the picture after arrays have moved to another address. Only the mesh (or, if is_field, only the field) is set
+ * again, and is declared unchanged; now is the input with the new addresses. */
 static void check_picture(const session_input *now, bool is_field)
 {
     insitu_session *session = open_and_draw(), *fresh = open_session(MPI_COMM_WORLD, scene);
@@ -139,8 +143,8 @@ static void reallocated_vertices_are_drawn_at_new_positions(void **context)
     const size_t count = 3 * (size_t)input.part.vertex_count;
     double *moved = malloc(count * sizeof *moved);
     assert_non_null(moved);
-    for (size_t i = 0; i < count; i++) /* far away: the picture's space is new, as that of the fresh session */
-        moved[i] = 64 * input.part.coordinates[i];
+    /* so far away that the session changes the origin of its coordinates, as a fresh session chooses it */
+    for (size_t i = 0; i < count; i++) moved[i] = 64 * input.part.coordinates[i];
     insitu_mesh_interleaved(&now.mesh, moved, INSITU_FLOAT64);
     check_picture(&now, false);
     free(moved);
@@ -180,8 +184,8 @@ static void invert_values(void)
     for (int64_t v = 0; v < input.part.vertex_count; v++) input.part.values[v] = 0.5 - input.part.values[v];
 }
 
-/* Checks values that change in place but are stated to be unchanged or are not set again: they are drawn as they are,
- * with a warning. */
+/* Checks values that change in place although they are declared unchanged or are not set again: the new values are
+ * drawn, and a warning is given. */
 static void undeclared_value_changes_are_reported(void **context)
 {
     (void)context;

@@ -1,6 +1,6 @@
-/* Checks the numbers that an EXR file may contain besides colours: the nearest surface's normal, value, layer and
- * number. They are compared with closed forms on planes in a cube of every type of cell; if cells are distributed at
- * random, they are the same to the bit as on one rank. */
+/* Checks the data channels that an EXR file may contain besides colours: normal, value, index of the layer and index of
+ * the surface, at the nearest surface of each pixel. They are compared with closed forms on planes in a cube of every
+ * type of cell. If cells are distributed at random, the channels must be bit-identical to those of one rank. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,8 +13,8 @@
 enum { SIDE = 3, WIDTH = 48, HEIGHT = 36, PIXELS = WIDTH * HEIGHT };
 enum { NX, NY, NZ, VALUE, LAYER, SURFACE, CHANNELS };
 
-/* The layers: 0 is a volume, 1 two planes of a slice, 2 two transparent isosurfaces, none of which f colours, and 3 an
- * isosurface that f colours. test_linear_field() is 0.3 x - 0.7 y + 0.5 z + 0.1. */
+/* The layers: 0: a volume; 1: a slice of two planes; 2: two transparent isosurfaces, not coloured by f; 3: an
+ * isosurface coloured by f. test_linear_field() is 0.3 x - 0.7 y + 0.5 z + 0.1. */
 #define SCENE(more)                                                                                                    \
     "images:\n  - name: a\n    size: [48, 36]\n    background: [0, 0, 0, 0]\n"                                         \
     "    camera: {position: [3, 2.2, 4], focal: [0, 0, 0], angle: 40}\n" more "    layers:\n"                          \
@@ -29,7 +29,7 @@ typedef struct plane {
     double normal[3], distance;
     int layer, surface;
     bool has_isovalue;
-    double isovalue; /* the value, unless it is the field at the hit */
+    double isovalue; /* the expected value if has_isovalue is set; else the field at the hit is expected */
 } plane;
 
 static const plane planes[] = {{{1, 0, 0}, -0.4, 1, 0, false, 0},
@@ -44,8 +44,8 @@ static double dot_product(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Computes the depth at which the pixel's ray meets the plane inside the cube; returns false if it does not. close is
- * set if rounding decides. */
+/* Computes the depth at which the pixel's ray meets the plane; returns false if that position is not inside the cube.
+ * *close is set if rounding decides whether it is. */
 static bool intersect_plane(const plane *p, const double base[3], const double direction[3], double *depth, bool *close)
 {
     *depth = (p->distance - dot_product(p->normal, base)) / dot_product(p->normal, direction);
@@ -58,8 +58,9 @@ static bool intersect_plane(const plane *p, const double base[3], const double d
     return is_within;
 }
 
-/* Compares a pixel's numbers. Normals are rounded by some units of 6e-8; a value has an error of its gradient of 0.91
- * times the position's 1.5e-5, which test_session_surfaces.c derives. */
+/* Returns whether a pixel's channels are those of plane p, or those of no surface if p is NULL. Normals are rounded by
+ * some units of 6e-8. The error of a value is its gradient of 0.91 times the position's error of 1.5e-5, which is
+ * derived in test_session_surfaces.c. */
 static bool is_as_expected(const caught_picture *picture, int pixel, const plane *p, const double place[3],
                            const double direction[3])
 {

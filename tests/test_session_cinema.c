@@ -1,5 +1,5 @@
-/* Checks databases as they are written: every byte of the table, the same on any number of ranks; runs that are
- * restarted or killed; and pictures of orbits, sweeps and paths, which equal those of scenes that define each picture
+/* Checks Cinema databases. Every byte of a table must be as expected, on any number of ranks, also if runs are
+ * restarted or killed. Pictures of orbits, sweeps and paths must equal those of scenes that define each picture
  * explicitly. */
 #include <math.h>
 #include <stdio.h>
@@ -67,7 +67,7 @@ static void run_steps(const char *scene, const session_input *in, int first, int
 
 /* ---- tables ---------------------------------------------------------------------------------------------------- */
 
-/* Makes the table that the scene `swept` writes for cycles first to end - 1. */
+/* Makes the table that is expected from the scene `swept` for cycles first to end - 1. */
 static void expect_table(int first, int end, char text[MOST])
 {
     static const double values[] = {0.25, -0.5}, elevations[] = {-20, 10.5};
@@ -78,7 +78,7 @@ static void expect_table(int first, int end, char text[MOST])
                                      i % 2 * 180, elevations[i / 2 % 2], values[i / 4], cycle, i % 4, values[i / 4]);
 }
 
-/* Converts the table's lines to a list in a script. */
+/* Converts the table's lines to the list that is expected in the database's script. */
 static void expect_script(const char *table, char text[MOST])
 {
     size_t size = (size_t)snprintf(text, MOST, "cinemaTable([\n");
@@ -158,7 +158,7 @@ static void restarted_runs_continue_the_table(void **state)
     make_input(&in);
     remove_files();
     run_steps(swept, &in, 0, 7);
-    run_steps(swept, &in, 3, 7); /* the first picture is that of cycle 4 */
+    run_steps(swept, &in, 3, 7); /* draws cycles 4 and 6 a second time */
     everywhere(is_table(0, 7));
     read_file("out/a.cdb/data.csv", MOST, text);
     if (own_rank == 0) text[strlen(text) - 9] = '\0'; /* truncates the last line */
@@ -180,8 +180,8 @@ static void restarted_runs_continue_the_table(void **state)
     input_free(&in);
 }
 
-/* Checks that lines between the session's first cycle and its first picture, which come from an earlier run, are
- * removed. */
+/* Checks that lines from an earlier run are removed if their cycle is between the session's first cycle and its first
+ * picture. */
 static void table_lines_begin_at_the_first_step(void **state)
 {
     (void)state;
@@ -202,7 +202,7 @@ static void table_lines_begin_at_the_first_step(void **state)
     input_free(&in);
 }
 
-/* Checks a simulation that goes back in time, and one that draws a cycle twice. */
+/* Checks a simulation that returns to an earlier cycle, and one that draws a cycle twice. */
 static void earlier_cycle_removes_later_table_lines(void **state)
 {
     (void)state;
@@ -273,8 +273,8 @@ static void unwritable_pictures_have_no_table_line(void **state)
     input_free(&in);
 }
 
-/* Checks that the table has only whole lines of whole steps, whichever allocation of rank 0 fails, and that it is
- * continued afterwards. */
+/* Checks that the table has only complete lines of complete steps, whichever allocation of rank 0 fails, and that later
+ * steps continue the table. */
 static void tables_stay_complete_if_memory_runs_out(void **state)
 {
     (void)state;
@@ -314,7 +314,7 @@ static void tables_stay_complete_if_memory_runs_out(void **state)
 
 /* ---- reports --------------------------------------------------------------------------------------------------- */
 
-/* Compares a database's report with a pattern, in which # stands for a time stamp of the scene's file. */
+/* Returns whether a database's report equals a pattern, in which # stands for a time stamp of the scene file. */
 static bool report_matches(const char *path, const char *pattern)
 {
     static char text[MOST];
@@ -329,8 +329,8 @@ static bool report_matches(const char *path, const char *pattern)
     return !*at;
 }
 
-/* Checks report.json, which contains what a program that watches the run cannot find out otherwise: warnings, and
- * errors of steps and of edits. */
+/* Checks report.json: it contains warnings, and errors of steps and of edits, which a program that watches the run
+ * cannot find out otherwise. */
 static void reports_have_warnings_and_edits(void **state)
 {
     (void)state;
@@ -402,7 +402,7 @@ static void take_picture_set(picture_set *set)
 {
     set->count = caught_count;
     memcpy(set->items, caught, sizeof caught);
-    caught_count = 0; /* the pictures now belong to the set */
+    caught_count = 0; /* the caught pictures now belong to the set */
 }
 
 static void free_pictures(picture_set *set)
@@ -410,7 +410,8 @@ static void free_pictures(picture_set *set)
     for (int i = 0; i < set->count; i++) free(set->items[i].rgba), free(set->items[i].depth);
 }
 
-/* Checks that two scenes draw the same pictures in the same order, to the bit, and that not all pictures are equal. */
+/* Checks that two scenes draw bit-identical pictures in the same order, and that not all pictures of a scene are
+ * equal. */
 static void check_scenes_draw_same(const char *one, const char *other, int cycle, int count)
 {
     picture_set set;
@@ -445,7 +446,8 @@ static void sweeps_draw_same_pictures_as_single_images(void **state)
                            0, 2);
 }
 
-/* Compares orbits with single cameras. The sines and cosines of the directions are exact, or are the same doubles. */
+/* Compares orbits with single cameras. The pictures can be bit-identical because the sines and cosines of the
+ * directions are exact, or are the same doubles. */
 static void orbits_draw_same_pictures_as_single_cameras(void **state)
 {
     (void)state;
@@ -473,7 +475,7 @@ static void paths_draw_same_pictures_as_single_cameras(void **state)
                            1);
 }
 
-/* Checks that a condition and once apply to all pictures of an image: a step draws all or none of them. */
+/* Checks that a condition and the key `once` apply to an image as a whole: a step draws all of its pictures or none. */
 static void conditions_hold_for_all_pictures_of_an_image(void **state)
 {
     (void)state;
@@ -500,8 +502,8 @@ static void conditions_hold_for_all_pictures_of_an_image(void **state)
     input_free(&in);
 }
 
-/* Checks that an isovalue which the field does not reach is reported once, though each picture has its own isovalue and
- * is drawn at each step. */
+/* Checks that an isovalue which the field does not reach is reported only once, although each picture has its own
+ * isovalue and is drawn at each step. */
 static void warnings_of_swept_isovalues_are_reported_once(void **state)
 {
     (void)state;

@@ -1,7 +1,8 @@
-/* Checks clipping: every layer is drawn only where planes, boxes and spheres leave it. Pictures are compared with
- * closed forms: the cube's surface, isosurfaces that are planes, and a medium of constant opacity by all methods,
- * clipped by the image's clip, by the layer's own, and next to a layer that is not clipped. Cells of every type are
- * tested; if they are distributed at random, the picture is the same as on one rank. */
+/* Checks clipping: every layer is drawn only in the region that the planes, boxes and spheres of a clip leave. Pictures
+ * are compared with closed forms for the cube's surface, for isosurfaces that are planes, and for a medium of constant
+ * opacity drawn by all methods. The clip belongs to the image, to each layer, or to one layer beside a layer that is
+ * not clipped. Cells of every type are tested; if they are distributed at random, the picture is the same as on one
+ * rank. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -25,12 +26,12 @@ static const half_space clips[] = {
 static const half_space corner[] = {{{-1, 0, 0}, -0.1}, {{1, 0, 0}, 5},  {{0, -1, 0}, 0.2},
                                     {{0, 1, 0}, 5},     {{0, 0, -1}, 0}, {{0, 0, 1}, 5}};
 
-/* The visible region: inside the half spaces and the ball, outside the hole, which is a ball that is cut out. */
+/* The visible region: inside the half spaces and the ball, and outside the hole, a convex region that is cut out. */
 typedef struct region {
     const char *text; /* text of the scene's clip */
     const half_space *planes, *hole;
     size_t plane_count, hole_count;
-    double radius; /* 0 if there is no ball */
+    double radius; /* radius of the ball; 0 if there is no ball */
     bool is_outside;
 } region;
 
@@ -120,7 +121,8 @@ static bool is_near_interval_end(double depth, interval s)
     return fabs(depth - s.begin) < 1e-4 || fabs(depth - s.end) < 1e-4;
 }
 
-/* Keeps the depths of crossings inside the region, in order; returns their number, or -1 if rounding decides. */
+/* Stores the depths of crossings that are inside the visible region, in their order. Returns their number, or -1 if a
+ * crossing is so near the region's border that rounding decides. */
 static int select_visible_depths(const region *g, const ray *r, const double *depths, int count, double out[MOST])
 {
     const interval within = compute_visible_interval(g, r), hole = compute_hole_interval(g, r);
@@ -153,7 +155,8 @@ static int find_visible_plane_hits(const region *g, const ray *r, double out[MOS
 
 typedef int see_function(const region *g, const ray *r, double out[MOST]);
 
-/* Checks surfaces of constant opacity: the depth of the nearest one, and the opacity from their number. */
+/* Checks surfaces of constant opacity: the depth of the nearest surface in each pixel, and the opacity that follows
+ * from the number of surfaces. */
 static bool has_surfaces(const caught_picture *picture, const region *g, see_function *see, double opacity)
 {
     int hits = 0, behind = 0;
@@ -167,7 +170,7 @@ static bool has_surfaces(const caught_picture *picture, const region *g, see_fun
         hits += count > 0;
         behind += count == 1;
         if (fabs((double)picture->rgba[4 * pixel + 3] - alpha) < 1e-6 &&
-            (own == depth || fabs(own - depth) < 1.5e-5)) /* the bound of test_session_surfaces.c */
+            (own == depth || fabs(own - depth) < 1.5e-5)) /* the tolerance derived in test_session_surfaces.c */
             continue;
         fprintf(stderr, "pixel %d: opacity %g, depth %g; expected %g, %g\n", pixel,
                 (double)picture->rgba[4 * pixel + 3], own, alpha, depth);
@@ -181,8 +184,9 @@ static double interval_length(interval s)
     return fmax(s.end - s.begin, 0);
 }
 
-/* Checks a medium in which half of the light passes a length of 1. The visible region extends by 2e-6 of half the
- * diagonal, which is 4e-6, divided by the cosine to its border. */
+/* Checks the opacity of a medium in which half of the light passes a length of 1. media: number of such media in the
+ * same region. The library enlarges the visible region by 2e-6 of half the diagonal, which is 4e-6, and a ray's
+ * interval by this over the cosine to the region's border. */
 static bool has_medium(const caught_picture *picture, const region *g, double media, double tolerance)
 {
     int hits = 0;
@@ -217,13 +221,14 @@ static bool is_clear_plane(const caught_picture *p, const region *g)
 {
     return has_surfaces(p, g, find_visible_plane_hits, 0.25);
 }
-/* The length of a ray that grazes the ball has an error of about the square root of the ball's error: 0.004 for
- * 4e-6. */
+/* If a ray grazes the ball, the length of its interval has an error of about the square root of the ball's error: 0.004
+ * for 4e-6. */
 static bool is_exact_medium(const caught_picture *p, const region *g)
 {
     return has_medium(p, g, 1, g->radius > 0 ? 4e-3 : 1e-4);
 }
-/* A step of 0.01 absorbs 0.0069 of the light, at either end of a ray and of the hole. */
+/* One sampling step of 0.01 absorbs 0.0069 of the light. An interval can be wrong by a step at either end, and the hole
+ * adds two ends. */
 static bool is_sampled_medium(const caught_picture *p, const region *g)
 {
     return has_medium(p, g, 1, g->hole_count || g->is_outside ? 0.028 : 0.014);
@@ -237,15 +242,16 @@ static bool is_double_sampled_medium(const caught_picture *p, const region *g)
     return has_medium(p, g, 2, g->hole_count || g->is_outside ? 0.056 : 0.028);
 }
 
-/* The text of each layer ends where its own clip may follow. */
+/* The format %s is replaced by the layer's own clip, if it has one. */
 #define MEDIUM "      - volume: {field: f, range: [-9, 9], opacity: [[0, 0.5], [1, 0.5]], unit_distance: 1%s}\n"
-/* A layer that is invisible, and is not clipped, so that the others' clip is not that of all layers. */
+/* An invisible layer without a clip, beside which the other layers' clip cannot be handled as the clip of the whole
+ * image. */
 #define WHOLE "      - isosurface: {field: f, values: [99]}\n"
 
 typedef struct clip_case {
     const char *name, *scene;
     bool (*is_right)(const caught_picture *picture, const region *g);
-    double tolerance; /* between ranks; 0 means the same bits */
+    double tolerance; /* allowed difference between the pictures of one and of several ranks; 0: bit-identical */
 } clip_case;
 
 static const clip_case cases[] = {
@@ -266,7 +272,7 @@ static const clip_case cases[] = {
 };
 enum { CASES = sizeof cases / sizeof *cases };
 
-/* Where the clip is defined: for the image, for the layers, or for the layers next to one that is not clipped. */
+/* Which part of the scene has the clip: the image, each layer, or each layer beside a layer that is not clipped. */
 typedef enum clip_place { OF_IMAGE, OF_LAYERS, BESIDE_A_WHOLE, PLACES } clip_place;
 
 static const char *write_clip_scene(const clip_case *c, const region *g, clip_place place)
@@ -314,8 +320,8 @@ static void verify_case(test_mesh_kind kind, const clip_case *c, const region *g
     free_caught(&alone);
 }
 
-/* Checks two pairs of a region and a position of the clip for each case, different ones for each kind of mesh: over all
- * kinds, every case is checked with all pairs. */
+/* Checks each case with two pairs of a region and a clip_place. The pairs differ from one kind of mesh to the next, so
+ * that every case is checked with all pairs over all kinds. */
 static void verify_all(test_mesh_kind kind, const session_input inputs[2])
 {
     for (int i = 0; i < CASES; i++)
@@ -341,7 +347,8 @@ static void layers_are_clipped(void **state)
     }
 }
 
-/* Checks that a slice in a clipping plane is visible as a whole, and in front of everything else. */
+/* Checks that a slice that coincides with a clipping plane is visible, wherever it is inside the mesh, and is in front
+ * of all else. */
 static void slices_in_the_clipping_plane_are_visible(void **state)
 {
     (void)state;

@@ -1,4 +1,4 @@
-/* Counts how often all ranks synchronize in a step: the collective MPI calls of the library. */
+/* Counts the library's collective MPI calls in a step, each of which synchronizes all ranks. */
 #include <mpi.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,7 +11,8 @@ enum { MOST_IDLE = 1 };
 
 static int calls;
 
-/* Functions with MPI's own names, to which the library's calls are linked. */
+/* Replacements of MPI functions: the linker resolves the library's calls to these counters, which call the PMPI
+ * functions. */
 int MPI_Allreduce(const void *send, void *receive, int count, MPI_Datatype type, MPI_Op op, MPI_Comm comm)
 {
     calls++;
@@ -81,19 +82,23 @@ static const counted_scene scenes[] = {
     {"transparent isosurfaces", "      - isosurface: {field: f, values: [-0.2, 0.1], opacity: 0.5}\n", 6},
     {"volume",
      "      - volume: {field: f, map: viridis, range: [-1, 1], opacity: [[0, 0], [1, 0.5]], unit_distance: 1}\n", 6},
-    /* One more call: where the plane lies in the cells. */
+    /* One more call than for an isosurface: it finds out how the plane intersects the cells. */
     {"slice", "      - slice: {field: f, range: [-1, 1], planes: [{normal: [1, 2, 3]}]}\n", 7},
-    /* Two more calls: the extremes of the values; whether cells with a volume count, and six digits. */
+    /* Two more calls than for an isosurface: one for the plane, one for the extremes of the values. Percentiles take
+     * eight more: one for the plane, one that finds out whether cells with a volume count, and one for each of six
+     * digits. */
     {"slice by its extremes", "      - slice: {field: f, planes: [{normal: [1, 2, 3]}]}\n", 8},
     {"slice by percentiles", "      - slice: {field: f, range: {percentile: [2, 98]}, planes: [{normal: [1, 2, 3]}]}\n",
      14},
     /* Two more calls: which faces are stale; whether there is memory for their values. */
     {"outer surface", "      - surface: {colour_by: {field: f, range: [-1, 1]}}\n", 8},
-    /* Three more calls: which values are stale; values to their homes, and means back. */
+    /* Three more calls: which values are stale; sending values to the ranks that compute means; sending the means
+     * back. */
     {"isosurface of a cell field", "      - isosurface: {field: c, values: [0.1]}\n", 9},
-    /* Four more calls: what layers need; vertices to neighbours, the largest gradient, and sums back. */
+    /* Four more calls: what the layers need; sending vertices to neighbours; the largest gradient; sending the sums
+     * back. */
     {"vertex normals", "      - isosurface: {field: f, values: [0.1], normals: vertex}\n", 10},
-    /* Four more calls: ranges and boxes; hits to neighbours, and samples back. */
+    /* Four more calls: ranges of values; bounding boxes; sending hits to neighbours; sending samples back. */
     {"differences", "      - isosurface: {field: f, values: [0.1], normals: differences}\n", 10},
 };
 
@@ -108,8 +113,8 @@ static const char *write_counted_scene(const counted_scene *s)
     return write_scene(text);
 }
 
-/* Counts the calls of the third and the fourth step, when everything about an unchanged mesh is known. The writer's
- * thread makes no MPI calls. */
+/* Counts the collective calls of the third and the fourth step, in which everything about the unchanged mesh is already
+ * known. The thread that writes pictures makes no MPI calls. */
 static void count_steps(const counted_scene *s)
 {
     session_input in;
@@ -150,8 +155,8 @@ static void step_makes_few_collective_calls(void **state)
     session_writes_behind = false;
 }
 
-/* Checks that the picture is the same with every schedule of fragments, and that the report states the schedule and its
- * bytes. */
+/* Checks that pictures are bit-identical for every communication schedule of fragments, and that the report states the
+ * schedule and the number of bytes it sends. */
 static void schedules_change_no_bit_and_are_reported(void **context)
 {
     static const char *const names[] = {"auto", "direct", "nodes", "radix", "binary"};

@@ -1,6 +1,6 @@
-/* Checks sources of colour ranges over all ranks: pictures with each source equal, to the bit, those with the range
- * that brute force finds over the whole mesh. Ranges over a run widen and outlive the session, and a corrupt file of
- * them is an error. All ranks have colour maps from files. */
+/* Checks the sources of colour ranges over all ranks: the picture with each source is bit-identical to the picture with
+ * the explicit range that brute force finds over the whole mesh. Ranges over a run widen from step to step and are kept
+ * in a file for later sessions; a corrupt file is an error. Colour maps from files must reach all ranks. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,7 +16,8 @@ static const test_mesh_kind kind = TEST_MIXED;
 static char folder[512], image_name[32];
 static session_input block, distributed;
 
-/* Returns a scene with a coloured surface and a volume, each with its keys. */
+/* Returns a scene with a coloured isosurface and a volume. The keys are inserted into the isosurface's colours and into
+ * the volume. */
 static const char *make_scene(const char *surface_keys, const char *volume_keys)
 {
     static char text[2048];
@@ -46,8 +47,8 @@ static caught_picture draw_with_keys(const session_input *in, const char *surfac
     return picture;
 }
 
-/* Compares two pictures by the largest difference of a channel and frees both. Surfaces have the same bits; volumes
- * agree to 1e-6 on several ranks. */
+/* Checks that no colour channel differs by more than `allowed`, and frees both pictures. Pictures of surfaces are
+ * bit-identical; volumes agree to 1e-6 on several ranks. */
 static void assert_alike(caught_picture *a, caught_picture *b, double allowed)
 {
     double worst = 0;
@@ -69,7 +70,7 @@ static int compare_values(const void *left, const void *right)
 typedef struct truth {
     double least, most, least_positive;
     int64_t count, positive;
-    double *middles; /* middle of the range of each cell's values, sorted */
+    double *middles; /* sorted middles of the ranges of cells: half the sum of a cell's least and greatest value */
 } truth;
 
 static truth compute_exact_ranges(void)
@@ -95,8 +96,8 @@ static truth compute_exact_ranges(void)
     return t;
 }
 
-/* Returns the percentile by the nearest rank: the least value such that percent of the values, without the first
- * `skipped`, are at most as large. */
+/* Returns a percentile by the nearest-rank method, ignoring the first `skipped` values: the least value such that
+ * `percent` percent of the values are at most as large. */
 static double compute_percentile(const truth *t, int64_t skipped, double percent)
 {
     const int64_t count = t->count - skipped, rank = (int64_t)ceil(percent / 100 * (double)count);
@@ -176,10 +177,11 @@ static void ranges_over_a_run_widen_and_persist(void **state)
     }
     insitu_destroy(&session);
     everywhere(own_rank != 0 || access(make_ranges_file_name(), R_OK) == 0);
-    /* Another session continues the range. Only volumes are compared, since another field colours the surface. */
+    /* Another session continues the range from the file. The comparison concerns the volume, because the surface is
+     * coloured by another field. */
     caught_picture again = draw_with_keys(&distributed, "", run);
     assert_alike(&again, &fixed, 0);
-    /* There is no range for another field yet. */
+    /* The file contains no range for another field yet. */
     caught_picture other = draw_with_keys(&distributed, "", ", component: magnitude, range: run"), fresh;
     fresh = draw_with_keys(&distributed, "", ", component: magnitude");
     assert_alike(&other, &fresh, 0);
@@ -189,8 +191,8 @@ static void ranges_over_a_run_widen_and_persist(void **state)
     remove_ranges();
 }
 
-/* Checks every kind of layer with colours of a field: the picture equals that with the data's range, and the file has a
- * line for it. */
+/* Checks every kind of layer that is coloured by a field, with a range over a run: the picture equals that with the
+ * range of the data, and the file has a line for the layer. */
 static void every_kind_of_layer_has_a_range_over_a_run(void **state)
 {
     (void)state;
@@ -270,8 +272,9 @@ static void assert_colour(const render_transfer *t, double value, const float ex
             fail_msg("value %g, channel %d: %g, expected %g", value, c, colour[c], (double)expected[c]);
 }
 
-/* Checks volumes with bands and outside colours. Within a sixteenth of a band from its border the colour may be that of
- * the neighbouring band; outside colours begin one entry beyond the ends. */
+/* Checks colour bands of volumes and the colours outside the range. Within a sixteenth of a band from its border the
+ * colour may be that of the neighbouring band. The colours outside begin one table entry beyond the ends of the
+ * range. */
 static void volumes_have_bands_and_colours_outside(void **state)
 {
     (void)state;
@@ -310,7 +313,8 @@ static void volumes_have_bands_and_colours_outside(void **state)
     }
 }
 
-/* Checks control points of the opacity on a logarithmic scale: the renderer interpolates linearly along the scale. */
+/* Checks control points of the opacity on a logarithmic scale: the renderer interpolates the opacity linearly in the
+ * scaled value. */
 static void opacity_points_follow_the_scale(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
-/* Checks concave polygons as shells and as faces of polyhedra under `surface`: coverage, depth, value, light, edges and
- * clips, compared with closed forms; with any distribution of cells the picture is the same to the bit as on one
- * rank. */
+/* Checks concave polygons, as shells and as faces of polyhedra, in the layer `surface`. Coverage, depth, value,
+ * shading, edges and clips are compared with closed forms. With any distribution of cells the picture is bit-identical
+ * to that of one rank. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,7 +12,7 @@
 
 enum { SIZE = 240, PIXELS = SIZE * SIZE, TILES = 9, MOST_CORNERS = 64, MOST_ENTRIES = 512 };
 
-/* A pixel is 1/100 wide; the view is along z from z = 5. */
+/* A pixel is 1/100 wide; the camera looks along z from z = 5. */
 #define IMAGE(more, layer)                                                                                             \
     "images:\n  - name: a\n    size: [240, 240]\n    background: [0, 0, 0, 0]\n    camera: {position: [0, 0, 5], "     \
     "focal: [0, 0, 0], up: [0, 1, 0], projection: orthographic, height: 2.4}\n" more                                   \
@@ -58,8 +58,8 @@ static void make_star(tile *t)
     }
 }
 
-/* Makes polygons in the unit square: convex and concave ones, one with a hole at the end of a bridge, and ones with
- * repeated corners. */
+/* Makes polygons in the unit square: convex ones, concave ones, one with a hole that a double edge (bridge) connects to
+ * its outline, and ones with repeated corners. */
 static void make_tiles(tile tiles[TILES])
 {
     static const double u[8][2] = {{0, 0}, {1, 0}, {1, 1}, {0.67, 1}, {0.67, 0.33}, {0.33, 0.33}, {0.33, 1}, {0, 1}};
@@ -95,7 +95,8 @@ typedef struct shells {
     unsigned char types[TILES];
 } shells;
 
-/* Makes the rank's polygons on the plane z = 0.3 x + 0.2 y; the first corner of each polygon depends on the rank. */
+/* Makes the rank's polygons, on the plane z = 0.3 x + 0.2 y. The corner with which each polygon begins depends on the
+ * rank. */
 static void make_shells(const tile tiles[TILES], int rank, int ranks, shells *out)
 {
     *out = (shells){0};
@@ -147,7 +148,8 @@ static caught_picture draw_shells(MPI_Comm comm, const char *scene, const shells
 
 /* ---- the expected pictures ------------------------------------------------------------------------------------ */
 
-/* Returns how often the loop winds around the point, and computes the point's distance from the loop. */
+/* Returns how often the polygon's outline winds around the point; lowers *distance to the point's distance from the
+ * outline. */
 static int compute_winding_number(const tile *t, const double at[2], double *distance)
 {
     int turns = 0;
@@ -183,7 +185,7 @@ static truth compute_expected_pixel(const tile tiles[TILES], int pixel)
 
 typedef bool verify_function(const truth *t, const double at[2], const float *rgba, float depth);
 
-/* Checks depths and colours to the bounds that test_session_surfaces.c derives. */
+/* Checks depths and colours. The tolerances are derived in test_session_surfaces.c. */
 static bool is_value(const truth *t, const double at[2], const float *rgba, float depth)
 {
     (void)at;
@@ -193,8 +195,8 @@ static bool is_value(const truth *t, const double at[2], const float *rgba, floa
     return rgba[3] == 1 && fabs((double)depth - t->depth) < 1.5e-5 && fabs((double)rgba[0] - grey) < 1e-4;
 }
 
-/* Checks the light: a plane seen along one direction has one brightness, to a few units in the last place from the
- * rounding of normals. */
+/* Checks shading: a plane seen along one direction has the same brightness everywhere, except for a few units in the
+ * last place due to the rounding of normals. */
 static bool is_lit(const truth *t, const double at[2], const float *rgba, float depth)
 {
     static float first;
@@ -205,7 +207,8 @@ static bool is_lit(const truth *t, const double at[2], const float *rgba, float 
     return rgba[0] > 0.1f && fabsf(rgba[0] - first) < 1e-5f;
 }
 
-/* Checks black lines, three pixels wide, on the edges and nowhere else. */
+/* Checks black lines that are three pixels wide on the polygons' edges: inside polygons all other pixels must be
+ * white. */
 static bool is_lined(const truth *t, const double at[2], const float *rgba, float depth)
 {
     (void)at;
@@ -292,8 +295,8 @@ static void concave_shells_match_their_outline(void **state)
 
 /* ---- polyhedra ------------------------------------------------------------------------------------------------ */
 
-/* Checks upright prisms from z = -0.4 to 0.45 whose top is shifted by 0.1 along y: the top must be visible in its
- * polygon, and nothing may be nearer. */
+/* Checks upright prisms from z = -0.4 to z = 0.45 whose top is shifted by 0.1 along y. The visible top must have the
+ * outline of its polygon, and nothing may be nearer than the top. */
 static void tops_of_concave_prisms_match_their_outline(void **state)
 {
     (void)state;

@@ -1,4 +1,5 @@
-/* Checks a rank's share of the cores for any binding of ranks: by arithmetic, and on this machine. */
+/* Checks the number of cores that a rank receives, for different bindings of ranks to cores: by arithmetic, and with
+ * this machine's cores. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -12,7 +13,7 @@
 
 enum { MOST_CORES = 128, MOST_RANKS = 16 };
 
-/* The cores that a rank may use: count of them, from first on. */
+/* The cores to which a rank is bound: `count` cores from number `first` on. */
 typedef struct binding {
     int first, count;
 } binding;
@@ -29,7 +30,7 @@ static void check_shares(const binding *ranks, int rank_count, const int *expect
         assert_int_equal(session_share_of_cores(own[r], counts, MOST_CORES), expected[r]);
 }
 
-/* Checks the share of ranks with the same binding. */
+/* Checks the numbers of cores of ranks that are all bound to the same cores. */
 static void check_equal_shares(binding one, int rank_count, int expected)
 {
     binding ranks[MOST_RANKS];
@@ -48,7 +49,7 @@ static void ranks_divide_the_cores_of_their_affinity_mask(void **context)
     check_equal_shares((binding){0, 64}, 8, 8);
     check_equal_shares((binding){0, 64}, 7, 9);
     check_equal_shares((binding){0, 2}, 8, 1);
-    check_equal_shares((binding){40, 12}, 3, 4); /* the cores of a container */
+    check_equal_shares((binding){40, 12}, 3, 4); /* the container's cores do not begin at 0 */
     check_shares((const binding[]){{0, 32}, {32, 32}, {0, 32}, {32, 32}}, 4, (const int[]){16, 16, 16, 16});
     check_shares((const binding[]){{0, 4}, {4, 4}, {8, 4}}, 3, (const int[]){4, 4, 4});
     check_shares((const binding[]){{0, 1}, {0, 4}}, 2, (const int[]){1, 3});

@@ -1,7 +1,8 @@
-/* Checks fields with a value at each corner of each cell. On discontinuous meshes the pictures equal, to the bit, those
- * of a mesh whose vertices the caller duplicated: with fields at vertices and cells beside them, through an index, in
- * rows, with another order of vertices, with ids, and when values and coordinates change. Averaged fields draw the
- * pictures of the means at vertices by brute force. Errors are returned on all ranks. */
+/* Checks fields that have a value at each corner of each cell. Discontinuous fields must give pictures that are
+ * bit-identical to those of a mesh whose vertices the caller duplicated: beside fields at vertices and at cells, with
+ * values given through an index or in rows, with another order of vertices, with vertex ids, and after values and
+ * coordinates change. Averaged fields must give the pictures of means at vertices, which are computed by brute force.
+ * Errors must be returned on all ranks. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -40,14 +41,15 @@ typedef struct form {
     bool is_by_index, is_in_rows, is_lexicographic, has_ids;
 } form;
 
-/* The fields as plain arrays: at the shared vertices, at the corners, and at the cells. */
+/* The fields as plain arrays: at shared vertices, at corners and at cells. gathered: values of the vertices at the
+ * corners. */
 typedef struct values {
     int64_t corners;
     double *at_vertices, *at_corners, *at_cells, *gathered;
-    double *distributed; /* the corners' values in the layout of the form */
-    int64_t *index;      /* NULL if there is none */
+    double *distributed; /* values at corners in the layout of the form */
+    int64_t *index;      /* index of each corner's value; NULL if the form has no index */
     int64_t distributed_count;
-    double *coordinates; /* of the mesh with duplicated vertices */
+    double *coordinates; /* coordinates, and below connectivity and ids, of the mesh with duplicated vertices */
     int64_t *connectivity, *ids, *doubled_ids;
 } values;
 
@@ -65,7 +67,7 @@ static int64_t *allocate_integers(int64_t count)
     return out;
 }
 
-/* Returns a number that depends only on the cell, not on its rank. */
+/* Returns a number that depends only on the cell's coordinates, and therefore not on the rank that owns the cell. */
 static double compute_cell_number(const test_mesh *part, int64_t cell)
 {
     double sum = 0;
@@ -121,7 +123,7 @@ static values make_values(const form *of, const test_mesh *part)
     v.connectivity = allocate_integers(corners);
     v.ids = allocate_integers(part->vertex_count);
     v.doubled_ids = allocate_integers(corners);
-    /* entries after the corners of a row, which must not be read */
+    /* invalid indices, which remain after the corners of each row and must not be read */
     for (int64_t i = 0; i < places; i++) v.index[i] = -1;
     fill_values(&v, of, part, 1);
     duplicate_vertices(&v, part);
@@ -135,7 +137,7 @@ static void free_values(values *v)
     free(v->coordinates), free(v->connectivity), free(v->ids), free(v->doubled_ids);
 }
 
-/* Changes each cell's vertices to lexicographic order; the permutation is its own inverse. */
+/* Changes the vertices of hexes to lexicographic order; the permutation is its own inverse. */
 static void sort_hex_vertices(test_mesh *part)
 {
     for (int64_t i = 0; i + 3 < part->connectivity_count; i += 4) {
@@ -221,7 +223,7 @@ static void scale_coordinates(session_input *in, values *v, double scale)
     for (int64_t i = 0; i < 3 * v->corners; i++) v->coordinates[i] *= scale;
 }
 
-/* Draws the mesh unchanged, with other values, and with other coordinates. */
+/* Draws the mesh in three steps: first as it is, then with other values, and then with other coordinates. */
 static drawing draw_form(session_input *in, values *v, const form *of, bool is_doubled)
 {
     drawing out = {.copied = 0};
@@ -266,7 +268,7 @@ static void check_form(test_mesh_kind kind, const form *of)
     if (of->is_lexicographic) sort_hex_vertices(&in.part);
     values v = make_values(of, &in.part);
     drawing doubled = draw_form(&in, &v, of, true), discontinuous = draw_form(&in, &v, of, false);
-    /* for each corner: coordinates, an index, and g; also f if it cannot be read in place */
+    /* bytes copied for each corner: coordinates, an index, and g; also f if it cannot be read in place */
     const int64_t tuples = 3 * 8 + 4 + 8 + (of->is_by_index || of->is_in_rows ? 8 : 0);
     everywhere(discontinuous.copied == doubled.copied + tuples * v.corners);
     compare_drawings(&doubled, &discontinuous, STEPS);
@@ -302,8 +304,8 @@ static int compare_magnitudes(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Returns the mean over all corners of the whole mesh at one position, summed by increasing size, as means of cells
- * are. */
+/* Returns the mean over all corners of the whole mesh at one position. The summation order, by increasing magnitude, is
+ * that of the library's means of cells. */
 static double compute_corner_mean(const test_mesh *whole, const double at[3])
 {
     double found[256], sum = 0;
@@ -398,7 +400,7 @@ static void wrong_input_is_reported_on_all_ranks(void **state)
     input_free(&in);
 }
 
-/* Checks errors that a step detects; the centring is the same on all ranks. */
+/* Checks errors in the contents of arrays, which only a step detects. The centring is the same on all ranks. */
 static void wrong_array_contents_are_reported_on_all_ranks(void **state)
 {
     (void)state;

@@ -1,5 +1,6 @@
-/* Checks deep pictures: the samples of every pixel are in order and do not overlap, and blended in double they give the
- * flat picture. For surfaces and for reproducible volumes, any partition gives the samples of one rank to the bit. */
+/* Checks deep pictures. The samples of every pixel must be sorted by depth without overlaps, and blending them in
+ * double must give the flat picture. For surfaces and for reproducible volumes, the samples of any partition must be
+ * bit-identical to those of one rank. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,7 +10,7 @@
 
 enum { SIDE = 3, WIDTH = 48, HEIGHT = 36, PIXELS = WIDTH * HEIGHT };
 
-/* The colours are 0 and 1, which are the same in sRGB and in linear light. */
+/* All colour components are 0 or 1, which have the same values in sRGB and in linear light. */
 #define SCENE(layers, more)                                                                                            \
     "images:\n  - name: a\n    size: [48, 36]\n    background: [0, 1, 0, 0.5]\n" more "    layers:\n" layers           \
     "    outputs: [{path: flat.exr}, {path: deep.exr, deep: true}]\n"
@@ -23,7 +24,7 @@ enum { SIDE = 3, WIDTH = 48, HEIGHT = 36, PIXELS = WIDTH * HEIGHT };
 typedef struct deep_case {
     const char *name, *scene;
     bool is_of_surfaces;
-    bool is_reproducible; /* the same on any partition, to the bit */
+    bool is_reproducible; /* whether the samples of any partition are bit-identical */
 } deep_case;
 
 static const deep_case cases[] = {
@@ -47,10 +48,10 @@ enum { CASES = sizeof cases / sizeof *cases, ANTIALIASED = 1 };
 
 /* ---- one picture ---------------------------------------------------------------------------------------------- */
 
-/* Returns the bound of a pixel's error. A float's rounding is 2^-24 of at most 1. A sample takes a product, a sum and
- * another product in compositing, and the deep picture's A is a difference: four roundings. For mixed segments the flat
- * picture multiplies the transmittance of a run of them as one number: two more. The background takes a product and a
- * sum. */
+/* Returns the bound of the error of a pixel with this number of samples. A float's rounding error is at most 2^-24, as
+ * all numbers are at most 1. Compositing a sample takes two products and a sum, and the opacity in the deep picture is
+ * a difference: four roundings. For mixed segments the flat picture multiplies the transmittance of several consecutive
+ * ones as one number: two more roundings. The background takes a product and a sum. */
 static double compute_error_bound(int64_t samples)
 {
     return ldexp((double)(6 * samples + 2), -24);
@@ -66,7 +67,7 @@ static bool is_in_order(const insitu_deep_sample *samples, int64_t count)
     return true;
 }
 
-/* Returns how far the flat pixel is from the samples blended over the background. */
+/* Returns the largest difference between a channel of the flat pixel and of the samples blended over the background. */
 static double distance_from_flattened(const insitu_deep_sample *samples, int64_t count, const double behind[4],
                                       const float *flat)
 {
@@ -97,7 +98,8 @@ static bool is_the_flat_picture(const caught_picture *deep, const caught_picture
     return shown > 0 || strcmp(name, "nothing") == 0;
 }
 
-/* Checks that the nearest surface's depth is that of the first sample, since there is no volume. */
+/* Checks that the depth in the flat picture is that of the first sample, which belongs to the nearest surface because
+ * the scene has no volume. */
 static bool has_depths(const caught_picture *deep, const caught_picture *flat)
 {
     for (int p = 0; p < PIXELS; p++) {

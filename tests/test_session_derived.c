@@ -1,6 +1,6 @@
-/* Checks derived fields: gradients of linear functions are exact on every cell type; expressions are compared with C;
- * values for curved functions converge with the square of the cell size; any partition gives the same bits; unchanged
- * fields are not computed again; and errors are reported on all ranks. */
+/* Checks derived fields: gradients of linear functions are exact on every cell type; expressions are compared with C
+ * arithmetic; errors for curved functions decrease with the square of the cell size; results are bit-identical for any
+ * partition; unchanged fields are not recomputed; and errors are reported on all ranks. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,7 +13,8 @@
 
 enum { SIDE = 3, MOST_TEXT = 1 << 14 };
 
-/* A scene with statistics that need the fields, and an image that is never drawn. */
+/* A scene that requests the derived field by a condition that never holds, so that the field is computed but the image
+ * is never drawn. */
 #define SCENE(fields, name)                                                                                            \
     "fields: {" fields "}\nimages:\n  - name: a\n    size: [8, 6]\n    when: {field: " name ", above: 1e30}\n"         \
     "    layers: [{isosurface: {field: " name ", values: [0.1]}}]\n    outputs: [{path: a.png}]\n"
@@ -22,7 +23,7 @@ enum { SIDE = 3, MOST_TEXT = 1 << 14 };
 
 typedef void vector_function(const double position[3], double out[3]);
 
-/* A field of 3 components in a stride of 4 numbers, of either width; the test owns its arrays. */
+/* A field of 3 components, stored with a stride of 4 numbers that are floats or doubles. The test owns the array. */
 typedef struct vector_field {
     void *values;
     insitu_field field;
@@ -113,7 +114,7 @@ static void linear_velocity(const double p[3], double out[3])
     for (int c = 0; c < 3; c++) out[c] = slopes[c][0] * p[0] + slopes[c][1] * p[1] + slopes[c][2] * p[2] + 2 - c;
 }
 
-/* Returns det(M - x), whose middle root is found by bisection between the extremes of its derivative. */
+/* Returns det(M - x). The middle root is found by bisection between the positions at which its derivative is 0. */
 static double shifted_determinant(const double m[3][3], double x)
 {
     const double a = m[0][0] - x, b = m[1][1] - x, c = m[2][2] - x;
@@ -127,7 +128,7 @@ static double find_middle_eigenvalue(const double m[3][3])
     const double second = m[0][0] * m[1][1] + m[0][0] * m[2][2] + m[1][1] * m[2][2] - m[0][1] * m[1][0] -
                           m[0][2] * m[2][0] - m[1][2] * m[2][1];
     const double half = sqrt(trace * trace / 9 - second / 3);
-    double low = trace / 3 - half, high = trace / 3 + half; /* the determinant increases between them */
+    double low = trace / 3 - half, high = trace / 3 + half; /* the determinant increases between low and high */
     for (int i = 0; i < 200; i++) {
         const double middle = 0.5 * (low + high);
         if (shifted_determinant(m, middle) < 0)
@@ -144,7 +145,8 @@ typedef struct expected_value {
     double value;
 } expected_value;
 
-/* Computes the quantities from the tensors S and W themselves. */
+/* Computes the Q criterion, lambda2 and the strain rate directly from the symmetric part S and the antisymmetric part W
+ * of the velocity gradient. */
 static void find_tensors(double *q, double *lambda2, double *strain)
 {
     double s[3][3], w[3][3], m[3][3] = {{0}}, of_s = 0, of_w = 0;
@@ -201,8 +203,8 @@ static double find_largest_linear_error(const insitu_session *session, const tes
     return worst;
 }
 
-/* Checks linear velocities. With doubles only rounding remains, 1e-15 over the shortest edge, at most 1e-10 for a
- * sliver; results in float are off by the last bit of a value near 1 over an edge of 0.2: 6e-8 * 2 / 0.2. */
+/* Checks linear velocities. With doubles only rounding errors remain: 1e-15 over the shortest edge, at most 1e-10 for a
+ * sliver. Results in float are off by the last bit of a value near 1, divided by an edge of 0.2: 6e-8 * 2 / 0.2. */
 static void linear_velocities_are_exact(void **state)
 {
     (void)state;
@@ -291,7 +293,7 @@ static int64_t find_vertex(const test_mesh *whole, const double place[3])
     return -1;
 }
 
-/* Marks the vertices of cells that are no ghosts; other vertices need no values. */
+/* Marks the vertices of all cells that are not ghosts. No other vertex needs a value. */
 static bool *find_used(const insitu_session *session, const char *mesh)
 {
     const grid *g = &session_find_mesh(&session->meshes, mesh)->cells;
@@ -324,8 +326,8 @@ static bool check_same_bits(const insitu_session *parts, const char *mesh, const
 #define PARTITION_SCENE                                                                                                \
     SCENE("q: {q_criterion: u}, w: {vorticity: u}, l: {lambda2: u}, mixed: q + w.z + l + c.x", "mixed")
 
-/* Checks that threads, ranks, the numbering of vertices and cells, the order of a cell's vertices, and ghosts do not
- * change the results. */
+/* Checks that the results do not depend on the number of threads and ranks, the numbering of vertices and cells, the
+ * order of a cell's vertices, and ghost cells. */
 static void derived_fields_do_not_depend_on_the_partition(void **state)
 {
     (void)state;
@@ -365,8 +367,8 @@ static void derived_fields_do_not_depend_on_the_partition(void **state)
 
 /* ---- several meshes ---------------------------------------------------------------------------------------------- */
 
-/* Checks that blocks of one mesh, on any ranks, give the same fields as the whole mesh: gradients at a block's border
- * use both sides. */
+/* Checks that two parts of a mesh, given as blocks on any ranks, have the same derived fields as the whole mesh:
+ * gradients at the border of a block use the cells on both sides. */
 static void derived_fields_have_no_seam_between_blocks(void **state)
 {
     (void)state;
@@ -408,8 +410,8 @@ static void derived_fields_have_no_seam_between_blocks(void **state)
 
 enum { SHEET = 4 };
 
-/* Checks a sheet on the plane z = 0.3 x + 0.2 y, of quads and, in every second square, triangles: its gradients are
- * those in space without the component normal to the sheet. */
+/* Checks a sheet on the plane z = 0.3 x + 0.2 y that consists of quads and, in every second square, of triangles. The
+ * gradients must be those of the function in space without the component normal to the sheet. */
 static void gradients_of_shells_are_tangential(void **state)
 {
     (void)state;
@@ -467,8 +469,8 @@ static void gradients_of_shells_are_tangential(void **state)
     insitu_destroy(&session);
 }
 
-/* Checks velocities at cells and corners. Those at cells are first averaged at the vertices, which is exact in a
- * lattice except at its border; those at corners are exact. */
+/* Checks velocities at cells and at corners. Velocities at cells are first averaged at the vertices, which is exact for
+ * linear functions in a lattice except at its border. Velocities at corners give exact results everywhere. */
 static void velocities_at_cells_and_corners_are_supported(void **state)
 {
     (void)state;
@@ -544,7 +546,7 @@ static void unchanged_derived_fields_are_not_recomputed(void **state)
     set_field_and_step(session, &u, INSITU_CHANGED_VALUES, 2);
     everywhere(get_field_version(session, "d") > of_d && get_field_version(session, "e") > of_e);
     everywhere(in.part.cell_count == 0 || fabs(get_derived_value(session, "d", 0, 0) - 2 * trace) < 1e-9);
-    /* A mesh twice as long has half the slopes; a field that depends only on values is not computed again. */
+    /* In a mesh twice as long the slopes are half as large. A field that depends only on values is not recomputed. */
     const int64_t before = get_field_version(session, "x");
     for (int64_t i = 0; i < 3 * in.part.vertex_count; i++) in.part.coordinates[i] *= 2;
     in.mesh.changed = INSITU_CHANGED_GEOMETRY;
@@ -557,7 +559,8 @@ static void unchanged_derived_fields_are_not_recomputed(void **state)
     input_free(&in);
 }
 
-/* Checks that an edited scene has its own derived fields, even if their names are those of the previous scene. */
+/* Checks that an edited scene computes its own derived fields, even if the previous scene had fields of the same
+ * names. */
 static void edited_scene_computes_its_own_derived_fields(void **state)
 {
     (void)state;
@@ -601,8 +604,8 @@ static const wrong_case wrong[] = {
     {"u: f + 1, q: f / 2", {"", "", ""}},
 };
 
-/* Checks that each error is reported by the step, on all ranks, with its line, and that an image of other fields is
- * still drawn. */
+/* Checks that each error is reported by the step on all ranks, with its line in the scene, and that an image with other
+ * fields is still drawn. */
 static void wrong_input_is_reported_on_all_ranks(void **state)
 {
     (void)state;
@@ -637,8 +640,8 @@ static void wrong_input_is_reported_on_all_ranks(void **state)
     input_free(&in);
 }
 
-/* Checks a name that the simulation uses too, one that is similar to a derived field's, and a field whose components
- * differ on one rank. */
+/* Checks a derived field with the name of a field that the simulation sets, a misspelt name of a derived field, and a
+ * field whose number of components differs on one rank. */
 static void name_conflicts_are_reported_on_all_ranks(void **state)
 {
     (void)state;
@@ -656,7 +659,7 @@ static void name_conflicts_are_reported_on_all_ranks(void **state)
     check_reported_everywhere(session, status, INSITU_ERROR_FIELD,
                               "no mesh has the field \"sped\" (did you mean speed?)", "there are: ");
     insitu_destroy(&session);
-    /* The simulation may set the field later. */
+    /* The simulation sets the field only after the first step. */
     session = open_stepped(MPI_COMM_WORLD, SCENE("late: u.x + 1", "late"), &in, &u);
     insitu_field late = in.field;
     late.name = "late";

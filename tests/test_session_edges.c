@@ -1,6 +1,6 @@
-/* Checks edges of outer surfaces: lines cover every pixel according to the projected edges of the face that its ray
- * hits, for all types of cells and for faces with more than four corners; the picture is the same on any number of
- * ranks. */
+/* Checks edges of outer surfaces. The part of each pixel that lines cover must follow from the projected edges of the
+ * face that the pixel's ray hits, for all types of cells and for faces with more than four corners. The picture must be
+ * the same on any number of ranks. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -48,7 +48,7 @@ typedef struct body {
     polygon *faces;
 } body;
 
-/* Makes a body of the faces on the border of the cube from -1 to 1, or of all faces of all cells. */
+/* Makes a body of the faces on the border of the cube from -1 to 1 (is_cube), or of all faces of all cells. */
 static body make_body(const grid *g, bool is_cube)
 {
     body out = {0};
@@ -100,7 +100,7 @@ static double intersect_face(const polygon *face, const double base[3], const do
     return depth;
 }
 
-/* Projects a point into the picture, in pixels; returns its depth. */
+/* Projects a point into the picture; out receives its position in pixels. Returns the point's depth. */
 static double project_point(const render_camera *c, const double point[3], double out[2])
 {
     double from[3];
@@ -112,8 +112,9 @@ static double project_point(const render_camera *c, const double point[3], doubl
     return depth;
 }
 
-/* Bounds the distance of a line's middle from the pixel's, in pixels. The library divides an edge's offset from the ray
- * by the hit's depth instead of the edge's own; the error is bounded by the difference of the two depths. */
+/* Computes a lower and an upper bound of the distance, in pixels, from the pixel's centre to the middle of the nearest
+ * line. The library divides an edge's offset from the ray by the depth of the hit instead of the edge's own depth; the
+ * resulting error is bounded by the difference of the two depths. */
 static void bound_distance(const render_camera *c, const polygon *face, const double pixel[2], double hit,
                            double bounds[2])
 {
@@ -132,8 +133,8 @@ static void bound_distance(const render_camera *c, const polygon *face, const do
     }
 }
 
-/* Checks the white that lines leave in a pixel. The tolerance is single precision: positions are rounded by about 5e-7
- * in scenes of size 5, a 15,000th of a pixel, but more on slanted faces. */
+/* Checks how much of a pixel the lines leave white. The tolerance is that of single precision: positions are rounded by
+ * about 5e-7 in scenes of size 5, which is 1/15,000 of a pixel, but more on slanted faces. */
 static bool is_pixel(const render_camera *c, const body *b, const caught_picture *picture, int pixel, bool *has_line)
 {
     double base[3], direction[3], nearest = INFINITY, bounds[2];
@@ -167,7 +168,7 @@ static bool is_exact_picture(const caught_picture *picture, const body *b, bool 
 
 /* ---- pictures ------------------------------------------------------------------------------------------------ */
 
-/* Draws a picture; also makes the body if b is not NULL. */
+/* Draws a picture; if b is not NULL, also makes the body of the session's mesh. */
 static caught_picture draw_edges(MPI_Comm comm, const char *scene, const session_input *in, body *b)
 {
     insitu_session *session = open_session_and_draw(comm, scene, in);
@@ -203,8 +204,8 @@ static void lines_are_drawn_along_edges(void **state)
     }
 }
 
-/* Checks a prism over a regular hexagon, whose fan has three inner lines that must not be drawn; it is rotated, so that
- * its least corner changes. */
+/* Checks a prism over a regular hexagon: the triangle fan of the hexagon has three inner edges, along which no lines
+ * may be drawn. The prism is rotated, because the fan depends on which corner has the smallest coordinates. */
 static void faces_of_many_corners_have_no_other_lines(void **state)
 {
     (void)state;
@@ -270,7 +271,8 @@ static void any_ranks_draw_one_picture(void **state)
     }
 }
 
-/* Checks 24 squares a side on about 10 pixels: the picture must be white, as without lines. */
+/* Checks a lattice of 24 squares along each side that covers about 10 pixels: the picture must be white, as without
+ * lines. */
 static void lines_fade_on_small_faces(void **state)
 {
     (void)state;
@@ -292,9 +294,10 @@ static void lines_fade_on_small_faces(void **state)
 
 enum { ACROSS = 65 };
 
-/* Draws along an axis with rays on lines of the lattice, where all numbers are exact: pixels are 1/32 wide, with the
- * middle one at 0. Surfaces have opacity 0.5, so that a front and a back that are hit once each leave a quarter of the
- * light. Pixels on the border of the picture are not checked, since the surface covers half of them. */
+/* Returns whether a surface drawn along an axis is closed. The rays pass exactly through lines of the lattice: pixels
+ * are 1/32 wide, the middle one is at 0, and all numbers are exact. Surfaces have opacity 0.5, so that a front and a
+ * back that are hit once each leave a quarter of the light. Pixels on the border of the picture are not checked,
+ * because the surface covers only half of them. */
 static bool is_closed_along(const session_input *in, int axis, int side, const char *edges)
 {
     char text[512];

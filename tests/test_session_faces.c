@@ -1,7 +1,7 @@
-/* Checks a user's errors in the faces of polyhedra, on one rank only: every rank gets the same message, with the rank,
- * the mesh, the cell, the face and the value; nothing is drawn; and after the correction the next step draws. A rank's
- * faces and vertices are numbered in the order in which its cells first use them: cell 0 begins with face 0, and no
- * cell precedes it. */
+/* Checks errors of a user in the faces of polyhedra, on one rank only. Every rank must get the same message, which
+ * states the rank, the mesh, the cell, the face and the value. Nothing may be drawn, and the next step after the
+ * correction must draw. The faces and vertices of a rank's part are numbered in the order in which its cells first use
+ * them, so that cell 0 begins with face 0. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -109,8 +109,8 @@ static void exclude_face(session_input *in)
 {
     in->part.connectivity[0] = in->part.connectivity[1];
 }
-/* Gives cell 0 its first face again, taken from the entries of the next cell, which then lacks a face; cell 0 is
- * checked first. */
+/* Lists the first face of cell 0 twice. The second entry overwrites the first entry of cell 1, which then lacks a face.
+ * Cell 0 is checked first, so that its error is reported. */
 static void repeat_face(session_input *in)
 {
     in->part.connectivity[in->part.offsets[1]] = in->part.connectivity[0];
@@ -131,12 +131,12 @@ static void remove_faces_of_cell(session_input *in)
 {
     in->part.offsets[1] = in->part.offsets[0];
 }
-/* Makes a face that goes back and forth: a, b, a. */
+/* Makes a face whose outline goes back and forth between two vertices: a, b, a. */
 static void repeat_vertex_apart(session_input *in)
 {
     in->part.face_connectivity[2] = in->part.face_connectivity[0];
 }
-/* Makes a face a, b, b, which is only an edge. */
+/* Makes a face with the vertices a, b, b, which is only an edge. */
 static void repeat_adjacent_vertex(session_input *in)
 {
     in->part.face_connectivity[2] = in->part.face_connectivity[1];
@@ -272,7 +272,7 @@ static void corrupted_faces_are_reported_at_the_step(void **context)
         check_fault_is_reported(session, &input, &at_the_step[i]);
 }
 
-/* Checks ghosts, which are not drawn: their coordinates may be anything, but their faces must be valid. */
+/* Checks faults in ghost cells, which are not drawn: any coordinates are accepted, but faces must be valid. */
 static void ghost_cells_are_checked_except_coordinates(void **context)
 {
     (void)context;
@@ -290,8 +290,9 @@ static void ghost_cells_are_checked_except_coordinates(void **context)
 
 /* ---- cells without volume ------------------------------------------------------------------------------------ */
 
-/* Adds a flat cell next to every third cell of the part: the cell's first face twice, as front and back, closed by
- * faces that are points, or four faces that are points. Returns the number of flat cells. */
+/* Adds a flat polyhedron after every third cell of the part. It consists of the cell's first face twice, as front and
+ * back, and two faces that have shrunk to points, or of four faces that are points. Returns the number of flat
+ * cells. */
 static int64_t add_flat_cells(const test_mesh *part, test_mesh *out)
 {
     int *all = test_calloc((size_t)part->cell_count + 1, sizeof *all);
@@ -346,8 +347,8 @@ static void flat_polyhedra_are_counted_and_change_no_picture(void **context)
     test_free(before);
 }
 
-/* Checks a failing allocation. The first allocation of a step that checks polyhedra, and need not recognise any, is for
- * their edges. If it fails, the cells remain unchecked, and the next step must check them again. */
+/* Checks a failing allocation. If a step checks polyhedra and need not recognise any, its first allocation is for their
+ * edges. If this allocation fails, the cells remain unchecked, and the next step must check them. */
 static void check_without_memory_is_reported_and_repeated(void **context)
 {
     (void)context;

@@ -1,7 +1,8 @@
-/* Checks files that the library reads, appends to or replaces if something else has taken their place: pipes, devices,
- * directories, sockets, links and huge files, before the first step or between two steps; and directories that are
- * missing, are removed or cannot be created. No call may block, every failure is reported with the file and the reason
- * on all ranks, links are replaced as for pictures, and the step succeeds after the obstacle has been removed. */
+/* Checks the files that the library reads, appends to or replaces, if something else is at their path (a pipe, a
+ * device, a directory, a socket, a link or a huge file) before the first step or between two steps. Also checks
+ * directories that are missing, are removed or cannot be created. No call may block; every failure must be reported on
+ * all ranks with the file and the reason; links are replaced, as they are for pictures; and the step must succeed after
+ * the obstacle is removed. */
 #include <fcntl.h>
 #include <signal.h>
 #include <stdio.h>
@@ -65,8 +66,8 @@ static void make_socket(const char *path)
     close(file);
 }
 
-/* Puts the obstacle at the path, on rank 0. The file itself, if there is one, is renamed to "victim", to which a link
- * may lead. */
+/* Puts the obstacle at the path, on rank 0. A file that is already there is renamed to "victim"; links can point to
+ * it. */
 static void place_obstacle(plant p, const char *path)
 {
     unlink("victim");
@@ -101,7 +102,7 @@ static void remove_obstacle(const char *path)
     if (unlink(path) != 0) rmdir(path);
 }
 
-/* Removes any file or directory of this name. */
+/* Removes any file or directory of these names. */
 static void remove_recursively(const char *name)
 {
     char command[100];
@@ -157,11 +158,11 @@ static void colour_maps_are_regular_files(void **state)
 
 /* ---- files that the library writes ----------------------------------------------------------------------------- */
 
-/* A kind of file that is read again or appended to. */
+/* A file of the library that later steps read again or append to. */
 typedef struct own_file {
     const char *name, *path, *header;
     char scene[512];
-    bool is_appended; /* false: it is replaced at each step */
+    bool is_appended; /* false: the file is replaced at each step */
 } own_file;
 
 enum { OWN_COUNT = 3 };
@@ -183,7 +184,7 @@ static void name_scenes(const char *folder)
     snprintf(own_files[2].scene, 512, IMAGE, SURFACE, output);
 }
 
-/* Makes a step whose values are larger than the last one's, so that ranges widen. */
+/* Makes a step whose values are larger than those of the previous step, so that ranges widen. */
 static insitu_status step_with_larger_values(insitu_session *session, int cycle)
 {
     input_restore(&input);
@@ -193,7 +194,7 @@ static insitu_status step_with_larger_values(insitu_session *session, int cycle)
     return insitu_step(session, cycle, cycle);
 }
 
-/* Checks that the file is a regular one with whole lines. */
+/* Checks that the file is a regular one, begins with its header and ends with a complete line. */
 static void assert_written(const own_file *file)
 {
     char text[MOST];
@@ -204,8 +205,8 @@ static void assert_written(const own_file *file)
     everywhere(own_rank != 0 || (strchr(text, '\n')[1] && text[strlen(text) - 1] == '\n'));
 }
 
-/* Returns the text of the expected error, or NULL. A pipe, a directory and a socket are refused at any step; a huge
- * file only if it is read. Links are replaced when the file is next written. */
+/* Returns the text of the expected error, or NULL. A pipe, a directory and a socket are refused at any step, a huge
+ * file only at the first step, which reads it. Links are replaced when the file is next written. */
 static const char *get_expected_refusal(const own_file *file, plant p, bool is_later)
 {
     if (p == HUGE_FILE) return is_later ? NULL : "has more than";
@@ -238,7 +239,7 @@ static void run_with_obstacle(const own_file *file, plant p, bool is_later)
     if (p != HUGE_FILE || !file->is_appended || !is_later) assert_written(file);
     read_file("victim", MOST, after);
     everywhere(strcmp(before, after) == 0 && (own_rank != 0 || access("own.cdb/nowhere", F_OK) != 0));
-    read_file(file->path, MOST, after); /* the lines of a linked file are continued */
+    read_file(file->path, MOST, after); /* the lines of a file behind a link are kept and continued */
     const bool has_first = strstr(after, "\n0,0,") != NULL;
     everywhere(own_rank != 0 || p != LINK_TO_FILE || file == &own_files[1] || has_first);
     insitu_destroy(&session);
@@ -253,7 +254,7 @@ static void obstacles_at_file_paths_are_refused_or_replaced(void **state)
             for (int is_later = 0; is_later < 2; is_later++) run_with_obstacle(&own_files[i], p, is_later);
 }
 
-/* Checks that a link to the ranges of another run is read before it is replaced. */
+/* Checks that ranges of another run, to which a link points, are read before the link is replaced by a file. */
 static void linked_ranges_are_read(void **state)
 {
     (void)state;
@@ -298,8 +299,8 @@ static void missing_folders_are_created(void **state)
     }
 }
 
-/* Checks directories that cannot be created: inside a regular file, and, for users without root's rights, inside a
- * directory without write permission. */
+/* Checks directories that cannot be created: inside a regular file, inside /proc, and, unless the user has root's
+ * rights, inside a directory without write permission. */
 static void folders_that_cannot_be_created_are_reported(void **state)
 {
     (void)state;
@@ -326,7 +327,8 @@ static int set_up_test_group(void **state)
 {
     (void)state;
     if (!enter_test_folder("files")) return 1;
-    remove_recursively("scene.yaml map.json own.cdb pipe victim blocked"); /* files that an interrupted test leaves */
+    /* files left over from an interrupted test */
+    remove_recursively("scene.yaml map.json own.cdb pipe victim blocked");
     input_create(&input, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
     return 0;
 }

@@ -1,6 +1,6 @@
-/* Checks fields whose values a function computes: it is called once in a step that needs the field, for a picture, a
- * statistic or a condition, and in no other step; it may communicate; its values draw the same pictures as values that
- * are passed directly. Its errors are returned on all ranks. */
+/* Checks fields whose values are computed by a fill function of the caller. The function is called once in a step that
+ * needs the field for a picture, a statistic or a condition, and in no other step. It may communicate. The pictures
+ * equal those of values that are passed directly. Errors that the function returns are reported on all ranks. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -20,7 +20,7 @@ static const char scene_text[] =
         IMAGE("b", "4", "{isosurface: {field: f, values: [0.1], colour_by: {field: g}}}")
             IMAGE("c", "3", "{surface: {colour_by: {field: g}}}");
 
-/* The input and results of a fill function. */
+/* The data of a fill function: its input, the values that it computes, and what it does to the field. */
 typedef struct maker {
     const session_input *in;
     double *values, scale;
@@ -34,7 +34,7 @@ static insitu_status fill_field(void *data, insitu_field *field)
 {
     maker *m = data;
     int one = 1, ranks = 0;
-    /* completes only if all ranks call the function */
+    /* This call completes only if all ranks call the fill function. */
     MPI_Allreduce(&one, &ranks, 1, MPI_INT, MPI_SUM, MPI_COMM_WORLD);
     const int64_t count = m->in->part.vertex_count;
     for (int64_t i = 0; i < count; i++) m->values[i] = ranks == rank_count ? m->scale * m->in->part.values[i] : 0;
@@ -68,7 +68,7 @@ static insitu_field describe_field(const char *name, maker *m, bool is_filled)
     return field;
 }
 
-/* Consecutive pictures, as rank 0 receives them. */
+/* Consecutive pictures, intercepted on rank 0. */
 typedef struct album {
     int count;
     float *pixels;
@@ -82,7 +82,7 @@ static void append_caught_pictures(album *out)
         memcpy(out->pixels + (size_t)out->count++ * PIXELS * 4, caught[i].rgba, PIXELS * 4 * sizeof(float));
 }
 
-/* Draws pictures with values that change at each step. */
+/* Draws all steps, with values that change at each step. */
 static album draw_steps(const session_input *in, bool is_filled)
 {
     static const char *const names[] = {"f", "g", "h"};
@@ -201,11 +201,11 @@ static const char *const calls[CALLS] = {"insitu_set_mesh",      "insitu_set_mes
                                          "insitu_step",          "insitu_destroy",     "insitu_keep_pictures",
                                          "insitu_last_pictures", "insitu_last_report", "insitu_set_field"};
 
-/* A fill function that makes one of the calls on its own session, and returns values nevertheless. */
+/* A fill function that calls the library with its own session, and nevertheless returns values. */
 typedef struct caller {
     maker values;
     insitu_session *session;
-    int call; /* -1: no call */
+    int call; /* index in calls; -1: no call */
     bool is_refused;
 } caller;
 
@@ -249,7 +249,7 @@ static void library_calls_in_a_fill_function_are_refused(void **state)
     f.session = open_session(MPI_COMM_WORLD, write_scene(text));
     everywhere(insitu_set_mesh(f.session, "m", &in.mesh) == INSITU_OK);
     for (int i = 0; i < 2; i++) everywhere(insitu_set_field(f.session, "m", &fields[i]) == INSITU_OK);
-    for (int i = 0; i < 2 * CALLS; i++) { /* on the last rank, then on all ranks */
+    for (int i = 0; i < 2 * CALLS; i++) { /* first the last rank alone makes each call, then all ranks */
         char words[128];
         const bool calls_now = i >= CALLS || own_rank == rank_count - 1;
         snprintf(words, sizeof words, "field \"f\": its fill called %s() of its session", calls[i % CALLS]);

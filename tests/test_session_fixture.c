@@ -193,7 +193,7 @@ void check_fault_is_reported(insitu_session *session, session_input *in, const c
     const insitu_status at_once = submit_input(session, in);
     everywhere(at_once == (is_bad && c->at_once ? c->status : INSITU_OK));
     everywhere(!is_bad || !c->at_once || strstr(insitu_error(session), c->words[0]) != NULL);
-    for (int again = 0; again < 2; again++) { /* the error remains until it is corrected */
+    for (int again = 0; again < 2; again++) { /* the error is reported at every step until it is corrected */
         discard_pictures();
         const insitu_status status = insitu_step(session, 1, 0);
         check_reported_everywhere(session, status, c->status, rank_words, "mesh \"m\"", c->words[0],
@@ -229,7 +229,7 @@ void check_all_faults_are_reported(session_input *in, const corrupted_case *case
 
 double compute_mean(const double *values, int count)
 {
-    double sum = 0, rest = 0; /* Knuth's two-sum: both together have twice the precision */
+    double sum = 0, rest = 0; /* Knuth's two-sum: sum + rest has twice the precision */
     for (int i = 0; i < count; i++) {
         const double next = sum + values[i], added = next - sum;
         rest += (sum - (next - added)) + (values[i] - added);
@@ -302,7 +302,7 @@ caught_picture draw_scene(MPI_Comm comm, const char *scene, const session_input 
     return submit_and_draw(&session, in);
 }
 
-/* Compares two arrays; either may be missing, but then in both pictures. */
+/* Returns whether two arrays are equal or both NULL. */
 static bool are_same_bytes(const void *a, const void *b, size_t bytes)
 {
     return a && b ? memcmp(a, b, bytes) == 0 : a == b;
@@ -390,7 +390,7 @@ double session_load_image_library(void)
     return library_loaded.ms;
 }
 
-/* Copies a deep picture; returns false if memory runs out. */
+/* Copies a deep picture; returns false if an allocation fails. */
 static bool copy_deep_picture(const insitu_deep *deep, size_t pixels, caught_picture *out)
 {
     int64_t count = 0;

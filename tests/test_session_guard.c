@@ -1,5 +1,5 @@
-/* Checks a step under unusual floating-point settings: enabled traps, as by gfortran's -ffpe-trap, and subnormal
- * numbers flushed to zero. */
+/* Checks that a step works under unusual floating-point settings of the caller: enabled traps, as set by gfortran's
+ * -ffpe-trap, and subnormal numbers flushed to zero. */
 #define _GNU_SOURCE
 #include <fenv.h>
 #include <omp.h>
@@ -15,7 +15,7 @@
 
 enum { TRAPS = FE_DIVBYZERO | FE_INVALID | FE_OVERFLOW, THREADS = 3 };
 
-/* Volatile, so that the optimizer does not move or remove the divisions. */
+/* volatile, so that the optimizer does not move or remove the divisions */
 static volatile double zero = 0;
 
 static void divide_by_zero_on_threads(int threads)
@@ -29,7 +29,7 @@ static void divide_by_zero_on_threads(int threads)
     }
 }
 
-/* Starts threads as the session does before its first region with this number of threads. */
+/* Starts a team of threads as the session does before its first parallel region with this number of threads. */
 static void start_threads(const session_guard *guard, int threads)
 {
     session_guard_suspend(guard);
@@ -47,8 +47,8 @@ static void enable_traps(void)
     feenableexcept(TRAPS);
 }
 
-/* Counts the threads of a team whose traps are enabled, and those with the flag of a division by zero, and disables all
- * traps. */
+/* Disables the traps of a team. Counts the threads whose traps were enabled (armed), and those whose flag of a division
+ * by zero was set (flagged). */
 static void count_enabled(int threads, int *armed, int *flagged)
 {
     int traps = 0, flags = 0;
@@ -78,7 +78,7 @@ static void floating_point_traps_are_disabled_inside(void **state)
     assert_int_equal(flagged, 0);
 }
 
-/* Checks a team with more threads than any team before. */
+/* Checks a team that is larger than any team before, so that new threads are started. */
 static void threads_started_inside_inherit_the_callers_settings(void **state)
 {
     (void)state;
@@ -96,7 +96,7 @@ static void threads_started_inside_inherit_the_callers_settings(void **state)
     assert_int_equal(flagged, 0);
 }
 
-/* Checks that the rounding mode of a worker is restored between regions, and is to nearest inside them. */
+/* Checks the rounding mode of worker threads: to nearest inside regions, and the worker's own mode between them. */
 static void workers_restore_their_settings_between_regions(void **state)
 {
     (void)state;
@@ -113,7 +113,8 @@ static void workers_restore_their_settings_between_regions(void **state)
             region_leave();
         }
     }
-    fesetround(FE_UPWARD); /* LLVM's workers inherit the caller's mode at every begin of a region */
+    /* sets the mode of the calling thread too, because LLVM's workers inherit it whenever a region begins */
+    fesetround(FE_UPWARD);
 #pragma omp parallel num_threads(THREADS) reduction(+ : upward)
     upward += fegetround() == FE_UPWARD;
     session_guard_end(&guard);
@@ -135,8 +136,7 @@ static void rounding_is_to_nearest_inside(void **state)
     fesetround(FE_TONEAREST);
 }
 
-/* Checks the size of teams: OpenMP may choose any size if the caller has enabled that; all teams of a step have the
- * same size. */
+/* Checks that all teams of a step have the same size, even if the caller has allowed OpenMP to choose any size. */
 static void thread_teams_have_one_size_inside(void **state)
 {
     (void)state;

@@ -1,8 +1,8 @@
-/* Checks cell values on cubes of which some are refined, with covered cells given as ghosts: an isosurface is
- * continuous at hanging nodes, whether all cells are one mesh or each level is its own mesh. The distance from the
- * middle has a sphere as isosurface, in closed form; a ray through a gap would show the sphere's back, or nothing. The
- * picture must be the same to the bit on any number of ranks, in either form. Also checks which meshes are treated as
- * one. */
+/* Checks cell values on cubes of which some are refined and then given as ghosts beside the smaller cubes that cover
+ * them. An isosurface must be continuous at hanging nodes, whether all cells are one mesh or each level of refinement
+ * is a mesh of its own. The field is the distance from the centre, so that the isosurface is a sphere, known in closed
+ * form; a ray through a gap would hit the sphere's back, or nothing. In either form the picture must be bit-identical
+ * on any number of ranks. Also checks which meshes the library treats as one. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,7 +13,7 @@
 
 enum { SIZE = 200, PIXELS = SIZE * SIZE, SIDE = 8, LEVELS = 3, CUTS = 4, LINE = SIDE * CUTS * CUTS + 1 };
 
-/* A view along z from z = 5; a pixel is 1/100 wide. */
+/* An orthographic view along z from z = 5; a pixel is 1/100 wide. */
 static const char scene_text[] =
     "images:\n  - name: a\n    size: [200, 200]\n    background: [0, 0, 0, 0]\n    camera: {position: [0, 0, 5], "
     "focal: [0, 0, 0], up: [0, 1, 0], projection: orthographic, height: 2}\n    layers:\n"
@@ -23,7 +23,7 @@ typedef enum amr_shape {
     PLAIN,
     TURNED,
     BENT,
-    /* rotated, and coordinates of the same vertex differ in their last bits between levels, if each level is a mesh */
+    /* as TURNED; if each level is a mesh, coordinates of the same vertex differ in their last bits between levels */
     ROUGH,
     SHAPES
 } amr_shape;
@@ -32,15 +32,15 @@ typedef struct amr {
     int cuts; /* number of parts of a refined cell along each axis */
     amr_shape shape;
     insitu_cell_type type; /* hexes, or the type into which a cube is divided */
-    bool is_by_level;      /* each level is a mesh */
-    int rank, ranks;       /* the rank whose cells are made, and the number of ranks */
+    bool is_by_level;      /* whether each level is a mesh of its own */
+    int rank, ranks;       /* rank: the rank whose cells are made; ranks: number of ranks */
 } amr;
 
 /* The arrays of one mesh on one rank. */
 typedef struct part {
     insitu_cell_type type;
     int64_t vertex_count, cell_count;
-    int64_t *vertices; /* number of each vertex of the finest lattice; -1: not made yet */
+    int64_t *vertices; /* index in this part of each vertex of the finest lattice; -1: not made yet */
     double *coordinates, *values;
     int64_t *connectivity;
     unsigned char *ghosts;
@@ -70,20 +70,21 @@ static void part_free(part *p)
 static void compute_vertex_position(const amr *a, int level, const double at[3], double out[3])
 {
     memcpy(out, at, 3 * sizeof *out);
-    if (a->shape == TURNED || a->shape == ROUGH) { /* rotates, so that no coordinate is exact */
+    if (a->shape == TURNED || a->shape == ROUGH) { /* rotates the cube, so that no coordinate is exact */
         out[0] = 0.8 * at[0] - 0.6 * at[1];
         out[1] = 0.48 * at[0] + 0.64 * at[1] - 0.6 * at[2];
         out[2] = 0.36 * at[0] + 0.48 * at[1] + 0.8 * at[2];
     }
     for (int axis = 0; axis < 3 && a->shape == ROUGH; axis++) out[axis] *= 1 + level * 0x1p-52;
-    if (a->shape == BENT) { /* a map that is bilinear in every cube, so that hanging vertices are on quads */
+    if (a->shape == BENT) { /* a map that is bilinear in every cube, so that hanging vertices lie on its quads */
         out[0] += 0.2 * at[1] * at[2];
         out[1] += 0.1 * at[0] * at[2];
     }
 }
 
-/* The cells into which a cube is divided, by the cube's corners, whose bits are coordinates. The diagonals of a cube's
- * squares coincide with those of the smaller cubes' squares on them. */
+/* The cells into which a cube is divided. places: the cube's corners at each cell's vertices; bits 0, 1 and 2 of a
+ * corner are its coordinates x, y and z. Diagonals of a cube's squares coincide with those of the smaller cubes'
+ * squares that cover them. */
 typedef struct cutting {
     int cells, corners;
     int places[6][8];
@@ -98,7 +99,7 @@ static const cutting *get_cutting(insitu_cell_type type)
     return type == INSITU_TET ? &tets : type == INSITU_WEDGE ? &wedges : &hexes;
 }
 
-/* Returns the number of the vertex at a position in the finest lattice. */
+/* Returns the index in part p of the vertex at a position of the finest lattice; adds the vertex if necessary. */
 static int64_t find_or_add_vertex(const amr *a, part *p, int level, const int at[3])
 {
     const int64_t index = at[0] + LINE * (at[1] + LINE * (int64_t)at[2]);
@@ -131,7 +132,8 @@ static void add_cube(const amr *a, part *p, int level, const int at[3], int widt
     }
 }
 
-/* Returns whether a cube is refined: half of the cubes, in blocks, are, and of their parts those next to them. */
+/* Returns whether a cube is refined. About half of the cubes of level 0 are, in contiguous regions; of their smaller
+ * cubes a part is refined once more, if cuts is 2. */
 static bool is_refined(const amr *a, int level, const int at[3], int width)
 {
     double middle[3];
@@ -207,8 +209,9 @@ static caught_picture draw_amr(MPI_Comm comm, const char *scene, const amr *a)
     return picture;
 }
 
-/* Counts pixels in which the front of the sphere is invisible. The surface inside a cell is off the sphere by less than
- * half the largest cell's diagonal, 0.22; inside a radius of 0.6 the front and the back are 0.8 apart. */
+/* Counts pixels in which the front of the sphere is not visible. Inside a cell the surface is at most half the diagonal
+ * of the largest cell, 0.22, away from the sphere. Within a radius of 0.6 in the picture the sphere's front and back
+ * are at least 0.8 apart. */
 static int count_slits(const caught_picture *picture)
 {
     int slits = 0;
@@ -253,8 +256,8 @@ static void cell_values_continue_across_hanging_nodes(void **state)
     check_surface_continues(4, BENT, INSITU_HEX);
 }
 
-/* Checks cells with triangles in shapes with plane faces: triangles are flat, so that hanging vertices of bent shapes
- * are not on them. */
+/* Checks cells with triangular faces, in shapes whose faces are plane: in the bent shape, hanging vertices would not
+ * lie on the flat triangles. */
 static void cell_values_continue_across_triangles(void **state)
 {
     (void)state;
@@ -264,8 +267,8 @@ static void cell_values_continue_across_triangles(void **state)
 
 /* ---- which meshes are one -------------------------------------------------------------------------------------- */
 
-/* A box with the given number of hexes along each axis; a rank has every rank_count-th of them. All values are `value`,
- * except those of the lowest layer along z, which are `rest` if that is different. */
+/* A box with the given number of hexes along each axis, which are dealt to the ranks in turn. All cells have the value
+ * `value`, except that the lowest layer along z has `rest`. */
 typedef struct box {
     double lower[3], upper[3];
     int counts[3];
@@ -302,7 +305,7 @@ static int count_covered_pixels(const caught_picture *picture)
     return count;
 }
 
-/* Draws the boxes as meshes; the first `givers` ranks pass their part of the second mesh. */
+/* Draws the boxes, each as a mesh. Only the first `givers` ranks pass their part of the second mesh. */
 static caught_picture draw_boxes(const char *layers, const box *boxes, int count, int givers)
 {
     static const char *const names[] = {"a", "b"};
@@ -321,8 +324,9 @@ static caught_picture draw_boxes(const char *layers, const box *boxes, int count
     return picture;
 }
 
-/* Checks two materials, each with one value: if one layer shows both, the field increases from one to the other between
- * them; if each has its own layer, there is no value between. */
+/* Checks two adjacent meshes, each with one value. If one layer shows both, the field increases continuously from one
+ * value to the other, so that an isosurface lies between them. If each mesh has its own layer, there is no value
+ * between, and no isosurface. */
 static void layer_of_two_meshes_is_continuous(void **state)
 {
     static const box boxes[] = {{{-1, -1, -1}, {1, 1, 0}, {2, 2, 2}, 0, 0}, {{-1, -1, 0}, {1, 1, 1}, {2, 2, 2}, 1, 1}};
@@ -342,8 +346,9 @@ static void layer_of_two_meshes_is_continuous(void **state)
     free_caught(&both);
 }
 
-/* Checks a fine mesh that overlaps a coarse one along a wall: its vertices on the wall lie on faces of the coarse
- * cells, which have the same orientation, and do not hang on them. No two vertices have the same position. */
+/* Checks a fine mesh that overlaps a coarse mesh at a common wall. The fine vertices on the wall lie on faces of coarse
+ * cells, but these faces have the same orientation as the fine cells' faces, so that the vertices are not hanging. No
+ * vertex of one mesh has the position of a vertex of the other. */
 static void vertices_on_a_shared_boundary_are_not_hanging(void **state)
 {
     static const box boxes[] = {{{-0.7, -0.7, 0}, {0.7, 0.7, 0.6}, {5, 5, 3}, 1, 0},
@@ -357,8 +362,8 @@ static void vertices_on_a_shared_boundary_are_not_hanging(void **state)
     free_caught(&both);
 }
 
-/* Checks that the values of one mesh, and its part on the last rank, may appear and disappear: the other mesh's means
- * equal those of a new session. */
+/* Checks that the values of one mesh, and the last rank's part of it, can appear and disappear: the means of the other
+ * mesh must equal those of a new session. */
 static void means_include_values_of_the_adjacent_mesh(void **state)
 {
     static const char layers[] = "      - isosurface: {field: f, values: [0.25]}\n";

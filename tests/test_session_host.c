@@ -1,7 +1,8 @@
-/* Checks a session in difficult processes: ones that can start few threads or none, whose OpenMP makes smaller teams
- * than requested, or that trap floating-point exceptions. The test replaces the functions for the number of cores, for
- * starting threads and for (GNU's) parallel regions, so that any machine can have any limit. If OpenMP itself fails to
- * start a thread, the process ends. */
+/* Checks a session in restricted processes: ones that can start few threads or none, in which OpenMP makes smaller
+ * teams than requested, or in which floating-point exceptions trap. The test replaces the functions that return the
+ * number of cores, start threads and open GNU's parallel regions, so that it can set any limit on any machine. The
+ * session must not run into a limit inside OpenMP, because the process ends if OpenMP itself fails to start a
+ * thread. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -72,16 +73,16 @@ VISIBLE int pthread_create(pthread_t *thread, const pthread_attr_t *attributes, 
     return code;
 }
 
-/* Allows the given number of additional threads. */
+/* Allows this number of threads to be started in addition to those that are running. */
 static void allow_additional_threads(int more)
 {
     atomic_store(&most_threads, atomic_load(&live_threads) + more);
 }
 
-/* Ends idle threads: GNU's OpenMP ends threads that the next region does not need, LLVM's keeps them. other_threads is
- * the number of MPI's threads. */
-static int other_threads; /* threads of MPI */
+static int other_threads; /* number of threads that MPI has started */
 
+/* Ends idle threads, as far as OpenMP does so: GNU's ends threads that the next region does not need, LLVM's keeps
+ * them. */
 static void end_threads(void)
 {
     int given = 0;
@@ -127,7 +128,7 @@ VISIBLE void GOMP_parallel_loop_nonmonotonic_dynamic(void (*body)(void *), void 
 /* ---- a session ------------------------------------------------------------------------------------------------ */
 
 static session_input input;
-static caught_picture expected; /* drawn by one thread */
+static caught_picture expected; /* the picture drawn with one thread */
 
 static const char *write_scene_with_threads(int threads)
 {
@@ -153,7 +154,7 @@ static insitu_session *open_session_with_threads(int threads)
     return session;
 }
 
-/* Checks that a step draws the picture of one thread. */
+/* Checks that a step draws the picture that one thread draws. */
 static void step_draws_the_same(insitu_session *session, int cycle)
 {
     const size_t pixels = (size_t)120 * 90;
@@ -256,9 +257,9 @@ static void threads_that_ended_are_tried_again(void **context)
     insitu_destroy(&session);
 }
 
-/* Checks the number of parallel regions of a step. At the end of each region the team waits for threads that have lost
- * their core, so regions should be few. Only the values are new: their ranges are refitted (on small trees by one
- * thread), cells are binned, and tiles are traced. */
+/* Checks the number of parallel regions in a step. It should be small, because at the end of each region the team waits
+ * for threads whose core is in use by another process. Only the values are new in the step: their ranges are refitted
+ * (by one thread if trees are small), cells are binned, and tiles are traced. */
 static void a_step_opens_few_regions(void **context)
 {
     (void)context;

@@ -1,6 +1,6 @@
-/* Checks meshes whose indices begin at 1, as in Fortran: the pictures equal, to the bit, those with indices from 0, for
- * all types of cells, in arrays of 8 bytes with offsets and of 4 bytes without; and errors state indices as the caller
- * counts them. */
+/* Checks meshes whose indices begin at 1, as in Fortran. Pictures must be bit-identical to those with indices from 0,
+ * for all types of cells: with 8-byte indices and offsets, and with 4-byte indices without offsets. Errors must state
+ * indices as the caller counts them. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -36,7 +36,7 @@ static void make_indices_one_based(session_input *in)
     in->mesh.index_base = 1;
 }
 
-/* The 4-byte arrays that kernels for several cells at once read. */
+/* The 4-byte arrays that kernels read which process several cells at once. */
 typedef struct narrow_arrays {
     float *coordinates, *values;
     int32_t *connectivity;
@@ -114,7 +114,7 @@ static void one_based_indices_draw_same_pictures_as_zero_based(void **state)
     check_index_base(TEST_HEXES, true);
 }
 
-/* Checks errors of which each is on the last rank only. */
+/* Checks errors in indices, offsets and index_base, one after another, on the last rank only. */
 static void errors_report_one_based_indices(void **state)
 {
     (void)state;
@@ -143,7 +143,8 @@ static void errors_report_one_based_indices(void **state)
     input_free(&in);
 }
 
-/* Checks errors of which each is a single wrong entry in the last rank's connectivity. */
+/* Checks that wrong values of one entry in the last rank's connectivity are reported. cell: the cell that has the
+ * entry. */
 static void check_wrong_indices_are_reported(insitu_session *session, const session_input *in, int32_t *place,
                                              int64_t cell)
 {
@@ -162,7 +163,8 @@ static void check_wrong_indices_are_reported(insitu_session *session, const sess
     everywhere(insitu_step(session, 9, 0) == INSITU_OK);
 }
 
-/* Checks packed arrays, of which many cells are checked together: an entry in the middle, or the last one, is wrong. */
+/* Checks packed arrays, for which many cells are checked at once. The wrong entry is in the middle, or is the last
+ * one. */
 static void errors_of_many_cells_are_reported(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
-/* Checks fields whose values are in another order than the mesh's vertices or cells, as in vectors of degrees of
- * freedom: with an index they draw the pictures of the same values in order, to the bit, at each step and when they
- * change. An error in one rank's index is reported on all ranks. */
+/* Checks fields whose values are in another order than the mesh's vertices or cells, like vectors of degrees of
+ * freedom, and are found by an index. Pictures must be bit-identical to those of the same values in the mesh's order,
+ * at each step and after the values change. An error in one rank's index must be reported on all ranks. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,7 +11,7 @@
 
 enum { SIDE = 4, PIXELS = 64 * 48, PICTURES = 4, STEPS = 4 };
 
-/* With a condition, the values are read before images are planned. */
+/* If an image has a condition, the field's values are read before it is decided which images are drawn. */
 #define SCENE(condition)                                                                                               \
     "images:\n  - name: a\n    size: [64, 48]\n    background: [0, 0, 0, 0]\n    layers:\n"                            \
     "      - isosurface: {field: f, values: [0.1, 0.3], opacity: 0.6, colour_by: {field: f, map: turbo}}\n"            \
@@ -30,11 +30,12 @@ static const char conditional_scene[] = SCENE("    when: {field: f, above: -5}\n
 /* ---- fields --------------------------------------------------------------------------------------------------- */
 
 typedef struct form {
-    bool at_cells, is_narrow; /* float and int32, with other numbers between the elements of the index */
+    bool at_cells, is_narrow; /* is_narrow: values are float and indices int32, which are separated by other numbers */
     int components, base;
 } form;
 
-/* One field in two forms: in order, and by an index into a longer array whose other values are NaN. */
+/* One field in two forms: values in the mesh's order (plain), and an index into a longer array (shuffled) whose other
+ * values are NaN. */
 typedef struct twice {
     form of;
     int64_t places, count;
@@ -68,7 +69,7 @@ static void fill_values(twice *t, const session_input *in, double scale)
     const form *of = &t->of;
     for (int64_t i = 0; i < t->count * of->components; i++) set_number(of, t->shuffled, i, (double)NAN);
     for (int64_t i = 0; i < t->places; i++) {
-        const int64_t at = t->count - 1 - 2 * i - i % 2; /* backwards, with gaps: injective */
+        const int64_t at = t->count - 1 - 2 * i - i % 2; /* backwards, with gaps; no two values have the same index */
         set_index(of, t->index, i, at + of->base);
         for (int c = 0; c < of->components; c++) {
             const double value = scale * compute_value(in, of, i, c);
@@ -137,7 +138,7 @@ static void step_and_catch(insitu_session *session, int cycle, caught_picture ou
     caught_count = 0;
 }
 
-/* Draws the values as they are, halved in the same arrays, set as unchanged, and restored. */
+/* Draws four steps: the values as they are, halved in the same arrays, declared unchanged, and restored. */
 static drawing draw_fields(const session_input *in, twice *t, bool is_by_index)
 {
     drawing out = {.copied = 0};
@@ -169,7 +170,7 @@ static void compare_drawings(drawing *a, drawing *b)
             differ = differ || !are_same_pictures(&a->pictures[0][i], &a->pictures[step][i]);
         }
     everywhere(same);
-    everywhere(differ); /* the picture of the second step differs from the first */
+    everywhere(differ); /* some later picture differs from that of the first step */
     for (int step = 0; step < STEPS && own_rank == 0; step++)
         for (int i = 0; i < PICTURES; i++) {
             free(a->pictures[step][i].rgba), free(a->pictures[step][i].depth);
@@ -202,7 +203,7 @@ static void indexed_values_draw_same_picture_as_ordered_values(void **state)
         for (size_t i = 0; i < sizeof forms / sizeof forms[0]; i++) check_form(kind, &forms[i]);
 }
 
-/* Checks that a field which no scene uses is neither copied nor checked. */
+/* Checks that a field which no layer uses is neither copied nor checked. */
 static void unused_index_is_not_read(void **state)
 {
     (void)state;
@@ -241,7 +242,7 @@ static void set_large_index(session_input *in)
 {
     use_indexed_field(in);
     corrupted[7] = in->part.vertex_count;
-    corrupted[9] = -1; /* the first error is reported */
+    corrupted[9] = -1; /* only the first error is reported */
 }
 static void set_far_index(session_input *in)
 {
@@ -331,7 +332,8 @@ static void wrong_input_is_reported_on_all_ranks(void **state)
     free(corrupted);
 }
 
-/* Checks fields at cells. The centring is the same on all ranks, so this error cannot be on the last one only. */
+/* Checks fields at cells. The centring must be the same on all ranks, so this error cannot be tested as one of the last
+ * rank only. */
 static void wrong_indices_of_cell_fields_are_reported(void **state)
 {
     (void)state;
@@ -346,15 +348,15 @@ static void wrong_indices_of_cell_fields_are_reported(void **state)
         check_reported_everywhere(session, insitu_step(session, step, 0), INSITU_ERROR_FIELD,
                                   "mesh \"m\": field \"f\": the index of cell ", " is 1000000, outside 0..");
     corrupted[in.part.cell_count - 1] = 0;
-    check_step_succeeds(session, 2); /* corrected in place, since nothing was copied */
+    check_step_succeeds(session, 2); /* The index is corrected in place: nothing was copied. */
     insitu_destroy(&session);
     input_free(&in);
     free(corrupted);
     corrupted = NULL;
 }
 
-/* Checks ranks without vertices: the first rank has all cells; the others pass their parts of the vector too, with a
- * NULL index. */
+/* Checks ranks without vertices: the first rank has all cells, but the other ranks also pass their part of the vector
+ * of values, with a NULL index. */
 static void ranks_without_vertices_have_values(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-/* Checks a user's errors in a mesh or a field, on one rank only: every rank gets the same message, which states the
- * rank and the error; nothing is drawn; and after the correction the next step draws. */
+/* Checks errors of a user in a mesh or a field, on one rank only. Every rank must get the same message, which states
+ * the rank and the error; nothing may be drawn; and the next step after the correction must draw. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -272,7 +272,7 @@ static void field_of_two_centrings_is_refused(void **context)
     everywhere(submit_input(session, &input) == INSITU_OK);
     insitu_field other = input.field;
     other.centring = INSITU_CELL;
-    other.count = input.part.cell_count; /* fewer than the vertices: the array is long enough */
+    other.count = input.part.cell_count; /* the cells are fewer than the vertices, so that the array is long enough */
     everywhere(own_rank != 1 || insitu_set_field(session, "m", &other) == INSITU_OK);
     const insitu_status status = insitu_step(session, 11, 0);
     check_reported_everywhere(session, status, INSITU_ERROR_FIELD, "rank 1: mesh \"m\": field \"f\"",
@@ -284,7 +284,7 @@ static void field_of_two_centrings_is_refused(void **context)
 static void nan_outside_drawn_cells_is_accepted(void **context)
 {
     (void)context;
-    /* Adds to the mesh one vertex that no cell uses. */
+    /* Adds a vertex that no cell uses, with NaN as coordinate and value. */
     double *coordinates = test_calloc((size_t)input.part.vertex_count * 3 + 3, sizeof *coordinates);
     double *values = test_calloc((size_t)input.part.vertex_count + 1, sizeof *values);
     memcpy(coordinates, input.part.coordinates, (size_t)input.part.vertex_count * 3 * sizeof *coordinates);
@@ -323,7 +323,8 @@ static void value_that_is_not_finite_is_counted(void **context)
     everywhere(submit_input(session, &input) == INSITU_OK);
 }
 
-/* Displaces every vertex: cells are folded, and some of their points have no coordinates in the cell. */
+/* Moves every vertex to a random position, so that cells are folded and the inverse map fails at some points of
+ * cells. */
 static void inverse_maps_that_fail_are_counted(void **context)
 {
     (void)context;
@@ -338,7 +339,7 @@ static void inverse_maps_that_fail_are_counted(void **context)
     everywhere(submit_input(session, &input) == INSITU_OK);
 }
 
-/* Changes the mesh to cells of one type, with indices of 4 bytes instead of 8. */
+/* Changes the mesh to cells of a single type, with 4-byte indices instead of 8-byte ones. */
 static void make_single_type(session_input *in)
 {
     char *indices = (char *)in->part.connectivity;
@@ -351,11 +352,11 @@ static void make_single_type(session_input *in)
     in->mesh.cell_type = INSITU_HEX;
 }
 
-/* Checks the message for cells of one type, which are checked several at once. */
+/* Checks the message for meshes with a single cell type, in which several cells are checked at once. */
 static void invalid_cell_of_a_single_type_mesh_is_reported(void **context)
 {
     (void)context;
-    int64_t cells = input.part.cell_count; /* number of rank 0's cells */
+    int64_t cells = input.part.cell_count; /* number of cells of rank 0 */
     MPI_Bcast(&cells, 1, MPI_INT64_T, 0, MPI_COMM_WORLD);
     for (int cell = 0; cell < 20 && cell < cells; cell += 3) {
         char words[64];
@@ -375,12 +376,12 @@ static void invalid_cell_of_a_single_type_mesh_is_reported(void **context)
 
 /* ---- cells without volume ------------------------------------------------------------------------------------ */
 
-/* The kinds of flat cells. A cell is an affine image of its type's reference cell. Points, lines and repeated faces
- * have a volume of 0 to the bit; the volume of oblique ones is rounding error. */
+/* The kinds of flat cells. A cell is an affine image of the reference cell of its type. Cells that are points, lines or
+ * have a repeated face have a volume of exactly 0; the computed volume of oblique ones is a rounding error. */
 typedef enum flatness { GOOD, SLIVER, OBLIQUE, REPEATED_FACE, LINE, POINT, FLATNESS_COUNT } flatness;
 
-/* TILTED: number of the first cells, none of which has a volume of exactly 0. Several cells are checked at once only if
- * none of them is exactly flat. */
+/* TILTED: number of cells at the beginning whose computed volume is never exactly 0. The library checks several cells
+ * at once only if the volume of none of them is exactly 0. */
 enum { FLAT_TYPES = 4, TILTED = 240, FLAT_CELLS = TILTED + 64, FLAT_CORNERS = 8 * FLAT_CELLS };
 
 static const insitu_cell_type flat_types[FLAT_TYPES] = {INSITU_TET, INSITU_HEX, INSITU_WEDGE, INSITU_PYRAMID};
@@ -397,8 +398,8 @@ static flatness get_flatness(int cell)
     return (flatness)(cell < TILTED ? cell % (OBLIQUE + 1) : cell % FLATNESS_COUNT);
 }
 
-/* Returns a coordinate. Along x and y they are multiples of 2^-40, along z of 2^-16, which are exact in float: sums are
- * exact, and flat cells are flat to the bit. */
+/* Returns a coordinate. Coordinates along x and y are multiples of 2^-40; those along z are multiples of 2^-16, which
+ * are exact in float. Sums of coordinates are therefore exact, and flat cells are exactly flat. */
 static double compute_flat_coordinate(int type, int cell, int corner, int axis)
 {
     const flatness how = get_flatness(cell);
@@ -406,7 +407,7 @@ static double compute_flat_coordinate(int type, int cell, int corner, int axis)
     double v[4];
     for (int i = 0; i < 4; i++)
         v[i] = unit * floor((2 * test_uniform((uint64_t)(16 * cell + 4 * axis + i), 31) - 1) / unit);
-    if (how == SLIVER) v[3] = v[1] - v[2] + 0x1p-16 * floor(8 * v[3]); /* 1e-4 thick */
+    if (how == SLIVER) v[3] = v[1] - v[2] + 0x1p-16 * floor(8 * v[3]); /* thickness of about 1e-4 */
     if (how == OBLIQUE) v[3] = v[1] - v[2];
     if (how == REPEATED_FACE) v[3] = 0;
     if (how == LINE) v[2] = v[3] = v[1];
@@ -415,8 +416,9 @@ static double compute_flat_coordinate(int type, int cell, int corner, int axis)
     return v[0] + at[0] * v[1] + at[1] * v[2] + at[2] * v[3];
 }
 
-/* Checks the count of flat cells: of one type, which are checked several at once; with types, checked one by one; with
- * coordinates of mixed widths, checked by other code; and the first eight alone, whose volumes are small but not 0. */
+/* Checks the number of flat cells that is reported: for a single cell type, where several cells are checked at once;
+ * with a type for each cell, where cells are checked one by one; with coordinates of mixed widths, which other code
+ * checks; and for the first eight cells only, whose volumes are small but not 0. */
 static void flat_cells_are_counted(void **context)
 {
     (void)context;
@@ -460,8 +462,8 @@ static void flat_cells_are_counted(void **context)
     everywhere(insitu_last_report(session)->cells_flat == 0);
 }
 
-/* Checks that the message of a failed step remains until the next step, unless a call fails in between, whose message
- * replaces it. */
+/* Checks that the message of a failed step persists until the next step. If another call fails in between, its message
+ * replaces that of the step. */
 static void error_message_persists_until_the_next_step(void **context)
 {
     (void)context;
@@ -484,7 +486,7 @@ static void error_message_persists_until_the_next_step(void **context)
 /* ---- other images ---------------------------------------------------------------------------------------------- */
 
 #define OF(name, layer) "  - {name: " name ", size: [24, 16], layers: [" layer "], outputs: [{path: " name ".exr}]}\n"
-/* Images of layers on meshes of any name, and of layers on mesh "m" only. */
+/* Images "f", "g" and "s" have layers on meshes of any name, "m" on the mesh "m" only. */
 static const char several[] =
     "images:\n" OF("f", "{isosurface: {field: f, values: [0.1]}}") OF("g", "{isosurface: {field: g, values: [0.1]}}")
         OF("m", "{surface: {mesh: m, colour_by: {field: f}}}") OF("s", "{surface: {}}");
@@ -507,11 +509,11 @@ static void fill_fails(session_input *in)
 }
 static void check_wrong_index_is_reported(session_input *in)
 {
-    in->field.index = in->mesh.connectivity; /* as many values as the mesh has vertices, but the last one is missing */
+    in->field.index = in->mesh.connectivity; /* the index has an entry for each vertex, but only one value exists */
     in->field.count = 1;
 }
 
-/* Passes the mesh "n" with the field "g", which may be faulty. */
+/* Passes the mesh "n" with the field "g". A call may fail on the last rank, whose input can be corrupted. */
 static void submit_other(const session_input *in)
 {
     insitu_field g = in->field;
@@ -520,7 +522,7 @@ static void submit_other(const session_input *in)
         (void)insitu_set_field(session, "n", &g);
 }
 
-/* Makes a step and checks that rank 0 has pictures with exactly these names, in this order. */
+/* Makes a step and checks its status and that rank 0 has caught pictures with exactly these names, in this order. */
 static void step_draws(const char *names, insitu_status expected, const char *words)
 {
     char drawn[8] = "";

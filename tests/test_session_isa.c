@@ -1,5 +1,5 @@
-/* Checks ranks on nodes of different kinds: every rank has another instruction set, and the picture must be that of the
- * rank with the lowest one. */
+/* Checks ranks on nodes with different CPUs: each rank may use another instruction set, and the picture must be that of
+ * the lowest instruction set of all ranks. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -27,7 +27,7 @@ static const char *write_layer_scene(const char *layer)
     return write_scene(text);
 }
 
-/* Returns rank 0's picture of the whole mesh, drawn without the other ranks. */
+/* Returns the picture of the whole mesh that rank 0 draws in a session of its own. */
 static caught_picture draw_alone(const char *scene, test_mesh_kind kind)
 {
     caught_picture picture = {0};
@@ -82,7 +82,7 @@ static void ranks_of_mixed_instruction_sets_use_the_lowest(void **context)
 static int set_up_test_group(void **state)
 {
     (void)state;
-    /* none is not a set: the best one is used, and a warning is given on all ranks */
+    /* "none" is not the name of a set, so that the best set is used, and a warning is given on all ranks */
     static const char *const sets[] = {"plain", "none", "sse4.2"};
     setenv("INSITU_ISA", sets[own_rank % 3], 1); /* before the library first reads the variable */
     return 0;

@@ -1,7 +1,8 @@
-/* Compares cells in lanes (session_lanes.h) with each cell alone in long double, for all types, layouts and instruction
- * sets. Unusual cells must be left to the code for single cells, and no index that is out of range may be used: the
- * coordinates are next to pages that cannot be read. Also compares the checks of several cells (session_tally.h),
- * including mixed cells, with checks cell by cell. */
+/* Compares sums over cells that are computed in SIMD lanes (session_lanes.h) with sums over single cells in long
+ * double, for all types, layouts and instruction sets. Unusual cells must be left to the code for single cells. No
+ * index that is out of range may be dereferenced, which is tested by coordinates next to pages that cannot be read.
+ * Also compares the checks of several cells at once (session_tally.h), including mixed cells, with checks of one cell
+ * at a time. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -17,9 +18,12 @@
 #include "session_tally.h"
 #include "test_meshes.h"
 
-enum { SIDE = 7 /* cells for a block and part of another, but no multiple of eight hexes */, LAYOUTS = 16 };
+/* SIDE: chosen so that the cells fill a block and a part of another one, and the number of hexes is no multiple of
+ * eight. */
+enum { SIDE = 7, LAYOUTS = 16 };
 
-/* The fraction of the volume of a cell's box that is rounding error, as session_tally.c derives it. */
+/* The largest rounding error of a cell's volume, as a fraction of the volume of the cell's bounding box. It is derived
+ * in session_tally.c. */
 static const double rounding_share = 0x1p-46;
 
 static test_layout choose_layout(int i)
@@ -30,8 +34,8 @@ static test_layout choose_layout(int i)
 
 /* ---- single cells -------------------------------------------------------------------------------------------- */
 
-/* Finds the neighbours of a corner of a prism, or of a pyramid's base: the next and the previous one around, and the
- * one above or below; in right-handed order. */
+/* Finds the neighbours of a corner of a prism, or of a corner of a pyramid's base, in right-handed order: the next and
+ * the previous corner around the base, and the corner above or below. */
 static void find_corner_neighbours(int type, int corner, int out[3])
 {
     const int around = type == GRID_WEDGE ? 3 : 4;
@@ -51,8 +55,9 @@ static long double compute_corner_determinant(long double p[][3], int corner, co
            e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0]);
 }
 
-/* Returns the mean over the corners of the volume that a cell with this corner and parallel edges would have: 6 tets
- * make such a hex, 3 a wedge, and a pyramid is a third of the prism over its base. */
+/* Returns the mean over the corners of the volume that the cell would have if its edges were parallel to those at the
+ * corner. The determinant of a corner's edges is the volume of such a hex; a wedge has half of it, and a pyramid a
+ * third. */
 static long double compute_mean_corner_volume(int type, long double p[][3])
 {
     if (type == GRID_TET) return compute_corner_determinant(p, 0, (const int[]){1, 2, 3}) / 6;
@@ -71,7 +76,7 @@ typedef struct truth {
     double lower[3], upper[3];
     long double least, sizes;
     int64_t inverted;
-    long double box; /* the largest volume of a cell's box */
+    long double box; /* volume of the largest bounding box of a cell */
 } truth;
 
 static void add_cell(const grid *g, int64_t cell, truth *t)
@@ -92,7 +97,8 @@ static void add_cell(const grid *g, int64_t cell, truth *t)
         box *= (long double)high - (long double)low;
     }
     const long double volume = compute_mean_corner_volume(grid_cell_type(g, cell), p), size = fabsl(volume);
-    assert_true(size > (long double)rounding_share * box); /* so large that its sign is certain */
+    /* the volume is so large that rounding cannot change its sign */
+    assert_true(size > (long double)rounding_share * box);
     t->least = size < t->least ? size : t->least;
     t->sizes += cbrtl(size);
     t->inverted += volume < 0;
@@ -107,7 +113,8 @@ static truth compute_sums_by_brute_force(const grid *g, int64_t first, int64_t c
     return t;
 }
 
-/* Compares the sums: a root by Halley's method is off by at most 1e-14, and a sum of n by n roundings. */
+/* Compares the sums computed in lanes with brute force. A cube root by Halley's method has a relative error of at most
+ * 1e-14, and a sum of n terms one of at most n roundings. */
 static void assert_sums(const lane_sums *sums, const truth *t, int64_t count)
 {
     for (int axis = 0; axis < 3; axis++) {
@@ -121,7 +128,7 @@ static void assert_sums(const lane_sums *sums, const truth *t, int64_t count)
 
 /* ---- all types and layouts ----------------------------------------------------------------------------------- */
 
-/* Makes a view in which some cells are mirrored, so that they are inverted; coordinates in double are far from the
+/* Makes a mesh in which some cells are mirrored and thus inverted. If its coordinates are doubles, it is far from the
  * origin. */
 static test_view make_view(test_mesh_kind kind, test_layout layout, int64_t base)
 {
@@ -167,7 +174,7 @@ static void sums_in_lanes_match_single_cells(void **state)
     (void)state;
     const int64_t counts[] = {0, 1, 7, 8, 9, 40, 301};
     for (test_mesh_kind kind = TEST_TETS; kind <= TEST_PYRAMIDS; kind++)
-        /* the range of cells is an argument of the lanes' code, so that layouts with offsets need no test */
+        /* Layouts with offsets need no test, because the code for lanes receives the range of cells as an argument. */
         for (int i = 0; i < LAYOUTS / 2; i++) {
             test_view view = make_view(kind, choose_layout(i), i & 1);
             view.cells.ghosts = NULL;
@@ -177,7 +184,7 @@ static void sums_in_lanes_match_single_cells(void **state)
         }
 }
 
-/* Checks connectivity with other numbers between its entries. */
+/* Checks connectivity whose entries are separated by other numbers. */
 static void strided_connectivity_gives_the_same_sums(void **state)
 {
     (void)state;
@@ -242,7 +249,8 @@ static void unusual_cells_are_excluded_from_lanes(void **state)
             for (cpu_isa isa = CPU_PLAIN; isa <= cpu_best_isa(); isa++) {
                 int64_t taken, alone, again, none;
                 const lane_sums sums = compute_lane_sums(isa, &cells, &taken, &alone);
-                assert_true(taken <= place && taken % LANES == 0); /* earlier cells may use the changed vertex too */
+                /* earlier cells may be excluded too, because they can share the changed vertex */
+                assert_true(taken <= place && taken % LANES == 0);
                 assert_true(alone > 0 && taken + alone <= cells.count);
                 if (make[m] == make_ghost || make[m] == make_stray_index) assert_true(taken + alone > place);
                 const lane_cells before = {&view.cells, GRID_TET, 0, taken, 0};
@@ -255,7 +263,7 @@ static void unusual_cells_are_excluded_from_lanes(void **state)
         }
 }
 
-/* Memory between two pages that cannot be read; the numbers begin or end at one of the pages. */
+/* Memory between two pages that cannot be read. The numbers in it are adjacent to one of these pages. */
 typedef struct guarded {
     char *pages;
     size_t page, inner;
@@ -294,7 +302,8 @@ static void assert_not_followed(const grid *g, void *index, int64_t cell, int64_
 static void wrong_indices_are_not_dereferenced(void **state)
 {
     (void)state;
-    for (int i = 0; i < 16; i++) { /* bits: the widths, the index base, and the end at which the numbers are */
+    /* bits: widths of coordinates and of indices, index base, end of the memory at which the numbers are */
+    for (int i = 0; i < 16; i++) {
         const int64_t base = i >> 2 & 1;
         test_view view = make_view(TEST_HEXES, choose_layout(i & 3), base);
         grid *g = &view.cells;
@@ -314,7 +323,7 @@ static void wrong_indices_are_not_dereferenced(void **state)
                 assert_not_followed(
                     g, (char *)(uintptr_t)g->connectivity.data + g->connectivity.stride * (8 * cells[c] + k), cells[c],
                     wrong[k]);
-        assert_run(g, 0, g->cell_count); /* reads the first and the last vertex, and nothing beyond */
+        assert_run(g, 0, g->cell_count); /* reads the first and the last vertex, but nothing beyond them */
         for (int axis = 0; axis < 3; axis++) munmap(memory[axis].pages, memory[axis].inner + 2 * memory[axis].page);
         test_view_free(&view);
     }
@@ -346,7 +355,7 @@ static void volumes_in_lanes_match_single_cells(void **state)
             assert_int_equal(all.inverted_count, each.inverted_count);
             assert_int_equal(all.flat_count, 0);
             assert_true(fabs(all.size_sum - each.size_sum) <=
-                        1e-12 * each.size_sum); /* 4000 roundings, and the 1e-14 of roots */
+                        1e-12 * each.size_sum); /* error of 4000 roundings, and of cube roots */
             test_view_free(&view);
         }
 }

@@ -1,7 +1,7 @@
-/* Checks structured blocks: the pictures, statistics and counts of a lattice equal, to the bit, those of the same cells
- * passed as hexes, for uniform, rectilinear and curvilinear coordinates, for arrays in any order with padding, for
- * ghost layers and for blanked cells. Padding contains values that are not finite, so that a picture that used them
- * would have holes. */
+/* Checks structured blocks. Pictures, statistics and counts of a lattice must be bit-identical to those of the same
+ * cells passed as hexes: for uniform, rectilinear and curvilinear coordinates, for arrays in any order with padding,
+ * for ghost layers and for blanked cells. The padding contains values that are not finite, so that a picture would have
+ * holes if they were used. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,7 +12,7 @@
 typedef enum place_form { UNIFORM, RECTILINEAR, RECTILINEAR_FLOAT, CURVILINEAR, CURVILINEAR_FLOAT, FORMS } place_form;
 typedef enum array_order { PACKED, FORTRAN_PADDED, C_PADDED, ORDERS } array_order;
 
-/* Numbers of cells along the axes of the whole lattice, which is divided among ranks along k. */
+/* Numbers of cells along the axes of the whole lattice. Ranks have parts of its layers along k. */
 static const int64_t whole[3] = {9, 7, 12};
 static const double origin[3] = {0.1, -0.3, 1.7}, spacing[3] = {0.1, 0.07, 0.13};
 
@@ -29,20 +29,20 @@ static const char *const images[] = {
 };
 enum { IMAGES = sizeof images / sizeof images[0] };
 
-/* A rank's block: its cells and vertices, including ghost layers and padding, in the whole lattice's indices. */
+/* A rank's block of the lattice. Indices are those of the whole lattice unless stated otherwise. */
 typedef struct block {
     place_form form;
-    int64_t first[3], cells[3];       /* including the ghost layers */
-    int64_t own_first[3], own_end[3]; /* excluding the ghost layers, in the block's indices */
+    int64_t first[3], cells[3];       /* first cell and number of cells, with ghost layers */
+    int64_t own_first[3], own_end[3]; /* range of the cells without ghost layers, as indices in the block */
     int64_t vertex_strides[3], cell_strides[3], vertex_count, cell_count;
     double *places[3];
     float *narrow[3];
     double *axes[3], *f, *c;
     float *narrow_axes[3];
     unsigned char *ghosts;
-    int32_t *wide_ghosts; /* nonzero flags have a lowest byte of 0 */
+    int32_t *wide_ghosts; /* ghost flags of 4 bytes; the lowest byte of nonzero flags is 0 */
     int64_t hex_count, *hexes;
-    int64_t *hex_cells; /* number in the block of each hex's cell */
+    int64_t *hex_cells; /* index in the block of each hex's cell */
     double *hex_values;
     insitu_lattice lattice;
 } block;
@@ -151,7 +151,7 @@ static void fill_cells(block *b, bool blanking)
             }
 }
 
-/* Makes the rank's share of the layers along k; rank_count may exceed the number of layers. */
+/* Makes the rank's block from its share of the layers along k. There may be more ranks than layers. */
 static void make_block(block *b, place_form form, array_order order, bool layers, bool blanking)
 {
     int64_t vertices[3];
@@ -159,7 +159,7 @@ static void make_block(block *b, place_form form, array_order order, bool layers
     for (int axis = 0; axis < 3; axis++) {
         const int64_t first = axis < 2 ? 0 : whole[2] * own_rank / rank_count;
         const int64_t end = axis < 2 ? whole[axis] : whole[2] * (own_rank + 1) / rank_count;
-        const int64_t low = layers ? 1 : 0, high = layers ? 2 : 0; /* the ghost layers extend beyond the domain too */
+        const int64_t low = layers ? 1 : 0, high = layers ? 2 : 0; /* ghost layers extend beyond the domain too */
         b->first[axis] = first - low;
         b->cells[axis] = end - first + low + high;
         b->own_first[axis] = low;
@@ -268,7 +268,8 @@ static bool set_hexes(insitu_session *session, const block *b)
     return insitu_set_mesh(session, "m", &mesh) == INSITU_OK && set_fields(session, b, b->hex_values, b->hex_count);
 }
 
-/* Returns a scene with the first `count` images: trees contain only cells that they show. */
+/* Returns a scene with the first `count` images. `count` decides which cells the trees contain, namely those that these
+ * images show. */
 static const char *make_scene_of_images(int count)
 {
     static char text[4096];
@@ -294,8 +295,8 @@ static int count_covered_pixels(const caught_picture *p)
     return count;
 }
 
-/* Returns the bytes that a lattice copies: a number for each index along each axis, unless vertices have
- * coordinates. */
+/* Returns the number of bytes that the library copies for a lattice: a double for each index along each axis, or
+ * nothing if each vertex has coordinates. */
 static int64_t compute_copied_axis_bytes(const block *b)
 {
     int64_t bytes = 0;
@@ -304,7 +305,7 @@ static int64_t compute_copied_axis_bytes(const block *b)
     return bytes;
 }
 
-/* Compares the pictures of hexes, which are drawn first, with those of the lattice. */
+/* Compares the pictures, reports and statistics of the hexes, which are drawn first, with those of the lattice. */
 static void compare_with_hexes(place_form form, array_order order, bool layers, bool blanking, int count)
 {
     block b;
@@ -333,7 +334,7 @@ static void compare_with_hexes(place_form form, array_order order, bool layers, 
         assert_true(is_same(&caught[i], &caught[count + i]));
     }
     everywhere(strcmp(statistics[0], statistics[1]) == 0);
-    everywhere(strcmp(left_out[0], left_out[1]) == 0); /* the message with the number of cells that trees leave out */
+    everywhere(strcmp(left_out[0], left_out[1]) == 0); /* messages with the number of cells that trees leave out */
     everywhere(count > 1 || strstr(left_out[1], "cells show nothing"));
     /* the first image shows the values as they are passed, so that no bytes are allocated per cell or vertex */
     everywhere(count > 1 || reports[1].bytes_copied == compute_copied_axis_bytes(&b));
@@ -359,8 +360,8 @@ static void lattices_draw_same_picture_as_hexes(void **state)
 
 enum { SHEET = 6 };
 
-/* Draws a sheet without cells along one axis: uniform, or with the vertices' coordinates; arrays are packed, i
- * fastest. */
+/* Draws a sheet, which has no cells along the axis `flat`: as a lattice or as quads, uniform or with coordinates of its
+ * vertices. Arrays are packed, with i fastest. */
 static caught_picture draw_sheet(int flat, bool is_lattice, bool is_uniform)
 {
     static const char scene[] =
@@ -423,7 +424,8 @@ static void flat_lattices_draw_same_picture_as_quads(void **state)
         }
 }
 
-/* Checks that a cube whose three axes point downwards, so that all its cells are left-handed, causes no warning. */
+/* Checks that a cube whose three axes all point in negative directions causes no warning, although all its cells are
+ * left-handed. */
 static void left_handed_blocks_give_no_warning(void **state)
 {
     (void)state;

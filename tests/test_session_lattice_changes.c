@@ -1,8 +1,8 @@
-/* Checks faulty structured blocks, and blocks that change. A faulty description on one rank gives the same error on all
- * ranks, which states the axis and the number, and has no effect after the correction. After each change of form or
- * position, a session draws the picture of a second session, to which each block is a new mesh. (The second session has
- * drawn as many pictures, because sessions keep the origin of their coordinates while the cells stay approximately in
- * place.) */
+/* Checks structured blocks that are faulty or that change. A faulty description on one rank must give the same error on
+ * all ranks, with the axis and the number, and must have no effect after its correction. After each change of its form
+ * or position, a session must draw the same picture as a second session, to which each block is a new mesh. The second
+ * session draws as many pictures, because a session keeps the origin of its coordinates while the cells stay
+ * approximately at the same position. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,7 +18,8 @@ static const char blocks_scene[] = "images:\n  - name: a\n    size: [32, 24]\n  
                                    "    camera: {position: [9, 14, 11], focal: [5, 2, 2], up: [0, 0, 1]}\n"
                                    "    outputs: [{path: a.exr}]\n";
 
-/* A rank's block, side by side along i, with the arrays of all forms. Strides of 0 mean that the lattice is packed. */
+/* A rank's block, with the arrays of all forms. The blocks of the ranks are side by side along i. Strides of 0 mean
+ * that the lattice is packed. */
 typedef struct block {
     insitu_lattice lattice;
     insitu_mesh mesh;
@@ -208,7 +209,7 @@ SPOIL(cell_field_short, b->c.count = CELLS - 1)
 typedef struct wrong_block {
     const char *name;
     void (*corrupt)(block *b);
-    bool at_once; /* a set call fails too */
+    bool at_once; /* whether a set call fails, not only the step */
     const char *words;
     insitu_status status;
 } wrong_block;
@@ -356,12 +357,12 @@ SPOIL(make_lattice_again, {
 SPOIL(make_quads, (make_uniform(b), b->lattice.cells[2] = 0))
 SPOIL(make_cells, b->lattice.cells[2] = NK)
 
-/* Changes the block to one smaller than the arrays: the padding at their end has no vertices. */
+/* Makes the block smaller than its arrays. The padding at the end of the arrays belongs to no vertex. */
 SPOIL(fewer_layers, (make_curvilinear(b), b->lattice.cells[2] = NK - 1))
 SPOIL(shorter_rows, b->lattice.cells[0] = 2)
 
-/* A change, and what the caller states as changed; fields are set again if the mesh is a different one, and if
- * sets_fields is set. */
+/* A change of a block, and what the caller declares as changed. Fields are set again if sets_fields is set, or if the
+ * mesh is passed to the second session, where it is new. */
 typedef struct change {
     const char *name;
     void (*make)(block *b);

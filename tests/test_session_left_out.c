@@ -1,7 +1,7 @@
-/* Checks cells that are not drawn, of every type and distributed over any number of ranks. A cell whose own value is
- * not finite shows no isosurface of the values that its neighbours give to the vertices, as if it were flagged as a
- * ghost. A cell without volume shows none either, although the field in front of it differs from that behind it, as if
- * it did not exist. Both hold to the bit. */
+/* Checks cells that must not be drawn, of every type and distributed over any number of ranks. A cell whose own value
+ * is not finite shows nothing, not even an isosurface of the means that its neighbours give to its vertices: the
+ * picture is bit-identical to that with the cell flagged as a ghost. A cell without volume shows no isosurface,
+ * although the field differs between its front and its back: the picture is bit-identical to that without the cell. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -21,7 +21,7 @@ static const char volume_scene[] = IMAGE("      - volume: {field: f, range: [-1,
 static const char *const scenes[] = {surface_scene, clear_scene, volume_scene};
 enum { SCENES = sizeof scenes / sizeof *scenes };
 
-/* All kinds, and hexes and mixed cells as polyhedra too. */
+/* Number of meshes: one of each kind, and mixed cells converted to polyhedra. */
 enum { MESHES = TEST_KIND_COUNT + 1 };
 
 static void make_mesh(int kind, test_mesh *out)
@@ -49,7 +49,7 @@ static void draw_step(insitu_session *session, const session_input *in, int cycl
     caught_count = 0;
 }
 
-/* Returns whether all channels differ by at most the bound, and the picture is not empty. */
+/* Returns whether all channels of two pictures differ by at most the bound, and the first picture is not empty. */
 static bool are_same_within_bound(const caught_picture *a, const caught_picture *b, double bound)
 {
     int shown = 0;
@@ -72,8 +72,8 @@ static void free_picture(caught_picture *picture)
 
 /* ---- cells without a value of their own ---------------------------------------------------------------------- */
 
-/* Returns the cell's value: computed from its corners' positions in the wave; for a polyhedron, from one vertex of each
- * face. */
+/* Returns the cell's value: the mean of the wave field at the cell's vertices or, for a polyhedron, at one vertex of
+ * each face. */
 static double compute_cell_value(const test_mesh *part, int64_t cell)
 {
     double sum = 0;
@@ -130,8 +130,8 @@ static void cells_without_a_value_are_not_drawn(void **context)
         for (int i = 0; i < SCENES; i++) verify_lacking(kind, scenes[i]);
 }
 
-/* Checks cells that lose their value while the means at vertices stay the same: of cells with equal values some lose
- * theirs, and others get theirs back. */
+/* Checks cells that lose their value while the means at vertices stay the same. All cells have equal values; from one
+ * step to the next some of them lose their value, and others get theirs back. */
 static void cells_that_lose_their_value_disappear_at_the_next_step(void **context)
 {
     (void)context;
@@ -166,8 +166,8 @@ static void cells_that_lose_their_value_disappear_at_the_next_step(void **contex
 
 /* ---- cells without volume ------------------------------------------------------------------------------------ */
 
-/* Computes the position of vertex i of a flat cell: hexes and wedges have a possibly bent face as front and as back;
- * tets and pyramids are in the plane of the first three corners. */
+/* Computes the position of vertex i of a flat cell. In hexes and wedges the front and the back are the same face, which
+ * can be bent; tets and pyramids are in the plane of the first three corners. */
 static void compute_flat_position(int type, double corners[4][3], int i, double place[3])
 {
     static const double in_plane[5][2] = {{0, 0}, {0.5, 0}, {0.5, 0.5}, {0, 0.5}, {0.2, 0.1}};
@@ -182,7 +182,8 @@ static void compute_flat_position(int type, double corners[4][3], int i, double 
     }
 }
 
-/* Adds a flat cell with its own vertices; the field is -1 at one half of them and 1 at the other. */
+/* Adds a flat cell whose vertices belong to no other cell. The field is -1 at one half of them and 1 at the other
+ * half. */
 static void add_flat_cell(test_mesh *mesh, int type, double corners[4][3])
 {
     const int count = grid_type_vertices(type);
@@ -196,7 +197,7 @@ static void add_flat_cell(test_mesh *mesh, int type, double corners[4][3])
     test_mesh_add_cell(mesh, type, vertices, (const int[]){0, 1, 2, 3, 4, 5, 6, 7});
 }
 
-/* Adds next to every hex a flat cell on one of its faces. as_polyhedra: all cells become polyhedra, with plane
+/* Adds for every hex a flat cell on one of its faces. If as_polyhedra is set, all cells become polyhedra with plane
  * faces. */
 static void add_flat_cells(test_mesh *mesh, bool as_polyhedra)
 {
@@ -250,7 +251,7 @@ static void flat_cells_between_differing_fields_change_no_pixel(void **context)
         for (int i = 0; i < SCENES; i++) verify_flat(as_polyhedra, scenes[i]);
 }
 
-/* Checks vertices that move while the arrays stay the same: hexes are flat at one step and have a volume at the
+/* Checks vertices that move although the arrays stay the same: hexes are flat in one step and have a volume in the
  * next. */
 static void flat_cells_that_gain_volume_are_drawn(void **context)
 {

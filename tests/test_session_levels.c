@@ -1,6 +1,6 @@
-/* Checks levels of refinement in blocks of one mesh: which cells finer blocks cover, and the values at hanging
- * vertices, against brute force on integers; a sphere without gaps, the same to the bit on any number of ranks,
- * including ranks that have no block of a level; and blocks that appear and disappear. */
+/* Checks levels of refinement that are given as blocks of one mesh. The cells that finer blocks cover, and the values
+ * at hanging vertices, are compared with brute force on integers. A sphere must have no gaps and must be bit-identical
+ * on any number of ranks, including ranks that have no block of some level. Blocks may appear and disappear. */
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -13,7 +13,7 @@
 
 enum { SIZE = 200, PIXELS = SIZE * SIZE, SIDE = 8, LEVELS = 3, MOST_BLOCKS = 64, GRIDS = 3 };
 
-/* A view along z from z = 5; a pixel is 1/100 wide. */
+/* An orthographic view along z from z = 5; a pixel is 1/100 wide. */
 static const char scene_text[] =
     "images:\n  - name: a\n    size: [200, 200]\n    background: [0, 0, 0, 0]\n    camera: {position: [0, 0, 5], "
     "focal: [0, 0, 0], up: [0, 1, 0], projection: orthographic, height: 2}\n    layers:\n"
@@ -21,20 +21,20 @@ static const char scene_text[] =
 
 /* ---- the levels -------------------------------------------------------------------------------------------------- */
 
-/* A block, in cells of the coarsest level. */
+/* A block of cells of one level; its bounds are counted in cells of the coarsest level. */
 typedef struct box {
     int level, lower[3], upper[3];
 } box;
 
-/* The layout of a mesh's blocks and their distribution over ranks. */
+/* The blocks of a mesh and how they are distributed over ranks. */
 typedef struct levels {
-    int refinement[LEVELS]; /* cells per coarsest cell along each axis, for each level */
-    int grid;               /* number of the set of boxes */
+    int refinement[LEVELS]; /* number of cells of each level per cell of the coarsest level, along each axis */
+    int grid;               /* index of the set of boxes */
     bool is_of_cells;
     bool is_by_level; /* each rank has blocks of one level only */
     bool has_layers;  /* some blocks have ghost layers */
-    bool is_mixed;    /* every other block is given by the coordinates of its vertices */
-    double off;       /* relative excess of these coordinates */
+    bool is_mixed;    /* every other block has coordinates for each vertex */
+    double off;       /* relative error that is added to these coordinates */
     int rank, ranks;
     int count;
     box boxes[MOST_BLOCKS];
@@ -49,7 +49,7 @@ static void add_box(levels *l, int level, const int lower[3], const int upper[3]
     memcpy(b->upper, upper, sizeof b->upper);
 }
 
-/* Adds a box as two blocks. */
+/* Adds a box as two blocks, which are halves along the axis. */
 static void add_halves(levels *l, int level, const int lower[3], const int upper[3], int axis)
 {
     int middle[3], low[3];
@@ -60,7 +60,7 @@ static void add_halves(levels *l, int level, const int lower[3], const int upper
     add_box(l, level, low, upper);
 }
 
-/* Makes boxes of which level 2 is next to level 1, next to level 0 and at the border of the domain. */
+/* Makes boxes of levels 0, 1 and 2. Level 2 is adjacent to level 1, to level 0 and to the border of the domain. */
 static void make_levels(levels *l)
 {
     static const int fine[GRIDS][4][2][3] = {
@@ -81,16 +81,15 @@ static int get_block_owner(const levels *l, int block)
     return (int)(test_uniform((uint64_t)(block + 100 * l->grid), 8) * l->ranks);
 }
 
-/* ---- brute force, on the lattice of the finest level's cells, in integers
- * ----------------------------------------- */
+/* ---- brute force, in integer coordinates counted in cells of the finest level ----------------------------------- */
 
 static int get_finest_level(const levels *l)
 {
     return l->refinement[LEVELS - 1];
 }
 
-/* Returns the distance from the middle of the domain, [-1, 1]^3; the coordinates are doubled, so that middles of cells
- * are integers. */
+/* Returns the distance of a point from the middle of the domain [-1, 1]^3. The point's coordinates are passed doubled,
+ * so that those of cell centres are integers too. */
 static double compute_distance(const levels *l, const int twice[3])
 {
     double square = 0;
@@ -101,7 +100,7 @@ static double compute_distance(const levels *l, const int twice[3])
     return sqrt(square);
 }
 
-/* Returns the finest level of a box that contains the point with these doubled coordinates; -1: none. */
+/* Returns the finest level of a box that contains the point with these doubled coordinates; -1 if no box does. */
 static int find_level(const levels *l, const int twice[3])
 {
     int level = -1;
@@ -116,8 +115,8 @@ static int find_level(const levels *l, const int twice[3])
     return level;
 }
 
-/* Finds the cell of a level, by its lowest corner, that touches the vertex in the direction given by the bits; returns
- * false if there is no drawn cell of that level. */
+/* Finds the cell of a level that touches the vertex in the direction given by three bits, one for each axis. lower
+ * receives the cell's lowest corner. Returns false if no cell of that level is drawn there. */
 static bool find_adjacent_cell(const levels *l, int level, const int vertex[3], int bits, int lower[3])
 {
     const int width = get_finest_level(l) / l->refinement[level];
@@ -152,8 +151,8 @@ static double compute_cell_mean(const levels *l, const int vertex[3])
     return sum / count;
 }
 
-/* Finds the largest drawn cell that has the vertex on its border, but not as a corner; returns false if there is
- * none. */
+/* Finds the largest drawn cell on whose border the vertex lies without being one of the corners; returns false if there
+ * is none. */
 static bool find_hanging_cell(const levels *l, const int vertex[3], int *width, int lower[3])
 {
     for (int level = 0; level < LEVELS; level++)
@@ -164,7 +163,8 @@ static bool find_hanging_cell(const levels *l, const int vertex[3], int *width, 
     return false;
 }
 
-/* Returns the value at a vertex: that interpolated in the cell on which it hangs, else the vertex's own. */
+/* Returns the expected value at a vertex. If the vertex hangs on a cell, it is interpolated in that cell; otherwise it
+ * is the mean of cells or the field itself. */
 static double compute_expected_value(const levels *l, const int vertex[3])
 {
     const int twice[3] = {2 * vertex[0], 2 * vertex[1], 2 * vertex[2]};
@@ -185,9 +185,9 @@ static double compute_expected_value(const levels *l, const int vertex[3])
     return value;
 }
 
-/* Returns the allowed error of the library's value at a vertex. Interpolated values are sums of at most 64 products of
- * weights and values below 2, of up to three levels, with less than 200 roundings of 2. A vertex that does not hang has
- * the same value in all blocks, whose mean is exact. */
+/* Returns the allowed error of the library's value at a vertex. An interpolated value is a sum of at most 64 products
+ * of weights and values below 2, over up to three levels, with less than 200 roundings of numbers below 2. A vertex
+ * that does not hang has the same value in all blocks, so that their mean is exact. */
 static double compute_allowed_error(const levels *l, const int vertex[3])
 {
     int width, lower[3];
@@ -200,20 +200,22 @@ typedef struct block {
     insitu_lattice lattice;
     int64_t vertex_count, cell_count;
     double *values, (*places)[3]; /* places is NULL if the block is uniform */
-    int16_t *flags;               /* flags of cells; NULL if there are none */
+    int16_t *flags;               /* ghost flags of cells; NULL if there are none */
 } block;
 
 typedef enum layer_kind { NO_LAYER, OUTSIDE_INTERIOR, FLAGGED } layer_kind;
 
-/* Returns the kind of a block's ghost layer, which is one cell wide. Finer blocks cover the cells below their flagged
- * cells, so that only blocks of the coarsest level have flagged layers. */
+/* Returns how a block marks its ghost layer, which is one cell wide: by the interior range, or by flags. Finer blocks
+ * cover all cells under them, including those under their own flagged cells, so only blocks of the coarsest level have
+ * flagged layers. */
 static layer_kind get_ghost_layer(const levels *l, int number)
 {
     const layer_kind kind = (layer_kind)(number % 3);
     return !l->has_layers || (kind == FLAGGED && l->boxes[number].level) ? NO_LAYER : kind;
 }
 
-/* Returns whether a cell (is_vertex: a vertex) with these indices belongs to the block without its layer. */
+/* Returns whether the cell with these indices (a vertex if is_vertex is set) is in the block without its ghost
+ * layer. */
 static bool is_inner(const block *b, int layer, const int at[3], bool is_vertex)
 {
     for (int axis = 0; axis < 3; axis++)
@@ -231,7 +233,7 @@ static void make_flags(block *b)
             is_inner(b, 1, (const int[]){i % wide[0], i / wide[0] % wide[1], i / wide[0] / wide[1]}, false) ? 0 : 256;
 }
 
-/* Makes the coordinates of the uniform block, increased by a fraction of them. */
+/* Replaces the uniform lattice of a block by coordinates of its vertices, which are increased by the fraction `off`. */
 static void make_coordinates(block *b, double off)
 {
     const insitu_lattice *l = &b->lattice;
@@ -246,7 +248,7 @@ static void make_coordinates(block *b, double off)
     for (int axis = 0; axis < 3; axis++) b->lattice.origin[axis] = b->lattice.spacing[axis] = 0;
 }
 
-/* Makes a block; values in ghost layers are wrong on purpose. */
+/* Makes a block. Values in ghost layers are wrong, so that the result differs if they are used. */
 static void make_block(const levels *l, int number, block *out)
 {
     const box *b = &l->boxes[number];
@@ -330,7 +332,7 @@ static bool submit_levels(insitu_session *session, const levels *l, const block 
 
 /* ---- results ----------------------------------------------------------------------------------------------------- */
 
-/* Compares the drawn values with brute force. */
+/* Compares the values that are drawn at vertices with brute force. */
 static bool check_vertex_values(const insitu_session *session, const levels *l)
 {
     const session_parts parts = session_find_parts(&session->meshes, "m");
@@ -378,7 +380,7 @@ static int64_t count_covered_pixels(const levels *l, const box *b)
     return count;
 }
 
-/* Counts the cells that are not drawn: covered ones, and those of ghost layers. */
+/* Counts the cells that are not drawn because they are covered by finer cells or are in ghost layers. */
 static int64_t count_ghosts(const levels *l)
 {
     int64_t count = 0;
@@ -395,8 +397,9 @@ static int64_t count_ghosts(const levels *l)
     return count;
 }
 
-/* Counts pixels in which the front of the sphere is invisible. The surface inside a cell is off the sphere by at most
- * half the largest cell's diagonal, 0.217; inside a radius of 0.6 the front and the back are 0.8 apart. */
+/* Counts pixels in which the front of the sphere is not visible. Inside a cell the surface is at most half the diagonal
+ * of the largest cell, 0.217, away from the sphere. Within a radius of 0.6 in the picture the front and the back are at
+ * least 0.8 apart. */
 static int count_slits(const caught_picture *picture)
 {
     int slits = 0;
@@ -418,7 +421,7 @@ static caught_picture step_and_take_picture(insitu_session *session, int cycle)
     return pop_caught_picture();
 }
 
-/* Draws the levels in a new session. */
+/* Draws the levels in a new session; *is_true is cleared if values or counts are wrong. */
 static caught_picture draw_levels(MPI_Comm comm, const char *scene, const levels *l, bool *is_true)
 {
     block blocks[MOST_BLOCKS];
@@ -462,9 +465,9 @@ static void check_levels(levels l)
 
 /* ---- tests ------------------------------------------------------------------------------------------------------ */
 
-/* Checks spheres. By default each set of ratios is drawn on one or on several ranks, and with values at cells or at
- * vertices, alternating. With the ratio of 3, vertices of every other block differ in their last bits from those at the
- * same positions. */
+/* Checks a sphere for four sets of refinement ratios. By default each set is drawn on one rank or on several, with
+ * values at cells or at vertices, alternating. For the set with a ratio of 3, coordinates of every other block differ
+ * in their last bits from those of the same vertices in other blocks. */
 static void a_sphere_continues_across_levels(void **state)
 {
     static const int refinements[][LEVELS] = {{1, 2, 4}, {1, 4, 8}, {1, 2, 8}, {1, 3, 6}};
@@ -488,8 +491,8 @@ static const char walls_text[] =
     "focal: [0, 0, 0], up: [0, 1, 0], projection: orthographic, height: 4}\n    layers:\n"
     "      - surface: {colour: [1, 0.5, 0.25], opacity: 0.3}\n    outputs: [{path: a.exr}]\n";
 
-/* Checks that a transparent surface of levels equals that of one block of the domain: its planes are the same up to
- * rounding, on which no colour depends, and a wall between levels would be visible in it. */
+/* Checks that a transparent outer surface of levels equals that of a single block. A wall between levels would be
+ * visible through it. The planes of both agree up to rounding, which affects no colour. */
 static void outer_surfaces_have_no_faces_between_levels(void **state)
 {
     static const int domain[2][3] = {{0, 0, 0}, {SIDE, SIDE, SIDE}};
@@ -520,7 +523,7 @@ static void outer_surfaces_have_no_faces_between_levels(void **state)
     }
 }
 
-/* Checks blocks that change: at every step some blocks of another grid of levels replace those of the last one, on
+/* Checks blocks that change: at every step some blocks of another set of levels replace blocks of the previous step, on
  * other ranks. */
 static void levels_are_added_and_removed(void **state)
 {
@@ -559,8 +562,8 @@ static void levels_are_added_and_removed(void **state)
     free_blocks(&last, held);
 }
 
-/* Checks the removal of a block of the finest level: blocks whose covered cells stay the same are not made again, and
- * keep their trees. */
+/* Checks the removal of a block of the finest level. Blocks of which the same cells are covered as before are not
+ * rebuilt, and keep their trees. */
 static void blocks_adjacent_to_a_change_are_kept(void **state)
 {
     levels l = {.refinement = {1, 2, 4}, .rank = own_rank, .ranks = rank_count}, rest;
@@ -596,7 +599,7 @@ static void blocks_adjacent_to_a_change_are_kept(void **state)
     free_blocks(&l, blocks);
 }
 
-/* Checks a level 1 that ends inside a cell of level 0. */
+/* Checks that a block of level 1 that ends inside a cell of level 0 is reported. */
 static void blocks_that_do_not_fit_are_reported(void **state)
 {
     levels l = {.refinement = {1, 2, 4}, .rank = own_rank, .ranks = rank_count};
@@ -628,8 +631,8 @@ static void blocks_that_do_not_fit_are_reported(void **state)
     free_blocks(&l, blocks);
 }
 
-/* Makes a block of cubes that are 1 / of of a cell of the coarsest level, which has 4^3 cells in [-1, 1]^3; the plane z
- * = 0.1 has the value 0.72. */
+/* Makes a block of cubes whose width is 1 / `of` of that of a cell of the coarsest level, which has 4^3 cells in [-1,
+ * 1]^3. The field is 0.72 on the plane z = 0.1. */
 static block make_nested(int of, int first, int cells)
 {
     block out = {.vertex_count = (int64_t)(cells + 1) * (cells + 1) * (cells + 1),
@@ -648,7 +651,7 @@ static block make_nested(int of, int first, int cells)
     return out;
 }
 
-/* Counts the pixels that do not show the plane, at a depth of 4.9. */
+/* Counts the pixels that do not show the plane, which has a depth of 4.9. */
 static int count_holes(const caught_picture *picture)
 {
     int holes = 0;
@@ -657,8 +660,8 @@ static int count_holes(const caught_picture *picture)
     return holes;
 }
 
-/* Checks that the finest block may begin in the middle of a cell of the coarsest level if the level between covers that
- * cell. Without the level between it is an error. */
+/* Checks that the finest block may begin in the middle of a cell of the coarsest level if a level between them covers
+ * that cell, and that it is an error if it does not. */
 static void intermediate_levels_allow_finer_levels_within_a_cell(void **state)
 {
     static const int of[3] = {1, 2, 4}, first[3] = {0, 2, 6}, cells[3] = {4, 4, 4};

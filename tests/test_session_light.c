@@ -1,7 +1,8 @@
-/* Checks shadows and ambient occlusion. Outlines of shadows have a closed form: a disk cut from a slice by a ball casts
- * an ellipse on another slice, and an isosurface that is a plane darkens what is behind it. Ambient occlusion in a
- * corner of two planes is a segment of a disk, and is compared ray by ray with planes in double; so is that in a valley
- * of an isosurface. All pictures are the same to the bit with any partition, for all kinds of cells. */
+/* Checks shadows and ambient occlusion. Outlines of shadows have closed forms: a disk, cut from a slice by a spherical
+ * clip, casts an ellipse on another slice, and an isosurface that is a plane darkens everything behind it. Ambient
+ * occlusion in a corner of two planes, whose closed form is a segment of a disk, and in a valley of an isosurface is
+ * compared ray by ray with planes in double. All pictures must be bit-identical for any partition, for all kinds of
+ * cells. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -37,7 +38,7 @@ static void make_camera_ray(int pixel, double base[3], double direction[3])
     render_camera_ray(&camera, pixel % WIDTH, pixel / WIDTH, base, direction);
 }
 
-/* Computes the position on the pixel's ray at the depth. */
+/* Computes the position on the pixel's ray at a depth. */
 static void compute_ray_position(int pixel, double depth, double out[3])
 {
     double base[3], direction[3];
@@ -50,7 +51,7 @@ static void decode_normal(const caught_picture *picture, int pixel, double out[3
     for (int a = 0; a < 3; a++) out[a] = (double)picture->data[a * PIXELS + pixel];
 }
 
-/* Makes a mesh for every rank's own session, the whole mesh, or a rank's part of it. */
+/* Makes the part of one rank of `count`, from a mesh with jitter. A count of 1 gives the whole mesh. */
 static void make_jittered(session_input *in, test_mesh_kind kind, double jitter, test_function *f,
                           test_partition_kind distributed, int rank, int count)
 {
@@ -73,7 +74,8 @@ static void make_part(session_input *in, test_mesh_kind kind, test_function *f, 
 
 /* ---- shadows in closed form ---------------------------------------------------------------------------------- */
 
-/* A floor, a disk above it, and light from the side. The material has ambient 0.2, diffuse 0.8. */
+/* A floor, a disk above it, and light from the side. The material has an ambient coefficient of 0.2 and a diffuse one
+ * of 0.8. */
 static const double to_light[3] = {2. / 7, 6. / 7, 3. / 7};
 #define FLOOR                                                                                                          \
     "      - slice: {field: f, map: {colours: [[0.5, 0.5, 0.5], [1, 1, 1]]}, planes: [{normal: [0, 1, 0], point: [0, " \
@@ -84,7 +86,8 @@ static const double to_light[3] = {2. / 7, 6. / 7, 3. / 7};
     "0.25, 0]}], " MATTE ", clip: {sphere: {centre: [0.1, 0.25, -0.2], radius: 0.5}}" more "}\n"
 #define LIGHT(more) "    lights: [{direction: [2, 6, 3], in: world" more "}]\n"
 
-/* Returns 1 in the light, 0 in the shadow, -1 if rounding decides or the floor is invisible. */
+/* Returns 1 if the floor is lit in this pixel, 0 if it is in shadow, and -1 if rounding decides or the pixel does not
+ * show the floor. */
 static int compute_floor_light(int pixel, double depth)
 {
     double place[3], across = 0;
@@ -101,7 +104,8 @@ typedef struct tally {
     int lit, dark, wrong;
 } tally;
 
-/* Verifies the floor's light; lit is the picture without shadows, to which its light is relative. */
+/* Counts pixels in which the floor is lit, dark or wrong. lit is the picture without shadows, to which brightness is
+ * relative. */
 static tally verify_floor(const caught_picture *shadowed, const caught_picture *lit)
 {
     tally out = {0};
@@ -148,14 +152,15 @@ static void shadows_of_disks_are_ellipses(void **context)
     }
 }
 
-/* The vector half way between the eye and this light is the floor's normal, but the light is below the floor. */
+/* A light below the floor. The half vector between the directions to the eye and to the light is the floor's normal, so
+ * that a highlight would appear if the light's side were ignored. */
 #define BELOW(more) "    lights: [{direction: [-3, -0.3, -4], in: world" more "}]\n"
 #define GLOSSY                                                                                                         \
     "      - slice: {field: f, planes: [{normal: [0, 1, 0], point: [0, -0.5, 0]}],\n"                                  \
     "                material: {ambient: 0.2, diffuse: 0.4, specular: 1, shininess: 2}}\n"
 
-/* Checks that none of these changes the picture: a transparent disk, a disk that is clipped away, a light without
- * shadows, and a light below the floor that has neither shadow nor highlight. */
+/* Checks that these do not change the picture: the shadow of a transparent disk, the shadow of a disk that is clipped
+ * away, a light without shadows, and a light below the floor, which causes neither shadow nor highlight. */
 static void transparent_layers_cast_no_shadow(void **context)
 {
     static const char *const scenes[][2] = {
@@ -181,7 +186,7 @@ static void transparent_layers_cast_no_shadow(void **context)
         free_caught(&shadowed);
         free_caught(&lit);
         input_free(&in);
-        /* Colours are shaded in double here and in float there: a few products below 1 differ by 5e-7. */
+        /* The test shades in double and the library in float: products of a few numbers below 1 differ by 5e-7. */
         if (worst > 5e-7) fprintf(stderr, "scene %zu: off by %g\n", i, worst);
         everywhere(worst <= 5e-7);
     }
@@ -192,12 +197,12 @@ static void transparent_layers_cast_no_shadow(void **context)
 #define BARE "material: {ambient: 0.6, diffuse: 0.1, specular: 0}"
 #define DARK "    lights: [{direction: [0, 0, 1], intensity: 0}]\n"
 
-/* Two perpendicular planes in the cube. */
+/* Two perpendicular planes, of which the parts inside the cube occlude. */
 typedef struct corner {
     struct {
         double normal[3], distance;
     } planes[2];
-    double least; /* surfaces nearer than this may count or not */
+    double least; /* a surface nearer than this distance may occlude or not */
 } corner;
 
 static const corner slices = {{{{0, 0.8, 0.6}, -0.4}, {{0.8, -0.36, 0.48}, -0.3}}, 0};
@@ -209,8 +214,8 @@ static double signed_distance_above_plane(const corner *c, int plane, const doub
     return n[0] * place[0] + n[1] * place[1] + n[2] * place[2] - c->planes[plane].distance;
 }
 
-/* Returns whether the ray meets a plane within the radius: 1, 0, or -1 if rounding or the corner's least distance
- * decides. */
+/* Returns 1 if the ray meets one of the planes within the radius, 0 if it does not, and -1 if rounding decides or the
+ * hit is nearer than the corner's least distance. */
 static int is_blocked_by_corner(const corner *c, const double from[3], const double d[3])
 {
     for (int i = 0; i < 2; i++) {
@@ -230,11 +235,11 @@ static int is_blocked_by_corner(const corner *c, const double from[3], const dou
 
 typedef struct sky {
     int pixels, wrong, undecided_rays;
-    double sum; /* sum of the unoccluded fractions as drawn */
+    double sum; /* sum over the pixels of the fraction of rays that are not occluded, as drawn */
 } sky;
 
-/* Verifies pictures lit by ambient light only: the picture is the unoccluded one times the fraction of unoccluded
- * rays. */
+/* Compares pictures lit by ambient light only: `drawn` must be `plain`, the picture without occlusion, times the
+ * fraction of rays that are not occluded. */
 static sky verify_sky(const corner *c, const caught_picture *drawn, const caught_picture *plain)
 {
     sky out = {0};
@@ -284,16 +289,17 @@ static void ambient_occlusion_of_corners_matches_disk_segments(void **context)
                 double at[3];
                 if (!isfinite(drawn.depth[p])) continue;
                 compute_ray_position(p, (double)drawn.depth[p], at);
-                /* The angle is measured from the plane on which the position is not. */
+                /* The angle follows from the distance to the plane that does not contain the position, so the larger
+                 * distance is used. */
                 const double ratio = fmax(fabs(signed_distance_above_plane(&slices, 0, at)),
                                           fabs(signed_distance_above_plane(&slices, 1, at))) /
                                      radius;
                 expected += ratio < 1 ? 1 - (acos(ratio) - ratio * sqrt(1 - ratio * ratio)) / acos(-1.0) : 1;
                 count++;
             }
-            /* The fraction of a pixel is off by no more than that of 16 independent rays, 1/8. The error of the mean
-             * over the pixels is smaller by the root of their number, and is allowed five times that. At the cube's
-             * faces the planes end, in at most a tenth of the pixels. */
+            /* The error of a pixel's fraction is at most that of 16 independent rays, 1/8. The error of the mean over
+             * the pixels is smaller by the square root of their number; five times that is allowed. Another 0.02 is
+             * added because the planes end at the cube's faces, which matters in at most a tenth of the pixels. */
             const double off = fabs(s.sum - expected) / count;
             is_right = s.wrong == 0 && s.pixels > 200 && s.undecided_rays < s.pixels / 10 &&
                        off < 5 * 0.125 / sqrt(count) + 0.02;
@@ -310,16 +316,16 @@ static void ambient_occlusion_of_corners_matches_disk_segments(void **context)
 
 #define VALLEY "      - isosurface: {field: f, values: [-0.3], " BARE "}\n"
 
-/* A valley along y whose bottom is between cells: the field is linear in every cell, for most kinds of cells, and the
- * isosurface is two planes. */
+/* A valley along y. Its bottom coincides with faces of cells, so that for most kinds of cells the field is linear in
+ * every cell, and the isosurface consists of two planes. */
 static double valley_field(const double p[3])
 {
     return p[2] - fabs(p[0]);
 }
 
-/* Checks valleys. Cells are up to half a unit wide. A surface of an isosurface nearer than a fifth of its cell need not
- * hide anything (session_layers.c), but everything farther must: so also in the pixels counted as near, in which the
- * other side is just beyond that distance. */
+/* Checks ambient occlusion in valleys. Cells are up to half a unit wide. Parts of an isosurface that are nearer than a
+ * fifth of a cell's width need not occlude (session_layers.c), but everything farther must. This includes the pixels
+ * counted as `near`, for which the valley's other side is just beyond that distance. */
 static void ambient_occlusion_darkens_valleys(void **context)
 {
     static const double root = 0.70710678118654752;
@@ -380,8 +386,8 @@ static double largest_difference(const caught_picture *a, const caught_picture *
     return worst;
 }
 
-/* Compares the picture of all ranks with that of one; most is the allowed difference, 0 if there are only surfaces,
- * which are the same to the bit. */
+/* Compares the picture that all ranks draw together with the one that rank 0 draws from the whole mesh. most: the
+ * largest allowed difference; 0 if the scene has only surfaces, which are bit-identical. */
 static void verify_partition(const char *scene, const session_input *whole, const session_input *part, double most,
                              const char *what)
 {
@@ -403,7 +409,7 @@ static void lit_pictures_are_the_same_on_any_partition(void **context)
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
         for (test_partition_kind distributed = 0; distributed < TEST_PARTITION_COUNT; distributed++) {
             session_input whole = {0}, part = {0};
-            /* In random partitions the last rank has no cells. */
+            /* In random partitions the last of several ranks has no cells. */
             const int count = distributed == TEST_RANDOM && rank_count > 1 ? rank_count - 1 : rank_count;
             make_part(&whole, kind, test_wave_field, TEST_BLOCK, 0, 1);
             make_part(&part, kind, test_wave_field, distributed, own_rank, count);
@@ -415,7 +421,7 @@ static void lit_pictures_are_the_same_on_any_partition(void **context)
         }
 }
 
-/* Checks that ghosts cast no shadow: every rank has all cells, of which those of other ranks are ghosts. */
+/* Checks that ghost cells cast no shadow. Every rank has all cells of the mesh; those of other ranks are ghosts. */
 static void ghost_cells_cast_no_shadow(void **context)
 {
     session_input whole = {0}, part = {0};

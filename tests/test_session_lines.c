@@ -1,6 +1,6 @@
-/* Checks contour lines in sessions: on every layer that supports them, for fields at vertices, at cells and derived,
- * the picture has the same bits on all ranks as on one, and lines are visible in it. On outer surfaces their positions
- * follow the field's formula. */
+/* Checks contour lines in sessions, on every layer that supports them and for fields at vertices, at cells and derived
+ * ones. Lines must be visible, and the picture of all ranks must be bit-identical to that of one rank. On outer
+ * surfaces the lines' positions are compared with the field's formula. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -33,7 +33,8 @@ static const struct lines_case {
 };
 enum { CASES = sizeof cases / sizeof *cases };
 
-/* Returns values at cells: the mean of x and y of the first four vertices of each cell. */
+/* Returns values at cells: the mean of x and y over the first four vertices (of a polyhedron: one vertex of each of the
+ * first four faces). */
 static double *make_cell_values(const test_mesh *mesh)
 {
     double *values = malloc((size_t)(mesh->cell_count + 1) * sizeof *values);
@@ -71,7 +72,7 @@ static caught_picture draw_lines(MPI_Comm comm, const char *scene, const session
     return picture;
 }
 
-/* Counts the pixels in which two pictures differ. */
+/* Returns the number of pixels in which two pictures differ. */
 static int count_differing_pixels(const caught_picture *a, const caught_picture *b)
 {
     int count = 0;
@@ -112,8 +113,8 @@ static void lines_are_the_same_on_all_ranks(void **state)
 
 /* ---- outer surfaces ---------------------------------------------------------------------------------------------- */
 
-/* Returns the fraction of a pixel that a line of a value covers on the front of the cube, z = 1, seen from the front:
- * the field is linear, and a pixel is `size` wide. */
+/* Returns the fraction of a pixel that the contour line of the value `level` covers on the cube's face z = 1, seen from
+ * the front. `size` is the width of a pixel; the field is linear. */
 static double compute_front_coverage(double x, double y, double size, double level)
 {
     const double at[3] = {x, y, 1}, right[3] = {x + 1, y, 1}, up[3] = {x, y + 1, 1};
@@ -122,7 +123,8 @@ static double compute_front_coverage(double x, double y, double size, double lev
     return fmin(fmax(1.25 - fabs(value - level) / (slope * size), 0), 1);
 }
 
-/* Compares the coverage. Values in float are off by 1e-7, and the field changes by 0.04 from one pixel to the next. */
+/* Compares how much of each pixel the lines cover. Values in float have errors of 1e-7, while the field changes by 0.04
+ * from one pixel to the next. */
 static bool are_lines_exact_on_front(const caught_picture *picture)
 {
     const double size = 2.4 / HEIGHT;

@@ -1,5 +1,5 @@
-/* Tests that the CPU time of a step grows linearly with the number of meshes, or with the number of blocks of one mesh.
- * There are thousands of them over all ranks, and each consists of one hex. */
+/* Checks that the CPU time of a step grows linearly with the number of meshes, or with the number of blocks of one
+ * mesh. All ranks together have thousands of them, each of which consists of one hex. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -44,8 +44,8 @@ static void row_free(row_of_cubes *row)
     free(row->values);
 }
 
-/* Writes the cube's name. Names of neighbours differ in their first digit, so that sorting by name changes their
- * order. */
+/* Writes the cube's name. Names of neighbouring cubes differ in their first digit, so that the order by name is not the
+ * order in the row. */
 static void make_cube_name(int i, char name[32])
 {
     snprintf(name, 32, "%d%03d rank %d", i % 10, i / 10, own_rank);
@@ -102,8 +102,8 @@ static double read_cpu_seconds(void)
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-/* Measures the CPU seconds of the first step, including its set calls, and the least CPU seconds of later steps with
-   new values. `count` is the number of cubes of all ranks together. */
+/* Measures the CPU time in seconds of the first step, including its set calls, and the least CPU time of the later
+ * steps, which have new values. `count` is the number of cubes of all ranks together. */
 static void measure_steps(bool are_blocks, int count, double *first, double *later)
 {
     row_of_cubes row;
@@ -124,7 +124,7 @@ static void measure_steps(bool are_blocks, int count, double *first, double *lat
     row_free(&row);
 }
 
-/* Returns whether the times of all ranks are within the bound. */
+/* Returns whether the times on all ranks grow by at most the allowed factor. */
 static bool is_linear(bool are_blocks)
 {
     const double most = 8 * sqrt(8);
@@ -136,10 +136,10 @@ static bool is_linear(bool are_blocks)
     return is_within;
 }
 
-/* Checks that times grow linearly. Eight times the meshes take eight times as long, or a little more if they no longer
- * fit into caches. Quadratic growth would take 64 times as long. The bound is the geometric mean of 8 and 64. MPICH's
- * ranks spin while they wait for each other, so other programs on the machine can lengthen their CPU times: the
- * measurement is repeated if it fails. */
+/* Checks that times grow linearly. Eight times as many meshes take eight times as long, or a little longer if they no
+ * longer fit into caches; quadratic growth would take 64 times as long. The bound is the geometric mean of 8 and 64.
+ * While MPICH's ranks wait for each other they spin, so that other programs on the machine can lengthen their CPU
+ * times; therefore the measurement is repeated if it fails. */
 static void check_linear(bool are_blocks)
 {
     bool is_well = false;

@@ -1,4 +1,4 @@
-/* Tests messages about input that is valid but probably a mistake. A warning is given once and is the same on all
+/* Checks messages about input that is valid but probably a mistake. A warning is given once and is the same on all
  * ranks. An error is returned if no useful picture could be drawn in an acceptable time. */
 #include <math.h>
 #include <stdio.h>
@@ -32,7 +32,8 @@ static void swap_integers(int64_t *a, int64_t *b)
     *b = held;
 }
 
-/* Numbers the vertices of quads row by row: VTK's vertex 2 becomes the fourth vertex, and VTK's vertex 6 the last. */
+/* Changes the order of vertices of quads and hexes from VTK's to rows: VTK's vertices 2 and 3 are exchanged, and for
+ * hexes also 6 and 7. */
 static void reorder_quads_by_rows(session_input *in)
 {
     for (int64_t cell = 0; cell < in->part.cell_count; cell++) {
@@ -42,7 +43,7 @@ static void reorder_quads_by_rows(session_input *in)
     }
 }
 
-/* Removes the jitter, so that the volumes of cells numbered by rows are exactly 0. */
+/* Removes the jitter of the vertices, so that the volume of a cell whose vertices are numbered by rows is exactly 0. */
 static void remove_jitter(session_input *in)
 {
     for (int64_t i = 0; i < 3 * in->part.vertex_count; i++)
@@ -81,7 +82,7 @@ static void make_cell_field(session_input *in)
 {
     for (int64_t i = 0; i < in->part.vertex_count; i++) in->part.values[i] = cell_value;
     in->field.centring = INSITU_CELL;
-    in->field.count = in->part.cell_count; /* hexes, of which there are fewer than vertices */
+    in->field.count = in->part.cell_count; /* cells are hexes, which are fewer than the vertices */
 }
 
 static void make_negative(session_input *in)
@@ -99,7 +100,7 @@ static void make_nothing_there(session_input *in)
     if (own_rank == rank_count - 1 && in->part.cell_count) in->part.values[in->part.connectivity[0]] = NAN;
 }
 
-/* Keeps the first face of each hex as a quad, and removes the hex. */
+/* Replaces each hex by its first face, a quad. */
 static void make_shells(session_input *in)
 {
     for (int64_t cell = 0; cell < in->part.cell_count; cell++) {
@@ -111,7 +112,7 @@ static void make_shells(session_input *in)
     input_describe(in);
 }
 
-/* Sets the values to x, and replaces each hex that has a value of 0 or more by its first face. */
+/* Sets the values to x. Keeps hexes whose values are all negative, and replaces every other hex by its first face. */
 static void make_some_shells(session_input *in)
 {
     int64_t at = 0;
@@ -148,14 +149,14 @@ static void make_ghosts(session_input *in)
     for (int64_t cell = 0; cell < in->part.cell_count; cell++) in->part.ghosts[cell] = 1;
 }
 
-/* Moves the mesh to coordinates near 1e12, which doubles represent to 1e-4. */
+/* Moves the mesh to coordinates near 1e12, where doubles have a spacing of about 1e-4. */
 static void move_far(session_input *in)
 {
     for (int64_t i = 0; i < 3 * in->part.vertex_count; i++)
         in->part.coordinates[i] = 1e12 + 1e-2 * in->part.coordinates[i];
 }
 
-/* Scales x and y so that half a cell is less than a millionth of the scene's size. */
+/* Scales x and y so that half a cell's width is less than a millionth of the scene's size. */
 static void make_needles(session_input *in)
 {
     for (int64_t i = 0; i < 3 * in->part.vertex_count; i++)
@@ -168,7 +169,7 @@ static const struct warning_case {
     const char *name, *scene;
     test_mesh_kind kind;
     corrupt_function *corrupt;
-    const char *words[3]; /* the first is NULL if no warning is expected */
+    const char *words[3]; /* texts that the warning contains; the first is NULL if no warning is expected */
 } warnings[] = {
     {"hexes by rows",
      plain,
@@ -425,8 +426,8 @@ static void likely_mistakes_are_reported_once(void **context)
     for (size_t i = 0; i < sizeof warnings / sizeof warnings[0]; i++) check_warning(&warnings[i]);
 }
 
-/* Checks that a warning is given once, is not repeated in the next step, and is given again if its cause disappears and
- * then returns, or if the scene is edited. */
+/* Checks that a warning is given once, is not repeated in the next step, and is given a second time if its cause
+ * disappears and returns. Editing the scene also repeats it. */
 static void warnings_recur_with_their_causes(void **context)
 {
     (void)context;
@@ -460,8 +461,8 @@ static bool is_parameter_value(insitu_session *session, const char *name, double
     return insitu_parameter(session, name, &value) == INSITU_OK && fabs(value - expected) <= 0;
 }
 
-/* Checks that insitu_parameter() leaves the value unchanged for a name that the scene does not define, and that its
- * error lists the names that the scene defines. */
+/* Returns whether insitu_parameter() refuses a name that the scene does not define, leaves the value unchanged, and
+ * gives an error with these words, which list the names that the scene defines. */
 static bool is_parameter_undefined(insitu_session *session, const char *name, const char *words)
 {
     double value = -77;
@@ -489,7 +490,7 @@ static void parameters_change_with_the_scene_on_all_ranks(void **context)
     everywhere(insitu_parameter(NULL, "inflow", &(double){0}) == INSITU_ERROR_ARGUMENT);
     everywhere(submit_input(session, &in) == INSITU_OK);
     check_step_succeeds(session, 0);
-    everywhere(is_warned(session, none)); /* not yet, as the simulation may still read the parameter */
+    everywhere(is_warned(session, none)); /* no warning yet, because the simulation may still read the parameter */
     check_step_succeeds(session, 1);
     everywhere(is_warned(session, unread));
     for (int i = 0; i < 3; i++) {
@@ -507,8 +508,8 @@ static void parameters_change_with_the_scene_on_all_ranks(void **context)
     input_free(&in);
 }
 
-/* Two meshes have cell values. A warning about vertex ids is given for a layer drawn by means at vertices, but not for
- * a layer drawn by cell values. */
+/* Checks the warning about vertex ids if two meshes have cell values. It is given for a layer drawn by means at
+ * vertices, but not for a layer drawn by cell values. */
 static void meshes_with_ids_among_others_are_reported(void **context)
 {
     (void)context;
@@ -538,8 +539,8 @@ static void meshes_with_ids_among_others_are_reported(void **context)
     }
 }
 
-/* Checks that all errors in words are reported in the step that draws the words, although the words are written later,
- * and that no error hides another. */
+/* Checks that all faults of a picture's text are reported in the step that draws it, although the text is rendered
+ * later, and that no fault hides another. */
 static void faults_of_words_are_reported_at_once(void **context)
 {
     (void)context;
@@ -602,8 +603,8 @@ static void oversized_pictures_are_refused(void **context)
     input_free(&in);
 }
 
-/* Checks that names are reported as they were given, except that control characters, which could act on a terminal or
- * split a line in two, are escaped. */
+/* Checks that names are reported as they were given, except that control characters are escaped, because they could act
+ * on a terminal or break a line. */
 static void control_characters_are_escaped(void **context)
 {
     (void)context;

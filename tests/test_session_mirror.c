@@ -1,7 +1,8 @@
-/* Mirrored meshes: the pictures of a mesh that the scene mirrors are, to the bit, those of a mesh that consists of
- * blocks of which each second is the mirror image of the one before: of all forms of meshes, lattices, blocks, levels
- * of refinement and cells of higher order, warped or not, on any ranks. Colours by derived fields are those of the
- * given mesh, and statistics and counts are of its cells alone. Steps follow what changes. */
+/* Checks meshes that the scene mirrors. Their pictures must be bit-identical to those of a mesh that consists of
+ * blocks, of which every second one is the mirror image of the one before, made by the test. Tested are all forms of
+ * meshes, lattices, blocks, levels of refinement and cells of higher order, warped or not, on any ranks. Colours by
+ * derived fields must be those of the given mesh (the source). Statistics and counts must include only the cells of the
+ * source. Steps must follow changes of the source and of the scene. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,7 +18,8 @@ enum { SIDE = 3, MOST_TEXT = 1 << 13, MOST_IMAGES = 8 };
 
 /* ---- images by hand ---------------------------------------------------------------------------------------------- */
 
-/* The planes of a mirror, and the text of the scene for it. */
+/* The planes of a mirror, and the scene's text that defines it. axes: bits of the axes that have a plane; planes:
+ * coordinate of the plane along each of these axes. */
 typedef struct mirror {
     int axes;
     double planes[3];
@@ -32,7 +34,7 @@ static const mirror mirrors[] = {
 };
 enum { MIRRORS = sizeof mirrors / sizeof mirrors[0] };
 
-/* An image's description and its arrays. */
+/* The description of a mirror image, with its own arrays. */
 typedef struct mirror_image {
     void *places[3];
     double *along[3];
@@ -60,7 +62,7 @@ static void mirror_by_vertex(const insitu_mesh *mesh, int axes, const mirror *by
     }
 }
 
-/* A lattice with coordinates along its axes becomes rectilinear. */
+/* Mirrors a lattice that has coordinates along its axes, or is uniform; the image is rectilinear. */
 static void mirror_along_axes(const insitu_mesh *mesh, int axes, const mirror *by, mirror_image *out)
 {
     int64_t stride = 1;
@@ -78,7 +80,7 @@ static void mirror_along_axes(const insitu_mesh *mesh, int axes, const mirror *b
     }
 }
 
-/* Ids of vertices that are not in the mirror planes are others. */
+/* Gives new ids to the image's vertices, except for those in the mirror planes, which are the source's own. */
 static void renumber_vertices(const insitu_mesh *mesh, int axes, const mirror *by, mirror_image *out)
 {
     out->ids = test_calloc((size_t)mesh->vertex_count + 1, sizeof *out->ids);
@@ -117,8 +119,8 @@ static void free_image(mirror_image *i)
 
 /* ---- pictures --------------------------------------------------------------------------------------------------- */
 
-/* Hands a mesh and its images over as blocks with these fields, the first of them with this number. Returns how many.
- */
+/* Passes a mesh and all its mirror images as blocks with these fields; the blocks' numbers begin at `first`. Returns
+ * the number after the last block. */
 static int set_mirrored_blocks(insitu_session *session, int first, const insitu_mesh *mesh, const mirror *by,
                                const insitu_field *fields, int count, mirror_image images[MOST_IMAGES])
 {
@@ -250,8 +252,8 @@ static void blocks_draw_their_images(void **state)
 
 enum { COARSE = 4, FINE = 4 };
 
-/* The coarse block of 4^3 cells from x = 0 on, or the fine one on its first half along x, y and z; mirrored: the same
- * at negative x, with indices and values from the other end. */
+/* Makes the coarse block of 4^3 cells from x = 0 on, or the fine block that covers its first half along x, y and z. If
+ * is_mirrored is set, makes the mirror image at negative x, whose indices and values begin at the other end. */
 static void make_level(bool is_fine, bool is_mirrored, double values[125], insitu_lattice *l, insitu_mesh *mesh,
                        insitu_field *f)
 {
@@ -323,7 +325,7 @@ static void any_partition_draws_one_picture(void **state)
     }
 }
 
-/* Returns the derived values at the vertices of this rank's part. */
+/* Returns the values of a derived field at the vertices of this rank's part. */
 static double *get_derived_values(const insitu_session *session, const char *name, int64_t count)
 {
     const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
@@ -335,7 +337,8 @@ static double *get_derived_values(const insitu_session *session, const char *nam
     return out;
 }
 
-/* The image's colours are those of the source's gradients: no sum at the mirror plane takes cells of the image. */
+/* Checks that a mirror image has the colours of the source's gradients: means at vertices in the mirror plane do not
+ * include cells of the image. */
 static void derived_fields_are_those_of_the_source(void **state)
 {
     (void)state;
@@ -378,7 +381,8 @@ static void derived_fields_are_those_of_the_source(void **state)
 
 /* ---- steps ------------------------------------------------------------------------------------------------------- */
 
-/* A step of the mirrored session draws what the blocks draw in another one that has taken the same steps. */
+/* Makes a step of the mirrored session, and checks that it draws the same pictures as the session `blocks`, which
+ * receives the mesh and its mirror images as blocks and has made the same steps. */
 static void expect_step(insitu_session *session, insitu_session *blocks, const session_input *in, const mirror *by,
                         int cycle, const char *what)
 {
@@ -487,7 +491,7 @@ static void errors_name_the_source_mesh(void **state)
         everywhere(insitu_set_mesh(session, "m", &in.mesh) == INSITU_OK);
         everywhere(insitu_set_field(session, "m", &in.field) == INSITU_OK);
         expect_step(session, blocks, &in, by, cycle, "a mended mesh");
-        insitu_field wrong = in.field; /* the field alone */
+        insitu_field wrong = in.field; /* only the field is set, with too few values */
         wrong.count--;
         everywhere(insitu_set_field(session, "m", &wrong) == INSITU_ERROR_FIELD);
         status = insitu_step(session, cycle, 0);

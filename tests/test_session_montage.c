@@ -1,5 +1,5 @@
-/* Tests montages, which put pictures side by side, and insets, which put pictures over corners. On any number of ranks,
-   each picture in a montage has the same bits as the picture in a file of its own. */
+/* Checks montages, which put pictures side by side, and insets, which put pictures over the corners of a montage. On
+ * any number of ranks, each picture in a montage must be bit-identical to the same picture in a file of its own. */
 #include <stdio.h>
 #include <string.h>
 
@@ -25,7 +25,8 @@ static const caught_picture *find_picture(const char *path)
     return NULL;
 }
 
-/* Returns whether the cell has the picture's pixels; if picture is NULL, whether the cell is transparent. */
+/* Returns whether a cell of the montage has exactly the pixels of the picture or, if picture is NULL, is
+ * transparent. */
 static bool is_in_cell(const caught_picture *whole, int cell, const caught_picture *picture)
 {
     static const float nothing[4 * WIDTH];
@@ -38,7 +39,7 @@ static bool is_in_cell(const caught_picture *whole, int cell, const caught_pictu
     return is_in;
 }
 
-/* Checks the montage of a step on rank 0. `with_c` states whether the third image was due. */
+/* Returns whether rank 0 has the montage that is expected after a step. with_c: whether the third image was due. */
 static bool is_montage(int cycle, bool with_c)
 {
     char path[32];
@@ -92,7 +93,8 @@ static void files_that_cannot_be_written_are_reported(void **state)
 
 /* ---- shared colour bars ------------------------------------------------------------------------------------------ */
 
-/* Writes a scene of two pictures in one row. Each has a colour bar at `side`; their ranges end at 1 and at `high`. */
+/* Writes a scene of two pictures in one row. Each has a colour bar at `side`, whose range ends at 1 in the first
+ * picture and at `high` in the second. */
 static void write_bars(char text[2048], const char *side, const char *high)
 {
     static const char image[] = "  - name: %s\n    size: [32, 24]\n    camera: {automatic: {direction: %s}}\n"
@@ -104,7 +106,7 @@ static void write_bars(char text[2048], const char *side, const char *high)
     snprintf(text + used, 2048 - (size_t)used, image, "b", "[1, 1, 1]", high, side);
 }
 
-/* Width of the strip with the shared colour bar: 9 times the height of letters, rounded up. */
+/* Width of the strip with the shared colour bar, in pixels: 9 times the height of letters, rounded up. */
 enum { STRIP = 22 };
 
 static bool check_insets_placed(const char *side, bool is_shared)
@@ -143,7 +145,7 @@ static void alike_colour_bars_are_drawn_once(void **state)
             everywhere(own_rank != 0 || check_insets_placed(sides[i % 2], is_shared));
             const char *warning =
                 strstr(insitu_last_report(session)->warnings, "all.png: the pictures in it have different");
-            everywhere((warning != NULL) == (!is_shared && cycle == 0)); /* the warning is given once */
+            everywhere((warning != NULL) == (!is_shared && cycle == 0)); /* the warning is given only once */
         }
         insitu_destroy(&session);
     }
@@ -166,8 +168,8 @@ static const char inset_scene[] = "images:\n"
                                   "  - name: d\n    size: [6, 20]\n    every: 2\n    layers: [{surface: {}}]\n"
                                   "    outputs: [{path: d.png}, {path: whole.png, inset: bottom_left}]\n";
 
-/* Distance of insets from the montage's edges, in pixels, and width of the frame that is drawn around them within
- * it. */
+/* MARGIN: distance of insets from the montage's edges; FRAME: width of the frame around insets, which is inside the
+ * margin; both in pixels. */
 enum { MARGIN = 2, FRAME = 1 };
 
 typedef struct inset_place {
@@ -175,7 +177,8 @@ typedef struct inset_place {
     int x, y;
 } inset_place;
 
-/* Returns the pixel that an inset or its frame has at a position; NULL if the position is outside of them. */
+/* Returns the expected pixel of an inset or its frame at a position of the montage; NULL if the position is outside
+ * both. */
 static const float *get_inset_pixel(const inset_place *inset, int x, int y)
 {
     static const float grey[4] = {0.2140F, 0.2140F, 0.2140F, 1};
@@ -186,7 +189,8 @@ static const float *get_inset_pixel(const inset_place *inset, int x, int y)
     return is_in ? p->rgba + 4 * ((ptrdiff_t)row * p->width + column) : grey;
 }
 
-/* Checks the montage with insets on rank 0 after a step. `with_d` states whether the fourth image was due. */
+/* Returns whether rank 0 has the montage with insets that is expected after a step. with_d: whether the fourth image
+ * was due. */
 static bool has_insets(bool with_d)
 {
     const caught_picture *whole = find_picture("whole.png"), *cells[2] = {find_picture("a.png"), find_picture("b.png")};
@@ -210,8 +214,8 @@ static bool is_covered(const placed_picture *panel, int x, int y, int width, int
     return panel->covered_count == 1 && r->x == x && r->y == y && r->width == width && r->height == height;
 }
 
-/* Checks the areas that decorations must avoid, on rank 0. For the second panel this is the rectangle of the inset and
- * its frame; the first panel has no inset over it and thus no such area. */
+/* Returns whether rank 0 has the expected areas that decorations must avoid. In the second panel this is the rectangle
+ * of the inset with its frame; the first panel, over which no inset lies, has no such area. */
 static bool check_avoided_areas(void)
 {
     return placed_count >= 2 && placed[0].covered_count == 0 &&
@@ -236,7 +240,8 @@ static void insets_cover_corners(void **state)
     discard_pictures();
 }
 
-/* Writes a scene of two panels that share a colour bar up to 1, and of two insets with colour bars up to 1 and to 2. */
+/* Writes a scene of two panels and two insets. The panels share a colour bar that ends at 1; the insets have colour
+ * bars that end at 1 and at 2. */
 static void write_insets_beside_bars(char text[2048], const char *side)
 {
     static const char panel[] = "  - name: %s\n    size: [32, 24]\n    layers: [{slice: {field: f, range: [-1, 1]}}]\n"
@@ -252,8 +257,8 @@ static void write_insets_beside_bars(char text[2048], const char *side)
     snprintf(text + used, 2048 - (size_t)used, inset, "d", "2", side, "bottom_left");
 }
 
-/* Checks on rank 0 that insets are drawn after the panels and over them, but not over the strip with the shared colour
- * bar. The inset whose colour bar is the strip's must have no colour bar of its own. */
+/* Returns whether, on rank 0, insets are drawn after the panels and over them, but not over the strip with the shared
+ * colour bar. The inset whose colour bar equals the shared one must have none of its own. */
 static bool check_insets_beside_bars(const char *side)
 {
     const int left = strcmp(side, "left") == 0 ? STRIP : 0;

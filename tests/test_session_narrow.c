@@ -1,7 +1,7 @@
-/* Tests colours over narrow ranges of values far from 0. A field rises linearly from left to right, so that the colour
- * of each pixel is computed from its position by a closed form in double. Every kind of layer is drawn with every
- * scale, of float32 and float64 values. Also tests the legends of constant fields, the warnings about values that
- * cannot be distinguished, and statistics. */
+/* Checks colours over narrow ranges of values far from 0. The field rises linearly from left to right, so that the
+ * colour of each pixel has a closed form in its position, computed in double. Every kind of layer is drawn with every
+ * scale, for float32 and float64 values. Also checks colour bars of constant fields, warnings about values that cannot
+ * be distinguished, and statistics. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,8 +16,8 @@ enum { SIDE = 4, SIZE = 16, MOST = 1 << 12 };
 
 /* ---- inputs ---------------------------------------------------------------------------------------------------- */
 
-/* The field "f", which rises from low at x = -1 to high at x = 1, and "z", the third coordinate, of which isosurfaces
- * are drawn. */
+/* An input with two fields: "f" rises from low at x = -1 to high at x = 1; "z" is the third coordinate, of which
+ * isosurfaces are drawn. */
 typedef struct ramp {
     session_input in;
     double *values, *heights;
@@ -65,7 +65,8 @@ static void ramp_submit(const ramp *r, insitu_session *session)
 
 #define LIT "material: {ambient: 1, diffuse: 0, specular: 0}"
 
-/* Layers in which the colour of every pixel is a function of its position. Each gets the keys of its colour map. */
+/* Layers in which the colour of every pixel is a function of its position. %s is replaced by the keys of the colour
+ * map. */
 static const char *const layers[] = {
     "isosurface: {field: z, values: [0.1], colour_by: {field: f, %s}, " LIT "}",
     "slice: {field: f, planes: [{normal: [0, 0, 1]}], %s, " LIT "}",
@@ -98,8 +99,9 @@ static double convert_srgb_to_linear(double srgb)
     return srgb <= 0.04045 ? srgb / 12.92 : pow((srgb + 0.055) / 1.055, 2.4);
 }
 
-/* Returns the largest error of a picture's colours, from 0 to 1, in sRGB or in linear light. The expected colours are
- * the closed form's: the colour map interpolates linearly in sRGB. */
+/* Returns the largest error of a picture's colours, which are from 0 to 1, in linear light if is_linear is set and else
+ * in sRGB. The expected colours follow from the position in the range, because the colour map interpolates linearly in
+ * sRGB. */
 static double measure_colour_error(const caught_picture *picture, bool is_linear, double (*place)(double value),
                                    double low, double high)
 {
@@ -155,7 +157,8 @@ static const narrow_case cases[] = {
 };
 
 /* Returns the error allowed to a picture: the rounding of values at vertices; 2e-3 for the colour map's table and for
- * float32 intermediates, as sRGB is steep at dark colours; and 2e-4 for scales that are approximated as linear. */
+ * float32 intermediates, to which dark colours are sensitive in sRGB; and 2e-4 for scales that the library approximates
+ * linearly over a narrow range. */
 static double compute_allowed_error(const narrow_case *c)
 {
     const double larger = fmax(fabs(c->low), fabs(c->high));
@@ -177,7 +180,7 @@ static void check_case(const narrow_case *c, int layer, bool is_given)
     everywhere(insitu_step(session, 0, 0) == INSITU_OK);
     everywhere(!strstr(insitu_last_report(session)->warnings, "too near"));
     caught_picture picture = pop_caught_picture();
-    const bool is_volume = layer == 3; /* integrated to max_error, in linear light */
+    const bool is_volume = layer == 3; /* volumes are integrated to max_error and compared in linear light */
     const double allowed = compute_allowed_error(c) + (is_volume ? 0.01 : 0);
     const double off = measure_colour_error(&picture, is_volume, c->place, c->low, c->high);
     if (!(off <= allowed)) fprintf(stderr, "layer %d, %s: off by %g\n", layer, keys, off);
@@ -203,7 +206,7 @@ static int compare_doubles(const void *left, const void *right)
     return (a > b) - (a < b);
 }
 
-/* Returns the sorted middles of the value ranges of all cells of all ranks. */
+/* Returns the middles of the value ranges of all cells of the whole mesh, sorted. */
 static double *collect_sorted_middles(const narrow_case *c, int64_t *count)
 {
     ramp whole;
@@ -240,7 +243,7 @@ static caught_picture draw_range(const ramp *r, int layer, const char *scale, co
     return picture;
 }
 
-/* Checks that the percentiles are the values low and high: pictures with either range must have the same bits. */
+/* Checks that the percentiles equal low and high: the pictures with either range must be bit-identical. */
 static void check_percentiles(const ramp *r, int layer, const char *scale, const int percents[2], double low,
                               double high)
 {
@@ -275,7 +278,8 @@ static void percentiles_are_those_of_doubles(void **state)
     }
 }
 
-/* The mesh has 10,368 cells. More than two fifths of them have the lower value, and as many the higher one. */
+/* Checks percentiles of a mesh of 10,368 cells. More than two fifths of the cells have the lower value, and more than
+ * two fifths the higher one. */
 static void percentiles_are_exact_for_many_equal_values(void **state)
 {
     (void)state;
@@ -315,8 +319,8 @@ static void constant_fields_have_one_tick(void **state)
         }
 }
 
-/* Checks that a warning is given once if values differ only by rounding, and none for a constant field. All steps must
-   succeed. */
+/* Checks that a warning is given only once if values differ by rounding alone, and that there is none for a constant
+ * field. All steps must succeed. */
 static void values_too_near_are_reported(void **state)
 {
     (void)state;
@@ -350,8 +354,8 @@ static void values_too_near_are_reported(void **state)
 
 /* ---- statistics ------------------------------------------------------------------------------------------------ */
 
-/* Checks the statistics of a linear field over a cube: its extremes are at corners and its mean in the middle. The
- * histogram's shares sum to 1, and each bin has at least a tenth. */
+/* Checks the statistics of a linear field over a cube: its extremes are at corners, and its mean is the value in the
+ * middle. The bins of the histogram must sum to 1, and each must have more than a tenth. */
 static void statistics_distinguish_narrow_fields(void **state)
 {
     (void)state;
@@ -371,8 +375,8 @@ static void statistics_distinguish_narrow_fields(void **state)
         read_file("narrow.csv", MOST, text);
         const char *at = strchr(text, '\n');
         for (int i = 0; at && i < 14; i++, at = strchr(at + 1, ',')) n[i] = strtod(at + 1, NULL);
-        /* Columns: cycle, time, cells, volume, minimum, maximum, mean, deviation, low, high, bins. Adjacent doubles
-         * differ by 1.5e-8 near 1e8. */
+        /* Columns of the table: cycle, time, cells, volume, minimum, maximum, mean, deviation, low, high, bins. Near
+         * 1e8, adjacent doubles differ by 1.5e-8. */
         const bool is_well = fabs(n[4] - low) <= 2e-8 && fabs(n[5] - high) <= 2e-8 &&
                              fabs(n[6] - 0.5 * (low + high)) <= 1e-6 && fabs(n[8] - low) <= 2e-8 &&
                              fabs(n[9] - high) <= 2e-8 && fabs(n[10] + n[11] + n[12] + n[13] - 1) < 1e-8 &&

@@ -1,8 +1,9 @@
-/* Cells of higher order, drawn as pieces between their own nodes. A linear field on straight cells is a plane, whatever
- * the cells: every ray that meets the cube has its hit, in closed form, and no other has one. Hexes draw, to the bit,
- * the linear hexes between their nodes. Against a quadratic field the error falls by four as nodes are twice as dense.
- * Ghosts, values in cells, thresholds and counts are those of the caller's cells. All pictures are the same on any
- * ranks. */
+/* Checks cells of higher order, which the library splits into pieces: linear cells between the cell's nodes. A linear
+ * field on straight cells has a plane as isosurface, for all kinds of cells, so that every ray that meets the plane
+ * inside the cube must have a hit in closed form, and no other ray may have one. Hexes of higher order must give
+ * pictures that are bit-identical to those of linear hexes between their nodes. For a quadratic field the error must
+ * fall by a factor of four if nodes are twice as dense. Ghosts, cell values, thresholds and counts must refer to the
+ * caller's cells, not to pieces. All pictures must be the same on any ranks. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -22,7 +23,7 @@ enum { WIDTH = 96, HEIGHT = 72, PIXELS = WIDTH * HEIGHT };
     "  - name: " name "\n    size: [96, 72]\n    background: [0, 0, 0, 0]\n" CAMERA "    layers:\n      - " layer      \
     "\n    outputs: [{path: " name ".exr}]\n"
 
-/* One piece between two nodes. */
+/* A key of the scene: cells have exactly one piece between neighbouring nodes. */
 #define BETWEEN_NODES "finer_pieces: 1\n"
 
 static const char plane_scene[] = "images:\n" IMAGE("a", "isosurface: {field: f, values: [0.1]}")
@@ -35,7 +36,8 @@ static const char sphere_scene[] = BETWEEN_NODES "images:\n" IMAGE("a", "isosurf
             IMAGE("c", "surface: {threshold: {field: f, from: -0.9}, colour_by: {field: f}}")                          \
                 IMAGE("d", "volume: {field: f}")
 static const char all_scene[] = ALL("gradient");
-/* Normals by which cells of higher order are drawn as the linear ones between their nodes. */
+/* A scene in which cells of higher order are drawn exactly as the linear cells between their nodes: with one piece
+ * between nodes, and with normals that do not use the cells' polynomials. */
 static const char linear_scene[] = BETWEEN_NODES ALL("differences");
 static const char cell_scene[] =
     "images:\n" IMAGE("a", "surface: {threshold: {field: c, from: 0.5}, colour_by: {field: c}}")
@@ -51,7 +53,7 @@ static bool step_succeeds(insitu_session *session, int cycle)
     return status == INSITU_OK;
 }
 
-/* more: a second field, or NULL. */
+/* Draws the mesh in a new session. more: a second field, or NULL. */
 static drawn draw_mesh(MPI_Comm comm, const char *scene, const order_mesh *mesh, const insitu_field *more,
                        insitu_report *report)
 {
@@ -65,11 +67,11 @@ static drawn draw_mesh(MPI_Comm comm, const char *scene, const order_mesh *mesh,
     return out;
 }
 
-/* Depth is float, of numbers up to 6, after a few operations of the same precision. */
+/* The allowed error of depths: they are up to 6, in float, and result from a few float operations. */
 static const double rounding = 1e-5;
 
-/* Returns whether the first pictures have the same hits, but for the rounding of places: these are relative to the
- * middle of the cells that are drawn, which is another one if some are ghosts. */
+/* Returns whether the first pictures have the same hits, up to the rounding of positions. Positions are relative to the
+ * centre of the drawn cells, which changes if some cells are ghosts. */
 static bool are_same_depths(const drawn *a, const drawn *b)
 {
     bool is_same = true;
@@ -94,7 +96,8 @@ static double linear_field(const double p[3])
     return p[2] + 0.3 * p[0] + 0.2 * p[1];
 }
 
-/* The pixels whose depth is wrong: a hit where none should be, or the other way round, or at another place. */
+/* Counts pixels whose depth is wrong: a hit is missing, is unexpected, or is at a wrong depth. is_face: the face z = 1
+ * of the cube is drawn instead of the plane. */
 static int count_wrong_pixels(const caught_picture *picture, bool is_face)
 {
     int wrong = 0;
@@ -138,7 +141,8 @@ static void planes_have_no_gap(void **state)
 
 /* ---- the order of the error -------------------------------------------------------------------------------------- */
 
-/* The largest distance along rays within 0.4 of the axis, where the sphere faces the eye. */
+/* Returns the largest error of depths of the sphere, over rays within 0.4 of the axis, where the sphere faces the
+ * eye. */
 static double measure_sphere_error(const order_kind *kind, int side, double bend)
 {
     order_mesh mesh;
@@ -159,16 +163,17 @@ static double measure_sphere_error(const order_kind *kind, int side, double bend
     return worst;
 }
 
-/* An interpolant's error is a constant times the square of the spacing, plus less: the constant hardly changes between
- * cells of this size. Rays sample its largest places, so the ratio of two maxima is near 4. */
+/* Checks that the error falls by about 4. The error of the interpolant is a constant times the square of the spacing of
+ * nodes, plus terms of higher order; the constant hardly changes between cells of this size. Rays sample the positions
+ * of the largest errors, so that the ratio of the two maxima is near 4. */
 static void error_falls_by_a_factor_of_four(void **state)
 {
     (void)state;
-    /* By default on one rank only: the other cases compare the pictures of several ranks with those of one. */
+    /* By default this runs on one rank only: other cases compare the pictures of several ranks with those of one. */
     if (rank_count > 1 && !test_is_long_run()) return;
     for (int k = 0; k < order_kind_count; k++)
         for (int is_bent = 0; is_bent < 2; is_bent++) {
-            if (order_kinds[k].order == 4) continue; /* the finer mesh would take long */
+            if (order_kinds[k].order == 4) continue; /* the finer mesh would take too long */
             const int side = order_kinds[k].order == 1 ? 6 : order_kinds[k].order == 3 ? 2 : 3;
             const double coarse = measure_sphere_error(&order_kinds[k], side, is_bent ? 0.08 : 0);
             const double fine = measure_sphere_error(&order_kinds[k], 2 * side, is_bent ? 0.08 : 0);
@@ -181,7 +186,7 @@ static void error_falls_by_a_factor_of_four(void **state)
 
 /* ---- hexes are the linear ones between their nodes --------------------------------------------------------------- */
 
-/* Vertices of each cell's own, without connectivity. */
+/* Returns the mesh with vertices that no two cells share, and without connectivity. The cells have order p. */
 static order_mesh duplicate_nodes_per_cell(const order_mesh *of, int p)
 {
     order_mesh out = *of;
@@ -201,7 +206,9 @@ static order_mesh duplicate_nodes_per_cell(const order_mesh *of, int p)
     return out;
 }
 
-/* Surfaces to the bit; samples of volumes are blended in the order of cells, whose numbers are the same. */
+/* Checks hexes of higher order against linear hexes between their nodes: pictures are bit-identical, also of volumes,
+ * because samples are blended in the order of cell numbers, which are the same in both meshes. Also checks that cells
+ * without connectivity draw the same as cells with it. */
 static void hexes_match_linear_hexes_between_nodes(void **state)
 {
     (void)state;
@@ -210,7 +217,8 @@ static void hexes_match_linear_hexes_between_nodes(void **state)
         order_mesh mesh;
         order_mesh_create(&kind, 2, 0.1, order_wave_field, own_rank, rank_count, &mesh);
         order_mesh cut = order_mesh_make_linear_hexes(&mesh, p), own = duplicate_nodes_per_cell(&mesh, p);
-        /* The threshold of picture 2 shows whole cells, which linear ones do not know. */
+        /* Picture 2 is not compared: its threshold shows the caller's cells as a whole, but each of the linear hexes
+         * separately. */
         drawn high = draw_mesh(MPI_COMM_WORLD, linear_scene, &mesh, NULL, NULL);
         drawn low = draw_mesh(MPI_COMM_WORLD, linear_scene, &cut, NULL, NULL);
         drawn listed = draw_mesh(MPI_COMM_WORLD, all_scene, &mesh, NULL, NULL);
@@ -233,8 +241,8 @@ static void hexes_match_linear_hexes_between_nodes(void **state)
 
 /* ---- the caller's cells ------------------------------------------------------------------------------------------ */
 
-/* Cells with values of 0 and 1 in turn; a threshold on them draws what the mesh of those with 1 alone does, and so do
- * ghosts in place of the others. */
+/* Checks a threshold on cell values and ghosts. Every third cell has the value 0, all others have 1. The threshold must
+ * leave the same cells as flagging the cells of value 0 as ghosts. */
 static void cell_values_match_the_callers_cells(void **state)
 {
     (void)state;
@@ -259,7 +267,8 @@ static void cell_values_match_the_callers_cells(void **state)
         mesh.mesh.ghosts = (insitu_array){ghosts, INSITU_UINT8, 0};
         drawn hidden = draw_mesh(MPI_COMM_WORLD, cell_scene, &mesh, &c, &report);
         everywhere(report.cells == mesh.cell_count && report.cells_ghost == ghost_count);
-        everywhere(are_same_depths(&threshold, &hidden)); /* colours range over other cells */
+        /* only depths are compared, because the range of colours differs: it excludes ghosts */
+        everywhere(are_same_depths(&threshold, &hidden));
         free_picture_set(&threshold);
         free_picture_set(&hidden);
         free(values);
@@ -268,7 +277,8 @@ static void cell_values_match_the_callers_cells(void **state)
     }
 }
 
-/* A threshold on a field at vertices shows whole cells: those all of whose nodes are within it, as ghosts say here. */
+/* Checks that a threshold on a field at vertices shows the caller's cells as a whole, namely those whose nodes are all
+ * within it: the depths equal those with all other cells flagged as ghosts. */
 static void thresholds_show_whole_cells(void **state)
 {
     (void)state;
@@ -295,7 +305,7 @@ static void thresholds_show_whole_cells(void **state)
 
 /* ---- corners ----------------------------------------------------------------------------------------------------- */
 
-/* A field with a value at each node of each cell draws what vertices of each cell's own do. */
+/* Checks that a field with a value at each node of each cell draws the same as a mesh whose cells share no vertices. */
 static void corner_fields_are_discontinuous_between_cells(void **state)
 {
     (void)state;
@@ -325,7 +335,7 @@ static void corner_fields_are_discontinuous_between_cells(void **state)
 
 /* ---- nodes that move --------------------------------------------------------------------------------------------- */
 
-/* Turned by about a radian, which changes all orders of coordinates. */
+/* Rotates the mesh about z by about a radian, which changes the order of nodes along each coordinate. */
 static void rotate_nodes(order_mesh *mesh)
 {
     for (int64_t i = 0; i < mesh->vertex_count; i++) {
@@ -336,8 +346,8 @@ static void rotate_nodes(order_mesh *mesh)
     }
 }
 
-/* Draws the kind's cells, then the turned ones, of which `changed` is told. The origin that places are relative to
- * stays that of the first step, so that pictures may be compared to the bit. */
+/* Draws the kind's cells, and then the rotated cells, for which the caller declares `changed`. Positions stay relative
+ * to the origin of the first step, so that pictures can be compared bit for bit. */
 static drawn draw_rotated(const order_kind *kind, unsigned changed)
 {
     order_mesh mesh;
@@ -357,8 +367,8 @@ static drawn draw_rotated(const order_kind *kind, unsigned changed)
     return out;
 }
 
-/* Serendipity cells are cut anew as their nodes move; others keep their pieces. Both draw the surfaces that a mesh does
- * which is new. */
+/* Checks moving nodes. Serendipity cells are split anew when their nodes move; all other cells keep their pieces.
+ * Surfaces must be bit-identical to those of a mesh that is declared as new. */
 static void moved_nodes_draw_same_picture_as_new_mesh(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-/* What a layer or a report says by cells, it says by the caller's cells, not by the pieces that they are split into:
- * lines along edges, counts of cells, and means of cell values at nodes. */
+/* Checks that layers and reports refer to the caller's cells of higher order, not to the linear pieces into which the
+ * library splits them: lines along edges, counts of cells, and means of cell values at nodes. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,7 +10,8 @@
 
 enum { SIDE = 240, PIXELS = SIDE * SIDE };
 
-/* A pixel is 1/100 wide; looked at along z from z = 5. Cells have one piece between two nodes, or more. */
+/* A pixel is 1/100 wide; the camera looks along z from z = 5. pieces: number of linear pieces between two nodes of a
+ * cell. */
 #define PICTURE(pieces, layer, more)                                                                                   \
     "finer_pieces: " pieces "\nimages:\n  - name: a\n    size: [240, 240]\n    background: [0, 0, 0, 0]\n"             \
     "    camera: {position: [0, 0, 5], focal: [0, 0, 0], up: [0, 1, 0], projection: orthographic, height: 2.4}\n"      \
@@ -24,7 +25,7 @@ enum { SIDE = 240, PIXELS = SIDE * SIDE };
             "")
 #define LINED(width) FINER_LINED("1", width)
 
-/* more: a second field, or NULL. The caller owns the session. */
+/* Opens a session, which the caller must destroy, and makes a step with the mesh. more: a second field, or NULL. */
 static insitu_session *open_session_and_step(const char *scene, const order_mesh *mesh, const insitu_field *more)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
@@ -61,7 +62,7 @@ static void compute_pixel_position(int pixel, double out[2])
     out[1] = 1.2 - (pixel / SIDE + 0.5) / 100;
 }
 
-/* The squared distance from the point to a segment. */
+/* Returns the squared distance from a point to a segment. */
 static double squared_distance_from_segment(const double at[2], const double a[2], const double b[2])
 {
     const double e[2] = {b[0] - a[0], b[1] - a[1]}, d[2] = {at[0] - a[0], at[1] - a[1]};
@@ -69,20 +70,21 @@ static double squared_distance_from_segment(const double at[2], const double a[2
     return pow(d[0] - s * e[0], 2) + pow(d[1] - s * e[1], 2);
 }
 
-/* The edges of eight cubes on their face z = 1, by nodes or finer pieces; and the diagonals of tets and wedges there.
- */
+/* The edges of eight cubes on the face z = 1 of the cube that they fill, as segments between nodes or finer pieces,
+ * with the diagonals of tets and wedges there. */
 typedef struct edge_list {
     int count;
     double ends[512][2][2];
 } edge_list;
 
-/* How cells are bent, and how many pieces are between two nodes. */
+/* order: order of the cells; parts: number of linear pieces between two nodes; bend: how far nodes are moved. */
 typedef struct edge_form {
     int order, parts;
     double bend;
 } edge_form;
 
-/* Computes a point of an edge: that of the polynomial through its nodes, which are equispaced until they are bent. */
+/* Computes the point at parameter `at` (0 to 1) of a curved edge: of the polynomial through the edge's nodes, which are
+ * equispaced before they are moved. */
 static void compute_edge_point(const edge_form *form, const double from[2], const double to[2], double at,
                                double out[2])
 {
@@ -123,8 +125,8 @@ static void list_edges(const order_kind *kind, double bend, int parts, edge_list
         }
 }
 
-/* The pixels that are not black by as much as a line covers them; fade: of all lines. The library computes places in
- * float, which are wrong by less than a thousandth of a pixel here. */
+/* Counts the pixels that are not as dark as the lines that cover them make them. fade: opacity of all lines. The
+ * library computes positions in float, with errors of less than a thousandth of a pixel here. */
 static int count_wrong_pixels(const caught_picture *picture, const edge_list *edges, double width, double fade)
 {
     int wrong = 0;
@@ -156,8 +158,8 @@ static void check_edges(const order_kind *kind, double bend, int parts, const ch
     order_mesh_free(&mesh);
 }
 
-/* Lines run along the caller's cells alone, through the nodes of their edges, or along the finer pieces there; and how
- * far they fade follows from the length of a cell's edge, 100 pixels or, of diagonals, 141. */
+/* Checks lines: they run only along edges of the caller's cells, through the nodes of these edges or along finer pieces
+ * between them. How far lines fade follows from the length of a cell's edge: 100 pixels or, for diagonals, 141. */
 static void edges_are_those_of_the_callers_cells(void **state)
 {
     (void)state;
@@ -170,8 +172,8 @@ static void edges_are_those_of_the_callers_cells(void **state)
     }
 }
 
-/* Hexes of 8, 20 and 27 nodes in turn, in one mesh: all have lines along their edges, and a linear field has its normal
- * everywhere. */
+/* Checks a mesh in which hexes of 8, 20 and 27 nodes alternate: all have lines along their edges, and the isosurface of
+ * a linear field has its exact normal in all cells. */
 static void cells_of_several_orders_share_a_mesh(void **state)
 {
     (void)state;
@@ -211,7 +213,7 @@ static void cells_of_several_orders_share_a_mesh(void **state)
 
 /* ---- shells ------------------------------------------------------------------------------------------------------ */
 
-/* Four quads in the plane z = 1, of nodes in rows, or those of eight nodes in VTK's order. */
+/* Checks four quads in the plane z = 1: quads of (p + 1)^2 nodes in rows, or of eight nodes in VTK's order. */
 static void shells_have_edges_of_their_own(void **state)
 {
     (void)state;
@@ -259,7 +261,8 @@ static bool has_node(const order_mesh *mesh, int64_t cell, int64_t vertex)
     return has;
 }
 
-/* NaN at the first node beside the origin on the edge along x, which several cells have. */
+/* Checks the count of cells that cannot be drawn because of a NaN at one node. The node is next to the origin on the
+ * edge along x, which several cells share. */
 static void cells_that_cannot_be_shown_count_once(void **state)
 {
     (void)state;
@@ -286,7 +289,9 @@ static void cells_that_cannot_be_shown_count_once(void **state)
     }
 }
 
-/* Without the cells of which no piece meets the plane in a corner of the cube, if the tree is without them. */
+/* Checks the reported number of cells that show nothing. The isosurface is a plane that cuts off a corner of the cube;
+ * cells of which no piece meets it are not in the tree. The number is reported only if the library builds a tree
+ * without them. */
 static void cells_that_show_nothing_count_once(void **state)
 {
     (void)state;
@@ -346,7 +351,8 @@ static double compute_cell_value(int64_t cell)
     return sin(1.7 * (double)cell);
 }
 
-/* The mean, at each vertex of the whole mesh, over the cells that have it, each once. */
+/* Returns, for each vertex of the whole mesh, the mean value of all cells that have the vertex; each cell counts
+ * once. */
 static double *compute_vertex_means(const order_mesh *whole)
 {
     enum { MOST = 64 };
@@ -363,7 +369,7 @@ static double *compute_vertex_means(const order_mesh *whole)
     return means;
 }
 
-/* The means at the part's vertices, which are found in the whole by their bits. */
+/* Returns the means at the part's vertices. Each vertex is looked up in the whole mesh by bitwise equal coordinates. */
 static double *find_means_of_part(const order_mesh *part, const order_mesh *whole, const double *means)
 {
     double *out = malloc((size_t)(part->vertex_count + 1) * sizeof *out);
@@ -380,7 +386,7 @@ static bool are_same_depths(const caught_picture *a, const caught_picture *b)
     return own_rank || memcmp(a->depth, b->depth, PIXELS * sizeof *a->depth) == 0;
 }
 
-/* A value of a cell counts once at each of its nodes, whether it is given once or at each corner. */
+/* Checks that a cell's value counts once at each of the cell's nodes, whether it is given once or at each corner. */
 static void cell_values_count_once(void **state)
 {
     (void)state;
@@ -416,8 +422,8 @@ static void cell_values_count_once(void **state)
     }
 }
 
-/* Normals of surfaces of means come from the pieces, as the means are not values of the cells' polynomial: the picture
- * is that of linear hexes between the nodes, of the means as values of vertices. */
+/* Checks normals of isosurfaces of means. The means are not values of a cell's polynomial, so normals are those of the
+ * linear pieces: the picture equals that of linear hexes between the nodes, with the means as values at vertices. */
 static void normals_of_cell_means_match_those_of_pieces(void **state)
 {
     (void)state;

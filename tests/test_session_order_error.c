@@ -1,6 +1,7 @@
-/* Pieces whose number follows from an error in pixels (`surface_error`). On straight cells that contain the squared
- * distance from the origin the isosurface is a sphere, from which each hit may be as far as the report says, and no
- * farther; rays that pass it closer have hits, and those farther away have none. */
+/* Checks the key `surface_error`: cells of higher order are split into linear pieces, whose number follows from an
+ * allowed error in pixels. On straight cells with the squared distance from the origin as field, the isosurface is a
+ * sphere. No hit may be farther from the sphere than the error bound that the report states; rays that pass inside the
+ * sphere by more than the bound must have hits, and rays that miss it by more must have none. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -45,12 +46,12 @@ static const order_kind hex_4 = {"hex 4", INSITU_LAGRANGE_HEX, INSITU_ORDER_LEXI
 
 /* ---- drawing ----------------------------------------------------------------------------------------------------- */
 
-/* What a step draws, and what its report tells of pieces and warns of. */
+/* The pictures of a step, and what its report states: text about pieces, and warnings. */
 typedef struct drawn_report {
     drawn pictures;
     char pieces[512], warnings[2048];
-    int count;    /* number of pieces */
-    double bound; /* in pixels; infinite if there is none */
+    int count;    /* number of pieces between two nodes */
+    double bound; /* bound of the error in pixels; infinite if the report states none */
 } drawn_report;
 
 static drawn_report step_and_report(insitu_session *session, int cycle)
@@ -73,7 +74,7 @@ static drawn_report draw_and_report(MPI_Comm comm, const char *scene, const orde
     return out;
 }
 
-/* Draws, and returns what the report says about the pieces. */
+/* Draws the mesh; returns only the report, without pictures. */
 static drawn_report draw_and_report_pieces(const char *scene, const order_mesh *mesh)
 {
     drawn_report out = draw_and_report(MPI_COMM_WORLD, scene, mesh);
@@ -81,7 +82,7 @@ static drawn_report draw_and_report_pieces(const char *scene, const order_mesh *
     return out;
 }
 
-/* Returns whether the pieces are drawn as that fixed number of them, on rank 0. */
+/* Returns whether, on rank 0, the pictures equal those that are drawn with a fixed number of pieces. */
 static bool is_drawn_as(const drawn_report *of, int count, const char *images, const order_mesh *mesh)
 {
     char scene[4096];
@@ -94,10 +95,12 @@ static bool is_drawn_as(const drawn_report *of, int count, const char *images, c
 
 /* ---- the sphere -------------------------------------------------------------------------------------------------- */
 
-/* The hits of a picture of the sphere. Distances are in pixels. */
+/* How the hits of a picture compare with the sphere. Distances are in pixels. */
 typedef struct sphere_hits {
-    double farthest;    /* largest distance of a hit from the sphere */
-    int missed, beyond; /* numbers of rays without a hit that pass it within the bound, and with one that do not */
+    double farthest; /* largest distance of a hit from the sphere */
+    /* missed: number of rays without a hit that pass inside the sphere by more than the bound; beyond: number of rays
+     * with a hit that pass outside it by more than the bound */
+    int missed, beyond;
 } sphere_hits;
 
 static sphere_hits find_hits(const caught_picture *picture, double bound)
@@ -114,7 +117,8 @@ static sphere_hits find_hits(const caught_picture *picture, double bound)
     return out;
 }
 
-/* Depths are floats of up to 5, rounded by 2.4e-7, 3e-5 of a pixel. */
+/* Compares the hits with the sphere. Another 1e-4 of a pixel is allowed because depths are floats up to 5, rounded by
+ * 2.4e-7, which is 3e-5 of a pixel. */
 static void check_sphere(const char *name, const order_mesh *mesh, double allowed)
 {
     char scene[1024];
@@ -159,7 +163,8 @@ static void lobatto_points_are_recognised(void **state)
 
 /* ---- bent cells -------------------------------------------------------------------------------------------------- */
 
-/* The polynomials of a hex of order 2: a position and the field, and their derivatives along the axes. */
+/* Values of the polynomials of a hex of order 2 at one point: position and field, and their derivatives along the three
+ * reference axes. */
 typedef struct hex_values {
     double value[4], slopes[3][4];
 } hex_values;
@@ -187,7 +192,7 @@ static hex_values evaluate_hex(const order_mesh *mesh, int64_t cell, const doubl
     return out;
 }
 
-/* Computes the way in reference coordinates that leads so far in space, to first order. */
+/* Computes the step in reference coordinates that moves the position by `shift` in space, to first order. */
 static void solve_for_shift(const hex_values *of, const double shift[3], double out[3])
 {
     double dual[3][3], determinant = 0;
@@ -201,7 +206,8 @@ static void solve_for_shift(const hex_values *of, const double shift[3], double 
         out[a] = (dual[a][0] * shift[0] + dual[a][1] * shift[1] + dual[a][2] * shift[2]) / determinant;
 }
 
-/* Finds the reference coordinates of a place. Returns false if it is not in the cell, or near it. */
+/* Finds the reference coordinates of a position by Newton's method. Returns false if the position is neither in the
+ * cell nor near it. */
 static bool find_in_cell(const order_mesh *mesh, int64_t cell, const double place[3], double at[3])
 {
     for (int a = 0; a < 3; a++) at[a] = 0.5;
@@ -217,7 +223,7 @@ static bool find_in_cell(const order_mesh *mesh, int64_t cell, const double plac
     return is_in;
 }
 
-/* Returns the distance of a place from the polynomial's isosurface, along the gradient, in pixels. */
+/* Returns the distance in pixels of a position from the isosurface of the polynomial, along the gradient. */
 static double distance_from_isosurface(const order_mesh *mesh, double isovalue, const double place[3])
 {
     double nearest = INFINITY;
@@ -227,7 +233,9 @@ static double distance_from_isosurface(const order_mesh *mesh, double isovalue, 
         hex_values of = evaluate_hex(mesh, cell, at);
         for (int turn = 0; turn < 30; turn++, of = evaluate_hex(mesh, cell, at)) {
             double gradient[3] = {0}, shift[3], way[3], square = 0;
-            for (int x = 0; x < 3; x++) { /* the way along each axis of space, and the field's change on it */
+            /* the step in reference coordinates for a unit step along each axis of space, and the change of the field
+             * over it */
+            for (int x = 0; x < 3; x++) {
                 const double unit[3] = {x == 0, x == 1, x == 2};
                 solve_for_shift(&of, unit, way);
                 for (int a = 0; a < 3; a++) gradient[x] += of.slopes[a][3] * way[a];
@@ -243,7 +251,8 @@ static double distance_from_isosurface(const order_mesh *mesh, double isovalue, 
     return nearest;
 }
 
-/* A place on the border of two cells may be nearer to the surface of one of them, which continues there. */
+/* Checks bent cells. The distance is that from the nearest surface of any cell, because a position on the border of two
+ * cells may be nearer to the surface of the other cell, which continues there. */
 static void bent_cells_are_within_the_stated_error(void **state)
 {
     (void)state;
@@ -272,8 +281,8 @@ static void bent_cells_are_within_the_stated_error(void **state)
 
 /* ---- the number of pieces ---------------------------------------------------------------------------------------- */
 
-/* Nearer to the camera, pixels are smaller. With a quarter of the error there are about twice as
- * many pieces. */
+/* Checks the number of pieces. It is larger near the camera, where a pixel covers less of the surface, and about twice
+ * as large for a quarter of the error. It is 1 if no camera sees the isosurface, or if no cell has it. */
 static void pieces_follow_the_error_and_the_camera(void **state)
 {
     (void)state;
@@ -295,8 +304,8 @@ static void pieces_follow_the_error_and_the_camera(void **state)
     everywhere(from_near.count > from_far.count && from_near.bound <= 1 && from_far.bound <= 1);
     const char *away = "{position: [0, 0, 5], focal: [0, 0, 9], up: [0, 1, 0]}";
     snprintf(scene[0], sizeof scene[0], WITHIN("0.4") IMAGE("a", "[96, 72]", "%s", ISO("0.5")), away);
-    everywhere(draw_and_report_pieces(scene[0], &mesh).count == 1);                      /* no camera sees it */
-    everywhere(draw_and_report_pieces(WITHIN("0.4") SMALL(ISO("9")), &mesh).count == 1); /* no cell has it */
+    everywhere(draw_and_report_pieces(scene[0], &mesh).count == 1); /* no camera sees the isosurface */
+    everywhere(draw_and_report_pieces(WITHIN("0.4") SMALL(ISO("9")), &mesh).count == 1); /* no cell has the isovalue */
     everywhere(draw_and_report_pieces(FINER("3") SMALL(ISO("0.5")), &mesh).pieces[0] == '\0');
     order_mesh_free(&mesh);
 }
@@ -315,8 +324,7 @@ static void pieces_are_drawn_as_a_fixed_number(void **state)
     }
 }
 
-/* Numbers and pictures are the same, with automatic cameras too. */
-/* The field is at most -0.06 at nodes, but up to 0.05 more between them. */
+/* A field that is at most -0.06 at nodes, but up to 0.05 larger between them. */
 static double ridge_field(const double p[3])
 {
     return -(p[0] - 0.5) * (p[0] - 0.5) - 0.05 * p[2];
@@ -344,7 +352,8 @@ static insitu_status fill_values(void *data, insitu_field *field)
     return INSITU_OK;
 }
 
-/* Values at corners, by an index, or by a fill function, which say the same. */
+/* Checks that the numbers of pieces and the pictures are the same if the same values are given at corners, by an index,
+ * or by a fill function. */
 static void other_descriptions_have_the_same_pieces(void **state)
 {
     (void)state;
@@ -386,7 +395,8 @@ static void fields_without_an_error_bound_are_reported(void **state)
     const drawn_report of = draw_and_report_pieces(
         "surface_error: 0.5\nfields: {g: 2 * f}\nimages:\n" SMALL("isosurface: {field: g, values: [0.1]}"), &mesh);
     everywhere(strstr(of.warnings, "surface_error does not hold for the isosurface of \"g\" on mesh \"m\"") != NULL);
-    everywhere(of.bound <= 0.5 && !strstr(of.pieces, "cells")); /* positions are bounded nevertheless */
+    /* the positions of the surface are bounded nevertheless */
+    everywhere(of.bound <= 0.5 && !strstr(of.pieces, "cells"));
     const drawn_report plain = draw_and_report_pieces(WITHIN("0.5") SMALL(ISO("0.1")), &mesh);
     everywhere(!strstr(plain.warnings, "surface_error"));
     order_mesh_free(&mesh);
@@ -427,8 +437,8 @@ static void defaults_are_within_a_quarter_of_a_pixel(void **state)
     order_mesh_free(&mesh);
 }
 
-/* Straight hexes of 20 nodes are drawn as those of 27 nodes that have the same polynomials, with one piece between two
- * nodes if no isosurface needs more. The field has no terms that 20 nodes do not determine. */
+/* Checks that straight hexes of 20 nodes are drawn as hexes of 27 nodes with the same polynomials. There is one piece
+ * between two nodes, because no isosurface needs more. The field has no terms that 20 nodes do not determine. */
 static void serendipity_cells_are_completed(void **state)
 {
     (void)state;
@@ -484,7 +494,7 @@ static void piece_count_is_in_the_database(void **state)
 
 enum { VALUES, NODES, TIGHTER, FIXED, NONE, CHANGES };
 
-/* After a change the session has the pieces of a new one, and draws what that draws. */
+/* Checks that after a change the session makes as many pieces as a new session, and draws the same pictures. */
 static void check_change(int change)
 {
     static const char *const scenes[CHANGES] = {WITHIN("1") ALL, WITHIN("1") ALL, WITHIN("0.3") ALL, FINER("2") ALL,
@@ -519,7 +529,8 @@ static void changes_are_drawn(void **state)
 
 /* ---- limits ------------------------------------------------------------------------------------------------------ */
 
-/* 8 hexes of order 2: with n pieces, (2 n)^3 pieces of 36 bytes, and (2 n + 1)^3 nodes of 24 bytes and a value of 8. */
+/* Returns the memory, in MiB, of n pieces between two nodes in 8 hexes of order 2. Each hex has (2 n)^3 pieces of 36
+ * bytes, and (2 n + 1)^3 nodes of 24 bytes with a value of 8 bytes. */
 static double compute_piece_mebibytes(int n)
 {
     return 8 * (36 * pow(2 * n, 3) + 32 * pow(2 * n + 1, 3)) / 1048576;

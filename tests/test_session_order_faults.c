@@ -1,5 +1,6 @@
-/* What may be wrong with cells of higher order: types, orders, counts, layouts, indices. Each is told on all ranks,
- * with the mesh, the place and the value; once it is right the next step draws. */
+/* Checks errors of a user in cells of higher order: types, orders, counts, layouts and indices. Each error must be
+ * reported on all ranks, with the mesh, the position in the array and the value, and the next step after the correction
+ * must draw. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,7 +14,7 @@ static double evaluate_field(const double p[3])
     return p[0] + p[1] * p[2];
 }
 
-/* The input of a case: the mesh and its field, both of which may be spoilt, and room for arrays. */
+/* The input of a case: a mesh and its field, either of which the case may corrupt, and memory for its arrays. */
 typedef struct input {
     order_mesh *whole;
     insitu_mesh mesh;
@@ -26,7 +27,7 @@ typedef struct input {
 typedef void corrupt_input(input *in);
 
 typedef struct fault {
-    int kind; /* in kinds */
+    int kind; /* index in kinds */
     corrupt_input *corrupt;
     insitu_status status;
     bool of_field, at_once;

@@ -1,6 +1,7 @@
-/* Pieces finer than the nodes (`finer_pieces`). On straight cells that contain the squared distance from the origin the
- * surface is a sphere, to which pictures come nearer by four as pieces are twice as fine. In bent cells a linear field
- * is a plane, which every ray meets once: there are no gaps. */
+/* Checks the key `finer_pieces`: cells of higher order are split into linear pieces that are finer than the nodes. On
+ * straight cells with the squared distance from the origin as field, the isosurface is a sphere, and the error of
+ * pictures falls by a factor of four if pieces are twice as fine. In bent cells a linear field has a plane as
+ * isosurface, which every ray must meet exactly once: there are no gaps. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -45,8 +46,8 @@ static void compute_pixel_position(int pixel, double out[2])
     out[1] = (HEIGHT / 2.0 - pixel / WIDTH - 0.5) * VIEW_HEIGHT / HEIGHT;
 }
 
-/* The root of the mean square of the hits' distances from the sphere, as differences of depth within a radius of 0.6;
- * infinite if a ray has no hit. */
+/* Returns the root mean square of the errors of hits, measured as differences of depth from the sphere within a radius
+ * of 0.6; infinity if a ray has no hit there. */
 static double measure_sphere_error(const caught_picture *picture)
 {
     double sum = 0;
@@ -62,7 +63,7 @@ static double measure_sphere_error(const caught_picture *picture)
     return sqrt(sum / count);
 }
 
-/* The largest distance between a hit's unit normal and the sphere's. */
+/* Returns the largest distance between a hit's unit normal and that of the sphere. */
 static double measure_normal_error(const caught_picture *picture)
 {
     double worst = 0;
@@ -90,9 +91,9 @@ static double draw_sphere(const char *scene, const order_mesh *mesh, double *nor
     return errors[0];
 }
 
-/* Draws with 1, 2 and 4 pieces between nodes. The error of linear pieces is that of their second differences, which
- * fall by four; the factor varies by some, as pieces lie otherwise to the surface. Normals are those of
- * test_session_order_normals.c. */
+/* Draws with 1, 2 and 4 pieces between nodes. The error of linear pieces follows from second differences, which fall by
+ * four if pieces are twice as fine. The measured factor varies a little, because the position of pieces relative to the
+ * surface changes. The tolerance of normals is derived in test_session_order_normals.c. */
 static void check_sphere(const char *name, const order_mesh *mesh)
 {
     static const char *const scenes[] = {FINER("1") SPHERE, FINER("2") SPHERE, FINER("4") SPHERE};
@@ -101,7 +102,7 @@ static void check_sphere(const char *name, const order_mesh *mesh)
     if (own_rank == 0)
         printf("%s: off by %.2g, %.2g, %.2g, normals by %.2g\n", name, errors[0], errors[1], errors[2], normals[2]);
     everywhere(errors[0] / errors[1] > 3.4 && errors[1] / errors[2] > 3.4 && errors[0] / errors[2] > 13);
-    /* normals in pyramids are those of their pieces */
+    /* normals in pyramids are not checked, because they are those of the linear pieces */
     everywhere(strstr(name, "pyramid") || (normals[1] < 2e-5 && normals[2] < 2e-5));
 }
 
@@ -120,7 +121,8 @@ static void error_falls_with_the_square(void **state)
 static const order_kind hex_4 = {"hex 4", INSITU_LAGRANGE_HEX, INSITU_ORDER_LEXICOGRAPHIC, 4};
 static const order_kind hex_20 = {"hex 20", INSITU_QUADRATIC_HEX, INSITU_ORDER_VTK, 2};
 
-/* Taken as equispaced, these nodes would give a surface that no number of pieces mends. */
+/* Checks that nodes at Gauss-Lobatto points are recognised. If they were taken as equispaced, the surface would be
+ * wrong for any number of pieces. */
 static void lobatto_points_are_recognised(void **state)
 {
     (void)state;
@@ -136,7 +138,8 @@ static void lobatto_points_are_recognised(void **state)
     order_mesh_free(&mesh);
 }
 
-/* The nodes of a cube are at -1, 0 and 1. The field is -0.25 at two of them and 0 between these, up to 0.05. */
+/* A field that exceeds its values at nodes: nodes are at -1, 0 and 1, where the field is at most -0.25, but between 0
+ * and 1 it reaches 0. */
 static double ridge_field(const double p[3])
 {
     return -(p[0] - 0.5) * (p[0] - 0.5);
@@ -164,17 +167,19 @@ static void surfaces_between_nodes_are_drawn(void **state)
 
 /* ---- no gaps ----------------------------------------------------------------------------------------------------- */
 
-/* A view of the cube without perspective. From the front some rays run within faces and along edges of straight pieces,
- * which are 1/8 wide if 4 are between two nodes of quadratic cells. In the oblique view rays cross them. */
+/* An orthographic view of the cube. From the front, some rays are within faces and along edges of straight pieces,
+ * which are 1/8 wide if 4 pieces are between two nodes of quadratic cells. In the oblique view rays cross faces and
+ * edges. */
 typedef struct gap_view {
-    int size; /* of the picture in pixels */
+    int size; /* width and height of the picture in pixels */
     double pixel, forward[3], right[3], above[3];
 } gap_view;
 
 static gap_view make_view(bool is_oblique)
 {
     const int half =
-        test_case_count(32, 128); /* pixels from the middle, which is that of a pixel, to a face of the cube */
+        /* number of pixels between the middle of the picture, which is a pixel's centre, and a face of the cube */
+        test_case_count(32, 128);
     gap_view out = {2 * half + 9, 1. / half, {0, 0, -1}, {1, 0, 0}, {0, 1, 0}};
     if (!is_oblique) return out;
     const double length = hypot(3, 12);
@@ -187,15 +192,16 @@ static gap_view make_view(bool is_oblique)
     return out;
 }
 
-/* No ray meets an edge of a straight piece at the plane: on such a ray the intervals of several tets may begin or end
- * within rounding of the hit (test_chords.c), which is then found in each. */
+/* The plane's position is such that no ray meets an edge of a straight piece at the plane. On such a ray the intervals
+ * of several tets can begin or end within the rounding error of the hit (test_chords.c), so that the hit is found in
+ * each of them. */
 #define HEIGHT_OF_PLANE 0.1037
 #define HALF_PLANE "isosurface: {field: f, values: [0.1037], opacity: 0.5}"
 #define HALF_SLICE "slice: {field: f, planes: [{normal: [0.3, 0.2, 1], point: [0, 0, 0.1037]}], opacity: 0.5}"
 #define HALF_SURFACE "surface: {colour: [1, 1, 1], opacity: 0.5}"
 #define MEDIUM "volume: {field: f, opacity: [[0, 0.5], [1, 0.5]], unit_distance: 1}"
 
-/* Draws a picture of each layer, with 4 pieces between two nodes. */
+/* Draws one picture of each layer, with 4 pieces between two nodes. */
 static drawn draw_layers(const gap_view *view, const char *const *layers, int count, const order_mesh *mesh)
 {
     char scene[4096];
@@ -212,9 +218,9 @@ static drawn draw_layers(const gap_view *view, const char *const *layers, int co
     return draw_mesh(scene, mesh);
 }
 
-/* A ray's part in a cube. */
+/* The part of a ray that is inside a cube. */
 typedef struct cube_chord {
-    double base[3], length; /* base: where the ray crosses the plane through the origin that faces the eye */
+    double base[3], length; /* base: the intersection of the ray with the plane through the origin that faces the eye */
 } cube_chord;
 
 static cube_chord find_chord(const gap_view *view, int pixel, double half)
@@ -234,16 +240,18 @@ static cube_chord find_chord(const gap_view *view, int pixel, double half)
     return out;
 }
 
-/* Numbers of rays, of those at the border, which are not checked, and of wrong ones. */
+/* rays: number of rays; left_out: number of rays at the border of the cube, which are not checked; wrong: number of
+ * wrong rays. */
 typedef struct gap_tally {
     int64_t rays, left_out, wrong;
-    double worst; /* difference of a volume's depth from the length in the cube */
+    double worst; /* largest difference between the depth of a volume and the length of the ray in the cube */
 } gap_tally;
 
-/* Positions are floats of up to 1, rounded by 3e-8 each: by that much the cube's border is not known. */
+/* Width of the border in which rays are not checked. Positions are floats up to 1, rounded by 3e-8 each, so that the
+ * position of the cube's border is uncertain. */
 static const double border = 1e-6;
 
-/* A ray that meets the plane is dimmed once. */
+/* Checks that a ray which meets the plane inside the cube loses half of its light, once. */
 static void check_plane(const gap_view *view, const caught_picture *picture, int pixel, gap_tally *t)
 {
     const cube_chord chord = find_chord(view, pixel, 1);
@@ -257,7 +265,7 @@ static void check_plane(const gap_view *view, const caught_picture *picture, int
     t->wrong += !is_at_border && picture->rgba[4 * pixel + 3] != (most < 1 ? 0.5f : 0);
 }
 
-/* A ray that meets the cube is dimmed twice by its surface. */
+/* Checks that the cube's surface halves the light of a ray that meets the cube twice. */
 static void check_surface(const gap_view *view, const caught_picture *picture, int pixel, gap_tally *t)
 {
     const bool is_in = find_chord(view, pixel, 1 - border).length > 0;
@@ -267,9 +275,9 @@ static void check_surface(const gap_view *view, const caught_picture *picture, i
     t->wrong += !is_at_border && picture->rgba[4 * pixel + 3] != (is_in ? 0.75f : 0);
 }
 
-/* A ray of length L in the medium loses 1 - 2^-L of its light. In at most 100 pieces this product of floats is rounded
- * by 6e-8 twice each, and the lengths are by as much: 1.8e-5 of the remaining light, which is 2.6e-5 of a length of 1.
- */
+/* Checks the medium: a ray of length L in it loses 1 - 2^-L of its light. The product over at most 100 pieces is
+ * rounded by 6e-8 twice for each piece, and the lengths by as much. Together this is 1.8e-5 of the remaining light, or
+ * a length of 2.6e-5. */
 static void check_medium(const gap_view *view, const caught_picture *picture, int pixel, gap_tally *t)
 {
     const double most = find_chord(view, pixel, 1 + border).length, least = find_chord(view, pixel, 1 - border).length;
@@ -282,7 +290,8 @@ static void check_medium(const gap_view *view, const caught_picture *picture, in
 
 typedef void check_pixel(const gap_view *view, const caught_picture *picture, int pixel, gap_tally *t);
 
-/* Isosurfaces and slices alone have only the pieces that they cross, and with the others all are made. */
+/* Checks all layers in two groups: for isosurfaces and slices alone, only the pieces that they cross are made; beside
+ * surfaces and volumes all pieces are made. */
 static void check_gaps(const char *name, const order_mesh *mesh, gap_tally tallies[3])
 {
     static const char *const layers[] = {HALF_PLANE, HALF_SLICE, HALF_PLANE, HALF_SLICE, HALF_SURFACE, MEDIUM};
@@ -305,7 +314,7 @@ static void check_gaps(const char *name, const order_mesh *mesh, gap_tally talli
     }
 }
 
-/* Adds the cells in columns of cubes along z that have an odd or an even number. */
+/* Adds the cells in those columns of cubes along z whose number is odd (parity 1) or even (parity 0). */
 static void add_columns(const order_mesh *of, int cells_of_cube, int parity, order_mesh *out, unsigned char *types,
                         int64_t *offsets)
 {
@@ -323,7 +332,7 @@ static void add_columns(const order_mesh *of, int cells_of_cube, int parity, ord
     out->vertex_count += of->vertex_count;
 }
 
-/* Columns of hexes of 27 nodes and wedges of 18 in turn. */
+/* Checks a mesh in which columns of hexes of 27 nodes and of wedges of 18 nodes alternate. */
 static void check_mixed_gaps(double bend, gap_tally tallies[3])
 {
     enum { MOST = 64 };
@@ -362,8 +371,8 @@ static bool is_of_usual_gaps(const char *name)
     return is_one;
 }
 
-/* Every ray crosses the plane, the cube's surface and all of the medium in it once: pieces leave no gap, and none is
- * crossed twice. */
+/* Checks that every ray crosses the plane, the cube's surface and all of the medium exactly once: between pieces there
+ * are no gaps, and no piece is crossed twice. */
 static void rays_cross_pieces_once(void **state)
 {
     (void)state;
@@ -404,7 +413,8 @@ static void linear_meshes_are_not_affected(void **state)
     input_free(&in);
 }
 
-/* Vertex ids, an index, and a value at each corner of each cell change nothing if they say the same. */
+/* Checks that vertex ids, an index of values, and a value at each corner of each cell do not change the pictures if
+ * they give the same values. */
 static void other_descriptions_draw_the_same(void **state)
 {
     (void)state;
@@ -451,7 +461,6 @@ static void out_of_range_index_is_reported(void **state)
     free(index);
 }
 
-/* Cells of several types and orders, in one mesh with offsets: those of the second mesh follow those of the first. */
 static void cells_are_counted_as_the_caller_gave_them(void **state)
 {
     (void)state;
@@ -467,7 +476,8 @@ static void cells_are_counted_as_the_caller_gave_them(void **state)
     order_mesh_free(&mesh);
 }
 
-/* Offsets and types, of which all are the same or each second cell is a hex of 27 nodes by its type, draw the same. */
+/* Checks that offsets and types do not change the pictures, whether all types are the same, or every second cell is
+ * declared as a hex of 27 nodes. */
 static void mixed_cells_draw_the_same(void **state)
 {
     (void)state;
@@ -491,12 +501,12 @@ static void mixed_cells_draw_the_same(void **state)
 
 /* ---- cells that are not shown ------------------------------------------------------------------------------------ */
 
-/* A small sphere in the middle, and a plane through a corner. */
+/* Images that need few cells: a small sphere in the middle, and a plane through a corner. */
 #define FEW                                                                                                            \
     IMAGE("a", "isosurface: {field: f, values: [0.05]}")                                                               \
     IMAGE("b", "slice: {field: f, planes: [{point: [0.8, 0.9, 0.9], normal: [1, 2, 3]}]}")
 
-/* One more picture, for which all cells are refined. */
+/* One more image, for which all cells must be refined. */
 #define WHOLE IMAGE("z", "volume: {field: f}")
 
 static drawn draw_and_count_bytes(const char *scene, const order_mesh *mesh, int64_t *bytes)
@@ -509,9 +519,10 @@ static drawn draw_and_count_bytes(const char *scene, const order_mesh *mesh, int
     return out;
 }
 
-/* A volume is drawn from all pieces, so that with it all cells are refined. Rays hit the same places to the bit.
- * Where a cell that is not refined has a common node with one that is, its gradient is not part of the mean there, so
- * that normals differ. */
+/* Checks that cells in which nothing is drawn are not refined. The scene with only the isosurface and the slice is
+ * compared with the same scene and a volume, for which all cells are refined. Hit positions must be bit-identical.
+ * Normals may differ where a refined and an unrefined cell share a node, because the mean gradient at that node does
+ * not include that of the unrefined cell. */
 static void other_cells_are_not_refined(void **state)
 {
     (void)state;
@@ -542,7 +553,7 @@ static void other_cells_are_not_refined(void **state)
     }
 }
 
-/* Returns the number of pieces on all ranks. */
+/* Returns the number of pieces that all ranks make. */
 static int64_t count_pieces(const char *scene, const order_mesh *mesh)
 {
     long long count = 0;
@@ -558,8 +569,9 @@ static int64_t count_pieces(const char *scene, const order_mesh *mesh)
     return all;
 }
 
-/* The sphere and the plane cross all 8 cubes. With 8 pieces between two nodes each of the cubes has 4096 hexes, of
- * which a plane crosses some 400, and 27 are at nodes. With twice as many pieces there would be 8 times as many. */
+/* Checks that only the pieces that a surface crosses are made. The sphere and the plane cross all 8 cubes. With 8
+ * pieces between two nodes, a cube has 4096 hexes, of which a plane crosses some 400; 27 more are made at the nodes.
+ * With twice as many pieces between nodes there would be 8 times as many hexes. */
 static void pieces_that_nothing_crosses_are_not_made(void **state)
 {
     (void)state;
@@ -605,7 +617,7 @@ static void surfaces_are_made_of_pieces_on_outer_faces(void **state)
 
 enum { VALUES, NODES, SCENE, COARSE, CHANGES };
 
-/* After a change the session draws what a new one does. */
+/* Checks that after a change the session draws the same pictures as a new session. */
 static void check_change(int change)
 {
     order_mesh mesh;

@@ -1,10 +1,10 @@
-/* Spectral elements as their codes hand them over: bent hexes of order 4 and 7 with Gauss-Lobatto points, each with
- * its own nodes, without connectivity, dealt to ranks at random. With the settings that a scene has by default, every
- * hit is as near to the isosurface of the cells' polynomials as the report says, and no ray passes through this surface
- * by more than that.
+/* Checks spectral elements as simulation codes pass them: bent hexes of order 4 and 7 with nodes at Gauss-Lobatto
+ * points, without shared nodes or connectivity, dealt to ranks at random. With the default settings of a scene, no hit
+ * may be farther from the isosurface of the cells' polynomials than the error bound that the report states, and no ray
+ * may continue beyond this surface by more than the bound.
  *
- * The polynomials are evaluated in double, as sums over all nodes of a cell. A point of a ray is found in a cell by
- * Newton's method, which starts from the inverse of the map that bends the mesh. */
+ * The polynomials are evaluated in double, as sums over all nodes of a cell. The reference coordinates of a point on a
+ * ray are found by Newton's method, which starts from the inverse of the map that bends the mesh. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -26,7 +26,7 @@ enum {
 #define EYE_DISTANCE 5.0
 #define ISOVALUE 0.1
 
-/* Looks at the origin from an oblique direction. */
+/* An orthographic view of the origin from an oblique direction. */
 static const char scene[] =
     "images:\n  - name: a\n    size: [480, 480]\n    background: [0, 0, 0, 0]\n"
     "    camera: {position: [2, 3, 3.4641016151377544], focal: [0, 0, 0], up: [0, 1, 0], projection: orthographic, "
@@ -42,15 +42,15 @@ static double evaluate_field(const double p[3])
 
 typedef struct lobatto_mesh {
     int order, side;
-    double points[MOST_ORDER + 1];  /* from 0 to 1 */
-    double scales[MOST_ORDER + 1];  /* of the Lagrange polynomials at these points */
-    double (*nodes)[MOST_NODES][4]; /* of each cell: position and value */
+    double points[MOST_ORDER + 1];  /* Gauss-Lobatto points, in the interval from 0 to 1 */
+    double scales[MOST_ORDER + 1];  /* factors that normalise the Lagrange polynomials of these points */
+    double (*nodes)[MOST_NODES][4]; /* position and value of each node of each cell of the whole mesh */
     insitu_mesh mesh;
     insitu_field field;
-    double *coordinates, *values; /* those of this rank's cells */
+    double *coordinates, *values; /* nodes and values of this rank's cells */
 } lobatto_mesh;
 
-/* Computes Legendre's polynomial of order p and its first two derivatives. */
+/* Computes the Legendre polynomial of order p and its first two derivatives. */
 static void evaluate_legendre(int p, double x, double out[3])
 {
     double before = 1, at = x;
@@ -64,7 +64,8 @@ static void evaluate_legendre(int p, double x, double out[3])
     out[2] = (2 * x * out[1] - p * (p + 1) * at) / (1 - x * x);
 }
 
-/* The inner points are the zeros of the derivative, between which are those of Chebyshev's. */
+/* Finds the Gauss-Lobatto points. The inner points are the zeros of the derivative of the Legendre polynomial; Newton's
+ * method starts from Chebyshev points. */
 static void find_points(lobatto_mesh *m)
 {
     const int p = m->order;
@@ -141,12 +142,12 @@ static void free_mesh(lobatto_mesh *m)
 
 /* ---- the polynomials --------------------------------------------------------------------------------------------- */
 
-/* A position and the field, and their derivatives along the axes. */
+/* Position and field at a point of a cell, and their derivatives along the three reference axes. */
 typedef struct cell_values {
     double value[4], slopes[3][4];
 } cell_values;
 
-/* Computes the Lagrange polynomials and their derivatives. */
+/* Computes the values and the derivatives of the Lagrange polynomials at x. */
 static void compute_lagrange_weights(const lobatto_mesh *m, double x, double weights[MOST_ORDER + 1],
                                      double derived[MOST_ORDER + 1])
 {
@@ -169,7 +170,7 @@ static void evaluate_cell(const lobatto_mesh *m, int cell, const double at[3], c
     for (int a = 0; a < 3; a++) compute_lagrange_weights(m, at[a], w[a], d[a]);
     memset(out, 0, sizeof *out);
     for (int k = 0; k < n; k++) {
-        double plane[3][4] = {{0}}; /* the value, and the derivatives along two axes */
+        double plane[3][4] = {{0}}; /* sums over two axes: of values, and of derivatives along either axis */
         for (int j = 0; j < n; j++) {
             double row[2][4] = {{0}};
             for (int i = 0; i < n; i++, node++)
@@ -192,8 +193,8 @@ static void evaluate_cell(const lobatto_mesh *m, int cell, const double at[3], c
     }
 }
 
-/* Computes the inverse of the derivatives of the position: dual[a][x] is the derivative of reference coordinate a along
- * axis x of space. */
+/* Inverts the Jacobian matrix of the position: dual[a][x] is the derivative of the reference coordinate a along axis x
+ * of space. */
 static void invert_jacobian(const cell_values *of, double dual[3][3])
 {
     double determinant = 0;
@@ -212,7 +213,8 @@ typedef struct cell_point {
     int cell;
     double at[3];
     cell_values of;
-    double gradient[3], distance; /* in space; the distance from the isosurface to first order, with the field's sign */
+    /* gradient: in space; distance: distance from the isosurface to first order, with the sign of field - isovalue */
+    double gradient[3], distance;
 } cell_point;
 
 static void compute_derivatives(cell_point *p)
@@ -227,7 +229,7 @@ static void compute_derivatives(cell_point *p)
     p->distance = (p->of.value[3] - ISOVALUE) / sqrt(square);
 }
 
-/* Finds a position in p->cell by Newton's method from p->at. */
+/* Finds the reference coordinates of a position in p->cell by Newton's method, which starts from p->at. */
 static void find_in_cell(const lobatto_mesh *m, const double position[3], cell_point *p)
 {
     for (int turn = 0; turn < 20; turn++) {
@@ -242,7 +244,8 @@ static void find_in_cell(const lobatto_mesh *m, const double position[3], cell_p
     compute_derivatives(p);
 }
 
-/* Computes the point that is moved to a position, with the bend of exact sines: a first guess for polynomials. */
+/* Computes the point that the exact bend, made of sines, moves to a position. The polynomials approximate this bend, so
+ * the point is a first guess for them. */
 static void unbend_position(const double position[3], double out[3])
 {
     memcpy(out, position, 3 * sizeof *out);
@@ -253,7 +256,7 @@ static void unbend_position(const double position[3], double out[3])
     }
 }
 
-/* Finds the cell that contains a position. Returns false if it is outside the mesh. */
+/* Finds the cell that contains a position, and its reference coordinates. Returns false if it is outside the mesh. */
 static bool find_point(const lobatto_mesh *m, const double position[3], cell_point *p)
 {
     double point[3];
@@ -267,7 +270,7 @@ static bool find_point(const lobatto_mesh *m, const double position[3], cell_poi
         }
         p->cell = cube[0] + m->side * (cube[1] + m->side * cube[2]);
         find_in_cell(m, position, p);
-        for (int a = 0; a < 3; a++) { /* the polynomials bend faces slightly otherwise */
+        for (int a = 0; a < 3; a++) { /* the polynomials' faces differ slightly from those of the exact bend */
             const int step = p->at[a] < -1e-9 ? -1 : p->at[a] > 1 + 1e-9 ? 1 : 0;
             if (cube[a] + step < 0 || cube[a] + step >= m->side) return false;
             cube[a] += step;
@@ -278,7 +281,8 @@ static bool find_point(const lobatto_mesh *m, const double position[3], cell_poi
     return true;
 }
 
-/* Returns the distance of a position from a point of the isosurface of a cell, which is found along gradients. */
+/* Returns the distance of a position from the isosurface of a cell. The point of the isosurface is found by steps along
+ * the gradient. */
 static double surface_distance(const lobatto_mesh *m, const double position[3], const cell_point *from)
 {
     cell_point p = *from;
@@ -298,7 +302,8 @@ static double surface_distance(const lobatto_mesh *m, const double position[3], 
 
 /* ---- rays -------------------------------------------------------------------------------------------------------- */
 
-/* Unit vectors of the camera: forward is (-2, -3, -sqrt(12)) / 5, and right is across it and the y axis. */
+/* Unit vectors of the camera: forward is (-2, -3, -sqrt(12)) / 5, and right is perpendicular to it and to the y
+ * axis. */
 static const double right[3] = {0.8660254037844386, 0, -0.5};
 static const double above[3] = {-0.29999999999999999, 0.80000000000000004, -0.51961524227066314};
 static const double forward[3] = {-0.40000000000000002, -0.59999999999999998, -0.69282032302755092};
@@ -309,7 +314,8 @@ static void ray_position(int pixel, double depth, double out[3])
     for (int a = 0; a < 3; a++) out[a] = x * right[a] + y * above[a] + (depth - EYE_DISTANCE) * forward[a];
 }
 
-/* The depths at which a ray is in the cube, which is the mesh: its faces are flat. */
+/* Computes the depths at which a ray enters and leaves the cube, which is the mesh because its outer faces are flat.
+ * Returns false if the ray misses the cube. */
 static bool is_in_cube(int pixel, double *in, double *out)
 {
     double base[3];
@@ -324,19 +330,20 @@ static bool is_in_cube(int pixel, double *in, double *out)
     return *out > *in;
 }
 
-/* Distances are in pixels. */
+/* Results over rays. Distances are in pixels. */
 typedef struct ray_tally {
     int64_t rays, hits, wrong;
-    double farthest; /* distance of a hit from the surface */
-    double deepest;  /* of a point beyond the surface from it, before the hit */
+    double farthest; /* largest distance of a hit from the isosurface */
+    double deepest;  /* largest distance beyond the isosurface of a point on a ray before its hit */
 } ray_tally;
 
-/* Follows a ray up to its hit, or to the end: it may be beyond the surface, on the other side of it, by no more than
- * the bound. */
+/* Follows a ray up to its hit, or to its end if it has none, and measures how far it continues on the other side of the
+ * isosurface, which must not be more than the bound. */
 static void follow_ray(const lobatto_mesh *m, int pixel, double from, double to, double bound, ray_tally *t)
 {
     const int steps = (int)ceil((to - from) / (0.5 * PIXEL));
-    double side = 0; /* on which the ray was, out of reach of the surface */
+    /* side of the isosurface on which the ray is at its first point that is farther away than the bound */
+    double side = 0;
     for (int n = 1; n < steps; n++) {
         double position[3];
         cell_point p;
@@ -365,7 +372,7 @@ static void check_ray(const lobatto_mesh *m, int pixel, double depth, double bou
     t->farthest = fmax(t->farthest, surface_distance(m, position, &p) / PIXEL);
 }
 
-/* Each rank checks some of the rays of rank 0's picture. */
+/* Checks rays of rank 0's picture; each rank checks a part of them. */
 static ray_tally check_rays(const lobatto_mesh *m, const caught_picture *picture, double bound)
 {
     ray_tally t = {0};
@@ -381,8 +388,8 @@ static ray_tally check_rays(const lobatto_mesh *m, const caught_picture *picture
     return t;
 }
 
-/* Depths are floats of up to 7, rounded by 2.4e-7, 3.6e-5 of a pixel; the library's positions are relative to the
- * middle, and of the same precision. */
+/* Error of depths in pixels: they are floats up to 7, rounded by 2.4e-7, which is 3.6e-5 of a pixel. The library's
+ * positions are relative to the middle of the mesh, and have the same precision. */
 #define ROUNDING 1e-4
 
 static void check_order(int order, int side)

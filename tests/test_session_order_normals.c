@@ -1,5 +1,6 @@
-/* Normals of isosurfaces in cells of higher order come from the gradient of the cells' polynomial. On straight cells
- * that contain the squared distance from the origin they are those of a sphere. The same bits come out on any ranks. */
+/* Checks that normals of isosurfaces in cells of higher order are gradients of the cells' polynomial. On straight cells
+ * with the squared distance from the origin as field they are those of a sphere. Pictures must be bit-identical on any
+ * number of ranks. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -36,8 +37,8 @@ static bool is_of_order_two(const order_kind *kind)
     return kind->order > 1 && !strstr(kind->name, "pyramid");
 }
 
-/* The largest distance between a hit's unit normal and the field's gradient at the hit, divided by its length; pixels
- * within 0.5 of the axis, where the sphere faces the eye. Infinite if a pixel has no hit. */
+/* Returns the largest distance between a hit's unit normal and the normalised gradient of the field at the hit, over
+ * pixels within 0.5 of the axis, where the sphere faces the eye; infinity if such a pixel has no hit. */
 static double find_largest_normal_error(const caught_picture *picture)
 {
     double worst = 0;
@@ -67,8 +68,8 @@ static double measure_sphere_normal_error(const order_kind *kind, int side, doub
     return worst;
 }
 
-/* The gradient is linear, and pieces interpolate it exactly; depths are floats of up to 5, wrong by 1e-6, as places are
- * over a radius of 0.7. */
+/* Checks normals of a sphere. The gradient is linear, so that pieces interpolate it exactly. Depths are floats up to 5
+ * with errors of 1e-6, and so are positions; divided by the radius of 0.7 this is the error of normals. */
 static void normals_of_a_sphere_are_exact(void **state)
 {
     (void)state;
@@ -80,9 +81,9 @@ static void normals_of_a_sphere_are_exact(void **state)
     }
 }
 
-/* In bent cells, gradients at nodes are of second order, and so is what lies between: a quarter of the distance between
- * nodes divides their error by 16. On meshes as coarse as these the factor is still between that and 4, by which
- * normals of single pieces become better. */
+/* Checks that errors of normals in bent cells are of second order, as are those of gradients at nodes and of the
+ * interpolation between them: if the distance between nodes is a quarter, the error falls by 16. On such coarse meshes
+ * the factor is still between 16 and 4, the factor of normals that are constant on each piece. */
 static void normals_in_bent_cells_are_of_second_order(void **state)
 {
     (void)state;
@@ -110,8 +111,8 @@ static void bend_top_face(order_mesh *mesh)
     }
 }
 
-/* Returns the largest distance of a unit normal in the picture from that of the face. Infinite if the face has a gap.
- */
+/* Returns the largest distance between a unit normal in the picture and that of the curved face; infinity if the face
+ * has a gap. */
 static double find_largest_face_normal_error(const caught_picture *picture)
 {
     double worst = 0;
@@ -131,8 +132,8 @@ static double find_largest_face_normal_error(const caught_picture *picture)
     return worst;
 }
 
-/* The normals of such faces are linear over each cell's face, so that pieces of any number interpolate them exactly,
- * but for the rounding of float. Normals of flat pieces are off by 0.05 and more. */
+/* Checks normals of curved outer faces. They are linear over each cell's face, so that any number of pieces
+ * interpolates them exactly, up to rounding to float. Normals of flat pieces would have errors of 0.05 and more. */
 static void normals_of_curved_faces_are_exact(void **state)
 {
     (void)state;
@@ -156,8 +157,9 @@ static void normals_of_curved_faces_are_exact(void **state)
 
 enum { POLYGONS = 40, CORNERS = 12 };
 
-/* Makes polygons around points of a grid in the plane z = 0, whose corners lie alternately above and below it: too bent
- * for a common apex (session_outer_mesh.h). Rank 0 has all of them. */
+/* Makes polygons around the points of a grid in the plane z = 0. Their corners are alternately above and below the
+ * plane, so that the polygons are too bent to be split into triangles with a common apex (session_outer_mesh.h). Rank 0
+ * has all of them. */
 static void make_zigzag_polygons(double positions[][3], int64_t *connectivity, int64_t *offsets, insitu_mesh *mesh)
 {
     const int count = own_rank == 0 ? POLYGONS : 0;
@@ -179,7 +181,7 @@ static void make_zigzag_polygons(double positions[][3], int64_t *connectivity, i
     mesh->offsets = (insitu_array){offsets, INSITU_INT64, 0};
 }
 
-/* Draws the polygons, and if `curved` is given this mesh too, which must not be in the picture. */
+/* Draws the polygons. If `curved` is not NULL, also sets this mesh, which must be outside the picture. */
 static caught_picture draw_polygons(const insitu_mesh *polygons, const insitu_mesh *curved)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(SCENE("surface: {}")));
@@ -191,8 +193,9 @@ static caught_picture draw_polygons(const insitu_mesh *polygons, const insitu_me
     return pop_caught_picture();
 }
 
-/* In a session with curved faces, the faces of linear cells have normals at vertices too. They are the same but for the
- * rounding of normals to float, also for polygons whose triangles have an apex each. */
+/* Checks linear cells in a session that also has curved faces, so that faces of linear cells have normals at vertices
+ * too. The picture must be that without curved faces, up to the rounding of normals to float, also for polygons whose
+ * triangles each have an apex of their own. */
 static void faces_of_linear_cells_keep_their_normals(void **state)
 {
     (void)state;
@@ -223,7 +226,8 @@ static void faces_of_linear_cells_keep_their_normals(void **state)
 
 /* ---- derived gradients ------------------------------------------------------------------------------------------- */
 
-/* The derivative of the squared distance along z is 2 z at all nodes, and 0.3 on the plane z = 0.15. */
+/* Checks a derived gradient: the derivative of the squared distance along z is 2 z at all nodes, so that the isosurface
+ * 0.3 is the plane z = 0.15. */
 static void derived_gradients_are_exact(void **state)
 {
     (void)state;
@@ -247,7 +251,7 @@ static void derived_gradients_are_exact(void **state)
 
 /* ---- Gauss-Lobatto points ---------------------------------------------------------------------------------------- */
 
-/* Moves the nodes of cubes of order 4, of which two are along each axis, to Gauss-Lobatto points. */
+/* Moves the nodes of cubes of order 4, two of which are along each axis, to Gauss-Lobatto points. */
 static void move_nodes_to_lobatto_points(order_mesh *mesh)
 {
     const double of4[5] = {0, 0.5 - 0.5 * sqrt(3. / 7), 0.5, 0.5 + 0.5 * sqrt(3. / 7), 1};
@@ -291,7 +295,7 @@ static void normals_are_the_same_on_any_ranks(void **state)
     }
 }
 
-/* The normals by default are those that `vertex` asks for. */
+/* Checks that the default normals are those of the setting `normals: vertex`. */
 static void vertex_normals_are_the_default(void **state)
 {
     (void)state;
@@ -309,9 +313,10 @@ static void vertex_normals_are_the_default(void **state)
 
 /* ---- lost values ------------------------------------------------------------------------------------------------- */
 
-/* If a value of a cell is not finite, other pieces of it are drawn, with normals from differences along their edges.
- * These are one-sided on the border of the cube: there the gradient along z is 1.5 instead of 2, and on the surface at
- * most 0.21 off in a length of 1.41. Without them, normals would be up to 0.7 off. */
+/* Checks a cell of which some values are not finite. Its other pieces are drawn, with normals from differences along
+ * their edges. On the border of the cube these differences are one-sided: the gradient along z is 1.5 there instead of
+ * 2, which is an error of at most 0.21 on the surface for a gradient of length 1.41. Without such normals the errors
+ * would be up to 0.7. */
 static void pieces_adjacent_to_missing_values_have_normals(void **state)
 {
     (void)state;

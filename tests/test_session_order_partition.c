@@ -1,5 +1,5 @@
-/* Cells of higher order that are dealt to ranks at random, one by one: pieces and pictures have the bits of those that
- * one rank draws alone. */
+/* Checks cells of higher order that are dealt to ranks at random, one by one: the numbers of pieces and the pictures
+ * must be bit-identical to those of rank 0 with all cells. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -31,7 +31,7 @@ static const char *const scenes[] = {
 };
 enum { SCENES = sizeof scenes / sizeof *scenes, VOLUME_SCENE = 0, VOLUME = 3 };
 
-/* Each way to split and to refine cells is that of one of these. */
+/* Returns whether a kind is tested by default. These kinds cover all methods to split and to refine cells. */
 static bool is_usual(const order_kind *kind)
 {
     static const char *const names[] = {"tet 10", "hex 20", "hex 27", "wedge 18", "hex 4", "pyramid 13"};
@@ -40,7 +40,7 @@ static bool is_usual(const order_kind *kind)
     return is_one;
 }
 
-/* Leaves the cells of the rank, in reverse. */
+/* Keeps only the cells that are dealt to this rank, in reverse order. */
 static void keep_random_cells(order_mesh *mesh, uint64_t seed)
 {
     const size_t row = (size_t)mesh->nodes;
@@ -55,7 +55,7 @@ static void keep_random_cells(order_mesh *mesh, uint64_t seed)
     mesh->mesh.connectivity_count = count * mesh->nodes;
 }
 
-/* The scene file has been written. pieces: what the report says of them. */
+/* Draws a scene file that exists already. pieces: receives what the report states about pieces. */
 static drawn draw_and_report(MPI_Comm comm, const char *file, const order_mesh *mesh, char pieces[512])
 {
     insitu_session *session = open_session(comm, file);
@@ -68,7 +68,8 @@ static drawn draw_and_report(MPI_Comm comm, const char *file, const order_mesh *
     return take_caught_pictures();
 }
 
-/* Volumes that are not reproducible are blended in float, each rank's part first. */
+/* Returns whether a picture of all ranks equals that of rank 0 alone: bit by bit or, for volumes that are not
+ * reproducible, up to 1e-6, because they are blended in float, the part of each rank first. */
 static bool is_same_picture(int scene, int picture, const drawn *all, const drawn *alone)
 {
     const caught_picture *one = &all->pictures[picture], *other = &alone->pictures[picture];
@@ -101,7 +102,8 @@ static void pictures_are_the_same_on_any_ranks(void **state)
     bool are_all_same = true;
     for (int k = 0; k < order_kind_count; k++) {
         order_mesh part, whole;
-        if (!is_usual(&order_kinds[k]) && (!test_is_long_run() || rank_count > 7)) continue; /* many ranks take long */
+        /* runs on many ranks take long */
+        if (!is_usual(&order_kinds[k]) && (!test_is_long_run() || rank_count > 7)) continue;
         order_mesh_create(&order_kinds[k], 2, 0.07, order_wave_field, 0, 1, &part);
         order_mesh_create(&order_kinds[k], 2, 0.07, order_wave_field, 0, 1, &whole);
         keep_random_cells(&part, (uint64_t)k);

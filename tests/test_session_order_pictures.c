@@ -1,9 +1,11 @@
-/* Pictures of quadratic tets with the settings that a scene has by default, against the polynomials' own isosurfaces.
- * At most 1 pixel in 1000 is missed, and the median of the distances along rays is at most 0.1 pixel.
+/* Compares pictures of quadratic tets, drawn with the default settings of a scene, with the isosurfaces of the cells'
+ * polynomials. At most 1 pixel in 1000 may be missed, and the median of the distances along rays may be at most 0.1
+ * pixel.
  *
- * In straight cells the field along a ray is a quadratic polynomial, whose first root in each cell is found. Bent cells
- * are cut into small tets, 24 between two nodes: their hits are first guesses, from which Newton's method leads to the
- * polynomial's. The cells of INSITU_TEST_DATA are left out if it is not set. */
+ * In straight cells the field along a ray is a quadratic polynomial, whose first root in each cell is computed. Bent
+ * cells are divided into small tets, 24 between two nodes: their hits are first guesses for Newton's method, which
+ * finds the hits of the polynomials. Cells from files in INSITU_TEST_DATA are not tested if this variable is not
+ * set. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,12 +17,12 @@
 
 enum { WIDTH = 480, HEIGHT = 360, PIXELS = WIDTH * HEIGHT, NODES = 10, SMALL = 24 };
 
-/* Cells, their isosurface, and a camera without perspective. */
+/* Cells, an isovalue, and an orthographic camera. */
 typedef struct subject {
     const char *name;
     data_cells cells;
     double isovalue;
-    double eye[3], focal[3], up[3], height; /* of the picture in scene units */
+    double eye[3], focal[3], up[3], height; /* height: height of the picture in scene units */
     /* unit vectors of the camera */
     double right[3], above[3], forward[3];
 } subject;
@@ -43,7 +45,7 @@ static void make_unit(double a[3])
     for (int x = 0; x < 3; x++) a[x] /= length;
 }
 
-/* Solves three equations by Cramer's rule. Returns false if they have no single solution. */
+/* Solves a system of three linear equations by Cramer's rule. Returns false if it has no unique solution. */
 static bool solve_linear_system(const double columns[3][3], const double right[3], double out[3])
 {
     double product[3];
@@ -65,7 +67,7 @@ static void place_camera(subject *s)
     cross_product(s->right, s->forward, s->above);
 }
 
-/* Computes a place in camera coordinates: in pixels from the left and the top, and its depth in scene units. */
+/* Transforms a position to camera coordinates: pixels from the left, pixels from the top, and depth in scene units. */
 static void transform_to_camera(const subject *s, const double place[3], double out[3])
 {
     double to[3];
@@ -77,10 +79,11 @@ static void transform_to_camera(const subject *s, const double place[3], double 
 
 /* ---- polynomials ------------------------------------------------------------------------------------------------- */
 
-/* Each node is at a corner, or between two. */
+/* Corners between which each node lies; equal for a node at a corner. */
 static const int ends[NODES][2] = {{0, 0}, {1, 1}, {2, 2}, {3, 3}, {0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};
 
-/* Computes the polynomials of a cell at barycentric coordinates. nodes: position in camera coordinates, and value. */
+/* Computes the polynomials of a cell at barycentric coordinates. nodes: position in camera coordinates and value of
+ * each node. */
 static void evaluate_cell(const double nodes[NODES][4], const double at[4], double out[4])
 {
     for (int f = 0; f < 4; f++) out[f] = 0;
@@ -91,7 +94,7 @@ static void evaluate_cell(const double nodes[NODES][4], const double at[4], doub
     }
 }
 
-/* Computes the derivatives from corner 0 to the others. */
+/* Computes the derivatives of the polynomials along the directions from corner 0 to the other corners. */
 static void compute_derivatives(const double nodes[NODES][4], const double at[4], double out[3][4])
 {
     double of[4][4] = {{0}};
@@ -128,7 +131,8 @@ static bool is_straight(const double nodes[NODES][4])
 
 /* ---- true hits --------------------------------------------------------------------------------------------------- */
 
-/* Calls the function for all pixels whose middles are in the box of the places. */
+/* A function that for_each_pixel() calls for all pixels whose centres are inside the bounding rectangle of the given
+ * positions. */
 typedef void pixel_function(const subject *s, const double nodes[NODES][4], const double guess[4], int pixel,
                             double *depths);
 
@@ -146,8 +150,8 @@ static void for_each_pixel(const subject *s, const double nodes[NODES][4], const
             visit(s, nodes, guess, j * WIDTH + i, depths);
 }
 
-/* Finds the first root of a quadratic polynomial, given by its values at 0, 1/2 and 1, from 0 to 1; INFINITY: none. On
- * faces all of whose nodes have the isovalue, rounding does not hide it. */
+/* Finds the first root between 0 and 1 of a quadratic polynomial, which is given by its values at 0, 1/2 and 1; returns
+ * INFINITY if there is none. A root is found despite rounding if all nodes of a face have the isovalue. */
 static double find_first_root(double left, double middle, double right)
 {
     const double a = 2 * (left + right - 2 * middle), b = 4 * middle - 3 * left - right, c = left;
@@ -191,7 +195,8 @@ static void intersect_straight_cell(const subject *s, const double nodes[NODES][
     depths[pixel] = fmin(depths[pixel], enter + (leave - enter) * find_first_root(values[0], values[1], values[2]));
 }
 
-/* Newton's method from a guess near by. A hit outside the cell is one of another cell. */
+/* Finds the hit of a bent cell by Newton's method from a nearby guess. A hit outside the cell is ignored, because it
+ * belongs to another cell. */
 static void intersect_by_newton(const subject *s, const double nodes[NODES][4], const double guess[4], int pixel,
                                 double *depths)
 {
@@ -214,7 +219,7 @@ static void intersect_by_newton(const subject *s, const double nodes[NODES][4], 
         depths[pixel] = fmin(depths[pixel], out[2]);
 }
 
-/* The small boxes of reference coordinates; those outside the cell are not looked at. */
+/* Number of small boxes along each reference coordinate; boxes outside the cell are not searched. */
 enum { BOXES = 2 * SMALL };
 typedef double value_lattice[BOXES + 1][BOXES + 1][BOXES + 1];
 
@@ -224,7 +229,7 @@ static void compute_box_corner(const int at[3], double out[4])
     out[0] = 1 - out[1] - out[2] - out[3];
 }
 
-/* Looks for hits in a small box, half of which may be outside the cell. */
+/* Searches for hits in a small box, half of which may be outside the cell. */
 static void intersect_box(const subject *s, const double nodes[NODES][4], value_lattice values, const int first[3],
                           double *depths)
 {
@@ -324,10 +329,10 @@ static void draw_part(const subject *s, const char *pieces, caught_picture *out,
     free(own);
 }
 
-/* How a picture differs from the true one. */
+/* How a picture differs from the exact one. */
 typedef struct difference {
-    int hits, missed;    /* numbers of true hits, and of pixels with a hit in only one of the pictures */
-    double median, most; /* distances along rays, in pixels; `most` is exceeded by 1 in 1000 */
+    int hits, missed; /* hits: number of exact hits; missed: number of pixels with a hit in only one of the pictures */
+    double median, most; /* median and 99.9th percentile of the distances along rays, in pixels */
 } difference;
 
 static difference compare_picture(const subject *s, const float *drawn, const double *depths)
@@ -348,7 +353,8 @@ static difference compare_picture(const subject *s, const float *drawn, const do
     return out;
 }
 
-/* The picture by default is within the bars, that of pieces between nodes is not. */
+/* Checks that the picture with default settings is within the limits, and that the picture with one piece between nodes
+ * is not. */
 static void check_subject(subject *s)
 {
     static const char *const pieces[] = {"", "finer_pieces: 1\n"};
@@ -396,7 +402,7 @@ static double wave_field(const double p[3])
     return p[0] * p[0] + 0.6 * p[1] * p[1] - 0.5 * p[2] + 0.3 * sin(2 * p[1] + p[2]);
 }
 
-/* A bracket: a block that is bent by a quarter of a circle, so that the edges of its cells are curved. */
+/* Checks a bracket: a block that is bent along a quarter of a circle, so that the edges of its cells are curved. */
 static void bent_tets_match_their_polynomials(void **state)
 {
     (void)state;

@@ -1,5 +1,6 @@
-/* Statistics of meshes with cells of higher order are integrals of the cells' polynomials: they are closed forms in
- * cells that a polynomial map has bent, and do not depend on the pieces that are drawn, on cameras and on ranks. */
+/* Checks statistics of meshes with cells of higher order, which are integrals of the cells' polynomials. They must
+ * equal closed forms in cells that are bent by a polynomial map, and must not depend on the linear pieces that are
+ * drawn, on cameras or on ranks. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -38,7 +39,7 @@ static void write_and_read_statistics(const char *scene, const insitu_mesh *mesh
     read_file("s.csv", MOST, text);
 }
 
-/* Nine digits are written. */
+/* Returns whether a number in the table is the expected one, up to the nine digits that are written. */
 static bool is_nearly_equal(const char *text, int column, double expected)
 {
     const double number = read_last_number(text, column);
@@ -47,7 +48,8 @@ static bool is_nearly_equal(const char *text, int column, double expected)
     return false;
 }
 
-/* The usual run does every third kind of cells, among them tets, hexes, wedges and pyramids. */
+/* Returns whether a kind of cells is not tested by default. Every third kind is tested, among them tets, hexes, wedges
+ * and pyramids. */
 static bool is_left_out(int kind)
 {
     return !test_is_long_run() && kind % 3 != 1;
@@ -62,8 +64,8 @@ static bool is_same(const char *a, const char *b)
 
 /* ---- closed forms ------------------------------------------------------------------------------------------------ */
 
-/* Maps the cube to x + b x^2 + b y^2, y + b z^2, z + b x^2, which every cell of order 2 contains. The determinant of
- * its Jacobian is 1 + 2 b x + 8 b^3 x y z. */
+/* Maps the cube to x + b x^2 + b y^2, y + b z^2, z + b x^2. Every cell of order 2 represents this map exactly. The
+ * determinant of its Jacobian matrix is 1 + 2 b x + 8 b^3 x y z. */
 static void bend_position(double b, double place[3])
 {
     const double x = place[0], y = place[1], z = place[2];
@@ -72,8 +74,8 @@ static void bend_position(double b, double place[3])
     place[2] = z + b * x * x;
 }
 
-/* A function of the place before it is moved. Over the cube from -1 to 1, the mean of x + y z with the determinant as
- * weight is 2 b / 3, and that of its square 4/9 + 16 b^3 / 27. */
+/* The field x + y z at a position before the map. Over the cube from -1 to 1, weighted by the determinant, its mean is
+ * 2 b / 3, and the mean of its square is 4/9 + 16 b^3 / 27. */
 static double bent_field(const double p[3])
 {
     return p[0] + p[1] * p[2];
@@ -109,7 +111,7 @@ static void bent_cells_have_the_moments_of_their_polynomials(void **state)
         }
 }
 
-/* Cells at x > 0 have the value 1, and the volume 4 (1 + b). */
+/* Checks cell values, which are 1 in cells at x > 0: the volume of these cells is 4 (1 + b). */
 static void cell_values_have_the_volumes_of_bent_cells(void **state)
 {
     (void)state;
@@ -131,8 +133,8 @@ static void cell_values_have_the_volumes_of_bent_cells(void **state)
     order_mesh_free(&mesh);
 }
 
-/* Each cube of side 1 has three times its number, and a slope of 1 along x around it, whose variance is 1/12. The
- * numbers 0 to 7 have the variance 63/12. */
+/* Checks values at corners. In each cube of side 1 the value is three times the cube's number plus a term with slope 1
+ * along x, whose variance is 1/12. The numbers 0 to 7 have the variance 63/12. */
 static void corner_values_count_per_cell(void **state)
 {
     (void)state;
@@ -159,7 +161,7 @@ static void corner_values_count_per_cell(void **state)
 
 /* ---- Gauss-Lobatto points ---------------------------------------------------------------------------------------- */
 
-/* Eight cubes of order 4 or 7 that have their nodes for themselves, and x^power at them, dealt to the ranks. */
+/* Makes eight cubes of order 4 or 7, dealt to the ranks, that share no nodes. The values at nodes are x^power. */
 static void make_lobatto(int p, int power, double b, order_mesh *out)
 {
     static const double of4[5] = {-1, -0.654653670707977144, 0, 0.654653670707977144, 1};
@@ -236,7 +238,7 @@ static void numbers_do_not_depend_on_pieces_and_cameras(void **state)
     }
 }
 
-/* Derived values are those at the cells' nodes, on any lattice. */
+/* Checks derived fields: their values are those at the cells' nodes, however many pieces are drawn. */
 static void numbers_of_derived_fields_do_not_depend_on_pieces(void **state)
 {
     (void)state;
@@ -279,8 +281,8 @@ static void numbers_are_the_same_on_any_ranks(void **state)
     }
 }
 
-/* Reads the cells of rows of 27 nodes as linear hexes of their corners unless their number is a multiple of
- * `quadratic`. offsets and types: memory for those of all cells. */
+/* Makes a mesh of both orders from rows of 27 nodes: cells whose number is no multiple of `quadratic` become the linear
+ * hexes of their corners. offsets, types and connectivity are memory for all cells. */
 static void mix_types(const order_mesh *mesh, int quadratic, int ranks, int64_t *offsets, unsigned char *types,
                       int64_t *connectivity, insitu_mesh *out)
 {
@@ -300,7 +302,8 @@ static void mix_types(const order_mesh *mesh, int quadratic, int ranks, int64_t 
     out->cell_types = (insitu_array){types, INSITU_UINT8, 0};
 }
 
-/* Linear cells count as in meshes of linear cells, which the parts of most ranks are. */
+/* Checks that linear cells in a mesh with cells of higher order have the same statistics as in a mesh of linear cells
+ * only, which most ranks' parts are. */
 static void linear_cells_count_as_in_linear_meshes(void **state)
 {
     (void)state;
@@ -330,8 +333,9 @@ static double height_function(double x, double y)
     return 0.3 * x * x + 0.2 * x * y - 0.2 * y * y;
 }
 
-/* Integrates the area of the graph, x^2 and its square over it, by midpoints of n x n squares and of half as many,
- * whose errors are eliminated: what remains is of the order 1 / n^4, and below 1e-9. */
+/* Integrates 1, x^2 and x^4 over the graph of height_function() by the midpoint rule on n x n squares and on half as
+ * many along each axis. Combining the two eliminates the leading error; the remaining one is of the order 1 / n^4, and
+ * below 1e-9. */
 static void integrate_graph(double out[3])
 {
     double sums[2][3] = {{0}};
@@ -349,7 +353,8 @@ static void integrate_graph(double out[3])
     for (int i = 0; i < 3; i++) out[i] = (4 * sums[1][i] - sums[0][i]) / 3;
 }
 
-/* Four quads of 9 nodes or eight triangles of 6 on the graph of a polynomial of order 2, dealt to the ranks. */
+/* Checks four quads of 9 nodes or eight triangles of 6 nodes, dealt to the ranks, on the graph of a polynomial of order
+ * 2. */
 static void bent_shells_have_their_areas(void **state)
 {
     (void)state;
@@ -397,9 +402,10 @@ static void bent_shells_have_their_areas(void **state)
 }
 
 /* ---- histograms, percentiles, and cells that do not count
- * --------------------------------------------------------------------- */
+ * --------------------------------------------------------- */
 
-/* Along x there are two cells with 4 points each, of which two are in each bin. */
+/* Checks that a bin has the volume of the quadrature points whose values are in it. Along x there are two cells with 4
+ * points each, and two of these points are in each bin. */
 static void bins_have_the_volumes_of_the_points_in_them(void **state)
 {
     (void)state;
@@ -423,7 +429,8 @@ static int compare_numbers(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Finds two percentiles of the middles between the least and the greatest value at each cell's nodes. */
+/* Computes two percentiles of the cells' middle values; a cell's middle is half way between the least and the greatest
+ * value at its nodes. */
 static void find_percentiles(const order_mesh *whole, const int percents[2], double out[2])
 {
     double middles[27];
@@ -453,7 +460,8 @@ static drawn draw_slice(const char *pieces, const char *range, const order_mesh 
     return out;
 }
 
-/* A slice has the same colours by percentiles as by the values that they stand for, whatever pieces are drawn. */
+/* Checks that a slice coloured between two percentiles equals the slice coloured between the values of these
+ * percentiles, however many pieces are drawn. */
 static void percentiles_count_the_callers_cells(void **state)
 {
     (void)state;
@@ -478,7 +486,8 @@ static void percentiles_count_the_callers_cells(void **state)
     }
 }
 
-/* A value at one node that is not finite leaves out its cell; the others have 7 of the 8 units of volume. */
+/* Checks that a cell with a value that is not finite at one node does not count: the other cells have 7 of the 8 units
+ * of volume. */
 static void cells_with_missing_values_do_not_count(void **state)
 {
     (void)state;
@@ -497,7 +506,8 @@ static void cells_with_missing_values_do_not_count(void **state)
     }
 }
 
-/* Cells in a mirror are inside out. Their volumes are positive, and their means are those of the others. */
+/* Checks mirrored cells, which are inverted: their volumes are positive, and their statistics are those of the cells
+ * before mirroring. */
 static void inverted_cells_have_exact_volumes(void **state)
 {
     (void)state;
@@ -511,7 +521,7 @@ static void inverted_cells_have_exact_volumes(void **state)
     order_mesh_free(&mesh);
 }
 
-/* Squares of the values overflow, but not the deviation. */
+/* Checks values whose squares overflow: their deviation must not. */
 static void large_values_do_not_overflow(void **state)
 {
     (void)state;

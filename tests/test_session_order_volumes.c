@@ -1,6 +1,7 @@
-/* Volumes of cells of higher order, whose number of pieces follows from max_error, against integrals along each pixel's
- * ray in double. The field is known everywhere in straight cells that contain the squared distance from the origin, and
- * in cubes that interpolate a product of waves, which is the product of the interpolated waves. */
+/* Checks volumes of cells of higher order, whose number of linear pieces is chosen to keep the error within max_error,
+ * against integrals along each pixel's ray in double. The field has closed forms: the squared distance from the origin,
+ * which straight cells represent exactly, and the interpolant of a product of waves in cubes, which is the product of
+ * the interpolated waves. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,7 +14,8 @@
 enum { WIDTH = 160, HEIGHT = 120, PIXELS = WIDTH * HEIGHT, STEPS = 400 };
 #define VIEW_HEIGHT 2.6
 
-/* A volume's transfer function: red, green and blue in equal distances, and opacities in a layer of 0.5. */
+/* A volume's transfer function: red, green and blue at equal distances in its range, and opacities per length of
+ * 0.5. */
 typedef struct transfer {
     const char *name, *text;
     int count;
@@ -43,7 +45,7 @@ static double wave_product_field(const double p[3])
     return 1.25 + sin(4 * p[0]) * cos(3 * p[1]) + 0.2 * p[2];
 }
 
-/* Interpolates sin(4 x + phase) between the equispaced nodes of `side` cells in [-1, 1]. */
+/* Interpolates sin(frequency x + phase) between the equispaced nodes of `side` cells in [-1, 1]. */
 static double interpolate_wave(double frequency, double phase, double x, int order, int side)
 {
     const double along = fmin(fmax((x + 1) / 2 * side, 0), side - 1e-12), cell = floor(along);
@@ -65,7 +67,7 @@ static double interpolated_wave_field(const double p[3], int order, int side)
            interpolate_wave(4, 0, p[0], order, side) * interpolate_wave(3, quarter, p[1], order, side);
 }
 
-/* Colours of a list are interpolated in sRGB (docs/colour.md). */
+/* Converts to linear light. Colours of a list are interpolated in sRGB before (docs/colour.md). */
 static double convert_srgb_to_linear(double v)
 {
     return v <= 0.04045 ? v / 12.92 : pow((v + 0.055) / 1.055, 2.4);
@@ -80,8 +82,8 @@ static double interpolate_opacity(const transfer *of, double position)
     return of->opacities[i - 1] + share * (of->opacities[i] - of->opacities[i - 1]);
 }
 
-/* Integrates along the ray of a pixel, from the front of the cube to its back. With 400 steps of 0.005 by the midpoint
- * rule, results differ by less than 2e-4 from those with 4000. */
+/* Integrates along the ray of a pixel, from the front of the cube to its back, by the midpoint rule. With 400 steps of
+ * length 0.005, results differ by less than 2e-4 from those with 4000 steps. */
 static void integrate_ray(const transfer *of, field_function *field, int order, int side, int pixel, double light[3])
 {
     const double size = VIEW_HEIGHT / HEIGHT;
@@ -106,14 +108,14 @@ static int compare_doubles(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Returns the largest of 99.9 % of the pixels' errors, which are sorted. */
+/* Sorts the pixels' errors, and returns the largest error of the best 99.9 % of the pixels. */
 static double find_largest(double errors[PIXELS])
 {
     qsort(errors, PIXELS, sizeof *errors, compare_doubles);
     return errors[PIXELS * 999 / 1000];
 }
 
-/* Returns the largest error of a colour in 99.9 % of the pixels, on rank 0. */
+/* Returns, on rank 0, the largest error of a colour component in the best 99.9 % of the pixels. */
 static double find_error(const caught_picture *picture, const transfer *of, field_function *field, int order, int side)
 {
     static double errors[PIXELS];
@@ -143,7 +145,7 @@ static double find_difference(const caught_picture *a, const caught_picture *b)
 
 typedef struct drawn_volume {
     drawn pictures;
-    int count; /* number of pieces */
+    int count; /* number of pieces between two nodes */
     double estimate;
 } drawn_volume;
 
@@ -173,7 +175,7 @@ typedef struct volume_case {
     int side;
     order_function *values;
     field_function *field;
-    bool is_usual; /* set if it is not only drawn by the long test */
+    bool is_usual; /* false: only drawn by the long test */
 } volume_case;
 
 static const volume_case cases[] = {
@@ -189,7 +191,8 @@ static const volume_case cases[] = {
      false},
 };
 
-/* The estimate is the same on any ranks, and 1 piece would not suffice. */
+/* Checks that the error is within max_error, that the estimated error is the same on any number of ranks, and that 1
+ * piece would not suffice. */
 static void check_case(const volume_case *of, const transfer *with)
 {
     order_mesh mesh, whole;
@@ -221,7 +224,8 @@ static void volumes_are_within_max_error(void **state)
             if (cases[k].is_usual || test_is_long_run()) check_case(&cases[k], &transfers[t]);
 }
 
-/* Bent cells have no closed form. 8 pieces are off by a small part of what the chosen ones are off by. */
+/* Checks bent cells, for which there is no closed form: the reference is drawn with 8 pieces, whose error is a small
+ * fraction of the error with the chosen number of pieces. */
 static void volumes_of_bent_cells_are_within_max_error(void **state)
 {
     (void)state;
@@ -242,7 +246,7 @@ static void volumes_of_bent_cells_are_within_max_error(void **state)
     }
 }
 
-/* Straight cells with a linear field need 1 piece. So does a volume that a due image does not show. */
+/* Checks that one piece is chosen for straight cells with a linear field. */
 static void exact_volumes_have_one_piece(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-/* Tests the boxes of an outline: around all data, around each mesh over all ranks, and around the cells of each rank.
- * Each rank has two moved copies of one cube; of three or more ranks, the second has no cells. */
+/* Checks the boxes of an outline: around all data, around each mesh over all ranks, and around the cells of each rank.
+ * Each rank has two moved copies of one cube. If there are three or more ranks, rank 1 has no cells. */
 #include <string.h>
 
 #include "session.h"

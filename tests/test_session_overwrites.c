@@ -1,5 +1,5 @@
-/* Tests the warning that a picture has overwritten an earlier picture of the same run. The warning names the file, the
- * images, the cycles and the remedy, and is given once, on every rank. Pictures with different names give no
+/* Checks the warning that a picture has overwritten an earlier picture of the same run. The warning names the file, the
+ * images, the cycles and the remedy, and is given only once, on every rank. Pictures with different names give no
  * warning. */
 #include <stdio.h>
 #include <string.h>
@@ -14,7 +14,7 @@ static session_input input;
 
 enum { STEPS = 4 };
 
-/* A scene and, for each step, the words that its warning must contain; none if no warning is expected. */
+/* A scene and, for each step, the texts that its warning must contain; none if no warning is expected. */
 typedef struct overwrite_case {
     const char *scene;
     const char *words[STEPS][4];
@@ -45,7 +45,7 @@ static void check_step(insitu_session *session, int cycle, const char *const *wo
     bool is_well = words[0] || !strstr(warnings, "overwritten");
     for (int i = 0; i < 4 && words[i]; i++) is_well = is_well && strstr(warnings, words[i]);
     const char *line = strstr(warnings, "overwritten");
-    is_well = is_well && !(line && strstr(line + 1, "overwritten")); /* the warning is given once */
+    is_well = is_well && !(line && strstr(line + 1, "overwritten")); /* the warning is given only once */
     if (!is_well) fprintf(stderr, "cycle %d, expected \"%s\": %s\n", cycle, words[0] ? words[0] : "", warnings);
     everywhere(is_well);
 }
@@ -60,8 +60,8 @@ static void overwritten_pictures_are_reported(void **state)
     }
 }
 
-/* Checks that no warning is given if a simulation repeats a step under the same cycle: it intends to replace the
- * pictures. */
+/* Checks that no warning is given if a simulation repeats a step with the same cycle, because it then intends to
+ * replace the pictures. */
 static void repeated_steps_are_not_reported(void **state)
 {
     (void)state;

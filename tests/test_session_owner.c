@@ -1,6 +1,6 @@
-/* Tests meshes of finite volumes, which are given by faces with an owner and a neighbour. Every form of this
- * description draws, to the bit, the pictures of the same polyhedra given cell by cell. Polyhedra with the faces of
- * hexes, wedges, pyramids or tets draw the pictures of these cell types. An error on one rank is reported on all
+/* Checks meshes of finite volumes, which are given by faces with an owner and a neighbour. The pictures of every form
+ * of this description must be bit-identical to those of the same polyhedra given cell by cell. Polyhedra with the faces
+ * of hexes, wedges, pyramids or tets must be drawn as these cell types. An error on one rank must be reported on all
  * ranks. */
 #include <math.h>
 #include <stdio.h>
@@ -90,7 +90,8 @@ static int64_t sum_over_ranks(int64_t mine)
     return sum;
 }
 
-/* Creates the cells of a kind as polyhedra, whose faces have their vertices in either direction. */
+/* Creates cells of a kind and converts the given share of them to polyhedra. The vertices of faces run in either
+ * direction. */
 static void create_polyhedra(session_input *in, test_mesh_kind kind, double share)
 {
     input_create(in, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
@@ -99,8 +100,8 @@ static void create_polyhedra(session_input *in, test_mesh_kind kind, double shar
     input_describe(in);
 }
 
-/* Exchanges owner and neighbour of some boundary faces, which CGNS permits: a 0 on either side means that there is no
- * cell. */
+/* Exchanges owner and neighbour of every second boundary face. CGNS permits this: a 0 as either of the two means that
+ * there is no cell on that side. */
 static void swap_owner_and_neighbour(owned *faces, int64_t count)
 {
     for (int64_t face = 0; face < count; face += 2) {
@@ -179,8 +180,8 @@ static void polyhedra_are_recognised_as_typed_cells(void **state)
     }
 }
 
-/* Cuts every ninth face of the hexes, which are given as polyhedra, into two triangles. The cells of these faces cannot
- * be recognised as hexes. */
+/* Splits every ninth face of the hexes, which are given as polyhedra, into two triangles. The cells of these faces
+ * cannot be recognised as hexes. */
 static void cut_faces(const test_mesh *part, test_mesh *out, unsigned char *is_cut)
 {
     test_mesh_allocate(out, part->vertex_count, part->cell_count, 2 * part->connectivity_count);
@@ -206,7 +207,8 @@ static void cut_faces(const test_mesh *part, test_mesh *out, unsigned char *is_c
     free(halves);
 }
 
-/* Combines the hexes that have no cut face, as hexes, with the polyhedra that have one. */
+/* Makes a mesh from hexes and polyhedra that describe the same cells: it takes the polyhedra of cells with a split
+ * face, and the hexes of all other cells. */
 static void mix_cells(const test_mesh *hexes, const test_mesh *polyhedra, const unsigned char *is_cut, test_mesh *out)
 {
     test_mesh_allocate(out, hexes->vertex_count, hexes->cell_count, 12 * hexes->cell_count);
@@ -262,8 +264,8 @@ static void hexes_among_polyhedra_are_recognised(void **state)
     input_free(&mixed);
 }
 
-/* Makes a polyhedron like an orange of six segments. It has six quads and eight vertices like a hex, but every quad
- * extends from pole to pole. */
+/* Makes a polyhedron shaped like an orange of six segments. Like a hex it has six quads and eight vertices, but every
+ * quad extends from pole to pole. */
 static void make_orange(test_mesh *out)
 {
     test_mesh_allocate(out, 8, 1, 6);
@@ -300,7 +302,8 @@ static void six_quads_that_form_no_hex_stay_a_polyhedron(void **state)
     input_free(&in);
 }
 
-/* Checks that a hex is refused as not closed if any one of its faces crosses itself. Only the last rank has it. */
+/* Checks that a hex is refused as not closed if one of its faces crosses itself; each face is tested. Only the last
+ * rank has the hex. */
 static void hexes_with_a_crossed_face_are_reported(void **state)
 {
     (void)state;
@@ -323,8 +326,8 @@ static void hexes_with_a_crossed_face_are_reported(void **state)
     input_free(&in);
 }
 
-/* Draws the mesh twice, the second time with other coordinates. Returns the second drawing; its `copied` is the number
- * of bytes by which the second step's copies exceed the first's. */
+/* Draws the mesh twice, the second time with other coordinates. Returns the second drawing. Its member `copied` is the
+ * number of bytes by which the second step's copies exceed those of the first step. */
 static drawing draw_moved(const char *scene, session_input *in)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
@@ -344,8 +347,8 @@ static drawing draw_moved(const char *scene, session_input *in)
     return after;
 }
 
-/* Checks that a mesh with new coordinates reuses the cells recognised in its faces without reading the faces again:
- * they are overwritten before the second step. */
+/* Checks that a mesh with new coordinates reuses the cells that were recognised, without reading the faces again: the
+ * faces are overwritten before the second step. */
 static void moved_cells_match_cells_at_new_positions(void **state)
 {
     (void)state;
@@ -362,7 +365,7 @@ static void moved_cells_match_cells_at_new_positions(void **state)
     input_free(&in);
 }
 
-/* Lets the n-th allocation fail on the last rank, for each n. The step must return an error on all ranks or draw the
+/* Lets each allocation of the last rank fail, one in each run. The step must return an error on all ranks or draw the
  * picture, and the next step must draw the picture. */
 static void memory_that_runs_out_is_reported(void **state)
 {

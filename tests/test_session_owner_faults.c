@@ -1,12 +1,13 @@
-/* Tests errors of users in owners, neighbours and lists of faces, each on one rank only. Every rank must get the same
- * message, which names the rank, the mesh, the face and the value; nothing is drawn; and the next step draws once the
- * input is corrected. */
+/* Checks errors of users in owners, neighbours and lists of faces, each on one rank only. Every rank must get the same
+ * message, which names the rank, the mesh, the face and the value. Nothing may be drawn, and the next step after the
+ * correction must draw. */
 #include "test_owned_faces.h"
 #include "test_session_fixture.h"
 
 static owned corrupted;
 
-/* Describes the mesh by owners in `corrupted`. One rank then corrupts this description or its arrays. */
+/* Describes the mesh by owners, with arrays in `corrupted`. The test cases then corrupt this description or its arrays
+ * on one rank. */
 static void describe_by_owner(session_input *in, form which, int base)
 {
     free_owned(&corrupted);
@@ -27,7 +28,7 @@ static void set_negative_owner(session_input *in)
 static void set_owner_before_one(session_input *in)
 {
     describe_by_owner(in, FORM_PAIRS, 1);
-    corrupted.pairs[2 * 4] = corrupted.pairs[2 * 4 + 1] = 0; /* one 0 alone would mark a boundary face, as in CGNS */
+    corrupted.pairs[2 * 4] = corrupted.pairs[2 * 4 + 1] = 0; /* a single 0 would mark a boundary face, as in CGNS */
 }
 static void set_large_neighbour(session_input *in)
 {

@@ -1,10 +1,10 @@
-/* Tests a volume for which the scene gives no sampling, range, unit distance or camera. They are derived from the data
- * of all ranks, so the picture must be the one that rank 0 draws of the whole mesh alone. Each rank lists its cells in
- * its own order: vertices and cells are permuted, the vertices of a face begin at another vertex and run in the
- * opposite direction, and a polyhedron's faces are permuted. The volume of a cell with warped faces depends on how each
- * face is divided into triangles, and this division must not depend on the listing.
+/* Checks a volume for which the scene gives no sampling, range, unit distance or camera. They are derived from the data
+ * of all ranks, so that the picture of all ranks must be the one that rank 0 draws of the whole mesh alone. Each rank
+ * lists its cells in an order of its own: vertices and cells are permuted, the vertices of a face begin at another
+ * vertex and run in the opposite direction, and a polyhedron's faces are permuted. The volume of a cell with warped
+ * faces depends on how each face is divided into triangles, and this division must not depend on the order.
  *
- * The bound is compositing's, 1e-6, as fragments are blended in other groups. */
+ * The allowed difference is that of compositing, 1e-6, because fragments are blended in other groups. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -39,7 +39,8 @@ static const scene_case scenes[] = {
     {"segments", IMAGE(VOLUME, "    sampling: {method: segments}\n")},
     {"two volumes", IMAGE(VOLUME DENSE, "")},
 };
-enum { FIRST_SAMPLED = 4, SCENES = sizeof scenes / sizeof *scenes }; /* scenes from this one on use the default step */
+/* FIRST_SAMPLED: index of the first scene that uses the default step */
+enum { FIRST_SAMPLED = 4, SCENES = sizeof scenes / sizeof *scenes };
 
 /* ---- meshes -------------------------------------------------------------------------------------------------- */
 
@@ -48,8 +49,8 @@ typedef enum mesh_kind { HONEYCOMB, WARPED_POLYHEDRA, WARPED_MIXED, HEXES, FLAT_
 static const char *const mesh_names[MESHES] = {"honeycomb", "warped polyhedra", "polyhedra among others", "hexes",
                                                "flat cells among hexes"};
 
-/* Doubles the number of hexes. The eight vertices of each added hex lie in one oblique plane, so the rounding of its
- * volume depends on which vertex is listed first. */
+/* Adds a flat hex for every hex. Its eight vertices are in one oblique plane, so that the rounding of its volume
+ * depends on which vertex is listed first. */
 static void add_flat_hexes(test_mesh *mesh)
 {
     test_mesh old = *mesh;
@@ -82,7 +83,7 @@ static void make_mesh(mesh_kind kind, test_mesh *out)
     if (kind == FLAT_AMONG_HEXES) add_flat_hexes(out);
 }
 
-/* Makes this rank's part of a random partition, and lists its vertices, faces and cells in this rank's own order. */
+/* Makes this rank's part of a random partition, with vertices, faces and cells in an order of its own. */
 static void extract_rank_cells(const test_mesh *whole, session_input *out)
 {
     int *owners = test_calloc((size_t)whole->cell_count, sizeof *owners);
@@ -96,7 +97,8 @@ static void extract_rank_cells(const test_mesh *whole, session_input *out)
 
 /* ---- pictures ------------------------------------------------------------------------------------------------ */
 
-/* Draws the scene and returns the size of cells. On rank 0, *out becomes the picture, which the caller frees. */
+/* Draws the scene and returns the mean size of cells that the session derives. On rank 0, *out receives the picture,
+ * which the caller frees. */
 static double draw_and_get_cell_size(MPI_Comm comm, const char *scene, const session_input *in, caught_picture *out)
 {
     insitu_session *session = open_session(comm, scene);
@@ -145,7 +147,8 @@ static void verify_kind(mesh_kind kind)
 
 /* ---- error of the default ------------------------------------------------------------------------------------ */
 
-/* Returns whether the default picture, whose error is at most 0.01, agrees with one whose error is at most 1e-4. */
+/* Returns whether the default picture, which has an error of at most 0.01, agrees with a picture that has an error of
+ * at most 1e-4. */
 static bool is_nearly_equal(const char *layers, const session_input *in)
 {
     char text[1024];
@@ -203,7 +206,8 @@ static void default_volumes_of_hexes_give_one_picture(void **context)
     verify_kind(HEXES);
 }
 
-/* Tests only scenes with samples: to max_error, pixels in which flat cells overlap others agree only to max_error. */
+/* Checks only scenes that are sampled with the default step. In scenes integrated to max_error, pixels in which flat
+ * cells overlap others agree only up to max_error. */
 static void flat_cells_do_not_change_the_default_step(void **context)
 {
     (void)context;

@@ -1,6 +1,6 @@
-/* Tests errors of users in the patches of a field, each on one rank only. Every rank must get the same message, which
- * names the rank, the mesh, the field, the patch, the face and the error; nothing is drawn; and the next step draws
- * once the input is corrected. */
+/* Checks errors of users in the patches of a field (values on boundary faces), each on one rank only. Every rank must
+ * get the same message, which names the rank, the mesh, the field, the patch, the face and the error. Nothing may be
+ * drawn, and the next step after the correction must draw. */
 #include <stdio.h>
 #include <string.h>
 
@@ -16,7 +16,7 @@ enum { SIDE = 3, MOST = 64 };
 static session_input input;
 static owned faces;
 static double cell_values[SIDE * SIDE * SIDE], values[2 * MOST];
-static int64_t inner, outer; /* an interior and a boundary face, counted from index_base */
+static int64_t inner, outer; /* numbers of an interior and of a boundary face, counted from index_base */
 static int64_t inner_quad[4], outer_quad[4], no_quad[4] = {0, 2, 5, 7}, twice[8], numbers[MOST];
 static insitu_patch patches[2];
 
@@ -36,8 +36,8 @@ static void find_quads(void)
     memcpy(twice + 4, outer_quad, sizeof outer_quad);
 }
 
-/* Creates a whole mesh on each rank, so that each rank has interior and boundary faces. The ranks' meshes lie side by
- * side. */
+/* Creates a whole mesh on each rank, so that each rank has interior and boundary faces. The ranks' meshes are side by
+ * side along x. */
 static void create_input(void)
 {
     input_create(&input, TEST_HEXES, SIDE, TEST_BLOCK, 0, 1);
@@ -52,7 +52,7 @@ static void create_input(void)
     for (int i = 0; i < SIDE * SIDE * SIDE; i++) cell_values[i] = i % 2;
 }
 
-/* Describes a mesh by owners, with index_base 1, and a patch by the number of its first face. */
+/* Describes a mesh by owners with index_base 1, and a patch by the number of its first face. */
 static void describe_mesh_and_patch(void)
 {
     input_describe(&input);
@@ -218,7 +218,7 @@ static void set_fill_function(void)
 typedef struct fault {
     void (*corrupt)(void);
     insitu_status status;
-    bool at_once; /* insitu_set_field() fails too, before the step */
+    bool at_once; /* whether insitu_set_field() fails too, before the step */
     const char *words[2];
 } fault;
 

@@ -1,6 +1,7 @@
-/* Tests values on boundary faces. A vertex of faces that have values gets, bit for bit, the mean over these faces that
- * a brute-force search over the whole mesh finds, for any partition of the cells and any way of listing the faces.
- * Linear fields are exact at the vertices for which the header guarantees it. */
+/* Checks values on boundary faces. A vertex of faces that have values must get a value that is bitwise equal to the
+ * mean over these faces, which a brute-force search over the whole mesh computes: for any partition of the cells, and
+ * for each method of listing the faces. Linear fields must be exact at the vertices for which the header guarantees
+ * it. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -27,7 +28,8 @@ static int *owners;
 
 /* ---- expected means --------------------------------------------------------------------------------------------- */
 
-/* Returns a pseudorandom number. Numbers differ by many orders of magnitude, so that the order of a sum matters. */
+/* Returns a pseudorandom number. The numbers differ by many orders of magnitude, so that sums depend on the order of
+ * their terms. */
 static double make_scattered_number(double at, uint64_t seed)
 {
     uint64_t bits;
@@ -42,11 +44,11 @@ static double compute_cell_value(int64_t cell)
 
 typedef struct boundary_face {
     double centre[3];
-    int patch; /* axis of the face's wall; walls at z = 1 and z = -1 have no values */
+    int patch; /* axis perpendicular to the face's wall; walls at z = 1 and z = -1 have no values */
 } boundary_face;
 
-/* Returns whether a face lies on a wall. Walls are at 1 and -1, and their vertices are not moved, so sums of their
- * coordinates are exact. */
+/* Returns whether a face is on a wall, and stores its centre and wall. Walls are at 1 and -1, and vertices on them are
+ * not moved, so that sums of their coordinates are exact. */
 static bool is_on_wall(const double (*points)[3], int64_t count, boundary_face *out)
 {
     int wall = -1;
@@ -84,8 +86,8 @@ static bool is_among(const double (*points)[3], int count, const double position
     return false;
 }
 
-/* Returns the mean of the values on boundary faces around a vertex or, without any, of the values of the cells around
- * it. Each cell of the whole mesh has its own faces, so an interior face is visited twice. */
+/* Returns the mean of the values on boundary faces around a vertex or, if there are none, of the values of the cells
+ * around it. Each cell of the whole mesh has its own faces, so that an interior face is visited twice. */
 static double compute_expected_mean(const grid *all, const double position[3])
 {
     double cells[256], faces[256];
@@ -110,8 +112,8 @@ static double compute_expected_mean(const grid *all, const double position[3])
 
 /* ---- input ----------------------------------------------------------------------------------------------------- */
 
-/* How a patch lists its faces. BY_NUMBERS and BY_RANGES need faces with numbers: those of owners (FORM_* of
- * test_owned_faces.h) or of polyhedra. */
+/* How a patch lists its faces. BY_NUMBERS and BY_RANGES require faces that have numbers: those of a mesh with owners
+ * (FORM_* of test_owned_faces.h) or of polyhedra. */
 typedef enum telling { BY_VERTICES, BY_NUMBERS, BY_RANGES } telling;
 
 enum { MOST_FACES = 8 * 6 * SIDE * SIDE, RUBBISH = 1000000 };
@@ -121,9 +123,9 @@ typedef struct part_input {
     owned faces;
     insitu_mesh mesh;
     insitu_field field;
-    double *values; /* of cells */
+    double *values; /* values of cells */
     insitu_patch patches[MOST_FACES];
-    double wide[PATCHES][2 * MOST_FACES]; /* only every second element is used */
+    double wide[PATCHES][2 * MOST_FACES]; /* only every second element is used, so that the array has a stride */
     float narrow[PATCHES][MOST_FACES];
     int64_t vertices[PATCHES][8 * MOST_FACES], offsets[PATCHES][MOST_FACES + 1], numbers[PATCHES][MOST_FACES];
     int64_t counts[PATCHES];
@@ -139,7 +141,8 @@ static void add_value(part_input *in, int patch, double value)
     in->narrow[patch][at] = (float)value;
 }
 
-/* Lists the boundary faces of all cells. Faces of ghost cells get wrong values. */
+/* Lists the boundary faces of all cells. Faces of ghost cells get wrong values, so that a mean differs if they are
+ * used. */
 static void list_by_cells(part_input *in, const grid *g)
 {
     for (int64_t cell = 0; cell < g->cell_count; cell++) {
@@ -161,7 +164,7 @@ static void list_by_cells(part_input *in, const grid *g)
     }
 }
 
-/* Lists the boundary faces of make_owned(), which numbers faces in its own order. */
+/* Lists the boundary faces in the numbering of make_owned(). */
 static void list_by_owned(part_input *in)
 {
     for (int64_t f = in->faces.inner; f < in->part.face_count; f++) {
@@ -220,8 +223,8 @@ static void describe_input(part_input *in)
     in->field.values = (insitu_array){in->values, INSITU_FLOAT64, 0};
 }
 
-/* Creates the part of a rank or, with_ghosts, the whole mesh, in which cells of other ranks are ghosts with wrong
- * values. */
+/* Creates the part of a rank or, if with_ghosts is set, the whole mesh, in which cells of other ranks are ghosts with
+ * wrong values. */
 static void part_create(part_input *in, int rank, bool with_ghosts)
 {
     int *all = test_calloc((size_t)whole.cell_count, sizeof *all);
@@ -303,7 +306,7 @@ static void make_part_lists(part_input *in)
     test_view_free(&view);
 }
 
-/* Makes the whole mesh. If `polyhedra`, all cells become polyhedra. */
+/* Makes the whole mesh. If `polyhedra` is set, all cells become polyhedra. */
 static void make_whole_mesh(test_mesh_kind kind, bool polyhedra)
 {
     test_mesh_make_lattice(kind, SIDE, 0.2, test_wave_field, &whole);
@@ -407,7 +410,7 @@ static insitu_status fill_patch_field(void *data, insitu_field *field)
     return INSITU_OK;
 }
 
-/* Checks that means are computed again if only the values on the boundary change, and if a fill function gives the
+/* Checks that means are recomputed if only the values on the boundary change, and if a fill function gives the
  * field. */
 static void means_follow_values_on_the_boundary(void **state)
 {
@@ -445,9 +448,9 @@ static void means_follow_values_on_the_boundary(void **state)
 
 /* ---- a linear field ---------------------------------------------------------------------------------------------- */
 
-/* The mean of a linear function over faces is its value at the mean of the faces' centres. For a vertex within a wall
- * this is the vertex itself; at an edge it is moved by h / 4 away from both walls, and at a corner by h / 3 from all
- * three walls. Four values of size 2 and their sum are off by a few roundings of 2.2e-16 × 2. */
+/* Checks a linear field. Its mean over faces is its value at the mean of the faces' centres. For a vertex inside a wall
+ * this position is the vertex; for a vertex at an edge it is h / 4 away from both walls, and at a corner h / 3 from all
+ * three walls. Four values of size 2 and their sum have errors of a few roundings of 2.2e-16 × 2. */
 static void linear_fields_are_exact_amid_walls(void **state)
 {
     (void)state;

@@ -1,6 +1,7 @@
-/* Tests plane runs: triangles, quads and polygons in the plane of x and y, given without z. If the scene has no camera
- * and no material, each pixel has the colour map's colour of the field, which a closed form computes, and the pictures
- * are the same to the bit on any number of ranks. Statistics, conditions and percentiles weight cells by area. */
+/* Checks plane runs: triangles, quads and polygons in the plane of x and y, given without z coordinates. If the scene
+ * has no camera and no material, each pixel must have the colour of the colour map at the field's value, which has a
+ * closed form, and the pictures must be bit-identical on any number of ranks. Statistics, conditions and percentiles
+ * must weight cells by area. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -23,7 +24,7 @@ static const double right = 3, top = 2; /* the plate is [0, 3] x [0, 2] */
 
 typedef enum plate_kind { QUADS, TRIANGLES, POLYGONS, PLATE_KINDS } plate_kind;
 
-/* This rank's cells of a plate, with all of the plate's vertices. */
+/* This rank's cells of a rectangular plate, with all vertices of the plate. */
 typedef struct plate {
     plate_kind kind;
     int cell_count, entry_count;
@@ -62,7 +63,7 @@ static void add_square(plate *p, int i, int j)
     }
 }
 
-/* Makes the squares of the plate that `rank` has among `ranks` ranks. */
+/* Makes the squares of the plate that belong to rank `rank` of `ranks` ranks. */
 static void make_plate(plate_kind kind, int rank, int ranks, plate *out)
 {
     *out = (plate){.kind = kind};
@@ -135,8 +136,8 @@ static caught_picture draw_plate(MPI_Comm comm, const char *scene, const plate *
 
 /* ---- pictures ------------------------------------------------------------------------------------------------- */
 
-/* Computes the plate's position at the centre of a pixel. The plate is as large as fits into 0.95 of the frame's width
-   and of its height. */
+/* Computes the position on the plate at the centre of a pixel. The plate is scaled to fit into 0.95 of the frame's
+ * width and of its height. */
 static void compute_pixel_position(int pixel, double *x, double *y)
 {
     const double half = fmax(top / 2, right / 2 * HEIGHT / WIDTH) / 0.95, size = 2 * half / HEIGHT;
@@ -157,9 +158,9 @@ static double encode_srgb(float light)
     return 255 * (c <= 0.0031308 ? 12.92 * c : 1.055 * pow(c, 1 / 2.4) - 0.055);
 }
 
-/* Returns whether each 8-bit channel of each pixel differs by at most 1 from the grey map at the field's value. The
- * rounding of codes takes half of this tolerance. The colour map's table, which is linear between 1024 greys, and
- * float32 values cause errors far below the other half. */
+/* Returns whether each 8-bit channel of each pixel differs by at most 1 from the grey map at the field's value.
+ * Rounding to 8 bits takes half of this tolerance. Errors of the colour map's table, which is linear between 1024
+ * greys, and of float32 values are far below the other half. */
 static bool is_map(const caught_picture *picture, bool is_of_cells)
 {
     int hits = 0;
@@ -188,7 +189,7 @@ static bool are_equal_pictures(const caught_picture *a, const caught_picture *b)
            memcmp(a->depth, b->depth, PIXELS * sizeof(float)) == 0;
 }
 
-/* Draws the plate without z and with z = 0, on all ranks and on one rank. */
+/* Checks pictures of the plate without z coordinates and with z = 0, on all ranks and on one rank. */
 static void pictures_are_the_colour_map_of_the_field(void **state)
 {
     (void)state;
@@ -211,8 +212,8 @@ static void pictures_are_the_colour_map_of_the_field(void **state)
         }
 }
 
-/* Checks that what the scene specifies overrides the defaults of plane runs: a direction from behind, an explicit
- * camera, a light and a material each change the picture. */
+/* Checks that keys of the scene override the defaults of plane runs: a direction from behind, an explicit camera, a
+ * light and a material must each change the picture. */
 static void scene_keys_override_defaults(void **state)
 {
     (void)state;
@@ -253,17 +254,17 @@ static void layers_that_show_nothing_are_reported(void **state)
 
 #define LINES "{isosurface: {field: f, values: [3, 1], colours: [[1, 0, 0], [0, 1, 0]]}}"
 
-/* Returns the share of a pixel that the contour line of a level covers. The line is 1.5 pixels wide and lies within a
- * field with the slope of linear_field(). The coverage is that of a box of one pixel across the line. */
+/* Returns the fraction of a pixel that the contour line of the value `level` covers. The line is 1.5 pixels wide, in a
+ * field with the slope of linear_field(). The coverage is that of a box filter of one pixel across the line. */
 static double compute_line_coverage(double value, double level)
 {
     const double half = fmax(top / 2, right / 2 * HEIGHT / WIDTH) / 0.95, size = 2 * half / HEIGHT;
     return fmin(fmax(1.25 - fabs(value - level) / (sqrt(5) * size), 0), 1);
 }
 
-/* Returns whether the picture has the two contour lines, red at 3 and green at 1, over the grey map if on_grey. Float32
- * values up to 8 are off by 1e-6, which is 4e-6 of a pixel of 0.094; the light of a pixel is proportional to the share
- * covered by the line. */
+/* Returns whether the picture shows the two contour lines, red at 3 and green at 1, over the grey map if on_grey is
+ * set. Float32 values up to 8 have errors of 1e-6, which moves a line by 4e-6 of a pixel of 0.094. The light of a pixel
+ * is proportional to the fraction that the line covers. */
 static bool check_contour_lines(const caught_picture *picture, bool on_grey)
 {
     int hits = 0;
@@ -290,8 +291,8 @@ static bool check_contour_lines(const caught_picture *picture, bool on_grey)
     return hits > 100;
 }
 
-/* Draws the contour lines alone, over the surface of the plate, and with shadows, for which hits are lit later.
- * Pictures are the same on all ranks and on one rank. */
+/* Checks contour lines without other layers, over the surface of the plate, and with shadows, for which hits are shaded
+ * in a later pass. Pictures must be the same on all ranks and on one rank. */
 static void isosurfaces_are_contour_lines(void **state)
 {
     (void)state;
@@ -315,8 +316,8 @@ static void isosurfaces_are_contour_lines(void **state)
         }
 }
 
-/* Returns the share of the pixel that the strip about the hyperbola x y = level covers. It samples points of the pixel
- * and estimates each point's distance from the curve along the field's gradient. */
+/* Returns the fraction of the pixel that the strip around the hyperbola x y = level covers. It is counted over sample
+ * points of the pixel; each point's distance from the curve is estimated along the field's gradient. */
 static double compute_hyperbola_coverage(int pixel, double level)
 {
     enum { POINTS = 16 };
@@ -338,9 +339,9 @@ static double compute_hyperbola_coverage(int pixel, double level)
     return (double)inside / (POINTS * POINTS);
 }
 
-/* Quads represent the field x y exactly. The drawn lines have a ramp of one pixel in all directions. Their root mean
- * square error must be within 0.02 of the covered share, and their total light within a hundredth of width times
- * length. */
+/* Checks curved lines of the field x y, which quads represent exactly. A drawn line has a ramp of one pixel at its
+ * borders in any direction. The root mean square error of its coverage must be within 0.02, and the total light within
+ * a hundredth of width times length. */
 static void coverage_of_curved_lines_matches_strips(void **state)
 {
     (void)state;
@@ -436,7 +437,7 @@ static void colour_bars_state_the_field_and_range(void **state)
 
 enum { MOST = 1 << 12 };
 
-/* Returns a number of the file's second line. */
+/* Returns a number in the second line of a table; columns are counted from 0. */
 static double read_number(const char *text, int column)
 {
     const char *at = strchr(text, '\n');
@@ -451,7 +452,8 @@ static bool is_nearly_equal(double a, double b)
     return false;
 }
 
-/* Checks a linear field's statistics: its mean is the value at the plate's centre, and its extremes are at corners. */
+/* Returns whether the statistics are those of the linear field: its mean is the value at the plate's centre, and its
+ * extremes are at corners. */
 static bool check_plate_statistics(const char *text, plate_kind kind)
 {
     enum { CELLS = 2, AREA, LEAST, GREATEST, MEAN };
@@ -492,7 +494,7 @@ static double compute_column_width(int i)
     return i == NX - 1 ? 1.75 : 0.25;
 }
 
-/* Makes the plate's last column wider; the plate's bounds stay the same. */
+/* Makes the plate's last column wider and the others narrower, so that the plate's bounds stay the same. */
 static void widen_column(plate *p)
 {
     for (int n = 0; n < MAX_VERTICES; n++) {
@@ -502,7 +504,8 @@ static void widen_column(plate *p)
     }
 }
 
-/* The mean weighted by area is 2. A mean over cells would differ, as one column is wider. */
+/* Checks conditions on means. The mean weighted by area is 2; an unweighted mean over cells would differ, because one
+ * column is wider. */
 static void conditions_weigh_shells_by_area(void **state)
 {
     (void)state;
@@ -522,7 +525,7 @@ static void conditions_weigh_shells_by_area(void **state)
     }
 }
 
-/* Returns the least value such that squares with at most this value cover the given percentage of the area. */
+/* Returns the least value such that squares with at most this value cover the given percentage of the plate's area. */
 static int compute_percentile_by_area(double percent)
 {
     enum { LEAST = -1, GREATEST = 5 };
@@ -535,7 +538,8 @@ static int compute_percentile_by_area(double percent)
     return GREATEST;
 }
 
-/* No percentage falls exactly between whole squares, so rounding does not change the result. */
+/* Checks percentiles. None of the tested percentages is exactly the area of whole squares, so that rounding cannot
+ * change the result. */
 static void percentiles_weigh_shells_by_area(void **state)
 {
     (void)state;
@@ -580,8 +584,8 @@ static void set_tet_and_triangle(insitu_session *session)
     set_field(session, "f", INSITU_VERTEX, mesh.vertex_count, 1, values);
 }
 
-/* Checks that shells are ignored in meshes that also have cells with a volume: the statistics are those of the tet
- * alone. */
+/* Checks that shells are ignored in meshes that also have cells with a volume: the statistics are those of the tet,
+ * without the triangle. */
 static void shells_beside_solids_do_not_count(void **state)
 {
     (void)state;

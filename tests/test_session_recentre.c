@@ -1,6 +1,6 @@
-/* Tests the averaging of cell values at vertices. For any partition of the cells, with vertices matched by coordinates
- * or by ids, the mean is bit for bit that of a search over the whole mesh, and the picture of the partitioned mesh is
- * that of the whole mesh. */
+/* Checks the averaging of cell values at vertices. For any partition of the cells, with vertices matched by coordinates
+ * or by ids, the mean must be bitwise equal to that of a search over the whole mesh, and the picture of the partitioned
+ * mesh must be that of the whole mesh. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -34,7 +34,8 @@ static const char mixed_scene[] = "images:\n"
                                   "    outputs:\n"
                                   "      - path: a.exr\n";
 
-/* The scene of mixed_scene, except that the isosurface is coloured by `field`, which is c or v. */
+/* A scene with an isosurface of c that is coloured by `field`, and a volume of `field`; field is c (at cells) or v (at
+ * vertices). */
 #define SMOOTH(field, how, method)                                                                                     \
     "images:\n  - name: a\n    size: [40, 30]\n    layers:\n"                                                          \
     "      - isosurface: {field: c, values: [8], colour_by: {field: " field how "}, opacity: 0.5}\n"                   \
@@ -45,8 +46,8 @@ static const char mixed_scene[] = "images:\n"
 static test_mesh whole;
 static int *owners;
 
-/* Returns the value of a cell of the whole mesh. Values differ by many orders of magnitude, so that the order of a sum
- * matters. */
+/* Returns the value of a cell of the whole mesh. Values differ by many orders of magnitude, so that a sum depends on
+ * the order of its terms. */
 static double compute_cell_value(int64_t cell)
 {
     const double u = test_uniform((uint64_t)cell, 5);
@@ -71,8 +72,8 @@ static double compute_expected_mean(const double position[3])
 
 typedef struct part_input {
     test_mesh part;
-    double *values; /* of cells */
-    int64_t *ids;   /* of vertices */
+    double *values; /* values of cells */
+    int64_t *ids;   /* ids of vertices */
     insitu_mesh mesh;
     insitu_field field;
 } part_input;
@@ -94,8 +95,8 @@ static void describe_input(part_input *in)
     in->field.values = (insitu_array){in->values, INSITU_FLOAT64, 0};
 }
 
-/* Creates the part of a rank or, with_ghosts, the whole mesh, in which cells of other ranks are ghosts with wrong
- * values. */
+/* Creates the part of a rank or, if with_ghosts is set, the whole mesh, in which cells of other ranks are ghosts with
+ * wrong values. */
 static void part_create(part_input *in, int rank, bool with_ghosts)
 {
     int *all = test_calloc((size_t)whole.cell_count, sizeof *all);
@@ -152,8 +153,8 @@ static insitu_status draw_step(insitu_session *session, const part_input *in, in
     return status ? status : stepped;
 }
 
-/* How vertices are matched: by coordinates, by ids of various widths and signs, or by coordinates with a layer of
- * ghosts. */
+/* How vertices are matched: by coordinates, by ids of various widths and signs, or by coordinates in a mesh with ghost
+ * cells. */
 typedef enum variant { BY_COORDINATES, BY_IDS, WITH_GHOSTS, VARIANT_COUNT } variant;
 
 static void means_equal_a_search_over_all_cells(void **context)
@@ -178,7 +179,7 @@ static void means_equal_a_search_over_all_cells(void **context)
     insitu_destroy(&session);
 }
 
-/* Checks that duplicate vertices within a rank are treated as one vertex, like duplicates on two ranks. */
+/* Checks that vertices with equal coordinates within a rank are treated as one vertex, like those on two ranks. */
 static void duplicated_vertices_are_merged(void **context)
 {
     (void)context;
@@ -204,8 +205,8 @@ static void duplicated_vertices_are_merged(void **context)
     part_free(&in);
 }
 
-/* Two adjacent hexes have equal vertices but share none. When the second hex moves away, the groups of equal vertices
- * must be found again. */
+/* Checks two adjacent hexes whose common face has separate but equal vertices. When the second hex moves away, the
+ * groups of equal vertices must be found anew. */
 static void means_follow_separated_cells(void **context)
 {
     (void)context;
@@ -272,9 +273,9 @@ static void means_follow_values_that_changed_on_one_rank(void **context)
     test_free(right);
 }
 
-/* Compares the picture of the whole mesh, which rank 0 draws alone, with the picture of all ranks. Surfaces alone have
- * the same bits. If a volume lies behind transparent surfaces, pictures agree within the rounding of the over operator
- * (1e-6, as in all tests). */
+/* Compares the picture of all ranks with the one that rank 0 draws from the whole mesh. Pictures that show only
+ * surfaces are bit-identical. If a volume is behind transparent surfaces, pictures agree up to the rounding of the over
+ * operator (1e-6, as in all tests). */
 static void compare_with_alone(const char *scene, double bound)
 {
     for (int distributed = 0; distributed < TEST_PARTITION_COUNT; distributed++) {
@@ -333,8 +334,8 @@ static void smooth_volumes_do_not_depend_on_the_partition(void **context)
     compare_with_alone(SMOOTH("c", AT_VERTICES, "segments"), 1e-6);
 }
 
-/* Draws a scene on rank 0 with the cells' values as field c, and with the means of a search over all cells as field
- * v. */
+/* Draws a scene with two fields: c has the cells' values, and v the means at vertices that a search over all cells has
+ * found. Returns the picture on rank 0. */
 static caught_picture draw_smooth(const char *scene, const part_input *in, const double *means)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
@@ -352,8 +353,9 @@ static caught_picture draw_smooth(const char *scene, const part_input *in, const
     return picture;
 }
 
-/* Checks that `interpolate: vertex` draws a cell field by the means at its vertices, and that the default draws cell
- * values. The vertex field v cannot mark cells without a finite value of their own, so these cells are ghosts. */
+/* Checks that `interpolate: vertex` draws a cell field by the means at vertices, and that the default draws cell
+ * values. Cells without a finite value of their own are ghosts here, because the vertex field v, with which the picture
+ * is compared, cannot exclude them. */
 static void smooth_layers_match_vertex_means(void **context)
 {
     (void)context;

@@ -1,6 +1,6 @@
-/* Tests regions: several meshes in one picture, each with its own fields. Checks on which meshes a layer is drawn, by
- * its field or by a mesh's name, which surfaces are grey, and what is refused, on any number of ranks, some of which
- * have no cells of a region. */
+/* Checks regions: several meshes in one picture, each with fields of its own. Tests on which meshes a layer is drawn,
+ * by its field or by a mesh's name, which surfaces are grey, and which scenes are refused, on any number of ranks, some
+ * of which have no cells of a region. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,8 +15,9 @@ enum { WIDTH = 40, HEIGHT = 30, SIDE = 4 };
     "images:\n  - name: a\n    size: [40, 30]\n    background: [0, 0, 0, 0]\n    layers:\n" layers                     \
     "    outputs: [{path: a.exr}]\n"
 
-/* Two cubes of hexes side by side, the meshes "air" and "sea/0". Both are partitioned over all ranks, except that the
- * last of several ranks has no cells of the sea. Both have the field f; the air also has t, and the sea also has s. */
+/* Two adjacent cubes of hexes: the meshes "air" and "sea/0". Both are partitioned over all ranks, except that the last
+ * of several ranks has no cells of the sea. Both have the field f; the air also has the field t, and the sea also has
+ * s. */
 static session_input air, sea;
 
 static void regions_create(void)
@@ -58,7 +59,8 @@ static insitu_session *open_regions(const char *scene)
     return session;
 }
 
-/* Draws a scene and checks its warnings. Returns the picture on rank 0. */
+/* Draws a scene and checks that its warnings contain `warning` or, if that is NULL, that there are none. Returns the
+ * picture on rank 0. */
 static caught_picture draw_and_check_warnings(const char *scene, const char *warning)
 {
     insitu_session *session = open_regions(scene);
@@ -76,7 +78,8 @@ static bool has_colour(const caught_picture *picture, int p)
     return picture->rgba[4 * p + 3] > 0;
 }
 
-/* Counts on rank 0 the covered pixels of the left half, which shows only the air, and of the right half. */
+/* Counts the covered pixels on rank 0: counts[0] in the left half, which shows only the air, and counts[1] in the right
+ * half. */
 static void count_covered_pixels(const caught_picture *picture, int counts[2])
 {
     counts[0] = counts[1] = 0;
@@ -103,13 +106,13 @@ static void assert_same(const char *scene, const char *warning, const char *othe
     "    outputs: [{path: a.exr}]\n"
 
 /* Checks that a layer that names no mesh is drawn on all meshes that have its field, and that a layer that names a mesh
- * or a pattern is drawn on the meshes that match. */
+ * or a pattern of names is drawn on the matching meshes. */
 static void layers_draw_only_meshes_with_the_field(void **context)
 {
     (void)context;
     static const struct {
         const char *scene;
-        bool is_on[2]; /* on air, on sea */
+        bool is_on[2]; /* whether the layer is drawn on the air, and on the sea */
     } cases[] = {
         {FRONT_IMAGE("      - isosurface: {field: f, values: [0.1]}\n"), {true, true}},
         {FRONT_IMAGE("      - isosurface: {field: t, values: [0.1]}\n"), {true, false}},
@@ -143,8 +146,8 @@ static void separate_meshes_draw_same_picture_as_one_mesh(void **context)
                       "      - isosurface: {field: f, values: [0.1], colours: [[1, 0, 0]], mesh: sea}\n"));
 }
 
-/* Checks that meshes without the colour field are drawn grey, as with `colours: [grey]`, and that the range of the
- * colours is taken from the meshes that have the field. */
+/* Checks that meshes without the field of the colours are drawn grey, and that the range of the colours is that of the
+ * meshes that have the field. */
 static void surfaces_without_the_colour_field_are_grey(void **context)
 {
     (void)context;
@@ -161,7 +164,7 @@ static void surfaces_without_the_colour_field_are_grey(void **context)
                 IMAGE("      - isosurface: {field: f, values: [0.1], colours: [[" GREY "]], mesh: sea}\n"));
 }
 
-/* Checks that each point whose colour value is not a number is drawn grey. Here all values of one region are NaN. */
+/* Checks that a point is drawn grey if its colour value is not a number. All values of one region are NaN. */
 static void colours_that_are_not_numbers_are_grey(void **context)
 {
     (void)context;

@@ -1,7 +1,7 @@
-/* Tests shells: triangles, quads and polygons, alone and together with cells of three dimensions. A sheet of shells is
- * compared with the closed form of its plane, and is the same to the bit for any partition as on one rank. A shell on a
- * cell's face is drawn instead of the face. Isosurfaces, slices and volumes are those of the mesh without its
- * shells. */
+/* Checks shells: triangles, quads and polygons, without other cells and together with cells of three dimensions. A
+ * sheet of shells is compared with the closed form of its plane, and must be bit-identical for any partition. A shell
+ * on a cell's face must be drawn instead of the face. Isosurfaces, slices and volumes must be those of the mesh without
+ * its shells. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -48,7 +48,7 @@ static void add_cell(shell_mesh *m, unsigned char type, double value, int count,
     m->offsets[++m->cell_count] = m->entry_count;
 }
 
-/* Kinds of cells that make up a block of two squares of a sheet. */
+/* The types of shells into which each block of two squares of a sheet is divided. */
 typedef enum sheet_kind { QUADS, TRIANGLES, POLYGONS, MIXED, SHEET_KINDS } sheet_kind;
 
 static void add_block(shell_mesh *m, sheet_kind kind, const int at[6])
@@ -69,7 +69,7 @@ static void add_block(shell_mesh *m, sheet_kind kind, const int at[6])
     }
 }
 
-/* Makes 6 × 6 squares over x and y from -1 to 1, on the plane z = 0.3 x + 0.2 y. */
+/* Makes a sheet of 6 × 6 squares over x and y from -1 to 1, in the plane z = 0.3 x + 0.2 y. */
 static void make_sheet(sheet_kind kind, shell_mesh *out)
 {
     enum { SIDE = 6 };
@@ -87,8 +87,8 @@ static void make_sheet(sheet_kind kind, shell_mesh *out)
         }
 }
 
-/* Makes 2 × 2 × 2 hexes of the value 0 between -1 and 1, and shells of the value 1: on the hexes' outer faces at z = 1,
- * on interior faces at z = 0, and through the hexes at z = 0.5. */
+/* Makes 2 × 2 × 2 hexes with the value 0 between -1 and 1, and shells with the value 1: on the hexes' outer faces at z
+ * = 1, on interior faces at z = 0, and through the hexes at z = 0.5. */
 static void make_block(bool with_shells, shell_mesh *out)
 {
     *out = (shell_mesh){0};
@@ -110,8 +110,8 @@ static void make_block(bool with_shells, shell_mesh *out)
                          (const int[]){at[k][j][i], at[k][j + 1][i], at[k][j + 1][i + 1], at[k][j][i + 1]});
 }
 
-/* Extracts this rank's cells, which are every rank_count-th cell or, with_ghosts, all cells, of which those of other
- * ranks are ghosts. */
+/* Extracts this rank's cells or, if with_ghosts is set, all cells, of which those of other ranks are ghosts. Cells are
+ * dealt to the ranks one by one. */
 static void extract_rank_cells(const shell_mesh *whole, bool with_ghosts, shell_mesh *out)
 {
     *out = *whole;
@@ -182,7 +182,7 @@ static caught_picture draw_shells(MPI_Comm comm, const char *scene, const shell_
 
 /* ---- pictures ------------------------------------------------------------------------------------------------ */
 
-/* Finds where the pixel's ray intersects the plane 0.3 x + 0.2 y = z. */
+/* Computes the position at which the pixel's ray intersects the plane 0.3 x + 0.2 y = z; returns its depth. */
 static double intersect_sheet(int pixel, double place[3])
 {
     static const double normal[3] = {0.3, 0.2, -1};
@@ -196,8 +196,8 @@ static double intersect_sheet(int pixel, double place[3])
     return left / along;
 }
 
-/* Compares depths and colours with the sheet's, within the tolerances that is_cube() in test_session_surfaces.c
- * derives. */
+/* Compares depths and colours with those of the sheet. The tolerances are derived at is_cube() in
+ * test_session_surfaces.c. */
 static bool is_sheet(const caught_picture *picture)
 {
     int hits = 0;
@@ -241,7 +241,7 @@ static void sheets_are_planes_on_any_ranks(void **state)
         }
 }
 
-/* Of the 12 shells, 4 replace outer faces of the block, which has 24. */
+/* Checks the outer surface of the block. It has 24 outer faces; 4 of the 12 shells replace outer faces. */
 static void shells_replace_coincident_faces(void **state)
 {
     (void)state;

@@ -1,7 +1,7 @@
-/* Tests slices of a session. A plane is at the position of its closed form and has the colours of a linear field there,
- * on cells of every type, for any partition and with ghosts, and is the same to the bit as on one rank. A plane that
- * coincides with faces of cells is drawn once and has no holes. A plane on the boundary of the data is drawn for either
- * direction of its normal. */
+/* Checks slices in a session. On cells of every type, a plane must be at the position of its closed form and have the
+ * colours of a linear field there; for any partition, with and without ghosts, it must be bit-identical to that of one
+ * rank. A plane that coincides with faces of cells must be drawn once, without holes. A plane on the boundary of the
+ * data must be drawn for either direction of its normal. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -64,10 +64,10 @@ static caught_picture draw_slices(MPI_Comm comm, const char *scene, const sessio
     return picture;
 }
 
-/* Compares the picture with the scene's planes: the nearest hit within the cube is visible. Rays near the cube's border
- * may hit or miss. Depths near 5 are off by roundings of single precision times the inverse cosine of the angle of
- * incidence, at most 10 here. Colours are off by the depth error times the field's slope, 1 in 3.2, and the colour
- * table's slope, at most 12. */
+/* Returns whether the picture shows the given planes: in each pixel, the nearest hit inside the cube must be visible.
+ * Rays near the cube's border may hit or miss. Depths near 5 have rounding errors of single precision times the inverse
+ * cosine of the angle of incidence, at most 10 here. Colours have the error of the depth times the field's slope, 1 in
+ * 3.2, times the slope of the colour table, at most 12. */
 static bool check_planes(const caught_picture *picture, const plane *planes, int count)
 {
     const double depth_error = 10 * 5 * 3e-7, colour_error = depth_error / 3.2 * 12;
@@ -113,7 +113,7 @@ static void make_whole_mesh(test_mesh_kind kind, double jitter, session_input *o
     input_describe(out);
 }
 
-/* Extracts this rank's cells or, with_ghosts, all cells, of which those of other ranks are ghosts. */
+/* Extracts this rank's cells or, if with_ghosts is set, all cells, of which those of other ranks are ghosts. */
 static void extract_rank_cells(const session_input *whole, test_partition_kind distributed, bool with_ghosts,
                                session_input *out)
 {
@@ -127,8 +127,8 @@ static const char three_planes[] =
               SLICE("", "{normal: [0, 3, 0], point: [0, -0.6, 0]}"));
 static const plane three[3] = {{{1. / 3, 2. / 3, -2. / 3}, -0.4}, {{1, 1, 4}, 0.1 + 0.3 + 2.4}, {{0, 1, 0}, -0.6}};
 
-/* Planes given by `count` are spread evenly over the cube's extent along the normal, which is from -sqrt(3) to sqrt(3)
- * along the diagonal. */
+/* Checks planes given by `count` and by `offsets`. Planes given by `count` are spread evenly over the cube's extent
+ * along the normal, which is from -sqrt(3) to sqrt(3) along the diagonal. */
 static void several_planes_are_exact(void **state)
 {
     (void)state;
@@ -139,7 +139,8 @@ static void several_planes_are_exact(void **state)
                              {{1, 1, 1}, 0},
                              {{1, 1, 1}, 2},
                              {{0, -1, 0}, -0.75},
-                             {{0, -1, 0}, 0.25}}; /* the distance of 2/3 sqrt(3), divided by n */
+                             /* the first three planes are 2/3 sqrt(3) apart; the distances here are divided by n */
+                             {{0, -1, 0}, 0.25}};
     session_input whole = {0};
     bool is_well = true;
     assert_true(fabs(2 * n - 2. / 3 * sqrt(3)) < 1e-15);
@@ -188,7 +189,7 @@ static void planes_are_exact_on_any_ranks(void **state)
 
 enum { MANY_VALUES = 40, MANY_PLANES = 24 };
 
-/* Returns the isovalues in descending order, as those of a layer need not be sorted. */
+/* Returns an isovalue. The isovalues are in descending order, because those of a layer need not be sorted. */
 static double get_isovalue(int i)
 {
     return 1.2207 - 0.0613 * i;
@@ -199,7 +200,7 @@ static double get_plane_distance(int i)
     return -0.93 + 0.0817 * i;
 }
 
-/* Writes a scene with the maximum number of isovalues and planes of an image, each of opacity 0.05. */
+/* Writes a scene with the maximum number of isovalues and of planes in an image, each with opacity 0.05. */
 static const char *write_scene_of_many_surfaces(void)
 {
     char text[8192];
@@ -214,9 +215,9 @@ static const char *write_scene_of_many_surfaces(void)
     return write_scene(text);
 }
 
-/* Checks that each surface is crossed by some ray, and that each crossing leaves 0.95 of the light behind it. The
- * isosurfaces of a linear field are planes. Each of at most 64 products is rounded to single precision: 64 × 2^-23 <
- * 1e-5. */
+/* Returns whether each surface is crossed by some ray, and each crossing leaves 0.95 of the light behind it. The
+ * isosurfaces of a linear field are planes. Each of at most 64 products is rounded to single precision, which gives an
+ * error of at most 64 × 2^-23 < 1e-5. */
 static bool check_all_surfaces_crossed(const caught_picture *picture)
 {
     bool is_crossed[MANY_VALUES + MANY_PLANES] = {false};
@@ -265,8 +266,8 @@ static void many_isovalues_and_planes_are_all_drawn(void **state)
 
 /* ---- planes in faces ----------------------------------------------------------------------------------------- */
 
-/* Checks that every ray that intersects the plane within the cube crosses the slice exactly once: the opacity is
- * 0.5. */
+/* Returns whether every ray that intersects the plane inside the cube crosses the slice exactly once, so that the
+ * opacity is 0.5. */
 static bool is_drawn_once(const caught_picture *picture, const plane *p)
 {
     int hits = 0;
@@ -334,7 +335,7 @@ static void planes_outside_the_data_give_a_warning(void **state)
 
 /* ---- values -------------------------------------------------------------------------------------------------- */
 
-/* Each hex has one value. Checks that a point has the colour of its cell, and is grey if the cell's value is NaN. */
+/* Returns whether each point has the colour of its hex, or is grey if the hex's value is NaN. */
 static bool has_colours_of_cells(const caught_picture *picture)
 {
     int hits = 0;
@@ -396,8 +397,8 @@ static session_scalar *find_distance_field(const insitu_session *session)
     return NULL;
 }
 
-/* Checks that two images of one plane share the distances of vertices, that new values do not cause them to be
- * recomputed but new coordinates do, and that a plane through the centre of the data moves with the data. */
+/* Checks the distances of vertices from a plane: two images of one plane share them, new values do not cause them to be
+ * recomputed, and new coordinates do. Also checks that a plane through the centre of the data moves with the data. */
 static void distances_follow_the_geometry(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
-/* Tests normals from gradients at vertices. They are compared with gradients that this file computes at every vertex in
- * double, drawn as three fields that colour the surface, and with the exact gradient if the field is linear. They are
- * the same to the bit for any partition. */
+/* Checks normals from gradients at vertices. They are compared with gradients that this file computes at every vertex
+ * in double and draws as three fields that colour the surface, and with the exact gradient if the field is linear.
+ * Pictures must be bit-identical for any partition. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -30,11 +30,12 @@ static void *allocate_zeroed(int64_t count, size_t size)
 }
 
 typedef struct gradients {
-    double (*sum)[4]; /* sum of the weighted gradients, and of the weights */
+    double (*sum)[4]; /* sum of the weighted gradients, and (last number) sum of the weights */
     double *component[3];
 } gradients;
 
-/* Solves the 3 × 3 system in x, whose last column is the right-hand side. Returns false if the system is singular. */
+/* Solves a 3 × 3 system by Gaussian elimination, in place. The last column of x is the right-hand side, and becomes the
+ * solution. Returns false if the system is singular. */
 static bool eliminate_gauss(double x[3][4], double *determinant)
 {
     *determinant = 1;
@@ -56,8 +57,8 @@ static bool eliminate_gauss(double x[3][4], double *determinant)
     return true;
 }
 
-/* Adds the gradient in one corner of a cell. The corner and the other ends of its three edges each have a position and
- * a value. */
+/* Adds the gradient in one corner of a cell, with its weight. The corner and the other ends of its three edges are
+ * given by position and value. */
 static void add_corner(gradients *g, int64_t vertex, const double corner[4], const double ends[3][4])
 {
     double x[3][4], determinant, squares = 0;
@@ -90,7 +91,8 @@ static void add_corner_gradient(gradients *g, const test_mesh *mesh, const int64
 
 static void add_cell_gradients(gradients *g, const test_mesh *mesh, int type, const int64_t *cell)
 {
-    static const int around[8] = {0, 1, 3, 2, 4, 5, 7, 6}; /* maps a hex's vertices to three bits, and back */
+    /* maps a hex's vertex to its corner of the unit cube, as three bits, and back */
+    static const int around[8] = {0, 1, 3, 2, 4, 5, 7, 6};
     for (int i = 0; i < 8 && type == INSITU_HEX; i++)
         add_corner_gradient(g, mesh, cell, i, around[around[i] ^ 1], around[around[i] ^ 2], around[around[i] ^ 4]);
     for (int i = 0; i < 4 && type == INSITU_TET; i++)
@@ -103,7 +105,8 @@ static void add_cell_gradients(gradients *g, const test_mesh *mesh, int type, co
     }
 }
 
-/* Adds the gradients of a polyhedron. Its centre is the mean of its vertices, each counted once. */
+/* Adds the gradients of a polyhedron, which is divided into tets. Its centre is the mean of its vertices, each counted
+ * once. */
 static void add_polyhedron(gradients *g, const test_mesh *mesh, const int64_t *faces, int64_t face_count)
 {
     int64_t known[MAX_ENDS];
@@ -157,7 +160,8 @@ static void gradients_free(gradients *g)
 
 /* ---- pictures -------------------------------------------------------------------------------------------------- */
 
-/* Draws the scene. If g is not NULL, the whole mesh also gets the fields "gx", "gy" and "gz". */
+/* Draws the scene. If g is not NULL, the mesh, which is then the whole mesh, also gets the fields "gx", "gy" and
+ * "gz". */
 static caught_picture draw_with_gradients(MPI_Comm comm, const char *scene, const session_input *in, const gradients *g)
 {
     static const char *const names[] = {"gx", "gy", "gz"};
@@ -188,11 +192,11 @@ static double swirl_field(const double p[3])
     return sin(2.1 * p[0] + 0.3) * cos(1.7 * p[1]) + 0.4 * p[2] * p[2] - 0.3 * p[0] * p[2] + 0.2 * p[1];
 }
 
-/* A mesh of every kind, and lattices of hexes and of mixed cells of which a share is converted to polyhedra. */
+/* A mesh of each kind, and lattices of hexes and of mixed cells that are converted to polyhedra, all or in part. */
 typedef struct mesh_case {
     const char *name;
     test_mesh_kind kind;
-    double as_polyhedra; /* share of the cells */
+    double as_polyhedra; /* fraction of the cells that are converted */
 } mesh_case;
 
 static const mesh_case cases[] = {
@@ -203,7 +207,7 @@ static const mesh_case cases[] = {
     {"mixed", TEST_MIXED, 0},
     {"hexes as polyhedra", TEST_HEXES, 1},
     {"mixed, half of them polyhedra", TEST_MIXED, 0.5},
-    {"polyhedra", TEST_POLYHEDRA, 0}, /* concave; must be last, as its bound is another */
+    {"polyhedra", TEST_POLYHEDRA, 0}, /* some are concave; must be last, because its tolerance differs */
 };
 enum { CASES = sizeof cases / sizeof *cases };
 
@@ -223,9 +227,9 @@ static void whole_create(const mesh_case *c, test_function *f, session_input *wh
 
 /* ---- normals --------------------------------------------------------------------------------------------------- */
 
-/* Returns the largest sine of the angle between the drawn and the expected normal over all pixels with a surface. The
- * expected normal is `gradient` or, if it is NULL, the values of the three pictures. far gets the number of pixels in
- * which the sine exceeds 3e-4. */
+/* Returns the largest sine of the angle between the drawn and the expected normal, over all pixels that show a surface.
+ * The expected normal is `gradient` or, if it is NULL, the values of the three pictures. *pixels: number of these
+ * pixels; *far: number of those in which the sine exceeds 3e-4. */
 static double find_largest_angle(const caught_picture *picture, const caught_picture *expected, const double *gradient,
                                  int *pixels, int *far)
 {
@@ -250,12 +254,13 @@ static double find_largest_angle(const caught_picture *picture, const caught_pic
     return worst;
 }
 
-/* Components of gradients are between -3 and 3, and gradients are 0.3 long or more on these surfaces. Each component,
- * drawn as a field, is off by some units of 6e-8 × 3, and by the position's error of 1.5e-5 (test_session_surfaces.c)
- * times the component's own slope, at most 6: together 9e-5, so a normal is off by 3e-4 of its length. Polyhedra
- * interpolate fields differently near quads, whose values are bilinear as in an adjacent hex, and if their tets
- * overlap: a field is then the sum of the overlapping tets, but the normal is that of one tet. So only nine pixels of
- * ten must be right for polyhedra whose faces are triangles and of which some are concave. */
+/* Compares normals with gradients drawn as fields. Components of gradients are between -3 and 3, and gradients are at
+ * least 0.3 long on these surfaces. Each component, drawn as a field, has an error of some units of 6e-8 × 3, and the
+ * position's error of 1.5e-5 (test_session_surfaces.c) times the component's own slope, at most 6. Together this is
+ * 9e-5, or 3e-4 of a gradient's length. Polyhedra interpolate fields differently in two cases. Near quads the field is
+ * bilinear, as in an adjacent hex. If tets of a polyhedron overlap, the field is the sum over the overlapping tets, but
+ * the normal is that of one tet. Therefore only nine of ten pixels must be right for the case of polyhedra with
+ * triangular faces, some of which are concave. */
 static void normals_are_the_interpolated_gradients(void **state)
 {
     static const char *const scenes[] = {SCENE(COLOURED("gx")), SCENE(COLOURED("gy")), SCENE(COLOURED("gz"))};
@@ -281,8 +286,9 @@ static void normals_are_the_interpolated_gradients(void **state)
     }
 }
 
-/* The lattice's coordinates are doubles, so each gradient is accurate to some units of 1e-16 divided by a corner's
- * determinant. The error is that of rounding gradients, coordinates and normals to float32, some units of 6e-8. */
+/* Checks a linear field. The lattice's coordinates are doubles, so that each gradient is accurate to some units of
+ * 1e-16 divided by a corner's determinant. The remaining error is the rounding of gradients, coordinates and normals to
+ * float32, some units of 6e-8. */
 static void a_linear_field_has_its_gradient(void **state)
 {
     static const double gradient[3] = {0.3, -0.7, 0.5};
@@ -309,7 +315,7 @@ static void swirl_gradient(const double p[3], double out[3])
     out[2] = 0.8 * p[2] - 0.3 * p[0];
 }
 
-/* Returns the mean angle in degrees between the drawn normals and the gradient of the function itself. */
+/* Returns the mean angle in degrees between the drawn normals and the gradient of the function. */
 static double measure_mean_angle(test_mesh_kind kind, int side, const char *scene)
 {
     render_camera camera;
@@ -339,9 +345,9 @@ static double measure_mean_angle(test_mesh_kind kind, int side, const char *scen
     return sum / count;
 }
 
-/* The error of gradients in cells is of first order in the cells' size. At vertices the errors of first order cancel,
- * except at the boundary and because of the jitter. So errors at vertices must be smaller, and halving the cells' size
- * must more than halve them. */
+/* Checks the order of errors. Gradients in cells have errors of first order in the cells' size. At vertices the errors
+ * of first order cancel, except at the boundary and because of the jitter. Therefore the errors at vertices must be
+ * smaller than those in cells, and must be more than halved if the cells' size is halved. */
 static void smooth_normals_are_nearer_to_the_exact_gradient(void **state)
 {
     static const test_mesh_kind kinds[] = {TEST_TETS, TEST_HEXES, TEST_POLYHEDRA};
@@ -361,8 +367,8 @@ static void smooth_normals_are_nearer_to_the_exact_gradient(void **state)
 
 /* ---- on any partition ------------------------------------------------------------------------------------------ */
 
-/* Makes this rank's part, with its cells listed in this rank's own order. with_ghosts: all cells, of which those of
- * other ranks are ghosts. */
+/* Makes this rank's part, or, if with_ghosts is set, the whole mesh, in which cells of other ranks are ghosts. The
+ * cells are listed in an order of this rank's own. */
 static void part_create(const test_mesh *whole, test_partition_kind distributed, bool with_ghosts, session_input *out)
 {
     int *owners = allocate_zeroed(whole->cell_count, sizeof *owners);
@@ -378,7 +384,8 @@ static void part_create(const test_mesh *whole, test_partition_kind distributed,
     describe_input(out);
 }
 
-/* Checks that all ranks draw the picture that rank 0 draws alone. Only rank 0's whole is used. */
+/* Checks that all ranks together draw the picture that rank 0 draws from the whole mesh. On other ranks `whole` is not
+ * used. */
 static void check_same_as_rank_0_alone(const char *name, const char *scene, const session_input *whole,
                                        const session_input *part)
 {
@@ -412,7 +419,7 @@ static void any_partition_has_the_same_bits(void **state)
         }
 }
 
-/* Joins the tets of both halves without merging their equal vertices. */
+/* Joins the tets of both halves without merging vertices with equal coordinates. */
 static void concatenate_halves(const test_mesh halves[2], test_mesh *out)
 {
     *out = (test_mesh){.vertex_count = halves[0].vertex_count + halves[1].vertex_count,
@@ -436,7 +443,8 @@ static void concatenate_halves(const test_mesh halves[2], test_mesh *out)
     for (int64_t cell = 0; cell <= out->cell_count; cell++) out->offsets[cell] = 4 * cell;
 }
 
-/* Draws a mesh with a crack on one rank: the cells on the two sides of a plane have separate, equal vertices there. */
+/* Checks a mesh with a crack, on one rank: the cells on the two sides of a plane have separate vertices there, with
+ * equal coordinates. */
 static void duplicated_vertices_are_merged(void **state)
 {
     session_input whole, cracked = {0};
@@ -460,7 +468,7 @@ static void duplicated_vertices_are_merged(void **state)
     input_free(&whole);
 }
 
-/* Checks that cells with values that are not finite are not drawn and do not contribute to the gradients at their
+/* Checks that cells with a value that is not finite are not drawn, and do not contribute to the gradients at their
  * vertices. */
 static void unusable_cells_contribute_no_gradient(void **state)
 {

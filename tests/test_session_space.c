@@ -1,11 +1,12 @@
-/* Tests that a scene's position and size do not change the picture: far from the origin, as in projected coordinates of
- * maps, and a million times smaller or larger, if the camera and all lengths of the scene file are scaled as well.
+/* Checks that a scene's position and size do not change the picture: far from the origin, as in projected coordinates
+ * of maps, and a million times smaller or larger, if the camera and all lengths of the scene file are changed in the
+ * same way.
  *
- * An integer offset of coordinates that are multiples of 2^-24 is exact, so only the rounding of the eye's position may
- * change. A factor of 1e6 is not a power of two, so all float32 numbers are rounded differently. If computed in double,
- * this changes no pixel by 1e-12; vertices rounded to float32 change no pixel by 1e-7. The accuracy of a hit matters:
- * if the field at the hit is off by 3e-8, a pixel whose ray grazes a hex changes by 7e-7. So the robust hit finder
- * computes the residuals of its last step in double. */
+ * An integer offset of coordinates that are multiples of 2^-24 is exact, so that only the rounding of the eye's
+ * position can differ. A factor of 1e6 is not a power of two, so that all float32 numbers are rounded differently. In
+ * double, this changes no pixel by 1e-12; if vertices are rounded to float32, it changes no pixel by 1e-7. Errors of
+ * hits matter more: if the field at the hit is off by 3e-8, a pixel whose ray grazes a hex changes by 7e-7. Therefore
+ * the robust hit finder computes the residuals of its last step in double. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -20,13 +21,13 @@ typedef struct space_case {
     test_mesh_kind kind;
     bool as_polyhedra;
     double allowed;
-    const char *layers, *sampling; /* each contains at most one length */
+    const char *layers, *sampling; /* each contains at most one length, as a format */
 } space_case;
 
 #define FIELD "volume: {field: f, range: [-1.5, 1.5], opacity: [[0, 0.1], [0.5, 0.8], [1, 0.3]], unit_distance: %.17g}"
 
-/* With max_error, rounding may decide whether an interval of a ray is divided once more. Both results are within their
- * share of the error; a fiftieth of it is allowed here (0.011 was measured). */
+/* With max_error, rounding can decide whether an interval of a ray is divided once more. Both results are within
+ * max_error; the allowed difference is a fiftieth of it (0.011 was measured). */
 static const space_case cases[] = {
     {"isosurface of tets", TEST_TETS, false, 1e-6, "isosurface: {field: f, values: [-0.2, 0.3]}", ""},
     {"isosurface of hexes", TEST_HEXES, false, 1e-6, "isosurface: {field: f, values: [-0.2, 0.3], opacity: 0.5}", ""},
@@ -134,7 +135,7 @@ static void scaling_by_a_million_changes_no_picture(void **context)
 
 /* ---- depth --------------------------------------------------------------------------------------------------- */
 
-/* The field is z, which cells of all types represent exactly, so isosurfaces are planes across the cube. */
+/* Returns z. Cells of all types represent this field exactly, so that its isosurfaces are planes across the cube. */
 static double height_field(const double position[3])
 {
     return position[2];
@@ -176,7 +177,7 @@ static void normalize_vector(double v[3])
 
 static const double eye[3] = {0.9, 1.2, 4}, focal[3] = {0.1, -0.2, 0.1}, camera_angle = 35;
 
-/* Computes the direction of pixel p, with a component of 1 along the camera's axis. */
+/* Computes the direction of pixel p's ray; its component along the camera's axis is 1. */
 static void compute_pixel_direction(int p, double out[3])
 {
     const double up[3] = {0, 1, 0}, pixel = 2 * tan(camera_angle * 3.14159265358979323846 / 360) / HEIGHT;
@@ -190,8 +191,8 @@ static void compute_pixel_direction(int p, double out[3])
     for (int i = 0; i < 3; i++) out[i] = forward[i] + x * right[i] + y * above[i];
 }
 
-/* Returns the depth of the plane: infinite if it is met outside of the cube; 0 within 1e-4 of the cube's border, where
- * a hit or a miss is accepted. */
+/* Returns the depth of the plane on a ray: infinity if the ray meets the plane outside the cube, and 0 if it does so
+ * within 1e-4 of the cube's border, where either a hit or a miss is accepted. */
 static double plane_depth(const double direction[3], double plane)
 {
     const double depth = (plane - eye[2]) / direction[2];
@@ -201,7 +202,8 @@ static double plane_depth(const double direction[3], double plane)
     return farthest < 1 ? depth : (double)INFINITY;
 }
 
-/* A hit is off by at most 1e-5 of the cell's size, 0.5, and a depth of 5 in float32 by 3e-7. */
+/* Returns whether a pixel has the depth of the nearest plane. A hit has an error of at most 1e-5 of the cell's size of
+ * 0.5, and a depth of 5 in float32 one of 3e-7. */
 static bool is_depth(const caught_picture *picture, int p, int count, const double planes[2])
 {
     double direction[3], expected = INFINITY;
@@ -212,8 +214,8 @@ static bool is_depth(const caught_picture *picture, int p, int count, const doub
     return isinf(expected) ? found == (double)INFINITY : fabs(found - expected) <= 1e-5 * 0.5 + 3e-7;
 }
 
-/* Checks that the depth in an EXR is that of the nearest isosurface along the camera's axis, regardless of its opacity
- * and even behind a volume, and infinite in pixels without an isosurface. */
+/* Checks that the depth in an EXR file is that of the nearest isosurface along the camera's axis, whatever its opacity,
+ * even behind a volume, and that it is infinite in pixels without an isosurface. */
 static void depth_is_that_of_the_nearest_surface(void **context)
 {
     (void)context;

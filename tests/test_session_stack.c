@@ -1,8 +1,9 @@
-/* Tests that the calling thread and the worker threads use less stack in a step than the sizes that the step requires
- * (session_threads.h). The stacks are filled with a pattern before a step, and searched for it afterwards.
+/* Checks that the calling thread and the worker threads use less stack in a step than the sizes that the step requires
+ * (session_threads.h). The stacks are filled with a pattern before a step, and the pattern is searched for the part
+ * that was overwritten afterwards.
  *
  * If SMALL_STACKS is set in the environment, OpenMP's stacks are too small: the step must fail and state a sufficient
- * size. If TOLD_STACKS is set, the stacks have this size. */
+ * size. If TOLD_STACKS is set, the stacks have this sufficient size. */
 #define _GNU_SOURCE
 #include <omp.h>
 #include <pthread.h>
@@ -31,7 +32,7 @@ static __attribute__((noinline)) void paint_stack(volatile unsigned char **top)
     for (int i = NEAR; i < PAINTED; i++) here[-i] = PAINT;
 }
 
-/* Returns the largest distance below top at which the pattern was overwritten. */
+/* Returns the largest distance below `top` at which the pattern was overwritten. */
 static __attribute__((noinline)) int measure_painted_stack(volatile unsigned char *top)
 {
     int taken = PAINTED - 1;
@@ -103,13 +104,13 @@ static void steps_use_less_stack_than_checked(void **context)
         for (int layer = 0; layer < LAYERS; layer++) measure_stack_of_layer(&in, layers[layer], most);
         input_free(&in);
     }
-    session_input in; /* enough cells to build the tree in parallel branches */
+    session_input in; /* enough cells for several threads to build the tree */
     input_create(&in, TEST_TETS, 15, TEST_BLOCK, 0, 1);
     measure_stack_of_layer(&in, layers[0], most);
     input_free(&in);
     printf("%s: of %d kB the calling thread takes %d, of %d kB a worker %d\n", render_isa(), SESSION_CALLER_STACK >> 10,
            most[0] >> 10, SESSION_WORKER_STACK >> 10, most[1] >> 10);
-    assert_true(most[0] > 4 * NEAR && most[1] > 4 * NEAR); /* checks that both stacks were measured */
+    assert_true(most[0] > 4 * NEAR && most[1] > 4 * NEAR); /* both stacks were really measured */
     assert_true(4 * most[0] <= 3 * SESSION_CALLER_STACK);
     assert_true(4 * most[1] <= 3 * SESSION_WORKER_STACK);
 }
@@ -133,7 +134,7 @@ static void small_stacks_are_reported(void **context)
     input_free(&in);
 }
 
-/* Runs with OMP_STACKSIZE=MOST_TOLD in the environment. */
+/* Checks that stacks of the suggested size suffice: the test runs with OMP_STACKSIZE=MOST_TOLD in the environment. */
 static void suggested_stacks_suffice(void **context)
 {
     (void)context;

@@ -1,5 +1,6 @@
-/* Tests statistics of fields: comparisons with closed forms and with sums computed here; files that are the same to the
- * byte on any number of ranks and that restarted runs continue; images that are drawn on a condition or only once. */
+/* Checks statistics of fields. They are compared with closed forms and with sums computed here. Files must be identical
+ * byte by byte on any number of ranks, and restarted runs must continue them. Images must be drawn only if a condition
+ * holds, or only once. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -19,8 +20,8 @@ enum { SIDE = 4, MOST = 1 << 16 };
 
 /* ---- inputs and files ------------------------------------------------------------------------------------------ */
 
-/* Makes this rank's part. If is_cell_centred, each cell gets a random value that does not depend on the rank that has
- * the cell. */
+/* Makes this rank's part. If is_cell_centred is set, each cell gets a random value that does not depend on the rank
+ * that owns the cell. */
 static void make_part(test_mesh_kind kind, double jitter, bool is_cell_centred, session_input *out)
 {
     test_mesh whole;
@@ -45,7 +46,7 @@ static void make_part(test_mesh_kind kind, double jitter, bool is_cell_centred, 
     test_mesh_free(&whole);
 }
 
-/* Returns a column of the file's last line as a number. */
+/* Returns the number in a column of the file's last line. */
 static double read_last_line_number(const char *text, int column)
 {
     const char *line = text, *end;
@@ -79,8 +80,8 @@ static bool is_nearly_equal(double a, double b)
 }
 
 /* Checks a linear field over the cube from -1 to 1: its mean is the value at the centre, and its extremes are at
- * corners. The polyhedra are cubes here, so the mean of their vertices is their centre. Mixed lattices are exempt from
- * the exact mean: their pyramids are not in pairs, so the means of the vertices are not the centres. */
+ * corners. The polyhedra are cubes here, so that the mean of their vertices is their centre. Mixed lattices are exempt
+ * from the exact mean: their pyramids are not in pairs, so that the means of vertices are not the centres. */
 static void statistics_of_linear_fields_match_closed_forms(void **state)
 {
     (void)state;
@@ -102,7 +103,7 @@ static void statistics_of_linear_fields_match_closed_forms(void **state)
 }
 
 /* Checks that cells with warped faces and concave cells leave no gap and do not overlap: their volumes sum to the
- * cube's. Warped hexes and wedges are also tested as polyhedra with bilinear faces. */
+ * cube's volume. Warped hexes and wedges are also tested as polyhedra with bilinear faces. */
 static void bent_and_concave_cells_fill_their_cube(void **state)
 {
     (void)state;
@@ -123,8 +124,8 @@ static void bent_and_concave_cells_fill_their_cube(void **state)
         }
 }
 
-/* Compares the statistics of equal cubes of known values with sums computed here. Bins range from -2 to 6, so that some
- * cells are in no bin. */
+/* Compares the statistics of equal cubes with known values with sums computed here. The bins range from -2 to 6, so
+ * that some cells are in no bin. */
 static void cell_counts_are_sums_over_ranks(void **state)
 {
     (void)state;
@@ -206,7 +207,7 @@ static void restarted_runs_continue_the_file(void **state)
     run_steps(scene, &in, 3, 7);
     read_file("runs.csv", MOST, text);
     everywhere(own_rank != 0 || strcmp(first, text) == 0);
-    if (own_rank == 0) first[strlen(first) - 20] = '\0'; /* the last line is incomplete */
+    if (own_rank == 0) first[strlen(first) - 20] = '\0'; /* makes the last line incomplete */
     write_text_file("runs.csv", first);
     run_steps(scene, &in, 6, 7);
     read_file("runs.csv", MOST, first);
@@ -214,7 +215,7 @@ static void restarted_runs_continue_the_file(void **state)
     input_free(&in);
 }
 
-/* Checks that the error is returned on all ranks, and that the picture is still drawn. */
+/* Checks files that cannot be written: the error is returned on all ranks, and the picture is still drawn. */
 static void files_that_cannot_be_written_are_reported(void **state)
 {
     (void)state;
@@ -240,7 +241,8 @@ static void files_that_cannot_be_written_are_reported(void **state)
     input_free(&in);
 }
 
-/* Checks that statistics and conditions of a missing field do not prevent those of other fields from being found. */
+/* Checks that statistics and conditions of other fields are evaluated if the scene also requests those of a missing
+ * field. */
 static void other_fields_are_found_if_a_field_is_missing(void **state)
 {
     (void)state;
@@ -269,7 +271,8 @@ static void other_fields_are_found_if_a_field_is_missing(void **state)
 
 /* ---- conditions ------------------------------------------------------------------------------------------------ */
 
-/* Sets a field whose maximum is the cycle, and returns the cycles from 0 to 9 at which a picture was drawn, as bits. */
+/* Makes steps with the cycles 0 to 9, in which the maximum of the field is the cycle. Returns the cycles that drew a
+ * picture, as bits. */
 static unsigned find_cycles_drawn(const char *scene)
 {
     unsigned drawn = 0;

@@ -1,6 +1,7 @@
-/* Tests the strides of every array of every form of mesh, of its fields, patches and components. A stride by which the
- * elements could not lie in memory is refused at once, with the array, its count and its stride, and the same error is
- * returned on all ranks. Arrays that are read backwards draw the same pictures as arrays that are read forwards. */
+/* Checks the strides of every array of every form of mesh, of its fields, patches and components. If elements with a
+ * stride could not lie in memory, the call must refuse it at once and name the array, its count and its stride, and all
+ * ranks must return the same error. Arrays that are read backwards must give the same pictures as arrays that are read
+ * forwards. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,12 +10,12 @@
 
 enum { SIDE = 3, MOST = 40 };
 
-/* A stride of a description, with the name of its array in messages and the number of its elements. */
+/* A stride in a description, with the name that messages use for its array, and the number of elements. */
 typedef struct strided {
     const char *name;
     int64_t *stride;
     int64_t count;
-    insitu_array *array; /* NULL if the stride is that of components */
+    insitu_array *array; /* NULL if it is the stride between components */
 } strided;
 
 static int append_strided_array(strided *list, int at, const char *name, insitu_array *array, int64_t count)
@@ -59,7 +60,8 @@ static int list_field_arrays(formed_mesh *m, strided *out, int at)
     return at;
 }
 
-/* Describes the patch's faces by their vertices and offsets, or by a list of their numbers. */
+/* Describes the patch's faces by their vertices and offsets, or by a list of their numbers; appends the arrays of this
+ * description to the list. */
 static int list_patch_arrays(formed_mesh *m, strided *out)
 {
     static int64_t offsets[2], number[1];
@@ -86,7 +88,7 @@ static int list_patch_arrays(formed_mesh *m, strided *out)
 static const int64_t wild[] = {(int64_t)1 << 60,    (int64_t)1 << 62, (int64_t)1 << 49,   INT64_MIN,
                                -((int64_t)1 << 60), INT64_MAX - 7,    -((int64_t)1 << 49)};
 
-/* Sets invalid strides on the last rank, and checks that all ranks get the error. */
+/* Sets each invalid stride on the last rank, and checks that all ranks get the error. */
 static void check_strides_are_refused(insitu_session *session, formed_mesh *m, const strided *s, bool is_last)
 {
     for (size_t i = 0; i < sizeof wild / sizeof wild[0]; i++) {
@@ -111,7 +113,8 @@ static void check_strides_are_refused(insitu_session *session, formed_mesh *m, c
     }
 }
 
-/* Refuses each array of the list. All ranks must have equally long lists, since the checks are collective. */
+/* Checks that invalid strides of each array in the list are refused. The lists of all ranks must have the same length,
+ * because the checks are collective. */
 static void check_all_strides_are_refused(insitu_session *session, formed_mesh *m, const strided *list, int count)
 {
     int most = count;
@@ -183,7 +186,7 @@ static int64_t get_element_size(const strided *s)
                                                             : 8;
 }
 
-/* Copies the elements, each of `bytes` bytes, in reverse order. The array then begins at the copy's last element and
+/* Copies the elements, each of `bytes` bytes, in reverse order. The array then begins at the copy's last element, and
  * has a negative stride. */
 static void *copy_in_reverse(const strided *s, int64_t bytes)
 {

@@ -1,6 +1,6 @@
-/* Tests the outer surfaces of a session. They consist of the faces that only one cell has; their area shows that no
- * face is missing and that no interior face is included. Their pictures agree with a closed form and are the same to
- * the bit for any partition as on one rank. Warped faces are drawn as bilinear patches. */
+/* Checks the outer surfaces of a session, which consist of the faces that only one cell has. Their area shows that no
+ * face is missing and that no interior face is included. Their pictures must agree with a closed form, and must be
+ * bit-identical for any partition. Warped faces must be drawn as bilinear patches. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -24,8 +24,8 @@ static void make_whole_mesh(test_mesh_kind kind, session_input *out)
     input_describe(out);
 }
 
-/* Extracts this rank's cells in this rank's own order or, with_ghosts, all cells, of which those of other ranks are
- * ghosts. */
+/* Extracts this rank's cells in an order of its own or, if with_ghosts is set, all cells, of which those of other ranks
+ * are ghosts. */
 static void extract_rank_cells(const session_input *whole, test_partition_kind distributed, bool with_ghosts,
                                session_input *out)
 {
@@ -96,7 +96,8 @@ static double compute_whole_area(const session_input *in)
     return area;
 }
 
-/* The cube has six squares of area 4. A sum of some hundred areas is off by less than 1e-12. */
+/* Checks the area of the outer faces: the cube has six squares of area 4. A sum of some hundred areas has an error of
+ * less than 1e-12. */
 static void outer_faces_match_the_cube(void **state)
 {
     (void)state;
@@ -106,7 +107,7 @@ static void outer_faces_match_the_cube(void **state)
             make_whole_mesh(kind, &whole);
             extract_rank_cells(&whole, way == 1 ? TEST_BLOCK : TEST_RANDOM, way == 2, &part);
             if (way == 3 && kind != TEST_POLYHEDRA)
-                test_mesh_to_polyhedra(&part.part, 0.5); /* half of the cells, mixed with the others */
+                test_mesh_to_polyhedra(&part.part, 0.5); /* half of the cells, mixed with other types */
             input_describe(&part);
             const double area = compute_whole_area(&part);
             if (!(fabs(area - 24) < 1e-12))
@@ -127,8 +128,8 @@ static int64_t *make_ids(const session_input *whole, const session_input *part, 
     return ids;
 }
 
-/* Checks that vertex ids that are the same on all ranks do not change the outer faces, and that with ids of each rank's
- * own each rank's whole boundary is outer. */
+/* Checks that vertex ids that are equal on all ranks do not change the outer faces. If the ids of each rank differ from
+ * those of all other ranks, the whole boundary of each rank's part is outer. */
 static void vertex_ids_identify_shared_faces(void **state)
 {
     (void)state;
@@ -150,7 +151,7 @@ static void vertex_ids_identify_shared_faces(void **state)
 /* ---- pictures of the cube ------------------------------------------------------------------------------------ */
 
 /* Computes the depths at which the ray enters and leaves the cube; returns false if it misses the cube. *margin is the
- * distance from an edge or from a change between hit and miss. */
+ * distance of the ray from the nearest edge of the cube or from the border between hit and miss. */
 static bool cross_cube(const ray *r, double depths[2], double *margin)
 {
     double in[3], out[3];
@@ -167,9 +168,10 @@ static bool cross_cube(const ray *r, double depths[2], double *margin)
     return depths[0] < depths[1];
 }
 
-/* A hit's depth is off by roundings of numbers near 5 in single precision, and by equal errors of its position across
- * the ray, divided by the sine of the angle between ray and face, at least 1/10 here. Its grey is off by the rounded
- * position times the field's slope of 1 in 4 and the colour table's slope of 3. */
+/* Returns whether the picture shows the cube. The depth of a hit has rounding errors of numbers near 5 in single
+ * precision, and equal errors of its position across the ray, divided by the sine of the angle between ray and face, at
+ * least 1/10 here. The grey of a hit has the error of the position, times the field's slope of 1 in 4, times the colour
+ * table's slope of 3. */
 static bool is_cube(const caught_picture *picture, float opacity)
 {
     int hits = 0;
@@ -212,7 +214,8 @@ static bool are_equal_pictures(const caught_picture *a, const caught_picture *b)
            memcmp(a->depth, b->depth, PIXELS * sizeof(float)) == 0;
 }
 
-/* Surfaces of opacity 1/2 are crossed twice by every ray, so their opacity is 3/4. */
+/* Checks pictures of the cube. Every ray crosses surfaces of opacity 1/2 twice, so that the opacity of the pixel is
+ * 3/4. */
 static void check_cube_picture(test_mesh_kind kind)
 {
     session_input whole = {0};
@@ -248,8 +251,8 @@ static void cube_surfaces_are_exact_on_any_ranks(void **state)
 
 /* ---- warped faces -------------------------------------------------------------------------------------------- */
 
-/* The oracle first intersects each bilinear patch as FINE × FINE squares of two triangles each. Newton's method then
- * finds the intersection of the ray and the patch itself in STEPS steps. */
+/* The reference intersects each bilinear patch in two stages: first as FINE × FINE squares of two triangles each, and
+ * then by STEPS steps of Newton's method for the exact patch. */
 enum { FINE = 16, STEPS = 6 };
 
 static void cross_product(const double a[3], const double b[3], double out[3])
@@ -278,7 +281,7 @@ static bool intersects_triangle(const ray *r, const double *a, const double *b, 
     return s >= 0 && t >= 0 && s + t <= 1;
 }
 
-/* A ray's hit on a patch: its depth, and the sine of the angle between the two. */
+/* A ray's hit on a patch: its depth, and the sine of the angle between ray and patch. */
 typedef struct patch_hit {
     double depth, slant;
 } patch_hit;
@@ -319,9 +322,9 @@ static void intersect_patch(const ray *r, const double *const p[4], patch_hit *n
         }
 }
 
-/* Rays at the silhouette, whose neighbours do not hit the hex, are left out. Depths are off by roundings of numbers
- * near 7 in single precision, and by errors of the position across the ray divided by the sine of the angle between ray
- * and patch. */
+/* Returns whether the picture shows the hex. Rays at the silhouette, next to pixels that do not hit the hex, are not
+ * checked. Depths have rounding errors of numbers near 7 in single precision, and errors of the position across the ray
+ * divided by the sine of the angle between ray and patch. */
 static bool is_hex(const caught_picture *picture, const double *places)
 {
     static const int faces[6][4] = {{0, 4, 7, 3}, {1, 2, 6, 5}, {0, 1, 5, 4}, {3, 7, 6, 2}, {0, 3, 2, 1}, {4, 5, 6, 7}};
@@ -416,8 +419,8 @@ static void faces_are_found_once_for_the_cells(void **state)
 
 /* ---- polygons -------------------------------------------------------------------------------------------------- */
 
-/* Draws a cube whose face towards the eye has an additional vertex in the middle of an edge, like a hanging node. Rays
- * that meet the face exactly on the line between two of its triangles, y = z, must hit it. */
+/* Checks a cube whose face towards the eye has an additional vertex in the middle of an edge, like a hanging node. Rays
+ * that meet the face exactly on the line y = z, between two of its triangles, must hit it. */
 static void rays_along_the_diagonals_of_polygons_hit(void **state)
 {
     (void)state;
@@ -450,7 +453,7 @@ static void rays_along_the_diagonals_of_polygons_hit(void **state)
     for (int i = 0; is_right && own_rank == 0 && i < 64 * 64; i++) {
         const int column = i % 64, row = i / 64;
         const bool is_inside = column >= 16 && column < 48 && row >= 16 && row < 48;
-        /* The camera's depth is a float of about 4. */
+        /* Depths are floats of about 4, measured along the camera's axis. */
         is_right = is_inside ? fabs((double)caught[0].depth[i] - 4) < 1e-6 : isinf(caught[0].depth[i]);
         if (!is_right) fprintf(stderr, "pixel %d, %d: depth %g\n", column, row, (double)caught[0].depth[i]);
     }

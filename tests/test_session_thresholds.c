@@ -1,6 +1,6 @@
-/* Tests the surfaces of thresholds: the faces between cells within the bounds and all others. They are compared with a
- * brute-force search over all pairs of faces, are found again when the values change, and give the same picture on any
- * number of ranks. */
+/* Checks the surfaces of thresholds, which are the faces between cells with values within the bounds and all other
+ * cells. They are compared with a brute-force search over all pairs of faces, must be updated when the values change,
+ * and must give the same picture on any number of ranks. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -22,8 +22,8 @@ enum { SIDE = 3, PIXELS = 48 * 36 };
 
 /* ---- faces ---------------------------------------------------------------------------------------------------- */
 
-/* Mixes the bits of a hash. A face's hash is the sum of the mixed hashes of its corners' positions, so it does not
- * depend on their order. */
+/* Mixes the bits of a hash. The hash of a face is the sum of the mixed hashes of its corners' positions, so that it
+ * does not depend on their order. */
 static uint64_t mix_bits(uint64_t h)
 {
     h = (h ^ h >> 30) * 0xbf58476d1ce4e5b9u;
@@ -42,7 +42,7 @@ static uint64_t hash_position(const double place[3])
     return out;
 }
 
-/* A set of faces: the number of faces, and a sum of hashes that differs between different sets. */
+/* A set of faces: number of faces, and a sum of hashes that differs between different sets. */
 typedef struct face_set {
     uint64_t count, sum;
 } face_set;
@@ -63,7 +63,7 @@ static bool is_value_within_bounds(const test_mesh *mesh, const grid *g, int64_t
     return true;
 }
 
-/* Finds the faces that exactly one of the cells within the bounds has, by comparing each face with each other face. */
+/* Finds the faces that belong to exactly one cell within the bounds, by comparing each face with every other face. */
 static face_set find_faces_by_brute_force(const test_mesh *mesh, const grid *g, bool is_cell_centred)
 {
     face_set out = {0};
@@ -91,8 +91,8 @@ static face_set find_faces_by_brute_force(const test_mesh *mesh, const grid *g, 
     return out;
 }
 
-/* Finds the faces that this rank draws, and sums them over all ranks. Faces are stored as pyramids and tets, whose last
- * vertex is the apex. */
+/* Collects the faces that this rank draws, and sums the sets of all ranks. The session stores faces as pyramids and
+ * tets, whose last vertex is the apex. */
 static face_set find_drawn_faces(const insitu_session *session)
 {
     face_set out = {0};
@@ -110,8 +110,8 @@ static face_set find_drawn_faces(const insitu_session *session)
 
 /* ---- sessions ------------------------------------------------------------------------------------------------- */
 
-/* Sets the values to a wave that moves from step to step. Cell values are the wave's values at the cells' first
- * vertices. */
+/* Sets the values to a wave that moves from step to step. The value of a cell is that of the wave at the cell's first
+ * vertex. */
 static void set_values(session_input *in, bool is_cell_centred, double step)
 {
     test_mesh *part = &in->part;
@@ -120,7 +120,7 @@ static void set_values(session_input *in, bool is_cell_centred, double step)
     part->values = calloc((size_t)count + 1, sizeof *part->values);
     assert_non_null(part->values);
     for (int64_t i = 0; i < count; i++) {
-        /* The connectivity of a polyhedron lists faces, not vertices. */
+        /* the connectivity of a polyhedron lists faces, not vertices */
         int64_t vertex = is_cell_centred ? part->connectivity[part->offsets[i]] : i;
         if (is_cell_centred && part->types[i] == 42)
             vertex = part->face_connectivity[part->face_offsets[part->connectivity[part->offsets[i]]]];
@@ -200,7 +200,7 @@ static void faces_enclose_the_cells_within_bounds(void **state)
         for (int way = 0; way < 3; way++) check_threshold(kind, way == 1, way == 2);
 }
 
-/* Checks thresholds that all cells or no cells are within, and a mesh without the field. */
+/* Checks thresholds that select all cells or no cell, and a threshold on a field that the mesh does not have. */
 static void bounds_can_select_all_or_no_cells(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
-/* Tests volumes that fill the same space, which make a fragment in every cell on a ray. They are drawn in several
- * turns, so that no rank holds all of its fragments at once. The number of turns must be small, because all ranks wait
- * for each other in each turn. */
+/* Checks volumes that fill the same space, for which every cell on a ray makes a fragment. They are drawn in several
+ * turns, so that no rank has all of its fragments in memory at once. The number of turns must be small, because all
+ * ranks wait for each other in each turn. */
 #include <stdio.h>
 
 #include "test_effort.h"
@@ -38,7 +38,7 @@ static void one_volume_needs_no_further_pass(void **context)
     everywhere(totals.turns == 0);
 }
 
-/* A picture of a few fragments per ray is drawn in one turn. */
+/* Checks that a picture with few fragments per ray is drawn in one turn. */
 static void two_volumes_take_a_further_pass(void **context)
 {
     (void)context;
@@ -46,8 +46,9 @@ static void two_volumes_take_a_further_pass(void **context)
     everywhere(totals.turns == 1);
 }
 
-/* Checks a picture that took 124 turns when a turn was limited to an estimated 4 million fragments of all ranks
- * together. A rank may hold 2 million fragments at once (64 MiB), and as many again packed and unpacked. */
+/* Checks a picture with many fragments. It took 124 turns when a turn was limited to an estimated 4 million fragments
+ * of all ranks together. Now a rank can hold 2 million fragments at once (64 MiB), and as many packed and unpacked
+ * ones. */
 static void many_fragments_take_few_passes(void **context)
 {
     (void)context;

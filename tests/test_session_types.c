@@ -1,6 +1,6 @@
-/* Tests that arrays of any type, address and stride draw the same picture as the same numbers in float64 and int64.
- * This applies to arrays of cells and faces, to flags and coordinates, and to values whose components are interleaved
- * or separate. Arrays that are read in place must not increase the number of copied bytes. */
+/* Checks that arrays of any type, address and stride draw the same picture as the same numbers in float64 and int64:
+ * arrays of cells and faces, flags, coordinates, and values whose components are interleaved or separate. The number of
+ * copied bytes must not increase for arrays that can be read in place. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -109,7 +109,7 @@ static bool convert_array(insitu_array *a, int64_t count, const layout *as)
 {
     const int64_t stride = get_type_size(as->type) + as->gap;
     if (!a->data) return true;
-    char *room = malloc((size_t)(count * stride + as->shift + 16)); /* malloc aligns this to 16 bytes */
+    char *room = malloc((size_t)(count * stride + as->shift + 16)); /* malloc aligns the block to 16 bytes */
     assert_true(room && room_count < MOST_ROOMS);
     rooms[room_count++] = room;
     bool fits = true;
@@ -137,7 +137,7 @@ static void create_integer_input(session_input *in, test_mesh_kind kind)
     input_describe(in);
 }
 
-/* Draws the input. Returns its picture and the number of bytes that the step copied. */
+/* Draws the input. Returns the picture, and in *copied the number of bytes that the step copied. */
 static caught_picture draw_and_count_copies(const char *path, const session_input *in, int64_t *copied)
 {
     discard_pictures();
@@ -148,8 +148,8 @@ static caught_picture draw_and_count_copies(const char *path, const session_inpu
     return pop_caught_picture();
 }
 
-/* Draws the input and compares the picture with the true one. If is_in_place, no more bytes may be copied than for the
- * true picture. */
+/* Draws the input and compares the picture with the expected one. If is_in_place is set, no more bytes may be copied
+ * than for the expected picture. */
 static void check_same_picture(const char *path, const session_input *in, const caught_picture *truth, int64_t copied,
                                bool is_in_place)
 {
@@ -196,7 +196,8 @@ static void index_type_changes_no_picture(void **state)
     everywhere(drawn > 60);
 }
 
-/* Gives cell types by VTK's numbers and by other numbers with a map, and flags whose lowest byte is 0. */
+/* Checks types and flags in all layouts: cell types are VTK's numbers, or other numbers with a map, and the lowest byte
+ * of flags is 0. */
 static void type_of_types_and_flags_changes_no_picture(void **state)
 {
     (void)state;
@@ -215,7 +216,7 @@ static void type_of_types_and_flags_changes_no_picture(void **state)
         for (int64_t c = 0; c < in.mesh.cell_count; c++) {
             char *to = (char *)(uintptr_t)in.mesh.ghosts.data + c * (get_type_size(as->type) + as->gap);
             store_number(to, as->type, in.part.ghosts[c] ? flag : 0);
-            /* Applies the inverse of the map, which adds 25 modulo 60. */
+            /* applies the inverse of the map, which adds 25 modulo 60 */
             if (i % 2) in.part.types[c] = (unsigned char)((in.part.types[c] + 35) % 60);
         }
         if (i % 2) in.mesh.cell_type_map = map;
@@ -294,7 +295,7 @@ static const char vector_scene[] = "images:\n"
 
 enum { COMPONENTS = 3 };
 
-/* Layouts of the vector field; the true picture is drawn from packed tuples. */
+/* Layouts of the vector field. The expected picture is drawn from packed tuples. */
 typedef enum vector_form { TUPLES, APART, APART_BY_INDEX, UNALIGNED_TUPLES, TUPLES_BY_INDEX, VECTOR_FORMS } vector_form;
 
 static insitu_array components[COMPONENTS];
@@ -355,8 +356,8 @@ static void separate_components_draw_the_same_picture(void **state)
     }
 }
 
-/* Checks that a field that is set again, unchanged or without need, is read correctly, whether its tables of components
- * are reused or created again. */
+/* Checks that a field is read correctly if it is set in each step with the same values, declared as changed or
+ * unchanged, and if the caller overwrites the table of components after the call. */
 static void components_can_be_set_again(void **state)
 {
     (void)state;
@@ -391,8 +392,8 @@ static void components_can_be_set_again(void **state)
     input_free(&in);
 }
 
-/* Checks that a session whose arrays change between layouts, and then get new coordinates, draws the same pictures as a
- * session that always has float64. */
+/* Checks a session whose arrays change their layout from step to step, and then get new coordinates: it must draw the
+ * same pictures as a session whose arrays are always float64. */
 static void forms_can_change_between_steps(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
-/* Tests meshes whose cells list their vertices in an order other than the declared one. The warning must name the
+/* Checks meshes whose cells list their vertices in another order than the declared one. The warning must name the
  * actual order, whatever signs the sums of corner volumes have. Mirrored and distorted cells must not cause this
- * warning, and cells that are wrong in every order get a warning that states this. */
+ * warning, and for cells that are wrong in every order the warning must state this. */
 #include <stdio.h>
 #include <string.h>
 
@@ -43,8 +43,8 @@ static bool orders_differ(test_mesh_kind kind, int a, int b)
     return a == own || b == own;
 }
 
-/* Checks that one warning with these words is given. If words is NULL, checks that no warning about the vertex order is
- * given; a warning about left-handed cells is then allowed. */
+/* Checks that exactly one warning is given, which contains `words`. If words is NULL, checks that no warning about the
+ * vertex order is given; a warning about left-handed cells is then allowed. */
 static void expect_warning(insitu_session *session, const session_input *in, const char *words, const char *what)
 {
     everywhere(submit_input(session, in) == INSITU_OK);
@@ -86,13 +86,14 @@ static void fitting_vertex_order_is_suggested(void **state)
             for (int said = 0; said < ORDERS; said++)
                 for (int j = 0; j < 3; j++)
                     for (int mirrored = 0; mirrored < 2; mirrored++)
-                        /* If the actual order equals VTK's for this kind, the warning names VTK's. */
+                        /* If the actual order equals VTK's for this kind of cells, the warning names VTK's order, so
+                         * that the case is not tested. */
                         if (stand == INSITU_ORDER_VTK || orders_differ(kinds[k], INSITU_ORDER_VTK, stand))
                             check_order_warning(kinds[k], (insitu_vertex_order)stand, (insitu_vertex_order)said,
                                                 jitters[j], mirrored);
 }
 
-/* Exchanges two opposite vertices of each hex, so that the cells are wrong in every order. */
+/* Checks hexes of which two opposite vertices are exchanged, so that the cells are wrong in every order. */
 static void twisted_cells_are_reported(void **state)
 {
     (void)state;

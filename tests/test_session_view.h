@@ -1,4 +1,5 @@
-/* Defines a small image and its camera, for tests of sessions that compute each pixel by a closed form. */
+/* Defines a small image and its camera (the view), for tests of sessions that compute the expected pixels in closed
+ * form. */
 #ifndef TEST_SESSION_VIEW_H
 #define TEST_SESSION_VIEW_H
 
@@ -8,7 +9,8 @@ enum { WIDTH = 48, HEIGHT = 36, PIXELS = WIDTH * HEIGHT };
 
 #define EYE "    camera: {position: [3, 2.2, 4], focal: [0, 0, 0], angle: 40}\n"
 
-/* Begins the image with these keys, followed by `more`, further keys of the image. The layers and IMAGE_END follow. */
+/* The beginning of a scene of one image, with `more` further keys of the image. The layers and IMAGE_END must
+ * follow. */
 #define IMAGE_BEGIN(more)                                                                                              \
     "images:\n  - name: a\n    size: [48, 36]\n    background: [0, 0, 0, 0]\n" EYE more "    layers:\n"
 #define IMAGE_END "    outputs: [{path: a.exr}]\n"

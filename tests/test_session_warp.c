@@ -1,8 +1,8 @@
-/* Warped meshes: the pictures of a mesh that the scene warps are, to the bit, those of a mesh that is handed over with
- * the vertices at x + scale * u, computed here in double: of all forms of meshes, lattices, blocks and cells of higher
- * order, with displacements in arrays of any layout, on any ranks. Only what changes is computed anew. Statistics are
- * those of the warped mesh, by closed forms. What is wrong with the field is told to all ranks, with the line and the
- * key of the scene. */
+/* Checks meshes that the scene warps. Their pictures must be bit-identical to those of a mesh that is passed with
+ * vertices at x + scale * u, which the test computes in double. Tested are all forms of meshes, lattices, blocks and
+ * cells of higher order, with displacements in arrays of any layout, on any ranks. Only what depends on a change may be
+ * recomputed. Statistics must be those of the warped mesh, in closed form. A fault of the displacement field must be
+ * reported on all ranks, with the line and the key of the scene. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -27,7 +27,7 @@ static void compute_displacement(const double p[3], double out[3])
     out[2] = 0.3 * sin(2 * p[0]) * cos(p[1]);
 }
 
-/* A field "u" at the vertices, packed, and a mesh that is moved by it; both have arrays of their own. */
+/* A packed field "u" at the vertices, and a mesh that is moved by it. Both have arrays of their own. */
 typedef struct warped {
     int components;
     double *u;
@@ -54,7 +54,8 @@ static void make_field(const insitu_mesh *mesh, int components, warped *out)
     out->field.values = (insitu_array){out->u, INSITU_FLOAT64, 0};
 }
 
-/* The mesh with moved coordinates, of its own types; of double where a lattice has them along its axes. */
+/* Makes the moved mesh. Its coordinates have the types of the given ones, or are doubles if a lattice has coordinates
+ * only along its axes. */
 static void move_mesh(const insitu_mesh *mesh, double factor, warped *w)
 {
     const bool has_axes = mesh->lattice && !mesh->coordinates[0].data;
@@ -148,8 +149,9 @@ static void cells_of_higher_order_draw_their_moved_nodes(void **state)
     }
 }
 
-/* Finer pieces are made of the moved nodes, and again if the displacements change, the scene's warp goes and comes, or
- * nodes move. The plain session is handed the moved nodes anew in each step. */
+/* Checks finer pieces of cells of higher order. They must be made of the moved nodes, and must be remade if the
+ * displacements change, if the scene's warp is removed or added, or if nodes move. The session `plain` receives the
+ * moved nodes as a new mesh in each step. */
 static void refined_pieces_follow_the_warp(void **state)
 {
     (void)state;
@@ -189,7 +191,7 @@ static void refined_pieces_follow_the_warp(void **state)
     order_mesh_free(&m);
 }
 
-/* Lagrange hexes without connectivity, each with nodes of its own. */
+/* Checks Lagrange hexes without connectivity, which share no nodes. */
 static void unshared_nodes_are_moved(void **state)
 {
     (void)state;
@@ -275,7 +277,8 @@ static void blocks_draw_their_moved_vertices(void **state)
 
 typedef enum layout { TUPLES, FLOATS, APART, BY_INDEX, FILLED, LAYOUTS } layout;
 
-/* Whole numbers, so that all types hold them; in arrays of `room`. */
+/* Stores displacements, which are integers so that all types can represent them, in one of the layouts. room: memory
+ * for the arrays. */
 static void store_displacements(layout as, warped *w, void *room, int64_t *index, filled_values *values)
 {
     static insitu_array apart[3];
@@ -384,7 +387,8 @@ static stamps get_stamps(const insitu_session *session)
     return (stamps){mesh->cells_stamp, mesh->coordinates_stamp};
 }
 
-/* A step of the warped session draws what the moved mesh draws in another session, which has taken the same steps. */
+/* Makes a step of the warped session, and checks that it draws the same pictures as the session `plain`, which receives
+ * the moved mesh and has made the same steps. */
 static void expect_step(insitu_session *session, insitu_session *plain, const session_input *in, double factor,
                         warped *w, int cycle, const char *what)
 {
@@ -420,7 +424,7 @@ static void steps_compute_only_what_has_changed(void **state)
     expect_step(session, plain, &in, scale, &w, 2, "the same mesh again");
     everywhere(get_stamps(session).coordinates == first.coordinates);
 
-    if (own_rank == rank_count - 1) /* the others learn of it */
+    if (own_rank == rank_count - 1) /* the change on the last rank must reach all other ranks */
         for (int64_t i = 0; i < 3 * in.part.vertex_count; i++) w.u[i] *= 1.5;
     everywhere(insitu_set_field(session, "m", &w.field) == INSITU_OK);
     const int64_t before = insitu_last_report(session)->bytes_copied;
@@ -496,7 +500,7 @@ static void copies_and_gradients_are_reported(void **state)
 
 /* ---- statistics ------------------------------------------------------------------------------------------------- */
 
-/* The cube of volume 8 is stretched by 1 + 0.3 along x. */
+/* Checks the volume of a cube of volume 8 that is stretched by 1 + 0.3 along x. */
 static void statistics_are_of_the_warped_mesh(void **state)
 {
     (void)state;
@@ -628,7 +632,7 @@ static void errors_are_reported_with_line_and_key(void **state)
         memset(values, 0, size * sizeof *values);
         u.values.data = values;
         if (own_rank == rank_count - 1 && faults[i].spoil) faults[i].spoil(&u, &in.mesh);
-        for (int cycle = 0; cycle < 2; cycle++) { /* told in each step until it is mended */
+        for (int cycle = 0; cycle < 2; cycle++) { /* the error is returned by each step until it is corrected */
             everywhere(submit_input(session, &in) == INSITU_OK && insitu_set_field(session, "m", &u) == INSITU_OK);
             discard_pictures();
             const insitu_status status = insitu_step(session, cycle, 0);

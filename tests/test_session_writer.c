@@ -1,6 +1,6 @@
-/* Tests the pictures that a thread of rank 0 writes while the simulation continues. They must be the same, and in the
- * same order, as if they were written in the step. Errors are returned by a later step on all ranks, the number of
- * pending pictures is limited, and they can outlive their scene. */
+/* Checks the pictures that a thread of rank 0 writes while the simulation continues. The pictures and their order must
+ * be the same as if they were written in the step. Errors are returned by a later step on all ranks, the number of
+ * pending pictures is limited, and pending pictures can outlive their scene. */
 #include <pthread.h>
 #include <stdio.h>
 #include <string.h>
@@ -17,7 +17,8 @@ enum { SIDE = 4, MIB = 1 << 20 };
          "}]\n    decorations: {title: '{cycle}'}\n    outputs: [{path: 'a{cycle}.png'}, {path: 'a{cycle}.exr'}]\n"    \
          "  - name: b\n    size: [8, 12]\n    layers: [{volume: {field: f}}]\n    outputs: [{path: 'b{cycle}.exr'}]\n"
 
-/* While is_closed, rank 0's writer thread waits at this gate before it writes a picture. */
+/* A gate for tests: while is_closed is set, rank 0's writer thread waits at the gate before each picture. passed:
+ * number of pictures that have passed the gate. */
 static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
 static pthread_cond_t has_changed = PTHREAD_COND_INITIALIZER;
 static bool is_closed;
@@ -72,7 +73,7 @@ static bool are_equal_pictures(const caught_picture *a, const caught_picture *b)
            (!a->depth || memcmp(a->depth, b->depth, pixels * sizeof(float)) == 0);
 }
 
-/* Returns whether 2 × count pictures were caught, of which the first half equals the second half. */
+/* Returns whether exactly 2 × count pictures were caught, and the first half equals the second half. */
 static bool are_picture_halves_equal(int count)
 {
     bool is_same = caught_count == 2 * count;
@@ -98,7 +99,7 @@ static void pictures_are_those_written_in_the_step(void **state)
     input_free(&in);
 }
 
-/* Checks that steps end while no picture is written. The report counts the pending pictures, and insitu_destroy()
+/* Checks that steps end while no picture can be written. The report counts the pending pictures, and insitu_destroy()
  * reports all pictures that could not be written. */
 static void simulation_continues_while_pictures_are_pending(void **state)
 {
@@ -110,7 +111,7 @@ static void simulation_continues_while_pictures_are_pending(void **state)
     for (int cycle = 0; cycle < 4; cycle++) {
         everywhere(insitu_step(session, cycle, 0.5) == INSITU_OK);
         const insitu_report *report = insitu_last_report(session);
-        const int waiting = cycle + 1 + cycle / 2 + 1; /* image a at every other cycle, b at each cycle */
+        const int waiting = cycle + 1 + cycle / 2 + 1; /* image a is due every other cycle, b each cycle */
         everywhere(report->pictures_waiting == (own_rank ? 0 : waiting) && report->background_ms == 0);
     }
     everywhere(caught_count == 0);
@@ -179,7 +180,7 @@ static void write_failure_is_reported_by_a_later_step_or_destroy(void **state)
     insitu_session *session = open_session_with_gate(write_scene(SCENE("", "[16, 12]")), &in, wait_at_gate);
     everywhere(insitu_step(session, 2, 0.5) == INSITU_OK);
     wait_for_passed(3);
-    /* The writer thread's progress determines which step returns the error: the last picture has passed the gate, but
+    /* The writer thread's progress decides which step returns the error: the last picture has passed the gate, but it
      * may not be written yet. */
     insitu_status status = INSITU_OK;
     for (int cycle = 3; cycle < 1000 && !status; cycle += 2) {
@@ -197,7 +198,7 @@ static void write_failure_is_reported_by_a_later_step_or_destroy(void **state)
     input_free(&in);
 }
 
-/* Checks that an error of the step is returned first, and that the error of a picture is returned later and not
+/* Checks that the error of a step is returned first, and that the error of a picture is returned later and is not
  * lost. */
 static void write_failure_is_reported_after_a_step_error(void **state)
 {
@@ -272,9 +273,8 @@ static void tables_are_written_after_their_pictures(void **state)
     input_free(&in);
 }
 
-/* Checks that the calling thread loads the image library in insitu_create(). Loading it in parallel with a step would
- * hold the loader's lock, for which the start of OpenMP's threads waits. The next report includes the time for
- * loading. */
+/* Checks that the calling thread loads the image library in insitu_create(). If it were loaded in parallel with a step,
+ * the loader's lock would delay the start of OpenMP's threads. The next report includes the time for loading. */
 static void image_library_is_loaded_before_the_first_step(void **state)
 {
     (void)state;

@@ -1,10 +1,10 @@
-/* Tests meshes of every form and fields with random errors: in counts, strides, NULL pointers, types, alignment,
- * indices, offsets, coordinates, values and options, and missing arrays; on one rank or on all ranks. Each step must
- * return an error, the same on all ranks, or draw its pictures. Once the input is correct, the next step must draw what
- * the first step drew.
+/* Checks meshes of every form and fields with random errors, on one rank or on all ranks: in counts, strides, NULL
+ * pointers, types, alignment, indices, offsets, coordinates, values and options, and missing arrays. Each step must
+ * either return the same error on all ranks, or draw its pictures. After the input is corrected, the next step must
+ * draw the same as the first step.
  *
- * The library must be able to detect each error, so no error makes an array longer than its memory: counts and elements
- * are made smaller, or so large that no array of this size can exist. */
+ * The library must be able to detect each error, so no error describes an array as longer than its memory: counts and
+ * elements are made smaller, or so large that no array of this size can exist. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -30,12 +30,13 @@ static int64_t draw_random(dice *d, int64_t sides)
 
 /* ---- arrays ---------------------------------------------------------------------------------------------------- */
 
-/* An array of the input: its description, which may be corrupted, and its correct description. */
+/* An array of the input: its description, which may be corrupted, and its correct description (truth). */
 typedef struct input_array {
     insitu_array *array;
     insitu_array truth;
-    int64_t count;              /* correct number of elements */
-    bool are_indices, is_table; /* is_table: has pointers, or the sizes of their lists */
+    int64_t count; /* correct number of elements */
+    /* are_indices: elements are indices; is_table: elements are pointers, or the sizes of lists */
+    bool are_indices, is_table;
 } input_array;
 
 enum { ARRAYS = 22 };
@@ -120,7 +121,8 @@ static void corrupt_stride(const input_array *a, dice *d)
     a->array->stride_bytes = stride == 3 && size < stride ? size : stride; /* stays within the array's memory */
 }
 
-/* Sets another type of at most as many bytes, valid or invalid for this array, or a number that is not a type. */
+/* Sets another type of at most as many bytes, which can be valid or invalid for this array, or a number that is no
+ * type. */
 static void corrupt_type(const input_array *a, dice *d)
 {
     static const int types[] = {INSITU_FLOAT32, INSITU_FLOAT64, INSITU_INT32, INSITU_INT64, INSITU_UINT8, 0, -1, 77};
@@ -130,7 +132,7 @@ static void corrupt_type(const input_array *a, dice *d)
     a->array->type = (insitu_type)type;
 }
 
-/* Copies the array's memory to an address that is not a multiple of its elements' size. */
+/* Copies the array to an address that is not a multiple of the size of its elements. */
 static void unalign_array(const input_array *a)
 {
     static char copies[ARRAYS][1 << 14];
@@ -207,7 +209,7 @@ static void corrupt_choice(formed_mesh *m, dice *d)
     }
 }
 
-/* Removes this rank's cells, a field, or names. */
+/* Removes this rank's cells, a field, or a name. */
 static void remove_items(formed_mesh *m, dice *d)
 {
     insitu_field *field = &m->fields[draw_random(d, FORMED_FIELDS)];
@@ -224,7 +226,8 @@ static void remove_items(formed_mesh *m, dice *d)
     }
 }
 
-/* Corrupts the input in one random way if is_mine. The random numbers of a fault do not depend on the rank's input. */
+/* Corrupts the input in one random way if is_mine is set. The random numbers of a fault do not depend on the rank's
+ * input. */
 static void corrupt_input(formed_mesh *m, const formed_mesh *right, uint64_t number, int fault, bool is_mine)
 {
     dice d = {number, 1000 * (uint64_t)(fault + 1)};
@@ -246,8 +249,8 @@ typedef struct bench {
     float truth[FORMED_PICTURES][MOST_PIXELS * 4];
 } bench;
 
-/* Counts the pixels that differ from the first step's by more than 0.02. Rounding may differ, since a refused mesh may
- * change the origin. */
+/* Counts the pixels that differ from those of the first step by more than 0.02. Smaller differences are accepted
+ * because a refused mesh can change the origin of coordinates, and thereby the rounding. */
 static int count_differing_pixels(const bench *b)
 {
     int count = 0;
@@ -311,8 +314,8 @@ static bool draw_corrupted_input(bench *b, int number)
     return status != INSITU_OK;
 }
 
-/* Runs the cases first to end - 1, or only the case whose number is in the environment variable INSITU_TEST_CASE.
- * Returns how many steps failed. */
+/* Runs the cases with numbers from `first` to `end` - 1 or, if the environment variable INSITU_TEST_CASE is set, only
+ * the case with that number. Returns the number of steps that failed. */
 static int run_cases(mesh_form form, bool has_corner_fields, int first, int end)
 {
     const char *only = getenv("INSITU_TEST_CASE");

@@ -1,6 +1,6 @@
-/* Tests all combinations of counts of a mesh that are 0 or not, in each form of mesh, for all layers, on the last rank
- * or on all, with and without the arrays of these counts. The step must return an error on all ranks or draw a picture,
- * and must never abort. A mesh without cells is valid, whatever other counts it has. */
+/* Checks all combinations of counts of a mesh that are 0 or not, in each form of mesh, for all layers, on the last rank
+ * or on all ranks, with and without the arrays that have these counts. The step must return an error on all ranks or
+ * draw a picture, and must never abort. A mesh without cells is valid, whatever its other counts are. */
 #include <stdio.h>
 #include <string.h>
 
@@ -20,7 +20,7 @@ static void list_mesh_counts(insitu_mesh *mesh, int64_t *counts[COUNTS])
     memcpy(counts, all, sizeof all);
 }
 
-/* Removes the arrays that have as many elements as a count of the mask, or one more. */
+/* Removes the arrays whose number of elements is a count in the mask, or is one more than such a count. */
 static void drop_arrays(insitu_mesh *mesh, unsigned mask)
 {
     insitu_array *const of_counts[COUNTS][5] = {

@@ -1,5 +1,6 @@
-/* Tests slices, which are the isosurface 0 of the vertices' distances from a plane. A brute-force intersection in
- * double on warped cells of every type checks positions and colours; a closed form checks that the slice is a plane. */
+/* Checks slices, which the renderer draws as the isosurface 0 of the vertices' distances from a plane. Positions and
+ * colours are compared with a brute-force intersection in double, on warped cells of every type. Positions are also
+ * compared with the plane's closed form. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -22,9 +23,9 @@ static double signed_distance(const double position[3])
     return normal[0] * position[0] + normal[1] * position[1] + normal[2] * position[2] - 0.1;
 }
 
-/* Checks that hits lie on the plane. Cells have 1/4 of the cube's half side. The fixture's bound on depths, 2e-6 cells
- * or 5e-7 × conditioning, is then below 1e-5 of the scene for rays that meet the plane at an angle of more than a few
- * degrees. */
+/* Checks that hits are on the plane. A cell is a quarter as wide as half the cube. The fixture's bound on errors of
+ * depths, 2e-6 cells or 5e-7 × conditioning, is then below 1e-5 in the scene for rays that meet the plane at an angle
+ * of more than a few degrees. */
 static void assert_on_plane(const render_fixture *f, const drawn_frame *drawn, const char *what)
 {
     int64_t hits = 0;

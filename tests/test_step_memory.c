@@ -1,7 +1,8 @@
-/* Tests that a session handles the failure of any allocation: each one fails in turn, on one rank or on all ranks,
- * while the session is created, meshes and fields are set and drawn, and the scene is edited. The result must be an
- * error on all ranks or, to the bit, the picture; and the next step must draw the picture, whatever failed before. The
- * failing heap is that of the whole process, which libyaml and the C library also use. */
+/* Checks that a session handles the failure of any allocation. Allocations fail one after the other, on one rank or on
+ * all ranks, while the session is created, meshes and fields are set and drawn, and the scene is edited. The result
+ * must be an error on all ranks, or a picture that is bit-identical to the one without failure. The next step must draw
+ * the picture, whatever failed before. The failing heap is that of the whole process, which libyaml and the C library
+ * also use. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,13 +12,13 @@
 #include "test_session_fixture.h"
 #include "text_file.h"
 
-/* Distance between the allocations that are tried, given on the command line; 0 selects the default. */
+/* Distance between the numbers of the allocations that are tested, given on the command line; 0 selects the default. */
 static int given_stride;
-/* Number of the allocation that fails, or that failed last. */
+/* Number of the allocation that fails now or failed most recently. */
 static int64_t allocation;
 
-/* Returns the distance between the allocations that are tried. Each case begins at a different allocation. The distance
- * is larger on several ranks, as their steps take longer. */
+/* Returns the distance between the numbers of the allocations that are tested. Each case begins at a different
+ * allocation. The distance is larger on several ranks, because their steps take longer. */
 static int get_allocation_stride(void)
 {
     return given_stride ? given_stride : rank_count > 1 ? 193 : 97;
@@ -34,8 +35,8 @@ static int get_allocation_stride(void)
     "          lines: {field: c, count: 3}}\n"
 #define VOLUME(field) "      - volume: {field: " field ", opacity: [[0, 0], [0.3, 0.4], [1, 0.9]]}\n"
 
-/* The scene has surfaces alone and in front of a volume, volumes by samples and by segments, values at vertices and in
- * cells, several volumes, and frames that are averaged. */
+/* The scene has surfaces with and without a volume behind them, volumes by samples and by segments, values at vertices
+ * and at cells, several volumes, and pictures that average several frames. */
 #define DECORATIONS                                                                                                    \
     "    decorations: {title: t, text: [{text: a}], colour_bar: {labels: x}, outline: ranks, axes: true}\n"
 
@@ -136,7 +137,7 @@ typedef struct picture_set {
     caught_picture pictures[MAX_CAUGHT];
 } picture_set;
 
-/* Moves the caught pictures out of the list of caught pictures. Only rank 0 has any. */
+/* Removes the caught pictures from the list of caught pictures and returns them. Only rank 0 has any. */
 static picture_set pop_pictures(void)
 {
     picture_set set = {.count = caught_count};
@@ -164,7 +165,7 @@ static bool are_pictures_in_set(const picture_set *set)
     return are_all;
 }
 
-/* Checks the condition on all ranks; if it is false, prints the number of the allocation that failed. */
+/* Checks the condition on all ranks. If it is false, prints the number of the allocation that failed. */
 #define at_allocation(condition) everywhere(name_allocation((condition)))
 static bool name_allocation(bool is_well)
 {
@@ -203,7 +204,8 @@ static void start_failing(const failure *f)
     if (f->is_armed) heap_start_failing(f->n, false);
 }
 
-/* Stops failing. Returns whether every rank made fewer allocations than the number of the one to fail. */
+/* Ends the failing of allocations. Returns whether every rank made fewer allocations than the number of the one that
+ * was to fail. */
 static bool stop_failing(const failure *f)
 {
     int is_over = !f->is_armed || heap_stop_failing() < f->n;
@@ -211,8 +213,8 @@ static bool stop_failing(const failure *f)
     return is_over;
 }
 
-/* Checks that the status is the same on all ranks, and that an error is about memory or about the field of a mesh that
- * was refused. */
+/* Checks that the status is the same on all ranks, and that an error concerns memory or the field of a mesh that was
+ * refused. */
 static void check_reported(const insitu_session *session, insitu_status status)
 {
     if (status == INSITU_OK || status == INSITU_ERROR_FIELD) {
@@ -240,7 +242,8 @@ typedef struct step_state {
     picture_set expected;
 } step_state;
 
-/* Returns whether there are no further allocations to fail. */
+/* Sets the input and makes a step, both with a failing allocation, and checks the result and the next steps. Returns
+ * whether there are no further allocations to test. */
 static bool set_and_step_fail_cleanly(const scenery *s, const failure *f, void *state)
 {
     step_state *t = state;
@@ -345,9 +348,9 @@ typedef struct edit_state {
     picture_set before, after;
 } edit_state;
 
-/* Checks that the next step draws. report.json is written after all ranks have agreed on the status of a step. So the
- * next step draws, but returns the error of an earlier step that could not write report.json, and the step after the
- * next returns no error. */
+/* Checks that the next step draws. report.json is written after all ranks have agreed on the status of a step. If an
+ * earlier step could not write report.json, the next step draws but returns this error, and only the step after it
+ * returns no error. */
 static void next_step_draws(insitu_session *session, const picture_set *expected)
 {
     discard_pictures();
@@ -417,8 +420,8 @@ static bool has_many_lines(const char *path)
     return strcmp(text, expected) == 0;
 }
 
-/* Checks that a file has either the whole new text or its previous contents; in the latter case the error must be about
- * memory. */
+/* Checks that a file has either the complete new text or its previous contents. In the latter case the error must
+ * concern memory. */
 static void failed_allocation_writes_complete_texts_or_none(void **context)
 {
     (void)context;

@@ -1,5 +1,5 @@
-/* Tests steps of the opacity in scenes of many cells: in lattices of cells with curved fields, in which max_error
- * bounds the error of all of a ray's cells together; and in a scene of several volumes, which are mixed. */
+/* Checks steps in the opacity in scenes of many cells: in lattices of cells with curved fields, where max_error bounds
+ * the sum of the errors of all cells on a ray; and in a scene of several volumes, which are mixed. */
 #include "test_effort.h"
 #include "test_step_fixture.h"
 
@@ -15,8 +15,8 @@
 
 enum { POINTS = 6, CELLS = 4, LATTICE_SIDE = 15, MIXED_SIDE = 7 };
 
-/* Verifies pictures of a lattice. With a unit distance of 0.02 the volume is so dense that rays end in the first cells
- * whose field is beyond a step; with 0.3 rays reach the cells behind them. */
+/* Checks pictures of a lattice. With a unit distance of 0.02 the volume is so dense that rays end in the first cells
+ * whose field is beyond a step. With 0.3, rays reach the cells behind them. */
 static void verify_lattice(test_mesh_kind kind, fixture_camera camera, double unit)
 {
     static const double values[POINTS] = {-0.7, -0.15, -0.15, 0.3, 0.3, 0.7};
@@ -39,7 +39,7 @@ static void verify_lattice(test_mesh_kind kind, fixture_camera camera, double un
     test_mesh_free(&mesh);
 }
 
-/* Usually draws each kind of cell with only one of the cameras, since all combinations take long. */
+/* By default each kind of cell is drawn with only one of the cameras, because all combinations would take long. */
 static void lattices_of_curved_cells_keep_max_error(void **state)
 {
     static const test_mesh_kind kinds[4] = {TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS, TEST_MIXED};
@@ -52,10 +52,11 @@ static void lattices_of_curved_cells_keep_max_error(void **state)
 
 /* ---- volumes that are mixed ---- */
 
-/* Draws two volumes of one field, with the step size of a cell. The opacity of the first volume is constant except for
- * a step; that of the second is constant. A curved field causes errors only at the step, whose intervals are halved.
- * The error is a share of the mixing's 0.4 RENDER_MIXING_ERROR by length and another share by absorption
- * (kernel_cell_segments.h), in addition to the error of mixing itself. */
+/* Draws two volumes of one field, sampled with a step of the size of a cell. The opacity of the first volume is
+ * constant except for a step; that of the second volume is constant. A curved field causes errors only at the step,
+ * whose intervals are halved. Each interval is allowed a share of 0.4 RENDER_MIXING_ERROR in proportion to its length,
+ * and another share in proportion to its absorption (kernel_cell_segments.h), in addition to the error of mixing
+ * itself. */
 static double verify_mixed(const test_mesh *mesh, fixture_camera camera, double unit)
 {
     static const float colours[12] = {0.9f, 0.2f, 0.1f, 0.9f, 0.2f, 0.1f, 0.1f, 0.4f, 0.9f, 0.1f, 0.4f, 0.9f};

@@ -36,7 +36,8 @@ insitu_status copy_filled_values(void *filled, insitu_field *field)
 {
     filled_values *f = filled;
     int one = 1, ranks = 0;
-    MPI_Allreduce(&one, &ranks, 1, MPI_INT, MPI_SUM, MPI_COMM_WORLD); /* returns only if all ranks call this function */
+    /* completes only if all ranks call this function */
+    MPI_Allreduce(&one, &ranks, 1, MPI_INT, MPI_SUM, MPI_COMM_WORLD);
     f->calls += ranks == rank_count;
     field->count = f->count;
     field->values = f->values;

@@ -1,16 +1,16 @@
-/* Draws meshes that the scene warps or mirrors, and compares their pictures with those of meshes that are given in
- * their final form. Also makes planes, lattices and blocks for these tests. */
+/* Declares functions that draw meshes that the scene warps or mirrors, compare the pictures with those of meshes that
+ * are given in their final form, and make planes, lattices and blocks for these tests. */
 #ifndef TEST_TRANSFORMED_H
 #define TEST_TRANSFORMED_H
 
 #include "test_mesh_forms.h"
 
-/* Computes the position of a vertex from the mesh's description: from coordinates by vertex, or along the axes of a
- * lattice with packed strides. */
+/* Computes the position of a vertex from the mesh's description: from coordinates of each vertex, or from those along
+ * the axes of a lattice with packed strides. */
 void compute_vertex_position(const insitu_mesh *mesh, int64_t vertex, double out[3]);
 
-/* The data of copy_filled_values(), a fill function that all ranks must call. `calls` counts the calls that all ranks
- * made together. */
+/* The data of copy_filled_values(), a fill function that all ranks must call. `calls` counts only the calls that all
+ * ranks made together. */
 typedef struct filled_values {
     insitu_array values;
     int64_t count;
@@ -19,7 +19,7 @@ typedef struct filled_values {
 
 insitu_status copy_filled_values(void *filled, insitu_field *field);
 
-/* Compares both drawings and frees them. Also fails if the compared pictures are empty. */
+/* Checks that both drawings have bit-identical pictures that are not empty, and frees the drawings. */
 void expect_same(drawn *a, drawn *b, const char *what);
 
 /* Opens a session with the text `before` followed by the scene. */
@@ -28,17 +28,19 @@ insitu_session *open_text(MPI_Comm comm, const char *before, const char *scene);
 #define LAYERS(name, layers)                                                                                           \
     "  - name: " name "\n    size: [24, 18]\n    layers: " layers "\n    outputs: [{path: " name ".exr}]\n"
 
-/* Scenes with all layers of "f", and with surfaces alone, which are the same to the bit on any number of ranks. */
+/* Scenes with all layers of "f", and with surfaces only. Pictures of surfaces are bit-identical on any number of
+ * ranks. */
 extern const char all_layers[], surface_layers[];
 
 /* Draws "f" on one mesh in one step, and destroys the session. `u` is a further field, or NULL. */
 drawn draw_mesh(insitu_session *session, const insitu_mesh *mesh, const insitu_field *f, const insitu_field *u);
 
-/* Draws a formed mesh with another description in one step, and destroys the session. */
+/* Draws the formed mesh `m`, described by `mesh` instead of its own description, in one step, and destroys the
+ * session. */
 drawn draw_formed(insitu_session *session, const formed_mesh *m, const insitu_mesh *mesh, bool with_corners,
                   const insitu_field *u);
 
-/* This rank's rows of quads in the plane z = 0, 3 × 3 quads per rank, with float or double coordinates. */
+/* This rank's 3 × 3 quads in the plane z = 0, with float or double coordinates. */
 typedef struct plane {
     double wide[16][2], values[16];
     float narrow[16][2];
@@ -63,7 +65,7 @@ typedef struct block {
     insitu_field field;
 } block;
 
-/* Makes the block with this number. The blocks of all ranks are stacked along z, and blocks of quads along y.
+/* Makes the block with this number. Consecutive blocks are stacked along z, or along y if they consist of quads.
  * Curvilinear blocks have padding along x. */
 void make_block(lattice_form form, int number, block *out);
 

@@ -1,5 +1,5 @@
-/* Tests that the VTK adaptor passes VTK's own pointers to the session if it can, and correct conversions otherwise. The
- * session is a stub that records its input. Volumes of cells that are split or reordered are compared with volumes
+/* Checks that the VTK adaptor passes VTK's own pointers to the session if it can, and correct conversions otherwise.
+ * The session is a stub that records its input. Volumes of cells that are split or reordered are compared with volumes
  * computed here from the positions of corners; everything else is compared element by element with VTK's arrays. */
 #include <algorithm>
 #include <array>
@@ -51,7 +51,7 @@ namespace
 
 using point = std::array<double, 3>;
 
-/* Adds a cell with these points, which it shares with no other cell, to the grid. */
+/* Adds a cell with points of its own to the grid. */
 void add_cell(vtkUnstructuredGrid *grid, int type, const std::vector<point> &points)
 {
     if (!grid->GetPoints()) {
@@ -110,9 +110,9 @@ double compute_tet_volume(const point &a, const point &b, const point &c, const 
            6;
 }
 
-/* Returns the signed volume of cell i, as a sum of tets; it is exact except for rounding if faces are flat. Vertices
- * are in VTK's order: a hex's lower quad is counterclockwise if seen from above. Wedges occur in both orientations, so
- * the magnitude of their volume is used. */
+/* Returns the signed volume of cell i, as a sum of tets, which is exact up to rounding if faces are flat. Vertices are
+ * in VTK's order: a hex's lower quad is counterclockwise if seen from above. Wedges occur in both orientations, so that
+ * the absolute value of their volume is used. */
 double compute_cell_volume(const insitu_mesh &m, int64_t i)
 {
     const int64_t begin = m.offsets.data ? read_integer(m.offsets, i) : 0;
@@ -130,7 +130,7 @@ double compute_cell_volume(const insitu_mesh &m, int64_t i)
     }
 }
 
-/* Bound on the error of volumes, which are sums of a few products of numbers of size 1. */
+/* Allowed error of volumes, which are sums of a few products of numbers of size 1. */
 constexpr double rounding = 1e-14;
 
 void plain_grid_is_borrowed(void **)
@@ -391,8 +391,8 @@ void bezier_cells_are_drawn_as_linear_cells_with_a_warning(void **)
     assert_non_null(strstr(f.report.cells_why, "1 higher-order cells"));
 }
 
-/* Checks cells of higher order. If all cells have one type and one order, neither types nor offsets are passed. Cells
- * whose last points libinsitu does not support are copied without these points. */
+/* Checks cells of higher order. If all cells have the same type and the same order, neither types nor offsets are
+ * passed. If libinsitu does not support the last points of a cell type, the cells are copied without these points. */
 void cells_of_higher_order_are_submitted(void **)
 {
     const struct {
@@ -431,7 +431,7 @@ void other_high_order_cells_are_drawn_as_linear_cells(void **)
     for (const auto &c : cases) {
         const auto &[corners, volume] = shapes.at(c.linear);
         std::vector<point> points = *corners;
-        points.resize(static_cast<size_t>(c.points), point{9, 9, 9}); // not at a corner
+        points.resize(static_cast<size_t>(c.points), point{9, 9, 9}); // a position at which no corner is
         vtkNew<vtkUnstructuredGrid> grid;
         add_cell(grid, c.type, points);
         fixture f;
@@ -464,8 +464,8 @@ void line_cells_are_skipped_with_their_values(void **)
     assert_non_null(strstr(f.report.cells_why, "2 points and lines"));
 }
 
-/* Checks that triangles, quads and polygons are passed in place, and that the vertices of pixels are reordered.
- * Quadratic shells in a grid with polygons are reduced to their corners. */
+/* Checks that triangles, quads and polygons are passed in place, that the vertices of pixels are reordered, and that
+ * quadratic shells in a grid with polygons are reduced to their corners. */
 void shells_are_submitted(void **)
 {
     const std::vector<std::array<double, 3>> square = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
@@ -509,7 +509,7 @@ void add_polyhedron(vtkUnstructuredGrid *grid)
     grid->InsertNextCell(VTK_POLYHEDRON, 4, ids, 4, faces);
 }
 
-/* Two tets with a common triangle, given as polyhedra, have 7 faces. One of the faces belongs to both. */
+/* Checks two tets with a common triangle, given as polyhedra: they have 7 faces, one of which belongs to both. */
 void polyhedra_share_their_faces(void **)
 {
     vtkNew<vtkUnstructuredGrid> grid;
@@ -570,7 +570,7 @@ void ghost_flags_that_hide_are_submitted(void **)
     assert_null(f.mesh().mesh.ghosts.data);
 }
 
-/* Checks a vtkGhostType array of 32 bits, VisIt's array of ghost zones alone, and both together. */
+/* Checks hidden cells: by a vtkGhostType array of 32 bits, by VisIt's array of ghost zones, and by both together. */
 void ghost_flags_of_other_types_and_names_hide_cells_too(void **)
 {
     const int own[4] = {0, vtkDataSetAttributes::DUPLICATECELL, 0, vtkDataSetAttributes::HIDDENCELL};
@@ -615,8 +615,8 @@ void ghost_flags_follow_skipped_cells(void **)
     for (int i = 0; i < 2; i++) assert_int_equal(read_integer(f.mesh().mesh.ghosts, i), expected[i]);
 }
 
-/* Returns a lattice's coordinate along an axis at the n-th vertex along that axis, if coordinates are not given by
- * vertex. */
+/* Returns the coordinate along an axis of the n-th vertex along that axis, for a lattice whose coordinates are not
+ * given for each vertex. */
 double compute_axis_coordinate(const insitu_lattice &l, int axis, int64_t n)
 {
     const insitu_array &a = l.axes[axis];
@@ -625,11 +625,11 @@ double compute_axis_coordinate(const insitu_lattice &l, int axis, int64_t n)
                                     : static_cast<const double *>(a.data)[n];
 }
 
-/* Each grid has 3 × 4 × 5 points. */
+/* Checks grids of 3 × 4 × 5 points. */
 void structured_grids_are_hexahedra(void **)
 {
     vtkNew<vtkImageData> image;
-    image->SetExtent(2, 4, -1, 2, 3, 7); // an extent that is a piece of a larger grid
+    image->SetExtent(2, 4, -1, 2, 3, 7); // an extent that is a part of a larger grid
     image->SetOrigin(1, 2, 3);
     image->SetSpacing(0.5, 1, 2);
     vtkNew<vtkRectilinearGrid> rectilinear;
@@ -669,7 +669,7 @@ void structured_grids_are_hexahedra(void **)
             const int64_t index[3] = {i % 3, i / 3 % 4, i / 12};
             data->GetPoint(i, at);
             for (int a = 0; a < 3 && data != curvilinear.Get(); a++)
-                assert_true(compute_axis_coordinate(*lattice, a, index[a]) == at[a]); // equal to the bit
+                assert_true(compute_axis_coordinate(*lattice, a, index[a]) == at[a]); // bitwise equal
         }
         assert_ptr_equal(f.mesh().fields.at("f").values.data, values->GetPointer(0));
         assert_int_equal(f.report.bytes_copied, 0);
@@ -677,8 +677,8 @@ void structured_grids_are_hexahedra(void **)
     }
 }
 
-/* Checks images that are flat along an axis, images with a hidden point, and rotated images. Only for a rotated image
- * are points listed. */
+/* Checks images that are flat along an axis, images with a hidden point, and rotated images. Coordinates of points are
+ * listed only for a rotated image. */
 void flat_hidden_and_turned_images_are_lattices(void **)
 {
     for (int flat = 0; flat < 3; flat++) {
@@ -778,7 +778,8 @@ void leaves_of_composites_are_meshes_until_removed(void **)
     collection->SetPartitionedDataSet(0, partitions);
     assert_int_equal(f.set(collection), INSITU_OK);
     assert_int_equal(f.session.meshes.size(), 2);
-    partitions->SetPartition(0, nullptr); // this rank has no piece of it; the other keeps its number
+    // this rank has no part of this partition; the other partition keeps its number
+    partitions->SetPartition(0, nullptr);
     vtkNew<vtkPartitionedDataSet> images;
     vtkNew<vtkImageData> image;
     image->SetDimensions(2, 2, 2);

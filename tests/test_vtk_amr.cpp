@@ -1,5 +1,5 @@
-/* Tests AMR data in the VTK adaptor: grids become blocks of the levels of one mesh, at the positions of their AMR
- * boxes. session_levels and vtk_structured test that the session draws each position by the finest cell there. */
+/* Checks AMR data in the VTK adaptor: grids become blocks of the levels of one mesh, at the positions of their AMR
+ * boxes. That the session draws the finest cell at each position is checked by session_levels and vtk_structured. */
 #include <array>
 #include <cmath>
 #include <string>
@@ -32,7 +32,7 @@ extern "C" {
 namespace
 {
 
-/* A grid of an AMR: its level, the indices of its first cell within that level, and its number of cells. */
+/* A grid of an AMR data set: its level, the indices of its first cell in that level, and its number of cells. */
 struct block {
     unsigned level;
     std::array<int, 3> low, cells;
@@ -41,8 +41,8 @@ struct block {
 
 const std::array<double, 3> origin = {-3, 1, 0.5}, spacing = {1, 0.5, 0.25}; // origin and spacing of level 0
 
-/* Three levels with refinement ratios of 2 and 4. Some blocks touch, one lies across two coarser ones, and one has
- * negative indices. */
+/* Three levels with refinement ratios of 2 and 4. Some blocks are adjacent, one overlaps two coarser ones, and some
+ * have negative indices. */
 const std::vector<block> blocks = {{0, {0, 0, 0}, {4, 6, 4}, 1},   {0, {4, 0, 0}, {3, 6, 4}, 1},
                                    {0, {-2, 0, 0}, {2, 6, 4}, 1},  {1, {4, 2, 2}, {6, 4, 4}, 2},
                                    {1, {-4, 4, 0}, {2, 6, 4}, 2},  {1, {-2, 4, 0}, {4, 2, 2}, 2},
@@ -66,7 +66,7 @@ vtkSmartPointer<vtkUniformGrid> make_uniform_grid(const block &b, bool is_flat =
 
 enum class given { spacings, ratios };
 
-enum class held { all, some }; // grids that a rank has; some: not the first and level 1
+enum class held { all, some }; // grids that a rank has; some: all except the first grid and those of level 1
 
 vtkSmartPointer<vtkOverlappingAMR> make_amr(given what, bool is_flat = false, held grids = held::all)
 {
@@ -228,7 +228,7 @@ void boxes_that_do_not_fit_are_reported(void **)
     assert_true(!is_on_level(f, 0) && is_on_level(f, 1));
 }
 
-/* Checks a box of level 1 that begins within a cell of level 0, and a grid whose position differs from its box. */
+/* Checks a box of level 1 that begins inside a cell of level 0, and a grid whose position differs from its box. */
 void boxes_within_cells_make_no_levels(void **)
 {
     auto amr = make_amr(given::spacings);

@@ -1,5 +1,5 @@
-/* Tests the distribution of cells to ranks. For any partition each cell must be on exactly one rank, with bitwise equal
- * points and with its values. */
+/* Checks the distribution of cells to ranks. For any partition each cell must be on exactly one rank, with bitwise
+ * equal points and with its values. */
 #include <cstdint>
 #include <map>
 #include <string>
@@ -34,8 +34,8 @@ using render_tool::partition;
 namespace
 {
 
-/* Returns n × n × n hexahedra, whose coordinates are multiples of 1/3, so that float cannot represent them. Cell data
- * "id" counts from `first`; point data is "x". */
+/* Returns n × n × n hexahedra, whose coordinates are multiples of 1/3, so that float cannot represent them. The cell
+ * data "id" are numbers from `first` on; the point data are "x". */
 vtkSmartPointer<vtkUnstructuredGrid> make_lattice(int n, int first, double shift)
 {
     auto grid = vtkSmartPointer<vtkUnstructuredGrid>::New();
@@ -135,8 +135,9 @@ void more_ranks_than_cells_leaves_some_without(void **)
     assert_int_equal(with, 1);
 }
 
-/* The size of a block differs from the mean by less than one cell. The size of a part of 4096 cells that are hashed to
- * 4 ranks differs by less than 5 standard deviations: sqrt(4096 · 1/4 · 3/4) · 5 = 139. */
+/* Checks the numbers of cells of each rank. Blocks differ from the mean by less than one cell. If 4096 cells are hashed
+ * to 4 ranks, a rank's number differs from the mean by less than 5 standard deviations: 5 · sqrt(4096 · 1/4 · 3/4) =
+ * 139. */
 void parts_are_balanced(void **)
 {
     const auto grid = make_lattice(16, 0, 0);

@@ -1,4 +1,4 @@
-/* Tests the pictures that insitu-render draws without a scene, by their pixels.
+/* Checks pixels of the pictures that insitu-render draws without a scene.
  *
  *     test_vtk_default <insitu-render> <mpiexec> */
 #include <array>
@@ -31,7 +31,7 @@ extern "C" {
 namespace
 {
 
-constexpr int width = 240, height = 160, bar = 180; // bar: the colour bar is to the right of this column
+constexpr int width = 240, height = 160, bar = 180; // bar: number of columns to the left of the colour bar
 
 std::string tool, mpiexec, folder;
 
@@ -69,8 +69,8 @@ picture draw_default(const std::string &arguments, const std::string &name, int 
     return read_picture(name);
 }
 
-/* Compares colours of eight bits. They may differ by 1 because of the colour map's table and by 1 because of
- * rounding. */
+/* Returns whether two 8-bit colours are equal up to 2 in each channel: 1 because of the colour map's table, and 1
+ * because of rounding. */
 bool is_near(const colour &a, const colour &b)
 {
     bool is = true;
@@ -88,7 +88,7 @@ int count_near(const picture &p, const colour &c)
 
 using field = double (*)(const std::array<double, 3> &at);
 
-/* Writes the cells of a lattice over [-1, 1] along all axes except `without`; if `without` is not an axis, the cells
+/* Writes the cells of a lattice over [-1, 1] along all axes except `without`. If `without` is not an axis, the cells
  * are hexahedra. */
 void write_lattice(const std::string &name, int without, field f)
 {
@@ -127,7 +127,8 @@ void write_lattice(const std::string &name, int without, field f)
     assert_int_equal(writer->Write(), 1);
 }
 
-/* The field is 0 on the whole surface and up to 1 at the centre. Only a cut shows the colour of the centre. */
+/* Checks that a solid whose outside does not show the field is cut open. The field is 0 on the whole surface and up to
+ * 1 at the centre, so that only a cut shows the colour of the centre. */
 void a_solid_with_a_dark_outside_is_cut_open(void **)
 {
     write_lattice("hot.vtu", -1, [](auto &at) {
@@ -137,7 +138,8 @@ void a_solid_with_a_dark_outside_is_cut_open(void **)
     assert_int_equal(count_near(draw_default("--whole hot.vtu", "hot_0000.png"), viridis_high), 0);
 }
 
-/* The cube's edge that is nearest to the eye extends downwards from the picture's centre; a cut would remove it. */
+/* Checks a solid whose outside shows the field: it must not be cut. The cube's edge that is nearest to the eye extends
+ * downwards from the picture's centre, and a cut would remove it. */
 void a_solid_whose_outside_shows_the_field_is_drawn_whole(void **)
 {
     write_lattice("shown.vtu", -1, [](auto &at) { return at[0] + 2 * at[2]; });
@@ -146,8 +148,8 @@ void a_solid_whose_outside_shows_the_field_is_drawn_whole(void **)
     for (int y = 80; y < 140; y++) assert_false(is_near(p.at(112, y), background));
 }
 
-/* A field that rises along the first axis is seen from the front. Each column must have one colour, and colours must
- * rise to the right; lighting or perspective would make colours vary within a column. */
+/* Checks flat meshes, whose field rises along their first axis. Each column of the picture must have one colour, and
+ * colours must rise to the right. Lighting or perspective would make colours vary within a column. */
 void flat_meshes_are_seen_from_the_front_in_the_colours_of_the_map(void **)
 {
     write_lattice("x.vtu", 0, [](auto &at) { return at[1]; });
@@ -165,8 +167,8 @@ void flat_meshes_are_seen_from_the_front_in_the_colours_of_the_map(void **)
     }
 }
 
-/* Checks that the only step of a run reports the errors in its words, and that the warning about a missing glyph does
- * not hide the one about missing space. */
+/* Checks that the only step of a run reports faults of the picture's texts, and that the warning about a missing glyph
+ * does not hide the one about missing space. */
 void faults_of_words_are_reported_in_a_run_of_one_step(void **)
 {
     write_lattice("words.vtu", 2, [](auto &at) { return at[0]; });

@@ -1,9 +1,9 @@
-/* Tests element blocks of Exodus files, of every type and with every number of nodes that codes write. Each element
- * must be read as the cell between its corners or be refused by the name of its type. The test writes the files by the
- * Exodus library.
+/* Checks element blocks of Exodus files, of every type and with every number of nodes that simulation codes write. Each
+ * element must be read as the cell between its corners, or must be refused by the name of its type. The test writes the
+ * files with the Exodus library.
  *
  * The body is a cube of volume 1 with the field f = x + 2 z, whose mean is 1.5. Volume and integral are summed in
- * double over the tets of each cell. All faces are flat, so the choice of their diagonals does not matter. */
+ * double over the tets of each cell. All faces are flat, so that the choice of their diagonals does not matter. */
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -52,8 +52,8 @@ struct body {
     std::vector<node_list> cells; // indices of nodes, from 0
 };
 
-/* A division of a box into cells. Nodes 0 to 7 are the box's corners in VTK's order of a hexahedron; node 8 is its
- * centre. */
+/* A division of a box into cells. Nodes 0 to 7 are the box's corners in VTK's order of a hexahedron; node 8 is the
+ * box's centre. */
 struct division {
     const char *type;
     std::vector<node_list> cells;
@@ -67,8 +67,8 @@ const division tets = {"TETRA", {{0, 1, 2, 6}, {0, 2, 3, 6}, {0, 3, 7, 6}, {0, 7
 const division quads = {"SHELL", {{0, 1, 2, 3}}};
 const division triangles = {"TRI", {{0, 1, 2}, {0, 2, 3}}};
 
-/* Returns the cube as two adjacent boxes. The nodes of each cell beyond its corners are separate nodes, all at the
- * cell's centre. */
+/* Returns the cube as two adjacent boxes. Nodes of a cell that are not corners are not shared with other cells, and are
+ * all at the cell's centre. */
 body divide_cube(const division &how, int nodes_per_cell, double first_x)
 {
     body b;
@@ -106,7 +106,7 @@ void require_success(int status)
 }
 
 /* Writes two steps; f is twice as large in the second step. The cell field is the cell's number in its block. If
- * is_moved, a second point field, of zeros, has the names of a displacement's components. */
+ * is_moved is set, three more point fields, of zeros, have the names of a displacement's components. */
 void write_exodus(const std::string &path, const std::vector<block> &blocks, bool is_moved = false)
 {
     int word = 8, io_word = 8;
@@ -161,7 +161,7 @@ void write_exodus(const std::string &path, const std::vector<block> &blocks, boo
     require_success(ex_close(file));
 }
 
-/* The size of the cells (volume, or area of flat cells), and the integral of f over them. */
+/* size: total size of the cells (volume, or area of flat cells); integral: integral of f over them */
 struct sums {
     double size = 0, integral = 0;
     vtkIdType cells = 0, points = 0;
@@ -258,13 +258,13 @@ sums compute_file_sums(const std::string &path, size_t step, int piece = 0, int 
     return all;
 }
 
-/* The numbers are sums of a few terms of size 1 in double, so they agree to 1e-12. */
+/* Returns whether two sums are equal up to 1e-12: each is a sum in double of a few terms of size 1. */
 bool is_near(double a, double b)
 {
     return std::fabs(a - b) < 1e-12;
 }
 
-/* Writes and reads elements of one type and number of nodes. Returns the number of wrong files. */
+/* Writes and reads elements of one type with this number of nodes. Returns the number of wrong files. */
 int check_kind(const division &how, const std::string &type, int nodes, double mean)
 {
     const std::string name = type + " of " + std::to_string(nodes) + " nodes";
@@ -299,7 +299,7 @@ void every_kind_of_element_has_its_corners(void **)
     assert_int_equal(wrong, 0);
 }
 
-/* Surface elements are at z = 0, where f = x has the mean 0.5. */
+/* Checks elements of surfaces, which are at z = 0, where f = x has the mean 0.5. */
 void elements_of_surfaces_have_their_corners(void **)
 {
     int wrong = 0;
@@ -369,8 +369,8 @@ std::string get_refusal(const std::string &path)
     return "";
 }
 
-/* Any one file of a parallel run stands for all of the run's files, each of which is a piece. In the second step the
- * field is 2 f. */
+/* Checks files of a parallel run: the name of any one of them stands for all of them, and each is a piece. In the
+ * second step the field is 2 f. */
 void files_of_a_parallel_run_are_pieces(void **)
 {
     const std::string start = folder + "/run.e-s002.12.";
@@ -378,7 +378,7 @@ void files_of_a_parallel_run_are_pieces(void **)
         write_exodus(start + (p < 10 ? "0" : "") + std::to_string(p), {{"HEX8", divide_cube(hexes, 8, p)}});
     const sums all = compute_file_sums(start + "07", 1);
     assert_true(is_near(all.size, 12));
-    assert_true(std::fabs(all.integral - 2 * (12 * 1.5 + 66)) < 1e-10); /* a sum of some hundred terms */
+    assert_true(std::fabs(all.integral - 2 * (12 * 1.5 + 66)) < 1e-10); /* error of a sum of some hundred terms */
     assert_int_equal(open_data_file(start + "00")->pieces(0), 12);
     for (int piece = 0; piece < 3; piece++) assert_true(is_near(compute_file_sums(start + "00", 0, piece, 3).size, 4));
     assert_int_equal(std::remove((start + "03").c_str()), 0);

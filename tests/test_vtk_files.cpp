@@ -1,7 +1,7 @@
-/* Tests that insitu-render's readers return the cells and values that files of every format contain. For truncated
- * files they must return an error or the same cells and values.
+/* Checks that insitu-render's readers return the cells and values that files of every format contain. For a truncated
+ * file they must return an error, or the same cells and values.
  *
- *     test_vtk_files [random cuts of each file] */
+ *     test_vtk_files [number of random truncations of each file] */
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -62,7 +62,7 @@ int write_all(void **)
     return 0;
 }
 
-/* Returns the only grid with cells in data. */
+/* Returns the only grid in data that has cells. */
 vtkSmartPointer<vtkUnstructuredGrid> find_only_grid(vtkDataObject *data)
 {
     if (auto *grid = vtkUnstructuredGrid::SafeDownCast(data)) return grid;
@@ -85,7 +85,7 @@ vtkSmartPointer<vtkUnstructuredGrid> read_grid(const std::string &name)
     return find_only_grid(grids_of(open_data_file(path)->read(0, 0, 1), path));
 }
 
-/* Returns what differs between the cells of two grids, or "". */
+/* Returns a description of the first difference between the points and cells of two grids; "" if there is none. */
 std::string describe_cell_difference(vtkUnstructuredGrid *a, vtkUnstructuredGrid *b)
 {
     if (a->GetNumberOfPoints() != b->GetNumberOfPoints()) return "number of points";
@@ -112,8 +112,9 @@ std::string describe_cell_difference(vtkUnstructuredGrid *a, vtkUnstructuredGrid
     return "";
 }
 
-/* Returns what differs between two arrays of one name, or "". If an array is missing, no picture can draw wrong values
- * of it. */
+/* Returns a description of the first difference between two arrays of the same name; "" if there is none. An array that
+ * b lacks is not compared. An array that only a lacks is a difference only if must_exist is set, because no picture can
+ * draw wrong values of a missing array. */
 std::string describe_value_difference(vtkDataSetAttributes *a, vtkDataSetAttributes *b, const std::string &name,
                                       bool must_exist)
 {
@@ -149,8 +150,8 @@ void every_format_gives_its_cells_and_values(void **)
     }
 }
 
-/* Returns what is wrong in the contents that were read from a truncated file; "" if they are right or the file was
- * refused. */
+/* Returns a description of what is wrong in the contents that were read from a truncated file; "" if the contents are
+ * right or the file was refused. */
 std::string describe_wrong_contents(const sample &s)
 {
     try {
@@ -178,7 +179,7 @@ int count_wrong_cuts(const sample &s, const std::string &file)
     int wrong = 0;
     const std::string whole = read_file(folder + "/" + file);
     for (const size_t cut : choose_cut_sizes(whole.size(), random_cuts)) {
-        std::filesystem::remove(folder + "/" + file); /* else HDF5 would use its old contents */
+        std::filesystem::remove(folder + "/" + file); /* else HDF5 would use the old contents that it has cached */
         write_file(folder + "/" + file, whole.substr(0, cut));
         const std::string where = describe_wrong_contents(s);
         if (where.empty()) continue;
@@ -212,7 +213,8 @@ void hidden_points_hide_their_cells(void **)
     for (int i = 0; i < 60; i++) assert_int_equal(get_ghost_array(grid)->GetValue(i) != 0, i == 0 || i == 59);
 }
 
-/* A coarse lattice has 4 × 4 × 4 cells; finer cells cover 2 × 2 × 2 of them. */
+/* Checks a coarse lattice of 4 × 4 × 4 cells, of which finer cells cover 2 × 2 × 2: the covered cells must be
+ * hidden. */
 void finer_levels_hide_coarser_cells(void **)
 {
     const double origin[3] = {0, 0, 0}, steps[2][3] = {{1, 1, 1}, {0.5, 0.5, 0.5}}, inner[3] = {1, 1, 1};
@@ -284,7 +286,7 @@ void truncated_foam_files_give_errors_or_the_same_grid(void **)
     assert_int_equal(wrong, 0);
 }
 
-/* Returns the message of the error when the file is opened or read, or "" if there is none. */
+/* Returns the error message that opening or reading the file gives; "" if there is none. */
 std::string get_refusal(const std::string &name)
 {
     try {
@@ -312,7 +314,7 @@ vtkIdType count_cells(vtkDataObject *data)
     return count;
 }
 
-/* The second processor does not have step 0.5 at first. */
+/* Checks a parallel run, of which the second processor does not have step 0.5 at first. */
 void foam_cases_of_parallel_runs_are_read_by_processors(void **)
 {
     namespace fs = std::filesystem;
@@ -336,7 +338,7 @@ void foam_cases_of_parallel_runs_are_read_by_processors(void **)
     assert_true(piece->GetBounds()[0] == 2);
     assert_true(piece->GetCellData()->GetArray("p")->GetComponent(2, 0) == 6);
 
-    write_foam(parallel); /* a case of a serial run with the same last time */
+    write_foam(parallel); /* also makes a case of a serial run, with the same last time */
     assert_int_equal(open_data_file(parallel + "/dec.foam")->pieces(0), 1);
     fs::remove_all(parallel + "/0.5");
     file = open_data_file(parallel + "/dec.foam");
@@ -358,7 +360,7 @@ void foam_cases_that_lack_folders_are_refused_by_their_names(void **)
     expect_reported(get_refusal("lacking/dec.foam"), "processors4/ is of OpenFOAM's collated format");
 }
 
-/* Checks that a cell's value is that of its hex's position, for any numbering of the boundary's quads. */
+/* Checks that the value of a cell is that of the hex at its position, for any numbering of the boundary's quads. */
 void cgns_cells_are_read_wherever_the_boundary_is_numbered(void **)
 {
     const auto expected = make_hex_grid(lattice::curved);
@@ -398,7 +400,7 @@ void cgns_zones_with_wrong_numbers_are_refused(void **)
     expect_reported(get_refusal("wrong.cgns"), "sections that mix cells and boundary are not read");
 }
 
-/* Reads the .vtm of a run that writes a table of residuals in addition to the grid. */
+/* Reads a .vtm file that lists a table of residuals beside the grid. */
 void tables_among_grids_are_skipped(void **)
 {
     write_file(folder + "/residuals.vtt",
@@ -410,7 +412,7 @@ void tables_among_grids_are_skipped(void **)
     assert_int_equal(read_grid("table.vtm")->GetNumberOfCells(), 60);
 }
 
-/* Checks that entries with one time become parts of one step, and that steps are sorted by their times. */
+/* Checks that entries with the same time become pieces of one step, and that steps are sorted by time. */
 void series_have_the_times_of_their_entries(void **)
 {
     auto entry = [](const char *time, const char *file) {
@@ -421,7 +423,7 @@ void series_have_the_times_of_their_entries(void **)
     const auto file = open_data_file(folder + "/s.pvd");
     assert_int_equal(file->times().size(), 2);
     assert_true(file->times()[0] == 0.25 && file->times()[1] == 2);
-    assert_int_equal(file->pieces(0), 60); // as many cells as the structured grid
+    assert_int_equal(file->pieces(0), 60); // as many pieces as the structured grid has cells
     assert_int_equal(file->pieces(1), 2);
     assert_string_equal(file->step_path(0).c_str(), (folder + "/g.vts").c_str());
     const auto both = grids_of(file->read(1, 0, 1), "");
@@ -462,7 +464,7 @@ void wrong_series_are_refused_with_the_reason(void **)
                    "none.vtu: No such file");
 }
 
-/* Reads files of grids without cells, as written by VTK and by other programs. */
+/* Checks files of grids without cells, as written by VTK and by other programs. */
 void grids_without_cells_are_accepted(void **)
 {
     const std::string head = "<VTKFile type=\"UnstructuredGrid\" version=\"0.1\"><UnstructuredGrid>",
@@ -479,7 +481,8 @@ void grids_without_cells_are_accepted(void **)
                         "");
 }
 
-/* In each text file the last value is replaced by a number in Fortran's notation without the exponent's letter. */
+/* Checks text files in which the last value is replaced by a number in Fortran's notation without the letter of the
+ * exponent. */
 void numbers_without_the_letter_of_their_exponent_are_refused(void **)
 {
     const std::string vtu = "<VTKFile type=\"UnstructuredGrid\" version=\"0.1\"><UnstructuredGrid>\n"
@@ -546,8 +549,8 @@ template <typename Number> std::string concatenate_bytes(const std::vector<Numbe
     return {reinterpret_cast<const char *>(values.data()), values.size() * sizeof(Number)};
 }
 
-/* Writes all steps into one file for the geometry and one for the variable, each of which begins with "C Binary". The
- * second step has `more` more tets. */
+/* Writes all steps into one file for the geometry and one file for the variable, each of which begins with "C Binary".
+ * The second step has `more` additional tets. */
 void write_ensight_set(int more)
 {
     using floats = std::vector<float>;
@@ -605,7 +608,7 @@ void ensight_file_sets_are_read_step_by_step(void **)
     assert_true(get_set_refusal().find("set.f: has steps of different sizes") != std::string::npos);
 }
 
-/* Writes a cube as a binary file whose values are in `section`, which is what precedes the values. */
+/* Writes a cube as a binary file. `section` is the text that precedes the values. */
 void write_ensight_cube(const std::string &section, const std::string &values)
 {
     using floats = std::vector<float>;

@@ -1,4 +1,4 @@
-/* Sets up an adaptor on a session that only records its input. Include this after cmocka.h. */
+/* Sets up an adaptor on a session that only records its input. This header must be included after cmocka.h. */
 #ifndef TEST_VTK_FIXTURE_H
 #define TEST_VTK_FIXTURE_H
 

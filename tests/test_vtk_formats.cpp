@@ -1,12 +1,12 @@
-/* Tests insitu-render on files of every format. Pictures must be, bit for bit, those of the same cells in a .vtu, on
- * one rank and on two ranks. A truncated file must cause an error or not change the picture. Pictures are written as
- * plain numbers (plain_image.c).
+/* Checks insitu-render on files of every format. Pictures must be bit-identical to those of the same cells in a .vtu
+ * file, on one rank and on two ranks. A truncated file must cause an error, or must not change the picture. Pictures
+ * are written as plain numbers (plain_image.c).
  *
  *     test_vtk_formats <insitu-render> <mpiexec> [percent...]
  *
  * Each file is truncated to each of these percentages of its size, on one rank and on two ranks. By default files are
- * truncated to 95 percent and only one of thirteen runs is made, as programs start slowly. test_vtk_files truncates
- * each file within one program. */
+ * truncated to 95 percent, and only one of thirteen runs is made, because starting a program takes long. test_vtk_files
+ * truncates every file, within one program. */
 #include <algorithm>
 #include <cstdlib>
 #include <string>
@@ -87,7 +87,8 @@ std::string read_picture_file(size_t step)
     return read_file(folder + "/a_" + (step < 10 ? "0" : "") + number + ".exr");
 }
 
-/* Draws the files as steps of one run. The first file is the .vtu; the others must have the same picture. */
+/* Draws the files as steps of one run. The first file is the .vtu; the pictures of all others must be bit-identical to
+ * its picture. */
 void expect_same_pictures(int ranks, const std::vector<std::string> &files)
 {
     std::string names;
@@ -95,7 +96,7 @@ void expect_same_pictures(int ranks, const std::vector<std::string> &files)
     const std::string count = std::to_string(files.size());
     expect_result(run_tool(ranks, "scene.yaml" + names), 0, count + " steps, " + count + " pictures");
     const std::string first = read_picture_file(0), pixels = first.substr(0, size_t{64} * 48 * 4 * sizeof(float));
-    // Not all pixels have the same colour, so the picture is not empty.
+    // the picture is not empty: not all pixels have the same colour
     assert_true(pixels.substr(4 * sizeof(float)) != pixels.substr(0, pixels.size() - 4 * sizeof(float)));
     for (size_t i = 1; i < files.size(); i++) {
         if (read_picture_file(i) == first) continue;
@@ -133,7 +134,7 @@ void polyhedra_beside_other_cells_are_drawn_on_any_ranks(void **)
     assert_true(read_picture_file(0) == random);
 }
 
-/* none.vtu is the file that VTK writes for a grid without cells. */
+/* Checks pieces without cells. none.vtu is the file that VTK writes for such a grid. */
 void pieces_without_cells_change_no_picture(void **)
 {
     write_vtu(folder + "/none.vtu", vtkNew<vtkUnstructuredGrid>());
@@ -154,7 +155,8 @@ void foam_cases_are_drawn_step_by_step(void **)
     assert_true(read_picture_file(0) != read_picture_file(1));
 }
 
-/* A rank reads the folder of one processor, or several ranks share one folder. */
+/* Checks that the picture is the same whether a rank reads the directories of both processors, one of them, or shares
+ * one with another rank. */
 void foam_cases_of_parallel_runs_look_the_same_on_any_ranks(void **)
 {
     for (const int p : {0, 1}) write_foam(folder + "/parallel/processor" + std::to_string(p), 2 * p);
@@ -180,7 +182,7 @@ void steps_of_series_are_chosen_by_number(void **)
     expect_result(run_tool(1, "--info run.pvd"), 0, "times  3: 3 .. 9");
 }
 
-/* Checks that --info ignores hidden cells, and points that belong only to hidden cells. */
+/* Checks that --info ignores hidden cells, and points that belong to no other cells. */
 void info_excludes_hidden_cells(void **)
 {
     const auto data = make_structured_grid(lattice::curved);

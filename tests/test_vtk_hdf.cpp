@@ -1,6 +1,6 @@
-/* Tests VTK's HDF files: the steps of unstructured grids must be read as they were written, one at a time, and
- * unsupported types must be refused by name. The test writes the files by the HDF5 library. Each part is a row of unit
- * cubes along x. */
+/* Checks VTK's HDF files: the steps of unstructured grids must be read as they were written, one at a time, and
+ * unsupported types must be refused by name. The test writes the files with the HDF5 library. Each part is a row of
+ * unit cubes along x. */
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -40,15 +40,15 @@ std::string folder;
 
 using numbers = std::vector<long long>;
 
-/* The concatenated arrays of all parts. */
+/* The arrays of all parts, one after another, as a file stores them. */
 struct lists {
     numbers point_counts, cell_counts, id_counts, ids, offsets, types;
-    std::vector<double> points, f; // f: at points
-    std::vector<double> c;         // of cells
+    std::vector<double> points, f; // points: coordinates; f: values at points
+    std::vector<double> c;         // values of cells
 };
 
-/* Adds a part of the cubes first to first + count - 1 of a row at height z. The fields are f = x + 100 step and c =
- * cube + 100 step. */
+/* Adds a part with the cubes `first` to `first` + `count` - 1 of a row at height z. The fields are f = x + 100 step at
+ * points and c = cube + 100 step of cells. */
 void add_part(lists &all, int first, int count, double z, int step)
 {
     const double corners[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
@@ -175,7 +175,7 @@ void expect_refusal(const std::string &name, const std::string &why)
     assert_true(false);
 }
 
-/* Writes three parts with 2, 0 and 3 cells; the reader must return the cells of all of them. */
+/* Checks three parts with 2, 0 and 3 cells: the reader must return the cells of all parts. */
 void parts_of_one_step_are_all_read(void **)
 {
     {
@@ -194,7 +194,7 @@ void parts_of_one_step_are_all_read(void **)
     assert_true(found.find("3 cells x 2..5 z 0..1 f 2..5 c 2..4; ") != std::string::npos);
 }
 
-/* Everything changes from step to step, including the number of parts. The second step begins with a part without
+/* Checks steps in which everything changes, including the number of parts. The second step begins with a part without
  * cells. */
 void steps_of_a_mesh_that_changes_are_read_one_by_one(void **)
 {
@@ -224,7 +224,7 @@ void steps_of_a_mesh_that_changes_are_read_one_by_one(void **)
     expect_step("changing.vtkhdf", 2, "1 cells x 7..8 z 2..3 f 207..208 c 207..207; ");
 }
 
-/* All steps share one mesh. Only the values change, and each field has its own offsets. */
+/* Checks steps that share one mesh: only the values change, and each field has offsets of its own. */
 void steps_of_values_share_their_mesh(void **)
 {
     {
@@ -247,8 +247,8 @@ void steps_of_values_share_their_mesh(void **)
     expect_step("values.vtkhdf", 1, "3 cells x 0..3 z 0..1 f 100..103 c 0..2; ");
 }
 
-/* The points move from step to step. The cells are those of the first step, although each step has a part of its
- * own. */
+/* Checks points that move from step to step. Each step has a part of its own, but its cells are those of the first
+ * step. */
 void points_that_move_keep_their_cells(void **)
 {
     {

@@ -1,13 +1,14 @@
-/* Tests insitu-render on real files: one rank and several ranks must draw the same pictures. The pixels of isosurfaces
- * (depth and colour) are bitwise the same for any partition. The pixels of volumes differ by the rounding of the over
- * operator in another order. Their bound of 1e-6 in linear light is what the library guarantees: the few tens of merges
- * of a pixel, each with a float rounding (6e-8) of values up to 1, leave no room for other errors.
+/* Checks insitu-render on real files: one rank and several ranks must draw the same pictures. The pixels of isosurfaces
+ * (depth and colour) must be bit-identical for any partition. The pixels of volumes differ by rounding, because the
+ * over operator is applied in another order. The library guarantees a difference of at most 1e-6 in linear light: the
+ * few tens of merges of a pixel, each with a float rounding (6e-8) of values up to 1, leave no room for other errors.
  *
- * Usually the files' cells are distributed to ranks at random, and one file's also in blocks; the whole test does both
- * for all files.
+ * By default the cells of each file are distributed to ranks at random, and those of one file also in blocks. The long
+ * run does both for all files.
  *
- *     test_vtk_images <insitu-render that writes plain numbers (plain_image.c)> <mpiexec>, with the data's folder in
- *     INSITU_TEST_DATA; the exit status is 77 if that is not set */
+ *     test_vtk_images <insitu-render that writes plain numbers (plain_image.c)> <mpiexec>
+ *
+ * The data's directory is given by INSITU_TEST_DATA; the exit status is 77 if that is not set. */
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
@@ -36,7 +37,7 @@ constexpr int width = 96, height = 72;
 constexpr double volume_tolerance = 1e-6;
 
 std::string tool, mpiexec, data_folder;
-run_result last_run; // last_run: the last run of draw_subject()
+run_result last_run; // result of the most recent draw_subject()
 
 struct subject {
     std::string name;
@@ -44,10 +45,10 @@ struct subject {
     std::string field;
     double value, low, high;
     int shown_in;                                  // a step whose pictures are not empty
-    std::vector<std::string> volumes = {"volume"}; // pictures of the volume to draw, by name in volume_pictures
+    std::vector<std::string> volumes = {"volume"}; // names of the pictures of the volume to draw, as in volume_pictures
 };
 
-/* Pictures of the volume by each integration method, one of them with a second volume. */
+/* Pictures of the volume with each integration method; the last one has a second volume. */
 const struct volume_picture {
     std::string name, sampling, second;
 } volume_pictures[] = {{"volume", "{}", ""},
@@ -107,7 +108,8 @@ std::string make_scene(const subject &s)
     return text;
 }
 
-/* Draws into a folder of its own and returns it. If ranks is 0, the program is run without mpiexec. */
+/* Draws the subject in a directory of its own, and returns this directory. If ranks is 0, the program is run without
+ * mpiexec. */
 std::string draw_subject(const subject &s, int ranks, const std::string &partition)
 {
     const std::string folder =
@@ -159,7 +161,8 @@ void expect_same_pictures(const subject &s, const std::string &alone, const std:
     }
 }
 
-/* The smallest surface here, that of the notch's stress, covers some 20 pixels. */
+/* Checks that the pictures are not empty. The smallest surface here, that of the notch's stress, covers some 20
+ * pixels. */
 void expect_visible_pixels(const subject &s, const std::string &folder)
 {
     const auto step = static_cast<size_t>(s.shown_in);
@@ -199,7 +202,7 @@ void post_is_the_same_on_ranks(void **)
     check_draws_same_on_ranks({"post_tet", {"post_tet.vtu"}, "VelocityMagnitude", 0.8, 0, 1.4, 0});
 }
 
-/* The 8,000 cells are distributed at random to seven ranks. */
+/* Checks 8,000 polyhedra that are distributed at random to seven ranks. */
 void polyhedra_are_the_same_on_seven_ranks(void **)
 {
     const subject s = {
@@ -252,7 +255,7 @@ void info_counts_the_mixed_lattice(void **)
         assert_true(r.contains_text(text));
 }
 
-/* NetCDF would read zeros if the end of a file is missing. */
+/* Checks that a truncated file is refused. Without this check, NetCDF would read zeros beyond the end of the file. */
 void exodus_cut_short_is_refused(void **)
 {
     const std::string folder = make_empty_folder("vtk_cut");

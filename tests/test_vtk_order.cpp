@@ -1,9 +1,9 @@
-/* insitu-render on files of each type of cell of higher order that VTK 9.1 has. VTK's own writers write them, and the
- * positions of nodes are the parametric coordinates of VTK's cells.
+/* Checks insitu-render on files of each type of cell of higher order that VTK 9.1 has. The files are written by VTK's
+ * own writers, and the positions of nodes are the parametric coordinates of VTK's cells.
  *
- * The squared distance from the origin is in the polynomials of straight cells, so that its isosurface is a sphere,
- * which pictures show to a quarter of a pixel if each node is taken for what it is. Shells are paraboloids. Cells whose
- * polynomials the library lacks have a linear field, or are flat.
+ * The polynomials of straight cells represent the squared distance from the origin exactly, so that its isosurface is a
+ * sphere. If every node is interpreted correctly, pictures show the sphere with an error of at most a quarter of a
+ * pixel. Shells are paraboloids. Cells whose polynomials the library does not know have a linear field, or are flat.
  *
  *     test_vtk_order <insitu-render that writes plain numbers (plain_image.c)> */
 #include <array>
@@ -58,10 +58,10 @@ enum class shape { triangle, quad, tet, hex, wedge, pyramid };
 struct cell_kind {
     int type;
     shape of;
-    int order; // of Lagrange and Bezier cells; 0: the type has only one
+    int order; // order of Lagrange and Bezier cells; 0 for types that have only one order
 };
 
-/* The number of points of a cell with all nodes of its order. */
+/* Returns the number of points of a cell with all nodes of its order. */
 int count_nodes(const cell_kind &kind)
 {
     const int n = kind.order + 1;
@@ -90,8 +90,9 @@ vtkSmartPointer<vtkCell> make_cell(const cell_kind &kind)
     return cell;
 }
 
-/* The reference pyramid here has a unit square below its apex (0.5, 0.5, 1). That of VTK's quadratic pyramid is a
- * collapsed cube, and that of the triquadratic one is half as high and begins at 0.5. */
+/* Maps VTK's parametric coordinates to the reference pyramid of this test, which has a unit square as base and the apex
+ * (0.5, 0.5, 1). VTK's quadratic pyramid is a collapsed cube; its triquadratic pyramid is half as high and begins at
+ * height 0.5. */
 point map_to_pyramid(int type, const point &p)
 {
     const double height = p[2];
@@ -99,8 +100,8 @@ point map_to_pyramid(int type, const point &p)
     return {p[0] + height * (0.5 - p[0]), p[1] + height * (0.5 - p[1]), height};
 }
 
-/* VTK 9.1 has no class for the pyramids of Lagrange and Bezier: those of order 2 are quadratic ones, and the middle of
- * the base. */
+/* Returns the positions of the nodes in the reference cell. VTK 9.1 has no class for Lagrange and Bezier pyramids:
+ * those of order 2 have the nodes of the quadratic pyramid, and one in the middle of the base. */
 std::vector<point> list_reference_nodes(const cell_kind &kind)
 {
     const bool is_unknown = kind.of == shape::pyramid && kind.order == 2;
@@ -115,8 +116,8 @@ std::vector<point> list_reference_nodes(const cell_kind &kind)
     return nodes;
 }
 
-/* The linear map of the reference cell to corners: its origin, and where its axes go. Corners of cubes: 0 to 7 by bits
- * along x, y, z; 8 is the middle. */
+/* A linear map from the reference cell to a cube, by the corners to which the origin and the ends of the three axes are
+ * mapped. Corners 0 to 7 of a cube are numbered by bits along x, y and z; 8 is the middle. */
 struct placing {
     int origin, first, second, third;
 };
@@ -170,7 +171,7 @@ double plane_height(const point &p)
     return p[2] + 0.3 * p[0] + 0.2 * p[1];
 }
 
-/* Heights of shells. */
+/* Height functions of shells. */
 double bowl_height(const point &p)
 {
     return 0.4 * (p[0] * p[0] + p[1] * p[1]) - 0.3;
@@ -181,8 +182,8 @@ double sloped_height(const point &p)
     return 0.1 - 0.3 * p[0] - 0.2 * p[1];
 }
 
-/* Two cubes along each axis of [-1, 1]^3, or their lower faces, moved to the height of the field. `order`: of the
- * points in each cell. Cells share points. */
+/* Makes two cubes along each axis of [-1, 1]^3, whose cells share points, or the cubes' lower faces moved to the height
+ * of the field. order: permutation of the points in each cell. */
 vtkSmartPointer<vtkUnstructuredGrid> make_grid(const cell_kind &kind, const field &f,
                                                const std::vector<size_t> &order = {})
 {
@@ -243,7 +244,7 @@ std::string write_grid(const std::string &name, vtkUnstructuredGrid *grid, forma
 
 /* ---- pictures ---------------------------------------------------------------------------------------------------- */
 
-/* Draws each file as a step, by one run of the program. */
+/* Draws each file as a step, in one run of the program. */
 run_result draw_files(const std::string &layer, const std::vector<std::string> &files)
 {
     write_file(folder + "/scene.yaml",
@@ -270,10 +271,10 @@ std::vector<float> read_depths(size_t step)
     return depths;
 }
 
-/* Depths are floats of up to 5, and positions are as precise. */
+/* Allowed error of depths, which are floats up to 5; positions have the same precision. */
 constexpr double rounding = 1e-5;
 
-/* Tells whether a ray has its hit, or none. */
+/* A function that returns whether a ray's depth is right: that of its hit, or infinite if it has none. */
 using truth = std::function<bool(double x, double y, double depth)>;
 
 bool is_on_sphere(double x, double y, double depth)
@@ -289,7 +290,8 @@ bool is_on_plane(double x, double y, double depth)
     return std::fabs(eye - depth - sloped_height({x, y, 0})) <= rounding;
 }
 
-/* A quarter of a pixel across the surface is more along the ray. */
+/* Returns whether a ray has its hit on the bowl. An error of a quarter of a pixel perpendicular to the surface is
+ * larger along the ray. */
 bool is_in_bowl(double x, double y, double depth)
 {
     if (std::fabs(x) > 1 || std::fabs(y) > 1) return !std::isfinite(depth);
@@ -297,7 +299,7 @@ bool is_in_bowl(double x, double y, double depth)
     return std::fabs(eye - depth - bowl_height({x, y, 0})) <= allowed;
 }
 
-/* Tells whether all rays of the step's picture are right, and enough of them have hits. */
+/* Returns whether all rays of the step's picture are right, and enough of them have hits. */
 bool is_right_picture(const std::string &name, size_t step, const truth &is_right)
 {
     const std::vector<float> depths = read_depths(step);
@@ -320,7 +322,7 @@ void expect_pictures(const std::vector<std::string> &files, const truth &is_righ
     assert_true(are_right);
 }
 
-/* Draws two files of each kind, in formats that alternate, and returns what is said of them. */
+/* Draws two files of each kind of cells, in alternating formats, and returns the program's result with its messages. */
 run_result expect_all(const std::vector<cell_kind> &kinds, const field &f, const std::string &layer,
                       const truth &is_right)
 {
@@ -356,7 +358,7 @@ void solids_match_their_polynomials(void **)
     assert_false(expect_all(kinds, squared_height, isosurface, is_on_sphere).contains_text(by_corners));
 }
 
-/* Their polynomials are not known, but that they fill the cube is. */
+/* Checks pyramids, whose polynomials are not compared: a linear field shows that they fill the cube without gaps. */
 void pyramids_have_no_gaps(void **)
 {
     const std::vector<cell_kind> kinds = {{VTK_QUADRATIC_PYRAMID, shape::pyramid, 0},
@@ -405,7 +407,7 @@ void other_cells_are_drawn_as_linear_cells_with_warnings(void **)
     expect_corners(shells, sloped_height, shell);
 }
 
-/* Beside hexes, which are drawn. */
+/* Checks cells that the library cannot draw, in a grid with hexes, which are drawn. */
 void cells_without_a_replacement_are_reported(void **)
 {
     const auto grid = make_grid({VTK_QUADRATIC_HEXAHEDRON, shape::hex, 0}, squared_height);
@@ -423,7 +425,7 @@ void cells_without_a_replacement_are_reported(void **)
 
 /* ---- files from before VTK 9.1 ----------------------------------------------------------------------------------- */
 
-/* Until then the nodes within the vertical edges at corners 2 and 3 were in the other order. */
+/* Returns the order of nodes before VTK 9.1: the nodes inside the vertical edges at corners 2 and 3 were exchanged. */
 std::vector<size_t> make_old_node_order(int p)
 {
     std::vector<size_t> order(static_cast<size_t>((p + 1) * (p + 1) * (p + 1)));

@@ -1,4 +1,4 @@
-/* Runs programs and checks their output, for the tests of insitu-render. */
+/* Declares functions that run programs and return their output, for the tests of insitu-render. */
 #ifndef TEST_VTK_RUN_H
 #define TEST_VTK_RUN_H
 
@@ -13,12 +13,12 @@ struct run_result {
     bool contains_text(const std::string &text) const { return (out + err).find(text) != std::string::npos; }
 };
 
-/* Runs a shell command in folder. Returns its exit status and what it wrote to stdout and stderr. */
+/* Runs a shell command in a directory. Returns its exit status and what it wrote to stdout and stderr. */
 run_result run_in_folder(const std::string &folder, const std::string &command);
 
 std::string quote_for_shell(const std::string &word);
 
-/* Returns an empty folder below the working directory; removes its former contents. */
+/* Returns an empty directory below the working directory; removes its former contents. */
 std::string make_empty_folder(const std::string &name);
 
 void write_file(const std::string &path, const std::string &text);

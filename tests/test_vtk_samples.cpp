@@ -46,8 +46,8 @@ struct place {
     double x, y, z;
 };
 
-/* Returns the position of a point. All coordinates are multiples of 1/16, so neither the sum of an image's steps nor
- * six decimal digits round them. */
+/* Returns the position of a point. All coordinates are multiples of 1/16, so that neither the sum of an image's steps
+ * nor six decimal digits round them. */
 place compute_point_position(lattice kind, int i, int j, int k)
 {
     switch (kind) {
@@ -206,7 +206,7 @@ void write_text_pieces(const std::string &path, const std::string &list, const s
                          points + pieces + "</" + list + "></VTKFile>\n");
 }
 
-/* Each file has one piece, as VTK itself reads files of several pieces. */
+/* Writes parallel files of one piece each, because VTK itself reads files of several pieces. */
 void write_parallel_lattices(const std::string &folder)
 {
     const std::string whole = "WholeExtent=\"0 5 0 4 0 3\"", piece = "<Piece Extent=\"0 5 0 4 0 3\" Source=\"g.",
@@ -219,8 +219,8 @@ void write_parallel_lattices(const std::string &folder)
                       "<PPoints><PDataArray type=\"Float32\" NumberOfComponents=\"3\"/></PPoints>", piece + "vts\"/>");
 }
 
-/* Writes C binary files. VTK's writer needs the numbers of blocks. VTK also writes a .case, but does not close it
- * before the program ends. */
+/* Writes C binary files. VTK's writer requires an array of block numbers. VTK also writes a .case file, but closes it
+ * only when the program ends. */
 void write_ensight(const std::string &folder, vtkUnstructuredGrid *grid)
 {
     vtkNew<vtkUnstructuredGrid> numbered;
@@ -321,7 +321,7 @@ vtkSmartPointer<vtkUnstructuredGrid> join_grids(vtkUnstructuredGrid *first, vtkU
     return all;
 }
 
-/* The first piece has no polyhedra, the second has hexahedra and polyhedra. */
+/* Writes two pieces: the first has no polyhedra, the second has hexahedra and polyhedra. */
 vtkSmartPointer<vtkUnstructuredGrid> write_polyhedra(const std::string &folder)
 {
     write_xml(folder + "/p0.vtu", make_cubes(2, 0, false), vtkXMLWriter::Appended, true);
@@ -339,7 +339,7 @@ std::string format_values(vtkDataArray *values, int component)
     return text.str();
 }
 
-/* Writes text files, with each number of a point or cell in a line of its own. */
+/* Writes text files in which each number of a point or cell has a line of its own. */
 void write_ensight_text(const std::string &folder, vtkUnstructuredGrid *grid)
 {
     std::ostringstream cells;
@@ -385,7 +385,7 @@ void write_cgns_fields(int file, int base, int zone, vtkUnstructuredGrid *grid)
                    grid->GetCellData()->GetArray("c")->GetVoidPointer(0), &number);
 }
 
-/* Writes a structured zone. */
+/* Writes the grid as a structured zone. */
 void write_cgns(const std::string &path, vtkUnstructuredGrid *grid)
 {
     int file = 0, base = 0, zone = 0;
@@ -398,13 +398,13 @@ void write_cgns(const std::string &path, vtkUnstructuredGrid *grid)
     cg_close(file);
 }
 
-/* Writes sections of the grid's hexes and of the quads at its bottom. */
+/* Writes sections of a CGNS zone, which contain the grid's hexes and the quads at its bottom. */
 struct section_writer {
     int file, base, zone;
     vtkUnstructuredGrid *grid;
     cgsize_t quads = (size[0] - 1) * (size[1] - 1);
 
-    /* Adds the vertices of a hex, counted from 1, and then repeats its first vertex until there are `count` nodes. */
+    /* Adds the vertices of a hex, counted from 1. Then repeats the hex's first vertex until there are `count` nodes. */
     void add_hex(vtkIdType cell, int count, std::vector<cgsize_t> &nodes) const
     {
         vtkIdType corners = 0;
@@ -420,7 +420,7 @@ struct section_writer {
         for (int k = 3; k >= 0; k--) nodes.push_back(points[k] + 1);
     }
 
-    /* write_hex_section() and write_wall_section() return the number after that of the last element. */
+    /* write_hex_section() and write_wall_section() return the number that follows the one of their last element. */
     cgsize_t write_hex_section(const char *name, cgsize_t number, cgsize_t begin, cgsize_t end,
                                int nodes_each = 8) const
     {

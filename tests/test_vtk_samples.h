@@ -1,5 +1,5 @@
-/* Writes small files of every format that insitu-render reads, and makes the grids that they contain without reading
- * the files. */
+/* Declares functions that write small files of every format that insitu-render reads, and that make the grids in these
+ * files without reading them. */
 #ifndef TEST_VTK_SAMPLES_H
 #define TEST_VTK_SAMPLES_H
 
@@ -15,36 +15,36 @@ class vtkUnstructuredGrid;
  * a list of points. */
 enum class lattice { image, rectilinear, curved };
 
-/* Returns a grid with the point field "x" and the cell field "c", which counts cells. */
+/* Returns a grid with the point field "x" and the cell field "c", whose values are the cells' numbers. */
 vtkSmartPointer<vtkDataSet> make_structured_grid(lattice kind);
 
 /* Returns the grid of make_structured_grid() as a list of hexahedra, made only from the lattice's indices. */
 vtkSmartPointer<vtkUnstructuredGrid> make_hex_grid(lattice kind);
 
-/* Returns a row of unit cubes along x, beginning at `first`. If is_mixed, every second cube is a polyhedron, otherwise
- * all cubes are hexahedra. */
+/* Returns a row of unit cubes along x, beginning at `first`. If is_mixed is set, every second cube is a polyhedron;
+ * otherwise all cubes are hexahedra. */
 vtkSmartPointer<vtkUnstructuredGrid> make_cubes(int count, int first, bool is_mixed);
 
 struct sample {
-    std::string name;               // name of the file to open, within the folder
-    std::vector<std::string> files; // files that may be truncated: that file and those that it names
+    std::string name;               // name of the file to open, in the directory
+    std::vector<std::string> files; // files that tests may truncate: that file and those that it names
     vtkSmartPointer<vtkUnstructuredGrid> expected;
 };
 
-/* Writes into folder the files of all formats that this version of VTK can write. */
+/* Writes the files of all formats that this version of VTK can write into a directory. */
 std::vector<sample> write_samples(const std::string &folder);
 
 void write_vtu(const std::string &path, vtkUnstructuredGrid *grid);
 
-/* The numbering of the elements of a CGNS zone. */
+/* How the elements of a CGNS zone are numbered. */
 enum class cgns_order {
     cells_first,  // the hexes, then the quads at the bottom
     wall_first,   // the quads, then the hexes
     wall_between, // 20 hexes, then the quads, then the other hexes
-    wall_long,    // four times the quads, which are more than the hexes, then the hexes
-    wall_stored,  // like cells_first, but the section of the quads is stored first
+    wall_long,    // the quads, four times, so that they are more than the hexes, then the hexes
+    wall_stored,  // numbered like cells_first, but the section of the quads is stored first
     mixed,        // one section of both types: a quad before each of the first hexes
-    curved,       // like wall_first, with HEXA_27 whose nodes beyond the corners repeat the first corner
+    curved,       // like wall_first, but with HEXA_27 elements, whose nodes beyond the corners repeat the first corner
     gap           // like wall_first, but the hexes' numbers begin one too high
 };
 
@@ -53,9 +53,9 @@ enum class cgns_order {
 void write_cgns_elements(const std::string &path, vtkUnstructuredGrid *grid, cgns_order order, int claimed = 60,
                          const std::vector<std::string> &zones = {"Zone"});
 
-/* Writes an OpenFOAM case to folder: a cube that begins at x = first and, beside it, two wedges whose triangles
- * together are the cube's face, so that the cube has seven faces. The field p is the cell's number at time 0, and twice
- * this number at time 0.5. */
+/* Writes an OpenFOAM case into a directory: a cube that begins at x = `first`, and two adjacent wedges. Their triangles
+ * together are one side of the cube, so that the cube has seven faces. The field p is the cell's number at time 0, and
+ * twice this number at time 0.5. */
 void write_foam(const std::string &folder, int first = 0);
 
 #endif

@@ -1,4 +1,4 @@
-/* The defaults are those that the public header documents. */
+/* Implements the functions of a session that the adaptor calls. Defaults are those that the public header documents. */
 #include "test_vtk_session_stub.h"
 
 #include <iterator>

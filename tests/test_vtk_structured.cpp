@@ -1,6 +1,6 @@
-/* Tests insitu-render on structured files. Each rank reads a part of the extent, and the picture is bitwise the same on
- * any number of ranks. Blocks of a .vtm must have no seam. An AMR file that VTK wrote must show a sphere without slits,
- * compared with the closed form. Pictures are written as plain numbers (plain_image.c).
+/* Checks insitu-render on structured files. Each rank reads a part of the extent, and the picture must be bit-identical
+ * on any number of ranks. Blocks of a .vtm file must have no seam. An AMR file that VTK wrote must show a sphere,
+ * compared with the closed form, without gaps between levels. Pictures are written as plain numbers (plain_image.c).
  *
  *     test_vtk_structured <insitu-render> <mpiexec> */
 #include <algorithm>
@@ -59,7 +59,7 @@ run_result run_tool(int ranks, const std::string &arguments)
     return run_in_folder(folder, start + quote_for_shell(tool) + " " + arguments);
 }
 
-/* Draws a file and returns the picture. */
+/* Draws a file and returns the picture; checks that there is no warning. */
 std::string draw_file(int ranks, const std::string &arguments)
 {
     const run_result r = run_tool(ranks, arguments);
@@ -76,7 +76,8 @@ void expect_same(const std::string &a, const std::string &b, const std::string &
     assert_true(a == b && a.size() > size_t{pixels} * 16);
 }
 
-/* Returns a scene, seen along z from z = 5, whose layers are the same to the bit on any number of ranks. */
+/* Returns a scene with a camera that looks along z from z = 5. Its pictures are bit-identical on any number of
+ * ranks. */
 std::string make_scene(const std::string &field)
 {
     return "images:\n  - name: a\n    size: [200, 200]\n    background: [0, 0, 0, 0]\n    camera: {position: [0, 0, "
@@ -194,7 +195,7 @@ void grids_are_the_same_on_any_ranks(void **)
                     draw_file(1, "cells.yaml g.vti"), how);
 }
 
-/* Checks that the ranks together read each cell once, and that each rank's number of cells is near the mean. */
+/* Checks that the ranks together read each cell exactly once, and that each rank's number of cells is near the mean. */
 void ranks_read_parts_of_the_extent(void **)
 {
     for (const sizes &cells : {sizes{13, 10, 17}, sizes{2, 2, 2}, sizes{40, 1, 1}}) {
@@ -225,7 +226,7 @@ void ranks_read_parts_of_the_extent(void **)
 
 /* ---- blocks ------------------------------------------------------------------------------------------------------ */
 
-/* Writes the grid of an image as four blocks. Two of the blocks meet the others at different indices. */
+/* Writes the grid of an image as four blocks, of which two are adjacent to the others at different indices. */
 void write_blocks(const sizes &cells)
 {
     const auto whole = make_image_grid(cells);
@@ -277,20 +278,21 @@ void blocks_have_no_seam(void **)
 
 /* ---- AMR --------------------------------------------------------------------------------------------------------- */
 
-/* A grid of a level. Its position and size are in cells of level 0, of which [-1, 1]^3 has 8^3. */
+/* A grid of a level of refinement. Its position and size are counted in cells of level 0, of which [-1, 1]^3 has
+ * 8^3. */
 struct box {
     unsigned level;
     sizes low, cells;
 };
 
-/* The grid of level 2 lies across both grids of level 1, which touch level 0 and the border of the domain. */
+/* The grid of level 2 overlaps both grids of level 1, which are adjacent to level 0 and to the border of the domain. */
 const std::vector<box> boxes = {{0, {0, 0, 0}, {4, 8, 8}},
                                 {0, {4, 0, 0}, {4, 8, 8}},
                                 {1, {0, 2, 4}, {3, 5, 4}},
                                 {1, {3, 2, 4}, {2, 5, 4}},
                                 {2, {1, 3, 5}, {3, 3, 3}}};
 
-/* Writes the AMR. `ratios` are the refinement ratios of level 1 to level 0 and of level 2 to level 1. */
+/* Writes the AMR file. `ratios` are the refinement ratios of level 1 to level 0 and of level 2 to level 1. */
 void write_amr(const std::array<int, 2> &ratios)
 {
     const double origin[3] = {-1, -1, -1};
@@ -323,9 +325,9 @@ void write_amr(const std::array<int, 2> &ratios)
     write_data_object<vtkXMLUniformGridAMRWriter>("levels.vthb", amr);
 }
 
-/* Counts the pixels in which the sphere's front is not visible. The surface in a cell differs from the sphere by at
- * most half of the largest cell's diagonal, 0.217. Within a radius of 0.6 the front and the back are at least 0.8
- * apart. */
+/* Counts the pixels in which the front of the sphere is not visible. Inside a cell the surface is at most half the
+ * diagonal of the largest cell, 0.217, away from the sphere. Within a radius of 0.6 in the picture the front and the
+ * back are at least 0.8 apart. */
 int count_slits(const std::string &picture)
 {
     int slits = 0;

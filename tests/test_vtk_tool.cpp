@@ -1,5 +1,5 @@
-/* Tests insitu-render as a program: its output for valid and invalid files, on one rank and on several. The test writes
- * the files, so it knows their contents.
+/* Checks insitu-render as a program: its output for valid and invalid files, on one rank and on several. The test
+ * writes the files, so that it knows their contents.
  *
  *     test_vtk_tool <insitu-render> <a copy that writes pictures as plain numbers (plain_image.c)> <mpiexec> */
 #include <filesystem>
@@ -49,8 +49,8 @@ const char *const scene = "images:\n"
                           "    outputs:\n"
                           "      - path: a_{cycle:02}.exr\n";
 
-/* Returns tets along x, beginning at `first`, each with its own points. The point field "x" is the point's x; the cell
- * field "number" counts the tets. */
+/* Returns a row of tets along x, beginning at `first`, each with points of its own. The point field "x" is the point's
+ * x; the cell field "number" is the tet's number. */
 vtkSmartPointer<vtkUnstructuredGrid> make_row_of_tets(int count, int first = 0)
 {
     auto grid = vtkSmartPointer<vtkUnstructuredGrid>::New();
@@ -198,7 +198,7 @@ void info_lists_what_is_in_a_file(void **)
     assert_true(r.contains_text("0 .. 39\n"));
 }
 
-/* VTK 9.1 has other names for these cell types. */
+/* Checks the names of cell types for which VTK 9.1 has other names. */
 void info_names_cells_of_higher_order(void **)
 {
     vtkNew<vtkUnstructuredGrid> grid;
@@ -273,8 +273,8 @@ void wrong_options_are_named(void **)
     expect_result(run_tool("row.vtu scene.yaml"), 0, "1 step, 1 picture");
 }
 
-/* Only one rank is given a file that does not exist, so it alone fails while the others continue to collective
- * calls. */
+/* Checks that all ranks stop if only one rank fails: its file does not exist, while the other ranks continue to
+ * collective calls. */
 void failure_on_one_rank_stops_all_ranks(void **)
 {
     const std::string start = quote_for_shell(mpiexec) + " -n 2 " + quote_for_shell(tool) +
@@ -302,7 +302,7 @@ void surface_meshes_are_drawn(void **)
     }
 }
 
-/* Checks the names of pictures drawn without a scene, for files of one name in several folders or with several
+/* Checks the names of pictures drawn without a scene, for files of the same name in several directories or with several
  * extensions, and for long names with a common prefix. If a file is drawn again, its pictures must have the same
  * names. */
 void default_pictures_of_two_files_have_two_names(void **)
@@ -380,7 +380,8 @@ void steps_before_the_first_value_of_a_field_are_skipped(void **)
                   "insitu-render: scene.yaml:6: no mesh has the field");
 }
 
-/* Checks that the default field is one that the first and the last step have, or otherwise one of the last step. */
+/* Checks that the default field is one that the first and the last step have or, if there is none, one of the last
+ * step. */
 void default_field_is_one_that_the_last_step_has(void **)
 {
     auto with_y = make_row_without_x(3);
@@ -395,9 +396,9 @@ void default_field_is_one_that_the_last_step_has(void **)
     expect_result(run_tool("with_x.vtu without.vtu with_x.vtu"), 0, "; other steps have it, and --field takes another");
 }
 
-/* Checks that, without a scene, all steps of a series share the scale of values and the camera: a small step is drawn
- * differently if a larger step with larger values follows. Pictures are the same on any number of ranks. All steps have
- * the same time, which the pictures show. */
+/* Checks that, without a scene, all steps of a series share the range of values and the camera: a small step is drawn
+ * differently if a larger step with larger values follows. Pictures are the same on any number of ranks. The pictures
+ * show the time, so all steps have the same time. */
 void a_series_has_one_scale_and_one_camera(void **)
 {
     for (const auto &[name, count] : {std::pair{"grow_0.vtu", 2}, {"grow_1.vtu", 9}, {"grow_2.vtu", 2}}) {
@@ -420,8 +421,8 @@ void a_series_has_one_scale_and_one_camera(void **)
     assert_true(grown == first_picture("grow_1.vtu grow_2.vtu", 2));
 }
 
-/* One piece has doubles, one has no field, and one has a field that is not declared. Picture and warnings must be the
- * same on any number of ranks. */
+/* Checks pieces that differ: one has doubles, one has no field, and one has a field that is not declared. The picture
+ * and the warnings must be the same on any number of ranks. */
 void pieces_that_differ_are_drawn_the_same_on_any_ranks(void **)
 {
     auto wide = make_row_of_tets(4), more = make_row_of_tets(2, 10);
@@ -455,7 +456,7 @@ void pieces_that_differ_are_drawn_the_same_on_any_ranks(void **)
     }
 }
 
-/* Checks that all cells are present for each way of reading and distributing them. */
+/* Checks that no cell is missing for each method of reading and distributing cells. */
 void every_distribution_mode_reads_all_cells(void **)
 {
     for (const int ranks : {2, 4}) {

@@ -1,5 +1,5 @@
-/* Tests runs that end while pictures are still pending, immediately after the last step, in every way in which a
- * process may end. Each run is a process of its own. A killed run may lack pictures that were pending, but must not
+/* Checks runs that end immediately after the last step, while pictures are still pending, by each method by which a
+ * process can end. Each run is a process of its own. A killed run may lack pictures that were pending, but must not
  * leave an incomplete file. */
 #include <dirent.h>
 #include <signal.h>
@@ -46,10 +46,10 @@ static insitu_status draw_two_steps(const char *folder, insitu_session **session
     return status;
 }
 
-/* Runs a simulation, and then ends in the way that `end` names. */
+/* Runs a simulation, and then ends the process by the method with the name `end`. */
 static int run_and_end(const char *end, const char *folder)
 {
-    static insitu_session *session; /* static, so that a run that ends without insitu_destroy() has no leak */
+    static insitu_session *session; /* static, so that a run without insitu_destroy() is not reported as a leak */
     MPI_Init(NULL, NULL);
     if (draw_two_steps(folder, &session) != INSITU_OK) {
         fprintf(stderr, "%s: %s\n", end, insitu_error(session));
@@ -59,11 +59,11 @@ static int run_and_end(const char *end, const char *folder)
     if (strcmp(end, "exit") == 0) exit(0);
     if (strcmp(end, "destroy") == 0 && insitu_destroy(&session) != INSITU_OK) return 1;
     MPI_Finalize();
-    if (strcmp(end, "finalize") == 0) _exit(0); /* all pictures are written by now */
+    if (strcmp(end, "finalize") == 0) _exit(0); /* all pictures must have been written by MPI_Finalize() */
     return 0;
 }
 
-/* Returns whether a PNG is complete, from its first bytes to its last chunk. */
+/* Returns whether a PNG is complete, judged by its first bytes and its last chunk. */
 static int is_complete_png(const char *path)
 {
     static const unsigned char begin[8] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'}, end[4] = {'I', 'E', 'N', 'D'};
@@ -115,7 +115,7 @@ int main(int argc, char **argv)
         const int is_killed = strcmp(ends[i], "killed") == 0;
         const int status = get_exit_status(argv[0], ends[i], folder), count = count_pictures(folder);
         const int is_well = is_killed ? WIFSIGNALED(status) && count >= 0 : status == 0 && count == PICTURES;
-        /* Open MPI's own handler replaces the status of an exit() without MPI_Finalize(). */
+        /* Open MPI's handler replaces the exit status of an exit() without MPI_Finalize(). */
         const int is_exit_well = strcmp(ends[i], "exit") == 0 && WIFEXITED(status) && count == PICTURES;
         printf("%s: status %d, %d of %d pictures\n", ends[i], status, count, PICTURES);
         if (!is_well && !is_exit_well) failed = 1;
