@@ -86,13 +86,13 @@ DEFINE_MAPPING(occlusion, "ambient_occlusion", OCCLUSION_KEYS);
     X(CYAML_FIELD_BOOL_PTR("reproducible", OPTIONAL, scene_file_sampling, reproducible),                               \
       .help = "If true, volumes are the same to the last bit on any number of ranks and any partition, if no cells "   \
               "overlap. Otherwise they are the same to 1e-6. A volume takes 1.1 to 1.6 times the time on one rank. "   \
-              "It takes twice the time on eight ranks, where five fragments are sent from rank to rank instead of "    \
-              "one. Several volumes are drawn sample by sample or segment by segment, which is much slower.",          \
+              "On eight ranks it takes twice the time, because ranks send five times as many fragments to each "       \
+              "other. Several volumes are drawn sample by sample or segment by segment, which is much slower.",        \
       .default_text = "`false`")                                                                                       \
     X(CYAML_FIELD_FLOAT_PTR("max_seconds", OPTIONAL, scene_file_sampling, max_seconds),                                \
       .help = "The longest time that the samples of an image may take, in seconds. The time is estimated before the "  \
-              "image is drawn. If it is longer, the image is refused with the estimate. So a step that is a thousand " \
-              "times too small does not make a run wait for days.",                                                    \
+              "image is drawn. If it is longer, the image is refused with the estimate. Without this limit, a `step` " \
+              "that is a thousand times too small would make a run wait for days.",                                    \
       .default_text = "`3600`", .low = 1, .high = 1e9)
 DEFINE_MAPPING(sampling, "sampling", SAMPLING_KEYS);
 
@@ -286,8 +286,8 @@ DEFINE_MAPPING(histogram, "histogram", HISTOGRAM_KEYS);
     X(CYAML_FIELD_INT_PTR("every", OPTIONAL, scene_file_statistics, every),                                            \
       .help = "Write at the cycles that are multiples of this.", .default_text = "`1`", .low = 1, .high = 1000000000)  \
     X(CYAML_FIELD_MAPPING_PTR("histogram", OPTIONAL, scene_file_statistics, histogram, histogram_fields),              \
-      .help = "The share of the volume that has values in each bin. Each cell counts with its value, cells of higher " \
-              "order with those at their quadrature points.",                                                          \
+      .help = "The share of the volume that has values in each bin. Each cell counts with its value. A cell of "       \
+              "higher order counts with the values at its quadrature points.",                                         \
       .default_text = "none", .child = &histogram_mapping)
 DEFINE_MAPPING(statistics, "statistics", STATISTICS_KEYS);
 
@@ -309,8 +309,8 @@ static const cyaml_schema_value_t statistics = {
       .help = "Draw only in those steps of `every` or `every_time` in which this condition holds.",                    \
       .default_text = "always", .child = &condition_mapping)                                                           \
     X(CYAML_FIELD_BOOL_PTR("once", OPTIONAL, scene_file_image, once),                                                  \
-      .help =                                                                                                          \
-          "Draw only in the first of the steps in which the image is due. An edit of the scene starts this again.",    \
+      .help = "Draw only in the first of the steps in which the image is due. After an edit of the scene, the image "  \
+              "is drawn in the first such step again.",                                                                \
       .default_text = "`false`")                                                                                       \
     X(CYAML_FIELD_MAPPING_PTR("camera", OPTIONAL, scene_file_image, camera, scene_camera_fields),                      \
       .help = "The viewpoint of the image.", .default_text = "automatic", .child = &scene_camera_mapping)              \
@@ -329,13 +329,15 @@ static const cyaml_schema_value_t statistics = {
               "transparent surfaces. Every light casts shadows unless its own `shadows` is false. The picture is the " \
               "same on any partition. Transparent layers and volumes cast no shadows, and volumes receive none. A "    \
               "layer that is not lit, such as a slice by default, receives none either. What `clip` cuts away casts "  \
-              "no shadow. What lies outside the camera's view casts its shadow. A part of an isosurface casts no "     \
+              "no shadow. What lies outside the camera's view casts shadows too. A part of an isosurface casts no "    \
               "shadow on a hit that is closer than a fifth of the size of that part's cell.",                          \
       .default_text = "`false`")                                                                                       \
     X(CYAML_FIELD_MAPPING_PTR("ambient_occlusion", OPTIONAL, scene_file_image, ambient_occlusion, occlusion_fields),   \
-      .help = "Darkens corners and hollows. From each hit, rays are sent into the hemisphere above it, distributed "   \
-              "as the cosine. The share of rays that meet no opaque layer within `radius` is a factor on the ambient " \
-              "and diffuse light of the hit. The same layers hide and are darkened as with `shadows`. The rays of a "  \
+      .help = "Darkens corners and hollows. From each hit, rays are sent into the hemisphere above it, in directions " \
+              "that are distributed in proportion to the cosine of their angle to the normal. The share of rays that " \
+              "meet no opaque layer within `radius` is a factor on the ambient "                                       \
+              "and diffuse light of the hit. The layers that block rays and those that are darkened are the same as "  \
+              "with `shadows`. The rays of a "                                                                         \
               "pixel do not change from step to step. A part of an isosurface does not hide a hit that is closer "     \
               "than a fifth of the size of that part's cell, so `radius` should be several cells. One core traces "    \
               "some 7 million rays a second in tetrahedra and 4 million in hexahedra. `{}` uses all defaults.",        \
@@ -362,7 +364,8 @@ static const cyaml_schema_value_t statistics = {
       .help =                                                                                                          \
           "Words, bars and lines in addition to the data. None of them lies over another, and all of them grow with "  \
           "the picture. What is too large is wrapped or made smaller, and bars may be placed in several columns. "     \
-          "What has no room at all is left out and named by the report. Words need a font: DejaVuSans, or another "    \
+          "Anything for which there is no space at all is left out, and the report names it. Words need a font: "      \
+          "DejaVuSans, or another "                                                                                    \
           "common one. It is looked for in the folders that OPENIMAGEIO_FONTS names in rank 0's environment, and "     \
           "otherwise in the system's folders. The report warns if there is no font, or none in the folders named. "    \
           "Words are UTF-8; a character that the font lacks is a box, and the report names it.",                       \
@@ -452,7 +455,8 @@ static const scene_form mirror_forms[] = {
 #define MESH_KEYS(X)                                                                                                   \
     X(TEXT("name", REQUIRED, scene_file_mesh, name, 255),                                                              \
       .help = "The name that the simulation gives the mesh; or the beginning of several meshes' names, as at a "       \
-              "layer. Of several entries for a mesh that have a key, the one with the longest name holds.")            \
+              "layer. If several entries apply to a mesh, each key is taken from the entry that has this key and the " \
+              "longest name.")                                                                                         \
     X(CYAML_FIELD_MAPPING_PTR("warp", OPTIONAL, scene_file_mesh, warp, warp_fields),                                   \
       .help = "Draw the mesh's vertices at x + `scale` * `field`, as in [Warped meshes](#warped-meshes).",             \
       .default_text = "none", .child = &warp_mapping)                                                                  \
@@ -473,13 +477,14 @@ static const scene_form parameter_form = {{CYAML_VALUE_FLOAT(CYAML_FLAG_DEFAULT,
       .default_text = "`0`", .low = 0, .high = 4096)                                                                   \
     X(CHOICE("tree", scene_file, tree, tree_words),                                                                    \
       .help = "The cells over which trees are built: all cells (`full`), only those that the images can show "         \
-              "(`partial`), or whichever of these has cost less so far (`auto`). Changes the speed, not the images.",  \
+              "(`partial`), or whichever of these has cost less so far (`auto`). This changes only the speed, not "    \
+              "the images.",                                                                                           \
       .default_text = "`auto`")                                                                                        \
     X(CHOICE("schedule", scene_file, schedule, schedule_words),                                                        \
       .help = "The route by which traced fragments are sent to the ranks that blend them. `direct`: without other "    \
               "ranks in between. `nodes`: within nodes first. `radix`: within nodes, and then in rounds of at most 8 " \
               "ranks. `binary`: in rounds of two ranks. `auto`: the route that is cheapest according to a model of "   \
-              "the network. Changes the speed, not the images; the report tells which.",                               \
+              "the network. This changes only the speed, not the images. The report names the route.",                 \
       .default_text = "`auto`")                                                                                        \
     X(CHOICE("writing", scene_file, writing, writing_words),                                                           \
       .help = "When pictures are written: by a thread of rank 0 while the simulation goes on (`background`), or "      \
@@ -488,32 +493,28 @@ static const scene_form parameter_form = {{CYAML_VALUE_FLOAT(CYAML_FLAG_DEFAULT,
               "`insitu_destroy`, which waits for all pictures.",                                                       \
       .default_text = "`background`")                                                                                  \
     X(CYAML_FIELD_INT_PTR("finer_pieces", OPTIONAL, scene_file, finer_pieces),                                         \
-      .help = "The number of linear pieces along an edge between two neighbouring nodes of a cell of higher "          \
-              "order, in place of one that `surface_error` chooses. With 1, the corners of pieces are the cells' "     \
+      .help = "The number of linear pieces along an edge between two neighbouring nodes of a cell of higher order, "   \
+              "instead of the number that `surface_error` chooses. With 1, the corners of pieces are the cells' "      \
               "own nodes. With more, the cells' polynomials are also evaluated between the nodes, and surfaces "       \
               "come closer to the polynomial's: with twice as many pieces, their error is divided by 4. Memory "       \
               "and time grow with the number of pieces. See [Cells of higher order](high_order.md#finer-pieces). "     \
               "Linear cells are not affected.",                                                                        \
       .default_text = "by `surface_error`", .low = 1, .high = 8)                                                       \
     X(CYAML_FIELD_FLOAT_PTR("surface_error", OPTIONAL, scene_file, surface_error),                                     \
-      .help = "Cells of higher order are drawn as linear pieces, whose number is chosen, from 1 to 8 for each "        \
-              "mesh and step: isosurfaces, and positions in other layers, are at most so many pixels away from "       \
-              "those of the cells' polynomials. The report tells the numbers and the bounds. Volumes have as "         \
-              "many as their `max_error` needs. Meshes all of whose cells are refined for other reasons have at most " \
-              "2 pieces, unless the scene gives this key. See [Cells of higher "                                       \
-              "order](high_order.md#an-error-in-pixels).",                                                             \
+      .help =                                                                                                          \
+          "The largest distance, in pixels, of isosurfaces and of positions in other layers from those of the "        \
+          "polynomials of cells of higher order. Such cells are drawn as linear pieces. For each mesh and step, the "  \
+          "smallest number of pieces from 1 to 8 is chosen that keeps this error. The report states the numbers and "  \
+          "the bounds. Volumes get as many pieces as their `max_error` needs. If all cells of a mesh are refined for " \
+          "other reasons, it has at most 2 pieces, unless the scene gives this key. See [Cells of higher "             \
+          "order](high_order.md#an-error-in-pixels).",                                                                 \
       .default_text = "`0.25`", .low = 0, .is_low_excluded = true, .high = 1000)                                       \
     X(CYAML_FIELD_FLOAT_PTR("finer_memory", OPTIONAL, scene_file, finer_memory),                                       \
       .help = "Memory in MiB that finer pieces, their nodes and the values there may take on all ranks together. If "  \
-              "they would take more, there are fewer pieces, and a warning tells the numbers.",                        \
+              "they would take more, fewer pieces are made, and a warning states the numbers.",                        \
       .default_text = "`4096`", .low = 0, .is_low_excluded = true, .high = 1e12)                                       \
     X(CYAML_FIELD_SEQUENCE("images", CYAML_FLAG_POINTER, scene_file, images, &image, 1, SCENE_MAX_IMAGES),             \
-      .help = "The images to draw. If three or more frames of a step show the same isosurface, they can share the "    \
-              "search for its cells. The isosurface must be opaque, with one colour per value and normals by "         \
-              "gradient. Its cells must be tets or hexes in arrays of float32, and the images must show most of a "    \
-              "rank's mesh. The shared data take 64 bytes per crossed tet and 128 per hex, at most 64 MiB per rank, "  \
-              "while the step is drawn.",                                                                              \
-      .child = &image_mapping)                                                                                         \
+      .help = "The images to draw.", .child = &image_mapping)                                                          \
     X(CYAML_FIELD_SEQUENCE("statistics", POINTER, scene_file, statistics, &statistics, 0, 64),                         \
       .help =                                                                                                          \
           "Statistics of fields. Each entry writes one file with one line per step. A line has the cycle, the "        \

@@ -242,8 +242,8 @@ DEFINE_MAPPING(lines, "lines", LINES_KEYS);
     X(NAMES("mesh"), .help = MESH_HELP, .default_text = MESH_DEFAULT)                                                  \
     X(CYAML_FIELD_SEQUENCE("values", CYAML_FLAG_POINTER, scene_file_isosurface, values, &number, 1,                    \
                            SCENE_MAX_SURFACES),                                                                        \
-      .help = "The values at which surfaces are drawn. No value may occur twice. The largest number of values is "     \
-              "that of all isosurfaces of an image together.")                                                         \
+      .help = "The values at which surfaces are drawn. No value may occur twice. All isosurfaces of an image "         \
+              "together can have at most 64 values.")                                                                  \
     X(CYAML_FIELD_SEQUENCE("colours", POINTER, scene_file_isosurface, colours, &colour, 1, SCENE_MAX_SURFACES),        \
       .help = "Colours of the values, in the same order, sRGB. If there are fewer colours than values, the last one "  \
               "is used for all further values. Not allowed with `colour_by`.",                                         \
@@ -301,7 +301,7 @@ DEFINE_MAPPING(volume, "volume", VOLUME_KEYS);
       .default_text = "`cell`")                                                                                        \
     X(NAMES("mesh"), .help = MESH_HELP, .default_text = MESH_DEFAULT)                                                  \
     X(CYAML_FIELD_SEQUENCE("planes", POINTER, scene_file_slice, planes, &plane, 1, SCENE_MAX_SURFACES),                \
-      .help = "The planes. The largest number is that of all isovalues and planes of an image together. Each plane "   \
+      .help = "The planes. An image can have at most 64 isovalues and planes together. Each plane "                    \
               "takes 4 bytes per vertex. If a plane lies in faces of cells, it is drawn once, by the cells on the "    \
               "side from which its normal points away. A plane on the border of the data is moved slightly into the "  \
               "data so that it is visible. This is done if its distance from the border is less than a millionth of "  \

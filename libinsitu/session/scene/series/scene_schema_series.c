@@ -102,8 +102,8 @@ static const cyaml_schema_value_t point = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAUL
       .default_text = "what fits the data; with `position`, the height that a perspective image shows at `focal`",     \
       .low = 0, .is_low_excluded = true, .high = 1e30)                                                                 \
     X(CYAML_FIELD_MAPPING_PTR("orbit", OPTIONAL, scene_file_camera, orbit, orbit_fields),                              \
-      .help = "Draws the image from several places on circles around the data, at each drawn step. Each place gives "  \
-              "a picture. `fit` and `zoom` are those of `automatic`.",                                                 \
+      .help = "Draws the image from several viewpoints on circles around the data, at each drawn step. Each "          \
+              "viewpoint gives a picture. `fit` and `zoom` are those of `automatic`.",                                 \
       .default_text = "none", .child = &orbit_mapping)                                                                 \
     X(CYAML_FIELD_SEQUENCE("path", POINTER, scene_file_camera, path, &point, 1, 256),                                  \
       .help =                                                                                                          \
