@@ -49,9 +49,9 @@ void accuracy_measure_build(accuracy_context *context)
     double times[MAX_RUNS];
     build_tree(context->subject);
     for (int i = 0; i < context->effort->runs; i++) {
-        const double began = bench_seconds();
+        const double began = bench_read_clock();
         build_tree(context->subject);
-        times[i] = bench_seconds() - began;
+        times[i] = bench_read_clock() - began;
     }
     context->build = bench_compute_stats(times, context->effort->runs).median;
 }
@@ -91,11 +91,11 @@ static void merge_fragments(studio *s)
 static double draw_frame(studio *s)
 {
     base_error error;
-    const double began = bench_seconds();
+    const double began = bench_read_clock();
     s->fragments.count = 0;
     check_status(render_frame(&s->scene.job, &s->fragments, NULL, &error), &error);
     merge_fragments(s);
-    return bench_seconds() - began;
+    return bench_read_clock() - began;
 }
 
 static void choose_pixels(studio *s)
@@ -119,9 +119,10 @@ static void measure_row(studio *s, accuracy_row *row)
     row->first = s->context->build + draw_frame(s);
     while (needs_another_run(s->context->effort, row->runs, total)) total += frames[row->runs++] = draw_frame(s);
     choose_pixels(s);
-    row->error = s->scene.job.surface_count ? accuracy_surface_error(s->context->truth, s->depths)
-                                            : accuracy_volume_error(s->context->truth, ACCURACY_OPACITY, s->chosen);
-    accuracy_print(s->context, row);
+    row->error = s->scene.job.surface_count
+                     ? accuracy_compute_surface_error(s->context->truth, s->depths)
+                     : accuracy_compute_volume_error(s->context->truth, ACCURACY_OPACITY, s->chosen);
+    accuracy_print_row(s->context, row);
 }
 
 void accuracy_measure_surface_rows(const accuracy_context *context)
@@ -189,8 +190,8 @@ static void measure_frame_rows(studio *s)
                             .runs = 1,
                             .frames = &(double){total}};
         snprintf(row.setting, sizeof row.setting, "%d", frame + 1);
-        row.error = accuracy_volume_error(s->context->truth, ACCURACY_OPACITY, mean);
-        accuracy_print(s->context, &row);
+        row.error = accuracy_compute_volume_error(s->context->truth, ACCURACY_OPACITY, mean);
+        accuracy_print_row(s->context, &row);
     }
     s->scene.job.frame = 0;
     free(sum);

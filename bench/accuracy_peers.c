@@ -75,14 +75,14 @@ static void measure_peer_row(const accuracy_context *context, const peer *p, con
         snprintf(row.setting, sizeof row.setting, "%s", p->setting);
     else
         snprintf(row.setting, sizeof row.setting, "%d^3", request.resolution);
-    row.status = bench_unindexed_draw(&request, context->effort->peer_seconds, &result, rgba);
+    row.status = bench_draw_in_child_process(&request, context->effort->peer_seconds, &result, rgba);
     if (row.status[0] == 'o') {
         row.first = result.first;
         row.runs = result.runs;
         row.frames = result.frames;
-        row.error = accuracy_volume_error(context->truth, p->meaning, rgba);
+        row.error = accuracy_compute_volume_error(context->truth, p->meaning, rgba);
     }
-    accuracy_print(context, &row);
+    accuracy_print_row(context, &row);
 }
 
 void accuracy_measure_peer_rows(const accuracy_context *context)

@@ -110,7 +110,7 @@ const bench_pixels *accuracy_reference_pixels(const accuracy_reference *t)
     return t->pixels;
 }
 
-accuracy_error accuracy_volume_error(const accuracy_reference *t, accuracy_opacity meaning, const float *rgba)
+accuracy_error accuracy_compute_volume_error(const accuracy_reference *t, accuracy_opacity meaning, const float *rgba)
 {
     const double *truth = t->rgba[meaning];
     accuracy_error e = {0, 0, 0, 0, (double)NAN};
@@ -136,7 +136,7 @@ static bool is_undefined(const accuracy_reference *t, const reference_ray *ray)
     return ray->ambiguous && t->subject->mesh.face_count > 0;
 }
 
-accuracy_error accuracy_surface_error(const accuracy_reference *t, const double *depths)
+accuracy_error accuracy_compute_surface_error(const accuracy_reference *t, const double *depths)
 {
     accuracy_error e = {0, 0, 0, 0, t->subject->mesh.face_count ? (double)NAN : 0};
     double sum = 0;
@@ -146,7 +146,7 @@ accuracy_error accuracy_surface_error(const accuracy_reference *t, const double 
         if ((!hit && !isfinite(depths[i])) || is_undefined(t, &t->rays[i])) continue;
         e.pixels += hit != NULL;
         const double off =
-            hit ? fabs(depths[i] - hit->depth) / accuracy_box_size(t->kept.cells, hit->cell) : (double)INFINITY;
+            hit ? fabs(depths[i] - hit->depth) / accuracy_compute_box_size(t->kept.cells, hit->cell) : (double)INFINITY;
         if (!(off <= 1)) {
             e.wrong++;
             continue;
@@ -158,7 +158,8 @@ accuracy_error accuracy_surface_error(const accuracy_reference *t, const double 
         e.max = fmax(e.max, off);
         if (isnan(e.residual)) continue;
         bench_pixels_position(t->pixels, i, &x, &y);
-        e.residual = fmax(e.residual, fabs(reference_residual(t->reference, x, y, hit, depths[i], &slope, NULL)));
+        e.residual =
+            fmax(e.residual, fabs(reference_compute_residual(t->reference, x, y, hit, depths[i], &slope, NULL)));
     }
     if (same) e.rms = sqrt(sum / same);
     return e;

@@ -37,9 +37,10 @@ typedef struct accuracy_error {
     double residual;
 } accuracy_error;
 
-/* accuracy_volume_error() and accuracy_surface_error() compute the error of a picture from its values in the chosen
- * pixels: rgba (count × 4) or depths (count). */
-accuracy_error accuracy_volume_error(const accuracy_reference *truth, accuracy_opacity meaning, const float *rgba);
-accuracy_error accuracy_surface_error(const accuracy_reference *truth, const double *depths);
+/* accuracy_compute_volume_error() and accuracy_compute_surface_error() compute the error of a picture from its values
+ * in the chosen pixels: rgba (count × 4) or depths (count). */
+accuracy_error accuracy_compute_volume_error(const accuracy_reference *truth, accuracy_opacity meaning,
+                                             const float *rgba);
+accuracy_error accuracy_compute_surface_error(const accuracy_reference *truth, const double *depths);
 
 #endif

@@ -45,6 +45,6 @@ typedef struct accuracy_row {
 } accuracy_row;
 
 void accuracy_print_head(void);
-void accuracy_print(const accuracy_context *context, accuracy_row *row);
+void accuracy_print_row(const accuracy_context *context, accuracy_row *row);
 
 #endif

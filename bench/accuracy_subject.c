@@ -109,7 +109,7 @@ static bool read_grid(const char *name, accuracy_subject *s)
     return false;
 }
 
-double accuracy_box_size(const grid *g, int64_t cell)
+double accuracy_compute_box_size(const grid *g, int64_t cell)
 {
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
     grid_walk walk = grid_walk_cell(g, cell);

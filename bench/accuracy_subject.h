@@ -53,7 +53,7 @@ void accuracy_scene_create_surface(accuracy_scene *scene, const accuracy_subject
 void accuracy_scene_create_volume(accuracy_scene *scene, const accuracy_subject *subject);
 
 /* Returns the cube root of the volume of a cell's bounding box. */
-double accuracy_box_size(const grid *cells, int64_t cell);
+double accuracy_compute_box_size(const grid *cells, int64_t cell);
 
 /* Returns whether, in every cell, the field is linear along a ray (tets), or piecewise linear with pieces that the
  * kernels distinguish (polyhedra). */

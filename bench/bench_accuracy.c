@@ -20,7 +20,7 @@ void accuracy_print_head(void)
 }
 
 /* Prints a row. Times are in milliseconds. */
-void accuracy_print(const accuracy_context *context, accuracy_row *row)
+void accuracy_print_row(const accuracy_context *context, accuracy_row *row)
 {
     const accuracy_error *e = &row->error;
     const bench_stats frame = bench_compute_stats(row->frames, row->runs);

@@ -31,7 +31,8 @@ static bool receive_block(int from, void *block, size_t bytes)
     return true;
 }
 
-const char *bench_unindexed_draw(const bench_vtk_request *request, int seconds, bench_vtk_result *result, float *rgba)
+const char *bench_draw_in_child_process(const bench_vtk_request *request, int seconds, bench_vtk_result *result,
+                                        float *rgba)
 {
     const size_t bytes = 4 * (size_t)request->pixel_count * sizeof *rgba;
     int ends[2], status;

@@ -6,6 +6,7 @@
 
 /* Calls bench_vtk_draw() in a child process. The child is stopped after the given number of seconds. Returns "ok", or a
  * text that states how the child failed. The calling process gets neither an X connection nor VTK's threads. */
-const char *bench_unindexed_draw(const bench_vtk_request *request, int seconds, bench_vtk_result *result, float *rgba);
+const char *bench_draw_in_child_process(const bench_vtk_request *request, int seconds, bench_vtk_result *result,
+                                        float *rgba);
 
 #endif

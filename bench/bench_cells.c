@@ -90,9 +90,9 @@ static void print_dense_error(bench_scene *s, const picture *p)
     free(s->integrals); /* integrals of the usual transfer function */
     s->integrals = NULL;
     if (p->max_error > 0)
-        bench_scene_integral_error(s, p->name);
+        bench_scene_print_integral_error(s, p->name);
     else
-        bench_scene_sample_error(s, p->name);
+        bench_scene_print_sample_error(s, p->name);
     free(s->integrals);
     s->integrals = NULL;
 }
@@ -106,11 +106,11 @@ static void measure_types(bench_scene *s, const bench_command *command)
         for (int number = 0; number <= command->runs; number++) time_frame(s, number, &series);
         bench_print_series(&s->subject, pictures[i].name, &series);
         if (pictures[i].is_surface)
-            bench_scene_surface_error(s, pictures[i].name);
+            bench_scene_print_surface_error(s, pictures[i].name);
         else if (pictures[i].unit > 0)
             print_dense_error(s, &pictures[i]);
         else if (!pictures[i].shows_everything)
-            bench_scene_integral_error(s, pictures[i].name);
+            bench_scene_print_integral_error(s, pictures[i].name);
         reset_transfer_function(s);
     }
 }
@@ -128,7 +128,7 @@ static void measure_layouts(bench_scene *first, const bench_command *command)
 {
     static bench_scene scenes[LAYOUTS];
     test_mesh mesh;
-    bench_scene_mesh(first->kind, first->subject.n, &mesh);
+    bench_scene_make_mesh(first->kind, first->subject.n, &mesh);
     for (int l = 0; l < LAYOUTS; l++) {
         bench_scene_create(&scenes[l], first->subject.program, first->kind, 1);
         scenes[l].subject = first->subject;

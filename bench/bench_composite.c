@@ -65,7 +65,7 @@ static void make_scene(const options *o, bench_scene *s)
 {
     test_mesh whole, part;
     bench_scene_create(s, "bench_composite", TEST_HEXES, 1);
-    bench_scene_mesh(TEST_HEXES, o->size, &whole);
+    bench_scene_make_mesh(TEST_HEXES, o->size, &whole);
     int *owners = malloc((size_t)whole.cell_count * sizeof *owners);
     if (!owners) abort();
     distribute_cells(&whole, o, owners);
@@ -176,12 +176,12 @@ typedef struct stopwatch {
 static stopwatch start_stopwatch(void)
 {
     MPI_Barrier(MPI_COMM_WORLD);
-    return (stopwatch){bench_seconds(), read_cpu_seconds()};
+    return (stopwatch){bench_read_clock(), read_cpu_seconds()};
 }
 
 static void stop_stopwatch(const stopwatch *watch, int number, measure *m)
 {
-    const double seconds = bench_seconds() - watch->began, cpu = read_cpu_seconds() - watch->cpu_began;
+    const double seconds = bench_read_clock() - watch->began, cpu = read_cpu_seconds() - watch->cpu_began;
     bench_add_sample(reduce_over_ranks(seconds, MPI_MAX), number, &m->series);
     bench_add_sample(reduce_over_ranks(cpu, MPI_SUM), number, &m->cpu);
 }

@@ -150,7 +150,7 @@ void bench_contour_draw(bench_contour *c)
     c->window->WaitForCompletion();
 }
 
-void bench_contour_read(bench_contour *c, float *depths)
+void bench_contour_read_depths(bench_contour *c, float *depths)
 {
     const int *size = c->window->GetSize(), width = size[0], height = size[1];
     double range[2];

@@ -53,7 +53,7 @@ void bench_contour_draw(bench_contour *contour);
 
 /* Reads the depths of the most recently drawn picture along the camera's axis, row-major with the top row first;
  * infinity in empty pixels. */
-void bench_contour_read(bench_contour *contour, float *depths);
+void bench_contour_read_depths(bench_contour *contour, float *depths);
 
 #ifdef __cplusplus
 }

@@ -43,7 +43,7 @@ void bench_contour_draw(bench_contour *contour)
     abort();
 }
 
-void bench_contour_read(bench_contour *contour, float *depths)
+void bench_contour_read_depths(bench_contour *contour, float *depths)
 {
     (void)contour, (void)depths;
     abort();

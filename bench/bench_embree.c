@@ -330,9 +330,9 @@ double bench_embree_build_cells(bench_embree *e, bench_embree_builder builder)
     arguments.setNodeChildren = is_wide ? set_wide_children : set_inner_children;
     arguments.setNodeBounds = is_wide ? set_wide_bounds : set_inner_bounds;
     arguments.createLeaf = create_leaf;
-    const double began = bench_seconds();
+    const double began = bench_read_clock();
     e->root = require_memory(rtcBuildBVH(&arguments));
-    return bench_seconds() - began;
+    return bench_read_clock() - began;
 }
 
 static double compute_half_area(const struct RTCBounds *b)
@@ -363,7 +363,7 @@ static double compute_subtree_cost(const tree_node *node, double area)
     return sum;
 }
 
-double bench_embree_cost(const bench_embree *e)
+double bench_embree_compute_cost(const bench_embree *e)
 {
     const inner_node *root = e->root;
     if (!root->head.child_count) return 1 + (double)root->head.cell_count;

@@ -43,6 +43,6 @@ void bench_embree_set_cells(bench_embree *embree, const grid *cells);
 double bench_embree_build_cells(bench_embree *embree, bench_embree_builder builder);
 
 /* Returns the SAH cost of the most recently built tree, as mmbvh_cost() defines it. The tree must be binary. */
-double bench_embree_cost(const bench_embree *embree);
+double bench_embree_compute_cost(const bench_embree *embree);
 
 #endif

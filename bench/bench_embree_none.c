@@ -49,7 +49,7 @@ double bench_embree_build_cells(bench_embree *embree, bench_embree_builder build
     abort();
 }
 
-double bench_embree_cost(const bench_embree *embree)
+double bench_embree_compute_cost(const bench_embree *embree)
 {
     (void)embree;
     abort();

@@ -141,7 +141,7 @@ static void print_rate(const lit *l, const kind *k, const char *what, bench_seri
 
 /* Prints the share of rays that Embree finds blocked, for comparison with libinsitu's share. The shares may differ: if
  * cells are not tets, the triangles are a different surface, and Embree rounds differently. */
-static void print_agreement(const lit *l, const kind *k)
+static void print_share_blocked_in_embree(const lit *l, const kind *k)
 {
     int64_t theirs = 0;
     char measure[96];
@@ -162,7 +162,7 @@ static void print_measurements(lit *l)
         kind *k = &l->kinds[i];
         snprintf(measure, sizeof measure, "%s blocked", k->name);
         bench_print_number(subject, measure, "share", (double)k->blocked / (double)k->rays);
-        print_agreement(l, k);
+        print_share_blocked_in_embree(l, k);
         print_rate(l, k, "trace", &k->trace);
         print_rate(l, k, "embree trace", &k->embree);
     }

@@ -34,7 +34,7 @@ typedef struct bench_times {
     bench_series first, later;
 } bench_times;
 
-static data_cells cells_of(const order_mesh *m)
+static data_cells view_as_data_cells(const order_mesh *m)
 {
     return (data_cells){(int)m->mesh.cell_type, m->nodes,  m->vertex_count, m->mesh.cell_count,
                         m->coordinates,         m->values, m->connectivity};
@@ -46,7 +46,7 @@ static data_cells make_cells(const char *name, int side, double bend)
     order_mesh m;
     while (strcmp(order_kinds[kind].name, name) != 0) kind++;
     order_mesh_create(&order_kinds[kind], side, bend, order_sphere_field, 0, 1, &m);
-    return cells_of(&m);
+    return view_as_data_cells(&m);
 }
 
 /* Makes linear hexes whose vertices are FINER times as dense along each axis as the nodes of the hexes of 27 nodes.
@@ -59,7 +59,7 @@ static data_cells make_split_hexes(int side, double bend)
     order_mesh split = order_mesh_make_linear_hexes(&m, kind.order);
     split.nodes = 8;
     free(m.connectivity);
-    return cells_of(&split);
+    return view_as_data_cells(&split);
 }
 
 /* Initializes a drawing, and makes its second values. The drawing takes ownership of the arrays of `cells`. */
@@ -200,7 +200,7 @@ static void measure_hexes(const bench_scene *scene, int runs, const char *name, 
 /* Returns the largest error of linear interpolation in the middle of an edge of a linear piece. It is a quarter of the
  * edge's squared length, because the field is the squared distance from the origin. In half of the tets, the longest
  * edge is a diagonal of an octahedron, from (0, 0, 0) to (1, 2, 1) in a lattice with spacing h. */
-static double error_of_pieces(int side, int pieces)
+static double compute_error_of_pieces(int side, int pieces)
 {
     const double h = 1.0 / (side * pieces);
     return 6 * h * h / 4;
@@ -208,7 +208,7 @@ static double error_of_pieces(int side, int pieces)
 
 static void measure_pieces(bench_drawing *d, int pieces, int runs)
 {
-    const double error = error_of_pieces(d->subject.n, pieces), rounding = 1.0001;
+    const double error = compute_error_of_pieces(d->subject.n, pieces), rounding = 1.0001;
     char name[32];
     bench_times times = {0};
     bench_series update = {0};

@@ -47,7 +47,7 @@ static void print_costs(bench_scene *scene, bench_routes *routes)
         char measure[64];
         snprintf(measure, sizeof measure, "embree cells %s cost", builder_names[i]);
         bench_embree_build_cells(routes->embree, (bench_embree_builder)i);
-        bench_print_number(&scene->subject, measure, "tests/ray", bench_embree_cost(routes->embree));
+        bench_print_number(&scene->subject, measure, "tests/ray", bench_embree_compute_cost(routes->embree));
     }
 }
 
@@ -99,7 +99,7 @@ static void measure_mesh(const bench_command *command, test_mesh_kind kind, int 
     print_series(&scene, &routes, &series);
     float *depths = draw_frame_depths(&scene);
     bench_routes_compare(&routes, depths, "isosurface", command->depths);
-    bench_scene_surface_error(&scene, "isosurface");
+    bench_scene_print_surface_error(&scene, "isosurface");
     free(depths);
     bench_routes_free(&routes);
     bench_scene_free(&scene);

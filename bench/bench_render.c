@@ -15,9 +15,9 @@ static bench_stats measure_speed(bench_scene *scene, int runs, void (*act)(bench
     double speeds[BENCH_MAX_RUNS];
     act(scene);
     for (int i = 0; i < runs; i++) {
-        const double began = bench_seconds();
+        const double began = bench_read_clock();
         act(scene);
-        speeds[i] = units / (bench_seconds() - began);
+        speeds[i] = units / (bench_read_clock() - began);
     }
     return bench_compute_stats(speeds, runs);
 }
@@ -71,10 +71,10 @@ static void measure_mesh(const bench_command *command, test_mesh_kind kind, int 
     measure_tree(&scene, runs);
     bench_scene_show_surfaces(&scene, 1);
     measure_frame(&scene, runs, "isosurface");
-    bench_scene_surface_error(&scene, "isosurface");
+    bench_scene_print_surface_error(&scene, "isosurface");
     bench_scene_show_volume(&scene);
     measure_frame(&scene, runs, "volume");
-    bench_scene_sample_error(&scene, "volume");
+    bench_scene_print_sample_error(&scene, "volume");
     bench_scene_free(&scene);
 }
 

@@ -190,7 +190,7 @@ void bench_routes_compare(bench_routes *r, const float *depths, const char *name
     if (folder) write_depths(r, depths, folder, "insitu");
     if (r->has_window) {
         float *drawn = require_memory(malloc(count * sizeof *drawn));
-        bench_contour_read(r->contour, drawn);
+        bench_contour_read_depths(r->contour, drawn);
         compare_depths(r, depths, drawn, name, "vtk");
         if (folder) write_depths(r, drawn, folder, "vtk");
         free(drawn);

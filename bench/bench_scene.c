@@ -82,7 +82,7 @@ void bench_scene_resize(bench_scene *s, int width, int height)
     render_camera_look_at(&s->job.camera, bench_eye, bench_focal, bench_up, bench_degrees, width, height);
 }
 
-void bench_scene_mesh(test_mesh_kind kind, int n, test_mesh *out)
+void bench_scene_make_mesh(test_mesh_kind kind, int n, test_mesh *out)
 {
     test_mesh_make_lattice(kind, n, jitter, test_wave_field, out);
 }
@@ -92,7 +92,7 @@ void bench_scene_create(bench_scene *s, const char *program, test_mesh_kind kind
     test_mesh mesh;
     memset(s, 0, sizeof *s);
     s->kind = kind;
-    bench_scene_mesh(kind, n, &mesh);
+    bench_scene_make_mesh(kind, n, &mesh);
     test_view_create(&mesh, (test_layout){0}, &s->view);
     s->view.cells.ghosts = NULL;
     test_mesh_free(&mesh);
@@ -145,17 +145,18 @@ void bench_scene_frame(bench_scene *s)
 
 /* Returns the chosen pixels. The first call chooses them, because not every benchmark needs them. A big mesh gets fewer
  * pixels, because the reference intersects each pixel's ray with every cell near any of them. */
-const bench_pixels *bench_scene_pixels(bench_scene *s)
+const bench_pixels *bench_scene_choose_pixels(bench_scene *s)
 {
     const int block = s->job.camera.height / (s->subject.cells < BIG_MESH ? ROWS : ROWS / 2);
     if (!s->pixels) s->pixels = bench_pixels_create(&s->view.cells, &s->job.camera, block);
     return s->pixels;
 }
 
-void bench_scene_surface_error(bench_scene *s, const char *name)
+void bench_scene_print_surface_error(bench_scene *s, const char *name)
 {
     char measure[96];
-    const bench_surface_error e = bench_surface_compare(bench_scene_pixels(s), &s->job, test_wave_field, &s->fragments);
+    const bench_surface_error e =
+        bench_surface_compare(bench_scene_choose_pixels(s), &s->job, test_wave_field, &s->fragments);
     const struct {
         const char *what;
         double number;
@@ -170,10 +171,10 @@ void bench_scene_surface_error(bench_scene *s, const char *name)
     }
 }
 
-double *bench_scene_integrals(bench_scene *s, const render_transfer *transfer)
+double *bench_scene_compute_integrals(bench_scene *s, const render_transfer *transfer)
 {
     const float nothing[4] = {0, 0, 0, 0};
-    const bench_pixels *pixels = bench_scene_pixels(s);
+    const bench_pixels *pixels = bench_scene_choose_pixels(s);
     const int count = bench_pixels_count(pixels);
     const render_part kept = {bench_pixels_cells(pixels), NULL, NULL};
     const render_volume_layer layer = {s->volume.field, transfer};
@@ -194,7 +195,7 @@ double *bench_scene_integrals(bench_scene *s, const render_transfer *transfer)
     return rgba;
 }
 
-bench_stats bench_scene_pixel_error(const bench_scene *s, const double *truth, const float *rgba)
+bench_stats bench_scene_compute_pixel_error(const bench_scene *s, const double *truth, const float *rgba)
 {
     const int count = bench_pixels_count(s->pixels);
     double *errors = malloc((size_t)count * sizeof *errors);
@@ -211,24 +212,25 @@ bench_stats bench_scene_pixel_error(const bench_scene *s, const double *truth, c
     return out;
 }
 
-void bench_scene_sample_error(bench_scene *s, const char *name)
+void bench_scene_print_sample_error(bench_scene *s, const char *name)
 {
     char measure[96];
     snprintf(measure, sizeof measure, "%s error", name);
-    bench_print(&s->subject, measure, "linear", bench_volume_compare(bench_scene_pixels(s), &s->job, &s->fragments));
+    bench_print(&s->subject, measure, "linear",
+                bench_volume_compare(bench_scene_choose_pixels(s), &s->job, &s->fragments));
 }
 
-void bench_scene_integral_error(bench_scene *s, const char *name)
+void bench_scene_print_integral_error(bench_scene *s, const char *name)
 {
-    const int count = bench_pixels_count(bench_scene_pixels(s));
+    const int count = bench_pixels_count(bench_scene_choose_pixels(s));
     float *rgba = malloc(4 * (size_t)count * sizeof *rgba);
     double *depths = malloc((size_t)count * sizeof *depths);
     char measure[96];
     if (!rgba || !depths) abort();
-    if (!s->integrals) s->integrals = bench_scene_integrals(s, &s->transfer);
+    if (!s->integrals) s->integrals = bench_scene_compute_integrals(s, &s->transfer);
     bench_pixels_merge(s->pixels, &s->job.space, &s->fragments, rgba, depths);
     snprintf(measure, sizeof measure, "%s integral error", name);
-    bench_print(&s->subject, measure, "linear", bench_scene_pixel_error(s, s->integrals, rgba));
+    bench_print(&s->subject, measure, "linear", bench_scene_compute_pixel_error(s, s->integrals, rgba));
     free(rgba);
     free(depths);
 }

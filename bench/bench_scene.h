@@ -23,7 +23,7 @@ extern const double bench_unit_distance;
 extern const double bench_eye[3], bench_focal[3], bench_up[3], bench_degrees;
 
 /* Makes the mesh in double precision. The caller frees it. */
-void bench_scene_mesh(test_mesh_kind kind, int n, test_mesh *out);
+void bench_scene_make_mesh(test_mesh_kind kind, int n, test_mesh *out);
 
 typedef struct bench_scene {
     bench_subject subject;
@@ -63,23 +63,24 @@ void bench_scene_show_volume(bench_scene *scene);
 void bench_scene_frame(bench_scene *scene);
 
 /* The following functions print the error of the most recent frame, as measures whose names begin with `name`.
- * bench_scene_surface_error() is for a frame with one isosurface. The others are for the volume:
- * bench_scene_sample_error() compares it with the same samples in double, which shows the effect of rounding and missed
- * samples; bench_scene_integral_error() compares it with the integral, which shows the error of the step. */
-void bench_scene_surface_error(bench_scene *scene, const char *name);
-void bench_scene_sample_error(bench_scene *scene, const char *name);
-void bench_scene_integral_error(bench_scene *scene, const char *name);
+ * bench_scene_print_surface_error() is for a frame with one isosurface. The others are for the volume:
+ * bench_scene_print_sample_error() compares it with the same samples in double, which shows the effect of rounding and
+ * missed samples; bench_scene_print_integral_error() compares it with the integral, which shows the error of the step.
+ */
+void bench_scene_print_surface_error(bench_scene *scene, const char *name);
+void bench_scene_print_sample_error(bench_scene *scene, const char *name);
+void bench_scene_print_integral_error(bench_scene *scene, const char *name);
 
 /* Returns the pixels in which errors are measured. */
-const bench_pixels *bench_scene_pixels(bench_scene *scene);
+const bench_pixels *bench_scene_choose_pixels(bench_scene *scene);
 
 /* Returns the colours of the exact volume integral at the chosen pixels for a transfer function: count × 4 numbers. The
  * caller frees them. */
-double *bench_scene_integrals(bench_scene *scene, const render_transfer *transfer);
+double *bench_scene_compute_integrals(bench_scene *scene, const render_transfer *transfer);
 
 /* Returns the statistics of the errors of `rgba` against the integrals. The error of a pixel is the largest difference
  * of its four channels. Pixels whose integral is 0 are left out. */
-bench_stats bench_scene_pixel_error(const bench_scene *scene, const double *integrals, const float *rgba);
+bench_stats bench_scene_compute_pixel_error(const bench_scene *scene, const double *integrals, const float *rgba);
 
 /* A table that a program prints for each mesh. */
 typedef struct bench_table {

@@ -21,7 +21,7 @@ static comp_load make_load(int ranks)
 
 static void print_costs(const char *name, const comp_route *route, const comp_load *load)
 {
-    const comp_cost cost = comp_cost_of(route, load, &comp_default_machine);
+    const comp_cost cost = comp_estimate_cost(route, load, &comp_default_machine);
     printf("%d,%d,%s,%d,%.0f,%.0f,%.3f\n", route->ranks, route->nodes.ranks, name, route->round_count, cost.messages,
            cost.bytes, 1e3 * cost.seconds);
 }

@@ -26,7 +26,7 @@ double session_load_image_library(void)
     return 0;
 }
 
-void session_check_words(const insitu_image *image, insitu_word_faults *out)
+void session_find_text_faults(const insitu_image *image, insitu_word_faults *out)
 {
     (void)image;
     *out = (insitu_word_faults){.font = ""};
@@ -417,7 +417,7 @@ void bench_session_print(bench_session *s)
     bench_print_number(&s->scene->subject, measure, "bytes/cell", (double)s->bytes_peak / cells);
 }
 
-float *bench_session_depths(const bench_session *s)
+float *bench_session_draw_depths(const bench_session *s)
 {
     bench_session again = *s;
     again.session = open_session(s, ".exr");

@@ -99,6 +99,6 @@ void bench_session_print(bench_session *session);
 
 /* Draws the current arrays in a separate session. Returns the depths, width × height, infinity in empty pixels; the
  * caller frees them. */
-float *bench_session_depths(const bench_session *session);
+float *bench_session_draw_depths(const bench_session *session);
 
 #endif

@@ -26,7 +26,7 @@ void bench_use_processor_time(void)
     used_clock = CLOCK_PROCESS_CPUTIME_ID;
 }
 
-double bench_seconds(void)
+double bench_read_clock(void)
 {
     struct timespec t;
     clock_gettime(used_clock, &t);
@@ -54,12 +54,12 @@ double bench_start_timer(void)
 {
     const struct timespec pause = {.tv_nsec = 20 * 1000 * 1000};
     nanosleep(&pause, NULL);
-    return bench_seconds();
+    return bench_read_clock();
 }
 
 double bench_stop_timer(double began, int number, bench_series *series)
 {
-    const double seconds = bench_seconds() - began;
+    const double seconds = bench_read_clock() - began;
     bench_add_sample(seconds, number, series);
     return seconds;
 }

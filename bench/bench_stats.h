@@ -13,7 +13,7 @@ typedef struct bench_stats {
 bench_stats bench_compute_stats(double *values, int count);
 
 /* Returns the seconds of a monotonic clock. */
-double bench_seconds(void);
+double bench_read_clock(void);
 
 /* From now on, measures the CPU time of all threads of this process instead of wall-clock time; series are printed as
  * "cpu ms". CPU times vary less than wall-clock times if the machine has other work. */

@@ -26,7 +26,7 @@ static void measure_picture(const bench_scene *scene, bench_routes *routes, benc
     }
     for (bench_change change = 0; change < BENCH_CHANGE_COUNT; change++) bench_session_print(&sessions[change]);
     bench_routes_print(routes, name);
-    float *depths = bench_session_depths(last);
+    float *depths = bench_session_draw_depths(last);
     bench_routes_compare(routes, depths, name, NULL);
     free(depths);
     for (bench_change change = 0; change < BENCH_CHANGE_COUNT; change++) bench_session_free(&sessions[change]);

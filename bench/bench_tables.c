@@ -28,7 +28,7 @@ static void build_and_print_time(bench_scene *s)
 {
     const double began = bench_start_timer();
     bench_scene_build(s);
-    bench_print_number(&s->subject, "build", "s", bench_seconds() - began);
+    bench_print_number(&s->subject, "build", "s", bench_read_clock() - began);
 }
 
 static void measure_frames(bench_scene *s, const char *name, const bench_command *command)
@@ -39,7 +39,7 @@ static void measure_frames(bench_scene *s, const char *name, const bench_command
     for (int i = 0; i < command->runs; i++) {
         const double began = bench_start_timer();
         bench_scene_frame(s);
-        speeds[i] = rays / (bench_seconds() - began);
+        speeds[i] = rays / (bench_read_clock() - began);
     }
     bench_print(&s->subject, name, "Mrays/s", bench_compute_stats(speeds, command->runs));
 }
@@ -48,14 +48,14 @@ static void measure_surface(bench_scene *s, const char *name, const bench_comman
 {
     bench_scene_show_surfaces(s, 1);
     measure_frames(s, name, command);
-    bench_scene_surface_error(s, name);
+    bench_scene_print_surface_error(s, name);
 }
 
 static void measure_volume(bench_scene *s, const char *name, const bench_command *command)
 {
     bench_scene_show_volume(s);
     measure_frames(s, name, command);
-    bench_scene_integral_error(s, name);
+    bench_scene_print_integral_error(s, name);
 }
 
 /* Measures traversal by tiles with the default sample group, and then with groups of each size. The sample window of a

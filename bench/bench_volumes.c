@@ -71,7 +71,7 @@ static void print_peer(bench_scene *scene, const char *name, bench_vtk_result *r
     snprintf(measure, sizeof measure, "volume %s frame", name);
     bench_print_series(&scene->subject, measure, &frames);
     snprintf(measure, sizeof measure, "volume %s integral error", name);
-    bench_print(&scene->subject, measure, "linear", bench_scene_pixel_error(scene, truth, rgba));
+    bench_print(&scene->subject, measure, "linear", bench_scene_compute_pixel_error(scene, truth, rgba));
 }
 
 static int *list_pixel_positions(const bench_pixels *pixels)
@@ -87,11 +87,11 @@ static void measure_peers(bench_scene *scene, test_mesh_kind kind, int runs)
 {
     peer_look look;
     test_mesh mesh;
-    bench_scene_mesh(kind, scene->subject.n, &mesh);
+    bench_scene_make_mesh(kind, scene->subject.n, &mesh);
     make_transfer_function(scene, &look);
-    const int count = bench_pixels_count(bench_scene_pixels(scene));
+    const int count = bench_pixels_count(bench_scene_choose_pixels(scene));
     int *places = list_pixel_positions(scene->pixels);
-    double *truth = bench_scene_integrals(scene, &look.transfer);
+    double *truth = bench_scene_compute_integrals(scene, &look.transfer);
     float *rgba = malloc(4 * (size_t)count * sizeof *rgba);
     if (!rgba) abort();
     bench_vtk_request request = {.mesh = &mesh,
@@ -112,7 +112,7 @@ static void measure_peers(bench_scene *scene, test_mesh_kind kind, int runs)
     for (size_t i = 0; i < sizeof peers / sizeof *peers; i++) {
         bench_vtk_result result = {0};
         request.mapper = peers[i].mapper;
-        const char *status = bench_unindexed_draw(&request, PEER_SECONDS, &result, rgba);
+        const char *status = bench_draw_in_child_process(&request, PEER_SECONDS, &result, rgba);
         if (!strcmp(status, "ok"))
             print_peer(scene, peers[i].name, &result, truth, rgba);
         else
@@ -151,7 +151,7 @@ static void measure_frames(bench_scene *scene, const char *name, render_integrat
     snprintf(measure, sizeof measure, "volume %s frame", name);
     bench_print_series(&scene->subject, measure, &frames);
     snprintf(measure, sizeof measure, "volume %s", name);
-    bench_scene_integral_error(scene, measure);
+    bench_scene_print_integral_error(scene, measure);
 }
 
 static void measure_mesh(const bench_command *command, test_mesh_kind kind, int n)

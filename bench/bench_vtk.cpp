@@ -284,7 +284,7 @@ bool bench_vtk_draw(const bench_vtk_request *request, bench_vtk_result *result, 
     vtkObject::GlobalWarningDisplayOff();
     peer p{*request, {}, {}, {}, nullptr, nullptr, nullptr};
     if (!open_window(p)) return false;
-    const vtkSmartPointer<vtkUnstructuredGrid> grid = bench_vtk_grid(*request->mesh);
+    const vtkSmartPointer<vtkUnstructuredGrid> grid = bench_vtk_make_grid(*request->mesh);
     grid->GetBounds();
     const double began = read_seconds();
     set_mapper(p, grid);

@@ -40,7 +40,7 @@ void add_polyhedron(const test_mesh &mesh, int64_t cell, vtkUnstructuredGrid &gr
 
 } // namespace
 
-vtkSmartPointer<vtkUnstructuredGrid> bench_vtk_grid(const test_mesh &mesh)
+vtkSmartPointer<vtkUnstructuredGrid> bench_vtk_make_grid(const test_mesh &mesh)
 {
     auto grid = vtkSmartPointer<vtkUnstructuredGrid>::New();
     vtkNew<vtkPoints> points;

@@ -8,6 +8,6 @@
 #include "bench_vtk.h"
 
 /* Returns a grid with float32 points, and float32 values as the point scalars "f". */
-vtkSmartPointer<vtkUnstructuredGrid> bench_vtk_grid(const test_mesh &mesh);
+vtkSmartPointer<vtkUnstructuredGrid> bench_vtk_make_grid(const test_mesh &mesh);
 
 #endif

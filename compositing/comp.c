@@ -125,7 +125,7 @@ static insitu_status merge_owned(composition *c, const comp_messages *held, comp
     return status;
 }
 
-static insitu_status merge_alone(composition *c, base_error *error)
+static insitu_status merge_on_single_rank(composition *c, base_error *error)
 {
     return merge_owned(c, &(comp_messages){NULL, NULL}, &(comp_messages){NULL, NULL}, INSITU_OK, error);
 }
@@ -196,7 +196,7 @@ static insitu_status composite_fragments(composition *c, fragment_list *items, i
     if (!status) {
         if (c->route.ranks > 1) choose_message_route(c, most);
         choose_owners(c);
-        own = c->route.ranks > 1 ? run_phases(c, items, error) : merge_alone(c, error);
+        own = c->route.ranks > 1 ? run_phases(c, items, error) : merge_on_single_rank(c, error);
         *has_overlaps = c->merged.overlaps && pixel_set_count(c->merged.overlaps, pixel_count(c)) > 0;
         status = c->route.ranks > 1 ? comp_agree(comm, own, has_overlaps, error) : own;
     }

@@ -16,7 +16,7 @@ static double count_partners(const comp_route *route, int round, const comp_load
     return comp_route_is_dense(route, round) || own > all ? all : own;
 }
 
-comp_cost comp_cost_of(const comp_route *route, const comp_load *load, const comp_machine *m)
+comp_cost comp_estimate_cost(const comp_route *route, const comp_load *load, const comp_machine *m)
 {
     comp_cost cost = {0, 0, 0};
     const double bytes = (double)load->fragments * load->bytes;
@@ -49,10 +49,10 @@ comp_route comp_cheapest_route(int ranks, comp_nodes nodes, const comp_load *loa
                  {COMP_RADIX, 16}, {COMP_RADIX, 32}, {COMP_BINARY, 2}};
     if (nodes.ranks >= ranks) nodes = (comp_nodes){1, false}; /* all ranks are treated as one node */
     comp_route best = comp_route_of(COMP_DIRECT, ranks, nodes, 0);
-    double least = comp_cost_of(&best, load, machine).seconds;
+    double least = comp_estimate_cost(&best, load, machine).seconds;
     for (unsigned i = 0; i < sizeof tried / sizeof *tried; i++) {
         const comp_route route = comp_route_of(tried[i].schedule, ranks, nodes, tried[i].radix);
-        const double seconds = comp_cost_of(&route, load, machine).seconds;
+        const double seconds = comp_estimate_cost(&route, load, machine).seconds;
         if (!(seconds < least)) continue;
         best = route;
         least = seconds;

@@ -33,7 +33,7 @@ typedef struct comp_cost {
     double seconds;
 } comp_cost;
 
-comp_cost comp_cost_of(const comp_route *route, const comp_load *load, const comp_machine *machine);
+comp_cost comp_estimate_cost(const comp_route *route, const comp_load *load, const comp_machine *machine);
 
 /* Returns the route with the lowest estimated time. */
 comp_route comp_cheapest_route(int ranks, comp_nodes nodes, const comp_load *load, const comp_machine *machine);

@@ -78,7 +78,7 @@ int32_t comp_claim_priority(uint32_t block, int rank, int64_t fragments)
 
 /* Computes the number of fragments that each rank owns in `loads`. Returns the mean over the ranks that own blocks,
  * rounded up. */
-static uint64_t find_share(const comp_claim *claims, uint32_t blocks, uint64_t *loads, int ranks)
+static uint64_t compute_equal_share(const comp_claim *claims, uint32_t blocks, uint64_t *loads, int ranks)
 {
     uint64_t owners = 0, all = 0;
     for (int r = 0; r < ranks; r++) loads[r] = 0;
@@ -123,7 +123,7 @@ static int find_new_owner(owner_search *t, uint64_t fragments)
 
 void comp_claims_balance(comp_claim *claims, uint32_t blocks, uint64_t *loads, int ranks)
 {
-    owner_search t = {claims, blocks, 0, 4, loads, find_share(claims, blocks, loads, ranks)};
+    owner_search t = {claims, blocks, 0, 4, loads, compute_equal_share(claims, blocks, loads, ranks)};
     for (uint32_t b = 0; b < blocks; b++) {
         if (!claims[b].priority) continue;
         const uint64_t fragments = claims[b].fragments;

@@ -63,7 +63,7 @@ static inline uint32_t comp_grid_strip(const comp_grid *grid, uint32_t pixel)
 }
 
 /* Returns the pixel's index in its strip; pixels of a strip are numbered row by row. */
-static inline uint32_t comp_grid_at(const comp_grid *grid, uint32_t pixel)
+static inline uint32_t comp_grid_index_in_strip(const comp_grid *grid, uint32_t pixel)
 {
     const uint32_t y = comp_grid_y(grid, pixel), x = pixel - y * grid->width;
     return (y & ((1u << grid->row_shift) - 1)) * COMP_LANES + x % COMP_LANES;

@@ -67,7 +67,7 @@ static void heap_sort(fragment *items, int64_t count)
     }
 }
 
-static float nearest_surface(const fragment *sorted, int64_t count)
+static float find_depth_of_nearest_surface(const fragment *sorted, int64_t count)
 {
     for (int64_t i = 0; i < count; i++)
         if (sorted[i].kind >= FRAGMENT_SURFACE) return sorted[i].t_in;
@@ -126,7 +126,7 @@ static const float face_error = 4e-6f;
 
 /* Advances *next to the first fragment that does not begin in front of t by more than rounding. Returns the larger of
  * `reach` and the largest t_out of the volume fragments before *next. */
-static float furthest_end_before(const fragment *sorted, int64_t *next, float t, float reach)
+static float find_furthest_end_before(const fragment *sorted, int64_t *next, float t, float reach)
 {
     const float begin = t - face_error * fmaxf(fabsf(t), 1);
     for (; sorted[*next].t_in < begin; ++*next)
@@ -142,7 +142,7 @@ bool comp_pixel_overlaps(const fragment *sorted, int64_t count)
         const fragment *f = &sorted[i];
         n = count_coincident_samples(f, count - i);
         const bool is_surface = f->kind >= FRAGMENT_SURFACE;
-        if (is_surface) before = furthest_end_before(sorted, &next, f->t_in, before);
+        if (is_surface) before = find_furthest_end_before(sorted, &next, f->t_in, before);
         if (f->t_in <= (is_surface ? before : reach) && f->t_out >= f->t_in) return true;
         if (f->transmittance == 0) return false;
         if (n > 1 && are_of_one_volume(f, n)) return true;
@@ -224,7 +224,7 @@ static int64_t move_open_to_front(fragment *items, int64_t count, float depth)
     return open;
 }
 
-static float next_end(const fragment *items, int64_t count)
+static float find_next_interval_end(const fragment *items, int64_t count)
 {
     float to = INFINITY;
     for (int64_t i = 0; i < count; i++)
@@ -285,7 +285,7 @@ static int64_t blend_overlapping(blend *b, fragment *sorted, int64_t count, cons
         }
         open = move_open_to_front(sorted, open, at);
         if (open == 0 || b->transmittance == 0) break;
-        float to = next_end(sorted, open);
+        float to = find_next_interval_end(sorted, open);
         if (end < count && sorted[end].t_in < to) to = sorted[end].t_in;
         blend_interval(b, sorted, open, at, to, sink);
         at = to;
@@ -299,7 +299,7 @@ static void blend_single(const fragment *f, const float background[4], float out
 {
     for (int c = 0; c < 3; c++) out_rgba[c] = 0 + f->colour[c] + f->transmittance * background[c];
     out_rgba[3] = 1 - f->transmittance + f->transmittance * background[3];
-    *out_depth = nearest_surface(f, 1);
+    *out_depth = find_depth_of_nearest_surface(f, 1);
 }
 
 /* Not inlined, because inlining it would slow down the frequent case of a single fragment. */
@@ -325,7 +325,7 @@ static __attribute__((noinline)) void blend_sorted(fragment *items, int64_t coun
     }
     for (int c = 0; c < 3; c++) out_rgba[c] = colour[c] + transmittance * background[c];
     out_rgba[3] = 1 - transmittance + transmittance * background[3];
-    *out_depth = nearest_surface(items, count);
+    *out_depth = find_depth_of_nearest_surface(items, count);
 }
 
 /* Returns the number of leading fragments that are folded into one (fragment_fold.h): volume fragments in the same
@@ -362,7 +362,7 @@ void comp_merge_folded_pixel(fragment *items, int64_t count, const float backgro
     }
     for (int c = 0; c < 3; c++) out_rgba[c] = colour[c] + transmittance * background[c];
     out_rgba[3] = 1 - transmittance + transmittance * background[3];
-    *out_depth = nearest_surface(items, count);
+    *out_depth = find_depth_of_nearest_surface(items, count);
 }
 
 void comp_merge_pixel(fragment *items, int64_t count, const float background[4], float out_rgba[4], float *out_depth)

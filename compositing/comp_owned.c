@@ -69,14 +69,14 @@ static bool join_second(merge_scratch *m, const fragment *item, uint32_t at)
     return true;
 }
 
-static bool join_own(const comp_strips *own, uint32_t strip, merge_scratch *m)
+static bool join_own_fragments(const comp_strips *own, uint32_t strip, merge_scratch *m)
 {
     enum { AHEAD = 16 };
     const comp_grid grid = *own->grid;
     for (uint32_t r = own->starts[strip]; r < own->starts[strip + 1]; r++) {
         const fragment *item = own->items + own->ranges[r].first;
         for (const fragment *end = item + own->ranges[r].count; item < end; item++) {
-            const uint32_t at = comp_grid_at(&grid, item->pixel);
+            const uint32_t at = comp_grid_index_in_strip(&grid, item->pixel);
             __builtin_prefetch(item + AHEAD);
             if (!comp_sheet_has(&m->joined, at))
                 comp_sheet_put(&m->joined, at, item);
@@ -87,7 +87,7 @@ static bool join_own(const comp_strips *own, uint32_t strip, merge_scratch *m)
     return true;
 }
 
-static bool join_other(merge_scratch *m)
+static bool join_received_sheet(merge_scratch *m)
 {
     uint16_t left[COMP_ROWS];
     comp_sheet_join(&m->joined, &m->other, left);
@@ -100,7 +100,7 @@ static bool join_other(merge_scratch *m)
     return true;
 }
 
-static bool join_all(const comp_owned *owned, uint32_t strip, merge_scratch *m)
+static bool join_fragments_of_strip(const comp_owned *owned, uint32_t strip, merge_scratch *m)
 {
     const comp_received *const come = &owned->arrivals;
     const uint32_t first = come->starts[strip];
@@ -108,10 +108,10 @@ static bool join_all(const comp_owned *owned, uint32_t strip, merge_scratch *m)
     m->remaining.count = 0;
     memset(m->mixed, 0, sizeof m->mixed);
     comp_sheet_begin(&m->joined, strip);
-    if (!join_own(owned->traced_strips, strip, m)) return false;
+    if (!join_own_fragments(owned->traced_strips, strip, m)) return false;
     for (uint32_t i = first; i < come->starts[strip + 1]; i++) {
         comp_sheet_read(come->sheets[i], COMP_WORDS, i > first || has_own ? &m->other : &m->joined);
-        if ((i > first || has_own) && !join_other(m)) return false;
+        if ((i > first || has_own) && !join_received_sheet(m)) return false;
     }
     return true;
 }
@@ -185,7 +185,7 @@ static bool write_pixels(const comp_owned *owned, merge_scratch *m)
 
 static bool merge_strip(const comp_owned *owned, uint32_t strip, const comp_merge_output *merged, merge_scratch *m)
 {
-    if (!join_all(owned, strip, m)) return false;
+    if (!join_fragments_of_strip(owned, strip, m)) return false;
     comp_sheet_finish(&m->joined, merged->background, &m->pixels);
     if (merged->deep) mark_all_mixed(m);
     if (!list_mixed_pixels(m)) return false;

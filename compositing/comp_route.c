@@ -1,7 +1,7 @@
 #include "comp_route.h"
 
 /* Returns the largest divisor of the number that is at most `most`. */
-static int largest_divisor(int number, int most)
+static int find_largest_divisor(int number, int most)
 {
     for (int k = most; k > 1; k--)
         if (number % k == 0) return k;
@@ -17,7 +17,7 @@ static bool has_radices(int number, int most)
 
 /* Returns the largest product of radices that does not exceed the number. It exceeds half of the number, because the
  * largest power of two does. */
-static int largest_product(int number, int most)
+static int find_largest_product(int number, int most)
 {
     while (!has_radices(number, most)) number--;
     return number;
@@ -31,7 +31,7 @@ static void add_round(comp_route *route, int radix)
 static void add_rounds(comp_route *route, int number, int most)
 {
     while (number > 1) {
-        const int radix = largest_divisor(number, most);
+        const int radix = find_largest_divisor(number, most);
         add_round(route, radix);
         number /= radix;
     }
@@ -46,7 +46,7 @@ comp_route comp_route_of(comp_schedule schedule, int ranks, comp_nodes nodes, in
     int groups = ranks / route.nodes.ranks;
     if (schedule == COMP_RADIX || schedule == COMP_BINARY) {
         const int most = schedule == COMP_BINARY || radix < 2 ? 2 : radix;
-        groups = largest_product(groups, most);
+        groups = find_largest_product(groups, most);
         add_round(&route, route.nodes.ranks);
         add_rounds(&route, groups, most);
     } else {

@@ -132,7 +132,7 @@ static void clear_empty_tile(const comp_tiles *tiles, const pixel_area *area)
 
 /* Returns the pixel's index in the area, row by row. The truncated quotient is exact: half a pixel is added, so that
  * the quotient is far from integers compared with its rounding error. */
-static uint32_t index_in_area(const comp_tiles *tiles, const pixel_area *area, uint32_t pixel)
+static uint32_t find_index_in_area(const comp_tiles *tiles, const pixel_area *area, uint32_t pixel)
 {
     const uint32_t width = (uint32_t)tiles->out->width;
     const uint32_t from = pixel - ((uint32_t)area->y * width + (uint32_t)area->x);
@@ -148,9 +148,9 @@ static void sort_by_pixel(const comp_tiles *tiles, const pixel_area *area, const
 {
     const int64_t pixels = (int64_t)area->width * area->height;
     memset(starts, 0, (size_t)pixels * sizeof *starts);
-    for (int64_t i = 0; i < count; i++) starts[index_in_area(tiles, area, items[i].pixel)]++;
+    for (int64_t i = 0; i < count; i++) starts[find_index_in_area(tiles, area, items[i].pixel)]++;
     for (int64_t k = 1; k < pixels; k++) starts[k] += starts[k - 1];
-    for (int64_t i = 0; i < count; i++) order[--starts[index_in_area(tiles, area, items[i].pixel)]] = i;
+    for (int64_t i = 0; i < count; i++) order[--starts[find_index_in_area(tiles, area, items[i].pixel)]] = i;
     starts[pixels] = count;
 }
 
@@ -183,7 +183,7 @@ static bool blend_singles(const comp_tiles *tiles, const pixel_area *area, fragm
     if (count > pixels || pixels > MOST_PIXELS) return false;
     if (count < pixels) clear_tile(tiles, area);
     for (int64_t i = 0; i < count; i++) {
-        const uint32_t place = index_in_area(tiles, area, items[i].pixel);
+        const uint32_t place = find_index_in_area(tiles, area, items[i].pixel);
         if (seen[place]) return false;
         seen[place] = 1;
         blend_pixel(tiles, items[i].pixel, &items[i], 1);

@@ -106,7 +106,7 @@ INLINE void load_vertices(const wave_grid *grid, const cell_view *view, real p[8
 
 /* Computes the mean over a face's vertices. Opposite vertices of a quad are summed first, so that the mean is rounded
  * in the same way for both of its cells. */
-INLINE void face_mean(const wave_cell_shape *shape, int f, const real p[8][4], real mean[4])
+INLINE void compute_face_mean(const wave_cell_shape *shape, int f, const real p[8][4], real mean[4])
 {
     const int8_t *v = shape->face[f];
     if (shape->face_size[f] == 3) {
@@ -123,7 +123,7 @@ INLINE void integrate_faces(const cell_view *view, const real p[8][4], real inte
     for (int f = 0; f < view->shape->face_count; ++f) {
         const real *n = view->face + 4 * f;
         real mean[4];
-        face_mean(view->shape, f, p, mean);
+        compute_face_mean(view->shape, f, p, mean);
         integral[0] += n[3] * (n[0] * mean[1] + n[1] * mean[2] + n[2] * mean[3]);
         for (int a = 0; a < 3; ++a) integral[1 + a] += n[3] * n[a] * mean[0];
     }
@@ -178,7 +178,7 @@ typedef struct face_side {
     int layer;
 } face_side;
 
-INLINE face_side side_of(const wave_grid *grid, int32_t cell)
+INLINE face_side get_face_side(const wave_grid *grid, int32_t cell)
 {
     return cell < 0 ? (face_side){NULL, 0}
                     : (face_side){(const real *)grid->jump + 4 * (int64_t)cell, grid->layers[cell]};
@@ -210,13 +210,13 @@ INLINE void apply_flux(const wave_grid *grid, const wave_cell_shape *shape, cons
     cell_view view = view_cell(grid, shape, c);
     real p[8][4], mean[4] = {0, 0, 0, 0}, sum[4] = {0, 0, 0, 0};
     int layer = grid->layers[c];
-    face_side near = side_of(grid, c);
+    face_side near = get_face_side(grid, c);
     if (grid->second_order) load_vertices(grid, &view, p);
     for (int f = 0; f < view.shape->face_count; ++f) {
         const real *n = view.face + 4 * f;
         real star[2];
-        if (grid->second_order) face_mean(view.shape, f, p, mean);
-        solve_riemann(grid, layers, n, mean, near, side_of(grid, view.neighbour[f]), star);
+        if (grid->second_order) compute_face_mean(view.shape, f, p, mean);
+        solve_riemann(grid, layers, n, mean, near, get_face_side(grid, view.neighbour[f]), star);
         sum[0] += n[3] * star[1];
         for (int a = 0; a < 3; ++a) sum[1 + a] += n[3] * star[0] * n[a];
     }

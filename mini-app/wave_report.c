@@ -6,7 +6,7 @@
 #include <string.h>
 #include <unistd.h>
 
-static double resident_bytes(void)
+static double read_resident_bytes(void)
 {
     long total = 0, resident = 0;
     FILE *file = fopen("/proc/self/statm", "r");
@@ -26,7 +26,7 @@ void wave_report_begin(MPI_Comm comm, const wave_options *options, const wave_me
     MPI_Comm_size(comm, &ranks);
     MPI_Reduce(cells, &sum, 1, MPI_LONG_LONG, MPI_SUM, 0, comm);
     MPI_Reduce(report->rank ? cells : MPI_IN_PLACE, cells, 3, MPI_LONG_LONG, MPI_MAX, 0, comm);
-    report->memory_before = resident_bytes();
+    report->memory_before = read_resident_bytes();
     if (report->rank != 0) return;
     printf("insitu-wave: %lld cells (%d x %d x %d cubes) on %d ranks (%lld to %lld each), %d steps of %.3g\n", sum,
            options->size[0], options->size[1], options->size[2], ranks, -cells[2], cells[0], options->steps,
@@ -50,7 +50,7 @@ void wave_report_step(wave_report *report, int64_t cycle, double time, double si
                   insitu->composite_ms,
                   insitu->write_ms,
                   (double)insitu->bytes_peak,
-                  resident_bytes() - report->memory_before};
+                  read_resident_bytes() - report->memory_before};
     enum { COUNT = sizeof v / sizeof *v };
     MPI_Reduce(report->rank ? v : MPI_IN_PLACE, v, COUNT, MPI_DOUBLE, MPI_MAX, 0, report->comm);
     if (report->rank != 0) return;
@@ -100,7 +100,7 @@ static void print_paths(const char *scene)
 
 void wave_report_end(const wave_report *report, const wave_options *options, const wave_solver *solver, int images)
 {
-    wave_totals totals = wave_solver_totals(solver);
+    wave_totals totals = wave_solver_compute_totals(solver);
     if (report->rank != 0) return;
     double all = report->simulation_ms + report->insitu_ms;
     printf("simulated in %.2f s, in situ %.2f s (%.0f %% of both); energy %.4g, peak pressure %.3g\n",

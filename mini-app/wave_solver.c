@@ -220,7 +220,7 @@ void wave_solver_get(const wave_solver *s, int32_t cell, double state[4])
     }
 }
 
-void wave_solver_centroid(const wave_solver *s, int32_t cell, double xyz[3])
+void wave_solver_compute_centroid(const wave_solver *s, int32_t cell, double xyz[3])
 {
     wave_cell_geometry g;
     measure_cells(s->mesh, cell, &g);
@@ -261,7 +261,7 @@ void wave_solver_step(wave_solver *s)
     s->time += s->time_step;
 }
 
-wave_totals wave_solver_totals(const wave_solver *s)
+wave_totals wave_solver_compute_totals(const wave_solver *s)
 {
     double sum[3] = {0, 0, 0}, peak = 0, q[4];
     for (int32_t c = 0; c < s->mesh->own_cells; ++c) {

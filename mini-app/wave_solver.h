@@ -51,7 +51,7 @@ void wave_solver_free(wave_solver *solver);
  * only before wave_solver_start(). Local. */
 void wave_solver_set(wave_solver *solver, int32_t cell, const double state[4]);
 void wave_solver_get(const wave_solver *solver, int32_t cell, double state[4]);
-void wave_solver_centroid(const wave_solver *solver, int32_t cell, double xyz[3]);
+void wave_solver_compute_centroid(const wave_solver *solver, int32_t cell, double xyz[3]);
 
 /* Agrees with all ranks on the time step, and updates halo cells and vertices to the state that was set. Collective. */
 void wave_solver_start(wave_solver *solver);
@@ -60,6 +60,6 @@ void wave_solver_start(wave_solver *solver);
 void wave_solver_step(wave_solver *solver);
 
 /* Computes the totals of the current state. Collective. */
-wave_totals wave_solver_totals(const wave_solver *solver);
+wave_totals wave_solver_compute_totals(const wave_solver *solver);
 
 #endif

@@ -58,7 +58,7 @@ static void read_any(const bounds_source *source, const uint32_t *cells, int cou
 {
     for (int i = 0; i < count; i++) {
         fetch_box_empty(&boxes[i]);
-        fetch_box_any_cell(&boxes[i], source->g, cells[i]);
+        extend_box_by_any_cell(&boxes[i], source->g, cells[i]);
     }
 }
 
@@ -66,7 +66,7 @@ static void extend_by_any_cells(const bounds_source *source, const uint32_t *cel
                                 fetch_box *box)
 {
     (void)later;
-    for (int i = 0; i < count; i++) fetch_box_any_cell(box, source->g, cells[i]);
+    for (int i = 0; i < count; i++) extend_box_by_any_cell(box, source->g, cells[i]);
 }
 
 static void read_given_boxes(const bounds_source *source, const uint32_t *cells, int count, fetch_box *boxes)
@@ -109,7 +109,7 @@ bounds_source bounds_source_make(const grid *g, const float *lower, const float 
 }
 
 /* Computes the smallest and largest finite value of an array of any type. */
-static void array_range_any(const grid_array *a, int64_t count, int threads, double *least, double *most)
+static void compute_array_range_any_type(const grid_array *a, int64_t count, int threads, double *least, double *most)
 {
     double low = INFINITY, high = -INFINITY;
 #pragma omp parallel num_threads(threads)
@@ -134,7 +134,8 @@ static inline float load_float(const char *p)
 }
 
 /* Computes the smallest and largest value of an array of floats, four at a time. NaN is ignored. */
-MMBVH_INLINE void array_range_floats(const char *data, const int64_t stride, int64_t count, float *least, float *most)
+MMBVH_INLINE void compute_array_range_floats(const char *data, const int64_t stride, int64_t count, float *least,
+                                             float *most)
 {
     enum { LANES = 4 };
     vec4 low = vec4_set1(INFINITY), high = vec4_set1(-INFINITY);
@@ -155,18 +156,18 @@ MMBVH_INLINE void array_range_floats(const char *data, const int64_t stride, int
     }
 }
 
-static void array_range(const grid_array *a, int64_t count, int threads, double *least, double *most)
+static void compute_array_range(const grid_array *a, int64_t count, int threads, double *least, double *most)
 {
     enum { BLOCK = 65536 };
     float low = INFINITY, high = -INFINITY;
     if (a->axis) {
         const grid_array places = {
             .data = (const char *)a->axis->axis_coordinates, .stride = sizeof(double), .is_wide = true};
-        array_range_any(&places, a->axis->count, 1, least, most);
+        compute_array_range_any_type(&places, a->axis->count, 1, least, most);
         return;
     }
     if (a->is_wide || a->is_integer) {
-        array_range_any(a, count, threads, least, most);
+        compute_array_range_any_type(a, count, threads, least, most);
         return;
     }
 #pragma omp parallel num_threads(threads)
@@ -177,16 +178,16 @@ static void array_range(const grid_array *a, int64_t count, int threads, double 
             const int64_t n = count - begin < BLOCK ? count - begin : BLOCK;
             const char *data = a->data + begin * a->stride;
             if (a->stride == sizeof(float)) {
-                array_range_floats(data, sizeof(float), n, &low, &high);
+                compute_array_range_floats(data, sizeof(float), n, &low, &high);
             } else {
-                array_range_floats(data, a->stride, n, &low, &high);
+                compute_array_range_floats(data, a->stride, n, &low, &high);
             }
         }
         region_leave();
     }
     *least = (double)low;
     *most = (double)high;
-    if (!(low > -INFINITY && high < INFINITY)) array_range_any(a, count, threads, least, most);
+    if (!(low > -INFINITY && high < INFINITY)) compute_array_range_any_type(a, count, threads, least, most);
 }
 
 fetch_box bounds_estimate(const bounds_source *source, int threads)
@@ -196,13 +197,13 @@ fetch_box bounds_estimate(const bounds_source *source, int threads)
     for (int axis = 0; axis < 3; axis++) {
         if (source->g) {
             const grid_array *a = &source->g->coordinates[axis];
-            array_range(a, source->g->vertex_count, threads, &box.lower[axis], &box.upper[axis]);
+            compute_array_range(a, source->g->vertex_count, threads, &box.lower[axis], &box.upper[axis]);
         } else {
             double unused;
             const grid_array lower = {.data = (const char *)(source->lower + axis), .stride = 3 * size};
             const grid_array upper = {.data = (const char *)(source->upper + axis), .stride = 3 * size};
-            array_range(&lower, source->box_count, 1, &box.lower[axis], &unused);
-            array_range(&upper, source->box_count, 1, &unused, &box.upper[axis]);
+            compute_array_range(&lower, source->box_count, 1, &box.lower[axis], &unused);
+            compute_array_range(&upper, source->box_count, 1, &unused, &box.upper[axis]);
         }
     }
     bounds_transform(source, &box);

@@ -148,7 +148,7 @@ static insitu_status check_contained(const check_state *w, int64_t index, int64_
     return INSITU_OK;
 }
 
-static double pair_overlap(const mmbvh *tree, int64_t parent, int64_t pair)
+static double compute_overlap_of_pair(const mmbvh *tree, int64_t parent, int64_t pair)
 {
     float lower[3][4], upper[3][4];
     mmbvh_node_box(tree, parent, lower[2], upper[2]);
@@ -173,7 +173,7 @@ static insitu_status check_inner(check_state *w, int64_t index)
         const insitu_status status = check_contained(w, index, pair + side);
         if (status) return status;
     }
-    w->overlap += pair_overlap(w->tree, index, pair);
+    w->overlap += compute_overlap_of_pair(w->tree, index, pair);
     return INSITU_OK;
 }
 

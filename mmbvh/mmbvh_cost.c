@@ -21,7 +21,7 @@ double cost_half_area(const float lower[3], const float upper[3])
 
 /* Returns the sum over nodes [begin, end) of half the surface area of the box times the number of tests in the node:
  * one for each cell of a leaf, or two for the children's boxes. */
-static double area_of_nodes(const mmbvh *tree, int64_t begin, int64_t end)
+static double sum_areas_of_nodes(const mmbvh *tree, int64_t begin, int64_t end)
 {
     double sum = 0;
     for (int64_t i = begin; i < end; i++) {
@@ -42,7 +42,7 @@ double cost_area_of_tree(const mmbvh *tree, int threads)
 #pragma omp for schedule(dynamic) nowait
         for (int part = 0; part < PARTS; part++) {
             const int64_t begin = tree->node_count * part / PARTS, end = tree->node_count * (part + 1) / PARTS;
-            sums[part] = area_of_nodes(tree, begin, end);
+            sums[part] = sum_areas_of_nodes(tree, begin, end);
         }
         region_leave();
     }

@@ -89,8 +89,9 @@ static inline bool fetch_is_contiguous(const grid_array *a)
 }
 
 /* Computes the addresses of the values at a cell's vertices. The last address is repeated until there are eight. */
-MMBVH_INLINE void fetch_values(const grid *g, const grid_array *values, int64_t cell, const fetch_shape shape,
-                               const bool wide_index, const int64_t stride, const char *out[GRID_MAX_CELL_VERTICES])
+MMBVH_INLINE void fetch_value_addresses(const grid *g, const grid_array *values, int64_t cell, const fetch_shape shape,
+                                        const bool wide_index, const int64_t stride,
+                                        const char *out[GRID_MAX_CELL_VERTICES])
 {
     const int count = fetch_vertex_count(g, cell, shape);
     const int64_t first = fetch_first_entry(g, cell, count, shape);
@@ -104,7 +105,7 @@ MMBVH_INLINE bool fetch_cell_floats(const grid *g, const grid_array *values, int
 {
     const char *at[GRID_MAX_CELL_VERTICES];
     float v[GRID_MAX_CELL_VERTICES];
-    fetch_values(g, values, cell, shape, wide_index, is_packed ? (int64_t)sizeof *v : values->stride, at);
+    fetch_value_addresses(g, values, cell, shape, wide_index, is_packed ? (int64_t)sizeof *v : values->stride, at);
     for (int i = 0; i < GRID_MAX_CELL_VERTICES; i++) v[i] = *(const float *)(const void *)at[i];
     out[0] = (vec4){v[0], v[1], v[2], v[3]};
     out[1] = shape == FETCH_TETS ? out[0] : (vec4){v[4], v[5], v[6], v[7]};
@@ -124,7 +125,7 @@ MMBVH_INLINE bool fetch_cell_doubles(const grid *g, const grid_array *values, in
 {
     const char *at[GRID_MAX_CELL_VERTICES];
     double v[GRID_MAX_CELL_VERTICES];
-    fetch_values(g, values, cell, shape, wide_index, is_packed ? (int64_t)sizeof *v : values->stride, at);
+    fetch_value_addresses(g, values, cell, shape, wide_index, is_packed ? (int64_t)sizeof *v : values->stride, at);
     for (int i = 0; i < GRID_MAX_CELL_VERTICES; i++) v[i] = *(const double *)(const void *)at[i];
     const vec2 a = {v[0], v[1]}, b = {v[2], v[3]};
     vec2 nonfinite = (a - a) + (b - b); /* 0 if all values are finite, otherwise NaN */
@@ -318,7 +319,7 @@ static inline void extend_box_by_lattice_cell(fetch_box *box, const grid_lattice
     }
 }
 
-static inline void fetch_box_any_cell(fetch_box *box, const grid *g, int64_t cell)
+static inline void extend_box_by_any_cell(fetch_box *box, const grid *g, int64_t cell)
 {
     if (g->coordinates[0].axis) {
         extend_box_by_lattice_cell(box, g->lattice, cell);

@@ -24,23 +24,23 @@ static inline void store_measured(const sweep *s, int64_t node, vec4 lower, vec4
     const mmbvh *tree = s->tree;
     vec4 old[2];
     if (s->measures_area) {
-        store_decode(tree, node, &old[0], &old[1]);
+        store_read_box(tree, node, &old[0], &old[1]);
         *area_change -= node_area(tree, node, old[0], old[1]);
     }
     *outside_grid += !store_box(tree, node, lower, upper);
     if (s->measures_area) {
-        store_decode(tree, node, &old[0], &old[1]);
+        store_read_box(tree, node, &old[0], &old[1]);
         *area_change += node_area(tree, node, old[0], old[1]);
     }
 }
 
 /* Stores the union of the children's boxes. If the sweep visited only one of the children, the node gets the box of
  * that child. */
-static inline void store_children(const sweep *s, int64_t node, int64_t pair, int64_t *outside_grid,
-                                  double *area_change)
+static inline void store_union_of_children(const sweep *s, int64_t node, int64_t pair, int64_t *outside_grid,
+                                           double *area_change)
 {
     vec4 lower[2], upper[2];
-    for (int side = 0; side < 2; side++) store_decode(s->tree, pair + side, &lower[side], &upper[side]);
+    for (int side = 0; side < 2; side++) store_read_box(s->tree, pair + side, &lower[side], &upper[side]);
     if (s->visible_count) {
         const bool is_visited[2] = {sweep_visits(s, pair), sweep_visits(s, pair + 1)};
         for (int side = 0; side < 2; side++)

@@ -102,15 +102,15 @@ MMBVH_INLINE void prefetch_cell(const sweep *s, int64_t entry, const fetch_shape
 }
 
 /* Rounds a range outward. If no cell was read, the range stays empty. */
-static inline range rounded_range(const fetch_range *r)
+static inline range round_range_outward(const fetch_range *r)
 {
     return r->low <= r->high ? (range){round_down(r->low), round_up(r->high)} : range_empty();
 }
 
 /* Returns the range of a leaf whose values are doubles. Minima and maxima are accumulated per lane over the cells, and
  * lanes are combined at the end. */
-MMBVH_INLINE range double_leaf(const sweep *s, int64_t ref, int64_t count, const fetch_shape shape,
-                               const bool wide_index, const bool is_packed, int64_t *unusable)
+MMBVH_INLINE range compute_range_of_double_leaf(const sweep *s, int64_t ref, int64_t count, const fetch_shape shape,
+                                                const bool wide_index, const bool is_packed, int64_t *unusable)
 {
     fetch_lane_range leaf = {vec2_set1((double)INFINITY), vec2_set1(-(double)INFINITY)}, cell;
     for (int64_t entry = ref + count - 1; entry >= ref; entry--) {
@@ -123,11 +123,11 @@ MMBVH_INLINE range double_leaf(const sweep *s, int64_t ref, int64_t count, const
         leaf.high = vec2_max(cell.high, leaf.high);
     }
     const fetch_range r = fetch_combine_lanes(&leaf, true);
-    return rounded_range(&r);
+    return round_range_outward(&r);
 }
 
-MMBVH_INLINE range float_leaf(const sweep *s, int64_t ref, int64_t count, const fetch_shape shape,
-                              const bool wide_index, const bool is_packed, int64_t *unusable)
+MMBVH_INLINE range compute_range_of_float_leaf(const sweep *s, int64_t ref, int64_t count, const fetch_shape shape,
+                                               const bool wide_index, const bool is_packed, int64_t *unusable)
 {
     vec4 low = vec4_set1(INFINITY), high = vec4_set1(-INFINITY), v[2];
     for (int64_t entry = ref + count - 1; entry >= ref; entry--) {
@@ -150,11 +150,11 @@ MMBVH_INLINE sweep_sum run_ranges(const sweep *s, int64_t first, int64_t end, co
     for (int64_t i = end - 1; i >= first; i--) {
         const int64_t count = mmbvh_node_count(s->tree, i), ref = mmbvh_node_ref(s->tree, i);
         if (!count)
-            set_range(s, i, children_range(s, ref));
+            set_range(s, i, unite_ranges_of_children(s, ref));
         else if (wide_number)
-            set_range(s, i, double_leaf(s, ref, count, shape, wide_index, is_packed, &unusable));
+            set_range(s, i, compute_range_of_double_leaf(s, ref, count, shape, wide_index, is_packed, &unusable));
         else
-            set_range(s, i, float_leaf(s, ref, count, shape, wide_index, is_packed, &unusable));
+            set_range(s, i, compute_range_of_float_leaf(s, ref, count, shape, wide_index, is_packed, &unusable));
     }
     return (sweep_sum){.count = unusable};
 }
@@ -170,7 +170,7 @@ FETCH_INSTANCES(DEFINE_RUN, run_ranges)
 static const sweep_run run_ranges_table[FETCH_SHAPES][2][2] = FETCH_TABLE(run_ranges);
 
 /* Returns the range of a leaf for fields and cells that the specialized functions above cannot read. */
-static range generic_leaf(const sweep *s, int64_t ref, int64_t count, int64_t *unusable)
+static range compute_range_of_any_leaf(const sweep *s, int64_t ref, int64_t count, int64_t *unusable)
 {
     fetch_range leaf = {(double)INFINITY, -(double)INFINITY, true};
     for (int64_t k = 0; k < count; k++) {
@@ -180,7 +180,7 @@ static range generic_leaf(const sweep *s, int64_t ref, int64_t count, int64_t *u
         leaf.low = cell.low < leaf.low ? cell.low : leaf.low;
         leaf.high = cell.high > leaf.high ? cell.high : leaf.high;
     }
-    return rounded_range(&leaf);
+    return round_range_outward(&leaf);
 }
 
 static sweep_sum run_generic(const sweep *s, int64_t first, int64_t end)
@@ -188,7 +188,7 @@ static sweep_sum run_generic(const sweep *s, int64_t first, int64_t end)
     int64_t unusable = 0;
     for (int64_t i = end - 1; i >= first; i--) {
         const int64_t count = mmbvh_node_count(s->tree, i), ref = mmbvh_node_ref(s->tree, i);
-        set_range(s, i, count ? generic_leaf(s, ref, count, &unusable) : children_range(s, ref));
+        set_range(s, i, count ? compute_range_of_any_leaf(s, ref, count, &unusable) : unite_ranges_of_children(s, ref));
     }
     return (sweep_sum){.count = unusable};
 }
@@ -203,7 +203,7 @@ static sweep_sum run_box_ranges(const sweep *s, int64_t first, int64_t end)
 {
     for (int64_t i = end - 1; i >= first; i--) {
         const int64_t count = mmbvh_node_count(s->tree, i), ref = mmbvh_node_ref(s->tree, i);
-        range r = count ? range_empty() : children_range(s, ref);
+        range r = count ? range_empty() : unite_ranges_of_children(s, ref);
         for (int64_t k = 0; k < count; k++) {
             const float *of_box = s->box_ranges + 2 * (int64_t)s->tree->cells[ref + k];
             r = range_union((range){of_box[0], of_box[1]}, r);

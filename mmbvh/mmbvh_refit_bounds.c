@@ -35,7 +35,7 @@ static sweep_sum run_bounds(const sweep *s, int64_t first, int64_t end)
         if (count)
             store_cells(s, i, ref, count, &sum.count, &sum.area_change);
         else
-            store_children(s, i, ref, &sum.count, &sum.area_change);
+            store_union_of_children(s, i, ref, &sum.count, &sum.area_change);
     }
     return sum;
 }
@@ -57,7 +57,7 @@ sweep sweep_of_bounds_and_ranges(const mmbvh *tree, const bounds_source *source,
 }
 
 /* Returns the bounds of all the tree's cells, in the source's coordinates. */
-static fetch_box exact_bounds(const mmbvh *tree, const bounds_source *source, int threads)
+static fetch_box compute_exact_bounds(const mmbvh *tree, const bounds_source *source, int threads)
 {
     fetch_box all;
     fetch_box_empty(&all);
@@ -83,7 +83,7 @@ static fetch_box exact_bounds(const mmbvh *tree, const bounds_source *source, in
  * eighth of the mesh's size on each side. */
 static insitu_status sweep_new_grid(mmbvh *tree, const bounds_source *source, int threads)
 {
-    const fetch_box exact = exact_bounds(tree, source, threads);
+    const fetch_box exact = compute_exact_bounds(tree, source, threads);
     float lower[3], upper[3];
     round_box_outward(&exact, tree->origin, tree->scale, lower, upper);
     for (int axis = 0; axis < 3; axis++) {

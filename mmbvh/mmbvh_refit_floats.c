@@ -104,8 +104,8 @@ MMBVH_INLINE void store_nodes(const sweep *s, part *p, int64_t first, int64_t en
         if (count) {
             store_leaf(s, p, i, ref, count, pass);
         } else {
-            store_children(s, i, ref, &p->outside_grid, &p->area_change);
-            if (pass.with_values) set_range(s, i, children_range(s, ref));
+            store_union_of_children(s, i, ref, &p->outside_grid, &p->area_change);
+            if (pass.with_values) set_range(s, i, unite_ranges_of_children(s, ref));
         }
     }
 }

@@ -97,7 +97,7 @@ enum { EXTENT_LANES = 16 };
 DEFINE_EXTENT(float_extent, float)
 DEFINE_EXTENT(double_extent, double)
 
-bool rows_extent(const grid *g, const grid_field *field, float *low, float *high)
+bool rows_compute_total_range(const grid *g, const grid_field *field, float *low, float *high)
 {
     const int64_t size = field->values.is_wide ? sizeof(double) : sizeof(float);
     const char *data = field->values.data + field->component * field->component_stride;
@@ -108,7 +108,8 @@ bool rows_extent(const grid *g, const grid_field *field, float *low, float *high
 
 /* Finds the first drawn cell with a number from `from` to `end` - 1, the index of its first vertex, and the number of
  * drawn cells from it to the end of its row. Returns false if there is none. */
-static bool next_cells(const grid_lattice *l, int along, int64_t from, int64_t end, rows_ranges *out, int64_t *vertex)
+static bool find_next_drawn_cells(const grid_lattice *l, int along, int64_t from, int64_t end, rows_ranges *out,
+                                  int64_t *vertex)
 {
     while (from < end) {
         int64_t index[3], row = from;
@@ -137,12 +138,12 @@ static bool next_cells(const grid_lattice *l, int along, int64_t from, int64_t e
     return false;
 }
 
-bool rows_read(const grid *g, const grid_field *field, int64_t from, int64_t end, rows_ranges *out)
+bool rows_compute_cell_ranges(const grid *g, const grid_field *field, int64_t from, int64_t end, rows_ranges *out)
 {
     const grid_lattice *l = g->lattice;
     const int along = grid_lattice_row_axis(l);
     int64_t vertex;
-    if (!next_cells(l, along, from, end, out, &vertex)) return false;
+    if (!find_next_drawn_cells(l, along, from, end, out, &vertex)) return false;
     const char *rows[4];
     const char *data = field->values.data + field->component * field->component_stride;
     const int64_t stride = field->values.stride;

@@ -85,8 +85,8 @@ typedef struct pass_constants {
 } pass_constants;
 
 /* Returns the address of the value at the cell's vertex with the local index `at`. */
-MMBVH_INLINE uintptr_t value_address(const selector *s, int64_t cell, int at, const pass_constants pass,
-                                     const int64_t stride)
+MMBVH_INLINE uintptr_t find_value_address(const selector *s, int64_t cell, int at, const pass_constants pass,
+                                          const int64_t stride)
 {
     const grid_array *connectivity = &s->g->connectivity;
     const uintptr_t data = (uintptr_t)s->values.data - (uintptr_t)(connectivity->base * stride);
@@ -108,7 +108,7 @@ MMBVH_INLINE four_ranges read_four_floats(const selector *s, int64_t cell, const
     four_ranges r = {vec4_set1(INFINITY), vec4_set1(-INFINITY), {0}};
     for (int at = 0; at < fetch_vertex_count(s->g, cell, pass.shape); at++) {
         float v[4];
-        for (int i = 0; i < 4; i++) v[i] = *(const float *)value_address(s, cell + i, at, pass, stride);
+        for (int i = 0; i < 4; i++) v[i] = *(const float *)find_value_address(s, cell + i, at, pass, stride);
         const vec4 values = {v[0], v[1], v[2], v[3]};
         r.low = vec4_min(values, r.low);
         r.high = vec4_max(values, r.high);
@@ -127,8 +127,8 @@ MMBVH_INLINE four_ranges read_four_doubles(const selector *s, int64_t cell, cons
         high[pair] = -low[pair];
         for (int at = 0; at < fetch_vertex_count(s->g, cell, pass.shape); at++) {
             const int64_t first = cell + 2 * pair;
-            const vec2 values = {*(const double *)value_address(s, first, at, pass, stride),
-                                 *(const double *)value_address(s, first + 1, at, pass, stride)};
+            const vec2 values = {*(const double *)find_value_address(s, first, at, pass, stride),
+                                 *(const double *)find_value_address(s, first + 1, at, pass, stride)};
             low[pair] = vec2_min(values, low[pair]);
             high[pair] = vec2_max(values, high[pair]);
             nonfinite[pair] += values - values;
@@ -154,7 +154,7 @@ MMBVH_INLINE void match_four(const selector *s, const four_ranges *r, uint64_t *
 }
 
 /* Returns a bit mask of the cells in [first, first + count) that are drawn. */
-static uint64_t drawn_bits(const grid *g, int64_t first, int64_t count)
+static uint64_t mask_drawn_cells(const grid *g, int64_t first, int64_t count)
 {
     uint64_t bits = 0;
     if (!grid_has_ghosts(g) && !g->flat) return count < WORD_CELLS ? (UINT64_C(1) << count) - 1 : ~UINT64_C(0);
@@ -190,7 +190,7 @@ MMBVH_INLINE int64_t mark_four_at_once(const selector *s, int64_t begin, int64_t
     int64_t unusable = 0;
     for (int64_t first = begin; first < end; first += WORD_CELLS) {
         const int64_t count = end - first < WORD_CELLS ? end - first : WORD_CELLS;
-        const uint64_t drawn = drawn_bits(s->g, first, count);
+        const uint64_t drawn = mask_drawn_cells(s->g, first, count);
         uint64_t not_finite = 0, intersecting = 0, p, m;
         int64_t i = 0;
         for (; i + 4 <= count && drawn; i += 4) {
@@ -246,7 +246,7 @@ static int64_t mark_any(const selector *s, int64_t begin, int64_t end)
 
 /* Packs `count` bytes, each 0 or 1, into bits. The bytes up to the next multiple of 8 must be readable and also be 0 or
  * 1. The multiplication moves the eight bits of a word into its highest byte. */
-static uint64_t packed_bits(const unsigned char *bytes, int64_t count)
+static uint64_t pack_bytes_into_bits(const unsigned char *bytes, int64_t count)
 {
     uint64_t bits = 0, eight;
     for (int64_t n = 0; n < count; n += 8) {
@@ -257,7 +257,7 @@ static uint64_t packed_bits(const unsigned char *bytes, int64_t count)
 }
 
 /* Returns a bit mask of the row's cells whose range intersects an interval. */
-static uint64_t row_bits(const selector *s, const rows_ranges *r)
+static uint64_t match_cells_of_row(const selector *s, const rows_ranges *r)
 {
     unsigned char intersects[ROWS_CELLS] = {0};
     for (int i = 0; i < s->query->interval_count; i++) {
@@ -265,7 +265,7 @@ static uint64_t row_bits(const selector *s, const rows_ranges *r)
         for (int64_t n = 0; n < r->count; n++)
             intersects[n] = (unsigned char)(intersects[n] | ((r->low[n] <= of.high) & (r->high[n] >= of.low)));
     }
-    return packed_bits(intersects, r->count);
+    return pack_bytes_into_bits(intersects, r->count);
 }
 
 /* Sets the bits of a lattice's cells, row by row. The bits of a row may fall into two words; only this thread writes to
@@ -275,8 +275,9 @@ static int64_t mark_rows(const selector *s, int64_t begin, int64_t end)
     const grid *g = s->g;
     rows_ranges r;
     int64_t unusable = 0;
-    for (int64_t from = begin; rows_read(g, s->query->field, from, end, &r); from = r.first + r.count) {
-        uint64_t intersecting = row_bits(s, &r), finite = packed_bits(r.is_finite, r.count), drawn = 0;
+    for (int64_t from = begin; rows_compute_cell_ranges(g, s->query->field, from, end, &r); from = r.first + r.count) {
+        uint64_t intersecting = match_cells_of_row(s, &r), finite = pack_bytes_into_bits(r.is_finite, r.count),
+                 drawn = 0;
         for (int64_t n = 0; n < r.count && (g->ghosts || g->flat); n++) {
             const int64_t cell = r.first + n;
             drawn |= (uint64_t) !((g->ghosts && grid_is_flagged(g, cell)) || grid_is_flat(g, cell)) << n;
@@ -313,7 +314,8 @@ enum { MOST_READ_TWICE = 1 << 16 };
 static bool has_no_visible_cell(const selector *s)
 {
     float low, high;
-    if (s->run != mark_rows || s->g->cell_count > MOST_READ_TWICE || !rows_extent(s->g, s->query->field, &low, &high))
+    if (s->run != mark_rows || s->g->cell_count > MOST_READ_TWICE ||
+        !rows_compute_total_range(s->g, s->query->field, &low, &high))
         return false;
     return !match_range(s, (fetch_range){.low = (double)low, .high = (double)high, .is_finite = true}).intersects;
 }

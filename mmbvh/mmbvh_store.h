@@ -62,7 +62,7 @@ static inline bool store_box(const mmbvh *tree, int64_t index, vec4 lower, vec4 
 }
 
 /* Reads a node's box as two corners whose lane 3 is 0. */
-static inline void store_decode(const mmbvh *tree, int64_t index, vec4 *lower, vec4 *upper)
+static inline void store_read_box(const mmbvh *tree, int64_t index, vec4 *lower, vec4 *upper)
 {
     if (tree->compact) {
         compact_decode(&tree->compact[index], &tree->grid, lower, upper);

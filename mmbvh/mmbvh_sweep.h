@@ -111,7 +111,7 @@ static inline range range_union(range a, range b)
     return (range){a.low < b.low ? a.low : b.low, a.high > b.high ? a.high : b.high};
 }
 
-static inline range children_range(const sweep *s, int64_t left)
+static inline range unite_ranges_of_children(const sweep *s, int64_t left)
 {
     return range_union(get_range(s, left), get_range(s, left + 1));
 }

@@ -18,16 +18,16 @@ static int64_t draw_uniform_index(uint64_t *counter, int64_t count)
     return i < count ? i : count - 1;
 }
 
-static void random_point(uint64_t *counter, double size, double p[3])
+static void draw_random_point(uint64_t *counter, double size, double p[3])
 {
     for (int a = 0; a < 3; a++) p[a] = draw_uniform(counter, -size, size);
 }
 
-static void random_direction(uint64_t *counter, double d[3])
+static void draw_random_direction(uint64_t *counter, double d[3])
 {
     double square;
     do {
-        random_point(counter, 1, d);
+        draw_random_point(counter, 1, d);
         square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
     } while (square > 1 || square < 0.01);
     for (int a = 0; a < 3; a++) d[a] /= sqrt(square);
@@ -39,7 +39,7 @@ static void set_view(render_camera *camera, const double eye[3], const double fo
                      uint64_t *counter)
 {
     double up[3];
-    do random_direction(counter, up);
+    do draw_random_direction(counter, up);
     while (!render_camera_look_at(camera, eye, focal, up, 40, 1, 1));
     camera->is_orthographic = is_orthographic;
 }
@@ -48,9 +48,9 @@ static void set_random_camera(render_camera *camera, uint64_t *counter)
 {
     double eye[3], focal[3];
     const double distance = draw_uniform(counter, 2, 8);
-    random_direction(counter, eye);
+    draw_random_direction(counter, eye);
     for (int a = 0; a < 3; a++) eye[a] *= distance;
-    random_point(counter, 0.5, focal);
+    draw_random_point(counter, 0.5, focal);
     set_view(camera, eye, focal, draw_uniform(counter, 0, 1) < 0.5, counter);
 }
 
@@ -90,7 +90,7 @@ static int choose_cell_face(int type, uint64_t *counter, int picks[4])
     return picks[3] < 0 ? 3 : 4;
 }
 
-static void random_face(const test_mesh *mesh, int64_t cell, uint64_t *counter, face_loop *out)
+static void choose_random_face(const test_mesh *mesh, int64_t cell, uint64_t *counter, face_loop *out)
 {
     const int64_t *v = mesh->connectivity + mesh->offsets[cell];
     if (mesh->types[cell] == GRID_POLYHEDRON) {
@@ -142,7 +142,7 @@ static void set_camera_along_face(const face_loop *face, chord_aim aim, render_c
     memcpy(to, face->at[1], sizeof to);
     if (aim == CHORD_ALONG_FACES) interpolate_points(face->at[1], face->at[2], draw_uniform(counter, 0, 1), to);
     move_eye_back(face->at[0], to, draw_uniform(counter, 4, 8), eye);
-    random_point(counter, 0.5, focal);
+    draw_random_point(counter, 0.5, focal);
     const bool is_straight = draw_uniform(counter, 0, 1) < 0.5;
     set_view(camera, eye, is_straight ? to : focal, is_straight && draw_uniform(counter, 0, 1) < 0.7, counter);
 }
@@ -156,10 +156,10 @@ static void add_ray(chord_rays *rays, double x, double y)
     rays->count++;
 }
 
-static void aim_anywhere(const render_camera *camera, uint64_t *counter, chord_rays *rays)
+static void aim_near_random_point(const render_camera *camera, uint64_t *counter, chord_rays *rays)
 {
     double p[3];
-    random_point(counter, 1, p);
+    draw_random_point(counter, 1, p);
     project_to_pixel(camera, p, &rays->centre_x, &rays->centre_y);
     const double half = pow(10, draw_uniform(counter, -4, -0.7));
     while (rays->count < CHORD_MAX_RAYS)
@@ -168,7 +168,7 @@ static void aim_anywhere(const render_camera *camera, uint64_t *counter, chord_r
 }
 
 /* Adds rays around a random direction that is at most about 45 degrees off the view direction. */
-static void make_ray_directions_positive(uint64_t *counter, chord_rays *rays)
+static void aim_near_view_direction(uint64_t *counter, chord_rays *rays)
 {
     rays->centre_x = draw_uniform(counter, -0.9, 0.9);
     rays->centre_y = draw_uniform(counter, -0.9, 0.9);
@@ -179,7 +179,7 @@ static void make_ray_directions_positive(uint64_t *counter, chord_rays *rays)
 
 /* Adds a ray through the point itself (half of the rays) or past it, at a distance of 1e-9 to 1e-3 in the image plane.
  * The first ray also chooses the tile's middle: the point's projection, or a position within 0.05 of it. */
-static void aim_at(const render_camera *camera, const double p[3], uint64_t *counter, chord_rays *rays)
+static void aim_at_point(const render_camera *camera, const double p[3], uint64_t *counter, chord_rays *rays)
 {
     double x, y;
     const double off = draw_uniform(counter, 0, 1) < 0.5 ? 0 : pow(10, draw_uniform(counter, -9, -3));
@@ -198,32 +198,32 @@ static void aim_at_cell(const test_mesh *mesh, int64_t cell, chord_aim aim, cons
     while (rays->count < CHORD_MAX_RAYS) {
         face_loop face;
         double p[3];
-        random_face(mesh, cell, counter, &face);
+        choose_random_face(mesh, cell, counter, &face);
         choose_point_on_face(&face, aim, counter, p);
-        aim_at(camera, p, counter, rays);
+        aim_at_point(camera, p, counter, rays);
     }
 }
 
 /* Sets a camera that sees a face as a line, and aims rays at the face's vertices, edges and inner points. Every ray
  * then meets the face along that line. */
-static void aim_along(const test_mesh *mesh, int64_t cell, chord_aim aim, uint64_t *counter, render_camera *camera,
-                      chord_rays *rays)
+static void aim_along_face(const test_mesh *mesh, int64_t cell, chord_aim aim, uint64_t *counter, render_camera *camera,
+                           chord_rays *rays)
 {
     face_loop face;
-    random_face(mesh, cell, counter, &face);
+    choose_random_face(mesh, cell, counter, &face);
     set_camera_along_face(&face, aim, camera, counter);
-    aim_at(camera, face.at[0], counter, rays);
+    aim_at_point(camera, face.at[0], counter, rays);
     while (rays->count < CHORD_MAX_RAYS / 2) {
         double p[3];
         choose_point_on_face(&face, (chord_aim)(CHORD_TO_VERTICES + draw_uniform_index(counter, 3)), counter, p);
-        aim_at(camera, p, counter, rays);
+        aim_at_point(camera, p, counter, rays);
     }
     aim_at_cell(mesh, cell, (chord_aim)(CHORD_TO_VERTICES + draw_uniform_index(counter, 3)), camera, counter, rays);
 }
 
 /* Aims rays along an axis or a diagonal of a face or of the cube, in either direction. Eyes of perspective cameras lie
  * on lattice lines. Rays are an eighth of a cube's side apart, and the first rays lie on lattice planes. */
-static void aim_by_lattice(int n, uint64_t *counter, render_camera *camera, chord_rays *rays)
+static void aim_along_lattice(int n, uint64_t *counter, render_camera *camera, chord_rays *rays)
 {
     const double side = 2.0 / n;
     double eye[3], focal[3], direction[3], up[3] = {0, 0, 0};
@@ -253,18 +253,18 @@ void chord_aim_rays(const test_mesh *mesh, int n, chord_aim aim, uint64_t *count
     double eye[3], focal[3];
     rays->count = 0;
     switch (aim) {
-    case CHORD_AXIS_ALIGNED: aim_by_lattice(n, counter, camera, rays); break;
+    case CHORD_AXIS_ALIGNED: aim_along_lattice(n, counter, camera, rays); break;
     case CHORD_ALONG_EDGES:
-    case CHORD_ALONG_FACES: aim_along(mesh, cell, aim, counter, camera, rays); break;
+    case CHORD_ALONG_FACES: aim_along_face(mesh, cell, aim, counter, camera, rays); break;
     case CHORD_FROM_INSIDE:
-        random_point(counter, 0.9, eye);
-        random_point(counter, 2, focal);
+        draw_random_point(counter, 0.9, eye);
+        draw_random_point(counter, 2, focal);
         set_view(camera, eye, focal, draw_uniform(counter, 0, 1) < 0.3, counter);
-        make_ray_directions_positive(counter, rays);
+        aim_near_view_direction(counter, rays);
         break;
     case CHORD_RANDOM:
         set_random_camera(camera, counter);
-        aim_anywhere(camera, counter, rays);
+        aim_near_random_point(camera, counter, rays);
         break;
     default:
         set_random_camera(camera, counter);

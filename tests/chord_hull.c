@@ -38,20 +38,20 @@ static chord_depths clip_line_to_cube(const chord_line *l, double half)
     return c.in < c.out ? c : (chord_depths){0, 0};
 }
 
-static double chord_length(const chord_line *l, chord_depths c)
+static double compute_chord_length(const chord_line *l, chord_depths c)
 {
     return (c.out - c.in) * l->length / 2;
 }
 
-chord_ray chord_hull_ray(const render_job *job, const chord_rays *rays, int i)
+chord_ray chord_compute_hull_ray(const render_job *job, const chord_rays *rays, int i)
 {
     chord_ray r = {.line = make_ray_line(job, rays, i)};
     const chord_depths exact = clip_line_to_cube(&r.line, 1);
     r.within = clip_line_to_cube(&r.line, 1 - 2 * hull_shift);
     r.about = clip_line_to_cube(&r.line, 1 + 2 * hull_shift);
-    r.length = chord_length(&r.line, exact);
-    r.least = chord_length(&r.line, r.within);
-    r.most = chord_length(&r.line, r.about);
+    r.length = compute_chord_length(&r.line, exact);
+    r.least = compute_chord_length(&r.line, r.within);
+    r.most = compute_chord_length(&r.line, r.about);
     return r;
 }
 

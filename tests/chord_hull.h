@@ -49,7 +49,7 @@ typedef struct chord_ray {
 
 /* Returns the ray as the kernels trace it: its offset from the middle of its tile is float32, everything else
  * double. */
-chord_ray chord_hull_ray(const render_job *job, const chord_rays *rays, int i);
+chord_ray chord_compute_hull_ray(const render_job *job, const chord_rays *rays, int i);
 
 bool chord_is_slanted(const chord_ray *r);
 /* Returns whether the ray runs within the hull's surface: the chords of the shrunk and the swollen hull differ by more

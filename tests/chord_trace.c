@@ -82,8 +82,8 @@ static bool chord_meets_box(const double base[3], const double direction[3], con
     return from <= to;
 }
 
-static unsigned chord_rays_in_box(const kernel_packet *p, const double px[SIMD_WIDTH], const double py[SIMD_WIDTH],
-                                  const mmbvh *tree, int64_t node)
+static unsigned chord_find_rays_in_box(const kernel_packet *p, const double px[SIMD_WIDTH], const double py[SIMD_WIDTH],
+                                       const mmbvh *tree, int64_t node)
 {
     float lower[4], upper[4];
     unsigned met = 0;
@@ -107,7 +107,7 @@ static void chord_trace_part(kernel_packet *p, const double px[SIMD_WIDTH], cons
     while (top) {
         const int64_t node = stack[--top], ref = mmbvh_node_ref(tree, node);
         const int count = mmbvh_node_count(tree, node);
-        const unsigned met = chord_rays_in_box(p, px, py, tree, node);
+        const unsigned met = chord_find_rays_in_box(p, px, py, tree, node);
         if (!met) continue;
         for (int n = 0; n < count; n++)
             chord_trace_cell(p, state, field, part, tree->cells[ref + n], vm_from_bits(met));
@@ -117,7 +117,7 @@ static void chord_trace_part(kernel_packet *p, const double px[SIMD_WIDTH], cons
     }
 }
 
-static void chord_tile_rays(kernel_packet *p, const double px[SIMD_WIDTH], const double py[SIMD_WIDTH])
+static void chord_set_tile_rays(kernel_packet *p, const double px[SIMD_WIDTH], const double py[SIMD_WIDTH])
 {
     const bool flat = p->frame->job->camera.is_orthographic;
     const double reach = kernel_slope_to_origin(p->frame);
@@ -136,8 +136,8 @@ static void chord_tile_rays(kernel_packet *p, const double px[SIMD_WIDTH], const
 }
 
 /* Sets up a packet as kernel_packet_begin() does, but for any rays, not only those of pixels. */
-static void chord_trace_packet(kernel_packet *p, const kernel_frame *f, const kernel_tile *tile, kernel_thread *thread,
-                               const chord_rays *rays, int first, double px[SIMD_WIDTH], double py[SIMD_WIDTH])
+static void chord_set_up_packet(kernel_packet *p, const kernel_frame *f, const kernel_tile *tile, kernel_thread *thread,
+                                const chord_rays *rays, int first, double px[SIMD_WIDTH], double py[SIMD_WIDTH])
 {
     const int count = rays->count - first < SIMD_WIDTH ? rays->count - first : SIMD_WIDTH;
     p->frame = f;
@@ -149,7 +149,7 @@ static void chord_trace_packet(kernel_packet *p, const kernel_frame *f, const ke
         px[lane] = rays->x[ray];
         py[lane] = rays->y[ray];
     }
-    chord_tile_rays(p, px, py);
+    chord_set_tile_rays(p, px, py);
     p->is_pencil = rays->is_pencil;
     p->u = f->job->camera.is_orthographic ? p->origin_x : p->slope_x;
     p->v = f->job->camera.is_orthographic ? p->origin_y : p->slope_y;
@@ -180,7 +180,7 @@ static void chord_trace(const kernel_frame *f, kernel_thread *thread, chord_rays
         kernel_packet p;
         double px[SIMD_WIDTH], py[SIMD_WIDTH];
         const chord_state state = {rays, first};
-        chord_trace_packet(&p, f, &tile, thread, rays, first, px, py);
+        chord_set_up_packet(&p, f, &tile, thread, rays, first, px, py);
         for (int part = 0; part < f->job->part_count; part++) chord_trace_part(&p, px, py, &state, part);
     }
 }

@@ -50,7 +50,7 @@ void conduit_node_destroy(conduit_node *node)
 }
 
 /* Returns the child whose name is the first component of the path; *rest receives the remaining path. */
-static conduit_node *first_child(const conduit_node *node, const char *path, const char **rest)
+static conduit_node *find_first_child(const conduit_node *node, const char *path, const char **rest)
 {
     const size_t length = strcspn(path, "/");
     *rest = path[length] ? path + length + 1 : path + length;
@@ -63,7 +63,7 @@ static conduit_node *first_child(const conduit_node *node, const char *path, con
 
 static conduit_node *find_node(const conduit_node *node, const char *path)
 {
-    while (node && *path) node = first_child(node, path, &path);
+    while (node && *path) node = find_first_child(node, path, &path);
     return (conduit_node *)(uintptr_t)node;
 }
 
@@ -71,7 +71,7 @@ conduit_node *conduit_node_fetch(conduit_node *node, const char *path)
 {
     while (*path) {
         const char *rest;
-        conduit_node *child = first_child(node, path, &rest);
+        conduit_node *child = find_first_child(node, path, &rest);
         if (!child) {
             child = conduit_node_create();
             snprintf(child->name, sizeof child->name, "%.*s", (int)strcspn(path, "/"), path);
@@ -213,7 +213,7 @@ void stand_in_remove(conduit_node *node, const char *path)
     char parent[256];
     snprintf(parent, sizeof parent, "%.*s", last ? (int)(last - path) : 0, path);
     conduit_node *from = conduit_node_fetch_existing(node, parent);
-    conduit_node *gone = first_child(from, last ? last + 1 : path, &rest);
+    conduit_node *gone = find_first_child(from, last ? last + 1 : path, &rest);
     if (!gone) abort_with_message("no such path", path);
     for (int i = 0, kept = 0; i < from->child_count; i++)
         if (from->children[i] != gone) from->children[kept++] = from->children[i];

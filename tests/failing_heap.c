@@ -61,7 +61,7 @@ static int record_library_range(struct dl_phdr_info *info, size_t size, void *co
     return 0;
 }
 
-static bool is_exempt_caller(const void *caller)
+static bool is_caller_exempt(const void *caller)
 {
     for (int i = 0; i < spared_count; i++)
         if ((uintptr_t)caller >= spared[i].begin && (uintptr_t)caller < spared[i].end) return true;
@@ -70,7 +70,7 @@ static bool is_exempt_caller(const void *caller)
 
 static bool should_allocation_fail(const void *caller)
 {
-    if (!heap.is_armed || heap.pauses || is_exempt_caller(caller)) return false;
+    if (!heap.is_armed || heap.pauses || is_caller_exempt(caller)) return false;
     heap.count++;
     if (heap.count != heap.fails_at && !(heap.is_for_good && heap.count > heap.fails_at)) return false;
     errno = ENOMEM;

@@ -12,6 +12,6 @@ void integrate_in_float(const render_transfer *t, double length, double v_in, do
 
 /* For each range of values, computes the four members of kernel_light_variation: variation, cost, extinction,
  * steepness. They bound how much an error of the field can change the light. */
-void integral_variations(const render_transfer *t, int count, const double (*ranges)[2], double (*out)[4]);
+void integral_compute_variations(const render_transfer *t, int count, const double (*ranges)[2], double (*out)[4]);
 
 #endif

@@ -20,7 +20,7 @@ void integrate_in_float(const render_transfer *t, double length, double v_in, do
     render_pieces_free(&pieces);
 }
 
-void integral_variations(const render_transfer *t, int count, const double (*ranges)[2], double (*out)[4])
+void integral_compute_variations(const render_transfer *t, int count, const double (*ranges)[2], double (*out)[4])
 {
     kernel_pieces pieces;
     base_error error = {0};

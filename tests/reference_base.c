@@ -15,7 +15,7 @@ void *reference_reallocate(void *block, size_t bytes)
 }
 
 /* Maps a value to the scale of the transfer function (linear, log or symlog) by the scale's definition. */
-static double apply_scale(const render_transfer *t, double value)
+static double map_to_scale(const render_transfer *t, double value)
 {
     const double size = fabs(value) / t->threshold;
     if (t->scale == RENDER_LOG) return value > 0 ? log10(value) : -INFINITY;
@@ -23,29 +23,29 @@ static double apply_scale(const render_transfer *t, double value)
     return t->scale == RENDER_SYMLOG ? value / t->threshold : value;
 }
 
-double reference_opacity(const render_transfer *t, double value)
+double reference_compute_opacity(const render_transfer *t, double value)
 {
     const int last = t->opacity_count - 1;
     if (value < t->opacity_values[0]) return (double)t->opacities[0];
     for (int i = 0; i < last; i++) {
         const double low = t->opacity_values[i], high = t->opacity_values[i + 1];
-        const double from = apply_scale(t, low), to = apply_scale(t, high);
+        const double from = map_to_scale(t, low), to = map_to_scale(t, high);
         if (value < high)
-            return (double)t->opacities[i] + (apply_scale(t, value) - from) / (to - from) *
+            return (double)t->opacities[i] + (map_to_scale(t, value) - from) / (to - from) *
                                                  ((double)t->opacities[i + 1] - (double)t->opacities[i]);
     }
     return (double)t->opacities[last];
 }
 
-double reference_transfer_position(const render_transfer *t, double value)
+double reference_find_table_position(const render_transfer *t, double value)
 {
-    const double low = apply_scale(t, t->low), range = apply_scale(t, t->high) - low;
-    return range > 0 ? (apply_scale(t, value) - low) / range : 0;
+    const double low = map_to_scale(t, t->low), range = map_to_scale(t, t->high) - low;
+    return range > 0 ? (map_to_scale(t, value) - low) / range : 0;
 }
 
-void reference_colour(const render_transfer *t, double value, double colour[3])
+void reference_compute_colour(const render_transfer *t, double value, double colour[3])
 {
-    const double x = reference_transfer_position(t, value);
+    const double x = reference_find_table_position(t, value);
     const double place = fmin(fmax(x, 0), 1) * (t->colour_count - (t->is_banded ? 0 : 1));
     const bool is_last = place >= t->colour_count - 1;
     const int i = t->is_banded ? (int)fmin(place, t->colour_count - 1) : is_last ? t->colour_count - 2 : (int)place;

@@ -91,21 +91,21 @@ static long double cross_product(const double *a, const double *b)
 }
 
 /* Returns whether the positive x axis crosses the edge from a to b. */
-static bool axis_crosses(const double *a, const double *b)
+static bool does_axis_cross_edge(const double *a, const double *b)
 {
     if ((a[1] >= 0) == (b[1] >= 0)) return false;
     return a[1] < 0 ? cross_product(a, b) > 0 : cross_product(b, a) > 0;
 }
 
-static double edge_length(const double *a, const double *b)
+static double compute_edge_length(const double *a, const double *b)
 {
     return hypot(a[0] - b[0], a[1] - b[1]);
 }
 
 /* Computes the barycentric coordinates of the line's intersection with a triangle. They are 1/3 each if the triangle is
  * seen edge-on. */
-static void triangle_weights(const reference_cell *cell, const reference_line *line, const int *triangle,
-                             double weights[3])
+static void compute_triangle_weights(const reference_cell *cell, const reference_line *line, const int *triangle,
+                                     double weights[3])
 {
     double p[3][2];
     for (int i = 0; i < 3; i++) shear_point(line, cell->position[triangle[i]], p[i]);
@@ -119,15 +119,17 @@ static bool intersect_triangle(const reference_cell *cell, const reference_line 
 {
     double p[3][2], weights[3];
     for (int i = 0; i < 3; i++) shear_point(line, cell->position[triangle[i]], p[i]);
-    if ((axis_crosses(p[0], p[1]) + axis_crosses(p[1], p[2]) + axis_crosses(p[2], p[0])) % 2 == 0) return false;
-    triangle_weights(cell, line, triangle, weights);
+    if ((does_axis_cross_edge(p[0], p[1]) + does_axis_cross_edge(p[1], p[2]) + does_axis_cross_edge(p[2], p[0])) % 2 ==
+        0)
+        return false;
+    compute_triangle_weights(cell, line, triangle, weights);
     memset(out, 0, sizeof *out);
     for (int i = 0; i < 3; i++) out->z += weights[i] * cell->position[triangle[i]][2];
     out->z_triangle = out->z;
     return true;
 }
 
-static double distance_outside_unit_interval(double u)
+static double compute_distance_outside_unit(double u)
 {
     return u < 0 ? -u : u > 1 ? u - 1 : 0;
 }
@@ -147,7 +149,8 @@ static double solve_for_u(const double *a, const double *b, const double *c, con
 }
 
 /* Returns the magnitude of a + u b + w c + u w d relative to the size of the quad. */
-static double bilinear_residual(const double *a, const double *b, const double *c, const double *d, double u, double w)
+static double compute_bilinear_residual(const double *a, const double *b, const double *c, const double *d, double u,
+                                        double w)
 {
     double residual = 0, size = 0;
     for (int i = 0; i < 2; i++) {
@@ -177,8 +180,8 @@ static int solve_bilinear(const double *a, const double *b, const double *c, con
         if (!isfinite(candidates[i])) continue;
         const double w = candidates[i], u = solve_for_u(a, b, c, d, w);
         points[i] = (patch_point){u, w,
-                                  distance_outside_unit_interval(w) + distance_outside_unit_interval(u) +
-                                      bilinear_residual(a, b, c, d, u, w)};
+                                  compute_distance_outside_unit(w) + compute_distance_outside_unit(u) +
+                                      compute_bilinear_residual(a, b, c, d, u, w)};
         inside += points[i].beyond < 1e-9;
     }
     return inside;
@@ -207,8 +210,8 @@ static int find_patch_points(const reference_cell *cell, const reference_line *l
  * triangle crosses the patch once. A ray that crosses both or none crosses the patch twice or not at all, because the
  * patch is smooth at the diagonal where the triangles have a fold. Returns the number of crossings. Sets is_folded if
  * the ray crosses both triangles but not the patch. */
-static int move_to_patch(const reference_cell *cell, const reference_line *line, const int *face,
-                         reference_crossing crossings[2], int count, bool *is_folded)
+static int replace_crossings_by_patch(const reference_cell *cell, const reference_line *line, const int *face,
+                                      reference_crossing crossings[2], int count, bool *is_folded)
 {
     patch_point points[2];
     const int inside = find_patch_points(cell, line, face, points);
@@ -241,7 +244,8 @@ static int insert_crossing(reference_crossing *crossings, int count, const refer
     return count + 1;
 }
 
-static int polyhedron_crossings(const reference_cell *cell, const reference_line *line, reference_crossing *crossings)
+static int find_polyhedron_crossings(const reference_cell *cell, const reference_line *line,
+                                     reference_crossing *crossings)
 {
     const reference_polyhedron *p = &cell->poly;
     bool is_folded = false;
@@ -256,17 +260,18 @@ static int polyhedron_crossings(const reference_cell *cell, const reference_line
             found[of_face].face = face;
             found[of_face++].triangle = next;
         }
-        if (p->is_patch[face]) of_face = move_to_patch(cell, line, p->faces[face], found, of_face, &is_folded);
+        if (p->is_patch[face])
+            of_face = replace_crossings_by_patch(cell, line, p->faces[face], found, of_face, &is_folded);
         for (int k = 0; k < of_face; k++) count = insert_crossing(crossings, count, &found[k]);
     }
     for (int i = 0; i < count && is_folded; i++) crossings[i].is_folded = true;
     return count;
 }
 
-int reference_crossings(const reference_cell *cell, const reference_line *line,
-                        reference_crossing crossings[REFERENCE_MAX_CROSSINGS])
+int reference_find_crossings(const reference_cell *cell, const reference_line *line,
+                             reference_crossing crossings[REFERENCE_MAX_CROSSINGS])
 {
-    if (cell->type == GRID_POLYHEDRON) return polyhedron_crossings(cell, line, crossings);
+    if (cell->type == GRID_POLYHEDRON) return find_polyhedron_crossings(cell, line, crossings);
     const cell_faces *faces = get_cell_faces(cell->type);
     bool is_folded = false;
     int count = 0;
@@ -279,24 +284,25 @@ int reference_crossings(const reference_cell *cell, const reference_line *line,
             if (!intersect_triangle(cell, line, triangles[half], &found[of_face])) continue;
             found[of_face++].face = face;
         }
-        if (halves == 2) of_face = move_to_patch(cell, line, faces->vertices[face], found, of_face, &is_folded);
+        if (halves == 2)
+            of_face = replace_crossings_by_patch(cell, line, faces->vertices[face], found, of_face, &is_folded);
         for (int k = 0; k < of_face; k++) count = insert_crossing(crossings, count, &found[k]);
     }
     for (int i = 0; i < count && is_folded; i++) crossings[i].is_folded = true;
     return count;
 }
 
-static double triangle_value(const reference_cell *cell, const reference_line *line, const int *triangle,
-                             const double *values)
+static double compute_triangle_value(const reference_cell *cell, const reference_line *line, const int *triangle,
+                                     const double *values)
 {
     double weights[3], value = 0;
-    triangle_weights(cell, line, triangle, weights);
+    compute_triangle_weights(cell, line, triangle, weights);
     for (int i = 0; i < 3; i++) value += weights[i] * values[triangle[i]];
     return value;
 }
 
-double reference_face_value(const reference_cell *cell, const reference_line *line, const reference_crossing *crossing,
-                            const double *values, bool *is_folded)
+double reference_compute_face_value(const reference_cell *cell, const reference_line *line,
+                                    const reference_crossing *crossing, const double *values, bool *is_folded)
 {
     const bool is_polyhedron = cell->type == GRID_POLYHEDRON;
     const int *face =
@@ -304,20 +310,21 @@ double reference_face_value(const reference_cell *cell, const reference_line *li
     const bool is_quad = is_polyhedron ? cell->poly.is_patch[crossing->face] : face[3] >= 0;
     *is_folded = crossing->is_folded;
     if (!is_quad)
-        return triangle_value(cell, line, is_polyhedron ? cell->poly.triangles[crossing->triangle] : face, values);
+        return compute_triangle_value(cell, line, is_polyhedron ? cell->poly.triangles[crossing->triangle] : face,
+                                      values);
     const double corners[4] = {values[face[0]], values[face[1]], values[face[2]], values[face[3]]};
     return interpolate_bilinear(corners, crossing->u, crossing->w);
 }
 
-static double segment_distance(const double *a, const double *b)
+static double compute_segment_distance(const double *a, const double *b)
 {
-    const double length = edge_length(a, b);
+    const double length = compute_edge_length(a, b);
     if (length == 0) return hypot(a[0], a[1]);
     const double along = clamp_unit(-(a[0] * (b[0] - a[0]) + a[1] * (b[1] - a[1])) / (length * length));
     return hypot(a[0] + along * (b[0] - a[0]), a[1] + along * (b[1] - a[1]));
 }
 
-double reference_edge_distance(const reference_cell *cell, const reference_line *line)
+double reference_compute_edge_distance(const reference_cell *cell, const reference_line *line)
 {
     const bool is_polyhedron = cell->type == GRID_POLYHEDRON;
     const cell_faces *faces = get_cell_faces(cell->type);
@@ -330,7 +337,7 @@ double reference_edge_distance(const reference_cell *cell, const reference_line 
             double a[2], b[2];
             shear_point(line, cell->position[loop[i]], a);
             shear_point(line, cell->position[loop[(i + 1) % sides]], b);
-            least = fmin(least, segment_distance(a, b));
+            least = fmin(least, compute_segment_distance(a, b));
         }
     }
     return least;
@@ -345,16 +352,16 @@ static bool interpolate_on_line(const reference_cell *cell, const reference_line
     return reference_polyhedron_interpolate(cell, point, values, value, NULL);
 }
 
-/* Returns the profile's value at a crossing. The profile is the field along the ray (reference_profile_value); inward
- * is the sign of the direction towards the other crossing. */
-static double profile_end(const reference_cell *cell, const reference_line *line, const reference_crossing *end,
-                          const double *values, double inward)
+/* Returns the profile's value at a crossing. The profile is the field along the ray (reference_compute_profile_value);
+ * inward is the sign of the direction towards the other crossing. */
+static double compute_profile_end(const reference_cell *cell, const reference_line *line, const reference_crossing *end,
+                                  const double *values, double inward)
 {
     double sum;
     bool is_folded;
-    const double face = reference_face_value(cell, line, end, values, &is_folded);
+    const double face = reference_compute_face_value(cell, line, end, values, &is_folded);
     if (end->triangle < 0) return face;
-    const double triangle = triangle_value(cell, line, cell->poly.triangles[end->triangle], values);
+    const double triangle = compute_triangle_value(cell, line, cell->poly.triangles[end->triangle], values);
     /* Evaluates the sum over tets slightly inside the cell. The error is 1e-10 of the field's change along z. */
     if (!interpolate_on_line(cell, line, end->z_triangle + 1e-10 * inward, values, &sum)) sum = triangle;
     return face + (sum - triangle);
@@ -368,8 +375,8 @@ static int insert_depth(double *z, int count, double depth)
     return count + 1;
 }
 
-int reference_profile_breaks(const reference_cell *cell, const reference_line *line, const reference_crossing ends[2],
-                             double z[REFERENCE_MAX_BREAKS])
+int reference_find_profile_breaks(const reference_cell *cell, const reference_line *line,
+                                  const reference_crossing ends[2], double z[REFERENCE_MAX_BREAKS])
 {
     int count = insert_depth(z, insert_depth(z, 0, ends[0].z), ends[1].z);
     for (int i = 0; i < cell->poly.triangle_count; i++)
@@ -393,12 +400,12 @@ static bool interpolate_at_sheet(const reference_cell *cell, const reference_lin
            interpolate_on_line(cell, line, z - aside, values, value);
 }
 
-bool reference_profile_value(const reference_cell *cell, const reference_line *line, const reference_crossing ends[2],
-                             const double *values, double z, double *value)
+bool reference_compute_profile_value(const reference_cell *cell, const reference_line *line,
+                                     const reference_crossing ends[2], const double *values, double z, double *value)
 {
     const double length = ends[1].z - ends[0].z;
     double breaks[REFERENCE_MAX_BREAKS], v0, v1;
-    const int count = reference_profile_breaks(cell, line, ends, breaks);
+    const int count = reference_find_profile_breaks(cell, line, ends, breaks);
     int next = 1;
     while (next < count - 1 && breaks[next] <= z) next++;
     const double before = breaks[next - 1], behind = breaks[next];
@@ -414,11 +421,11 @@ bool reference_profile_value(const reference_cell *cell, const reference_line *l
     const double aside = 1e-9 * (behind - before);
     bool is_good = true;
     if (next == 1)
-        v0 = profile_end(cell, line, &ends[0], values, length);
+        v0 = compute_profile_end(cell, line, &ends[0], values, length);
     else
         is_good = interpolate_at_sheet(cell, line, before, aside, values, &v0);
     if (next == count - 1)
-        v1 = profile_end(cell, line, &ends[1], values, -length);
+        v1 = compute_profile_end(cell, line, &ends[1], values, -length);
     else
         is_good = interpolate_at_sheet(cell, line, behind, -aside, values, &v1) && is_good;
     *value = behind > before ? v0 + (z - before) / (behind - before) * (v1 - v0) : v0;
@@ -430,7 +437,7 @@ typedef struct shape_function {
     double n, d[3];
 } shape_function;
 
-static void tet_shape(const double *p, shape_function *s)
+static void compute_tet_shape(const double *p, shape_function *s)
 {
     s[0] = (shape_function){1 - p[0] - p[1] - p[2], {-1, -1, -1}};
     s[1] = (shape_function){p[0], {1, 0, 0}};
@@ -439,7 +446,7 @@ static void tet_shape(const double *p, shape_function *s)
 }
 
 /* Returns the bilinear weight of corner i of the unit square at (r, s). Corners are numbered around the square. */
-static shape_function square_shape(int i, double r, double s)
+static shape_function compute_square_shape(int i, double r, double s)
 {
     const bool right = i == 1 || i == 2, upper = i >= 2;
     const double a = right ? r : 1 - r, b = upper ? s : 1 - s;
@@ -453,16 +460,16 @@ static shape_function multiply_by_height(shape_function base, double height, dou
     return (shape_function){base.n * height, {base.d[0] * height, base.d[1] * height, base.n * slope}};
 }
 
-static void hex_shape(const double *p, shape_function *s)
+static void compute_hex_shape(const double *p, shape_function *s)
 {
     for (int i = 0; i < 4; i++) {
-        const shape_function base = square_shape(i, p[0], p[1]);
+        const shape_function base = compute_square_shape(i, p[0], p[1]);
         s[i] = multiply_by_height(base, 1 - p[2], -1);
         s[i + 4] = multiply_by_height(base, p[2], 1);
     }
 }
 
-static void wedge_shape(const double *p, shape_function *s)
+static void compute_wedge_shape(const double *p, shape_function *s)
 {
     const shape_function base[3] = {{1 - p[0] - p[1], {-1, -1, 0}}, {p[0], {1, 0, 0}}, {p[1], {0, 1, 0}}};
     for (int i = 0; i < 3; i++) {
@@ -471,24 +478,24 @@ static void wedge_shape(const double *p, shape_function *s)
     }
 }
 
-static void pyramid_shape(const double *p, shape_function *s)
+static void compute_pyramid_shape(const double *p, shape_function *s)
 {
-    for (int i = 0; i < 4; i++) s[i] = multiply_by_height(square_shape(i, p[0], p[1]), 1 - p[2], -1);
+    for (int i = 0; i < 4; i++) s[i] = multiply_by_height(compute_square_shape(i, p[0], p[1]), 1 - p[2], -1);
     s[4] = (shape_function){p[2], {0, 0, 1}};
 }
 
-static void cell_shape(int type, const double *p, shape_function *s)
+static void compute_cell_shape(int type, const double *p, shape_function *s)
 {
     switch (type) {
-    case GRID_TET: tet_shape(p, s); break;
-    case GRID_HEX: hex_shape(p, s); break;
-    case GRID_WEDGE: wedge_shape(p, s); break;
-    default: pyramid_shape(p, s); break;
+    case GRID_TET: compute_tet_shape(p, s); break;
+    case GRID_HEX: compute_hex_shape(p, s); break;
+    case GRID_WEDGE: compute_wedge_shape(p, s); break;
+    default: compute_pyramid_shape(p, s); break;
     }
 }
 
 /* Solves the 3 × 3 system a x[0] + b x[1] + c x[2] = right by Cramer's rule. Returns whether it has a solution. */
-static bool solve3(const double *a, const double *b, const double *c, const double *right, double x[3])
+static bool solve_3x3_system(const double *a, const double *b, const double *c, const double *right, double x[3])
 {
     const double *m[3] = {a, b, c};
     double cofactor[3][3];
@@ -511,7 +518,7 @@ static inline __attribute__((always_inline)) void evaluate_map(const reference_c
                                                                double columns[3][3], double left[3])
 {
     shape_function s[8];
-    cell_shape(type, parameter, s);
+    compute_cell_shape(type, parameter, s);
     for (int axis = 0; axis < 3; axis++) {
         left[axis] = point[axis];
         for (int k = 0; k < 3; k++) columns[k][axis] = 0;
@@ -527,7 +534,7 @@ static double length3(const double *v)
     return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
 
-static double cell_extent(const reference_cell *cell)
+static double compute_cell_extent(const reference_cell *cell)
 {
     double extent = 0;
     for (int i = 1; i < cell->count; i++)
@@ -539,11 +546,11 @@ static double cell_extent(const reference_cell *cell)
 static inline __attribute__((always_inline)) bool
 solve_by_newton_in_cell_type(const reference_cell *cell, int type, int count, const double *point, double parameter[3])
 {
-    const double tolerance = 1e-13 * cell_extent(cell);
+    const double tolerance = 1e-13 * compute_cell_extent(cell);
     for (int step = 0; step < 60; step++) {
         double columns[3][3], left[3], move[3];
         evaluate_map(cell, type, count, parameter, point, columns, left);
-        if (!solve3(columns[0], columns[1], columns[2], left, move)) return false;
+        if (!solve_3x3_system(columns[0], columns[1], columns[2], left, move)) return false;
         const double length = length3(move), limit = length > 0.5 && type != GRID_TET ? 0.5 / length : 1;
         for (int k = 0; k < 3; k++) parameter[k] += limit * move[k];
         /* Newton's error decreases as the square of the step: the next step would be below 1e-16. */
@@ -562,10 +569,10 @@ static bool solve_by_newton(const reference_cell *cell, const double *point, dou
     }
 }
 
-static double distance_outside_cell(const double *parameter)
+static double compute_distance_outside_cell(const double *parameter)
 {
-    return fmax(distance_outside_unit_interval(parameter[0]),
-                fmax(distance_outside_unit_interval(parameter[1]), distance_outside_unit_interval(parameter[2])));
+    return fmax(compute_distance_outside_unit(parameter[0]),
+                fmax(compute_distance_outside_unit(parameter[1]), compute_distance_outside_unit(parameter[2])));
 }
 
 /* Inverts the map by Newton's method. The starting points are tried in this order: the previous solution of this
@@ -580,8 +587,8 @@ static bool invert_map(const reference_cell *cell, const double *point, double p
     for (int i = 0; i < 10 && best > 0.1; i++) {
         double p[3];
         memcpy(p, starts[i], sizeof p);
-        if (!solve_by_newton(cell, point, p) || distance_outside_cell(p) >= best) continue;
-        best = distance_outside_cell(p);
+        if (!solve_by_newton(cell, point, p) || compute_distance_outside_cell(p) >= best) continue;
+        best = compute_distance_outside_cell(p);
         memcpy(parameter, p, sizeof p);
     }
     if (best <= 0.1) memcpy(starts[0], parameter, sizeof starts[0]);
@@ -612,20 +619,20 @@ static void compute_gradient(const reference_cell *cell, const double *parameter
 {
     shape_function s[8];
     double columns[3][3], rows[3][3], unused[3], slope[3] = {0, 0, 0};
-    cell_shape(cell->type, parameter, s);
+    compute_cell_shape(cell->type, parameter, s);
     evaluate_map(cell, cell->type, cell->count, parameter, parameter, columns, unused);
     for (int k = 0; k < 3; k++)
         for (int i = 0; i < cell->count; i++) slope[k] += s[i].d[k] * values[i];
     for (int k = 0; k < 3; k++)
         for (int axis = 0; axis < 3; axis++) rows[axis][k] = columns[k][axis];
-    if (!solve3(rows[0], rows[1], rows[2], slope, gradient)) gradient[0] = gradient[1] = gradient[2] = 0;
+    if (!solve_3x3_system(rows[0], rows[1], rows[2], slope, gradient)) gradient[0] = gradient[1] = gradient[2] = 0;
 }
 
 static double interpolate_value(const reference_cell *cell, const double *parameter, const double *values)
 {
     shape_function s[8];
     double value = 0;
-    cell_shape(cell->type, parameter, s);
+    compute_cell_shape(cell->type, parameter, s);
     for (int i = 0; i < cell->count; i++) value += s[i].n * values[i];
     return value;
 }

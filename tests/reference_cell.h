@@ -71,37 +71,37 @@ typedef struct reference_crossing {
 enum { REFERENCE_MAX_CROSSINGS = REFERENCE_MAX_TRIANGLES };
 
 /* Computes the crossings sorted by z and returns their number. The number is even for every line. */
-int reference_crossings(const reference_cell *cell, const reference_line *line,
-                        reference_crossing crossings[REFERENCE_MAX_CROSSINGS]);
+int reference_find_crossings(const reference_cell *cell, const reference_line *line,
+                             reference_crossing crossings[REFERENCE_MAX_CROSSINGS]);
 
 /* Computes the centre, the triangles and the signs of a polyhedron from the cell's distinct vertices and its faces. */
 void reference_polyhedron_setup(reference_cell *cell);
 
 /* Returns the distance of the point from the nearest sheet of the polyhedron. */
-double reference_sheet_distance(const reference_cell *cell, const double point[3]);
+double reference_compute_sheet_distance(const reference_cell *cell, const double point[3]);
 
 /* Computes the profile of a polyhedron at depth z between two crossings: the sum of the signed fields of the tets that
  * contain the point. From a crossing to the next sheet, the profile is linear and begins at the face's own value (on
  * quads, the value on the patch). If tets overlap at the crossing, the values of the other tets are added to the face's
  * value. Returns false if no sum is found. */
-bool reference_profile_value(const reference_cell *cell, const reference_line *line, const reference_crossing ends[2],
-                             const double *values, double z, double *value);
+bool reference_compute_profile_value(const reference_cell *cell, const reference_line *line,
+                                     const reference_crossing ends[2], const double *values, double z, double *value);
 
 enum { REFERENCE_MAX_BREAKS = 3 * REFERENCE_MAX_TRIANGLES + 2 };
 
 /* Finds the increasing depths, from the first crossing to the second, at which a polyhedron's profile bends: the
  * crossings with sheets that lie both between the faces and between the faces' triangles. Returns the number of
  * depths. */
-int reference_profile_breaks(const reference_cell *cell, const reference_line *line, const reference_crossing ends[2],
-                             double z[REFERENCE_MAX_BREAKS]);
+int reference_find_profile_breaks(const reference_cell *cell, const reference_line *line,
+                                  const reference_crossing ends[2], double z[REFERENCE_MAX_BREAKS]);
 
 /* Returns the field at a crossing, interpolated from the face's vertices only: bilinear on quads, linear on the
  * triangles of all other faces. */
-double reference_face_value(const reference_cell *cell, const reference_line *line, const reference_crossing *crossing,
-                            const double *values, bool *is_folded);
+double reference_compute_face_value(const reference_cell *cell, const reference_line *line,
+                                    const reference_crossing *crossing, const double *values, bool *is_folded);
 
 /* Returns the smallest distance, in a plane of constant z, between the line and an edge of the cell. */
-double reference_edge_distance(const reference_cell *cell, const reference_line *line);
+double reference_compute_edge_distance(const reference_cell *cell, const reference_line *line);
 
 /* Evaluates the interpolant at a point. If the inverse map has no solution because the cell is degenerate, value and
  * gradient are 0 and false is returned. gradient (in camera coordinates) may be NULL. */

@@ -116,20 +116,20 @@ static double interpolate_value(const cell_interval *s, const reference_line *li
     const double point[3] = {line->base[0] + line->slope[0] * z, line->base[1] + line->slope[1] * z, z};
     double value;
     if (placed->cell.type == GRID_POLYHEDRON)
-        reference_profile_value(&placed->cell, line, s->ends, placed->values, z, &value);
+        reference_compute_profile_value(&placed->cell, line, s->ends, placed->values, z, &value);
     else
         reference_interpolate(&placed->cell, point, placed->values, &value, NULL);
     return value;
 }
 
-static void add_sample(const active_intervals *c, const cell_interval *s, double z, sample *sum)
+static void add_sample_to_sums(const active_intervals *c, const cell_interval *s, double z, sample *sum)
 {
     const camera_cell *placed = s->cell;
     const double value = interpolate_value(s, &c->line, z);
     double colour[3];
-    const double clear = -log1p(-fmin(reference_opacity(placed->transfer, value), 1 - 1e-15));
+    const double clear = -log1p(-fmin(reference_compute_opacity(placed->transfer, value), 1 - 1e-15));
     const double extinction = clear * c->length / placed->transfer->unit_distance;
-    reference_colour(placed->transfer, value, colour);
+    reference_compute_colour(placed->transfer, value, colour);
     sum->extinction += extinction;
     for (int k = 0; k < 3; k++) sum->emission[k] += extinction * colour[k];
 }
@@ -137,7 +137,7 @@ static void add_sample(const active_intervals *c, const cell_interval *s, double
 static sample compute_sample(const active_intervals *c, double z)
 {
     sample sum = {0};
-    for (int64_t i = 0; i < c->count; i++) add_sample(c, c->active[i], z, &sum);
+    for (int64_t i = 0; i < c->count; i++) add_sample_to_sums(c, c->active[i], z, &sum);
     return sum;
 }
 
@@ -167,7 +167,7 @@ static light blend_over(const light *front, const light *back)
     return out;
 }
 
-static double light_difference(const light *a, const light *b)
+static double compute_light_difference(const light *a, const light *b)
 {
     double most = fabs(a->transmittance - b->transmittance);
     for (int c = 0; c < 3; c++) most = fmax(most, fabs(a->colour[c] - b->colour[c]));
@@ -185,7 +185,7 @@ static light integrate_adaptively(const active_intervals *c, double from, double
                        s[4]};
     light a = integrate_by_boole(left, 0.5 * width), b = integrate_by_boole(right, 0.5 * width);
     const light whole = integrate_by_boole(s, width), halves = blend_over(&a, &b);
-    if ((light_difference(&whole, &halves) <= tolerance && depth >= 2) || depth > 40) return halves;
+    if ((compute_light_difference(&whole, &halves) <= tolerance && depth >= 2) || depth > 40) return halves;
     a = integrate_adaptively(c, from, middle, left, 0.5 * tolerance, depth + 1);
     b = integrate_adaptively(c, middle, to, right, 0.5 * tolerance, depth + 1);
     return blend_over(&a, &b);
@@ -224,7 +224,7 @@ static cell_interval *collect_intervals(const reference_integral *scene, const r
         const reference_cell *cell = &scene->cells[i].cell;
         const bool may_pass =
             reference_box_is_near(&scene->cells[i].box, line, 0, 1e-9) && is_box_near_line(cell, line);
-        const int found = may_pass ? reference_crossings(cell, line, crossings) : 0;
+        const int found = may_pass ? reference_find_crossings(cell, line, crossings) : 0;
         for (int k = 0; k + 1 < found; k += 2) {
             if (!(crossings[k + 1].z > fmax(crossings[k].z, 0))) continue;
             if (*count == capacity)
@@ -272,7 +272,7 @@ static int find_interval_cuts(const cell_interval *s, const reference_line *line
     z[1] = s->z_out;
     if (s->cell->cell.type != GRID_POLYHEDRON) return 2;
     double breaks[REFERENCE_MAX_BREAKS];
-    const int count = reference_profile_breaks(&s->cell->cell, line, s->ends, breaks);
+    const int count = reference_find_profile_breaks(&s->cell->cell, line, s->ends, breaks);
     int cuts = 2;
     for (int i = 1; i + 1 < count; i++)
         if (breaks[i] > s->z_in) z[cuts++] = breaks[i];
@@ -396,7 +396,7 @@ static double *find_cuts(const cell_interval *list, int64_t count, const referen
     return all.z;
 }
 
-static void find_active(active_intervals *c, const cell_interval *list, int64_t count, double from, double to)
+static void find_active_intervals(active_intervals *c, const cell_interval *list, int64_t count, double from, double to)
 {
     c->count = 0;
     for (int64_t i = 0; i < count; i++)
@@ -440,7 +440,7 @@ void reference_integral_trace(const reference_integral *scene, int x, int y, con
     for (int64_t i = 0; i < cuts && sum.transmittance > 0; i++) {
         for (; next < hit_count && hits[next].depth <= z[i]; next++) blend_hit(&sum, &hits[next]);
         if (i + 1 == cuts || !(z[i] < z[i + 1]) || !is_depth_unclipped(&c, 0.5 * (z[i] + z[i + 1]))) continue;
-        find_active(&c, list, count, z[i], z[i + 1]);
+        find_active_intervals(&c, list, count, z[i], z[i + 1]);
         if (!c.count) continue;
         const light part = integrate_light(&c, z[i], z[i + 1]);
         sum = blend_over(&sum, &part);

@@ -57,7 +57,7 @@ static void make_loop(const double (*corners)[3], int count, loop *out)
     for (int axis = 0; axis < 3 && out->area > 0; axis++) out->normal[axis] /= out->area;
 }
 
-static double corner_area(const loop *l, int a, int b, int c)
+static double compute_corner_area(const loop *l, int a, int b, int c)
 {
     return signed_area_along_normal(l->normal, l->place[a], l->place[b], l->place[c]) / l->area;
 }
@@ -65,7 +65,7 @@ static double corner_area(const loop *l, int a, int b, int c)
 static bool is_fan(const loop *l)
 {
     for (int i = 1; i + 1 < l->count; i++)
-        if (corner_area(l, 0, i, i + 1) < -fan_slack) return false;
+        if (compute_corner_area(l, 0, i, i + 1) < -fan_slack) return false;
     return true;
 }
 
@@ -77,18 +77,19 @@ static bool are_equal_points(const loop *l, int a, int b)
 static bool is_ear(const loop *l, int tip)
 {
     const int n = l->count, a = (tip + n - 1) % n, c = (tip + 1) % n;
-    if (corner_area(l, a, tip, c) <= line_slack) return false;
+    if (compute_corner_area(l, a, tip, c) <= line_slack) return false;
     for (int i = 0; i < n; i++) {
         if (i == a || i == tip || i == c || are_equal_points(l, i, a) || are_equal_points(l, i, c)) continue;
         if (!are_equal_points(l, i, tip)) {
-            if (corner_area(l, a, tip, i) >= -line_slack && corner_area(l, tip, c, i) >= -line_slack &&
-                corner_area(l, c, a, i) >= -line_slack)
+            if (compute_corner_area(l, a, tip, i) >= -line_slack && compute_corner_area(l, tip, c, i) >= -line_slack &&
+                compute_corner_area(l, c, a, i) >= -line_slack)
                 return false;
             continue;
         }
         for (int side = 1; side < n; side += n - 2) { /* neighbours of another corner at the same position */
             const int end = (i + side) % n;
-            if (corner_area(l, a, tip, end) > line_slack && corner_area(l, tip, c, end) > line_slack) return false;
+            if (compute_corner_area(l, a, tip, end) > line_slack && compute_corner_area(l, tip, c, end) > line_slack)
+                return false;
         }
     }
     return true;
@@ -108,7 +109,7 @@ static int find_first_ear(const loop *l)
         if (is_ear(l, i % l->count)) return i % l->count;
     for (int i = 1; i <= l->count; i++) {
         const int n = l->count, b = i % n;
-        if (fabs(corner_area(l, (b + n - 1) % n, b, (b + 1) % n)) <= line_slack) return b;
+        if (fabs(compute_corner_area(l, (b + n - 1) % n, b, (b + 1) % n)) <= line_slack) return b;
     }
     return -1;
 }
@@ -136,6 +137,7 @@ bool reference_is_concave_quad(const double (*corners)[3])
     loop l;
     int inward = 0;
     make_loop(corners, 4, &l);
-    for (int i = 0; i < 4 && l.area > 0; i++) inward += corner_area(&l, (i + 3) % 4, i, (i + 1) % 4) < -fan_slack / 2;
+    for (int i = 0; i < 4 && l.area > 0; i++)
+        inward += compute_corner_area(&l, (i + 3) % 4, i, (i + 1) % 4) < -fan_slack / 2;
     return inward == 1;
 }

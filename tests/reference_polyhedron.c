@@ -169,8 +169,8 @@ void reference_polyhedron_setup(reference_cell *cell)
 
 /* Computes the barycentric coordinates of a point in tet i, for the triangle's vertices and then for the centre. slopes
  * receives their gradients. Returns false if the tet has no volume. */
-static bool tet_coordinates(const reference_cell *cell, int i, const double point[3], double lambda[4],
-                            double slopes[4][3])
+static bool compute_tet_coordinates(const reference_cell *cell, int i, const double point[3], double lambda[4],
+                                    double slopes[4][3])
 {
     const reference_polyhedron *p = &cell->poly;
     const double *centre = cell->position[cell->count];
@@ -208,7 +208,7 @@ static int sum_over_tets(const reference_cell *cell, const double point[3], cons
     *value = gradient[0] = gradient[1] = gradient[2] = 0;
     for (int i = 0; i < p->triangle_count; i++) {
         double lambda[4], slopes[4][3];
-        if (!p->sign[i] || !tet_coordinates(cell, i, point, lambda, slopes)) continue;
+        if (!p->sign[i] || !compute_tet_coordinates(cell, i, point, lambda, slopes)) continue;
         if (lambda[0] < 0 || lambda[1] < 0 || lambda[2] < 0 || lambda[3] < 0) continue;
         cover += p->sign[i];
         for (int k = 0; k < 4; k++) {
@@ -238,12 +238,12 @@ bool reference_polyhedron_interpolate(const reference_cell *cell, const double p
     return false;
 }
 
-double reference_sheet_distance(const reference_cell *cell, const double point[3])
+double reference_compute_sheet_distance(const reference_cell *cell, const double point[3])
 {
     double least = (double)INFINITY;
     for (int i = 0; i < cell->poly.triangle_count; i++) {
         double lambda[4], slopes[4][3], nearest = (double)INFINITY, outside = 0;
-        if (!tet_coordinates(cell, i, point, lambda, slopes)) continue;
+        if (!compute_tet_coordinates(cell, i, point, lambda, slopes)) continue;
         for (int k = 0; k < 4; k++) {
             const double height = lambda[k] / sqrt(slopes[k][0] * slopes[k][0] + slopes[k][1] * slopes[k][1] +
                                                    slopes[k][2] * slopes[k][2]);

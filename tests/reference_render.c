@@ -153,12 +153,12 @@ static void compute_ray_point(const trace *t, double z, double point[3])
     point[2] = z;
 }
 
-static double value_along(trace *t, const camera_cell *c, const double *values, double z)
+static double find_value_on_ray(trace *t, const camera_cell *c, const double *values, double z)
 {
     double point[3], value;
     compute_ray_point(t, z, point);
     const bool is_found = c->cell.type == GRID_POLYHEDRON
-                              ? reference_profile_value(&c->cell, &t->line, c->ends, values, z, &value)
+                              ? reference_compute_profile_value(&c->cell, &t->line, c->ends, values, z, &value)
                               : reference_interpolate(&c->cell, point, values, &value, NULL);
     if (!is_found) t->out->map_failed = true;
     return value;
@@ -173,7 +173,7 @@ static double bisect_root(trace *t, const camera_cell *c, const double *values, 
     for (int step = 0; step < 36; step++) {
         const double middle = 0.5 * (low + high);
         if (middle <= low || middle >= high) break;
-        if ((value_along(t, c, values, middle) >= iso) == side_in)
+        if ((find_value_on_ray(t, c, values, middle) >= iso) == side_in)
             low = middle;
         else
             high = middle;
@@ -190,9 +190,9 @@ typedef struct crossing_search {
     double iso, range;
 } crossing_search;
 
-static double relative_value_along_ray(const crossing_search *a, double z)
+static double compute_relative_value_on_ray(const crossing_search *a, double z)
 {
-    return value_along(a->t, a->c, a->values, z) - a->iso;
+    return find_value_on_ray(a->t, a->c, a->values, z) - a->iso;
 }
 
 /* Finds the depth in [low, high] at which `side` times the field is least, by golden-section search. */
@@ -200,20 +200,20 @@ static double find_minimum(const crossing_search *a, double low, double high, do
 {
     const double golden = 0.6180339887498949;
     double x = high - golden * (high - low), y = low + golden * (high - low);
-    double at_x = side * relative_value_along_ray(a, x), at_y = side * relative_value_along_ray(a, y);
+    double at_x = side * compute_relative_value_on_ray(a, x), at_y = side * compute_relative_value_on_ray(a, y);
     for (int i = 0; i < 40; i++) {
         if (at_x < at_y) {
             high = y;
             y = x;
             at_y = at_x;
             x = high - golden * (high - low);
-            at_x = side * relative_value_along_ray(a, x);
+            at_x = side * compute_relative_value_on_ray(a, x);
         } else {
             low = x;
             x = y;
             at_x = at_y;
             y = low + golden * (high - low);
-            at_y = side * relative_value_along_ray(a, y);
+            at_y = side * compute_relative_value_on_ray(a, y);
         }
     }
     return 0.5 * (low + high);
@@ -229,7 +229,7 @@ static int find_crossing_depths(const crossing_search *a, double z_in, double z_
     int n = 0;
     for (int i = 0; i <= CROSSING_PIECES; i++) {
         at[i] = z_in + (z_out - z_in) * i / CROSSING_PIECES;
-        f[i] = relative_value_along_ray(a, at[i]);
+        f[i] = compute_relative_value_on_ray(a, at[i]);
     }
     for (int i = 0; i <= CROSSING_PIECES; i++) {
         z[n] = at[i];
@@ -242,7 +242,7 @@ static int find_crossing_depths(const crossing_search *a, double z_in, double z_
         const bool rises = behind == i + 1 || side * (f[behind] - f[i + 1]) >= 0;
         if (!falls || !rises) continue;
         z[n] = find_minimum(a, at[i], at[i + 1], side);
-        v[n] = relative_value_along_ray(a, z[n]);
+        v[n] = compute_relative_value_on_ray(a, z[n]);
         lower_margin(&a->t->out->value_margin, fabs(v[n]) / a->range);
         n++;
     }
@@ -253,9 +253,9 @@ static int find_crossing_depths(const crossing_search *a, double z_in, double z_
  * is near the isovalue lowers the margin, since rounding decides on which side of the isovalue it is. */
 static int find_profile_depths(const crossing_search *a, double z[REFERENCE_MAX_BREAKS], double v[REFERENCE_MAX_BREAKS])
 {
-    const int count = reference_profile_breaks(&a->c->cell, &a->t->line, a->c->ends, z);
+    const int count = reference_find_profile_breaks(&a->c->cell, &a->t->line, a->c->ends, z);
     for (int i = 0; i < count; i++) {
-        v[i] = relative_value_along_ray(a, z[i]);
+        v[i] = compute_relative_value_on_ray(a, z[i]);
         lower_margin(&a->t->out->value_margin, fabs(v[i]) / a->range);
     }
     return count;
@@ -265,7 +265,7 @@ static void lower_margin_near_sheets(trace *t, const camera_cell *c, double z)
 {
     double point[3];
     compute_ray_point(t, z, point);
-    lower_margin(&t->out->value_margin, reference_sheet_distance(&c->cell, point) / c->size);
+    lower_margin(&t->out->value_margin, reference_compute_sheet_distance(&c->cell, point) / c->size);
 }
 
 static void compute_value_range(const double *values, int count, double *low, double *high)
@@ -283,14 +283,14 @@ static void transform_to_world(const render_camera *camera, const double v[3], d
         world[axis] = camera->right[axis] * v[0] + camera->up[axis] * v[1] + camera->forward[axis] * v[2];
 }
 
-static void surface_colour(trace *t, const camera_cell *c, const render_surface_layer *layer, int value_index, double z,
-                           double colour[3])
+static void compute_surface_colour(trace *t, const camera_cell *c, const render_surface_layer *layer, int value_index,
+                                   double z, double colour[3])
 {
     for (int k = 0; k < 3; k++) colour[k] = layer->colour_map ? 0 : (double)layer->colours[3 * value_index + k];
     if (!layer->colour_map) return;
     double values[REFERENCE_MAX_VERTICES];
     grid_cell_values(&layer->colour_field.fields[c->part_index], c->index, c->vertices, c->cell.count, values);
-    reference_colour(layer->colour_map, value_along(t, c, values, z), colour);
+    reference_compute_colour(layer->colour_map, find_value_on_ray(t, c, values, z), colour);
 }
 
 static reference_hit *add_hit(trace *t, const camera_cell *c, const render_surface_layer *layer, int value_index,
@@ -322,15 +322,16 @@ static reference_hit *add_hit(trace *t, const camera_cell *c, const render_surfa
     if (!has_gradient) t->out->ambiguous = true;
     e->hit.conditioning = has_gradient ? 1 / fabs(crossing_search) : 1;
     e->error_bound = c->size * e->hit.conditioning;
-    surface_colour(t, c, layer, value_index, depth, colour);
+    compute_surface_colour(t, c, layer, value_index, depth, colour);
     shade_hit(t, &layer->material, colour, e->hit.normal, e->hit.colour);
     return &e->hit;
 }
 
 /* Adds all crossings of a surface in a cell. If the isovalue is between the face's value and the interpolant's value at
  * the same face, the crossing is placed on the face. */
-static void cross_all_cells(trace *t, const camera_cell *c, const render_surface_layer *layer, int value_index,
-                            int surface, const double *values, const reference_crossing ends[2], const double face[2])
+static void add_hits_of_isovalue(trace *t, const camera_cell *c, const render_surface_layer *layer, int value_index,
+                                 int surface, const double *values, const reference_crossing ends[2],
+                                 const double face[2])
 {
     /* both functions below write to these arrays; the profile needs more elements */
     double z[REFERENCE_MAX_BREAKS], v[REFERENCE_MAX_BREAKS], low, high;
@@ -360,14 +361,14 @@ static void cross_all_cells(trace *t, const camera_cell *c, const render_surface
     }
 }
 
-static void cross_surface(trace *t, const camera_cell *c, const render_surface_layer *layer, int first_surface,
-                          const double *values, const reference_crossing ends[2])
+static void add_hits_of_surface(trace *t, const camera_cell *c, const render_surface_layer *layer, int first_surface,
+                                const double *values, const reference_crossing ends[2])
 {
     double face[2], low, high;
     compute_value_range(values, c->cell.count, &low, &high);
     for (int i = 0; i < 2; i++) {
         bool is_folded;
-        face[i] = reference_face_value(&c->cell, &t->line, &ends[i], values, &is_folded);
+        face[i] = reference_compute_face_value(&c->cell, &t->line, &ends[i], values, &is_folded);
         if (is_folded && c->cell.type == GRID_POLYHEDRON) t->out->ambiguous = true;
     }
     for (int i = 0; i < layer->value_count; i++) {
@@ -375,7 +376,7 @@ static void cross_surface(trace *t, const camera_cell *c, const render_surface_l
         for (int end = 0; end < 2 && high > low; end++)
             lower_margin(&t->out->value_margin, fabs(face[end] - iso) / (high - low));
         if (c->cell.type != GRID_TET) {
-            cross_all_cells(t, c, layer, i, first_surface + i, values, ends, face);
+            add_hits_of_isovalue(t, c, layer, i, first_surface + i, values, ends, face);
             continue;
         }
         const bool side = face[0] >= iso;
@@ -386,7 +387,7 @@ static void cross_surface(trace *t, const camera_cell *c, const render_surface_l
     }
 }
 
-static void cross_surfaces(trace *t, const camera_cell *c, const reference_crossing ends[2])
+static void add_hits_of_all_surfaces(trace *t, const camera_cell *c, const reference_crossing ends[2])
 {
     const render_job *job = t->scene->job;
     for (int layer = 0, first = 0; layer < job->surface_count; first += job->surfaces[layer++].value_count) {
@@ -394,15 +395,15 @@ static void cross_surfaces(trace *t, const camera_cell *c, const reference_cross
         double values[REFERENCE_MAX_VERTICES];
         if (!s->field.ranges[c->part_index].low) continue;
         if (grid_cell_values(&s->field.fields[c->part_index], c->index, c->vertices, c->cell.count, values))
-            cross_surface(t, c, s, first, values, ends);
+            add_hits_of_surface(t, c, s, first, values, ends);
     }
 }
 
 /* ---- volumes ---- */
 
-static void add_sample(trace *t, const render_transfer *transfer, int layer, double depth, double value)
+static void add_sample_to_sums(trace *t, const render_transfer *transfer, int layer, double depth, double value)
 {
-    const double opacity = reference_opacity(transfer, value);
+    const double opacity = reference_compute_opacity(transfer, value);
     double colour[3];
     t->out->samples++;
     if (opacity <= 0) return;
@@ -411,12 +412,12 @@ static void add_sample(trace *t, const render_transfer *transfer, int layer, dou
     e->is_sample = true;
     e->order = layer;
     e->transmittance = pow(1 - opacity, t->scene->job->step / transfer->unit_distance);
-    reference_colour(transfer, value, colour);
+    reference_compute_colour(transfer, value, colour);
     for (int c = 0; c < 3; c++) e->hit.colour[c] = colour[c];
 }
 
-static void cross_volume(trace *t, const camera_cell *c, int layer, const double *values,
-                         const reference_crossing ends[2])
+static void add_samples_of_volume(trace *t, const camera_cell *c, int layer, const double *values,
+                                  const reference_crossing ends[2])
 {
     const double spacing = t->scene->job->step / t->length;
     const bool is_folded = ends[0].is_folded || ends[1].is_folded;
@@ -427,11 +428,11 @@ static void cross_volume(trace *t, const camera_cell *c, int layer, const double
         lower_margin(&t->out->sample_margin, fmin(fabs(z - ends[0].z), fabs(z - ends[1].z)) / c->size);
         if (z >= ends[1].z) break;
         if (z < ends[0].z) continue;
-        add_sample(t, t->scene->job->volumes[layer].transfer, layer, z, value_along(t, c, values, z));
+        add_sample_to_sums(t, t->scene->job->volumes[layer].transfer, layer, z, find_value_on_ray(t, c, values, z));
     }
 }
 
-static void cross_volumes(trace *t, const camera_cell *c, const reference_crossing ends[2])
+static void add_samples_of_all_volumes(trace *t, const camera_cell *c, const reference_crossing ends[2])
 {
     const render_job *job = t->scene->job;
     for (int layer = 0; layer < job->volume_count; layer++) {
@@ -439,7 +440,7 @@ static void cross_volumes(trace *t, const camera_cell *c, const reference_crossi
         double values[REFERENCE_MAX_VERTICES];
         if (!field->ranges[c->part_index].low) continue;
         if (grid_cell_values(&field->fields[c->part_index], c->index, c->vertices, c->cell.count, values))
-            cross_volume(t, c, layer, values, ends);
+            add_samples_of_volume(t, c, layer, values, ends);
     }
 }
 
@@ -500,12 +501,12 @@ static void intersect_cell(trace *t, int part, int64_t index)
     reference_crossing crossings[REFERENCE_MAX_CROSSINGS];
     if (grid_is_ghost(t->scene->job->parts[part].cells, index) || !is_cell_near_ray(t, part, index)) return;
     load_cell(t->scene, part, index, &c);
-    lower_margin(&t->out->edge_margin, reference_edge_distance(&c.cell, &t->line) / c.size);
-    const int count = reference_crossings(&c.cell, &t->line, crossings);
+    lower_margin(&t->out->edge_margin, reference_compute_edge_distance(&c.cell, &t->line) / c.size);
+    const int count = reference_find_crossings(&c.cell, &t->line, crossings);
     for (int i = 0; i + 1 < count; i += 2) {
         memcpy(c.ends, crossings + i, sizeof c.ends);
-        cross_surfaces(t, &c, crossings + i);
-        cross_volumes(t, &c, crossings + i);
+        add_hits_of_all_surfaces(t, &c, crossings + i);
+        add_samples_of_all_volumes(t, &c, crossings + i);
     }
 }
 
@@ -602,8 +603,8 @@ void reference_trace(const reference_scene *scene, int x, int y, const float bac
     free(t.events);
 }
 
-double reference_residual(const reference_scene *scene, int x, int y, const reference_hit *hit, double depth,
-                          double *slope, double gradient[3])
+double reference_compute_residual(const reference_scene *scene, int x, int y, const reference_hit *hit, double depth,
+                                  double *slope, double gradient[3])
 {
     reference_ray unused = {.hit_count = 0};
     trace t = {.scene = scene, .out = &unused};

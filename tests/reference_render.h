@@ -55,8 +55,8 @@ void reference_free(reference_scene *scene);
 /* Evaluates the field at a depth on the ray of pixel (x, y), in the cell of a hit. Returns the field minus the
  * isovalue; slope receives its derivative with respect to depth, and gradient its gradient in world coordinates (may be
  * NULL). All three are relative to the range of the cell's values. */
-double reference_residual(const reference_scene *scene, int x, int y, const reference_hit *hit, double depth,
-                          double *slope, double gradient[3]);
+double reference_compute_residual(const reference_scene *scene, int x, int y, const reference_hit *hit, double depth,
+                                  double *slope, double gradient[3]);
 
 void reference_trace(const reference_scene *scene, int x, int y, const float background[4], reference_ray *out);
 

@@ -207,7 +207,7 @@ static void print_mapping(FILE *to, const scene_mapping *mapping, const char *pa
     for (int i = 0; mapping->fields[i].key; i++) {
         const scene_key *key = &mapping->keys[i];
         char words[SCENE_WORDS_SIZE];
-        scene_value_words(&mapping->fields[i].value, key, words);
+        scene_describe_value(&mapping->fields[i].value, key, words);
         char *keys = strstr(words, " with the keys");
         if (keys) *keys = '\0';
         fprintf(to, "| `%s` | %s | %s | %s |\n", mapping->fields[i].key, words,

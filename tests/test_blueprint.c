@@ -54,7 +54,7 @@ static void expect_set_succeeds(doorway *d, const char *name, const conduit_node
 }
 
 /* Draws the mesh passed by the public header. *copied receives the number of bytes copied for it. */
-static caught_picture draw_by_header(const char *path, const layout_case *layout, int64_t *copied)
+static caught_picture draw_mesh_by_header(const char *path, const layout_case *layout, int64_t *copied)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, path);
     everywhere(layout_submit(session, "mesh", layout) == INSITU_OK);
@@ -79,7 +79,7 @@ static void each_layout_draws_same_picture_as_header(void **state)
         layout_make(&layout_kinds[i], &layout);
         const char *path = write_scene_of(&layout);
         int64_t copied;
-        caught_picture truth = draw_by_header(path, &layout, &copied);
+        caught_picture truth = draw_mesh_by_header(path, &layout, &copied);
         everywhere(has_colour(&truth));
         for (int packed = 0; packed < 2; packed++) {
             doorway d = open_adaptor_session(path);
@@ -119,7 +119,7 @@ static void arrays_described_by_the_header_are_not_copied(void **state)
             layout_make(&layout_kinds[i], &layout);
             const char *path = write_scene_of(&layout);
             int64_t copied;
-            caught_picture truth = draw_by_header(path, &layout, &copied);
+            caught_picture truth = draw_mesh_by_header(path, &layout, &copied);
             doorway d = open_adaptor_session(path);
             expect_set_succeeds(&d, "", layout.node);
             expect_step_succeeds(&d);
@@ -156,7 +156,8 @@ static bool submit_block(insitu_session *session, const char *name, int64_t numb
 }
 
 /* Draws the two domains a and b as children of one node. */
-static caught_picture draw_both(const char *path, layout_case *a, layout_case *b, insitu_blueprint_report *report)
+static caught_picture draw_two_domains(const char *path, layout_case *a, layout_case *b,
+                                       insitu_blueprint_report *report)
 {
     conduit_node *both = conduit_node_create();
     move_child_node(both, "domain_000000", a->node);
@@ -194,7 +195,7 @@ static void domains_are_blocks_of_one_mesh(void **state)
         check_step_succeeds(session, 100);
         caught_picture truth = pop_caught_picture();
         insitu_destroy(&session);
-        caught_picture picture = draw_both(path, &a, &b, &report);
+        caught_picture picture = draw_two_domains(path, &a, &b, &report);
         const bool is_same = own_rank || are_same_pictures(&picture, &truth);
         everywhere(is_same);
         everywhere(report.meshes == 2 && report.fields == (has_same ? 6 : 5));
@@ -213,7 +214,7 @@ static void mesh_changes_to_blocks_and_back(void **state)
     layout_make(&layout_kinds[16], &a);
     int64_t copied;
     const char *path = write_scene(scene);
-    caught_picture truth = draw_by_header(path, &a, &copied);
+    caught_picture truth = draw_mesh_by_header(path, &a, &copied);
     doorway d = open_adaptor_session(path);
     conduit_node *list = conduit_node_create(), *child = conduit_node_fetch(list, "domain_000000");
     for (int step = 0; step < 4; step++) {
@@ -286,7 +287,7 @@ static void changed_arrays_are_detected(void **state)
                 for (int64_t v = 0; step == 1 && places && v < l.mesh.vertex_count; v++) places[3 * v] *= 1.25;
                 for (int64_t v = 0; step == 3 && v < l.mesh.vertex_count; v++) values[v] *= -0.5;
                 int64_t copied;
-                caught_picture truth = draw_by_header(path, &l, &copied);
+                caught_picture truth = draw_mesh_by_header(path, &l, &copied);
                 expect_set_succeeds(&d, "", l.node);
                 expect_step_succeeds(&d);
                 caught_picture picture = pop_caught_picture();

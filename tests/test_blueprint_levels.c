@@ -185,7 +185,7 @@ static void make_domains(const plan *p, domain domains[MOST_BOXES])
     }
 }
 
-static bool set_by_header(insitu_session *session, const plan *p, const domain *domains)
+static bool submit_domains_by_header(insitu_session *session, const plan *p, const domain *domains)
 {
     bool is_set = true;
     for (int i = 0, number = 0; i < p->count; i++) {
@@ -269,10 +269,10 @@ static conduit_node *make_node(const plan *p, const domain *domains)
 /* ---- pictures -----------------------------------------------------------------------------------------------------
  */
 
-static caught_picture draw_by_header(const char *path, const plan *p, const domain *domains)
+static caught_picture draw_mesh_by_header(const char *path, const plan *p, const domain *domains)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, path);
-    everywhere(set_by_header(session, p, domains));
+    everywhere(submit_domains_by_header(session, p, domains));
     check_step_succeeds(session, 0);
     insitu_destroy(&session);
     return pop_caught_picture();
@@ -298,7 +298,7 @@ static void draw_and_compare(doorway *d, const char *path, const plan *p, bool i
     domain domains[MOST_BOXES];
     make_domains(p, domains);
     conduit_node *node = make_node(p, domains);
-    caught_picture truth = draw_by_header(path, p, domains);
+    caught_picture truth = draw_mesh_by_header(path, p, domains);
     const insitu_status status = insitu_blueprint_set(d->adaptor, "amr", node);
     conduit_node_destroy(node);
     everywhere(status == INSITU_OK);
@@ -382,7 +382,7 @@ static void domains_of_one_level_have_no_seam(void **state)
             free(one[0].values);
             one[0].values = NULL;
         }
-        caught_picture truth = draw_by_header(path, &whole, one);
+        caught_picture truth = draw_mesh_by_header(path, &whole, one);
         make_domains(&p, domains);
         conduit_node *node = make_node(&p, domains);
         doorway d = open_adaptor_session(path);

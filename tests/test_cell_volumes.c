@@ -115,7 +115,7 @@ static void volumes_of_bent_cells_match_quadrature(void **state)
     }
 }
 
-static double shape_volume(const test_mesh *mesh, test_polyhedron_shape shape)
+static double compute_shape_volume(const test_mesh *mesh, test_polyhedron_shape shape)
 {
     double places[16][3], sum = 0;
     memcpy(places, mesh->coordinates, 3 * (size_t)mesh->vertex_count * sizeof(double));
@@ -137,7 +137,7 @@ static void volumes_of_concave_polyhedra_match_closed_forms(void **state)
         for (uint64_t turn = 0; turn < 20; turn++) {
             test_mesh mesh;
             test_mesh_make_polyhedron(shapes[i], test_linear_field, &mesh);
-            const double expected = shape_volume(&mesh, shapes[i]);
+            const double expected = compute_shape_volume(&mesh, shapes[i]);
             if (turn) test_mesh_reorder_vertices(&mesh, turn);
             assert_nearly_equal(compute_mesh_volume(&mesh), expected);
             test_mesh_free(&mesh);

@@ -174,7 +174,8 @@ static double compute_depth(const render_job *job, float t)
 }
 
 /* Returns whether all unshared ends are at depths that the bounds of chord_hull.h allow. */
-static bool is_paired(const render_job *job, const chord_ray *r, const chord_interval *ray_intervals, int count)
+static bool are_unshared_ends_allowed(const render_job *job, const chord_ray *r, const chord_interval *ray_intervals,
+                                      int count)
 {
     float lone[2 * CHORD_MAX_INTERVALS];
     const int alone = find_unshared_ends(ray_intervals, count, lone);
@@ -225,7 +226,7 @@ static void verify_length(const chord_ray *r, double sum, tally *t)
 static void verify_ray(const render_job *job, const chord_rays *rays, int ray, chord_interval *ray_intervals, int count,
                        tally *t)
 {
-    const chord_ray r = chord_hull_ray(job, rays, ray);
+    const chord_ray r = chord_compute_hull_ray(job, rays, ray);
     double sum = 0;
     assert_true(count <= CHORD_MAX_INTERVALS);
     count = clip_intervals(ray_intervals, count, (float)(-job->space.depth_origin * job->space.scale));
@@ -237,7 +238,7 @@ static void verify_ray(const render_job *job, const chord_rays *rays, int ray, c
         sum += ((double)ray_intervals[i].t_out - (double)ray_intervals[i].t_in) * r.line.length;
     verify_neighbours(job, &r, ray_intervals, count, t);
     verify_length(&r, sum, t);
-    if (is_paired(job, &r, ray_intervals, count)) return;
+    if (are_unshared_ends_allowed(job, &r, ray_intervals, count)) return;
     if (t->unpaired++ < 3)
         fprintf(stderr, "ray %.17g %.17g: ends of one interval alone; chord %.9g, %.9g to %.9g\n", rays->x[ray],
                 rays->y[ray], r.length, r.least, r.most);

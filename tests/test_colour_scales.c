@@ -69,9 +69,9 @@ static const double value_error = 4e-6, colour_error = 3e-6;
 static bool check_pixel(const render_transfer *t, double value, const float drawn[3], const char *what)
 {
     double at[3], low[3], high[3];
-    reference_colour(t, value, at);
-    reference_colour(t, value - value_error, low);
-    reference_colour(t, value + value_error, high);
+    reference_compute_colour(t, value, at);
+    reference_compute_colour(t, value - value_error, low);
+    reference_compute_colour(t, value + value_error, high);
     for (int c = 0; c < 3; c++) {
         const double moved = fmax(fabs(low[c] - at[c]), fabs(high[c] - at[c]));
         if (moved > 0.02) return false;
@@ -91,7 +91,7 @@ static void check_picture(const render_fixture *f, const render_transfer *t, con
         double base[3], direction[3], p[3];
         if (drawn.first[pixel] == drawn.first[pixel + 1]) continue;
         const fragment *hit = &drawn.list.items[drawn.first[pixel]];
-        const double depth = fixture_scene_depth(f, hit->t_in);
+        const double depth = fixture_compute_scene_depth(f, hit->t_in);
         render_camera_ray(camera, pixel % camera->width, pixel / camera->width, base, direction);
         for (int a = 0; a < 3; a++) p[a] = base[a] + depth * direction[a];
         hits++;

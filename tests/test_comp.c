@@ -35,16 +35,16 @@ static uint32_t draw_random(void)
     return (uint32_t)(state >> 32);
 }
 
-static float draw_unit(void)
+static float draw_unit_number(void)
 {
     return (float)(draw_random() >> 8) * 0x1p-24f;
 }
 
-static fragment random_fragment(void)
+static fragment make_random_fragment(void)
 {
-    fragment f = {.t_in = draw_unit(), .transmittance = draw_unit()};
-    f.t_out = f.t_in + draw_unit();
-    for (int c = 0; c < 3; c++) f.colour[c] = draw_unit() * (1 - f.transmittance);
+    fragment f = {.t_in = draw_unit_number(), .transmittance = draw_unit_number()};
+    f.t_out = f.t_in + draw_unit_number();
+    for (int c = 0; c < 3; c++) f.colour[c] = draw_unit_number() * (1 - f.transmittance);
     f.kind = draw_random() % 4 == 0 ? FRAGMENT_SURFACE + draw_random() % 3 : FRAGMENT_VOLUME;
     return f;
 }
@@ -107,9 +107,9 @@ static void merge_matches_double_reference(void **context)
         float rgba[4], depth, nearest = INFINITY;
         double expected[4];
         for (int i = 0; i < count; i++) {
-            items[i] = random_fragment();
+            items[i] = make_random_fragment();
             /* all depths are distinct, since 101 is prime */
-            items[i].t_in = (float)(i * 37 % 101) + 0.5f * draw_unit();
+            items[i].t_in = (float)(i * 37 % 101) + 0.5f * draw_unit_number();
             items[i].t_out = items[i].t_in + (items[i].kind < FRAGMENT_SURFACE ? 0.4f : 0);
             if (items[i].kind >= FRAGMENT_SURFACE) nearest = fminf(nearest, items[i].t_in);
         }
@@ -153,7 +153,7 @@ static void opaque_surface_hides_what_is_behind(void **context)
         const int count = 1 + trial % 60;
         all[0] = seen[seen_count++] = wall;
         for (int i = 1; i < count; i++) {
-            all[i] = random_fragment();
+            all[i] = make_random_fragment();
             if (all[i].t_in == 0.5f) all[i].t_in = 0.75f;
             if (all[i].t_in < 0.5f) seen[seen_count++] = all[i];
         }
@@ -210,7 +210,7 @@ static void joining_adjacent_segments_changes_only_rounding(void **context)
         const int count = 2 + trial % 50;
         int joined = 0;
         for (int i = 0; i < count; i++) {
-            fine[i] = random_fragment();
+            fine[i] = make_random_fragment();
             fine[i].kind = FRAGMENT_VOLUME;
             fine[i].t_in = (float)i;
             fine[i].t_out = (float)i + 1;
@@ -231,7 +231,7 @@ static void joining_adjacent_segments_changes_only_rounding(void **context)
  * member only, and equal fragments. */
 static fragment make_tied_fragment(void)
 {
-    fragment f = random_fragment();
+    fragment f = make_random_fragment();
     f.t_in = (float)(draw_random() % 3);
     if (f.t_in == 0 && draw_random() % 2) f.t_in = -0.0f;
     f.t_out = (float)(3 + draw_random() % 2);
@@ -288,7 +288,7 @@ static void check_grid(uint32_t width, uint32_t height, int ranks)
     for (int trial = 0; trial < 2000; trial++) {
         const uint32_t last = (uint32_t)((uint64_t)width * height - 1);
         const uint32_t pixel = trial == 0 ? last : draw_random() % (last + (last < UINT32_MAX));
-        const uint32_t strip = comp_grid_strip(&grid, pixel), at = comp_grid_at(&grid, pixel);
+        const uint32_t strip = comp_grid_strip(&grid, pixel), at = comp_grid_index_in_strip(&grid, pixel);
         const comp_area its = comp_grid_area(&grid, strip);
         assert_int_equal(comp_grid_y(&grid, pixel), pixel / width);
         assert_true(strip < grid.strips && at < COMP_STRIP_PIXELS);
@@ -347,18 +347,18 @@ typedef struct interval {
     double lower, upper;
 } interval;
 
-static double circle_half_width(double radius, double y)
+static double compute_circle_half_width(double radius, double y)
 {
     return fabs(y) < radius ? sqrt(radius * radius - y * y) : 0;
 }
 
 static interval compute_disc_interval(double y)
 {
-    return (interval){0, circle_half_width(0.3, y)};
+    return (interval){0, compute_circle_half_width(0.3, y)};
 }
 static interval compute_ring_interval(double y)
 {
-    return (interval){circle_half_width(0.35, y), circle_half_width(0.45, y)};
+    return (interval){compute_circle_half_width(0.35, y), compute_circle_half_width(0.45, y)};
 }
 static interval compute_column_interval(double y)
 {
@@ -503,7 +503,7 @@ static void different_fragments_of_ranks_are_balanced_over_owners(void **context
 
 /* Sets random priorities, assigns the winning ranks to their positions in the route, and checks that each position owns
  * the mean number of fragments to a tenth. */
-static void check_folded(const comp_route *route)
+static void check_balance_on_route(const comp_route *route)
 {
     const comp_grid grid = comp_grid_of(1920, 1080, route->ranks);
     set_claims_of_shape(&grid, compute_disc_interval);
@@ -535,7 +535,7 @@ static void fragments_are_balanced_with_fewer_owners_than_ranks(void **context)
             for (int is_cyclic = 0; is_cyclic < 2; is_cyclic++) {
                 const comp_route route = comp_route_of(s, ranks[n][0], (comp_nodes){ranks[n][1], is_cyclic}, 8);
                 folded += route.owners < route.ranks;
-                check_folded(&route);
+                check_balance_on_route(&route);
             }
     assert_true(folded >= 20);
 }
@@ -647,14 +647,14 @@ static void sheets_contain_all_fragments(void **context)
             received_sheets h = {&grid, back, 0, 0};
             grid.threads = threads;
             for (int i = 0; i < COUNT; i++) {
-                items[i] = random_fragment();
+                items[i] = make_random_fragment();
                 items[i].pixel =
                     spread == 1 ? (uint32_t)i * 7 % (101 * 67) : draw_random() % (101 * 67) / (uint32_t)spread;
             }
             assert_int_equal(comp_strips_make(&grid, &(fragment_list){items, COUNT, COUNT}, &strips, NULL), INSITU_OK);
             for (uint32_t s = 0; s < grid.strips; s++) {
                 const int64_t before = h.count;
-                assert_true(comp_strips_sheets(&strips, s, layers, store_sheet, &h));
+                assert_true(comp_strips_pass_sheets(&strips, s, layers, store_sheet, &h));
                 assert_int_equal(h.count - before, comp_strips_count(&strips, s));
             }
             assert_int_equal(h.count, COUNT);
@@ -692,7 +692,7 @@ static void samples_at_one_depth_share_absorption(void **context)
         double colour[3] = {0, 0, 0}, through = 1, weight = 0;
         float rgba[4], depth;
         for (int i = 0; i < count; i++) {
-            items[i] = random_fragment();
+            items[i] = make_random_fragment();
             items[i].kind = FRAGMENT_VOLUME;
             items[i].t_in = items[i].t_out = 3;
             for (int c = 0; c < 3; c++) colour[c] += (double)items[i].colour[c];
@@ -755,8 +755,8 @@ static void overlapping_segments_are_mixed(void **context)
         for (int k = 0; k < count; k++) {
             const double begin = (double)(draw_random() % 60) / 8, most = 8 - begin;
             media[k] = (medium){begin, begin + fmin(most, (double)(1 + draw_random() % 30) / 8), 0, {0, 0, 0}};
-            media[k].extinction = 2 * (double)draw_unit() / (media[k].end - begin);
-            for (int c = 0; c < 3; c++) media[k].colour[c] = (double)draw_unit();
+            media[k].extinction = 2 * (double)draw_unit_number() / (media[k].end - begin);
+            for (int c = 0; c < 3; c++) media[k].colour[c] = (double)draw_unit_number();
             items[k] = make_fragment(&media[k]);
         }
         items[count] = (fragment){.t_in = 4, .t_out = 4, .colour = {0.25f, 0, 0.125f}, .transmittance = 0.5f};
@@ -907,7 +907,7 @@ static int64_t draw_count(int most)
  * depth. */
 static fragment make_crowded_fragment(uint32_t pixel)
 {
-    fragment f = random_fragment();
+    fragment f = make_random_fragment();
     f.pixel = pixel;
     f.t_in = floorf(f.t_in * 16) / 16;
     f.t_out = f.kind >= FRAGMENT_SURFACE || draw_random() % 2 ? f.t_in : f.t_out;

@@ -134,7 +134,7 @@ static void encoded_sheets_decode_unchanged(void **context)
 
 /* Checks columns of depths of a plane that are exact in float32. Only the first two rows have residuals, so that little
  * is sent besides half a byte for each row and word. */
-static void straight_edges_compress_to_half_a_byte_per_row(void **context)
+static void plane_depths_compress_to_half_bytes(void **context)
 {
     (void)context;
     sheet_pair p = make_pair();
@@ -204,8 +204,8 @@ enum { WIDE = 40, HIGH = 50 };
 
 /* Stores a picture strip by strip with the given loops: all colours, then all depths. The rightmost and lowest strips
  * extend beyond the picture and are cut off. Every second strip has no depths. */
-static void store_with_loops(const comp_sheet_loops *loops, const comp_sheet *pixels, const float background[4],
-                             int ranks, float *stored)
+static void store_picture_with_loops(const comp_sheet_loops *loops, const comp_sheet *pixels, const float background[4],
+                                     int ranks, float *stored)
 {
     const comp_grid grid = comp_grid_of(WIDE, HIGH, ranks);
     memset(stored, 0x55, 5 * WIDE * HIGH * sizeof *stored);
@@ -234,7 +234,7 @@ static void sheet_merge_loops_agree(void **context)
         expected = first;
         plain->join(&expected, &other, plain_left);
         plain->finish(&expected, background, &plain_pixels);
-        store_with_loops(plain, &plain_pixels, background, ranks, plain_stored);
+        store_picture_with_loops(plain, &plain_pixels, background, ranks, plain_stored);
         for (cpu_isa isa = CPU_PLAIN; isa <= cpu_best_isa(); isa++) {
             const comp_sheet_loops *const loops = comp_sheet_loops_of(isa);
             joined = first;
@@ -244,7 +244,7 @@ static void sheet_merge_loops_agree(void **context)
             assert_int_equal(count_differences(&expected, &joined, COMP_WORDS), 0);
             loops->finish(&joined, background, &pixels);
             assert_int_equal(count_differences(&plain_pixels, &pixels, COMP_PIXEL_WORDS), 0);
-            store_with_loops(loops, &pixels, background, ranks, stored);
+            store_picture_with_loops(loops, &pixels, background, ranks, stored);
             assert_memory_equal(stored, plain_stored, sizeof stored);
         }
     }
@@ -330,7 +330,7 @@ static void gather_uses_a_tree(void **context)
 
 /* Checks that the chosen route costs no more than any schedule's route and that ranks send directly if there are few.
  * With up to 100,000 ranks, each with its share of a picture, no rank may send more than a few hundred messages. */
-static void the_cheapest_route_is_chosen(void **context)
+static void cheapest_route_is_chosen(void **context)
 {
     (void)context;
     const int counts[] = {2, 3, 5, 7, 8, 16, 32, 64, 127, 1000, 4000, 32768, 97336, 100000};
@@ -338,10 +338,10 @@ static void the_cheapest_route_is_chosen(void **context)
         const int ranks = counts[i], node = ranks % 8 == 0 && ranks > 8 ? 8 : 1;
         const comp_load load = {(int64_t)(4e6 / pow(ranks, 2.0 / 3)), 11, 256};
         const comp_route best = comp_cheapest_route(ranks, (comp_nodes){node, false}, &load, &comp_default_machine);
-        const comp_cost cost = comp_cost_of(&best, &load, &comp_default_machine);
+        const comp_cost cost = comp_estimate_cost(&best, &load, &comp_default_machine);
         for (comp_schedule s = COMP_DIRECT; s < COMP_SCHEDULE_COUNT; s++) {
             const comp_route other = comp_route_of(s, ranks, (comp_nodes){node, false}, 8);
-            assert_true(cost.seconds <= comp_cost_of(&other, &load, &comp_default_machine).seconds);
+            assert_true(cost.seconds <= comp_estimate_cost(&other, &load, &comp_default_machine).seconds);
         }
         if (ranks <= 8) assert_int_equal(best.schedule, COMP_DIRECT);
         assert_true(cost.messages < 300);
@@ -355,7 +355,7 @@ static void route_costs_match_the_model(void **context)
     const comp_machine machine = {1, 10, 100, 0, 0, 0};
     const comp_load load = {800, 2, 512};
     const comp_route route = comp_route_of(COMP_DIRECT, 8, (comp_nodes){1, false}, 0);
-    const comp_cost cost = comp_cost_of(&route, &load, &machine);
+    const comp_cost cost = comp_estimate_cost(&route, &load, &machine);
     assert_true(cost.messages == 7 && cost.bytes == 1400);
     assert_true(cost.seconds == 1 + 2 * 10 * 7 + 100 * 1400);
     assert_int_equal(comp_route_messages(&route, 3), 7);
@@ -364,14 +364,10 @@ static void route_costs_match_the_model(void **context)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(encoded_sheets_decode_unchanged),
-        cmocka_unit_test(straight_edges_compress_to_half_a_byte_per_row),
-        cmocka_unit_test(nearest_hits_are_kept_by_merge),
-        cmocka_unit_test(sheet_merge_loops_agree),
-        cmocka_unit_test(routes_deliver_to_owners),
-        cmocka_unit_test(gather_uses_a_tree),
-        cmocka_unit_test(the_cheapest_route_is_chosen),
-        cmocka_unit_test(route_costs_match_the_model),
+        cmocka_unit_test(encoded_sheets_decode_unchanged), cmocka_unit_test(plane_depths_compress_to_half_bytes),
+        cmocka_unit_test(nearest_hits_are_kept_by_merge),  cmocka_unit_test(sheet_merge_loops_agree),
+        cmocka_unit_test(routes_deliver_to_owners),        cmocka_unit_test(gather_uses_a_tree),
+        cmocka_unit_test(cheapest_route_is_chosen),        cmocka_unit_test(route_costs_match_the_model),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

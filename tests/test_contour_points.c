@@ -25,7 +25,7 @@ static double distance_field(const double p[3])
 }
 
 /* test_wave_field() stretched by two, so that its wavelength is 42 cells. */
-static double wave_field(const double p[3])
+static double compute_wave_field_value(const double p[3])
 {
     return test_wave_field((const double[]){p[0] / 2, p[1] / 2, p[2] / 2});
 }
@@ -61,7 +61,7 @@ static void check_kind(test_mesh_kind kind, int type, fixture_camera camera)
     drawn_frame drawn;
     double *points;
     test_mesh_make_lattice(kind, SIDE, 0.1, distance_field, &mesh);
-    test_mesh_make_lattice(kind, SIDE, 0.1, wave_field, &values);
+    test_mesh_make_lattice(kind, SIDE, 0.1, compute_wave_field_value, &values);
     test_view_create(&values, (test_layout){.wide_coordinates = true, .wide_values = true}, &view);
     fixture_create_lattice(&f, kind, SIDE, 0.1, distance_field);
     fixture_set_camera(&f, camera, WIDTH, HEIGHT);
@@ -72,8 +72,9 @@ static void check_kind(test_mesh_kind kind, int type, fixture_camera camera)
     f.surfaces[0].colours = black;
     f.surfaces[0].material = (render_material){.ambient = 1, .shininess = 1};
     fixture_draw(&f, &drawn);
-    const int64_t count = test_vtk_contour(mesh.vertex_count, mesh.coordinates, mesh.cell_count, type,
-                                           mesh.connectivity, values.values, origin, normal, LEVELS, levels, &points);
+    const int64_t count =
+        test_vtk_compute_contours(mesh.vertex_count, mesh.coordinates, mesh.cell_count, type, mesh.connectivity,
+                                  values.values, origin, normal, LEVELS, levels, &points);
     int64_t seen = 0, beside = 0;
     for (int64_t i = 0; i < count; i++) {
         const double cover = get_line_coverage(&f.job.camera, &drawn.picture, points + 3 * i);

@@ -15,9 +15,9 @@
 
 #include "test_vtk_grid.h"
 
-int64_t test_vtk_contour(int64_t vertex_count, const double *coordinates, int64_t cell_count, int type,
-                         const int64_t *connectivity, const double *field, const double origin[3],
-                         const double normal[3], int value_count, const double *values, double **points)
+int64_t test_vtk_compute_contours(int64_t vertex_count, const double *coordinates, int64_t cell_count, int type,
+                                  const int64_t *connectivity, const double *field, const double origin[3],
+                                  const double normal[3], int value_count, const double *values, double **points)
 {
     const int parts = 4;
     const auto grid = test_vtk_grid(vertex_count, coordinates, cell_count, type, connectivity);

@@ -2,8 +2,8 @@
  * double. Cells are hexes, wedges and pyramids, from parallelepipeds to cells that are strongly bent, flat, tiny or far
  * from the origin, each with its own ray. The kernels' headers are compiled here for the scalar instruction set.
  *
- * Reference: reference_crossings() gives a ray's intervals in the cell. In each interval the field is sampled at many
- * depths; between two samples of different sign, bisection finds the root. If the kernel decides that there is one
+ * Reference: reference_find_crossings() gives a ray's intervals in the cell. In each interval the field is sampled at
+ * many depths; between two samples of different sign, bisection finds the root. If the kernel decides that there is one
  * crossing, there must be exactly one, at the same depth. If the kernel decides that there is none, there must be none.
  *
  * Depth: the last step of Newton's method begins at most KERNEL_CONTRACTION_END from the root, in the cell's
@@ -55,13 +55,13 @@ typedef struct batch {
 
 /* ---- cells ---- */
 
-static double shape_size(shape s)
+static double choose_shape_size(shape s)
 {
     return s == TINY ? 1e-4 : s == FAR ? 0.008 : pow(10, draw_uniform(-2.5, -0.5));
 }
 
 /* Computes the columns of a random rotation, scaled by the extents of the cell. */
-static void random_axes(const double extent[3], double axes[3][3])
+static void make_random_axes(const double extent[3], double axes[3][3])
 {
     double q[4], sum = 0;
     for (int i = 0; i < 4; i++) {
@@ -80,13 +80,13 @@ static void random_axes(const double extent[3], double axes[3][3])
 static void place_cell_vertices(batch *b, shape s, int lane)
 {
     static const float apex[3] = {0.5f, 0.5f, 1};
-    const double size = shape_size(s), flat = s == FLAT ? pow(10, draw_uniform(-4, -1)) : 1;
+    const double size = choose_shape_size(s), flat = s == FLAT ? pow(10, draw_uniform(-4, -1)) : 1;
     const double jitter = s == AFFINE || s == FLAT ? 0 : s == BENT ? draw_uniform(0.2, 0.5) : draw_uniform(0, 0.2);
     const double extent[3] = {size, size * draw_uniform(0.5, 1), size * flat};
     const double middle[3] = {draw_uniform(-0.02, 0.02), draw_uniform(-0.02, 0.02),
                               draw_uniform(-0.5, 0.5) * (s != TINY)};
     double axes[3][3];
-    random_axes(extent, axes);
+    make_random_axes(extent, axes);
     for (int i = 0; i < grid_type_vertices(b->type); i++) {
         static const float base[4][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
         const float *corner = b->type != GRID_PYRAMID ? kernel_cell_shape(b->type)->corners[i]
@@ -226,7 +226,7 @@ static double bisect_reference_root(truth *r, double low, double high, bool rise
 static void find_reference_roots(truth *r)
 {
     reference_crossing ends[REFERENCE_MAX_CROSSINGS];
-    const int count = reference_crossings(r->cell, r->line, ends);
+    const int count = reference_find_crossings(r->cell, r->line, ends);
     for (int i = 0; i + 1 < count; i += 2) {
         const double low = ends[i].z, step = (ends[i + 1].z - low) / LOOKS;
         double before = evaluate_reference(r, low);
@@ -248,7 +248,7 @@ typedef struct count {
     double worst; /* largest error of depth, divided by its bound */
 } count;
 
-static double depth_bound(const batch *b, int lane, double t)
+static double compute_depth_bound(const batch *b, int lane, double t)
 {
     double low = INFINITY, high = -INFINITY;
     for (int i = 0; i < grid_type_vertices(b->type); i++) {
@@ -277,7 +277,7 @@ static void verify_ray(const batch *b, int lane, const kernel_point *at, vm with
     }
     n->wrong += (one && none) || r.roots != one;
     if (!one || r.roots != 1) return;
-    const double off = fabs((double)at->t[lane] - r.t) / depth_bound(b, lane, r.t);
+    const double off = fabs((double)at->t[lane] - r.t) / compute_depth_bound(b, lane, r.t);
     n->worst = fmax(n->worst, off);
     n->off += !(off <= 1);
 }

@@ -20,7 +20,7 @@ static int width,
     /* height of the picture; brute force tests all cells, usually for a third of the rays */
     height;
 
-static void cells_fixture(render_fixture *f)
+static void create_cells_fixture(render_fixture *f)
 {
     fixture_create(f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 0.1, 1,
                    (const double[]){0, 0, 0});
@@ -33,7 +33,7 @@ static void surfaces_and_samples_match_the_reference(void **state)
     (void)state;
     for (int pass = 0; pass < 2; pass++) {
         render_fixture f;
-        cells_fixture(&f);
+        create_cells_fixture(&f);
         fixture_add_surface(&f, pass ? clear : opaque, pass ? 2 : 1, pass ? 0.4f : 1);
         fixture_set_volume(&f, 1);
         const fixture_outcome o = fixture_compare_with_reference(&f, &fixture_usual_bounds, pass ? "clear" : "opaque");
@@ -52,7 +52,7 @@ static void segments_match_the_integral(void **state)
     render_fixture f;
     drawn_frame drawn;
     double worst = 0;
-    cells_fixture(&f);
+    create_cells_fixture(&f);
     fixture_set_volume(&f, 1);
     f.job.integration = RENDER_SEGMENTS;
     fixture_draw(&f, &drawn);

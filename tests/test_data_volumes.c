@@ -332,7 +332,7 @@ static void compute_reference_pixel(subject *s, int pixel, bool of_folded, doubl
 
 /* Returns whether the ray meets a folded cell, or a face whose patch is folded at the ray. To find out whether the ray
  * meets a folded cell, only folded cells are drawn, as a fog of constant density. */
-static bool lacks_reference(subject *s, int pixel)
+static bool is_pixel_without_reference(subject *s, int pixel)
 {
     double rgba[4];
     reference_ray ray;
@@ -439,7 +439,7 @@ static int check_picture(const data_set *set, const opacity_shape *shape)
     const int count = choose_pixels(set, pictures, pixels);
     for (int i = 0; i < count; i++) {
         double truth[4];
-        if (lacks_reference(&s, pixels[i])) {
+        if (is_pixel_without_reference(&s, pixels[i])) {
             folded++;
             continue;
         }

@@ -48,7 +48,7 @@ std::vector<float> draw_decorated(const std::vector<float> &rgba, const insitu_d
     return out;
 }
 
-float pixel_channel(const std::vector<float> &rgba, int x, int y, int channel = 0)
+float get_pixel_channel(const std::vector<float> &rgba, int x, int y, int channel = 0)
 {
     return rgba[static_cast<std::size_t>(4 * (y * width + x) + channel)];
 }
@@ -70,11 +70,11 @@ void strokes_are_before_or_behind_the_picture(void **)
     d.strokes = strokes;
     const std::vector<float> out = draw_decorated(make_grey_picture(0.5F, 0.75F), d),
                              without = draw_decorated(make_grey_picture(0.5F, 0.75F), make_plain_decorations());
-    assert_true(std::fabs(pixel_channel(out, 160, 50) - 1) < 1e-6F);
-    assert_true(std::fabs(pixel_channel(out, 160, 100) - (0.375F + 0.25F)) < 1e-6F);
-    for (int y : {48, 52, 98, 102}) assert_true(pixel_channel(out, 160, y) == pixel_channel(without, 160, y));
+    assert_true(std::fabs(get_pixel_channel(out, 160, 50) - 1) < 1e-6F);
+    assert_true(std::fabs(get_pixel_channel(out, 160, 100) - (0.375F + 0.25F)) < 1e-6F);
+    for (int y : {48, 52, 98, 102}) assert_true(get_pixel_channel(out, 160, y) == get_pixel_channel(without, 160, y));
     const std::vector<float> hidden = draw_decorated(make_grey_picture(0.5F, 1), d);
-    assert_true(pixel_channel(hidden, 160, 100) == 0.5F);
+    assert_true(get_pixel_channel(hidden, 160, 100) == 0.5F);
 }
 
 /* Checks that the total light of a line is its length times its width in any direction, because its edges are
@@ -117,8 +117,8 @@ void a_bar_has_the_colours_of_its_map(void **)
             float before = -1;
             for (int y = 0; y < height; y++) {
                 /* In the table's lower half green rises from 0.2 to 0.8 while blue falls from 0.9 to 0.1. */
-                const float r = pixel_channel(out, x, y, 0), g = pixel_channel(out, x, y, 1),
-                            b = pixel_channel(out, x, y, 2);
+                const float r = get_pixel_channel(out, x, y, 0), g = get_pixel_channel(out, x, y, 1),
+                            b = get_pixel_channel(out, x, y, 2);
                 const bool is_low = std::fabs((g - 0.2F) / 0.6F - (0.9F - b) / 0.8F) < 1e-4F && r < 0.31F;
                 const bool is_high = std::fabs((r - 0.3F) / 0.6F - (0.8F - g) / 0.7F) < 1e-4F && b < 0.21F && r > 0.29F;
                 if (!is_low && !is_high) continue;
@@ -151,7 +151,8 @@ void bands_are_of_equal_height(void **)
         for (int x = 0; x < width; x++) {
             int count = 0;
             for (int y = 0; y < height; y++)
-                count += pixel_channel(out, x, y, band) == 0.9F && pixel_channel(out, x, y, (band + 1) % 3) == 0;
+                count +=
+                    get_pixel_channel(out, x, y, band) == 0.9F && get_pixel_channel(out, x, y, (band + 1) % 3) == 0;
             rows[band] = count > rows[band] ? count : rows[band];
         }
     /* The frame covers a row of the outer bands, and the border between two bands may lie inside a row. */
@@ -169,7 +170,7 @@ void words_are_written_at_their_anchor(void **)
         double sum = 0, x_sum = 0, y_sum = 0;
         for (int y = 0; y < height; y++)
             for (int x = 0; x < width; x++) {
-                const double light = static_cast<double>(pixel_channel(out, x, y)) - 0.25;
+                const double light = static_cast<double>(get_pixel_channel(out, x, y)) - 0.25;
                 sum += light, x_sum += light * x, y_sum += light * y;
             }
         assert_true(sum > 10);

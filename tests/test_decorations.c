@@ -108,7 +108,7 @@ static void bands_of_ids_are_centred_on_the_ids(void **state)
 
 /* Returns the distance of a point from the renderer's ray through a position in the picture. The position is in
  * continuous pixel coordinates. */
-static double distance_from_ray(const render_camera *c, const double pixel[2], const double point[3])
+static double compute_distance_from_ray(const render_camera *c, const double pixel[2], const double point[3])
 {
     double base[3], direction[3], right[3], down[3], unused[3], along = 0, length = 0, square = 0;
     render_camera_ray(c, 0, 0, base, direction);
@@ -129,24 +129,24 @@ static double distance_from_ray(const render_camera *c, const double pixel[2], c
 static void check_corners(const render_camera *c, const double lower[3], const double upper[3])
 {
     insitu_stroke strokes[SESSION_BOX_EDGES];
-    assert_int_equal(session_box_strokes(lower, upper, c, strokes), SESSION_BOX_EDGES);
+    assert_int_equal(session_compute_box_strokes(lower, upper, c, strokes), SESSION_BOX_EDGES);
     for (int edge = 0; edge < SESSION_BOX_EDGES; edge++) {
         double best[2] = {INFINITY, INFINITY};
         for (int corner = 0; corner < 8; corner++) {
             const double p[3] = {corner & 1 ? upper[0] : lower[0], corner & 2 ? upper[1] : lower[1],
                                  corner & 4 ? upper[2] : lower[2]};
-            best[0] = fmin(best[0], distance_from_ray(c, strokes[edge].from, p));
-            best[1] = fmin(best[1], distance_from_ray(c, strokes[edge].to, p));
+            best[0] = fmin(best[0], compute_distance_from_ray(c, strokes[edge].from, p));
+            best[1] = fmin(best[1], compute_distance_from_ray(c, strokes[edge].to, p));
         }
         assert_true(best[0] < 1e-9 && best[1] < 1e-9);
     }
 }
 
-static int count_corners_behind_eye(const render_camera *c, const double lower[3], const double upper[3])
+static int count_edges_behind_data(const render_camera *c, const double lower[3], const double upper[3])
 {
     insitu_stroke strokes[SESSION_BOX_EDGES];
     int count = 0;
-    const int all = session_box_strokes(lower, upper, c, strokes);
+    const int all = session_compute_box_strokes(lower, upper, c, strokes);
     for (int i = 0; i < all; i++) count += strokes[i].is_behind;
     return count;
 }
@@ -178,12 +178,12 @@ static void edges_that_data_hides_are_reported(void **state)
     render_camera c;
     for (int i = 0; i < 3; i++) {
         assert_true(render_camera_look_at(&c, eyes[i], focal, up, 40, 64, 64));
-        assert_int_equal(count_corners_behind_eye(&c, lower, upper), expected[i]);
+        assert_int_equal(count_edges_behind_data(&c, lower, upper), expected[i]);
     }
     const double inside[3] = {0.4, 0.4, 0.4};
     insitu_stroke strokes[SESSION_BOX_EDGES];
     assert_true(render_camera_look_at(&c, inside, focal, up, 40, 64, 64));
-    const int count = session_box_strokes(lower, upper, &c, strokes);
+    const int count = session_compute_box_strokes(lower, upper, &c, strokes);
     /* edges behind the eye are omitted, and edges that cross the eye's plane are clipped */
     assert_in_range(count, 3, 11);
     for (int i = 0; i < count; i++) {
@@ -214,7 +214,7 @@ static void check_rulers(const render_camera *c, const double lower[3], const do
     insitu_decorations all = {0};
     insitu_stroke strokes[SESSION_RULER_STROKES];
     insitu_label labels[SESSION_RULER_LABELS];
-    session_box_rulers(lower, upper, c, 10, &all, strokes, labels);
+    session_add_box_rulers(lower, upper, c, 10, &all, strokes, labels);
     assert_in_range(all.stroke_count, 6, SESSION_RULER_STROKES);
     assert_int_equal(all.label_count, all.stroke_count + 3);
     for (int stroke = 0, first = 0, label = 0, axis = 0; label < all.label_count; label++) {
@@ -233,7 +233,7 @@ static void check_rulers(const render_camera *c, const double lower[3], const do
             p[axis] = strtod(words->text, NULL);
             p[(axis + 1) % 3] = corner & 1 ? upper[(axis + 1) % 3] : lower[(axis + 1) % 3];
             p[(axis + 2) % 3] = corner & 2 ? upper[(axis + 2) % 3] : lower[(axis + 2) % 3];
-            best = fmin(best, distance_from_ray(c, tick->from, p));
+            best = fmin(best, compute_distance_from_ray(c, tick->from, p));
         }
         assert_true(best < 1e-9);
         for (int a = 0; a < 2; a++) outward += (tick->to[a] - tick->from[a]) * words->away[a];

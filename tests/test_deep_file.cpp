@@ -34,7 +34,7 @@ struct slab {
     std::vector<std::int32_t> hexes;
 };
 
-std::int32_t vertex_index(int i, int j, int k)
+std::int32_t get_slab_vertex_index(int i, int j, int k)
 {
     return i + (NX + 1) * (j + (NY + 1) * k);
 }
@@ -52,8 +52,8 @@ slab make_slab()
             }
     for (int c = 0; c < NX * NY * NZ; c++)
         for (int n = 0; n < 8; n++)
-            s.hexes.push_back(
-                vertex_index(c % NX + (n % 4 == 1 || n % 4 == 2), c / NX % NY + n % 4 / 2, c / NX / NY + n / 4));
+            s.hexes.push_back(get_slab_vertex_index(c % NX + (n % 4 == 1 || n % 4 == 2), c / NX % NY + n % 4 / 2,
+                                                    c / NX / NY + n / 4));
     return s;
 }
 

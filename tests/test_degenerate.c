@@ -300,8 +300,8 @@ static void polyhedra_without_volume_change_no_pixel(void **state)
 
 /* Compares surfaces and samples with the brute-force renderer, and segments with the adaptive integral on every ray.
  * The tolerance of 1e-5 for segments covers values in float32, which have an error of about 1e-6, and the same error of
- * a segment's length in a steep part of the transfer function (see sums_through_spokes_match_the_reference). */
-static void assert_reference(const test_mesh *mesh, fixture_camera camera, const char *what)
+ * a segment's length in a steep part of the transfer function (see sums_on_spokes_match_the_reference). */
+static void assert_matches_reference(const test_mesh *mesh, fixture_camera camera, const char *what)
 {
     render_fixture f;
     drawn_frame drawn;
@@ -365,7 +365,7 @@ static split_edge *find_split(split_edges *edges, test_mesh *mesh, int64_t a, in
 
 /* Returns whether the face contains the vertex in the middle of the edge that begins at vertex `low`. The result is the
  * same for both cells at the face. */
-static bool face_has_middle(int64_t face, int64_t low)
+static bool contains_face_edge_middle(int64_t face, int64_t low)
 {
     return test_uniform((uint64_t)(face * 1000 + low), 4) < 0.5;
 }
@@ -377,7 +377,7 @@ static void add_middle_to_face(const test_mesh *mesh, int64_t face, split_edges 
         const int64_t a = get_face_vertex(mesh, face, i);
         const split_edge *e = find_split(edges, copy, a, get_face_vertex(mesh, face, i + 1));
         loop[count++] = a;
-        if (e && face_has_middle(face, e->low)) loop[count++] = e->middle;
+        if (e && contains_face_edge_middle(face, e->low)) loop[count++] = e->middle;
     }
     test_mesh_add_face(copy, loop, count);
 }
@@ -397,7 +397,7 @@ static int add_flat_faces_to_cell(const test_mesh *mesh, int64_t cell, split_edg
                 const int64_t a = get_face_vertex(mesh, faces[i], k), b = get_face_vertex(mesh, faces[i], k + 1);
                 if ((a < b ? a : b) != edge->low || (a < b ? b : a) != edge->high) continue;
                 at_edge++;
-                with += face_has_middle(faces[i], edge->low);
+                with += contains_face_edge_middle(faces[i], edge->low);
             }
         if (at_edge != 2 || with != 1) continue;
         if (edge->face < 0)
@@ -442,7 +442,8 @@ static void faces_without_area_match_the_reference(void **state)
             test_mesh_make_lattice(kind ? TEST_TETS : TEST_HEXES, 3, 0.1, test_wave_field, &mesh);
             test_mesh_to_polyhedra(&mesh, 1);
             assert_true(add_edge_middles(&mesh) > 10);
-            assert_reference(&mesh, camera, kind ? "tets with faces of no area" : "hexes with faces of no area");
+            assert_matches_reference(&mesh, camera,
+                                     kind ? "tets with faces of no area" : "hexes with faces of no area");
             test_mesh_set_values(&mesh, test_wave_field);
             for (scene_kind scene = 0; scene < SCENE_COUNT; scene++) {
                 drawn_frame drawn;
@@ -471,7 +472,7 @@ static void face_with_a_repeated_vertex_matches_the_reference(void **state)
         faces[6] = test_mesh_add_face(&mesh, (const int64_t[]){0, 1, 2, 0, 4, 3}, 6);
         test_mesh_add_polyhedron(&mesh, faces, 7);
         test_mesh_set_values(&mesh, test_wave_field);
-        assert_reference(&mesh, camera, "a face through a vertex twice");
+        assert_matches_reference(&mesh, camera, "a face through a vertex twice");
         test_mesh_free(&mesh);
     }
 }

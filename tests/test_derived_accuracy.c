@@ -28,7 +28,7 @@ static void evaluate_velocity(const double p[3], double u[3])
     u[2] = c * sin(k * p[1]) + b * cos(k * p[0]);
 }
 
-static double exact_q_criterion(const double p[3])
+static double compute_exact_q_criterion(const double p[3])
 {
     const double xy = -k * c * sin(k * p[1]), xz = k * a * cos(k * p[2]), yx = k * b * cos(k * p[0]);
     const double yz = -k * a * sin(k * p[2]), zx = -k * b * sin(k * p[0]), zy = k * c * cos(k * p[1]);
@@ -41,10 +41,10 @@ typedef struct sample_sums {
 } sample_sums;
 
 /* Adds the errors at a point. The exact curl of the flow is k times the velocity. */
-static void add_sample(const double p[3], const double values[6], sample_sums *sums)
+static void add_sample_to_sums(const double p[3], const double values[6], sample_sums *sums)
 {
     double u[3];
-    const double q = exact_q_criterion(p);
+    const double q = compute_exact_q_criterion(p);
     evaluate_velocity(p, u);
     sums->ours += (values[0] - q) * (values[0] - q);
     sums->vtks += (values[1] - q) * (values[1] - q);
@@ -73,7 +73,7 @@ static void find_weights(int corners, int place, double weights[8])
 }
 
 /* Sums the errors at eight points in each cell away from the border. nodes: the six numbers at each vertex that
- * add_sample() compares. */
+ * add_sample_to_sums() compares. */
 static sample_sums compare_with_exact(const test_mesh *mesh, const double (*nodes)[6])
 {
     sample_sums sums = {0};
@@ -87,7 +87,7 @@ static sample_sums compare_with_exact(const test_mesh *mesh, const double (*node
                 for (int axis = 0; axis < 3; axis++) p[axis] += weights[i] * mesh->coordinates[3 * vertices[i] + axis];
                 for (int n = 0; n < 6; n++) values[n] += weights[i] * nodes[vertices[i]][n];
             }
-            if (fabs(p[0]) < 0.5 && fabs(p[1]) < 0.5 && fabs(p[2]) < 0.5) add_sample(p, values, &sums);
+            if (fabs(p[0]) < 0.5 && fabs(p[1]) < 0.5 && fabs(p[2]) < 0.5) add_sample_to_sums(p, values, &sums);
         }
     }
     return sums;
@@ -100,8 +100,8 @@ static const session_mesh *get_session_mesh(const insitu_session *session)
 
 static double get_vertex_value(const insitu_session *session, const char *name, int component, int64_t vertex)
 {
-    const grid_field values =
-        session_caller_field(get_session_mesh(session), session_find_field(get_session_mesh(session), name), component);
+    const grid_field values = session_get_caller_values(get_session_mesh(session),
+                                                        session_find_field(get_session_mesh(session), name), component);
     return grid_field_value(&values, vertex);
 }
 
@@ -161,8 +161,8 @@ static grid_errors measure_errors(test_mesh_kind kind, int n, double jitter)
     double *q = calloc((size_t)mesh.vertex_count, sizeof *q),
            (*nodes)[6] = calloc((size_t)mesh.vertex_count, sizeof *nodes);
     assert_true(q && nodes);
-    test_vtk_q_criterion(mesh.vertex_count, mesh.coordinates, mesh.cell_count, mesh.types[0], mesh.connectivity,
-                         velocity, 1, q);
+    test_vtk_compute_q_criterion(mesh.vertex_count, mesh.coordinates, mesh.cell_count, mesh.types[0], mesh.connectivity,
+                                 velocity, 1, q);
     insitu_session *session = open_session_with_mesh_and_velocity(
         &mesh, velocity,
         "fields: {q: {q_criterion: u}, w: {vorticity: u}, d: {divergence: u}, all: q + w.x + d}\nimages: [{name: "
@@ -205,7 +205,7 @@ static void q_criterion_is_as_accurate_as_vtks(void **state)
 
 /* Returns the time that a step with new velocities takes to compute Q at all vertices for a slice. It is the minimum
  * over several steps. */
-static double time_q_criterion(const test_mesh *mesh, const float *velocity)
+static double measure_q_criterion_time(const test_mesh *mesh, const float *velocity)
 {
     static const char scene[] = "threads: 1\nfields: {q: {q_criterion: u}}\nimages: [{name: a, size: [8, 8], layers: "
                                 "[{slice: {field: q, range: [0, 1]}}], outputs: [{path: /dev/null/a.png}]}]\n";
@@ -233,9 +233,9 @@ static void q_criterion_takes_less_time_than_vtks(void **state)
         float *velocity = make_velocity(&mesh);
         double *q = calloc((size_t)mesh.vertex_count, sizeof *q);
         assert_non_null(q);
-        const double vtks = test_vtk_q_criterion(mesh.vertex_count, mesh.coordinates, mesh.cell_count, mesh.types[0],
-                                                 mesh.connectivity, velocity, 5, q);
-        const double ours = time_q_criterion(&mesh, velocity);
+        const double vtks = test_vtk_compute_q_criterion(mesh.vertex_count, mesh.coordinates, mesh.cell_count,
+                                                         mesh.types[0], mesh.connectivity, velocity, 5, q);
+        const double ours = measure_q_criterion_time(&mesh, velocity);
         fprintf(stderr, "%s: Q of %lld vertices in %.1f ms, VTK in %.1f ms, ratio %.3f\n", test_mesh_kind_name(kind),
                 (long long)mesh.vertex_count, 1e3 * ours, 1e3 * vtks, ours / vtks);
         assert_true(ours <= (kind == TEST_TETS ? 0.5 : 0.4) * vtks);

@@ -15,8 +15,8 @@
 
 #include "test_vtk_grid.h"
 
-double test_vtk_q_criterion(int64_t vertex_count, const double *coordinates, int64_t cell_count, int type,
-                            const int64_t *connectivity, const float *velocity, int runs, double *q)
+double test_vtk_compute_q_criterion(int64_t vertex_count, const double *coordinates, int64_t cell_count, int type,
+                                    const int64_t *connectivity, const float *velocity, int runs, double *q)
 {
     const auto grid = test_vtk_grid(vertex_count, coordinates, cell_count, type, connectivity);
     vtkNew<vtkFloatArray> values;

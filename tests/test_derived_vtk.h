@@ -10,8 +10,8 @@ extern "C" {
 
 /* Computes Q at the vertices on one thread. type: 10 (tets) or 12 (hexes); velocity: vertex_count × 3; q: vertex_count.
  * Returns the filter's time in seconds, the minimum over `runs` runs. */
-double test_vtk_q_criterion(int64_t vertex_count, const double *coordinates, int64_t cell_count, int type,
-                            const int64_t *connectivity, const float *velocity, int runs, double *q);
+double test_vtk_compute_q_criterion(int64_t vertex_count, const double *coordinates, int64_t cell_count, int type,
+                                    const int64_t *connectivity, const float *velocity, int runs, double *q);
 
 #ifdef __cplusplus
 }

@@ -17,7 +17,7 @@ enum { MOST = 400, RANKS = 7 };
 
 static uint32_t state_of_chance;
 
-static double random_number(void)
+static double draw_random_number(void)
 {
     state_of_chance = state_of_chance * 1664525u + 1013904223u;
     return (double)(state_of_chance >> 8) / 16777216.0;
@@ -33,17 +33,17 @@ typedef struct ray {
 
 static void make_ray(ray *r, double density, double gap, double surface)
 {
-    float t = (float)(-1.5 + random_number());
+    float t = (float)(-1.5 + draw_random_number());
     r->count = 0;
     while (t < 1.5f && r->count < MOST) {
-        const float end = t + (float)pow(10, -6 + 5 * random_number());
-        const bool is_surface = random_number() < surface;
-        const float clear = (float)exp(-density * random_number() * (is_surface ? 1 : (double)(end - t)));
-        if (random_number() >= gap) {
+        const float end = t + (float)pow(10, -6 + 5 * draw_random_number());
+        const bool is_surface = draw_random_number() < surface;
+        const float clear = (float)exp(-density * draw_random_number() * (is_surface ? 1 : (double)(end - t)));
+        if (draw_random_number() >= gap) {
             fragment *f = &r->items[r->count++];
             *f = (fragment){.t_in = t, .t_out = is_surface ? t : end, .transmittance = clear};
             f->kind = is_surface ? FRAGMENT_SURFACE : FRAGMENT_VOLUME;
-            for (int c = 0; c < 3; c++) f->colour[c] = (1 - clear) * (float)random_number();
+            for (int c = 0; c < 3; c++) f->colour[c] = (1 - clear) * (float)draw_random_number();
         }
         /* the next surface begins at another depth, so that the order of the two is defined */
         t = is_surface ? nextafterf(t, 2) : end;
@@ -56,7 +56,7 @@ static void distribute_fragments(ray *r, double change)
 {
     int owner = 0;
     for (int64_t i = 0; i < r->count; i++) {
-        if (random_number() < change) owner = (int)(random_number() * RANKS);
+        if (draw_random_number() < change) owner = (int)(draw_random_number() * RANKS);
         r->owners[i] = owner;
     }
 }

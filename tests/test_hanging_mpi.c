@@ -108,7 +108,7 @@ static void assert_everywhere(bool is_well)
     assert_true(all);
 }
 
-static double largest_image_difference(const image *a, const image *b)
+static double find_largest_image_difference(const image *a, const image *b)
 {
     double worst = 0;
     for (int i = 0; i < 4 * PIXELS; i++)
@@ -151,7 +151,7 @@ static void name_case(const hanging_case *c, char *name, size_t size)
 /* Compares the picture with the adaptive integral. In double, rounding leaves no visible gap. Rays in the plane of a
  * face, such as those along x, must be left out, because the integral does not decide on which side of the face they
  * are. */
-static bool is_as_integrated(const test_mesh *mesh, const drawing *d, fixture_camera camera, const image *drawn,
+static bool matches_integral(const test_mesh *mesh, const drawing *d, fixture_camera camera, const image *drawn,
                              const char *what)
 {
     render_fixture f;
@@ -179,14 +179,14 @@ static bool is_one_picture(const test_mesh *mesh, test_partition_kind partition,
     const int64_t overlaps = draw_distributed(mesh, partition, d, camera, &ours);
     if (my_rank == 0) {
         const int64_t alone = draw_whole(mesh, d, camera, &whole);
-        const double off = largest_image_difference(&whole, &ours);
+        const double off = find_largest_image_difference(&whole, &ours);
         good = !overlaps && !alone && off <= 1e-6;
         if (!good || getenv("INSITU_TEST_VERBOSE"))
             fprintf(stderr, "%s, %d ranks, %s, %s, %s: %d pixels overlap, %d alone; colour differs by %g\n", what,
                     rank_count, test_partition_kind_name(partition), d->name, fixture_camera_name(camera),
                     (int)overlaps, (int)alone, off);
         if (rank_count == 1 && camera != CAMERA_ALONG_X && d->max_error > 0 && !d->value_count)
-            good = is_as_integrated(mesh, d, camera, &whole, what) && good;
+            good = matches_integral(mesh, d, camera, &whole, what) && good;
         free_image(&whole);
     }
     free_image(&ours);
@@ -232,7 +232,7 @@ static bool intersects_plane(const render_camera *camera, int p, double value, d
 }
 
 /* Checks that the isosurface of a linear field is a plane without holes. */
-static bool is_plane_whole(const hanging_case *c, fixture_camera camera)
+static bool has_plane_without_holes(const hanging_case *c, fixture_camera camera)
 {
     static const drawing plane = {"plane", 0, 1, false, 1};
     test_mesh mesh;
@@ -251,7 +251,7 @@ static bool is_plane_whole(const hanging_case *c, fixture_camera camera)
         if (!(drawn.depth[p] < INFINITY))
             holes++;
         else
-            worst = test_larger_error(worst, fabs(fixture_scene_depth(&f, drawn.depth[p]) - depth));
+            worst = test_larger_error(worst, fabs(fixture_compute_scene_depth(&f, drawn.depth[p]) - depth));
     }
     const bool good = my_rank != 0 || (met > 30 && !holes && worst < 1e-5);
     if (!good)
@@ -269,7 +269,7 @@ static void surfaces_continue_across_hanging_nodes(void **state)
     bool good = true;
     for (int i = 0; i < CASE_COUNT; i++)
         for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++)
-            if (camera != CAMERA_INSIDE) good = is_plane_whole(&cases[i], camera) && good;
+            if (camera != CAMERA_INSIDE) good = has_plane_without_holes(&cases[i], camera) && good;
     assert_everywhere(good);
 }
 
@@ -291,7 +291,7 @@ static void nodes_off_the_coarse_face_count_as_overlaps(void **state)
         if (my_rank == 0) {
             const double bound = volumes[v].max_error > 0 ? volumes[v].max_error : 1e-6;
             const int64_t alone = draw_whole(&mesh, &volumes[v], CAMERA_OUTSIDE, &whole);
-            const double off = largest_image_difference(&whole, &ours);
+            const double off = find_largest_image_difference(&whole, &ours);
             good = good && overlaps > 50 && alone > 50 && off <= bound;
             if (!good)
                 fprintf(stderr, "%s, %d ranks: %d pixels overlap, %d alone; colour differs by %g\n", volumes[v].name,

@@ -50,7 +50,7 @@ static void *grow_array(void *block, int64_t count, size_t size)
 }
 
 /* Adds, for every third cell, a cell without volume that has the same vertices except the replaced ones. */
-static void add_collapsed(test_mesh *mesh)
+static void add_collapsed_cells(test_mesh *mesh)
 {
     const int64_t cells = mesh->cell_count, most = cells + cells / 3 + 1;
     mesh->types = grow_array(mesh->types, most, 1);
@@ -79,7 +79,7 @@ static void cells_without_volume_change_no_pixel(void **state)
                 drawn_frame without, with;
                 test_mesh_make_lattice(kinds[k], 4, camera == CAMERA_ALONG_X ? 0 : 0.1, test_wave_field, &mesh);
                 draw_mesh(&mesh, scene, camera, &without);
-                add_collapsed(&mesh);
+                add_collapsed_cells(&mesh);
                 draw_mesh(&mesh, scene, camera, &with);
                 assert_true(without.list.count > 100);
                 drawn_frame_assert_same(&without, &with);

@@ -70,8 +70,8 @@ static void verify_hit(const render_fixture *f, const reference_scene *scene, in
                        const fragment *hit, tally *t)
 {
     double slope;
-    const double depth = fixture_scene_depth(f, hit->t_in);
-    const double residual = fabs(reference_residual(scene, x, y, truth, depth, &slope, NULL));
+    const double depth = fixture_compute_scene_depth(f, hit->t_in);
+    const double residual = fabs(reference_compute_residual(scene, x, y, truth, depth, &slope, NULL));
     t->hits++;
     t->beyond += residual > 1e-6;
     t->residual = fmax(t->residual, residual - compute_allowed_residual(f, slope) + 1e-6);
@@ -137,7 +137,7 @@ static void add_many_surfaces(render_fixture *f)
     f->surfaces[0].colours = black;
 }
 
-static void add_robust(render_fixture *f, float opacity)
+static void add_robust_surface(render_fixture *f, float opacity)
 {
     fixture_add_surface(f, three_values, 3, opacity);
 }
@@ -171,7 +171,8 @@ static void robust_hits_are_on_the_surface(void **state)
             if (!test_is_long_run() && (k + (int)camera) % 2) continue;
             fixture_create_lattice(&f, kinds[k], kinds[k] == TEST_PYRAMIDS ? 3 : 4, 0.2, test_wave_field);
             fixture_set_camera(&f, camera, 53, 45);
-            add_robust(&f, 0.4f); /* surfaces are transparent, so that all crossings are drawn, not only the first */
+            add_robust_surface(
+                &f, 0.4f); /* surfaces are transparent, so that all crossings are drawn, not only the first */
             verify_frame(&f, 1e-6, &t);
             print_tally(test_mesh_kind_name(kinds[k]), &t);
             assert_true(t.hits > 600);
@@ -357,7 +358,7 @@ static void verify_normal(const render_fixture *f, const reference_scene *scene,
 {
     const int x = (int)hit->pixel % f->job.camera.width, y = (int)hit->pixel / f->job.camera.width;
     double slope, gradient[3];
-    reference_residual(scene, x, y, truth, fixture_scene_depth(f, hit->t_in), &slope, gradient);
+    reference_compute_residual(scene, x, y, truth, fixture_compute_scene_depth(f, hit->t_in), &slope, gradient);
     const double length = sqrt(gradient[0] * gradient[0] + gradient[1] * gradient[1] + gradient[2] * gradient[2]);
     if (fabs(slope) < 1e-4 * length) return;
     const double off = compute_normal_error(f, hit, gradient), allowed = 4e-6 / (length * f->cell_size) + 1e-6;
@@ -375,7 +376,7 @@ static void cell_gradients_match_the_reference(void **state)
         int64_t checked = 0, rays = 0, left_out = 0;
         fixture_create_lattice(&f, kinds[k], 3, 0.2, test_wave_field);
         fixture_set_camera(&f, CAMERA_OUTSIDE, 43, 37);
-        add_robust(&f, 0.5f);
+        add_robust_surface(&f, 0.5f);
         set_axis_lights(&f, lights);
         fixture_draw(&f, &drawn);
         reference_scene *scene = reference_create(&f.job);
@@ -462,7 +463,7 @@ static double measure_quadratic_error(int n, render_normal normal, double differ
         const fragment *hit = &drawn.list.items[i];
         double base[3], d[3], p[3];
         render_camera_ray(&f.job.camera, (int)hit->pixel % 64, (int)hit->pixel / 64, base, d);
-        for (int a = 0; a < 3; a++) p[a] = base[a] + fixture_scene_depth(&f, hit->t_in) * d[a];
+        for (int a = 0; a < 3; a++) p[a] = base[a] + fixture_compute_scene_depth(&f, hit->t_in) * d[a];
         sum += compute_normal_error(&f, hit, (const double[]){2 * p[0] + 0.3 * p[1], p[1] + 0.3 * p[0], 1.4 * p[2]});
     }
     assert_true(drawn.list.count > 300);

@@ -47,7 +47,7 @@ static uint64_t hash_position(const double point[3])
 
 /* Checks every vertex on the faces of a block, on a lattice of eighths: all neighbours that have the vertex must
  * compute the same home as the block's rank. Returns the number of distinct homes. */
-static int count_homes(const block_rank *own, block_rank *neighbours, int neighbour_count, int64_t *shared)
+static int check_homes_of_block(const block_rank *own, block_rank *neighbours, int neighbour_count, int64_t *shared)
 {
     bool is_home[RANKS] = {false};
     const double *low = own->homes.boxes[0].lower;
@@ -85,7 +85,7 @@ static void home_ranks_by_coordinates_agree_on_all_ranks(void **state)
         assert_non_null(neighbours);
         block_create(&own, ranks[i]);
         for (int n = 0; n < own.homes.near_count; n++) block_create(&neighbours[n], own.near[n]);
-        const int homes = count_homes(&own, neighbours, own.homes.near_count, &shared);
+        const int homes = check_homes_of_block(&own, neighbours, own.homes.near_count, &shared);
         assert_true(shared > 100);
         assert_true(homes > 1 && homes <= own.homes.near_count);
         free(neighbours);

@@ -81,7 +81,7 @@ insitu_status write_image(const insitu_image &image, insitu_image_format format,
     return session_write_image(&image, format, path.c_str(), &error);
 }
 
-void write_ok(const insitu_image &image, insitu_image_format format, const fs::path &path)
+void write_valid_image(const insitu_image &image, insitu_image_format format, const fs::path &path)
 {
     base_error error;
     if (write_image(image, format, path, error) != INSITU_OK) fail_msg("%s", error.message);
@@ -103,7 +103,7 @@ std::vector<number_type> read_back(const fs::path &path, OIIO::TypeDesc type, OI
     return values;
 }
 
-double exact_code(double linear, double largest)
+double compute_exact_code(double linear, double largest)
 {
     const double l = std::fmin(1, std::fmax(0, linear));
     return largest * (l <= 0.0031308 ? 12.92 * l : 1.055 * std::pow(l, 1 / 2.4) - 0.055);
@@ -113,7 +113,7 @@ template <typename code>
 void check_png(const picture &p, insitu_image_format format, OIIO::TypeDesc type, std::size_t channels)
 {
     const fs::path path = folder / "png" / "round_trip.png";
-    write_ok(p.make_view(true), format, path);
+    write_valid_image(p.make_view(true), format, path);
     OIIO::ImageSpec spec;
     const std::vector<code> codes = read_back<code>(path, type, spec);
     assert_int_equal(spec.width, p.width);
@@ -127,7 +127,7 @@ void check_png(const picture &p, insitu_image_format format, OIIO::TypeDesc type
         const double alpha = p.rgba[4 * i + 3];
         for (std::size_t c = 0; c < 3; c++) {
             const double straight = alpha > 0 ? p.rgba[4 * i + c] / alpha : 0;
-            assert_true(std::fabs(codes[channels * i + c] - exact_code(straight, largest)) <= half);
+            assert_true(std::fabs(codes[channels * i + c] - compute_exact_code(straight, largest)) <= half);
         }
         if (channels == 4) assert_true(std::fabs(codes[4 * i + 3] - alpha * largest) <= half);
     }
@@ -175,7 +175,7 @@ void nan_pixels_are_black_in_png(void **)
 {
     const float nan = std::numeric_limits<float>::quiet_NaN(), infinity = std::numeric_limits<float>::infinity();
     const picture p{2, 1, {nan, infinity, -infinity, 1, nan, nan, nan, nan}, {0, 0}};
-    write_ok(p.make_view(false), INSITU_PNG8, folder / "nan.png");
+    write_valid_image(p.make_view(false), INSITU_PNG8, folder / "nan.png");
     OIIO::ImageSpec spec;
     const auto codes = read_back<std::uint8_t>(folder / "nan.png", OIIO::TypeDesc::UINT8, spec);
     assert_int_equal(codes.size(), 8);
@@ -191,7 +191,7 @@ void exr_has_channels_of_other_numbers(void **)
     insitu_image image = p.make_view(true);
     image.channel_count = 2;
     image.channels = channels;
-    write_ok(image, INSITU_EXR, path);
+    write_valid_image(image, INSITU_EXR, path);
     OIIO::ImageSpec spec;
     const std::vector<float> values = read_back<float>(path, OIIO::TypeDesc::FLOAT, spec);
     assert_int_equal(spec.nchannels, 7);
@@ -206,7 +206,7 @@ void exr_has_channels_of_other_numbers(void **)
         assert_true(pixel[x] == p.rgba[4 * i + 1] && pixel[green] == p.rgba[4 * i + 1]);
         assert_true(pixel[value] == p.depth[i] && pixel[z] == p.depth[i]);
     }
-    write_ok(image, INSITU_PNG8, folder / "png" / "channels.png"); /* PNG ignores the additional channels */
+    write_valid_image(image, INSITU_PNG8, folder / "png" / "channels.png"); /* PNG ignores the additional channels */
 }
 
 void exr_is_bitwise(void **)
@@ -215,7 +215,7 @@ void exr_is_bitwise(void **)
         for (const std::size_t channels : {std::size_t{4}, std::size_t{5}}) {
             const picture p = make_picture(size[0], size[1], false);
             const fs::path path = folder / "deep" / "er" / "round_trip.exr";
-            write_ok(p.make_view(channels == 5), INSITU_EXR, path);
+            write_valid_image(p.make_view(channels == 5), INSITU_EXR, path);
             OIIO::ImageSpec spec;
             const std::vector<float> values = read_back<float>(path, OIIO::TypeDesc::FLOAT, spec);
             assert_int_equal(spec.nchannels, channels);
@@ -344,8 +344,8 @@ void writing_does_not_change_the_picture(void **)
 {
     const fs::path in = folder / "alone";
     const picture first = make_picture(20, 10, true), second = make_picture(5, 4, true);
-    write_ok(first.make_view(false), INSITU_PNG8, in / "a.png");
-    write_ok(second.make_view(false), INSITU_PNG8, in / "a.png");
+    write_valid_image(first.make_view(false), INSITU_PNG8, in / "a.png");
+    write_valid_image(second.make_view(false), INSITU_PNG8, in / "a.png");
     assert_int_equal(count_files(in), 1);
     OIIO::ImageSpec spec;
     read_back<std::uint8_t>(in / "a.png", OIIO::TypeDesc::UINT8, spec);
@@ -358,7 +358,7 @@ void unwritable_paths_are_reported(void **)
     const fs::path in = folder / "unwritable";
     fs::create_directories(in / "taken.png" / "below");
     const picture p = make_picture(3, 2, true);
-    write_ok(p.make_view(false), INSITU_PNG8, in / "file.png");
+    write_valid_image(p.make_view(false), INSITU_PNG8, in / "file.png");
     const std::size_t before = count_files(in);
     const struct {
         fs::path path;
@@ -389,7 +389,7 @@ void full_disk_is_reported_and_leaves_the_old_picture(void **)
     const picture small = make_picture(2, 2, true), large = make_picture(200, 200, false);
     for (const auto format : {INSITU_PNG8, INSITU_PNG16, INSITU_EXR}) {
         const fs::path path = in / "a";
-        write_ok(small.make_view(true), format, path);
+        write_valid_image(small.make_view(true), format, path);
         const std::uintmax_t size = fs::file_size(path);
         rlimit before;
         getrlimit(RLIMIT_FSIZE, &before);
@@ -423,7 +423,7 @@ void longest_legal_name_is_written(void **)
     const picture p = make_picture(3, 2, true);
     for (const std::size_t length : {std::size_t{244}, std::size_t{255}}) {
         const fs::path path = in / (std::string(length - 4, 'a') + ".png");
-        write_ok(p.make_view(false), INSITU_PNG8, path);
+        write_valid_image(p.make_view(false), INSITU_PNG8, path);
         assert_true(fs::is_regular_file(path));
     }
     assert_int_equal(count_files(in), 2);
@@ -437,7 +437,7 @@ void writing_does_not_follow_planted_links(void **)
     fs::create_directories(in);
     std::ofstream(victim) << "precious";
     fs::create_symlink(fs::absolute(victim), in / (".a.png." + std::to_string(getpid()) + ".part.png"));
-    write_ok(make_picture(3, 2, true).make_view(false), INSITU_PNG8, in / "a.png");
+    write_valid_image(make_picture(3, 2, true).make_view(false), INSITU_PNG8, in / "a.png");
     std::string found;
     std::ifstream(victim) >> found;
     assert_string_equal(found.c_str(), "precious");
@@ -459,7 +459,7 @@ void files_of_killed_runs_are_removed(void **)
     assert_int_equal(mkfifo((in / pipe).c_str(), 0600), 0);
     const int writer = open((in / held).c_str(), O_RDWR);
     assert_int_equal(flock(writer, LOCK_EX), 0);
-    write_ok(make_picture(3, 2, true).make_view(false), INSITU_PNG8, in / "a.png");
+    write_valid_image(make_picture(3, 2, true).make_view(false), INSITU_PNG8, in / "a.png");
     assert_false(fs::exists(in / left));
     for (const std::string &name : {held, others[0], others[1], others[2]}) assert_true(fs::exists(in / name));
     assert_true(fs::is_symlink(fs::symlink_status(in / link)) && fs::is_fifo(in / pipe));

@@ -333,7 +333,7 @@ static void light_variation_bounds_hold(void **state)
             ranges[i][0] = test_uniform_between(i, 9000 + n, first - 0.1, last + 0.1);
             ranges[i][1] = ranges[i][0] + pow(10, test_uniform_between(RANGES + i, 9000 + n, -4, 0.2));
         }
-        integral_variations(&r.transfer, RANGES, (const double(*)[2])ranges, found);
+        integral_compute_variations(&r.transfer, RANGES, (const double(*)[2])ranges, found);
         for (int i = 0; i < RANGES; i++) {
             double truth[4], wide[4];
             const double low = ranges[i][0], high = ranges[i][1], more = 2 * bin + 0.25 * (high - low);

@@ -133,8 +133,8 @@ enum { KINDS = sizeof kinds / sizeof *kinds };
 
 /* Calls visit for each vertex of the cell. A vertex that several faces of a polyhedron share is visited several
  * times. */
-static void for_each_vertex(const test_mesh *mesh, int64_t cell, void (*visit)(void *state, int64_t vertex),
-                            void *state)
+static void visit_cell_vertices(const test_mesh *mesh, int64_t cell, void (*visit)(void *state, int64_t vertex),
+                                void *state)
 {
     for (int64_t i = mesh->offsets[cell]; i < mesh->offsets[cell + 1]; i++) {
         const int64_t entry = mesh->connectivity[i];
@@ -164,7 +164,7 @@ static uint64_t compute_morton_code(const test_mesh *mesh, int64_t cell)
 {
     mean_place mean = {.mesh = mesh};
     uint64_t code = 0;
-    for_each_vertex(mesh, cell, add_vertex_position, &mean);
+    visit_cell_vertices(mesh, cell, add_vertex_position, &mean);
     for (int bit = 9; bit >= 0; bit--)
         for (int a = 0; a < 3; a++) {
             const double part = (mean.sum[a] / mean.count + 1) / 2;
@@ -223,10 +223,10 @@ static void add_neighbour_layer(const test_mesh *mesh, unsigned char *taken)
     vertex_set set = {.has = calloc((size_t)mesh->vertex_count, 1)};
     assert_non_null(set.has);
     for (int64_t i = 0; i < mesh->cell_count; i++)
-        if (taken[i]) for_each_vertex(mesh, i, add_vertex, &set);
+        if (taken[i]) visit_cell_vertices(mesh, i, add_vertex, &set);
     for (int64_t i = 0; i < mesh->cell_count; i++) {
         set.found = false;
-        for_each_vertex(mesh, i, find_vertex, &set);
+        visit_cell_vertices(mesh, i, find_vertex, &set);
         if (set.found) taken[i] = 1;
     }
     free(set.has);

@@ -76,7 +76,8 @@ static void compute_ray_start(const render_fixture *f, const render_hit *hit, co
     double base[3], direction[3];
     render_camera_ray(&f->job.camera, (int)(hit->pixel % WIDTH), (int)(hit->pixel / WIDTH), base, direction);
     for (int a = 0; a < 3; a++)
-        out[a] = base[a] + fixture_scene_depth(f, hit->t) * direction[a] + RENDER_LIFT / f->job.space.scale * n[a];
+        out[a] =
+            base[a] + fixture_compute_scene_depth(f, hit->t) * direction[a] + RENDER_LIFT / f->job.space.scale * n[a];
 }
 
 typedef struct tally {

@@ -34,13 +34,13 @@ static double square_radius(const double p[3])
 }
 
 /* Returns the depth at which a ray meets the plane. */
-static double plane_depth(const double base[3], const double direction[3])
+static double compute_plane_depth(const double base[3], const double direction[3])
 {
     const double along = normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2];
     return -distance_field(base) / along;
 }
 
-static double sphere_depth(const double base[3], const double direction[3])
+static double compute_sphere_depth(const double base[3], const double direction[3])
 {
     double a = 0, b = 0;
     for (int i = 0; i < 3; i++) {
@@ -76,7 +76,7 @@ typedef struct lines_case {
 static const lines_case cases[] = {
     {"a linear field on a plane",
      distance_field,
-     plane_depth,
+     compute_plane_depth,
      test_linear_field,
      CAMERA_OUTSIDE,
      1.5F,
@@ -84,11 +84,29 @@ static const lines_case cases[] = {
      0.2,
      3,
      {-0.3, 0, 0.25}},
-    {"thin lines", distance_field, plane_depth, test_linear_field, CAMERA_OUTSIDE, 0.7F, 4, 0.2, 2, {-0.1, 0.3}},
-    {"wide lines", distance_field, plane_depth, test_linear_field, CAMERA_ORTHOGRAPHIC, 4, 4, 0.2, 2, {-0.3, 0.25}},
+    {"thin lines",
+     distance_field,
+     compute_plane_depth,
+     test_linear_field,
+     CAMERA_OUTSIDE,
+     0.7F,
+     4,
+     0.2,
+     2,
+     {-0.1, 0.3}},
+    {"wide lines",
+     distance_field,
+     compute_plane_depth,
+     test_linear_field,
+     CAMERA_ORTHOGRAPHIC,
+     4,
+     4,
+     0.2,
+     2,
+     {-0.3, 0.25}},
     {"a quadratic field on a plane",
      distance_field,
-     plane_depth,
+     compute_plane_depth,
      quadratic_field,
      CAMERA_OUTSIDE,
      1.5F,
@@ -98,7 +116,7 @@ static const lines_case cases[] = {
      {-0.4, 0.1, 0.5}},
     {"a linear field on a sphere",
      square_radius,
-     sphere_depth,
+     compute_sphere_depth,
      test_linear_field,
      CAMERA_OUTSIDE,
      1.5F,
@@ -138,7 +156,7 @@ static double evaluate_field(const truth *t, double x, double y)
 
 /* Returns the distance from a position in the picture to the line of a level, found by Newton's method along the
  * gradient in the picture. */
-static double line_distance(const truth *t, double level, double x, double y)
+static double compute_line_distance(const truth *t, double level, double x, double y)
 {
     const double h = 1e-3;
     double px = x, py = y;
@@ -157,12 +175,13 @@ static double line_distance(const truth *t, double level, double x, double y)
  * middle. */
 static double compute_exact_coverage(const truth *t, double level, double x, double y)
 {
-    const double reach = 0.5 * (double)t->of->width, middle = line_distance(t, level, x, y);
+    const double reach = 0.5 * (double)t->of->width, middle = compute_line_distance(t, level, x, y);
     int inside = 0;
     if (middle > reach + 1) return 0;
     for (int j = 0; j < POINTS; j++)
         for (int i = 0; i < POINTS; i++)
-            inside += line_distance(t, level, x + (i + 0.5) / POINTS - 0.5, y + (j + 0.5) / POINTS - 0.5) <= reach;
+            inside +=
+                compute_line_distance(t, level, x + (i + 0.5) / POINTS - 0.5, y + (j + 0.5) / POINTS - 0.5) <= reach;
     return (double)inside / (POINTS * POINTS);
 }
 

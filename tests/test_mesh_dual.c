@@ -18,7 +18,7 @@ typedef struct hull {
     double normals[MOST_TRIANGLES][3];
 } hull;
 
-const char *test_random_name(test_random_polyhedron kind)
+const char *test_random_polyhedron_name(test_random_polyhedron kind)
 {
     static const char *const names[TEST_RANDOM_COUNT] = {"random hulls", "random duals", "random spikes"};
     return names[kind];
@@ -35,7 +35,7 @@ static void normalize_vector(double *v)
     for (int a = 0; a < 3; a++) v[a] /= length;
 }
 
-static void random_direction(uint64_t index, uint64_t seed, double out[3])
+static void draw_random_direction(uint64_t index, uint64_t seed, double out[3])
 {
     const double z = test_uniform_between(2 * index, seed, -1, 1),
                  angle = 6.283185307 * test_uniform(2 * index + 1, seed);
@@ -51,7 +51,7 @@ static void spread_points(hull *h, uint64_t seed)
     double least = 1.9 / sqrt(h->point_count);
     for (uint64_t n = 0, tries = 0; n < (uint64_t)h->point_count; tries++) {
         double nearest = 4;
-        random_direction(tries, seed, h->points[n]);
+        draw_random_direction(tries, seed, h->points[n]);
         for (uint64_t i = 0; i < n; i++) nearest = fmin(nearest, 2 - 2 * dot_product(h->points[i], h->points[n]));
         if (nearest >= least * least)
             n++;
@@ -60,7 +60,7 @@ static void spread_points(hull *h, uint64_t seed)
     }
 }
 
-static void triangle_normal(const hull *h, const int *t, double out[3])
+static void compute_triangle_normal(const hull *h, const int *t, double out[3])
 {
     double d[2][3];
     for (int k = 0; k < 2; k++)
@@ -88,7 +88,7 @@ static void find_triangles(hull *h)
                 for (int side = 0; side < 2; side++) {
                     const int t[3] = {i, side ? k : j, side ? j : k};
                     double normal[3];
-                    triangle_normal(h, t, normal);
+                    compute_triangle_normal(h, t, normal);
                     if (h->triangle_count == MOST_TRIANGLES || !is_outside(h, t, normal)) continue;
                     memcpy(h->normals[h->triangle_count], normal, sizeof normal);
                     memcpy(h->triangles[h->triangle_count++], t, sizeof t);
@@ -251,7 +251,7 @@ static void find_edges(tet_mesh *m)
             }
 }
 
-static bool tet_has(const int64_t *tet, int64_t point)
+static bool contains_tet_point(const int64_t *tet, int64_t point)
 {
     return tet[0] == point || tet[1] == point || tet[2] == point || tet[3] == point;
 }
@@ -260,12 +260,12 @@ static bool tet_has(const int64_t *tet, int64_t point)
 static bool are_adjacent_tets(const int64_t *one, const int64_t *other)
 {
     int common = 0;
-    for (int i = 0; i < 4; i++) common += tet_has(other, one[i]);
+    for (int i = 0; i < 4; i++) common += contains_tet_point(other, one[i]);
     return common == 3;
 }
 
 /* Sorts the tets at an edge into cyclic order around the edge. */
-static void order_around(const tet_mesh *m, edge *e)
+static void sort_tets_around_edge(const tet_mesh *m, edge *e)
 {
     for (int i = 0; i + 1 < e->tet_count; i++)
         for (int k = i + 1; k < e->tet_count; k++) {
@@ -294,13 +294,13 @@ static void add_dual_faces(const tet_mesh *m, test_mesh *out, int64_t *faces, in
     for (int64_t i = 0; i < m->table_size; i++) {
         edge *e = &m->table[i];
         if (e->ends[0] < 0 || !(is_inner_point(m, e->ends[0]) || is_inner_point(m, e->ends[1]))) continue;
-        order_around(m, e);
+        sort_tets_around_edge(m, e);
         const int64_t face = test_mesh_add_face(out, e->tets, e->tet_count);
         for (int end = 0; end < 2; end++) faces[MOST_EDGES * e->ends[end] + counts[e->ends[end]]++] = face;
     }
 }
 
-static void add_means(const tet_mesh *m, test_mesh *out)
+static void add_tet_means(const tet_mesh *m, test_mesh *out)
 {
     for (int64_t tet = 0; tet < m->tet_count; tet++) {
         double p[3] = {0, 0, 0};
@@ -326,7 +326,7 @@ void test_mesh_make_dual(int n, double jitter, test_function *f, test_mesh *out)
     find_edges(&m);
     test_mesh_allocate(out, m.tet_count, m.point_count, MOST_EDGES * m.point_count);
     test_mesh_allocate_faces(out, edges, MOST_AROUND * edges);
-    add_means(&m, out);
+    add_tet_means(&m, out);
     add_dual_faces(&m, out, faces, counts);
     for (int64_t i = 0; i < m.point_count; i++)
         if (is_inner_point(&m, i)) test_mesh_add_polyhedron(out, faces + MOST_EDGES * i, counts[i]);

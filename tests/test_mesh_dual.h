@@ -15,7 +15,7 @@ typedef enum test_random_polyhedron {
     TEST_RANDOM_COUNT
 } test_random_polyhedron;
 
-const char *test_random_name(test_random_polyhedron kind);
+const char *test_random_polyhedron_name(test_random_polyhedron kind);
 
 /* Makes a mesh with one random cell around the origin, inside the unit ball. Values are random in [-1, 1]. */
 void test_mesh_make_random_polyhedron(test_random_polyhedron kind, uint64_t seed, test_mesh *out);

@@ -131,12 +131,12 @@ static void describe_mesh(formed_mesh *m)
     if (m->form == MESH_MIXED && m->part.cell_count > 1) m->part.ghosts[m->part.cell_count / 2] = 1;
     m->mesh.keep_polyhedra = m->form == MESH_POLYHEDRA || m->form == MESH_LISTS;
     if (m->form < MESH_OWNER || m->form > MESH_LISTS) return;
-    m->faces = make_owned(&m->part, m->form != MESH_OWNER);
-    describe_owned(&m->faces,
-                   m->form == MESH_OWNER   ? FORM_WIDE
-                   : m->form == MESH_PAIRS ? FORM_PAIRS
-                                           : FORM_LISTS,
-                   m->form != MESH_OWNER, &m->mesh);
+    m->faces = make_owned_faces(&m->part, m->form != MESH_OWNER);
+    describe_owned_faces(&m->faces,
+                         m->form == MESH_OWNER   ? FORM_WIDE
+                         : m->form == MESH_PAIRS ? FORM_PAIRS
+                                                 : FORM_LISTS,
+                         m->form != MESH_OWNER, &m->mesh);
 }
 
 /* ---- fields ---------------------------------------------------------------------------------------------------- */
@@ -220,7 +220,7 @@ void formed_mesh_free(formed_mesh *m)
     void *const arrays[] = {m->narrow_coordinates, m->narrow_connectivity, m->rows,        m->ids, m->index,
                             m->cell_values,        m->corner_values,       m->patch_values};
     for (size_t i = 0; i < sizeof arrays / sizeof arrays[0]; i++) free(arrays[i]);
-    free_owned(&m->faces);
+    free_owned_faces(&m->faces);
     test_mesh_free(&m->part);
 }
 

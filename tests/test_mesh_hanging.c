@@ -112,7 +112,7 @@ static void add_cells(hanging *h, test_mesh_kind kind, const int64_t at[3], int 
     test_mesh_add_cube(h->mesh, kind, corners);
 }
 
-static void add_refined(hanging *h, test_mesh_kind kind, const int64_t cube[3], bool is_fine)
+static void add_cells_of_cube(hanging *h, test_mesh_kind kind, const int64_t cube[3], bool is_fine)
 {
     const int cuts = is_fine ? h->side : 1, width = h->side / cuts;
     for (int i = 0; i < cuts * cuts * cuts; i++) {
@@ -132,7 +132,7 @@ void test_mesh_make_hanging(test_mesh_kind kind, int n, int side, test_hanging_s
     for (int64_t i = 0; i < places; i++) h.vertices[i] = -1;
     test_mesh_allocate(out, places, cells, 8 * cells);
     for (int64_t i = 0; i < (int64_t)n * n * n; i++)
-        add_refined(&h, kind, (const int64_t[]){i % n, i / n % n, i / ((int64_t)n * n)},
-                    test_uniform((uint64_t)i, 77) < 1.0 / 3);
+        add_cells_of_cube(&h, kind, (const int64_t[]){i % n, i / n % n, i / ((int64_t)n * n)},
+                          test_uniform((uint64_t)i, 77) < 1.0 / 3);
     free(h.vertices);
 }

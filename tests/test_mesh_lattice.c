@@ -11,7 +11,7 @@ const char *test_mesh_kind_name(test_mesh_kind kind)
     return names[kind];
 }
 
-static void lattice_vertices(test_mesh *mesh, int n, double jitter)
+static void add_lattice_vertices(test_mesh *mesh, int n, double jitter)
 {
     const double side = 2.0 / n;
     for (int k = 0; k <= n; k++)
@@ -59,7 +59,8 @@ void test_mesh_add_cube(test_mesh *mesh, test_mesh_kind kind, const int64_t *cor
 
 /* Connects a face of the cube (one of cube_faces) to the cube's centre, by two tets if is_split is set, else by a
  * pyramid. */
-static void close_face(test_mesh *mesh, const int64_t *corners, int64_t centre, const int face[4], bool is_split)
+static void connect_face_to_centre(test_mesh *mesh, const int64_t *corners, int64_t centre, const int face[4],
+                                   bool is_split)
 {
     const int64_t v[5] = {corners[face[0]], corners[face[1]], corners[face[2]], corners[face[3]], centre};
     if (!is_split) {
@@ -85,7 +86,7 @@ static int choose_mixed_cell_type(const int place[3])
     return (int)(test_hash((uint64_t)(place[0] + 1024 * place[1] + 1024 * 1024 * place[2]), 2) % 3);
 }
 
-static void add_mixed(test_mesh *mesh, int n, const int place[3], const int64_t *corners)
+static void add_mixed_cube(test_mesh *mesh, int n, const int place[3], const int64_t *corners)
 {
     if ((place[0] + place[1] + place[2]) % 2 == 0) {
         void (*const add[3])(test_mesh *, const int64_t *) = {add_hex, add_wedges, add_tets};
@@ -98,7 +99,7 @@ static void add_mixed(test_mesh *mesh, int n, const int place[3], const int64_t 
         beside[face / 2] += face % 2 ? 1 : -1;
         const bool outside = beside[face / 2] < 0 || beside[face / 2] >= n;
         const int choice = outside ? 0 : choose_mixed_cell_type(beside);
-        close_face(mesh, corners, centre, cube_faces[face], choice == 2 || (choice == 1 && face >= 4));
+        connect_face_to_centre(mesh, corners, centre, cube_faces[face], choice == 2 || (choice == 1 && face >= 4));
     }
 }
 
@@ -116,10 +117,10 @@ static void add_cube(test_mesh *mesh, test_mesh_kind kind, int n, const int plac
     case TEST_POLYHEDRA: test_mesh_add_cube(mesh, kind, corners); break;
     case TEST_PYRAMIDS: {
         const int64_t centre = add_centre(mesh, corners);
-        for (int face = 0; face < 6; face++) close_face(mesh, corners, centre, cube_faces[face], false);
+        for (int face = 0; face < 6; face++) connect_face_to_centre(mesh, corners, centre, cube_faces[face], false);
         break;
     }
-    default: add_mixed(mesh, n, place, corners); break;
+    default: add_mixed_cube(mesh, n, place, corners); break;
     }
 }
 
@@ -130,7 +131,7 @@ void test_mesh_make_lattice(test_mesh_kind kind, int n, double jitter, test_func
     const int64_t cubes = (int64_t)n * n * n, lattice = (int64_t)(n + 1) * (n + 1) * (n + 1);
     test_mesh_allocate(out, lattice + (kind >= TEST_PYRAMIDS ? cubes : 0), cubes * cells[kind],
                        cubes * connectivity[kind]);
-    lattice_vertices(out, n, jitter);
+    add_lattice_vertices(out, n, jitter);
     for (int k = 0; k < n; k++)
         for (int j = 0; j < n; j++)
             for (int i = 0; i < n; i++) add_cube(out, kind, n, (const int[]){i, j, k});

@@ -36,7 +36,7 @@ typedef struct test_faces {
     int vertices[6][4];
 } test_faces;
 
-const test_faces *test_faces_of(int type);
+const test_faces *test_get_cell_faces(int type);
 
 /* Joins the tets of a mesh into polyhedra that consist of up to six tets. */
 void test_mesh_merge_tets(test_mesh *mesh);

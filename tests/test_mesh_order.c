@@ -169,7 +169,7 @@ typedef struct maker {
     double bend;
 } maker;
 
-double order_mesh_make_moved(double bend, const double point[3], int axis)
+double order_mesh_move_coordinate(double bend, const double point[3], int axis)
 {
     const double *p = point;
     const int next = (axis + 1) % 3, last = (axis + 2) % 3;
@@ -184,7 +184,7 @@ static int64_t find_or_add_node(maker *m, const int64_t place[3])
     for (int axis = 0; axis < 3; axis++) point[axis] = -1 + 2 * (double)place[axis] / (m->across - 1);
     *number = m->out->vertex_count++;
     for (int axis = 0; axis < 3; axis++)
-        m->out->coordinates[3 * *number + axis] = order_mesh_make_moved(m->bend, point, axis);
+        m->out->coordinates[3 * *number + axis] = order_mesh_move_coordinate(m->bend, point, axis);
     return *number;
 }
 

@@ -43,7 +43,7 @@ void order_mesh_create(const order_kind *kind, int side, double bend, order_func
                        order_mesh *out);
 
 /* Returns the coordinate along an axis to which order_mesh_create() moves a point of the cube. */
-double order_mesh_make_moved(double bend, const double point[3], int axis);
+double order_mesh_move_coordinate(double bend, const double point[3], int axis);
 
 /* Returns the mesh of linear hexes between the nodes of lexicographic hexes of order p. The caller frees its
  * connectivity; all other arrays belong to the original mesh. */

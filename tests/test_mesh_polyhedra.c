@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-const test_faces *test_faces_of(int type)
+const test_faces *test_get_cell_faces(int type)
 {
     static const test_faces tet = {4, {{0, 1, 2, -1}, {0, 1, 3, -1}, {1, 2, 3, -1}, {0, 2, 3, -1}}};
     static const test_faces hex = {
@@ -61,7 +61,7 @@ static int64_t face_table_find(face_table *t, const int64_t *vertices, int count
 
 static int64_t find_or_add_cell_face(face_table *t, const test_mesh *mesh, int64_t cell, int face)
 {
-    const int *picks = test_faces_of(mesh->types[cell])->vertices[face];
+    const int *picks = test_get_cell_faces(mesh->types[cell])->vertices[face];
     const int count = picks[3] < 0 ? 3 : 4;
     int64_t vertices[4];
     for (int i = 0; i < count; i++) vertices[i] = mesh->connectivity[mesh->offsets[cell] + picks[i]];
@@ -86,7 +86,7 @@ void test_mesh_to_polyhedra(test_mesh *mesh, double share)
             continue;
         }
         int64_t faces[6];
-        const int count = test_faces_of(old.types[cell])->count;
+        const int count = test_get_cell_faces(old.types[cell])->count;
         for (int i = 0; i < count; i++) faces[i] = table.faces[find_or_add_cell_face(&table, &old, cell, i)];
         test_mesh_add_polyhedron(mesh, faces, count);
     }
@@ -103,7 +103,7 @@ typedef struct tet_group {
     int64_t faces[4 * GROUP_TETS]; /* slots of the face table */
 } tet_group;
 
-static void group_toggle(tet_group *g, int64_t face)
+static void group_toggle_face(tet_group *g, int64_t face)
 {
     for (int i = 0; i < g->face_count; i++)
         if (g->faces[i] == face) {
@@ -129,21 +129,22 @@ static bool group_is_closed(const tet_group *g, const face_table *t)
     return true;
 }
 
-static void group_add(tet_group *g, const int64_t (*faces_of)[4], int64_t tet)
+static void group_add_tet(tet_group *g, const int64_t (*faces_of)[4], int64_t tet)
 {
     g->tets[g->count++] = tet;
-    for (int i = 0; i < 4; i++) group_toggle(g, faces_of[tet][i]);
+    for (int i = 0; i < 4; i++) group_toggle_face(g, faces_of[tet][i]);
 }
 
 /* Adds a neighbouring tet with which the surface remains closed. Returns false if there is none. */
-static bool group_grow(tet_group *g, const face_table *t, const int64_t (*faces_of)[4], const bool *is_taken)
+static bool group_add_neighbouring_tet(tet_group *g, const face_table *t, const int64_t (*faces_of)[4],
+                                       const bool *is_taken)
 {
     for (int i = 0; i < g->face_count; i++)
         for (int side = 0; side < 2; side++) {
             const int64_t tet = t->cells[g->faces[(i * 5 + g->count) % g->face_count]][side];
             tet_group larger = *g;
             if (tet < 0 || is_taken[tet]) continue;
-            group_add(&larger, faces_of, tet);
+            group_add_tet(&larger, faces_of, tet);
             if (!group_is_closed(&larger, t)) continue;
             *g = larger;
             return true;
@@ -169,10 +170,10 @@ void test_mesh_merge_tets(test_mesh *mesh)
     for (int64_t cell = 0; cell < old.cell_count; cell++) {
         tet_group g = {0};
         if (is_taken[cell]) continue;
-        group_add(&g, (const int64_t(*)[4])faces_of, cell);
+        group_add_tet(&g, (const int64_t(*)[4])faces_of, cell);
         is_taken[cell] = true;
         const int wanted = 1 + (int)(GROUP_TETS * test_uniform((uint64_t)cell, 7));
-        while (g.count < wanted && group_grow(&g, &table, (const int64_t(*)[4])faces_of, is_taken))
+        while (g.count < wanted && group_add_neighbouring_tet(&g, &table, (const int64_t(*)[4])faces_of, is_taken))
             is_taken[g.tets[g.count - 1]] = true;
         for (int i = 0; i < g.face_count; i++) {
             int64_t *face = &table.faces[g.faces[i]];

@@ -51,7 +51,7 @@ static void refine_cells(const order_kind *kind, int side, double bend, int colu
     session_interpolation of;
     order_mesh_create(kind, side, bend, test_linear_field, 0, 1, &mesh);
     const int64_t of_cube = mesh.cell_count / (side * side * side);
-    assert_true(session_nodes_of((int)kind->type, mesh.nodes, &nodes));
+    assert_true(session_describe_nodes((int)kind->type, mesh.nodes, &nodes));
     assert_true(session_make_interpolation(&nodes, kind->layout, PARTS, false, &of));
     out->coordinates = malloc((size_t)(mesh.cell_count * MOST_NODES) * 3 * sizeof(double));
     insitu_mesh_defaults(&out->mesh);

@@ -65,7 +65,7 @@ static void make_cavity(test_mesh *mesh)
         }
         for (int face = 0; face < 6; face++) {
             int64_t quad[4];
-            for (int i = 0; i < 4; i++) quad[i] = first + test_faces_of(GRID_HEX)->vertices[face][i];
+            for (int i = 0; i < 4; i++) quad[i] = first + test_get_cell_faces(GRID_HEX)->vertices[face][i];
             faces[6 * shell + face] = test_mesh_add_face(mesh, quad, 4);
         }
     }
@@ -98,7 +98,7 @@ const char *test_cell_shape_name(test_cell_shape shape)
     return names[shape];
 }
 
-static int shape_type(test_cell_shape shape)
+static int get_shape_type(test_cell_shape shape)
 {
     switch (shape) {
     case TEST_UNIT_TET:
@@ -110,7 +110,7 @@ static int shape_type(test_cell_shape shape)
     }
 }
 
-static void shape_hex_vertex(test_cell_shape shape, int i, double p[3])
+static void compute_shape_hex_vertex(test_cell_shape shape, int i, double p[3])
 {
     const double upper = i < 4 ? 0 : 1, angle = 50 * 3.14159265358979 / 180 * upper, x = p[0], y = p[1];
     switch (shape) {
@@ -132,10 +132,10 @@ static void shape_hex_vertex(test_cell_shape shape, int i, double p[3])
     }
 }
 
-static void shape_vertex(test_cell_shape shape, int i, double p[3])
+static void compute_shape_vertex(test_cell_shape shape, int i, double p[3])
 {
     static const double wedge[3][2] = {{-0.5, -0.4}, {0.6, -0.3}, {0.0, 0.6}};
-    switch (shape_type(shape)) {
+    switch (get_shape_type(shape)) {
     case GRID_TET:
         memcpy(p, unit_tet[i], sizeof unit_tet[i]);
         if (shape == TEST_SLIVER_TET) p[2] = i == 3 ? 1e-4 : 0;
@@ -149,19 +149,19 @@ static void shape_vertex(test_cell_shape shape, int i, double p[3])
     case GRID_PYRAMID: memcpy(p, i < 4 ? unit_hex[i] : (const double[]){0.2, -0.1, 0.6}, 3 * sizeof(double)); break;
     default:
         memcpy(p, unit_hex[i], sizeof unit_hex[i]);
-        shape_hex_vertex(shape, i, p);
+        compute_shape_hex_vertex(shape, i, p);
         break;
     }
 }
 
 void test_mesh_make_single_cell(test_cell_shape shape, test_function *f, test_mesh *out)
 {
-    const int type = shape_type(shape);
+    const int type = get_shape_type(shape);
     const int64_t indices[8] = {0, 1, 2, 3, 4, 5, 6, 7};
     test_mesh_allocate(out, 8, 1, 8);
     for (int i = 0; i < grid_type_vertices(type); i++) {
         double p[3];
-        shape_vertex(shape, i, p);
+        compute_shape_vertex(shape, i, p);
         test_mesh_add_vertex(out, p);
     }
     test_mesh_add_cell(out, type, indices, (const int[]){0, 1, 2, 3, 4, 5, 6, 7});

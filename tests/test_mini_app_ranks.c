@@ -76,7 +76,7 @@ static void compare_partitions(wave_cells cells, wave_partition_kind kind, const
     int ok = make_model(&whole, &lattice, WAVE_BLOCK, &setup, 4, MPI_COMM_SELF);
     ok = make_model(&part, &lattice, kind, &setup, index_bytes, MPI_COMM_WORLD) && ok;
     int differences = ok ? count_differences(&part, &whole) : 1;
-    double peak = ok ? wave_solver_totals(&whole.solver).peak : 0;
+    double peak = ok ? wave_solver_compute_totals(&whole.solver).peak : 0;
     MPI_Allreduce(MPI_IN_PLACE, &differences, 1, MPI_INT, MPI_SUM, MPI_COMM_WORLD);
     free_model(&part);
     free_model(&whole);

@@ -43,7 +43,7 @@ static void free_model(model *m)
 
 /* Returns the pressure of a pulse along x that is an exact solution: it travels at speed 1 with u = p / Z. At a
  * distance of 5 widths it is e^-12.5 of its height. */
-static double exact_pulse(double x, double time)
+static double compute_exact_pulse(double x, double time)
 {
     double r = (x + 0.35 - time) / 0.12;
     return exp(-0.5 * r * r);
@@ -53,8 +53,8 @@ static void set_pulse(model *m)
 {
     for (int32_t c = 0; c < m->mesh.own_cells; ++c) {
         double x[3];
-        wave_solver_centroid(&m->solver, c, x);
-        double p = exact_pulse(x[0], 0), q[4] = {p, p, 0, 0};
+        wave_solver_compute_centroid(&m->solver, c, x);
+        double p = compute_exact_pulse(x[0], 0), q[4] = {p, p, 0, 0};
         wave_solver_set(&m->solver, c, q);
     }
     wave_solver_start(&m->solver);
@@ -74,10 +74,10 @@ static double measure_pulse_error(int n, wave_cells cells, int order)
     for (int i = 0; i < steps; ++i) wave_solver_step(&m.solver);
     for (int32_t c = 0; c < m.mesh.own_cells; ++c) {
         double x[3], q[4];
-        wave_solver_centroid(&m.solver, c, x);
+        wave_solver_compute_centroid(&m.solver, c, x);
         wave_solver_get(&m.solver, c, q);
-        error += m.solver.volume[c] * fabs(q[0] - exact_pulse(x[0], 0.6));
-        whole += m.solver.volume[c] * fabs(exact_pulse(x[0], 0.6));
+        error += m.solver.volume[c] * fabs(q[0] - compute_exact_pulse(x[0], 0.6));
+        whole += m.solver.volume[c] * fabs(compute_exact_pulse(x[0], 0.6));
     }
     free_model(&m);
     return error / whole;
@@ -129,7 +129,7 @@ static void plane_wave_converges_with_order_1_by_the_first_order_scheme(void **s
     check_order(WAVE_HEXES, 1, 0.7, 0.25);
 }
 
-static double bell_function(double r)
+static double evaluate_bell_function(double r)
 {
     return exp(-0.5 * r * r);
 }
@@ -137,10 +137,11 @@ static double bell_function(double r)
 /* Returns the pressure of a pulse that travelled downwards for 0.8 time units. At z = -1 the impedance changes from 1
  * to 3: R = (3 - 1) / (3 + 1), one half, of the pressure was reflected, and 1 + R of it was transmitted. The
  * transmitted pulse is faster, and therefore longer by a factor of 1.5. */
-static double exact_transmitted_pulse(double z)
+static double compute_exact_transmitted_pulse(double z)
 {
     double width = 0.08;
-    return z > -1 ? 0.5 * bell_function((z + 0.6) / width) : 1.5 * bell_function((z + 1.6) / (1.5 * width));
+    return z > -1 ? 0.5 * evaluate_bell_function((z + 0.6) / width)
+                  : 1.5 * evaluate_bell_function((z + 1.6) / (1.5 * width));
 }
 
 static void interface_reflects_and_transmits_by_its_impedances(void **state)
@@ -155,8 +156,8 @@ static void interface_reflects_and_transmits_by_its_impedances(void **state)
         make_model(&m, size, (wave_cells)kind, 0, &setup);
         for (int32_t c = 0; c < m.mesh.own_cells; ++c) {
             double x[3];
-            wave_solver_centroid(&m.solver, c, x);
-            double p = bell_function((x[2] + 0.6) / 0.08), q[4] = {p, 0, 0, -p};
+            wave_solver_compute_centroid(&m.solver, c, x);
+            double p = evaluate_bell_function((x[2] + 0.6) / 0.08), q[4] = {p, 0, 0, -p};
             wave_solver_set(&m.solver, c, q);
         }
         wave_solver_start(&m.solver);
@@ -165,10 +166,10 @@ static void interface_reflects_and_transmits_by_its_impedances(void **state)
         for (int i = 0; i < steps; ++i) wave_solver_step(&m.solver);
         for (int32_t c = 0; c < m.mesh.own_cells; ++c) {
             double x[3], q[4];
-            wave_solver_centroid(&m.solver, c, x);
+            wave_solver_compute_centroid(&m.solver, c, x);
             wave_solver_get(&m.solver, c, q);
-            error += m.solver.volume[c] * fabs(q[0] - exact_transmitted_pulse(x[2]));
-            whole += m.solver.volume[c] * exact_transmitted_pulse(x[2]);
+            error += m.solver.volume[c] * fabs(q[0] - compute_exact_transmitted_pulse(x[2]));
+            whole += m.solver.volume[c] * compute_exact_transmitted_pulse(x[2]);
         }
         print_message("cells %d: error %.4f behind an interface\n", kind, error / whole);
         /* The pulse is 6.4 cubes wide; the plane pulses of the tests above have errors of 0.01 at 4.8 cubes and 0.002
@@ -212,11 +213,11 @@ static void one_step_solves_riemanns_problem(void **state)
 }
 
 /* Sets a Gaussian pressure, slightly off the middle of the box, with velocity 0. */
-static void set_bump(model *m, double sharpness)
+static void set_pressure_bump(model *m, double sharpness)
 {
     for (int32_t c = 0; c < m->mesh.own_cells; ++c) {
         double x[3], q[4] = {0};
-        wave_solver_centroid(&m->solver, c, x);
+        wave_solver_compute_centroid(&m->solver, c, x);
         double r2 = x[0] * x[0] + (x[1] - 0.2) * (x[1] - 0.2) + (x[2] + 0.8) * (x[2] + 0.8);
         q[0] = exp(-sharpness * r2);
         wave_solver_set(&m->solver, c, q);
@@ -239,10 +240,10 @@ static void mass_is_conserved_between_rigid_walls(void **state)
             model m;
             setup.medium = wave_medium_layered(&lattice);
             make_model(&m, size, (wave_cells)kind, 0.1, &setup);
-            set_bump(&m, 20);
-            double before = wave_solver_totals(&m.solver).mass;
+            set_pressure_bump(&m, 20);
+            double before = wave_solver_compute_totals(&m.solver).mass;
             for (int i = 0; i < 100; ++i) wave_solver_step(&m.solver);
-            double after = wave_solver_totals(&m.solver).mass;
+            double after = wave_solver_compute_totals(&m.solver).mass;
             assert_true(fabs(after - before) <= 100 * 60 * 2.3e-16 * 8);
             free_model(&m);
         }
@@ -268,7 +269,7 @@ static void source_adds_the_stated_volume(void **state)
     }
     /* The source is a ball, sampled at cell centres whose distance is at most its radius. The sum of the samples is 1
      * to within 2 exp(-2 pi^2) per axis, and the ball is cut off at 5 radii, which omits 1.6e-5. */
-    assert_true(fabs(wave_solver_totals(&m.solver).mass / injected - 1) < 1e-4);
+    assert_true(fabs(wave_solver_compute_totals(&m.solver).mass / injected - 1) < 1e-4);
     free_model(&m);
 }
 
@@ -307,11 +308,11 @@ static void energy_does_not_increase(void **state)
             model m;
             setup.medium = wave_medium_layered(&lattice);
             make_model(&m, size, (wave_cells)kind, 0.2, &setup);
-            set_bump(&m, 20);
-            double first = wave_solver_totals(&m.solver).energy, last = first;
+            set_pressure_bump(&m, 20);
+            double first = wave_solver_compute_totals(&m.solver).energy, last = first;
             for (int i = 0; i < 400; ++i) {
                 wave_solver_step(&m.solver);
-                double energy = wave_solver_totals(&m.solver).energy;
+                double energy = wave_solver_compute_totals(&m.solver).energy;
                 if (order == 1) assert_true(energy <= last * (1 + 1e-13));
                 assert_true(energy <= first * (1 + 1e-13));
                 last = energy;
@@ -334,10 +335,10 @@ static void absorbing_walls_do_not_reflect_a_wave(void **state)
         model m;
         setup.reflecting = reflecting != 0;
         make_model(&m, size, WAVE_HEXES, 0, &setup);
-        set_bump(&m, 8);
-        double before = wave_solver_totals(&m.solver).energy;
+        set_pressure_bump(&m, 8);
+        double before = wave_solver_compute_totals(&m.solver).energy;
         while (m.solver.time < 3) wave_solver_step(&m.solver);
-        double left = wave_solver_totals(&m.solver).energy / before;
+        double left = wave_solver_compute_totals(&m.solver).energy / before;
         print_message("%s walls: %.3g of the energy left\n", reflecting ? "rigid" : "absorbing", left);
         assert_true(reflecting ? left > 0.5 : left < 0.03);
         free_model(&m);
@@ -405,9 +406,9 @@ static void float_result_is_near_double_result(void **state)
         setup.real_bytes = i ? 4 : 8;
         setup.is_soa = i != 0;
         make_model(&m, size, WAVE_MIXED, 0, &setup);
-        set_bump(&m, 20);
+        set_pressure_bump(&m, 20);
         for (int s = 0; s < 50; ++s) wave_solver_step(&m.solver);
-        peak[i] = wave_solver_totals(&m.solver).peak;
+        peak[i] = wave_solver_compute_totals(&m.solver).peak;
         free_model(&m);
     }
     /* tolerance: 50 steps with about 60 roundings by 6e-8 of values of at most 1 */

@@ -301,7 +301,8 @@ static void refitted_ranges_equal_a_fresh_build(void **state)
     for (int64_t v = 0; v < l.g.vertex_count; v++) set_number(&l.field.values, v, hash_to_unit_interval((uint64_t)v));
     const int64_t unusable = corrupt_vertex_values(&l);
     mmbvh fresh = build_with_threads(&l, &l.field, 2);
-    assert_memory_not_equal(node_bytes(&old), node_bytes(&fresh), (size_t)fresh.node_count * node_size(&fresh));
+    assert_memory_not_equal(get_node_bytes(&old), get_node_bytes(&fresh),
+                            (size_t)fresh.node_count * get_node_size(&fresh));
     for (int threads = 1; threads <= 3; threads++) {
         for (int64_t i = 0; i < old.node_count; i++) corrupt_range(&old, i);
         assert_int_equal(mmbvh_refit_ranges(&old, &l.g, &l.field, &(mmbvh_options){.threads = threads}), INSITU_OK);

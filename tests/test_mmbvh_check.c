@@ -39,7 +39,7 @@ static int tear_down(void **state)
     return 0;
 }
 
-static void assert_found(fixture *f, const char *words)
+static void assert_violation_is_found(fixture *f, const char *words)
 {
     base_error error = {0};
     mmbvh_statistics untouched = {.leaves = -1};
@@ -60,14 +60,14 @@ static void cell_twice_is_found(void **state)
     fixture *f = *state;
     const uint64_t first = f->tree.nodes[f->leaf].ref;
     f->tree.cells[first + 1] = f->tree.cells[first];
-    assert_found(f, "twice");
+    assert_violation_is_found(f, "twice");
 }
 
 static void cell_that_is_not_there_is_found(void **state)
 {
     fixture *f = *state;
     f->tree.cells[f->tree.nodes[f->leaf].ref] = (uint32_t)f->l.g.cell_count;
-    assert_found(f, "there is no cell");
+    assert_violation_is_found(f, "there is no cell");
 }
 
 static void missing_cell_is_found(void **state)
@@ -78,7 +78,7 @@ static void missing_cell_is_found(void **state)
     assert_true(last->count > 1);
     last->count--;
     f->tree.cell_count--;
-    assert_found(f, "in no leaf");
+    assert_violation_is_found(f, "in no leaf");
 }
 
 static void entry_in_no_leaf_is_found(void **state)
@@ -87,21 +87,21 @@ static void entry_in_no_leaf_is_found(void **state)
     mmbvh_node *last = &f->tree.nodes[f->tree.node_count - 1];
     assert_true(last->count > 1);
     last->count--;
-    assert_found(f, "entries are in leaves");
+    assert_violation_is_found(f, "entries are in leaves");
 }
 
 static void overlapping_leaves_are_found(void **state)
 {
     fixture *f = *state;
     f->tree.nodes[f->leaf].ref += 1;
-    assert_found(f, "its cells are entries");
+    assert_violation_is_found(f, "its cells are entries");
 }
 
 static void emptied_leaf_is_found(void **state)
 {
     fixture *f = *state;
     f->tree.nodes[f->leaf].count = 0;
-    assert_found(f, "its children are nodes");
+    assert_violation_is_found(f, "its children are nodes");
 }
 
 static void ghost_in_a_leaf_is_found(void **state)
@@ -111,7 +111,7 @@ static void ghost_in_a_leaf_is_found(void **state)
     f->l.ghosts[5] = 1;
     f->l.g.ghosts = f->l.ghosts;
     f->l.g.ghosts_stride = 1;
-    assert_found(f, "is a ghost");
+    assert_violation_is_found(f, "is a ghost");
 }
 
 static void narrow_leaf_is_found(void **state)
@@ -121,10 +121,10 @@ static void narrow_leaf_is_found(void **state)
         mmbvh_node *leaf = &f->tree.nodes[f->leaf];
         const float lower = leaf->lower[axis], upper = leaf->upper[axis];
         leaf->lower[axis] = nextafterf(lower, INFINITY);
-        assert_found(f, "lies outside its bounds");
+        assert_violation_is_found(f, "lies outside its bounds");
         leaf->lower[axis] = lower;
         leaf->upper[axis] = nextafterf(upper, -INFINITY);
-        assert_found(f, "lies outside its bounds");
+        assert_violation_is_found(f, "lies outside its bounds");
         leaf->upper[axis] = upper;
     }
 }
@@ -135,10 +135,10 @@ static void narrow_leaf_range_is_found(void **state)
     mmbvh_node *leaf = &f->tree.nodes[f->leaf];
     const float low = leaf->range_low;
     leaf->range_low = nextafterf(low, INFINITY);
-    assert_found(f, "lies outside its range");
+    assert_violation_is_found(f, "lies outside its range");
     leaf->range_low = low;
     leaf->range_high = nextafterf(leaf->range_high, -INFINITY);
-    assert_found(f, "lies outside its range");
+    assert_violation_is_found(f, "lies outside its range");
 }
 
 static void narrow_inner_node_is_found(void **state)
@@ -148,10 +148,10 @@ static void narrow_inner_node_is_found(void **state)
     for (int axis = 0; axis < 3; axis++) {
         const float lower = node->lower[axis], upper = node->upper[axis];
         node->lower[axis] = nextafterf(lower, INFINITY);
-        assert_found(f, "lies outside its bounds");
+        assert_violation_is_found(f, "lies outside its bounds");
         node->lower[axis] = lower;
         node->upper[axis] = nextafterf(upper, -INFINITY);
-        assert_found(f, "lies outside its bounds");
+        assert_violation_is_found(f, "lies outside its bounds");
         node->upper[axis] = upper;
     }
 }
@@ -160,35 +160,35 @@ static void narrow_inner_range_is_found(void **state)
 {
     fixture *f = *state;
     f->tree.nodes[f->inner].range_high = nextafterf(f->tree.nodes[f->inner].range_high, -INFINITY);
-    assert_found(f, "lies outside its range");
+    assert_violation_is_found(f, "lies outside its range");
 }
 
 static void bounds_that_are_not_numbers_are_found(void **state)
 {
     fixture *f = *state;
     f->tree.nodes[0].lower[1] = NAN;
-    assert_found(f, "above upper bound");
+    assert_violation_is_found(f, "above upper bound");
 }
 
 static void range_that_is_not_a_number_is_found(void **state)
 {
     fixture *f = *state;
     f->tree.nodes[0].range_low = NAN;
-    assert_found(f, "outside its range");
+    assert_violation_is_found(f, "outside its range");
 }
 
 static void cycle_is_found(void **state)
 {
     fixture *f = *state;
     f->tree.nodes[f->inner].ref = 1;
-    assert_found(f, "its children are nodes 1 on");
+    assert_violation_is_found(f, "its children are nodes 1 on");
 }
 
 static void reference_beyond_the_nodes_is_found(void **state)
 {
     fixture *f = *state;
     f->tree.node_count--;
-    assert_found(f, "its children are nodes");
+    assert_violation_is_found(f, "its children are nodes");
 }
 
 static void node_never_reached_is_found(void **state)
@@ -196,14 +196,14 @@ static void node_never_reached_is_found(void **state)
     fixture *f = *state;
     f->tree.nodes = base_realloc(f->tree.nodes, (size_t)(f->tree.node_count + 2) * sizeof *f->tree.nodes);
     f->tree.node_count += 2;
-    assert_found(f, "nodes are reached");
+    assert_violation_is_found(f, "nodes are reached");
 }
 
-static void wrong_count_of_unusable_cells_is_found(void **state)
+static void wrong_unusable_count_is_found(void **state)
 {
     fixture *f = *state;
     f->tree.unusable_cells = 1;
-    assert_found(f, "unusable");
+    assert_violation_is_found(f, "unusable");
 }
 
 /* Makes a tree that is one level too deep: every left child is a leaf of one cell. */
@@ -248,7 +248,7 @@ int main(void)
         BROKEN_TREE(cycle_is_found),
         BROKEN_TREE(reference_beyond_the_nodes_is_found),
         BROKEN_TREE(node_never_reached_is_found),
-        BROKEN_TREE(wrong_count_of_unusable_cells_is_found),
+        BROKEN_TREE(wrong_unusable_count_is_found),
         cmocka_unit_test(too_deep_a_tree_is_found),
     };
     return cmocka_run_group_tests_name("mmbvh_check", tests, NULL, NULL);

@@ -31,12 +31,12 @@ static inline mmbvh_statistics assert_proved(const mmbvh *tree, const grid *g, c
     return statistics;
 }
 
-static inline size_t node_size(const mmbvh *tree)
+static inline size_t get_node_size(const mmbvh *tree)
 {
     return tree->compact ? sizeof *tree->compact : sizeof *tree->nodes;
 }
 
-static inline const void *node_bytes(const mmbvh *tree)
+static inline const void *get_node_bytes(const mmbvh *tree)
 {
     return tree->compact ? (const void *)tree->compact : (const void *)tree->nodes;
 }
@@ -44,9 +44,9 @@ static inline const void *node_bytes(const mmbvh *tree)
 #define assert_same_nodes(a, b)                                                                                        \
     do {                                                                                                               \
         assert_int_equal((a)->node_count, (b)->node_count);                                                            \
-        assert_int_equal(node_size(a), node_size(b));                                                                  \
+        assert_int_equal(get_node_size(a), get_node_size(b));                                                          \
         assert_memory_equal(&(a)->grid, &(b)->grid, sizeof(mmbvh_grid));                                               \
-        assert_memory_equal(node_bytes(a), node_bytes(b), (size_t)(a)->node_count *node_size(a));                      \
+        assert_memory_equal(get_node_bytes(a), get_node_bytes(b), (size_t)(a)->node_count *get_node_size(a));          \
     } while (0)
 
 static inline void corrupt_range(const mmbvh *tree, int64_t index)

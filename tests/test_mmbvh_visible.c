@@ -140,9 +140,9 @@ static void assert_same_with_any_threads(const subject *s, const mmbvh *before)
 static mmbvh copy_tree(const mmbvh *tree)
 {
     mmbvh copy = *tree;
-    const size_t bytes = (size_t)tree->node_count * node_size(tree);
+    const size_t bytes = (size_t)tree->node_count * get_node_size(tree);
     void *nodes = malloc(bytes);
-    memcpy(nodes, node_bytes(tree), bytes);
+    memcpy(nodes, get_node_bytes(tree), bytes);
     if (tree->compact)
         copy.compact = nodes;
     else
@@ -156,7 +156,7 @@ static void free_copy(mmbvh *copy)
     free(copy->nodes);
 }
 
-static int64_t count_stale(const subject *s, const mmbvh *before, const mmbvh *whole)
+static int64_t count_stale_nodes(const subject *s, const mmbvh *before, const mmbvh *whole)
 {
     int64_t stale = 0;
     for (int64_t i = 0; i < s->tree.node_count; i++) {
@@ -182,7 +182,7 @@ static void check_visible_refit(subject *s)
     assert_same_with_any_threads(s, &other);
     assert_int_equal(mmbvh_refit_bounds(&whole, &s->l.g, &(mmbvh_options){.threads = 2}), INSITU_OK);
     assert_true(visited > 100 && visited < s->tree.node_count);
-    assert_true(count_stale(s, &before, &whole) > s->tree.node_count / 10);
+    assert_true(count_stale_nodes(s, &before, &whole) > s->tree.node_count / 10);
     /* A refit of all nodes must also update the nodes that were skipped. */
     assert_int_equal(mmbvh_refit_bounds(&s->tree, &s->l.g, &(mmbvh_options){.threads = 2}), INSITU_OK);
     assert_same_nodes(&s->tree, &whole);

@@ -27,7 +27,7 @@ typedef struct bound_kind {
     bool is_lobatto;
 } bound_kind;
 
-static double random_number(void)
+static double draw_random_number(void)
 {
     return 2 * (rand() / (RAND_MAX + 1.0)) - 1;
 }
@@ -79,11 +79,11 @@ static void add_terms(const session_nodes *of, int function, double size, double
     for (int i = 0; i < POWERS * POWERS * POWERS; i++) {
         const int q[3] = {i % POWERS, i / POWERS % POWERS, i / POWERS / POWERS}, sum = q[0] + q[1] + q[2];
         if (sum > 1 && is_in_polynomial_space(of, q))
-            out->weights[function][q[2]][q[1]][q[0]] += size * random_number() * pow(fall, sum - 2);
+            out->weights[function][q[2]][q[1]][q[0]] += size * draw_random_number() * pow(fall, sum - 2);
     }
 }
 
-static void add_linear(int function, const double slopes[3], cell_functions *out)
+static void add_linear_terms(int function, const double slopes[3], cell_functions *out)
 {
     out->weights[function][0][0][1] += slopes[0];
     out->weights[function][0][1][0] += slopes[1];
@@ -153,7 +153,7 @@ static void choose_point_in_piece(int type, double out[3])
     const bool is_flat = type == GRID_TRIANGLE || type == GRID_QUAD;
     double sum;
     do {
-        for (int a = 0; a < 3; a++) out[a] = is_flat && a == 2 ? 0 : 0.5 + 0.5 * random_number();
+        for (int a = 0; a < 3; a++) out[a] = is_flat && a == 2 ? 0 : 0.5 + 0.5 * draw_random_number();
         sum = type == GRID_HEX || type == GRID_QUAD ? 0 : out[0] + out[1] + (type == GRID_TET ? out[2] : 0);
     } while (sum > 1);
 }
@@ -219,7 +219,7 @@ static session_cell_bound compute_smallest_bound(const bound_kind *kind, const c
 }
 
 /* Returns the largest distance between the positions that pieces and the polynomial assign to random points. */
-static double largest_shift(const cell_functions *functions, const cut_cell *of, int points)
+static double find_largest_position_error(const cell_functions *functions, const cut_cell *of, int points)
 {
     double worst = 0;
     const int *corners = of->pattern.piece_positions;
@@ -247,7 +247,7 @@ static void check_positions(const bound_kind *kind, double fall, double ratios[2
     for (int parts = 1; parts <= MOST_PARTS && parts * of->order <= 16; parts++) {
         cut_cell pieces;
         cut_cell_into_pieces(kind, of, parts, &pieces);
-        const double shift = largest_shift(of, &pieces, 8) * parts * parts;
+        const double shift = find_largest_position_error(of, &pieces, 8) * parts * parts;
         if (!(shift <= bound.position_error * (1 + 1e-9)))
             fprintf(stderr, "%s, %d parts: positions are off by %g, and the bound is %g\n", kind->name, parts, shift,
                     bound.position_error);
@@ -285,7 +285,7 @@ static int list_kinds(bound_kind *out)
         {INSITU_QUADRATIC_QUAD, 8}, {INSITU_QUADRATIC_HEX, 20}, {INSITU_QUADRATIC_WEDGE, 15}};
     for (int i = 0; i < 3; i++, count++) {
         out[count] = (bound_kind){.name = "serendipity", .order = INSITU_ORDER_VTK};
-        assert_true(session_nodes_of(serendipity[i][0], serendipity[i][1], &out[count].nodes));
+        assert_true(session_describe_nodes(serendipity[i][0], serendipity[i][1], &out[count].nodes));
     }
     return count;
 }
@@ -331,7 +331,8 @@ static double find_gradient(const cell_functions *of, const double at[3], double
 
 /* Moves a point of the cell along the field's gradient to the position at which the polynomial has the value. Returns
  * the distance of this position from `from`, or infinity if the iteration does not converge. */
-static double distance_to_surface(const cell_functions *of, const double start[3], double value, const double from[3])
+static double compute_distance_to_surface(const cell_functions *of, const double start[3], double value,
+                                          const double from[3])
 {
     double at[3] = {start[0], start[1], start[2]}, rest = INFINITY, square = 0;
     for (int step = 0; step < 60 && fabs(rest) > 1e-13; step++) {
@@ -365,7 +366,7 @@ static bool find_crossing(const cut_cell *of, int type, const int *corners, doub
 
 /* Returns the largest distance between the isosurface of the pieces and that of the polynomial, over random points.
  * Returns -1 if there are no points. */
-static double largest_distance(const cell_functions *functions, const cut_cell *of, double value)
+static double find_largest_surface_distance(const cell_functions *functions, const cut_cell *of, double value)
 {
     double worst = -1;
     const int *corners = of->pattern.piece_positions;
@@ -374,7 +375,7 @@ static double largest_distance(const cell_functions *functions, const cut_cell *
         for (int n = 0; n < 12; n++) {
             piece_point point;
             if (find_crossing(of, type, corners, value, &point))
-                worst = fmax(worst, distance_to_surface(functions, point.at, value, point.tuple));
+                worst = fmax(worst, compute_distance_to_surface(functions, point.at, value, point.tuple));
         }
         corners += grid_type_vertices(type);
     }
@@ -389,7 +390,8 @@ typedef struct surface_tally {
 
 static void check_surface(const bound_kind *kind, const cell_functions *of, surface_tally *tally)
 {
-    const double inside[3] = {0.2 + 0.1 * random_number(), 0.3 + 0.2 * random_number(), 0.25 + 0.2 * random_number()};
+    const double inside[3] = {0.2 + 0.1 * draw_random_number(), 0.3 + 0.2 * draw_random_number(),
+                              0.25 + 0.2 * draw_random_number()};
     const double value = evaluate_function(of, 3, inside, -1);
     const session_cell_bound bound = compute_smallest_bound(kind, of, &(session_isovalues){1, &value, 0});
     assert_true(bound.is_crossed);
@@ -399,7 +401,7 @@ static void check_surface(const bound_kind *kind, const cell_functions *of, surf
     for (int parts = 1; parts <= MOST_PARTS && is_bounded && parts * of->order <= 12; parts++) {
         cut_cell pieces;
         cut_cell_into_pieces(kind, of, parts, &pieces);
-        const double distance = largest_distance(of, &pieces, value) * parts * parts;
+        const double distance = find_largest_surface_distance(of, &pieces, value) * parts * parts;
         if (!(distance <= bound.surface_error))
             fprintf(stderr, "%s of order %d, %d parts: the surface is off by %g, and the bound is %g\n", kind->name,
                     of->order, parts, distance, bound.surface_error);
@@ -416,13 +418,13 @@ static void make_surface(const bound_kind *kind, double curved, double fall, cel
     *out = (cell_functions){.order = kind->nodes.order};
     for (int f = 0; f < 3; f++) {
         double slopes[3];
-        for (int a = 0; a < 3; a++) slopes[a] = (f == a) + 0.2 * random_number();
+        for (int a = 0; a < 3; a++) slopes[a] = (f == a) + 0.2 * draw_random_number();
         if (f == 0) slopes[0] *= 10;
-        add_linear(f, slopes, out);
+        add_linear_terms(f, slopes, out);
         add_terms(&kind->nodes, f, 0.05, fall, out);
     }
-    const double slopes[3] = {random_number(), random_number(), random_number()};
-    add_linear(3, slopes, out);
+    const double slopes[3] = {draw_random_number(), draw_random_number(), draw_random_number()};
+    add_linear_terms(3, slopes, out);
     add_terms(&kind->nodes, 3, curved, fall, out);
 }
 
@@ -460,7 +462,7 @@ static void crossings_between_nodes_are_found(void **state)
     const bound_kind kind = {"hex", session_complete_nodes(GRID_HEX, 2), INSITU_ORDER_LEXICOGRAPHIC, false};
     cell_functions *of = calloc(1, sizeof *of);
     of->order = 2;
-    for (int f = 0; f < 3; f++) add_linear(f, (const double[]){f == 0, f == 1, f == 2}, of);
+    for (int f = 0; f < 3; f++) add_linear_terms(f, (const double[]){f == 0, f == 1, f == 2}, of);
     of->weights[3][0][0][2] = 1; /* (x - 0.3)^2 */
     of->weights[3][0][0][1] = -0.6;
     of->weights[3][0][0][0] = 0.09;
@@ -481,7 +483,7 @@ static void linear_cells_have_no_error(void **state)
     cell_functions *of = malloc(sizeof *of);
     for (int k = 0; k < count; k++) {
         *of = (cell_functions){.order = kinds[k].nodes.order};
-        for (int f = 0; f < 4; f++) add_linear(f, (const double[]){f == 0, f == 1 || f == 3, f == 2}, of);
+        for (int f = 0; f < 4; f++) add_linear_terms(f, (const double[]){f == 0, f == 1 || f == 3, f == 2}, of);
         const double value = 0.25;
         const session_cell_bound bound = compute_smallest_bound(&kinds[k], of, &(session_isovalues){1, &value, 0});
         assert_true(bound.is_crossed && bound.surface_error < 1e-11);
@@ -496,7 +498,7 @@ static void cells_with_infinite_values_have_no_bound(void **state)
     cell_functions *of = calloc(1, sizeof *of);
     const double value = 0.25;
     of->order = 2;
-    for (int f = 0; f < 4; f++) add_linear(f, (const double[]){f == 0 || f == 3, f == 1, f == 2}, of);
+    for (int f = 0; f < 4; f++) add_linear_terms(f, (const double[]){f == 0 || f == 3, f == 1, f == 2}, of);
     assert_true(compute_smallest_bound(&kind, of, &(session_isovalues){1, &value, 0}).is_crossed);
     of->weights[3][0][0][0] = NAN;
     assert_false(compute_smallest_bound(&kind, of, &(session_isovalues){1, &value, 0}).is_crossed);

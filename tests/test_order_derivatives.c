@@ -136,7 +136,7 @@ static void check_kind(const order_kind *kind, bool is_lobatto)
     for (int64_t cell = 0; cell < mesh.cell_count; cell++) {
         for (int n = 0; n < mesh.nodes; n++)
             memcpy(places[n], mesh.coordinates + 3 * mesh.connectivity[cell * mesh.nodes + n], sizeof places[n]);
-        const session_derivatives *d = session_derivatives_of(&polynomials, cell, places[0], 3);
+        const session_derivatives *d = session_find_derivatives_of_cell(&polynomials, cell, places[0], 3);
         assert_int_equal(d->axis_count, strstr(kind->name, "pyramid") ? 0 : 3);
         if (d->axis_count)
             check_derivatives(kind->name, &polynomials.rows.kinds[0].nodes, d, (const double(*)[3])places, 8);
@@ -179,13 +179,13 @@ static void shells_have_their_derivatives(void **state)
                     places[count][0] = (double)i / p;
                     places[count][1] = (double)j / p;
                 }
-            assert_true(session_nodes_of(is_quad ? INSITU_LAGRANGE_QUAD : INSITU_LAGRANGE_TRIANGLE, count, &of));
+            assert_true(session_describe_nodes(is_quad ? INSITU_LAGRANGE_QUAD : INSITU_LAGRANGE_TRIANGLE, count, &of));
             assert_true(session_make_derivatives(&of, INSITU_ORDER_LEXICOGRAPHIC, false, 1, &d));
             assert_int_equal(d.axis_count, 2);
             check_derivatives("shell", &of, &d, (const double(*)[3])places, 1);
             session_drop_derivatives(&d);
         }
-    assert_true(session_nodes_of(INSITU_QUADRATIC_QUAD, 8, &of));
+    assert_true(session_describe_nodes(INSITU_QUADRATIC_QUAD, 8, &of));
     assert_true(session_make_derivatives(&of, INSITU_ORDER_VTK, false, 1, &d));
     check_derivatives("quad of 8 nodes", &of, &d, of8, 1);
     session_drop_derivatives(&d);

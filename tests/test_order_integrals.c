@@ -80,7 +80,7 @@ static bool is_in_polynomial_space(const session_nodes *of, const int q[3])
     return of->is_complete || (q[0] == 2) + (q[1] == 2) + (q[2] == 2) <= 1;
 }
 
-static double random_number(unsigned *seed)
+static double draw_random_number(unsigned *seed)
 {
     *seed = *seed * 1664525u + 1013904223u;
     return (*seed >> 8) * 0x1p-23 - 1;
@@ -96,14 +96,14 @@ static void make_polynomials(const session_nodes *of, double bend, unsigned seed
         const int q[3] = {n % size, n / size % size, n / size / size}, all = q[0] + q[1] + q[2];
         if (!is_in_polynomial_space(of, q)) continue;
         for (int f = 0; f < FUNCTIONS; f++) {
-            const double random = random_number(&seed);
+            const double random = draw_random_number(&seed);
             out->factors[out->count][f] = f < 3 ? bend * random / ((1 + all) * (1 + all)) + (all == 1 && q[f]) : random;
         }
         memcpy(out->powers[out->count++], q, sizeof q);
     }
 }
 
-static double integer_power(double x, int power)
+static double compute_integer_power(double x, int power)
 {
     double out = 1;
     for (int n = 0; n < power; n++) out *= x;
@@ -114,8 +114,8 @@ static double evaluate_term(const int powers[3], const double at[3], int derived
 {
     double value = 1;
     for (int a = 0; a < 3; a++)
-        value *= a != derived ? integer_power(at[a], powers[a])
-                 : powers[a]  ? powers[a] * integer_power(at[a], powers[a] - 1)
+        value *= a != derived ? compute_integer_power(at[a], powers[a])
+                 : powers[a]  ? powers[a] * compute_integer_power(at[a], powers[a] - 1)
                               : 0;
     return value;
 }
@@ -229,7 +229,7 @@ static void cell_integrals_match_their_polynomials(void **state)
         session_nodes nodes;
         if (strstr(kind->name, "pyramid")) continue;
         order_mesh_create(kind, 1, 0, zero_field, 0, 1, &mesh);
-        assert_true(session_nodes_of((int)kind->type, mesh.nodes, &nodes));
+        assert_true(session_describe_nodes((int)kind->type, mesh.nodes, &nodes));
         double *places = malloc((size_t)(mesh.cell_count * mesh.nodes) * 3 * sizeof *places);
         for (int64_t i = 0; i < mesh.cell_count * mesh.nodes; i++)
             memcpy(places + 3 * i, mesh.coordinates + 3 * mesh.connectivity[i], 3 * sizeof *places);

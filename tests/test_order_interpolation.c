@@ -107,7 +107,7 @@ static void check_kind(const order_kind *kind, int parts, bool is_lobatto)
     double(*places)[3] = malloc(200 * sizeof *places);
     order_mesh_create(kind, 1, 0, zero_field, 0, 1, &mesh);
     if (is_lobatto) move_nodes_to_lobatto_points(&mesh);
-    assert_true(session_nodes_of((int)kind->type, mesh.nodes, &nodes));
+    assert_true(session_describe_nodes((int)kind->type, mesh.nodes, &nodes));
     if (kind->order == 1) nodes.order = 1;
     assert_true(session_make_interpolation(&nodes, kind->layout, parts, is_lobatto, &of));
     for (int64_t cell = 0; cell < mesh.cell_count; cell++) {
@@ -178,7 +178,7 @@ static bool is_on_face(int type, int p, const int at[3])
     return at_first || at[2] == p || at[0] + at[1] == p;
 }
 
-static double random_number(void)
+static double draw_random_number(void)
 {
     return rand() / (RAND_MAX + 1.0);
 }
@@ -197,7 +197,7 @@ static void check_rotated_cell(const session_interpolation *of, insitu_vertex_or
         const int from = session_node_index(&of->of, order, at[0], at[1], at[2]);
         const int to = session_node_index(&of->of, order, turned[0], turned[1], turned[2]);
         if (from >= of->of.count) continue;
-        for (int c = 0; c < 4; c++) tuples[0][from][c] = tuples[1][to][c] = random_number();
+        for (int c = 0; c < 4; c++) tuples[0][from][c] = tuples[1][to][c] = draw_random_number();
     }
     for (int side = 0; side < 2; side++) {
         double corners[8][3];
@@ -227,7 +227,7 @@ static void rotated_cells_have_the_same_bits_on_faces(void **state)
         session_nodes nodes;
         session_interpolation of;
         if (is_pyramid(kind) || kind->order == 1) continue;
-        assert_true(session_nodes_of((int)kind->type, session_node_count((int)kind->type, kind->order), &nodes));
+        assert_true(session_describe_nodes((int)kind->type, session_node_count((int)kind->type, kind->order), &nodes));
         for (int way = 0; way < 4; way++) {
             const bool is_lobatto = way % 2;
             assert_true(session_make_interpolation(&nodes, kind->layout, 2 + way / 2, is_lobatto, &of));
@@ -247,7 +247,7 @@ static void constants_are_exact(void **state)
         session_nodes nodes;
         session_interpolation of;
         if (kind->order == 1) continue;
-        assert_true(session_nodes_of((int)kind->type, session_node_count((int)kind->type, kind->order), &nodes));
+        assert_true(session_describe_nodes((int)kind->type, session_node_count((int)kind->type, kind->order), &nodes));
         assert_true(session_make_interpolation(&nodes, kind->layout, 3, false, &of));
         for (int n = 0; n < nodes.count; n++) values[n] = 0.1;
         session_interpolate(&of, (const double(*)[3])corners, 1, values, room, fine);

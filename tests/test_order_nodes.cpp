@@ -84,7 +84,7 @@ void lagrange_nodes_match_vtk(void **)
         for (int p = 1; p <= 6; p++) {
             session_nodes of;
             const int64_t count = session_node_count(type, p);
-            assert_true(session_nodes_of(type, count, &of));
+            assert_true(session_describe_nodes(type, count, &of));
             assert_true(of.order == p && of.count == count && of.is_complete);
             const auto cell = make_cell(type, count);
             const double *theirs = cell->GetParametricCoords();
@@ -102,7 +102,7 @@ void quadratic_nodes_match_vtk(void **)
 {
     for (const int type : {22, 24, 28, 29, 32}) {
         session_nodes of;
-        assert_true(session_nodes_of(type, session_node_count(type, 0), &of));
+        assert_true(session_describe_nodes(type, session_node_count(type, 0), &of));
         vtkNew<vtkGenericCell> cell;
         cell->SetCellType(type);
         assert_int_equal(cell->GetNumberOfPoints(), of.count);
@@ -117,7 +117,7 @@ void old_hexes_have_two_edges_swapped(void **)
 {
     for (int p = 2; p <= 5; p++) {
         session_nodes of;
-        assert_true(session_nodes_of(INSITU_LAGRANGE_HEX, session_node_count(INSITU_LAGRANGE_HEX, p), &of));
+        assert_true(session_describe_nodes(INSITU_LAGRANGE_HEX, session_node_count(INSITU_LAGRANGE_HEX, p), &of));
         const int r = p - 1, first = 8 + 10 * r;
         for_each_node(of, [&](int i, int j, int k) {
             const int now = session_node_index(&of, INSITU_ORDER_VTK, i, j, k);
@@ -137,8 +137,8 @@ void node_positions_are_permutations(void **)
         for (const insitu_vertex_order order : orders)
             for (int p = 1; p <= 4; p++) {
                 session_nodes of;
-                assert_true(session_nodes_of(type, session_node_count(type, p), &of));
-                if (session_order_refused(&of, order)) continue;
+                assert_true(session_describe_nodes(type, session_node_count(type, p), &of));
+                if (session_explain_refused_order(&of, order)) continue;
                 std::vector<int> seen(static_cast<size_t>(of.count));
                 for_each_node(of, [&](int i, int j, int k) {
                     const int place = session_node_index(&of, order, i, j, k);

@@ -72,7 +72,7 @@ static int64_t list_faces(const grid *g, face_key *keys)
     for (int64_t cell = 0; cell < g->cell_count; cell++) {
         const session_cell_faces faces = session_faces_of_cell(g, cell);
         for (int64_t f = 0; f < faces.count; f++) {
-            const session_face_loop loop = session_face_of(&faces, f);
+            const session_face_loop loop = session_find_face_loop(&faces, f);
             keys[count] = (face_key){{-1, -1, -1, -1}};
             for (int64_t i = 0; i < loop.size; i++) keys[count].vertices[i] = session_face_vertex(&loop, i);
             qsort(keys[count++].vertices, 4, sizeof(int64_t), compare_numbers);

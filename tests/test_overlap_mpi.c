@@ -199,7 +199,7 @@ static void assert_everywhere(bool is_well)
  * whether a pixel with a transparent overlap is drawn twice depends on the partition, and the second drawing cuts rays
  * at other positions. Both pictures are within max_error of the integral; for a max_error of 1e-3, the measured
  * difference was 2.7e-6. */
-static bool same_images(const image *whole, const image *other, const drawing *d, const char *what)
+static bool are_same_images_to_rounding(const image *whole, const image *other, const drawing *d, const char *what)
 {
     int depths = 0;
     double colour = 0;
@@ -228,7 +228,7 @@ static bool is_doubtful(const reference_ray *ray)
 /* Compares a picture with the brute-force renderer. The usual run compares every fifth pixel. Overlapping cells have
  * many surfaces and faces in a pixel, so up to a tenth of the rays may be doubtful; most of these are map_failed or
  * ambiguous. */
-static bool is_as_counted(const test_mesh *mesh, const drawing *d, const image *drawn, const char *what)
+static bool matches_counting_reference(const test_mesh *mesh, const drawing *d, const image *drawn, const char *what)
 {
     staged s;
     set_up_frame(&s, mesh, d);
@@ -259,7 +259,7 @@ static bool is_as_counted(const test_mesh *mesh, const drawing *d, const image *
 /* Compares every seventeenth pixel (in the usual run every 151st) with the adaptive integral. The error must not exceed
  * max_error in any of these pixels, except where the reference is doubtful. The reference is computed with a tolerance
  * of a thousandth of max_error. */
-static bool is_as_integrated(const test_mesh *mesh, const drawing *d, const image *drawn, const char *what)
+static bool matches_integral(const test_mesh *mesh, const drawing *d, const image *drawn, const char *what)
 {
     staged s;
     set_up_frame(&s, mesh, d);
@@ -315,11 +315,11 @@ static void compare_partitions(const test_mesh *mesh, const drawing *d, bool wit
         /* Segments of several volumes are drawn with separate fragments in the first drawing already. No overlaps are
          * reported then. */
         const bool is_found = (overlaps >= FEWEST && alone >= FEWEST) || (d->max_error > 0 && d->scene == TWO_VOLUMES);
-        good = is_found && (rank_count == 1 || same_images(&whole, &ours, d, what));
+        good = is_found && (rank_count == 1 || are_same_images_to_rounding(&whole, &ours, d, what));
         /* The reference is slow. It is compared on one rank only, since the picture is the same on any number of
          * ranks. */
         if (with_reference && (rank_count == 1 || test_is_long_run()))
-            good = (d->max_error > 0 ? is_as_integrated : is_as_counted)(mesh, d, &ours, what) && good;
+            good = (d->max_error > 0 ? matches_integral : matches_counting_reference)(mesh, d, &ours, what) && good;
         if (rank_count > 1) free_image(&whole);
     }
     free_image(&ours);
@@ -416,7 +416,7 @@ static void draw_in_passes(const test_mesh *mesh, drawing d, int64_t fragment_li
 
 /* Checks pictures drawn in turns. The number of fragments of sampled rays is that estimated before the first turn;
  * segments make far fewer. */
-static void number_of_passes_changes_no_bit(void **state)
+static void any_number_of_passes_gives_same_bits(void **state)
 {
     (void)state;
     test_mesh mesh;
@@ -508,7 +508,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(segments_of_nested_lattices_match_integration),
         cmocka_unit_test(segments_of_two_volumes_match_integration),
         cmocka_unit_test(tangled_lattices_are_same_on_any_ranks),
-        cmocka_unit_test(number_of_passes_changes_no_bit),
+        cmocka_unit_test(any_number_of_passes_gives_same_bits),
         cmocka_unit_test(differences_among_overlapping_cells_are_the_same_bits),
         cmocka_unit_test(conforming_meshes_have_no_overlap),
         cmocka_unit_test(a_cell_does_not_overlap_itself),

@@ -80,7 +80,7 @@ static void draw_surface(const test_mesh *mesh, double cell_size, const double *
 
 /* Returns whether the ray passes so near to an edge, or its value at a face of a tet is so near to the isovalue, that
  * the result may depend on rounding. Computed in double. */
-static bool is_in_band(const reference_scene *scene, int x, int y)
+static bool may_depend_on_rounding(const reference_scene *scene, int x, int y)
 {
     reference_ray ray;
     reference_trace(scene, x, y, fixture_background, &ray);
@@ -93,7 +93,7 @@ static void compare_pixel(const reference_scene *scene, int x, int y, double own
     const bool has_own = isfinite(own), has_tets = isfinite(tets);
     t->pixels += has_tets;
     if (has_own == has_tets && (!has_own || fabs(own - tets) <= allowed)) return;
-    if (is_in_band(scene, x, y))
+    if (may_depend_on_rounding(scene, x, y))
         t->in_band++;
     else if (has_tets)
         t->missing++;
@@ -112,8 +112,9 @@ own_tets_tally compare_with_split_tets(test_mesh *polyhedra, double cell_size, d
     draw_surface(&tets, cell_size, &value, width, height, &parts, &other);
     reference_scene *scene = reference_create(&parts.job);
     for (int64_t i = 0; i < (int64_t)width * height; i++)
-        compare_pixel(scene, (int)(i % width), (int)(i / width), fixture_scene_depth(&whole, own.picture.depth[i]),
-                      fixture_scene_depth(&parts, other.picture.depth[i]), 1e-3 * cell_size, &t);
+        compare_pixel(scene, (int)(i % width), (int)(i / width),
+                      fixture_compute_scene_depth(&whole, own.picture.depth[i]),
+                      fixture_compute_scene_depth(&parts, other.picture.depth[i]), 1e-3 * cell_size, &t);
     reference_free(scene);
     drawn_frame_free(&own);
     drawn_frame_free(&other);

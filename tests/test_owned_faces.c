@@ -43,7 +43,7 @@ static void make_narrow(owned *o, int64_t faces, int32_t base)
 
 /* Makes the arrays for FORM_APART. In the separate list of boundary faces, one more face at the end belongs to no cell
  * and has no vertices. */
-static void make_apart(owned *o, int64_t cells, int32_t base)
+static void make_separate_boundary(owned *o, int64_t cells, int32_t base)
 {
     for (int64_t face = 0; face < o->middle; face++) {
         const int32_t halo = (int32_t)(cells + face % OWNED_HALO) + base, own = (int32_t)o->owner[face] + base;
@@ -59,7 +59,7 @@ static void make_apart(owned *o, int64_t cells, int32_t base)
     o->apart_owner[o->faces - o->middle] = base - 1;
 }
 
-owned make_owned(const test_mesh *part, int32_t base)
+owned make_owned_faces(const test_mesh *part, int32_t base)
 {
     const int64_t faces = part->face_count, entries = part->face_connectivity_count;
     owned o = {.owner = test_allocate(faces, sizeof(int64_t)),
@@ -83,13 +83,13 @@ owned make_owned(const test_mesh *part, int32_t base)
         if (second[face] < 0) append_face(&o, part, face, at++, first[face], second[face]);
     o.middle = o.inner + (faces - o.inner) / 3;
     make_narrow(&o, faces, base);
-    make_apart(&o, part->cell_count, base);
+    make_separate_boundary(&o, part->cell_count, base);
     free(first);
     free(second);
     return o;
 }
 
-void free_owned(owned *o)
+void free_owned_faces(owned *o)
 {
     void *const arrays[] = {o->owner,      o->neighbour,      o->offsets,         o->vertices,
                             o->pairs,      o->narrow_offsets, o->narrow_vertices, o->lists,
@@ -98,7 +98,7 @@ void free_owned(owned *o)
     *o = (owned){0};
 }
 
-static void describe_apart(const owned *o, int base, insitu_mesh *mesh)
+static void describe_separate_boundary(const owned *o, int base, insitu_mesh *mesh)
 {
     const int64_t pair = 2 * sizeof(int32_t), first = o->offsets[o->middle];
     mesh->face_count = mesh->neighbour_count = o->middle;
@@ -114,7 +114,7 @@ static void describe_apart(const owned *o, int base, insitu_mesh *mesh)
     mesh->index_base = base;
 }
 
-void describe_owned(const owned *o, form which, int base, insitu_mesh *mesh)
+void describe_owned_faces(const owned *o, form which, int base, insitu_mesh *mesh)
 {
     const int64_t pair = 2 * sizeof(int32_t);
     mesh->cell_type = INSITU_POLYHEDRON;
@@ -133,7 +133,7 @@ void describe_owned(const owned *o, form which, int base, insitu_mesh *mesh)
         mesh->face_connectivity = (insitu_array){o->vertices, INSITU_INT64, 0};
         mesh->index_base = 0;
     }
-    if (which == FORM_APART) describe_apart(o, base, mesh);
+    if (which == FORM_APART) describe_separate_boundary(o, base, mesh);
     if (which != FORM_LISTS) return;
     mesh->face_connectivity_count = 0;
     mesh->face_offsets = mesh->face_connectivity = (insitu_array){0};

@@ -28,8 +28,8 @@ typedef struct owned {
 enum { OWNED_HALO = 5 }; /* number of halo cells */
 
 /* Makes the faces of a part that consists only of polyhedra. Indices in 4-byte arrays begin at base. */
-owned make_owned(const test_mesh *part, int32_t base);
-void free_owned(owned *o);
+owned make_owned_faces(const test_mesh *part, int32_t base);
+void free_owned_faces(owned *o);
 
 /* FORM_WIDE: 8-byte elements, indices from 0, neighbours for inner faces only. FORM_PAIRS: 4-byte elements, indices
  * from base, owner and neighbour alternating, for all faces; the neighbour is base - 1 at the boundary. FORM_LISTS:
@@ -38,6 +38,6 @@ void free_owned(owned *o);
 typedef enum form { FORM_WIDE, FORM_PAIRS, FORM_LISTS, FORM_APART, FORM_COUNT } form;
 
 /* Describes the mesh by its faces in the given form. The faces replace the cells' connectivity. */
-void describe_owned(const owned *o, form which, int base, insitu_mesh *mesh);
+void describe_owned_faces(const owned *o, form which, int base, insitu_mesh *mesh);
 
 #endif

@@ -83,7 +83,7 @@ static void free_image(image *picture)
     free(picture->depth);
 }
 
-static bool same_images(const image *whole, const image *other, const scene *scene, const char *what)
+static bool are_same_images_to_rounding(const image *whole, const image *other, const scene *scene, const char *what)
 {
     int depths = 0;
     double colour = 0;
@@ -122,7 +122,7 @@ static void compare_with_whole(const test_mesh *mesh, const int *owners, bool gh
     draw_mesh(&part, scene, MPI_COMM_WORLD, rank_count == 1, &ours);
     if (my_rank == 0) {
         draw_mesh(mesh, scene, MPI_COMM_SELF, true, &whole);
-        good = same_images(&whole, &ours, scene, what);
+        good = are_same_images_to_rounding(&whole, &ours, scene, what);
         free_image(&whole);
     }
     MPI_Bcast(&good, 1, MPI_INT, 0, MPI_COMM_WORLD);

@@ -138,16 +138,16 @@ static void cut_polygon(const polygon *p, cut *out)
     free(room);
 }
 
-static double triangle_area(const polygon *p, const int *t)
+static double compute_triangle_area(const polygon *p, const int *t)
 {
     const double *a = p->plane[t[0]], *b = p->plane[t[1]], *c = p->plane[t[2]];
     return ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])) / 2;
 }
 
-static double polygon_area(const polygon *p)
+static double compute_polygon_area(const polygon *p)
 {
     double sum = 0;
-    for (int i = 1; i + 1 < p->count; i++) sum += triangle_area(p, (const int[]){0, i, i + 1});
+    for (int i = 1; i + 1 < p->count; i++) sum += compute_triangle_area(p, (const int[]){0, i, i + 1});
     return sum;
 }
 
@@ -201,9 +201,9 @@ static void polygons_are_covered_once(void **state)
             make_polygon(which, &p);
             embed_in_space(which, bent, &p);
             cut_polygon(&p, &c);
-            for (int i = 0; i < c.count; i++) sum += triangle_area(&p, c.triangles[i]);
+            for (int i = 0; i < c.count; i++) sum += compute_triangle_area(&p, c.triangles[i]);
             /* tolerance: roundings of numbers of at most 60 */
-            assert_true(fabs(sum - polygon_area(&p)) <= 1e-12 * p.count);
+            assert_true(fabs(sum - compute_polygon_area(&p)) <= 1e-12 * p.count);
             /* Bent polygons are triangulated along another normal than the plane's. Along the plane's normal, a thin
              * triangle may be reversed. */
             if (!bent) assert_covered_once(&p, &c, which);
@@ -224,7 +224,7 @@ static int list_sorted_triangles(const polygon *p, const cut *c, double (*out)[9
 {
     int count = 0;
     for (int i = 0; i < c->count; i++) {
-        if (fabs(triangle_area(p, c->triangles[i])) < 1e-12) continue;
+        if (fabs(compute_triangle_area(p, c->triangles[i])) < 1e-12) continue;
         double *t = out[count++];
         for (int k = 0; k < 3; k++) memcpy(t + 3 * k, p->corners[c->triangles[i][k]], 3 * sizeof *t);
         qsort(t, 3, 3 * sizeof *t, compare_triangles);

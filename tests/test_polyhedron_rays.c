@@ -79,7 +79,7 @@ static double evaluate_linear(const linear *f, const double p[3])
 }
 
 /* Makes the linear function that is 1 at apex and 0 on the triangle `base`. Returns false if the tet has no volume. */
-static bool make_weight(const double *apex, const double *const base[3], linear *out)
+static bool make_barycentric_function(const double *apex, const double *const base[3], linear *out)
 {
     double d[3][3], volume = 0;
     for (int a = 0; a < 3; a++) {
@@ -110,7 +110,7 @@ static bool make_tet(const subject *s, int triangle, double mean, tet *out)
     for (int i = 0; i < 4; i++) {
         const double *const base[3] = {corners[(i + 1) % 4], corners[(i + 2) % 4], corners[(i + 3) % 4]};
         linear *w = &out->inside[i];
-        if (!make_weight(corners[i], base, w)) return false;
+        if (!make_barycentric_function(corners[i], base, w)) return false;
         out->value.at_origin += f[i] * w->at_origin;
         for (int a = 0; a < 3; a++) out->value.gradient[a] += f[i] * w->gradient[a];
     }
@@ -377,7 +377,7 @@ static void verify_ray(const verify *j, const reference_line *line, ray_hits *hi
     int next = 0;
     bool goes_on = true;
     if (!count && !hits->count) return;
-    if (reference_edge_distance(&j->s->cell, line) < j->place) {
+    if (reference_compute_edge_distance(&j->s->cell, line) < j->place) {
         j->t->at_edges++;
         return;
     }
@@ -396,7 +396,7 @@ static void list_hits(const render_fixture *f, const drawn_frame *drawn, int64_t
 {
     *out = (ray_hits){.count = 0};
     for (int64_t i = drawn->first[pixel]; i < drawn->first[pixel + 1] && out->count < REFERENCE_MAX_HITS; i++)
-        out->z[out->count++] = fixture_scene_depth(f, drawn->list.items[i].t_in);
+        out->z[out->count++] = fixture_compute_scene_depth(f, drawn->list.items[i].t_in);
 }
 
 /* ---- frames ---- */
@@ -477,7 +477,7 @@ static void random_polyhedra_miss_no_crossing(void **state)
             verify_cell(&mesh, seed, &t);
             test_mesh_free(&mesh);
         }
-        assert_none_missed(test_random_name(kind), &t);
+        assert_none_missed(test_random_polyhedron_name(kind), &t);
     }
 }
 

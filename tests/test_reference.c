@@ -44,7 +44,7 @@ static void load_cell(const test_mesh *mesh, int64_t index, reference_cell *cell
     if (cell->type == GRID_POLYHEDRON) reference_polyhedron_setup(cell);
 }
 
-static reference_line random_line(uint64_t index)
+static reference_line make_random_line(uint64_t index)
 {
     return (reference_line){{0.9 * test_uniform(index, 11) - 0.45, 0.9 * test_uniform(index, 12) - 0.45},
                             {test_uniform(index, 13) - 0.5, test_uniform(index, 14) - 0.5}};
@@ -60,7 +60,7 @@ static void crossings_of_unit_hex_match_slab_test(void **state)
     test_mesh_make_single_cell(TEST_UNIT_HEX, test_linear_field, &mesh);
     load_cell(&mesh, 0, &cell, values);
     for (uint64_t i = 0; i < 2000; i++) {
-        const reference_line line = random_line(i);
+        const reference_line line = make_random_line(i);
         reference_crossing crossings[REFERENCE_MAX_CROSSINGS];
         double low = -0.5, high = 0.5;
         for (int axis = 0; axis < 2; axis++) {
@@ -69,7 +69,7 @@ static void crossings_of_unit_hex_match_slab_test(void **state)
             low = fmax(low, fmin(a, b));
             high = fmin(high, fmax(a, b));
         }
-        const int count = reference_crossings(&cell, &line, crossings);
+        const int count = reference_find_crossings(&cell, &line, crossings);
         assert_int_equal(count, low < high ? 2 : 0);
         if (!count) continue;
         met++;
@@ -84,7 +84,7 @@ static void crossings_of_unit_hex_match_slab_test(void **state)
  * vertices. */
 static reference_line make_aimed_line(const reference_cell *cell, uint64_t i)
 {
-    reference_line line = random_line(i);
+    reference_line line = make_random_line(i);
     if (i % 3 == 0) return line;
     const double *a = cell->position[i % (uint64_t)cell->count], *b = cell->position[(i / 3) % (uint64_t)cell->count];
     const double along = i % 3 == 1 ? 0 : 0.5;
@@ -106,7 +106,7 @@ static void crossings_of_every_shape_are_even(void **state)
         for (uint64_t i = 0; i < 3000; i++) {
             const reference_line line = make_aimed_line(&cell, i);
             reference_crossing crossings[REFERENCE_MAX_CROSSINGS];
-            assert_int_equal(reference_crossings(&cell, &line, crossings) % 2, 0);
+            assert_int_equal(reference_find_crossings(&cell, &line, crossings) % 2, 0);
         }
         test_mesh_free(&mesh);
     }
@@ -121,7 +121,7 @@ static void intervals_of_lattices_tile_the_ray(void **state)
         test_mesh mesh;
         test_mesh_make_lattice(kind, 4, 0.2, test_linear_field, &mesh);
         for (uint64_t i = 0; i < 40; i++) {
-            reference_line line = random_line(i);
+            reference_line line = make_random_line(i);
             if (i % 4 == 0)
                 line = (reference_line){{0.5 * (double)(i / 16) - 0.5, 0}, {0, 0}}; /* along planes of the lattice */
             double length = 0, low = 0, high = 0;
@@ -130,7 +130,7 @@ static void intervals_of_lattices_tile_the_ray(void **state)
                 double values[REFERENCE_MAX_VERTICES];
                 reference_crossing c[REFERENCE_MAX_CROSSINGS];
                 load_cell(&mesh, index, &cell, values);
-                const int count = reference_crossings(&cell, &line, c);
+                const int count = reference_find_crossings(&cell, &line, c);
                 for (int k = 0; k + 1 < count; k += 2) {
                     length += c[k + 1].z - c[k].z;
                     low = fmin(low, c[k].z);
@@ -294,13 +294,13 @@ static void face_values_are_continuous_with_the_interior(void **state)
         test_mesh_make_single_cell(shapes[s], test_wave_field, &mesh);
         load_cell(&mesh, 0, &cell, values);
         for (uint64_t i = 0; i < 500; i++) {
-            const reference_line line = random_line(i);
+            const reference_line line = make_random_line(i);
             reference_crossing c[REFERENCE_MAX_CROSSINGS];
-            const int count = reference_crossings(&cell, &line, c);
+            const int count = reference_find_crossings(&cell, &line, c);
             for (int k = 0; k < count; k++) {
                 double value;
                 bool is_folded;
-                const double face = reference_face_value(&cell, &line, &c[k], values, &is_folded);
+                const double face = reference_compute_face_value(&cell, &line, &c[k], values, &is_folded);
                 const double point[3] = {line.base[0] + line.slope[0] * c[k].z, line.base[1] + line.slope[1] * c[k].z,
                                          c[k].z};
                 assert_true(reference_interpolate(&cell, point, values, &value, NULL));
@@ -364,7 +364,7 @@ static void set_up_frame(frame_fixture *f, test_mesh_kind kind, bool is_orthogra
 }
 
 /* Computes the interval of the ray inside the cube [-1, 1]^3. Returns whether the ray meets the cube. */
-static bool cube_interval(const double *base, const double *direction, double *low, double *high)
+static bool compute_cube_interval(const double *base, const double *direction, double *low, double *high)
 {
     *low = 0;
     *high = (double)INFINITY;
@@ -391,7 +391,7 @@ static void isosurface_of_a_linear_field_is_its_plane(void **state)
             render_camera_ray(&f.job.camera, pixel % 24, pixel / 24, base, d);
             reference_trace(scene, pixel % 24, pixel / 24, no_background, &ray);
             const double slope = 0.3 * d[0] - 0.7 * d[1] + 0.5 * d[2], z = (f.iso - test_linear_field(base)) / slope;
-            const bool inside = cube_interval(base, d, &low, &high) && z > low && z < high;
+            const bool inside = compute_cube_interval(base, d, &low, &high) && z > low && z < high;
             assert_int_equal(ray.hit_count, inside);
             if (!inside) continue;
             hits++;
@@ -430,7 +430,7 @@ static void constant_extinction_follows_beers_law(void **state)
             reference_ray ray;
             render_camera_ray(&f.job.camera, pixel % 24, pixel / 24, base, d);
             reference_trace(scene, pixel % 24, pixel / 24, no_background, &ray);
-            if (!cube_interval(base, d, &low, &high)) continue;
+            if (!compute_cube_interval(base, d, &low, &high)) continue;
             met++;
             const double length = pass % 2 ? 1 : sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]),
                          step = f.job.step / length;

@@ -186,7 +186,7 @@ static void volume_between_many_surfaces_matches_the_reference(void **state)
 
 /* ---- closed forms ---- */
 
-static double linear_field_along_ray(const render_camera *camera, int pixel, double *at_base)
+static double compute_linear_slope_on_ray(const render_camera *camera, int pixel, double *at_base)
 {
     double base[3], d[3];
     render_camera_ray(camera, pixel % camera->width, pixel / camera->width, base, d);
@@ -208,8 +208,8 @@ static void compare_plane(test_mesh_kind kind, fixture_camera camera, bool is_wa
     for (int64_t i = 0; i < drawn.list.count; i++) {
         const fragment *hit = &drawn.list.items[i];
         double at_base;
-        const double slope = linear_field_along_ray(&f.job.camera, (int)hit->pixel, &at_base);
-        const double value = at_base + slope * fixture_scene_depth(&f, hit->t_in);
+        const double slope = compute_linear_slope_on_ray(&f.job.camera, (int)hit->pixel, &at_base);
+        const double value = at_base + slope * fixture_compute_scene_depth(&f, hit->t_in);
         assert_true(fabs(value - linear_values[hit->kind - FRAGMENT_SURFACE]) < 2e-6 + 1e-6 * fabs(slope));
     }
     assert_true(drawn.list.count > 300);
@@ -284,7 +284,7 @@ static void lattice_lines_have_no_holes(void **state)
         for (int p = 0; p < 43 * 41; p++) {
             double base[3], d[3], at_base;
             render_camera_ray(&f.job.camera, p % 43, p / 43, base, d);
-            const double slope = linear_field_along_ray(&f.job.camera, p, &at_base), z = (0.1 - at_base) / slope;
+            const double slope = compute_linear_slope_on_ray(&f.job.camera, p, &at_base), z = (0.1 - at_base) / slope;
             const double x = base[0] + z * d[0];
             if (fabs(base[1]) >= 1 || fabs(base[2]) >= 1 || fabs(fabs(x) - 1) < 1e-5) continue;
             met++;

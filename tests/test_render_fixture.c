@@ -167,7 +167,7 @@ void fixture_set_function(render_fixture *f, fixture_function *function, uint64_
                                     .unit_distance = unit};
 }
 
-double fixture_scene_depth(const render_fixture *f, float t)
+double fixture_compute_scene_depth(const render_fixture *f, float t)
 {
     return (double)t / f->job.space.scale + f->job.space.depth_origin;
 }
@@ -276,7 +276,7 @@ void drawn_frame_assert_same(const drawn_frame *a, const drawn_frame *b)
         if (memcmp(a->picture.rgba + 4 * p, b->picture.rgba + 4 * p, 4 * sizeof(float))) print_difference(a, b, p);
 }
 
-double drawn_frame_difference(const drawn_frame *a, const drawn_frame *b)
+double drawn_frame_find_largest_difference(const drawn_frame *a, const drawn_frame *b)
 {
     const int64_t numbers = 4 * (int64_t)a->picture.width * a->picture.height;
     double worst = 0;
@@ -328,7 +328,7 @@ static void print_hits(const comparison *c, int x, int y, const reference_ray *r
         fprintf(stderr, "  reference: %.9g surface %d, conditioning %.3g, slowness %.3g\n", ray->hits[i].depth,
                 ray->hits[i].surface, ray->hits[i].conditioning, ray->hits[i].slowness);
     for (int i = 0; i < count; i++)
-        fprintf(stderr, "  kernels:   %.9g surface %u\n", fixture_scene_depth(c->f, hits[i]->t_in),
+        fprintf(stderr, "  kernels:   %.9g surface %u\n", fixture_compute_scene_depth(c->f, hits[i]->t_in),
                 hits[i]->kind - FRAGMENT_SURFACE);
 }
 
@@ -351,7 +351,7 @@ static void compare_hits(comparison *c, int x, int y, const reference_ray *ray)
          * the two ends of its interval, and a slowly varying field turns this into an error of depth. */
         const double grazing =
             fmax(fmax(5e-7 * ray->hits[i].conditioning, 1.2e-7 * ray->hits[i].slowness) - c->bounds->depth, 0);
-        const double off = fabs(fixture_scene_depth(c->f, hits[i]->t_in) - ray->hits[i].depth);
+        const double off = fabs(fixture_compute_scene_depth(c->f, hits[i]->t_in) - ray->hits[i].depth);
         c->outcome.total_depth += off / c->f->cell_size;
         worst = test_larger_error(worst, off / c->f->cell_size - grazing);
     }

@@ -72,7 +72,7 @@ typedef struct drawn_frame {
 extern const float fixture_background[4];
 
 /* Returns the depth of a fragment along the camera's axis in scene units. Its t is (depth - depth_origin) * scale. */
-double fixture_scene_depth(const render_fixture *f, float t);
+double fixture_compute_scene_depth(const render_fixture *f, float t);
 
 void fixture_draw(const render_fixture *f, drawn_frame *out);
 /* The instruction sets of this machine up to the one that INSITU_ISA names, by index. fixture_select_isa() selects the
@@ -93,7 +93,7 @@ void drawn_frame_assert_same_depths(const drawn_frame *a, const drawn_frame *b);
 /* Checks that the colours and depths of all pixels are bit-identical. Fails at the first difference. */
 void drawn_frame_assert_same(const drawn_frame *a, const drawn_frame *b);
 /* Returns the largest difference of a colour channel. */
-double drawn_frame_difference(const drawn_frame *a, const drawn_frame *b);
+double drawn_frame_find_largest_difference(const drawn_frame *a, const drawn_frame *b);
 
 /* Bounds of the differences between the kernels and the reference. */
 typedef struct fixture_bounds {

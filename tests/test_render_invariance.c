@@ -26,8 +26,8 @@ static void add_layers(render_fixture *f, scene_kind scene)
     if (scene >= VOLUME) fixture_set_volume(f, 0.3);
 }
 
-static void mesh_fixture(render_fixture *f, const test_mesh *meshes, int count, int n, scene_kind scene,
-                         fixture_camera camera)
+static void create_mesh_fixture(render_fixture *f, const test_mesh *meshes, int count, int n, scene_kind scene,
+                                fixture_camera camera)
 {
     fixture_create(f, meshes, count, wide, 2.0 / n, 1, origin);
     fixture_set_camera(f, camera, 61, 47);
@@ -41,7 +41,7 @@ static void create_lattice_fixture(render_fixture *f, test_mesh_kind kind, scene
     add_layers(f, scene);
 }
 
-static void threads_do_not_change_a_bit(void **state)
+static void any_thread_count_gives_same_bits(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
@@ -184,7 +184,7 @@ static void compare_traversals(test_mesh_kind kind, int n, scene_kind scene, fix
     fixture_free(&f);
 }
 
-static void traversals_do_not_change_a_bit(void **state)
+static void all_traversals_give_the_same_bits(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
@@ -214,7 +214,7 @@ static void sample_groups_draw_the_same(void **state)
                 f.job.sample_group = groups[i];
                 fixture_draw(&f, &more);
                 drawn_frame_assert_same_depths(&one, &more);
-                assert_true(drawn_frame_difference(&one, &more) <= 1e-6);
+                assert_true(drawn_frame_find_largest_difference(&one, &more) <= 1e-6);
                 drawn_frame_free(&more);
             }
             drawn_frame_free(&one);
@@ -222,7 +222,7 @@ static void sample_groups_draw_the_same(void **state)
         }
 }
 
-static void order_and_numbering_do_not_change_a_bit(void **state)
+static void any_cell_order_gives_the_same_bits(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
@@ -231,11 +231,11 @@ static void order_and_numbering_do_not_change_a_bit(void **state)
             render_fixture f;
             drawn_frame first, other;
             test_mesh_make_lattice(kind, 4, 0.2, test_wave_field, &mesh);
-            mesh_fixture(&f, &mesh, 1, 4, scene, CAMERA_OUTSIDE);
+            create_mesh_fixture(&f, &mesh, 1, 4, scene, CAMERA_OUTSIDE);
             fixture_draw(&f, &first);
             fixture_free(&f);
             test_mesh_shuffle_cells(&mesh, 77);
-            mesh_fixture(&f, &mesh, 1, 4, scene, CAMERA_OUTSIDE);
+            create_mesh_fixture(&f, &mesh, 1, 4, scene, CAMERA_OUTSIDE);
             fixture_draw(&f, &other);
             drawn_frame_assert_same(&first, &other);
             drawn_frame_free(&first);
@@ -247,7 +247,7 @@ static void order_and_numbering_do_not_change_a_bit(void **state)
 
 /* Returns the largest difference of depth in units of t. Returns infinity if only one of the pictures has a hit in some
  * pixel. */
-static double depth_difference(const drawn_frame *a, const drawn_frame *b)
+static double find_largest_depth_difference(const drawn_frame *a, const drawn_frame *b)
 {
     double worst = 0;
     for (int64_t p = 0; p < (int64_t)a->picture.width * a->picture.height; p++) {
@@ -270,18 +270,19 @@ static void reordered_cells_draw_the_same(void **state)
             render_fixture f;
             drawn_frame first, other;
             test_mesh_make_lattice(kind, 4, 0.2, test_wave_field, &mesh);
-            mesh_fixture(&f, &mesh, 1, 4, scene, CAMERA_OUTSIDE);
+            create_mesh_fixture(&f, &mesh, 1, 4, scene, CAMERA_OUTSIDE);
             fixture_draw(&f, &first);
             fixture_free(&f);
             test_mesh_reorder_vertices(&mesh, 78);
-            mesh_fixture(&f, &mesh, 1, 4, scene, CAMERA_OUTSIDE);
+            create_mesh_fixture(&f, &mesh, 1, 4, scene, CAMERA_OUTSIDE);
             fixture_draw(&f, &other);
             if (getenv("INSITU_TEST_VERBOSE"))
                 fprintf(stderr, "turned %s, scene %d: depth %.2g, colour %.2g\n", test_mesh_kind_name(kind), (int)scene,
-                        depth_difference(&first, &other), drawn_frame_difference(&first, &other));
+                        find_largest_depth_difference(&first, &other),
+                        drawn_frame_find_largest_difference(&first, &other));
             if (kind == TEST_TETS) drawn_frame_assert_same(&first, &other);
-            assert_true(depth_difference(&first, &other) < 5e-6);
-            assert_true(drawn_frame_difference(&first, &other) < 2e-5);
+            assert_true(find_largest_depth_difference(&first, &other) < 5e-6);
+            assert_true(drawn_frame_find_largest_difference(&first, &other) < 2e-5);
             drawn_frame_free(&first);
             drawn_frame_free(&other);
             fixture_free(&f);
@@ -289,7 +290,7 @@ static void reordered_cells_draw_the_same(void **state)
         }
 }
 
-static void layouts_do_not_change_a_bit(void **state)
+static void all_layouts_give_the_same_bits(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
@@ -343,7 +344,7 @@ static void distribute_cells(const test_mesh *mesh, test_partition_kind partitio
 static void assert_same_to_rounding(const drawn_frame *whole, const drawn_frame *parts, scene_kind scene)
 {
     drawn_frame_assert_same_depths(whole, parts);
-    const double off = drawn_frame_difference(whole, parts);
+    const double off = drawn_frame_find_largest_difference(whole, parts);
     if (off > 1e-6) fail_msg("colour off by %g", off);
     if (scene == OPAQUE || scene == TRANSPARENT) drawn_frame_assert_same(whole, parts);
 }
@@ -356,18 +357,18 @@ static void compare_distributed(test_mesh_kind kind, scene_kind scene, test_part
     render_fixture f, apart[5];
     drawn_frame whole, other;
     test_mesh_make_lattice(kind, 4, 0.2, test_wave_field, &mesh);
-    mesh_fixture(&f, &mesh, 1, 4, scene, camera);
+    create_mesh_fixture(&f, &mesh, 1, 4, scene, camera);
     fixture_draw(&f, &whole);
     fixture_free(&f);
     distribute_cells(&mesh, partition, 4, parts, ghosts, distributed);
     for (int i = 0; i < parts; i++) {
-        mesh_fixture(&apart[i], &distributed[i], 1, 4, scene, camera);
+        create_mesh_fixture(&apart[i], &distributed[i], 1, 4, scene, camera);
         apart[i].job.is_alone = false;
     }
     fixture_draw_distributed(apart, parts, &other);
     assert_same_to_rounding(&whole, &other, scene);
     drawn_frame_free(&other);
-    mesh_fixture(&f, distributed, parts, 4, scene, camera);
+    create_mesh_fixture(&f, distributed, parts, 4, scene, camera);
     fixture_draw(&f, &other);
     assert_same_to_rounding(&whole, &other, scene);
     drawn_frame_free(&other);
@@ -397,7 +398,7 @@ static void compare_volume_traversals(test_mesh_kind kind, scene_kind scene, fix
     test_mesh_free(&mesh);
 }
 
-static void traversals_of_volumes_do_not_change_a_bit(void **state)
+static void volume_traversals_give_the_same_bits(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
@@ -431,7 +432,7 @@ static void samples_on_faces_have_one_owner(void **state)
             test_mesh_make_lattice(kind, 4, 0, test_wave_field, &mesh);
             distribute_cells(&mesh, partition, 4, 3, false, distributed);
             for (int i = 0; i < 3; i++) {
-                mesh_fixture(&apart[i], &distributed[i], 1, 4, VOLUME, CAMERA_ALONG_X);
+                create_mesh_fixture(&apart[i], &distributed[i], 1, 4, VOLUME, CAMERA_ALONG_X);
                 apart[i].job.camera.eye[0] = 3.125;
                 apart[i].job.space.depth_origin = 3;
                 apart[i].job.is_alone = apart[i].job.jitter = false;
@@ -476,7 +477,7 @@ static void parent_tree_changes_nothing(void **state)
         base_error error = {0};
         test_mesh_make_lattice(TEST_MIXED, 4, 0.2, test_wave_field, &mesh);
         distribute_cells(&mesh, TEST_BLOCK, 4, 5, false, distributed);
-        mesh_fixture(&f, distributed, 5, 4, scene, CAMERA_OUTSIDE);
+        create_mesh_fixture(&f, distributed, 5, 4, scene, CAMERA_OUTSIDE);
         fixture_draw(&f, &without);
         for (int i = 0; i < 5; i++) {
             float low[4], high[4];
@@ -523,7 +524,7 @@ static void draw_opaque_ends(const test_mesh *mesh, scene_kind scene, int way, d
 {
     static const float opaque_ends[3] = {0.6f, 0.1f, 0.5f};
     render_fixture f;
-    mesh_fixture(&f, mesh, 1, 4, scene, CAMERA_OUTSIDE);
+    create_mesh_fixture(&f, mesh, 1, 4, scene, CAMERA_OUTSIDE);
     f.transfer.opacities = opaque_ends;
     f.job.integration = way ? RENDER_SEGMENTS : RENDER_SAMPLES;
     f.job.max_error = way == 2 ? 1e-3 : 0;
@@ -618,7 +619,7 @@ static void isovalue_at_vertices_gives_no_hole(void **state)
                 const int hits = (int)(drawn.first[p + 1] - drawn.first[p]);
                 several += hits > 1;
                 for (int64_t i = drawn.first[p]; i < drawn.first[p + 1]; i++)
-                    assert_true(fabs(fixture_scene_depth(&f, drawn.list.items[i].t_in) - z) < 1e-5);
+                    assert_true(fabs(fixture_compute_scene_depth(&f, drawn.list.items[i].t_in) - z) < 1e-5);
                 if (hits % 2 != inside)
                     fail_msg("%s, %s, pixel %d, %d: %d hits", test_mesh_kind_name(kind), fixture_camera_name(camera),
                              p % 43, p / 43, hits);
@@ -649,15 +650,15 @@ static void jitter_is_uniform_per_pixel_and_frame(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(threads_do_not_change_a_bit),
+        cmocka_unit_test(any_thread_count_gives_same_bits),
         cmocka_unit_test(tiles_have_the_fragments_of_the_list),
         cmocka_unit_test(refused_tiles_end_the_frame),
-        cmocka_unit_test(traversals_do_not_change_a_bit),
+        cmocka_unit_test(all_traversals_give_the_same_bits),
         cmocka_unit_test(sample_groups_draw_the_same),
-        cmocka_unit_test(order_and_numbering_do_not_change_a_bit),
+        cmocka_unit_test(any_cell_order_gives_the_same_bits),
         cmocka_unit_test(reordered_cells_draw_the_same),
-        cmocka_unit_test(layouts_do_not_change_a_bit),
-        cmocka_unit_test(traversals_of_volumes_do_not_change_a_bit),
+        cmocka_unit_test(all_layouts_give_the_same_bits),
+        cmocka_unit_test(volume_traversals_give_the_same_bits),
         cmocka_unit_test(parts_and_ranks_draw_the_whole_picture),
         cmocka_unit_test(samples_on_faces_have_one_owner),
         cmocka_unit_test(ghosts_change_nothing),

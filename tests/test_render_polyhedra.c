@@ -14,7 +14,7 @@ static const double values[3] = {-0.25, 0.1, 0.35};
 static const double wave_values[2] = {-0.2, 0.3};
 static const float constant_opacity[1] = {0.3f};
 
-static void mesh_fixture(render_fixture *f, const test_mesh *meshes, int count, double cell_size)
+static void create_mesh_fixture(render_fixture *f, const test_mesh *meshes, int count, double cell_size)
 {
     fixture_create(f, meshes, count, (test_layout){.wide_coordinates = true, .wide_values = true}, cell_size, 1,
                    (const double[]){0, 0, 0});
@@ -34,7 +34,7 @@ static void compare_shape(test_polyhedron_shape shape, fixture_camera camera, bo
     test_mesh mesh;
     render_fixture f;
     test_mesh_make_polyhedron(shape, is_linear ? test_linear_field : test_wave_field, &mesh);
-    mesh_fixture(&f, &mesh, 1, 1);
+    create_mesh_fixture(&f, &mesh, 1, 1);
     fixture_set_camera(&f, camera, 49, 43);
     fixture_add_surface(&f, values, 3, 0.5f);
     fixture_set_volume(&f, 0.05);
@@ -78,7 +78,7 @@ static void aim_at_spoke(render_fixture *f, const test_mesh *mesh, uint64_t ray)
  * another tet, a few tenths. The tolerance covers values in float32, which have an error of about 1e-6, and the same
  * error of a segment's length in a steep part of the transfer function. The rounding of the ray itself does not change
  * the sum by more, because the field is continuous. */
-static void sums_through_spokes_match_the_reference(void **state)
+static void sums_on_spokes_match_the_reference(void **state)
 {
     static const test_polyhedron_shape shapes[3] = {TEST_L_PRISM, TEST_BENT_SPIKES, TEST_CAVITY};
     (void)state;
@@ -88,7 +88,7 @@ static void sums_through_spokes_match_the_reference(void **state)
         double worst = 0;
         test_mesh_make_polyhedron(shapes[s], test_linear_field, &mesh);
         for (int64_t v = 0; v < mesh.vertex_count; v++) mesh.values[v] = 2 * test_uniform((uint64_t)v, 5) - 1;
-        mesh_fixture(&f, &mesh, 1, 1);
+        create_mesh_fixture(&f, &mesh, 1, 1);
         fixture_set_volume(&f, 1);
         f.job.integration = RENDER_SEGMENTS;
         for (uint64_t ray = 0; ray < AIMED_RAYS; ray++) {
@@ -144,7 +144,7 @@ static void set_constant_volume(render_fixture *f)
 static void draw_mesh(const test_mesh *mesh, fixture_camera camera, scene_set *set, drawn_frame *out)
 {
     render_fixture f;
-    mesh_fixture(&f, mesh, 1, 0.5);
+    create_mesh_fixture(&f, mesh, 1, 0.5);
     fixture_set_camera(&f, camera, 61, 47);
     set(&f);
     fixture_draw(&f, out);
@@ -201,7 +201,7 @@ static void polyhedra_beside_other_cells_match_the_reference(void **state)
                 render_fixture f;
                 test_mesh_make_lattice(kinds[i], 4, 0.2, test_wave_field, &mesh);
                 test_mesh_to_polyhedra(&mesh, half ? 0.5 : 1);
-                mesh_fixture(&f, &mesh, 1, 0.5);
+                create_mesh_fixture(&f, &mesh, 1, 0.5);
                 fixture_set_camera(&f, camera, 33, 29);
                 fixture_add_surface(&f, wave_values, 2, 0.5f);
                 fixture_set_volume(&f, 0.3);
@@ -222,7 +222,7 @@ static void linear_surface_of_warped_polyhedra_is_a_plane(void **state)
     drawn_frame drawn;
     test_mesh_make_lattice(TEST_HEXES, 4, 0.2, test_linear_field, &mesh);
     test_mesh_to_polyhedra(&mesh, 0.7);
-    mesh_fixture(&f, &mesh, 1, 0.5);
+    create_mesh_fixture(&f, &mesh, 1, 0.5);
     fixture_set_camera(&f, CAMERA_OUTSIDE, 61, 47);
     fixture_add_surface(&f, values, 3, 0.5f);
     fixture_draw(&f, &drawn);
@@ -231,7 +231,7 @@ static void linear_surface_of_warped_polyhedra_is_a_plane(void **state)
         double base[3], d[3];
         render_camera_ray(&f.job.camera, (int)hit->pixel % 61, (int)hit->pixel / 61, base, d);
         const double slope = 0.3 * d[0] - 0.7 * d[1] + 0.5 * d[2];
-        const double value = test_linear_field(base) + slope * fixture_scene_depth(&f, hit->t_in);
+        const double value = test_linear_field(base) + slope * fixture_compute_scene_depth(&f, hit->t_in);
         if (!(fabs(value - values[hit->kind - FRAGMENT_SURFACE]) < 2e-6 + 1e-6 * fabs(slope)))
             fail_msg("pixel %u: value %.9g", hit->pixel, value);
     }
@@ -255,7 +255,7 @@ static void draw_distributed(const test_mesh *mesh, bool is_turned, scene_set *s
         test_mesh_extract_part(mesh, owners, rank, &part);
         test_mesh_shuffle_cells(&part, (uint64_t)rank + 20);
         if (is_turned) test_mesh_reorder_vertices(&part, (uint64_t)rank + 40);
-        mesh_fixture(&parts[rank], &part, 1, 0.5);
+        create_mesh_fixture(&parts[rank], &part, 1, 0.5);
         fixture_set_camera(&parts[rank], CAMERA_OUTSIDE, 61, 47);
         set(&parts[rank]);
         parts[rank].job.is_alone = false;
@@ -282,8 +282,8 @@ static void random_cell_owners_change_no_pixel(void **state)
         draw_mesh(&mesh, CAMERA_OUTSIDE, pass < 3 ? set_surfaces : set_volume, &alone);
         draw_distributed(&mesh, pass % 3 < 2, pass < 3 ? set_surfaces : set_volume, &distributed);
         if (pass < 3) drawn_frame_assert_same(&alone, &distributed);
-        if (!(drawn_frame_difference(&alone, &distributed) <= 1e-6))
-            fail_msg("off by %g", drawn_frame_difference(&alone, &distributed));
+        if (!(drawn_frame_find_largest_difference(&alone, &distributed) <= 1e-6))
+            fail_msg("off by %g", drawn_frame_find_largest_difference(&alone, &distributed));
         drawn_frame_free(&alone);
         drawn_frame_free(&distributed);
         test_mesh_free(&mesh);
@@ -295,7 +295,7 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(shapes_match_the_reference),
-        cmocka_unit_test(sums_through_spokes_match_the_reference),
+        cmocka_unit_test(sums_on_spokes_match_the_reference),
         cmocka_unit_test(tets_passed_as_polyhedra_match_tets),
         cmocka_unit_test(intervals_of_polyhedra_match_typed_cells),
         cmocka_unit_test(polyhedra_beside_other_cells_match_the_reference),

@@ -128,7 +128,7 @@ static truth find_exact_root(const cubic *g, long double low, long double high)
 }
 
 /* Chooses two random points in the unit cube whose heights are not nearly equal. */
-static void random_points(double from[3], double to[3])
+static void choose_two_points(double from[3], double to[3])
 {
     do {
         for (int a = 0; a < 3; a++) {
@@ -145,12 +145,12 @@ static void aim_all_rays(bundle *b, bool is_near)
 {
     const double lean = is_near && draw_uniform(0, 1) < 0.5 ? pow(10, draw_uniform(-3, -1)) : 1;
     double from[3], to[3];
-    random_points(from, to);
+    choose_two_points(from, to);
     for (int a = 0; a < 2; a++) to[a] = from[a] + lean * (to[a] - from[a]);
     bundle_aim_ray(b, 0, from, to);
     for (int lane = 1; lane < SIMD_WIDTH; lane++) {
         double p[3], q[3];
-        random_points(p, q);
+        choose_two_points(p, q);
         const double off = pow(10, draw_uniform(-7, -1));
         for (int a = 0; a < 3 && is_near; a++) {
             p[a] = from[a] + off * (p[a] - 0.5);
@@ -161,7 +161,7 @@ static void aim_all_rays(bundle *b, bool is_near)
 }
 
 /* Rounds the values to float32 after scaling them to a maximum of 1, as kernel_cell_relative() does. */
-static void normalize_values(double values[8])
+static void scale_values_to_maximum_of_1(double values[8])
 {
     double largest = 0;
     for (int i = 0; i < 8; i++) largest = fmax(largest, fabs(values[i]));
@@ -208,7 +208,7 @@ static void make_bundle(bundle *b, int64_t n)
     for (int i = 0; i < 8 && kind == 3; i++) b->values[i] = 0.2 * b->values[i] + (i < 4 ? -0.7 : 0.7);
     if (kind == 4 || kind == 5) make_double_root(b, kind == 4 ? small : 0);
     if (kind == 6 || kind == 7) make_triple_root(b, draw_uniform(0.2, 0.8), kind == 6 ? fabs(small) : 0);
-    normalize_values(b->values);
+    scale_values_to_maximum_of_1(b->values);
     bundle_initialize(b);
     b->cell.type = GRID_HEX;
     b->cell.count = 8;
@@ -226,7 +226,7 @@ typedef struct count {
     double worst; /* largest residual at a hit */
 } count;
 
-static void verify_robust(count *c, const cubic *g, const truth *t, bool hit, long double at_t)
+static void verify_first_root(count *c, const cubic *g, const truth *t, bool hit, long double at_t)
 {
     c->rays++;
     c->certain += t->certain;
@@ -260,7 +260,7 @@ static void verify_bundle(bundle *b, rates *r)
             if (!(vm_bits(list[n].mask) >> lane & 1)) continue;
             const cubic g = expand_cubic(b, lane);
             const truth truth = find_exact_root(&g, (long double)list[n].t_in[lane], (long double)list[n].t_out[lane]);
-            verify_robust(&r->robust, &g, &truth, hit >> lane & 1, (long double)t[lane]);
+            verify_first_root(&r->robust, &g, &truth, hit >> lane & 1, (long double)t[lane]);
             /* Crossings alternate in direction, so their number is odd if the signs at both faces differ. */
             if (((int)hits[lane] & 1) != (int)(vm_bits(change) >> lane & 1)) r->further_crossings++;
         }

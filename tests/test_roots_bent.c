@@ -87,7 +87,7 @@ static void ray_profile_add_piece(ray_profile *c, knot a, knot b)
     ray_profile_add(c, b);
 }
 
-static void ray_profile_halve(ray_profile *c, knot a, knot b, int halvings)
+static void ray_profile_refine(ray_profile *c, knot a, knot b, int halvings)
 {
     const double h = b.t - a.t;
     const knot middle = ray_profile_evaluate(c, 0.5 * (a.t + b.t));
@@ -99,8 +99,8 @@ static void ray_profile_halve(ray_profile *c, knot a, knot b, int halvings)
         ray_profile_add_piece(c, middle, b);
         return;
     }
-    ray_profile_halve(c, a, middle, halvings + 1);
-    ray_profile_halve(c, middle, b, halvings + 1);
+    ray_profile_refine(c, a, middle, halvings + 1);
+    ray_profile_refine(c, middle, b, halvings + 1);
 }
 
 static void ray_profile_trace(ray_profile *c, double low, double high)
@@ -108,7 +108,7 @@ static void ray_profile_trace(ray_profile *c, double low, double high)
     const knot first = ray_profile_evaluate(c, low);
     c->count = 0;
     ray_profile_add(c, first);
-    ray_profile_halve(c, first, ray_profile_evaluate(c, high), 0);
+    ray_profile_refine(c, first, ray_profile_evaluate(c, high), 0);
 }
 
 /* Returns the depth between two knots at which the field reaches v. */
@@ -230,7 +230,7 @@ static bool is_solid(const reference_cell *cell)
 
 /* Chooses two points at different heights. In a pyramid, the distance from the apex to the ray between the points is
  * 1e-4 to 1e-1. */
-static void random_points(const reference_cell *cell, double from[3], double to[3])
+static void choose_two_points(const reference_cell *cell, double from[3], double to[3])
 {
     do {
         for (int a = 0; a < 3; a++) {
@@ -248,11 +248,11 @@ static void random_points(const reference_cell *cell, double from[3], double to[
 static void aim_all_rays(bundle *b, const reference_cell *cell, bool is_near)
 {
     double from[3], to[3];
-    random_points(cell, from, to);
+    choose_two_points(cell, from, to);
     bundle_aim_ray(b, 0, from, to);
     for (int lane = 1; lane < SIMD_WIDTH; lane++) {
         double p[3], q[3];
-        random_points(cell, p, q);
+        choose_two_points(cell, p, q);
         const double off = pow(10, draw_uniform(-7, -1));
         for (int a = 0; a < 3 && is_near; a++) {
             p[a] = from[a] + off * (p[a] - 0.5);
@@ -269,11 +269,11 @@ static reference_line make_lane_line(const bundle *b, int lane)
 }
 
 /* Traces ray 0 through the cell. Returns false if it misses the cell. */
-static bool trace_first(const bundle *b, const reference_cell *cell, ray_profile *c)
+static bool trace_first_ray(const bundle *b, const reference_cell *cell, ray_profile *c)
 {
     reference_crossing ends[REFERENCE_MAX_CROSSINGS];
     *c = (ray_profile){.cell = cell, .values = b->values, .line = make_lane_line(b, 0)};
-    if (reference_crossings(cell, &c->line, ends) < 2 || !(ends[1].z - ends[0].z > 0.01)) return false;
+    if (reference_find_crossings(cell, &c->line, ends) < 2 || !(ends[1].z - ends[0].z > 0.01)) return false;
     ray_profile_trace(c, ends[0].z, ends[1].z);
     return true;
 }
@@ -286,7 +286,7 @@ static void shift_values(bundle *b, const reference_cell *cell, double level, do
 /* Shifts the values so that the field on ray 0 has an extreme with the value `miss`; 0 makes a double root. */
 static void make_double_root(bundle *b, const reference_cell *cell, ray_profile *c, double miss)
 {
-    if (!trace_first(b, cell, c)) return;
+    if (!trace_first_ray(b, cell, c)) return;
     for (int i = 1; i + 1 < c->count; i++)
         if ((c->knots[i].f < c->knots[i - 1].f) == (c->knots[i].f < c->knots[i + 1].f)) {
             shift_values(b, cell, miss - c->knots[i].f, 0);
@@ -299,7 +299,7 @@ static void make_double_root(bundle *b, const reference_cell *cell, ray_profile 
  * ray. */
 static void make_triple_root(bundle *b, const reference_cell *cell, ray_profile *c, double slope)
 {
-    if (!trace_first(b, cell, c)) return;
+    if (!trace_first_ray(b, cell, c)) return;
     for (int i = 1; i + 1 < c->count; i++) {
         const knot *k = &c->knots[i];
         if ((k->slope < k[-1].slope) != (k->slope < k[1].slope)) continue;
@@ -319,7 +319,7 @@ static void make_triple_root(bundle *b, const reference_cell *cell, ray_profile 
 }
 
 /* Rounds the values to float32 after scaling them to a maximum of 1, as kernel_cell_relative() does. */
-static void normalize_values(double *values, int count)
+static void scale_values_to_maximum_of_1(double *values, int count)
 {
     double largest = 0;
     for (int i = 0; i < count; i++) largest = fmax(largest, fabs(values[i]));
@@ -336,7 +336,7 @@ static void make_bundle(bundle *b, reference_cell *cell, ray_profile *scratch, b
     for (int i = 0; i < cell->count; i++) b->values[i] = draw_uniform(-1, 1);
     if (roots == 1 || roots == 2) make_double_root(b, cell, scratch, roots == 1 ? small : 0);
     if (roots == 3 || roots == 4) make_triple_root(b, cell, scratch, roots == 3 ? small : 0);
-    normalize_values(b->values, cell->count);
+    scale_values_to_maximum_of_1(b->values, cell->count);
     bundle_initialize(b);
     b->cell.type = cell->type;
     b->cell.count = cell->count;
@@ -352,7 +352,7 @@ typedef struct count {
     double worst, worst_band; /* worst: largest residual relative to the band; worst_band: largest band */
 } count;
 
-static double sum_lanes(const vf c[8])
+static double sum_magnitudes_of_lane_0(const vf c[8])
 {
     double sum = 0;
     for (int i = 0; i < 8; i++) sum += fabs((double)c[i][0]);
@@ -361,8 +361,9 @@ static double sum_lanes(const vf c[8])
 
 static double compute_error_band(const kernel_map *map, const ray_profile *c)
 {
-    double band = 7 * 6e-8 * sum_lanes(map->field);
-    for (int a = 0; a < 3; a++) band += c->steepest[a] * 6e-8 * (7 * sum_lanes(map->position[a]) + 3 * 1.5 + 0.5);
+    double band = 7 * 6e-8 * sum_magnitudes_of_lane_0(map->field);
+    for (int a = 0; a < 3; a++)
+        band += c->steepest[a] * 6e-8 * (7 * sum_magnitudes_of_lane_0(map->position[a]) + 3 * 1.5 + 0.5);
     return band;
 }
 

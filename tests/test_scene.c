@@ -39,7 +39,7 @@ static insitu_status parse_scene(const char *text, scene *s, base_error *error)
     return scene_parse(text, strlen(text), "scene.yaml", NULL, s, error);
 }
 
-static void parse_good(const char *text, scene *s)
+static void parse_valid_scene(const char *text, scene *s)
 {
     base_error error;
     if (parse_scene(text, s, &error) != INSITU_OK) fail_msg("refused: %s", error.message);
@@ -214,7 +214,7 @@ static void check_vector(const double v[3], double x, double y, double z)
 }
 
 /* Checks that the colours of the map are bitwise equal to the table with the given name. */
-static void check_built_in(const scene_colour_map *map, const char *name)
+static void check_built_in_colour_map(const scene_colour_map *map, const char *name)
 {
     int count = 0;
     const float *table = colour_map_table(name, &count);
@@ -234,7 +234,7 @@ static void scene_image_keys_are_read(void **state)
 {
     (void)state;
     scene s;
-    parse_good(every_key, &s);
+    parse_valid_scene(every_key, &s);
     assert_int_equal(s.threads, 3);
     assert_int_equal(s.tree, SCENE_TREE_PARTIAL);
     assert_int_equal(s.writing, SCENE_WRITE_IN_STEP);
@@ -275,7 +275,7 @@ static void scene_view_keys_are_read(void **state)
 {
     (void)state;
     scene s;
-    parse_good(every_key, &s);
+    parse_valid_scene(every_key, &s);
     const scene_camera *camera = &s.images[0].camera;
     assert_false(camera->is_automatic);
     check_vector(camera->eye, 4, 3, 5);
@@ -323,7 +323,7 @@ static void lights_cast_shadows_by_default(void **state)
         char filled[512];
         scene s;
         snprintf(filled, sizeof filled, text, cases[i].keys);
-        parse_good(filled, &s);
+        parse_valid_scene(filled, &s);
         assert_int_equal(s.images[0].shadows, cases[i].shadows);
         assert_int_equal(s.images[0].occlusion_samples, cases[i].samples);
         assert_true(s.images[0].occlusion_radius == 0);
@@ -335,7 +335,7 @@ static void scene_isosurface_keys_are_read(void **state)
 {
     (void)state;
     scene s;
-    parse_good(every_key, &s);
+    parse_valid_scene(every_key, &s);
     assert_int_equal(s.images[0].isosurface_count, 2);
     const scene_isosurface *first = &s.images[0].isosurfaces[0], *second = first + 1;
     assert_string_equal(first->field.name, "pressure");
@@ -360,7 +360,7 @@ static void scene_isosurface_keys_are_read(void **state)
     assert_true(scene_field_is_on(&second->colour_by, "air") && !scene_field_is_on(&second->colour_by, "sea"));
     assert_true(scene_field_is_on(&first->field, "anything"));
     assert_true(first->field.at_vertices && second->field.at_vertices && second->colour_by.at_vertices);
-    check_built_in(&second->colour_map, "inferno");
+    check_built_in_colour_map(&second->colour_map, "inferno");
     assert_true(second->colour_map.range.is_fixed);
     assert_true(second->colour_map.range.low == 0 && second->colour_map.range.high == 1);
     scene_free(&s);
@@ -372,12 +372,12 @@ static void scene_volume_keys_are_read(void **state)
     static const double at[] = {0, 0.4, 0.4, 1};
     static const float opacity[] = {0, 0.3F, 0.5F, 0.9F};
     scene s;
-    parse_good(every_key, &s);
+    parse_valid_scene(every_key, &s);
     assert_int_equal(s.images[0].volume_count, 1);
     const scene_volume *volume = &s.images[0].volumes[0];
     assert_string_equal(volume->field.name, "temperature");
     assert_int_equal(volume->field.component, 1);
-    check_built_in(&volume->colour_map, "cool_to_warm");
+    check_built_in_colour_map(&volume->colour_map, "cool_to_warm");
     const scene_range *range = &volume->colour_map.range;
     assert_true(range->is_fixed && range->low == -2 && range->high == 3);
     assert_true(volume->unit_distance == 0.1);
@@ -395,7 +395,7 @@ static void scene_image_defaults_hold(void **state)
 {
     (void)state;
     scene s;
-    parse_good(fewest_keys, &s);
+    parse_valid_scene(fewest_keys, &s);
     const scene_image *image = &s.images[0];
     const double length = sqrt(1 + 0.64 + 1.44);
     assert_int_equal(s.threads, 0);
@@ -456,7 +456,7 @@ static void sampling_method_follows_the_keys(void **state)
         for (int k = 0; k < cases[i].volumes; k++) strcat(text, "  - volume: {field: p}\n");
         snprintf(text + strlen(text), sizeof text - strlen(text), "  sampling: %s\n  outputs: [{path: a.png}]\n",
                  cases[i].sampling);
-        parse_good(text, &s);
+        parse_valid_scene(text, &s);
         const scene_image *image = &s.images[0];
         if (image->method != cases[i].method || image->max_error != cases[i].max_error)
             fprintf(stderr, "%s, %d volumes: method %d, max_error %g\n", cases[i].sampling, cases[i].volumes,
@@ -470,7 +470,7 @@ static void clips_are_read_for_images_and_layers(void **state)
 {
     (void)state;
     scene s;
-    parse_good(every_key, &s);
+    parse_valid_scene(every_key, &s);
     const scene_image *image = &s.images[0];
     const scene_clip *clips = image->clips;
     assert_int_equal(image->clip_count, 4);
@@ -496,7 +496,7 @@ static void statistics_and_conditions_are_read(void **state)
 {
     (void)state;
     scene s;
-    parse_good(every_key, &s);
+    parse_valid_scene(every_key, &s);
     assert_int_equal(s.statistics_count, 3);
     const scene_statistics *first = s.statistics;
     assert_string_equal(first->field.name, "p");
@@ -519,7 +519,7 @@ static void warps_are_read_per_mesh(void **state)
     static const scene_warp expected[] = {
         {"plate", "DISPL", -2.5, 0, 0}, {"plate/a.b", "w", 1, 0, 0}, {"colour", "u", 0, 0, 0}};
     scene s;
-    parse_good(every_key, &s);
+    parse_valid_scene(every_key, &s);
     assert_int_equal(s.warp_count, 3);
     for (int i = 0; i < 3; i++) {
         const scene_warp *warp = &s.warps[i];
@@ -534,7 +534,7 @@ static void warps_are_read_per_mesh(void **state)
     assert_ptr_equal(scene_find_warp(&s, "plate/a.b/c"), &s.warps[1]);
     assert_null(scene_find_warp(&s, "plates"));
     scene_free(&s);
-    parse_good(fewest_keys, &s);
+    parse_valid_scene(fewest_keys, &s);
     assert_int_equal(s.warp_count, 0);
     scene_free(&s);
 }
@@ -545,7 +545,7 @@ static void mirrors_are_read_per_mesh(void **state)
     static const scene_mirror expected[] = {
         {"colour", 5, {0, 0, 0}, 0}, {"axis", 2, {0, 0, 0}, 0}, {"axis/b", 5, {-1.5, 0, 2}, 0}};
     scene s;
-    parse_good(every_key, &s);
+    parse_valid_scene(every_key, &s);
     assert_int_equal(s.mirror_count, 3);
     for (int i = 0; i < 3; i++) {
         const scene_mirror *mirror = &s.mirrors[i];
@@ -558,7 +558,7 @@ static void mirrors_are_read_per_mesh(void **state)
     assert_ptr_equal(scene_find_mirror(&s, "axis/b"), &s.mirrors[2]);
     assert_null(scene_find_mirror(&s, "plate"));
     scene_free(&s);
-    parse_good(fewest_keys, &s);
+    parse_valid_scene(fewest_keys, &s);
     assert_int_equal(s.mirror_count, 0);
     scene_free(&s);
 }
@@ -571,7 +571,7 @@ static void parameters_are_read_by_their_names(void **state)
     static const scene_parameter expected[] = {
         {"inflow", 2.5}, {"_k-2", -1e-3}, {"values", 3}, {"color", 4}, {"axis", 5}};
     scene s;
-    parse_good(every_key, &s);
+    parse_valid_scene(every_key, &s);
     assert_int_equal(s.parameter_count, 5);
     for (int i = 0; i < 5; i++) {
         assert_string_equal(s.parameters[i].name, expected[i].name);
@@ -580,7 +580,7 @@ static void parameters_are_read_by_their_names(void **state)
     }
     assert_null(scene_find_parameter(&s, "colour"));
     scene_free(&s);
-    parse_good(fewest_keys, &s);
+    parse_valid_scene(fewest_keys, &s);
     assert_int_equal(s.parameter_count, 0);
     scene_free(&s);
 }
@@ -589,7 +589,7 @@ static void surface_colours_are_read(void **state)
 {
     (void)state;
     scene s;
-    parse_good(every_key, &s);
+    parse_valid_scene(every_key, &s);
     assert_int_equal(s.images[0].surface_count, 3);
     const scene_surface *surface = s.images[0].surfaces;
     check_colour(surface[0].colour, convert_srgb_to_linear(1), convert_srgb_to_linear(0.5), convert_srgb_to_linear(0));
@@ -610,7 +610,7 @@ static void surface_colours_are_read(void **state)
     assert_true(surface[1].opacity == 1 && surface[1].has_colour_by && surface[1].colour_by.at_vertices);
     assert_true(scene_field_is_on(&surface[1].meshes_field, "any"));
     assert_string_equal(surface[1].colour_by.name, "q");
-    check_built_in(&surface[1].colour_map, "grey");
+    check_built_in_colour_map(&surface[1].colour_map, "grey");
     check_colour(surface[1].colour, convert_srgb_to_linear(0.8), convert_srgb_to_linear(0.8),
                  convert_srgb_to_linear(0.8));
     assert_true(surface[1].material.diffuse == 0.75F);
@@ -623,13 +623,14 @@ static void several_planes_are_read(void **state)
     (void)state;
     static const double offsets[] = {-1, 0.5, 2}, shares[] = {-0.75, -0.25, 0.25, 0.75};
     scene s;
-    parse_good("images:\n"
-               "- name: a\n"
-               "  layers:\n"
-               "  - slice: {field: p, planes: [{normal: x, point: [1, 2, 3], offsets: [-1, 0.5, 2]}, {normal: -z, "
-               "count: 4}]}\n"
-               "  - slice: {field: p, planes: {normal: y, count: 1}}\n",
-               &s);
+    parse_valid_scene(
+        "images:\n"
+        "- name: a\n"
+        "  layers:\n"
+        "  - slice: {field: p, planes: [{normal: x, point: [1, 2, 3], offsets: [-1, 0.5, 2]}, {normal: -z, "
+        "count: 4}]}\n"
+        "  - slice: {field: p, planes: {normal: y, count: 1}}\n",
+        &s);
     const scene_slice *slice = s.images[0].slices;
     assert_int_equal(slice[0].plane_count, 7);
     for (int i = 0; i < 7; i++) {
@@ -649,7 +650,7 @@ static void slices_have_planes_of_unit_normals(void **state)
 {
     (void)state;
     scene s;
-    parse_good(
+    parse_valid_scene(
         "images:\n- name: a\n  layers:\n"
         "  - slice: {field: p, planes: [{normal: [3e200, 0, 4e200]}, {normal: [0, -1e-200, 0], point: [1, 2, 3],\n"
         "            offset: -2}]}\n"
@@ -665,10 +666,10 @@ static void slices_have_planes_of_unit_normals(void **state)
     check_vector(slice[0].planes[1].normal, 0, -1, 0);
     check_vector(slice[0].planes[1].point, 1, 2, 3);
     assert_true(slice[0].planes[1].has_point && slice[0].planes[1].offset == -2);
-    check_built_in(&slice[0].colour_map, "viridis");
+    check_built_in_colour_map(&slice[0].colour_map, "viridis");
     assert_true(slice[0].opacity == 1 && !slice[0].colour_map.range.is_fixed && !slice[0].field.at_vertices);
     assert_true(slice[0].material.ambient == 1 && slice[0].material.diffuse == 0 && slice[0].material.specular == 0);
-    check_built_in(&slice[1].colour_map, "plasma");
+    check_built_in_colour_map(&slice[1].colour_map, "plasma");
     assert_true(slice[1].opacity == 0.5F && slice[1].colour_map.range.high == 2 && slice[1].field.at_vertices);
     assert_true(slice[1].field.component == 0 && slice[1].field.mesh_count == 1);
     assert_true(slice[1].material.diffuse == 0.75F && slice[1].material.specular == 0);
@@ -679,14 +680,15 @@ static void contour_lines_use_the_colour_field(void **state)
 {
     (void)state;
     scene s;
-    parse_good("images:\n- name: a\n  size: [40, 1200]\n  sweep: {fields: [w]}\n  layers:\n"
-               "  - slice: {field: p, component: y, mesh: air, lines: {count: 7}}\n"
-               "  - isosurface: {field: q, values: [1], lines: {field: r, component: x, values: [3, -1, 2], width: 4,\n"
-               "                 colour: white}}\n"
-               "  - surface: {colour_by: {field: p}, lines: {values: 5}}\n"
-               "  - slice: {field: p}\n"
-               "  outputs: [{path: a.png}]\n",
-               &s);
+    parse_valid_scene(
+        "images:\n- name: a\n  size: [40, 1200]\n  sweep: {fields: [w]}\n  layers:\n"
+        "  - slice: {field: p, component: y, mesh: air, lines: {count: 7}}\n"
+        "  - isosurface: {field: q, values: [1], lines: {field: r, component: x, values: [3, -1, 2], width: 4,\n"
+        "                 colour: white}}\n"
+        "  - surface: {colour_by: {field: p}, lines: {values: 5}}\n"
+        "  - slice: {field: p}\n"
+        "  outputs: [{path: a.png}]\n",
+        &s);
     const scene_lines *slice = &s.images[0].slices[0].lines, *iso = &s.images[0].isosurfaces[0].lines;
     const scene_lines *outer = &s.images[0].surfaces[0].lines;
     assert_true(slice->is_given && slice->is_of_colours && !slice->has_values && slice->count == 7);
@@ -707,18 +709,18 @@ static void scene_layer_defaults_hold(void **state)
 {
     (void)state;
     scene s;
-    parse_good(fewest_keys, &s);
+    parse_valid_scene(fewest_keys, &s);
     const scene_isosurface *surface = &s.images[0].isosurfaces[0];
     assert_int_equal(surface->field.component, SCENE_COMPONENT_DEFAULT);
     assert_true(surface->opacity == 1);
     assert_true(surface->material.ambient == 0.15F && surface->material.diffuse == 0.75F);
     assert_true(surface->material.specular == 0.25F && surface->material.shininess == 32);
-    check_built_in(&surface[1].colour_map, "viridis");
+    check_built_in_colour_map(&surface[1].colour_map, "viridis");
     assert_false(surface[1].colour_map.range.is_fixed);
     assert_memory_not_equal(surface[0].colours, surface[0].colours + 3, 3 * sizeof(float));
     assert_memory_not_equal(surface[0].colours, surface[1].colours, 3 * sizeof(float));
     const scene_volume *volume = &s.images[0].volumes[0];
-    check_built_in(&volume->colour_map, "viridis");
+    check_built_in_colour_map(&volume->colour_map, "viridis");
     assert_false(volume->colour_map.range.is_fixed);
     assert_true(volume->unit_distance == 0 && volume->opacity_count == 2);
     assert_true(volume->opacity[0].position == 0 && volume->opacity[0].opacity == 0);
@@ -730,9 +732,10 @@ static void scene_up_defaults_to_z_for_views_along_y(void **state)
 {
     (void)state;
     scene s;
-    parse_good("images: [{name: a, camera: {automatic: {direction: [0, -2, 0]}}, layers: [{volume: {field: p}}], "
-               "outputs: [{path: a.png}]}]",
-               &s);
+    parse_valid_scene(
+        "images: [{name: a, camera: {automatic: {direction: [0, -2, 0]}}, layers: [{volume: {field: p}}], "
+        "outputs: [{path: a.png}]}]",
+        &s);
     check_vector(s.images[0].camera.up, 0, 0, 1);
     scene_free(&s);
 }
@@ -1238,7 +1241,7 @@ static void unmodified_scene_of_error_cases_is_valid(void **state)
     char text[4096];
     scene s;
     replace_line(0, "", text);
-    parse_good(text, &s);
+    parse_valid_scene(text, &s);
     scene_free(&s);
 }
 
@@ -1345,7 +1348,7 @@ static void scene_numbers_do_not_follow_the_locale(void **state)
     (void)state;
     if (!setlocale(LC_NUMERIC, "de_DE.UTF-8") && !setlocale(LC_NUMERIC, "de_DE")) skip();
     scene s;
-    parse_good(every_key, &s);
+    parse_valid_scene(every_key, &s);
     assert_true(s.images[0].camera.angle == 35.5);
     scene_free(&s);
     assert_string_equal(localeconv()->decimal_point, ",");
@@ -1388,17 +1391,17 @@ static void mutually_exclusive_keys_are_checked(void **state)
 {
     (void)state;
     scene s;
-    parse_good(excluding_keys, &s);
+    parse_valid_scene(excluding_keys, &s);
     assert_true(s.finer_pieces == 0 && s.surface_error == 0.5 && s.is_surface_error_given && s.finer_memory == 4096);
     scene_free(&s);
-    parse_good(mirrored_keys, &s);
+    parse_valid_scene(mirrored_keys, &s);
     assert_true(s.finer_pieces == 0 && s.mirror_count > 0);
     scene_free(&s);
 }
 
 /* ---- the schema ---- */
 
-static bool is_of_mappings(const cyaml_schema_value_t *value)
+static bool contains_mappings(const cyaml_schema_value_t *value)
 {
     if (value->type == CYAML_MAPPING) return true;
     return value->type == CYAML_SEQUENCE && value->sequence.entry->type == CYAML_MAPPING;
@@ -1415,7 +1418,7 @@ static void check_mapping(const scene_mapping *mapping)
         if (!key->help || strlen(key->help) < 10) fail_msg("%s.%s has no help", mapping->title, field->key);
         if (is_optional == !key->default_text)
             fail_msg("%s.%s: default and optional differ", mapping->title, field->key);
-        if (is_of_mappings(&field->value) == !key->child) fail_msg("%s.%s: child", mapping->title, field->key);
+        if (contains_mappings(&field->value) == !key->child) fail_msg("%s.%s: child", mapping->title, field->key);
         if (!strstr(every_key, in_file) && !strstr(excluding_keys, in_file))
             fail_msg("%s.%s is not in the test's file", mapping->title, field->key);
         if (key->child) {
@@ -1431,7 +1434,7 @@ static void scene_decorations_are_read(void **state)
 {
     (void)state;
     scene s;
-    parse_good(every_key, &s);
+    parse_valid_scene(every_key, &s);
     const scene_decorations *d = &s.images[2].decorations;
     assert_true(d->has_rulers && d->has_scale_bar && d->scale_bar_anchor == SCENE_BOTTOM);
     assert_string_equal(d->scale_unit, "mm");
@@ -1447,7 +1450,7 @@ static void scene_decorations_are_read(void **state)
     assert_true(d->colour[0] == 1 && d->colour[1] == 0 && d->colour[2] == colour_linear_from_srgb(0.5F));
     assert_true(!s.images[2].outputs[0].has_decorations && s.images[2].outputs[1].has_decorations);
     scene_free(&s);
-    parse_good(fewest_keys, &s);
+    parse_valid_scene(fewest_keys, &s);
     assert_true(!s.images[0].decorations.is_given && s.images[0].outputs[0].has_decorations);
     assert_true(!s.images[0].camera.has_bounds && !s.images[0].has_lights);
     scene_free(&s);
@@ -1466,7 +1469,7 @@ static void derived_fields_are_sorted_and_read(void **state)
     (void)state;
     scene s;
     int late, speed, last, late_w, at;
-    parse_good(every_key, &s);
+    parse_valid_scene(every_key, &s);
     assert_int_equal(s.derived_count, 11);
     const scene_derived *of = find_derived(&s, "late", &late);
     find_derived(&s, "speed", &speed);

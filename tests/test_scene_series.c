@@ -16,7 +16,7 @@
 /* Error of the sine and cosine of an angle that is converted from degrees to radians: a few times 2^-53. */
 #define ANGLE_TOLERANCE 1e-15
 
-static void parse_good(const char *text, scene *s)
+static void parse_valid_scene(const char *text, scene *s)
 {
     base_error error = {.status = INSITU_OK};
     if (scene_parse(text, strlen(text), "scene.yaml", NULL, s, &error) != INSITU_OK) fail_msg("%s", error.message);
@@ -39,7 +39,7 @@ static void parse_camera(const char *camera, scene *s)
     char text[2048];
     snprintf(text, sizeof text,
              "images: [{name: a, camera: {%s}, layers: [{volume: {field: p}}], outputs: [{cinema: a.cdb}]}]", camera);
-    parse_good(text, s);
+    parse_valid_scene(text, s);
 }
 
 /* ---- orbits ---------------------------------------------------------------------------------------------------- */
@@ -114,15 +114,15 @@ static void sweeps_make_each_combination_once(void **state)
     (void)state;
     static const char *const fields[] = {"p", "r"};
     scene s;
-    parse_good("images:\n- name: a\n  camera: {orbit: {views: 2}}\n  sweep: {isovalues: true, fields: [p, r]}\n"
-               "  layers:\n"
-               "  - isosurface: {field: q, values: [1, 2, 3], colours: [[1, 0, 0], [0, 1, 0]], opacity: 0.5}\n"
-               "  - slice: {field: x, planes: [{normal: [1, 0, 0]}]}\n"
-               "  - volume: {field: x}\n"
-               "  - surface: {colour_by: {field: x}}\n"
-               "  outputs: [{cinema: a.cdb}]\n"
-               "- name: b\n  layers: [{volume: {field: x}}]\n  outputs: [{path: b.png}]\n",
-               &s);
+    parse_valid_scene("images:\n- name: a\n  camera: {orbit: {views: 2}}\n  sweep: {isovalues: true, fields: [p, r]}\n"
+                      "  layers:\n"
+                      "  - isosurface: {field: q, values: [1, 2, 3], colours: [[1, 0, 0], [0, 1, 0]], opacity: 0.5}\n"
+                      "  - slice: {field: x, planes: [{normal: [1, 0, 0]}]}\n"
+                      "  - volume: {field: x}\n"
+                      "  - surface: {colour_by: {field: x}}\n"
+                      "  outputs: [{cinema: a.cdb}]\n"
+                      "- name: b\n  layers: [{volume: {field: x}}]\n  outputs: [{path: b.png}]\n",
+                      &s);
     assert_int_equal(s.image_count, 2 * 3 * 2 + 1);
     for (int i = 0; i < 12; i++) {
         const scene_image *image = &s.images[i];
@@ -140,7 +140,7 @@ static void sweeps_make_each_combination_once(void **state)
         /* both views of a variant have the same layers */
         assert_true(image->isosurfaces == s.images[i - i % 2].isosurfaces);
         assert_true(scene_is_first_variant(image) == (i == 0));
-        const scene_placeholder_values moment = scene_placeholder_values_of(image, 5, 0);
+        const scene_placeholder_values moment = scene_make_placeholder_values(image, 5, 0);
         char expected[64], *path = scene_expand(image->outputs[0].path, &moment);
         snprintf(expected, sizeof expected, "a.cdb/a_000005_%03d_%d_%s.png", i % 2, value + 1, fields[field]);
         assert_string_equal(path, expected);
@@ -155,11 +155,11 @@ static void sweeps_go_through_planes(void **state)
     (void)state;
     static const double shares[] = {-0.5, 0.5}, offsets[] = {-1, 0, 2};
     scene s;
-    parse_good("images:\n- name: a\n  sweep: {isovalues: true, planes: true}\n  layers:\n"
-               "  - slice: {field: p, planes: [{normal: x, offsets: [-1, 0, 2]}, {normal: y, count: 2}]}\n"
-               "  - isosurface: {field: q, values: [3, 4]}\n"
-               "  outputs: [{cinema: a.cdb}, {path: \"{isovalue}_{plane}.png\"}]\n",
-               &s);
+    parse_valid_scene("images:\n- name: a\n  sweep: {isovalues: true, planes: true}\n  layers:\n"
+                      "  - slice: {field: p, planes: [{normal: x, offsets: [-1, 0, 2]}, {normal: y, count: 2}]}\n"
+                      "  - isosurface: {field: q, values: [3, 4]}\n"
+                      "  outputs: [{cinema: a.cdb}, {path: \"{isovalue}_{plane}.png\"}]\n",
+                      &s);
     assert_int_equal(s.image_count, 2 * 5);
     assert_true(s.databases[0].has_planes && s.databases[0].has_isovalues);
     for (int i = 0; i < 10; i++) {
@@ -171,7 +171,7 @@ static void sweeps_go_through_planes(void **state)
         assert_true(slice->planes[0].offset == (plane < 3 ? offsets[plane] : 0));
         assert_true(slice->planes[0].extent_fraction == (plane < 3 ? 0 : shares[plane - 3]));
         assert_true(scene_is_first_variant(image) == (i == 0));
-        const scene_placeholder_values moment = scene_placeholder_values_of(image, 5, 0);
+        const scene_placeholder_values moment = scene_make_placeholder_values(image, 5, 0);
         char expected[64], *path = scene_expand(image->outputs[0].path, &moment);
         snprintf(expected, sizeof expected, "a.cdb/a_000005_%d_%02d.png", 3 + i / 5, plane);
         assert_string_equal(path, expected);
@@ -184,11 +184,11 @@ static void databases_have_the_columns_of_their_images(void **state)
 {
     (void)state;
     scene s;
-    parse_good("images:\n- name: a\n  camera: {orbit: {views: 3}}\n  layers: [{volume: {field: p}}]\n"
-               "  outputs: [{cinema: a.cdb}, {cinema: ././out/b.cdb, path: \"x/{view}.png\", bits: 16}]\n"
-               "- name: b\n  sweep: {fields: [p]}\n  layers: [{volume: {field: p}}]\n"
-               "  outputs: [{path: b.png}, {cinema: out/b.cdb}]\n",
-               &s);
+    parse_valid_scene("images:\n- name: a\n  camera: {orbit: {views: 3}}\n  layers: [{volume: {field: p}}]\n"
+                      "  outputs: [{cinema: a.cdb}, {cinema: ././out/b.cdb, path: \"x/{view}.png\", bits: 16}]\n"
+                      "- name: b\n  sweep: {fields: [p]}\n  layers: [{volume: {field: p}}]\n"
+                      "  outputs: [{path: b.png}, {cinema: out/b.cdb}]\n",
+                      &s);
     assert_int_equal(s.database_count, 2);
     const scene_database *a = s.databases, *b = a + 1;
     assert_string_equal(a->path, "a.cdb");
@@ -207,12 +207,12 @@ static void grid_cells_are_numbered(void **state)
 {
     (void)state;
     scene s;
-    parse_good("images:\n- name: a\n  size: [8, 6]\n  camera: {orbit: {views: 2}}\n  sweep: {fields: [p, r]}\n"
-               "  layers: [{volume: {field: p}}]\n"
-               "  outputs: [{path: \"all_{cycle:04}.png\", grid: [3, 2]}, {path: \"{field}_{view}.png\"}]\n"
-               "- name: b\n  size: [8, 6]\n  layers: [{volume: {field: p}}]\n"
-               "  outputs: [{path: \"all_{cycle}.png\", grid: [3, 2]}, {path: \"{name}.png\", grid: [1, 1]}]\n",
-               &s);
+    parse_valid_scene("images:\n- name: a\n  size: [8, 6]\n  camera: {orbit: {views: 2}}\n  sweep: {fields: [p, r]}\n"
+                      "  layers: [{volume: {field: p}}]\n"
+                      "  outputs: [{path: \"all_{cycle:04}.png\", grid: [3, 2]}, {path: \"{field}_{view}.png\"}]\n"
+                      "- name: b\n  size: [8, 6]\n  layers: [{volume: {field: p}}]\n"
+                      "  outputs: [{path: \"all_{cycle}.png\", grid: [3, 2]}, {path: \"{name}.png\", grid: [1, 1]}]\n",
+                      &s);
     assert_int_equal(s.image_count, 5);
     assert_int_equal(s.montage_count, 2);
     assert_true(s.montages[0].columns == 3 && s.montages[0].rows == 2 && s.montages[0].panel_count == 5);
@@ -239,15 +239,15 @@ static void insets_cover_the_corners_of_grids(void **state)
 {
     (void)state;
     scene s;
-    parse_good("images:\n- name: a\n  size: [320, 240]\n  layers: [{volume: {field: p}}]\n"
-               "  outputs: [{path: \"all_{cycle:04}.png\", grid: [3, 2]}]\n"
-               "- name: b\n  size: [100, 80]\n  sweep: {fields: [p, r]}\n  layers: [{volume: {field: p}}]\n"
-               "  outputs: [{path: \"b_{field}.png\", grid: [1, 1]}]\n"
-               "- name: c\n  size: [90, 70]\n  sweep: {fields: [p, r]}\n  layers: [{volume: {field: p}}]\n"
-               "  outputs: [{path: \"b_{field}.png\", inset: bottom_left}]\n"
-               "- name: d\n  size: [90, 70]\n  layers: [{volume: {field: p}}]\n"
-               "  outputs: [{path: \"all_{cycle}.png\", inset: top_right}, {path: all_1.png}]\n",
-               &s);
+    parse_valid_scene("images:\n- name: a\n  size: [320, 240]\n  layers: [{volume: {field: p}}]\n"
+                      "  outputs: [{path: \"all_{cycle:04}.png\", grid: [3, 2]}]\n"
+                      "- name: b\n  size: [100, 80]\n  sweep: {fields: [p, r]}\n  layers: [{volume: {field: p}}]\n"
+                      "  outputs: [{path: \"b_{field}.png\", grid: [1, 1]}]\n"
+                      "- name: c\n  size: [90, 70]\n  sweep: {fields: [p, r]}\n  layers: [{volume: {field: p}}]\n"
+                      "  outputs: [{path: \"b_{field}.png\", inset: bottom_left}]\n"
+                      "- name: d\n  size: [90, 70]\n  layers: [{volume: {field: p}}]\n"
+                      "  outputs: [{path: \"all_{cycle}.png\", inset: top_right}, {path: all_1.png}]\n",
+                      &s);
     assert_int_equal(s.image_count, 6);
     assert_int_equal(s.montage_count, 3);
     assert_true(s.montages[0].frame_width == 2 && s.montages[0].inset_margin == 12);
@@ -280,7 +280,7 @@ static void colour_bar_strips_fit_their_labels(void **state)
                  "images:\n- name: a\n  size: [32, 24]\n  layers: [{slice: {field: p}}]\n  decorations: {%s}\n"
                  "  outputs: [{path: a.png, grid: [1, 1], shared_bars: true}, {path: b.png, grid: [1, 1]}]\n",
                  cases[i].decorations);
-        parse_good(text, &s);
+        parse_valid_scene(text, &s);
         assert_true(s.montages[0].shares_bars && !s.montages[1].shares_bars);
         assert_true(s.montages[0].bar_width == cases[i].width && s.montages[1].bar_width == 0);
         assert_true(s.montages[0].are_bars_left == cases[i].is_left);

@@ -85,7 +85,7 @@ static bool sample_deviations(const reference_cell *cell, chord_deviations *out)
 {
     reference_crossing ends[REFERENCE_MAX_CROSSINGS];
     out->count = cell->count;
-    if (reference_crossings(cell, &middle_line, ends) != 2 || ends[0].is_folded || ends[1].is_folded) return false;
+    if (reference_find_crossings(cell, &middle_line, ends) != 2 || ends[0].is_folded || ends[1].is_folded) return false;
     const double from = ends[0].z, length = ends[1].z - from;
     if (length < 0.3) return false;
     for (int i = 0; i < cell->count; i++) {
@@ -115,7 +115,7 @@ static void subtract_projection(int count, const double b[8], double a[8])
 
 /* Computes values in [0, 1] for which the functions that the aim requires to be 0 are 0, and the mean deviation is
  * largest. */
-static void aim_values(const chord_deviations *looks, bend_aim aim, double *values)
+static void choose_values_for_aim(const chord_deviations *looks, bend_aim aim, double *values)
 {
     double found[3][8], largest = 0;
     int wanted = aim == BLIND ? 3 : 1;
@@ -155,7 +155,7 @@ static bool verify_cell(test_cell_shape shape, bend_aim aim, uint64_t seed, doub
     step_fixture_create(&f, &mesh, CAMERA_ORTHOGRAPHIC, SIDE);
     load_cell(&f, &mesh, &cell);
     bool is_seen = is_unfolded(&mesh) && sample_deviations(&cell, &looks);
-    if (is_seen && aim != ANY) aim_values(&looks, aim, mesh.values);
+    if (is_seen && aim != ANY) choose_values_for_aim(&looks, aim, mesh.values);
     fixture_free(&f);
     if (is_seen) {
         step_fixture_create(&f, &mesh, CAMERA_ORTHOGRAPHIC, SIDE);

@@ -33,7 +33,7 @@ static double compute_ramp_fraction(int field, uint64_t vertex, uint64_t seed)
  * ds has the error int dk (c T - int_s c k T) ds, whose bracket is at most T for colours c in [0, 1]. So the error of
  * light is at most int dk T ds. This is at most dk times the length, and at most the largest dk / k, because int k T ds
  * <= 1. */
-static double bound_rounding(const step_function *function, double width, double unit)
+static double compute_rounding_bound(const step_function *function, double width, double unit)
 {
     const double a = (double)function->opacities[1], b = (double)function->opacities[2], way = 1.8 * 1.24 * sqrt(3);
     const double off = 4e-7 * fabs(b - a) / width, seen = off / (1 - fmax(a, b)) * way / unit;
@@ -73,7 +73,7 @@ static void verify_ramp(test_cell_shape shape, ramp_scene scene, double width, u
         step_measure_errors(&f, 1, 1e-7, cell_worst);
         for (int i = 0; i < 3; i++) {
             raw = fmax(raw, cell_worst[i]);
-            if (scene == POLYHEDRON) cell_worst[i] -= bound_rounding(&function, width, unit);
+            if (scene == POLYHEDRON) cell_worst[i] -= compute_rounding_bound(&function, width, unit);
             worst[i] = test_larger_error(worst[i], cell_worst[i]);
         }
         fixture_free(&f);

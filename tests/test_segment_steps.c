@@ -44,7 +44,7 @@ static int sample_values_on_ray(const render_fixture *f, const test_mesh *mesh, 
                 cell.position[i][axis] += axes[axis][a] * (cell.world[i][a] - camera->eye[a]);
             }
         }
-    if (reference_crossings(&cell, &line, ends) != 2) return 0;
+    if (reference_find_crossings(&cell, &line, ends) != 2) return 0;
     for (int i = 0; i < SAMPLES; i++) {
         const double z = ends[0].z + (ends[1].z - ends[0].z) * i / (SAMPLES - 1);
         const double point[3] = {line.base[0] + line.slope[0] * z, line.base[1] + line.slope[1] * z, z};
@@ -71,7 +71,7 @@ static bool find_extreme_value(const double values[SAMPLES], double sign, double
 
 /* Compares pictures of this hex, for an opacity with a ramp of the given width at 0.6, or with a step if the width is
  * 0. */
-static void verify_hex(step_function function, fixture_camera camera, double width, double unit)
+static void verify_hex_near_step(step_function function, fixture_camera camera, double width, double unit)
 {
     test_mesh mesh;
     render_fixture f;
@@ -93,7 +93,7 @@ static void hexes_that_barely_reach_a_step_keep_max_error(void **state)
     (void)state;
     for (int k = 0; k < 2; k++)
         for (fixture_camera camera = 0; camera <= CAMERA_ORTHOGRAPHIC; camera++)
-            verify_hex((step_function){.opacities = {0, 0, 0.9f, 0.9f}}, camera, 0, units[k]);
+            verify_hex_near_step((step_function){.opacities = {0, 0, 0.9f, 0.9f}}, camera, 0, units[k]);
 }
 
 /* Checks a cubic. On the middle ray, which is the hex's diagonal, the field is 0.2 - 0.4 s + 3 s^2 - 2 s^3: it falls to
@@ -304,8 +304,8 @@ static void steep_ramps_keep_max_error(void **state)
     for (int k = 0; k < (int)(sizeof widths / sizeof *widths); k++)
         for (int dense = 0; dense < 2; dense++)
             if (test_is_long_run() || dense == k % 2)
-                verify_hex((step_function){.opacities = {0, 0.02f, 0.9f, 0.5f}}, CAMERA_OUTSIDE, widths[k],
-                           dense ? 0.005 : 0.1);
+                verify_hex_near_step((step_function){.opacities = {0, 0.02f, 0.9f, 0.5f}}, CAMERA_OUTSIDE, widths[k],
+                                     dense ? 0.005 : 0.1);
 }
 
 /* ---- the same intervals of rays in lanes and in single cells ---- */
@@ -331,7 +331,7 @@ static void lanes_are_split_like_single_cells(void **state)
             if (i == 0) fixture_add_surface(&f, &nowhere, 1, 0.5f);
             fixture_draw(&f, &drawn[i]);
             f.job.surface_count = 0;
-            assert_true(drawn_frame_difference(&drawn[0], &drawn[i]) < 5e-7);
+            assert_true(drawn_frame_find_largest_difference(&drawn[0], &drawn[i]) < 5e-7);
         }
         for (int i = 0; i < 3; i++) drawn_frame_free(&drawn[i]);
         fixture_free(&f);

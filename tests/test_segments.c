@@ -99,7 +99,7 @@ static void tets_are_exact_for_every_camera(void **state)
 
 /* Returns the number of random tets. It is a multiple of 16 (in the usual run 32), so that all combinations of steps,
  * slivers and cameras occur. */
-static uint64_t random_tets(void)
+static uint64_t count_random_tets(void)
 {
     return (uint64_t)test_case_count(32, 80);
 }
@@ -136,7 +136,7 @@ static void random_tets_are_exact(void **state)
     for (int k = 0; k < 3; k++) {
         double worst = 0;
         int steps = 0;
-        for (uint64_t seed = 0; seed < random_tets(); seed++) {
+        for (uint64_t seed = 0; seed < count_random_tets(); seed++) {
             test_mesh mesh;
             render_fixture f;
             fixture_function function;
@@ -152,7 +152,7 @@ static void random_tets_are_exact(void **state)
         }
         fprintf(stderr, "random tets, opacities to %g: %.2g\n", most[k], worst);
         assert_true(worst < EXACT);
-        assert_int_equal(steps, random_tets() / 4);
+        assert_int_equal(steps, count_random_tets() / 4);
     }
 }
 
@@ -240,7 +240,7 @@ static void random_tets_keep_max_error(void **state)
     enum { DIGITS = 4 };
     double worst[DIGITS] = {0};
     (void)state;
-    for (uint64_t seed = 0; seed < random_tets(); seed++) {
+    for (uint64_t seed = 0; seed < count_random_tets(); seed++) {
         test_mesh mesh;
         render_fixture f;
         fixture_function function;
@@ -369,7 +369,7 @@ static void parts_draw_the_whole_picture(void **state)
                 }
                 fixture_draw(&whole, &at_once);
                 fixture_draw_distributed(parts, RANKS, &apart);
-                const double off = drawn_frame_difference(&at_once, &apart);
+                const double off = drawn_frame_find_largest_difference(&at_once, &apart);
                 for (int p = 0; p < 37 * 31; p++)
                     assert_true(
                         !comp_pixel_overlaps(apart.list.items + apart.first[p], apart.first[p + 1] - apart.first[p]));

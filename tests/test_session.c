@@ -21,7 +21,7 @@ static const char plain_scene[] = "images:\n" IMAGE("a", "1", SURFACE, "");
 
 static session_input input;
 
-static void step_draws(insitu_session *session, int64_t cycle, int images)
+static void check_step_draws(insitu_session *session, int64_t cycle, int images)
 {
     discard_pictures();
     const insitu_status status = insitu_step(session, cycle, 0.5 * (double)cycle);
@@ -47,7 +47,7 @@ static void images_are_drawn_when_due(void **context)
         open_session(MPI_COMM_WORLD, write_scene("images:\n" IMAGE("a", "2", SURFACE, "") IMAGE("b", "3", VOLUME, "")));
     everywhere(submit_input(session, &input) == INSITU_OK);
     const int expected[] = {2, 0, 1, 1, 1, 0, 2};
-    for (int cycle = 0; cycle < 7; cycle++) step_draws(session, cycle, expected[cycle]);
+    for (int cycle = 0; cycle < 7; cycle++) check_step_draws(session, cycle, expected[cycle]);
     everywhere(own_rank != 0 || (!strcmp(caught[0].path, "a_6.exr") && !strcmp(caught[1].path, "b_6.exr")));
     everywhere(insitu_last_report(session)->cycle == 6 && insitu_last_report(session)->time == 3);
     insitu_destroy(&session);
@@ -59,27 +59,27 @@ static void unchanged_input_rebuilds_nothing(void **context)
     insitu_session *session =
         open_session(MPI_COMM_WORLD, write_scene("images:\n" IMAGE("a", "1", SURFACE, "      - " VOLUME "\n")));
     everywhere(submit_input(session, &input) == INSITU_OK);
-    step_draws(session, 0, 1);
+    check_step_draws(session, 0, 1);
     const caught_picture first = caught[0];
     caught_count = 0;
     everywhere(insitu_last_report(session)->build_ms > 0 || input.part.cell_count == 0);
     session_input same = input;
     same.mesh.changed = same.field.changed = INSITU_CHANGED_NOTHING;
     everywhere(submit_input(session, &same) == INSITU_OK);
-    step_draws(session, 1, 1);
+    check_step_draws(session, 1, 1);
     const insitu_report *report = insitu_last_report(session);
     everywhere(report->build_ms == 0 && report->refit_ms == 0);
     everywhere(own_rank != 0 || are_same_pictures(&first, &caught[0]));
     same.field.changed = INSITU_CHANGED_VALUES; /* the caller's statement is used, although no values changed */
     everywhere(submit_input(session, &same) == INSITU_OK);
-    step_draws(session, 2, 1);
+    check_step_draws(session, 2, 1);
     everywhere(report->build_ms == 0 && report->refit_ms == 0);
     everywhere(strstr(report->left_out, "\"f\" has the values of the last picture"));
     everywhere(own_rank != 0 || are_same_pictures(&first, &caught[0]));
     same.field.changed = INSITU_CHANGED_NOTHING;
     same.mesh.changed = INSITU_CHANGED_GEOMETRY;
     everywhere(submit_input(session, &same) == INSITU_OK);
-    step_draws(session, 3, 1);
+    check_step_draws(session, 3, 1);
     everywhere(report->build_ms == 0 && (report->refit_ms > 0 || input.part.cell_count == 0));
     everywhere(own_rank != 0 || are_same_pictures(&first, &caught[0]));
     if (own_rank == 0) free(first.rgba), free(first.depth);
@@ -94,14 +94,14 @@ static void changed_values_are_detected(void **context)
     session_input in;
     input_create(&in, TEST_TETS, 4, TEST_BLOCK, own_rank, rank_count);
     everywhere(submit_input(session, &in) == INSITU_OK);
-    step_draws(session, 0, 1);
+    check_step_draws(session, 0, 1);
     in.mesh.changed = INSITU_CHANGED_NOTHING;
     for (int64_t cycle = 1; cycle < 20; cycle++) {
         const int64_t spots[] = {0, in.part.vertex_count / 3 + cycle, in.part.vertex_count - cycle};
         if (in.part.vertex_count > 60)
             in.part.values[spots[cycle % 3]] = nextafter(in.part.values[spots[cycle % 3]], 9);
         everywhere(submit_input(session, &in) == INSITU_OK);
-        step_draws(session, cycle, 1);
+        check_step_draws(session, cycle, 1);
         everywhere(insitu_last_report(session)->refit_ms > 0 || in.part.vertex_count <= 60);
     }
     input_free(&in);
@@ -115,7 +115,7 @@ static void moved_mesh_draws_the_moved_picture(void **context)
     (void)context;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
     everywhere(submit_input(session, &input) == INSITU_OK);
-    step_draws(session, 0, 1);
+    check_step_draws(session, 0, 1);
     const caught_picture first = caught[0];
     caught_count = 0;
     session_input moved = input;
@@ -125,7 +125,7 @@ static void moved_mesh_draws_the_moved_picture(void **context)
     moved.mesh.changed = INSITU_CHANGED_GEOMETRY;
     moved.field.changed = INSITU_CHANGED_NOTHING;
     everywhere(submit_input(session, &moved) == INSITU_OK);
-    step_draws(session, 1, 1);
+    check_step_draws(session, 1, 1);
     for (int i = 0; own_rank == 0 && i < 24 * 16; i++) caught[0].depth[i] /= 64;
     everywhere(own_rank != 0 || are_same_pictures(&first, &caught[0]));
     if (own_rank == 0) free(first.rgba), free(first.depth);
@@ -178,7 +178,7 @@ static void native_layouts_are_not_copied(void **context)
         field.values = make_array(&view.field.values);
         everywhere(insitu_set_mesh(session, "m", &mesh) == INSITU_OK);
         everywhere(insitu_set_field(session, "m", &field) == INSITU_OK);
-        step_draws(session, bits, 1);
+        check_step_draws(session, bits, 1);
         const insitu_report *report = insitu_last_report(session);
         int64_t borrowed = rounded.vertex_count * (layout.wide_coordinates ? 24 : 12) +
                            rounded.connectivity_count * (layout.wide_indices ? 8 : 4) +
@@ -208,11 +208,11 @@ static void cells_invisible_in_all_pictures_are_skipped(void **context)
     insitu_field other = input.field;
     other.name = "g";
     everywhere(submit_input(session, &input) == INSITU_OK);
-    step_draws(session, 0, 1);
+    check_step_draws(session, 0, 1);
     const int64_t trees = insitu_last_report(session)->bytes_trees;
     everywhere(insitu_set_field(session, "m", &other) == INSITU_OK);
     everywhere(insitu_set_mesh(session, "unseen", &input.mesh) == INSITU_OK);
-    step_draws(session, 1, 1);
+    check_step_draws(session, 1, 1);
     const insitu_report *report = insitu_last_report(session);
     everywhere(strstr(report->left_out, "mesh \"m\": field \"g\"") != NULL);
     everywhere(strstr(report->left_out, "mesh \"unseen\"") != NULL);
@@ -238,7 +238,7 @@ static void mirrored_cells_are_counted(void **context)
         session_input in;
         input_create(&in, (test_mesh_kind)kind, 3, TEST_BLOCK, own_rank, rank_count);
         everywhere(submit_input(session, &in) == INSITU_OK);
-        step_draws(session, 0, 1);
+        check_step_draws(session, 0, 1);
         const int64_t before = insitu_last_report(session)->cells_inverted, cells = in.part.cell_count;
         if (kind == TEST_PYRAMIDS)
             everywhere(2 * sum_over_ranks(before) == sum_over_ranks(cells));
@@ -246,7 +246,7 @@ static void mirrored_cells_are_counted(void **context)
             everywhere(kind == TEST_MIXED || before == 0);
         test_mesh_mirror_cells(&in.part, false);
         everywhere(submit_input(session, &in) == INSITU_OK);
-        step_draws(session, 1, 1);
+        check_step_draws(session, 1, 1);
         everywhere(insitu_last_report(session)->cells_inverted == cells - before);
         insitu_destroy(&session);
         input_free(&in);
@@ -262,13 +262,13 @@ static void ghosts_are_counted_and_not_drawn(void **context)
     for (int64_t cell = 0; cell < in.part.cell_count; cell += 3) in.part.ghosts[cell] = 1;
     test_mesh_mirror_cells(&in.part, false);
     everywhere(submit_input(session, &in) == INSITU_OK);
-    step_draws(session, 0, 1);
+    check_step_draws(session, 0, 1);
     const int64_t ghosts = (in.part.cell_count + 2) / 3;
     everywhere(insitu_last_report(session)->cells_ghost == ghosts);
     everywhere(insitu_last_report(session)->cells_inverted == in.part.cell_count - ghosts);
     memset(in.part.ghosts, 1, (size_t)in.part.cell_count);
     everywhere(submit_input(session, &in) == INSITU_OK);
-    step_draws(session, 1, 1);
+    check_step_draws(session, 1, 1);
     everywhere(own_rank != 0 || count_covered_pixels(&caught[0]) == 0);
     insitu_destroy(&session);
     input_free(&in);
@@ -280,12 +280,12 @@ static void empty_meshes_draw_the_background(void **context)
 {
     (void)context;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
-    step_draws(session, 0, 1);
+    check_step_draws(session, 0, 1);
     everywhere(own_rank != 0 || (count_covered_pixels(&caught[0]) == 0 && isinf(caught[0].depth[0])));
     insitu_mesh none;
     insitu_mesh_defaults(&none);
     everywhere(insitu_set_mesh(session, "m", &none) == INSITU_OK);
-    step_draws(session, 1, 1);
+    check_step_draws(session, 1, 1);
     everywhere(own_rank != 0 || count_covered_pixels(&caught[0]) == 0);
     insitu_destroy(&session);
 }
@@ -304,7 +304,7 @@ static void cells_on_one_rank_are_drawn(void **context)
             everywhere(submit_input(session, &all) == INSITU_OK);
         else /* odd ranks have an empty mesh, even ranks have no mesh */
             everywhere(insitu_set_mesh(session, "m", own_rank % 2 ? &none : NULL) == INSITU_OK);
-        step_draws(session, holder, 1);
+        check_step_draws(session, holder, 1);
         everywhere(own_rank != 0 || count_covered_pixels(&caught[0]) > 20);
         if (own_rank == 0 && holder == 0) {
             first = caught[0];
@@ -325,7 +325,7 @@ static void several_meshes_draw_one_picture(void **context)
     (void)context;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
     everywhere(submit_input(session, &input) == INSITU_OK);
-    step_draws(session, 0, 1);
+    check_step_draws(session, 0, 1);
     const caught_picture first = caught[0];
     caught_count = 0;
     everywhere(insitu_set_mesh(session, "m", NULL) == INSITU_OK);
@@ -339,7 +339,7 @@ static void several_meshes_draw_one_picture(void **context)
         everywhere(insitu_set_mesh(session, name, &in->mesh) == INSITU_OK);
         everywhere(insitu_set_field(session, name, &in->field) == INSITU_OK);
     }
-    step_draws(session, 1, 1);
+    check_step_draws(session, 1, 1);
     everywhere(own_rank != 0 || are_same_pictures(&first, &caught[0]));
     if (own_rank == 0) free(first.rgba), free(first.depth);
     insitu_destroy(&session);
@@ -373,7 +373,7 @@ static void overlapping_meshes_draw_one_picture(void **context)
             everywhere(insitu_set_mesh(session, name, has_part ? &in[i].mesh : NULL) == INSITU_OK);
             everywhere(!has_part || insitu_set_field(session, name, &in[i].field) == INSITU_OK);
         }
-        step_draws(session, turn, 1);
+        check_step_draws(session, turn, 1);
         /* the warning is given only in the first of these steps */
         everywhere(has_overlap_warning(session) == (turn == 0));
         if (own_rank != 0 || turn) continue;
@@ -385,11 +385,11 @@ static void overlapping_meshes_draw_one_picture(void **context)
         worst = test_larger_error(worst, fabs((double)first.rgba[i] - (double)caught[0].rgba[i]));
     everywhere(worst <= 1e-6 && (own_rank != 0 || count_covered_pixels(&first) > 20));
     everywhere(insitu_set_mesh(session, "tets", NULL) == INSITU_OK);
-    step_draws(session, 2, 1);
+    check_step_draws(session, 2, 1);
     everywhere(!has_overlap_warning(session));
     everywhere(insitu_set_mesh(session, "tets", &distributed[1].mesh) == INSITU_OK);
     everywhere(insitu_set_field(session, "tets", &distributed[1].field) == INSITU_OK);
-    step_draws(session, 3, 1);
+    check_step_draws(session, 3, 1);
     /* the warning is given again after the overlap has disappeared and returned */
     everywhere(has_overlap_warning(session));
     free(first.rgba);
@@ -411,7 +411,7 @@ static void constant_fields_are_drawn(void **context)
     for (int i = 0; i < 4; i++) {
         for (int64_t v = 0; v < in.part.vertex_count; v++) in.part.values[v] = constants[i];
         everywhere(submit_input(session, &in) == INSITU_OK);
-        step_draws(session, i, 1);
+        check_step_draws(session, i, 1);
         bool is_finite = true;
         for (int p = 0; own_rank == 0 && p < 24 * 16 * 4; p++) is_finite = is_finite && isfinite(caught[0].rgba[p]);
         everywhere(is_finite);
@@ -488,7 +488,7 @@ static void ranks_at_different_cycles_are_reported(void **context)
     everywhere(submit_input(session, &input) == INSITU_OK);
     const insitu_status status = insitu_step(session, own_rank == 1 ? 5 : 4, 0);
     check_reported_everywhere(session, status, INSITU_ERROR_MPI, "ranks disagree on the cycle: 4 on one, 5 on another");
-    step_draws(session, 6, 1);
+    check_step_draws(session, 6, 1);
     insitu_destroy(&session);
 }
 
@@ -504,7 +504,7 @@ static void picture_that_cannot_be_written_is_reported_on_all_ranks(void **conte
     unwritable = NULL;
     check_reported_everywhere(session, status, INSITU_ERROR_IO, "rank 0: image \"a\": a_3.exr: cannot be written");
     everywhere(own_rank != 0 || (caught_count == 1 && !strcmp(caught[0].path, "b_3.exr")));
-    step_draws(session, 4, 2);
+    check_step_draws(session, 4, 2);
     insitu_destroy(&session);
 }
 
@@ -514,20 +514,20 @@ static void edited_scene_is_used_unless_it_is_invalid(void **context)
     static const char edited[] = "the scene file was edited: its images are drawn from this step on";
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
     everywhere(submit_input(session, &input) == INSITU_OK);
-    step_draws(session, 0, 1);
+    check_step_draws(session, 0, 1);
     write_scene("images:\n" IMAGE("first", "1", SURFACE, "") IMAGE("second", "1", VOLUME, ""));
     for (int again = 0; again < 2; again++) {
-        step_draws(session, 1, 2);
+        check_step_draws(session, 1, 2);
         everywhere(!strcmp(insitu_last_report(session)->warnings, again ? "" : edited));
     }
     write_scene("images:\n  - nmae: a\n");
     for (int cycle = 2; cycle < 4; cycle++) {
-        step_draws(session, cycle, 2);
+        check_step_draws(session, cycle, 2);
         everywhere(strstr(insitu_last_report(session)->warnings, "last edit was not taken") != NULL);
         everywhere(strstr(insitu_last_report(session)->warnings, ".yaml:2: ") != NULL);
     }
     write_scene(plain_scene);
-    step_draws(session, 4, 1);
+    check_step_draws(session, 4, 1);
     everywhere(!strcmp(insitu_last_report(session)->warnings, edited));
     insitu_destroy(&session);
 }
@@ -595,10 +595,10 @@ static void missing_scene_file_is_reported(void **context)
     char kept[1100];
     snprintf(kept, sizeof kept, "%s.kept", scene);
     everywhere(submit_input(session, &input) == INSITU_OK);
-    step_draws(session, 0, 1);
+    check_step_draws(session, 0, 1);
     everywhere(own_rank != 0 || (rename(scene, kept) == 0 && mkfifo(scene, 0600) == 0));
     for (int cycle = 1; cycle < 3; cycle++) {
-        step_draws(session, cycle, 1);
+        check_step_draws(session, cycle, 1);
         everywhere(strstr(insitu_last_report(session)->warnings, "is a named pipe (FIFO), expected a regular file"));
     }
     insitu_session *other = NULL;
@@ -622,7 +622,7 @@ static void memory_is_freed(void **context)
     int64_t held = 0;
     for (int cycle = 0; cycle < 4; cycle++) {
         everywhere(submit_two_meshes(session, &cells) == INSITU_OK);
-        step_draws(session, cycle, 1);
+        check_step_draws(session, cycle, 1);
         everywhere(cycle < 2 || base_memory_held() == held);
         held = base_memory_held();
         everywhere(insitu_last_report(session)->bytes_peak >= held && held > before);
@@ -642,7 +642,7 @@ static void picture_memory_is_kept_to_a_limit(void **context)
                                "\n    outputs: [{path: h.png}]\n";
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
     everywhere(submit_input(session, &input) == INSITU_OK);
-    step_draws(session, 0, 1);
+    check_step_draws(session, 0, 1);
     const caught_picture first = caught[0];
     caught_count = 0;
     everywhere(insitu_last_report(session)->bytes_pictures == (own_rank == 0 ? 24 * 16 * 20 : 0));
@@ -650,14 +650,14 @@ static void picture_memory_is_kept_to_a_limit(void **context)
     session = open_session(MPI_COMM_WORLD, write_scene(large));
     everywhere(submit_input(session, &input) == INSITU_OK);
     for (int cycle = 0; cycle < 2; cycle++) {
-        step_draws(session, cycle, 2);
+        check_step_draws(session, cycle, 2);
         everywhere(insitu_last_report(session)->bytes_pictures == (own_rank == 0 ? 100 * 70 * 16 : 0));
         everywhere(own_rank != 0 || (!caught[0].depth && are_same_pictures(&first, &caught[1])));
     }
     insitu_destroy(&session);
     session = open_session(MPI_COMM_WORLD, write_scene(huge));
     everywhere(submit_input(session, &input) == INSITU_OK);
-    step_draws(session, 0, 1);
+    check_step_draws(session, 0, 1);
     everywhere(insitu_last_report(session)->bytes_pictures == 0);
     everywhere(own_rank != 0 || insitu_last_report(session)->bytes_peak >= 2049 * 2048 * 16);
     if (own_rank == 0) free(first.rgba), free(first.depth);
@@ -673,7 +673,7 @@ static void failed_allocation_returns_an_error(void **context)
     insitu_field cells = input.field;
     cells.name = "c", cells.centring = INSITU_CELL, cells.count = input.part.cell_count;
     everywhere(submit_two_meshes(session, &cells) == INSITU_OK);
-    step_draws(session, 0, 1);
+    check_step_draws(session, 0, 1);
     const caught_picture first = caught[0];
     caught_count = 0;
     const int64_t before = base_memory_held();
@@ -697,7 +697,7 @@ static void failed_allocation_returns_an_error(void **context)
             if (status != INSITU_OK && status != INSITU_ERROR_FIELD)
                 check_reported_everywhere(session, status, INSITU_ERROR_MEMORY, "memory");
             everywhere(submit_two_meshes(session, &cells) == INSITU_OK);
-            step_draws(session, n, 1);
+            check_step_draws(session, n, 1);
             everywhere(own_rank != 0 || are_same_pictures(&first, &caught[0]));
         }
         everywhere(failures > 20);

@@ -77,7 +77,7 @@ static bool add_exact_sample(const render_camera *c, double x, double y, double 
  * section to decide. The tolerance is the error 5 x 3e-7 of a depth near 5 in single precision, divided by a cosine of
  * at least 0.1, times the slope of the field relative to the range, 1 / 3.2, times the slope of the colour table, at
  * most 12. */
-static bool is_mean(const float *rgba, int pixel, int count)
+static bool is_pixel_sample_mean(const float *rgba, int pixel, int count)
 {
     render_camera camera;
     double sum[4] = {0}, off = 0;
@@ -123,7 +123,7 @@ static bool is_exact_mean(const caught_picture *picture, const caught_picture *p
         const float *rgba = picture->rgba + 4 * pixel, *before = plain->rgba + 4 * pixel;
         const float *next = pixel % WIDTH < WIDTH - 1 ? before + 4 : before;
         const bool is_edge = pixel_set_has(edges, pixel);
-        is_well = is_edge ? is_mean(rgba, pixel, count) : memcmp(rgba, before, 4 * sizeof *rgba) == 0;
+        is_well = is_edge ? is_pixel_sample_mean(rgba, pixel, count) : memcmp(rgba, before, 4 * sizeof *rgba) == 0;
         is_well = is_well && (is_edge || next[3] == before[3]);
         if (!is_well) fprintf(stderr, "pixel %d is off, of %d samples\n", pixel, count);
     }

@@ -115,7 +115,7 @@ static void a_box_fills_an_orthographic_frame(void **state)
 
 /* Returns the fraction of half a side of the picture that decorations leave free. words: number of heights of text that
  * the decorations take, 6.5 for a colour bar, 2.4 for a title, 3 for a ruler; size: height of the text in pixels. */
-static double fraction_left_by_decorations(double words, double size, int pixels)
+static double compute_undecorated_fraction(double words, double size, int pixels)
 {
     return fmax(0.95 - 2 * words * size / pixels, 0.5);
 }
@@ -139,10 +139,10 @@ static void decorations_keep_their_space(void **state)
         d->title = i % 7 ? (char *)(uintptr_t) "title" : NULL;
         if (!(extent.half_diagonal > 0) || !session_make_camera(&extent, &image, &camera)) continue;
         const double size = 0.03 * image.height, ruled = d->has_rulers ? 3 : 0;
-        const double most[2] = {fraction_left_by_decorations(ruled + (i % 3 == 2 ? 6.5 : 0), size, image.width),
-                                fraction_left_by_decorations(i % 7 ? 2.4 : 0, size, image.height)};
-        const double least[2] = {-fraction_left_by_decorations(ruled + (i % 3 == 1 ? 6.5 : 0), size, image.width),
-                                 -fraction_left_by_decorations(ruled, size, image.height)};
+        const double most[2] = {compute_undecorated_fraction(ruled + (i % 3 == 2 ? 6.5 : 0), size, image.width),
+                                compute_undecorated_fraction(i % 7 ? 2.4 : 0, size, image.height)};
+        const double least[2] = {-compute_undecorated_fraction(ruled + (i % 3 == 1 ? 6.5 : 0), size, image.width),
+                                 -compute_undecorated_fraction(ruled, size, image.height)};
         assert_true(compute_projected_bounds(&camera, &extent, low, high));
         bool is_filled = is_close(&camera, &extent);
         for (int a = 0; a < 2; a++) {

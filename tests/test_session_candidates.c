@@ -52,7 +52,7 @@ static void step_and_compare(insitu_session *full, insitu_session *other, int64_
     everywhere(insitu_last_report(full)->cells_unusable == insitu_last_report(other)->cells_unusable);
 }
 
-static void step_same(insitu_session *full, insitu_session *other, const session_input *in, int64_t cycle)
+static void submit_and_compare(insitu_session *full, insitu_session *other, const session_input *in, int64_t cycle)
 {
     everywhere(submit_input(full, in) == INSITU_OK && submit_input(other, in) == INSITU_OK);
     step_and_compare(full, other, cycle);
@@ -79,22 +79,22 @@ static void compare_trees(scene_tree tree, const char *images, test_mesh_kind ki
     insitu_session *full = open_tree(SCENE_TREE_FULL, scene), *other = open_tree(tree, scene);
     session_input in;
     input_create(&in, kind, 6, TEST_CHECKERBOARD, own_rank, rank_count);
-    step_same(full, other, &in, 0);
+    submit_and_compare(full, other, &in, 0);
     in.mesh.changed = INSITU_CHANGED_NOTHING;
     shift_values(&in, 0.15);
-    step_same(full, other, &in, 1);
+    submit_and_compare(full, other, &in, 1);
     in.field.changed = INSITU_CHANGED_NOTHING;
-    step_same(full, other, &in, 2);
+    submit_and_compare(full, other, &in, 2);
     in.mesh.changed = INSITU_CHANGED_GEOMETRY;
     for (int64_t i = 0; i < in.part.vertex_count; i++) in.part.coordinates[3 * i] *= 1.125;
-    step_same(full, other, &in, 3);
+    submit_and_compare(full, other, &in, 3);
     in.mesh.changed = INSITU_CHANGED_NOTHING;
     in.field.changed = INSITU_CHANGED_VALUES;
     if (in.part.vertex_count) in.part.values[in.part.vertex_count / 2] = NAN;
-    step_same(full, other, &in, 4);
+    submit_and_compare(full, other, &in, 4);
     input_free(&in);
     input_create(&in, kind, 5, TEST_RANDOM, own_rank, rank_count);
-    step_same(full, other, &in, 5);
+    submit_and_compare(full, other, &in, 5);
     input_free(&in);
     insitu_destroy(&full);
     insitu_destroy(&other);
@@ -240,7 +240,7 @@ static void move_vertices_periodically(session_input *in, double by)
 /* Compares moving meshes with a second session that rebuilds its trees at each step. First the vertices move while the
  * cells stay, with or without new values; then only values change, which can make cells visible whose bounds were not
  * refitted. Images a and b are due alternately from cycle 2 on. */
-static void compare_moving(const char *images, test_mesh_kind kind)
+static void compare_moving_meshes(const char *images, test_mesh_kind kind)
 {
     static const struct {
         double sway, change;
@@ -277,7 +277,7 @@ static void moving_vertices_draw_same_picture_as_new_trees(void **context)
     (void)context;
     for (size_t i = 0; i < sizeof images / sizeof images[0]; i++)
         for (size_t kind = 0; kind < sizeof kinds / sizeof kinds[0]; kind++)
-            if (test_is_long_run() || (i + kind) % 3 == 0) compare_moving(images[i], kinds[kind]);
+            if (test_is_long_run() || (i + kind) % 3 == 0) compare_moving_meshes(images[i], kinds[kind]);
 }
 
 /* Checks that bounds refitted for one image are not used for another. Two images with different layers of the mesh are

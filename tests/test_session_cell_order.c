@@ -160,7 +160,7 @@ static void free_drawing(drawing *d)
 }
 
 /* Returns whether the part has any cell whose vertices are in another order than VTK's. */
-static bool has_reordered(const test_mesh *part, insitu_vertex_order order)
+static bool has_cells_in_other_order(const test_mesh *part, insitu_vertex_order order)
 {
     bool turned = false;
     for (int64_t cell = 0; cell < part->cell_count; cell++)
@@ -181,7 +181,8 @@ static void check_order_and_layout(test_mesh_kind kind, insitu_vertex_order orde
     moved plain_arrays = move_arrays(&plain, how >= NARROW ? NARROW : how == ROWS ? PACKED : how);
     moved arrays = move_arrays(&in, how);
     drawing expected = draw_input(&plain), drawn = draw_input(&in);
-    const bool is_copied = in.part.cell_count && (in.mesh.connectivity_row || has_reordered(&in.part, order));
+    const bool is_copied =
+        in.part.cell_count && (in.mesh.connectivity_row || has_cells_in_other_order(&in.part, order));
     everywhere(are_same_drawings(&expected, &drawn));
     everywhere(drawn.copied == expected.copied + is_copied * 4 * (in.part.connectivity_count + 1));
     everywhere(drawn.gives_reason == is_copied && !drawn.is_warned);

@@ -61,8 +61,8 @@ static bool intersect_plane(const plane *p, const double base[3], const double d
 /* Returns whether a pixel's channels are those of plane p, or those of no surface if p is NULL. Normals are rounded by
  * some units of 6e-8. The error of a value is its gradient of 0.91 times the position's error of 1.5e-5, which is
  * derived in test_session_surfaces.c. */
-static bool is_as_expected(const caught_picture *picture, int pixel, const plane *p, const double place[3],
-                           const double direction[3])
+static bool has_expected_channels(const caught_picture *picture, int pixel, const plane *p, const double place[3],
+                                  const double direction[3])
 {
     double own[CHANNELS];
     for (int c = 0; c < CHANNELS; c++) own[c] = (double)picture->data[c * PIXELS + pixel];
@@ -97,7 +97,7 @@ static bool is_channel_picture_exact(const caught_picture *picture)
         if (is_close) continue;
         for (int a = 0; a < 3; a++) place[a] = base[a] + nearest * direction[a];
         if (seen) hits[seen - planes]++;
-        if (is_as_expected(picture, pixel, seen, place, direction)) continue;
+        if (has_expected_channels(picture, pixel, seen, place, direction)) continue;
         fprintf(stderr, "pixel %d, plane %d:", pixel, seen ? (int)(seen - planes) : -1);
         for (int c = 0; c < CHANNELS; c++) fprintf(stderr, " %.9g", (double)picture->data[c * PIXELS + pixel]);
         fprintf(stderr, "; the field there is %.9g\n", test_linear_field(place));

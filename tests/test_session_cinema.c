@@ -68,7 +68,7 @@ static void run_steps(const char *scene, const session_input *in, int first, int
 /* ---- tables ---------------------------------------------------------------------------------------------------- */
 
 /* Makes the table that is expected from the scene `swept` for cycles first to end - 1. */
-static void expect_table(int first, int end, char text[MOST])
+static void make_expected_table(int first, int end, char text[MOST])
 {
     static const double values[] = {0.25, -0.5}, elevations[] = {-20, 10.5};
     size_t size = (size_t)snprintf(text, MOST, "cycle,time,phi,theta,isovalue,FILE\n");
@@ -79,7 +79,7 @@ static void expect_table(int first, int end, char text[MOST])
 }
 
 /* Converts the table's lines to the list that is expected in the database's script. */
-static void expect_script(const char *table, char text[MOST])
+static void make_expected_script(const char *table, char text[MOST])
 {
     size_t size = (size_t)snprintf(text, MOST, "cinemaTable([\n");
     for (const char *line = table; *line; line = strchr(line, '\n') + 1)
@@ -98,14 +98,14 @@ static bool is_table(int first, int end)
 {
     static char expected[MOST], found[MOST];
     if (own_rank != 0) return true;
-    expect_table(first, end, expected);
+    make_expected_table(first, end, expected);
     read_file("out/a.cdb/data.csv", MOST, found);
     if (strcmp(found, expected) != 0) {
         fprintf(stderr, "%s\nexpected\n%s\n", found, expected);
         return false;
     }
     static char script[MOST];
-    expect_script(expected, script);
+    make_expected_script(expected, script);
     read_file("out/a.cdb/data.js", MOST, found);
     return strcmp(found, script) == 0 && page_exists();
 }
@@ -164,7 +164,7 @@ static void restarted_runs_continue_the_table(void **state)
     if (own_rank == 0) text[strlen(text) - 9] = '\0'; /* truncates the last line */
     write_text_file("out/a.cdb/data.csv", text);
     run_steps(swept, &in, 7, 9);
-    expect_table(0, 9, text);
+    make_expected_table(0, 9, text);
     static char found[MOST];
     read_file("out/a.cdb/data.csv", MOST, found);
     if (own_rank == 0) { /* all lines except the truncated one */
@@ -195,8 +195,8 @@ static void table_lines_begin_at_the_first_step(void **state)
     static char text[MOST], expected[MOST], last[MOST];
     run_steps(late, &in, 3, 7);
     read_file("out/a.cdb/data.csv", MOST, text);
-    expect_table(0, 3, expected);
-    expect_table(6, 7, last);
+    make_expected_table(0, 3, expected);
+    make_expected_table(6, 7, last);
     strcat(expected, strchr(last, '\n') + 1);
     everywhere(own_rank != 0 || strcmp(text, expected) == 0);
     input_free(&in);

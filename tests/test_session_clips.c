@@ -179,7 +179,7 @@ static bool has_surfaces(const caught_picture *picture, const region *g, see_fun
     return hits > PIXELS / 60 && behind > PIXELS / 80;
 }
 
-static double interval_length(interval s)
+static double compute_interval_length(interval s)
 {
     return fmax(s.end - s.begin, 0);
 }
@@ -187,15 +187,15 @@ static double interval_length(interval s)
 /* Checks the opacity of a medium in which half of the light passes a length of 1. media: number of such media in the
  * same region. The library enlarges the visible region by 2e-6 of half the diagonal, which is 4e-6, and a ray's
  * interval by this over the cosine to the region's border. */
-static bool has_medium(const caught_picture *picture, const region *g, double media, double tolerance)
+static bool has_expected_medium(const caught_picture *picture, const region *g, double media, double tolerance)
 {
     int hits = 0;
     for (int pixel = 0; pixel < PIXELS; pixel++) {
         const ray r = make_pixel_ray(pixel);
         const interval within = intersect_intervals(intersect_ray_with_cube(&r), compute_visible_interval(g, &r));
-        const double length =
-            (interval_length(within) - interval_length(intersect_intervals(within, compute_hole_interval(g, &r)))) *
-            sqrt(dot_product(r.direction, r.direction));
+        const double length = (compute_interval_length(within) -
+                               compute_interval_length(intersect_intervals(within, compute_hole_interval(g, &r)))) *
+                              sqrt(dot_product(r.direction, r.direction));
         const double alpha = 1 - pow(0.5, media * length), own = (double)picture->rgba[4 * pixel + 3];
         hits += alpha > 0.1;
         if (fabs(own - alpha) < tolerance) continue;
@@ -205,7 +205,7 @@ static bool has_medium(const caught_picture *picture, const region *g, double me
     return hits > PIXELS / 20;
 }
 
-static bool is_clear_cube(const caught_picture *p, const region *g)
+static bool has_transparent_cube_surface(const caught_picture *p, const region *g)
 {
     return has_surfaces(p, g, find_visible_cube_faces, 0.5);
 }
@@ -217,7 +217,7 @@ static bool is_plane(const caught_picture *p, const region *g)
 {
     return has_surfaces(p, g, find_visible_plane_hits, 1);
 }
-static bool is_clear_plane(const caught_picture *p, const region *g)
+static bool has_transparent_isosurface_plane(const caught_picture *p, const region *g)
 {
     return has_surfaces(p, g, find_visible_plane_hits, 0.25);
 }
@@ -225,21 +225,21 @@ static bool is_clear_plane(const caught_picture *p, const region *g)
  * for 4e-6. */
 static bool is_exact_medium(const caught_picture *p, const region *g)
 {
-    return has_medium(p, g, 1, g->radius > 0 ? 4e-3 : 1e-4);
+    return has_expected_medium(p, g, 1, g->radius > 0 ? 4e-3 : 1e-4);
 }
 /* One sampling step of 0.01 absorbs 0.0069 of the light. An interval can be wrong by a step at either end, and the hole
  * adds two ends. */
 static bool is_sampled_medium(const caught_picture *p, const region *g)
 {
-    return has_medium(p, g, 1, g->hole_count || g->is_outside ? 0.028 : 0.014);
+    return has_expected_medium(p, g, 1, g->hole_count || g->is_outside ? 0.028 : 0.014);
 }
 static bool is_double_medium(const caught_picture *p, const region *g)
 {
-    return has_medium(p, g, 2, g->radius > 0 ? 8e-3 : 2e-4);
+    return has_expected_medium(p, g, 2, g->radius > 0 ? 8e-3 : 2e-4);
 }
 static bool is_double_sampled_medium(const caught_picture *p, const region *g)
 {
-    return has_medium(p, g, 2, g->hole_count || g->is_outside ? 0.056 : 0.028);
+    return has_expected_medium(p, g, 2, g->hole_count || g->is_outside ? 0.056 : 0.028);
 }
 
 /* The format %s is replaced by the layer's own clip, if it has one. */
@@ -256,11 +256,11 @@ typedef struct clip_case {
 
 static const clip_case cases[] = {
     {"surface", CLIPPED("", "      - surface: {opacity: 1%s}\n"), is_cube, 0},
-    {"clear surface", CLIPPED("", "      - surface: {opacity: 0.5%s}\n"), is_clear_cube, 0},
+    {"clear surface", CLIPPED("", "      - surface: {opacity: 0.5%s}\n"), has_transparent_cube_surface, 0},
     {"isosurface", CLIPPED("", "      - isosurface: {field: f, values: [0.2]%s}\n"), is_plane, 0},
     {"coloured", CLIPPED("", "      - isosurface: {field: f, values: [0.2], colour_by: {field: f}%s}\n"), is_plane, 0},
     {"clear isosurface", CLIPPED("", "      - isosurface: {field: f, values: [0.2], opacity: 0.25%s}\n"),
-     is_clear_plane, 0},
+     has_transparent_isosurface_plane, 0},
     {"to an error", CLIPPED("", MEDIUM), is_exact_medium, 1e-6},
     {"to a small error", CLIPPED("    sampling: {max_error: 1e-4}\n", MEDIUM), is_exact_medium, 1e-6},
     {"segments", CLIPPED("    sampling: {method: segments}\n", MEDIUM), is_exact_medium, 1e-6},

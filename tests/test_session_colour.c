@@ -49,7 +49,7 @@ static caught_picture draw_with_keys(const session_input *in, const char *surfac
 
 /* Checks that no colour channel differs by more than `allowed`, and frees both pictures. Pictures of surfaces are
  * bit-identical; volumes agree to 1e-6 on several ranks. */
-static void assert_alike(caught_picture *a, caught_picture *b, double allowed)
+static void assert_similar_pictures(caught_picture *a, caught_picture *b, double allowed)
 {
     double worst = 0;
     for (int i = 0; own_rank == 0 && i < 4 * a->width * a->height; i++)
@@ -110,9 +110,9 @@ static void check_source(const char *keys, const char *scale, double low, double
     snprintf(fixed, sizeof fixed, "%s, range: [%.17g, %.17g]", scale, low, high);
     snprintf(by_source, sizeof by_source, "%s, range: %s", scale, keys);
     caught_picture truth = draw_with_keys(&block, "", fixed), found = draw_with_keys(&block, "", by_source);
-    assert_alike(&found, &truth, 0);
+    assert_similar_pictures(&found, &truth, 0);
     truth = draw_with_keys(&block, "", fixed), found = draw_with_keys(&distributed, "", by_source);
-    assert_alike(&found, &truth, 1e-6);
+    assert_similar_pictures(&found, &truth, 1e-6);
 }
 
 static void ranges_match_brute_force(void **state)
@@ -171,7 +171,7 @@ static void ranges_over_a_run_widen_and_persist(void **state)
         everywhere(submit_input(session, &distributed) == INSITU_OK);
         caught_picture picture = draw_step(session, cycle);
         if (cycle == 0)
-            assert_alike(&picture, &by_data, 0);
+            assert_similar_pictures(&picture, &by_data, 0);
         else
             free(picture.rgba), free(picture.depth);
     }
@@ -180,14 +180,14 @@ static void ranges_over_a_run_widen_and_persist(void **state)
     /* Another session continues the range from the file. The comparison concerns the volume, because the surface is
      * coloured by another field. */
     caught_picture again = draw_with_keys(&distributed, "", run);
-    assert_alike(&again, &fixed, 0);
+    assert_similar_pictures(&again, &fixed, 0);
     /* The file contains no range for another field yet. */
     caught_picture other = draw_with_keys(&distributed, "", ", component: magnitude, range: run"), fresh;
     fresh = draw_with_keys(&distributed, "", ", component: magnitude");
-    assert_alike(&other, &fresh, 0);
+    assert_similar_pictures(&other, &fresh, 0);
     remove_ranges();
     caught_picture anew = draw_with_keys(&distributed, "", run);
-    assert_alike(&anew, &plain, 0);
+    assert_similar_pictures(&anew, &plain, 0);
     remove_ranges();
 }
 
@@ -222,7 +222,7 @@ static void every_kind_of_layer_has_a_range_over_a_run(void **state)
             everywhere(!file || strncmp(line, layers[i][0], strlen(layers[i][0])) == 0);
             if (file) fclose(file);
         }
-        assert_alike(&pictures[0], &pictures[1], 1e-6);
+        assert_similar_pictures(&pictures[0], &pictures[1], 1e-6);
     }
     remove_ranges();
 }
@@ -352,7 +352,7 @@ static void maps_from_files_reach_every_rank(void **state)
     const char *list = ", map: {colours: [[0, 0, 1], [1, 1, 0], [1, 0, 0]]}";
     caught_picture by_file = draw_with_keys(&distributed, keys, keys),
                    by_list = draw_with_keys(&distributed, list, list);
-    assert_alike(&by_file, &by_list, 0);
+    assert_similar_pictures(&by_file, &by_list, 0);
 }
 
 static void missing_and_broken_maps_are_reported_on_all_ranks(void **state)

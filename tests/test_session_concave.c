@@ -186,7 +186,7 @@ static truth compute_expected_pixel(const tile tiles[TILES], int pixel)
 typedef bool verify_function(const truth *t, const double at[2], const float *rgba, float depth);
 
 /* Checks depths and colours. The tolerances are derived in test_session_surfaces.c. */
-static bool is_value(const truth *t, const double at[2], const float *rgba, float depth)
+static bool has_exact_depth_and_colour(const truth *t, const double at[2], const float *rgba, float depth)
 {
     (void)at;
     if (t->margin < 1e-5) return true;
@@ -209,7 +209,7 @@ static bool is_lit(const truth *t, const double at[2], const float *rgba, float 
 
 /* Checks black lines that are three pixels wide on the polygons' edges: inside polygons all other pixels must be
  * white. */
-static bool is_lined(const truth *t, const double at[2], const float *rgba, float depth)
+static bool has_lines_on_edges(const truth *t, const double at[2], const float *rgba, float depth)
 {
     (void)at;
     (void)depth;
@@ -223,7 +223,7 @@ static bool is_clipped(const truth *t, const double at[2], const float *rgba, fl
     const double side = at[0] + 0.5 * at[1];
     if (fabs(side) < 1e-5) return true;
     const truth cut = {t->is_hit && side < 0, t->margin, t->depth, t->value};
-    return is_value(&cut, at, rgba, depth);
+    return has_exact_depth_and_colour(&cut, at, rgba, depth);
 }
 
 static bool is_correct(const tile tiles[TILES], const caught_picture *picture, verify_function *verify,
@@ -268,9 +268,9 @@ static void concave_shells_match_their_outline(void **state)
         const char *what, *scene;
         verify_function *verify;
     } cases[] = {
-        {"values", IMAGE("", BY_FIELD), is_value},
+        {"values", IMAGE("", BY_FIELD), has_exact_depth_and_colour},
         {"light", IMAGE("", "colour: [1, 1, 1]"), is_lit},
-        {"edges", IMAGE("", "colour: [1, 1, 1], edges: {width: 3, colour: [0, 0, 0]}, " UNLIT), is_lined},
+        {"edges", IMAGE("", "colour: [1, 1, 1], edges: {width: 3, colour: [0, 0, 0]}, " UNLIT), has_lines_on_edges},
         {"clip", IMAGE("    clip: {planes: [{point: [0, 0, 0], normal: [1, 0.5, 0]}]}\n", BY_FIELD), is_clipped},
     };
     static tile tiles[TILES];

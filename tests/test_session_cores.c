@@ -27,7 +27,7 @@ static void check_shares(const binding *ranks, int rank_count, const int *expect
             counts[k]++;
         }
     for (int r = 0; r < rank_count; r++)
-        assert_int_equal(session_share_of_cores(own[r], counts, MOST_CORES), expected[r]);
+        assert_int_equal(session_compute_share_of_cores(own[r], counts, MOST_CORES), expected[r]);
 }
 
 /* Checks the numbers of cores of ranks that are all bound to the same cores. */
@@ -61,7 +61,7 @@ static void ranks_of_one_node_divide_its_cores(void **context)
     int ranks = 1;
     MPI_Comm_size(MPI_COMM_WORLD, &ranks);
     const int share = omp_get_num_procs() / ranks;
-    assert_int_equal(session_cores_of_rank(MPI_COMM_WORLD), share > 1 ? share : 1);
+    assert_int_equal(session_count_cores_of_rank(MPI_COMM_WORLD), share > 1 ? share : 1);
 }
 
 int main(int argc, char **argv)

@@ -101,7 +101,7 @@ static double get_derived_value(const insitu_session *session, const char *name,
 {
     const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
     find_derived_field(session, "m", name);
-    const grid_field values = session_caller_field(mesh, session_find_field(mesh, name), component);
+    const grid_field values = session_get_caller_values(mesh, session_find_field(mesh, name), component);
     return grid_field_value(&values, at);
 }
 
@@ -109,13 +109,13 @@ static double get_derived_value(const insitu_session *session, const char *name,
 
 static const double slopes[3][3] = {{0.3, -1.1, 0.7}, {0.9, 0.2, -0.4}, {-0.6, 0.5, 1.3}};
 
-static void linear_velocity(const double p[3], double out[3])
+static void compute_linear_velocity(const double p[3], double out[3])
 {
     for (int c = 0; c < 3; c++) out[c] = slopes[c][0] * p[0] + slopes[c][1] * p[1] + slopes[c][2] * p[2] + 2 - c;
 }
 
 /* Returns det(M - x). The middle root is found by bisection between the positions at which its derivative is 0. */
-static double shifted_determinant(const double m[3][3], double x)
+static double compute_shifted_determinant(const double m[3][3], double x)
 {
     const double a = m[0][0] - x, b = m[1][1] - x, c = m[2][2] - x;
     return a * (b * c - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * c - m[1][2] * m[2][0]) +
@@ -131,7 +131,7 @@ static double find_middle_eigenvalue(const double m[3][3])
     double low = trace / 3 - half, high = trace / 3 + half; /* the determinant increases between low and high */
     for (int i = 0; i < 200; i++) {
         const double middle = 0.5 * (low + high);
-        if (shifted_determinant(m, middle) < 0)
+        if (compute_shifted_determinant(m, middle) < 0)
             low = middle;
         else
             high = middle;
@@ -147,7 +147,7 @@ typedef struct expected_value {
 
 /* Computes the Q criterion, lambda2 and the strain rate directly from the symmetric part S and the antisymmetric part W
  * of the velocity gradient. */
-static void find_tensors(double *q, double *lambda2, double *strain)
+static void compute_tensor_invariants(double *q, double *lambda2, double *strain)
 {
     double s[3][3], w[3][3], m[3][3] = {{0}}, of_s = 0, of_w = 0;
     for (int i = 0; i < 3; i++)
@@ -174,7 +174,7 @@ static void find_tensors(double *q, double *lambda2, double *strain)
 static double find_largest_linear_error(const insitu_session *session, const test_mesh *mesh)
 {
     double q, lambda2, strain, worst = 0;
-    find_tensors(&q, &lambda2, &strain);
+    compute_tensor_invariants(&q, &lambda2, &strain);
     const double w[3] = {slopes[2][1] - slopes[1][2], slopes[0][2] - slopes[2][0], slopes[1][0] - slopes[0][1]};
     const double wm = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]), *g = slopes[1];
     const double gm = sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]), d = slopes[0][0] + slopes[1][1] + slopes[2][2];
@@ -217,7 +217,7 @@ static void linear_velocities_are_exact(void **state)
         in.mesh.keep_polyhedra = 1;
         for (int is_wide = 0; is_wide < 2; is_wide++) {
             vector_field u;
-            make_vector(&in.part, linear_velocity, INSITU_VERTEX, is_wide, "u", &u);
+            make_vector(&in.part, compute_linear_velocity, INSITU_VERTEX, is_wide, "u", &u);
             insitu_session *session = open_stepped(MPI_COMM_SELF, SCENE(ALL_KINDS, "all"), &in, &u);
             const double worst = find_largest_linear_error(session, &in.part);
             if (!(worst < (is_wide ? 1e-9 : 1e-5)))
@@ -233,7 +233,7 @@ static void linear_velocities_are_exact(void **state)
 
 /* ---- expressions ------------------------------------------------------------------------------------------------ */
 
-static void swirl_velocity(const double p[3], double out[3])
+static void compute_swirl_velocity(const double p[3], double out[3])
 {
     out[0] = sin(3 * p[2]) + cos(2 * p[1]) + 0.2;
     out[1] = sin(2 * p[0]) + 1.5 * cos(3 * p[2]);
@@ -246,7 +246,7 @@ static void swirl_velocity(const double p[3], double out[3])
     "d: \"log(3 + u.x) + log10(3 + u.y) + sin(u.z) * cos(u.x) + tan(u.y / 4) + 2^3^0.5 + 7 - 2 - 1\", "                \
     "e: {magnitude: u}, h: {field: u, component: y}, all: a + b + c + d + e + h"
 
-static void find_expressions(const double u[3], double out[6])
+static void compute_expected_expressions(const double u[3], double out[6])
 {
     const double length = sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
     out[0] = sqrt(u[0] * u[0] + u[1] * u[1]) / (2 + fabs(u[2]));
@@ -265,12 +265,12 @@ static void expressions_match_c_arithmetic(void **state)
     input_create(&in, TEST_HEXES, SIDE, TEST_BLOCK, 0, 1);
     for (insitu_centring centring = INSITU_VERTEX; centring <= INSITU_CELL; centring++) {
         vector_field u;
-        make_vector(&in.part, swirl_velocity, centring, true, "u", &u);
+        make_vector(&in.part, compute_swirl_velocity, centring, true, "u", &u);
         insitu_session *session = open_stepped(MPI_COMM_SELF, SCENE(EXPRESSIONS, "all"), &in, &u);
         double worst = 0;
         for (int64_t i = 0; i < u.field.count; i++) {
             double expected[7] = {0};
-            find_expressions((const double *)u.values + 4 * i, expected);
+            compute_expected_expressions((const double *)u.values + 4 * i, expected);
             for (int k = 0; k < 6; k++) expected[6] += expected[k];
             for (int k = 0; k < 7; k++)
                 worst = test_larger_error(worst, fabs(get_derived_value(session, names[k], 0, i) - expected[k]) /
@@ -294,7 +294,7 @@ static int64_t find_vertex(const test_mesh *whole, const double place[3])
 }
 
 /* Marks the vertices of all cells that are not ghosts. No other vertex needs a value. */
-static bool *find_used(const insitu_session *session, const char *mesh)
+static bool *mark_used_vertices(const insitu_session *session, const char *mesh)
 {
     const grid *g = &session_find_mesh(&session->meshes, mesh)->cells;
     bool *used = calloc((size_t)g->vertex_count + 1, sizeof *used);
@@ -312,7 +312,7 @@ static bool check_same_bits(const insitu_session *parts, const char *mesh, const
 {
     const session_field *a = find_derived_field(parts, mesh, name), *b = find_derived_field(alone, "m", name);
     const int64_t size = a->values.stride;
-    bool *used = find_used(parts, mesh), is_same = a->values.stride == b->values.stride;
+    bool *used = mark_used_vertices(parts, mesh), is_same = a->values.stride == b->values.stride;
     for (int64_t v = 0; v < part->vertex_count && is_same; v++) {
         if (!used[v]) continue;
         const int64_t there = find_vertex(whole, part->coordinates + 3 * v);
@@ -342,10 +342,10 @@ static void derived_fields_do_not_depend_on_the_partition(void **state)
             extract_own_cells(&whole.part, distributed, SIDE, kind == TEST_HEXES, &in.part);
             if (kind != TEST_POLYHEDRA) test_mesh_reorder_vertices(&in.part, (uint64_t)own_rank + 3);
             input_describe(&in);
-            make_vector(&in.part, swirl_velocity, INSITU_VERTEX, kind % 2 == 0, "u", &u);
-            make_vector(&whole.part, swirl_velocity, INSITU_VERTEX, kind % 2 == 0, "u", &whole_u);
-            make_vector(&in.part, linear_velocity, INSITU_VERTEX, true, "c", &c);
-            make_vector(&whole.part, linear_velocity, INSITU_VERTEX, true, "c", &whole_c);
+            make_vector(&in.part, compute_swirl_velocity, INSITU_VERTEX, kind % 2 == 0, "u", &u);
+            make_vector(&whole.part, compute_swirl_velocity, INSITU_VERTEX, kind % 2 == 0, "u", &whole_u);
+            make_vector(&in.part, compute_linear_velocity, INSITU_VERTEX, true, "c", &c);
+            make_vector(&whole.part, compute_linear_velocity, INSITU_VERTEX, true, "c", &whole_c);
             insitu_session *parts = open_session_with_velocity(MPI_COMM_WORLD, scene, &in, &u);
             assert_int_equal(insitu_set_field(parts, "m", &c.field), INSITU_OK);
             insitu_session *alone = open_session_with_velocity(MPI_COMM_SELF, two_threads, &whole, &whole_u);
@@ -379,7 +379,7 @@ static void derived_fields_have_no_seam_between_blocks(void **state)
         vector_field whole_u, u[2];
         test_mesh_make_lattice(TEST_MIXED, SIDE, 0.2, test_wave_field, &whole.part);
         input_describe(&whole);
-        make_vector(&whole.part, swirl_velocity, INSITU_VERTEX, true, "u", &whole_u);
+        make_vector(&whole.part, compute_swirl_velocity, INSITU_VERTEX, true, "u", &whole_u);
         insitu_session *alone = open_stepped(MPI_COMM_SELF, scene, &whole, &whole_u), *session = NULL;
         int *owners = calloc((size_t)whole.part.cell_count, sizeof *owners);
         assert_non_null(owners);
@@ -388,7 +388,7 @@ static void derived_fields_have_no_seam_between_blocks(void **state)
         for (int i = 0; i < 2; i++) {
             test_mesh_extract_part(&whole.part, owners, 2 * own_rank + i, &parts[i].part);
             input_describe(&parts[i]);
-            make_vector(&parts[i].part, swirl_velocity, INSITU_VERTEX, true, "u", &u[i]);
+            make_vector(&parts[i].part, compute_swirl_velocity, INSITU_VERTEX, true, "u", &u[i]);
             assert_int_equal(insitu_set_mesh(session, meshes[i], &parts[i].mesh), INSITU_OK);
             assert_int_equal(insitu_set_field(session, meshes[i], &u[i].field), INSITU_OK);
         }
@@ -424,7 +424,7 @@ static void gradients_of_shells_are_tangential(void **state)
         p[0] = 0.2 * (v % ROW) + 0.05 * test_uniform((uint64_t)v, 3);
         p[1] = 0.3 * (double)(v / ROW) + 0.05 * test_uniform((uint64_t)v, 4);
         p[2] = 0.3 * p[0] + 0.2 * p[1];
-        linear_velocity(p, u + 3 * (ptrdiff_t)v);
+        compute_linear_velocity(p, u + 3 * (ptrdiff_t)v);
     }
     for (int i = 0; i < SHEET * SHEET; i++) {
         const int at = i / SHEET * ROW + i % SHEET, quad[4] = {at, at + 1, at + ROW + 1, at + ROW};
@@ -482,12 +482,12 @@ static void velocities_at_cells_and_corners_are_supported(void **state)
         int64_t count = 0;
         test_mesh_make_lattice(TEST_HEXES, LONG, 0, test_wave_field, &in.part);
         input_describe(&in);
-        make_vector(&in.part, linear_velocity, INSITU_CELL, true, "u", &u);
+        make_vector(&in.part, compute_linear_velocity, INSITU_CELL, true, "u", &u);
         if (is_of_corners) {
             double *values = calloc((size_t)in.part.connectivity_count * 4, sizeof *values);
             assert_non_null(values);
             for (int64_t i = 0; i < in.part.connectivity_count; i++)
-                linear_velocity(in.part.coordinates + 3 * in.part.connectivity[i], values + 4 * i);
+                compute_linear_velocity(in.part.coordinates + 3 * in.part.connectivity[i], values + 4 * i);
             free(u.values);
             u.values = values;
             u.field.values.data = values;
@@ -533,7 +533,7 @@ static void unchanged_derived_fields_are_not_recomputed(void **state)
     session_input in = {0};
     vector_field u;
     input_create(&in, TEST_HEXES, SIDE, TEST_BLOCK, own_rank, rank_count);
-    make_vector(&in.part, linear_velocity, INSITU_VERTEX, true, "u", &u);
+    make_vector(&in.part, compute_linear_velocity, INSITU_VERTEX, true, "u", &u);
     insitu_session *session =
         open_stepped(MPI_COMM_WORLD, SCENE("d: {divergence: u}, x: u.x + 0, e: d + x", "e"), &in, &u);
     const double trace = slopes[0][0] + slopes[1][1] + slopes[2][2];
@@ -567,7 +567,7 @@ static void edited_scene_computes_its_own_derived_fields(void **state)
     session_input in = {0};
     vector_field u;
     input_create(&in, TEST_TETS, SIDE, TEST_BLOCK, own_rank, rank_count);
-    make_vector(&in.part, linear_velocity, INSITU_VERTEX, true, "u", &u);
+    make_vector(&in.part, compute_linear_velocity, INSITU_VERTEX, true, "u", &u);
     insitu_session *session =
         open_session(MPI_COMM_WORLD, write_scene(SCENE("a: u.x + 0, b: {gradient: a}, c: b.y + f", "c")));
     assert_int_equal(submit_input(session, &in), INSITU_OK);
@@ -612,8 +612,8 @@ static void wrong_input_is_reported_on_all_ranks(void **state)
     session_input in = {0};
     vector_field u, velocity;
     input_create(&in, TEST_HEXES, SIDE, TEST_BLOCK, own_rank, rank_count);
-    make_vector(&in.part, swirl_velocity, INSITU_VERTEX, true, "u", &u);
-    make_vector(&in.part, swirl_velocity, INSITU_VERTEX, true, "velocity", &velocity);
+    make_vector(&in.part, compute_swirl_velocity, INSITU_VERTEX, true, "u", &u);
+    make_vector(&in.part, compute_swirl_velocity, INSITU_VERTEX, true, "velocity", &velocity);
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
         char scene[1000];
         const bool is_right = !*wrong[i].words[0];
@@ -648,7 +648,7 @@ static void name_conflicts_are_reported_on_all_ranks(void **state)
     session_input in = {0};
     vector_field u;
     input_create(&in, TEST_HEXES, SIDE, TEST_BLOCK, own_rank, rank_count);
-    make_vector(&in.part, swirl_velocity, INSITU_VERTEX, true, "u", &u);
+    make_vector(&in.part, compute_swirl_velocity, INSITU_VERTEX, true, "u", &u);
     insitu_session *session = open_session_with_velocity(MPI_COMM_WORLD, SCENE("f: u.x + 1", "f"), &in, &u);
     insitu_status status = insitu_step(session, 0, 0);
     check_reported_everywhere(session, status, INSITU_ERROR_FIELD,

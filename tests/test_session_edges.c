@@ -56,7 +56,7 @@ static body make_body(const grid *g, bool is_cube)
     for (int64_t cell = 0; cell < g->cell_count; cell++) {
         const session_cell_faces faces = session_faces_of_cell(g, cell);
         for (int64_t f = 0; f < faces.count; f++) {
-            const session_face_loop loop = session_face_of(&faces, f);
+            const session_face_loop loop = session_find_face_loop(&faces, f);
             polygon face = {.count = (int)loop.size};
             bool is_on = !is_cube;
             for (int i = 0; i < face.count; i++) grid_vertex(g, session_face_vertex(&loop, i), face.corners[i]);
@@ -115,8 +115,8 @@ static double project_point(const render_camera *c, const double point[3], doubl
 /* Computes a lower and an upper bound of the distance, in pixels, from the pixel's centre to the middle of the nearest
  * line. The library divides an edge's offset from the ray by the depth of the hit instead of the edge's own depth; the
  * resulting error is bounded by the difference of the two depths. */
-static void bound_distance(const render_camera *c, const polygon *face, const double pixel[2], double hit,
-                           double bounds[2])
+static void bound_distance_from_line(const render_camera *c, const polygon *face, const double pixel[2], double hit,
+                                     double bounds[2])
 {
     bounds[0] = bounds[1] = INFINITY;
     for (int i = 0; i < face->count; i++) {
@@ -135,7 +135,8 @@ static void bound_distance(const render_camera *c, const polygon *face, const do
 
 /* Checks how much of a pixel the lines leave white. The tolerance is that of single precision: positions are rounded by
  * about 5e-7 in scenes of size 5, which is 1/15,000 of a pixel, but more on slanted faces. */
-static bool is_pixel(const render_camera *c, const body *b, const caught_picture *picture, int pixel, bool *has_line)
+static bool is_exact_edge_pixel(const render_camera *c, const body *b, const caught_picture *picture, int pixel,
+                                bool *has_line)
 {
     double base[3], direction[3], nearest = INFINITY, bounds[2];
     const polygon *face = NULL;
@@ -148,7 +149,7 @@ static bool is_pixel(const render_camera *c, const body *b, const caught_picture
     }
     const float *rgba = picture->rgba + 4 * pixel;
     if (!face) return true;
-    bound_distance(c, face, (const double[]){pixel % WIDTH + 0.5, pixel / WIDTH + 0.5}, nearest, bounds);
+    bound_distance_from_line(c, face, (const double[]){pixel % WIDTH + 0.5, pixel / WIDTH + 0.5}, nearest, bounds);
     const double least = fmin(fmax(bounds[0] - 0.5 * (LINE_WIDTH - 1), 0), 1);
     const double most = fmin(fmax(bounds[1] - 0.5 * (LINE_WIDTH - 1), 0), 1);
     *has_line = *has_line || most < 0.5;
@@ -162,7 +163,8 @@ static bool is_exact_picture(const caught_picture *picture, const body *b, bool 
 {
     const render_camera c = make_camera(is_flat);
     bool has_line = false, is_well = true;
-    for (int pixel = 0; pixel < PIXELS && is_well; pixel++) is_well = is_pixel(&c, b, picture, pixel, &has_line);
+    for (int pixel = 0; pixel < PIXELS && is_well; pixel++)
+        is_well = is_exact_edge_pixel(&c, b, picture, pixel, &has_line);
     return is_well && has_line;
 }
 

@@ -105,7 +105,7 @@ static void leave_three_faces(session_input *in)
 {
     in->part.offsets[1] = in->part.offsets[0] + 3;
 }
-static void exclude_face(session_input *in)
+static void exclude_first_face_of_cell(session_input *in)
 {
     in->part.connectivity[0] = in->part.connectivity[1];
 }
@@ -249,7 +249,7 @@ static const corrupted_case at_the_step[] = {
      false,
      {CELL_0 "face ", "not once in each of two"}},
     {"a face an edge", repeat_adjacent_vertex, INSITU_ERROR_MESH, false, {CELL_0 "face ", "not once in each of two"}},
-    {"face twice", exclude_face, INSITU_ERROR_MESH, false, {CELL_0 "face ", "the surface is not closed"}},
+    {"face twice", exclude_first_face_of_cell, INSITU_ERROR_MESH, false, {CELL_0 "face ", "the surface is not closed"}},
     {"another's face",
      add_face_of_another_cell,
      INSITU_ERROR_MESH,

@@ -172,7 +172,7 @@ static own_file own_files[OWN_COUNT] = {
     {.name = "ranges", .path = "own.cdb/a.ranges", .header = "# The widest"},
     {.name = "table", .path = "own.cdb/data.csv", .header = "cycle,time,FILE"}};
 
-static void name_scenes(const char *folder)
+static void write_scenes_for_folder(const char *folder)
 {
     const char *ranges = "surface: {colour_by: {field: f, range: run}}";
     char output[200];
@@ -248,7 +248,7 @@ static void run_with_obstacle(const own_file *file, plant p, bool is_later)
 static void obstacles_at_file_paths_are_refused_or_replaced(void **state)
 {
     (void)state;
-    name_scenes("own.cdb");
+    write_scenes_for_folder("own.cdb");
     for (int i = 0; i < OWN_COUNT; i++)
         for (plant p = 0; p < PLANT_COUNT; p++)
             for (int is_later = 0; is_later < 2; is_later++) run_with_obstacle(&own_files[i], p, is_later);
@@ -259,7 +259,7 @@ static void linked_ranges_are_read(void **state)
 {
     (void)state;
     char text[MOST];
-    name_scenes("own.cdb");
+    write_scenes_for_folder("own.cdb");
     start_time_limit("ranges", "link to file", "of another run");
     remove_recursively("own.cdb");
     if (own_rank == 0) {
@@ -282,7 +282,7 @@ static void linked_ranges_are_read(void **state)
 static void missing_folders_are_created(void **state)
 {
     (void)state;
-    name_scenes("own.cdb");
+    write_scenes_for_folder("own.cdb");
     for (int i = 0; i < OWN_COUNT; i++) {
         start_time_limit(own_files[i].name, "no folder", "at every step");
         remove_recursively("own.cdb");
@@ -314,7 +314,7 @@ static void folders_that_cannot_be_created_are_reported(void **state)
     for (int f = 0; f < (geteuid() ? 3 : 2); f++)
         for (int i = 0; i < OWN_COUNT; i++) {
             start_time_limit(own_files[i].name, folders[f].name, folders[f].reason);
-            name_scenes(folders[f].name);
+            write_scenes_for_folder(folders[f].name);
             insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(own_files[i].scene));
             for (int cycle = 0; cycle < 2; cycle++)
                 check_reported_everywhere(session, step_with_larger_values(session, cycle), INSITU_ERROR_IO,

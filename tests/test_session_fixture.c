@@ -272,7 +272,7 @@ caught_picture pop_caught_picture(void)
     return picture;
 }
 
-static void draw_ok(insitu_session *session, const session_input *in)
+static void submit_and_check_step(insitu_session *session, const session_input *in)
 {
     discard_pictures();
     assert_int_equal(submit_input(session, in), INSITU_OK);
@@ -284,13 +284,13 @@ static void draw_ok(insitu_session *session, const session_input *in)
 insitu_session *open_session_and_draw(MPI_Comm comm, const char *scene, const session_input *in)
 {
     insitu_session *session = open_session(comm, scene);
-    draw_ok(session, in);
+    submit_and_check_step(session, in);
     return session;
 }
 
 caught_picture submit_and_draw(insitu_session **session, const session_input *in)
 {
-    draw_ok(*session, in);
+    submit_and_check_step(*session, in);
     const caught_picture picture = pop_caught_picture();
     insitu_destroy(session);
     return picture;
@@ -377,7 +377,7 @@ library_loading library_loaded;
 
 insitu_word_faults word_faults;
 
-void session_check_words(const insitu_image *image, insitu_word_faults *out)
+void session_find_text_faults(const insitu_image *image, insitu_word_faults *out)
 {
     (void)image;
     *out = word_faults;

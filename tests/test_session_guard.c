@@ -49,7 +49,7 @@ static void enable_traps(void)
 
 /* Disables the traps of a team. Counts the threads whose traps were enabled (armed), and those whose flag of a division
  * by zero was set (flagged). */
-static void count_enabled(int threads, int *armed, int *flagged)
+static void disable_and_count_traps(int threads, int *armed, int *flagged)
 {
     int traps = 0, flags = 0;
 #pragma omp parallel num_threads(threads) reduction(+ : traps, flags)
@@ -73,7 +73,7 @@ static void floating_point_traps_are_disabled_inside(void **state)
     session_guard_begin(&guard);
     divide_by_zero_on_threads(THREADS); /* without the guard, this terminates the process */
     session_guard_end(&guard);
-    count_enabled(THREADS, &armed, &flagged);
+    disable_and_count_traps(THREADS, &armed, &flagged);
     assert_int_equal(armed, THREADS);
     assert_int_equal(flagged, 0);
 }
@@ -91,7 +91,7 @@ static void threads_started_inside_inherit_the_callers_settings(void **state)
     start_threads(&guard, 2 * THREADS);
     divide_by_zero_on_threads(2 * THREADS);
     session_guard_end(&guard);
-    count_enabled(2 * THREADS, &armed, &flagged);
+    disable_and_count_traps(2 * THREADS, &armed, &flagged);
     assert_int_equal(armed, 2 * THREADS);
     assert_int_equal(flagged, 0);
 }

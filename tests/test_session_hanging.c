@@ -142,7 +142,7 @@ static bool is_refined(const amr *a, int level, const int at[3], int width)
     return level == 1 && a->cuts == 2 && middle[0] + 0.4 * middle[1] > 0.6;
 }
 
-static void add_tree(const amr *a, part *parts, int level, const int at[3], int width)
+static void add_refined_cubes(const amr *a, part *parts, int level, const int at[3], int width)
 {
     const bool is_cut = is_refined(a, level, at, width);
     const uint64_t name = (uint64_t)(at[0] + LINE * (at[1] + LINE * at[2])) * LEVELS + (uint64_t)level;
@@ -152,7 +152,7 @@ static void add_tree(const amr *a, part *parts, int level, const int at[3], int 
         const int w = width / a->cuts;
         const int within[3] = {at[0] + i % a->cuts * w, at[1] + i / a->cuts % a->cuts * w,
                                at[2] + i / (a->cuts * a->cuts) * w};
-        add_tree(a, parts, level + 1, within, w);
+        add_refined_cubes(a, parts, level + 1, within, w);
     }
 }
 
@@ -161,8 +161,8 @@ static void make_parts(const amr *a, part *parts)
     const int width = a->cuts * a->cuts;
     for (int level = 0; level < (a->is_by_level ? LEVELS : 1); level++) part_create(&parts[level], a->type);
     for (int i = 0; i < SIDE * SIDE * SIDE; i++)
-        add_tree(a, parts, 0, (const int[]){i % SIDE * width, i / SIDE % SIDE * width, i / (SIDE * SIDE) * width},
-                 width);
+        add_refined_cubes(a, parts, 0,
+                          (const int[]){i % SIDE * width, i / SIDE % SIDE * width, i / (SIDE * SIDE) * width}, width);
 }
 
 static void set_part(insitu_session *session, const char *name, const part *p)
@@ -212,7 +212,7 @@ static caught_picture draw_amr(MPI_Comm comm, const char *scene, const amr *a)
 /* Counts pixels in which the front of the sphere is not visible. Inside a cell the surface is at most half the diagonal
  * of the largest cell, 0.22, away from the sphere. Within a radius of 0.6 in the picture the sphere's front and back
  * are at least 0.8 apart. */
-static int count_slits(const caught_picture *picture)
+static int count_gap_pixels(const caught_picture *picture)
 {
     int slits = 0;
     for (int pixel = 0; pixel < PIXELS; pixel++) {
@@ -235,7 +235,7 @@ static void check_surface_continues(int cuts, amr_shape shape, insitu_cell_type 
         caught_picture ours = draw_amr(MPI_COMM_WORLD, scene, &own);
         bool is_well = true;
         if (own_rank == 0) {
-            const int slits = count_slits(&alone), parted = count_slits(&ours);
+            const int slits = count_gap_pixels(&alone), parted = count_gap_pixels(&ours);
             is_well = slits == 0 && parted == 0 && are_same_pictures(&ours, &alone);
             if (!is_well)
                 fprintf(stderr, "%d to 1, shape %d, type %d%s: %d pixels torn, %d on ranks; %s\n", cuts, (int)shape,

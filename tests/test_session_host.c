@@ -155,7 +155,7 @@ static insitu_session *open_session_with_threads(int threads)
 }
 
 /* Checks that a step draws the picture that one thread draws. */
-static void step_draws_the_same(insitu_session *session, int cycle)
+static void check_step_draws_expected_picture(insitu_session *session, int cycle)
 {
     const size_t pixels = (size_t)120 * 90;
     check_step_succeeds(session, cycle);
@@ -189,7 +189,7 @@ static void one_thread_draws_the_picture(void **context)
 {
     (void)context;
     insitu_session *session = open_session_with_threads(1);
-    step_draws_the_same(session, 0);
+    check_step_draws_expected_picture(session, 0);
     everywhere(!*insitu_last_report(session)->warnings);
     insitu_destroy(&session);
 }
@@ -200,7 +200,7 @@ static void thread_count_is_at_most_core_count(void **context)
     cores = 3;
     allow_additional_threads(3 - 1 + 4); /* the session tries to start the missing threads and four spare ones */
     insitu_session *session = open_session_with_threads(1024);
-    step_draws_the_same(session, 0);
+    check_step_draws_expected_picture(session, 0);
     everywhere(has_warning(session,
                            "the scene asks for 1024 threads, at most 3 are used: this rank may run on no more cores"));
     everywhere(!has_warning(session, "can be started"));
@@ -219,12 +219,12 @@ static void step_succeeds_without_threads_that_fail_to_start(void **context)
         end_threads();
         allow_additional_threads(cases[i].allowed);
         insitu_session *session = open_session_with_threads(8);
-        step_draws_the_same(session, 0);
+        check_step_draws_expected_picture(session, 0);
         everywhere(has_warning(session, cases[i].words));
         everywhere(has_warning(session, "are used: no more can be started"));
-        for (int cycle = 1; cycle < 4; cycle++) step_draws_the_same(session, cycle);
+        for (int cycle = 1; cycle < 4; cycle++) check_step_draws_expected_picture(session, cycle);
         allow_additional_threads(30);
-        step_draws_the_same(session, 4);
+        check_step_draws_expected_picture(session, 4);
         everywhere(!*insitu_last_report(session)->warnings);
         insitu_destroy(&session);
     }
@@ -235,14 +235,14 @@ static void scene_edit_starts_at_most_the_possible_threads(void **context)
     (void)context;
     cores = 2;
     insitu_session *session = open_session_with_threads(2);
-    step_draws_the_same(session, 0);
+    check_step_draws_expected_picture(session, 0);
     cores = 64;
     allow_additional_threads(20);
     write_scene_with_threads(4096);
-    step_draws_the_same(session, 1);
+    check_step_draws_expected_picture(session, 1);
     everywhere(has_warning(session, "the scene asks for 4096 threads, at most 64 are used"));
     everywhere(has_warning(session, "18 of 64 threads are used: no more can be started"));
-    for (int cycle = 2; cycle < 5; cycle++) step_draws_the_same(session, cycle);
+    for (int cycle = 2; cycle < 5; cycle++) check_step_draws_expected_picture(session, cycle);
     insitu_destroy(&session);
 }
 
@@ -250,10 +250,10 @@ static void threads_that_ended_are_tried_again(void **context)
 {
     (void)context;
     insitu_session *session = open_session_with_threads(8);
-    step_draws_the_same(session, 0);
+    check_step_draws_expected_picture(session, 0);
     end_threads();
     allow_additional_threads(5);
-    step_draws_the_same(session, 1);
+    check_step_draws_expected_picture(session, 1);
     insitu_destroy(&session);
 }
 
@@ -291,7 +291,7 @@ static void fewer_threads_draw_the_same_picture(void **context)
     for (int cycle = 0; cycle < 30; cycle++) {
         everywhere(submit_input(session, &input) == INSITU_OK);
         input.mesh.changed = cycle % 3 == 0 ? INSITU_CHANGED_ALL : cycle % 3 == 1 ? INSITU_CHANGED_GEOMETRY : 0;
-        step_draws_the_same(session, cycle);
+        check_step_draws_expected_picture(session, cycle);
     }
     input.mesh.changed = INSITU_CHANGED_ALL;
     insitu_destroy(&session);
@@ -302,10 +302,10 @@ static void team_size_of_the_caller_is_not_changed(void **context)
     (void)context;
     insitu_session *session = open_session_with_threads(4);
     omp_set_dynamic(1);
-    step_draws_the_same(session, 0);
+    check_step_draws_expected_picture(session, 0);
     everywhere(omp_get_dynamic());
     omp_set_dynamic(0);
-    step_draws_the_same(session, 1);
+    check_step_draws_expected_picture(session, 1);
     everywhere(!omp_get_dynamic());
     insitu_destroy(&session);
 }
@@ -319,7 +319,7 @@ static void a_parallel_region_of_the_caller_gets_one_thread(void **context)
 #pragma omp master
     {
         allow_additional_threads(0);
-        step_draws_the_same(session, 0);
+        check_step_draws_expected_picture(session, 0);
         everywhere(has_warning(session, "within a parallel region"));
     }
     insitu_destroy(&session);

@@ -79,7 +79,7 @@ static void fill_values(twice *t, const session_input *in, double scale)
     }
 }
 
-static twice make_twice(const session_input *in, const form *of)
+static twice create_indexed_field(const session_input *in, const form *of)
 {
     const int64_t places = of->at_cells ? in->part.cell_count : in->part.vertex_count, count = 2 * places + 3;
     const size_t tuple = sizeof(double) * (size_t)of->components;
@@ -183,7 +183,7 @@ static void check_form(test_mesh_kind kind, const form *of)
     session_input in = {0};
     input_create(&in, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
     if (of->base) make_indices_one_based(&in);
-    twice t = make_twice(&in, of);
+    twice t = create_indexed_field(&in, of);
     drawing plain = draw_fields(&in, &t, false), indexed = draw_fields(&in, &t, true);
     const int64_t size = of->is_narrow ? 4 : 8, tuples = size * of->components;
     everywhere(indexed.copied == plain.copied + t.places * tuples);
@@ -210,7 +210,7 @@ static void unused_index_is_not_read(void **state)
     session_input in = {0};
     input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
-    twice t = make_twice(&in, &(form){false, false, 1, 0});
+    twice t = create_indexed_field(&in, &(form){false, false, 1, 0});
     insitu_field other = describe_field(&t, true);
     other.name = "other";
     ((int64_t *)(void *)t.index)[0] = -9;

@@ -491,23 +491,23 @@ static const char several[] =
     "images:\n" OF("f", "{isosurface: {field: f, values: [0.1]}}") OF("g", "{isosurface: {field: g, values: [0.1]}}")
         OF("m", "{surface: {mesh: m, colour_by: {field: f}}}") OF("s", "{surface: {}}");
 
-static void mesh_is_no_mesh(session_input *in)
+static void set_negative_cell_count(session_input *in)
 {
     in->mesh.cell_count = -1;
 }
 
-static insitu_status fill_badly(void *data, insitu_field *field)
+static insitu_status return_io_error(void *data, insitu_field *field)
 {
     (void)data, (void)field;
     return INSITU_ERROR_IO;
 }
-static void fill_fails(session_input *in)
+static void use_failing_fill_function(session_input *in)
 {
-    in->field.fill = fill_badly;
+    in->field.fill = return_io_error;
     in->field.values.data = NULL;
     in->field.count = 0;
 }
-static void check_wrong_index_is_reported(session_input *in)
+static void set_short_values_with_index(session_input *in)
 {
     in->field.index = in->mesh.connectivity; /* the index has an entry for each vertex, but only one value exists */
     in->field.count = 1;
@@ -523,7 +523,7 @@ static void submit_other(const session_input *in)
 }
 
 /* Makes a step and checks its status and that rank 0 has caught pictures with exactly these names, in this order. */
-static void step_draws(const char *names, insitu_status expected, const char *words)
+static void check_step_draws(const char *names, insitu_status expected, const char *words)
 {
     char drawn[8] = "";
     discard_pictures();
@@ -542,12 +542,12 @@ static void images_without_corrupted_input_are_drawn(void **context)
         insitu_status status;
         const char *drawn, *words;
     } cases[] = {
-        {mesh_is_no_mesh, INSITU_ERROR_ARGUMENT, "fm", "mesh \"n\": cell_count is -1"},
+        {set_negative_cell_count, INSITU_ERROR_ARGUMENT, "fm", "mesh \"n\": cell_count is -1"},
         {set_large_index, INSITU_ERROR_MESH, "fm", "mesh \"n\": cell 2 (hex): vertex index"},
         {set_nan_coordinate, INSITU_ERROR_MESH, "fm", "coordinate that is not finite"},
         {set_too_few_values, INSITU_ERROR_FIELD, "fms", "mesh \"n\": field \"g\": "},
-        {fill_fails, INSITU_ERROR_FIELD, "fms", "mesh \"n\": field \"g\": its fill returned"},
-        {check_wrong_index_is_reported, INSITU_ERROR_FIELD, "fms", "mesh \"n\": field \"g\": the index of vertex"},
+        {use_failing_fill_function, INSITU_ERROR_FIELD, "fms", "mesh \"n\": field \"g\": its fill returned"},
+        {set_short_values_with_index, INSITU_ERROR_FIELD, "fms", "mesh \"n\": field \"g\": the index of vertex"},
     };
     insitu_session *const before = session;
     session = open_session(MPI_COMM_WORLD, write_scene(several));
@@ -557,15 +557,15 @@ static void images_without_corrupted_input_are_drawn(void **context)
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         everywhere(submit_input(session, &input) == INSITU_OK);
         submit_other(&other);
-        step_draws("fgms", INSITU_OK, "");
+        check_step_draws("fgms", INSITU_OK, "");
         if (own_rank == rank_count - 1) cases[i].corrupt(&other);
         submit_other(&other);
-        for (int again = 0; again < 2; again++) step_draws(cases[i].drawn, cases[i].status, cases[i].words);
+        for (int again = 0; again < 2; again++) check_step_draws(cases[i].drawn, cases[i].status, cases[i].words);
         input_restore(&other);
         submit_other(&other);
-        step_draws("fgms", INSITU_OK, "");
+        check_step_draws("fgms", INSITU_OK, "");
         everywhere(insitu_set_field(session, "none", &input.field) == INSITU_ERROR_FIELD);
-        step_draws("gms", INSITU_ERROR_FIELD, "its mesh \"none\" is not set");
+        check_step_draws("gms", INSITU_ERROR_FIELD, "its mesh \"none\" is not set");
     }
     input_free(&other);
     insitu_destroy(&session);

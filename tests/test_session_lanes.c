@@ -148,11 +148,11 @@ static lane_sums compute_lane_sums(cpu_isa isa, const lane_cells *cells, int64_t
 {
     lane_sums sums;
     memset(&sums, 0, sizeof sums);
-    *taken = session_lanes_of(isa, cells->g, cells->type)(cells, &sums, alone);
+    *taken = session_find_lane_run(isa, cells->g, cells->type)(cells, &sums, alone);
     return sums;
 }
 
-static void assert_run(const grid *g, int64_t first, int64_t count)
+static void assert_sums_of_cell_range(const grid *g, int64_t first, int64_t count)
 {
     const int vertices = grid_type_vertices(g->cell_type);
     const lane_cells cells = {g, g->cell_type, first, count, first * vertices};
@@ -178,8 +178,9 @@ static void sums_in_lanes_match_single_cells(void **state)
         for (int i = 0; i < LAYOUTS / 2; i++) {
             test_view view = make_view(kind, choose_layout(i), i & 1);
             view.cells.ghosts = NULL;
-            for (size_t k = 0; k < sizeof counts / sizeof *counts; k++) assert_run(&view.cells, (int64_t)k, counts[k]);
-            assert_run(&view.cells, 0, view.cells.cell_count);
+            for (size_t k = 0; k < sizeof counts / sizeof *counts; k++)
+                assert_sums_of_cell_range(&view.cells, (int64_t)k, counts[k]);
+            assert_sums_of_cell_range(&view.cells, 0, view.cells.cell_count);
             test_view_free(&view);
         }
 }
@@ -199,7 +200,7 @@ static void strided_connectivity_gives_the_same_sums(void **state)
         g->ghosts = NULL;
         g->connectivity.data = spread;
         g->connectivity.stride = 3 * size;
-        assert_run(g, 0, g->cell_count);
+        assert_sums_of_cell_range(g, 0, g->cell_count);
         free(spread);
         test_view_free(&view);
     }
@@ -230,7 +231,7 @@ static void make_nan(grid *g, int64_t cell)
     ((float *)(uintptr_t)g->coordinates[2].data)[vertex] = NAN;
 }
 
-static void make_stray_index(grid *g, int64_t cell)
+static void set_index_out_of_range(grid *g, int64_t cell)
 {
     ((int32_t *)(uintptr_t)g->connectivity.data)[4 * cell + 1] = (int32_t)g->vertex_count;
 }
@@ -238,7 +239,7 @@ static void make_stray_index(grid *g, int64_t cell)
 static void unusual_cells_are_excluded_from_lanes(void **state)
 {
     (void)state;
-    void (*const make[])(grid *, int64_t) = {make_ghost, make_flat, make_infinite, make_nan, make_stray_index};
+    void (*const make[])(grid *, int64_t) = {make_ghost, make_flat, make_infinite, make_nan, set_index_out_of_range};
     const int64_t places[] = {0, 3, 8, 511, 512, 700, 2047};
     for (size_t m = 0; m < sizeof make / sizeof *make; m++)
         for (size_t i = 0; i < sizeof places / sizeof *places; i++) {
@@ -252,7 +253,7 @@ static void unusual_cells_are_excluded_from_lanes(void **state)
                 /* earlier cells may be excluded too, because they can share the changed vertex */
                 assert_true(taken <= place && taken % LANES == 0);
                 assert_true(alone > 0 && taken + alone <= cells.count);
-                if (make[m] == make_ghost || make[m] == make_stray_index) assert_true(taken + alone > place);
+                if (make[m] == make_ghost || make[m] == set_index_out_of_range) assert_true(taken + alone > place);
                 const lane_cells before = {&view.cells, GRID_TET, 0, taken, 0};
                 const lane_sums expected = compute_lane_sums(isa, &before, &again, &none);
                 assert_int_equal(again, taken);
@@ -323,7 +324,8 @@ static void wrong_indices_are_not_dereferenced(void **state)
                 assert_not_followed(
                     g, (char *)(uintptr_t)g->connectivity.data + g->connectivity.stride * (8 * cells[c] + k), cells[c],
                     wrong[k]);
-        assert_run(g, 0, g->cell_count); /* reads the first and the last vertex, but nothing beyond them */
+        assert_sums_of_cell_range(g, 0,
+                                  g->cell_count); /* reads the first and the last vertex, but nothing beyond them */
         for (int axis = 0; axis < 3; axis++) munmap(memory[axis].pages, memory[axis].inner + 2 * memory[axis].page);
         test_view_free(&view);
     }
@@ -344,7 +346,7 @@ static void volumes_in_lanes_match_single_cells(void **state)
             for (int64_t cell = 0; cell < view.cells.cell_count; cell++)
                 mesh.topology.connectivity_count += grid_type_vertices(grid_cell_type(&view.cells, cell));
             mesh_tally all = tally_empty(), each = tally_empty();
-            const tally_run run = tally_choose(&mesh);
+            const tally_run run = tally_choose_run(&mesh);
             assert_non_null(run);
             assert_int_equal(run(&mesh, 0, view.cells.cell_count, &all), view.cells.cell_count);
             for (int64_t cell = 0; cell < view.cells.cell_count; cell++) tally_cell(&view.cells, cell, &each);

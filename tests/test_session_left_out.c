@@ -90,7 +90,7 @@ static bool is_value_missing(int64_t cell)
     return test_uniform((uint64_t)(cell + 100 * own_rank), 8) < 0.3;
 }
 
-static void verify_lacking(int kind, const char *scene)
+static void verify_cells_without_value(int kind, const char *scene)
 {
     session_input in = {0};
     test_mesh whole;
@@ -127,7 +127,7 @@ static void cells_without_a_value_are_not_drawn(void **context)
 {
     (void)context;
     for (int kind = 0; kind < MESHES; kind++)
-        for (int i = 0; i < SCENES; i++) verify_lacking(kind, scenes[i]);
+        for (int i = 0; i < SCENES; i++) verify_cells_without_value(kind, scenes[i]);
 }
 
 /* Checks cells that lose their value while the means at vertices stay the same. All cells have equal values; from one

@@ -400,7 +400,7 @@ static int64_t count_ghosts(const levels *l)
 /* Counts pixels in which the front of the sphere is not visible. Inside a cell the surface is at most half the diagonal
  * of the largest cell, 0.217, away from the sphere. Within a radius of 0.6 in the picture the front and the back are at
  * least 0.8 apart. */
-static int count_slits(const caught_picture *picture)
+static int count_gap_pixels(const caught_picture *picture)
 {
     int slits = 0;
     for (int pixel = 0; pixel < PIXELS; pixel++) {
@@ -452,10 +452,10 @@ static void check_levels(levels l)
     if (own_rank == 0) alone = draw_levels(MPI_COMM_SELF, scene, &whole, &is_alone_true);
     caught_picture ours = draw_levels(MPI_COMM_WORLD, scene, &l, &is_true);
     if (own_rank == 0) {
-        is_well = count_slits(&alone) == 0 && are_same_pictures(&ours, &alone);
+        is_well = count_gap_pixels(&alone) == 0 && are_same_pictures(&ours, &alone);
         if (!is_well)
             fprintf(stderr, "levels of %d, %d, grid %d%s: %d pixels torn; %s\n", l.refinement[1], l.refinement[2],
-                    l.grid, l.is_of_cells ? ", values of cells" : "", count_slits(&alone),
+                    l.grid, l.is_of_cells ? ", values of cells" : "", count_gap_pixels(&alone),
                     are_same_pictures(&ours, &alone) ? "the same" : "another picture on ranks");
     }
     free_caught(&ours);
@@ -617,7 +617,7 @@ static void blocks_that_do_not_fit_are_reported(void **state)
         if (blocks[i].values && l.boxes[i].level == 2) blocks[i].lattice.first[1]--;
     everywhere(submit_levels(session, &l, blocks));
     caught_picture picture = step_and_take_picture(session, 1);
-    everywhere(own_rank || count_slits(&picture) == 0);
+    everywhere(own_rank || count_gap_pixels(&picture) == 0);
     free_caught(&picture);
     blocks[0].lattice.refinement[2] = 0;
     if (blocks[0].values) {
@@ -633,7 +633,7 @@ static void blocks_that_do_not_fit_are_reported(void **state)
 
 /* Makes a block of cubes whose width is 1 / `of` of that of a cell of the coarsest level, which has 4^3 cells in [-1,
  * 1]^3. The field is 0.72 on the plane z = 0.1. */
-static block make_nested(int of, int first, int cells)
+static block make_nested_block(int of, int first, int cells)
 {
     block out = {.vertex_count = (int64_t)(cells + 1) * (cells + 1) * (cells + 1),
                  .cell_count = (int64_t)cells * cells * cells};
@@ -672,7 +672,7 @@ static void intermediate_levels_allow_finer_levels_within_a_cell(void **state)
         block blocks[3];
         bool is_set = true;
         for (int i = 0; i < 3; i++) {
-            blocks[i] = make_nested(of[i], first[i], cells[i]);
+            blocks[i] = make_nested_block(of[i], first[i], cells[i]);
             if (i % rank_count == own_rank && (i != 1 || has_middle))
                 is_set = is_set && set_block(session, i, &l, &blocks[i], true);
         }

@@ -52,8 +52,8 @@ static void decode_normal(const caught_picture *picture, int pixel, double out[3
 }
 
 /* Makes the part of one rank of `count`, from a mesh with jitter. A count of 1 gives the whole mesh. */
-static void make_jittered(session_input *in, test_mesh_kind kind, double jitter, test_function *f,
-                          test_partition_kind distributed, int rank, int count)
+static void make_jittered_part(session_input *in, test_mesh_kind kind, double jitter, test_function *f,
+                               test_partition_kind distributed, int rank, int count)
 {
     test_mesh whole;
     test_mesh_make_lattice(kind, SIDE, jitter, f, &whole);
@@ -69,7 +69,7 @@ static void make_jittered(session_input *in, test_mesh_kind kind, double jitter,
 static void make_part(session_input *in, test_mesh_kind kind, test_function *f, test_partition_kind distributed,
                       int rank, int count)
 {
-    make_jittered(in, kind, 0.2, f, distributed, rank, count);
+    make_jittered_part(in, kind, 0.2, f, distributed, rank, count);
 }
 
 /* ---- shadows in closed form ---------------------------------------------------------------------------------- */
@@ -208,7 +208,7 @@ typedef struct corner {
 static const corner slices = {{{{0, 0.8, 0.6}, -0.4}, {{0.8, -0.36, 0.48}, -0.3}}, 0};
 static const double radius = 0.4;
 
-static double signed_distance_above_plane(const corner *c, int plane, const double place[3])
+static double compute_height_above_plane(const corner *c, int plane, const double place[3])
 {
     const double *n = c->planes[plane].normal;
     return n[0] * place[0] + n[1] * place[1] + n[2] * place[2] - c->planes[plane].distance;
@@ -220,8 +220,8 @@ static int is_blocked_by_corner(const corner *c, const double from[3], const dou
 {
     for (int i = 0; i < 2; i++) {
         const double ahead[3] = {from[0] + d[0], from[1] + d[1], from[2] + d[2]};
-        const double height = signed_distance_above_plane(c, i, from),
-                     way = height / (height - signed_distance_above_plane(c, i, ahead));
+        const double height = compute_height_above_plane(c, i, from),
+                     way = height / (height - compute_height_above_plane(c, i, ahead));
         double most = 0;
         if (fabs(height) < 1e-5) continue; /* the ray begins on this plane */
         if (fabs(way - radius) < 1e-4) return -1;
@@ -240,7 +240,7 @@ typedef struct sky {
 
 /* Compares pictures lit by ambient light only: `drawn` must be `plain`, the picture without occlusion, times the
  * fraction of rays that are not occluded. */
-static sky verify_sky(const corner *c, const caught_picture *drawn, const caught_picture *plain)
+static sky verify_ambient_occlusion(const corner *c, const caught_picture *drawn, const caught_picture *plain)
 {
     sky out = {0};
     for (int p = 0; p < PIXELS; p++) {
@@ -282,7 +282,7 @@ static void ambient_occlusion_of_corners_matches_disk_segments(void **context)
         caught_picture plain = draw_lit_scene(MPI_COMM_WORLD, IMAGE(DARK, CORNER), &in);
         bool is_right = true;
         if (own_rank == 0) {
-            const sky s = verify_sky(&slices, &drawn, &plain);
+            const sky s = verify_ambient_occlusion(&slices, &drawn, &plain);
             double expected = 0;
             int count = 0;
             for (int p = 0; p < PIXELS; p++) {
@@ -291,8 +291,8 @@ static void ambient_occlusion_of_corners_matches_disk_segments(void **context)
                 compute_ray_position(p, (double)drawn.depth[p], at);
                 /* The angle follows from the distance to the plane that does not contain the position, so the larger
                  * distance is used. */
-                const double ratio = fmax(fabs(signed_distance_above_plane(&slices, 0, at)),
-                                          fabs(signed_distance_above_plane(&slices, 1, at))) /
+                const double ratio = fmax(fabs(compute_height_above_plane(&slices, 0, at)),
+                                          fabs(compute_height_above_plane(&slices, 1, at))) /
                                      radius;
                 expected += ratio < 1 ? 1 - (acos(ratio) - ratio * sqrt(1 - ratio * ratio)) / acos(-1.0) : 1;
                 count++;
@@ -318,7 +318,7 @@ static void ambient_occlusion_of_corners_matches_disk_segments(void **context)
 
 /* A valley along y. Its bottom coincides with faces of cells, so that for most kinds of cells the field is linear in
  * every cell, and the isosurface consists of two planes. */
-static double valley_field(const double p[3])
+static double compute_valley_field(const double p[3])
 {
     return p[2] - fabs(p[0]);
 }
@@ -334,20 +334,20 @@ static void ambient_occlusion_darkens_valleys(void **context)
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         session_input in = {0};
         if (kind == TEST_POLYHEDRA) continue; /* some polyhedra have parts on both sides of the bottom */
-        make_jittered(&in, kind, 0, valley_field, TEST_RANDOM, own_rank, rank_count);
+        make_jittered_part(&in, kind, 0, compute_valley_field, TEST_RANDOM, own_rank, rank_count);
         caught_picture drawn = draw_lit_scene(
             MPI_COMM_WORLD, IMAGE(DARK "    ambient_occlusion: {samples: 16, radius: 0.4}\n", VALLEY), &in);
         caught_picture plain = draw_lit_scene(MPI_COMM_WORLD, IMAGE(DARK, VALLEY), &in);
         bool is_right = true;
         if (own_rank == 0) {
-            const sky s = verify_sky(&valley, &drawn, &plain);
+            const sky s = verify_ambient_occlusion(&valley, &drawn, &plain);
             int near = 0;
             for (int p = 0; p < PIXELS; p++) {
                 double at[3];
                 if (!isfinite(drawn.depth[p])) continue;
                 compute_ray_position(p, (double)drawn.depth[p], at);
                 const double height =
-                    fmax(signed_distance_above_plane(&valley, 0, at), signed_distance_above_plane(&valley, 1, at));
+                    fmax(compute_height_above_plane(&valley, 0, at), compute_height_above_plane(&valley, 1, at));
                 near += height > valley.least && height < 2 * valley.least;
             }
             is_right = s.wrong == 0 && s.pixels > 200 && near > 12 && s.undecided_rays < s.pixels / 10;

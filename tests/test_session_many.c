@@ -140,28 +140,28 @@ static bool is_linear(bool are_blocks)
  * longer fit into caches; quadratic growth would take 64 times as long. The bound is the geometric mean of 8 and 64.
  * While MPICH's ranks wait for each other they spin, so that other programs on the machine can lengthen their CPU
  * times; therefore the measurement is repeated if it fails. */
-static void check_linear(bool are_blocks)
+static void check_step_time_is_linear(bool are_blocks)
 {
     bool is_well = false;
     for (int i = 0; i < TRIES && !is_well; i++) is_well = is_linear(are_blocks);
     everywhere(is_well);
 }
 
-static void a_step_is_linear_in_the_number_of_meshes(void **context)
+static void step_time_is_linear_in_mesh_count(void **context)
 {
     (void)context;
-    check_linear(false);
+    check_step_time_is_linear(false);
 }
 
-static void a_step_is_linear_in_the_number_of_blocks(void **context)
+static void step_time_is_linear_in_block_count(void **context)
 {
     (void)context;
-    check_linear(true);
+    check_step_time_is_linear(true);
 }
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(a_step_is_linear_in_the_number_of_meshes),
-                                       cmocka_unit_test(a_step_is_linear_in_the_number_of_blocks)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(step_time_is_linear_in_mesh_count),
+                                       cmocka_unit_test(step_time_is_linear_in_block_count)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

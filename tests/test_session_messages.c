@@ -85,17 +85,17 @@ static void make_cell_field(session_input *in)
     in->field.count = in->part.cell_count; /* cells are hexes, which are fewer than the vertices */
 }
 
-static void make_negative(session_input *in)
+static void make_values_negative(session_input *in)
 {
     for (int64_t v = 0; v < in->part.vertex_count; v++) in->part.values[v] = -1 - fabs(in->part.values[v]);
 }
 
-static void make_nothing(session_input *in)
+static void set_all_values_to_nan(session_input *in)
 {
     for (int64_t i = 0; i < in->part.vertex_count; i++) in->part.values[i] = NAN;
 }
 
-static void make_nothing_there(session_input *in)
+static void set_nan_value_on_last_rank(session_input *in)
 {
     if (own_rank == rank_count - 1 && in->part.cell_count) in->part.values[in->part.connectivity[0]] = NAN;
 }
@@ -113,7 +113,7 @@ static void make_shells(session_input *in)
 }
 
 /* Sets the values to x. Keeps hexes whose values are all negative, and replaces every other hex by its first face. */
-static void make_some_shells(session_input *in)
+static void replace_some_hexes_by_quads(session_input *in)
 {
     int64_t at = 0;
     for (int64_t v = 0; v < in->part.vertex_count; v++) in->part.values[v] = in->part.coordinates[3 * v];
@@ -133,31 +133,31 @@ static void make_some_shells(session_input *in)
 }
 
 /* Raises all values to at least 0.1, which float32 cannot represent exactly. */
-static void make_least(session_input *in)
+static void raise_values_to_a_tenth(session_input *in)
 {
     for (int64_t v = 0; v < in->part.vertex_count; v++) in->part.values[v] = fmax(in->part.values[v], 0.1);
 }
 
 /* Lowers all values to at most 0.1. */
-static void make_most(session_input *in)
+static void lower_values_to_a_tenth(session_input *in)
 {
     for (int64_t v = 0; v < in->part.vertex_count; v++) in->part.values[v] = fmin(in->part.values[v], 0.1);
 }
 
-static void make_ghosts(session_input *in)
+static void mark_all_cells_as_ghosts(session_input *in)
 {
     for (int64_t cell = 0; cell < in->part.cell_count; cell++) in->part.ghosts[cell] = 1;
 }
 
 /* Moves the mesh to coordinates near 1e12, where doubles have a spacing of about 1e-4. */
-static void move_far(session_input *in)
+static void move_mesh_far_from_origin(session_input *in)
 {
     for (int64_t i = 0; i < 3 * in->part.vertex_count; i++)
         in->part.coordinates[i] = 1e12 + 1e-2 * in->part.coordinates[i];
 }
 
 /* Scales x and y so that half a cell's width is less than a millionth of the scene's size. */
-static void make_needles(session_input *in)
+static void scale_cells_to_needles(session_input *in)
 {
     for (int64_t i = 0; i < 3 * in->part.vertex_count; i++)
         if (i % 3 < 2) in->part.coordinates[i] *= 1e-9;
@@ -223,14 +223,14 @@ static const struct warning_case {
     {"an isovalue that is the least",
      plain,
      TEST_HEXES,
-     make_least,
+     raise_values_to_a_tenth,
      {"the isosurface of \"f\" at 0.1 is empty: the field goes from 0.1 to ", "nothing below it"}},
     {"an isovalue that is the least, of a full tree",
      "tree: full\n" IMAGE("[24, 16]", "", SURFACE ", {isosurface: {field: f, values: [0.2]}}", ""),
      TEST_TETS,
-     make_least,
+     raise_values_to_a_tenth,
      {"the isosurface of \"f\" at 0.1 is empty: the field goes from 0.1 to "}},
-    {"an isovalue that is the greatest", plain, TEST_HEXES, make_most, {NULL}},
+    {"an isovalue that is the greatest", plain, TEST_HEXES, lower_values_to_a_tenth, {NULL}},
     {"an isosurface of shells", plain, TEST_HEXES, make_shells, {NULL}},
     {"a volume of shells",
      IMAGE("[24, 16]", "", VOLUME, ""),
@@ -246,7 +246,7 @@ static const struct warning_case {
     {"an isovalue that shells alone have",
      plain,
      TEST_HEXES,
-     make_some_shells,
+     replace_some_hexes_by_quads,
      {"the isosurface of \"f\" at 0.1 is empty: the field goes from -"}},
     {"a volume whose range lies above the field",
      IMAGE("[24, 16]", "", "{volume: {field: f, range: [10, 20]}}", ""),
@@ -312,17 +312,17 @@ static const struct warning_case {
     {"a logarithm of nothing",
      IMAGE("[24, 16]", "", "{surface: {colour_by: {field: f, scale: log}}}", ""),
      TEST_HEXES,
-     make_negative,
+     make_values_negative,
      {"image \"a\": the field \"f\" has no value above 0", "scale: log"}},
     {"no value at all",
      plain,
      TEST_TETS,
-     make_nothing,
+     set_all_values_to_nan,
      {"mesh \"m\": 384 cells are not drawn: values of field \"f\" are"}},
     {"no value on one rank",
      IMAGE("[24, 16]", "", VOLUME ", " SURFACE, SAMPLES),
      TEST_TETS,
-     make_nothing_there,
+     set_nan_value_on_last_rank,
      {"mesh \"m\": ", " cells are not drawn: values of field \"f\" are not finite"}},
     {"a camera that looks away",
      IMAGE("[24, 16]", CAMERA("position: [0, 0, 9], focal: [0, 0, 12]"), SURFACE, ""),
@@ -367,10 +367,14 @@ static const struct warning_case {
     {"ghosts alone",
      IMAGE("[24, 16]", "", SURFACE, ""),
      TEST_HEXES,
-     make_ghosts,
+     mark_all_cells_as_ghosts,
      {"pictures show their background alone: no mesh has cells on any rank but ghosts"}},
-    {"small cells far away", IMAGE("[24, 16]", "", SURFACE ", " VOLUME, ""), TEST_HEXES, move_far, {NULL}},
-    {"cells as thin as needles", IMAGE("[24, 16]", "", VOLUME, ""), TEST_HEXES, make_needles, {NULL}},
+    {"small cells far away",
+     IMAGE("[24, 16]", "", SURFACE ", " VOLUME, ""),
+     TEST_HEXES,
+     move_mesh_far_from_origin,
+     {NULL}},
+    {"cells as thin as needles", IMAGE("[24, 16]", "", VOLUME, ""), TEST_HEXES, scale_cells_to_needles, {NULL}},
     {"the smallest angle", IMAGE("[24, 16]", CAMERA("angle: 1e-6"), SURFACE ", " VOLUME, ""), TEST_HEXES, NULL, {NULL}},
     {"the smallest angle, and an error that is asked for",
      IMAGE("[24, 16]", CAMERA("angle: 1e-6"), SURFACE ", " VOLUME, "    sampling: {max_error: 0.01}\n"),
@@ -393,7 +397,7 @@ static bool is_warned(const insitu_session *session, const char *const words[3])
     return is_so;
 }
 
-static bool is_reported_alike(const char *text)
+static bool is_report_equal_on_ranks(const char *text)
 {
     char first[2048] = "";
     if (own_rank == 0) snprintf(first, sizeof first, "%s", text);
@@ -413,7 +417,7 @@ static void check_warning(const struct warning_case *c)
         everywhere(submit_input(session, &in) == INSITU_OK);
         check_step_succeeds(session, cycle);
         everywhere(is_warned(session, cycle == 0 ? c->words : none));
-        everywhere(is_reported_alike(insitu_last_report(session)->warnings));
+        everywhere(is_report_equal_on_ranks(insitu_last_report(session)->warnings));
     }
     insitu_destroy(&session);
     input_free(&in);

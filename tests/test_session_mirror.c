@@ -146,7 +146,7 @@ static drawn draw_blocks(const char *scene, const insitu_mesh *mesh, const mirro
                          int count)
 {
     mirror_image images[MOST_IMAGES];
-    insitu_session *session = open_text(MPI_COMM_WORLD, "", scene);
+    insitu_session *session = open_session_from_texts(MPI_COMM_WORLD, "", scene);
     set_mirrored_blocks(session, 0, mesh, by, fields, count, images);
     drawn out = step_and_take_pictures(session, 0);
     insitu_destroy(&session);
@@ -154,19 +154,19 @@ static drawn draw_blocks(const char *scene, const insitu_mesh *mesh, const mirro
     return out;
 }
 
-static void expect_mirrored_by(const char *keys, const insitu_mesh *mesh, const insitu_field *f, const mirror *by,
-                               const char *what)
+static void check_mirrored_session_by(const char *keys, const insitu_mesh *mesh, const insitu_field *f,
+                                      const mirror *by, const char *what)
 {
     char text[MOST_TEXT];
     snprintf(text, sizeof text, "%s%s", keys, all_layers);
-    drawn a = draw_mesh(open_text(MPI_COMM_WORLD, by->text, text), mesh, f, NULL);
+    drawn a = draw_mesh(open_session_from_texts(MPI_COMM_WORLD, by->text, text), mesh, f, NULL);
     drawn b = draw_blocks(text, mesh, by, f, 1);
     expect_same(&a, &b, what);
 }
 
-static void expect_mirrored(const insitu_mesh *mesh, const insitu_field *f, const mirror *by, const char *what)
+static void check_mirrored_session(const insitu_mesh *mesh, const insitu_field *f, const mirror *by, const char *what)
 {
-    expect_mirrored_by("", mesh, f, by, what);
+    check_mirrored_session_by("", mesh, f, by, what);
 }
 
 static void forms_draw_their_images(void **state)
@@ -178,7 +178,8 @@ static void forms_draw_their_images(void **state)
             const mirror *by = &mirrors[form % 2];
             formed_mesh m;
             formed_mesh_create(form, SIDE, own_rank, rank_count, &m);
-            drawn a = draw_formed(open_text(MPI_COMM_WORLD, by->text, scene), &m, &m.mesh, with_corners, NULL);
+            drawn a =
+                draw_formed(open_session_from_texts(MPI_COMM_WORLD, by->text, scene), &m, &m.mesh, with_corners, NULL);
             drawn b = draw_blocks(scene, &m.mesh, by, m.fields, with_corners ? FORMED_FIELDS : FORMED_D);
             expect_same(&a, &b, mesh_form_name(form));
             formed_mesh_free(&m);
@@ -190,7 +191,7 @@ static void all_mirror_planes_draw_images(void **state)
     (void)state;
     session_input in;
     input_create(&in, TEST_MIXED, SIDE, TEST_RANDOM, own_rank, rank_count);
-    for (int i = 0; i < 3; i++) expect_mirrored(&in.mesh, &in.field, &mirrors[i], mirrors[i].text);
+    for (int i = 0; i < 3; i++) check_mirrored_session(&in.mesh, &in.field, &mirrors[i], mirrors[i].text);
     input_free(&in);
 }
 
@@ -200,8 +201,8 @@ static void cells_of_higher_order_draw_their_images(void **state)
     for (int k = 0; k < order_kind_count; k += 4) {
         order_mesh m;
         order_mesh_create(&order_kinds[k], 2, 0.1, test_wave_field, own_rank, rank_count, &m);
-        expect_mirrored(&m.mesh, &m.field, &mirrors[0], order_kinds[k].name);
-        expect_mirrored_by("finer_pieces: 2\n", &m.mesh, &m.field, &mirrors[0], order_kinds[k].name);
+        check_mirrored_session(&m.mesh, &m.field, &mirrors[0], order_kinds[k].name);
+        check_mirrored_session_by("finer_pieces: 2\n", &m.mesh, &m.field, &mirrors[0], order_kinds[k].name);
         order_mesh_free(&m);
     }
 }
@@ -212,13 +213,13 @@ static void planes_and_lattices_draw_their_images(void **state)
     for (int is_wide = 0; is_wide < 2; is_wide++) {
         plane p;
         make_plane(is_wide, &p);
-        expect_mirrored(&p.mesh, &p.field, &mirrors[3], "a plane");
+        check_mirrored_session(&p.mesh, &p.field, &mirrors[3], "a plane");
     }
     for (lattice_form form = 0; form < LATTICE_FORMS; form++) {
         block b;
         make_block(form, own_rank, &b);
-        expect_mirrored(&b.mesh, &b.field, &mirrors[0], lattice_form_name(form));
-        if (form != QUADS) expect_mirrored(&b.mesh, &b.field, &mirrors[1], lattice_form_name(form));
+        check_mirrored_session(&b.mesh, &b.field, &mirrors[0], lattice_form_name(form));
+        if (form != QUADS) check_mirrored_session(&b.mesh, &b.field, &mirrors[1], lattice_form_name(form));
     }
 }
 
@@ -229,7 +230,7 @@ static void blocks_draw_their_images(void **state)
         drawn pictures[2];
         const mirror *by = &mirrors[0];
         for (int by_hand = 0; by_hand < 2; by_hand++) {
-            insitu_session *session = open_text(MPI_COMM_WORLD, by_hand ? "" : by->text, all_layers);
+            insitu_session *session = open_session_from_texts(MPI_COMM_WORLD, by_hand ? "" : by->text, all_layers);
             block b[2];
             mirror_image images[2][MOST_IMAGES];
             for (int i = 0, number = 0; i < 2; i++) {
@@ -290,7 +291,8 @@ static void levels_draw_their_images(void **state)
             LAYERS("b", "[{surface: {colour_by: {field: f}, edges: {}}}]") LAYERS("c", "[{surface: {opacity: 0.5}}]");
     drawn pictures[2];
     for (int by_hand = 0; by_hand < 2; by_hand++) {
-        insitu_session *session = open_text(MPI_COMM_WORLD, by_hand ? "" : "meshes: {m: {mirror: x}}\n", scene);
+        insitu_session *session =
+            open_session_from_texts(MPI_COMM_WORLD, by_hand ? "" : "meshes: {m: {mirror: x}}\n", scene);
         double values[4][125];
         insitu_lattice l[4];
         insitu_mesh mesh[4];
@@ -316,8 +318,10 @@ static void any_partition_draws_one_picture(void **state)
         input_create(&part, TEST_MIXED, SIDE, kind, own_rank, rank_count);
         input_create(&whole, TEST_MIXED, SIDE, kind, 0, 1);
         const char *text = mirrors[1].text;
-        drawn a = draw_mesh(open_text(MPI_COMM_WORLD, text, surface_layers), &part.mesh, &part.field, NULL);
-        drawn b = draw_mesh(open_text(MPI_COMM_SELF, text, surface_layers), &whole.mesh, &whole.field, NULL);
+        drawn a =
+            draw_mesh(open_session_from_texts(MPI_COMM_WORLD, text, surface_layers), &part.mesh, &part.field, NULL);
+        drawn b =
+            draw_mesh(open_session_from_texts(MPI_COMM_SELF, text, surface_layers), &whole.mesh, &whole.field, NULL);
         if (own_rank != 0) free_picture_set(&b);
         expect_same(&a, &b, test_partition_kind_name(kind));
         input_free(&part);
@@ -332,7 +336,7 @@ static double *get_derived_values(const insitu_session *session, const char *nam
     double *out = test_calloc((size_t)count + 1, sizeof *out);
     const int index = session_find_field(mesh, name);
     assert_true(index >= 0 && mesh->fields[index].is_derived);
-    const grid_field values = session_caller_field(mesh, index, 0);
+    const grid_field values = session_get_caller_values(mesh, index, 0);
     for (int64_t v = 0; v < count; v++) out[v] = grid_field_value(&values, v);
     return out;
 }
@@ -349,7 +353,7 @@ static void derived_fields_are_those_of_the_source(void **state)
     input_create(&in, TEST_TETS, SIDE, TEST_BLOCK, own_rank, rank_count);
     char before[MOST_TEXT];
     snprintf(before, sizeof before, "%sfields: {g: {gradient: f, component: x}, h: f * f}\n", mirrors[0].text);
-    insitu_session *session = open_text(MPI_COMM_WORLD, before, scene);
+    insitu_session *session = open_session_from_texts(MPI_COMM_WORLD, before, scene);
     everywhere(submit_input(session, &in) == INSITU_OK);
     for (int cycle = 0; cycle < 2; cycle++) {
         for (int64_t v = 0; v < in.part.vertex_count; v++) in.part.values[v] *= cycle ? 1.5 : 1;
@@ -357,7 +361,7 @@ static void derived_fields_are_those_of_the_source(void **state)
         drawn a = step_and_take_pictures(session, cycle);
         double *values[2] = {get_derived_values(session, "g", in.part.vertex_count),
                              get_derived_values(session, "h", in.part.vertex_count)};
-        insitu_session *alone = open_text(MPI_COMM_WORLD, before + strlen(mirrors[0].text), scene);
+        insitu_session *alone = open_session_from_texts(MPI_COMM_WORLD, before + strlen(mirrors[0].text), scene);
         everywhere(submit_input(alone, &in) == INSITU_OK);
         drawn of_alone = step_and_take_pictures(alone, cycle);
         double *expected = get_derived_values(alone, "g", in.part.vertex_count);
@@ -403,8 +407,8 @@ static void mirrored_images_follow_changes(void **state)
     session_input in;
     const mirror *by = &mirrors[0];
     input_create(&in, TEST_MIXED, SIDE, TEST_BLOCK, own_rank, rank_count);
-    insitu_session *session = open_text(MPI_COMM_WORLD, by->text, all_layers);
-    insitu_session *blocks = open_text(MPI_COMM_WORLD, "", all_layers);
+    insitu_session *session = open_session_from_texts(MPI_COMM_WORLD, by->text, all_layers);
+    insitu_session *blocks = open_session_from_texts(MPI_COMM_WORLD, "", all_layers);
     everywhere(submit_input(session, &in) == INSITU_OK);
     expect_step(session, blocks, &in, by, 0, "the first step");
     const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
@@ -457,7 +461,7 @@ static void edits_of_the_scene_mirror_and_unmirror(void **state)
     static const mirror none = {0, {0, 0, 0}, ""};
     input_create(&in, TEST_MIXED, SIDE, TEST_BLOCK, own_rank, rank_count);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(all_layers));
-    insitu_session *blocks = open_text(MPI_COMM_WORLD, "", all_layers);
+    insitu_session *blocks = open_session_from_texts(MPI_COMM_WORLD, "", all_layers);
     everywhere(submit_input(session, &in) == INSITU_OK);
     for (int i = 0; i < 6; i++) {
         const mirror *by = order[i] < 0 ? &none : &mirrors[order[i]];
@@ -477,8 +481,8 @@ static void errors_name_the_source_mesh(void **state)
     session_input in;
     const mirror *by = &mirrors[1];
     input_create(&in, TEST_TETS, SIDE, TEST_BLOCK, own_rank, rank_count);
-    insitu_session *session = open_text(MPI_COMM_WORLD, by->text, all_layers);
-    insitu_session *blocks = open_text(MPI_COMM_WORLD, "", all_layers);
+    insitu_session *session = open_session_from_texts(MPI_COMM_WORLD, by->text, all_layers);
+    insitu_session *blocks = open_session_from_texts(MPI_COMM_WORLD, "", all_layers);
     for (int cycle = 0; cycle < 2; cycle++) {
         const double good = in.part.coordinates[4];
         if (own_rank == rank_count - 1) in.part.coordinates[4] = (double)NAN;
@@ -524,9 +528,9 @@ static void warped_meshes_are_mirrored_after_the_warp(void **state)
     static const char scene[] =
         "threads: 1\nimages:\n" LAYERS("a", "[{surface: {colour_by: {field: u, component: y}}}]")
             LAYERS("b", "[{volume: {field: f}}]");
-    drawn a =
-        draw_mesh(open_text(MPI_COMM_WORLD, "meshes: {m: {warp: {field: u, scale: 0.5}, mirror: {x: -1}}}\n", scene),
-                  &in.mesh, &in.field, &field);
+    drawn a = draw_mesh(open_session_from_texts(
+                            MPI_COMM_WORLD, "meshes: {m: {warp: {field: u, scale: 0.5}, mirror: {x: -1}}}\n", scene),
+                        &in.mesh, &in.field, &field);
     everywhere(values.calls == 1);
     for (int64_t i = 0; i < count; i++) in.part.coordinates[i] += 0.5 * u[i];
     insitu_field fields[2] = {in.field, field};
@@ -550,8 +554,8 @@ static void fill_functions_are_called_once(void **state)
     field.name = "f";
     field.fill = copy_filled_values;
     field.fill_data = &values;
-    insitu_session *session = open_text(MPI_COMM_WORLD, mirrors[0].text, all_layers);
-    insitu_session *blocks = open_text(MPI_COMM_WORLD, "", all_layers);
+    insitu_session *session = open_session_from_texts(MPI_COMM_WORLD, mirrors[0].text, all_layers);
+    insitu_session *blocks = open_session_from_texts(MPI_COMM_WORLD, "", all_layers);
     everywhere(insitu_set_mesh(session, "m", &in.mesh) == INSITU_OK);
     everywhere(insitu_set_field(session, "m", &field) == INSITU_OK);
     for (int cycle = 0; cycle < 3; cycle++) {
@@ -574,8 +578,8 @@ static void counts_include_only_source_cells(void **state)
     input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
     if (own_rank == 0) unlink("mirror.csv");
     insitu_session *session =
-        open_text(MPI_COMM_WORLD, mirrors[2].text,
-                  "statistics: [{field: f, path: mirror.csv}]\nimages:\n" LAYERS("a", "[{surface: {}}]"));
+        open_session_from_texts(MPI_COMM_WORLD, mirrors[2].text,
+                                "statistics: [{field: f, path: mirror.csv}]\nimages:\n" LAYERS("a", "[{surface: {}}]"));
     everywhere(submit_input(session, &in) == INSITU_OK);
     drawn a = step_and_take_pictures(session, 0);
     const insitu_report *report = insitu_last_report(session);
@@ -598,8 +602,8 @@ static void unlikely_mirror_planes_give_a_warning(void **state)
     (void)state;
     session_input in;
     input_create(&in, TEST_TETS, SIDE, TEST_BLOCK, own_rank, rank_count);
-    insitu_session *session =
-        open_text(MPI_COMM_WORLD, "meshes:\n  m: {mirror: {y: 0.5}}\n  plate: {mirror: z}\n", surface_layers);
+    insitu_session *session = open_session_from_texts(
+        MPI_COMM_WORLD, "meshes:\n  m: {mirror: {y: 0.5}}\n  plate: {mirror: z}\n", surface_layers);
     everywhere(submit_input(session, &in) == INSITU_OK);
     drawn a = step_and_take_pictures(session, 0);
     const char *warnings = insitu_last_report(session)->warnings;

@@ -95,7 +95,7 @@ static void files_that_cannot_be_written_are_reported(void **state)
 
 /* Writes a scene of two pictures in one row. Each has a colour bar at `side`, whose range ends at 1 in the first
  * picture and at `high` in the second. */
-static void write_bars(char text[2048], const char *side, const char *high)
+static void write_shared_bar_scene(char text[2048], const char *side, const char *high)
 {
     static const char image[] = "  - name: %s\n    size: [32, 24]\n    camera: {automatic: {direction: %s}}\n"
                                 "    layers: [{slice: {field: f, range: [-1, %s]}}]\n"
@@ -134,7 +134,7 @@ static void alike_colour_bars_are_drawn_once(void **state)
     for (int i = 0; i < 4; i++) {
         const bool is_shared = i / 2 == 0;
         insitu_session *session = NULL;
-        write_bars(text, sides[i % 2], is_shared ? "1" : "1.5");
+        write_shared_bar_scene(text, sides[i % 2], is_shared ? "1" : "1.5");
         const insitu_status status = insitu_create_from_text(MPI_COMM_WORLD, text, &session);
         if (status) fprintf(stderr, "%s\n", insitu_error(NULL));
         assert_int_equal(status, INSITU_OK);

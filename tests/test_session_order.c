@@ -91,7 +91,7 @@ static void compute_pixel_position(int pixel, double out[2])
 
 /* ---- planes ----------------------------------------------------------------------------------------------------- */
 
-static double linear_field(const double p[3])
+static double compute_linear_field(const double p[3])
 {
     return p[2] + 0.3 * p[0] + 0.2 * p[1];
 }
@@ -117,10 +117,10 @@ static void planes_have_no_gap(void **state)
     for (int k = 0; k < order_kind_count; k++) {
         order_mesh part, whole;
         insitu_report report;
-        order_mesh_create(&order_kinds[k], 2, 0, linear_field, own_rank, rank_count, &part);
+        order_mesh_create(&order_kinds[k], 2, 0, compute_linear_field, own_rank, rank_count, &part);
         drawn all = draw_mesh(MPI_COMM_WORLD, plane_scene, &part, NULL, &report);
         everywhere(report.cells == part.cell_count && report.cells_inverted == 0 && report.cells_flat == 0);
-        order_mesh_create(&order_kinds[k], 2, 0, linear_field, 0, 1, &whole);
+        order_mesh_create(&order_kinds[k], 2, 0, compute_linear_field, 0, 1, &whole);
         drawn alone = draw_mesh(MPI_COMM_SELF, plane_scene, &whole, NULL, NULL);
         int wrong[3] = {0};
         bool is_same = true;

@@ -63,7 +63,7 @@ static void compute_pixel_position(int pixel, double out[2])
 }
 
 /* Returns the squared distance from a point to a segment. */
-static double squared_distance_from_segment(const double at[2], const double a[2], const double b[2])
+static double compute_squared_segment_distance(const double at[2], const double a[2], const double b[2])
 {
     const double e[2] = {b[0] - a[0], b[1] - a[1]}, d[2] = {at[0] - a[0], at[1] - a[1]};
     const double s = fmin(fmax((d[0] * e[0] + d[1] * e[1]) / (e[0] * e[0] + e[1] * e[1]), 0), 1);
@@ -95,7 +95,7 @@ static void compute_edge_point(const edge_form *form, const double from[2], cons
         double weight = 1;
         for (int other = 0; other <= form->order; other++)
             if (other != node) weight *= (form->order * at - other) / (node - other);
-        for (int axis = 0; axis < 2; axis++) out[axis] += weight * order_mesh_make_moved(form->bend, point, axis);
+        for (int axis = 0; axis < 2; axis++) out[axis] += weight * order_mesh_move_coordinate(form->bend, point, axis);
     }
 }
 
@@ -135,7 +135,7 @@ static int count_wrong_pixels(const caught_picture *picture, const edge_list *ed
         compute_pixel_position(pixel, at);
         if (fabs(at[0]) > 1 || fabs(at[1]) > 1) continue;
         for (int i = 0; i < edges->count; i++)
-            nearest = fmin(nearest, squared_distance_from_segment(at, edges->ends[i][0], edges->ends[i][1]));
+            nearest = fmin(nearest, compute_squared_segment_distance(at, edges->ends[i][0], edges->ends[i][1]));
         const double covered = fmin(fmax(0.5 * (width + 1) - 100 * sqrt(nearest), 0), 1);
         wrong += !(fabs((double)picture->rgba[4 * pixel] - (1 - fade * covered)) < 1e-3);
     }
@@ -229,7 +229,7 @@ static void shells_have_edges_of_their_own(void **state)
                     const double v = is_loose ? at8[n][1] / 2. : (double)(n / (p + 1)) / p;
                     const double point[3] = {cell % 2 - 1 + u, cell / 2 - 1 + v, 1};
                     for (int axis = 0; axis < 3; axis++)
-                        coordinates[3 * mesh.vertex_count + axis] = order_mesh_make_moved(0.1, point, axis);
+                        coordinates[3 * mesh.vertex_count + axis] = order_mesh_move_coordinate(0.1, point, axis);
                     mesh.vertex_count++;
                 }
             int32_t connectivity[100];

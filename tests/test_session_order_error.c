@@ -103,7 +103,7 @@ typedef struct sphere_hits {
     int missed, beyond;
 } sphere_hits;
 
-static sphere_hits find_hits(const caught_picture *picture, double bound)
+static sphere_hits measure_sphere_hits(const caught_picture *picture, double bound)
 {
     sphere_hits out = {0, 0, 0};
     const double radius = sqrt(0.5);
@@ -126,7 +126,7 @@ static void check_sphere(const char *name, const order_mesh *mesh, double allowe
     drawn_report of = draw_and_report(MPI_COMM_WORLD, scene, mesh);
     const double bound = of.bound + 1e-4;
     sphere_hits hits = {0, 0, 0};
-    if (own_rank == 0) hits = find_hits(&of.pictures.pictures[0], bound);
+    if (own_rank == 0) hits = measure_sphere_hits(&of.pictures.pictures[0], bound);
     if (own_rank == 0) printf("%s: %s; the farthest hit by %.3f\n", name, of.pieces, hits.farthest);
     everywhere(of.bound <= allowed && of.count > 1 && strstr(of.pieces, ", of which 0 have no bound") != NULL);
     everywhere(hits.farthest <= bound && hits.missed == 0 && hits.beyond == 0);
@@ -224,7 +224,7 @@ static bool find_in_cell(const order_mesh *mesh, int64_t cell, const double plac
 }
 
 /* Returns the distance in pixels of a position from the isosurface of the polynomial, along the gradient. */
-static double distance_from_isosurface(const order_mesh *mesh, double isovalue, const double place[3])
+static double compute_distance_from_isosurface(const order_mesh *mesh, double isovalue, const double place[3])
 {
     double nearest = INFINITY;
     for (int64_t cell = 0; cell < mesh->cell_count; cell++) {
@@ -268,7 +268,7 @@ static void bent_cells_are_within_the_stated_error(void **state)
         if (!isfinite(depth)) continue;
         const double place[3] = {(pixel % WIDTH + 0.5 - WIDTH / 2.0) * PIXEL,
                                  (HEIGHT / 2.0 - pixel / WIDTH - 0.5) * PIXEL, EYE - depth};
-        farthest = fmax(farthest, distance_from_isosurface(&whole, 0.2, place));
+        farthest = fmax(farthest, compute_distance_from_isosurface(&whole, 0.2, place));
         hits++;
     }
     if (own_rank == 0) printf("bent hexes: %s; the farthest of %d hits by %.3f\n", of.pieces, hits, farthest);
@@ -325,7 +325,7 @@ static void pieces_are_drawn_as_a_fixed_number(void **state)
 }
 
 /* A field that is at most -0.06 at nodes, but up to 0.05 larger between them. */
-static double ridge_field(const double p[3])
+static double compute_ridge_field(const double p[3])
 {
     return -(p[0] - 0.5) * (p[0] - 0.5) - 0.05 * p[2];
 }
@@ -334,7 +334,7 @@ static void surfaces_between_nodes_are_found(void **state)
 {
     (void)state;
     order_mesh mesh;
-    order_mesh_create(&hex_27, 1, 0, ridge_field, own_rank, rank_count, &mesh);
+    order_mesh_create(&hex_27, 1, 0, compute_ridge_field, own_rank, rank_count, &mesh);
     drawn_report of = draw_and_report(MPI_COMM_WORLD, WITHIN("0.25") SMALL(ISO("-0.01")), &mesh);
     int hits = 0;
     for (int pixel = 0; pixel < 96 * 72 && own_rank == 0; pixel++)

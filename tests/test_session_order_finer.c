@@ -140,7 +140,7 @@ static void lobatto_points_are_recognised(void **state)
 
 /* A field that exceeds its values at nodes: nodes are at -1, 0 and 1, where the field is at most -0.25, but between 0
  * and 1 it reaches 0. */
-static double ridge_field(const double p[3])
+static double compute_ridge_field(const double p[3])
 {
     return -(p[0] - 0.5) * (p[0] - 0.5);
 }
@@ -154,7 +154,7 @@ static void surfaces_between_nodes_are_drawn(void **state)
     for (int i = 0; i < 2; i++) {
         order_mesh mesh;
         int hits = 0;
-        order_mesh_create(&kind, 1, 0, ridge_field, own_rank, rank_count, &mesh);
+        order_mesh_create(&kind, 1, 0, compute_ridge_field, own_rank, rank_count, &mesh);
         for (int64_t v = 0; v < mesh.vertex_count; v++) mesh.values[v] -= 0.05 * mesh.coordinates[3 * v + 2];
         drawn pictures = draw_mesh(scenes[i], &mesh);
         for (int pixel = 0; pixel < PIXELS && own_rank == 0; pixel++)
@@ -315,8 +315,8 @@ static void check_gaps(const char *name, const order_mesh *mesh, gap_tally talli
 }
 
 /* Adds the cells in those columns of cubes along z whose number is odd (parity 1) or even (parity 0). */
-static void add_columns(const order_mesh *of, int cells_of_cube, int parity, order_mesh *out, unsigned char *types,
-                        int64_t *offsets)
+static void add_cells_of_columns(const order_mesh *of, int cells_of_cube, int parity, order_mesh *out,
+                                 unsigned char *types, int64_t *offsets)
 {
     for (int64_t cell = 0; cell < of->cell_count; cell++) {
         const int64_t cube = (cell * rank_count + own_rank) / cells_of_cube;
@@ -347,8 +347,8 @@ static void check_mixed_gaps(double bend, gap_tally tallies[3])
     out.coordinates = malloc((size_t)(hexes.vertex_count + wedges.vertex_count + 1) * 3 * sizeof(double));
     out.values = malloc((size_t)(hexes.vertex_count + wedges.vertex_count + 1) * sizeof(double));
     out.connectivity = malloc(MOST * 27 * sizeof *out.connectivity);
-    add_columns(&hexes, 1, 0, &out, types, offsets);
-    add_columns(&wedges, 2, 1, &out, types, offsets);
+    add_cells_of_columns(&hexes, 1, 0, &out, types, offsets);
+    add_cells_of_columns(&wedges, 2, 1, &out, types, offsets);
     insitu_mesh_interleaved(&out.mesh, out.coordinates, INSITU_FLOAT64);
     out.mesh.vertex_count = out.field.count = out.vertex_count;
     out.mesh.cell_count = out.cell_count;
@@ -363,7 +363,7 @@ static void check_mixed_gaps(double bend, gap_tally tallies[3])
     order_mesh_free(&out);
 }
 
-static bool is_of_usual_gaps(const char *name)
+static bool is_default_gap_kind(const char *name)
 {
     static const char *const names[] = {"tet 10", "hex 20", "hex 27", "wedge 18", "pyramid 13"};
     bool is_one = false;
@@ -380,7 +380,7 @@ static void rays_cross_pieces_once(void **state)
     for (int bent = 0; bent < 2; bent++) {
         for (int k = 0; k < order_kind_count; k++) {
             order_mesh mesh;
-            if (!test_is_long_run() && !is_of_usual_gaps(order_kinds[k].name)) continue;
+            if (!test_is_long_run() && !is_default_gap_kind(order_kinds[k].name)) continue;
             order_mesh_create(&order_kinds[k], 2, bent * 0.07, order_plane_field, own_rank, rank_count, &mesh);
             check_gaps(order_kinds[k].name, &mesh, all);
             order_mesh_free(&mesh);

@@ -66,7 +66,7 @@ static void evaluate_legendre(int p, double x, double out[3])
 
 /* Finds the Gauss-Lobatto points. The inner points are the zeros of the derivative of the Legendre polynomial; Newton's
  * method starts from Chebyshev points. */
-static void find_points(lobatto_mesh *m)
+static void compute_lobatto_points(lobatto_mesh *m)
 {
     const int p = m->order;
     for (int i = 0; i <= p; i++) {
@@ -86,7 +86,7 @@ static void find_points(lobatto_mesh *m)
 
 static void bend_position(const double point[3], double out[3])
 {
-    for (int axis = 0; axis < 3; axis++) out[axis] = order_mesh_make_moved(BEND, point, axis);
+    for (int axis = 0; axis < 3; axis++) out[axis] = order_mesh_move_coordinate(BEND, point, axis);
 }
 
 static void place_nodes(const lobatto_mesh *m, int cell)
@@ -110,7 +110,7 @@ static void make_mesh(int order, int side, lobatto_mesh *m)
 {
     const int count = side * side * side, nodes = (order + 1) * (order + 1) * (order + 1);
     *m = (lobatto_mesh){.order = order, .side = side};
-    find_points(m);
+    compute_lobatto_points(m);
     m->nodes = malloc((size_t)count * sizeof *m->nodes);
     m->coordinates = malloc((size_t)(count * nodes) * 3 * sizeof(double));
     m->values = malloc((size_t)(count * nodes) * sizeof(double));
@@ -283,7 +283,7 @@ static bool find_point(const lobatto_mesh *m, const double position[3], cell_poi
 
 /* Returns the distance of a position from the isosurface of a cell. The point of the isosurface is found by steps along
  * the gradient. */
-static double surface_distance(const lobatto_mesh *m, const double position[3], const cell_point *from)
+static double compute_distance_from_surface(const lobatto_mesh *m, const double position[3], const cell_point *from)
 {
     cell_point p = *from;
     for (int turn = 0; turn < 20 && fabs(p.distance) > 1e-10; turn++) {
@@ -308,7 +308,7 @@ static const double right[3] = {0.8660254037844386, 0, -0.5};
 static const double above[3] = {-0.29999999999999999, 0.80000000000000004, -0.51961524227066314};
 static const double forward[3] = {-0.40000000000000002, -0.59999999999999998, -0.69282032302755092};
 
-static void ray_position(int pixel, double depth, double out[3])
+static void compute_point_on_ray(int pixel, double depth, double out[3])
 {
     const double x = (pixel % SIZE + 0.5 - SIZE / 2.0) * PIXEL, y = (SIZE / 2.0 - pixel / SIZE - 0.5) * PIXEL;
     for (int a = 0; a < 3; a++) out[a] = x * right[a] + y * above[a] + (depth - EYE_DISTANCE) * forward[a];
@@ -316,10 +316,10 @@ static void ray_position(int pixel, double depth, double out[3])
 
 /* Computes the depths at which a ray enters and leaves the cube, which is the mesh because its outer faces are flat.
  * Returns false if the ray misses the cube. */
-static bool is_in_cube(int pixel, double *in, double *out)
+static bool find_cube_interval(int pixel, double *in, double *out)
 {
     double base[3];
-    ray_position(pixel, 0, base);
+    compute_point_on_ray(pixel, 0, base);
     *in = -INFINITY;
     *out = INFINITY;
     for (int a = 0; a < 3; a++) {
@@ -347,7 +347,7 @@ static void follow_ray(const lobatto_mesh *m, int pixel, double from, double to,
     for (int n = 1; n < steps; n++) {
         double position[3];
         cell_point p;
-        ray_position(pixel, from + (to - from) * n / steps, position);
+        compute_point_on_ray(pixel, from + (to - from) * n / steps, position);
         if (!find_point(m, position, &p)) continue;
         const double distance = p.distance / PIXEL;
         if (side == 0 && fabs(distance) > bound) side = copysign(1, distance);
@@ -359,7 +359,7 @@ static void check_ray(const lobatto_mesh *m, int pixel, double depth, double bou
 {
     double in, out, position[3];
     cell_point p;
-    if (!is_in_cube(pixel, &in, &out)) {
+    if (!find_cube_interval(pixel, &in, &out)) {
         t->wrong += isfinite(depth);
         return;
     }
@@ -367,9 +367,9 @@ static void check_ray(const lobatto_mesh *m, int pixel, double depth, double bou
     t->hits += isfinite(depth);
     follow_ray(m, pixel, in, fmin(out, depth), bound, t);
     if (!isfinite(depth)) return;
-    ray_position(pixel, depth, position);
+    compute_point_on_ray(pixel, depth, position);
     find_point(m, position, &p);
-    t->farthest = fmax(t->farthest, surface_distance(m, position, &p) / PIXEL);
+    t->farthest = fmax(t->farthest, compute_distance_from_surface(m, position, &p) / PIXEL);
 }
 
 /* Checks rays of rank 0's picture; each rank checks a part of them. */

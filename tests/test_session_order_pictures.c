@@ -397,7 +397,7 @@ static void straight_tets_match_their_polynomials(void **state)
     free(s.cells.connectivity);
 }
 
-static double wave_field(const double p[3])
+static double compute_wave_field_value(const double p[3])
 {
     return p[0] * p[0] + 0.6 * p[1] * p[1] - 0.5 * p[2] + 0.3 * sin(2 * p[1] + p[2]);
 }
@@ -408,7 +408,7 @@ static void bent_tets_match_their_polynomials(void **state)
     (void)state;
     const order_kind kind = {"tet 2", INSITU_QUADRATIC_TET, INSITU_ORDER_VTK, 2};
     order_mesh mesh;
-    order_mesh_create(&kind, 4, 0, wave_field, 0, 1, &mesh);
+    order_mesh_create(&kind, 4, 0, compute_wave_field_value, 0, 1, &mesh);
     for (int64_t v = 0; v < mesh.vertex_count; v++) {
         double *at = mesh.coordinates + 3 * v;
         const double radius = 1.5 + 0.5 * at[0], angle = 0.7853981633974483 * at[1];

@@ -76,7 +76,7 @@ static void bend_position(double b, double place[3])
 
 /* The field x + y z at a position before the map. Over the cube from -1 to 1, weighted by the determinant, its mean is
  * 2 b / 3, and the mean of its square is 4/9 + 16 b^3 / 27. */
-static double bent_field(const double p[3])
+static double compute_bent_field(const double p[3])
 {
     return p[0] + p[1] * p[2];
 }
@@ -101,7 +101,7 @@ static void bent_cells_have_the_moments_of_their_polynomials(void **state)
             const double b = way ? 0.2 : 0;
             order_mesh mesh;
             if (order_kinds[k].order == 1) continue;
-            order_mesh_create(&order_kinds[k], 2, 0, bent_field, own_rank, rank_count, &mesh);
+            order_mesh_create(&order_kinds[k], 2, 0, compute_bent_field, own_rank, rank_count, &mesh);
             bend_mesh(b, &mesh);
             write_and_read_statistics(OF_F FAR, &mesh.mesh, &mesh.field, text);
             const bool is_good = has_moments(text, 2 * b / 3, 4. / 9 + 16 * b * b * b / 27);
@@ -118,7 +118,7 @@ static void cell_values_have_the_volumes_of_bent_cells(void **state)
     static char text[MOST];
     const double b = 0.2;
     order_mesh mesh;
-    order_mesh_create(&hex_20, 2, 0, bent_field, own_rank, rank_count, &mesh);
+    order_mesh_create(&hex_20, 2, 0, compute_bent_field, own_rank, rank_count, &mesh);
     double *values = calloc((size_t)mesh.cell_count + 1, sizeof *values);
     for (int64_t cell = 0; cell < mesh.cell_count; cell++)
         values[cell] = mesh.coordinates[3 * mesh.connectivity[cell * mesh.nodes + 1]] > 0;
@@ -140,7 +140,7 @@ static void corner_values_count_per_cell(void **state)
     (void)state;
     static char text[MOST];
     order_mesh mesh;
-    order_mesh_create(&hex_20, 2, 0, bent_field, own_rank, rank_count, &mesh);
+    order_mesh_create(&hex_20, 2, 0, compute_bent_field, own_rank, rank_count, &mesh);
     const int64_t entries = mesh.cell_count * mesh.nodes;
     double *values = calloc((size_t)entries + 1, sizeof *values);
     for (int64_t i = 0; i < entries; i++) {
@@ -162,7 +162,7 @@ static void corner_values_count_per_cell(void **state)
 /* ---- Gauss-Lobatto points ---------------------------------------------------------------------------------------- */
 
 /* Makes eight cubes of order 4 or 7, dealt to the ranks, that share no nodes. The values at nodes are x^power. */
-static void make_lobatto(int p, int power, double b, order_mesh *out)
+static void make_lobatto_mesh(int p, int power, double b, order_mesh *out)
 {
     static const double of4[5] = {-1, -0.654653670707977144, 0, 0.654653670707977144, 1};
     static const double half7[4] = {0.209299217902478869, 0.591700181433142302, 0.871740148509606615, 1};
@@ -201,7 +201,7 @@ static void nodes_at_lobatto_points_are_recognised(void **state)
     for (int way = 0; way < 4; way++) {
         const int p = way % 2 ? 7 : 4, power = way % 2 ? 6 : 4;
         order_mesh mesh;
-        make_lobatto(p, power, way / 2 ? 0.2 : 0, &mesh);
+        make_lobatto_mesh(p, power, way / 2 ? 0.2 : 0, &mesh);
         write_and_read_statistics(OF_F "finer_pieces: 1\n" FAR, &mesh.mesh, &mesh.field, text);
         everywhere(has_moments(text, 1. / (power + 1), 1. / (2 * power + 1)));
         write_and_read_statistics(OF_F "finer_pieces: 2\n" FAR, &mesh.mesh, &mesh.field, finer);
@@ -328,14 +328,14 @@ static void linear_cells_count_as_in_linear_meshes(void **state)
 
 /* ---- shells ------------------------------------------------------------------------------------------------------ */
 
-static double height_function(double x, double y)
+static double compute_shell_height(double x, double y)
 {
     return 0.3 * x * x + 0.2 * x * y - 0.2 * y * y;
 }
 
-/* Integrates 1, x^2 and x^4 over the graph of height_function() by the midpoint rule on n x n squares and on half as
- * many along each axis. Combining the two eliminates the leading error; the remaining one is of the order 1 / n^4, and
- * below 1e-9. */
+/* Integrates 1, x^2 and x^4 over the graph of compute_shell_height() by the midpoint rule on n x n squares and on half
+ * as many along each axis. Combining the two eliminates the leading error; the remaining one is of the order 1 / n^4,
+ * and below 1e-9. */
 static void integrate_graph(double out[3])
 {
     double sums[2][3] = {{0}};
@@ -366,7 +366,7 @@ static void bent_shells_have_their_areas(void **state)
     integrate_graph(expected);
     for (int v = 0; v < 25; v++) {
         const double x = -1 + 0.5 * (v % 5), y = -1 + 0.5 * (v / 5); /* NOLINT */
-        memcpy(coordinates[v], (const double[3]){x, y, height_function(x, y)}, sizeof coordinates[v]);
+        memcpy(coordinates[v], (const double[3]){x, y, compute_shell_height(x, y)}, sizeof coordinates[v]);
         values[v] = x * x;
     }
     for (int of = 0; of < 2; of++) {
@@ -527,7 +527,7 @@ static void large_values_do_not_overflow(void **state)
     (void)state;
     static char text[MOST];
     order_mesh mesh;
-    order_mesh_create(&hex_20, 2, 0, bent_field, own_rank, rank_count, &mesh);
+    order_mesh_create(&hex_20, 2, 0, compute_bent_field, own_rank, rank_count, &mesh);
     for (int64_t v = 0; v < mesh.vertex_count; v++) mesh.values[v] *= 0x1p1000;
     write_and_read_statistics(OF_F FAR, &mesh.mesh, &mesh.field, text);
     everywhere(own_rank || fabs(read_last_number(text, DEVIATION) * 0x1p-1000 - 2. / 3) < 1e-8);

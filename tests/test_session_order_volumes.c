@@ -33,14 +33,14 @@ static const transfer transfers[] = {
 
 typedef double field_function(const double point[3], int order, int side);
 
-static double squared_distance_field(const double point[3], int order, int side)
+static double compute_squared_distance(const double point[3], int order, int side)
 {
     (void)order;
     (void)side;
     return order_sphere_field(point);
 }
 
-static double wave_product_field(const double p[3])
+static double compute_wave_product(const double p[3])
 {
     return 1.25 + sin(4 * p[0]) * cos(3 * p[1]) + 0.2 * p[2];
 }
@@ -60,7 +60,7 @@ static double interpolate_wave(double frequency, double phase, double x, int ord
     return sum;
 }
 
-static double interpolated_wave_field(const double p[3], int order, int side)
+static double compute_interpolated_wave_product(const double p[3], int order, int side)
 {
     const double quarter = 1.57079632679489662;
     return 1.25 + 0.2 * p[2] +
@@ -179,15 +179,23 @@ typedef struct volume_case {
 } volume_case;
 
 static const volume_case cases[] = {
-    {{"tet 2", INSITU_QUADRATIC_TET, INSITU_ORDER_VTK, 2}, 2, order_sphere_field, squared_distance_field, false},
-    {{"tet 2", INSITU_QUADRATIC_TET, INSITU_ORDER_VTK, 2}, 6, order_sphere_field, squared_distance_field, true},
-    {{"wedge 18", INSITU_BIQUADRATIC_WEDGE, INSITU_ORDER_VTK, 2}, 3, order_sphere_field, squared_distance_field, false},
-    {{"hex 20", INSITU_QUADRATIC_HEX, INSITU_ORDER_VTK, 2}, 3, order_sphere_field, squared_distance_field, true},
-    {{"hex 27", INSITU_TRIQUADRATIC_HEX, INSITU_ORDER_VTK, 2}, 4, wave_product_field, interpolated_wave_field, false},
+    {{"tet 2", INSITU_QUADRATIC_TET, INSITU_ORDER_VTK, 2}, 2, order_sphere_field, compute_squared_distance, false},
+    {{"tet 2", INSITU_QUADRATIC_TET, INSITU_ORDER_VTK, 2}, 6, order_sphere_field, compute_squared_distance, true},
+    {{"wedge 18", INSITU_BIQUADRATIC_WEDGE, INSITU_ORDER_VTK, 2},
+     3,
+     order_sphere_field,
+     compute_squared_distance,
+     false},
+    {{"hex 20", INSITU_QUADRATIC_HEX, INSITU_ORDER_VTK, 2}, 3, order_sphere_field, compute_squared_distance, true},
+    {{"hex 27", INSITU_TRIQUADRATIC_HEX, INSITU_ORDER_VTK, 2},
+     4,
+     compute_wave_product,
+     compute_interpolated_wave_product,
+     false},
     {{"hex 4", INSITU_LAGRANGE_HEX, INSITU_ORDER_LEXICOGRAPHIC, 4},
      2,
-     wave_product_field,
-     interpolated_wave_field,
+     compute_wave_product,
+     compute_interpolated_wave_product,
      false},
 };
 

@@ -121,18 +121,18 @@ static void check_forms(test_mesh_kind kind, int keep_polyhedra)
     drawing expected = draw_input(scene, &plain);
     everywhere(has_visible_pixels(&expected));
     for (int base = 0; base < 2; base++) {
-        owned faces = make_owned(&plain.part, base);
+        owned faces = make_owned_faces(&plain.part, base);
         for (form which = base ? FORM_PAIRS : 0; which < FORM_COUNT; which++) {
             session_input in = plain;
             if (base && which == FORM_LISTS) swap_owner_and_neighbour(&faces, plain.part.face_count);
-            describe_owned(&faces, which, base, &in.mesh);
+            describe_owned_faces(&faces, which, base, &in.mesh);
             drawing drawn = draw_input(scene, &in);
             everywhere(are_same_drawings(&expected, &drawn));
             everywhere(drawn.recognised == expected.recognised);
             everywhere(drawn.copied > expected.copied || !keep_polyhedra);
             free_drawing(&drawn);
         }
-        free_owned(&faces);
+        free_owned_faces(&faces);
     }
     free_drawing(&expected);
     input_free(&plain);
@@ -182,7 +182,7 @@ static void polyhedra_are_recognised_as_typed_cells(void **state)
 
 /* Splits every ninth face of the hexes, which are given as polyhedra, into two triangles. The cells of these faces
  * cannot be recognised as hexes. */
-static void cut_faces(const test_mesh *part, test_mesh *out, unsigned char *is_cut)
+static void split_some_faces(const test_mesh *part, test_mesh *out, unsigned char *is_cut)
 {
     test_mesh_allocate(out, part->vertex_count, part->cell_count, 2 * part->connectivity_count);
     test_mesh_allocate_faces(out, 2 * part->face_count, 2 * part->face_connectivity_count);
@@ -235,7 +235,7 @@ static void hexes_among_polyhedra_are_recognised(void **state)
     input_create(&hexes, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
     create_polyhedra(&whole, TEST_HEXES, 1);
     unsigned char *is_cut = test_allocate(hexes.part.cell_count, 1);
-    cut_faces(&whole.part, &cut.part, is_cut);
+    split_some_faces(&whole.part, &cut.part, is_cut);
     mix_cells(&hexes.part, &cut.part, is_cut, &mixed.part);
     input_describe(&cut);
     input_describe(&mixed);
@@ -247,15 +247,15 @@ static void hexes_among_polyhedra_are_recognised(void **state)
     everywhere(sum_over_ranks(kept) > 0 && sum_over_ranks(drawn.recognised) > 0);
     everywhere(are_same_drawings(&expected, &drawn));
     free_drawing(&drawn);
-    owned faces = make_owned(&cut.part, 1);
+    owned faces = make_owned_faces(&cut.part, 1);
     for (form which = FORM_PAIRS; which < FORM_COUNT; which++) {
         session_input in = cut;
-        describe_owned(&faces, which, 1, &in.mesh);
+        describe_owned_faces(&faces, which, 1, &in.mesh);
         drawn = draw_input(scene, &in);
         everywhere(are_same_drawings(&expected, &drawn));
         free_drawing(&drawn);
     }
-    free_owned(&faces);
+    free_owned_faces(&faces);
     free_drawing(&expected);
     free(is_cut);
     input_free(&hexes);
@@ -266,7 +266,7 @@ static void hexes_among_polyhedra_are_recognised(void **state)
 
 /* Makes a polyhedron shaped like an orange of six segments. Like a hex it has six quads and eight vertices, but every
  * quad extends from pole to pole. */
-static void make_orange(test_mesh *out)
+static void make_orange_polyhedron(test_mesh *out)
 {
     test_mesh_allocate(out, 8, 1, 6);
     test_mesh_allocate_faces(out, 6, 24);
@@ -287,7 +287,7 @@ static void six_quads_that_form_no_hex_stay_a_polyhedron(void **state)
     session_input in = {0};
     const char *scene = write_scene(scene_text);
     if (own_rank == 0)
-        make_orange(&in.part);
+        make_orange_polyhedron(&in.part);
     else
         input_create(&in, TEST_HEXES, 1, TEST_BLOCK, 0, 2); /* the first of two parts, which has no cell */
     everywhere(in.part.cell_count == (own_rank == 0));
@@ -373,8 +373,8 @@ static void memory_that_runs_out_is_reported(void **state)
     session_input in = {0};
     const char *scene = write_scene(scene_text);
     create_polyhedra(&in, TEST_MIXED, 1);
-    owned faces = make_owned(&in.part, 1);
-    describe_owned(&faces, FORM_LISTS, 1, &in.mesh);
+    owned faces = make_owned_faces(&in.part, 1);
+    describe_owned_faces(&faces, FORM_LISTS, 1, &in.mesh);
     drawing expected = draw_input(scene, &in), drawn;
     const int64_t held = base_memory_held();
     int reported = 0;
@@ -394,7 +394,7 @@ static void memory_that_runs_out_is_reported(void **state)
     }
     everywhere(reported >= 6); /* arrays: 2 of the lists, 2 of owner and neighbour, 1 of types, 2 of cells */
     free_drawing(&expected);
-    free_owned(&faces);
+    free_owned_faces(&faces);
     input_free(&in);
 }
 

@@ -10,9 +10,9 @@ static owned corrupted;
  * on one rank. */
 static void describe_by_owner(session_input *in, form which, int base)
 {
-    free_owned(&corrupted);
-    corrupted = make_owned(&in->part, base);
-    describe_owned(&corrupted, which, base, &in->mesh);
+    free_owned_faces(&corrupted);
+    corrupted = make_owned_faces(&in->part, base);
+    describe_owned_faces(&corrupted, which, base, &in->mesh);
 }
 
 static void set_large_owner(session_input *in)
@@ -75,7 +75,7 @@ static void set_negative_neighbour_count(session_input *in)
     describe_by_owner(in, FORM_WIDE, 0);
     in->mesh.neighbour_count = -4;
 }
-static void set_neighbours_alone(session_input *in)
+static void set_neighbours_without_owners(session_input *in)
 {
     describe_by_owner(in, FORM_WIDE, 0);
     in->mesh.owner.data = NULL;
@@ -106,7 +106,7 @@ static void set_owners_and_offsets(session_input *in)
     describe_by_owner(in, FORM_WIDE, 0);
     in->mesh.offsets = (insitu_array){in->part.offsets, INSITU_INT64, 0};
 }
-static void keep_some_faces(session_input *in)
+static void set_unknown_keep_polyhedra(session_input *in)
 {
     in->mesh.keep_polyhedra = 7;
 }
@@ -327,7 +327,7 @@ static const corrupted_case cases[] = {
     {"no faces", exclude_faces, INSITU_ERROR_MESH, false, {"cell 0 (polyhedron): 0 faces"}},
     {"count", set_more_neighbours, INSITU_ERROR_MESH, true, {"neighbour_count is ", "more than face_count"}},
     {"count -4", set_negative_neighbour_count, INSITU_ERROR_ARGUMENT, true, {"neighbour_count is -4"}},
-    {"alone", set_neighbours_alone, INSITU_ERROR_MESH, true, {"neighbours of faces are given without owners"}},
+    {"alone", set_neighbours_without_owners, INSITU_ERROR_MESH, true, {"neighbours of faces are given without owners"}},
     {"none", remove_neighbours, INSITU_ERROR_MESH, true, {"neighbours of faces are not given"}},
     {"float",
      set_float_owners,
@@ -345,7 +345,7 @@ static const corrupted_case cases[] = {
      true,
      {"owners of faces and connectivity indices are"}},
     {"two", set_owners_and_offsets, INSITU_ERROR_MESH, true, {"owners of faces and offsets are given"}},
-    {"keep", keep_some_faces, INSITU_ERROR_ARGUMENT, true, {"keep_polyhedra is 7, expected 0 or 1"}},
+    {"keep", set_unknown_keep_polyhedra, INSITU_ERROR_ARGUMENT, true, {"keep_polyhedra is 7, expected 0 or 1"}},
     {"NULL", set_null_list, INSITU_ERROR_MESH, false, {"face 5: its list is NULL, its size "}},
     {"size", set_negative_list_size, INSITU_ERROR_MESH, false, {"face 6: its size is -3"}},
     {"listed",
@@ -368,7 +368,7 @@ static void wrong_input_is_reported_on_all_ranks(void **state)
     input_create(&in, TEST_POLYHEDRA, 3, TEST_RANDOM, own_rank, rank_count);
     check_all_faults_are_reported(&in, cases, sizeof cases / sizeof cases[0]);
     input_free(&in);
-    free_owned(&corrupted);
+    free_owned_faces(&corrupted);
 }
 
 int main(int argc, char **argv)

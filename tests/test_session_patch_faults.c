@@ -44,8 +44,8 @@ static void create_input(void)
     test_mesh_to_polyhedra(&input.part, 1);
     for (int64_t v = 0; v < input.part.vertex_count; v++) input.part.coordinates[3 * v] += 2 * own_rank;
     find_quads();
-    free_owned(&faces);
-    faces = make_owned(&input.part, 1);
+    free_owned_faces(&faces);
+    faces = make_owned_faces(&input.part, 1);
     inner = 1;
     outer = faces.inner + 1;
     for (int i = 0; i < MOST; i++) numbers[i] = outer + i;
@@ -56,7 +56,7 @@ static void create_input(void)
 static void describe_mesh_and_patch(void)
 {
     input_describe(&input);
-    describe_owned(&faces, FORM_LISTS, 1, &input.mesh);
+    describe_owned_faces(&faces, FORM_LISTS, 1, &input.mesh);
     patches[0] = (insitu_patch){.count = 5, .first_face = outer, .values = {values, INSITU_FLOAT64, 0}};
     patches[1] = (insitu_patch){0};
     insitu_field_defaults(&input.field);
@@ -291,7 +291,7 @@ static void wrong_input_is_reported_on_all_ranks(void **state)
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
     for (int i = 0; i < (int)(sizeof faults / sizeof faults[0]); i++) check_fault(session, &faults[i], 2 * i);
     insitu_destroy(&session);
-    free_owned(&faces);
+    free_owned_faces(&faces);
 }
 
 /* Checks that a patch given by the numbers of faces is refused for hexes, whose faces have no numbers. */

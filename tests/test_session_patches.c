@@ -96,7 +96,7 @@ static double compute_expected_mean(const grid *all, const double position[3])
         const session_cell_faces of_cell = session_faces_of_cell(all, cell);
         bool is_at = false;
         for (int64_t f = 0; f < of_cell.count; f++) {
-            const session_face_loop loop = session_face_of(&of_cell, f);
+            const session_face_loop loop = session_find_face_loop(&of_cell, f);
             double points[8][3];
             boundary_face face;
             const int count = read_loop(all, &loop, points);
@@ -143,12 +143,12 @@ static void add_value(part_input *in, int patch, double value)
 
 /* Lists the boundary faces of all cells. Faces of ghost cells get wrong values, so that a mean differs if they are
  * used. */
-static void list_by_cells(part_input *in, const grid *g)
+static void list_boundary_faces_by_cells(part_input *in, const grid *g)
 {
     for (int64_t cell = 0; cell < g->cell_count; cell++) {
         const session_cell_faces of_cell = session_faces_of_cell(g, cell);
         for (int64_t f = 0; f < of_cell.count; f++) {
-            const session_face_loop loop = session_face_of(&of_cell, f);
+            const session_face_loop loop = session_find_face_loop(&of_cell, f);
             double points[8][3];
             boundary_face face;
             const int count = read_loop(g, &loop, points);
@@ -164,8 +164,8 @@ static void list_by_cells(part_input *in, const grid *g)
     }
 }
 
-/* Lists the boundary faces in the numbering of make_owned(). */
-static void list_by_owned(part_input *in)
+/* Lists the boundary faces in the numbering of make_owned_faces(). */
+static void list_boundary_faces_by_owner(part_input *in)
 {
     for (int64_t f = in->faces.inner; f < in->part.face_count; f++) {
         const int64_t first = in->faces.offsets[f], count = in->faces.offsets[f + 1] - first;
@@ -244,7 +244,7 @@ static void part_free(part_input *in)
 {
     test_mesh_free(&in->part);
     test_free(in->values);
-    if (in->faces.owner) free_owned(&in->faces);
+    if (in->faces.owner) free_owned_faces(&in->faces);
 }
 
 /* ---- checks --------------------------------------------------------------------------------------------------------
@@ -302,7 +302,7 @@ static void make_part_lists(part_input *in)
     test_view_create(&in->part, (test_layout){true, true, true, false, true}, &view);
     view.cells.ghosts = (const char *)in->part.ghosts;
     view.cells.ghosts_stride = view.cells.ghosts_bytes = 1;
-    list_by_cells(in, &view.cells);
+    list_boundary_faces_by_cells(in, &view.cells);
     test_view_free(&view);
 }
 
@@ -361,9 +361,9 @@ static void owner_meshes_accept_patches_by_numbers_and_ranges(void **state)
         insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
         test_partition_cells(&whole, TEST_RANDOM, SIDE, rank_count, owners);
         part_create(&input, own_rank, variant == 5);
-        input.faces = make_owned(&input.part, base);
-        describe_owned(&input.faces, (form)(variant / 4), base, &input.mesh);
-        list_by_owned(&input);
+        input.faces = make_owned_faces(&input.part, base);
+        describe_owned_faces(&input.faces, (form)(variant / 4), base, &input.mesh);
+        list_boundary_faces_by_owner(&input);
         describe_patches(&input, variant % 2 ? BY_NUMBERS : BY_RANGES);
         everywhere(draw_step(session, &input, 0) == INSITU_OK);
         everywhere(are_means_right(session));
@@ -465,7 +465,7 @@ static void linear_fields_are_exact_amid_walls(void **state)
     for (int64_t cell = 0; cell < input.part.cell_count; cell++) {
         const session_cell_faces of_cell = session_faces_of_cell(&view.cells, cell);
         for (int64_t f = 0; f < of_cell.count; f++) {
-            const session_face_loop loop = session_face_of(&of_cell, f);
+            const session_face_loop loop = session_find_face_loop(&of_cell, f);
             double points[8][3];
             boundary_face face;
             const int count = read_loop(&view.cells, &loop, points);

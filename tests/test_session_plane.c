@@ -32,7 +32,7 @@ typedef struct plate {
     int connectivity[MAX_ENTRIES], offsets[MAX_CELLS + 1];
 } plate;
 
-static double linear_field(double x, double y)
+static double compute_linear_field(double x, double y)
 {
     return 2 * x - y;
 }
@@ -71,7 +71,7 @@ static void make_plate(plate_kind kind, int rank, int ranks, plate *out)
         const double x = right * (n % (NX + 1)) / NX, y = top * (n / (NX + 1)) / NY;
         out->xy[2 * n] = x;
         out->xy[2 * n + 1] = y;
-        out->f[n] = linear_field(x, y);
+        out->f[n] = compute_linear_field(x, y);
         out->v[3 * n] = 0.6 * out->f[n];
         out->v[3 * n + 2] = 0.8 * out->f[n];
     }
@@ -161,7 +161,7 @@ static double encode_srgb(float light)
 /* Returns whether each 8-bit channel of each pixel differs by at most 1 from the grey map at the field's value.
  * Rounding to 8 bits takes half of this tolerance. Errors of the colour map's table, which is linear between 1024
  * greys, and of float32 values are far below the other half. */
-static bool is_map(const caught_picture *picture, bool is_of_cells)
+static bool is_picture_of_grey_map(const caught_picture *picture, bool is_of_cells)
 {
     int hits = 0;
     for (int pixel = 0; pixel < PIXELS; pixel++) {
@@ -171,7 +171,7 @@ static bool is_map(const caught_picture *picture, bool is_of_cells)
         if (is_near_edge(x, right, NX) || is_near_edge(y, top, NY)) continue;
         const bool is_hit = x > 0 && x < right && y > 0 && y < top;
         const double value =
-            is_of_cells ? compute_square_value((int)(x / right * NX), (int)(y / top * NY)) : linear_field(x, y);
+            is_of_cells ? compute_square_value((int)(x / right * NX), (int)(y / top * NY)) : compute_linear_field(x, y);
         const double code = 255 * (value + 2) / 8;
         bool is_well = own[3] == (is_hit ? 1 : 0);
         for (int k = 0; k < 3 && is_hit; k++) is_well = is_well && fabs(encode_srgb(own[k]) - code) <= 1;
@@ -204,7 +204,7 @@ static void pictures_are_the_colour_map_of_the_field(void **state)
             bool is_well = true;
             if (own_rank == 0) {
                 alone = draw_plate(MPI_COMM_SELF, scene, &whole, !of_cells);
-                is_well = is_map(&ours, of_cells) && are_equal_pictures(&ours, &alone);
+                is_well = is_picture_of_grey_map(&ours, of_cells) && are_equal_pictures(&ours, &alone);
             }
             everywhere(is_well);
             free_caught(&ours);
@@ -255,7 +255,7 @@ static void layers_that_show_nothing_are_reported(void **state)
 #define LINES "{isosurface: {field: f, values: [3, 1], colours: [[1, 0, 0], [0, 1, 0]]}}"
 
 /* Returns the fraction of a pixel that the contour line of the value `level` covers. The line is 1.5 pixels wide, in a
- * field with the slope of linear_field(). The coverage is that of a box filter of one pixel across the line. */
+ * field with the slope of compute_linear_field(). The coverage is that of a box filter of one pixel across the line. */
 static double compute_line_coverage(double value, double level)
 {
     const double half = fmax(top / 2, right / 2 * HEIGHT / WIDTH) / 0.95, size = 2 * half / HEIGHT;
@@ -274,9 +274,9 @@ static bool check_contour_lines(const caught_picture *picture, bool on_grey)
         const float *own = picture->rgba + 4 * (ptrdiff_t)pixel;
         if (is_near_edge(x, right, NX) || is_near_edge(y, top, NY)) continue;
         const bool is_in = x > 0 && x < right && y > 0 && y < top;
-        const double red = is_in ? compute_line_coverage(linear_field(x, y), 3) : 0,
-                     green = is_in ? compute_line_coverage(linear_field(x, y), 1) : 0;
-        const double code = 255 * (linear_field(x, y) + 2) / 8, share = red + green;
+        const double red = is_in ? compute_line_coverage(compute_linear_field(x, y), 3) : 0,
+                     green = is_in ? compute_line_coverage(compute_linear_field(x, y), 1) : 0;
+        const double code = 255 * (compute_linear_field(x, y) + 2) / 8, share = red + green;
         bool is_well = fabs((double)own[3] - (on_grey ? is_in : share)) < 1e-4;
         is_well = is_well && (share == 0 || on_grey || fabs((double)own[0] - red) < 1e-4);
         is_well = is_well && (share == 0 || on_grey || fabs((double)own[1] - green) < 1e-4);
@@ -460,9 +460,9 @@ static bool check_plate_statistics(const char *text, plate_kind kind)
     return strncmp(text, "cycle,time,cells,area,minimum,", 30) == 0 &&
            read_number(text, CELLS) == (kind == TRIANGLES ? 2 : 1) * NX * NY &&
            is_nearly_equal(read_number(text, AREA), 6) &&
-           is_nearly_equal(read_number(text, LEAST), linear_field(0, top)) &&
-           is_nearly_equal(read_number(text, GREATEST), linear_field(right, 0)) &&
-           is_nearly_equal(read_number(text, MEAN), linear_field(right / 2, top / 2));
+           is_nearly_equal(read_number(text, LEAST), compute_linear_field(0, top)) &&
+           is_nearly_equal(read_number(text, GREATEST), compute_linear_field(right, 0)) &&
+           is_nearly_equal(read_number(text, MEAN), compute_linear_field(right / 2, top / 2));
 }
 
 static void statistics_weigh_shells_by_area(void **state)
@@ -500,7 +500,7 @@ static void widen_column(plate *p)
     for (int n = 0; n < MAX_VERTICES; n++) {
         const int i = n % (NX + 1);
         p->xy[2 * n] = i == NX ? right : compute_column_width(0) * i;
-        p->f[n] = linear_field(p->xy[2 * n], p->xy[2 * n + 1]);
+        p->f[n] = compute_linear_field(p->xy[2 * n], p->xy[2 * n + 1]);
     }
 }
 

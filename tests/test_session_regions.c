@@ -33,7 +33,7 @@ static void regions_free(void)
     input_free(&sea);
 }
 
-static bool has_sea(void)
+static bool has_cells_of_sea(void)
 {
     return rank_count == 1 || own_rank < rank_count - 1;
 }
@@ -52,9 +52,9 @@ static insitu_session *open_regions(const char *scene)
     insitu_status status = insitu_set_mesh(session, "air", &air.mesh);
     if (!status) status = set_field_with_name(session, "air", &air, "f");
     if (!status) status = set_field_with_name(session, "air", &air, "t");
-    if (!status && has_sea()) status = insitu_set_mesh(session, "sea/0", &sea.mesh);
-    if (!status && has_sea()) status = set_field_with_name(session, "sea/0", &sea, "f");
-    if (!status && has_sea()) status = set_field_with_name(session, "sea/0", &sea, "s");
+    if (!status && has_cells_of_sea()) status = insitu_set_mesh(session, "sea/0", &sea.mesh);
+    if (!status && has_cells_of_sea()) status = set_field_with_name(session, "sea/0", &sea, "f");
+    if (!status && has_cells_of_sea()) status = set_field_with_name(session, "sea/0", &sea, "s");
     everywhere(status == INSITU_OK);
     return session;
 }
@@ -86,7 +86,7 @@ static void count_covered_pixels(const caught_picture *picture, int counts[2])
     for (int p = 0; own_rank == 0 && p < WIDTH * HEIGHT; p++) counts[p % WIDTH >= WIDTH / 2] += has_colour(picture, p);
 }
 
-static void assert_same(const char *scene, const char *warning, const char *other)
+static void assert_scenes_draw_same(const char *scene, const char *warning, const char *other)
 {
     caught_picture a = draw_and_check_warnings(scene, warning), b = draw_and_check_warnings(other, NULL);
     bool is_same = true;
@@ -141,9 +141,9 @@ static void layers_draw_only_meshes_with_the_field(void **context)
 static void separate_meshes_draw_same_picture_as_one_mesh(void **context)
 {
     (void)context;
-    assert_same(IMAGE("      - isosurface: {field: f, values: [0.1], colours: [[1, 0, 0]]}\n"), NULL,
-                IMAGE("      - isosurface: {field: f, values: [0.1], colours: [[1, 0, 0]], mesh: air}\n"
-                      "      - isosurface: {field: f, values: [0.1], colours: [[1, 0, 0]], mesh: sea}\n"));
+    assert_scenes_draw_same(IMAGE("      - isosurface: {field: f, values: [0.1], colours: [[1, 0, 0]]}\n"), NULL,
+                            IMAGE("      - isosurface: {field: f, values: [0.1], colours: [[1, 0, 0]], mesh: air}\n"
+                                  "      - isosurface: {field: f, values: [0.1], colours: [[1, 0, 0]], mesh: sea}\n"));
 }
 
 /* Checks that meshes without the field of the colours are drawn grey, and that the range of the colours is that of the
@@ -151,17 +151,19 @@ static void separate_meshes_draw_same_picture_as_one_mesh(void **context)
 static void surfaces_without_the_colour_field_are_grey(void **context)
 {
     (void)context;
-    assert_same(IMAGE("      - isosurface: {field: f, values: [0.1], colour_by: {field: t}}\n"),
-                "image \"a\": mesh \"sea/0\" does not have the field \"t\": its isosurface of \"f\" is grey",
-                IMAGE("      - isosurface: {field: f, values: [0.1], colour_by: {field: t}, mesh: air}\n"
-                      "      - isosurface: {field: f, values: [0.1], colours: [[" GREY "]], mesh: sea}\n"));
-    assert_same(IMAGE("      - isosurface: {field: f, values: [0.1], colour_by: {field: t, nan: [1, 0, 0]}}\n"),
-                "mesh \"sea/0\" does not have the field \"t\": its isosurface of \"f\" is of the colour nan",
-                IMAGE("      - isosurface: {field: f, values: [0.1], colour_by: {field: t}, mesh: air}\n"
-                      "      - isosurface: {field: f, values: [0.1], colours: [[1, 0, 0]], mesh: sea}\n"));
-    assert_same(IMAGE("      - isosurface: {field: f, values: [0.1], colour_by: {field: t}, mesh: sea}\n"),
-                "mesh \"sea/0\" does not have the field \"t\"",
-                IMAGE("      - isosurface: {field: f, values: [0.1], colours: [[" GREY "]], mesh: sea}\n"));
+    assert_scenes_draw_same(
+        IMAGE("      - isosurface: {field: f, values: [0.1], colour_by: {field: t}}\n"),
+        "image \"a\": mesh \"sea/0\" does not have the field \"t\": its isosurface of \"f\" is grey",
+        IMAGE("      - isosurface: {field: f, values: [0.1], colour_by: {field: t}, mesh: air}\n"
+              "      - isosurface: {field: f, values: [0.1], colours: [[" GREY "]], mesh: sea}\n"));
+    assert_scenes_draw_same(
+        IMAGE("      - isosurface: {field: f, values: [0.1], colour_by: {field: t, nan: [1, 0, 0]}}\n"),
+        "mesh \"sea/0\" does not have the field \"t\": its isosurface of \"f\" is of the colour nan",
+        IMAGE("      - isosurface: {field: f, values: [0.1], colour_by: {field: t}, mesh: air}\n"
+              "      - isosurface: {field: f, values: [0.1], colours: [[1, 0, 0]], mesh: sea}\n"));
+    assert_scenes_draw_same(IMAGE("      - isosurface: {field: f, values: [0.1], colour_by: {field: t}, mesh: sea}\n"),
+                            "mesh \"sea/0\" does not have the field \"t\"",
+                            IMAGE("      - isosurface: {field: f, values: [0.1], colours: [[" GREY "]], mesh: sea}\n"));
 }
 
 /* Checks that a point is drawn grey if its colour value is not a number. All values of one region are NaN. */
@@ -206,12 +208,13 @@ static void warning_of_grey_is_reported_once(void **context)
         open_regions(IMAGE("      - isosurface: {field: f, values: [0.1], colour_by: {field: t}}\n"));
     static const bool has_t[] = {false, false, true, false, false}, is_reported[] = {true, false, false, true, false};
     for (int cycle = 0; cycle < 5; cycle++) {
-        if (has_sea())
+        if (has_cells_of_sea())
             everywhere(insitu_set_mesh(session, "sea/0", &sea.mesh) == INSITU_OK);
         else
             everywhere(true);
-        everywhere(!has_sea() || set_field_with_name(session, "sea/0", &sea, "f") == INSITU_OK);
-        everywhere(!has_sea() || !has_t[cycle] || set_field_with_name(session, "sea/0", &sea, "t") == INSITU_OK);
+        everywhere(!has_cells_of_sea() || set_field_with_name(session, "sea/0", &sea, "f") == INSITU_OK);
+        everywhere(!has_cells_of_sea() || !has_t[cycle] ||
+                   set_field_with_name(session, "sea/0", &sea, "t") == INSITU_OK);
         check_step_succeeds(session, cycle);
         everywhere((strstr(insitu_last_report(session)->warnings, "is grey") != NULL) == is_reported[cycle]);
     }

@@ -198,7 +198,7 @@ static double intersect_sheet(int pixel, double place[3])
 
 /* Compares depths and colours with those of the sheet. The tolerances are derived at is_cube() in
  * test_session_surfaces.c. */
-static bool is_sheet(const caught_picture *picture)
+static bool is_picture_of_sheet(const caught_picture *picture)
 {
     int hits = 0;
     for (int pixel = 0; pixel < PIXELS; pixel++) {
@@ -233,7 +233,7 @@ static void sheets_are_planes_on_any_ranks(void **state)
             bool is_well = true;
             if (own_rank == 0) {
                 alone = draw_shells(MPI_COMM_SELF, scene, &whole);
-                is_well = is_sheet(&alone) && are_same_pictures(&ours, &alone);
+                is_well = is_picture_of_sheet(&alone) && are_same_pictures(&ours, &alone);
             }
             everywhere(is_well);
             free_caught(&ours);

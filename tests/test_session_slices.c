@@ -35,7 +35,7 @@ static double intersect_plane(const ray *r, const plane *p, double at[3])
     return from / along;
 }
 
-static double distance_outside_cube(const double at[3])
+static double compute_distance_outside_cube(const double at[3])
 {
     return fmax(fabs(at[0]), fmax(fabs(at[1]), fabs(at[2]))) - 1;
 }
@@ -78,7 +78,7 @@ static bool check_planes(const caught_picture *picture, const plane *planes, int
         bool is_near_border = false;
         for (int i = 0; i < count; i++) {
             double at[3];
-            const double depth = intersect_plane(&r, &planes[i], at), outside = distance_outside_cube(at);
+            const double depth = intersect_plane(&r, &planes[i], at), outside = compute_distance_outside_cube(at);
             is_near_border = is_near_border || fabs(outside) < 1e-4;
             if (outside < 0 && depth < nearest) {
                 nearest = depth;
@@ -230,7 +230,7 @@ static bool check_all_surfaces_crossed(const caught_picture *picture)
                                             : (plane){{1, 0, 0}, get_plane_distance(i - MANY_VALUES)};
             double at[3];
             intersect_plane(&r, &p, at);
-            const double outside = distance_outside_cube(at);
+            const double outside = compute_distance_outside_cube(at);
             is_near_border = is_near_border || fabs(outside) < 1e-4;
             crossings += outside < 0;
             is_crossed[i] = is_crossed[i] || outside < -1e-4;
@@ -275,7 +275,7 @@ static bool is_drawn_once(const caught_picture *picture, const plane *p)
         const ray r = make_pixel_ray(pixel);
         double at[3];
         intersect_plane(&r, p, at);
-        const double outside = distance_outside_cube((const double[3]){
+        const double outside = compute_distance_outside_cube((const double[3]){
             p->normal[0] != 0 ? 0 : at[0], p->normal[1] != 0 ? 0 : at[1], p->normal[2] != 0 ? 0 : at[2]});
         const float opacity = picture->rgba[4 * pixel + 3];
         if (fabs(outside) < 1e-5) continue;
@@ -287,7 +287,7 @@ static bool is_drawn_once(const caught_picture *picture, const plane *p)
     return hits > 50;
 }
 
-static void draw_in_faces(test_mesh_kind kind, const char *scene, const plane *p)
+static void check_plane_in_faces(test_mesh_kind kind, const char *scene, const plane *p)
 {
     session_input whole = {0}, part = {0};
     make_whole_mesh(kind, 0, &whole);
@@ -304,8 +304,8 @@ static void planes_in_faces_are_drawn_once(void **state)
     (void)state;
     const plane half = {{1, 0, 0}, 0.5};
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
-        draw_in_faces(kind, IMAGE(SLICE(", opacity: 0.5", "{normal: [1, 0, 0], point: [0.5, 0, 0]}")), &half);
-        draw_in_faces(kind, IMAGE(SLICE(", opacity: 0.5", "{normal: [-7, 0, 0], point: [0.5, 0, 0]}")), &half);
+        check_plane_in_faces(kind, IMAGE(SLICE(", opacity: 0.5", "{normal: [1, 0, 0], point: [0.5, 0, 0]}")), &half);
+        check_plane_in_faces(kind, IMAGE(SLICE(", opacity: 0.5", "{normal: [-7, 0, 0], point: [0.5, 0, 0]}")), &half);
     }
 }
 
@@ -314,10 +314,10 @@ static void planes_on_the_border_are_drawn(void **state)
     (void)state;
     const plane lower = {{1, 0, 0}, -1}, upper = {{0, 0, 1}, 1};
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
-        draw_in_faces(kind, IMAGE(SLICE(", opacity: 0.5", "{normal: [1, 0, 0], point: [-1, 5, 0]}")), &lower);
-        draw_in_faces(kind, IMAGE(SLICE(", opacity: 0.5", "{normal: [-1, 0, 0], offset: 1.0000001}")), &lower);
-        draw_in_faces(kind, IMAGE(SLICE(", opacity: 0.5", "{normal: [0, 0, 1], offset: 1}")), &upper);
-        draw_in_faces(kind, IMAGE(SLICE(", opacity: 0.5", "{normal: [0, 0, -1], offset: -0.9999999}")), &upper);
+        check_plane_in_faces(kind, IMAGE(SLICE(", opacity: 0.5", "{normal: [1, 0, 0], point: [-1, 5, 0]}")), &lower);
+        check_plane_in_faces(kind, IMAGE(SLICE(", opacity: 0.5", "{normal: [-1, 0, 0], offset: 1.0000001}")), &lower);
+        check_plane_in_faces(kind, IMAGE(SLICE(", opacity: 0.5", "{normal: [0, 0, 1], offset: 1}")), &upper);
+        check_plane_in_faces(kind, IMAGE(SLICE(", opacity: 0.5", "{normal: [0, 0, -1], offset: -0.9999999}")), &upper);
     }
 }
 
@@ -344,7 +344,7 @@ static bool has_colours_of_cells(const caught_picture *picture)
         double at[3], expected[3], off = 0;
         intersect_plane(&r, &(plane){{0, 0, 1}, 0.1}, at);
         const double x = (at[0] + 1) / 2 * SIDE, y = (at[1] + 1) / 2 * SIDE;
-        if (distance_outside_cube(at) > -1e-4 || fabs(x - rint(x)) < 1e-4 || fabs(y - rint(y)) < 1e-4) continue;
+        if (compute_distance_outside_cube(at) > -1e-4 || fabs(x - rint(x)) < 1e-4 || fabs(y - rint(y)) < 1e-4) continue;
         const int cell = (int)x + SIDE * (int)y;
         get_table_colour(-1.5 + 0.2 * cell, expected);
         for (int c = 0; c < 3; c++) {

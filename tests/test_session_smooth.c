@@ -36,7 +36,7 @@ typedef struct gradients {
 
 /* Solves a 3 × 3 system by Gaussian elimination, in place. The last column of x is the right-hand side, and becomes the
  * solution. Returns false if the system is singular. */
-static bool eliminate_gauss(double x[3][4], double *determinant)
+static bool solve_by_gaussian_elimination(double x[3][4], double *determinant)
 {
     *determinant = 1;
     for (int c = 0; c < 3; c++) {
@@ -66,7 +66,7 @@ static void add_corner(gradients *g, int64_t vertex, const double corner[4], con
         for (int k = 0; k < 4; k++) x[i][k] = ends[i][k] - corner[k];
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++) squares += x[i][k] * x[i][k];
-    if (!eliminate_gauss(x, &determinant)) return;
+    if (!solve_by_gaussian_elimination(x, &determinant)) return;
     const double weight = fabs(determinant) / pow(squares, 2);
     for (int k = 0; k < 3; k++) g->sum[vertex][k] += weight * x[k][3];
     g->sum[vertex][3] += weight;
@@ -187,7 +187,7 @@ static caught_picture draw_with_gradients(MPI_Comm comm, const char *scene, cons
 
 /* ---- meshes ---------------------------------------------------------------------------------------------------- */
 
-static double swirl_field(const double p[3])
+static double compute_swirl_field(const double p[3])
 {
     return sin(2.1 * p[0] + 0.3) * cos(1.7 * p[1]) + 0.4 * p[2] * p[2] - 0.3 * p[0] * p[2] + 0.2 * p[1];
 }
@@ -271,7 +271,7 @@ static void normals_are_the_interpolated_gradients(void **state)
         caught_picture expected[3];
         int pixels, far;
         if (cases[c].as_polyhedra > 0) continue;
-        whole_create(&cases[c], swirl_field, &whole);
+        whole_create(&cases[c], compute_swirl_field, &whole);
         solve_gradients(&whole.part, &g);
         caught_picture smooth = draw_with_gradients(MPI_COMM_SELF, SCENE(SMOOTH("")), &whole, NULL);
         for (int k = 0; k < 3; k++) expected[k] = draw_with_gradients(MPI_COMM_SELF, scenes[k], &whole, &g);
@@ -308,7 +308,7 @@ static void a_linear_field_has_its_gradient(void **state)
 
 /* ---- convergence ----------------------------------------------------------------------------------------------- */
 
-static void swirl_gradient(const double p[3], double out[3])
+static void compute_swirl_gradient(const double p[3], double out[3])
 {
     out[0] = 2.1 * cos(2.1 * p[0] + 0.3) * cos(1.7 * p[1]) - 0.3 * p[2];
     out[1] = -1.7 * sin(2.1 * p[0] + 0.3) * sin(1.7 * p[1]) + 0.2;
@@ -324,7 +324,7 @@ static double measure_mean_angle(test_mesh_kind kind, int side, const char *scen
     int count = 0;
     render_camera_look_at(&camera, (const double[]){3, 2.2, 4}, (const double[]){0, 0, 0}, (const double[]){0, 1, 0},
                           40, WIDTH, HEIGHT);
-    test_mesh_make_lattice(kind, side, 0.2, swirl_field, &whole.part);
+    test_mesh_make_lattice(kind, side, 0.2, compute_swirl_field, &whole.part);
     describe_input(&whole);
     caught_picture picture = draw_with_gradients(MPI_COMM_SELF, scene, &whole, NULL);
     for (int i = 0; i < PIXELS; i++) {
@@ -332,7 +332,7 @@ static double measure_mean_angle(test_mesh_kind kind, int side, const char *scen
         if (picture.data[LAYER * PIXELS + i] < 0) continue;
         render_camera_ray(&camera, i % WIDTH, i / WIDTH, base, direction);
         for (int k = 0; k < 3; k++) place[k] = base[k] + (double)picture.depth[i] * direction[k];
-        swirl_gradient(place, g);
+        compute_swirl_gradient(place, g);
         for (int k = 0; k < 3; k++) {
             dot += g[k] * (double)picture.data[(NX + k) * PIXELS + i];
             length += g[k] * g[k];
@@ -407,7 +407,7 @@ static void any_partition_has_the_same_bits(void **state)
     for (int c = 0; c < CASES; c++)
         for (test_partition_kind distributed = 0; distributed < TEST_PARTITION_COUNT; distributed++) {
             session_input whole, part;
-            whole_create(&cases[c], swirl_field, &whole);
+            whole_create(&cases[c], compute_swirl_field, &whole);
             part_create(&whole.part, distributed, false, &part);
             check_same_as_rank_0_alone(cases[c].name, SCENE(SMOOTH("")), &whole, &part);
             check_same_as_rank_0_alone(cases[c].name, SCENE(SMOOTH(", opacity: 0.4")), &whole, &part);
@@ -451,7 +451,7 @@ static void duplicated_vertices_are_merged(void **state)
     test_mesh halves[2];
     (void)state;
     if (own_rank > 0) return;
-    whole_create(&cases[0], swirl_field, &whole);
+    whole_create(&cases[0], compute_swirl_field, &whole);
     int *owners = allocate_zeroed(whole.part.cell_count, sizeof *owners);
     test_partition_cells(&whole.part, TEST_BLOCK, SIDE, 2, owners);
     for (int i = 0; i < 2; i++) test_mesh_extract_part(&whole.part, owners, i, &halves[i]);
@@ -474,7 +474,7 @@ static void unusable_cells_contribute_no_gradient(void **state)
 {
     (void)state;
     session_input whole, part;
-    whole_create(&cases[4], swirl_field, &whole);
+    whole_create(&cases[4], compute_swirl_field, &whole);
     whole.part.values[whole.part.vertex_count / 2] = NAN;
     whole.part.values[whole.part.vertex_count / 3] = INFINITY;
     part_create(&whole.part, TEST_RANDOM, false, &part);

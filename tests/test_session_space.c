@@ -136,7 +136,7 @@ static void scaling_by_a_million_changes_no_picture(void **context)
 /* ---- depth --------------------------------------------------------------------------------------------------- */
 
 /* Returns z. Cells of all types represent this field exactly, so that its isosurfaces are planes across the cube. */
-static double height_field(const double position[3])
+static double return_height(const double position[3])
 {
     return position[2];
 }
@@ -193,7 +193,7 @@ static void compute_pixel_direction(int p, double out[3])
 
 /* Returns the depth of the plane on a ray: infinity if the ray meets the plane outside the cube, and 0 if it does so
  * within 1e-4 of the cube's border, where either a hit or a miss is accepted. */
-static double plane_depth(const double direction[3], double plane)
+static double compute_plane_depth(const double direction[3], double plane)
 {
     const double depth = (plane - eye[2]) / direction[2];
     double farthest = 0;
@@ -204,11 +204,11 @@ static double plane_depth(const double direction[3], double plane)
 
 /* Returns whether a pixel has the depth of the nearest plane. A hit has an error of at most 1e-5 of the cell's size of
  * 0.5, and a depth of 5 in float32 one of 3e-7. */
-static bool is_depth(const caught_picture *picture, int p, int count, const double planes[2])
+static bool is_depth_of_nearest_plane(const caught_picture *picture, int p, int count, const double planes[2])
 {
     double direction[3], expected = INFINITY;
     compute_pixel_direction(p, direction);
-    for (int i = 0; i < count; i++) expected = fmin(expected, plane_depth(direction, planes[i]));
+    for (int i = 0; i < count; i++) expected = fmin(expected, compute_plane_depth(direction, planes[i]));
     const double found = (double)picture->depth[p];
     if (expected == 0) return true;
     return isinf(expected) ? found == (double)INFINITY : fabs(found - expected) <= 1e-5 * 0.5 + 3e-7;
@@ -228,12 +228,12 @@ static void depth_is_that_of_the_nearest_surface(void **context)
                  WIDTH, HEIGHT, eye[0], eye[1], eye[2], focal[0], focal[1], focal[2], camera_angle, depths[n].layers);
         insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
         input_create(&in, TEST_MIXED, 4, TEST_RANDOM, own_rank, rank_count);
-        test_mesh_set_values(&in.part, height_field);
+        test_mesh_set_values(&in.part, return_height);
         everywhere(submit_input(session, &in) == INSITU_OK);
         check_step_succeeds(session, 0);
         int wrong = 0, finite = 0;
         for (int p = 0; own_rank == 0 && p < WIDTH * HEIGHT; p++) {
-            wrong += !is_depth(&caught[0], p, depths[n].count, depths[n].planes);
+            wrong += !is_depth_of_nearest_plane(&caught[0], p, depths[n].count, depths[n].planes);
             finite += isfinite(caught[0].depth[p]);
         }
         everywhere(wrong == 0);

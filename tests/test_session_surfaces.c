@@ -53,7 +53,7 @@ static caught_picture draw_input(MPI_Comm comm, const char *scene, const session
 
 /* ---- faces --------------------------------------------------------------------------------------------------- */
 
-static double triangle_area(const double *a, const double *b, const double *c)
+static double compute_triangle_area(const double *a, const double *b, const double *c)
 {
     double u[3], v[3], sum = 0;
     for (int i = 0; i < 3; i++) u[i] = b[i] - a[i], v[i] = c[i] - a[i];
@@ -82,7 +82,7 @@ static double compute_outer_area(const insitu_session *session)
             is_on_border = is_on_border || is_on;
         }
         if (!is_on_border) return NAN;
-        sum += triangle_area(p[0], p[1], p[2]) + (corners == 4 ? triangle_area(p[0], p[2], p[3]) : 0);
+        sum += compute_triangle_area(p[0], p[1], p[2]) + (corners == 4 ? compute_triangle_area(p[0], p[2], p[3]) : 0);
     }
     return sum;
 }

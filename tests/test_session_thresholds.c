@@ -73,7 +73,7 @@ static face_set find_faces_by_brute_force(const test_mesh *mesh, const grid *g, 
         if (!is_value_within_bounds(mesh, g, cell, is_cell_centred)) continue;
         const session_cell_faces of = session_faces_of_cell(g, cell);
         for (int64_t f = 0; f < of.count; f++) {
-            const session_face_loop loop = session_face_of(&of, f);
+            const session_face_loop loop = session_find_face_loop(&of, f);
             double place[3];
             for (int64_t i = 0; i < loop.size; i++) {
                 grid_vertex(g, session_face_vertex(&loop, i), place);

@@ -119,7 +119,7 @@ static bool convert_array(insitu_array *a, int64_t count, const layout *as)
     return fits;
 }
 
-static bool all_ranks_agree(bool here)
+static bool is_true_on_all_ranks(bool here)
 {
     int all = here;
     MPI_Allreduce(MPI_IN_PLACE, &all, 1, MPI_INT, MPI_MIN, MPI_COMM_WORLD);
@@ -185,7 +185,7 @@ static void index_type_changes_no_picture(void **state)
             const layout *as = &index_layouts[i / 2];
             input_describe(&in);
             in.mesh.open_offsets = i % 2;
-            const bool fits = all_ranks_agree(convert_cells(&in.mesh, as));
+            const bool fits = is_true_on_all_ranks(convert_cells(&in.mesh, as));
             if (fits) check_same_picture(path, &in, &truth, copied, as->is_in_place);
             drawn += fits;
             free_memory_blocks();

@@ -45,7 +45,8 @@ static bool orders_differ(test_mesh_kind kind, int a, int b)
 
 /* Checks that exactly one warning is given, which contains `words`. If words is NULL, checks that no warning about the
  * vertex order is given; a warning about left-handed cells is then allowed. */
-static void expect_warning(insitu_session *session, const session_input *in, const char *words, const char *what)
+static void check_order_warning_text(insitu_session *session, const session_input *in, const char *words,
+                                     const char *what)
 {
     everywhere(submit_input(session, in) == INSITU_OK);
     check_step_succeeds(session, 0);
@@ -71,7 +72,7 @@ static void check_order_warning(test_mesh_kind kind, insitu_vertex_order stand, 
     in.mesh.vertex_order = said;
     snprintf(what, sizeof what, "%s in order %d read in %d, jitter %g%s", test_mesh_kind_name(kind), (int)stand,
              (int)said, jitter, mirrored ? ", mirrored" : "");
-    expect_warning(session, &in, orders_differ(kind, (int)stand, (int)said) ? names[stand] : NULL, what);
+    check_order_warning_text(session, &in, orders_differ(kind, (int)stand, (int)said) ? names[stand] : NULL, what);
     insitu_destroy(&session);
     input_free(&in);
 }
@@ -100,19 +101,19 @@ static void twisted_cells_are_reported(void **state)
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
     session_input in = {0};
     input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
-    expect_warning(session, &in, NULL, "good hexes");
+    check_order_warning_text(session, &in, NULL, "good hexes");
     for (int64_t cell = 0; cell < in.part.cell_count; cell++) {
         int64_t *v = in.part.connectivity + 8 * cell, held = v[0];
         v[0] = v[6];
         v[6] = held;
     }
-    expect_warning(session, &in, "no vertex_order would mend that", "hexes with two vertices exchanged");
+    check_order_warning_text(session, &in, "no vertex_order would mend that", "hexes with two vertices exchanged");
     insitu_destroy(&session);
     input_free(&in);
 }
 
 /* Checks that no warning is given if only a minority of the cells has another order. */
-static void few_cells_are_not_reported(void **state)
+static void few_reordered_cells_are_not_reported(void **state)
 {
     (void)state;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
@@ -123,7 +124,7 @@ static void few_cells_are_not_reported(void **state)
         v[1] = v[3];
         v[3] = held;
     }
-    expect_warning(session, &in, NULL, "a third of the hexes in DMPlex's order");
+    check_order_warning_text(session, &in, NULL, "a third of the hexes in DMPlex's order");
     insitu_destroy(&session);
     input_free(&in);
 }
@@ -133,7 +134,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(fitting_vertex_order_is_suggested),
         cmocka_unit_test(twisted_cells_are_reported),
-        cmocka_unit_test(few_cells_are_not_reported),
+        cmocka_unit_test(few_reordered_cells_are_not_reported),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

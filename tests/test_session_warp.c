@@ -86,7 +86,7 @@ static void move_mesh(const insitu_mesh *mesh, double factor, warped *w)
     w->moved.lattice = &w->lattice;
 }
 
-static void make_warped(const insitu_mesh *mesh, int components, warped *out)
+static void create_warped_mesh(const insitu_mesh *mesh, int components, warped *out)
 {
     make_field(mesh, components, out);
     move_mesh(mesh, scale, out);
@@ -110,31 +110,32 @@ static void forms_draw_their_moved_meshes(void **state)
             formed_mesh m;
             warped w;
             formed_mesh_create(form, SIDE, own_rank, rank_count, &m);
-            make_warped(&m.mesh, 3, &w);
-            drawn a = draw_formed(open_text(MPI_COMM_WORLD, WARP, scene), &m, &m.mesh, with_corners, &w.field);
-            drawn b = draw_formed(open_text(MPI_COMM_WORLD, "", scene), &m, &w.moved, with_corners, NULL);
+            create_warped_mesh(&m.mesh, 3, &w);
+            drawn a =
+                draw_formed(open_session_from_texts(MPI_COMM_WORLD, WARP, scene), &m, &m.mesh, with_corners, &w.field);
+            drawn b = draw_formed(open_session_from_texts(MPI_COMM_WORLD, "", scene), &m, &w.moved, with_corners, NULL);
             expect_same(&a, &b, mesh_form_name(form));
             free_warped(&w);
             formed_mesh_free(&m);
         }
 }
 
-static void expect_moved_by_components(const char *keys, const insitu_mesh *mesh, const insitu_field *f, int components,
-                                       const char *what)
+static void check_warped_session_by(const char *keys, const insitu_mesh *mesh, const insitu_field *f, int components,
+                                    const char *what)
 {
     warped w;
     char text[256];
     snprintf(text, sizeof text, "%s%s", keys, WARP);
-    make_warped(mesh, components, &w);
-    drawn a = draw_mesh(open_text(MPI_COMM_WORLD, text, all_layers), mesh, f, &w.field);
-    drawn b = draw_mesh(open_text(MPI_COMM_WORLD, keys, all_layers), &w.moved, f, NULL);
+    create_warped_mesh(mesh, components, &w);
+    drawn a = draw_mesh(open_session_from_texts(MPI_COMM_WORLD, text, all_layers), mesh, f, &w.field);
+    drawn b = draw_mesh(open_session_from_texts(MPI_COMM_WORLD, keys, all_layers), &w.moved, f, NULL);
     expect_same(&a, &b, what);
     free_warped(&w);
 }
 
-static void expect_moved(const insitu_mesh *mesh, const insitu_field *f, int components, const char *what)
+static void check_warped_session(const insitu_mesh *mesh, const insitu_field *f, int components, const char *what)
 {
-    expect_moved_by_components("", mesh, f, components, what);
+    check_warped_session_by("", mesh, f, components, what);
 }
 
 static void cells_of_higher_order_draw_their_moved_nodes(void **state)
@@ -143,8 +144,8 @@ static void cells_of_higher_order_draw_their_moved_nodes(void **state)
     for (int k = 0; k < order_kind_count; k += 3) {
         order_mesh m;
         order_mesh_create(&order_kinds[k], 2, 0.1, test_wave_field, own_rank, rank_count, &m);
-        expect_moved(&m.mesh, &m.field, 3, order_kinds[k].name);
-        expect_moved_by_components("finer_pieces: 2\n", &m.mesh, &m.field, 3, order_kinds[k].name);
+        check_warped_session(&m.mesh, &m.field, 3, order_kinds[k].name);
+        check_warped_session_by("finer_pieces: 2\n", &m.mesh, &m.field, 3, order_kinds[k].name);
         order_mesh_free(&m);
     }
 }
@@ -163,7 +164,7 @@ static void refined_pieces_follow_the_warp(void **state)
     order_mesh_create(&hex, 2, 0.1, test_wave_field, own_rank, rank_count, &m);
     make_field(&m.mesh, 3, &w);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(all_layers));
-    insitu_session *plain = open_text(MPI_COMM_WORLD, "finer_pieces: 2\n", all_layers);
+    insitu_session *plain = open_session_from_texts(MPI_COMM_WORLD, "finer_pieces: 2\n", all_layers);
     for (int i = 0; i < 6; i++) {
         snprintf(text, sizeof text, "finer_pieces: 2\nmeshes: {m: {warp: {field: u, scale: %g}}}\n%s", factors[i],
                  all_layers);
@@ -217,7 +218,7 @@ static void unshared_nodes_are_moved(void **state)
     f.name = "f";
     f.count = mesh.vertex_count;
     f.values = (insitu_array){values, INSITU_FLOAT64, 0};
-    expect_moved(&mesh, &f, 3, "own nodes");
+    check_warped_session(&mesh, &f, 3, "own nodes");
 }
 
 /* ---- planes --------------------------------------------------------------------------------------------------- */
@@ -229,9 +230,9 @@ static void flat_meshes_move_by_two_or_three_components(void **state)
         for (int components = 2; components <= 3; components++) {
             plane p;
             make_plane(is_wide, &p);
-            expect_moved(&p.mesh, &p.field, components, "a plane without z");
+            check_warped_session(&p.mesh, &p.field, components, "a plane without z");
             p.mesh.coordinates[2] = (insitu_array){p.values, INSITU_FLOAT64, 0};
-            if (is_wide) expect_moved(&p.mesh, &p.field, components, "a bent surface");
+            if (is_wide) check_warped_session(&p.mesh, &p.field, components, "a bent surface");
         }
 }
 
@@ -243,8 +244,8 @@ static void lattices_draw_their_moved_vertices(void **state)
     for (lattice_form form = 0; form < LATTICE_FORMS; form++) {
         block b;
         make_block(form, own_rank, &b);
-        expect_moved(&b.mesh, &b.field, 3, lattice_form_name(form));
-        if (form == QUADS) expect_moved(&b.mesh, &b.field, 2, lattice_form_name(form));
+        check_warped_session(&b.mesh, &b.field, 3, lattice_form_name(form));
+        if (form == QUADS) check_warped_session(&b.mesh, &b.field, 2, lattice_form_name(form));
     }
 }
 
@@ -254,13 +255,13 @@ static void blocks_draw_their_moved_vertices(void **state)
     for (lattice_form form = 0; form < LATTICE_FORMS; form++) {
         drawn pictures[2];
         for (int is_moved = 0; is_moved < 2; is_moved++) {
-            insitu_session *session =
-                is_moved ? open_text(MPI_COMM_WORLD, "", all_layers) : open_text(MPI_COMM_WORLD, WARP, all_layers);
+            insitu_session *session = is_moved ? open_session_from_texts(MPI_COMM_WORLD, "", all_layers)
+                                               : open_session_from_texts(MPI_COMM_WORLD, WARP, all_layers);
             block b[2];
             warped w[2];
             for (int i = 0; i < 2; i++) {
                 make_block(form, 2 * own_rank + i, &b[i]);
-                make_warped(&b[i].mesh, 3, &w[i]);
+                create_warped_mesh(&b[i].mesh, 3, &w[i]);
                 everywhere(insitu_set_block(session, "m", i, is_moved ? &w[i].moved : &b[i].mesh) == INSITU_OK);
                 everywhere(insitu_set_block_field(session, "m", i, &b[i].field) == INSITU_OK);
                 everywhere(insitu_set_block_field(session, "m", i, &w[i].field) == INSITU_OK);
@@ -337,12 +338,12 @@ static void displacements_are_read_in_any_layout(void **state)
             w.field.values = (insitu_array){0};
             const insitu_field promised = w.field;
             w.field = u;
-            a = draw_mesh(open_text(MPI_COMM_WORLD, WARP, all_layers), &in.mesh, &in.field, &promised);
+            a = draw_mesh(open_session_from_texts(MPI_COMM_WORLD, WARP, all_layers), &in.mesh, &in.field, &promised);
             everywhere(values.calls == 1);
         } else {
-            a = draw_mesh(open_text(MPI_COMM_WORLD, WARP, all_layers), &in.mesh, &in.field, &w.field);
+            a = draw_mesh(open_session_from_texts(MPI_COMM_WORLD, WARP, all_layers), &in.mesh, &in.field, &w.field);
         }
-        drawn b = draw_mesh(open_text(MPI_COMM_WORLD, "", all_layers), &w.moved, &in.field, NULL);
+        drawn b = draw_mesh(open_session_from_texts(MPI_COMM_WORLD, "", all_layers), &w.moved, &in.field, NULL);
         expect_same(&a, &b, "a layout of the displacements");
         free_warped(&w);
     }
@@ -361,10 +362,12 @@ static void any_partition_draws_one_picture(void **state)
         warped of_part, of_whole;
         input_create(&part, TEST_MIXED, SIDE, kind, own_rank, rank_count);
         input_create(&whole, TEST_MIXED, SIDE, kind, 0, 1);
-        make_warped(&part.mesh, 3, &of_part);
-        make_warped(&whole.mesh, 3, &of_whole);
-        drawn a = draw_mesh(open_text(MPI_COMM_WORLD, WARP, surface_layers), &part.mesh, &part.field, &of_part.field);
-        drawn b = draw_mesh(open_text(MPI_COMM_SELF, WARP, surface_layers), &whole.mesh, &whole.field, &of_whole.field);
+        create_warped_mesh(&part.mesh, 3, &of_part);
+        create_warped_mesh(&whole.mesh, 3, &of_whole);
+        drawn a = draw_mesh(open_session_from_texts(MPI_COMM_WORLD, WARP, surface_layers), &part.mesh, &part.field,
+                            &of_part.field);
+        drawn b = draw_mesh(open_session_from_texts(MPI_COMM_SELF, WARP, surface_layers), &whole.mesh, &whole.field,
+                            &of_whole.field);
         for (int i = 0; own_rank != 0 && i < b.count; i++) free_caught(&b.pictures[i]);
         if (own_rank != 0) b.count = 0;
         expect_same(&a, &b, test_partition_kind_name(kind));
@@ -409,8 +412,8 @@ static void steps_compute_only_what_has_changed(void **state)
     warped w;
     input_create(&in, TEST_MIXED, SIDE, TEST_BLOCK, own_rank, rank_count);
     make_field(&in.mesh, 3, &w);
-    insitu_session *session = open_text(MPI_COMM_WORLD, WARP, all_layers);
-    insitu_session *plain = open_text(MPI_COMM_WORLD, "", all_layers);
+    insitu_session *session = open_session_from_texts(MPI_COMM_WORLD, WARP, all_layers);
+    insitu_session *plain = open_session_from_texts(MPI_COMM_WORLD, "", all_layers);
     everywhere(submit_input(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
     expect_step(session, plain, &in, scale, &w, 0, "the first step");
     const stamps first = get_stamps(session);
@@ -456,7 +459,7 @@ static void edits_of_the_scene_warp_and_unwarp(void **state)
     input_create(&in, TEST_MIXED, SIDE, TEST_BLOCK, own_rank, rank_count);
     make_field(&in.mesh, 3, &w);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(all_layers));
-    insitu_session *plain = open_text(MPI_COMM_WORLD, "", all_layers);
+    insitu_session *plain = open_session_from_texts(MPI_COMM_WORLD, "", all_layers);
     everywhere(submit_input(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
     static const double factors[] = {0, 0.3, -0.2, 0, 0.3};
     for (int i = 0; i < 5; i++) {
@@ -480,10 +483,10 @@ static void copies_and_gradients_are_reported(void **state)
     char words[160];
     input_create(&in, TEST_TETS, SIDE, TEST_BLOCK, own_rank, rank_count);
     make_field(&in.mesh, 3, &w);
-    insitu_session *session =
-        open_text(MPI_COMM_WORLD, WARP,
-                  "fields: {g: {gradient: f, component: x}}\nimages:\n" LAYERS("a", "[{surface: {colour_by: {field: "
-                                                                                    "g}}}]"));
+    insitu_session *session = open_session_from_texts(
+        MPI_COMM_WORLD, WARP,
+        "fields: {g: {gradient: f, component: x}}\nimages:\n" LAYERS("a", "[{surface: {colour_by: {field: "
+                                                                          "g}}}]"));
     everywhere(submit_input(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
     drawn a = step_and_take_pictures(session, 0);
     const insitu_report *report = insitu_last_report(session);
@@ -514,9 +517,9 @@ static void statistics_are_of_the_warped_mesh(void **state)
         w.u[3 * v + 1] = w.u[3 * v + 2] = 0;
     }
     if (own_rank == 0) unlink("warp.csv");
-    insitu_session *session = open_text(MPI_COMM_WORLD, WARP,
-                                        "statistics: [{field: f, path: warp.csv}]\nimages:\n" LAYERS(
-                                            "a", "[{surface: {}}]\n    when: {field: f, above: 1e30}"));
+    insitu_session *session = open_session_from_texts(MPI_COMM_WORLD, WARP,
+                                                      "statistics: [{field: f, path: warp.csv}]\nimages:\n" LAYERS(
+                                                          "a", "[{surface: {}}]\n    when: {field: f, above: 1e30}"));
     everywhere(submit_input(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
     everywhere(insitu_step(session, 0, 0) == INSITU_OK);
     insitu_destroy(&session);

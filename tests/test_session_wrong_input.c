@@ -187,7 +187,7 @@ static void corrupt_count(formed_mesh *m, dice *d)
     if (draw_random(d, 2)) formed_mesh_resize_fields(m);
 }
 
-static void corrupt_choice(formed_mesh *m, dice *d)
+static void corrupt_option(formed_mesh *m, dice *d)
 {
     static const int types[] = {0, 5, 7, 9, 10, 11, 12, 13, 14, 41, 42, -1};
     static const int64_t rows[] = {-1, 0, 3, 6, 9, 12, (int64_t)1 << 60, INT64_MIN, INT64_MAX};
@@ -210,7 +210,7 @@ static void corrupt_choice(formed_mesh *m, dice *d)
 }
 
 /* Removes this rank's cells, a field, or a name. */
-static void remove_items(formed_mesh *m, dice *d)
+static void remove_cells_or_field(formed_mesh *m, dice *d)
 {
     insitu_field *field = &m->fields[draw_random(d, FORMED_FIELDS)];
     switch (draw_random(d, 6)) {
@@ -235,8 +235,8 @@ static void corrupt_input(formed_mesh *m, const formed_mesh *right, uint64_t num
     if (!is_mine) return;
     if (kind < 4) corrupt_array(m, right, &d);
     if (kind == 4 || kind == 5) corrupt_count(m, &d);
-    if (kind == 6) corrupt_choice(m, &d);
-    if (kind == 7) remove_items(m, &d);
+    if (kind == 6) corrupt_option(m, &d);
+    if (kind == 7) remove_cells_or_field(m, &d);
 }
 
 /* ---- cases ----------------------------------------------------------------------------------------------------- */

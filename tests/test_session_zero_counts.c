@@ -43,8 +43,8 @@ static bool is_valid_empty_mesh(const insitu_mesh *mesh)
            (mesh->face_count == 0 || mesh->face_offsets.data || mesh->face_lists.data);
 }
 
-static void draw_with_zeros(insitu_session *session, formed_mesh *m, bool is_discontinuous, unsigned mask,
-                            bool with_arrays, bool is_mine)
+static void draw_mesh_with_zero_counts(insitu_session *session, formed_mesh *m, bool is_discontinuous, unsigned mask,
+                                       bool with_arrays, bool is_mine)
 {
     const insitu_mesh right = m->mesh;
     const insitu_field right_fields[FORMED_FIELDS] = {m->fields[0], m->fields[1], m->fields[2], m->fields[3]};
@@ -84,7 +84,8 @@ static void check_form(mesh_form form, bool is_discontinuous)
     for (unsigned mask = 1; mask < 1u << COUNTS; mask++) {
         if (mask & ~given) continue;
         for (int way = 0; way < 4; way++)
-            draw_with_zeros(session, &m, is_discontinuous, mask, way & 1, way & 2 || own_rank == rank_count - 1);
+            draw_mesh_with_zero_counts(session, &m, is_discontinuous, mask, way & 1,
+                                       way & 2 || own_rank == rank_count - 1);
     }
     discard_pictures();
     everywhere(formed_mesh_submit(session, &m, is_discontinuous) == INSITU_OK);

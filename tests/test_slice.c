@@ -18,7 +18,7 @@ enum { SIDE = 4, WIDTH = 33, HEIGHT = 29 };
 static const double through = 0;
 static const double normal[3] = {0.36, -0.48, 0.8};
 
-static double signed_distance(const double position[3])
+static double compute_signed_distance(const double position[3])
 {
     return normal[0] * position[0] + normal[1] * position[1] + normal[2] * position[2] - 0.1;
 }
@@ -33,9 +33,9 @@ static void assert_on_plane(const render_fixture *f, const drawn_frame *drawn, c
         const fragment *item = &drawn->list.items[i];
         double base[3], direction[3], at[3];
         render_camera_ray(&f->job.camera, (int)(item->pixel % WIDTH), (int)(item->pixel / WIDTH), base, direction);
-        for (int a = 0; a < 3; a++) at[a] = base[a] + fixture_scene_depth(f, item->t_in) * direction[a];
-        if (!(fabs(signed_distance(at)) < 1e-5))
-            fail_msg("%s: pixel %lld: %g from the plane", what, (long long)item->pixel, signed_distance(at));
+        for (int a = 0; a < 3; a++) at[a] = base[a] + fixture_compute_scene_depth(f, item->t_in) * direction[a];
+        if (!(fabs(compute_signed_distance(at)) < 1e-5))
+            fail_msg("%s: pixel %lld: %g from the plane", what, (long long)item->pixel, compute_signed_distance(at));
         hits++;
     }
     assert_true(hits > 100);
@@ -49,7 +49,7 @@ static void check_kind(test_mesh_kind kind)
     drawn_frame drawn;
     test_mesh_make_lattice(kind, SIDE, JITTER, test_wave_field, &mesh);
     test_view_create(&mesh, (test_layout){.wide_coordinates = true, .wide_values = true}, &colours);
-    fixture_create_lattice(&f, kind, SIDE, JITTER, signed_distance);
+    fixture_create_lattice(&f, kind, SIDE, JITTER, compute_signed_distance);
     fixture_set_camera(&f, CAMERA_OUTSIDE, WIDTH, HEIGHT);
     fixture_set_volume(&f, 0.3); /* the volume's colour map also colours the surface */
     f.job.volume_count = 0;

@@ -49,7 +49,7 @@ double *step_compute_reference(const render_fixture *f, int every, double tolera
     return truth;
 }
 
-static double step_largest_error(const drawn_frame *drawn, const double *truth, int every)
+static double step_find_largest_error(const drawn_frame *drawn, const double *truth, int every)
 {
     double worst = 0;
     for (int p = 0; p < drawn->picture.width * drawn->picture.height; p += every)
@@ -65,7 +65,7 @@ double step_largest_error_of_isas(const render_fixture *f, const double *truth, 
         drawn_frame drawn;
         fixture_select_isa(set);
         fixture_draw(f, &drawn);
-        worst = test_larger_error(worst, step_largest_error(&drawn, truth, every));
+        worst = test_larger_error(worst, step_find_largest_error(&drawn, truth, every));
         drawn_frame_free(&drawn);
     }
     return worst;

@@ -166,14 +166,14 @@ static bool are_pictures_in_set(const picture_set *set)
 }
 
 /* Checks the condition on all ranks. If it is false, prints the number of the allocation that failed. */
-#define at_allocation(condition) everywhere(name_allocation((condition)))
-static bool name_allocation(bool is_well)
+#define at_allocation(condition) everywhere(report_failed_allocation((condition)))
+static bool report_failed_allocation(bool is_well)
 {
     if (!is_well) fprintf(stderr, "allocation %lld:\n", (long long)allocation);
     return is_well;
 }
 
-static void step_draws(insitu_session *session, const picture_set *expected)
+static void check_step_draws(insitu_session *session, const picture_set *expected)
 {
     discard_pictures();
     const insitu_status status = insitu_step(session, 1, 0);
@@ -257,9 +257,9 @@ static bool set_and_step_fail_cleanly(const scenery *s, const failure *f, void *
     at_allocation(own_rank != 0 || status != INSITU_OK || caught_count == t->expected.count);
     int is_set = set == INSITU_OK;
     MPI_Allreduce(MPI_IN_PLACE, &is_set, 1, MPI_INT, MPI_LAND, MPI_COMM_WORLD);
-    if (is_set) step_draws(t->session, &t->expected); /* input that was set successfully must not be lost */
+    if (is_set) check_step_draws(t->session, &t->expected); /* input that was set successfully must not be lost */
     everywhere(submit_scenery(t->session, s) == INSITU_OK);
-    step_draws(t->session, &t->expected);
+    check_step_draws(t->session, &t->expected);
     return is_over;
 }
 
@@ -321,7 +321,7 @@ static bool creation_fails_cleanly(const scenery *s, const failure *f, void *sta
     check_reported(NULL, status);
     if (session) {
         everywhere(submit_scenery(session, s) == INSITU_OK);
-        step_draws(session, &t->expected);
+        check_step_draws(session, &t->expected);
     }
     insitu_destroy(&session);
     everywhere(base_memory_held() == held);
@@ -358,7 +358,7 @@ static void next_step_draws(insitu_session *session, const picture_set *expected
     const char *words = status ? "cycle 1: cinema: memory.cdb/report.json: cannot be written" : "";
     check_reported_everywhere(session, status, status ? INSITU_ERROR_MEMORY : INSITU_OK, words);
     at_allocation(own_rank != 0 || (are_pictures_in_set(expected) && caught_count == expected->count));
-    if (status) step_draws(session, expected);
+    if (status) check_step_draws(session, expected);
 }
 
 /* Checks that a step that fails to apply an edited scene returns an error, and that the next step applies the edit. */

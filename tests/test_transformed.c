@@ -53,7 +53,7 @@ void expect_same(drawn *a, drawn *b, const char *what)
     free_picture_set(b);
 }
 
-insitu_session *open_text(MPI_Comm comm, const char *before, const char *scene)
+insitu_session *open_session_from_texts(MPI_Comm comm, const char *before, const char *scene)
 {
     char text[MOST_TEXT];
     insitu_session *session = NULL;

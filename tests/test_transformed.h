@@ -23,7 +23,7 @@ insitu_status copy_filled_values(void *filled, insitu_field *field);
 void expect_same(drawn *a, drawn *b, const char *what);
 
 /* Opens a session with the text `before` followed by the scene. */
-insitu_session *open_text(MPI_Comm comm, const char *before, const char *scene);
+insitu_session *open_session_from_texts(MPI_Comm comm, const char *before, const char *scene);
 
 #define LAYERS(name, layers)                                                                                           \
     "  - name: " name "\n    size: [24, 18]\n    layers: " layers "\n    outputs: [{path: " name ".exr}]\n"

@@ -75,7 +75,7 @@ picture read_picture(const std::string &path)
     return p;
 }
 
-bool is_bitwise(const std::vector<float> &a, const std::vector<float> &b)
+bool are_bitwise_equal(const std::vector<float> &a, const std::vector<float> &b)
 {
     return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
 }
@@ -149,8 +149,8 @@ void expect_same_pictures(const subject &s, const std::string &alone, const std:
     for (size_t step = 0; step < s.files.size(); step++) {
         const picture iso = read_picture(make_picture_path(alone, "iso", step)),
                       iso2 = read_picture(make_picture_path(others, "iso", step));
-        assert_true(is_bitwise(iso.depth, iso2.depth));
-        assert_true(is_bitwise(iso.rgba, iso2.rgba));
+        assert_true(are_bitwise_equal(iso.depth, iso2.depth));
+        assert_true(are_bitwise_equal(iso.rgba, iso2.rgba));
         for (const std::string &name : s.volumes) {
             const picture volume = read_picture(make_picture_path(alone, name, step));
             const int count = count_differing_pixels(volume, read_picture(make_picture_path(others, name, step)));

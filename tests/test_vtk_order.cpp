@@ -161,23 +161,23 @@ bool is_flat(shape of)
 
 using field = std::function<double(const point &)>;
 
-double squared_height(const point &p)
+double compute_squared_height(const point &p)
 {
     return p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
 }
 
-double plane_height(const point &p)
+double compute_plane_height(const point &p)
 {
     return p[2] + 0.3 * p[0] + 0.2 * p[1];
 }
 
 /* Height functions of shells. */
-double bowl_height(const point &p)
+double compute_bowl_height(const point &p)
 {
     return 0.4 * (p[0] * p[0] + p[1] * p[1]) - 0.3;
 }
 
-double sloped_height(const point &p)
+double compute_sloped_height(const point &p)
 {
     return 0.1 - 0.3 * p[0] - 0.2 * p[1];
 }
@@ -281,13 +281,13 @@ bool is_on_sphere(double x, double y, double depth)
 {
     const double radius = std::sqrt(0.5), allowed = 0.25 * pixel + rounding, off = std::hypot(x, y);
     if (!std::isfinite(depth)) return off > radius - allowed;
-    return std::fabs(std::sqrt(squared_height({x, y, eye - depth})) - radius) <= allowed;
+    return std::fabs(std::sqrt(compute_squared_height({x, y, eye - depth})) - radius) <= allowed;
 }
 
 bool is_on_plane(double x, double y, double depth)
 {
     if (std::fabs(x) > 1 || std::fabs(y) > 1) return !std::isfinite(depth);
-    return std::fabs(eye - depth - sloped_height({x, y, 0})) <= rounding;
+    return std::fabs(eye - depth - compute_sloped_height({x, y, 0})) <= rounding;
 }
 
 /* Returns whether a ray has its hit on the bowl. An error of a quarter of a pixel perpendicular to the surface is
@@ -296,7 +296,7 @@ bool is_in_bowl(double x, double y, double depth)
 {
     if (std::fabs(x) > 1 || std::fabs(y) > 1) return !std::isfinite(depth);
     const double allowed = 0.25 * pixel * std::sqrt(1 + 0.64 * (x * x + y * y)) + rounding;
-    return std::fabs(eye - depth - bowl_height({x, y, 0})) <= allowed;
+    return std::fabs(eye - depth - compute_bowl_height({x, y, 0})) <= allowed;
 }
 
 /* Returns whether all rays of the step's picture are right, and enough of them have hits. */
@@ -355,7 +355,7 @@ void solids_match_their_polynomials(void **)
         kinds.push_back({VTK_LAGRANGE_HEXAHEDRON, shape::hex, order});
         kinds.push_back({VTK_LAGRANGE_WEDGE, shape::wedge, order});
     }
-    assert_false(expect_all(kinds, squared_height, isosurface, is_on_sphere).contains_text(by_corners));
+    assert_false(expect_all(kinds, compute_squared_height, isosurface, is_on_sphere).contains_text(by_corners));
 }
 
 /* Checks pyramids, whose polynomials are not compared: a linear field shows that they fill the cube without gaps. */
@@ -364,7 +364,7 @@ void pyramids_have_no_gaps(void **)
     const std::vector<cell_kind> kinds = {{VTK_QUADRATIC_PYRAMID, shape::pyramid, 0},
                                           {VTK_TRIQUADRATIC_PYRAMID, shape::pyramid, 0},
                                           {VTK_LAGRANGE_PYRAMID, shape::pyramid, 2}};
-    assert_false(expect_all(kinds, plane_height, flat_isosurface, is_on_plane).contains_text(by_corners));
+    assert_false(expect_all(kinds, compute_plane_height, flat_isosurface, is_on_plane).contains_text(by_corners));
 }
 
 void shells_match_their_polynomials(void **)
@@ -377,7 +377,7 @@ void shells_match_their_polynomials(void **)
         kinds.push_back({VTK_LAGRANGE_TRIANGLE, shape::triangle, order});
         kinds.push_back({VTK_LAGRANGE_QUADRILATERAL, shape::quad, order});
     }
-    assert_false(expect_all(kinds, bowl_height, shell, is_in_bowl).contains_text(by_corners));
+    assert_false(expect_all(kinds, compute_bowl_height, shell, is_in_bowl).contains_text(by_corners));
 }
 
 void expect_corners(const std::vector<cell_kind> &kinds, const field &f, const std::string &layer)
@@ -403,14 +403,14 @@ void other_cells_are_drawn_as_linear_cells_with_warnings(void **)
         shells.push_back({VTK_BEZIER_QUADRILATERAL, shape::quad, order});
     }
     solids.push_back({VTK_BEZIER_PYRAMID, shape::pyramid, 2});
-    expect_corners(solids, plane_height, flat_isosurface);
-    expect_corners(shells, sloped_height, shell);
+    expect_corners(solids, compute_plane_height, flat_isosurface);
+    expect_corners(shells, compute_sloped_height, shell);
 }
 
 /* Checks cells that the library cannot draw, in a grid with hexes, which are drawn. */
 void cells_without_a_replacement_are_reported(void **)
 {
-    const auto grid = make_grid({VTK_QUADRATIC_HEXAHEDRON, shape::hex, 0}, squared_height);
+    const auto grid = make_grid({VTK_QUADRATIC_HEXAHEDRON, shape::hex, 0}, compute_squared_height);
     const vtkIdType ids[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9};
     grid->InsertNextCell(VTK_QUADRATIC_POLYGON, 10, ids);
     grid->InsertNextCell(VTK_CONVEX_POINT_SET, 8, ids);
@@ -450,7 +450,8 @@ void old_files_have_the_old_order(void **)
 {
     std::vector<std::string> files;
     for (int p = 2; p <= 4; p++) {
-        const auto grid = make_grid({VTK_LAGRANGE_HEXAHEDRON, shape::hex, p}, squared_height, make_old_node_order(p));
+        const auto grid =
+            make_grid({VTK_LAGRANGE_HEXAHEDRON, shape::hex, p}, compute_squared_height, make_old_node_order(p));
         const std::string name = "old_" + std::to_string(p);
         for (const format as : {format::appended, format::binary}) {
             files.push_back(write_grid(name, grid, as));

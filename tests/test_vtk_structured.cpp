@@ -328,7 +328,7 @@ void write_amr(const std::array<int, 2> &ratios)
 /* Counts the pixels in which the front of the sphere is not visible. Inside a cell the surface is at most half the
  * diagonal of the largest cell, 0.217, away from the sphere. Within a radius of 0.6 in the picture the front and the
  * back are at least 0.8 apart. */
-int count_slits(const std::string &picture)
+int count_gap_pixels(const std::string &picture)
 {
     int slits = 0;
     for (int pixel = 0; pixel < pixels; pixel++) {
@@ -351,7 +351,7 @@ void a_sphere_has_no_slits_between_levels(void **)
             if (!test_is_long_run() && (ratios[0] == 2) != (yaml == "cells.yaml ")) continue;
             const std::string alone = draw_file(1, yaml + "levels.vthb");
             assert_true(alone.size() == size_t{pixels} * 20);
-            assert_int_equal(count_slits(alone), 0);
+            assert_int_equal(count_gap_pixels(alone), 0);
             for (const int ranks : {2, 5}) expect_same(draw_file(ranks, yaml + "levels.vthb"), alone, yaml);
             expect_same(draw_file(3, "--partition random " + yaml + "levels.vthb"), alone, "random");
         }

@@ -126,7 +126,7 @@ static bool read_changes(const node *domain, unsigned *changed)
 {
     const char *word;
     if (!node_has(domain, "state/insitu_changed")) return false;
-    if (!node_string(domain, "state/insitu_changed", &word)) return false;
+    if (!node_read_string(domain, "state/insitu_changed", &word)) return false;
     if (strcmp(word, "all") == 0)
         *changed = INSITU_CHANGED_ALL;
     else if (strcmp(word, "geometry") == 0)
@@ -190,8 +190,8 @@ static insitu_status set_known_mesh(insitu_blueprint *adaptor, blueprint_mesh *m
 }
 
 /* Sets the mesh and its fields on the session. */
-static bool pass_mesh(insitu_blueprint *adaptor, const node *domain, const node *topology, blueprint_mesh *mesh,
-                      uint64_t fields_hash, const char *name, int64_t number)
+static bool set_mesh_and_fields(insitu_blueprint *adaptor, const node *domain, const node *topology,
+                                blueprint_mesh *mesh, uint64_t fields_hash, const char *name, int64_t number)
 {
     known_mesh *known = find_known_mesh(adaptor, name, number);
     if (!known) known = add_known_mesh(adaptor, topology, name, number);
@@ -219,9 +219,9 @@ static bool pass_block(insitu_blueprint *adaptor, const node *domain, const node
     const known_mesh *other =
         number == WHOLE_MESH || mesh->mesh.cell_count == 0 ? NULL : find_pending_block(adaptor, name);
     if (!other || other->fields_hash == fields_hash)
-        return pass_mesh(adaptor, domain, topology, mesh, fields_hash, name, number);
+        return set_mesh_and_fields(adaptor, domain, topology, mesh, fields_hash, name, number);
     snprintf(own_name, sizeof own_name, "%s/%lld", name, (long long)number);
-    return pass_mesh(adaptor, domain, topology, mesh, fields_hash, own_name, WHOLE_MESH);
+    return set_mesh_and_fields(adaptor, domain, topology, mesh, fields_hash, own_name, WHOLE_MESH);
 }
 
 static bool set_topology(insitu_blueprint *adaptor, const node *domain, const node *topology, const char *name,
@@ -244,7 +244,7 @@ static bool read_state(insitu_blueprint *adaptor, const node *domain)
 {
     int64_t cycle = 0;
     double time = 0;
-    if (!node_integer(domain, "state/cycle", false, &cycle) || !node_real(domain, "state/time", false, &time))
+    if (!node_read_integer(domain, "state/cycle", false, &cycle) || !node_read_real(domain, "state/time", false, &time))
         return false;
     if (node_has(domain, "state/cycle")) {
         adaptor->cycle = adaptor->has_cycle && adaptor->cycle > cycle ? adaptor->cycle : cycle;
@@ -267,7 +267,7 @@ static bool set_domain(insitu_blueprint *adaptor, const node *domain, const char
     if (!node_require(domain, "coordsets", &topologies) || !node_require(domain, "topologies", &topologies))
         return false;
     for (int64_t i = 0; i < node_child_count(&topologies); i++) {
-        node_child(&topologies, i, &topology);
+        node_get_child(&topologies, i, &topology);
         snprintf(mesh, sizeof mesh, "%s%s%s", name, *name ? "/" : "", topology.name);
         if (!set_topology(adaptor, domain, &topology, mesh, number)) return false;
     }
@@ -279,7 +279,7 @@ static bool set_node(insitu_blueprint *adaptor, const char *name, const node *ro
     node domain;
     if (node_has(root, "coordsets") || node_has(root, "topologies")) return set_domain(adaptor, root, name, WHOLE_MESH);
     for (int64_t i = 0; i < node_child_count(root); i++) {
-        node_child(root, i, &domain);
+        node_get_child(root, i, &domain);
         if (!set_domain(adaptor, &domain, name, i)) return false;
     }
     return true;
@@ -319,7 +319,7 @@ void insitu_blueprint_refuse(insitu_blueprint *adaptor, insitu_status status, co
 
 /* ---- steps ------------------------------------------------------------------------------------------------------ */
 
-static insitu_status mpi_failure(insitu_blueprint *adaptor)
+static insitu_status fail_by_mpi_error(insitu_blueprint *adaptor)
 {
     return fail(adaptor, INSITU_ERROR_MPI, "insitu_blueprint_step: MPI returned an error");
 }
@@ -329,13 +329,13 @@ static insitu_status mpi_failure(insitu_blueprint *adaptor)
 static insitu_status reduce_state(insitu_blueprint *adaptor, int *failed_rank, bool *condition)
 {
     int rank, ranks;
-    if (MPI_Comm_rank(adaptor->comm, &rank) || MPI_Comm_size(adaptor->comm, &ranks)) return mpi_failure(adaptor);
+    if (MPI_Comm_rank(adaptor->comm, &rank) || MPI_Comm_size(adaptor->comm, &ranks)) return fail_by_mpi_error(adaptor);
     int64_t whole[4] = {adaptor->log.status ? ranks - rank : 0, adaptor->has_cycle,
                         adaptor->has_cycle ? adaptor->cycle : INT64_MIN, *condition};
     double real[2] = {adaptor->has_time, adaptor->has_time ? adaptor->time : -1e300};
     if (MPI_Allreduce(MPI_IN_PLACE, whole, 4, MPI_INT64_T, MPI_MAX, adaptor->comm) ||
         MPI_Allreduce(MPI_IN_PLACE, real, 2, MPI_DOUBLE, MPI_MAX, adaptor->comm))
-        return mpi_failure(adaptor);
+        return fail_by_mpi_error(adaptor);
     *failed_rank = whole[0] ? ranks - (int)whole[0] : -1;
     *condition = whole[3] != 0;
     adaptor->cycle = whole[1] ? whole[2] : adaptor->last_cycle + 1;
@@ -351,7 +351,7 @@ static insitu_status share_error(insitu_blueprint *adaptor, int failed_rank)
     memcpy(message, adaptor->log.message, sizeof message);
     if (MPI_Bcast(&status, 1, MPI_INT, failed_rank, adaptor->comm) ||
         MPI_Bcast(message, NODE_MESSAGE, MPI_CHAR, failed_rank, adaptor->comm))
-        return mpi_failure(adaptor);
+        return fail_by_mpi_error(adaptor);
     snprintf(adaptor->error, sizeof adaptor->error, "rank %d: %s", failed_rank, message);
     return (insitu_status)status;
 }
@@ -391,7 +391,7 @@ static insitu_status agree_on_lattices(insitu_blueprint *adaptor, named_lattices
     return INSITU_OK;
 }
 
-static bool is_same_place(const insitu_lattice *a, const insitu_lattice *b)
+static bool is_same_lattice_position(const insitu_lattice *a, const insitu_lattice *b)
 {
     bool is_same = true;
     for (int i = 0; i < 3; i++)
@@ -416,7 +416,7 @@ static void place_blocks(insitu_blueprint *adaptor)
                                  "block %lld is on no level, because its spacing or position does not fit the coarsest "
                                  "blocks: it covers no cells of theirs",
                                  (long long)known->number);
-        if (is_same_place(&lattice, &known->lattice)) continue;
+        if (is_same_lattice_position(&lattice, &known->lattice)) continue;
         known->lattice = lattice;
         known->mesh.lattice = &known->lattice;
         known->mesh.changed = INSITU_CHANGED_NOTHING;

@@ -63,7 +63,7 @@ typedef struct row_list {
 
 static int64_t row_size(const row_list *rows, int64_t i)
 {
-    return rows->sizes.count >= 0 ? node_element(&rows->sizes.array, i) : rows->vertices;
+    return rows->sizes.count >= 0 ? node_get_element(&rows->sizes.array, i) : rows->vertices;
 }
 
 /* Computes the offsets if the node has none. */
@@ -85,8 +85,9 @@ static bool make_offsets(const node *of, row_list *rows, owned_arrays *owned)
 static bool check_offsets(const node *of, const row_list *rows)
 {
     for (int64_t i = 0; i < rows->count; i++) {
-        const int64_t first = node_element(&rows->offsets.array, i), size = row_size(rows, i);
-        const int64_t next = i + 1 < rows->count ? node_element(&rows->offsets.array, i + 1) : rows->connectivity.count;
+        const int64_t first = node_get_element(&rows->offsets.array, i), size = row_size(rows, i);
+        const int64_t next =
+            i + 1 < rows->count ? node_get_element(&rows->offsets.array, i + 1) : rows->connectivity.count;
         if (first < 0 || size < 0 || first > rows->connectivity.count || size > rows->connectivity.count - first)
             return node_set_error(of, "offsets", INSITU_ERROR_MESH, "entry %lld: %lld and size %lld, outside 0..%lld",
                                   (long long)i, (long long)first, (long long)size, (long long)rows->connectivity.count);
@@ -119,7 +120,7 @@ static bool read_faces(const node *topology, blueprint_mesh *out)
     node faces;
     const char *name = NULL;
     row_list rows = {.vertices = 0};
-    if (!node_require(topology, "subelements", &faces) || !node_string(&faces, "shape", &name)) return false;
+    if (!node_require(topology, "subelements", &faces) || !node_read_string(&faces, "shape", &name)) return false;
     const shape *of = find_shape(name);
     if (!of && strcmp(name, "mixed") != 0) return fail_shape(&faces, "shape", name);
     if (of && of->type != INSITU_POLYGON && of->type != INSITU_TRIANGLE && of->type != INSITU_QUAD)
@@ -148,10 +149,10 @@ static bool read_map(const node *elements, blueprint_mesh *out, bool *are_vtk)
     for (int64_t i = 0; i < node_child_count(&map); i++) {
         node entry;
         int64_t number = -1;
-        node_child(&map, i, &entry);
+        node_get_child(&map, i, &entry);
         const shape *of = find_shape(entry.name);
         if (!of) return fail_shape(&map, entry.name, entry.name);
-        if (!node_integer(&map, entry.name, true, &number)) return false;
+        if (!node_read_integer(&map, entry.name, true, &number)) return false;
         if (number < 0 || number >= MAP_SIZE)
             return node_set_error(&entry, "", INSITU_ERROR_MESH, "is %lld, expected 0..%d", (long long)number,
                                   MAP_SIZE - 1);
@@ -167,7 +168,7 @@ static bool check_shape_numbers(const node *elements, const node_array *numbers,
                                 bool *has_polyhedra)
 {
     for (int64_t i = 0; i < numbers->count; i++) {
-        const int64_t number = node_element(&numbers->array, i);
+        const int64_t number = node_get_element(&numbers->array, i);
         const int type = number >= 0 && number < MAP_SIZE ? out->type_map[number] : 0;
         if (!type)
             return node_set_error(elements, "shapes", INSITU_ERROR_MESH,
@@ -239,7 +240,7 @@ bool blueprint_read_unstructured(const node *topology, blueprint_mesh *out)
         out->is_left_out = true;
         return true;
     }
-    if (!node_string(&elements, "shape", &name)) return false;
+    if (!node_read_string(&elements, "shape", &name)) return false;
     if (strcmp(name, "mixed") == 0) return read_mixed(topology, &elements, out);
     const shape *of = find_shape(name);
     if (!of) return fail_shape(&elements, "shape", name);

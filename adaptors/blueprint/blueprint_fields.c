@@ -27,7 +27,7 @@ static bool is_declared_ghosts(const node *domain, const char *name)
     node states, state;
     const char *attribute;
     if (!node_find(domain, "state/metadata/vtk_fields", &states) || !node_find(&states, name, &state)) return false;
-    return node_has(&state, "attribute_type") && node_string(&state, "attribute_type", &attribute) &&
+    return node_has(&state, "attribute_type") && node_read_string(&state, "attribute_type", &attribute) &&
            strcmp(attribute, "Ghosts") == 0;
 }
 
@@ -41,7 +41,7 @@ static bool is_ghosts(const node *domain, const char *name)
 static bool belongs_to(const node *field, const char *topology)
 {
     const char *name;
-    if (!node_string(field, "topology", &name)) return false;
+    if (!node_read_string(field, "topology", &name)) return false;
     return strcmp(name, topology) == 0;
 }
 
@@ -58,7 +58,7 @@ static bool find_field(const node *field, blueprint_field *out, bool reports_lef
         if (reports_left_out) node_report_left_out(field, "values", "values of materials alone are not read");
         return false;
     }
-    if (!node_string(field, "association", &association)) return false;
+    if (!node_read_string(field, "association", &association)) return false;
     out->field_node = *field;
     out->is_element = strcmp(association, "element") == 0;
     if (!out->is_element && strcmp(association, "vertex") != 0)
@@ -82,7 +82,7 @@ static bool next_field(field_walk *w)
 {
     if (w->next == 0 && !node_find(w->domain, "fields", &w->fields)) return false;
     while (w->next < node_child_count(&w->fields)) {
-        node_child(&w->fields, w->next++, &w->field);
+        node_get_child(&w->fields, w->next++, &w->field);
         w->field_found = (blueprint_field){.first = 0};
         if (belongs_to(&w->field, w->topology) && find_field(&w->field, &w->field_found, w->reports_left_out))
             return true;
@@ -94,7 +94,7 @@ static bool next_field(field_walk *w)
 /* ---- strides of lattices ---------------------------------------------------------------------------------------- */
 
 /* Returns the number of cells or vertices along each axis, at least 1. */
-static void element_counts(const blueprint_mesh *mesh, bool is_element, int64_t counts[3])
+static void get_element_counts(const blueprint_mesh *mesh, bool is_element, int64_t counts[3])
 {
     for (int axis = 0; axis < 3; axis++) {
         const int64_t cells = mesh->lattice.cells[axis];
@@ -107,13 +107,13 @@ static bool read_strides(const blueprint_mesh *mesh, blueprint_field *field)
 {
     int64_t counts[3], offsets[3] = {0, 0, 0};
     int count = 0;
-    element_counts(mesh, field->is_element, counts);
+    get_element_counts(mesh, field->is_element, counts);
     if (!mesh->mesh.lattice) {
-        node_strides(NULL, NULL, counts, field->strides);
+        node_read_strides(NULL, NULL, counts, field->strides);
         return true;
     }
-    node_integers(&field->field_node, "offsets", offsets, &count);
-    node_strides(&field->field_node, "strides", counts, field->strides);
+    node_read_integers(&field->field_node, "offsets", offsets, &count);
+    node_read_strides(&field->field_node, "strides", counts, field->strides);
     for (int axis = 0; axis < 3; axis++) {
         if (field->strides[axis] < 1 || offsets[axis] < 0)
             return node_set_error(&field->field_node, field->strides[axis] < 1 ? "strides" : "offsets",
@@ -137,7 +137,7 @@ static bool has_mesh_strides(const blueprint_mesh *mesh, const blueprint_field *
 {
     int64_t counts[3];
     if (!mesh->mesh.lattice) return true;
-    element_counts(mesh, field->is_element, counts);
+    get_element_counts(mesh, field->is_element, counts);
     return have_same_strides(counts, field->strides,
                              field->is_element ? mesh->lattice.cell_strides : mesh->lattice.vertex_strides);
 }
@@ -147,7 +147,7 @@ static void set_cell_strides(blueprint_mesh *mesh, const blueprint_field *field)
 {
     int64_t counts[3];
     if (!mesh->mesh.lattice || mesh->has_cell_strides) return;
-    element_counts(mesh, true, counts);
+    get_element_counts(mesh, true, counts);
     memcpy(mesh->lattice.cell_strides, field->strides, sizeof field->strides);
     mesh->mesh.cell_count = blueprint_element_span(counts, field->strides);
     mesh->has_cell_strides = true;
@@ -180,7 +180,7 @@ static unsigned char *make_flags(const node *of, blueprint_mesh *mesh, const ins
 {
     unsigned char *own = owned_arrays_add(of, &mesh->owned, mesh->mesh.cell_count);
     for (int64_t i = 0; own && i < mesh->mesh.cell_count && flags->data; i++)
-        own[i] = (node_element(flags, i) & mask) != 0;
+        own[i] = (node_get_element(flags, i) & mask) != 0;
     return own;
 }
 
@@ -192,7 +192,7 @@ static int64_t combine_flags(const insitu_array *flags, const int64_t strides[3]
     for (int64_t k = first[2]; k < end[2]; k++)
         for (int64_t j = first[1]; j < end[1]; j++)
             for (int64_t i = first[0]; i < end[0]; i++)
-                any |= node_element(flags, i * strides[0] + j * strides[1] + k * strides[2]);
+                any |= node_get_element(flags, i * strides[0] + j * strides[1] + k * strides[2]);
     return any;
 }
 
@@ -208,7 +208,8 @@ static void find_inner_cells(const insitu_array *flags, const int64_t strides[3]
     for (at[2] = 0; at[2] < counts[2]; at[2]++)
         for (at[1] = 0; at[1] < counts[1]; at[1]++)
             for (at[0] = 0; at[0] < counts[0]; at[0]++) {
-                if (node_element(flags, at[0] * strides[0] + at[1] * strides[1] + at[2] * strides[2]) & mask) continue;
+                if (node_get_element(flags, at[0] * strides[0] + at[1] * strides[1] + at[2] * strides[2]) & mask)
+                    continue;
                 for (int axis = 0; axis < 3; axis++) {
                     if (at[axis] < first[axis]) first[axis] = at[axis];
                     if (at[axis] >= end[axis]) end[axis] = at[axis] + 1;
@@ -227,13 +228,13 @@ static int64_t read_flag_bits(const insitu_array *flags, int64_t mask, blueprint
     int64_t counts[3], first[3], end[3], any = 0;
     if (!flags->data) return 0;
     if (mesh->has_level) {
-        element_counts(mesh, true, counts);
+        get_element_counts(mesh, true, counts);
         find_inner_cells(flags, l->cell_strides, counts, mask, first, end);
         memcpy(l->interior_first, first, sizeof first);
         memcpy(l->interior_end, end, sizeof end);
         return combine_flags(flags, l->cell_strides, first, end);
     }
-    for (int64_t i = 0; i < mesh->mesh.cell_count; i++) any |= node_element(flags, i);
+    for (int64_t i = 0; i < mesh->mesh.cell_count; i++) any |= node_get_element(flags, i);
     return any;
 }
 
@@ -264,13 +265,13 @@ static bool read_window(const node *window, const blueprint_mesh *mesh, int64_t 
     static const char *const origins[3] = {"origin/i", "origin/j", "origin/k"};
     static const char *const dims[3] = {"dims/i", "dims/j", "dims/k"};
     int64_t counts[3];
-    element_counts(mesh, true, counts);
+    get_element_counts(mesh, true, counts);
     *fits = true;
     for (int axis = 0; axis < 3; axis++) {
         int64_t count = 1;
         first[axis] = 0;
-        if (!node_integer(window, origins[axis], axis == 0, &first[axis])) return false;
-        if (!node_integer(window, dims[axis], axis == 0, &count)) return false;
+        if (!node_read_integer(window, origins[axis], axis == 0, &first[axis])) return false;
+        if (!node_read_integer(window, dims[axis], axis == 0, &count)) return false;
         *fits = *fits && first[axis] >= 0 && count >= 0 && count <= counts[axis] && first[axis] <= counts[axis] - count;
         end[axis] = first[axis] + count;
     }
@@ -295,8 +296,8 @@ static bool flag_covered_cells(const node *nestset, blueprint_mesh *mesh)
     bool fits;
     if (!node_require(nestset, "windows", &windows)) return false;
     for (int64_t i = 0; i < node_child_count(&windows); i++) {
-        node_child(&windows, i, &window);
-        if (!node_string(&window, "domain_type", &kind)) return false;
+        node_get_child(&windows, i, &window);
+        if (!node_read_string(&window, "domain_type", &kind)) return false;
         if (strcmp(kind, "child") != 0) continue;
         if (!read_window(&window, mesh, first, end, &fits)) return false;
         if (!fits) {
@@ -320,7 +321,7 @@ static bool read_nestsets(const node *domain, const char *topology, blueprint_me
     /* for blocks with levels of refinement, the session itself finds the covered cells */
     if (!mesh->mesh.lattice || mesh->has_level || !node_find(domain, "nestsets", &nestsets)) return true;
     for (int64_t i = 0; i < node_child_count(&nestsets); i++) {
-        node_child(&nestsets, i, &nestset);
+        node_get_child(&nestsets, i, &nestset);
         if (belongs_to(&nestset, topology) && !flag_covered_cells(&nestset, mesh)) return false;
         if (domain->log->status) return false;
     }
@@ -354,7 +355,7 @@ static insitu_array *read_values(const blueprint_field *field, const blueprint_m
     if (out && !children) is_read = read_component(&field->values_node, mesh, field, out);
     for (int i = 0; i < children && is_read; i++) {
         node component;
-        node_child(&field->values_node, i, &component);
+        node_get_child(&field->values_node, i, &component);
         is_read = read_component(&component, mesh, field, &out[i]);
     }
     if (is_read) return out;
@@ -385,7 +386,7 @@ static bool set_field(const blueprint_field *field, const blueprint_mesh *mesh, 
 }
 
 /* Finds the next field that can be drawn on the mesh. Returns false behind the last field, or if a field is invalid. */
-static bool next_drawn_field(field_walk *w, const blueprint_mesh *mesh)
+static bool find_next_drawn_field(field_walk *w, const blueprint_mesh *mesh)
 {
     while (next_field(w)) {
         blueprint_field *field = &w->field_found;
@@ -405,7 +406,7 @@ static bool next_drawn_field(field_walk *w, const blueprint_mesh *mesh)
 uint64_t blueprint_hash_fields(const node *domain, const char *topology, const blueprint_mesh *mesh)
 {
     uint64_t sum = 0;
-    for (field_walk w = {.domain = domain, .topology = topology}; next_drawn_field(&w, mesh);) {
+    for (field_walk w = {.domain = domain, .topology = topology}; find_next_drawn_field(&w, mesh);) {
         const int64_t components = node_child_count(&w.field_found.values_node);
         const uint64_t shape = 2 * (uint64_t)(components ? components : 1) + w.field_found.is_element;
         sum += blueprint_mix_hash(blueprint_hash_text(w.field.name), shape);
@@ -417,7 +418,7 @@ bool blueprint_set_fields(const node *domain, const char *topology, const bluepr
                           const mesh_target *target, int *count)
 {
     for (field_walk w = {.domain = domain, .topology = topology, .reports_left_out = true};
-         next_drawn_field(&w, mesh);) {
+         find_next_drawn_field(&w, mesh);) {
         if (!set_field(&w.field_found, mesh, target)) return false;
         ++*count;
     }

@@ -48,7 +48,7 @@ static void merge(common_lattice *into, const common_lattice *from)
     for (int axis = 0; axis < 3; axis++) merge_axis(into, from, axis);
 }
 
-static common_lattice lattice_of_block(const uniform_block *block)
+static common_lattice make_lattice_of_block(const uniform_block *block)
 {
     common_lattice out = {.origin = {0}};
     for (int axis = 0; axis < 3; axis++) {
@@ -72,7 +72,7 @@ static named_lattice *find_item(const named_lattices *list, uint64_t mesh)
 
 bool named_lattices_add(named_lattices *list, uint64_t mesh, const uniform_block *block)
 {
-    const common_lattice own = lattice_of_block(block);
+    const common_lattice own = make_lattice_of_block(block);
     named_lattice *item = find_item(list, mesh);
     if (!item) {
         named_lattice *items = realloc(list->items, (size_t)(list->count + 1) * sizeof *items);
@@ -172,7 +172,8 @@ bool named_lattices_agree(MPI_Comm comm, const named_lattices *own, named_lattic
 
 /* Moves the block's origin along an axis to the common origin. If a block states its first index, its origin must
  * already equal the common origin, except for rounding. Returns false if the block does not lie on the lattice. */
-static bool place_axis(const uniform_block *block, const common_lattice *common, int axis, insitu_lattice *out)
+static bool move_axis_to_common_origin(const uniform_block *block, const common_lattice *common, int axis,
+                                       insitu_lattice *out)
 {
     const double spacing = block->lattice.spacing[axis];
     const double shift = (block->lattice.origin[axis] - common->origin[axis]) / spacing, whole = nearbyint(shift);
@@ -184,7 +185,7 @@ static bool place_axis(const uniform_block *block, const common_lattice *common,
 }
 
 /* Computes the number of the block's cells per cell of the coarsest level. Returns false if it is not an integer. */
-static bool refine_axis(double coarsest, double spacing, int64_t *out)
+static bool compute_axis_refinement(double coarsest, double spacing, int64_t *out)
 {
     const double ratio = coarsest / fabs(spacing), whole = nearbyint(ratio);
     if (!(whole <= largest_refinement)) return false;
@@ -199,9 +200,10 @@ insitu_lattice uniform_block_place(const uniform_block *block, const common_latt
     *is_level = true;
     for (int axis = 0; axis < 3 && common; axis++) {
         if (!block->lattice.cells[axis]) continue;
-        *is_level = place_axis(block, common, axis, &out) && *is_level;
+        *is_level = move_axis_to_common_origin(block, common, axis, &out) && *is_level;
         *is_level =
-            refine_axis(common->coarsest[axis], block->lattice.spacing[axis], &out.refinement[axis]) && *is_level;
+            compute_axis_refinement(common->coarsest[axis], block->lattice.spacing[axis], &out.refinement[axis]) &&
+            *is_level;
         has_levels = has_levels || !is_same_spacing(common->coarsest[axis], common->finest[axis]);
     }
     if (!block->has_level || !has_levels || !*is_level) memset(out.refinement, 0, sizeof out.refinement);

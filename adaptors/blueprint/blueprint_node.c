@@ -102,7 +102,7 @@ int64_t node_child_count(const node *parent)
     return parent->conduit->number_of_children(parent->conduit_node);
 }
 
-void node_child(const node *parent, int64_t number, node *out)
+void node_get_child(const node *parent, int64_t number, node *out)
 {
     *out = (node){parent->conduit, parent->log, parent->conduit->child(parent->conduit_node, number), parent, {0}};
     char *name = parent->conduit->name(out->conduit_node);
@@ -113,7 +113,7 @@ void node_child(const node *parent, int64_t number, node *out)
     free(name);
 }
 
-bool node_string(const node *parent, const char *path, const char **out)
+bool node_read_string(const node *parent, const char *path, const char **out)
 {
     node found;
     if (!node_require(parent, path, &found)) return false;
@@ -191,7 +191,7 @@ int64_t node_type_bytes(insitu_type type)
         return (int64_t)value;                                                                                         \
     }
 
-int64_t node_element(const insitu_array *array, int64_t i)
+int64_t node_get_element(const insitu_array *array, int64_t i)
 {
     const int64_t stride = array->stride_bytes ? array->stride_bytes : node_type_bytes(array->type);
     const char *p = (const char *)array->data + i * stride;
@@ -226,17 +226,17 @@ static bool find_number(const node *parent, const char *path, bool is_required, 
            node_set_error(found, "", INSITU_ERROR_MESH, "has %lld elements, expected 1", (long long)out->count);
 }
 
-bool node_integer(const node *parent, const char *path, bool is_required, int64_t *out)
+bool node_read_integer(const node *parent, const char *path, bool is_required, int64_t *out)
 {
     node found;
     node_array number;
     if (!find_number(parent, path, is_required, &found, &number)) return !parent->log->status;
     if (!node_is_integers(&number)) return node_set_error(&found, "", INSITU_ERROR_MESH, "is no whole number");
-    *out = node_element(&number.array, 0);
+    *out = node_get_element(&number.array, 0);
     return true;
 }
 
-bool node_real(const node *parent, const char *path, bool is_required, double *out)
+bool node_read_real(const node *parent, const char *path, bool is_required, double *out)
 {
     node found;
     node_array number;
@@ -248,12 +248,12 @@ bool node_real(const node *parent, const char *path, bool is_required, double *o
         memcpy(&narrow, number.array.data, sizeof narrow);
         *out = (double)narrow;
     } else {
-        *out = (double)node_element(&number.array, 0);
+        *out = (double)node_get_element(&number.array, 0);
     }
     return true;
 }
 
-bool node_integers(const node *parent, const char *path, int64_t out[3], int *count)
+bool node_read_integers(const node *parent, const char *path, int64_t out[3], int *count)
 {
     node found;
     node_array array;
@@ -263,15 +263,15 @@ bool node_integers(const node *parent, const char *path, int64_t out[3], int *co
         return node_set_error(&found, "", INSITU_ERROR_MESH, "has %lld elements, expected 1 to 3",
                               (long long)array.count);
     *count = (int)array.count;
-    for (int i = 0; i < *count; i++) out[i] = node_element(&array.array, i);
+    for (int i = 0; i < *count; i++) out[i] = node_get_element(&array.array, i);
     return true;
 }
 
-void node_strides(const node *parent, const char *path, const int64_t counts[3], int64_t strides[3])
+void node_read_strides(const node *parent, const char *path, const int64_t counts[3], int64_t strides[3])
 {
     int count = 0;
     strides[0] = 1;
-    if (parent) node_integers(parent, path, strides, &count);
+    if (parent) node_read_integers(parent, path, strides, &count);
     for (int axis = 1; axis < 3; axis++)
         if (axis >= count) strides[axis] = strides[axis - 1] * (counts[axis - 1] > 0 ? counts[axis - 1] : 1);
 }

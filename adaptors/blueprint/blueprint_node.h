@@ -57,23 +57,23 @@ bool node_find(const node *parent, const char *path, node *out);
 bool node_require(const node *parent, const char *path, node *out);
 
 int64_t node_child_count(const node *parent);
-void node_child(const node *parent, int64_t number, node *out);
+void node_get_child(const node *parent, int64_t number, node *out);
 
 /* Reads a string; it belongs to the node. Returns false and sets the error if there is no string at the path. */
-bool node_string(const node *parent, const char *path, const char **out);
+bool node_read_string(const node *parent, const char *path, const char **out);
 
-/* node_integer() and node_real() read a number. If the number is missing, *out does not change; this is an error only
- * if is_required is set. */
-bool node_integer(const node *parent, const char *path, bool is_required, int64_t *out);
-bool node_real(const node *parent, const char *path, bool is_required, double *out);
+/* node_read_integer() and node_read_real() read a number. If the number is missing, *out does not change; this is an
+ * error only if is_required is set. */
+bool node_read_integer(const node *parent, const char *path, bool is_required, int64_t *out);
+bool node_read_real(const node *parent, const char *path, bool is_required, double *out);
 
 /* Reads one to three integers of an optional array, for example strides; *count receives their number. Returns false if
  * the array is missing or invalid. */
-bool node_integers(const node *parent, const char *path, int64_t out[3], int *count);
+bool node_read_integers(const node *parent, const char *path, int64_t out[3], int *count);
 
 /* Reads the strides of an array in which i varies fastest. Missing strides are computed from the numbers of elements
  * along each axis, as for an array without padding; parent is NULL if all are missing. A count of 0 is treated as 1. */
-void node_strides(const node *parent, const char *path, const int64_t counts[3], int64_t strides[3]);
+void node_read_strides(const node *parent, const char *path, const int64_t counts[3], int64_t strides[3]);
 
 /* node_read_array() describes the array of the node, node_require_array() that of the node at the path. They return
  * false and set the error if the node is not an array of numbers. */
@@ -81,7 +81,7 @@ bool node_read_array(const node *of, node_array *out);
 bool node_require_array(const node *parent, const char *path, node_array *out);
 
 /* Returns an element of an array of integers. */
-int64_t node_element(const insitu_array *array, int64_t i);
+int64_t node_get_element(const insitu_array *array, int64_t i);
 
 /* Returns the size of the type in bytes. */
 int64_t node_type_bytes(insitu_type type);

@@ -33,8 +33,8 @@ static void pack_lattice(blueprint_mesh *out)
 {
     int64_t counts[3];
     for (int axis = 0; axis < 3; axis++) counts[axis] = out->lattice.cells[axis] + 1;
-    node_strides(NULL, NULL, counts, out->lattice.vertex_strides);
-    node_strides(NULL, NULL, out->lattice.cells, out->lattice.cell_strides);
+    node_read_strides(NULL, NULL, counts, out->lattice.vertex_strides);
+    node_read_strides(NULL, NULL, out->lattice.cells, out->lattice.cell_strides);
     out->mesh.vertex_count = blueprint_element_span(counts, out->lattice.vertex_strides);
     out->mesh.cell_count = blueprint_element_span(out->lattice.cells, out->lattice.cell_strides);
 }
@@ -47,7 +47,7 @@ static bool read_first(const node *topology, int64_t first[3], bool *has_first)
                                             {"elements/origin/i0", "elements/origin/j0", "elements/origin/k0"}};
     for (int form = 0; form < 2; form++)
         for (int axis = 0; axis < 3; axis++) {
-            if (!node_integer(topology, paths[form][axis], false, &first[axis])) return false;
+            if (!node_read_integer(topology, paths[form][axis], false, &first[axis])) return false;
             *has_first = *has_first || node_has(topology, paths[form][axis]);
         }
     return true;
@@ -64,10 +64,10 @@ static bool read_uniform(const node *coordset, const node *topology, blueprint_m
     if (!read_first(topology, first, &out->has_first)) return false;
     for (int axis = 0; axis < 3; axis++) {
         double origin = 0, spacing = 1;
-        if (!node_integer(coordset, dims[axis], axis == 0, &counts[axis])) return false;
+        if (!node_read_integer(coordset, dims[axis], axis == 0, &counts[axis])) return false;
         if (!node_has(coordset, dims[axis])) continue;
-        if (!node_real(coordset, origins[axis], false, &origin)) return false;
-        if (!node_real(coordset, spacings[axis], false, &spacing)) return false;
+        if (!node_read_real(coordset, origins[axis], false, &origin)) return false;
+        if (!node_read_real(coordset, spacings[axis], false, &spacing)) return false;
         if (spacing == 0) return node_set_error(coordset, spacings[axis], INSITU_ERROR_MESH, "is 0");
         out->lattice.origin[axis] = origin - spacing * (double)first[axis];
         out->lattice.spacing[axis] = spacing;
@@ -143,14 +143,14 @@ static bool read_dims(const node *topology, int64_t counts[3], int64_t offsets[3
     int offset_count = 0;
     for (int axis = 0; axis < 3; axis++) {
         int64_t cells = 0;
-        if (!node_integer(topology, dims[axis], axis == 0, &cells)) return false;
+        if (!node_read_integer(topology, dims[axis], axis == 0, &cells)) return false;
         if (cells < 0)
             return node_set_error(topology, dims[axis], INSITU_ERROR_MESH, "is %lld, expected at least 0",
                                   (long long)cells);
         counts[axis] = cells + 1;
     }
-    node_integers(topology, "elements/dims/offsets", offsets, &offset_count);
-    node_strides(topology, "elements/dims/strides", counts, strides);
+    node_read_integers(topology, "elements/dims/offsets", offsets, &offset_count);
+    node_read_strides(topology, "elements/dims/strides", counts, strides);
     for (int axis = 0; axis < 3 && !topology->log->status; axis++)
         if (offsets[axis] < 0 || strides[axis] < 1)
             return node_set_error(topology, offsets[axis] < 0 ? "elements/dims/offsets" : "elements/dims/strides",
@@ -195,12 +195,12 @@ static bool read_coordset(const node *coordset, const node *topology, const char
 static bool find_coordset(const node *domain, const node *topology, node *sets, node *out, const char **type)
 {
     const char *name;
-    if (!node_string(topology, "coordset", &name)) return false;
+    if (!node_read_string(topology, "coordset", &name)) return false;
     if (!node_require(domain, "coordsets", sets)) return false;
     if (!node_find(sets, name, out))
         return node_set_error(topology, "coordset", INSITU_ERROR_MESH, "is \"%s\", which is not among the coordsets",
                               name);
-    return node_string(out, "type", type);
+    return node_read_string(out, "type", type);
 }
 
 /* Checks that the coordset's type is the one that this type of topology requires. */
@@ -219,7 +219,7 @@ bool blueprint_read_topology(const node *domain, const node *topology, blueprint
     node sets, coordset;
     memset(out, 0, sizeof *out);
     insitu_mesh_defaults(&out->mesh);
-    if (!node_string(topology, "type", &type)) return false;
+    if (!node_read_string(topology, "type", &type)) return false;
     if (strcmp(type, "points") == 0) {
         node_report_left_out(topology, "type", "points are not drawn");
         out->is_left_out = true;

@@ -50,7 +50,7 @@ static bool find_communicator(const node *root, MPI_Comm *comm)
         state.has_initialized_mpi = true;
     }
     *comm = MPI_COMM_WORLD;
-    if (!node_integer(root, "catalyst/mpi_comm", false, &handle)) return false;
+    if (!node_read_integer(root, "catalyst/mpi_comm", false, &handle)) return false;
     if (node_has(root, "catalyst/mpi_comm")) *comm = MPI_Comm_f2c((MPI_Fint)handle);
     return true;
 }
@@ -68,7 +68,7 @@ static const char *find_script(const node *root)
     node scripts, script, file;
     if (!node_find(root, "catalyst/scripts", &scripts)) return NULL;
     for (int64_t i = 0; i < node_child_count(&scripts); i++) {
-        node_child(&scripts, i, &script);
+        node_get_child(&scripts, i, &script);
         if (!node_find(&script, "filename", &file)) file = script;
         if (!file.conduit->is_string(file.conduit_node)) continue;
         const char *path = file.conduit->as_char8_str(file.conduit_node);
@@ -81,9 +81,9 @@ static const char *find_script(const node *root)
 static bool find_scene(const node *root, const char **scene, bool *is_text)
 {
     *is_text = false;
-    if (node_has(root, "catalyst/insitu/scene")) return node_string(root, "catalyst/insitu/scene", scene);
+    if (node_has(root, "catalyst/insitu/scene")) return node_read_string(root, "catalyst/insitu/scene", scene);
     *is_text = node_has(root, "catalyst/insitu/scene_text");
-    if (*is_text) return node_string(root, "catalyst/insitu/scene_text", scene);
+    if (*is_text) return node_read_string(root, "catalyst/insitu/scene_text", scene);
     *scene = find_script(root);
     if (!*scene) *scene = getenv("INSITU_SCENE");
     return *scene || node_set_error(root, "catalyst", INSITU_ERROR_SCENE,
@@ -98,10 +98,10 @@ static bool find_parameters(const node *root)
     if (!node_find(root, "catalyst/insitu/parameters", &all)) return true;
     for (int64_t i = 0; i < node_child_count(&all) && state.parameter_count < PARAMETERS; i++) {
         requested_parameter *p = &state.parameters[state.parameter_count++];
-        node_child(&all, i, &one);
+        node_get_child(&all, i, &one);
         snprintf(p->name, sizeof p->name, "%s", one.name);
         p->value = 0;
-        if (!node_real(&all, one.name, true, &p->value)) return false;
+        if (!node_read_real(&all, one.name, true, &p->value)) return false;
     }
     return true;
 }
@@ -149,7 +149,7 @@ static bool set_channel(const node *channel)
     const char *type;
     node data, mesh;
     char name[2 * NODE_NAME];
-    if (!node_string(channel, "type", &type)) return false;
+    if (!node_read_string(channel, "type", &type)) return false;
     if (!node_find(channel, "data", &data)) return true; /* a channel may have no data on this rank */
     const bool is_multimesh = strcmp(type, "multimesh") == 0;
     if (!is_multimesh && strcmp(type, "mesh") != 0 && strcmp(type, "amrmesh") != 0)
@@ -157,7 +157,7 @@ static bool set_channel(const node *channel)
                               type);
     if (!is_multimesh) return !insitu_blueprint_set(state.adaptor, channel->name, data.conduit_node);
     for (int64_t i = 0; i < node_child_count(&data); i++) {
-        node_child(&data, i, &mesh);
+        node_get_child(&data, i, &mesh);
         snprintf(name, sizeof name, "%s/%s", channel->name, mesh.name);
         if (insitu_blueprint_set(state.adaptor, name, mesh.conduit_node)) return false;
     }
@@ -169,7 +169,7 @@ static bool set_channels(const node *root)
     node channels, channel;
     if (!node_find(root, "catalyst/channels", &channels)) return true;
     for (int64_t i = 0; i < node_child_count(&channels); i++) {
-        node_child(&channels, i, &channel);
+        node_get_child(&channels, i, &channel);
         if (!set_channel(&channel)) return false;
     }
     return true;
@@ -188,7 +188,7 @@ static bool read_state(const node *root, int64_t *cycle, double *time, bool *has
     const char *path = node_has(root, "catalyst/state/timestep") ? "catalyst/state/timestep" : "catalyst/state/cycle";
     *has_cycle = node_has(root, path);
     *has_time = node_has(root, "catalyst/state/time");
-    return node_integer(root, path, false, cycle) && node_real(root, "catalyst/state/time", false, time);
+    return node_read_integer(root, path, false, cycle) && node_read_real(root, "catalyst/state/time", false, time);
 }
 
 insitu_status catalyst_adaptor_execute(const void *params)

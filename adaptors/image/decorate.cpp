@@ -24,7 +24,7 @@ struct drawing {
 
 /* ---- pixels ----------------------------------------------------------------------------------------------------- */
 
-float *pixel_at(drawing &s, int x, int y)
+float *get_pixel_address(drawing &s, int x, int y)
 {
     return &s.rgba[4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(s.image.width) +
                         static_cast<std::size_t>(x))];
@@ -59,11 +59,11 @@ void fill(drawing &s, const area &a, const float colour[3], double opacity)
     const int y1 = std::min(s.image.height, static_cast<int>(std::ceil(a.y1)));
     for (int y = std::max(0, static_cast<int>(a.y0)); y < y1; y++)
         for (int x = std::max(0, static_cast<int>(a.x0)); x < x1; x++)
-            blend(pixel_at(s, x, y), colour, opacity * pixel_coverage(a.x0, a.x1, x) * pixel_coverage(a.y0, a.y1, y),
-                  false);
+            blend(get_pixel_address(s, x, y), colour,
+                  opacity * pixel_coverage(a.x0, a.x1, x) * pixel_coverage(a.y0, a.y1, y), false);
 }
 
-double distance_to(const insitu_stroke &line, double x, double y)
+double compute_distance_to_stroke(const insitu_stroke &line, double x, double y)
 {
     const double dx = line.to[0] - line.from[0], dy = line.to[1] - line.from[1];
     const double square = dx * dx + dy * dy;
@@ -89,8 +89,8 @@ void draw_stroke(drawing &s, const insitu_stroke &line, double width, const floa
         const int first = static_cast<int>(std::clamp(low - reach, 0.0, static_cast<double>(s.image.width)));
         const double end = std::min(static_cast<double>(s.image.width), high + reach);
         for (int x = first; x < end; x++) {
-            const double inside = 0.5 + 0.5 * width - distance_to(line, x + 0.5, y + 0.5);
-            if (inside > 0) blend(pixel_at(s, x, y), colour, opacity * std::min(inside, 1.0), line.is_behind);
+            const double inside = 0.5 + 0.5 * width - compute_distance_to_stroke(line, x + 0.5, y + 0.5);
+            if (inside > 0) blend(get_pixel_address(s, x, y), colour, opacity * std::min(inside, 1.0), line.is_behind);
         }
     }
 }
@@ -131,7 +131,7 @@ void draw_glyphs(drawing &s, const placed_line &line, int size, double halo, con
     s.font->draw(line.text, size, halo, [&](int column, int row, double pixel_coverage) {
         const int x = left + column, y = top + row;
         if (x >= 0 && y >= 0 && x < s.image.width && y < s.image.height)
-            blend(pixel_at(s, x, y), colour, opacity * pixel_coverage, false);
+            blend(get_pixel_address(s, x, y), colour, opacity * pixel_coverage, false);
     });
 }
 

@@ -26,7 +26,7 @@ struct band {
     std::size_t first, pixels;
 };
 
-band band_at(int width, int height, int y)
+band make_band(int width, int height, int y)
 {
     const int rows = std::min<int>(BAND_ROWS, height - y);
     const auto columns = static_cast<std::size_t>(width);
@@ -113,7 +113,7 @@ void encode(int width, int height, const insitu_deep &deep, const std::string &p
     const OIIO::ImageSpec spec = describe(width, height);
     encoded_file file("picture.exr", spec, path);
     for (int y = 0; y < height; y += BAND_ROWS) {
-        const band b = band_at(width, height, y);
+        const band b = make_band(width, height, y);
         OIIO::DeepData data;
         data.init(static_cast<std::int64_t>(b.pixels), CHANNELS, spec.format, spec.channelnames);
         fill(deep, b, data);
@@ -127,7 +127,7 @@ std::size_t largest_band_bytes(int width, int height, const insitu_deep &deep)
 {
     std::size_t most = 0;
     for (int y = 0; y < height; y += BAND_ROWS) {
-        const band b = band_at(width, height, y);
+        const band b = make_band(width, height, y);
         const std::size_t samples = sample_count(deep, b.first, b.pixels);
         most = std::max(most, 3 * samples * sizeof(insitu_deep_sample) + b.pixels * 2 * CHANNELS * sizeof(void *));
     }

@@ -27,7 +27,7 @@ struct file_bytes {
 };
 
 /* Reads a little-endian number of this many bytes. */
-std::uint64_t number_at(const file_bytes &file, std::size_t at, int bytes)
+std::uint64_t read_number_at(const file_bytes &file, std::size_t at, int bytes)
 {
     std::uint64_t number = 0;
     for (int i = bytes; i-- > 0;) number = number << 8 | file.at[at + static_cast<std::size_t>(i)];
@@ -48,11 +48,11 @@ bool has_all_rows(const file_bytes &file, int height, int block_rows)
             at++;
         }
         if (at + SIZE_BYTES > file.size) return false;
-        at += SIZE_BYTES + static_cast<std::size_t>(number_at(file, at, SIZE_BYTES));
+        at += SIZE_BYTES + static_cast<std::size_t>(read_number_at(file, at, SIZE_BYTES));
     }
-    at += number_at(file, VERSION, SIZE_BYTES) & HAS_PARTS ? 2 : 1;
+    at += read_number_at(file, VERSION, SIZE_BYTES) & HAS_PARTS ? 2 : 1;
     for (int row = 0; row < height; row += block_rows, at += PLACE_BYTES)
-        if (at + PLACE_BYTES > file.size || !number_at(file, at, PLACE_BYTES)) return false;
+        if (at + PLACE_BYTES > file.size || !read_number_at(file, at, PLACE_BYTES)) return false;
     return true;
 }
 

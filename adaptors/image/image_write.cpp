@@ -38,7 +38,7 @@ double srgb_from_linear(double linear)
 }
 
 /* Returns the nearest code of a value in [0, 1]; NaN becomes 0. */
-template <typename code> code code_of(double value)
+template <typename code> code quantize_to_code(double value)
 {
     const double largest = static_cast<double>(static_cast<code>(~code{0}));
     if (!(value > 0)) return 0;
@@ -61,11 +61,12 @@ class srgb_codes
   public:
     srgb_codes()
     {
-        for (int code = 1; code < CODES; code++) begin_[static_cast<std::size_t>(code)] = least_of(code);
+        for (int code = 1; code < CODES; code++)
+            begin_[static_cast<std::size_t>(code)] = find_smallest_value_of_code(code);
         begin_[CODES] = std::numeric_limits<double>::infinity();
         for (int bin = 0; bin <= BINS; bin++)
             first_[static_cast<std::size_t>(bin)] =
-                code_of<std::uint8_t>(srgb_from_linear(static_cast<double>(bin) / BINS));
+                quantize_to_code<std::uint8_t>(srgb_from_linear(static_cast<double>(bin) / BINS));
     }
 
     std::uint8_t operator()(double linear) const
@@ -80,11 +81,11 @@ class srgb_codes
     static constexpr int CODES = 256, BINS = 4096;
 
     /* Returns the smallest linear value that has this code, found by bisection down to adjacent doubles. */
-    static double least_of(int code)
+    static double find_smallest_value_of_code(int code)
     {
         double below = 0, least = 1;
         for (double middle = 0.5; below < middle && middle < least; middle = below + (least - below) / 2)
-            (code_of<std::uint8_t>(srgb_from_linear(middle)) < code ? below : least) = middle;
+            (quantize_to_code<std::uint8_t>(srgb_from_linear(middle)) < code ? below : least) = middle;
         return least;
     }
 
@@ -92,12 +93,12 @@ class srgb_codes
     std::array<std::uint8_t, BINS + 1> first_{};
 };
 
-template <typename code> code srgb_code_of(double linear)
+template <typename code> code quantize_to_srgb_code(double linear)
 {
-    return code_of<code>(srgb_from_linear(linear));
+    return quantize_to_code<code>(srgb_from_linear(linear));
 }
 
-template <> std::uint8_t srgb_code_of(double linear)
+template <> std::uint8_t quantize_to_srgb_code(double linear)
 {
     static const srgb_codes codes;
     return codes(linear);
@@ -108,9 +109,9 @@ template <typename code> void encode_pixel(const float *pixel, std::size_t chann
     const double alpha = pixel[3];
     for (std::size_t c = 0; c < 3; c++) {
         const double straight = alpha > 0 ? (alpha < 1 ? pixel[c] / alpha : pixel[c]) : 0;
-        out[c] = srgb_code_of<code>(straight);
+        out[c] = quantize_to_srgb_code<code>(straight);
     }
-    if (channels == 4) out[3] = code_of<code>(alpha);
+    if (channels == 4) out[3] = quantize_to_code<code>(alpha);
 }
 
 /* Encodes to sRGB codes that are not premultiplied, with alpha if channels is 4. A pixel that equals its predecessor,

@@ -32,7 +32,7 @@ double pixels(double share, int size)
 
 /* Returns the text sizes to try, in descending order from the given one. No size is below the legible minimum SMALLEST,
  * unless the given size is. */
-std::vector<int> sizes_from(double size)
+std::vector<int> list_text_sizes(double size)
 {
     std::vector<int> out;
     for (const double factor : size_factors) {
@@ -106,7 +106,7 @@ bool find_free_bounds(const layout_state &s, insitu_anchor at, double width, dou
 
 /* Returns the number of bytes at the beginning of a word that fit in the width. Only whole UTF-8 characters are
  * counted. The result covers at least one character, even if it does not fit. */
-std::size_t bytes_that_fit(const layout_state &s, const std::string &word, int size, double available_width)
+std::size_t count_bytes_that_fit(const layout_state &s, const std::string &word, int size, double available_width)
 {
     const double width = s.measure(word, size);
     auto bytes = static_cast<std::size_t>(static_cast<double>(word.size()) * available_width / std::max(1.0, width));
@@ -138,7 +138,7 @@ std::vector<std::string> wrap_text(const layout_state &s, const std::string &tex
         if (!line.empty()) lines.push_back(line);
         while (s.measure(word, size) > available_width &&
                !word.empty()) { /* each iteration removes at least one character */
-            const std::size_t bytes = bytes_that_fit(s, word, size, available_width);
+            const std::size_t bytes = count_bytes_that_fit(s, word, size, available_width);
             lines.push_back(word.substr(0, bytes));
             word.erase(0, bytes);
         }
@@ -179,7 +179,7 @@ bool place_words(layout_state &s, int index)
 {
     static const double shares[] = {1, 0.5, 0.3};
     const insitu_words &words = s.decorations.words[index];
-    const std::vector<int> sizes = sizes_from(s.size * static_cast<double>(words.size));
+    const std::vector<int> sizes = list_text_sizes(s.size * static_cast<double>(words.size));
     for (const int size : sizes)
         for (const double share : shares) {
             const double pads = 2 * pixels(padding, size), available_width = share * (s.x1 - s.x0) - pads;
@@ -277,7 +277,7 @@ block make_bar(const layout_state &s, const bar_group &g, std::size_t n, const a
 
 /* Finds the range of heights that other blocks leave free in the vertical strip from x0 to x1. The range is the one
  * around the middle of the picture. */
-void free_height(const layout_state &s, double x0, double x1, double &top, double &bottom)
+void find_free_height(const layout_state &s, double x0, double x1, double &top, double &bottom)
 {
     top = s.y0, bottom = s.y1;
     for (const block &b : s.out.blocks) {
@@ -291,7 +291,7 @@ void free_height(const layout_state &s, double x0, double x1, double &top, doubl
 
 /* Returns the positions to try for the outer edge of the outermost column of bars: the border of the picture, and the
  * inner sides of covered areas, in case such an area takes too much of the height at the border. */
-std::vector<double> column_edges(const layout_state &s, const bar_group &g)
+std::vector<double> list_column_edges(const layout_state &s, const bar_group &g)
 {
     const bool is_at_left = g.anchor == INSITU_LEFT;
     const double gap = pixels(column_gap, g.size);
@@ -308,7 +308,7 @@ bool fill_column(const layout_state &s, const bar_group &g, std::size_t first, s
     const double pitch = g.width + pixels(column_gap, g.size);
     const double x0 = g.anchor == INSITU_LEFT ? edge + column * pitch : edge - column * pitch - g.width;
     double top = 0, bottom = 0;
-    free_height(s, x0, x0 + g.width, top, bottom);
+    find_free_height(s, x0, x0 + g.width, top, bottom);
     const double share = count == 1 ? 0.62 : count == 2 ? 0.8 : 1;
     const double total = std::min(bottom - top, share * s.image.height);
     const double height = std::floor(total / static_cast<double>(count));
@@ -348,17 +348,17 @@ bool place_group(layout_state &s, const bar_group &g, double edge)
 
 bool place_at_largest_size(layout_state &s, const std::vector<int> &bars, insitu_anchor at)
 {
-    const std::vector<int> sizes = sizes_from(s.size);
+    const std::vector<int> sizes = list_text_sizes(s.size);
     for (const int size : sizes) {
         const bar_group g = make_group(s, bars, at, size);
         if (!g.is_readable && size != sizes.back()) continue;
-        for (const double edge : column_edges(s, g))
+        for (const double edge : list_column_edges(s, g))
             if (place_group(s, g, edge)) return true;
     }
     return false;
 }
 
-std::string quoted_name(const char *decorations, const char *text)
+std::string quote_decoration_name(const char *decorations, const char *text)
 {
     enum { NAMED = 60 };
     std::string name = text;
@@ -379,7 +379,7 @@ void place_bars(layout_state &s, insitu_anchor at)
     for (int i = 0; i < s.decorations.bar_count; i++)
         if ((s.decorations.bars[i].at == INSITU_LEFT) == (at == INSITU_LEFT)) bars.push_back(i);
     while (!bars.empty() && !place_at_largest_size(s, bars, at)) {
-        s.out.left_out.push_back(quoted_name("the colour bar", s.decorations.bars[bars.back()].label));
+        s.out.left_out.push_back(quote_decoration_name("the colour bar", s.decorations.bars[bars.back()].label));
         bars.pop_back();
     }
 }
@@ -403,7 +403,7 @@ void place_covered(layout_state &s)
 bool place_scale_bar(layout_state &s)
 {
     const insitu_scale_bar &bar = s.decorations.scale_bar;
-    for (const int size : sizes_from(s.size)) {
+    for (const int size : list_text_sizes(s.size)) {
         const double pads = 2 * pixels(padding, size),
                      width = std::ceil(std::max<double>(s.measure(bar.text, size), bar.length));
         block b{block_kind::scale_bar, 0, size, {}, {}, {}, {}};
@@ -417,7 +417,7 @@ bool place_scale_bar(layout_state &s)
 
 bool place_axes(layout_state &s)
 {
-    for (const int size : sizes_from(s.size)) {
+    for (const int size : list_text_sizes(s.size)) {
         block b{block_kind::axes, 0, size, {}, {}, {}, {}};
         if (!find_free_bounds(s, INSITU_BOTTOM_LEFT, pixels(6.8, size), pixels(6.8, size), b.bounds)) continue;
         s.out.blocks.push_back(b);
@@ -450,7 +450,7 @@ void place_all_words(layout_state &s, bool at_sides)
 {
     for (int i = 0; i < s.decorations.words_count; i++)
         if (*s.decorations.words[i].text && is_at_side(s.decorations.words[i].at) == at_sides && !place_words(s, i))
-            s.out.left_out.push_back(quoted_name("the words", s.decorations.words[i].text));
+            s.out.left_out.push_back(quote_decoration_name("the words", s.decorations.words[i].text));
 }
 
 } // namespace
@@ -476,7 +476,7 @@ layout make_layout(const insitu_image &image, const text_measure &measure)
     place_bars(s, INSITU_LEFT);
     place_all_words(s, true);
     if (s.decorations.scale_bar.length > 0 && !place_scale_bar(s))
-        s.out.left_out.push_back(quoted_name("the scale bar", s.decorations.scale_bar.text));
+        s.out.left_out.push_back(quote_decoration_name("the scale bar", s.decorations.scale_bar.text));
     if (s.decorations.has_axes && !place_axes(s)) s.out.left_out.emplace_back("the axes");
     for (int i = 0; i < s.decorations.label_count; i++) place_label(s, i);
     return s.out;

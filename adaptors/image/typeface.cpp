@@ -118,14 +118,14 @@ char32_t next_character(const std::string &text, std::size_t &at)
 }
 
 /* Returns the glyph of a character. Control characters are drawn as blanks, because the text is a single line. */
-FT_UInt glyph_of(FT_Face face, char32_t character)
+FT_UInt find_glyph(FT_Face face, char32_t character)
 {
     const bool is_control = character < 0x20 || (character >= 0x7F && character < 0xA0);
     return FT_Get_Char_Index(face, is_control ? ' ' : character);
 }
 
 /* Returns the kerning between two glyphs in pixels, positive to the right. */
-int kerning(FT_Face face, FT_UInt before, FT_UInt glyph)
+int get_kerning(FT_Face face, FT_UInt before, FT_UInt glyph)
 {
     FT_Vector step = {0, 0};
     if (!before || !glyph || !FT_HAS_KERNING(face)) return 0;
@@ -151,8 +151,8 @@ int lay_out_glyphs(FT_Face face, const std::vector<char32_t> &characters, int si
     FT_UInt before = 0;
     if (!set_size(face, size)) return 0;
     for (const char32_t character : characters) {
-        const FT_UInt glyph = glyph_of(face, character);
-        x += kerning(face, before, glyph);
+        const FT_UInt glyph = find_glyph(face, character);
+        x += get_kerning(face, before, glyph);
         before = glyph;
         if (!succeeded(FT_Load_Glyph(face, glyph, flags))) continue;
         const int advance = advance_of_loaded(face);
@@ -224,8 +224,8 @@ int typeface::width_of(const std::string &text, int size) const
     FT_UInt before = 0;
     if (!face_ || !set_size(face_, size)) return 0;
     for (const char32_t character : decode_utf8(text, is_bad)) {
-        const FT_UInt glyph = glyph_of(face_, character);
-        x += kerning(face_, before, glyph) + advance_of(glyph, size);
+        const FT_UInt glyph = find_glyph(face_, character);
+        x += get_kerning(face_, before, glyph) + advance_of(glyph, size);
         before = glyph;
     }
     return x;
@@ -264,7 +264,7 @@ void typeface::record_missing(const std::string &text)
 {
     if (!face_) return;
     for (const char32_t character : decode_utf8(text, has_bad_bytes_))
-        if (glyph_of(face_, character) == 0) missing_.insert(character);
+        if (find_glyph(face_, character) == 0) missing_.insert(character);
 }
 
 std::string typeface::font_fault() const

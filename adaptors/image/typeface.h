@@ -1,5 +1,5 @@
-/* Draws text with FreeType, glyph by glyph with the font's kerning. Text is UTF-8. A character that the font lacks is
- * drawn as the font's box for missing glyphs, and an invalid byte as U+FFFD. */
+/* Draws text with FreeType, glyph by glyph with the font's kerning. Text is UTF-8. A character that the font lacks
+ * is drawn as the font's box for missing glyphs, and an invalid byte as U+FFFD. */
 #ifndef ADAPTORS_TYPEFACE_H
 #define ADAPTORS_TYPEFACE_H
 

@@ -227,7 +227,7 @@ bool make_lattice_part(vtkDataSet *data, const std::string &name, set_result &ou
     p.lattice = std::make_unique<insitu_lattice>();
     if (!view_lattice(data, what, p.held, log, p.mesh, *p.lattice)) return false;
     cells.count = p.mesh.cell_count;
-    set_ghosts(data, lattice_flags(data, *p.lattice), cells, what, log, p);
+    set_ghosts(data, make_lattice_ghost_flags(data, *p.lattice), cells, what, log, p);
     add_point_fields(data, what, log, p);
     add_cell_fields(data, cells, what, log, p);
     out.log.add(log);
@@ -307,7 +307,7 @@ void set_converted(insitu_vtk_adaptor *adaptor, part_map &parts, const std::stri
 /* Returns the name of the mesh of which this structured leaf becomes a block. Leaves with the same fields and the same
  * number of dimensions get the same name, because all blocks of a mesh must have the same fields. The name depends only
  * on this leaf, because the other leaves may be on other ranks. */
-std::string name_of_blocks(const std::string &name, const mesh_part &p)
+std::string make_name_of_blocks(const std::string &name, const mesh_part &p)
 {
     std::set<std::string> fields;
     for (const insitu_field &field : p.fields) fields.insert(field.name);
@@ -345,7 +345,7 @@ bool set_block(insitu_vtk_adaptor *adaptor, part_map &parts, const std::string &
     if (!make_lattice_part(leaf, name + "/" + std::to_string(number), out, new_part)) return false;
     place_amr_grid(composite, "mesh '" + name + "[" + std::to_string(number) + "]'", out.log, *new_part.lattice);
     const bool is_amr = vtkOverlappingAMR::SafeDownCast(composite.data);
-    const std::string mesh = is_amr ? name : name_of_blocks(name, new_part);
+    const std::string mesh = is_amr ? name : make_name_of_blocks(name, new_part);
     set_part(adaptor, parts, {mesh, number}, std::move(new_part), out);
     return true;
 }

@@ -20,7 +20,7 @@ namespace
 constexpr double tolerance = 1e-6;
 
 /* Returns a / b if the quotient is an integer within rounding, otherwise 0. */
-int64_t whole_ratio(double a, double b)
+int64_t compute_whole_ratio(double a, double b)
 {
     if (!(a > 0) || !(b > 0) || !(a / b < 1e6)) return 0;
     const int64_t ratio = std::llround(a / b);
@@ -29,14 +29,14 @@ int64_t whole_ratio(double a, double b)
 
 /* Computes, for each axis, the number of the level's cells along a cell of the next coarser level; 0 if it is
  * unknown. */
-std::array<int64_t, 3> ratios_to_coarser(vtkAMRInformation *information, unsigned level)
+std::array<int64_t, 3> compute_ratios_to_coarser(vtkAMRInformation *information, unsigned level)
 {
     std::array<int64_t, 3> ratios{};
     if (information->HasSpacing(level - 1) && information->HasSpacing(level)) {
         double coarse[3], fine[3];
         information->GetSpacing(level - 1, coarse);
         information->GetSpacing(level, fine);
-        for (size_t axis = 0; axis < 3; axis++) ratios[axis] = whole_ratio(coarse[axis], fine[axis]);
+        for (size_t axis = 0; axis < 3; axis++) ratios[axis] = compute_whole_ratio(coarse[axis], fine[axis]);
     } else if (information->HasRefinementRatio()) {
         ratios.fill(std::max(information->GetRefinementRatio(level - 1), 0));
     }
@@ -67,7 +67,7 @@ amr_refinements find_refinements(vtkOverlappingAMR *amr)
         const unsigned count = amr->GetNumberOfDataSets(level);
         std::array<int64_t, 3> ratios = {1, 1, 1};
         if (count == 0) break;
-        if (level > 0) ratios = ratios_to_coarser(information, level);
+        if (level > 0) ratios = compute_ratios_to_coarser(information, level);
         for (unsigned number = 0; number < count; number++) {
             const vtkAMRBox &box = amr->GetAMRBox(level, number);
             if (box.IsInvalid() || !fits_coarser_level(box, ratios)) return {};

@@ -54,7 +54,7 @@ template <typename T> bool borrow_aos(vtkDataArray *array, array_view &view)
 }
 
 /* Returns the distance in bytes between blocks if they are equally spaced in ascending order, otherwise 0. */
-template <typename T> int64_t block_stride(vtkSOADataArrayTemplate<T> *array)
+template <typename T> int64_t find_block_stride(vtkSOADataArrayTemplate<T> *array)
 {
     auto address = [array](int c) { return reinterpret_cast<uintptr_t>(array->GetComponentArrayPointer(c)); };
     const int components = array->GetNumberOfComponents();
@@ -70,7 +70,7 @@ template <typename T> bool borrow_soa(vtkDataArray *array, array_view &view)
 {
     auto *typed = vtkSOADataArrayTemplate<T>::FastDownCast(array);
     if (!typed || array->GetNumberOfTuples() == 0) return false;
-    const int64_t stride = block_stride(typed);
+    const int64_t stride = find_block_stride(typed);
     if (stride == 0) return false;
     view = describe_array(array, element_type<T>());
     view.data = typed->GetComponentArrayPointer(0);

@@ -208,7 +208,7 @@ void read_faces(vtkUnstructuredGrid *grid, const raw_cells<Id> &raw, cells_with_
 }
 
 template <typename Id>
-new_size count_new(const raw_cells<Id> &raw, const cells_with_faces &with_faces, cell_counts &counts)
+new_size count_converted_cells(const raw_cells<Id> &raw, const cells_with_faces &with_faces, cell_counts &counts)
 {
     new_size size;
     size_t number = 0;
@@ -230,8 +230,8 @@ new_size count_new(const raw_cells<Id> &raw, const cells_with_faces &with_faces,
 }
 
 template <typename Id>
-void fill_new(const raw_cells<Id> &raw, const cells_with_faces &with_faces, uint8_t *types, int64_t *offsets,
-              Id *connectivity, std::vector<int64_t> *source)
+void fill_converted_cells(const raw_cells<Id> &raw, const cells_with_faces &with_faces, uint8_t *types,
+                          int64_t *offsets, Id *connectivity, std::vector<int64_t> *source)
 {
     int64_t at = 0;
     size_t number = 0;
@@ -285,7 +285,7 @@ void convert_cells(vtkUnstructuredGrid *grid, const raw_cells<Id> &raw, const st
     cell_list &cells = view.cells;
     cells_with_faces with_faces;
     read_faces(grid, raw, with_faces);
-    const new_size size = count_new(raw, with_faces, view.counts);
+    const new_size size = count_converted_cells(raw, with_faces, view.counts);
     cells.count = size.cells;
     cells.is_one_to_one = size.is_one_to_one;
     if (!cells.is_one_to_one) cells.source.reserve(static_cast<size_t>(size.cells));
@@ -294,7 +294,7 @@ void convert_cells(vtkUnstructuredGrid *grid, const raw_cells<Id> &raw, const st
     auto *types = reinterpret_cast<uint8_t *>(held.allocate(static_cast<size_t>(size.cells)));
     auto *offsets = reinterpret_cast<int64_t *>(held.allocate(static_cast<size_t>(size.cells + 1) * 8));
     auto *connectivity = reinterpret_cast<Id *>(held.allocate(static_cast<size_t>(size.vertices) * sizeof(Id)));
-    fill_new(raw, with_faces, types, offsets, connectivity, cells.is_one_to_one ? nullptr : &cells.source);
+    fill_converted_cells(raw, with_faces, types, offsets, connectivity, cells.is_one_to_one ? nullptr : &cells.source);
 
     mesh.cell_count = size.cells;
     mesh.cell_types = {types, INSITU_UINT8, 0};
@@ -341,7 +341,7 @@ bool is_apart(uint8_t type)
 }
 
 /* Returns whether each Lagrange cell has the same order along all axes. */
-bool has_even_orders(vtkUnstructuredGrid *grid)
+bool has_equal_orders_on_axes(vtkUnstructuredGrid *grid)
 {
     vtkDataArray *degrees = grid->GetCellData()->GetHigherOrderDegrees();
     bool is_even = true;
@@ -358,7 +358,7 @@ bool view_typed(vtkUnstructuredGrid *grid, Array *offsets, Array *connectivity, 
 {
     using id = typename Array::ValueType;
     raw_cells<id> raw = {grid->GetCellTypesArray()->GetPointer(0), offsets->GetPointer(0), connectivity->GetPointer(0),
-                         grid->GetNumberOfCells(), has_even_orders(grid)};
+                         grid->GetNumberOfCells(), has_equal_orders_on_axes(grid)};
     const int64_t connectivity_count = connectivity->GetNumberOfValues();
     std::array<int64_t, 256> by_type{};
     bool is_as_it_is = true;

@@ -43,7 +43,7 @@ struct lattice {
 bool find_lattice(vtkDataSet *data, lattice &l)
 {
     int64_t cells[3], axes[3] = {1, 1, 1};
-    if (!insitu_vtk::cells_of_lattice(data, cells)) return false;
+    if (!insitu_vtk::count_cells_of_lattice(data, cells)) return false;
     size_t count = 0;
     for (const int64_t along : cells)
         if (along > 0) axes[count++] = along + 1;
@@ -137,8 +137,8 @@ void set_points(vtkDataSet *data, vtkUnstructuredGrid *grid)
 void hide_cells_of_hidden_points(vtkDataSet *data, vtkUnstructuredGrid *grid)
 {
     insitu_lattice lattice = {};
-    insitu_vtk::cells_of_lattice(data, lattice.cells);
-    const auto flags = insitu_vtk::lattice_flags(data, lattice);
+    insitu_vtk::count_cells_of_lattice(data, lattice.cells);
+    const auto flags = insitu_vtk::make_lattice_ghost_flags(data, lattice);
     if (!flags || flags->GetName()) return;
     bool is_any_hidden = false;
     for (vtkIdType i = 0; i < flags->GetNumberOfValues(); i++) is_any_hidden = is_any_hidden || flags->GetValue(i);

@@ -68,7 +68,7 @@ void list_points(vtkDataSet *data, const std::string &what, held_arrays &held, c
 
 } // namespace
 
-bool cells_of_lattice(vtkDataSet *data, int64_t cells[3])
+bool count_cells_of_lattice(vtkDataSet *data, int64_t cells[3])
 {
     std::array<int, 3> d{};
     if (auto *image = vtkImageData::SafeDownCast(data))
@@ -90,7 +90,7 @@ bool view_lattice(vtkDataSet *data, const std::string &what, held_arrays &held, 
                   insitu_lattice &lattice)
 {
     lattice = {};
-    if (!cells_of_lattice(data, lattice.cells)) return false;
+    if (!count_cells_of_lattice(data, lattice.cells)) return false;
     mesh.vertex_count = data->GetNumberOfPoints();
     mesh.cell_count = data->GetNumberOfCells();
     mesh.lattice = &lattice;
@@ -104,7 +104,7 @@ bool view_lattice(vtkDataSet *data, const std::string &what, held_arrays &held, 
     return true;
 }
 
-vtkSmartPointer<vtkUnsignedCharArray> lattice_flags(vtkDataSet *data, const insitu_lattice &lattice)
+vtkSmartPointer<vtkUnsignedCharArray> make_lattice_ghost_flags(vtkDataSet *data, const insitu_lattice &lattice)
 {
     using flag_list = vtkSmartPointer<vtkUnsignedCharArray>;
     auto cells = flag_list::Take(insitu_vtk_ghost_flags(data->GetCellData(), data->GetNumberOfCells()));

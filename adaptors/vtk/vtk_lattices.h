@@ -17,7 +17,7 @@ namespace insitu_vtk
 
 /* Returns the number of cells along each axis of an image, a rectilinear or a curvilinear grid. Returns false for other
  * data, or if fewer than two axes have cells. */
-bool cells_of_lattice(vtkDataSet *data, int64_t cells[3]);
+bool count_cells_of_lattice(vtkDataSet *data, int64_t cells[3]);
 
 /* Fills in the lattice and the coordinates of mesh from data, with the same vertices and cells in the same order.
  * Conversions are stored in `held` and counted. mesh.lattice points to lattice. Returns false without changes if data
@@ -27,7 +27,7 @@ bool view_lattice(vtkDataSet *data, const std::string &what, held_arrays &held, 
 
 /* Returns the ghost flags of data's cells. Without hidden points, this is VTK's own array; otherwise it is a new array
  * without a name, in which cells with a hidden point are flagged as hidden. Returns null if there are no flags. */
-vtkSmartPointer<vtkUnsignedCharArray> lattice_flags(vtkDataSet *data, const insitu_lattice &lattice);
+vtkSmartPointer<vtkUnsignedCharArray> make_lattice_ghost_flags(vtkDataSet *data, const insitu_lattice &lattice);
 
 } // namespace insitu_vtk
 

@@ -48,7 +48,7 @@ ROWS_INLINE lanes select_lanes(lanes which, lanes a, lanes b)
 }
 
 /* Returns the bitwise OR of all lanes. */
-ROWS_INLINE uint32_t any_bits(lanes values)
+ROWS_INLINE uint32_t or_all_lanes(lanes values)
 {
     quad parts[4];
     uint64_t halves[2];

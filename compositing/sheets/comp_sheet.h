@@ -30,8 +30,9 @@ enum { COMP_WORDS = 7, COMP_PIXEL_WORDS = 5, COMP_SHEET_HEAD = 20, COMP_SHEET_SL
 /* A sheet stores words: the members of a fragment except its pixel index, in their order (fragment.h), or the depth and
  * RGBA of a finished pixel. */
 typedef struct comp_sheet {
-    uint32_t words[COMP_WORDS][COMP_STRIP_PIXELS]; /* indexed by comp_grid_at(); words of absent pixels are undefined */
-    uint16_t masks[COMP_ROWS];                     /* bit mask per row: the pixels that have a fragment */
+    uint32_t words[COMP_WORDS]
+                  [COMP_STRIP_PIXELS]; /* indexed by comp_grid_index_in_strip(); words of absent pixels are undefined */
+    uint16_t masks[COMP_ROWS];         /* bit mask per row: the pixels that have a fragment */
     uint32_t strip;
     /* set if all fragments are hits of opaque surfaces, so that only the nearest one is visible if sheets are joined */
     bool is_opaque;

@@ -20,13 +20,13 @@ enum { WORD_T_IN = 0, WORD_COLOUR = 2, WORD_TRANSMITTANCE = 5, WORD_KIND = 6, WO
 
 /* Returns the lanes in the mask `both` in which the fragment of `other` is nearer than the fragment of `all`. Equal
  * depths and NaN are compared by fragment_compare(). */
-ROWS_INLINE lanes nearer_lanes(const comp_sheet *all, const comp_sheet *other, int at, unsigned both)
+ROWS_INLINE lanes find_nearer_lanes(const comp_sheet *all, const comp_sheet *other, int at, unsigned both)
 {
     const float_lanes old = (float_lanes)load_lanes(&all->words[WORD_T_IN][at]);
     const float_lanes new = (float_lanes)load_lanes(&other->words[WORD_T_IN][at]);
     const lanes is_in_both = mask_lanes(both), nearer = (lanes)(new < old) & is_in_both;
     const lanes undecided = is_in_both & ~nearer & ~(lanes)(old < new);
-    if (!any_bits(undecided)) return nearer;
+    if (!or_all_lanes(undecided)) return nearer;
     uint32_t decided[COMP_LANES];
     store_lanes(decided, nearer);
     for (int l = 0; l < COMP_LANES; l++) {
@@ -46,7 +46,7 @@ static void join_sheets(comp_sheet *all, const comp_sheet *other, uint16_t left[
         left[r] = (uint16_t)(are_opaque ? 0 : both);
         if (!other->masks[r]) continue;
         lanes taken = mask_lanes(other->masks[r] & ~both);
-        if (both && are_opaque) taken |= nearer_lanes(all, other, at, both);
+        if (both && are_opaque) taken |= find_nearer_lanes(all, other, at, both);
         for (int w = 0; w < COMP_WORDS; w++)
             store_lanes(&all->words[w][at],
                         select_lanes(taken, load_lanes(&other->words[w][at]), load_lanes(&all->words[w][at])));

@@ -11,7 +11,7 @@
 enum word_kind { WORD_LINEAR, WORD_CONSTANT, WORD_UNIFORM, WORD_REPEATED };
 
 /* Returns the nearest lane in `known` to the left of `lane`, or the nearest to the right if there is none. */
-static uint8_t nearest_lane(unsigned known, int lane)
+static uint8_t find_nearest_lane(unsigned known, int lane)
 {
     const unsigned left = known & ((1u << lane) - 1);
     return (uint8_t)(left ? 31 - __builtin_clz(left) : __builtin_ctz(known));
@@ -27,7 +27,7 @@ static void find_fresh_lanes(sheet_plan *plan)
         plan->fresh[i] = (uint16_t)(plan->mask[i] & ~known);
         for (unsigned left = plan->fresh[i]; left; left &= left - 1) {
             const int lane = __builtin_ctz(left);
-            plan->source[i][lane] = nearest_lane(known, lane);
+            plan->source[i][lane] = find_nearest_lane(known, lane);
         }
         known |= plan->mask[i];
     }
@@ -95,7 +95,7 @@ ROWS_INLINE void start_prediction(prediction *f, lanes values)
 
 /* ---- nibbles ---------------------------------------------------------------------------------------------------- */
 
-static inline unsigned nibble_count(uint32_t greatest)
+static inline unsigned count_nibbles(uint32_t greatest)
 {
     return greatest ? (35 - (unsigned)__builtin_clz(greatest)) / 4 : 0;
 }
@@ -237,7 +237,7 @@ typedef struct word_residuals {
 } word_residuals;
 
 /* Returns the residuals of the first row. Each value of this row is predicted from its left neighbour. */
-ROWS_INLINE lanes first_row_residuals(lanes values, unsigned mask)
+ROWS_INLINE lanes compute_first_row_residuals(lanes values, unsigned mask)
 {
     uint32_t own[COMP_LANES + 1];
     const lanes compact = mask == 0xffff ? values : compress_lanes(values, mask);
@@ -263,13 +263,13 @@ ROWS_INLINE enum word_kind predict_word(const uint32_t *words, const sheet_plan 
             if (mask != 0xffff) line = compress_lanes(line, mask);
             update_prediction(&f, values, mask, plan->fresh[i]);
         } else {
-            above = line = first_row_residuals(values, mask);
+            above = line = compute_first_row_residuals(values, mask);
             start_prediction(&f, values);
         }
         out->rows[WORD_CONSTANT][i] = above;
         out->rows[WORD_LINEAR][i] = line;
         for (int predictor = 0; predictor < 2; predictor++) {
-            out->nibbles[predictor][i] = (uint8_t)nibble_count(any_bits(out->rows[predictor][i]));
+            out->nibbles[predictor][i] = (uint8_t)count_nibbles(or_all_lanes(out->rows[predictor][i]));
             bytes[predictor] += packed_bytes(out->nibbles[predictor][i], plan->number[i]);
         }
     }
@@ -300,8 +300,8 @@ ROWS_INLINE enum word_kind find_kind(const comp_sheet *sheet, const sheet_plan *
         others |= (values ^ first) & is_there;
         next |= (values ^ load_lanes(before + plan->row[i] * COMP_LANES)) & is_there;
     }
-    if (!any_bits(others)) return WORD_UNIFORM;
-    return word && !any_bits(next) ? WORD_REPEATED : WORD_LINEAR;
+    if (!or_all_lanes(others)) return WORD_UNIFORM;
+    return word && !or_all_lanes(next) ? WORD_REPEATED : WORD_LINEAR;
 }
 
 static unsigned char *write_words(const comp_sheet *sheet, const sheet_plan *plan, int words, uint32_t *kinds,

@@ -220,7 +220,7 @@ static void receive_sparse(round *r)
 
 /* Marks the last message to a rank as final (flag 0), and the earlier ones as followed by more (flag 1). Returns false
  * if there is no message to the rank. */
-static bool mark_last(const comp_messages *out, int rank)
+static bool mark_final_message(const comp_messages *out, int rank)
 {
     comp_message *last = NULL;
     for (comp_message *m = out->first; m; m = m->next) {
@@ -260,7 +260,7 @@ insitu_status comp_messages_round(comp_transport *transport, const comp_route *r
     for (int i = 1; i <= partners && !r.is_sparse; i++) {
         const int digit = (own + i) % route->radix[number];
         const int rank = comp_route_rank(route, comp_route_partner(route, number, stride, place, digit));
-        if (!mark_last(out, rank)) send_data(&r, last_message, LAST_MESSAGE_BYTES, rank);
+        if (!mark_final_message(out, rank)) send_data(&r, last_message, LAST_MESSAGE_BYTES, rank);
     }
     return run_round(&r, out);
 }
@@ -279,6 +279,6 @@ insitu_status comp_messages_to_owners(comp_transport *transport, const comp_rout
     if (!sends_all && !receives_all) return status;
     make_requests(&r, out, 1);
     const int partner = sends_all ? comp_route_rank(route, place - route->owners) : 0;
-    if (sends_all && !mark_last(out, partner)) send_data(&r, last_message, LAST_MESSAGE_BYTES, partner);
+    if (sends_all && !mark_final_message(out, partner)) send_data(&r, last_message, LAST_MESSAGE_BYTES, partner);
     return run_round(&r, out);
 }

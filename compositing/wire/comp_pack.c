@@ -72,7 +72,7 @@ static bool pack_owner(const owner_strips *c, uint32_t owner, int share, int sha
     bool is_ok = true;
     for (uint32_t i = first; i < end; i++) p.remaining += comp_strips_count(c->strips, c->order[i]);
     for (uint32_t i = first; i < end && is_ok; i++)
-        is_ok = comp_strips_sheets(c->strips, c->order[i], layers, pack_sheet, &p);
+        is_ok = comp_strips_pass_sheets(c->strips, c->order[i], layers, pack_sheet, &p);
     return is_ok;
 }
 
@@ -138,8 +138,8 @@ insitu_status comp_pack(const comp_strips *strips, const comp_owners *owners, co
 
 /* Forwards the parcels for owners whose place has this digit at the round's position. Parcels for places that differ
  * from this rank's place in a digit of an earlier round have already been sent in that round. */
-static bool forward_to(const comp_messages *in, const comp_route *route, int round, int place, int digit,
-                       comp_writer *writer)
+static bool forward_parcels_with_digit(const comp_messages *in, const comp_route *route, int round, int place,
+                                       int digit, comp_writer *writer)
 {
     const int stride = comp_route_stride(route, round);
     for (const comp_message *m = in->first; m; m = m->next) {
@@ -165,7 +165,7 @@ insitu_status comp_forward(const comp_messages *in, const comp_route *route, int
     for (int i = 1; i < route->radix[round] && place < route->owners; i++) {
         const int digit = (own + i) % route->radix[round];
         comp_writer writer = {.rank = comp_route_rank(route, comp_route_partner(route, round, stride, place, digit))};
-        const bool is_ok = forward_to(in, route, round, place, digit, &writer);
+        const bool is_ok = forward_parcels_with_digit(in, route, round, place, digit, &writer);
         comp_messages_append(out, &writer.messages);
         if (is_ok) continue;
         comp_messages_free(out);
@@ -178,7 +178,7 @@ insitu_status comp_forward(const comp_messages *in, const comp_route *route, int
 
 /* If sheets is NULL, adds the number of each strip's sheets to starts. Otherwise stores the address of each sheet at
  * the position that counting sort gives it in `sheets`. */
-static void visit_sheets(const comp_messages *in, int owner, uint32_t *starts, const unsigned char **sheets)
+static void count_or_store_sheets(const comp_messages *in, int owner, uint32_t *starts, const unsigned char **sheets)
 {
     for (const comp_message *m = in->first; m; m = m->next) {
         comp_parcel parcel;
@@ -203,13 +203,13 @@ insitu_status comp_received_find(const comp_grid *grid, int owner, const comp_me
     uint32_t sum = 0;
     *out = (comp_received){NULL, base_calloc((size_t)grid->strips + 1, sizeof *out->starts)};
     if (out->starts) {
-        visit_sheets(in, owner, out->starts, NULL);
+        count_or_store_sheets(in, owner, out->starts, NULL);
         for (uint32_t s = 0; s < grid->strips; s++) out->starts[s] = sum += out->starts[s];
         out->starts[grid->strips] = sum;
         out->sheets = base_alloc((size_t)sum * sizeof *out->sheets);
     }
     if (out->sheets) {
-        visit_sheets(in, owner, out->starts, out->sheets);
+        count_or_store_sheets(in, owner, out->starts, out->sheets);
         return INSITU_OK;
     }
     comp_received_free(out);

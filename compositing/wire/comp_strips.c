@@ -132,13 +132,13 @@ int64_t comp_strips_count(const comp_strips *strips, uint32_t strip)
 /* ---- sheets ----------------------------------------------------------------------------------------------------- */
 
 /* Fills a sheet with all fragments of the strip; returns false if a pixel has more than one fragment. */
-static bool fill_single(const comp_strips *s, uint32_t strip, comp_sheet *sheet)
+static bool fill_sheet_of_single_fragments(const comp_strips *s, uint32_t strip, comp_sheet *sheet)
 {
     comp_sheet_begin(sheet, strip);
     for (uint32_t r = s->starts[strip]; r < s->starts[strip + 1]; r++) {
         const fragment *item = s->items + s->ranges[r].first;
         for (const fragment *end = item + s->ranges[r].count; item < end; item++) {
-            const uint32_t at = comp_grid_at(s->grid, item->pixel);
+            const uint32_t at = comp_grid_index_in_strip(s->grid, item->pixel);
             if (comp_sheet_has(sheet, at)) return false;
             comp_sheet_put(sheet, at, item);
         }
@@ -161,7 +161,7 @@ static void sort_pixel(const fragment **order, uint32_t count)
 
 /* Lists the strip's fragments sorted by pixel. On return, the fragments of pixel k begin at index ends[k]. Returns
  * false if memory ran out. */
-static bool list_pixels(const comp_strips *s, uint32_t strip, comp_layers *layers)
+static bool list_fragments_by_pixel(const comp_strips *s, uint32_t strip, comp_layers *layers)
 {
     const int64_t count = comp_strips_count(s, strip);
     uint32_t *const ends = layers->ends;
@@ -174,12 +174,12 @@ static bool list_pixels(const comp_strips *s, uint32_t strip, comp_layers *layer
     memset(ends, 0, sizeof layers->ends);
     for (uint32_t r = s->starts[strip]; r < s->starts[strip + 1]; r++)
         for (uint32_t i = 0; i < s->ranges[r].count; i++)
-            ends[comp_grid_at(s->grid, s->items[s->ranges[r].first + i].pixel)]++;
+            ends[comp_grid_index_in_strip(s->grid, s->items[s->ranges[r].first + i].pixel)]++;
     for (int k = 1; k <= COMP_STRIP_PIXELS; k++) ends[k] += ends[k - 1];
     for (uint32_t r = s->starts[strip]; r < s->starts[strip + 1]; r++)
         for (uint32_t i = 0; i < s->ranges[r].count; i++) {
             const fragment *const item = s->items + s->ranges[r].first + i;
-            layers->order[--ends[comp_grid_at(s->grid, item->pixel)]] = item;
+            layers->order[--ends[comp_grid_index_in_strip(s->grid, item->pixel)]] = item;
         }
     for (int k = 0; k < COMP_STRIP_PIXELS; k++) sort_pixel(layers->order + ends[k], ends[k + 1] - ends[k]);
     return true;
@@ -199,12 +199,13 @@ static int fill_layer(const comp_layers *layers, uint32_t n, comp_sheet *sheet, 
     return count;
 }
 
-bool comp_strips_sheets(const comp_strips *s, uint32_t strip, comp_layers *layers, comp_sheet_callback *take,
-                        void *state)
+bool comp_strips_pass_sheets(const comp_strips *s, uint32_t strip, comp_layers *layers, comp_sheet_callback *take,
+                             void *state)
 {
     if (s->starts[strip] == s->starts[strip + 1]) return true;
-    if (fill_single(s, strip, &layers->sheet)) return take(state, &layers->sheet, (int)comp_strips_count(s, strip));
-    if (!list_pixels(s, strip, layers)) return false;
+    if (fill_sheet_of_single_fragments(s, strip, &layers->sheet))
+        return take(state, &layers->sheet, (int)comp_strips_count(s, strip));
+    if (!list_fragments_by_pixel(s, strip, layers)) return false;
     for (uint32_t n = 0, count; (count = (uint32_t)fill_layer(layers, n, &layers->sheet, strip)) > 0; n++)
         if (!take(state, &layers->sheet, (int)count)) return false;
     return true;

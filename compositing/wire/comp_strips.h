@@ -31,7 +31,7 @@ void comp_strips_free(comp_strips *strips);
 /* Returns the number of the strip's fragments. */
 int64_t comp_strips_count(const comp_strips *strips, uint32_t strip);
 
-/* Buffers of one thread for comp_strips_sheets(). A zeroed struct is empty. */
+/* Buffers of one thread for comp_strips_pass_sheets(). A zeroed struct is empty. */
 typedef struct comp_layers {
     comp_sheet sheet;
     /* index of each pixel's first fragment in `order`; while fragments are listed, the index behind its last
@@ -49,7 +49,7 @@ typedef bool comp_sheet_callback(void *state, const comp_sheet *sheet, int count
 /* Passes a strip's fragments to the callback in sheets: first the nearest fragment of every pixel, then the second
  * fragment of every pixel that has several, and so on. Returns false if memory ran out or the callback returned false.
  * Local; several threads may call it at once. */
-bool comp_strips_sheets(const comp_strips *strips, uint32_t strip, comp_layers *layers, comp_sheet_callback *take,
-                        void *state);
+bool comp_strips_pass_sheets(const comp_strips *strips, uint32_t strip, comp_layers *layers, comp_sheet_callback *take,
+                             void *state);
 
 #endif

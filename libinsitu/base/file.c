@@ -32,7 +32,7 @@ static bool fail_for_file_type(file_failure *failure, mode_t mode)
     return false;
 }
 
-static bool fail_size(file_failure *failure, size_t limit)
+static bool fail_for_file_size(file_failure *failure, size_t limit)
 {
     *failure = (file_failure){.is_missing = false};
     snprintf(failure->reason, sizeof failure->reason, "it has more than %zu bytes, the most that is read", limit);
@@ -88,7 +88,7 @@ static bool read_all(int file, size_t limit, file_content *out, file_failure *fa
 {
     size_t capacity = (size_t)out->stamp.st_size + 1;
     while (true) {
-        if (out->size > limit) return fail_size(failure, limit);
+        if (out->size > limit) return fail_for_file_size(failure, limit);
         if (!out->text || out->size == capacity) {
             if (out->text) capacity += capacity / 2 + 4096;
             char *more = base_realloc(out->text, capacity + 1);
@@ -109,7 +109,7 @@ bool file_read(const char *path, size_t limit, file_content *out, file_failure *
     const int file = open_regular(path, O_RDONLY, &out->stamp, failure);
     if (file < 0) return false;
     const bool is_small = (uintmax_t)out->stamp.st_size <= limit;
-    const bool is_read = is_small ? read_all(file, limit, out, failure) : fail_size(failure, limit);
+    const bool is_read = is_small ? read_all(file, limit, out, failure) : fail_for_file_size(failure, limit);
     close(file);
     if (is_read) return true;
     base_free(out->text);

@@ -24,10 +24,10 @@ fragment fragment_fold(const fragment *sorted, int64_t count)
 {
     fragment open[FRAGMENT_HALVINGS + 2];
     int heights[FRAGMENT_HALVINGS + 2] = {0}, depth = 1;
-    int32_t leaf = fragment_leaf(sorted[0].t_in);
+    int32_t leaf = fragment_find_leaf(sorted[0].t_in);
     open[0] = sorted[0];
     for (int64_t i = 1; i < count; i++) {
-        const int32_t next = fragment_leaf(sorted[i].t_in);
+        const int32_t next = fragment_find_leaf(sorted[i].t_in);
         const int height = find_common_height(leaf, next);
         leaf = next;
         if (height == 0) {
@@ -70,7 +70,7 @@ static void fold_node(fold_part *part, const fragment *sorted, int64_t count, in
     while (count > 1 && height > 0 && !has_all_of(part, first_leaf, height)) {
         const int32_t middle = first_leaf + (1 << --height);
         int64_t left = 0;
-        while (left < count && fragment_leaf(sorted[left].t_in) < middle) left++;
+        while (left < count && fragment_find_leaf(sorted[left].t_in) < middle) left++;
         if (left) fold_node(part, sorted, left, first_leaf, height);
         sorted += left;
         count -= left;

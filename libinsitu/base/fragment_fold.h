@@ -33,7 +33,7 @@ enum { FRAGMENT_INTERVALS = 8, FRAGMENT_HALVINGS = 15 };
 /* Returns the number of the leaf that contains t; the numbers increase with t. The leaves of one interval differ only
  * in the lowest FRAGMENT_HALVINGS bits. All t above 1024, about a thousand times the scene's depth, are in one leaf,
  * and so are all t below -1024. */
-static inline int32_t fragment_leaf(float t)
+static inline int32_t fragment_find_leaf(float t)
 {
     const float most = 1024, at = t < -most ? -most : t < most ? t : most; /* this form of a clamp also replaces NaN */
     return (int32_t)floorf(at * (float)(FRAGMENT_INTERVALS << FRAGMENT_HALVINGS));
@@ -41,7 +41,7 @@ static inline int32_t fragment_leaf(float t)
 
 static inline int32_t fragment_interval_number(float t)
 {
-    return fragment_leaf(t) >> FRAGMENT_HALVINGS;
+    return fragment_find_leaf(t) >> FRAGMENT_HALVINGS;
 }
 
 /* Folds the fragments of one interval to one fragment. They must be sorted (fragment_order.h) and must not contain a

@@ -62,7 +62,8 @@ void text_print(text_output *out, const char *format, ...)
 
 typedef bool file_writer(const char *path, const char *bytes, size_t size, file_failure *failure);
 
-static bool print_to(const char *path, text_writer *write, const void *what, file_writer *put, file_failure *failure)
+static bool write_text_to_file(const char *path, text_writer *write, const void *what, file_writer *put,
+                               file_failure *failure)
 {
     c_locale numbers;
     text_output out = {.is_incomplete = !c_locale_enter(&numbers)};
@@ -78,15 +79,15 @@ static bool print_to(const char *path, text_writer *write, const void *what, fil
 
 bool text_file_replace(const char *path, text_writer *write, const void *what, file_failure *failure)
 {
-    return print_to(path, write, what, file_replace, failure);
+    return write_text_to_file(path, write, what, file_replace, failure);
 }
 
 bool text_file_append(const char *path, text_writer *write, const void *what, file_failure *failure)
 {
-    return print_to(path, write, what, file_append, failure);
+    return write_text_to_file(path, write, what, file_append, failure);
 }
 
-size_t text_keep_below(char *text, long long number)
+size_t text_keep_lines_below(char *text, long long number)
 {
     size_t kept = 0;
     for (char *line = text, *end; (end = strchr(line, '\n')) != NULL; line = end + 1) {

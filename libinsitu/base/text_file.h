@@ -37,6 +37,6 @@ bool text_file_append(const char *path, text_writer *write, const void *what, fi
 
 /* Keeps only the lines that start with an integer below `number`, and moves them to the start of the text. Returns the
  * number of bytes of the kept lines. If the text ends without a newline, its last line is incomplete and is removed. */
-size_t text_keep_below(char *text, long long number);
+size_t text_keep_lines_below(char *text, long long number);
 
 #endif

@@ -19,7 +19,7 @@ static const insitu_report no_report = {.schedule = "", .copied_why = "", .left_
 
 /* Returns whether the call is refused because a fill function is running. In this case the error is recorded in the
  * session. The cast removes const, because recording the error is the only change of the session. */
-static bool is_in_fill(const insitu_session *session, const char *call)
+static bool refuse_call_in_fill(const insitu_session *session, const char *call)
 {
     return session_refuse_in_fill(&((insitu_session *)(uintptr_t)session)->meshes, call);
 }
@@ -33,7 +33,7 @@ const char *insitu_error(const insitu_session *session)
 const insitu_report *insitu_last_report(const insitu_session *session)
 {
     if (!session) return NULL;
-    return is_in_fill(session, "insitu_last_report") ? &no_report : &session->report.public_report;
+    return refuse_call_in_fill(session, "insitu_last_report") ? &no_report : &session->report.public_report;
 }
 
 const char *insitu_status_name(insitu_status status)
@@ -158,7 +158,7 @@ static insitu_status store_error(insitu_session *session, const base_error *erro
 insitu_status insitu_set_mesh(insitu_session *session, const char *mesh_name, const insitu_mesh *mesh)
 {
     base_error error = {.status = INSITU_OK};
-    if (!session || is_in_fill(session, "insitu_set_mesh")) return INSITU_ERROR_ARGUMENT;
+    if (!session || refuse_call_in_fill(session, "insitu_set_mesh")) return INSITU_ERROR_ARGUMENT;
     session_set_mesh(&session->meshes, mesh_name, SESSION_WHOLE, mesh, &error);
     return store_error(session, &error);
 }
@@ -166,7 +166,7 @@ insitu_status insitu_set_mesh(insitu_session *session, const char *mesh_name, co
 insitu_status insitu_set_field(insitu_session *session, const char *mesh_name, const insitu_field *field)
 {
     base_error error = {.status = INSITU_OK};
-    if (!session || is_in_fill(session, "insitu_set_field")) return INSITU_ERROR_ARGUMENT;
+    if (!session || refuse_call_in_fill(session, "insitu_set_field")) return INSITU_ERROR_ARGUMENT;
     session_set_field(&session->meshes, mesh_name, SESSION_WHOLE, field, &error);
     return store_error(session, &error);
 }
@@ -174,7 +174,7 @@ insitu_status insitu_set_field(insitu_session *session, const char *mesh_name, c
 insitu_status insitu_set_block(insitu_session *session, const char *mesh_name, int64_t block, const insitu_mesh *mesh)
 {
     base_error error = {.status = INSITU_OK};
-    if (!session || is_in_fill(session, "insitu_set_block")) return INSITU_ERROR_ARGUMENT;
+    if (!session || refuse_call_in_fill(session, "insitu_set_block")) return INSITU_ERROR_ARGUMENT;
     session_set_mesh(&session->meshes, mesh_name, block, mesh, &error);
     return store_error(session, &error);
 }
@@ -183,7 +183,7 @@ insitu_status insitu_set_block_field(insitu_session *session, const char *mesh_n
                                      const insitu_field *field)
 {
     base_error error = {.status = INSITU_OK};
-    if (!session || is_in_fill(session, "insitu_set_block_field")) return INSITU_ERROR_ARGUMENT;
+    if (!session || refuse_call_in_fill(session, "insitu_set_block_field")) return INSITU_ERROR_ARGUMENT;
     session_set_field(&session->meshes, mesh_name, block, field, &error);
     return store_error(session, &error);
 }
@@ -191,7 +191,7 @@ insitu_status insitu_set_block_field(insitu_session *session, const char *mesh_n
 insitu_status insitu_parameter(insitu_session *session, const char *name, double *value)
 {
     base_error error = {.status = INSITU_OK};
-    if (!session || is_in_fill(session, "insitu_parameter")) return INSITU_ERROR_ARGUMENT;
+    if (!session || refuse_call_in_fill(session, "insitu_parameter")) return INSITU_ERROR_ARGUMENT;
     session_read_parameter(&session->scene_file, &session->requested_parameters, name, value, &error);
     return store_error(session, &error);
 }
@@ -199,7 +199,7 @@ insitu_status insitu_parameter(insitu_session *session, const char *name, double
 insitu_status insitu_keep_pictures(insitu_session *session, int keep)
 {
     base_error error = {.status = INSITU_OK};
-    if (!session || is_in_fill(session, "insitu_keep_pictures")) return INSITU_ERROR_ARGUMENT;
+    if (!session || refuse_call_in_fill(session, "insitu_keep_pictures")) return INSITU_ERROR_ARGUMENT;
     session_free_kept_pictures(&session->kept_pictures);
     int is_on = keep != 0;
     if (session_check_mpi(&error, MPI_Bcast(&is_on, 1, MPI_INT, 0, session->team.comm), "MPI_Bcast") == INSITU_OK)
@@ -209,7 +209,8 @@ insitu_status insitu_keep_pictures(insitu_session *session, int keep)
 
 const insitu_picture *insitu_last_pictures(const insitu_session *session, int *count)
 {
-    const int kept = session && !is_in_fill(session, "insitu_last_pictures") ? session->kept_pictures.count : 0;
+    const int kept =
+        session && !refuse_call_in_fill(session, "insitu_last_pictures") ? session->kept_pictures.count : 0;
     if (count) *count = kept;
     return kept ? session->kept_pictures.items : NULL;
 }
@@ -219,13 +220,13 @@ insitu_status insitu_destroy(insitu_session **session)
     if (!session || !*session) return INSITU_OK;
     insitu_session *s = *session;
     thread_error = (base_error){0};
-    if (is_in_fill(s, "insitu_destroy")) {
+    if (refuse_call_in_fill(s, "insitu_destroy")) {
         thread_error = s->meshes.filling.refused_error;
         return INSITU_ERROR_ARGUMENT;
     }
     session_writer_drain(&s->writer);
     session_writer_collect(&s->writer, &s->report);
-    if (s->writer.failure_count) thread_error = session_writer_failure(&s->writer);
+    if (s->writer.failure_count) thread_error = session_writer_take_failure(&s->writer);
     if (is_mpi_running()) {
         session_share_error(s->team.comm, 0, &thread_error);
         session_team_free(&s->team);

@@ -34,7 +34,7 @@ enum change_word {
     WRITES_AT_ONCE,
     ISA_LOW, /* lowest instruction set and the lowest rank that has it, packed into one word and negated */
     ISA_HIGH,
-    REPORTING_RANK, /* lowest rank with warnings for all ranks (session_reporting_word()) */
+    REPORTING_RANK, /* lowest rank with warnings for all ranks (session_encode_rank_with_warnings()) */
     ROOT_TIME,      /* bit pattern of the time on rank 0 */
     CHANGE_WORDS
 };
@@ -69,24 +69,24 @@ static void pack_changes(const insitu_session *session, int64_t cycle, double ti
     const session_team *team = &session->team;
     const session_meshes *meshes = &session->meshes;
     const session_scene_file *file = &session->scene_file;
-    const int64_t names = (int64_t)(session_names_hash(meshes) >> 1);
+    const int64_t names = (int64_t)(session_hash_names(meshes) >> 1);
     words[CYCLE_HIGH] = cycle;
     /* the complement decreases as the cycle increases, like a negative number, but cannot overflow */
     words[CYCLE_LOW] = ~cycle;
-    words[FAILED] = session_pending_error(meshes) ? team->ranks - team->rank : 0;
+    words[FAILED] = session_find_pending_error(meshes) ? team->ranks - team->rank : 0;
     words[CELLS_CHANGED] = meshes->are_cells_changed || !session->space.has_extent;
     words[LEVELS_CHANGED] = meshes->are_levels_changed;
     words[NAMES_CHANGED] = meshes->are_names_changed || !session->catalogue.is_known;
     words[NAMES_HIGH] = names;
     words[NAMES_LOW] = ~names;
     words[SCENE_CHANGED] = session_is_scene_edited(file, team->rank);
-    words[THREADS_LACKING] = session_lacks_threads(&session->threads, file->scene.threads, team->cores);
+    words[THREADS_LACKING] = session_needs_thread_trial(&session->threads, file->scene.threads, team->cores);
     words[UNWRITTEN] = session->writer.failure_count;
     words[FILLED] = has_filled_field(meshes);
-    words[WRITES_AT_ONCE] = team->rank == 0 && !session_writer_is_behind(&session->writer, &file->scene);
+    words[WRITES_AT_ONCE] = team->rank == 0 && !session_writer_writes_after_step(&session->writer, &file->scene);
     words[ISA_LOW] = -(render_isa_level() * rank_limit + team->rank);
     words[ISA_HIGH] = render_isa_level();
-    words[REPORTING_RANK] = session_reporting_word(&session->report, team);
+    words[REPORTING_RANK] = session_encode_rank_with_warnings(&session->report, team);
     words[ROOT_TIME] = team->rank == 0 ? bits_from_double(time) : INT64_MIN;
 }
 
@@ -114,13 +114,14 @@ insitu_status session_find_changes(const insitu_session *session, int64_t cycle,
                              .isa_level = (int)(-all[ISA_LOW] / rank_limit),
                              .isa_rank = (int)(-all[ISA_LOW] % rank_limit),
                              .isa_best = (int)all[ISA_HIGH],
-                             .reporting_rank = session_reporting_rank((int)all[REPORTING_RANK], &session->team)};
+                             .reporting_rank =
+                                 session_decode_rank_with_warnings((int)all[REPORTING_RANK], &session->team)};
     return INSITU_OK;
 }
 
 static void report_pending_error(int root, const session_meshes *meshes, const session_team *team, base_error *shared)
 {
-    const base_error *mine = session_pending_error(meshes);
+    const base_error *mine = session_find_pending_error(meshes);
     if (team->rank == root && mine) base_fail(shared, mine->status, "rank %d: %.900s", root, mine->message);
     session_share_error(team->comm, root, shared);
 }

@@ -41,7 +41,8 @@ insitu_status session_read_parameter(const session_scene_file *file, session_req
                      file->path, others);
 }
 
-void session_warn_of_parameters(const scene *scene, const session_requested_names *requested, session_report *report)
+void session_warn_of_unused_parameters(const scene *scene, const session_requested_names *requested,
+                                       session_report *report)
 {
     for (int i = 0; i < scene->parameter_count; i++) {
         const char *name = scene->parameters[i].name;

@@ -20,6 +20,7 @@ insitu_status session_read_parameter(const session_scene_file *file, session_req
                                      const char *name, double *value, base_error *error);
 
 /* Warns of parameters that were never requested on this rank. Local. */
-void session_warn_of_parameters(const scene *scene, const session_requested_names *requested, session_report *report);
+void session_warn_of_unused_parameters(const scene *scene, const session_requested_names *requested,
+                                       session_report *report);
 
 #endif

@@ -91,7 +91,7 @@ static void warn_of_environment(const session_team *team, session_report *report
                          team->rank, isa);
 }
 
-static session_derive_basis derive_basis(insitu_session *s)
+static session_derive_basis make_derive_basis(insitu_session *s)
 {
     return (session_derive_basis){&s->scene_file.scene, &s->catalogue, &s->meshes, &s->team, &s->space.extent};
 }
@@ -101,25 +101,25 @@ static session_derive_basis derive_basis(insitu_session *s)
 static insitu_status derive_for_events(insitu_session *s, const session_moment *moment, bool images, base_error *error)
 {
     const scene *scene = &s->scene_file.scene;
-    const uint64_t needed = session_derived_of_events(scene, moment->cycle, images);
-    const session_derive_basis basis = derive_basis(s);
+    const uint64_t needed = session_find_derived_fields_of_events(scene, moment->cycle, images);
+    const session_derive_basis basis = make_derive_basis(s);
     if (!needed) return INSITU_OK;
-    session_mark_sources(scene, needed, &s->meshes);
+    session_mark_source_fields(scene, needed, &s->meshes);
     /* all ranks agree on the status here, because fill functions may be collective */
     insitu_status status = session_agree(s->team.comm, error);
     if (!status) session_fill_fields(&s->meshes, &s->catalogue, false, error);
-    if (!error->status) session_copy_requested(&s->meshes, s->team.threads, error);
+    if (!error->status) session_copy_requested_fields(&s->meshes, s->team.threads, error);
     if (!status) status = session_agree(s->team.comm, error);
     return status ? status : session_compute_derived(&basis, needed, error);
 }
 
 /* Computes the statistics that are due, and determines the images whose conditions hold. If one of them fails, the
  * others are still computed and images are still drawn; the error is returned afterwards. Collective. */
-static void update_events(insitu_session *s, session_plan_basis *basis, base_error *error)
+static void update_statistics_and_conditions(insitu_session *s, session_plan_basis *basis, base_error *error)
 {
     const session_moment *moment = basis->moment;
     const session_event_time now = {moment->cycle, moment->time};
-    const bool images = session_count_due(basis->scene, moment) > 0;
+    const bool images = session_count_due_images(basis->scene, moment) > 0;
     s->events.held_conditions = 0;
     if (session_has_events(basis->scene, moment->cycle, images)) {
         base_error own = {.status = INSITU_OK};
@@ -128,10 +128,10 @@ static void update_events(insitu_session *s, session_plan_basis *basis, base_err
             session_update_events(&s->events, basis->scene, &s->meshes, basis->catalogue, &s->team, &now, &valid, &own);
         if (!error->status) *error = own;
     }
-    basis->allowed_images = session_drawable_images(&s->events, basis->scene);
+    basis->allowed_images = session_find_drawable_images(&s->events, basis->scene);
 }
 
-static insitu_status name_derived(insitu_session *s, base_error *error)
+static insitu_status add_derived_fields(insitu_session *s, base_error *error)
 {
     return session_add_derived_fields(&s->scene_file.scene, s->scene_file.path, &s->catalogue, &s->meshes, &s->team,
                                       error);
@@ -144,7 +144,7 @@ static insitu_status list_meshes(insitu_session *s, bool are_names_new, bool is_
 {
     insitu_status status = INSITU_OK;
     if (are_names_new) status = session_update_catalogue(&s->catalogue, &s->meshes, &s->team, is_shared, error);
-    if (!status) status = name_derived(s, error);
+    if (!status) status = add_derived_fields(s, error);
     if (!status) session_group_meshes(&s->scene_file.scene, &s->catalogue, &s->meshes, error);
     return status;
 }
@@ -178,7 +178,7 @@ static insitu_status refine_cells(insitu_session *s, const session_moment *momen
     const session_pieces_basis basis = {scene, moment, *are_cells_changed, &s->catalogue, &s->team, &s->meshes};
     bool are_changed = false;
     if (scene->finer_pieces == 1 || !session_catalogue_has_higher_order(&s->catalogue)) return INSITU_OK;
-    if (!*are_cells_changed && session_count_due(scene, moment) == 0) return INSITU_OK;
+    if (!*are_cells_changed && session_count_due_images(scene, moment) == 0) return INSITU_OK;
     session_finer_choice *choices = base_calloc((size_t)s->catalogue.mesh_count + 1, sizeof *choices);
     if (!choices) session_fail_for_memory(error, s->catalogue.mesh_count * (int64_t)sizeof *choices, "finer pieces");
     insitu_status status = session_agree(s->team.comm, error);
@@ -266,11 +266,13 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     session_plan plan = {0};
     insitu_status status = update_meshes(s, changes, moment, refused, error);
     if (!status) status = session_make_discontinuous(&s->meshes, &s->catalogue, basis.scene, team, error);
-    if (!status) update_events(s, &basis, &of_events);
+    if (!status) update_statistics_and_conditions(s, &basis, &of_events);
     if (!status) status = make_plan(s, &basis, refused, &plan, error);
-    const session_derive_basis derived = derive_basis(s);
-    if (!status) status = session_compute_derived(&derived, session_derived_of_plan(basis.scene, &plan), error);
-    if (!status && (plan.recentring_count || plan.surface_count || session_is_smooth(&plan, &s->catalogue)))
+    const session_derive_basis derived = make_derive_basis(s);
+    if (!status)
+        status = session_compute_derived(&derived, session_find_derived_fields_of_plan(basis.scene, &plan), error);
+    if (!status &&
+        (plan.recentring_count || plan.surface_count || session_plan_has_smooth_normals(&plan, &s->catalogue)))
         status = session_update_homes(&s->catalogue, &s->meshes, extent->half_diagonal, team, error);
     if (!status)
         status = session_recentre(plan.recentrings, plan.recentring_count, plan.stale, &s->meshes, team, error);
@@ -284,7 +286,7 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
         if (!error->status)
             session_update_trees(&s->trees, &s->meshes, &s->space, basis.scene->tree, team, &s->report.public_report,
                                  error);
-        status = session_check_layers(&plan, &s->catalogue, &s->meshes, team, &s->report, error);
+        status = session_warn_of_empty_layers(&plan, &s->catalogue, &s->meshes, team, &s->report, error);
     }
     if (!status) status = session_draw_images(&drawing, &plan, &s->events.drawn_images, error);
     session_plan_free(&plan);
@@ -309,7 +311,7 @@ static insitu_status run_phases(insitu_session *s, session_changes *changes, con
     const session_moment moment = {changes->cycle, changes->time, s->last_time, !s->has_stepped};
     s->has_stepped = true;
     s->last_time = changes->time;
-    const bool are_images_due = session_count_due(&s->scene_file.scene, &moment) > 0;
+    const bool are_images_due = session_count_due_images(&s->scene_file.scene, &moment) > 0;
     if (status) return status;
     if (!(are_images_due || session_has_events(&s->scene_file.scene, moment.cycle, false))) {
         *error = refused;
@@ -324,10 +326,10 @@ static insitu_status run_phases(insitu_session *s, session_changes *changes, con
 
 /* Returns the error of earlier steps' pictures that could not be written, unless this step has an error of its own.
  * Collective. */
-static insitu_status report_unwritten(insitu_session *s, base_error *error)
+static insitu_status report_unwritten_pictures(insitu_session *s, base_error *error)
 {
     base_error told = {.status = INSITU_OK};
-    if (s->team.rank == 0) told = session_writer_failure(&s->writer);
+    if (s->team.rank == 0) told = session_writer_take_failure(&s->writer);
     session_share_error(s->team.comm, 0, &told);
     *error = told;
     return error->status;
@@ -335,16 +337,16 @@ static insitu_status report_unwritten(insitu_session *s, base_error *error)
 
 /* Passes the text of report.json (session_news.h) to the writer. Called on rank 0 only; the next step returns the error
  * if this fails. */
-static void queue_news(insitu_session *s)
+static void queue_report_json(insitu_session *s)
 {
     const session_scene_file *file = &s->scene_file;
     const session_news_scene source = {&file->scene, file->path, file->has_stamp ? &file->stamp : NULL,
                                        s->report.pieces.size ? s->report.pieces.data : NULL, file->warning};
     if (s->team.rank != 0 || file->scene.database_count == 0) return;
-    session_record_news(&s->news, &s->report, &s->error);
+    session_record_step_messages(&s->news, &s->report, &s->error);
     if (!s->news.is_new) return;
     session_files *files = base_calloc(1, sizeof *files);
-    char *text = files ? session_make_news(&s->news, &source, &s->report.public_report) : NULL;
+    char *text = files ? session_compose_report_json(&s->news, &source, &s->report.public_report) : NULL;
     if (!text) {
         base_free(files);
         return;
@@ -369,18 +371,18 @@ insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
     session_writer_collect(&session->writer, &session->report);
     warn_of_environment(&session->team, &session->report);
     if (session->has_stepped && session->team.rank == 0)
-        session_warn_of_parameters(&session->scene_file.scene, &session->requested_parameters, &session->report);
+        session_warn_of_unused_parameters(&session->scene_file.scene, &session->requested_parameters, &session->report);
     insitu_status status = session_find_changes(session, cycle, time, &changes, &session->error);
     if (!status && changes.reporting_rank >= 0)
         status = session_share_lines(&session->report, changes.reporting_rank, &session->team, &session->error);
     if (!status) {
         status = run_phases(session, &changes, &guard, &session->error);
         session_drop_pending(&session->meshes);
-        if (!status && changes.has_unwritten_pictures) status = report_unwritten(session, &session->error);
+        if (!status && changes.has_unwritten_pictures) status = report_unwritten_pictures(session, &session->error);
     }
-    queue_news(session);
-    session_summarize(&session->meshes, &session->trees.parent, &session->writer, session->scene_file.warning,
-                      &session->report);
+    queue_report_json(session);
+    session_complete_report(&session->meshes, &session->trees.parent, &session->writer, session->scene_file.warning,
+                            &session->report);
     session_release_filled_arrays(&session->meshes);
     session->report.public_report.total_ms = milliseconds_since(start);
     session_guard_end(&guard);

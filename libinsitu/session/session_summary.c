@@ -11,41 +11,41 @@
 #include "session_scalars.h"
 #include "session_split.h"
 
-static int64_t array_bytes(const insitu_array *array, int64_t count)
+static int64_t count_array_bytes(const insitu_array *array, int64_t count)
 {
     return array->data ? count * session_type_size(array->type) : 0;
 }
 
-static int64_t mesh_bytes(const insitu_mesh *m)
+static int64_t count_mesh_bytes(const insitu_mesh *m)
 {
     int64_t bytes = 0;
-    for (int axis = 0; axis < 3; axis++) bytes += array_bytes(&m->coordinates[axis], m->vertex_count);
-    bytes += array_bytes(&m->vertex_ids, m->vertex_count);
-    bytes += array_bytes(&m->cell_types, m->cell_count);
-    bytes += array_bytes(&m->face_offsets, m->face_count + (m->open_offsets ? 0 : 1));
-    bytes += array_bytes(&m->face_connectivity, m->face_connectivity_count);
-    bytes += array_bytes(&m->face_sizes, m->face_count);
+    for (int axis = 0; axis < 3; axis++) bytes += count_array_bytes(&m->coordinates[axis], m->vertex_count);
+    bytes += count_array_bytes(&m->vertex_ids, m->vertex_count);
+    bytes += count_array_bytes(&m->cell_types, m->cell_count);
+    bytes += count_array_bytes(&m->face_offsets, m->face_count + (m->open_offsets ? 0 : 1));
+    bytes += count_array_bytes(&m->face_connectivity, m->face_connectivity_count);
+    bytes += count_array_bytes(&m->face_sizes, m->face_count);
     if (m->face_lists.data) bytes += m->face_count * (int64_t)sizeof(void *);
-    bytes += array_bytes(&m->owner, m->face_count);
-    bytes += array_bytes(&m->neighbour, m->neighbour_count);
-    bytes += array_bytes(&m->boundary_face_offsets, m->boundary_face_count + 1);
-    bytes += array_bytes(&m->boundary_face_connectivity, m->boundary_face_connectivity_count);
-    bytes += array_bytes(&m->boundary_owner, m->boundary_face_count);
-    bytes += array_bytes(&m->connectivity, m->connectivity_count);
-    bytes += array_bytes(&m->offsets, m->cell_count + (m->open_offsets ? 0 : 1));
+    bytes += count_array_bytes(&m->owner, m->face_count);
+    bytes += count_array_bytes(&m->neighbour, m->neighbour_count);
+    bytes += count_array_bytes(&m->boundary_face_offsets, m->boundary_face_count + 1);
+    bytes += count_array_bytes(&m->boundary_face_connectivity, m->boundary_face_connectivity_count);
+    bytes += count_array_bytes(&m->boundary_owner, m->boundary_face_count);
+    bytes += count_array_bytes(&m->connectivity, m->connectivity_count);
+    bytes += count_array_bytes(&m->offsets, m->cell_count + (m->open_offsets ? 0 : 1));
     for (int axis = 0; m->lattice && axis < 3; axis++)
-        bytes += array_bytes(&m->lattice->axes[axis], m->lattice->cells[axis] + 1);
-    return bytes + array_bytes(&m->ghosts, m->cell_count);
+        bytes += count_array_bytes(&m->lattice->axes[axis], m->lattice->cells[axis] + 1);
+    return bytes + count_array_bytes(&m->ghosts, m->cell_count);
 }
 
-static int64_t patch_bytes(const insitu_field *field)
+static int64_t count_patch_bytes(const insitu_field *field)
 {
     int64_t bytes = 0;
     for (int i = 0; i < field->patch_count; i++) {
         const insitu_patch *patch = &field->patches[i];
-        bytes += array_bytes(&patch->values, patch->count) * field->component_count;
-        bytes += array_bytes(&patch->faces, patch->count) + array_bytes(&patch->offsets, patch->count + 1);
-        bytes += array_bytes(&patch->connectivity, patch->connectivity_count);
+        bytes += count_array_bytes(&patch->values, patch->count) * field->component_count;
+        bytes += count_array_bytes(&patch->faces, patch->count) + count_array_bytes(&patch->offsets, patch->count + 1);
+        bytes += count_array_bytes(&patch->connectivity, patch->connectivity_count);
     }
     return bytes;
 }
@@ -98,9 +98,9 @@ static bool is_field_in_use(const session_mesh *mesh, int field)
 
 static int64_t value_bytes(const insitu_field *field)
 {
-    int64_t bytes = array_bytes(&field->values, field->count) * field->component_count;
+    int64_t bytes = count_array_bytes(&field->values, field->count) * field->component_count;
     for (int c = 0; field->components && c < field->component_count; c++)
-        bytes += array_bytes(&field->components[c], field->count);
+        bytes += count_array_bytes(&field->components[c], field->count);
     return bytes;
 }
 
@@ -116,14 +116,15 @@ static void report_field(session_report *out, copied_reasons *copied, const sess
                                               : "at the corners of a discontinuous mesh");
     if (is_field_in_use(mesh, index) && !mesh->source)
         out->public_report.bytes_borrowed +=
-            value_bytes(field) + array_bytes(&field->index, session_count_field_positions(&mesh->original, field)) +
-            patch_bytes(field);
+            value_bytes(field) +
+            count_array_bytes(&field->index, session_count_field_positions(&mesh->original, field)) +
+            count_patch_bytes(field);
 }
 
 static void report_scalar(session_report *out, copied_reasons *copied, const session_mesh *mesh,
                           const session_scalar *scalar)
 {
-    const char *name = session_scalar_name(mesh, scalar);
+    const char *name = session_get_scalar_name(mesh, scalar);
     const int64_t vertices = session_vertex_count(mesh);
     if (scalar->node_ranges) out->public_report.bytes_trees += mesh->tree.node_count * 2 * (int64_t)sizeof(float);
     if (scalar->vertex_values) {
@@ -185,7 +186,7 @@ static void report_part(session_report *out, copied_reasons *copied, const sessi
     if (!mesh->is_given) return;
     if (!mesh->source) {
         report->cells += session_cell_count(mesh);
-        report->bytes_borrowed += mesh_bytes(&mesh->original);
+        report->bytes_borrowed += count_mesh_bytes(&mesh->original);
     }
     report_topology(out, copied, mesh);
     if (!mesh->is_check_stale && !mesh->source) {
@@ -217,13 +218,13 @@ static bool is_shown(const session_mesh *mesh)
 /* Returns the number of the caller's cells that the mesh's tree contains. */
 static int64_t count_tree_cells(const session_mesh *mesh)
 {
-    return mesh->topology.is_split ? session_count_parents_of(mesh, mesh->tree.cells, mesh->tree.cell_count)
+    return mesh->topology.is_split ? session_count_parents_of_pieces(mesh, mesh->tree.cells, mesh->tree.cell_count)
                                    : mesh->tree.cell_count;
 }
 
 /* Reports the data of a mesh that pictures leave out: fields and meshes that no image uses, and cells that trees do not
  * contain. All blocks of a mesh have the same fields, and each field is reported one time. */
-static void report_left_out(session_report *out, const session_parts *parts)
+static void report_unused_data(session_report *out, const session_parts *parts)
 {
     const session_mesh *first = parts->items[0];
     int64_t shown = 0, drawn = 0, given = 0, partial = 0;
@@ -253,11 +254,11 @@ static void report_parts(session_report *out, const session_parts *parts)
     copied_reasons copied = {.count = 0};
     for (int i = 0; i < parts->count; i++) report_part(out, &copied, parts->items[i]);
     report_copied(&copied, parts->items[0]->name, out);
-    report_left_out(out, parts);
+    report_unused_data(out, parts);
 }
 
-void session_summarize(const session_meshes *meshes, const mmbvh *parent, session_writer *writer,
-                       const char *scene_warning, session_report *out)
+void session_complete_report(const session_meshes *meshes, const mmbvh *parent, session_writer *writer,
+                             const char *scene_warning, session_report *out)
 {
     insitu_report *report = &out->public_report;
     if (scene_warning) session_text_add(&out->warnings, "the scene file's last edit was not taken: %s", scene_warning);
@@ -267,6 +268,6 @@ void session_summarize(const session_meshes *meshes, const mmbvh *parent, sessio
         i += parts.count;
     }
     report->bytes_trees += mmbvh_bytes(parent);
-    report->bytes_pictures = session_writer_bytes(writer, &report->pictures_waiting);
+    report->bytes_pictures = session_writer_count_bytes(writer, &report->pictures_waiting);
     session_report_end(out);
 }

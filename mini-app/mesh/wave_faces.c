@@ -32,14 +32,14 @@ static void face_key(const wave_mesh *mesh, int32_t cell, int face, int64_t key[
     }
 }
 
-static uint64_t key_hash(const int64_t key[4])
+static uint64_t hash_face_key(const int64_t key[4])
 {
     uint64_t h = 0;
     for (int i = 0; i < 4; ++i) h = wave_hash(h ^ (uint64_t)key[i]);
     return h;
 }
 
-static bool same_key(const face_table *table, const face_entry *entry, const int64_t key[4])
+static bool has_face_key(const face_table *table, const face_entry *entry, const int64_t key[4])
 {
     int64_t other[4];
     face_key(table->mesh, entry->cell, entry->face, other);
@@ -54,7 +54,7 @@ static face_entry *find_entry(const face_table *table, const int64_t key[4], uin
 {
     for (int64_t at = (int64_t)hash & table->mask;; at = (at + 1) & table->mask) {
         face_entry *e = &table->entries[at];
-        if (e->cell < 0 || (e->hash == hash && same_key(table, e, key))) return e;
+        if (e->cell < 0 || (e->hash == hash && has_face_key(table, e, key))) return e;
     }
 }
 
@@ -88,7 +88,7 @@ static void match_faces(wave_mesh *mesh, face_table *table, int32_t cell)
     int faces = wave_cell_shape_of(wave_mesh_type(mesh, cell))->face_count;
     for (int f = 0; f < faces; ++f) {
         face_key(mesh, cell, f, key);
-        uint64_t hash = key_hash(key);
+        uint64_t hash = hash_face_key(key);
         face_entry *e = find_entry(table, key, hash);
         if (e->cell < 0) {
             /* Only faces of own cells are stored; own cells precede halo cells. */

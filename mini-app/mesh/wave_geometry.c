@@ -28,7 +28,7 @@ static double determinant3(const double a[3], const double b[3], const double c[
     return dot_product(ab, c);
 }
 
-static void face_area(const double p[4][3], int size, double area[3])
+static void compute_face_area(const double p[4][3], int size, double area[3])
 {
     double a[3], b[3];
     subtract_vectors(p[size == 4 ? 2 : 1], p[0], a);
@@ -38,7 +38,7 @@ static void face_area(const double p[4][3], int size, double area[3])
 }
 
 /* Returns the volume of the pyramid between the origin and the face. */
-static double face_volume(const double p[4][3], int size)
+static double compute_face_volume(const double p[4][3], int size)
 {
     if (size == 3) return determinant3(p[0], p[1], p[2]) / 6;
     return (determinant3(p[0], p[1], p[2]) + determinant3(p[0], p[2], p[3]) + determinant3(p[0], p[1], p[3]) +
@@ -69,8 +69,8 @@ void wave_cell_measure(const wave_cell_shape *shape, const double position[8][3]
     }
     for (int f = 0; f < shape->face_count; ++f) {
         face_points(shape, f, position, id, zero, p);
-        face_area(p, shape->face_size[f], out->area[f]);
+        compute_face_area(p, shape->face_size[f], out->area[f]);
         face_points(shape, f, position, id, position[0], p);
-        out->volume += face_volume(p, shape->face_size[f]);
+        out->volume += compute_face_volume(p, shape->face_size[f]);
     }
 }

@@ -69,14 +69,14 @@ static int64_t lattice_vertex_count(const wave_lattice *lattice)
     return (int64_t)(lattice->size[0] + 1) * (lattice->size[1] + 1) * (lattice->size[2] + 1);
 }
 
-static int64_t corner_vertex(const wave_lattice *lattice, const int ijk[3], int corner)
+static int64_t find_corner_vertex(const wave_lattice *lattice, const int ijk[3], int corner)
 {
     const int8_t *o = corner_offset[corner];
     int64_t nx = lattice->size[0] + 1, ny = lattice->size[1] + 1;
     return ijk[0] + o[0] + nx * (ijk[1] + o[1] + ny * (int64_t)(ijk[2] + o[2]));
 }
 
-static wave_cells cube_kind(const wave_lattice *lattice, const int ijk[3])
+static wave_cells find_cube_kind(const wave_lattice *lattice, const int ijk[3])
 {
     if (lattice->cells != WAVE_MIXED) return lattice->cells;
     int low = lattice->size[2] / 5, high = 3 * lattice->size[2] / 4;
@@ -91,7 +91,7 @@ static bool neighbour_wants_split(const wave_lattice *lattice, const int ijk[3],
     int beside[3] = {ijk[0], ijk[1], ijk[2]};
     beside[axis] += cube_face[face].step;
     if (!wave_lattice_holds(lattice, beside)) return false;
-    wave_cells kind = cube_kind(lattice, beside);
+    wave_cells kind = find_cube_kind(lattice, beside);
     return kind == WAVE_TETS || (kind == WAVE_WEDGES && axis == 2);
 }
 
@@ -142,8 +142,8 @@ int wave_lattice_cells(const wave_lattice *lattice, int64_t cube, wave_cell cell
     int ijk[3];
     int64_t v[8];
     wave_lattice_cube_ijk(lattice, cube, ijk);
-    for (int c = 0; c < 8; ++c) v[c] = corner_vertex(lattice, ijk, c);
-    switch (cube_kind(lattice, ijk)) {
+    for (int c = 0; c < 8; ++c) v[c] = find_corner_vertex(lattice, ijk, c);
+    switch (find_cube_kind(lattice, ijk)) {
     case WAVE_TETS: return cut_tets(v, cells);
     case WAVE_WEDGES: return cut_wedges(v, cells);
     case WAVE_PYRAMIDS: return cut_pyramids(lattice, ijk, v, lattice_vertex_count(lattice) + cube, cells);
@@ -182,7 +182,7 @@ uint8_t wave_lattice_walls(const wave_lattice *lattice, int64_t vertex)
     return (uint8_t)walls;
 }
 
-static void corner_position(const wave_lattice *lattice, int64_t vertex, const int ijk[3], double xyz[3])
+static void compute_corner_position(const wave_lattice *lattice, int64_t vertex, const int ijk[3], double xyz[3])
 {
     bool inner = true;
     for (int a = 0; a < 3; ++a) {
@@ -200,7 +200,7 @@ void wave_lattice_vertex(const wave_lattice *lattice, int64_t vertex, double xyz
 {
     int ijk[3];
     if (wave_lattice_vertex_ijk(lattice, vertex, ijk)) {
-        corner_position(lattice, vertex, ijk, xyz);
+        compute_corner_position(lattice, vertex, ijk, xyz);
         return;
     }
     xyz[0] = xyz[1] = xyz[2] = 0;
@@ -208,7 +208,7 @@ void wave_lattice_vertex(const wave_lattice *lattice, int64_t vertex, double xyz
         const int8_t *o = corner_offset[c];
         int at[3] = {ijk[0] + o[0], ijk[1] + o[1], ijk[2] + o[2]};
         double corner[3];
-        corner_position(lattice, corner_vertex(lattice, ijk, c), at, corner);
+        compute_corner_position(lattice, find_corner_vertex(lattice, ijk, c), at, corner);
         for (int a = 0; a < 3; ++a) xyz[a] += 0.125 * corner[a];
     }
 }

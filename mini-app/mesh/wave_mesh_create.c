@@ -32,7 +32,7 @@ typedef struct mesh_builder {
     int64_t cell_capacity, connectivity_capacity, vertex_capacity;
 } mesh_builder;
 
-static bool list_add(pair_list *list, int32_t rank, int64_t value)
+static bool add_to_pair_list(pair_list *list, int32_t rank, int64_t value)
 {
     if (list->count == list->capacity) {
         int64_t capacity = list->capacity ? 2 * list->capacity : 256;
@@ -45,20 +45,20 @@ static bool list_add(pair_list *list, int32_t rank, int64_t value)
     return true;
 }
 
-static int by_rank_and_value(const void *a, const void *b)
+static int compare_rank_and_value(const void *a, const void *b)
 {
     const pair *x = a, *y = b;
     if (x->rank != y->rank) return x->rank < y->rank ? -1 : 1;
     return (x->value > y->value) - (x->value < y->value);
 }
 
-static void list_sort_unique(pair_list *list)
+static void sort_and_deduplicate_list(pair_list *list)
 {
     int64_t kept = 0;
     if (list->count == 0) return;
-    qsort(list->items, (size_t)list->count, sizeof(pair), by_rank_and_value);
+    qsort(list->items, (size_t)list->count, sizeof(pair), compare_rank_and_value);
     for (int64_t i = 1; i < list->count; ++i) {
-        if (by_rank_and_value(&list->items[i], &list->items[kept]) != 0) list->items[++kept] = list->items[i];
+        if (compare_rank_and_value(&list->items[i], &list->items[kept]) != 0) list->items[++kept] = list->items[i];
     }
     list->count = kept + 1;
 }
@@ -72,7 +72,7 @@ static bool find_own_cubes(mesh_builder *m)
         for (at[1] = low[1]; at[1] < high[1]; ++at[1]) {
             for (at[0] = low[0]; at[0] < high[0]; ++at[0]) {
                 if (wave_partition_owner(p, at) != m->mesh->rank) continue;
-                if (!list_add(&m->own, m->mesh->rank, wave_lattice_cube(&p->lattice, at))) return false;
+                if (!add_to_pair_list(&m->own, m->mesh->rank, wave_lattice_cube(&p->lattice, at))) return false;
             }
         }
     }
@@ -105,7 +105,7 @@ static bool add_foreign_cubes(mesh_builder *m, int64_t cube, int owner[3][3][3])
         int at[3] = {ijk[0] + n % 3 - 1, ijk[1] + n / 3 % 3 - 1, ijk[2] + n / 9 - 1};
         int o = owner[n / 9][n / 3 % 3][n % 3];
         if (o < 0 || o == m->mesh->rank) continue;
-        if (!list_add(&m->foreign, o, wave_lattice_cube(lattice, at))) return false;
+        if (!add_to_pair_list(&m->foreign, o, wave_lattice_cube(lattice, at))) return false;
     }
     return true;
 }
@@ -117,7 +117,7 @@ static bool add_send(mesh_builder *m, int rank, int32_t cell)
     for (int64_t i = m->sends.count - 1; i >= 0 && m->sends.items[i].value == cell; --i) {
         if (m->sends.items[i].rank == rank) return true;
     }
-    return list_add(&m->sends, rank, cell);
+    return add_to_pair_list(&m->sends, rank, cell);
 }
 
 /* Adds a send to every rank that owns a cube with one of the cell's lattice vertices. */
@@ -220,12 +220,12 @@ static bool make_own_cells(mesh_builder *m)
     }
     m->mesh->own_cells = m->mesh->cells;
     m->mesh->own_vertices = m->mesh->vertices;
-    list_sort_unique(&m->foreign);
-    list_sort_unique(&m->sends);
+    sort_and_deduplicate_list(&m->foreign);
+    sort_and_deduplicate_list(&m->sends);
     return true;
 }
 
-static bool touches_own(const mesh_builder *m, const wave_cell *c)
+static bool touches_own_vertex(const mesh_builder *m, const wave_cell *c)
 {
     for (int i = 0; i < wave_cell_shape_of(c->type)->vertex_count; ++i) {
         int32_t local = wave_map_find(&m->vertex_map, c->vertex[i]);
@@ -252,7 +252,7 @@ static bool make_halo_cells(mesh_builder *m)
             mesh->links[mesh->link_count++] = (wave_link){.rank = rank, .receive_begin = mesh->cells};
         }
         for (int c = 0; c < count; ++c) {
-            if (!touches_own(m, &cells[c])) continue;
+            if (!touches_own_vertex(m, &cells[c])) continue;
             if (!add_cell(m, &cells[c], cube * WAVE_CELLS_PER_CUBE + c)) return false;
         }
         mesh->links[mesh->link_count - 1].receive_end = mesh->cells;
@@ -290,7 +290,7 @@ static void sort_by_id(const wave_mesh *mesh, int32_t *cells, int64_t count)
 
 /* Lists the cells around each own vertex, sorted by cell id, so that sums over them are rounded in the same way on
  * every rank that has the vertex. */
-static bool make_around(wave_mesh *mesh)
+static bool list_cells_around_vertices(wave_mesh *mesh)
 {
     int32_t v[8];
     mesh->vertex_cell_offsets = calloc((size_t)mesh->own_vertices + 2, sizeof *mesh->vertex_cell_offsets);
@@ -342,7 +342,7 @@ bool wave_mesh_create(const wave_partition *partition, int rank, int index_bytes
     free(m.foreign.items);
     free(m.sends.items);
     if (ok) drop_uniform_arrays(mesh);
-    ok = ok && make_around(mesh) && wave_faces_find_neighbours(mesh);
+    ok = ok && list_cells_around_vertices(mesh) && wave_faces_find_neighbours(mesh);
     if (!ok) wave_mesh_free(mesh);
     return ok;
 }

@@ -3,7 +3,7 @@
  * octant by octant, from the largest down. */
 #include "wave_partition.h"
 
-static double block_surface(const wave_lattice *lattice, const int blocks[3])
+static double compute_block_surface(const wave_lattice *lattice, const int blocks[3])
 {
     double s[3];
     for (int a = 0; a < 3; ++a) s[a] = (double)lattice->size[a] / blocks[a];
@@ -19,7 +19,7 @@ static void choose_blocks(const wave_lattice *lattice, int ranks, int best[3])
         for (int y = 1; ranks % x == 0 && y <= ranks / x; ++y) {
             int blocks[3] = {x, y, ranks / x / y};
             if (ranks / x % y != 0) continue;
-            if (block_surface(lattice, blocks) < block_surface(lattice, best)) {
+            if (compute_block_surface(lattice, blocks) < compute_block_surface(lattice, best)) {
                 for (int a = 0; a < 3; ++a) best[a] = blocks[a];
             }
         }
@@ -34,7 +34,7 @@ wave_partition wave_partition_make(const wave_lattice *lattice, wave_partition_k
 }
 
 /* Returns the number of cubes of the lattice in the box that begins at low and has this edge length. */
-static int64_t cubes_within(const wave_lattice *lattice, const int low[3], int edge)
+static int64_t count_cubes_within(const wave_lattice *lattice, const int low[3], int edge)
 {
     int64_t count = 1;
     for (int a = 0; a < 3; ++a) {
@@ -44,7 +44,7 @@ static int64_t cubes_within(const wave_lattice *lattice, const int low[3], int e
     return count;
 }
 
-static int64_t morton_position(const wave_lattice *lattice, const int ijk[3])
+static int64_t find_morton_position(const wave_lattice *lattice, const int ijk[3])
 {
     int edge = 1, low[3] = {0, 0, 0};
     int64_t before = 0;
@@ -57,7 +57,7 @@ static int64_t morton_position(const wave_lattice *lattice, const int ijk[3])
         for (unsigned octant = 0; octant < own; ++octant) {
             int at[3];
             for (int a = 0; a < 3; ++a) at[a] = low[a] + ((octant >> a & 1u) ? edge : 0);
-            before += cubes_within(lattice, at, edge);
+            before += count_cubes_within(lattice, at, edge);
         }
         for (int a = 0; a < 3; ++a) low[a] += (own >> a & 1u) ? edge : 0;
     }
@@ -71,7 +71,7 @@ int wave_partition_owner(const wave_partition *partition, const int ijk[3])
     switch (partition->kind) {
     case WAVE_MORTON: {
         /* position * ranks is far below 2^63: there are at most 2^40 cubes and 2^20 ranks */
-        return (int)(morton_position(lattice, ijk) * ranks / wave_lattice_cube_count(lattice));
+        return (int)(find_morton_position(lattice, ijk) * ranks / wave_lattice_cube_count(lattice));
     }
     case WAVE_RANDOM: return (int)(wave_hash((uint64_t)wave_lattice_cube(lattice, ijk)) % (uint64_t)ranks);
     case WAVE_CHECKERBOARD: return (int)(((int64_t)ijk[0] + ijk[1] + ijk[2]) % ranks);

@@ -107,7 +107,7 @@ void bins_fill(bins *b, const bin_mapping *m, const item *items, int64_t count, 
 }
 
 /* Returns half the surface areas of three boxes, in lanes 0 to 2. */
-static inline vec4 half_areas(const lanes boxes[3])
+static inline vec4 compute_three_half_areas(const lanes boxes[3])
 {
     const lanes x = item_extent(boxes[0]), y = item_extent(boxes[1]), z = item_extent(boxes[2]);
     const ivec4 xy = item_area_terms(__builtin_shufflevector(x, y, 0, 1, 2, 3, 8, 9, 10, 11)), zz = item_area_terms(z);
@@ -116,9 +116,9 @@ static inline vec4 half_areas(const lanes boxes[3])
 }
 
 /* Returns the SAH cost of one side per axis. The cost of an empty side is NaN, which never compares as the smallest. */
-static inline vec4 side_cost(const lanes boxes[3], ivec4 counts)
+static inline vec4 compute_side_costs(const lanes boxes[3], ivec4 counts)
 {
-    return (vec4)((ivec4)(half_areas(boxes) * vec4_from_int(counts)) | (ivec4)(counts == 0));
+    return (vec4)((ivec4)(compute_three_half_areas(boxes) * vec4_from_int(counts)) | (ivec4)(counts == 0));
 }
 
 static inline void extend_side(lanes boxes[3], ivec4 *counts, const bins *b, int bin)
@@ -128,7 +128,7 @@ static inline void extend_side(lanes boxes[3], ivec4 *counts, const bins *b, int
 }
 
 /* Returns the cheapest of the three axes' splits, without unpredictable branches. */
-static bin_split cheapest_axis(vec4 costs, ivec4 borders)
+static bin_split find_cheapest_axis(vec4 costs, ivec4 borders)
 {
     float cost = costs[0];
     int axis = 0, border = borders[0];
@@ -149,7 +149,7 @@ bin_split bins_choose(const bins *b, const bin_mapping *m)
     ivec4 counts = {0};
     for (int border = m->count - 1; border > 0; border--) {
         extend_side(boxes, &counts, b, border);
-        right_cost[border] = side_cost(boxes, counts);
+        right_cost[border] = compute_side_costs(boxes, counts);
     }
     for (int axis = 0; axis < 3; axis++) boxes[axis] = none;
     counts = (ivec4){0};
@@ -157,17 +157,17 @@ bin_split bins_choose(const bins *b, const bin_mapping *m)
     ivec4 best_border = {0};
     for (int border = 1; border < m->count; border++) {
         extend_side(boxes, &counts, b, border - 1);
-        const vec4 cost = side_cost(boxes, counts) + right_cost[border];
+        const vec4 cost = compute_side_costs(boxes, counts) + right_cost[border];
         const ivec4 better = (ivec4)(cost < best);
         best = (vec4)(((ivec4)cost & better) | ((ivec4)best & ~better));
         best_border = (border & better) | (best_border & ~better);
     }
-    return cheapest_axis(best, best_border);
+    return find_cheapest_axis(best, best_border);
 }
 
 /* Each item's box lies in the box of all items on its side of the plane. Therefore no plane costs less than the sum of
  * the surface areas of the items' boxes. */
-float bins_least_cost(const item *items, int64_t count)
+float bins_compute_cost_bound(const item *items, int64_t count)
 {
     vec4 terms = {0};
     for (int64_t i = 0; i < count; i++) terms += vec4_from_int(item_area_terms(item_extent(items[i])));

@@ -50,7 +50,7 @@ void bins_clear(bins *b, int count);
 void bins_merge(bins *b, const bins *other, int count);
 
 /* Returns the sampling stride for a node with `count` items: only every n-th item is binned, where n is the stride. */
-static inline int64_t bins_stride(int64_t count)
+static inline int64_t bins_sampling_stride(int64_t count)
 {
     return count < BINS_SAMPLED ? 1 : BINS_STRIDE;
 }
@@ -63,7 +63,7 @@ void bins_fill(bins *b, const bin_mapping *m, const item *items, int64_t count, 
 bin_split bins_choose(const bins *b, const bin_mapping *m);
 
 /* Returns a lower bound of the SAH cost of all planes that separate the items. */
-float bins_least_cost(const item *items, int64_t count);
+float bins_compute_cost_bound(const item *items, int64_t count);
 
 /* Returns whether a node with this SAH cost of its best split should be split rather than become a leaf. A split costs
  * two additional box tests. Returns true if the items do not fit in a leaf. */

@@ -37,7 +37,7 @@ typedef struct node_split {
     int64_t left_count;              /* number of items that go to the left child */
     branch_node node;
     bin_mapping mapping;
-    int64_t stride; /* sampling stride (bins_stride()) */
+    int64_t stride; /* sampling stride (bins_sampling_stride()) */
     bin_split split;
     bins all_bins;     /* bins of all chunks, merged */
     item_set sides[2]; /* bounds of the items of the left and of the right child */
@@ -53,24 +53,26 @@ static void choose_chunks(node_split *s)
     s->chunk_count = (int)((s->count + s->chunk_size - 1) / s->chunk_size);
 }
 
-static int64_t chunk_end(const node_split *s, int chunk)
+static int64_t find_end_of_chunk(const node_split *s, int chunk)
 {
     const int64_t end = (chunk + 1) * s->chunk_size;
     return end < s->count ? end : s->count;
 }
 
 /* Calls act() for every chunk, in parallel tasks. */
-static void for_chunks(node_split *s, const branch_builder *builder,
-                       void (*act)(node_split *, const branch_builder *, int chunk, int64_t begin, int64_t end))
+static void run_chunks_in_tasks(node_split *s, const branch_builder *builder,
+                                void (*act)(node_split *, const branch_builder *, int chunk, int64_t begin,
+                                            int64_t end))
 {
 #pragma omp taskgroup
     for (int chunk = 0; chunk < s->chunk_count; chunk++) {
 #pragma omp task if (s->chunk_count > 1) default(none) firstprivate(s, builder, act, chunk)
-        act(s, builder, chunk, chunk * s->chunk_size, chunk_end(s, chunk));
+        act(s, builder, chunk, chunk * s->chunk_size, find_end_of_chunk(s, chunk));
     }
 }
 
-static void place_chunk(node_split *s, const branch_builder *builder, int chunk, int64_t begin, int64_t end)
+static void quantize_chunk_to_node_grid(node_split *s, const branch_builder *builder, int chunk, int64_t begin,
+                                        int64_t end)
 {
     (void)chunk;
     item_set own = item_set_empty();
@@ -115,7 +117,7 @@ static bool misplaced_advance(misplaced_items *w)
     while (w->next >= w->end) {
         if (++w->chunk >= w->s->chunk_count) return false;
         const int64_t begin = w->chunk * w->s->chunk_size, border = w->s->left_count;
-        const int64_t middle = begin + w->s->left_counts[w->chunk], end = chunk_end(w->s, w->chunk);
+        const int64_t middle = begin + w->s->left_counts[w->chunk], end = find_end_of_chunk(w->s, w->chunk);
         w->next = w->is_left ? (begin > border ? begin : border) : middle;
         w->end = w->is_left ? middle : (end < border ? end : border);
     }
@@ -148,7 +150,7 @@ static void exchange_misplaced(node_split *s)
 
 static void partition_items(node_split *s, const branch_builder *builder)
 {
-    for_chunks(s, builder, partition_chunk);
+    run_chunks_in_tasks(s, builder, partition_chunk);
     s->left_count = 0;
     for (int chunk = 0; chunk < s->chunk_count; chunk++) s->left_count += s->left_counts[chunk];
     exchange_misplaced(s);
@@ -161,12 +163,12 @@ static void halve_items(node_split *s)
 }
 
 /* Chooses the split plane from a sample of the items. If the sample allows no split, all items are used. */
-static void choose_splits(node_split *s, const branch_builder *builder)
+static void choose_node_split(node_split *s, const branch_builder *builder)
 {
     s->mapping = bin_mapping_make(s->node.set.centroids, s->count);
-    for (s->stride = bins_stride(s->count);; s->stride = 1) {
+    for (s->stride = bins_sampling_stride(s->count);; s->stride = 1) {
         bins_clear(&s->all_bins, s->mapping.count);
-        for_chunks(s, builder, bin_chunk);
+        run_chunks_in_tasks(s, builder, bin_chunk);
         s->split = bins_choose(&s->all_bins, &s->mapping);
         if (s->split.axis >= 0 || s->stride == 1) return;
     }
@@ -178,11 +180,11 @@ static void split_branch(node_split *s, const branch_builder *builder)
     if (subtree_needs_finer_grid(s->node.set.bounds, &s->node.grid)) {
         s->node.grid = subtree_finer_grid(s->node.set.bounds, &s->node.grid);
         s->node.set = item_set_empty();
-        for_chunks(s, builder, place_chunk);
+        run_chunks_in_tasks(s, builder, quantize_chunk_to_node_grid);
     }
     s->split = (bin_split){.axis = -1};
     s->sides[0] = s->sides[1] = item_set_empty();
-    if (s->node.depth < TOPOLOGY_MEDIAN_DEPTH) choose_splits(s, builder);
+    if (s->node.depth < TOPOLOGY_MEDIAN_DEPTH) choose_node_split(s, builder);
     if (s->split.axis < 0) {
         halve_items(s);
     } else {

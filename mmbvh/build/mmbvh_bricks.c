@@ -36,7 +36,7 @@ static int64_t brick_cell_count(const brick *b)
     return b->count[0] * b->count[1] * b->count[2];
 }
 
-static brick drawn_brick(const grid_lattice *l)
+static brick get_drawn_brick(const grid_lattice *l)
 {
     brick out;
     for (int axis = 0; axis < 3; axis++) {
@@ -48,12 +48,12 @@ static brick drawn_brick(const grid_lattice *l)
 
 int64_t bricks_count(const grid_lattice *lattice)
 {
-    const brick all = drawn_brick(lattice);
+    const brick all = get_drawn_brick(lattice);
     return brick_cell_count(&all);
 }
 
 /* Returns the length of the edge from the vertex to the next one along the axis. */
-static double edge_length(const grid *g, int64_t vertex, int axis)
+static double compute_edge_length(const grid *g, int64_t vertex, int axis)
 {
     double from[3], to[3], sum = 0;
     grid_vertex(g, vertex, from);
@@ -66,7 +66,7 @@ static double edge_length(const grid *g, int64_t vertex, int axis)
 static void measure_edges(const grid *g, double out[3])
 {
     enum { SAMPLES = 5 };
-    const brick all = drawn_brick(g->lattice);
+    const brick all = get_drawn_brick(g->lattice);
     for (int axis = 0; axis < 3; axis++) {
         out[axis] = 0;
         for (int sample = 0; sample < SAMPLES * SAMPLES * SAMPLES; sample++) {
@@ -74,7 +74,7 @@ static void measure_edges(const grid *g, double out[3])
             int64_t vertex = 0;
             for (int a = 0; a < 3; a++)
                 vertex += (all.first[a] + all.count[a] * part[a] / SAMPLES) * g->lattice->vertex_numbering.stride[a];
-            out[axis] += edge_length(g, vertex, axis);
+            out[axis] += compute_edge_length(g, vertex, axis);
         }
     }
 }
@@ -203,7 +203,7 @@ static void build_top(const bricks *s, topology *t, const brick b)
 topology *bricks_build(topology_build *build, const grid *g, uint32_t *cells)
 {
     bricks s = {.build = build, .lattice = g->lattice, .cells = cells};
-    const brick all = drawn_brick(g->lattice);
+    const brick all = get_drawn_brick(g->lattice);
     topology *root = topology_new(build, 0, brick_cell_count(&all));
     if (!root) return NULL;
     measure_edges(g, s.edge);

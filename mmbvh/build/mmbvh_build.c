@@ -55,7 +55,7 @@ static bool is_skipped(const build *b, int64_t cell)
     return may_skip_cells(b) && !grid_is_drawn(b->source.g, cell);
 }
 
-static uint32_t candidate_cell(const build *b, int64_t i)
+static uint32_t get_candidate_cell(const build *b, int64_t i)
 {
     return b->selected ? b->selected[i] : (uint32_t)i;
 }
@@ -98,7 +98,7 @@ static void fill_items(const build *b, int chunk, item_set *set, fetch_box *exac
     const int64_t begin = chunk_start(b, chunk), end = chunk_start(b, chunk + 1);
     int64_t count = 0;
     for (int64_t cell = begin; cell < end; cell++) {
-        if (!is_skipped(b, cell)) items[count++] = item_of_index(candidate_cell(b, cell));
+        if (!is_skipped(b, cell)) items[count++] = item_of_index(get_candidate_cell(b, cell));
     }
     bounds_fill_items(&b->source, &b->grid, items, count, set, exact);
 }
@@ -109,7 +109,7 @@ static void fill_keys(const build *b, int chunk, fetch_box *exact)
     const int64_t begin = chunk_start(b, chunk), end = chunk_start(b, chunk + 1);
     int64_t count = 0;
     for (int64_t cell = begin; cell < end; cell++) {
-        if (!is_skipped(b, cell)) keys[count++] = candidate_cell(b, cell);
+        if (!is_skipped(b, cell)) keys[count++] = get_candidate_cell(b, cell);
     }
     morton_make_keys(&b->source, b->coder, keys, count, exact);
 }
@@ -147,7 +147,7 @@ static void quantize_cells(build *b, const fetch_box *box)
 
 /* Returns whether the estimated bounds are more than twice as long as the exact bounds on some axis. This happens if
  * vertices of ghost cells, or vertices that no cell uses, are far away. */
-static bool is_too_large(const fetch_box *guess, const fetch_box *exact)
+static bool is_estimate_too_large(const fetch_box *guess, const fetch_box *exact)
 {
     for (int axis = 0; axis < 3; axis++) {
         const double is = exact->upper[axis] - exact->lower[axis], was = guess->upper[axis] - guess->lower[axis];
@@ -156,13 +156,13 @@ static bool is_too_large(const fetch_box *guess, const fetch_box *exact)
     return false;
 }
 
-static void quantize_tightly(build *b)
+static void quantize_in_tight_bounds(build *b)
 {
     const fetch_box guess = bounds_estimate(&b->source, b->threads);
     quantize_cells(b, &guess);
     fetch_box exact = b->exact;
     bounds_transform(&b->source, &exact);
-    if (is_too_large(&guess, &exact)) quantize_cells(b, &exact);
+    if (is_estimate_too_large(&guess, &exact)) quantize_cells(b, &exact);
 }
 
 /* ---- topology --------------------------------------------------------------------------------------------------- */
@@ -182,7 +182,7 @@ static topology *build_sah(build *b, topology_build *t)
 {
     b->items = base_alloc((size_t)b->count * sizeof *b->items);
     if (!b->items) return NULL;
-    quantize_tightly(b);
+    quantize_in_tight_bounds(b);
     const branch_builder builder = {.build = t, .source = &b->source, .items = b->items, .count = b->count};
     return branch_build(&builder, &b->set, &b->grid);
 }
@@ -193,7 +193,7 @@ static topology *build_morton(build *b, topology_build *t)
     b->keys = base_alloc((size_t)b->count * sizeof *b->keys);
     b->other_keys = base_alloc((size_t)b->count * sizeof *b->other_keys);
     if (!b->coder || !b->keys || !b->other_keys) return NULL;
-    quantize_tightly(b);
+    quantize_in_tight_bounds(b);
     if (!morton_sort(b->coder, b->keys, b->other_keys, b->count, t->threads)) return NULL;
     base_free(b->other_keys);
     b->other_keys = NULL;

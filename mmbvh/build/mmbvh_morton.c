@@ -74,7 +74,7 @@ void morton_coder_init(morton_coder *coder, const double lower[3], const double 
     }
 }
 
-static inline uint64_t code_of_steps(const morton_coder *coder, const int32_t steps[])
+static inline uint64_t encode_morton_steps(const morton_coder *coder, const int32_t steps[])
 {
     uint64_t code = 0;
     for (int axis = 0; axis < 3; axis++) {
@@ -87,7 +87,7 @@ static inline uint64_t code_of_steps(const morton_coder *coder, const int32_t st
 }
 
 /* Returns the Morton code of a box whose centre is given in the source's coordinates. */
-static inline uint64_t morton_code(const bounds_source *source, const morton_coder *coder, const double centre[3])
+static inline uint64_t encode_box_centre(const bounds_source *source, const morton_coder *coder, const double centre[3])
 {
     int32_t steps[3];
     for (int axis = 0; axis < 3; axis++) {
@@ -95,7 +95,7 @@ static inline uint64_t morton_code(const bounds_source *source, const morton_cod
         const double place = (x - coder->origin[axis]) * coder->factor[axis];
         steps[axis] = (int32_t)(place > 0 ? place < coder->last_step[axis] ? place : coder->last_step[axis] : 0);
     }
-    return code_of_steps(coder, steps);
+    return encode_morton_steps(coder, steps);
 }
 
 /* Maps the centre of a box of floats, in the source's coordinates, to steps of the Morton code. */
@@ -116,13 +116,13 @@ static sum_mapping sum_mapping_make(const bounds_source *source, const morton_co
 }
 
 /* Returns the Morton code of a box of floats. A NaN coordinate is mapped to step 0. */
-static inline uint64_t code_of_float_box(const sum_mapping *m, const morton_coder *coder,
-                                         const fetch_float_box *float_box)
+static inline uint64_t encode_float_box(const sum_mapping *m, const morton_coder *coder,
+                                        const fetch_float_box *float_box)
 {
     const vec4 place = ((float_box->lower + float_box->upper) * 0.5f - m->origin) * m->factor;
     _Alignas(16) int32_t steps[4];
     *(ivec4 *)(void *)steps = vec4_truncate(vec4_min(vec4_max(place, (vec4){0}), m->last_step));
-    return code_of_steps(coder, steps);
+    return encode_morton_steps(coder, steps);
 }
 
 static int list_block_cells(const morton_coder *coder, const uint64_t *keys, int64_t count,
@@ -145,7 +145,7 @@ static fetch_box make_float_box_keys(const bounds_source *source, const morton_c
         source->read_float_boxes(source, cells, n, float_boxes);
         for (int i = 0; i < n; i++) {
             unite_float_boxes(&all, &float_boxes[i]);
-            keys[begin + i] = code_of_float_box(&m, coder, &float_boxes[i]) | cells[i];
+            keys[begin + i] = encode_float_box(&m, coder, &float_boxes[i]) | cells[i];
         }
     }
     return fetch_float_box_widen(&all);
@@ -163,7 +163,7 @@ static fetch_box make_box_keys(const bounds_source *source, const morton_coder *
             double centre[3];
             for (int axis = 0; axis < 3; axis++) centre[axis] = 0.5 * (boxes[i].lower[axis] + boxes[i].upper[axis]);
             unite_boxes(&all, &boxes[i]);
-            keys[begin + i] = morton_code(source, coder, centre) | cells[i];
+            keys[begin + i] = encode_box_centre(source, coder, centre) | cells[i];
         }
     }
     return all;
@@ -214,7 +214,7 @@ static void count_digits(const sorting *s, const uint64_t *keys, int64_t count, 
 }
 
 /* Converts the numbers of keys per digit to the index of the first key of each digit, overall and for each chunk. */
-static void sum_digits(const sorting *s, int64_t starts[DIGITS + 1])
+static void compute_starts_of_digits(const sorting *s, int64_t starts[DIGITS + 1])
 {
     int64_t sum = 0;
     for (int digit = 0; digit < DIGITS; digit++) {
@@ -228,7 +228,7 @@ static void sum_digits(const sorting *s, int64_t starts[DIGITS + 1])
     starts[DIGITS] = sum;
 }
 
-static void move_digits(const sorting *s, const uint64_t *from, uint64_t *to, int64_t count, int shift)
+static void move_keys_by_digit(const sorting *s, const uint64_t *from, uint64_t *to, int64_t count, int shift)
 {
 #pragma omp parallel num_threads(s->threads)
     {
@@ -290,8 +290,8 @@ static void sort_parallel(const sorting *s, uint64_t *from, uint64_t *other, int
     int64_t starts[DIGITS + 1];
     const int shift = top > DIGIT_BITS ? top - DIGIT_BITS : 0;
     count_digits(s, from, count, shift);
-    sum_digits(s, starts);
-    move_digits(s, from, other, count, shift);
+    compute_starts_of_digits(s, starts);
+    move_keys_by_digit(s, from, other, count, shift);
 #pragma omp parallel num_threads(s->threads)
     {
         region_enter();

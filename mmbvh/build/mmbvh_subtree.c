@@ -34,7 +34,7 @@ typedef struct subtree {
 static bin_split choose_split(subtree *s, lanes centroids, const item *items, int64_t count, bin_mapping *mapping)
 {
     *mapping = bin_mapping_make(centroids, count);
-    for (int64_t stride = bins_stride(count);; stride = 1) {
+    for (int64_t stride = bins_sampling_stride(count);; stride = 1) {
         bins_clear(&s->bins, mapping->count);
         bins_fill(&s->bins, mapping, items, count, stride);
         const bin_split split = bins_choose(&s->bins, mapping);
@@ -44,7 +44,7 @@ static bin_split choose_split(subtree *s, lanes centroids, const item *items, in
 
 static bool is_certainly_leaf(const item *items, int64_t count, lanes bounds)
 {
-    return count <= MMBVH_MAX_LEAF && !bins_is_split_cheaper(bins_least_cost(items, count), count, bounds);
+    return count <= MMBVH_MAX_LEAF && !bins_is_split_cheaper(bins_compute_cost_bound(items, count), count, bounds);
 }
 
 static topology_link build_node(subtree *s, int64_t first, int64_t count, const item_grid *grid, int depth)

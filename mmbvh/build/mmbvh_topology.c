@@ -50,15 +50,15 @@ void topology_copy_links(topology_build *build, topology *t, const topology_scra
     t->link_count = scratch->count;
 }
 
-static int64_t nodes_below(const topology *t)
+static int64_t count_nodes_below(const topology *t)
 {
     if (!t->children[0]) return t->link_count;
-    return 2 + nodes_below(t->children[0]) + nodes_below(t->children[1]);
+    return 2 + count_nodes_below(t->children[0]) + count_nodes_below(t->children[1]);
 }
 
 int64_t topology_node_count(const topology *t)
 {
-    return 1 + nodes_below(t);
+    return 1 + count_nodes_below(t);
 }
 
 static void write_link(const mmbvh *tree, int64_t node, const topology *t, topology_link link, int64_t below)

@@ -210,7 +210,7 @@ static double tet_volume(const double (*p)[3], const int *v, const double *centr
 
 /* Returns whether the ray from p in the negative x direction crosses the triangle. A corner with the same z as p is
  * treated as lying below p. If the projection of the triangle along x is a line, the ray does not cross it. */
-static bool is_crossed_below(const double *const t[3], const double *p)
+static bool ray_crosses_triangle_below(const double *const t[3], const double *p)
 {
     bool inside = false;
     for (int i = 0; i < 3; i++) {
@@ -242,7 +242,7 @@ static bool is_cavity(const closed_faces *c, const double (*positions)[3], int p
     for (int i = 0; i < c->triangle_count; i++) {
         const closed_triangle *t = &c->triangles[i];
         const double *const corners[3] = {positions[t->vertex[0]], positions[t->vertex[1]], positions[t->vertex[2]]};
-        if (c->piece[t->face] != piece && is_crossed_below(corners, positions[smallest])) inside = !inside;
+        if (c->piece[t->face] != piece && ray_crosses_triangle_below(corners, positions[smallest])) inside = !inside;
     }
     return inside;
 }

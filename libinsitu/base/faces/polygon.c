@@ -161,7 +161,7 @@ static void project_to_plane(polygon_work *w, const double normal[3])
 }
 
 /* Returns twice the signed area of a triangle: it is positive if the triangle runs counterclockwise. */
-static double triangle_area(const polygon_work *w, int a, int b, int c)
+static double compute_triangle_area(const polygon_work *w, int a, int b, int c)
 {
     const double *p = w->projection[a], *q = w->projection[b], *r = w->projection[c];
     return (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
@@ -179,7 +179,8 @@ static bool enters_corner(const polygon_work *w, int a, int tip, int c, int agai
 {
     const int ends[2] = {w->previous[again], w->next[again]};
     for (int i = 0; i < 2; i++)
-        if (triangle_area(w, a, tip, ends[i]) > line_slack && triangle_area(w, tip, c, ends[i]) > line_slack)
+        if (compute_triangle_area(w, a, tip, ends[i]) > line_slack &&
+            compute_triangle_area(w, tip, c, ends[i]) > line_slack)
             return true;
     return false;
 }
@@ -188,14 +189,14 @@ static bool is_blocked(const polygon_work *w, int a, int tip, int c, int by)
 {
     if (are_coincident(w, by, a) || are_coincident(w, by, c)) return false;
     if (are_coincident(w, by, tip)) return enters_corner(w, a, tip, c, by);
-    return triangle_area(w, a, tip, by) >= -line_slack && triangle_area(w, tip, c, by) >= -line_slack &&
-           triangle_area(w, c, a, by) >= -line_slack;
+    return compute_triangle_area(w, a, tip, by) >= -line_slack && compute_triangle_area(w, tip, c, by) >= -line_slack &&
+           compute_triangle_area(w, c, a, by) >= -line_slack;
 }
 
 static bool is_ear(const polygon_work *w, int tip)
 {
     const int a = w->previous[tip], c = w->next[tip];
-    if (!(triangle_area(w, a, tip, c) > line_slack)) return false;
+    if (!(compute_triangle_area(w, a, tip, c) > line_slack)) return false;
     for (int by = w->next[c]; by != a; by = w->next[by])
         if (is_blocked(w, a, tip, c, by)) return false;
     return true;
@@ -229,7 +230,7 @@ static int find_collinear_corner(const polygon_work *w, int first)
     int i = first;
     do {
         i = w->next[i];
-        if (fabs(triangle_area(w, w->previous[i], i, w->next[i])) <= line_slack) return i;
+        if (fabs(compute_triangle_area(w, w->previous[i], i, w->next[i])) <= line_slack) return i;
     } while (i != first);
     return -1;
 }

@@ -9,8 +9,8 @@
 /* maximum size in bytes of an existing table to which lines are added; about four million pictures */
 enum { MOST_BYTES = 1 << 28 };
 
-insitu_status session_fail_database(const scene_database *database, const char *file, const char *what,
-                                    const file_failure *failure, base_error *error)
+insitu_status session_fail_for_database_file(const scene_database *database, const char *file, const char *what,
+                                             const file_failure *failure, base_error *error)
 {
     return base_fail(error, failure->is_out_of_memory ? INSITU_ERROR_MEMORY : INSITU_ERROR_IO,
                      "cinema: %.300s/%s: cannot be %s: %s", database->path, file, what, failure->reason);
@@ -19,10 +19,10 @@ insitu_status session_fail_database(const scene_database *database, const char *
 static insitu_status fail_memory(const scene_database *database, const char *file, const char *what, base_error *error)
 {
     const file_failure failure = {.is_out_of_memory = true, .reason = "cannot allocate memory"};
-    return session_fail_database(database, file, what, &failure, error);
+    return session_fail_for_database_file(database, file, what, &failure, error);
 }
 
-char *session_database_file(const scene_database *database, const char *file)
+char *session_make_database_path(const scene_database *database, const char *file)
 {
     const size_t size = strlen(database->path) + strlen(file) + 2;
     char *path = base_alloc(size);
@@ -129,7 +129,7 @@ static void drop_lines_from_cycle(session_table *t, int64_t cycle)
     const char *end = t->size ? memchr(t->text, '\n', t->size) : NULL;
     const size_t header = end ? (size_t)(end + 1 - t->text) : 0;
     t->text[t->size] = '\0';
-    t->size = header + text_keep_below(t->text + header, cycle);
+    t->size = header + text_keep_lines_below(t->text + header, cycle);
 }
 
 /* Copies those lines of the table file in the folder that belong to cycles before `cycle`. */
@@ -153,7 +153,7 @@ static insitu_status begin_table(session_table *t, int64_t cycle, base_error *er
     table_line line = {t, true};
     file_content old;
     file_failure failure;
-    char *path = session_database_file(t->database, "data.csv");
+    char *path = session_make_database_path(t->database, "data.csv");
     t->size = 0;
     add_header(&line);
     if (!path || !line.is_complete) {
@@ -162,7 +162,7 @@ static insitu_status begin_table(session_table *t, int64_t cycle, base_error *er
     }
     insitu_status status = INSITU_OK;
     if (!file_read_own(path, MOST_BYTES, &old, &failure) && !failure.is_missing)
-        status = session_fail_database(t->database, "data.csv", "read", &failure, error);
+        status = session_fail_for_database_file(t->database, "data.csv", "read", &failure, error);
     if (!status && old.size) status = copy_earlier_lines(t, &old, cycle, error);
     base_free(old.text);
     base_free(path);
@@ -273,11 +273,11 @@ static bool write_page_file(const session_table *t, const char *path, file_failu
 static insitu_status write_file(const session_table *t, const char *name, table_writer *put, base_error *error)
 {
     file_failure failure;
-    char *path = session_database_file(t->database, name);
+    char *path = session_make_database_path(t->database, name);
     if (!path) return fail_memory(t->database, name, "written", error);
     const bool is_written = put(t, path, &failure);
     base_free(path);
-    return is_written ? INSITU_OK : session_fail_database(t->database, name, "written", &failure, error);
+    return is_written ? INSITU_OK : session_fail_for_database_file(t->database, name, "written", &failure, error);
 }
 
 insitu_status session_write_cinema(session_cinema *cinema, base_error *error)

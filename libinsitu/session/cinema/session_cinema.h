@@ -55,12 +55,12 @@ insitu_status session_write_cinema(session_cinema *cinema, base_error *error);
 void session_cinema_free(session_cinema *cinema);
 
 /* Returns the path of a file of the database. It is allocated by base_alloc(); NULL if memory runs out. */
-char *session_database_file(const scene_database *database, const char *file);
+char *session_make_database_path(const scene_database *database, const char *file);
 
 /* Stores an error with the message that the file could not be read or written, and returns its status; `what` is "read"
  * or "written". */
-insitu_status session_fail_database(const scene_database *database, const char *file, const char *what,
-                                    const file_failure *failure, base_error *error);
+insitu_status session_fail_for_database_file(const scene_database *database, const char *file, const char *what,
+                                             const file_failure *failure, base_error *error);
 
 /* content of index.html, which is generated from session_cinema_page.html */
 extern const unsigned char session_cinema_page[];

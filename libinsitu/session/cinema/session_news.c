@@ -21,7 +21,7 @@ static void store_line(session_news *news, int64_t cycle, const char *line, size
     news->lines[at][size] = '\0';
 }
 
-void session_record_news(session_news *news, const session_report *report, const base_error *error)
+void session_record_step_messages(session_news *news, const session_report *report, const base_error *error)
 {
     const char *at = report->warnings.size ? report->warnings.data : "";
     while (*at) {
@@ -103,7 +103,7 @@ static void add_warnings(text_output *out, const session_news *news)
     text_print(out, "]}\n");
 }
 
-char *session_make_news(session_news *news, const session_news_scene *source, const insitu_report *report)
+char *session_compose_report_json(session_news *news, const session_news_scene *source, const insitu_report *report)
 {
     text_output out = {0};
     c_locale numbers;
@@ -124,14 +124,14 @@ char *session_make_news(session_news *news, const session_news_scene *source, co
     return NULL;
 }
 
-insitu_status session_write_news(const scene *scene, const char *text, base_error *error)
+insitu_status session_write_report_json(const scene *scene, const char *text, base_error *error)
 {
     for (int i = 0; i < scene->database_count; i++) {
         file_failure failure;
-        char *path = session_database_file(&scene->databases[i], "report.json");
+        char *path = session_make_database_path(&scene->databases[i], "report.json");
         const bool is_awaited = path && !file_exists(scene->databases[i].path);
         if (path && !is_awaited && !file_replace(path, text, strlen(text), &failure))
-            session_fail_database(&scene->databases[i], "report.json", "written", &failure, error);
+            session_fail_for_database_file(&scene->databases[i], "report.json", "written", &failure, error);
         base_free(path);
     }
     return error->status;

@@ -41,14 +41,14 @@ typedef struct session_news_scene {
 
 /* Stores a step's error and its warnings. Must be called before the step's warnings include the error of a refused
  * scene file. Local. */
-void session_record_news(session_news *news, const session_report *report, const base_error *error);
+void session_record_step_messages(session_news *news, const session_report *report, const base_error *error);
 
 /* Returns the text of report.json, allocated by base_alloc(). Returns NULL if memory runs out; is_new then remains set.
  * Local. */
-char *session_make_news(session_news *news, const session_news_scene *source, const insitu_report *report);
+char *session_compose_report_json(session_news *news, const session_news_scene *source, const insitu_report *report);
 
 /* Writes report.json into the databases whose folders exist. Returns the first error. Local. */
-insitu_status session_write_news(const scene *scene, const char *text, base_error *error);
+insitu_status session_write_report_json(const scene *scene, const char *text, base_error *error);
 
 void session_news_free(session_news *news);
 

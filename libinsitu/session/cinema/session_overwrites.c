@@ -79,7 +79,7 @@ void session_record_written(session_overwrites *all, const scene *scene, int ima
                             session_report *report)
 {
     const scene_image *drawn = &scene->images[image];
-    const scene_placeholder_values moment = scene_placeholder_values_of(drawn, cycle, time);
+    const scene_placeholder_values moment = scene_make_placeholder_values(drawn, cycle, time);
     if (!reserve_entries(all, scene)) return;
     const int first = count_outputs_before(scene, image);
     for (int i = 0; i < drawn->output_count; i++) {

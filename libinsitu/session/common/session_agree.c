@@ -29,7 +29,7 @@ insitu_status session_share_error(MPI_Comm comm, int root, base_error *error)
     return error->status;
 }
 
-static void prefix_rank(int rank, base_error *error)
+static void prefix_message_with_rank(int rank, base_error *error)
 {
     char message[sizeof error->message];
     memcpy(message, error->message, sizeof message);
@@ -47,7 +47,7 @@ static insitu_status agree_on_error(MPI_Comm comm, base_error *error, int with_r
     const int code = MPI_Allreduce(&mine, &first, 1, MPI_INT, MPI_MIN, comm);
     if (code != MPI_SUCCESS) return session_check_mpi(error, code, "MPI_Allreduce");
     if (first == ranks) return INSITU_OK;
-    if (rank == first && with_rank) prefix_rank(rank, error);
+    if (rank == first && with_rank) prefix_message_with_rank(rank, error);
     return session_share_error(comm, first, error);
 }
 

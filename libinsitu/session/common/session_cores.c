@@ -12,7 +12,7 @@
 
 enum { MOST_CORES = CPU_SETSIZE };
 
-int session_share_of_cores(const int32_t *may_run, const int32_t *rank_counts, int cores)
+int session_compute_share_of_cores(const int32_t *may_run, const int32_t *rank_counts, int cores)
 {
     double share = 0;
     for (int k = 0; k < cores; k++)
@@ -50,14 +50,14 @@ static bool find_allowed_cores(int32_t may_run[MOST_CORES])
     return true;
 }
 
-int session_cores_of_rank(MPI_Comm node)
+int session_count_cores_of_rank(MPI_Comm node)
 {
     int32_t own[MOST_CORES] = {0}, all[MOST_CORES];
     int ranks = 1;
     MPI_Comm_size(node, &ranks);
     const bool is_known = find_allowed_cores(own);
     if (MPI_Allreduce(own, all, MOST_CORES, MPI_INT32_T, MPI_SUM, node) == MPI_SUCCESS && is_known)
-        return session_share_of_cores(own, all, MOST_CORES);
+        return session_compute_share_of_cores(own, all, MOST_CORES);
     /* a rank that may not run on all cores of the node is assumed to be bound to its own cores */
     const int cores = omp_get_num_procs(), share = cores / ranks;
     if (cores < sysconf(_SC_NPROCESSORS_ONLN)) return cores;

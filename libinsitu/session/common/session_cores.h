@@ -8,11 +8,11 @@
 /* Returns a rank's share of the cores on which it may run, rounded down, but at least 1. A core on which N ranks may
  * run counts as 1/N for each of them. may_run[k] is set if this rank may run on core k; rank_counts[k] is the number of
  * ranks that may run on it. Local. */
-int session_share_of_cores(const int32_t *may_run, const int32_t *rank_counts, int cores);
+int session_compute_share_of_cores(const int32_t *may_run, const int32_t *rank_counts, int cores);
 
 /* Returns this rank's share of the cores among the ranks of its node. If the operating system does not provide the set
  * of cores, the number of cores that OpenMP finds is divided by the number of ranks. Collective over the communicator
  * node. */
-int session_cores_of_rank(MPI_Comm node);
+int session_count_cores_of_rank(MPI_Comm node);
 
 #endif

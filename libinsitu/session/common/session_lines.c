@@ -6,12 +6,12 @@
 
 enum { MOST_BYTES = 2048 }; /* maximum length in bytes of the line of a warning */
 
-int session_reporting_word(const session_report *report, const session_team *team)
+int session_encode_rank_with_warnings(const session_report *report, const session_team *team)
 {
     return report->own_warnings.size ? team->ranks - team->rank : 0;
 }
 
-int session_reporting_rank(int word, const session_team *team)
+int session_decode_rank_with_warnings(int word, const session_team *team)
 {
     return word ? team->ranks - word : -1;
 }

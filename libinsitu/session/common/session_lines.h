@@ -7,11 +7,11 @@
 #include "session_team.h"
 
 /* Encodes whether this rank has warnings as a number. The ranks compute the maximum of these numbers; from the maximum,
- * session_reporting_rank() determines the lowest rank that has warnings. Local. */
-int session_reporting_word(const session_report *report, const session_team *team);
-/* Returns the lowest rank that has warnings, from the maximum of session_reporting_word() over all ranks; -1 if no rank
- * has warnings. Local. */
-int session_reporting_rank(int word, const session_team *team);
+ * session_decode_rank_with_warnings() determines the lowest rank that has warnings. Local. */
+int session_encode_rank_with_warnings(const session_report *report, const session_team *team);
+/* Returns the lowest rank that has warnings, from the maximum of session_encode_rank_with_warnings() over all ranks; -1
+ * if no rank has warnings. Local. */
+int session_decode_rank_with_warnings(int word, const session_team *team);
 
 /* Adds the warnings of the rank `root` to the reports of all ranks. Warnings of the other ranks are dropped, because
  * they are mostly the same as those of `root`. Collective. */

@@ -57,7 +57,7 @@ void session_text_add(session_text *text, const char *format, ...)
     append_text(text, line, size);
 }
 
-static const char *text_of(const session_text *text)
+static const char *text_or_empty(const session_text *text)
 {
     return text->data ? text->data : "";
 }
@@ -81,10 +81,10 @@ void session_report_begin(session_report *report, int64_t cycle, double time)
 void session_report_end(session_report *report)
 {
     report->public_report.bytes_peak = base_memory_peak();
-    report->public_report.copied_why = text_of(&report->copied_why);
-    report->public_report.left_out = text_of(&report->left_out);
-    report->public_report.warnings = text_of(&report->warnings);
-    report->public_report.pieces = text_of(&report->pieces);
+    report->public_report.copied_why = text_or_empty(&report->copied_why);
+    report->public_report.left_out = text_or_empty(&report->left_out);
+    report->public_report.warnings = text_or_empty(&report->warnings);
+    report->public_report.pieces = text_or_empty(&report->pieces);
 }
 
 void session_report_free(session_report *report)
@@ -123,7 +123,7 @@ static int find_reported(const session_report *report, uint64_t key)
     return begin;
 }
 
-static bool is_reported_at(const session_report *report, int at, uint64_t key)
+static bool reported_key_is_at(const session_report *report, int at, uint64_t key)
 {
     return at < report->reported_count && report->reported[at] == key;
 }
@@ -155,7 +155,7 @@ static void add_warning(session_report *report, session_text *text, const sessio
 {
     const uint64_t key = warning_key(warning);
     const int at = find_reported(report, key);
-    const bool is_reported = is_reported_at(report, at, key);
+    const bool is_reported = reported_key_is_at(report, at, key);
     if (holds && !is_reported) {
         char line[1024];
 #pragma GCC diagnostic push
@@ -188,7 +188,7 @@ void session_warn_locally(session_report *report, const session_warning *warning
 bool session_is_warned(const session_report *report, const session_warning *warning)
 {
     const uint64_t key = warning_key(warning);
-    return is_reported_at(report, find_reported(report, key), key);
+    return reported_key_is_at(report, find_reported(report, key), key);
 }
 
 void session_clear_reported_warnings(session_report *report)

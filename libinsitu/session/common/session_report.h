@@ -29,7 +29,8 @@ typedef struct session_report {
     /* reported_count: number of warnings in `reported`; reported_capacity: number of warnings for which it has space */
     int reported_count, reported_capacity;
     uint64_t *reported; /* hashes of warnings that were reported and whose condition still holds, in ascending order */
-    /* result of session_unusable_key() when warnings of unusable cells were last reported; 0: there were none */
+    /* result of session_hash_unusable_fields() when warnings of unusable cells were last reported; 0: there were none
+     */
     uint64_t unusable_key;
 } session_report;
 

@@ -3,7 +3,7 @@
 #include "session_agree.h"
 #include "session_cores.h"
 
-static insitu_status duplicate_comm(MPI_Comm comm, MPI_Comm *out, base_error *error)
+static insitu_status duplicate_communicator(MPI_Comm comm, MPI_Comm *out, base_error *error)
 {
     const insitu_status status = session_check_mpi(error, MPI_Comm_dup(comm, out), "MPI_Comm_dup");
     if (status) return status;
@@ -14,8 +14,8 @@ insitu_status session_team_create(MPI_Comm comm, session_team *out, base_error *
 {
     *out = (session_team){
         .comm = MPI_COMM_NULL, .compositing_comm = MPI_COMM_NULL, .node_ranks = 1, .cores = 1, .ranks_per_node = 1};
-    insitu_status status = duplicate_comm(comm, &out->comm, error);
-    if (!status) status = duplicate_comm(out->comm, &out->compositing_comm, error);
+    insitu_status status = duplicate_communicator(comm, &out->comm, error);
+    if (!status) status = duplicate_communicator(out->comm, &out->compositing_comm, error);
     if (status) return status;
     MPI_Comm_rank(out->comm, &out->rank);
     MPI_Comm_size(out->comm, &out->ranks);
@@ -45,7 +45,7 @@ void session_team_count_node(session_team *team)
     team->node_ranks = 1;
     if (MPI_Comm_split_type(team->comm, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &node) != MPI_SUCCESS) return;
     MPI_Comm_size(node, &team->node_ranks);
-    team->cores = session_cores_of_rank(node);
+    team->cores = session_count_cores_of_rank(node);
     find_rank_placement(team, node);
     MPI_Comm_free(&node);
 }

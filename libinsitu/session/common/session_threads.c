@@ -48,7 +48,7 @@ static thread_limit find_thread_limit(void)
     return (thread_limit){cores > 1 ? cores : 1, "this rank may run on no more cores"};
 }
 
-static int requested_threads(int scene_threads, int cores)
+static int compute_requested_threads(int scene_threads, int cores)
 {
     const int most = omp_get_max_threads(), usual = cores < most ? cores : most;
     const int requested = scene_threads > 0 ? scene_threads : usual;
@@ -82,9 +82,9 @@ static int count_living_threads(const session_threads *threads)
     return is_same && threads->ended_count == atomic_load(&ended_count) ? threads->count : 1;
 }
 
-bool session_lacks_threads(const session_threads *threads, int scene_threads, int cores)
+bool session_needs_thread_trial(const session_threads *threads, int scene_threads, int cores)
 {
-    return requested_threads(scene_threads, cores) > threads->count ||
+    return compute_requested_threads(scene_threads, cores) > threads->count ||
            !pthread_equal(threads->caller, pthread_self()) || threads->ended_count != atomic_load(&ended_count);
 }
 
@@ -120,7 +120,7 @@ static size_t parse_size(const char *text, size_t unit)
 }
 
 /* Returns the largest stack size that is set in the environment, in bytes; 0 if none is set. */
-static size_t stack_of_environment(void)
+static size_t find_stack_size_of_environment(void)
 {
     static const struct {
         const char *name;
@@ -146,7 +146,7 @@ static void start_trial_threads(trial *t, int requested)
     pthread_mutex_init(&t->exit_mutex, NULL);
     pthread_mutex_lock(&t->exit_mutex);
     if (!t->threads || !t->spare_memory || pthread_attr_init(&attributes) != 0) return;
-    const size_t stack = stack_of_environment();
+    const size_t stack = find_stack_size_of_environment();
     /* OpenMP, too, ignores a stack size that the system rejects */
     if (stack) pthread_attr_setstacksize(&attributes, stack);
     sigfillset(&all);
@@ -170,7 +170,7 @@ static void join_trial_threads(trial *t)
 
 /* Tries to start threads before a rank's first parallel region, if any rank needs more threads than it has. All ranks
  * try at the same time, because ranks on a node share its limits. Collective. */
-static insitu_status try_threads(session_threads *threads, int requested, MPI_Comm comm, base_error *error)
+static insitu_status start_threads_as_trial(session_threads *threads, int requested, MPI_Comm comm, base_error *error)
 {
     const int living = count_living_threads(threads), lacking = requested - living;
     trial t = {.count = 0};
@@ -221,7 +221,7 @@ static thread_stack find_own_stack(void)
 }
 
 /* Returns the smallest stack of all workers. */
-static thread_stack least_worker_stack(int threads)
+static thread_stack find_least_worker_stack(int threads)
 {
     int64_t left = INT64_MAX, size = INT64_MAX;
 #pragma omp parallel num_threads(threads) reduction(min : left, size)
@@ -252,7 +252,7 @@ static insitu_status check_stacks(session_threads *threads, const session_team *
 {
     const thread_stack own = find_own_stack();
     session_guard_suspend(guard);
-    const thread_stack least = least_worker_stack(team->threads);
+    const thread_stack least = find_least_worker_stack(team->threads);
     session_guard_resume();
     if (own.free_bytes < SESSION_CALLER_STACK)
         base_fail(error, INSITU_ERROR_ARGUMENT,
@@ -277,8 +277,8 @@ static insitu_status check_stacks(session_threads *threads, const session_team *
 insitu_status session_begin_threads(session_threads *threads, session_team *team, int scene_threads, bool is_new,
                                     const session_guard *guard, session_report *report, base_error *error)
 {
-    const int requested = requested_threads(scene_threads, team->cores);
-    insitu_status status = is_new ? try_threads(threads, requested, team->comm, error) : INSITU_OK;
+    const int requested = compute_requested_threads(scene_threads, team->cores);
+    insitu_status status = is_new ? start_threads_as_trial(threads, requested, team->comm, error) : INSITU_OK;
     if (status) return status;
     team->threads = choose_threads(threads, scene_threads, requested, report);
     return is_new ? check_stacks(threads, team, guard, error) : INSITU_OK;

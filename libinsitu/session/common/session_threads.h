@@ -28,7 +28,7 @@ typedef struct session_threads {
 /* Returns whether this rank must make a new trial: it requests more threads than are available, another thread of the
  * caller calls, or threads have ended. scene_threads is the number set in the scene; if it is 0, the rank requests its
  * share of the cores, or OpenMP's maximum if that is lower. Local. */
-bool session_lacks_threads(const session_threads *threads, int scene_threads, int cores);
+bool session_needs_thread_trial(const session_threads *threads, int scene_threads, int cores);
 
 /* Determines how many threads can be started, and sets team->threads. Warns if there are fewer than requested. If
  * is_new is set (because some rank lacks threads, or the scene was edited), threads are started and their stacks

@@ -57,8 +57,8 @@ static bool is_seen_outside(const double lower[3], const double upper[3], const 
     return high ? c->eye[axis] > upper[axis] : c->eye[axis] < lower[axis];
 }
 
-int session_box_strokes(const double lower[3], const double upper[3], const render_camera *camera,
-                        insitu_stroke strokes[SESSION_BOX_EDGES])
+int session_compute_box_strokes(const double lower[3], const double upper[3], const render_camera *camera,
+                                insitu_stroke strokes[SESSION_BOX_EDGES])
 {
     double size = 0;
     int count = 0;
@@ -122,7 +122,7 @@ static ruled_edge find_edge(const double lower[3], const double upper[3], const 
     return e;
 }
 
-static bool is_lower(const ruled_edge *a, const ruled_edge *b)
+static bool is_better_ruler_edge(const ruled_edge *a, const ruled_edge *b)
 {
     if (!a->is_in_front || !b->is_in_front) return a->is_in_front;
     if (a->is_outer != b->is_outer) return a->is_outer;
@@ -180,14 +180,14 @@ static void draw_ruler(const ruled_edge *e, int axis, const render_camera *c, do
     labels[out->label_count++] = make_label(name_at, e->outward, 2.4, names[axis]);
 }
 
-void session_box_rulers(const double lower[3], const double upper[3], const render_camera *camera, double size,
-                        insitu_decorations *out, insitu_stroke *strokes, insitu_label *labels)
+void session_add_box_rulers(const double lower[3], const double upper[3], const render_camera *camera, double size,
+                            insitu_decorations *out, insitu_stroke *strokes, insitu_label *labels)
 {
     for (int axis = 0; axis < 3; axis++) {
         ruled_edge best = {.is_in_front = false};
         for (int corner = 0; corner < 4; corner++) {
             const ruled_edge e = find_edge(lower, upper, camera, axis, corner);
-            if (is_lower(&e, &best)) best = e;
+            if (is_better_ruler_edge(&e, &best)) best = e;
         }
         if (best.is_in_front) draw_ruler(&best, axis, camera, size, out, strokes, labels);
     }
@@ -248,7 +248,7 @@ static bool shows_magnitude(const session_catalogue *catalogue, const scene_fiel
     for (int m = 0; m < catalogue->mesh_count; m++) {
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
         const session_catalogue_field *found =
-            scene_field_is_on(field, mesh->name) ? session_catalogue_find(mesh, field->name) : NULL;
+            scene_field_is_on(field, mesh->name) ? session_catalogue_find_field(mesh, field->name) : NULL;
         if (found && found->component_count > components) components = found->component_count;
     }
     return field->component == SCENE_COMPONENT_MAGNITUDE ||
@@ -394,8 +394,8 @@ static void fill_length_decorations(session_decorations *d, const scene_decorati
     double middle[3];
     for (int a = 0; a < 3; a++) middle[a] = 0.5 * extent->lower[a] + 0.5 * extent->upper[a];
     if (scene->has_rulers)
-        session_box_rulers(extent->lower, extent->upper, camera, scene->size * camera->height, &d->decorations,
-                           d->strokes, d->ruler_labels);
+        session_add_box_rulers(extent->lower, extent->upper, camera, scene->size * camera->height, &d->decorations,
+                               d->strokes, d->ruler_labels);
     if (scene->has_scale_bar) d->decorations.scale_bar = session_make_scale_bar(camera, middle, scene->scale_unit);
     d->decorations.scale_bar.at = (insitu_anchor)scene->scale_bar_anchor;
 }
@@ -403,8 +403,8 @@ static void fill_length_decorations(session_decorations *d, const scene_decorati
 static void fill_outline(session_decorations *d, const session_outline *outline, const render_camera *camera)
 {
     for (int i = 0; i < outline->count; i++)
-        d->decorations.stroke_count += session_box_strokes(outline->boxes[i].lower, outline->boxes[i].upper, camera,
-                                                           d->strokes + d->decorations.stroke_count);
+        d->decorations.stroke_count += session_compute_box_strokes(outline->boxes[i].lower, outline->boxes[i].upper,
+                                                                   camera, d->strokes + d->decorations.stroke_count);
 }
 
 session_decorations *session_make_decorations(const scene_image *image, const session_decoration_basis *basis)
@@ -437,7 +437,7 @@ session_decorations *session_make_decorations(const scene_image *image, const se
 }
 
 /* Changes the pointers in a bitwise copy of a struct, so that they refer to the copy's own members. */
-static void redirect_pointers(session_decorations *copy)
+static void redirect_pointers_to_copy(session_decorations *copy)
 {
     insitu_decorations *const both[2] = {&copy->decorations, &copy->background};
     for (int i = 0; i < 2; i++) {
@@ -467,7 +467,7 @@ session_decorations *session_copy_decorations(const session_decorations *from)
         is_done = copy->words[i].text != NULL;
         copy->decorations.words_count += is_done;
     }
-    redirect_pointers(copy);
+    redirect_pointers_to_copy(copy);
     if (is_done) return copy;
     session_free_decorations(copy);
     return NULL;

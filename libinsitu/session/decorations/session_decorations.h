@@ -52,13 +52,13 @@ void session_free_decorations(session_decorations *decorations);
 
 /* Computes the edges of a box as strokes in the picture, and returns their number. Parts behind the eye are clipped
  * away. An edge is marked as behind the box's content if the camera sees the inner sides of both its faces. Local. */
-int session_box_strokes(const double lower[3], const double upper[3], const render_camera *camera,
-                        insitu_stroke strokes[SESSION_BOX_EDGES]);
+int session_compute_box_strokes(const double lower[3], const double upper[3], const render_camera *camera,
+                                insitu_stroke strokes[SESSION_BOX_EDGES]);
 
 /* Adds ticks, numbers and names along three edges of the box, one per axis. For each axis, the edge on the box's
  * silhouette that is lowest in the picture is chosen. size is the height of texts in pixels. Local. */
-void session_box_rulers(const double lower[3], const double upper[3], const render_camera *camera, double size,
-                        insitu_decorations *out, insitu_stroke *strokes, insitu_label *labels);
+void session_add_box_rulers(const double lower[3], const double upper[3], const render_camera *camera, double size,
+                            insitu_decorations *out, insitu_stroke *strokes, insitu_label *labels);
 
 /* Returns a scale bar. Its length is a round number and at most a fifth of the picture's width, at the depth of the
  * point. unit may be NULL. Local. */

@@ -69,7 +69,8 @@ static void write_number(double value, bool is_plain, int digits, char *text, si
 
 /* Writes the number in the form that the scene requests. If it requests none, the number is written with `digits`
  * digits after the decimal point, and with an exponent unless is_plain is set. */
-static void write_in_form(double value, const scene_number_form *form, bool is_plain, int digits, insitu_tick *tick)
+static void write_number_in_form(double value, const scene_number_form *form, bool is_plain, int digits,
+                                 insitu_tick *tick)
 {
     enum { MOST = sizeof tick->text - 2 };
     const int wanted = form->has_digits ? form->digits : digits;
@@ -79,7 +80,7 @@ static void write_in_form(double value, const scene_number_form *form, bool is_p
     write_number(value, is_plain, wanted, tick->text, sizeof tick->text);
 }
 
-static double scale_position(const session_scale *s, double value)
+static double compute_position_on_scale(const session_scale *s, double value)
 {
     const double low = render_scaled(s->kind, s->threshold, s->low);
     const double high = render_scaled(s->kind, s->threshold, s->high);
@@ -88,7 +89,7 @@ static double scale_position(const session_scale *s, double value)
 
 /* ---- linear -------------------------------------------------------------------------------------------------- */
 
-static int fill_multiples(const session_scale *s, int most, insitu_tick *ticks)
+static int fill_ticks_at_multiples(const session_scale *s, int most, insitu_tick *ticks)
 {
     const round_step step = choose_round_step(s->low, s->high, most);
     const double largest = fmax(fabs(s->low), fabs(s->high));
@@ -101,8 +102,8 @@ static int fill_multiples(const session_scale *s, int most, insitu_tick *ticks)
     find_multiples(s->low, s->high, round_step_size(step), &first, &last);
     for (double n = first; n <= last && count < SESSION_MAX_TICKS; n++) {
         const double value = n * round_step_size(step);
-        ticks[count].place = scale_position(s, value);
-        write_in_form(value, &s->number_form, is_plain, digits, &ticks[count]);
+        ticks[count].place = compute_position_on_scale(s, value);
+        write_number_in_form(value, &s->number_form, is_plain, digits, &ticks[count]);
         count++;
     }
     return count;
@@ -126,9 +127,9 @@ static void add_tick(const session_scale *s, double value, insitu_tick *ticks, i
         const bool is_short = size < 1e4 && size > 9e-4;
         const bool is_plain =
             s->number_form.notation == SCENE_SHORTEST ? is_short : s->number_form.notation == SCENE_FIXED;
-        tick->place = scale_position(s, value);
-        write_in_form(value, &s->number_form, is_plain, is_plain && size < 0.9999 ? (int)ceil(-log10(size) - 1e-9) : 0,
-                      tick);
+        tick->place = compute_position_on_scale(s, value);
+        write_number_in_form(value, &s->number_form, is_plain,
+                             is_plain && size < 0.9999 ? (int)ceil(-log10(size) - 1e-9) : 0, tick);
     }
     (*count)++;
 }
@@ -149,7 +150,7 @@ static void add_decades(const session_scale *s, double sign, decade_choice choic
     }
 }
 
-static int fill_decades(const session_scale *s, decade_choice choice, insitu_tick *ticks)
+static int fill_decade_ticks(const session_scale *s, decade_choice choice, insitu_tick *ticks)
 {
     int count = 0;
     if (s->kind == RENDER_SYMLOG) {
@@ -164,11 +165,11 @@ static int fill_decades(const session_scale *s, decade_choice choice, insitu_tic
 
 static int fill_ticks(const session_scale *s, int most, insitu_tick *ticks)
 {
-    if (s->kind == RENDER_LINEAR) return fill_multiples(s, most, ticks);
-    int count = fill_decades(s, (decade_choice){true, 1}, ticks);
+    if (s->kind == RENDER_LINEAR) return fill_ticks_at_multiples(s, most, ticks);
+    int count = fill_decade_ticks(s, (decade_choice){true, 1}, ticks);
     for (int every = 1; count > most && every <= 64; every++)
-        count = fill_decades(s, (decade_choice){false, every}, ticks);
-    return count < 2 ? fill_multiples(s, most, ticks) : count;
+        count = fill_decade_ticks(s, (decade_choice){false, every}, ticks);
+    return count < 2 ? fill_ticks_at_multiples(s, most, ticks) : count;
 }
 
 /* Adds one tick in the centre of each band if the bands correspond to the integers of the range: the range begins and
@@ -209,7 +210,7 @@ int session_make_constant_tick(double value, const scene_number_form *form, insi
     const bool is_begun = c_locale_enter(&numbers);
     tick->place = 0.5;
     if (form->has_digits || form->notation != SCENE_SHORTEST) {
-        write_in_form(value, form, fabs(value) < 1e6, 6, tick);
+        write_number_in_form(value, form, fabs(value) < 1e6, 6, tick);
     } else {
         snprintf(tick->text, sizeof tick->text, "%.9g", value);
         shorten_exponent(tick->text);

@@ -12,7 +12,7 @@ static const lane_loops *find_lane_loops(cpu_isa isa)
     return &session_lanes_plain;
 }
 
-lane_run *session_lanes_of(cpu_isa isa, const grid *g, int type)
+lane_run *session_find_lane_run(cpu_isa isa, const grid *g, int type)
 {
     const bool wide_index = g->connectivity.is_wide, wide_number = g->coordinates[0].is_wide;
     switch (type) {

@@ -36,7 +36,7 @@ typedef int64_t lane_run(const lane_cells *cells, lane_sums *sums, int64_t *scal
 
 /* Returns the function for cells of this type and the layout of the grid's arrays; NULL if there is none for the
  * type. */
-lane_run *session_lanes_of(cpu_isa isa, const grid *g, int type);
+lane_run *session_find_lane_run(cpu_isa isa, const grid *g, int type);
 
 /* ---- for session_lanes.c ------------------------------------------------------------------------------------- */
 

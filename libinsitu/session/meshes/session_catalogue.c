@@ -65,7 +65,7 @@ static part_summary summarize_parts(const session_parts *parts)
     return out;
 }
 
-static const session_field *find_set_field(const session_mesh *part, const char *name)
+static const session_field *find_field_of_caller(const session_mesh *part, const char *name)
 {
     const int index = part->source ? -1 : session_find_field(part, name);
     return index < 0 || part->fields[index].is_derived ? NULL : &part->fields[index];
@@ -75,7 +75,7 @@ static const session_field *find_set_field(const session_mesh *part, const char 
 static bool is_first_with_field(const session_parts *parts, int part, const session_field *field)
 {
     for (int i = 0; i < part; i++)
-        if (find_set_field(parts->items[i], field->given.name)) return false;
+        if (find_field_of_caller(parts->items[i], field->given.name)) return false;
     return true;
 }
 
@@ -86,7 +86,7 @@ static void find_field_problem(const session_parts *parts, const session_field *
     const insitu_field *as = &first->given;
     for (int i = 0; i < parts->count && !problem->status; i++) {
         const session_mesh *part = parts->items[i];
-        const session_field *field = find_set_field(part, as->name);
+        const session_field *field = find_field_of_caller(part, as->name);
         if (part->source) continue;
         if (field && field->problem.status) {
             *problem = field->problem;
@@ -108,7 +108,7 @@ typedef struct field_visit {
     int part, next;
 } field_visit;
 
-static const session_field *next_set_field(field_visit *visit)
+static const session_field *next_field_of_caller(field_visit *visit)
 {
     for (; visit->part < visit->parts->count; visit->part++, visit->next = 0) {
         const session_mesh *part = visit->parts->items[visit->part];
@@ -120,14 +120,14 @@ static const session_field *next_set_field(field_visit *visit)
     return NULL;
 }
 
-static size_t append_parts(char *text, size_t capacity, size_t at, const session_parts *parts)
+static size_t append_mesh_to_table(char *text, size_t capacity, size_t at, const session_parts *parts)
 {
     const part_summary of = summarize_parts(parts);
     if (!of.is_given) return at;
     at = append_line(text, capacity, at, 'm', of.has_cells, of.has_ids | 2 * of.is_refined, parts->items[0]->name);
     if (of.problem) at = append_fault(text, capacity, at, of.problem);
     field_visit visit = {.parts = parts};
-    for (const session_field *field; (field = next_set_field(&visit)) != NULL;) {
+    for (const session_field *field; (field = next_field_of_caller(&visit)) != NULL;) {
         base_error problem = {.status = INSITU_OK};
         find_field_problem(parts, field, &problem);
         at = append_line(text, capacity, at, 'f', field->given.component_count, (int)field->given.centring,
@@ -147,7 +147,7 @@ static size_t write_table(const session_meshes *meshes, char *text, size_t capac
     at = append_fault(text, capacity, at, &meshes->pending_error);
     for (int i = 0; i < meshes->count;) {
         const session_parts parts = session_parts_at(meshes, i);
-        at = append_parts(text, capacity, at, &parts);
+        at = append_mesh_to_table(text, capacity, at, &parts);
         i += parts.count;
     }
     return at;
@@ -161,7 +161,7 @@ static void hash_parts(const session_parts *parts, uint64_t *hash)
     session_hash_bytes(hash, head, sizeof head);
     session_hash_text(hash, parts->items[0]->name);
     field_visit visit = {.parts = parts};
-    for (const session_field *field; (field = next_set_field(&visit)) != NULL;) {
+    for (const session_field *field; (field = next_field_of_caller(&visit)) != NULL;) {
         const int tail[] = {1, field->given.component_count, (int)field->given.centring};
         base_error problem = {.status = INSITU_OK};
         find_field_problem(parts, field, &problem);
@@ -172,7 +172,7 @@ static void hash_parts(const session_parts *parts, uint64_t *hash)
 }
 
 /* Errors that only some blocks have are hashed too, because other ranks must be informed of these errors. */
-uint64_t session_names_hash(const session_meshes *meshes)
+uint64_t session_hash_names(const session_meshes *meshes)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
     for (int i = 0; i < meshes->count;) {
@@ -412,7 +412,7 @@ static bool read_table(session_catalogue *catalogue, const char *text, size_t si
     return true;
 }
 
-const session_catalogue_field *session_catalogue_find(const session_catalogue_mesh *mesh, const char *name)
+const session_catalogue_field *session_catalogue_find_field(const session_catalogue_mesh *mesh, const char *name)
 {
     for (int i = 0; i < mesh->field_count; i++)
         if (strcmp(mesh->fields[i].name, name) == 0) return &mesh->fields[i];
@@ -433,8 +433,8 @@ static void sort_fields(const session_catalogue *catalogue)
     }
 }
 
-session_catalogue_field *session_catalogue_add(session_catalogue_mesh *mesh, const char *name, int component_count,
-                                               insitu_centring centring, int derived)
+session_catalogue_field *session_catalogue_add_field(session_catalogue_mesh *mesh, const char *name,
+                                                     int component_count, insitu_centring centring, int derived)
 {
     session_catalogue_field *field = add_field(mesh, name);
     if (!field) return NULL;
@@ -599,8 +599,8 @@ static void hash_stamps(const session_parts *parts, int rank, uint64_t hashes[2]
 }
 
 /* Computes cells_hash and positions_hash of each mesh: the sums over all ranks of the hashes of hash_stamps(). */
-static insitu_status update_parts(session_catalogue *catalogue, const session_meshes *meshes, const session_team *team,
-                                  base_error *error)
+static insitu_status update_mesh_hashes(session_catalogue *catalogue, const session_meshes *meshes,
+                                        const session_team *team, base_error *error)
 {
     const int count = catalogue->mesh_count;
     uint64_t *sums = base_calloc((size_t)count * 2 + 1, sizeof *sums);
@@ -675,7 +675,7 @@ insitu_status session_update_homes(session_catalogue *catalogue, const session_m
                                    const session_team *team, base_error *error)
 {
     insitu_status status = INSITU_OK;
-    if (!catalogue->are_hashes_known) status = update_parts(catalogue, meshes, team, error);
+    if (!catalogue->are_hashes_known) status = update_mesh_hashes(catalogue, meshes, team, error);
     for (int i = 0; i < catalogue->mesh_count && !status; i++) {
         session_catalogue_mesh *mesh = &catalogue->meshes[i];
         const session_parts parts = session_find_parts(meshes, mesh->name);

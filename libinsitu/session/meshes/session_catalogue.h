@@ -143,7 +143,7 @@ typedef struct session_catalogue {
     session_mesh_group **mesh_groups;
 } session_catalogue;
 
-/* Updates the catalogue. is_shared: all ranks have the same meshes and fields (equal session_names_hash()), and no mesh
+/* Updates the catalogue. is_shared: all ranks have the same meshes and fields (equal session_hash_names()), and no mesh
  * or field has an error. Meshes with an error are excluded from the step. Collective. */
 insitu_status session_update_catalogue(session_catalogue *catalogue, session_meshes *meshes, const session_team *team,
                                        bool is_shared, base_error *error);
@@ -167,7 +167,7 @@ static inline bool session_catalogue_has_higher_order(const session_catalogue *c
 
 /* Returns the name of the mesh group over which values on this mesh are averaged: if the mesh has vertex ids, the group
  * of this mesh alone; otherwise mesh_group_name, which is the name stored in the layer's field. */
-static inline uint64_t session_mesh_group_name(const session_catalogue_mesh *mesh, uint64_t mesh_group_name)
+static inline uint64_t session_find_group_name_of_mesh(const session_catalogue_mesh *mesh, uint64_t mesh_group_name)
 {
     return mesh->single_group_name ? mesh->single_group_name : mesh_group_name;
 }
@@ -194,16 +194,16 @@ void session_mesh_group_parts_free(session_mesh_group_parts *parts);
 void session_vertex_groups_free(session_vertex_groups *groups);
 
 /* Returns a hash of this rank's table of names. Two ranks have the same hash if their tables are equal. Local. */
-uint64_t session_names_hash(const session_meshes *meshes);
+uint64_t session_hash_names(const session_meshes *meshes);
 
 /* Adds a field that all ranks with cells of the mesh have. Its name must not exist yet. Returns NULL if memory runs
  * out. */
-session_catalogue_field *session_catalogue_add(session_catalogue_mesh *mesh, const char *name, int component_count,
-                                               insitu_centring centring, int derived);
+session_catalogue_field *session_catalogue_add_field(session_catalogue_mesh *mesh, const char *name,
+                                                     int component_count, insitu_centring centring, int derived);
 /* Removes the derived fields from the catalogue. */
 void session_catalogue_drop_derived(session_catalogue *catalogue);
 
 /* Returns the catalogue's entry for the field, or NULL if no rank has it. Local. */
-const session_catalogue_field *session_catalogue_find(const session_catalogue_mesh *mesh, const char *name);
+const session_catalogue_field *session_catalogue_find_field(const session_catalogue_mesh *mesh, const char *name);
 
 #endif

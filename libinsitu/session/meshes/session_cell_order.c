@@ -63,7 +63,7 @@ static cell_rows make_cell_rows(const session_mesh *mesh)
 
 /* Returns whether all entries fit into 4 bytes. An entry that does not fit, in a mesh with few vertices, is an invalid
  * index. The entries are then copied with 8 bytes, so that the error message shows this index. */
-static bool fit_in_32_bits(const cell_rows *rows, int threads)
+static bool do_entries_fit_in_32_bits(const cell_rows *rows, int threads)
 {
     int64_t least = 0, most = 0;
 #pragma omp parallel num_threads(threads)
@@ -116,7 +116,7 @@ insitu_status session_order_cells(session_mesh *mesh, int threads, base_error *e
     session_topology *t = &mesh->topology;
     const cell_rows rows = make_cell_rows(mesh);
     if (mesh->cells.cell_types && !has_reordered_cells(mesh)) return INSITU_OK;
-    const int64_t largest = fit_in_32_bits(&rows, threads) ? 0 : INT64_MAX;
+    const int64_t largest = do_entries_fit_in_32_bits(&rows, threads) ? 0 : INT64_MAX;
     if (!session_make_indices(mesh, "cells' vertices in VTK's order", rows.count, largest, &t->connectivity, error))
         return error->status;
 #pragma omp parallel num_threads(threads)

@@ -281,7 +281,7 @@ static cell_fault check_cell(const session_mesh *mesh, int64_t cell, edge_buffer
 }
 
 /* Returns the type as stored in the caller's array, which may contain 64-bit integers. */
-static long long original_type(const session_mesh *mesh, int64_t cell)
+static long long read_original_cell_type(const session_mesh *mesh, int64_t cell)
 {
     const grid *g = &mesh->cells;
     if (mesh->conformed.types) {
@@ -374,7 +374,7 @@ static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base
             error, INSITU_ERROR_MESH,
             "mesh \"%s\": cell %lld: unknown cell type %lld (10 tet, 12 hex, 13 wedge, 14 pyramid, 42 polyhedron; 5 "
             "triangle, 9 quad, 7 polygon)",
-            mesh->label, at, original_type(mesh, cell));
+            mesh->label, at, read_original_cell_type(mesh, cell));
     case BAD_OFFSETS: return describe_offsets(mesh, cell, &details, error);
     case BAD_INDEX:
         return base_fail(error, INSITU_ERROR_MESH,
@@ -406,10 +406,10 @@ static int64_t check_cells_one_by_one(const session_mesh *mesh, int64_t begin, i
 static int64_t check_cells(const session_mesh *mesh, int threads, mesh_tally *tally)
 {
     const int64_t count = mesh->cells.cell_count;
-    const tally_run run = tally_choose(mesh);
+    const tally_run run = tally_choose_run(mesh);
     int64_t first_bad = count;
-    if (tally_axes(mesh, tally)) return count;
-#pragma omp parallel num_threads(session_region_threads(threads, count)) reduction(min : first_bad)
+    if (tally_lattice_by_axes(mesh, tally)) return count;
+#pragma omp parallel num_threads(session_choose_loop_threads(threads, count)) reduction(min : first_bad)
     {
         region_enter();
         mesh_tally mine = tally_empty();
@@ -495,7 +495,7 @@ static bool has_far_coordinates(const mesh_tally *tally)
 static void find_flat_cells(const grid *g, int threads, uint64_t *flat)
 {
     const int64_t words = (g->cell_count + 63) / 64;
-#pragma omp parallel num_threads(session_region_threads(threads, g->cell_count))
+#pragma omp parallel num_threads(session_choose_loop_threads(threads, g->cell_count))
     {
         region_enter();
 #pragma omp for schedule(static) nowait
@@ -526,7 +526,7 @@ static insitu_status update_flat_cells(session_mesh *mesh, int64_t count, int th
     return INSITU_OK;
 }
 
-static insitu_status check_cells_of(session_mesh *mesh, int threads, base_error *error)
+static insitu_status check_mesh_cells(session_mesh *mesh, int threads, base_error *error)
 {
     mesh_tally tally = tally_empty();
     const int64_t bad = check_cells(mesh, threads, &tally);
@@ -582,7 +582,7 @@ static insitu_status check_mesh(session_mesh *mesh, int threads, base_error *err
     session_fill_conformed(mesh, threads);
     if (!mesh->topology.is_made && session_make_topology(mesh, threads, error)) return error->status;
     insitu_status status = session_make_axes(mesh, error);
-    if (!status) status = check_cells_of(mesh, threads, error);
+    if (!status) status = check_mesh_cells(mesh, threads, error);
     if (status) session_drop_topology(&mesh->topology);
     if (!status || !mesh->warp.is_applied) return status;
     const base_error fault = *error;

@@ -40,24 +40,24 @@ static conform_array find_array(insitu_mesh *m, int number)
 
 /* Returns the type in which indices of a type are read, in place or from a copy. below: upper bound of valid
  * indices. */
-static insitu_type index_type(insitu_type type, int64_t below)
+static insitu_type choose_index_type(insitu_type type, int64_t below)
 {
     if (type == INSITU_INT64 || type == INSITU_UINT64) return INSITU_INT64;
     return type == INSITU_UINT32 && below > INT32_MAX ? INSITU_INT64 : INSITU_INT32;
 }
 
 /* Returns the type in which the array is read. *is_copied is set if it must be read from a copy. */
-static insitu_type read_type(const conform_array *of, bool has_map, bool *is_copied)
+static insitu_type choose_conformed_type(const conform_array *of, bool has_map, bool *is_copied)
 {
     const insitu_type type = of->array->type;
     const bool is_float = type == INSITU_FLOAT32 || type == INSITU_FLOAT64;
     insitu_type as = is_float ? type : INSITU_FLOAT64;
     switch (of->role) {
     case OF_COORDINATES: break;
-    case OF_INDICES: as = index_type(type, of->index_limit); break;
-    case OF_TYPES: as = session_type_size(type) == 1 || has_map ? INSITU_UINT8 : index_type(type, 0); break;
+    case OF_INDICES: as = choose_index_type(type, of->index_limit); break;
+    case OF_TYPES: as = session_type_size(type) == 1 || has_map ? INSITU_UINT8 : choose_index_type(type, 0); break;
     case OF_FLAGS:
-        as = session_type_size(type) < 4 || !session_is_aligned(of->array) ? INSITU_UINT8 : index_type(type, 0);
+        as = session_type_size(type) < 4 || !session_is_aligned(of->array) ? INSITU_UINT8 : choose_index_type(type, 0);
         break;
     }
     const bool is_same_size = session_type_size(as) == session_type_size(type);
@@ -89,7 +89,7 @@ static int64_t read_integer(insitu_type type, const char *p)
 }
 
 /* Returns the type of a cell according to the caller's map, or GRID_NO_TYPE if the map does not contain its number. */
-static unsigned char mapped_type(const session_conformed *conformed, int64_t number)
+static unsigned char map_cell_type(const session_conformed *conformed, int64_t number)
 {
     if (number < 0 || number >= conformed->type_count) return GRID_NO_TYPE;
     return conformed->types[number];
@@ -111,7 +111,7 @@ static void convert_element(const session_conformed *conformed, const conform_ar
         if (of->role == OF_FLAGS)
             *out = whole != 0;
         else if (as == INSITU_UINT8)
-            *out = (char)(conformed->types ? mapped_type(conformed, whole) : (unsigned char)whole);
+            *out = (char)(conformed->types ? map_cell_type(conformed, whole) : (unsigned char)whole);
         else if (as == INSITU_INT64)
             memcpy(out, &whole, sizeof whole);
         else
@@ -139,7 +139,7 @@ void session_fill_conformed(session_mesh *mesh, int threads)
         if (!mesh->conformed.copies[i]) continue;
         bool is_copied;
         const conform_array of = find_array(&mesh->original, i);
-        const insitu_type as = read_type(&of, mesh->conformed.types != NULL, &is_copied);
+        const insitu_type as = choose_conformed_type(&of, mesh->conformed.types != NULL, &is_copied);
         convert_array(&mesh->conformed, &of, as, threads, mesh->conformed.copies[i]);
     }
 }
@@ -173,12 +173,13 @@ static bool copy_map(const insitu_mesh *original, session_conformed *out)
 /* Makes the description refer to a copy of the array with this number, if the array cannot be read in place. If
  * is_kept, the copy of the previous description is reused; otherwise a new one is allocated. Returns false if memory
  * runs out. */
-static bool refer_to_copy(session_conformed *last, bool is_kept, int number, insitu_mesh *given, session_conformed *out)
+static bool replace_array_by_copy(session_conformed *last, bool is_kept, int number, insitu_mesh *given,
+                                  session_conformed *out)
 {
     const conform_array of = find_array(given, number);
     bool is_copied;
     if (!of.array->data) return true;
-    const insitu_type as = read_type(&of, out->types != NULL, &is_copied);
+    const insitu_type as = choose_conformed_type(&of, out->types != NULL, &is_copied);
     if (!is_copied) {
         of.array->type = as;
         return true;
@@ -202,7 +203,7 @@ insitu_status session_conform_mesh(session_mesh *mesh, const insitu_mesh *origin
     bool is_made = copy_map(original, &made);
     for (int i = 0; i < SESSION_CONFORMED && is_made; i++) {
         const unsigned part = i < 3 ? INSITU_CHANGED_GEOMETRY : INSITU_CHANGED_TOPOLOGY;
-        is_made = refer_to_copy(&mesh->conformed, !(changed & part), i, &given, &made);
+        is_made = replace_array_by_copy(&mesh->conformed, !(changed & part), i, &given, &made);
     }
     if (!is_made) {
         const int64_t bytes = made.bytes;

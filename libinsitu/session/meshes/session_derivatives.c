@@ -43,7 +43,7 @@ typedef struct term_list {
 /* ---- one dimension --------------------------------------------------------------------------------------------- */
 
 /* Computes the derivative of Legendre's polynomial of degree p at x, and its second derivative. */
-static double legendre_slope(int p, double x, double *curvature)
+static double compute_legendre_slope(int p, double x, double *curvature)
 {
     double last = 1, value = x;
     for (int n = 2; n <= p; n++) {
@@ -63,14 +63,14 @@ void session_compute_node_positions(int p, bool is_lobatto, double out[MOST_NODE
     for (int i = 0; i <= p; i++) {
         double x = -cos(acos(-1) * i / p), curvature;
         for (int turn = 0; turn < 20 && i > 0 && i < p; turn++) {
-            const double slope = legendre_slope(p, x, &curvature);
+            const double slope = compute_legendre_slope(p, x, &curvature);
             x -= slope / curvature;
         }
         out[i] = is_lobatto ? 0.5 + 0.5 * x : (double)i / p;
     }
 }
 
-static void derive_lines(term_list *list, bool is_lobatto)
+static void compute_line_derivatives(term_list *list, bool is_lobatto)
 {
     const int p = list->order_of_polynomial, parts = list->parts;
     double x[MOST_NODES_OF_LINE] = {0};
@@ -90,7 +90,7 @@ static void derive_lines(term_list *list, bool is_lobatto)
 }
 
 /* Computes B_n and its derivative at t = i / parts for all indices i of nodes on a line. */
-static void derive_products(term_list *list)
+static void compute_simplex_derivatives(term_list *list)
 {
     for (int n = 0; n <= list->order_of_polynomial; n++)
         for (int i = 0; i <= list->of->order; i++) {
@@ -107,7 +107,7 @@ static void derive_products(term_list *list)
 
 /* ---- terms ----------------------------------------------------------------------------------------------------- */
 
-int session_missing_directions(int type, const int at[3], int directions[3][3])
+int session_find_missing_node_directions(int type, const int at[3], int directions[3][3])
 {
     int count = 0;
     memset(directions, 0, 9 * sizeof directions[0][0]);
@@ -135,7 +135,7 @@ static void store_term(term_list *list, int position, double weight)
 static void add_missing_term(term_list *list, const int at[3], double weight)
 {
     int directions[3][3], step[3];
-    const int count = session_missing_directions(list->of->type, at, directions);
+    const int count = session_find_missing_node_directions(list->of->type, at, directions);
     for (int n = 0; n < (count == 3 ? 27 : 9); n++) {
         int zeros = 0, node[3] = {at[0], at[1], at[2]};
         for (int d = 0, rest = n; d < count; d++, rest /= 3) {
@@ -220,7 +220,7 @@ static void list_terms(term_list *list, const int (*nodes_at)[3])
     out->starts[out->axis_count * list->of->count] = list->count;
 }
 
-static void find_nodes(const session_nodes *of, insitu_vertex_order order, int (*nodes_at)[3])
+static void list_lattice_indices_of_nodes(const session_nodes *of, insitu_vertex_order order, int (*nodes_at)[3])
 {
     for (int k = 0; k <= of->order; k++)
         for (int j = 0; j <= of->order; j++)
@@ -243,9 +243,9 @@ bool session_make_derivatives(const session_nodes *of, insitu_vertex_order order
     if (is_made) {
         *list =
             (term_list){.out = out, .of = of, .order = order, .parts = parts, .order_of_polynomial = of->order / parts};
-        find_nodes(of, order, nodes_at);
-        derive_lines(list, is_lobatto);
-        derive_products(list);
+        list_lattice_indices_of_nodes(of, order, nodes_at);
+        compute_line_derivatives(list, is_lobatto);
+        compute_simplex_derivatives(list);
         list_terms(list, (const int(*)[3])nodes_at);
         out->weights = base_alloc((size_t)list->count * sizeof *out->weights);
         out->nodes = base_alloc((size_t)list->count * sizeof *out->nodes);
@@ -273,7 +273,7 @@ bool session_has_two_spacings(const session_nodes *of)
 }
 
 /* Finds the derivatives of the cells' polynomials at the nodes of finer lattices. */
-static bool derive_finer(const session_mesh *mesh, session_polynomials *out)
+static bool derive_finer_polynomials(const session_mesh *mesh, session_polynomials *out)
 {
     bool is_made = true;
     for (int i = 0; i < out->nodal.kind_count && is_made; i++) {
@@ -301,7 +301,7 @@ bool session_polynomials_create(const session_mesh *mesh, session_polynomials *o
     }
     out->kinds = base_calloc((size_t)ROWS_MOST_KINDS * 2, sizeof *out->kinds);
     bool is_made = out->kinds != NULL;
-    if (mesh->finer.parts) return is_made && derive_finer(mesh, out);
+    if (mesh->finer.parts) return is_made && derive_finer_polynomials(mesh, out);
     for (int i = 0; i < out->rows.kind_count && is_made; i++) {
         const session_nodes *of = &out->rows.kinds[i].nodes;
         is_made = session_make_derivatives(of, out->order, false, 1, &out->kinds[2 * i]);
@@ -347,15 +347,15 @@ static double mean_end_segment(const session_nodes *of, insitu_vertex_order orde
     return ends / total;
 }
 
-const session_derivatives *session_derivatives_of(const session_polynomials *polynomials, int64_t cell,
-                                                  const double *positions, int stride)
+const session_derivatives *session_find_derivatives_of_cell(const session_polynomials *polynomials, int64_t cell,
+                                                            const double *positions, int stride)
 {
     if (polynomials->nodal.kind_count) {
-        const int nodal = session_kind_of(&polynomials->nodal, cell);
+        const int nodal = session_find_kind_of_cell(&polynomials->nodal, cell);
         const bool is_refined = session_row_size(&polynomials->rows, cell) == polynomials->refined_counts[nodal];
         return &polynomials->kinds[2 * nodal + !is_refined];
     }
-    const int kind = session_kind_of(&polynomials->rows, cell);
+    const int kind = session_find_kind_of_cell(&polynomials->rows, cell);
     const session_nodes *of = &polynomials->rows.kinds[kind].nodes;
     const session_derivatives *equispaced = &polynomials->kinds[2 * kind], *lobatto = equispaced + 1;
     if (!session_has_two_spacings(of)) return equispaced;

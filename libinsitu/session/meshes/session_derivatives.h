@@ -32,7 +32,7 @@ void session_compute_node_positions(int p, bool is_lobatto, double out[NODES_MOS
 
 /* Finds the directions from a node that a serendipity cell lacks to the nodes around it. Returns the number of
  * directions: 2 at the middle of a face, 3 at the middle of a hex. */
-int session_missing_directions(int type, const int at[3], int directions[3][3]);
+int session_find_missing_node_directions(int type, const int at[3], int directions[3][3]);
 
 /* The derivatives of the polynomials of all cells of a mesh whose cells of higher order are split into linear
  * pieces. */
@@ -59,7 +59,7 @@ void session_polynomials_free(session_polynomials *polynomials);
 
 /* Returns the derivatives of a cell. positions: positions of the cell's nodes, `stride` doubles apart. In quads and
  * hexes of order 3 and more, the positions show whether nodes are equispaced or Gauss-Lobatto points. */
-const session_derivatives *session_derivatives_of(const session_polynomials *polynomials, int64_t cell,
-                                                  const double *positions, int stride);
+const session_derivatives *session_find_derivatives_of_cell(const session_polynomials *polynomials, int64_t cell,
+                                                            const double *positions, int stride);
 
 #endif

@@ -159,7 +159,7 @@ static void measure_values(const deviation_work *w, const session_bound *of, int
  * so its bound is not refined. The result therefore does not depend on the order of cells. */
 static void measure_cell(const deviation_work *w, int64_t cell, double *buffer, session_deviation *out)
 {
-    const session_bound *of = &w->bounds[session_kind_of(&w->rows, cell)];
+    const session_bound *of = &w->bounds[session_find_kind_of_cell(&w->rows, cell)];
     const session_pixels *pixels = &w->request->pixels;
     if (!of->level_count || grid_is_ghost(&w->rows.cells, cell) || !may_cross(w, of, cell, buffer)) return;
     if (w->request->is_of_values) measure_values(w, of, cell, buffer, out);
@@ -184,7 +184,7 @@ static bool measure_cells(const deviation_work *w, int threads, session_deviatio
     bool is_lacking = false;
     double error = out->error, low = out->low, high = out->high;
     int64_t count = 0, unbounded = 0;
-#pragma omp parallel num_threads(session_region_threads(threads, cells)) reduction(|| : is_lacking)                    \
+#pragma omp parallel num_threads(session_choose_loop_threads(threads, cells)) reduction(|| : is_lacking)                    \
     reduction(max : error, high) reduction(min : low) reduction(+ : count, unbounded)
     {
         region_enter();

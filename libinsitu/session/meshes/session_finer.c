@@ -56,7 +56,7 @@ static bool is_refined(const session_finer *finer, int count, int64_t cell)
 
 static const session_interpolation *find_interpolation(const finer_work *w, int64_t cell)
 {
-    const session_interpolation *kind = w->kinds[session_kind_of(&w->rows, cell)];
+    const session_interpolation *kind = w->kinds[session_find_kind_of_cell(&w->rows, cell)];
     if (w->marks) return &kind[!w->marks[cell]];
     return &kind[w->finer->fine.cell_count > 0 && !is_refined(w->finer, kind[0].fine.count, cell)];
 }
@@ -100,7 +100,7 @@ static bool interpolate_cells(const finer_work *w, const session_node_values *va
 {
     const int64_t cells = w->rows.cells.cell_count;
     bool is_lacking = false;
-#pragma omp parallel num_threads(session_region_threads(threads, w->node_count)) reduction(|| : is_lacking)
+#pragma omp parallel num_threads(session_choose_loop_threads(threads, w->node_count)) reduction(|| : is_lacking)
     {
         region_enter();
         double *buffer = base_alloc((find_buffer_size(w, values->component_count) + 1) * sizeof *buffer);
@@ -200,7 +200,7 @@ static bool make_cells(session_finer *finer, const unsigned char *marks, int thr
 static void drop_node_data(session_meshes *meshes, session_mesh *mesh)
 {
     session_drop_cell_data(meshes, mesh);
-    session_read_topology(mesh);
+    session_select_grid_arrays(mesh);
     for (int i = 0; i < mesh->field_count; i++) session_drop_copy(&mesh->fields[i]);
 }
 
@@ -233,7 +233,8 @@ static bool has_marks(const session_finer *finer, const session_cell_marks *mark
         counts[i] = session_complete_nodes(of->type, finer->parts * of->order).count;
     }
     for (int64_t cell = 0; is_same && cell < finer->nodal.cell_count; cell++)
-        is_same = (!marks || marks->cells[cell]) == is_refined(finer, counts[session_kind_of(&rows, cell)], cell);
+        is_same =
+            (!marks || marks->cells[cell]) == is_refined(finer, counts[session_find_kind_of_cell(&rows, cell)], cell);
     return is_same && session_is_same_piece_set(&finer->pieces, marks ? &marks->pieces : &all, finer->nodal.cell_count);
 }
 
@@ -290,14 +291,15 @@ static void count_spacings(const session_polynomials *of, int64_t counts[SESSION
                            int64_t cells[ROWS_MOST_KINDS])
 {
     for (int64_t cell = 0; cell < of->cell_count; cell++) {
-        const int kind = session_kind_of(&of->rows, cell);
+        const int kind = session_find_kind_of_cell(&of->rows, cell);
         const session_nodes *nodes = &of->rows.kinds[kind].nodes;
         const int64_t first = session_row_first(&of->rows, cell);
         cells[kind]++;
         if (!session_has_two_spacings(nodes)) continue;
         for (int n = 0; n < nodes->count; n++)
             grid_vertex(&of->rows.cells, session_row_vertex(&of->rows, first + n), positions[n]);
-        counts[session_derivatives_of(of, cell, positions[0], 3) == &of->kinds[2 * kind] ? EQUISPACED : LOBATTO]++;
+        counts[session_find_derivatives_of_cell(of, cell, positions[0], 3) == &of->kinds[2 * kind] ? EQUISPACED
+                                                                                                   : LOBATTO]++;
     }
 }
 
@@ -425,7 +427,7 @@ void session_count_finer_bytes(const session_mesh *mesh, const unsigned char *ma
     int64_t counts[ROWS_MOST_KINDS][2] = {{0}};
     session_list_kinds(&rows);
     for (int64_t cell = 0; cell < nodal->cell_count; cell++)
-        counts[session_kind_of(&rows, cell)][marks && !marks[cell]]++;
+        counts[session_find_kind_of_cell(&rows, cell)][marks && !marks[cell]]++;
     for (int i = 0; i < rows.kind_count; i++)
         for (int parts = 2; parts <= FINER_MOST_PARTS; parts++) {
             add_bytes(&rows.kinds[i].nodes, parts, counts[i][0], &out[parts]);

@@ -148,7 +148,7 @@ bool session_is_in_other_box(const session_homes *homes, const double point[3])
     return false;
 }
 
-static int home_by_id(const session_homes *homes, int64_t id)
+static int find_home_of_id(const session_homes *homes, int64_t id)
 {
     int low = 0, high = homes->share_count;
     while (high - low > 1) {
@@ -171,7 +171,7 @@ static bool are_in_box(const session_box *box, const double (*points)[3], int co
 int session_find_home(const session_homes *homes, const double (*points)[3], int count, uint64_t hash, int64_t id)
 {
     int among = 0;
-    if (homes->by_id) return home_by_id(homes, id);
+    if (homes->by_id) return find_home_of_id(homes, id);
     for (int i = 0; i < homes->near_count; i++) among += are_in_box(&homes->boxes[i], points, count);
     int left = among ? (int)(hash % (uint64_t)among) : 0;
     for (int i = 0; i < homes->near_count; i++)

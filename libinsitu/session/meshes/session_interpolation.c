@@ -424,7 +424,7 @@ static double middle_of_hex(const cell_job *job, const int at[3], int component)
 static void fill_missing(const cell_job *job, const int at[3])
 {
     int directions[3][3];
-    const int count = session_missing_directions(job->of->of.type, at, directions);
+    const int count = session_find_missing_node_directions(job->of->of.type, at, directions);
     double *out = job->lattice + find_index(&job->of->complete, at) * job->size;
     for (int c = 0; c < job->size; c++)
         out[c] = count == 3 ? middle_of_hex(job, at, c) : middle_of_face(job, at, directions[0], directions[1], c);

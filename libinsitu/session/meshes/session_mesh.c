@@ -593,7 +593,7 @@ int session_find_field(const session_mesh *mesh, const char *name)
     return -1;
 }
 
-const base_error *session_pending_error(const session_meshes *meshes)
+const base_error *session_find_pending_error(const session_meshes *meshes)
 {
     for (int i = 0; i < meshes->count; i++) {
         const session_mesh *mesh = meshes->items[i];

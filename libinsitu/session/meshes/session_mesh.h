@@ -568,7 +568,7 @@ typedef struct session_part_walk {
 bool session_next_part(session_part_walk *walk);
 
 /* Returns the caller's part: for a mirror image the part that is mirrored, otherwise the part itself. */
-static inline const session_mesh *session_source(const session_mesh *mesh)
+static inline const session_mesh *session_find_source_part(const session_mesh *mesh)
 {
     return mesh->source ? mesh->source : mesh;
 }
@@ -601,7 +601,7 @@ static inline int64_t session_first_piece(const session_mesh *mesh, int64_t cell
 }
 
 /* Returns the number of the caller's cells if they are split into pieces, and otherwise the number of `cells`. */
-static inline int64_t session_whole_count(const session_mesh *mesh)
+static inline int64_t session_count_whole_cells(const session_mesh *mesh)
 {
     return mesh->topology.is_split ? mesh->given.cell_count : mesh->cells.cell_count;
 }
@@ -613,7 +613,7 @@ static inline int64_t session_vertex_count(const session_mesh *mesh)
 }
 
 /* Returns the first error of an insitu_set_*() call that no step has reported yet; NULL: there is none. */
-const base_error *session_pending_error(const session_meshes *meshes);
+const base_error *session_find_pending_error(const session_meshes *meshes);
 
 /* Stores an error of an insitu_set_*() call that cannot be stored with a mesh. field: NULL if the error does not belong
  * to a single field. */

@@ -177,7 +177,7 @@ static insitu_status check_face_owners(const insitu_mesh *mesh, base_error *erro
     return INSITU_OK;
 }
 
-static insitu_status check_choices(const insitu_mesh *mesh, base_error *error)
+static insitu_status check_mesh_options(const insitu_mesh *mesh, base_error *error)
 {
     if (mesh->changed & ~(unsigned)INSITU_CHANGED_ALL)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "changed is %u, unknown bits are set", mesh->changed);
@@ -201,7 +201,7 @@ static insitu_status check_choices(const insitu_mesh *mesh, base_error *error)
 /* Checks connectivity_row, and that no other array describes the cells if they are given in rows of equal length. */
 static insitu_status check_cell_rows(const insitu_mesh *mesh, base_error *error)
 {
-    const long long row = mesh->connectivity_row, vertices = session_cell_nodes(mesh);
+    const long long row = mesh->connectivity_row, vertices = session_count_cell_nodes(mesh);
     if (row == 0 || mesh->cell_count == 0) return INSITU_OK;
     const char *other = session_has_owners(mesh) ? "owners of faces"
                         : mesh->offsets.data     ? "offsets"
@@ -249,7 +249,7 @@ static insitu_status check_lagrange_order(const insitu_mesh *mesh, base_error *e
  * each cell's number of nodes later. */
 static insitu_status check_higher_order(const insitu_mesh *mesh, base_error *error)
 {
-    const long long cells = mesh->cell_count, nodes = session_cell_nodes(mesh), count = mesh->connectivity_count;
+    const long long cells = mesh->cell_count, nodes = session_count_cell_nodes(mesh), count = mesh->connectivity_count;
     const int type = (int)mesh->cell_type;
     session_nodes of;
     if (mesh->offsets.data) return INSITU_OK;
@@ -267,10 +267,10 @@ static insitu_status check_higher_order(const insitu_mesh *mesh, base_error *err
     if (!is_implied && !mesh->connectivity_row && (nodes == 0 || count != cells * nodes))
         return base_fail(error, INSITU_ERROR_MESH, "connectivity_count is %lld, %lld cells of %lld nodes need %lld",
                          count, cells, nodes, cells * nodes);
-    if (!session_nodes_of(type, nodes, &of))
+    if (!session_describe_nodes(type, nodes, &of))
         return base_fail(error, INSITU_ERROR_MESH, "cells of type %d have %lld nodes, which no order from 1 to %d has",
                          type, nodes, NODES_MOST_ORDER);
-    const char *why = session_order_refused(&of, mesh->vertex_order);
+    const char *why = session_explain_refused_order(&of, mesh->vertex_order);
     if (!why) return INSITU_OK;
     return base_fail(error, INSITU_ERROR_MESH, "cells of type %d and order %d: vertex_order is %d: %s", type, of.order,
                      (int)mesh->vertex_order, why);
@@ -308,7 +308,7 @@ static insitu_status check_mesh(const insitu_mesh *mesh, base_error *error)
     insitu_status status = check_counts(mesh, error);
     if (!status && mesh->lattice) status = session_check_lattice(mesh, error);
     if (!status) status = check_arrays(mesh, error);
-    if (!status) status = check_choices(mesh, error);
+    if (!status) status = check_mesh_options(mesh, error);
     if (!status) status = check_face_lists(mesh, error);
     if (!status) status = check_face_owners(mesh, error);
     if (!status) status = check_lagrange_order(mesh, error);
@@ -402,8 +402,8 @@ void session_store_mesh(session_meshes *meshes, session_mesh *mesh, const insitu
     }
     session_copy_lattice(mesh);
     mesh->original.lattice = mesh->given.lattice;
-    if (mesh->warp.is_applied) session_read_warp(mesh);
-    session_read_topology(mesh);
+    if (mesh->warp.is_applied) session_use_moved_coordinates(mesh);
+    session_select_grid_arrays(mesh);
     mesh->is_given = true;
     mesh->problem = (base_error){0};
 }
@@ -416,7 +416,7 @@ insitu_status session_prefix_error(base_error *error, const char *mesh, const ch
 
 /* Removes the mesh of this name that has no blocks if a block is being set, and all blocks of this name if a mesh
  * without blocks is being set. */
-static void remove_other_kind(session_meshes *meshes, const char *name, int64_t block)
+static void remove_whole_mesh_or_blocks(session_meshes *meshes, const char *name, int64_t block)
 {
     const session_parts parts = session_find_parts(meshes, name);
     if (parts.count && (parts.items[0]->block == SESSION_WHOLE) != (block == SESSION_WHOLE))
@@ -429,7 +429,7 @@ static insitu_status set_mesh(session_meshes *meshes, const char *name, int64_t 
     if (!given && block == SESSION_WHOLE) session_remove_mesh(meshes, name);
     if (!given) session_remove_block(meshes, name, block);
     if (!given) return INSITU_OK;
-    remove_other_kind(meshes, name, block);
+    remove_whole_mesh_or_blocks(meshes, name, block);
     session_mesh *mesh = session_find_block(meshes, name, block);
     if (!mesh) mesh = session_add_mesh(meshes, name, block, error);
     if (!mesh) return INSITU_ERROR_MEMORY;

@@ -42,7 +42,7 @@ static void mirror_numbers(const session_mesh *image, int axis, int threads)
     const insitu_array *to = &image->mirrored.coordinates[axis];
     const int64_t count = session_nodal_mesh(image->source)->vertex_count;
     const bool is_copied = !is_mirrored(image, axis);
-#pragma omp parallel num_threads(session_region_threads(threads, count))
+#pragma omp parallel num_threads(session_choose_loop_threads(threads, count))
     {
         region_enter();
 #pragma omp for schedule(static) nowait

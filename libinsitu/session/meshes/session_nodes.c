@@ -66,7 +66,7 @@ session_nodes session_complete_nodes(int corner_type, int order)
     return (session_nodes){corner_type, order, (int)count_complete_nodes(corner_type, order), true, true};
 }
 
-bool session_nodes_of(int type, int64_t count, session_nodes *out)
+bool session_describe_nodes(int type, int64_t count, session_nodes *out)
 {
     const int corners = session_corner_type(type);
     if (corners == GRID_NO_TYPE) return false;
@@ -79,7 +79,7 @@ bool session_nodes_of(int type, int64_t count, session_nodes *out)
     return false;
 }
 
-int64_t session_cell_nodes(const insitu_mesh *mesh)
+int64_t session_count_cell_nodes(const insitu_mesh *mesh)
 {
     const int type = (int)mesh->cell_type;
     if (session_corner_type(type) == GRID_NO_TYPE) return grid_type_vertices(type);
@@ -89,7 +89,7 @@ int64_t session_cell_nodes(const insitu_mesh *mesh)
     return mesh->cell_count ? mesh->connectivity_count / mesh->cell_count : 0;
 }
 
-const char *session_order_refused(const session_nodes *of, insitu_vertex_order order)
+const char *session_explain_refused_order(const session_nodes *of, insitu_vertex_order order)
 {
     if (order == INSITU_ORDER_DMPLEX) return "DMPlex's order is known for linear cells alone";
     if (order == INSITU_ORDER_LEXICOGRAPHIC && !of->is_complete)

@@ -27,7 +27,7 @@ bool session_is_lagrange(int type);
 
 /* Finds the description of a cell of the type, which must not be linear, with `count` nodes. Returns false if no order
  * of the type has this number of nodes. */
-bool session_nodes_of(int type, int64_t count, session_nodes *out);
+bool session_describe_nodes(int type, int64_t count, session_nodes *out);
 
 /* Returns the type INSITU_LAGRANGE_* with the same corners as the linear type, or GRID_NO_TYPE if there is none. */
 int session_lagrange_type(int corner_type);
@@ -41,7 +41,7 @@ session_nodes session_complete_nodes(int corner_type, int order);
 int64_t session_node_count(int type, int order);
 
 /* Returns the reason why the vertex order is not defined for the cell, or NULL if it is defined. */
-const char *session_order_refused(const session_nodes *of, insitu_vertex_order order);
+const char *session_explain_refused_order(const session_nodes *of, insitu_vertex_order order);
 
 /* Returns the position, in the cell's row of connectivity, of the node with the lattice indices i, j, k. The axes of
  * the lattice are the edges at the cell's first corner. Each layer k of a pyramid has one node less along i and j than
@@ -56,6 +56,6 @@ bool session_has_node(const session_nodes *of, int i, int j, int k);
 int session_quadratic_index(const session_nodes *of, insitu_vertex_order order, int n);
 
 /* Returns the number of nodes of each cell of a mesh of one type, or 0 if the description does not determine it. */
-int64_t session_cell_nodes(const insitu_mesh *mesh);
+int64_t session_count_cell_nodes(const insitu_mesh *mesh);
 
 #endif

@@ -62,7 +62,7 @@ static bool begin_work(const session_mesh *mesh, int parts, bool is_lobatto, ses
 
 static const piece_kind *kind_of(const piece_work *w, int64_t cell)
 {
-    return &w->kinds[session_kind_of(&w->rows, cell)];
+    return &w->kinds[session_find_kind_of_cell(&w->rows, cell)];
 }
 
 static void set_bit(uint64_t *bits, int piece)
@@ -113,7 +113,7 @@ static bool fill_sets(const piece_work *w, const unsigned char *marks, int parts
         base_free(is_own);
     }
     for (int64_t cell = 0; cell < cells && is_made; cell++) {
-        const int kind = session_kind_of(&w->rows, cell);
+        const int kind = session_find_kind_of_cell(&w->rows, cell);
         if (marks[cell])
             memcpy(w->set->bits + w->set->first_words[cell], at_nodes[kind],
                    (size_t)w->kinds[kind].word_count * sizeof **at_nodes);
@@ -190,7 +190,7 @@ static bool add_cells(const piece_work *w, int threads)
     const int field_size = w->request->values ? w->request->values->component_count : 1;
     const size_t buffer_size = find_buffer_size(w, field_size);
     bool is_lacking = false;
-#pragma omp parallel num_threads(session_region_threads(threads, first_words[cells])) reduction(|| : is_lacking)
+#pragma omp parallel num_threads(session_choose_loop_threads(threads, first_words[cells])) reduction(|| : is_lacking)
     {
         region_enter();
         double *buffer = base_alloc(buffer_size * sizeof *buffer);
@@ -269,7 +269,7 @@ static bool add_outer_pieces(const piece_work *w, const unsigned char *outer_fac
     for (int i = 0; i < w->rows.kind_count && is_made; i++)
         is_made = (on_faces[i] = list_pieces_on_faces(&w->kinds[i])) != NULL;
     for (int64_t cell = 0; cell < cells && is_made; cell++) {
-        const int kind = session_kind_of(&w->rows, cell), words = w->kinds[kind].word_count;
+        const int kind = session_find_kind_of_cell(&w->rows, cell), words = w->kinds[kind].word_count;
         if (first_words[cell] == first_words[cell + 1]) continue;
         for (unsigned left = outer_faces[cell]; left; left &= left - 1)
             for (int n = 0; n < words; n++)

@@ -83,7 +83,7 @@ static double tet_volume_from_origin(const double origin[3], double corners[3][3
 /* Returns the entry of a face's lexicographically first vertex, at which its canonical fan of triangles begins. If the
  * face contains that vertex twice, either entry may be returned, because both fans have the same triangles, apart from
  * triangles of area 0. */
-static int64_t least_entry(const grid *g, int64_t from, int64_t to)
+static int64_t find_first_vertex_entry(const grid *g, int64_t from, int64_t to)
 {
     int64_t least = from;
     double position[3], p[3];
@@ -110,7 +110,7 @@ static void add_fan(const grid *g, int64_t face, const double mean[3], const dou
     int64_t from, to;
     double corners[3][3];
     grid_face_vertices(g, face, &from, &to);
-    const int64_t least = least_entry(g, from, to), count = to - from;
+    const int64_t least = find_first_vertex_entry(g, from, to), count = to - from;
     read_relative_corner(g, least, mean, corners[0]);
     read_relative_corner(g, from + (least - from + 1) % count, mean, corners[1]);
     for (int64_t k = 2; k < count; k++, sums->triangle_count++) {

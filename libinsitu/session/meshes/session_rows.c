@@ -2,7 +2,7 @@
 
 session_rows session_caller_rows(const insitu_mesh *given)
 {
-    const int64_t nodes = session_cell_nodes(given), row = given->connectivity_row;
+    const int64_t nodes = session_count_cell_nodes(given), row = given->connectivity_row;
     return (session_rows){
         .cells = session_caller_grid(given), .nodes_per_cell = nodes, .row_stride = row ? row : nodes};
 }
@@ -32,7 +32,7 @@ void session_list_kinds(session_rows *rows)
         if ((type == last_type && size == last_size) || session_find_kind(rows, type, size) >= 0) continue;
         session_row_kind *kind = &rows->kinds[rows->kind_count++];
         *kind = (session_row_kind){type, {type, 1, (int)size, true, false}};
-        session_nodes_of(type, size, &kind->nodes); /* leaves the nodes unchanged if the type is linear */
+        session_describe_nodes(type, size, &kind->nodes); /* leaves the nodes unchanged if the type is linear */
         last_type = type;
         last_size = size;
     }

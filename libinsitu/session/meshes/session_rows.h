@@ -57,7 +57,7 @@ static inline int64_t session_row_entry(const session_rows *rows, int64_t cell, 
 }
 
 /* Returns the vertex of session_mesh.cells at the given position of the cell's row. */
-static inline int64_t session_row_node(const session_rows *rows, int64_t cell, int node)
+static inline int64_t session_find_row_vertex(const session_rows *rows, int64_t cell, int node)
 {
     return rows->is_discontinuous ? session_row_entry(rows, cell, node)
                                   : session_row_vertex(rows, session_row_first(rows, cell) + node);
@@ -65,7 +65,7 @@ static inline int64_t session_row_node(const session_rows *rows, int64_t cell, i
 
 /* Returns the index of the kind of cells of this type with `count` nodes, or -1 if it is not listed. */
 int session_find_kind(const session_rows *rows, int type, int64_t count);
-static inline int session_kind_of(const session_rows *rows, int64_t cell)
+static inline int session_find_kind_of_cell(const session_rows *rows, int64_t cell)
 {
     return session_find_kind(rows, grid_cell_type(&rows->cells, cell), session_row_size(rows, cell));
 }

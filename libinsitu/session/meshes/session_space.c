@@ -11,7 +11,7 @@
  * least 0.382 (2 minus the golden ratio) are rounded up: this threshold is far from all fractions of small integers,
  * and the means of regular and refined lattices are such fractions. The usual threshold, one half, is such a fraction
  * too. */
-static double rounded_size(double size)
+static double round_cell_size(double size)
 {
     enum { BITS = 13 };
     int exponent;
@@ -61,7 +61,7 @@ static insitu_status reduce_extent(const session_meshes *meshes, bool by_nodes, 
     if (status) return status;
     *out = (session_extent){.cell_count = totals[0], .solid_count = totals[2], .rank_count = (int)totals[1]};
     /* The mean is computed over cells with a volume, because samples are not taken in flat cells. */
-    if (totals[2] > 0) out->cell_size = rounded_size(all_sizes / (double)totals[2]);
+    if (totals[2] > 0) out->cell_size = round_cell_size(all_sizes / (double)totals[2]);
     for (int axis = 0; axis < 3 && totals[0] > 0; axis++) {
         out->lower[axis] = all[axis];
         out->upper[axis] = -all[3 + axis];

@@ -47,13 +47,13 @@ bool session_has_higher_order(const insitu_mesh *given)
 
 int64_t session_entry_index(const insitu_mesh *given, int64_t entry)
 {
-    const int64_t used = session_cell_nodes(given), row = given->connectivity_row;
+    const int64_t used = session_count_cell_nodes(given), row = given->connectivity_row;
     return !row || given->offsets.data || row == used ? entry : entry / used * row + entry % used;
 }
 
 static const session_pattern *find_cell_pattern(const split_work *w, int64_t cell)
 {
-    return &w->patterns[session_kind_of(&w->rows, cell)];
+    return &w->patterns[session_find_kind_of_cell(&w->rows, cell)];
 }
 
 /* ---- patterns and checks ---------------------------------------------------------------------------------------- */
@@ -78,8 +78,9 @@ static insitu_status add_pattern(split_work *w, int64_t cell, int type, int64_t 
     session_nodes nodes = {type, 1, grid_type_vertices(type), true, false};
     const insitu_vertex_order order = w->mesh->given.vertex_order;
     const bool is_linear = nodes.count && nodes.count == count;
-    if (!is_linear && !session_nodes_of(type, count, &nodes)) return describe_type(w->mesh, cell, type, count, error);
-    const char *why = is_linear ? NULL : session_order_refused(&nodes, order);
+    if (!is_linear && !session_describe_nodes(type, count, &nodes))
+        return describe_type(w->mesh, cell, type, count, error);
+    const char *why = is_linear ? NULL : session_explain_refused_order(&nodes, order);
     if (why)
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld of type %d and order %d: vertex_order is %d: %s", w->mesh->label,
@@ -108,7 +109,7 @@ static insitu_status check_offsets(const split_work *w, int64_t cell, base_error
                      w->mesh->label, (long long)cell, first, next, base, last);
 }
 
-static void choose_type(split_work *w)
+static void find_only_type(split_work *w)
 {
     int types = 0;
     for (int type = 0; type < LINEAR_TYPES; type++) {
@@ -142,7 +143,7 @@ static insitu_status find_patterns(split_work *w, base_error *error)
                          "mesh \"%s\": the last offset is %lld, not connectivity_count%s, %lld", w->mesh->label,
                          (long long)end + given->index_base, given->index_base ? " + 1" : "",
                          (long long)given->connectivity_count + given->index_base);
-    choose_type(w);
+    find_only_type(w);
     return INSITU_OK;
 }
 
@@ -164,7 +165,7 @@ static insitu_status check_indices(const split_work *w, int threads, base_error 
 {
     const int64_t cells = w->mesh->given.cell_count, vertices = w->mesh->given.vertex_count;
     int64_t bad = cells;
-#pragma omp parallel num_threads(session_region_threads(threads, cells))
+#pragma omp parallel num_threads(session_choose_loop_threads(threads, cells))
     {
         region_enter();
 #pragma omp for schedule(static) reduction(min : bad) nowait
@@ -206,7 +207,7 @@ typedef struct piece_walk {
     int next;              /* number of the first piece that has not been returned */
 } piece_walk;
 
-static piece_walk walk_pieces(const split_work *w, const session_pattern *of, int64_t cell)
+static piece_walk begin_piece_walk(const split_work *w, const session_pattern *of, int64_t cell)
 {
     const int64_t *first = w->set->first_words;
     /* Pyramids have no words. Their pieces have two types, and all of them are made. */
@@ -230,7 +231,7 @@ static int next_piece(piece_walk *walk)
 
 static int count_made(const split_work *w, const session_pattern *of, int64_t cell)
 {
-    piece_walk walk = walk_pieces(w, of, cell);
+    piece_walk walk = begin_piece_walk(w, of, cell);
     int count = 0;
     while (walk.words && next_piece(&walk) >= 0) count++;
     return walk.words ? count : of->piece_count;
@@ -271,7 +272,7 @@ static insitu_status count_all_pieces(split_work *w, int threads, base_error *er
     if (!w->first_pieces || (!w->only_type && !w->first_entries))
         return base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for %zu bytes of cells' pieces",
                          w->mesh->label, bytes);
-#pragma omp parallel num_threads(session_region_threads(threads, cells))
+#pragma omp parallel num_threads(session_choose_loop_threads(threads, cells))
     {
         region_enter();
 #pragma omp for schedule(static) nowait
@@ -305,7 +306,7 @@ static void store_cell(const split_work *w, int64_t cell)
 {
     const session_pattern *of = find_cell_pattern(w, cell);
     int64_t at = w->first_entries ? w->first_entries[cell] : w->first_pieces[cell] * grid_type_vertices(w->only_type);
-    piece_walk walk = walk_pieces(w, of, cell);
+    piece_walk walk = begin_piece_walk(w, of, cell);
     if (!walk.words)
         for (int n = 0; n < of->piece_size; n++) store_corner(w, cell, at++, of->piece_positions[n]);
     const int corners = walk.words ? grid_type_vertices(of->types[0]) : 0;
@@ -321,7 +322,7 @@ static void store_cell(const split_work *w, int64_t cell)
 static void store_cells(const split_work *w, int threads)
 {
     const int64_t cells = w->mesh->given.cell_count;
-#pragma omp parallel num_threads(session_region_threads(threads, cells))
+#pragma omp parallel num_threads(session_choose_loop_threads(threads, cells))
     {
         region_enter();
 #pragma omp for schedule(static) nowait
@@ -407,7 +408,7 @@ insitu_status session_split_entries(const session_mesh *mesh, int threads, grid_
 {
     split_work w = {.mesh = mesh, .rows = session_rows_of(mesh), .set = &mesh->finer.pieces};
     insitu_status status = find_patterns(&w, error);
-    const int64_t nodes = session_cell_nodes(&mesh->given), cells = mesh->given.cell_count;
+    const int64_t nodes = session_count_cell_nodes(&mesh->given), cells = mesh->given.cell_count;
     const int64_t largest = w.rows.cells.offsets.data ? mesh->given.connectivity_count : cells * nodes;
     w.stores_entries = true;
     if (!status) status = count_all_pieces(&w, threads, error);
@@ -443,7 +444,7 @@ session_counts session_count_parents(const session_mesh *mesh, bool any_inverted
     return out;
 }
 
-int64_t session_count_parents_of(const session_mesh *mesh, const uint32_t *pieces, int64_t count)
+int64_t session_count_parents_of_pieces(const session_mesh *mesh, const uint32_t *pieces, int64_t count)
 {
     uint64_t *bits = base_calloc((size_t)(mesh->given.cell_count + 63) / 64, sizeof *bits);
     int64_t parents = 0;

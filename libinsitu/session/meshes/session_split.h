@@ -24,6 +24,6 @@ session_counts session_count_parents(const session_mesh *mesh, bool any_inverted
 
 /* Returns the number of the caller's cells that have at least one piece in the list. If memory runs out, returns the
  * number of all drawn cells. Local. */
-int64_t session_count_parents_of(const session_mesh *mesh, const uint32_t *pieces, int64_t count);
+int64_t session_count_parents_of_pieces(const session_mesh *mesh, const uint32_t *pieces, int64_t count);
 
 #endif

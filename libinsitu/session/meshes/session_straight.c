@@ -112,7 +112,7 @@ static bool is_straight(const straight_work *w, const straight_kind *kind, int64
 
 static bool is_bent(const straight_work *w, int64_t cell)
 {
-    const straight_kind *kind = &w->kinds[session_kind_of(&w->rows, cell)];
+    const straight_kind *kind = &w->kinds[session_find_kind_of_cell(&w->rows, cell)];
     const int64_t first = session_row_first(&w->rows, cell);
     double corners[8][3], extent = 0;
     if (!kind->weights[0] || grid_is_ghost(&w->rows.cells, cell)) return false;
@@ -134,7 +134,7 @@ bool session_has_bent_cells(const session_mesh *mesh, int threads)
     bool is_any = !w || !begin_work(mesh->finer.parts ? &mesh->finer.nodal : &mesh->given, w);
     if (w && !is_any) {
         const int64_t cells = w->rows.cells.cell_count;
-#pragma omp parallel num_threads(session_region_threads(threads, cells)) reduction(|| : is_any)
+#pragma omp parallel num_threads(session_choose_loop_threads(threads, cells)) reduction(|| : is_any)
         {
             region_enter();
 #pragma omp for schedule(static) nowait

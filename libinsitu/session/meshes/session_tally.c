@@ -170,7 +170,7 @@ void tally_cell(const grid *g, int64_t cell, mesh_tally *tally)
 static const double least_share = 1e-6;
 
 /* Computes the signed areas at a quad's corners, with respect to the normal at the first corner. */
-static void quad_corner_areas(double points[][3], double out[4])
+static void compute_quad_corner_areas(double points[][3], double out[4])
 {
     double normals[4][3];
     for (int i = 0; i < 4; i++) {
@@ -194,7 +194,7 @@ bool tally_has_both_signs(int type, double points[][3])
     const cell_corners of = find_cell_corners(is_quad ? GRID_TET : type);
     double volumes[8], largest = 0;
     const int count = is_quad ? 4 : of.count;
-    if (is_quad) quad_corner_areas(points, volumes);
+    if (is_quad) compute_quad_corner_areas(points, volumes);
     for (int i = 0; i < count && !is_quad; i++) volumes[i] = corner_volume(points, of.corners[i]);
     for (int i = 0; i < count; i++) largest = fmax(largest, fabs(volumes[i]));
     bool has[2] = {false, false};
@@ -321,7 +321,7 @@ static int64_t tally_lanes(const lane_cells *alike, mesh_tally *t, double *least
     *alone = alike->count;
     /* a run whose grid has a lattice consists of a single cell (find_row_run()) */
     if (alike->count < LANES || alike->g->lattice) return 0;
-    lane_run *const run = session_lanes_of(cpu_best_isa(), alike->g, alike->type);
+    lane_run *const run = session_find_lane_run(cpu_best_isa(), alike->g, alike->type);
     if (!run) return 0;
     lane_sums sums;
     const int64_t taken = run(alike, &sums, alone);
@@ -373,7 +373,7 @@ static axis_lengths measure_axis(const grid_lattice *l, int axis)
     return out;
 }
 
-bool tally_axes(const session_mesh *mesh, mesh_tally *tally)
+bool tally_lattice_by_axes(const session_mesh *mesh, mesh_tally *tally)
 {
     const grid *g = &mesh->cells;
     if (!g->coordinates[0].axis || g->ghosts) return false;
@@ -468,7 +468,7 @@ MMBVH_INLINE int64_t tally_cells(const session_mesh *mesh, int64_t begin, int64_
     }
 FETCH_INSTANCES(DEFINE_RUN, tally_cells)
 
-tally_run tally_choose(const session_mesh *mesh)
+tally_run tally_choose_run(const session_mesh *mesh)
 {
     static const tally_run table[FETCH_SHAPES][2][2] = FETCH_TABLE(tally_cells);
     const grid *g = &mesh->cells;

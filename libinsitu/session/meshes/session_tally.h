@@ -36,10 +36,10 @@ typedef int64_t (*tally_run)(const session_mesh *mesh, int64_t begin, int64_t en
 
 /* Adds all cells of a uniform or rectilinear lattice at once, computed from the lengths along its axes. Returns false,
  * without adding anything, if the mesh is of another kind or has ghost flags. */
-bool tally_axes(const session_mesh *mesh, mesh_tally *tally);
+bool tally_lattice_by_axes(const session_mesh *mesh, mesh_tally *tally);
 
 /* Returns the function that checks the cells of the mesh's layout. Returns NULL if cells must be checked one by one,
  * because there may be polyhedra, or because coordinates are not all float or all double. */
-tally_run tally_choose(const session_mesh *mesh);
+tally_run tally_choose_run(const session_mesh *mesh);
 
 #endif

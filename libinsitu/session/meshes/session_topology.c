@@ -32,7 +32,7 @@
 
 /* ---- the grid --------------------------------------------------------------------------------------------------- */
 
-void session_read_topology(session_mesh *mesh)
+void session_select_grid_arrays(session_mesh *mesh)
 {
     session_topology *t = &mesh->topology;
     grid g = session_caller_grid(&mesh->given);
@@ -82,7 +82,7 @@ int session_caller_type(const session_mesh *mesh, int64_t cell)
 
 /* ---- faces' vertices from several lists ------------------------------------------------------------------------ */
 
-session_face_row session_caller_face(const insitu_mesh *mesh, int64_t face)
+session_face_row session_locate_caller_face(const insitu_mesh *mesh, int64_t face)
 {
     const bool is_apart = face >= mesh->face_count;
     if (mesh->face_lists.data) {
@@ -124,7 +124,7 @@ static int64_t count_listed_vertices(const session_mesh *mesh, base_error *error
 {
     int64_t total = 0;
     for (int64_t face = 0; face < session_face_count(&mesh->given); face++) {
-        const session_face_row row = session_caller_face(&mesh->given, face);
+        const session_face_row row = session_locate_caller_face(&mesh->given, face);
         if (check_row(mesh, face, &row, error)) return -1;
         total += row.size;
         if (total <= INT64_MAX / 64) continue;
@@ -147,7 +147,7 @@ static insitu_status copy_face_lists(session_mesh *mesh, base_error *error)
         !session_make_indices(mesh, "faces' vertices", total, given->vertex_count, &t->face_connectivity, error))
         return error->status;
     for (int64_t face = 0; face < count; face++) {
-        const session_face_row row = session_caller_face(given, face);
+        const session_face_row row = session_locate_caller_face(given, face);
         for (int64_t i = 0; i < row.size; i++) {
             const int64_t vertex = grid_array_index(&row.list, row.first + i);
             if (vertex < 0 || vertex >= given->vertex_count)
@@ -176,7 +176,7 @@ session_face_sides session_find_face_sides(const insitu_mesh *given)
                                 session_index_array(given, &given->boundary_owner)};
 }
 
-void session_cells_of_face(const session_face_sides *sides, int64_t face, int64_t cells[2])
+void session_find_cells_of_face(const session_face_sides *sides, int64_t face, int64_t cells[2])
 {
     const insitu_mesh *given = sides->given;
     const int64_t base = given->index_base, apart = face - given->face_count;
@@ -220,7 +220,7 @@ static insitu_status count_faces(const session_mesh *mesh, const session_face_si
 {
     for (int64_t face = 0; face < session_face_count(&mesh->given); face++) {
         int64_t cells[2];
-        session_cells_of_face(sides, face, cells);
+        session_find_cells_of_face(sides, face, cells);
         if (check_sides(mesh, face, cells, error)) return error->status;
         for (int i = 0; i < 2 && cells[i] >= 0; i++)
             session_store_index(offsets, cells[i] + 1, grid_array_index(offsets, cells[i] + 1) + 1);
@@ -238,7 +238,7 @@ static void store_faces(const session_mesh *mesh, const session_face_sides *side
                             grid_array_index(&t->offsets, c + 1) + grid_array_index(&t->offsets, c));
     for (int64_t face = 0; face < session_face_count(&mesh->given); face++) {
         int64_t cells[2];
-        session_cells_of_face(sides, face, cells);
+        session_find_cells_of_face(sides, face, cells);
         for (int i = 0; i < 2 && cells[i] >= 0; i++) {
             const int64_t at = grid_array_index(&t->offsets, cells[i]);
             session_store_index(&t->connectivity, at, face);
@@ -510,7 +510,7 @@ static void store_offsets(const session_mesh *mesh, const recognition *r, const 
 
 /* Stores the types, offsets and connectivity of all cells, after recognition, in the mesh's topology. If all cells have
  * one type, neither types nor offsets are stored. */
-static insitu_status write_cells(session_mesh *mesh, recognition *r, int threads, base_error *error)
+static insitu_status store_recognised_cells(session_mesh *mesh, recognition *r, int threads, base_error *error)
 {
     session_topology *t = &mesh->topology;
     const int64_t count = mesh->cells.cell_count, vertices = mesh->cells.vertex_count, faces = mesh->cells.face_count;
@@ -563,7 +563,7 @@ static insitu_status recognise_mesh(session_mesh *mesh, int threads, base_error 
     if (!r.is_faulty) t->polyhedron_count = r.polyhedron_count;
     if (!r.is_faulty && r.recognised_count) {
         t->recognised_count = r.recognised_count;
-        status = write_cells(mesh, &r, threads, error);
+        status = store_recognised_cells(mesh, &r, threads, error);
     }
     base_free(r.types);
     if (status || r.is_faulty || r.recognised_count < r.polyhedron_count) return status;
@@ -592,7 +592,7 @@ insitu_status session_make_topology(session_mesh *mesh, int threads, base_error 
     insitu_status status = INSITU_OK;
     if (mesh->topology.is_split) mark_value_copies_stale(mesh);
     session_drop_topology(&mesh->topology);
-    session_read_topology(mesh);
+    session_select_grid_arrays(mesh);
     if ((mesh->given.face_lists.data && mesh->given.face_sizes.data) || mesh->given.boundary_face_count)
         status = copy_face_lists(mesh, error);
     if (!status && session_has_owners(&mesh->given)) status = list_faces(mesh, error);
@@ -600,11 +600,11 @@ insitu_status session_make_topology(session_mesh *mesh, int threads, base_error 
         status = session_split_cells(mesh, threads, error);
     else if (!status && session_is_reordered(&mesh->given))
         status = session_order_cells(mesh, threads, error);
-    session_read_topology(mesh);
+    session_select_grid_arrays(mesh);
     if (!status && !mesh->given.keep_polyhedra && may_have_polyhedra(&mesh->cells))
         status = recognise_mesh(mesh, threads, error);
     if (status) session_drop_topology(&mesh->topology);
-    session_read_topology(mesh);
+    session_select_grid_arrays(mesh);
     mesh->topology.is_made = !status;
     if (mesh->topology.is_split) mark_value_copies_stale(mesh);
     return status;

@@ -19,7 +19,7 @@ typedef struct session_face_row {
     int64_t limit;       /* number of entries of the list that contains the row */
 } session_face_row;
 
-session_face_row session_caller_face(const insitu_mesh *mesh, int64_t face);
+session_face_row session_locate_caller_face(const insitu_mesh *mesh, int64_t face);
 
 /* The caller's arrays that give, for each face, the cell that owns it and the neighbouring cell. */
 typedef struct session_face_sides {
@@ -30,10 +30,10 @@ typedef struct session_face_sides {
 session_face_sides session_find_face_sides(const insitu_mesh *given);
 /* Finds the two cells of a face. cells[i] is negative if the cell is missing; if only one cell is missing, it is
  * cells[1]. */
-void session_cells_of_face(const session_face_sides *sides, int64_t face, int64_t cells[2]);
+void session_find_cells_of_face(const session_face_sides *sides, int64_t face, int64_t cells[2]);
 
 /* Sets the arrays that the grid reads: the session's own arrays if there are any, otherwise the caller's. Local. */
-void session_read_topology(session_mesh *mesh);
+void session_select_grid_arrays(session_mesh *mesh);
 
 /* Returns the cell's type in the caller's description. The session may read the cell as another type. */
 int session_caller_type(const session_mesh *mesh, int64_t cell);

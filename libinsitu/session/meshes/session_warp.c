@@ -15,7 +15,7 @@
 #include "session_region.h"
 #include "session_topology.h"
 
-void session_read_warp(session_mesh *mesh)
+void session_use_moved_coordinates(session_mesh *mesh)
 {
     session_warp *warp = &mesh->warp;
     insitu_mesh *nodal = mesh->finer.parts ? &mesh->finer.nodal : &mesh->given;
@@ -39,7 +39,7 @@ static void restore_coordinates(session_mesh *mesh)
     memcpy(mesh->given.coordinates, mesh->warp.unmoved, sizeof mesh->given.coordinates);
     if (mesh->given.lattice) mesh->given.lattice = &mesh->lattice.given;
     mesh->warp.is_applied = false;
-    session_read_topology(mesh);
+    session_select_grid_arrays(mesh);
 }
 
 static void mark_moved(session_meshes *meshes, session_mesh *mesh)
@@ -61,7 +61,7 @@ void session_unwarp_mesh(session_meshes *meshes, session_mesh *mesh)
     session_drop_warp(mesh);
     if (was_on) {
         mark_moved(meshes, mesh);
-        session_read_topology(mesh);
+        session_select_grid_arrays(mesh);
     }
 }
 
@@ -111,7 +111,7 @@ static bool move_vertices(const session_mesh *mesh, const session_displacement *
     const int64_t count = mesh->given.vertex_count;
     int64_t first_bad = count;
     bool is_moved = false;
-#pragma omp parallel num_threads(session_region_threads(threads, count))
+#pragma omp parallel num_threads(session_choose_loop_threads(threads, count))
     {
         region_enter();
 #pragma omp for schedule(static) reduction(min : first_bad) reduction(|| : is_moved) nowait
@@ -177,14 +177,14 @@ insitu_status session_warp_mesh(session_meshes *meshes, session_mesh *mesh, cons
     restore_coordinates(mesh);
     if (compute_coordinates(mesh, by, threads, &differ, error)) {
         if (was_on) mark_moved(meshes, mesh);
-        session_read_topology(mesh);
+        session_select_grid_arrays(mesh);
         return error->status;
     }
     warp->key = by->key;
     warp->is_stale = false;
     if (differ) mark_moved(meshes, mesh);
-    session_read_warp(mesh);
+    session_use_moved_coordinates(mesh);
     warp->is_applied = true;
-    session_read_topology(mesh);
+    session_select_grid_arrays(mesh);
     return INSITU_OK;
 }

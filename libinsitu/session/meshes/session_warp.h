@@ -26,7 +26,7 @@ insitu_status session_warp_mesh(session_meshes *meshes, session_mesh *mesh, cons
 void session_unwarp_mesh(session_meshes *meshes, session_mesh *mesh);
 
 /* Makes the description mesh->given refer to the moved coordinates again after the caller has set the mesh. The caller
- * of this function must then call session_read_topology(). */
-void session_read_warp(session_mesh *mesh);
+ * of this function must then call session_select_grid_arrays(). */
+void session_use_moved_coordinates(session_mesh *mesh);
 
 #endif

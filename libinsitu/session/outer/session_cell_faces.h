@@ -80,7 +80,7 @@ typedef struct session_face_loop {
     int64_t first, size;
 } session_face_loop;
 
-static inline session_face_loop session_face_of(const session_cell_faces *faces, int64_t face)
+static inline session_face_loop session_find_face_loop(const session_cell_faces *faces, int64_t face)
 {
     session_face_loop out = {.faces = faces};
     if (faces->table) {

@@ -82,7 +82,7 @@ static double find_cell_side(const grid *g, int64_t cell, const session_coarse_f
 bool session_read_outline(const grid *g, const session_face *face, session_face_outline *out)
 {
     const session_cell_faces faces = session_faces_of_cell(g, face->cell);
-    const session_face_loop loop = session_face_of(&faces, face->face);
+    const session_face_loop loop = session_find_face_loop(&faces, face->face);
     if (loop.size < 3 || loop.size > 4 || faces.size) return false;
     out->count = (int)loop.size;
     for (int i = 0; i < out->count; i++) {
@@ -107,7 +107,7 @@ static bool is_beyond(const session_face_outline *f, const double position[3], c
     return at < low - most || at > high + most;
 }
 
-bool session_may_contain(const session_face_outline *f, const double position[3], double slack)
+bool session_may_outline_contain(const session_face_outline *f, const double position[3], double slack)
 {
     double edges[4][3], normal[3], across[3];
     for (int i = 0; i < f->count; i++)

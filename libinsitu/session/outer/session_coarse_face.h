@@ -32,7 +32,7 @@ typedef struct session_face_outline {
 bool session_read_outline(const grid *g, const session_face *face, session_face_outline *out);
 /* Returns false only if a position in the outline's box is certainly more than `slack` away from the face: the position
  * is beyond all corners of the face, either along its normal or across one of its edges. */
-bool session_may_contain(const session_face_outline *outline, const double position[3], double slack);
+bool session_may_outline_contain(const session_face_outline *outline, const double position[3], double slack);
 
 /* Reads a face. vertices: receives the face's vertices, in the order of out->corner_positions. Returns false if the
  * face is not a triangle or quad of a cell with a volume, or if its area is 0. */

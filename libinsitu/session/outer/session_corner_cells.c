@@ -34,7 +34,7 @@ static int64_t add_cell(const session_mesh *mesh, const session_rows *rows, cons
     out->offsets[cell] = vertex;
     out->types[cell] = (unsigned char)type;
     for (int c = 0; c < grid_type_vertices(type); c++, vertex++) {
-        out->origins[vertex] = session_row_node(rows, cell, corners[c]);
+        out->origins[vertex] = session_find_row_vertex(rows, cell, corners[c]);
         out->connectivity[vertex] = vertex;
         grid_vertex(&mesh->cells, out->origins[vertex], out->coordinates + 3 * vertex);
     }
@@ -70,11 +70,11 @@ bool session_corner_cells_create(const session_mesh *mesh, session_corner_cells 
     session_list_kinds(&rows);
     find_corners(&rows, mesh->given.vertex_order, corners);
     for (int64_t cell = 0; cell < rows.cells.cell_count; cell++)
-        vertices += grid_type_vertices(rows.kinds[session_kind_of(&rows, cell)].nodes.type);
+        vertices += grid_type_vertices(rows.kinds[session_find_kind_of_cell(&rows, cell)].nodes.type);
     if (!allocate(rows.cells.cell_count, vertices, out)) return false;
     vertices = 0;
     for (int64_t cell = 0; cell < rows.cells.cell_count; cell++) {
-        const int kind = session_kind_of(&rows, cell);
+        const int kind = session_find_kind_of_cell(&rows, cell);
         vertices = add_cell(mesh, &rows, corners[kind], cell, rows.kinds[kind].nodes.type, vertices, out);
     }
     out->offsets[rows.cells.cell_count] = vertices;

@@ -99,7 +99,7 @@ static bool is_level_block(const session_mesh *mesh)
 
 /* Computes the common box of this rank: the bounding box of its refined blocks, in units of cells of the coarsest
  * level. It is extended by one such cell, which is far more than rounding requires. */
-static session_box common_box(const session_meshes *meshes)
+static session_box find_common_box(const session_meshes *meshes)
 {
     session_box out = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
     for (int i = 0; i < meshes->count; i++) {
@@ -176,7 +176,7 @@ static bool receive_boxes(cover_search *s, const session_mail *in)
 static insitu_status exchange_boxes(cover_search *s, const session_meshes *meshes, base_error *error)
 {
     session_mail out = {0}, in = {0};
-    const session_box own = common_box(meshes);
+    const session_box own = find_common_box(meshes);
     session_box *commons = base_alloc((size_t)s->team->ranks * sizeof *commons);
     if (!commons) session_fail_for_memory(error, s->team->ranks * (int64_t)sizeof *commons, "boxes of blocks");
     insitu_status status = session_agree(s->team->comm, error);
@@ -392,7 +392,7 @@ static bool update_block(const cover_search *s, session_meshes *meshes, session_
     if (!is_same) session_drop_cell_data(meshes, mesh);
     base_free(mesh->covered);
     mesh->covered = covered;
-    session_read_topology(mesh);
+    session_select_grid_arrays(mesh);
     if (mesh->misfit.exists) mesh->is_check_stale = true;
     return true;
 }
@@ -430,7 +430,7 @@ static void find_neighbour_centre(const session_mesh *mesh, const session_level_
     const grid_lattice *l = &mesh->lattice.cells;
     const insitu_lattice *given = mesh->given.lattice;
     const session_cell_faces faces = session_faces_of_cell(&mesh->cells, face->cell);
-    const session_face_loop loop = session_face_of(&faces, face->face);
+    const session_face_loop loop = session_find_face_loop(&faces, face->face);
     for (int axis = 0; axis < 3; axis++) {
         const int64_t index = grid_index_along(&l->cell_numbering, axis, face->cell);
         int64_t least = INT64_MAX, most = 0;
@@ -484,12 +484,12 @@ insitu_status session_drop_faces_between_levels(const session_meshes *meshes, co
 {
     box_bins bins = {.count = 0};
     bool has_levels = false;
-    for (int i = 0; i < count; i++) has_levels = has_levels || is_level_block(session_source(parts[i].mesh));
+    for (int i = 0; i < count; i++) has_levels = has_levels || is_level_block(session_find_source_part(parts[i].mesh));
     if (has_levels && !bin_boxes(meshes->level_boxes, meshes->level_box_count, true, &bins))
         session_fail_for_memory(error, meshes->level_box_count * 32, "faces between levels");
     for (int i = 0; i < count && has_levels && !error->status; i++) {
         /* the cells and faces of a mirror image are numbered as those of its source */
-        const session_mesh *mesh = session_source(parts[i].mesh);
+        const session_mesh *mesh = session_find_source_part(parts[i].mesh);
         if (is_level_block(mesh) && !session_is_quad_lattice(mesh->given.lattice) &&
             !parts[i].outer->threshold.is_given)
             drop_inner_faces(meshes, &bins, mesh, parts[i].outer);

@@ -35,9 +35,10 @@ static void read_cell(session_face_normals *n, const session_mesh *mesh, int64_t
 {
     const session_rows *rows = &n->polynomials.rows;
     const int count = (int)session_row_size(rows, cell);
-    for (int i = 0; i < count; i++) grid_vertex(&mesh->cells, session_row_node(rows, cell, i), n->positions + 3 * i);
+    for (int i = 0; i < count; i++)
+        grid_vertex(&mesh->cells, session_find_row_vertex(rows, cell, i), n->positions + 3 * i);
     n->cell = cell;
-    n->derivatives = session_derivatives_of(&n->polynomials, cell, n->positions, 3);
+    n->derivatives = session_find_derivatives_of_cell(&n->polynomials, cell, n->positions, 3);
 }
 
 /* Returns the position of a vertex in the cell's row of connectivity, or -1 if the cell does not have the vertex. */
@@ -45,10 +46,10 @@ static int find_node(const session_rows *rows, int64_t cell, int64_t vertex)
 {
     const int count = (int)session_row_size(rows, cell);
     /* in finer lattices, the nodes of a cell are numbered consecutively */
-    const int64_t guess = vertex - session_row_node(rows, cell, 0);
-    if (guess >= 0 && guess < count && session_row_node(rows, cell, (int)guess) == vertex) return (int)guess;
+    const int64_t guess = vertex - session_find_row_vertex(rows, cell, 0);
+    if (guess >= 0 && guess < count && session_find_row_vertex(rows, cell, (int)guess) == vertex) return (int)guess;
     for (int i = 0; i < count; i++)
-        if (session_row_node(rows, cell, i) == vertex) return i;
+        if (session_find_row_vertex(rows, cell, i) == vertex) return i;
     return -1;
 }
 
@@ -78,7 +79,7 @@ bool session_find_face_normal(session_face_normals *normals, const session_mesh 
     if (!session_has_face_normals(normals, mesh, cell)) return false;
     const int node = find_node(rows, cell, vertex), axes = normals->derivatives->axis_count;
     if (node < 0) return false;
-    session_rim_plane(&rows->kinds[session_kind_of(rows, cell)].nodes, face, plane);
+    session_find_rim_plane(&rows->kinds[session_find_kind_of_cell(rows, cell)].nodes, face, plane);
     for (int a = 0; a < axes; a++) find_tangent(normals, node, a, tangents[a]);
     for (int a = 0; a < 3; a++) {
         vector3_cross(tangents[(a + 1) % 3], tangents[(a + 2) % 3], product);

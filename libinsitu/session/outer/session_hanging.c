@@ -252,14 +252,16 @@ static bool is_in_box(const session_box *box, const double position[3], double s
 
 /* Returns whether a candidate may lie on the face. If needs_hit is set, only candidates that are known to lie on some
  * face are considered; otherwise all candidates that are not corners of this face. */
-static bool has_candidate(const hanging_search *s, int m, const session_face_outline *f, double slack, bool needs_hit)
+static bool may_candidate_lie_on_face(const hanging_search *s, int m, const session_face_outline *f, double slack,
+                                      bool needs_hit)
 {
     session_bin_walk walk = session_begin_bin_walk(&s->bins, f->box.lower, f->box.upper, slack);
     int64_t near;
     while (session_next_binned(&walk, &near)) {
         const candidate *c = &s->candidates[near];
         if (!is_in_box(&f->box, c->position, slack)) continue;
-        if ((needs_hit ? c->hit_list >= 0 : !is_corner_of(s, m, f, c)) && session_may_contain(f, c->position, slack))
+        if ((needs_hit ? c->hit_list >= 0 : !is_corner_of(s, m, f, c)) &&
+            session_may_outline_contain(f, c->position, slack))
             return true;
     }
     return false;
@@ -279,7 +281,8 @@ static bool is_face_needed(const hanging_search *s, int m, const session_face *f
     if (!session_read_outline(&s->basis->meshes[m]->cells, face, &f)) return false;
     /* an upper bound of the result of find_face_slack() */
     const double slack = relative_slack * f.diameter + s->rounding;
-    return has_candidate(s, m, &f, slack, needs_hit) || (!needs_hit && intersects_rank_box(s, &f.box, slack));
+    return may_candidate_lie_on_face(s, m, &f, slack, needs_hit) ||
+           (!needs_hit && intersects_rank_box(s, &f.box, slack));
 }
 
 /* Appends a face to the list of faces if it is a triangle or quad. Returns false if memory runs out. */
@@ -311,7 +314,7 @@ static bool read_faces(hanging_search *s, bool needs_hit)
     bool is_done = true;
     for (int m = 0; m < s->basis->part_count; m++) {
         const session_border *border = &borders[m];
-#pragma omp parallel num_threads(session_region_threads(s->team->threads, border->face_count))
+#pragma omp parallel num_threads(session_choose_loop_threads(s->team->threads, border->face_count))
         {
             region_enter();
 #pragma omp for schedule(dynamic, REGION_ITEMS) nowait
@@ -456,7 +459,7 @@ static bool test_faces(hanging_search *s, try_function *try_one)
 
 /* Returns the largest area among the faces that have the candidate as a corner and whose normal is opposite to that of
  * f; 0 if there are none. */
-static double largest_opposite_area(const hanging_search *s, const candidate *c, const session_coarse_face *f)
+static double find_largest_opposite_area(const hanging_search *s, const candidate *c, const session_coarse_face *f)
 {
     double area = 0;
     for (int64_t i = c->corner_list; i >= 0; i = s->contacts[i].next_contact) {
@@ -470,7 +473,7 @@ static void choose_face(const hanging_search *s, candidate *c)
 {
     for (int64_t i = c->hit_list; i >= 0; i = s->contacts[i].next_contact) {
         const session_coarse_face *f = &s->faces[s->contacts[i].face].face;
-        const double area = largest_opposite_area(s, c, f);
+        const double area = find_largest_opposite_area(s, c, f);
         if (!(area > 0 && f->area > least_ratio * area)) continue;
         if (c->face >= 0 && !session_is_larger_face(f, &s->faces[c->face].face)) continue;
         c->face = s->contacts[i].face;

@@ -240,7 +240,7 @@ static void add_faces(const xor_table *x, int64_t cell)
     }
     const session_cell_faces faces = session_faces_of_cell(g, cell);
     for (int64_t f = 0; f < faces.count; f++) {
-        const session_face_loop loop = session_face_of(&faces, f);
+        const session_face_loop loop = session_find_face_loop(&faces, f);
         add_face(x, &loop);
     }
 }
@@ -255,7 +255,7 @@ static void add_vertex(const face_search *s, int64_t vertex)
 }
 
 /* Computes the sums of the hashes of each vertex's faces, and marks the vertices whose sum is not 0. */
-static void cancel_faces(const face_search *s)
+static void mark_possible_outer_vertices(const face_search *s)
 {
 #pragma omp parallel num_threads(s->threads)
     {
@@ -303,7 +303,7 @@ static bool face_list_reserve(face_list *list)
     return !list->is_out_of_memory;
 }
 
-static bool is_open_face(const part_cells *p, const session_face_loop *loop)
+static bool may_be_outer_face(const part_cells *p, const session_face_loop *loop)
 {
     for (int64_t i = 0; i < loop->size; i++)
         if (!p->may_be_outer[session_face_vertex(loop, i)]) return false;
@@ -311,7 +311,7 @@ static bool is_open_face(const part_cells *p, const session_face_loop *loop)
 }
 
 /* Returns whether the cell may have an outer face, according to the flags may_be_outer of its vertices. */
-static bool has_open_vertices(const part_cells *p, int64_t cell)
+static bool may_have_outer_face(const part_cells *p, int64_t cell)
 {
     const grid *g = p->grid;
     int64_t vertices[GRID_MAX_CELL_VERTICES];
@@ -323,15 +323,15 @@ static bool has_open_vertices(const part_cells *p, int64_t cell)
 }
 
 /* Appends those faces of the cell to the list that may be outer faces. */
-static void append_open_faces(const face_search *s, int part, int64_t cell, face_list *out)
+static void append_possible_outer_faces(const face_search *s, int part, int64_t cell, face_list *out)
 {
     const part_cells *p = &s->cells[part];
-    if (!has_faces(p, cell) || !has_open_vertices(p, cell)) return;
+    if (!has_faces(p, cell) || !may_have_outer_face(p, cell)) return;
     const session_cell_faces of_cell = session_faces_of_cell(p->grid, cell);
     for (int64_t f = 0; f < of_cell.count; f++) {
-        const session_face_loop loop = session_face_of(&of_cell, f);
+        const session_face_loop loop = session_find_face_loop(&of_cell, f);
         session_key key;
-        if (!(of_cell.size || is_open_face(p, &loop)) || !make_key(p, &loop, &key)) continue;
+        if (!(of_cell.size || may_be_outer_face(p, &loop)) || !make_key(p, &loop, &key)) continue;
         if (!face_list_reserve(out)) return;
         out->faces[out->count] = (found_face){{cell, f}, part};
         out->keys[out->count++] = key;
@@ -345,7 +345,7 @@ static void append_faces_of_cells(const face_search *s, int64_t first, int64_t e
         const part_cells *p = &s->cells[part];
         const int64_t from = first - p->first_cell, to = end - p->first_cell;
         for (int64_t cell = from > 0 ? from : 0; cell < to && cell < p->grid->cell_count; cell++)
-            append_open_faces(s, part, cell, out);
+            append_possible_outer_faces(s, part, cell, out);
     }
 }
 
@@ -389,7 +389,7 @@ static bool collect_faces(face_search *s)
 }
 
 /* Determines the groups of equal keys, and the number of keys in each. Returns false if memory runs out. */
-static bool count_keys(const session_key *keys, int64_t count, int64_t **groups, int64_t **sizes)
+static bool group_equal_keys(const session_key *keys, int64_t count, int64_t **groups, int64_t **sizes)
 {
     session_key_table table = {0};
     *groups = base_alloc((size_t)count * sizeof **groups);
@@ -476,9 +476,9 @@ static insitu_status search_own_faces(face_search *s, bool by_id, base_error *er
     is_done = is_done && make_tables(s);
     if (is_done) {
         hash_vertices(s, by_id);
-        cancel_faces(s);
+        mark_possible_outer_vertices(s);
     }
-    is_done = is_done && collect_faces(s) && count_keys(s->keys, s->count, &s->groups, &s->group_sizes);
+    is_done = is_done && collect_faces(s) && group_equal_keys(s->keys, s->count, &s->groups, &s->group_sizes);
     if (!is_done)
         return session_fail_for_memory(error, s->vertex_count * (9 + 8 * s->table_count) + (int64_t)(s->mask + 1) * 8,
                                        "outer faces");
@@ -497,7 +497,7 @@ static int find_face_home(const face_search *s, const session_homes *homes, int6
     const found_face *face = &s->faces[number];
     const part_cells *p = &s->cells[face->part];
     const session_cell_faces faces = session_faces_of_cell(p->grid, face->face.cell);
-    const session_face_loop loop = session_face_of(&faces, face->face.face);
+    const session_face_loop loop = session_find_face_loop(&faces, face->face.face);
     int64_t first = session_face_vertex(&loop, 0);
     double point[1][3];
     for (int64_t i = 0; i < loop.size; i++) {
@@ -555,7 +555,7 @@ static bool count_received_keys(const session_mail *in, int ranks, session_mail 
     bool is_done = reply->counts && reply->words && keys;
     for (int64_t i = 0; i < count && is_done; i++)
         memcpy(keys[i].words, in->words + KEY_WORDS * i, sizeof keys[i].words);
-    is_done = is_done && count_keys(keys, count, &groups, &sizes);
+    is_done = is_done && group_equal_keys(keys, count, &groups, &sizes);
     for (int64_t i = 0; i < count && is_done; i++) reply->words[i] = (uint64_t)sizes[groups[i]];
     for (int rank = 0; rank < ranks && is_done; rank++) reply->counts[rank] = in->counts[rank] / KEY_WORDS;
     reply->total = count;
@@ -643,7 +643,7 @@ static bool next_face(face_walk *walk, session_face *out)
             return true;
         }
         for (; walk->next.face < faces.count; walk->next.face++) {
-            const session_face_loop loop = session_face_of(&faces, walk->next.face);
+            const session_face_loop loop = session_find_face_loop(&faces, walk->next.face);
             *out = walk->next;
             if (!is_on_found_face(walk, &loop)) continue;
             walk->next.face++;
@@ -662,7 +662,7 @@ static void mark_borders(const face_search *s)
         face_walk walk = walk_faces(s, &s->faces[i]);
         for (session_face face; next_face(&walk, &face);) {
             const session_cell_faces faces = session_faces_of_cell(&walk.mesh->cells, face.cell);
-            const session_face_loop loop = session_face_of(&faces, face.face);
+            const session_face_loop loop = session_find_face_loop(&faces, face.face);
             for (int64_t k = 0; k < loop.size; k++) is_border[session_face_vertex(&loop, k)] = 1;
         }
     }

@@ -237,7 +237,7 @@ static void add_cell(outer_work *w, corner_loop *loop, const double inside[3], i
 }
 
 /* Computes a triangle of the polygon and the triangle's own apex. Returns false if its area is 0. */
-static bool polygon_triangle(const face_polygon *p, int i, corner_loop *out, double apex[3])
+static bool find_polygon_triangle(const face_polygon *p, int i, corner_loop *out, double apex[3])
 {
     double inside[3];
     *out = (corner_loop){.count = 3};
@@ -263,13 +263,13 @@ static bool find_common_apex(const face_polygon *p, double out[3])
     int count = 0;
     out[0] = out[1] = out[2] = 0;
     for (int i = 0; i + 2 < p->count; i++) {
-        if (!polygon_triangle(p, i, &loop, own)) continue;
+        if (!find_polygon_triangle(p, i, &loop, own)) continue;
         for (int axis = 0; axis < 3; axis++) out[axis] += own[axis];
         count++;
     }
     for (int axis = 0; axis < 3 && count; axis++) out[axis] /= count;
     for (int i = 0; i + 2 < p->count; i++) {
-        if (!polygon_triangle(p, i, &loop, own)) continue;
+        if (!find_polygon_triangle(p, i, &loop, own)) continue;
         find_normal(&loop, normal);
         subtract_vectors(own, loop.positions[0], height);
         const double most = vector3_dot(height, normal);
@@ -320,9 +320,9 @@ static int64_t add_rim(outer_work *w, int64_t cell, int face)
     const session_rim_kind *of = session_rims_of(&w->rims, cell);
     const int64_t loop = w->loop_end;
     w->out->loops[w->loop_end++] = of->counts[face];
-    w->out->loops[w->loop_end++] = w->rims.rows.kinds[session_kind_of(&w->rims.rows, cell)].nodes.order;
+    w->out->loops[w->loop_end++] = w->rims.rows.kinds[session_find_kind_of_cell(&w->rims.rows, cell)].nodes.order;
     for (int i = 0; i < of->counts[face]; i++) {
-        const int64_t vertex = session_row_node(&w->rims.rows, cell, of->nodes[face][i]);
+        const int64_t vertex = session_find_row_vertex(&w->rims.rows, cell, of->nodes[face][i]);
         double position[3];
         grid_vertex(w->cells, vertex, position);
         w->out->loops[w->loop_end++] = add_copied_vertex(w, vertex, position);
@@ -358,7 +358,7 @@ static void add_polygon(outer_work *w, face_polygon *p, const double inside[3], 
     const bool is_shared = find_common_apex(p, common);
     const int64_t apex = is_shared ? add_vertex(w, common, p->vertices[p->triangles[0][0]], -1) : -1;
     for (int i = 0; i + 2 < p->count; i++) {
-        if (!polygon_triangle(p, i, &loop, own)) continue;
+        if (!find_polygon_triangle(p, i, &loop, own)) continue;
         add_cell_below(w, &loop, is_shared ? apex : add_vertex(w, own, loop.vertices[0], -1), origin);
     }
     add_loop(w, p, first);
@@ -387,7 +387,7 @@ static void read_polygon(const grid *g, const session_face_loop *face, face_poly
 static void add_face(outer_work *w, const session_face *face)
 {
     const session_cell_faces faces = session_faces_of_cell(w->cells, face->cell);
-    const session_face_loop of = session_face_of(&faces, face->face);
+    const session_face_loop of = session_find_face_loop(&faces, face->face);
     face_polygon *p = &w->polygon;
     const int64_t first = w->cell_count;
     double inside[3];
@@ -419,7 +419,7 @@ static outer_counts find_count_bounds(const grid *g, const session_outer *outer,
     for (int64_t i = 0; i < outer->face_count; i++) {
         const session_face *face = &outer->faces[i];
         const session_cell_faces faces = session_faces_of_cell(g, face->cell);
-        const session_face_loop loop = session_face_of(&faces, face->face);
+        const session_face_loop loop = session_find_face_loop(&faces, face->face);
         const int64_t size = loop.size;
         double positions[4][3];
         for (int k = 0; k < 4 && k < size; k++) grid_vertex(g, session_face_vertex(&loop, k), positions[k]);

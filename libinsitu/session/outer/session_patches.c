@@ -94,7 +94,7 @@ static insitu_status find_face(const patch_faces *p, int patch, int64_t i, patch
             given->faces.data ? grid_array_index(&faces, i) : given->first_face - mesh->index_base + i;
         if (number < 0 || number >= session_face_count(mesh))
             return fail_range_at_face(p, patch, i, "is outside", session_face_count(mesh), error);
-        *out = (patch_face){session_caller_face(mesh, number), number};
+        *out = (patch_face){session_locate_caller_face(mesh, number), number};
     }
     if (row->size < 3) return fail_at_face(p, patch, i, "has fewer than three vertices", error);
     if (row->first < 0 || row->first > row->limit || row->size > row->limit - row->first)
@@ -153,7 +153,7 @@ static insitu_status check_owner(patch_faces *p, int patch, int64_t i, int64_t f
     patch_face face;
     int64_t cells[2];
     if (find_face(p, patch, i, &face, error)) return error->status;
-    session_cells_of_face(&sides, face.number, cells);
+    session_find_cells_of_face(&sides, face.number, cells);
     if (cells[1] >= 0) return fail_at_face(p, patch, i, "is between two cells, not on the boundary", error);
     unsigned char *taken = &is_taken[face.number / 8], bit = (unsigned char)(1u << face.number % 8);
     if (*taken & bit) return fail_at_face(p, patch, i, "is given twice", error);
@@ -162,7 +162,7 @@ static insitu_status check_owner(patch_faces *p, int patch, int64_t i, int64_t f
     return INSITU_OK;
 }
 
-static bool are_by_number(const insitu_field *field)
+static bool are_all_faces_numbered(const insitu_field *field)
 {
     bool all = true;
     for (int i = 0; i < field->patch_count; i++)
@@ -260,7 +260,7 @@ static void count_cells(cell_search *s, const patch_faces *p)
         if (grid_is_shell_type(grid_cell_type(g, cell))) continue;
         const session_cell_faces faces = session_faces_of_cell(g, cell);
         for (int64_t i = 0; i < faces.count; i++) {
-            const session_face_loop loop = session_face_of(&faces, i);
+            const session_face_loop loop = session_find_face_loop(&faces, i);
             session_key key;
             const int64_t found = find_face_key(s, p, &loop, &key) ? session_keys_find(&s->keys, &key) : -1;
             if (found < 0) continue;
@@ -364,7 +364,7 @@ insitu_status session_find_patch_values(const session_mesh *mesh, int field, int
     p.first_groups = base_alloc((size_t)(p.count + 1) * sizeof *p.first_groups);
     p.is_drawn = base_calloc((size_t)p.count, 1);
     insitu_status status = p.first_groups && p.is_drawn ? list_faces(&p, error) : fail_for_memory(p.count * 2, error);
-    const bool has_sides = session_has_owners(&mesh->given) && are_by_number(given);
+    const bool has_sides = session_has_owners(&mesh->given) && are_all_faces_numbered(given);
     if (!status) status = has_sides ? check_owners(&p, error) : check_faces_by_cells(&p, error);
     if (!status) status = store_values(&p, component, out, error);
     base_free(p.first_groups);

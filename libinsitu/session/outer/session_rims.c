@@ -5,7 +5,7 @@
 
 /* ---- one kind -------------------------------------------------------------------------------------------------- */
 
-void session_rim_plane(const session_nodes *of, int face, double out[3])
+void session_find_rim_plane(const session_nodes *of, int face, double out[3])
 {
     int plane[3];
     session_find_face_plane(session_shape_of(of->type), face, plane);
@@ -78,11 +78,11 @@ int64_t session_count_rim_nodes(const session_rims *rims, int64_t cell)
 
 /* Sets faces_of_vertex for all vertices of the cell if are_set is true, and clears it otherwise. A vertex may occur at
  * several positions of the cell's row. */
-static void set_faces(session_rims *rims, int64_t cell, bool are_set)
+static void set_faces_of_vertices(session_rims *rims, int64_t cell, bool are_set)
 {
-    const int kind = session_kind_of(&rims->rows, cell);
+    const int kind = session_find_kind_of_cell(&rims->rows, cell);
     for (int n = 0; n < rims->rows.kinds[kind].nodes.count; n++) {
-        unsigned char *faces = &rims->faces_of_vertex[session_row_node(&rims->rows, cell, n)];
+        unsigned char *faces = &rims->faces_of_vertex[session_find_row_vertex(&rims->rows, cell, n)];
         *faces = are_set ? *faces | rims->kinds[kind].faces_of_node[n] : 0;
     }
 }
@@ -91,8 +91,8 @@ unsigned session_find_faces(session_rims *rims, int64_t cell, const int64_t *ver
 {
     unsigned faces = (1U << RIMS_MOST_FACES) - 1;
     if (rims->cell != cell) {
-        if (rims->cell >= 0) set_faces(rims, rims->cell, false);
-        set_faces(rims, cell, true);
+        if (rims->cell >= 0) set_faces_of_vertices(rims, rims->cell, false);
+        set_faces_of_vertices(rims, cell, true);
         rims->cell = cell;
     }
     for (int64_t i = 0; i < count; i++) faces &= rims->faces_of_vertex[vertices[i]];

@@ -39,12 +39,12 @@ int session_find_rim(session_rims *rims, int64_t cell, const int64_t *vertices, 
 
 /* Computes the normal, of any length, of a face's plane in the reference cell. It is (0, 0, z) for triangles and
  * quads. */
-void session_rim_plane(const session_nodes *of, int face, double out[3]);
+void session_find_rim_plane(const session_nodes *of, int face, double out[3]);
 
 /* Returns the rims of the cell's kind. */
 static inline const session_rim_kind *session_rims_of(const session_rims *rims, int64_t cell)
 {
-    return &rims->kinds[session_kind_of(&rims->rows, cell)];
+    return &rims->kinds[session_find_kind_of_cell(&rims->rows, cell)];
 }
 
 #endif

@@ -43,12 +43,12 @@ scene_surface session_make_shell_layer(const scene_isosurface *layer, int height
                               .field = layer->field,
                               .has_values = true,
                               .is_alone = true,
-                              .width = scene_line_width(height)};
+                              .width = scene_default_line_width(height)};
     copy_isovalues(layer, &out.lines);
     return out;
 }
 
-bool session_surface_is_on(const scene_surface *layer, const session_mesh *mesh)
+bool session_is_surface_on_mesh(const scene_surface *layer, const session_mesh *mesh)
 {
     return scene_field_is_on(&layer->meshes_field, mesh->name) && (!layer->is_of_shells || mesh->has_shells_alone);
 }

@@ -15,6 +15,6 @@ bool session_has_shells(const session_catalogue *catalogue);
 scene_surface session_make_shell_layer(const scene_isosurface *layer, int height);
 
 /* Returns whether the surface layer is drawn on the mesh. */
-bool session_surface_is_on(const scene_surface *layer, const session_mesh *mesh);
+bool session_is_surface_on_mesh(const scene_surface *layer, const session_mesh *mesh);
 
 #endif

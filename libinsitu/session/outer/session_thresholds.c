@@ -109,8 +109,8 @@ unsigned char *session_find_hidden_cells(const session_mesh *mesh, const session
     const session_scalar *scalar = find_scalar(mesh, threshold);
     unsigned char *is_hidden = base_alloc((size_t)(count ? count : 1));
     if (!is_hidden) return NULL;
-    const grid_field field = scalar ? session_scalar_field(mesh, scalar) : (grid_field){0};
-#pragma omp parallel num_threads(session_region_threads(threads, count))
+    const grid_field field = scalar ? session_get_scalar_values(mesh, scalar) : (grid_field){0};
+#pragma omp parallel num_threads(session_choose_loop_threads(threads, count))
     {
         region_enter();
 #pragma omp for schedule(static) nowait

@@ -42,7 +42,7 @@ typedef struct twin_search {
 static void measure_edges(const grid *g, const session_face *face, double *edges)
 {
     const session_cell_faces faces = session_faces_of_cell(g, face->cell);
-    const session_face_loop loop = session_face_of(&faces, face->face);
+    const session_face_loop loop = session_find_face_loop(&faces, face->face);
     for (int64_t i = 0; i < loop.size; i++) {
         const int64_t from = session_face_vertex(&loop, i), to = session_face_vertex(&loop, (i + 1) % loop.size);
         double a[3], b[3];

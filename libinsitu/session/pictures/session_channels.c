@@ -73,7 +73,7 @@ typedef struct surface_numbers {
     float layer[RENDER_MAX_ISOVALUES], surface[RENDER_MAX_ISOVALUES];
 } surface_numbers;
 
-static void add_surface_numbers(surface_numbers *n, int layer, int surfaces)
+static void add_numbers_of_layer(surface_numbers *n, int layer, int surfaces)
 {
     for (int i = 0; i < surfaces && n->count < RENDER_MAX_ISOVALUES; i++) {
         n->layer[n->count] = (float)layer;
@@ -87,12 +87,12 @@ static surface_numbers number_surfaces(const scene_image *image, bool has_shells
 {
     surface_numbers out = {0};
     for (int i = 0; i < image->isosurface_count; i++)
-        add_surface_numbers(&out, image->isosurfaces[i].number, image->isosurfaces[i].value_count);
+        add_numbers_of_layer(&out, image->isosurfaces[i].number, image->isosurfaces[i].value_count);
     for (int i = 0; i < image->isosurface_count && has_shells; i++)
-        add_surface_numbers(&out, image->isosurfaces[i].number, 1);
-    for (int i = 0; i < image->surface_count; i++) add_surface_numbers(&out, image->surfaces[i].number, 1);
+        add_numbers_of_layer(&out, image->isosurfaces[i].number, 1);
+    for (int i = 0; i < image->surface_count; i++) add_numbers_of_layer(&out, image->surfaces[i].number, 1);
     for (int i = 0; i < image->slice_count; i++)
-        add_surface_numbers(&out, image->slices[i].number, image->slices[i].plane_count);
+        add_numbers_of_layer(&out, image->slices[i].number, image->slices[i].plane_count);
     return out;
 }
 

@@ -3,7 +3,7 @@
 #include "memory.h"
 #include "region.h"
 
-bool session_needs_deep(const scene_image *image)
+bool session_needs_deep_samples(const scene_image *image)
 {
     for (int i = 0; i < image->output_count; i++)
         if (image->outputs[i].is_deep) return true;

@@ -12,7 +12,7 @@
 #include "scene.h"
 
 /* Returns whether an output of the image is deep. */
-bool session_needs_deep(const scene_image *image);
+bool session_needs_deep_samples(const scene_image *image);
 
 /* Initializes a deep picture without samples. Called on rank 0 only. Local. */
 insitu_status session_begin_deep(deep_image *deep, const scene_image *image, base_error *error);

@@ -74,7 +74,7 @@ static insitu_status share_ranges(difference_exchange *d, base_error *error)
 
 /* Lists the ranks whose boxes are near enough to contain samples for this rank's hits. The hits lie in this rank's own
  * box, so that the distance of their samples from this box is at most the largest sampling distance. */
-static void keep_near_ranks(difference_exchange *d)
+static void list_near_ranks(difference_exchange *d)
 {
     const render_box *own = &d->boxes[d->rank];
     double reach = 0;
@@ -95,7 +95,7 @@ static insitu_status share_boxes(difference_exchange *d, base_error *error)
     const int doubles = sizeof own / sizeof(double);
     const insitu_status status = session_check_mpi(
         error, MPI_Allgather(&own, doubles, MPI_DOUBLE, d->boxes, doubles, MPI_DOUBLE, d->comm), "MPI_Allgather");
-    if (!status) keep_near_ranks(d);
+    if (!status) list_near_ranks(d);
     return status;
 }
 
@@ -169,7 +169,7 @@ static insitu_status exchange_round(difference_exchange *d, base_error *error)
     return status;
 }
 
-static void light_round(const difference_exchange *d, fragment_list *fragments, base_error *error)
+static void light_hits_of_round(const difference_exchange *d, fragment_list *fragments, base_error *error)
 {
     const int64_t count = fragments->count + d->count;
     if (count > fragments->capacity) {
@@ -194,7 +194,7 @@ static insitu_status run_rounds(difference_exchange *d, fragment_list *fragments
         d->count = left < d->round_hits ? left : d->round_hits;
         if (!error->status) render_sample_pending_hits(d->job, d->list->items + d->first, d->samples, d->count, error);
         status = exchange_round(d, error);
-        if (!status && !error->status) light_round(d, fragments, error);
+        if (!status && !error->status) light_hits_of_round(d, fragments, error);
         d->first += d->count;
     }
     return status;

@@ -64,13 +64,13 @@ static bool needs_depth(const session_drawing *d, const scene_image *image)
     return false;
 }
 
-static bool has_edges_alone(const scene_image *image)
+static bool needs_frames_only_at_edges(const scene_image *image)
 {
     return image->antialias > 1 && image->volume_count == 0;
 }
 
 /* Warns if the step has been delayed because pictures are written slowly. */
-static void warn_of_wait(session_report *report, double seconds)
+static void warn_of_slow_writing(session_report *report, double seconds)
 {
     static const double noticed = 0.1;
     static const session_warning warning = {WARNING_WRITER, NULL, NULL, 1};
@@ -88,14 +88,14 @@ static void reserve_frame(const session_drawing *d, size_t bytes, canvas *c)
     c->frame.rgba = c->memory.pixels;
     const double seconds = MPI_Wtime() - start; /* time spent waiting for space in the queue */
     d->report->public_report.write_ms += 1e3 * seconds;
-    warn_of_wait(d->report, seconds);
+    warn_of_slow_writing(d->report, seconds);
 }
 
 static insitu_status canvas_create(const session_drawing *d, const scene_image *image, canvas *out, base_error *error)
 {
     const size_t pixels = (size_t)image->width * (size_t)image->height;
     const size_t bytes = pixels * (needs_depth(d, image) ? 5 : 4) * sizeof(float);
-    const bool is_summed = image->frames > 1 && !has_edges_alone(image);
+    const bool is_summed = image->frames > 1 && !needs_frames_only_at_edges(image);
     out->frame.width = out->samples.width = image->width;
     out->frame.height = out->samples.height = image->height;
     if (d->team->rank != 0) return INSITU_OK;
@@ -105,10 +105,10 @@ static insitu_status canvas_create(const session_drawing *d, const scene_image *
     if (!out->frame.rgba || (is_summed && !out->frame_sum))
         return session_fail_for_memory(error, (int64_t)(bytes + (is_summed ? pixels * 4 * sizeof *out->frame_sum : 0)),
                                        "a picture");
-    return session_needs_deep(image) ? session_begin_deep(&out->deep, image, error) : INSITU_OK;
+    return session_needs_deep_samples(image) ? session_begin_deep(&out->deep, image, error) : INSITU_OK;
 }
 
-static void canvas_add(canvas *c, int threads)
+static void add_frame_to_sum(canvas *c, int threads)
 {
     if (!c->frame_sum) return;
     const int64_t count = (int64_t)c->frame.width * c->frame.height * 4;
@@ -135,7 +135,7 @@ static bool canvas_begin_edges(canvas *c, const unsigned char *pixels)
     return true;
 }
 
-static void canvas_add_edges(canvas *c, int threads)
+static void add_frame_to_edge_sums(canvas *c, int threads)
 {
     if (!c->edge_count) return;
 #pragma omp parallel num_threads(threads)
@@ -289,7 +289,8 @@ static insitu_status share_edges(frames_basis *b, unsigned char **pixels, base_e
 
 /* Draws the image's frames. The sample positions in the pixels differ from frame to frame. If only pixels at edges are
  * drawn, job->pixels is the set of these pixels. */
-static insitu_status draw_samples(frames_basis *b, const scene_image *image, render_job *job, base_error *error)
+static insitu_status draw_frames_of_samples(frames_basis *b, const scene_image *image, render_job *job,
+                                            base_error *error)
 {
     canvas *c = b->canvas;
     insitu_status status = INSITU_OK;
@@ -297,8 +298,8 @@ static insitu_status draw_samples(frames_basis *b, const scene_image *image, ren
         render_camera_sample(image->antialias, job->frame % image->antialias, job->camera.offset);
         status = draw_frame(b, job, job->pixels ? &c->samples : &c->frame, error);
         if (status) break;
-        canvas_add(c, b->drawing->team->threads);
-        canvas_add_edges(c, b->drawing->team->threads);
+        add_frame_to_sum(c, b->drawing->team->threads);
+        add_frame_to_edge_sums(c, b->drawing->team->threads);
     }
     return status;
 }
@@ -310,14 +311,14 @@ static insitu_status draw_all_frames(frames_basis *b, const scene_image *image, 
 {
     canvas *c = b->canvas;
     unsigned char *pixels = NULL;
-    if (image->antialias == 1 || !(has_edges_alone(image) || needs_depth(b->drawing, image)))
-        return draw_samples(b, image, job, error);
+    if (image->antialias == 1 || !(needs_frames_only_at_edges(image) || needs_depth(b->drawing, image)))
+        return draw_frames_of_samples(b, image, job, error);
     insitu_status status = draw_frame(b, job, &c->frame, error);
-    if (!status && has_edges_alone(image)) status = share_edges(b, &pixels, error);
+    if (!status && needs_frames_only_at_edges(image)) status = share_edges(b, &pixels, error);
     job->pixels = pixels;
     c->depth = c->frame.depth;
     c->frame.depth = NULL;
-    if (!status) status = draw_samples(b, image, job, error);
+    if (!status) status = draw_frames_of_samples(b, image, job, error);
     c->frame.depth = c->depth;
     base_free(pixels);
     return status;
@@ -338,7 +339,7 @@ static insitu_status draw_frames(const session_drawing *d, const scene_image *im
                           {d->team->comm, compositing, background, overlap_fragments},
                           canvas,
                           0,
-                          session_needs_deep(image) ? &canvas->deep : NULL};
+                          session_needs_deep_samples(image) ? &canvas->deep : NULL};
     render_job job = make_job(d, image, view, layers);
     const insitu_status status = draw_all_frames(&basis, image, &job, error);
     if (status) return status;
@@ -356,11 +357,12 @@ static insitu_status draw_frames(const session_drawing *d, const scene_image *im
 
 static scene_placeholder_values make_placeholder_values(const session_drawing *d, const scene_image *image)
 {
-    return scene_placeholder_values_of(image, d->cycle, d->report->public_report.time);
+    return scene_make_placeholder_values(image, d->cycle, d->report->public_report.time);
 }
 
 /* Compares the picture's colour bars with those of the first picture that this step has drawn for the same montage. */
-static void compare_bars(const session_drawing *d, const scene_image *image, const session_decorations *decorations)
+static void compare_colour_bars_in_montage(const session_drawing *d, const scene_image *image,
+                                           const session_decorations *decorations)
 {
     for (int i = 0; i < image->output_count && decorations && d->shared_bars; i++) {
         const scene_output *output = &image->outputs[i];
@@ -371,7 +373,7 @@ static void compare_bars(const session_drawing *d, const scene_image *image, con
     }
 }
 
-static void warn_of_bars(const session_drawing *d)
+static void warn_of_different_colour_bars(const session_drawing *d)
 {
     for (int i = 0; i < d->scene->montage_count && d->shared_bars; i++) {
         const session_shared_bars *bars = &d->shared_bars[i];
@@ -401,7 +403,7 @@ static void queue_picture(const session_drawing *d, const scene_image *image, ca
     files->channels = c->channels;
     files->deep = c->deep;
     files->decorations = c->decorations;
-    compare_bars(d, image, c->decorations);
+    compare_colour_bars_in_montage(d, image, c->decorations);
     c->memory = (session_picture){0};
     c->channels = (session_channels){0};
     c->deep = (deep_image){0};
@@ -431,14 +433,15 @@ static insitu_status write_outputs(const session_drawing *d, const scene_image *
 
 /* Finds the areas of the picture that insets of its montage will cover. If several of the image's files have insets,
  * the areas are those of the first such file. Returns the number of areas. */
-static int find_covered(const scene *scene, const scene_image *image, insitu_rectangle covered[SCENE_ANCHORS])
+static int find_areas_under_insets_of_image(const scene *scene, const scene_image *image,
+                                            insitu_rectangle covered[SCENE_ANCHORS])
 {
     int count = 0;
     for (int i = 0; i < image->output_count && !count; i++) {
         const scene_output *output = &image->outputs[i];
         if (output->montage < 0 || output->is_inset) continue;
-        count =
-            session_find_covered(&scene->montages[output->montage], output->first_panel + image->variant.view, covered);
+        count = session_find_areas_under_insets(&scene->montages[output->montage],
+                                                output->first_panel + image->variant.view, covered);
     }
     return count;
 }
@@ -451,9 +454,9 @@ static void warn_of_words(const session_drawing *d, const scene_image *image, co
     insitu_rectangle covered[SCENE_ANCHORS];
     insitu_decorations in_file = decorations->decorations;
     in_file.covered = covered;
-    in_file.covered_count = find_covered(d->scene, image, covered);
-    session_check_words(&(insitu_image){.width = image->width, .height = image->height, .decorations = &in_file},
-                        &faults);
+    in_file.covered_count = find_areas_under_insets_of_image(d->scene, image, covered);
+    session_find_text_faults(&(insitu_image){.width = image->width, .height = image->height, .decorations = &in_file},
+                             &faults);
     const char *const texts[] = {faults.font, faults.letters, faults.room};
     for (int i = 0; i < 3; i++)
         session_warn_locally(d->report, &(session_warning){WARNING_WORDS, image->name, NULL, i}, *texts[i] != '\0',
@@ -475,7 +478,7 @@ static insitu_status make_image_decorations(const session_drawing *d, const scen
         out->decorations = session_make_decorations(
             image, &(session_decoration_basis){&moment, &d->space->extent, view, layers, &outline, d->catalogue});
         if (!out->decorations) session_fail_for_memory(error, (int64_t)sizeof *out->decorations, "decorations");
-        if (out->decorations && scene_has_words(image)) warn_of_words(d, image, out->decorations);
+        if (out->decorations && scene_draws_text(image)) warn_of_words(d, image, out->decorations);
     }
     session_free_outline(&outline);
     return INSITU_OK;
@@ -559,7 +562,7 @@ insitu_status session_draw_images(const session_drawing *drawing, const session_
     bool has_lines = !d->writes_behind || are_bars_shared;
     for (int i = 0; i < plan->image_count; i++) {
         base_error reason = {0};
-        has_lines = has_lines || scene_has_words(plan->images[i]);
+        has_lines = has_lines || scene_draws_text(plan->images[i]);
         /* a copy of the image, in which the camera is that of this step; the copy's lists belong to the scene */
         scene_image placed = *plan->images[i];
         placed.camera = scene_camera_at(&placed.camera, d->cycle, d->report->public_report.time);
@@ -570,7 +573,7 @@ insitu_status session_draw_images(const session_drawing *drawing, const session_
         }
         if (first.status == INSITU_OK) first = reason;
     }
-    warn_of_bars(d);
+    warn_of_different_colour_bars(d);
     base_free(own.shared_bars);
     if (has_lines) session_share_lines(d->report, 0, d->team, &first);
     write_tables(d, &first);

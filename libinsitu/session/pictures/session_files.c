@@ -79,7 +79,7 @@ void session_write_files(session_files *files)
 {
     const double start = read_clock_milliseconds();
     if (files->news)
-        session_write_news(files->scene, files->news, &files->error);
+        session_write_report_json(files->scene, files->news, &files->error);
     else if (!files->has_picture)
         write_tables(files);
     for (int i = 0; files->has_picture && i < files->image.output_count; i++)

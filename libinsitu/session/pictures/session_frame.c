@@ -151,7 +151,7 @@ typedef struct turn_order {
 
 enum { SQUARE = 16 };
 
-static int64_t greatest_divisor(int64_t a, int64_t b)
+static int64_t greatest_common_divisor(int64_t a, int64_t b)
 {
     while (b) {
         const int64_t rest = a % b;
@@ -166,12 +166,12 @@ static turn_order make_turn_order(const image *out)
     turn_order order = {out->width, out->height, (out->width + SQUARE - 1) / SQUARE, 0, 0};
     order.squares = (int64_t)order.squares_per_row * ((out->height + SQUARE - 1) / SQUARE);
     order.stride = (int64_t)(0.618 * (double)order.squares) + 1;
-    while (greatest_divisor(order.stride, order.squares) > 1) order.stride++;
+    while (greatest_common_divisor(order.stride, order.squares) > 1) order.stride++;
     return order;
 }
 
 /* Returns the k-th pixel of the order, or -1 if it is outside of the picture. */
-static int64_t pixel_in_turn_order(const turn_order *order, int64_t k)
+static int64_t find_pixel_in_turn_order(const turn_order *order, int64_t k)
 {
     const int64_t square = k / (SQUARE * SQUARE) % order->squares * order->stride % order->squares;
     const int64_t x = square % order->squares_per_row * SQUARE + k % SQUARE;
@@ -188,7 +188,7 @@ static int64_t select_turn_pixels(const image *out, const unsigned char *from, i
     const int64_t end = order.squares * SQUARE * SQUARE;
     memset(taken, 0, pixel_set_bytes((int64_t)out->width * out->height));
     for (; first < end && most > 0; first++) {
-        const int64_t pixel = pixel_in_turn_order(&order, first);
+        const int64_t pixel = find_pixel_in_turn_order(&order, first);
         if (pixel < 0 || !pixel_set_has(from, pixel)) continue;
         pixel_set_add(taken, pixel);
         most--;
@@ -289,7 +289,7 @@ static insitu_status draw_overlaps(const session_frame_target *t, const render_j
  * which overlap in every pixel. It is also the case for samples of several volumes if pictures must be reproducible:
  * whether a rank or compositing blends such samples affects their rounding, and therefore compositing must blend them
  * all. */
-static bool is_mixed_throughout(const render_job *job)
+static bool needs_separate_fragments_everywhere(const render_job *job)
 {
     return (job->integration == RENDER_SEGMENTS || job->reproducible) && job->volume_count > 1;
 }
@@ -311,7 +311,7 @@ insitu_status session_draw_frame(const session_frame_target *t, const render_job
     comp_overlaps overlaps = {0};
     insitu_status status = INSITU_OK;
     *frame = (session_frame){0};
-    if (is_mixed_throughout(job)) {
+    if (needs_separate_fragments_everywhere(job)) {
         status = mark_all_pixels(t, out, &overlaps, error);
     } else {
         out->is_folded = job->reproducible && job->volume_count > 0;

@@ -160,7 +160,7 @@ double session_load_image_library(void)
     return is_there ? 0 : 1e3 * (double)(end.tv_sec - start.tv_sec) + 1e-6 * (double)(end.tv_nsec - start.tv_nsec);
 }
 
-void session_check_words(const insitu_image *image, insitu_word_faults *out)
+void session_find_text_faults(const insitu_image *image, insitu_word_faults *out)
 {
     insitu_image_write_function *unused;
     *out = (insitu_word_faults){.font = ""};

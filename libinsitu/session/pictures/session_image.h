@@ -24,7 +24,7 @@ double session_load_image_library(void);
 /* Finds the reasons why a picture's texts cannot be drawn (image_output.h). Only the size and the decorations of the
  * picture are read. If the library cannot be loaded or memory runs out, no reasons are found, because writing the
  * picture will fail anyway. Local. Thread-safe. */
-void session_check_words(const insitu_image *image, insitu_word_faults *out);
+void session_find_text_faults(const insitu_image *image, insitu_word_faults *out);
 
 /* Set if pictures may be written by a separate thread (session_writer.h). Tests that replace this file set it to
  * false. */

@@ -16,14 +16,14 @@ static int width_of(const scene_montage *montage)
     return montage->width * montage->columns + montage->bar_width;
 }
 
-static int height_of(const scene_montage *montage)
+static int compute_montage_height(const scene_montage *montage)
 {
     return montage->height * montage->rows;
 }
 
 static int64_t count_pixels(const scene_montage *montage)
 {
-    return (int64_t)width_of(montage) * height_of(montage);
+    return (int64_t)width_of(montage) * compute_montage_height(montage);
 }
 
 /* Returns the position of a panel in the montage with the pixels rgba. */
@@ -41,7 +41,7 @@ static void clip_interval(int end, int *first, int *length)
     *length = last - *first;
 }
 
-int session_find_covered(const scene_montage *montage, int panel, insitu_rectangle covered[SCENE_ANCHORS])
+int session_find_areas_under_insets(const scene_montage *montage, int panel, insitu_rectangle covered[SCENE_ANCHORS])
 {
     const insitu_place place = find_panel_region(montage, NULL, panel);
     const int frame = montage->frame_width;
@@ -137,7 +137,7 @@ static insitu_status draw_panel(const scene_montage *of, session_montage *m, int
     if (picture->decorations) {
         decorations = *picture->decorations;
         decorations.covered = covered;
-        decorations.covered_count = session_find_covered(of, panel, covered);
+        decorations.covered_count = session_find_areas_under_insets(of, panel, covered);
         drawn.decorations = &decorations;
     }
     return session_place_image(&drawn, &place, error);
@@ -202,7 +202,7 @@ static insitu_status decorate_panel(const scene_montage *of, session_montage *m,
 static insitu_status draw_strip(const scene_montage *of, session_montage *m, const session_decorations *shared,
                                 base_error *error)
 {
-    const int height = height_of(of);
+    const int height = compute_montage_height(of);
     insitu_decorations decorations = shared->background;
     memcpy(decorations.colour, shared->decorations.colour, sizeof decorations.colour);
     decorations.size = shared->decorations.size / of->rows;
@@ -282,7 +282,7 @@ insitu_status session_write_montages(session_montages *montages, const scene *sc
         session_montage *m = &montages->items[i];
         const scene_montage *of = &scene->montages[i];
         if (!m->has_picture) continue;
-        const insitu_image whole = {.width = width_of(of), .height = height_of(of), .rgba = m->rgba};
+        const insitu_image whole = {.width = width_of(of), .height = compute_montage_height(of), .rgba = m->rgba};
         base_error reason = {0};
         const insitu_image_format format = of->format == SCENE_PNG16 ? INSITU_PNG16 : INSITU_PNG8;
         if (finish_montage(of, m, &reason) || session_write_image(&whole, format, m->path, &reason) != INSITU_OK)

@@ -46,7 +46,7 @@ typedef struct session_montages {
 
 /* Finds the areas of a panel, in pixels of the panel, that insets and their frames will cover. Returns the number of
  * areas. Local. */
-int session_find_covered(const scene_montage *montage, int panel, insitu_rectangle covered[SCENE_ANCHORS]);
+int session_find_areas_under_insets(const scene_montage *montage, int panel, insitu_rectangle covered[SCENE_ANCHORS]);
 
 /* Draws the picture into its panel, or stores it as an inset. decorations: the picture's decorations, or NULL. path:
  * the path of the file, of which the montage takes ownership. Local. */

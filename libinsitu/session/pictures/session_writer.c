@@ -55,7 +55,7 @@ static int wait_in_finalize(MPI_Comm comm, int key, void *value, void *state)
     return MPI_SUCCESS;
 }
 
-static void wait_at_end(void)
+static void register_wait_at_process_end(void)
 {
     int key = MPI_KEYVAL_INVALID;
     process = getpid();
@@ -67,7 +67,7 @@ static void wait_at_end(void)
 static void add_to_all_writers(session_writer *w)
 {
     static pthread_once_t once = PTHREAD_ONCE_INIT;
-    pthread_once(&once, wait_at_end);
+    pthread_once(&once, register_wait_at_process_end);
     pthread_mutex_lock(&all_mutex);
     w->next = all_writers;
     all_writers = w;
@@ -152,7 +152,7 @@ void session_writer_drop_memory(session_writer *w)
     pthread_mutex_unlock(&w->mutex);
 }
 
-int64_t session_writer_bytes(session_writer *w, int *waiting)
+int64_t session_writer_count_bytes(session_writer *w, int *waiting)
 {
     pthread_mutex_lock(&w->mutex);
     const int64_t bytes = w->queued_bytes + free_bytes(w);
@@ -213,7 +213,7 @@ void session_writer_create(session_writer *w)
     pthread_cond_init(&w->has_changed, NULL);
 }
 
-bool session_writer_is_behind(const session_writer *w, const scene *scene)
+bool session_writer_writes_after_step(const session_writer *w, const scene *scene)
 {
     return scene->writing == SCENE_WRITE_BEHIND && (w->is_running || (session_writes_behind && !w->is_refused));
 }
@@ -235,7 +235,7 @@ double session_writer_begin(session_writer *w, const scene *scene)
     if (scene->image_count == 0) return 0;
     const double ms = w->is_loaded ? 0 : session_load_image_library();
     w->is_loaded = true;
-    if (!w->is_running && session_writer_is_behind(w, scene)) start_thread(w);
+    if (!w->is_running && session_writer_writes_after_step(w, scene)) start_thread(w);
     return ms;
 }
 
@@ -290,7 +290,7 @@ void session_writer_collect(session_writer *w, session_report *report)
                          "pictures are written in the step: no thread can be started for it");
 }
 
-base_error session_writer_failure(session_writer *w)
+base_error session_writer_take_failure(session_writer *w)
 {
     base_error out = w->failure;
     const size_t size = strlen(out.message);

@@ -52,7 +52,7 @@ double session_writer_begin(session_writer *writer, const scene *scene);
 
 /* Returns whether pictures are written by the thread after the step: session_writer_begin() has started the thread, or
  * will start it for this scene. Local. */
-bool session_writer_is_behind(const session_writer *writer, const scene *scene);
+bool session_writer_writes_after_step(const session_writer *writer, const scene *scene);
 
 /* Records an error that occurred when a picture was passed to the writer. The next step returns it. Local. */
 void session_writer_record_error(session_writer *writer, int64_t cycle, const base_error *error);
@@ -74,14 +74,14 @@ void session_writer_collect(session_writer *writer, session_report *report);
 
 /* Returns the first error that no step has returned yet, with the number of further errors in its message, and clears
  * all of them. Local. */
-base_error session_writer_failure(session_writer *writer);
+base_error session_writer_take_failure(session_writer *writer);
 
 /* Blocks until all files are written. Local. */
 void session_writer_drain(session_writer *writer);
 
 /* Returns the size in bytes of queued pictures and of kept memory. *waiting receives the number of queued pictures.
  * Local. */
-int64_t session_writer_bytes(session_writer *writer, int *waiting);
+int64_t session_writer_count_bytes(session_writer *writer, int *waiting);
 
 /* Frees the memory that is kept for future pictures. Local. */
 void session_writer_drop_memory(session_writer *writer);

@@ -19,7 +19,7 @@ _Static_assert((int)SCENE_MAX_SURFACES == (int)RENDER_MAX_ISOVALUES &&
 
 /* Returns whether the interval was added to the scalar before. This happens if a scene sweeps over fields, because the
  * images of the sweep share their isosurfaces. */
-static bool has_interval(const session_scalar *scalar, const mmbvh_interval *interval)
+static bool scalar_has_interval(const session_scalar *scalar, const mmbvh_interval *interval)
 {
     for (int i = 0; i < scalar->interval_count; i++)
         if (scalar->intervals[i].low == interval->low && scalar->intervals[i].high == interval->high) return true;
@@ -28,7 +28,7 @@ static bool has_interval(const session_scalar *scalar, const mmbvh_interval *int
 
 static bool add_intervals(session_scalar *scalar, const mmbvh_interval *more, int count)
 {
-    if (count == 1 && has_interval(scalar, more)) return true;
+    if (count == 1 && scalar_has_interval(scalar, more)) return true;
     const size_t sum = (size_t)scalar->interval_count + (size_t)count;
     mmbvh_interval *intervals = base_realloc(scalar->intervals, (sum ? sum : 1) * sizeof *intervals);
     if (!intervals) return false;
@@ -60,7 +60,7 @@ static bool add_visible_intervals(session_scalar *scalar, const scene_volume *la
     return scalar->needs_all_cells || add_intervals(scalar, intervals, count);
 }
 
-static bool mark_volume(session_mesh *mesh, const scene_volume *layer)
+static bool mark_data_of_volume(session_mesh *mesh, const scene_volume *layer)
 {
     session_scalar *scalar;
     if (!session_mark_scalar(mesh, &layer->field, true, &scalar)) return false;
@@ -69,7 +69,7 @@ static bool mark_volume(session_mesh *mesh, const scene_volume *layer)
 
 /* Marks the scalar of distances from a plane as used. Its interval contains the distance at which the slice is drawn.
  * This distance is about 0 (session_slice_distance()). */
-static bool mark_plane(session_mesh *mesh, const scene_plane *plane, const session_extent *extent)
+static bool mark_distance_from_plane(session_mesh *mesh, const scene_plane *plane, const session_extent *extent)
 {
     const float reach = (float)(2 * SESSION_BORDER_SHARE * extent->half_diagonal);
     session_scalar *scalar;
@@ -77,48 +77,51 @@ static bool mark_plane(session_mesh *mesh, const scene_plane *plane, const sessi
            add_intervals(scalar, &(mmbvh_interval){-reach, reach}, 1);
 }
 
-static bool mark_slice(session_mesh *mesh, const scene_slice *layer, const session_extent *extent)
+static bool mark_data_of_slice(session_mesh *mesh, const scene_slice *layer, const session_extent *extent)
 {
     session_scalar *colour, *lines;
     bool is_marked = session_mark_scalar(mesh, &layer->field, false, &colour);
     if (colour && layer->lines.is_given)
         is_marked = is_marked && session_mark_scalar(mesh, &layer->lines.field, false, &lines);
     for (int i = 0; i < layer->plane_count && is_marked && colour; i++)
-        is_marked = mark_plane(mesh, &layer->planes[i], extent);
+        is_marked = mark_distance_from_plane(mesh, &layer->planes[i], extent);
     return is_marked;
 }
 
-static bool mark_outer(session_mesh *mesh, const scene_surface *layer)
+static bool mark_data_of_outer_surface(session_mesh *mesh, const scene_surface *layer)
 {
     session_scalar *scalar;
-    if (!session_surface_is_on(layer, mesh)) return true;
+    if (!session_is_surface_on_mesh(layer, mesh)) return true;
     if (!session_mark_outer(mesh, &layer->threshold)) return false;
     if (layer->lines.is_given && !session_mark_scalar(mesh, &layer->lines.field, false, &scalar)) return false;
     return !layer->has_colour_by || session_mark_scalar(mesh, &layer->colour_by, false, &scalar);
 }
 
-static bool mark_surface(session_mesh *mesh, const scene_isosurface *layer, int height)
+static bool mark_data_of_isosurface(session_mesh *mesh, const scene_isosurface *layer, int height)
 {
     session_scalar *scalar;
     if (!session_mark_scalar(mesh, &layer->field, true, &scalar)) return false;
     if (!scalar) return true;
     if (mesh->has_shells_alone) {
         const scene_surface shells = session_make_shell_layer(layer, height);
-        return mark_outer(mesh, &shells);
+        return mark_data_of_outer_surface(mesh, &shells);
     }
     if (!add_isovalue_intervals(scalar, layer)) return false;
     if (layer->lines.is_given && !session_mark_scalar(mesh, &layer->lines.field, false, &scalar)) return false;
     return !layer->has_colour_by || session_mark_scalar(mesh, &layer->colour_by, false, &scalar);
 }
 
-static bool mark_image(session_mesh *mesh, const scene_image *image, const session_extent *extent)
+static bool mark_data_of_image(session_mesh *mesh, const scene_image *image, const session_extent *extent)
 {
     bool is_marked = true;
     for (int i = 0; i < image->isosurface_count && is_marked; i++)
-        is_marked = mark_surface(mesh, &image->isosurfaces[i], image->height);
-    for (int i = 0; i < image->volume_count && is_marked; i++) is_marked = mark_volume(mesh, &image->volumes[i]);
-    for (int i = 0; i < image->surface_count && is_marked; i++) is_marked = mark_outer(mesh, &image->surfaces[i]);
-    for (int i = 0; i < image->slice_count && is_marked; i++) is_marked = mark_slice(mesh, &image->slices[i], extent);
+        is_marked = mark_data_of_isosurface(mesh, &image->isosurfaces[i], image->height);
+    for (int i = 0; i < image->volume_count && is_marked; i++)
+        is_marked = mark_data_of_volume(mesh, &image->volumes[i]);
+    for (int i = 0; i < image->surface_count && is_marked; i++)
+        is_marked = mark_data_of_outer_surface(mesh, &image->surfaces[i]);
+    for (int i = 0; i < image->slice_count && is_marked; i++)
+        is_marked = mark_data_of_slice(mesh, &image->slices[i], extent);
     return is_marked;
 }
 
@@ -138,7 +141,7 @@ bool session_mark_needed_data(session_meshes *meshes, const scene_image *const *
             mesh->scalars[i].interval_count = 0;
         }
         for (int i = 0; i < count && mesh->is_given; i++)
-            if (images[i]->variant.view == 0 && !mark_image(mesh, images[i], extent)) return false;
+            if (images[i]->variant.view == 0 && !mark_data_of_image(mesh, images[i], extent)) return false;
         session_drop_thresholds(mesh);
     }
     return true;
@@ -146,7 +149,7 @@ bool session_mark_needed_data(session_meshes *meshes, const scene_image *const *
 
 /* ---- cells with these values ------------------------------------------------------------------------------------ */
 
-bool session_find_candidates(const session_mesh *mesh, uint64_t *key)
+bool session_hash_candidate_queries(const session_mesh *mesh, uint64_t *key)
 {
     *key = SESSION_HASH_BEGIN;
     for (int i = 0; i < mesh->scalar_count; i++) {
@@ -175,7 +178,7 @@ insitu_status session_select_candidates(session_mesh *mesh, int threads, mmbvh_s
         for (int i = 0; i < mesh->scalar_count; i++) {
             const session_scalar *s = &mesh->scalars[i];
             if (!s->needs_ranges) continue;
-            fields[count] = session_scalar_field(mesh, s);
+            fields[count] = session_get_scalar_values(mesh, s);
             queries[count] = (mmbvh_query){&fields[count], s->interval_count, s->intervals};
             count++;
         }

@@ -77,7 +77,7 @@ static bool next_visited_part(const derive_work *w, part_visit *v)
 }
 
 /* Returns the component of an input that the derived field uses, as a value of grid_field.component. */
-static int input_component(const scene_field *input, int component_count)
+static int find_input_component(const scene_field *input, int component_count)
 {
     return input->component == SCENE_COMPONENT_ONLY ? 0 : session_resolve_component(input, component_count);
 }
@@ -85,19 +85,20 @@ static int input_component(const scene_field *input, int component_count)
 /* Returns whether the input's cell values on the mesh must first be converted to vertex values (recentred). */
 static bool is_recentred(const derive_work *w, const session_catalogue_mesh *mesh, const scene_field *input)
 {
-    const session_catalogue_field *field = find_field(w, mesh), *from = session_catalogue_find(mesh, input->name);
+    const session_catalogue_field *field = find_field(w, mesh), *from = session_catalogue_find_field(mesh, input->name);
     return field && from && from->centring == INSITU_CELL && field->centring != INSITU_CELL;
 }
 
 static uint64_t find_mesh_group_name(const session_catalogue_mesh *mesh, const scene_field *input)
 {
-    return session_mesh_group_name(mesh, input->mesh_group_name);
+    return session_find_group_name_of_mesh(mesh, input->mesh_group_name);
 }
 
 /* ---- cell values recentred to vertices ------------------------------------------------------------------------- */
 
 /* Adds a scalar to this rank's part of a mesh. The scalar will hold the input's cell values converted to vertices. */
-static bool add_to_part(const session_catalogue_mesh *mesh, session_mesh *part, const scene_field *input, int component)
+static bool add_recentred_scalar_to_part(const session_catalogue_mesh *mesh, session_mesh *part,
+                                         const scene_field *input, int component)
 {
     const int index = part->is_given ? session_find_field(part, input->name) : -1;
     const uint64_t mesh_group = find_mesh_group_name(mesh, input);
@@ -108,31 +109,31 @@ static bool add_to_part(const session_catalogue_mesh *mesh, session_mesh *part, 
     scalar->component = component;
     scalar->is_recentred = true;
     scalar->mesh_group_name = mesh_group;
-    scalar->original_values = session_caller_field(part, index, component);
+    scalar->original_values = session_get_caller_values(part, index, component);
     return true;
 }
 
-static bool add_recentred(const derive_work *w, const session_catalogue_mesh *mesh, const scene_field *input,
-                          int component)
+static bool add_recentred_scalar(const derive_work *w, const session_catalogue_mesh *mesh, const scene_field *input,
+                                 int component)
 {
     const session_parts parts = session_find_parts(w->basis->meshes, mesh->name);
     for (int i = 0; i < parts.count; i++)
-        if (!add_to_part(mesh, parts.items[i], input, component)) return false;
+        if (!add_recentred_scalar_to_part(mesh, parts.items[i], input, component)) return false;
     return true;
 }
 
 static bool recentre_input(derive_work *w, const session_catalogue_mesh *mesh, const scene_field *input)
 {
     if (!is_recentred(w, mesh, input)) return true;
-    const int count = session_catalogue_find(mesh, input->name)->component_count;
-    const int first = session_needs_vector(w->derived) ? 0 : input_component(input, count);
+    const int count = session_catalogue_find_field(mesh, input->name)->component_count;
+    const int first = session_needs_vector(w->derived) ? 0 : find_input_component(input, count);
     const int end = session_needs_vector(w->derived) ? count : first + 1;
     session_mesh_group *mesh_group = session_find_mesh_group(w->basis->catalogue, find_mesh_group_name(mesh, input));
     bool is_done = mesh_group != NULL;
     for (int c = first; c < end && is_done; c++) {
         const session_recentring item = {mesh_group, input->name, c};
-        is_done =
-            session_add_recentring(&w->recentrings, &w->recentring_count, &item) && add_recentred(w, mesh, input, c);
+        is_done = session_add_recentring(&w->recentrings, &w->recentring_count, &item) &&
+                  add_recentred_scalar(w, mesh, input, c);
     }
     return is_done;
 }
@@ -180,7 +181,7 @@ static uint64_t hash_sources(const derive_work *w, const session_catalogue_mesh 
 
 /* Finds the meshes on which the values are out of date on some rank. *error may hold an earlier error of this rank.
  * Collective; all ranks return the same status. */
-static insitu_status find_stale(derive_work *w, base_error *error)
+static insitu_status find_stale_meshes(derive_work *w, base_error *error)
 {
     const session_catalogue *catalogue = w->basis->catalogue;
     const int count = catalogue->mesh_count;
@@ -200,12 +201,12 @@ static insitu_status find_stale(derive_work *w, base_error *error)
 /* ---- values of one mesh ------------------------------------------------------------------------------------------ */
 
 /* Returns the values of an input or of one of its components, with the centring of the derived field. */
-static grid_field input_values(const derive_work *w, const session_catalogue_mesh *mesh, const session_mesh *part,
-                               int input, int component)
+static grid_field find_input_values(const derive_work *w, const session_catalogue_mesh *mesh, const session_mesh *part,
+                                    int input, int component)
 {
     const session_scalar *scalar = find_recentred(w, mesh, part, input, component);
-    if (scalar) return session_scalar_field(part, scalar);
-    return session_caller_field(part, session_find_field(part, w->derived->inputs[input].name), component);
+    if (scalar) return session_get_scalar_values(part, scalar);
+    return session_get_caller_values(part, session_find_field(part, w->derived->inputs[input].name), component);
 }
 
 static bool is_wide_input(const session_mesh *part, const scene_field *input)
@@ -256,7 +257,7 @@ static void mark_values_new(const derive_work *w, const session_catalogue_mesh *
     part->fields[index].is_copy_stale = false;
     for (int i = 0; i < part->scalar_count; i++)
         if (part->scalars[i].field == index)
-            part->scalars[i].original_values = session_caller_field(part, index, part->scalars[i].component);
+            part->scalars[i].original_values = session_get_caller_values(part, index, part->scalars[i].component);
 }
 
 /* ---- expressions ------------------------------------------------------------------------------------------------- */
@@ -304,11 +305,12 @@ static void block_buffers_free(block_buffer *buffers, int threads)
     base_free(buffers);
 }
 
-static void evaluate(const scene_derived *derived, const grid_field *inputs, const block_buffer *buffers,
-                     const session_field *field, int64_t count, int threads)
+static void evaluate_expression_in_blocks(const scene_derived *derived, const grid_field *inputs,
+                                          const block_buffer *buffers, const session_field *field, int64_t count,
+                                          int threads)
 {
     const int64_t blocks = (count + SCENE_BLOCK - 1) / SCENE_BLOCK;
-#pragma omp parallel num_threads(session_region_threads(threads, count))
+#pragma omp parallel num_threads(session_choose_loop_threads(threads, count))
     {
         region_enter();
         const block_buffer *buffer = &buffers[omp_get_thread_num()];
@@ -326,7 +328,8 @@ static void evaluate(const scene_derived *derived, const grid_field *inputs, con
     }
 }
 
-static bool make_expression(const derive_work *w, const session_catalogue_mesh *mesh, session_mesh *part, int index)
+static bool compute_expression_on_part(const derive_work *w, const session_catalogue_mesh *mesh, session_mesh *part,
+                                       int index)
 {
     const int threads = w->basis->team->threads;
     session_field *field = &part->fields[index];
@@ -337,22 +340,22 @@ static bool make_expression(const derive_work *w, const session_catalogue_mesh *
     for (int k = 0; k < w->derived->input_count && is_done; k++) {
         const scene_field *input = &w->derived->inputs[k];
         const int count = part->fields[session_find_field(part, input->name)].given.component_count;
-        inputs[k] = input_values(w, mesh, part, k, input_component(input, count));
+        inputs[k] = find_input_values(w, mesh, part, k, find_input_component(input, count));
     }
-    if (is_done) evaluate(w->derived, inputs, buffers, field, count_values(part, field), threads);
+    if (is_done) evaluate_expression_in_blocks(w->derived, inputs, buffers, field, count_values(part, field), threads);
     block_buffers_free(buffers, threads);
     base_free(inputs);
     if (is_done) mark_values_new(w, mesh, part, index);
     return is_done;
 }
 
-static void make_expressions(const derive_work *w, base_error *error)
+static void compute_expressions(const derive_work *w, base_error *error)
 {
     const session_catalogue *catalogue = w->basis->catalogue;
     for (int m = 0; m < catalogue->mesh_count; m++) {
         if (!w->stale[m]) continue;
         for (part_visit v = visit_parts(w, &catalogue->meshes[m]); next_visited_part(w, &v) && !error->status;)
-            if (!make_expression(w, &catalogue->meshes[m], v.part, v.field_index))
+            if (!compute_expression_on_part(w, &catalogue->meshes[m], v.part, v.field_index))
                 session_fail_for_memory(error, count_values(v.part, &v.part->fields[v.field_index]) * 8,
                                         "a derived field");
     }
@@ -372,7 +375,8 @@ static int select_component(int component, const double vector[3], double *out)
 }
 
 /* Computes the derived values at a vertex from the gradients of the components there. */
-static void compute_values(const scene_derived *derived, const double gradient[SPACE][SPACE], double out[SPACE])
+static void compute_values_from_gradient(const scene_derived *derived, const double gradient[SPACE][SPACE],
+                                         double out[SPACE])
 {
     double curl[SPACE];
     switch (derived->kind) {
@@ -391,17 +395,17 @@ static void compute_values(const scene_derived *derived, const double gradient[S
 static void store_gradients(const derive_work *w, const session_vertex_sums *sums, const session_sum_part *part,
                             const session_field *field)
 {
-    const int words = session_sum_words(sums->field_count);
-#pragma omp parallel num_threads(session_region_threads(w->basis->team->threads, part->mesh->cells.vertex_count))
+    const int words = session_count_sum_words(sums->field_count);
+#pragma omp parallel num_threads(session_choose_loop_threads(w->basis->team->threads, part->mesh->cells.vertex_count))
     {
         region_enter();
 #pragma omp for schedule(dynamic, REGION_ITEMS) nowait
         for (int64_t v = 0; v < part->mesh->cells.vertex_count; v++) {
             double gradient[SPACE][SPACE] = {{0}}, values[SPACE] = {(double)NAN, (double)NAN, (double)NAN};
             if (part->key_indices[v] >= 0) {
-                session_mean_gradients(sums->sums + (int64_t)part->key_indices[v] * words, sums->field_count,
-                                       &sums->bounds, sums->length, gradient);
-                compute_values(w->derived, (const double(*)[SPACE])gradient, values);
+                session_compute_mean_gradients(sums->sums + (int64_t)part->key_indices[v] * words, sums->field_count,
+                                               &sums->bounds, sums->length, gradient);
+                compute_values_from_gradient(w->derived, (const double(*)[SPACE])gradient, values);
             }
             store_values(field, v, values);
         }
@@ -418,14 +422,15 @@ static int list_scalars(const derive_work *w, const session_catalogue_mesh *mesh
     const int first = session_find_field(part, derived->inputs[0].name);
     const int count = session_needs_vector(derived) ? part->fields[first].given.component_count : derived->input_count;
     for (int c = 0; c < count; c++)
-        out[c] = input_values(w, mesh, part, session_needs_vector(derived) ? 0 : c,
-                              session_needs_vector(derived) ? c : input_component(&derived->inputs[c], 1));
+        out[c] = find_input_values(w, mesh, part, session_needs_vector(derived) ? 0 : c,
+                                   session_needs_vector(derived) ? c : find_input_component(&derived->inputs[c], 1));
     return count;
 }
 
 /* Returns the first mesh of the group on which the field has no fault. A vector has the same number of components on
  * all meshes without a fault. */
-static const session_catalogue_mesh *find_first_faultless(const derive_work *w, const session_mesh_group *mesh_group)
+static const session_catalogue_mesh *find_first_mesh_without_fault(const derive_work *w,
+                                                                   const session_mesh_group *mesh_group)
 {
     int i = 0;
     while (i < mesh_group->count && !find_field(w, mesh_group->meshes[i])) i++;
@@ -437,7 +442,8 @@ static const session_catalogue_mesh *find_first_faultless(const derive_work *w, 
 static int count_scalars(const derive_work *w, const session_mesh_group *mesh_group)
 {
     if (!session_needs_vector(w->derived)) return w->derived->input_count;
-    return session_catalogue_find(find_first_faultless(w, mesh_group), w->derived->inputs[0].name)->component_count;
+    return session_catalogue_find_field(find_first_mesh_without_fault(w, mesh_group), w->derived->inputs[0].name)
+        ->component_count;
 }
 
 static insitu_status begin_sums(const derive_work *w, const session_mesh_group *mesh_group, session_vertex_sums *sums,
@@ -463,7 +469,8 @@ static insitu_status derive_mesh_group(const derive_work *w, const session_mesh_
 {
     session_vertex_sums sums = {.by_id = mesh_group->by_id, .field_count = count_scalars(w, mesh_group)};
     if (!error->status) begin_sums(w, mesh_group, &sums, error);
-    const insitu_status status = session_find_sums(mesh_group->homes, w->basis->team, w->basis->extent, &sums, error);
+    const insitu_status status =
+        session_compute_vertex_sums(mesh_group->homes, w->basis->team, w->basis->extent, &sums, error);
     int at = 0;
     for (int m = 0; m < mesh_group->count && !status && !error->status; m++)
         for (part_visit v = visit_parts(w, mesh_group->meshes[m]); next_visited_part(w, &v);) {
@@ -492,9 +499,9 @@ static insitu_status derive_mesh_groups(const derive_work *w, base_error *error)
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
         const session_mesh_group *mesh_group =
             find_field(w, mesh)
-                ? session_find_mesh_group(catalogue, session_mesh_group_name(mesh, w->derived->mesh_group_name))
+                ? session_find_mesh_group(catalogue, session_find_group_name_of_mesh(mesh, w->derived->mesh_group_name))
                 : NULL;
-        if (mesh_group && find_first_faultless(w, mesh_group) == mesh && is_mesh_group_stale(w, mesh_group))
+        if (mesh_group && find_first_mesh_without_fault(w, mesh_group) == mesh && is_mesh_group_stale(w, mesh_group))
             status = derive_mesh_group(w, mesh_group, error);
     }
     return status;
@@ -511,9 +518,9 @@ static insitu_status derive_field(derive_work *w, base_error *error)
     if (!status && (!is_expression || w->recentring_count))
         status = session_update_homes(b->catalogue, b->meshes, b->extent->half_diagonal, b->team, error);
     if (!status) status = session_recentre(w->recentrings, w->recentring_count, w->stale, b->meshes, b->team, error);
-    if (!status) status = find_stale(w, error);
+    if (!status) status = find_stale_meshes(w, error);
     if (!status && is_expression)
-        make_expressions(w, error);
+        compute_expressions(w, error);
     else if (!status)
         status = derive_mesh_groups(w, error);
     return status ? status : session_agree(b->team->comm, error);
@@ -526,7 +533,7 @@ insitu_status session_compute_derived(const session_derive_basis *basis, uint64_
         if (!(needed >> i & 1)) continue;
         derive_work work = {.basis = basis, .derived = &basis->scene->derived[i], .derived_index = i};
         status = derive_field(&work, error);
-        session_share_derived(basis->meshes, work.derived->name);
+        session_share_derived_values(basis->meshes, work.derived->name);
         base_free(work.recentrings);
         base_free(work.stale);
     }

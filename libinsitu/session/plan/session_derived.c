@@ -13,7 +13,7 @@ bool session_needs_vector(const scene_derived *derived)
 
 /* ---- needed fields -------------------------------------------------------------------------------------------- */
 
-static uint64_t derived_field_bit(const scene *scene, const scene_field *field)
+static uint64_t find_derived_field_bit(const scene *scene, const scene_field *field)
 {
     const int derived = scene_find_derived(scene, field->name);
     return derived < 0 ? 0 : (uint64_t)1 << derived;
@@ -30,34 +30,36 @@ static uint64_t add_source_bits(const scene *scene, uint64_t needed)
     return needed;
 }
 
-static uint64_t bits_of_image(const scene *scene, const scene_image *image)
+static uint64_t find_derived_fields_of_image(const scene *scene, const scene_image *image)
 {
     scene_field_walk walk = {.image = image};
     uint64_t bits = 0;
-    for (const scene_field *field; (field = scene_next_field(&walk)) != NULL;) bits |= derived_field_bit(scene, field);
+    for (const scene_field *field; (field = scene_next_field(&walk)) != NULL;)
+        bits |= find_derived_field_bit(scene, field);
     return bits;
 }
 
-uint64_t session_derived_of_plan(const scene *scene, const session_plan *plan)
+uint64_t session_find_derived_fields_of_plan(const scene *scene, const session_plan *plan)
 {
     uint64_t bits = 0;
     for (int i = 0; i < plan->image_count && scene->derived_count; i++)
-        if (plan->images[i]->variant.view == 0) bits |= bits_of_image(scene, plan->images[i]);
+        if (plan->images[i]->variant.view == 0) bits |= find_derived_fields_of_image(scene, plan->images[i]);
     return add_source_bits(scene, bits);
 }
 
-uint64_t session_derived_of_events(const scene *scene, int64_t cycle, bool images)
+uint64_t session_find_derived_fields_of_events(const scene *scene, int64_t cycle, bool images)
 {
     uint64_t bits = 0;
     for (int i = 0; i < scene->statistics_count; i++)
-        if (session_is_statistics_due(&scene->statistics[i], cycle))
-            bits |= derived_field_bit(scene, &scene->statistics[i].field);
+        if (session_are_statistics_due(&scene->statistics[i], cycle))
+            bits |= find_derived_field_bit(scene, &scene->statistics[i].field);
     for (int i = 0; i < scene->image_count && images; i++)
-        if (scene->images[i].condition.is_given) bits |= derived_field_bit(scene, &scene->images[i].condition.field);
+        if (scene->images[i].condition.is_given)
+            bits |= find_derived_field_bit(scene, &scene->images[i].condition.field);
     return add_source_bits(scene, bits);
 }
 
-void session_mark_sources(const scene *scene, uint64_t needed, const session_meshes *meshes)
+void session_mark_source_fields(const scene *scene, uint64_t needed, const session_meshes *meshes)
 {
     for (int m = 0; m < meshes->count; m++) {
         session_mesh *mesh = meshes->items[m];
@@ -86,8 +88,8 @@ typedef struct derived_on_mesh {
 #define OF(at)                                                                                                         \
     (at)->scene_path, (at)->derived->line, (at)->derived->name, *(at)->derived->key ? "." : "", (at)->derived->key
 
-static insitu_status refuse_components(const derived_on_mesh *at, const scene_field *input,
-                                       const session_catalogue_field *found, base_error *error)
+static insitu_status fail_for_component_count(const derived_on_mesh *at, const scene_field *input,
+                                              const session_catalogue_field *found, base_error *error)
 {
     const char *name = input->name;
     if (at->derived->kind == SCENE_EXPRESSION)
@@ -105,7 +107,7 @@ static insitu_status check_other_meshes(const derived_on_mesh *at, const scene_f
                                         const session_catalogue_field *found, base_error *error)
 {
     for (const session_catalogue_mesh *other = at->first_mesh; other < at->mesh; other++) {
-        const session_catalogue_field *there = session_catalogue_find(other, input->name);
+        const session_catalogue_field *there = session_catalogue_find_field(other, input->name);
         if (!there || there->fault || there->component_count == found->component_count) continue;
         return base_fail(error, INSITU_ERROR_FIELD,
                          AT "field \"%s\" has %d components on mesh \"%s\" and %d on mesh \"%s\", expected as many",
@@ -126,7 +128,7 @@ static insitu_status check_components(const derived_on_mesh *at, const scene_fie
                             "2 or 3 scalars, as [u, v, w]",
                          OF(at), input->name, count, count == 1 ? "" : "s", at->mesh->name);
     }
-    if (input->component == SCENE_COMPONENT_ONLY && count > 1) return refuse_components(at, input, found, error);
+    if (input->component == SCENE_COMPONENT_ONLY && count > 1) return fail_for_component_count(at, input, found, error);
     if (input->component < count) return INSITU_OK;
     return base_fail(error, INSITU_ERROR_FIELD,
                      AT "component %d of field \"%s\" is asked for; on mesh \"%s\" it has %d, expected 0 to %d", OF(at),
@@ -162,15 +164,15 @@ static bool store_fault(session_catalogue_field *field, const base_error *error)
     return field->fault != NULL;
 }
 
-static bool add_to_mesh(const char *scene_path, const scene *scene, int number, const session_catalogue *catalogue,
-                        session_catalogue_mesh *mesh)
+static bool add_derived_field_to_mesh(const char *scene_path, const scene *scene, int number,
+                                      const session_catalogue *catalogue, session_catalogue_mesh *mesh)
 {
     const scene_derived *derived = &scene->derived[number];
     const derived_on_mesh at = {scene_path, derived, mesh, catalogue->meshes};
     bool is_of_cells = derived->kind == SCENE_EXPRESSION;
     base_error error = {.status = INSITU_OK};
     for (int k = 0; k < derived->input_count; k++) {
-        const session_catalogue_field *found = session_catalogue_find(mesh, derived->inputs[k].name);
+        const session_catalogue_field *found = session_catalogue_find_field(mesh, derived->inputs[k].name);
         if (!found) return true;
         is_of_cells = is_of_cells && found->centring == INSITU_CELL;
         if (!error.status) check_input(&at, &derived->inputs[k], found, &error);
@@ -185,8 +187,8 @@ static bool add_to_mesh(const char *scene_path, const scene *scene, int number, 
     const bool is_vector = (derived->kind == SCENE_GRADIENT_OF || derived->kind == SCENE_VORTICITY) &&
                            derived->component == SCENE_COMPONENT_DEFAULT;
     if (!field)
-        field = session_catalogue_add(mesh, derived->name, is_vector ? 3 : 1, is_of_cells ? INSITU_CELL : INSITU_VERTEX,
-                                      number);
+        field = session_catalogue_add_field(mesh, derived->name, is_vector ? 3 : 1,
+                                            is_of_cells ? INSITU_CELL : INSITU_VERTEX, number);
     return field && (!error.status || store_fault(field, &error));
 }
 
@@ -195,24 +197,24 @@ static bool add_derived_to_catalogue(const scene *scene, const char *scene_path,
     session_catalogue_drop_derived(catalogue);
     for (int m = 0; m < catalogue->mesh_count; m++)
         for (int i = 0; i < scene->derived_count; i++)
-            if (!add_to_mesh(scene_path, scene, i, catalogue, &catalogue->meshes[m])) return false;
+            if (!add_derived_field_to_mesh(scene_path, scene, i, catalogue, &catalogue->meshes[m])) return false;
     return true;
 }
 
 /* ---- derived fields of this rank's meshes ---------------------------------------------------------------------- */
 
-static bool is_faultless(const session_catalogue_field *field)
+static bool is_derived_without_fault(const session_catalogue_field *field)
 {
     return field->derived_index >= 0 && !field->fault;
 }
 
-static bool are_fields_named(const session_catalogue_mesh *all, const session_mesh *mesh)
+static bool has_current_derived_fields(const session_catalogue_mesh *all, const session_mesh *mesh)
 {
     int expected = 0, found = 0;
     for (int f = 0; f < mesh->field_count; f++) found += mesh->fields[f].is_derived;
     for (int f = 0; f < all->field_count; f++) {
         const session_catalogue_field *field = &all->fields[f];
-        if (!is_faultless(field)) continue;
+        if (!is_derived_without_fault(field)) continue;
         const int at = session_find_field(mesh, field->name);
         if (at < 0 || !mesh->fields[at].is_derived || mesh->fields[at].given.centring != field->centring ||
             mesh->fields[at].given.component_count != field->component_count)
@@ -224,11 +226,11 @@ static bool are_fields_named(const session_catalogue_mesh *all, const session_me
 
 static bool add_derived_to_mesh(const session_catalogue_mesh *all, session_mesh *mesh)
 {
-    if (are_fields_named(all, mesh)) return true;
+    if (has_current_derived_fields(all, mesh)) return true;
     session_drop_derived(mesh);
     for (int f = 0; f < all->field_count; f++) {
         const session_catalogue_field *field = &all->fields[f];
-        if (!is_faultless(field)) continue;
+        if (!is_derived_without_fault(field)) continue;
         session_field *own = session_add_field(mesh, field->name);
         if (!own) return false;
         own->given.component_count = field->component_count;

@@ -16,15 +16,15 @@ insitu_status session_add_derived_fields(const scene *scene, const char *scene_p
                                          session_meshes *meshes, const session_team *team, base_error *error);
 
 /* Both functions return a set of derived fields as a bit mask with one bit per field, including the fields on which
- * these depend. session_derived_of_plan() returns the fields that the images of the plan need.
- * session_derived_of_events() returns the fields that the statistics of a step need and, if `images` is set, those that
- * the conditions of images need. Local, the same on all ranks. */
-uint64_t session_derived_of_plan(const scene *scene, const session_plan *plan);
-uint64_t session_derived_of_events(const scene *scene, int64_t cycle, bool images);
+ * these depend. session_find_derived_fields_of_plan() returns the fields that the images of the plan need.
+ * session_find_derived_fields_of_events() returns the fields that the statistics of a step need and, if `images` is
+ * set, those that the conditions of images need. Local, the same on all ranks. */
+uint64_t session_find_derived_fields_of_plan(const scene *scene, const session_plan *plan);
+uint64_t session_find_derived_fields_of_events(const scene *scene, int64_t cycle, bool images);
 
 /* Marks on this rank's meshes the fields from which the needed derived fields are computed, so that their values are
  * filled and copied. */
-void session_mark_sources(const scene *scene, uint64_t needed, const session_meshes *meshes);
+void session_mark_source_fields(const scene *scene, uint64_t needed, const session_meshes *meshes);
 
 /* Returns whether the derived field is computed from the gradients of a vector's components. */
 bool session_needs_vector(const scene_derived *derived);

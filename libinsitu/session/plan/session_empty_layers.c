@@ -112,7 +112,7 @@ static void widen_range(double low, double high, field_range *range)
 static void add_root_range(const session_mesh *mesh, const session_scalar *scalar, field_range *range)
 {
     if (!mesh->is_needed || !mesh->has_tree || mesh->tree.node_count == 0) return;
-    const mmbvh_ranges root = session_scalar_ranges(mesh, scalar);
+    const mmbvh_ranges root = session_get_scalar_ranges(mesh, scalar);
     widen_range((double)*(const float *)(const void *)root.low, (double)*(const float *)(const void *)root.high, range);
 }
 
@@ -122,7 +122,7 @@ static void add_extent_range(const session_mesh *mesh, session_scalar *scalar, i
                              field_range *range)
 {
     double low, high;
-    session_scalar_extent(mesh, scalar, threads, kind, &low, &high);
+    session_find_scalar_extent(mesh, scalar, threads, kind, &low, &high);
     widen_range(low, high, range);
 }
 
@@ -157,7 +157,7 @@ static field_range find_own_range(const session_meshes *meshes, const planned_la
 /* Further data that is reduced together with the layers' ranges. */
 typedef struct reduced_extras {
     bool has_other_cells; /* set if some rank has cells that are not shown (session_unusable.h) */
-    int reporting_word;   /* maximum of all ranks' session_reporting_word() */
+    int reporting_word;   /* maximum of all ranks' session_encode_rank_with_warnings() */
 } reduced_extras;
 
 /* Combines the layers' ranges, earlier errors and the extra data over all ranks in one reduction. The ranges are
@@ -256,7 +256,7 @@ static bool find_new_warnings(const session_report *report, layer_batch *batch)
 
 /* ---- warnings -------------------------------------------------------------------------------------------------- */
 
-static void warn_of_value(session_report *report, const planned_layer *layer, int value, bool holds)
+static void warn_of_empty_isosurface(session_report *report, const planned_layer *layer, int value, bool holds)
 {
     const session_warning warning = make_warning(layer, value);
     const double low = layer->range.low, high = -layer->range.negated_high, at = layer->isosurface->values[value];
@@ -266,7 +266,7 @@ static void warn_of_value(session_report *report, const planned_layer *layer, in
                  at == low ? ", and a surface at its least value has nothing below it" : "");
 }
 
-static void warn_of_volume(session_report *report, const planned_layer *layer, bool holds)
+static void warn_of_empty_volume(session_report *report, const planned_layer *layer, bool holds)
 {
     const session_warning warning = make_warning(layer, 0);
     session_warn(report, &warning, holds,
@@ -293,19 +293,20 @@ static void warn_of_layer(session_report *report, const planned_layer *layer)
     const bool has_values = layer->range.low <= -layer->range.negated_high || !layer->is_unreported;
     for (int v = 0; v < count_values(layer); v++) {
         const bool holds = has_values && is_layer_empty(layer, v, &layer->range);
-        if (layer->isosurface) warn_of_value(report, layer, v, holds);
-        if (layer->volume) warn_of_volume(report, layer, holds);
+        if (layer->isosurface) warn_of_empty_isosurface(report, layer, v, holds);
+        if (layer->volume) warn_of_empty_volume(report, layer, holds);
         if (layer->surface) warn_of_threshold(report, layer, holds);
     }
 }
 
-insitu_status session_check_layers(const session_plan *plan, const session_catalogue *catalogue,
-                                   const session_meshes *meshes, const session_team *team, session_report *report,
-                                   base_error *error)
+insitu_status session_warn_of_empty_layers(const session_plan *plan, const session_catalogue *catalogue,
+                                           const session_meshes *meshes, const session_team *team,
+                                           session_report *report, base_error *error)
 {
     const int count = plan->cell_count ? list_layers(plan, &(layer_batch){.first = 0}) : 0;
-    reduced_extras extras = {false, session_reporting_word(report, team)};
-    if (count && !error->status) extras.has_other_cells = session_unusable_key(plan, meshes) != report->unusable_key;
+    reduced_extras extras = {false, session_encode_rank_with_warnings(report, team)};
+    if (count && !error->status)
+        extras.has_other_cells = session_hash_unusable_fields(plan, meshes) != report->unusable_key;
     insitu_status status = INSITU_OK;
     for (int first = 0; (first == 0 || first < count) && !status; first += BATCH) {
         layer_batch batch = {.first = first};
@@ -316,7 +317,8 @@ insitu_status session_check_layers(const session_plan *plan, const session_catal
         for (int i = 0; i < batch.count && !status; i++) warn_of_layer(report, &batch.layers[i]);
     }
     if (!status && extras.reporting_word)
-        status = session_share_lines(report, session_reporting_rank(extras.reporting_word, team), team, error);
+        status =
+            session_share_lines(report, session_decode_rank_with_warnings(extras.reporting_word, team), team, error);
     if (!status && extras.has_other_cells)
         status = session_warn_of_unusable(plan, catalogue, meshes, team, report, error);
     return status;

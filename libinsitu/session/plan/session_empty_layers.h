@@ -11,8 +11,8 @@
 /* Warns of layers that show no value of their fields, and of cells that layers cannot show (session_unusable.h). Must
  * be called after the trees are built, because their ranges suffice to decide most cases. Collective; an error in
  * *error on any rank is returned on all ranks. */
-insitu_status session_check_layers(const session_plan *plan, const session_catalogue *catalogue,
-                                   const session_meshes *meshes, const session_team *team, session_report *report,
-                                   base_error *error);
+insitu_status session_warn_of_empty_layers(const session_plan *plan, const session_catalogue *catalogue,
+                                           const session_meshes *meshes, const session_team *team,
+                                           session_report *report, base_error *error);
 
 #endif

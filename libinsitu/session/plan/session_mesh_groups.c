@@ -21,7 +21,7 @@ static bool is_group_member(const session_catalogue_mesh *mesh, const group_purp
         return false;
     }
     const session_catalogue_field *found =
-        scene_field_is_on(field, mesh->name) ? session_catalogue_find(mesh, field->name) : NULL;
+        scene_field_is_on(field, mesh->name) ? session_catalogue_find_field(mesh, field->name) : NULL;
     return found && session_is_recentred(field, found->centring, mesh->is_refined);
 }
 
@@ -124,7 +124,7 @@ static bool group_meshes_of_image(session_catalogue *catalogue, const scene_imag
     return is_done;
 }
 
-static void drop_other_scalars(const session_catalogue *catalogue, session_meshes *meshes)
+static void drop_scalars_without_group(const session_catalogue *catalogue, session_meshes *meshes)
 {
     for (int m = 0; m < meshes->count; m++) {
         session_mesh *mesh = meshes->items[m];
@@ -144,7 +144,7 @@ void session_group_meshes(scene *scene, session_catalogue *catalogue, session_me
         if (scene->images[i].variant.view == 0) is_done = group_meshes_of_image(catalogue, &scene->images[i]);
     for (int i = 0; i < scene->derived_count && is_done; i++) is_done = group_meshes_of_derived(catalogue, scene, i);
     if (is_done)
-        drop_other_scalars(catalogue, meshes);
+        drop_scalars_without_group(catalogue, meshes);
     else
         session_fail_for_memory(error, (int64_t)sizeof(session_mesh_group), "meshes that have one field");
     catalogue->are_meshes_grouped = is_done;

@@ -46,7 +46,7 @@ static void list_meshes(const session_catalogue *catalogue, char names[NAMES_SIZ
 }
 
 /* Copies the fault to *error and returns its status. If the fault is NULL, returns INSITU_OK. */
-static insitu_status refuse_fault(const base_error *fault, base_error *error)
+static insitu_status copy_fault(const base_error *fault, base_error *error)
 {
     if (!fault) return INSITU_OK;
     *error = *fault;
@@ -55,7 +55,7 @@ static insitu_status refuse_fault(const base_error *fault, base_error *error)
 
 /* Returns the fault of a mesh on which the layer is drawn; NULL if there is none. A faulty mesh is reported before a
  * missing field, because the mesh may be the one that has the field. */
-static const base_error *find_hidden_fault(const session_plan_basis *basis, const scene_field *field)
+static const base_error *find_fault_of_drawn_mesh(const session_plan_basis *basis, const scene_field *field)
 {
     for (int m = 0; m < basis->catalogue->mesh_count; m++) {
         const session_catalogue_mesh *mesh = &basis->catalogue->meshes[m];
@@ -67,7 +67,7 @@ static const base_error *find_hidden_fault(const session_plan_basis *basis, cons
 static bool is_on_any_mesh(const session_catalogue *catalogue, const char *name)
 {
     for (int m = 0; m < catalogue->mesh_count; m++)
-        if (session_catalogue_find(&catalogue->meshes[m], name)) return true;
+        if (session_catalogue_find_field(&catalogue->meshes[m], name)) return true;
     return false;
 }
 
@@ -95,7 +95,7 @@ static insitu_status refuse_missing_input(const session_plan_basis *basis, const
     for (int k = 0; k < derived->input_count; k++) {
         const scene_field *input = &derived->inputs[k];
         if (is_on_any_mesh(basis->catalogue, input->name)) continue;
-        if (refuse_fault(find_hidden_fault(basis, input), error) || refuse_missing_input(basis, input, error))
+        if (copy_fault(find_fault_of_drawn_mesh(basis, input), error) || refuse_missing_input(basis, input, error))
             return error->status;
         list_fields(basis->catalogue, names);
         write_suggestion(basis->catalogue, input->name, meant);
@@ -112,7 +112,7 @@ static insitu_status refuse_missing_input(const session_plan_basis *basis, const
 static insitu_status refuse_missing_field(const session_plan_basis *basis, const scene_field *field, base_error *error)
 {
     char names[NAMES_SIZE], meant[300];
-    if (refuse_fault(find_hidden_fault(basis, field), error)) return error->status;
+    if (copy_fault(find_fault_of_drawn_mesh(basis, field), error)) return error->status;
     if (refuse_missing_input(basis, field, error)) return error->status;
     list_fields(basis->catalogue, names);
     write_suggestion(basis->catalogue, field->name, meant);
@@ -129,9 +129,10 @@ static insitu_status check_named_mesh(const session_plan_basis *basis, const sce
     for (int m = 0; m < basis->catalogue->mesh_count; m++) {
         const session_catalogue_mesh *mesh = &basis->catalogue->meshes[m];
         if (!scene_name_stands_for(name, mesh->name)) continue;
-        if (refuse_fault(mesh->fault, error)) return error->status;
+        if (copy_fault(mesh->fault, error)) return error->status;
         is_there = true;
-        is_drawable = is_drawable || !field->name || mesh->first_rank < 0 || session_catalogue_find(mesh, field->name);
+        is_drawable =
+            is_drawable || !field->name || mesh->first_rank < 0 || session_catalogue_find_field(mesh, field->name);
     }
     if (is_drawable) return INSITU_OK;
     if (is_there) {
@@ -144,11 +145,11 @@ static insitu_status check_named_mesh(const session_plan_basis *basis, const sce
                      field->meshes_line, name, names);
 }
 
-static insitu_status check_on_mesh(const session_plan_basis *basis, const scene_field *field,
-                                   const session_catalogue_mesh *mesh, const session_catalogue_field *found,
-                                   base_error *error)
+static insitu_status check_field_on_mesh(const session_plan_basis *basis, const scene_field *field,
+                                         const session_catalogue_mesh *mesh, const session_catalogue_field *found,
+                                         base_error *error)
 {
-    if (refuse_fault(mesh->fault, error) || refuse_fault(found->fault, error)) return error->status;
+    if (copy_fault(mesh->fault, error) || copy_fault(found->fault, error)) return error->status;
     if (found->differing_rank >= 0)
         return base_fail(error, INSITU_ERROR_FIELD,
                          "rank %d: mesh \"%s\": field \"%s\" has another centring or number of components than on "
@@ -169,7 +170,7 @@ static insitu_status check_on_mesh(const session_plan_basis *basis, const scene_
 /* Returns the mesh's field if the layer is drawn on the mesh, else NULL. */
 static const session_catalogue_field *find_drawn_field(const session_catalogue_mesh *mesh, const scene_field *field)
 {
-    return scene_field_is_on(field, mesh->name) ? session_catalogue_find(mesh, field->name) : NULL;
+    return scene_field_is_on(field, mesh->name) ? session_catalogue_find_field(mesh, field->name) : NULL;
 }
 
 /* Checks that some mesh has the field, and that the field has no fault on the meshes on which the layer is drawn. */
@@ -181,9 +182,9 @@ static insitu_status check_field(const session_plan_basis *basis, const scene_fi
     for (int m = 0; m < basis->catalogue->mesh_count && !status; m++) {
         const session_catalogue_mesh *mesh = &basis->catalogue->meshes[m];
         const session_catalogue_field *shown =
-            scene_field_is_on(layer, mesh->name) ? session_catalogue_find(mesh, field->name) : NULL;
-        is_there = is_there || session_catalogue_find(mesh, field->name);
-        if (shown) status = check_on_mesh(basis, field, mesh, shown, error);
+            scene_field_is_on(layer, mesh->name) ? session_catalogue_find_field(mesh, field->name) : NULL;
+        is_there = is_there || session_catalogue_find_field(mesh, field->name);
+        if (shown) status = check_field_on_mesh(basis, field, mesh, shown, error);
     }
     return is_there || status ? status : refuse_missing_field(basis, field, error);
 }
@@ -208,7 +209,7 @@ static void warn_of_grey(const session_catalogue *catalogue, const scene_image *
     for (int m = 0; m < catalogue->mesh_count; m++) {
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
         const bool is_grey = mesh->first_rank >= 0 && find_drawn_field(mesh, &layer->field) &&
-                             !session_catalogue_find(mesh, layer->colour_by.name);
+                             !session_catalogue_find_field(mesh, layer->colour_by.name);
         const session_warning warning = {WARNING_GREY, image->name, mesh->name, layer->colour_by.line};
         session_warn(report, &warning, is_grey,
                      "image \"%s\": mesh \"%s\" does not have the field \"%s\": its isosurface of \"%s\" is %s",
@@ -227,7 +228,7 @@ static insitu_status check_lines(const session_plan_basis *basis, const scene_li
 
 static insitu_status check_surface(const session_plan_basis *basis, const scene_surface *layer, base_error *error)
 {
-    insitu_status status = refuse_fault(find_hidden_fault(basis, &layer->meshes_field), error);
+    insitu_status status = copy_fault(find_fault_of_drawn_mesh(basis, &layer->meshes_field), error);
     for (int i = 0; i < layer->meshes_field.mesh_count && !status; i++)
         status = check_named_mesh(basis, &layer->meshes_field, layer->meshes_field.meshes[i], error);
     if (!status && layer->threshold.is_given)
@@ -239,7 +240,7 @@ static insitu_status check_surface(const session_plan_basis *basis, const scene_
 
 static insitu_status check_image(const session_plan_basis *basis, const scene_image *image, base_error *error)
 {
-    insitu_status status = refuse_fault(basis->catalogue->fault, error);
+    insitu_status status = copy_fault(basis->catalogue->fault, error);
     for (int i = 0; i < image->isosurface_count && !status; i++) {
         const scene_isosurface *layer = &image->isosurfaces[i];
         status = check_layer_field(basis, &layer->field, error);
@@ -266,7 +267,7 @@ static bool add_recentrings(const session_catalogue *catalogue, session_plan *pl
         const bool is_shown_recentred = shown && session_is_recentred(field, shown->centring, mesh->is_refined);
         session_mesh_group *mesh_group =
             is_shown_recentred
-                ? session_find_mesh_group(catalogue, session_mesh_group_name(mesh, field->mesh_group_name))
+                ? session_find_mesh_group(catalogue, session_find_group_name_of_mesh(mesh, field->mesh_group_name))
                 : NULL;
         if (!mesh_group) continue;
         const session_recentring item = {mesh_group, field->name,
@@ -300,7 +301,7 @@ static double count_intervals(double time, double interval)
     return floor(count + 1e-9 * fmax(1, fabs(count)));
 }
 
-bool session_is_due(const scene_image *image, const session_moment *m)
+bool session_is_image_due(const scene_image *image, const session_moment *m)
 {
     if (image->time_interval > 0)
         return m->is_first ||
@@ -322,7 +323,7 @@ session_valid_events session_check_event_fields(const session_plan_basis *basis,
     if (!has_cells_or_faults(basis)) return valid;
     for (int i = 0; i < scene->statistics_count; i++) {
         base_error own = {.status = INSITU_OK};
-        if (!session_is_statistics_due(&scene->statistics[i], basis->moment->cycle)) continue;
+        if (!session_are_statistics_due(&scene->statistics[i], basis->moment->cycle)) continue;
         if (check_layer_field(basis, &scene->statistics[i].field, &own)) valid.statistics &= ~(UINT64_C(1) << i);
         if (!error->status) *error = own;
     }
@@ -337,10 +338,10 @@ session_valid_events session_check_event_fields(const session_plan_basis *basis,
     return valid;
 }
 
-int session_count_due(const scene *scene, const session_moment *moment)
+int session_count_due_images(const scene *scene, const session_moment *moment)
 {
     int count = 0;
-    for (int i = 0; i < scene->image_count; i++) count += session_is_due(&scene->images[i], moment);
+    for (int i = 0; i < scene->image_count; i++) count += session_is_image_due(&scene->images[i], moment);
     return count;
 }
 
@@ -350,7 +351,7 @@ static void warn_of_grey_surface(const session_catalogue *catalogue, const scene
     for (int m = 0; m < catalogue->mesh_count; m++) {
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
         const bool is_grey = mesh->first_rank >= 0 && scene_field_is_on(&layer->meshes_field, mesh->name) &&
-                             !session_catalogue_find(mesh, layer->colour_by.name);
+                             !session_catalogue_find_field(mesh, layer->colour_by.name);
         const session_warning warning = {WARNING_GREY, image->name, mesh->name, layer->colour_by.line};
         session_warn(report, &warning, is_grey,
                      "image \"%s\": mesh \"%s\" does not have the field \"%s\": its outer surface is %s", image->name,
@@ -369,7 +370,7 @@ static void warn_of_no_lines(const session_catalogue *catalogue, const scene_ima
         const bool is_on = on->name ? find_drawn_field(mesh, on) != NULL : scene_field_is_on(on, mesh->name);
         const session_warning warning = {WARNING_NO_LINES, image->name, mesh->name, lines->field.line};
         session_warn(report, &warning,
-                     mesh->first_rank >= 0 && is_on && !session_catalogue_find(mesh, lines->field.name),
+                     mesh->first_rank >= 0 && is_on && !session_catalogue_find_field(mesh, lines->field.name),
                      "image \"%s\": mesh \"%s\" does not have the field \"%s\": a layer has no lines on it",
                      image->name, mesh->name, lines->field.name);
     }
@@ -415,11 +416,12 @@ static void warn_of_ungrouped_mesh(const session_catalogue *catalogue, const sce
                  image->name, layer, field->name, name ? name : "");
 }
 
-static void warn_of_fields(const session_catalogue *catalogue, const scene_image *image, session_report *report)
+static void warn_of_shells_and_ungrouped_meshes(const session_catalogue *catalogue, const scene_image *image,
+                                                session_report *report)
 {
     scene_field_walk walk = {.image = image};
     for (const scene_field *field; (field = scene_next_field(&walk)) != NULL;) {
-        const char *layer = scene_layer_word(walk.kind);
+        const char *layer = scene_get_layer_word(walk.kind);
         if (walk.role == SCENE_SHOWN && walk.kind != SCENE_ISOSURFACE)
             warn_of_shells(catalogue, image, layer, field, report);
         if (walk.role == SCENE_SHOWN) warn_of_ungrouped_mesh(catalogue, image, layer, field, report);
@@ -440,13 +442,13 @@ static void warn_of_grey_layers(const session_catalogue *catalogue, const scene_
         warn_of_no_lines(catalogue, image, &image->slices[i].field, &image->slices[i].lines, report);
 }
 
-static bool can_be_drawn(const session_plan_basis *basis, const scene_image *image, session_report *report,
-                         base_error *refusal)
+static bool check_image_and_warn(const session_plan_basis *basis, const scene_image *image, session_report *report,
+                                 base_error *refusal)
 {
     if (!has_cells_or_faults(basis)) return true;
     if (check_image(basis, image, refusal) != INSITU_OK) return false;
     warn_of_grey_layers(basis->catalogue, image, report);
-    warn_of_fields(basis->catalogue, image, report);
+    warn_of_shells_and_ungrouped_meshes(basis->catalogue, image, report);
     return true;
 }
 
@@ -478,8 +480,9 @@ static void select_images(const session_plan_basis *basis, session_report *repor
     bool is_drawable = false;
     for (int i = 0; i < basis->scene->image_count; i++) {
         const scene_image *image = &basis->scene->images[i];
-        if (!(basis->allowed_images >> image->variant.source & 1) || !session_is_due(image, basis->moment)) continue;
-        if (image->variant.view == 0) is_drawable = can_be_drawn(basis, image, report, &plan->refusal);
+        if (!(basis->allowed_images >> image->variant.source & 1) || !session_is_image_due(image, basis->moment))
+            continue;
+        if (image->variant.view == 0) is_drawable = check_image_and_warn(basis, image, report, &plan->refusal);
         if (!is_drawable || lacks_outputs(basis, image, report)) continue;
         plan->images[plan->image_count++] = image;
         if (image->variant.view > 0) continue;
@@ -499,21 +502,22 @@ static void warn_of_no_cells(const session_plan_basis *basis, bool are_images_du
 insitu_status session_make_plan(const session_plan_basis *basis, session_meshes *meshes, const session_team *team,
                                 session_report *report, session_plan *out, base_error *error)
 {
-    const size_t due = (size_t)session_count_due(basis->scene, basis->moment);
+    const size_t due = (size_t)session_count_due_images(basis->scene, basis->moment);
     const session_extent *extent = basis->extent;
     session_plan plan = {.images = base_calloc(due, sizeof *plan.images), .cell_count = extent->cell_count};
     if (plan.images) select_images(basis, report, &plan);
     warn_of_no_cells(basis, plan.image_count > 0, report);
     const bool is_whole = plan.images && plan_recentrings(basis->catalogue, &plan) &&
                           session_mark_needed_data(meshes, plan.images, plan.image_count, extent);
-    if (is_whole) session_mark_sources(basis->scene, session_derived_of_plan(basis->scene, &plan), meshes);
+    if (is_whole)
+        session_mark_source_fields(basis->scene, session_find_derived_fields_of_plan(basis->scene, &plan), meshes);
     if (!is_whole) session_fail_for_memory(error, (int64_t)(due * sizeof *plan.images), "the plan of the images");
     insitu_status status =
         /* fill functions may be collective, so that all ranks must agree on the status before they are called */
         basis->is_filled ? session_agree(team->comm, error) : INSITU_OK;
     if (!status) {
         if (is_whole) session_fill_fields(meshes, basis->catalogue, true, error);
-        if (is_whole) session_copy_used(meshes, team->threads, error);
+        if (is_whole) session_copy_used_fields(meshes, team->threads, error);
         status = session_agree(team->comm, error);
     }
     if (status)

@@ -50,9 +50,9 @@ typedef struct session_plan_basis {
 } session_plan_basis;
 
 /* Returns whether an image is due, without regard to its condition. Local. */
-bool session_is_due(const scene_image *image, const session_moment *moment);
+bool session_is_image_due(const scene_image *image, const session_moment *moment);
 /* Returns the number of images that are due, without regard to conditions. Local. */
-int session_count_due(const scene *scene, const session_moment *moment);
+int session_count_due_images(const scene *scene, const session_moment *moment);
 
 /* Checks the fields of the statistics that are due and, if `images` is set, of the conditions of images. Returns the
  * sets of statistics and images whose fields exist. The first error is stored in *error. Local, the same on every

@@ -36,8 +36,8 @@ insitu_status session_find_extremes(const session_meshes *meshes, const session_
         if (scalar && of->plane) scalar = session_find_distance(mesh, of->plane);
         if (!scalar) continue;
         double least, most;
-        session_scalar_extent(mesh, scalar, team->threads, of->is_positive ? SESSION_POSITIVE : SESSION_SEEN, &least,
-                              &most);
+        session_find_scalar_extent(mesh, scalar, team->threads, of->is_positive ? SESSION_POSITIVE : SESSION_SEEN,
+                                   &least, &most);
         mine[0] = fmin(mine[0], least);
         mine[1] = fmin(mine[1], -most);
     }
@@ -55,14 +55,14 @@ enum { DIGIT_BITS = 11, DIGITS = 1 << DIGIT_BITS, PASSES = 6 };
 static const uint64_t sign_bit = UINT64_C(1) << 63;
 
 /* Maps a value to an integer, preserving the order. */
-static uint64_t order_from_value(double value)
+static uint64_t map_value_to_ordered_integer(double value)
 {
     uint64_t bits;
     memcpy(&bits, &value, sizeof bits);
     return bits & sign_bit ? ~bits : bits | sign_bit;
 }
 
-static double value_from_order(uint64_t order)
+static double map_ordered_integer_to_value(uint64_t order)
 {
     const uint64_t bits = order & sign_bit ? order & ~sign_bit : ~order;
     double value;
@@ -71,7 +71,7 @@ static double value_from_order(uint64_t order)
 }
 
 /* Returns the position of the lowest bit of the digit that a pass determines. In the last pass only 9 bits are left. */
-static int pass_shift(int pass)
+static int compute_digit_shift(int pass)
 {
     return pass + 1 < PASSES ? 64 - DIGIT_BITS * (pass + 1) : 0;
 }
@@ -79,7 +79,7 @@ static int pass_shift(int pass)
 /* Returns the mask of the bits that earlier passes have determined. */
 static uint64_t known_bits_mask(int pass)
 {
-    return pass ? ~UINT64_C(0) << pass_shift(pass - 1) : 0;
+    return pass ? ~UINT64_C(0) << compute_digit_shift(pass - 1) : 0;
 }
 
 /* MOST_KEPT: maximum number of values that a pass stores for the next passes; FIRST_KEPT: number of the first pass that
@@ -87,7 +87,7 @@ static uint64_t known_bits_mask(int pass)
 enum { MOST_KEPT = 4096, FIRST_KEPT = 2 };
 
 typedef struct weighted_value {
-    uint64_t order; /* the value, mapped to an integer in the same order (order_from_value()) */
+    uint64_t order; /* the value, mapped to an integer in the same order (map_value_to_ordered_integer()) */
     int64_t weight;
 } weighted_value;
 
@@ -122,13 +122,13 @@ static void keep_value(const weighted_value *value, kept_values *kept)
 /* Compares the leading bits of a value with the known bits of the two percentiles. If they are equal for a percentile,
  * adds the value's weight to the count of its next digit for this percentile. Returns whether the weight was added to
  * any count. */
-static bool count_value(const digit_count *of, const weighted_value *value, int64_t counts[2 * DIGITS])
+static bool add_weight_of_value(const digit_count *of, const weighted_value *value, int64_t counts[2 * DIGITS])
 {
     const uint64_t known = known_bits_mask(of->pass);
     bool is_counted = false;
     for (int end = 0; end < 2; end++) {
         if ((value->order & known) != of->known_bits[end]) continue;
-        counts[end * DIGITS + (int)((value->order & ~known) >> pass_shift(of->pass))] += value->weight;
+        counts[end * DIGITS + (int)((value->order & ~known) >> compute_digit_shift(of->pass))] += value->weight;
         is_counted = true;
     }
     return is_counted;
@@ -149,7 +149,7 @@ static bool find_cells(const session_meshes *meshes, int index, const scene_fiel
     const session_mesh *mesh = meshes->items[index];
     const session_scalar *scalar = mesh->is_given ? session_find_scalar(mesh, field) : NULL;
     if (!scalar) return false;
-    *out = (counted_cells){session_whole_count(mesh), &mesh->cells, session_scalar_field(mesh, scalar),
+    *out = (counted_cells){session_count_whole_cells(mesh), &mesh->cells, session_get_scalar_values(mesh, scalar),
                            of->order_values[index]};
     return true;
 }
@@ -166,7 +166,7 @@ static double find_area(const counted_cells *cells, int64_t cell)
 
 /* Computes the mean of a cell's minimum and maximum. Returns false if the cell is not shown or its values are not
  * counted. */
-static bool find_middle(const digit_count *of, const counted_cells *cells, int64_t cell, double *middle)
+static bool find_mean_of_extremes(const digit_count *of, const counted_cells *cells, int64_t cell, double *middle)
 {
     if (cells->values) {
         const session_cell_value *value = &cells->values[cell];
@@ -187,15 +187,15 @@ static int64_t find_weight(const digit_count *of, const counted_cells *cells, in
 
 static void count_cells(const counted_cells *cells, int threads, digit_count *of, int64_t counts[2 * DIGITS])
 {
-#pragma omp parallel num_threads(session_region_threads(threads, cells->count))
+#pragma omp parallel num_threads(session_choose_loop_threads(threads, cells->count))
     {
         region_enter();
 #pragma omp for schedule(static) reduction(+ : counts[:2 * DIGITS]) nowait
         for (int64_t cell = 0; cell < cells->count; cell++) {
             double middle;
-            if (is_shell(cells, cell) != of->is_of_shells || !find_middle(of, cells, cell, &middle)) continue;
-            const weighted_value value = {order_from_value(middle), find_weight(of, cells, cell)};
-            if (count_value(of, &value, counts) && of->pass >= FIRST_KEPT) keep_value(&value, &of->kept);
+            if (is_shell(cells, cell) != of->is_of_shells || !find_mean_of_extremes(of, cells, cell, &middle)) continue;
+            const weighted_value value = {map_value_to_ordered_integer(middle), find_weight(of, cells, cell)};
+            if (add_weight_of_value(of, &value, counts) && of->pass >= FIRST_KEPT) keep_value(&value, &of->kept);
         }
         region_leave();
     }
@@ -204,7 +204,7 @@ static void count_cells(const counted_cells *cells, int threads, digit_count *of
 static void count_own_digits(const session_meshes *meshes, const session_team *team, const scene_field *field,
                              digit_count *of, int64_t counts[2 * DIGITS])
 {
-    for (int i = 0; i < of->kept.count && of->is_kept; i++) count_value(of, &of->kept.values[i], counts);
+    for (int i = 0; i < of->kept.count && of->is_kept; i++) add_weight_of_value(of, &of->kept.values[i], counts);
     if (of->is_kept) return;
     of->kept.count = 0;
     for (int i = 0; i < meshes->count; i++) {
@@ -228,15 +228,15 @@ static insitu_status count_digits(const session_meshes *meshes, const session_te
  * been found. LACKING: -1 if memory ran out on a rank, otherwise 0. */
 enum { SOLID, AREA, LACKING, KINDS };
 
-static void find_own_kind(const counted_cells *cells, int threads, const digit_count *of, double least[KINDS])
+static void find_own_kinds_of_cells(const counted_cells *cells, int threads, const digit_count *of, double least[KINDS])
 {
-#pragma omp parallel num_threads(session_region_threads(threads, cells->count))
+#pragma omp parallel num_threads(session_choose_loop_threads(threads, cells->count))
     {
         region_enter();
 #pragma omp for schedule(static) reduction(min : least[:KINDS]) nowait
         for (int64_t cell = 0; cell < cells->count; cell++) {
             double middle;
-            if (least[SOLID] < 0 || !find_middle(of, cells, cell, &middle)) continue;
+            if (least[SOLID] < 0 || !find_mean_of_extremes(of, cells, cell, &middle)) continue;
             if (is_shell(cells, cell))
                 least[AREA] = fmin(least[AREA], -find_area(cells, cell));
             else
@@ -259,7 +259,7 @@ static bool find_order_values(const session_meshes *meshes, int threads, const s
         if (!scalar || !mesh->topology.is_split) continue;
         const bool is_own = !scalar->is_recentred && !session_is_distance(scalar);
         const session_order_field own = {.mesh = mesh,
-                                         .values = session_scalar_field(mesh, scalar),
+                                         .values = session_get_scalar_values(mesh, scalar),
                                          .given = is_own ? session_find_caller_nodes(mesh, scalar->field) : -1,
                                          .threads = threads};
         session_find_order_values(&own, &of->order_values[i], error);
@@ -281,7 +281,7 @@ static insitu_status find_kind(const session_meshes *meshes, const session_team 
     if (!find_order_values(meshes, team->threads, field, of, error)) least[LACKING] = -1;
     for (int i = 0; i < meshes->count && least[LACKING] == 0; i++) {
         counted_cells cells;
-        if (find_cells(meshes, i, field, of, &cells)) find_own_kind(&cells, team->threads, of, least);
+        if (find_cells(meshes, i, field, of, &cells)) find_own_kinds_of_cells(&cells, team->threads, of, least);
     }
     const insitu_status status = session_check_mpi(
         error, MPI_Allreduce(MPI_IN_PLACE, least, KINDS, MPI_DOUBLE, MPI_MIN, team->comm), "MPI_Allreduce");
@@ -292,7 +292,7 @@ static insitu_status find_kind(const session_meshes *meshes, const session_team 
 
 /* Returns the digit of the value at the position *rank of the sorted values. Positions are in units of weight, from 0.
  * *rank becomes the value's position among the values with this digit. */
-static int find_digit(const int64_t counts[DIGITS], int64_t *rank)
+static int find_digit_at_position(const int64_t counts[DIGITS], int64_t *rank)
 {
     int digit = 0;
     while (digit + 1 < DIGITS && *rank >= counts[digit]) *rank -= counts[digit++];
@@ -301,7 +301,7 @@ static int find_digit(const int64_t counts[DIGITS], int64_t *rank)
 
 /* Returns the position of a percentile among the sorted values, in units of weight. The position is limited to total -
  * 1, because the total may be too large for an exact conversion to double. */
-static int64_t find_rank(double percent, int64_t total)
+static int64_t find_position_of_percentile(double percent, int64_t total)
 {
     const int64_t rank = (int64_t)fmax(ceil(percent / 100 * (double)total), 1) - 1;
     return rank < total ? rank : total - 1;
@@ -318,14 +318,14 @@ static insitu_status find_percentiles(const session_meshes *meshes, const sessio
         status = count_digits(meshes, team, field, &of, counts, error);
         for (int i = 0; i < DIGITS && of.pass == 0; i++) total += counts[i];
         for (int end = 0; end < 2; end++) {
-            if (of.pass == 0) ranks[end] = find_rank(percent[end], total);
-            const int digit = find_digit(counts + (ptrdiff_t)end * DIGITS, &ranks[end]);
-            of.known_bits[end] |= (uint64_t)digit << pass_shift(of.pass);
+            if (of.pass == 0) ranks[end] = find_position_of_percentile(percent[end], total);
+            const int digit = find_digit_at_position(counts + (ptrdiff_t)end * DIGITS, &ranks[end]);
+            of.known_bits[end] |= (uint64_t)digit << compute_digit_shift(of.pass);
         }
     }
     free_order_values(meshes, &of);
-    *low = total ? value_from_order(of.known_bits[0]) : INFINITY;
-    *high = total ? value_from_order(of.known_bits[1]) : -INFINITY;
+    *low = total ? map_ordered_integer_to_value(of.known_bits[0]) : INFINITY;
+    *high = total ? map_ordered_integer_to_value(of.known_bits[1]) : -INFINITY;
     return status;
 }
 

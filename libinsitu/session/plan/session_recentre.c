@@ -123,7 +123,7 @@ static double find_mean(const double *values, int64_t count)
     return count ? sum_values(values, count, largest, scale) / (double)count / scale : NAN;
 }
 
-static void groups_average(value_groups *groups, int threads)
+static void compute_group_means(value_groups *groups, int threads)
 {
 #pragma omp parallel num_threads(threads)
     {
@@ -254,14 +254,14 @@ static bool add_part_values(recentring *r, int part, int threads)
 {
     const session_mesh *mesh = r->list.items[part];
     const grid *g = &mesh->cells;
-    const int64_t count = session_whole_count(mesh);
+    const int64_t count = session_count_whole_cells(mesh);
     const bool is_split = mesh->topology.is_split;
     bool is_lost = false;
     if (r->parts[part].is_of_vertices) {
         add_vertex_values(r, part);
         return true;
     }
-#pragma omp parallel num_threads(session_region_threads(threads, count)) reduction(|| : is_lost)
+#pragma omp parallel num_threads(session_choose_loop_threads(threads, count)) reduction(|| : is_lost)
     {
         region_enter();
         cell_groups list = {0};
@@ -303,7 +303,7 @@ static bool list_parts(const session_recentring *item, const session_meshes *mes
         mesh_part *part = &r->parts[i];
         part->scalar = session_find_recentred(mesh, item->field, item->component, item->mesh_group->name);
         if (!part->scalar) continue;
-        part->field = session_caller_field(mesh, part->scalar->field, part->scalar->component);
+        part->field = session_get_caller_values(mesh, part->scalar->field, part->scalar->component);
         part->is_of_vertices = mesh->fields[part->scalar->field].given.centring == INSITU_VERTEX;
     }
     return true;
@@ -363,7 +363,7 @@ static void average_own_values(recentring *r, const session_team *team, base_err
     for (int i = 0; i < count && is_done && !error->status; i++)
         if (r->parts[i].scalar) is_done = add_part_values(r, i, team->threads);
     if (!is_done) session_fail_for_memory(error, r->mesh_group->groups.count * 100, "values recentred to vertices");
-    if (!error->status) groups_average(&r->values, team->threads);
+    if (!error->status) compute_group_means(&r->values, team->threads);
     for (int i = 0; i < count && faces; i++) session_patch_values_free(&faces[i]);
     base_free(faces);
 }
@@ -408,14 +408,14 @@ static bool pack_records(const recentring *r, int ranks, session_mail *mail)
 
 /* ---- work of home ranks: merging records by key ---------------------------------------------------------------- */
 
-static int64_t record_count(const uint64_t *record)
+static int64_t count_record_values(const uint64_t *record)
 {
     return (int64_t)(record[RECORD_HEAD - 1] & ~FACE_VALUES);
 }
 
 static const uint64_t *next_record(const uint64_t *record)
 {
-    return record + RECORD_HEAD + record_count(record);
+    return record + RECORD_HEAD + count_record_values(record);
 }
 
 /* Returns whether the group uses the record's values. If any rank has values of boundary faces, values of cells are
@@ -444,7 +444,7 @@ static bool gather_records(const session_mail *in, const int64_t *groups, int64_
 {
     const uint64_t *end = in->words + in->total;
     int64_t i = 0;
-    for (const uint64_t *r = in->words; r < end; r = next_record(r)) starts[groups[i++] + 1] += record_count(r);
+    for (const uint64_t *r = in->words; r < end; r = next_record(r)) starts[groups[i++] + 1] += count_record_values(r);
     for (int64_t g = 0; g < count; g++) starts[g + 1] += starts[g];
     if (!groups_create(values, count, starts)) return false;
     i = 0;
@@ -453,8 +453,9 @@ static bool gather_records(const session_mail *in, const int64_t *groups, int64_
     i = 0;
     for (const uint64_t *r = in->words; r < end; r = next_record(r), i++) {
         if (!has_values(r, values, groups[i])) continue;
-        memcpy(values->values + values->ends[groups[i]], r + RECORD_HEAD, (size_t)record_count(r) * sizeof(double));
-        values->ends[groups[i]] += record_count(r);
+        memcpy(values->values + values->ends[groups[i]], r + RECORD_HEAD,
+               (size_t)count_record_values(r) * sizeof(double));
+        values->ends[groups[i]] += count_record_values(r);
     }
     return true;
 }
@@ -473,7 +474,7 @@ static bool merge_records(const session_mail *in, int ranks, int threads, sessio
     const bool is_done = groups && starts && reply->words && reply->counts &&
                          number_records(in, groups, &keys, reply->total) &&
                          gather_records(in, groups, keys.count, starts, &values);
-    if (is_done) groups_average(&values, threads);
+    if (is_done) compute_group_means(&values, threads);
     for (int64_t i = 0; i < reply->total && is_done; i++)
         memcpy(&reply->words[i], &values.means[groups[i]], sizeof(double));
     const uint64_t *record = in->words;
@@ -488,7 +489,7 @@ static bool merge_records(const session_mail *in, int ranks, int threads, sessio
 }
 
 /* Replaces the means of groups that are shared with other ranks by the means over all ranks. */
-static insitu_status merge_shared(const session_team *team, recentring *r, base_error *error)
+static insitu_status merge_shared_groups(const session_team *team, recentring *r, base_error *error)
 {
     const session_vertex_groups *groups = &r->mesh_group->groups;
     session_mail out = {0}, in = {0}, reply = {0}, means = {0};
@@ -518,7 +519,7 @@ static void copy_means_to_vertices(const recentring *r, int part, int threads)
     const int64_t count = r->list.items[part]->cells.vertex_count;
     const grid_field *own = &r->parts[part].field;
     double *values = r->parts[part].scalar->vertex_values;
-#pragma omp parallel num_threads(session_region_threads(threads, count))
+#pragma omp parallel num_threads(session_choose_loop_threads(threads, count))
     {
         region_enter();
 #pragma omp for schedule(static) nowait
@@ -532,10 +533,11 @@ static void copy_means_to_vertices(const recentring *r, int part, int threads)
 
 /* Returns whether values at hanging vertices must be constrained: some mesh has cell values, or has values at vertices
  * that may hang. Corner values are not constrained, because codes with such values constrain them themselves. */
-static bool is_constrained(const session_recentring *item)
+static bool needs_hanging_constraint(const session_recentring *item)
 {
     for (int i = 0; i < item->mesh_group->count; i++)
-        if (session_catalogue_find(item->mesh_group->meshes[i], item->field)->centring != INSITU_CORNER) return true;
+        if (session_catalogue_find_field(item->mesh_group->meshes[i], item->field)->centring != INSITU_CORNER)
+            return true;
     return false;
 }
 
@@ -580,12 +582,12 @@ static insitu_status recentre_field(const session_recentring *item, const sessio
     insitu_status status = INSITU_OK;
     const bool is_listed = list_parts(item, meshes, &r);
     if (!is_listed) session_fail_for_memory(error, item->mesh_group->count * 64LL, "values recentred to vertices");
-    if (item->mesh_group->count > 1 || is_constrained(item))
+    if (item->mesh_group->count > 1 || needs_hanging_constraint(item))
         status = session_update_borders(item->mesh_group, &r.list, team, error);
     if (!status && is_listed) average_own_values(&r, team, error);
     if (!status && !error->status) allocate_recentred(&r, error);
-    if (!status) status = team->ranks > 1 ? merge_shared(team, &r, error) : session_agree(team->comm, error);
-    if (!status && is_constrained(item)) status = constrain_hanging(&r, team, error);
+    if (!status) status = team->ranks > 1 ? merge_shared_groups(team, &r, error) : session_agree(team->comm, error);
+    if (!status && needs_hanging_constraint(item)) status = constrain_hanging(&r, team, error);
     if (!status && !error->status) store_means(&r, team->threads);
     groups_free(&r.values);
     base_free(r.starts);

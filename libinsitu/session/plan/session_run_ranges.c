@@ -58,7 +58,7 @@ static insitu_status fail_at_file(const session_image_ranges *ranges, const char
                      "image \"%s\": %.300s: cannot be %s: %s", ranges->image, ranges->path, what, failure->reason);
 }
 
-static char *file_path(const scene_image *image)
+static char *make_ranges_file_path(const scene_image *image)
 {
     const char *output = image->outputs[0].path;
     size_t folder = strcspn(output, "{");
@@ -187,7 +187,7 @@ static bool prepare_ranges(session_run_ranges *all, const scene_image *image, ba
         session_image_ranges *entry = &items[all->count];
         *entry = (session_image_ranges){.image = base_strdup(image->name),
                                         .layers = image->variant.layers,
-                                        .path = file_path(image),
+                                        .path = make_ranges_file_path(image),
                                         .count = count,
                                         .items = base_calloc((size_t)count, sizeof *entry->items)};
         if (entry->items) list_layers(image, &(layer_list){0, entry->items});
@@ -212,7 +212,7 @@ static insitu_status share_ranges(session_image_ranges *ranges, MPI_Comm comm, b
 }
 
 /* Reads the ranges from the file on rank 0, and sends them to all ranks. Collective. */
-static insitu_status fill_ranges(session_image_ranges *ranges, const session_team *team, base_error *error)
+static insitu_status load_ranges_on_all_ranks(session_image_ranges *ranges, const session_team *team, base_error *error)
 {
     if (team->rank == 0) read_ranges(ranges, error);
     const insitu_status status = session_agree_without_rank(team->comm, error);
@@ -227,7 +227,7 @@ insitu_status session_open_run_ranges(session_run_ranges *all, const scene_image
     const bool is_prepared = prepare_ranges(all, image, error);
     session_image_ranges *ranges = is_prepared ? &all->items[all->count] : NULL;
     insitu_status status = session_agree(team->comm, error);
-    if (!status && ranges) status = fill_ranges(ranges, team, error);
+    if (!status && ranges) status = load_ranges_on_all_ranks(ranges, team, error);
     if (status && ranges) free_ranges(ranges);
     if (status) return status;
     all->count++;

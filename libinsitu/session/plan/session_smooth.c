@@ -17,8 +17,8 @@ typedef struct smooth_item {
     const session_catalogue_mesh *mesh;
     const session_catalogue_field *field;
     const scene_field *scene_field; /* the field as described in the first layer that shows it */
-    /* name of the mesh group over which values are recentred (session_mesh_group_name()); unused if values are not
-     * recentred */
+    /* name of the mesh group over which values are recentred (session_find_group_name_of_mesh()); unused if values are
+     * not recentred */
     uint64_t mesh_group_name;
     int component;
     int value_count;
@@ -60,7 +60,7 @@ bool session_has_smooth_normals(const scene_isosurface *layer, const session_cat
     for (int m = 0; m < catalogue->mesh_count; m++) {
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
         if (!mesh->has_higher_order || !scene_field_is_on(&layer->field, mesh->name)) continue;
-        const session_catalogue_field *field = session_catalogue_find(mesh, layer->field.name);
+        const session_catalogue_field *field = session_catalogue_find_field(mesh, layer->field.name);
         has_polynomials = has_polynomials || (field && field->centring != INSITU_CELL);
     }
     return layer->normals == SCENE_VERTEX || (layer->normals == SCENE_GRADIENT && has_polynomials);
@@ -76,11 +76,12 @@ bool session_has_curved_faces(const session_catalogue *catalogue)
 /* Adds a mesh on which a layer with smooth normals is drawn. */
 static bool add_layer(smooth_items *items, const session_catalogue_mesh *mesh, const scene_isosurface *layer)
 {
-    const session_catalogue_field *field = session_catalogue_find(mesh, layer->field.name);
+    const session_catalogue_field *field = session_catalogue_find_field(mesh, layer->field.name);
     if (!field || !scene_field_is_on(&layer->field, mesh->name)) return true;
     const int component = session_resolve_component(&layer->field, field->component_count);
     const bool is_recentred = session_is_recentred(&layer->field, field->centring, mesh->is_refined);
-    const uint64_t mesh_group_name = is_recentred ? session_mesh_group_name(mesh, layer->field.mesh_group_name) : 0;
+    const uint64_t mesh_group_name =
+        is_recentred ? session_find_group_name_of_mesh(mesh, layer->field.mesh_group_name) : 0;
     smooth_item *item =
         find_item(items, &(smooth_item){mesh, field, &layer->field, mesh_group_name, component, 0, NULL});
     if (!item) return false;
@@ -115,7 +116,7 @@ static void items_free(smooth_items *items)
     base_free(items->items);
 }
 
-bool session_is_smooth(const session_plan *plan, const session_catalogue *catalogue)
+bool session_plan_has_smooth_normals(const session_plan *plan, const session_catalogue *catalogue)
 {
     for (int i = 0; i < plan->image_count; i++)
         for (int n = 0; n < plan->images[i]->isosurface_count; n++)
@@ -197,7 +198,7 @@ static insitu_status create_work(const smooth_item *item, const session_meshes *
         if (!scalar) continue;
         work->scalars[sums->part_count] = scalar;
         sums->parts[sums->part_count].mesh = part;
-        sums->parts[sums->part_count++].fields[0] = session_scalar_field(part, scalar);
+        sums->parts[sums->part_count++].fields[0] = session_get_scalar_values(part, scalar);
     }
     return find_own_keys(item, threads, work, error);
 }
@@ -215,7 +216,7 @@ static void free_work(smooth_work *work)
 /* Numbers the vertices of the part whose gradients this rank needs. The other vertices have no sum, or a sum that only
  * other ranks need. key_indices[vertex] becomes the vertex's number or -1, and sum_of[n] becomes the index of the sum
  * of vertex number n. Returns the number of numbered vertices. */
-static int64_t number_gradients(session_sum_part *part, int64_t own_count, int32_t *sum_of)
+static int64_t number_vertices_with_gradients(session_sum_part *part, int64_t own_count, int32_t *sum_of)
 {
     int64_t count = 0;
     for (int64_t v = 0; v < part->mesh->cells.vertex_count; v++) {
@@ -232,15 +233,15 @@ static int64_t number_gradients(session_sum_part *part, int64_t own_count, int32
  * values, so that they fit into a float; only their direction matters. */
 static bool store_gradients(const session_vertex_sums *sums, session_sum_part *part, session_scalar *scalar)
 {
-    const int64_t vertices = part->mesh->cells.vertex_count, words = session_sum_words(1);
+    const int64_t vertices = part->mesh->cells.vertex_count, words = session_count_sum_words(1);
     const session_gradient_bounds bounds = {1, sums->bounds.largest_inverse_square};
     session_drop_gradients(scalar);
     int32_t *sum_of = base_alloc((size_t)(vertices + 1) * sizeof *sum_of);
-    const int64_t count = sum_of ? number_gradients(part, sums->own_count, sum_of) : 0;
+    const int64_t count = sum_of ? number_vertices_with_gradients(part, sums->own_count, sum_of) : 0;
     scalar->gradients = base_alloc((size_t)(count + 1) * sizeof *scalar->gradients);
     for (int64_t i = 0; i < count && scalar->gradients; i++) {
         double gradient[1][3];
-        session_mean_gradients(sums->sums + sum_of[i] * words, 1, &bounds, 1, gradient);
+        session_compute_mean_gradients(sums->sums + sum_of[i] * words, 1, &bounds, 1, gradient);
         for (int a = 0; a < 3; a++)
             scalar->gradients[i][a] = gradient[0][a] == gradient[0][a] ? (float)gradient[0][a] : 0;
     }
@@ -258,7 +259,7 @@ static insitu_status find_item_gradients(const smooth_item *item, const session_
 {
     smooth_work work = {0};
     if (!error->status) create_work(item, meshes, team->threads, &work, error);
-    const insitu_status status = session_find_sums(&item->mesh->homes, team, extent, &work.sums, error);
+    const insitu_status status = session_compute_vertex_sums(&item->mesh->homes, team, extent, &work.sums, error);
     for (int i = 0; i < work.sums.part_count && !status && !error->status; i++)
         if (!store_gradients(&work.sums, &work.sums.parts[i], work.scalars[i]))
             session_fail_for_memory(error, work.sums.own_count * 12, "gradients at vertices");
@@ -271,7 +272,7 @@ insitu_status session_find_smooth_gradients(const session_plan *plan, const sess
                                             const session_extent *extent, base_error *error)
 {
     smooth_items items = {0};
-    if (!session_is_smooth(plan, catalogue)) return INSITU_OK;
+    if (!session_plan_has_smooth_normals(plan, catalogue)) return INSITU_OK;
     if (!list_items(plan, catalogue, &items)) session_fail_for_memory(error, 64, "the plan of gradients at vertices");
     insitu_status status = session_agree(team->comm, error);
     for (int i = 0; i < items.count && !status; i++)

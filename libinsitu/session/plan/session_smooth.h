@@ -15,7 +15,7 @@ insitu_status session_find_smooth_gradients(const session_plan *plan, const sess
                                             const session_extent *extent, base_error *error);
 
 /* Returns whether an isosurface of the plan has smooth normals. */
-bool session_is_smooth(const session_plan *plan, const session_catalogue *catalogue);
+bool session_plan_has_smooth_normals(const session_plan *plan, const session_catalogue *catalogue);
 
 /* Returns whether the normals of the isosurface are interpolated between vertices. This is the case if the scene
  * requests smooth normals. It is also the case if the scene requests gradients, and one of the layer's meshes has cells

@@ -63,7 +63,7 @@ static int list_image_requests(const scene_image *image, const session_catalogue
         }
         for (int n = 0; n < image->isosurface_count && mesh->has_shells_alone; n++) {
             const scene_field *field = &image->isosurfaces[n].field;
-            const bool is_on = scene_field_is_on(field, mesh->name) && session_catalogue_find(mesh, field->name);
+            const bool is_on = scene_field_is_on(field, mesh->name) && session_catalogue_find_field(mesh, field->name);
             if (is_on) count = add_surface_request(requests, count, &(surface_request){mesh, &none});
         }
     }
@@ -101,8 +101,8 @@ static insitu_status find_stale_surfaces(const session_meshes *meshes, const sur
                              "MPI_Allreduce");
 }
 
-static insitu_status find_faces(const session_meshes *meshes, const surface_request *request, const session_team *team,
-                                base_error *error)
+static insitu_status find_outer_faces_of_request(const session_meshes *meshes, const surface_request *request,
+                                                 const session_team *team, base_error *error)
 {
     const session_parts parts = session_find_parts(meshes, request->mesh->name);
     int count = 0;
@@ -156,7 +156,7 @@ insitu_status session_update_surfaces(const session_plan *plan, const session_ca
         count = list_requests(plan, catalogue, requests);
     insitu_status status = find_stale_surfaces(meshes, requests, count, team, stale, &is_any, error);
     for (int i = 0; i < count && !status && is_any; i++)
-        if (stale[i]) status = find_faces(meshes, &requests[i], team, error);
+        if (stale[i]) status = find_outer_faces_of_request(meshes, &requests[i], team, error);
     base_free(stale);
     base_free(requests);
     if (!status) make_meshes(meshes, session_has_curved_faces(catalogue), error);

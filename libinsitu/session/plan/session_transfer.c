@@ -33,7 +33,7 @@ static double larger_magnitude(double low, double high)
     return fmax(fabs(low), fabs(high));
 }
 
-static render_scale make_scale(const scene_colour_map *map, double low, double high)
+static render_scale choose_scale(const scene_colour_map *map, double low, double high)
 {
     if (high - low < straight * larger_magnitude(low, high)) return RENDER_LINEAR;
     switch (map->scale) {
@@ -75,7 +75,7 @@ static bool make_range_usable(const scene_colour_map *map, double *low, double *
 
 /* ---- colours --------------------------------------------------------------------------------------------------- */
 
-static double scale_value_at(const render_transfer *t, double fraction)
+static double find_value_at_fraction(const render_transfer *t, double fraction)
 {
     if (t->scale == RENDER_LINEAR) return t->low + fraction * (t->high - t->low);
     const double low = render_scaled(t->scale, t->threshold, t->low);
@@ -88,7 +88,7 @@ static void copy_colour(float *to, const float *from)
     memcpy(to, from, 3 * sizeof *to);
 }
 
-bool session_transfer_allocates(const scene_colour_map *map, const scene_volume *volume)
+bool session_transfer_needs_memory(const scene_colour_map *map, const scene_volume *volume)
 {
     return volume && (map->is_banded || map->has_below || map->has_above);
 }
@@ -105,8 +105,8 @@ static bool expand_table(const scene_colour_map *map, session_transfer *out)
     if (map->has_below) copy_colour(entry, map->outside_colours[0]), entry += 3;
     for (int i = 0; i < inner; i++, entry += 3) copy_colour(entry, map->colours + 3 * (size_t)(i / repeated));
     if (map->has_above) copy_colour(entry, map->outside_colours[1]);
-    const double low = scale_value_at(t, map->has_below ? -1.0 / (inner - 1) : 0);
-    const double high = scale_value_at(t, map->has_above ? 1 + 1.0 / (inner - 1) : 1);
+    const double low = find_value_at_fraction(t, map->has_below ? -1.0 / (inner - 1) : 0);
+    const double high = find_value_at_fraction(t, map->has_above ? 1 + 1.0 / (inner - 1) : 1);
     if (map->has_below) t->low = low;
     if (map->has_above) t->high = high;
     t->colours = out->table;
@@ -121,7 +121,7 @@ static void set_opacity(const scene_volume *volume, double half_diagonal, sessio
     render_transfer *t = &out->transfer;
     t->opacity_count = volume->opacity_count;
     for (int i = 0; i < t->opacity_count; i++) {
-        out->opacity_values[i] = scale_value_at(t, volume->opacity[i].position);
+        out->opacity_values[i] = find_value_at_fraction(t, volume->opacity[i].position);
         out->opacities[i] = volume->opacity[i].opacity;
     }
     t->opacity_values = out->opacity_values;
@@ -141,7 +141,7 @@ bool session_make_transfer(double half_diagonal, const scene_colour_map *map, do
                                            .high = high,
                                            .colour_count = map->count,
                                            .colours = map->colours,
-                                           .scale = make_scale(map, low, high),
+                                           .scale = choose_scale(map, low, high),
                                            .threshold = fmax(map->threshold, larger_magnitude(low, high) / widest_log),
                                            .unit_distance = 1},
                               .low = low,
@@ -150,7 +150,7 @@ bool session_make_transfer(double half_diagonal, const scene_colour_map *map, do
                               .constant = constant};
     if (volume) {
         set_opacity(volume, half_diagonal, out);
-        return !session_transfer_allocates(map, volume) || expand_table(map, out);
+        return !session_transfer_needs_memory(map, volume) || expand_table(map, out);
     }
     out->transfer.is_banded = map->is_banded;
     if (map->has_below || map->has_above || map->has_nan) out->transfer.outside = map->outside_colours[0];

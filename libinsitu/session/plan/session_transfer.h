@@ -23,7 +23,7 @@ typedef struct session_transfer {
 bool session_make_transfer(double half_diagonal, const scene_colour_map *map, double low, double high,
                            const scene_volume *volume, session_transfer *out);
 /* Returns whether the transfer function needs memory, and so may fail; the result is the same on all ranks. */
-bool session_transfer_allocates(const scene_colour_map *map, const scene_volume *volume);
+bool session_transfer_needs_memory(const scene_colour_map *map, const scene_volume *volume);
 void session_transfer_free(session_transfer *transfer);
 
 /* Computes the intervals of values in which a volume is not transparent, and returns their number. If the colour map's

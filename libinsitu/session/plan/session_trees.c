@@ -104,7 +104,7 @@ static insitu_status build_tree(const tree_update *u, session_mesh *mesh, const 
     session_drop_tree(mesh);
     u->trees->is_parent_stale = true;
     session_scalar *own = choose_own_scalar(mesh);
-    const grid_field field = session_scalar_field(mesh, own);
+    const grid_field field = session_get_scalar_values(mesh, own);
     const insitu_status status =
         mmbvh_build(&mesh->cells, &field, u->space->origin, u->space->scale, &options, &mesh->tree, error);
     if (status) return status;
@@ -125,7 +125,7 @@ static insitu_status build_tree(const tree_update *u, session_mesh *mesh, const 
 
 static insitu_status refit_scalar(session_mesh *mesh, session_scalar *scalar, const mmbvh_options *options)
 {
-    const grid_field field = session_scalar_field(mesh, scalar);
+    const grid_field field = session_get_scalar_values(mesh, scalar);
     if (scalar->has_own_ranges) {
         const insitu_status status = mmbvh_refit_ranges(&mesh->tree, &mesh->cells, &field, options);
         if (!mesh->is_partial) scalar->unusable_count = mesh->tree.unusable_cells;
@@ -152,7 +152,7 @@ static insitu_status refit_ranges(const tree_update *u, session_mesh *mesh, base
         const insitu_status status = refit_scalar(mesh, scalar, &options);
         if (status)
             return base_fail(error, status, "mesh \"%s\": no memory for the ranges of field \"%s\"", mesh->label,
-                             session_scalar_name(mesh, scalar));
+                             session_get_scalar_name(mesh, scalar));
         scalar->are_ranges_stale = false;
         const double seconds = omp_get_wtime() - start;
         update_rate(&u->trees->rates.refit, seconds, mesh->tree.cell_count);
@@ -171,7 +171,7 @@ static insitu_status build_and_refit(const tree_update *u, session_mesh *mesh, b
 
 /* Returns whether the tree's cost, relative to the area of its mesh's box, has grown so much that it should be rebuilt.
  * Nodes that were not refitted are included with their old boxes. */
-static bool is_decayed(const session_mesh *mesh)
+static bool has_tree_decayed(const session_mesh *mesh)
 {
     const double tree = mesh->tree.area * mesh->built_surface, built = mesh->tree.built_area * half_box_area(mesh);
     return tree > worst_cost * built;
@@ -179,13 +179,13 @@ static bool is_decayed(const session_mesh *mesh)
 
 /* Lists for each scalar the intervals of its values that are shown. Nodes of the tree whose values lie outside of these
  * intervals are invisible. The tree's ranges must be up to date. */
-static int list_visible(const session_mesh *mesh, mmbvh_visible *out)
+static int list_visible_intervals(const session_mesh *mesh, mmbvh_visible *out)
 {
     int count = 0;
     for (int i = 0; i < mesh->scalar_count; i++) {
         const session_scalar *s = &mesh->scalars[i];
         if (!s->needs_ranges) continue;
-        out[count++] = (mmbvh_visible){session_scalar_ranges(mesh, s), s->interval_count, s->intervals};
+        out[count++] = (mmbvh_visible){session_get_scalar_ranges(mesh, s), s->interval_count, s->intervals};
     }
     return count;
 }
@@ -199,7 +199,7 @@ static insitu_status refit_bounds(const tree_update *u, session_mesh *mesh, bool
     mmbvh_visible *visible = base_alloc((size_t)(mesh->scalar_count + 1) * sizeof *visible);
     if (!visible)
         return session_fail_for_memory(error, (mesh->scalar_count + 1) * (int64_t)sizeof *visible, "visible nodes");
-    const int count = all ? 0 : list_visible(mesh, visible);
+    const int count = all ? 0 : list_visible_intervals(mesh, visible);
     const insitu_status status =
         mmbvh_refit_visible_bounds(&mesh->tree, &mesh->cells, visible, count, &options, &is_whole);
     base_free(visible);
@@ -208,7 +208,7 @@ static insitu_status refit_bounds(const tree_update *u, session_mesh *mesh, bool
     u->report->refit_ms += 1e3 * (omp_get_wtime() - start);
     mesh->is_geometry_stale = false;
     mesh->are_bounds_partial = !is_whole;
-    return is_decayed(mesh) ? build_and_refit(u, mesh, error) : INSITU_OK;
+    return has_tree_decayed(mesh) ? build_and_refit(u, mesh, error) : INSITU_OK;
 }
 
 /* Updates the bounds. While the candidates are the same as in the previous step, only bounds of visible nodes must be
@@ -216,7 +216,7 @@ static insitu_status refit_bounds(const tree_update *u, session_mesh *mesh, bool
 static insitu_status update_bounds(const tree_update *u, session_mesh *mesh, bool are_values_new, base_error *error)
 {
     uint64_t key;
-    const bool is_told = session_find_candidates(mesh, &key);
+    const bool is_told = session_hash_candidate_queries(mesh, &key);
     const bool is_other = !is_told || are_values_new || key != mesh->candidates_key;
     if (!mesh->is_geometry_stale && !(mesh->are_bounds_partial && is_other)) return INSITU_OK;
     const insitu_status status = refit_bounds(u, mesh, !is_told || !mesh->is_geometry_stale, error);
@@ -285,7 +285,7 @@ static insitu_status update_parent(const tree_update *u, const session_meshes *m
 
 /* ---- choice between full and partial trees --------------------------------------------------------------------- */
 
-static double full_tree_cost(const tree_update *u, const session_mesh *mesh)
+static double estimate_full_tree_cost(const tree_update *u, const session_mesh *mesh)
 {
     return estimate_rate(u->trees->rates.build, first_rates.build, u->threads) * (double)mesh->drawn_count;
 }
@@ -298,9 +298,9 @@ static bool has_full_tree(const session_mesh *mesh)
 
 static bool prefers_partial_tree(const tree_update *u, const session_mesh *mesh, uint64_t *key)
 {
-    if (u->choice == SCENE_TREE_FULL || !session_find_candidates(mesh, key)) return false;
+    if (u->choice == SCENE_TREE_FULL || !session_hash_candidate_queries(mesh, key)) return false;
     if (u->choice == SCENE_TREE_PARTIAL) return true;
-    return !has_full_tree(mesh) && mesh->partial_tree_seconds < full_tree_cost(u, mesh);
+    return !has_full_tree(mesh) && mesh->partial_tree_seconds < estimate_full_tree_cost(u, mesh);
 }
 
 static bool has_new_values(const session_mesh *mesh)
@@ -318,7 +318,7 @@ static bool is_partial_fresh(const session_mesh *mesh, uint64_t key)
 }
 
 /* Updates a partial tree. key: the hash that identifies the candidates. */
-static insitu_status update_partial(const tree_update *u, session_mesh *mesh, uint64_t key, base_error *error)
+static insitu_status update_partial_tree(const tree_update *u, session_mesh *mesh, uint64_t key, base_error *error)
 {
     if (is_partial_fresh(mesh, key)) return INSITU_OK;
     const double start = omp_get_wtime();
@@ -340,7 +340,7 @@ static insitu_status update_partial(const tree_update *u, session_mesh *mesh, ui
     return status;
 }
 
-static insitu_status update_full(const tree_update *u, session_mesh *mesh, base_error *error)
+static insitu_status update_full_tree(const tree_update *u, session_mesh *mesh, base_error *error)
 {
     if (!has_full_tree(mesh)) return build_and_refit(u, mesh, error);
     const bool are_values_new = has_new_values(mesh);
@@ -353,10 +353,10 @@ static insitu_status update_tree(const tree_update *u, session_mesh *mesh, base_
     uint64_t key;
     insitu_status status;
     if (prefers_partial_tree(u, mesh, &key)) {
-        status = update_partial(u, mesh, key, error);
+        status = update_partial_tree(u, mesh, key, error);
         if (!status) status = refit_ranges(u, mesh, error);
     } else {
-        status = update_full(u, mesh, error);
+        status = update_full_tree(u, mesh, error);
     }
     if (!status && !mesh->is_partial) mesh->full_tree_steps++;
     return status;
@@ -413,7 +413,7 @@ static insitu_status update_on_threads(const tree_update *u, session_mesh *const
 }
 
 /* Lists the needed parts and returns their number. If parts is NULL, they are only counted. */
-static int list_needed(const session_meshes *meshes, session_mesh **parts)
+static int list_needed_parts(const session_meshes *meshes, session_mesh **parts)
 {
     int count = 0;
     for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) {
@@ -426,10 +426,10 @@ static int list_needed(const session_meshes *meshes, session_mesh **parts)
 
 static insitu_status update_all_trees(const tree_update *u, const session_meshes *meshes, base_error *error)
 {
-    const int count = list_needed(meshes, NULL);
+    const int count = list_needed_parts(meshes, NULL);
     session_mesh **parts = base_alloc((size_t)(count + 1) * sizeof *parts);
     if (!parts) return session_fail_for_memory(error, count * (int64_t)sizeof(session_mesh *), "trees");
-    list_needed(meshes, parts);
+    list_needed_parts(meshes, parts);
     insitu_status status = INSITU_OK;
     if (u->threads > 1 && count >= PARTS_A_THREAD * u->threads)
         status = update_on_threads(u, parts, count, error);

@@ -31,7 +31,7 @@ static int64_t count_unusable(const session_mesh *mesh, const scene_field *field
     return scalar ? session_count_unusable(mesh, scalar) : 0;
 }
 
-static int64_t unusable_of_parts(const session_meshes *meshes, const char *name, const scene_field *field)
+static int64_t count_unusable_of_parts(const session_meshes *meshes, const char *name, const scene_field *field)
 {
     const session_parts parts = session_find_parts(meshes, name);
     int64_t sum = 0;
@@ -39,7 +39,7 @@ static int64_t unusable_of_parts(const session_meshes *meshes, const char *name,
     return sum;
 }
 
-uint64_t session_unusable_key(const session_plan *plan, const session_meshes *meshes)
+uint64_t session_hash_unusable_fields(const session_plan *plan, const session_meshes *meshes)
 {
     uint64_t key = 0;
     field_walk walk = {.plan = plan};
@@ -56,7 +56,7 @@ uint64_t session_unusable_key(const session_plan *plan, const session_meshes *me
     return key;
 }
 
-static void warn_of_count(const char *mesh, const scene_field *field, int64_t count, session_report *report)
+static void warn_of_unusable_cells(const char *mesh, const scene_field *field, int64_t count, session_report *report)
 {
     session_warn(report, &(session_warning){WARNING_UNUSABLE, field->name, mesh, field->component}, count > 0,
                  "mesh \"%s\": %lld cells are not drawn: values of field \"%s\" are not finite", mesh, (long long)count,
@@ -73,13 +73,14 @@ insitu_status session_warn_of_unusable(const session_plan *plan, const session_c
     insitu_status status = session_agree(team->comm, error);
     field_walk walk = {.plan = plan};
     for (const scene_field *field; !status && (field = next_field(&walk)) != NULL;) {
-        for (int m = 0; m < mesh_count; m++) counts[m] = unusable_of_parts(meshes, catalogue->meshes[m].name, field);
+        for (int m = 0; m < mesh_count; m++)
+            counts[m] = count_unusable_of_parts(meshes, catalogue->meshes[m].name, field);
         const int code = MPI_Allreduce(MPI_IN_PLACE, counts, mesh_count, MPI_INT64_T, MPI_SUM, team->comm);
         status = session_check_mpi(error, code, "MPI_Allreduce");
         for (int m = 0; m < mesh_count && !status; m++)
-            warn_of_count(catalogue->meshes[m].name, field, counts[m], report);
+            warn_of_unusable_cells(catalogue->meshes[m].name, field, counts[m], report);
     }
     base_free(counts);
-    if (!status) report->unusable_key = session_unusable_key(plan, meshes);
+    if (!status) report->unusable_key = session_hash_unusable_fields(plan, meshes);
     return status;
 }

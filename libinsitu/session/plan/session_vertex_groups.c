@@ -9,7 +9,7 @@ typedef session_vertex_groups_basis groups_basis;
 
 /* ---- groups --------------------------------------------------------------------------------------------------- */
 
-static session_key key_of_point(const double position[3])
+static session_key make_key_of_point(const double position[3])
 {
     session_key key;
     for (int axis = 0; axis < 3; axis++) {
@@ -22,7 +22,7 @@ static session_key key_of_point(const double position[3])
 /* Assigns groups to the vertices of a part's drawn cells. A twin is a vertex that is equal to another vertex except for
  * rounding (session_twins.h). While this function runs, group_of_vertex contains -2 - i for the i-th twin. If vertices
  * are equal by id, one_vertex receives the number of one vertex of each group; otherwise it is NULL. */
-static void group_part(const groups_basis *basis, int part, session_vertex_groups *out, int64_t *one_vertex)
+static void group_vertices_of_part(const groups_basis *basis, int part, session_vertex_groups *out, int64_t *one_vertex)
 {
     const session_mesh *mesh = basis->parts[part];
     const session_border *border = basis->borders ? &basis->borders[part] : NULL;
@@ -37,7 +37,7 @@ static void group_part(const groups_basis *basis, int part, session_vertex_group
         while (grid_walk_next(&walk, &vertex)) {
             if (of_vertex[vertex] < 0) {
                 const int64_t twin = -2 - of_vertex[vertex];
-                const session_key key = twin >= 0 ? key_of_point(border->twins[twin].position)
+                const session_key key = twin >= 0 ? make_key_of_point(border->twins[twin].position)
                                                   : session_vertex_key(mesh, vertex, basis->by_id);
                 of_vertex[vertex] = session_keys_add(&out->keys, &key);
                 if (one_vertex) one_vertex[of_vertex[vertex]] = out->first_vertices[part] + vertex;
@@ -62,7 +62,7 @@ static bool group_vertices(const groups_basis *basis, session_vertex_groups *out
     if (!out->group_of_vertex || !out->corner_starts || (basis->by_id && !*one_vertex) ||
         !session_keys_create(&out->keys, most))
         return false;
-    for (int i = 0; i < basis->part_count; i++) group_part(basis, i, out, *one_vertex);
+    for (int i = 0; i < basis->part_count; i++) group_vertices_of_part(basis, i, out, *one_vertex);
     out->count = out->keys.count;
     for (int64_t group = 0; group < out->count; group++) out->corner_starts[group + 1] += out->corner_starts[group];
     int64_t *starts = base_realloc(out->corner_starts, (size_t)(out->count + 1) * sizeof *starts);
@@ -97,7 +97,7 @@ static void find_group_position(const groups_basis *basis, const session_vertex_
 
 /* Finds the home rank of each group that lies in another rank's box, and counts the groups per home. The home is -1 if
  * only this rank can have the group. */
-static void find_homes(const groups_basis *basis, const int64_t *one_vertex, session_vertex_groups *out, int *home)
+static void find_home_ranks(const groups_basis *basis, const int64_t *one_vertex, session_vertex_groups *out, int *home)
 {
     for (int64_t group = 0; group < out->count; group++) {
         const session_key *key = &out->keys.keys[group];
@@ -113,14 +113,14 @@ static void find_homes(const groups_basis *basis, const int64_t *one_vertex, ses
 }
 
 /* Lists the shared groups, sorted by their home ranks. */
-static bool list_shared(const groups_basis *basis, const int64_t *one_vertex, session_vertex_groups *out)
+static bool list_shared_groups(const groups_basis *basis, const int64_t *one_vertex, session_vertex_groups *out)
 {
     int *home = base_alloc((size_t)out->count * sizeof *home);
     int64_t *next = base_calloc((size_t)basis->ranks + 1, sizeof *next);
     out->shared_counts = base_calloc((size_t)basis->ranks, sizeof *out->shared_counts);
     bool is_done = home && next && out->shared_counts;
     if (is_done) {
-        find_homes(basis, one_vertex, out, home);
+        find_home_ranks(basis, one_vertex, out, home);
         out->shared_groups = base_alloc((size_t)out->shared_count * sizeof *out->shared_groups);
         out->shared_keys = base_alloc((size_t)out->shared_count * sizeof *out->shared_keys);
         is_done = out->shared_groups && out->shared_keys;
@@ -153,8 +153,8 @@ bool session_update_vertex_groups(const session_vertex_groups_basis *basis, sess
     const bool needs_keys = has_patches(basis);
     if (groups->positions_hash == basis->positions_hash && (groups->keys.keys || !needs_keys)) return true;
     session_vertex_groups_free(groups);
-    const bool is_done =
-        group_vertices(basis, groups, &one_vertex) && (basis->ranks == 1 || list_shared(basis, one_vertex, groups));
+    const bool is_done = group_vertices(basis, groups, &one_vertex) &&
+                         (basis->ranks == 1 || list_shared_groups(basis, one_vertex, groups));
     base_free(one_vertex);
     if (!is_done) session_vertex_groups_free(groups);
     if (!needs_keys) session_keys_free(&groups->keys);

@@ -186,7 +186,7 @@ static insitu_status send_requests(const session_homes *homes, const session_tea
 static bool write_answers(const session_vertex_sums *sums, const sums_messages *mail, int ranks, session_mail *out)
 {
     const session_mail *requests = &mail->received_requests;
-    const int64_t count = requests->total / KEY_WORDS, words = session_sum_words(sums->field_count);
+    const int64_t count = requests->total / KEY_WORDS, words = session_count_sum_words(sums->field_count);
     out->counts = base_calloc((size_t)ranks, sizeof *out->counts);
     out->words = base_calloc((size_t)(count ? count : 1), (size_t)words * sizeof *out->words);
     if (!out->counts || !out->words) return false;
@@ -201,7 +201,7 @@ static bool write_answers(const session_vertex_sums *sums, const sums_messages *
 
 static void add_answers(const sums_messages *mail, session_vertex_sums *sums)
 {
-    const int64_t words = session_sum_words(sums->field_count);
+    const int64_t words = session_count_sum_words(sums->field_count);
     for (int64_t i = 0; i < mail->received_answers.total / words; i++) {
         int64_t *sum = sums->sums + mail->own_numbers[i] * words;
         for (int64_t k = 0; k < words; k++) {
@@ -246,11 +246,12 @@ static bool filter_create(const session_key_table *keys, key_filter *out)
 /* Stores in key_indices the index of each vertex's key, or -1 if the vertex has none. The key is one of this rank's own
  * keys or a requested key; several vertices along a crack may have the same key. If only some pieces of cells of higher
  * order are made, most vertices belong to no piece and are not searched. */
-static void find_entries(const session_vertex_sums *sums, session_sum_part *part, const key_filter *filter, int threads)
+static void find_key_indices(const session_vertex_sums *sums, session_sum_part *part, const key_filter *filter,
+                             int threads)
 {
     const bool is_marked = part->mesh->finer.pieces.first_words != NULL;
     if (is_marked) mark_vertices(part);
-#pragma omp parallel num_threads(session_region_threads(threads, part->mesh->cells.vertex_count))
+#pragma omp parallel num_threads(session_choose_loop_threads(threads, part->mesh->cells.vertex_count))
     {
         region_enter();
 #pragma omp for schedule(static) nowait
@@ -265,11 +266,11 @@ static void find_entries(const session_vertex_sums *sums, session_sum_part *part
     }
 }
 
-static bool find_all_entries(const session_vertex_sums *sums, int threads)
+static bool find_all_key_indices(const session_vertex_sums *sums, int threads)
 {
     key_filter filter;
     if (!filter_create(&sums->keys, &filter)) return false;
-    for (int i = 0; i < sums->part_count; i++) find_entries(sums, &sums->parts[i], &filter, threads);
+    for (int i = 0; i < sums->part_count; i++) find_key_indices(sums, &sums->parts[i], &filter, threads);
     base_free(filter.bits);
     return true;
 }
@@ -302,8 +303,9 @@ static bool make_polynomials(const session_vertex_sums *sums, session_sum_part *
 static bool begin_sums(session_vertex_sums *sums, session_cell_list *lists, int threads)
 {
     const size_t count = (size_t)(sums->keys.count ? sums->keys.count : 1);
-    sums->sums = base_calloc(count, (size_t)session_sum_words(sums->field_count) * sizeof *sums->sums);
-    if (!sums->sums || (!sums->has_all_vertices && sums->keys.count && !find_all_entries(sums, threads))) return false;
+    sums->sums = base_calloc(count, (size_t)session_count_sum_words(sums->field_count) * sizeof *sums->sums);
+    if (!sums->sums || (!sums->has_all_vertices && sums->keys.count && !find_all_key_indices(sums, threads)))
+        return false;
     for (int i = 0; i < sums->part_count && sums->keys.count; i++) {
         session_gradient_bounds own;
         session_sum_part *part = &sums->parts[i];
@@ -318,7 +320,7 @@ static bool begin_sums(session_vertex_sums *sums, session_cell_list *lists, int 
 
 static bool add_sums(const session_vertex_sums *sums, const session_cell_list *lists, int threads)
 {
-    unsigned char *owners = session_sum_owners(sums->keys.count, threads);
+    unsigned char *owners = session_create_sum_owners(sums->keys.count, threads);
     bool is_done = owners != NULL;
     for (int i = 0; i < sums->part_count && is_done; i++) {
         if (!lists[i].count) continue;
@@ -332,10 +334,10 @@ static bool add_sums(const session_vertex_sums *sums, const session_cell_list *l
 /* Computes the sums of gradients in fixed-point integers. The value of their lowest bit is chosen from the largest
  * bounds over all ranks. If *error of any rank already holds an error, all ranks return this error; an error that
  * occurs after the reduction is only stored in *error. Collective. */
-static insitu_status make_sums(const session_team *team, session_vertex_sums *sums, session_cell_list *lists,
-                               base_error *error)
+static insitu_status compute_sums_over_ranks(const session_team *team, session_vertex_sums *sums,
+                                             session_cell_list *lists, base_error *error)
 {
-    const int64_t bytes = sums->keys.count * session_sum_words(sums->field_count) * (int64_t)sizeof(int64_t);
+    const int64_t bytes = sums->keys.count * session_count_sum_words(sums->field_count) * (int64_t)sizeof(int64_t);
     if (!error->status && !(lists && begin_sums(sums, lists, team->threads)))
         session_fail_for_memory(error, bytes, "gradients at vertices");
     /* the last entry is 1 if this rank has an error */
@@ -350,8 +352,8 @@ static insitu_status make_sums(const session_team *team, session_vertex_sums *su
     return status;
 }
 
-insitu_status session_find_sums(const session_homes *homes, const session_team *team, const session_extent *extent,
-                                session_vertex_sums *sums, base_error *error)
+insitu_status session_compute_vertex_sums(const session_homes *homes, const session_team *team,
+                                          const session_extent *extent, session_vertex_sums *sums, base_error *error)
 {
     int exponent = 0;
     sums_messages mail = {0};
@@ -360,7 +362,7 @@ insitu_status session_find_sums(const session_homes *homes, const session_team *
     frexp(extent->half_diagonal, &exponent);
     sums->length = ldexp(1, exponent);
     if (team->ranks > 1) status = send_requests(homes, team, sums, &mail, error);
-    if (!status) status = make_sums(team, sums, lists, error);
+    if (!status) status = compute_sums_over_ranks(team, sums, lists, error);
     if (!status && team->ranks > 1) status = send_answers(team, sums, &mail, error);
     for (int i = 0; i < sums->part_count && lists; i++) base_free(lists[i].cells);
     base_free(lists);

@@ -13,8 +13,8 @@ typedef struct session_sum_part {
     bool of_shells;
     grid_field fields[SESSION_GRADIENTS];
     int32_t *key_indices; /* index of each vertex's key, or -1 */
-    /* the cells' polynomials, computed by session_find_sums(); NULL: cells are linear, or values at nodes are means of
-     * cell values */
+    /* the cells' polynomials, computed by session_compute_vertex_sums(); NULL: cells are linear, or values at nodes are
+     * means of cell values */
     session_polynomials *polynomials;
 } session_sum_part;
 
@@ -32,7 +32,7 @@ typedef struct session_vertex_sums {
     int64_t own_count; /* number of this rank's keys; the keys after them were requested by other ranks */
     session_gradient_bounds bounds;
     double length;
-    int64_t *sums; /* the sums, session_sum_words() words per key */
+    int64_t *sums; /* the sums, session_count_sum_words() words per key */
 } session_vertex_sums;
 
 /* Assigns a key to every vertex of a cell that is not a ghost. Local. */
@@ -41,8 +41,8 @@ insitu_status session_key_all_vertices(session_vertex_sums *sums, base_error *er
 /* Computes the sums of this rank's keys over all ranks. The keys, and key_indices of each part, must be set. A rank
  * that has failed before calls this function with its error in *error. Collective. All ranks return the same status. An
  * error that occurs after the last exchange of messages is only stored in *error. */
-insitu_status session_find_sums(const session_homes *homes, const session_team *team, const session_extent *extent,
-                                session_vertex_sums *sums, base_error *error);
+insitu_status session_compute_vertex_sums(const session_homes *homes, const session_team *team,
+                                          const session_extent *extent, session_vertex_sums *sums, base_error *error);
 
 /* Frees all members except the parts' meshes. */
 void session_vertex_sums_free(session_vertex_sums *sums);

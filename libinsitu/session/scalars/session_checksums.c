@@ -45,7 +45,7 @@ static uint64_t sum_array(const grid_array *a, int64_t count, int threads)
 {
     const int64_t size = grid_element_bytes(a), blocks = (count + BLOCK_VALUES - 1) / BLOCK_VALUES;
     uint64_t sum = 0;
-#pragma omp parallel num_threads(session_region_threads(threads, count))
+#pragma omp parallel num_threads(session_choose_loop_threads(threads, count))
     {
         region_enter();
 #pragma omp for schedule(static) reduction(+ : sum) nowait
@@ -78,7 +78,7 @@ static uint64_t sum_field(uint64_t sum, const session_mesh *mesh, const grid_fie
  * values: if some of these become NaN, the means at their vertices may remain the same. */
 static uint64_t find_checksum(const session_mesh *mesh, const session_scalar *scalar, int threads)
 {
-    const grid_field field = session_scalar_field(mesh, scalar);
+    const grid_field field = session_get_scalar_values(mesh, scalar);
     const uint64_t sum = sum_field(0, mesh, &field, threads);
     return field.source_cells ? sum_field(sum, mesh, field.source_cells, threads) : sum;
 }
@@ -97,9 +97,9 @@ static uint64_t sample_field(uint64_t sum, const session_mesh *mesh, const grid_
     return sum;
 }
 
-static uint64_t find_sample(const session_mesh *mesh, const session_scalar *scalar)
+static uint64_t compute_sample_checksum(const session_mesh *mesh, const session_scalar *scalar)
 {
-    const grid_field field = session_scalar_field(mesh, scalar);
+    const grid_field field = session_get_scalar_values(mesh, scalar);
     const uint64_t sum = sample_field(1, mesh, &field);
     return field.source_cells ? sample_field(sum, mesh, field.source_cells) : sum;
 }
@@ -109,10 +109,10 @@ static uint64_t find_sample(const session_mesh *mesh, const session_scalar *scal
 static void warn_of_change(const session_mesh *mesh, session_scalar *scalar, session_report *report)
 {
     if (session_is_distance(scalar)) return;
-    const char *field = session_scalar_name(mesh, scalar);
+    const char *field = session_get_scalar_name(mesh, scalar);
     const session_warning warning = {WARNING_UNSAID, field, mesh->label, scalar->component};
-    const bool has_changed =
-        !scalar->may_have_changed && scalar->has_checksum && scalar->sample_checksum != find_sample(mesh, scalar);
+    const bool has_changed = !scalar->may_have_changed && scalar->has_checksum &&
+                             scalar->sample_checksum != compute_sample_checksum(mesh, scalar);
     session_warn_locally(
         report, &warning, has_changed && !mesh->source,
         "mesh \"%s\": field \"%s\" has other values than in the last picture, but was not set again, or with "
@@ -127,7 +127,7 @@ static bool compare_checksum(const session_mesh *mesh, session_scalar *scalar, i
 {
     const uint64_t checksum = find_checksum(mesh, scalar, threads);
     scalar->may_have_changed = false;
-    scalar->sample_checksum = find_sample(mesh, scalar);
+    scalar->sample_checksum = compute_sample_checksum(mesh, scalar);
     if (scalar->has_checksum && scalar->checksum == checksum) return true;
     scalar->has_checksum = true;
     scalar->checksum = checksum;
@@ -152,7 +152,7 @@ static int64_t compare_part(const session_mesh *mesh, int threads, session_repor
         else
             session_text_add(&report->left_out,
                              "mesh \"%s\": field \"%s\" has the values of the last picture: no ranges", mesh->name,
-                             session_scalar_name(mesh, scalar));
+                             session_get_scalar_name(mesh, scalar));
     }
     return unchanged;
 }

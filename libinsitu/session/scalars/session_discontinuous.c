@@ -19,7 +19,7 @@ static bool is_of_corners(const session_mesh *mesh, const scene_field *field)
     return index >= 0 && mesh->fields[index].given.centring == INSITU_CORNER;
 }
 
-static bool is_in_image(const session_mesh *mesh, const scene_image *image)
+static bool is_mesh_used_by_image(const session_mesh *mesh, const scene_image *image)
 {
     scene_field_walk walk = {.image = image};
     bool is_in = image->condition.is_given && is_of_corners(mesh, &image->condition.field);
@@ -28,20 +28,21 @@ static bool is_in_image(const session_mesh *mesh, const scene_image *image)
     return is_in;
 }
 
-static bool is_named_in_scene(const session_mesh *mesh, const scene *scene)
+static bool is_corner_field_used_by_scene(const session_mesh *mesh, const scene *scene)
 {
     bool is_in = false;
     for (int i = 0; i < scene->statistics_count; i++) is_in = is_in || is_of_corners(mesh, &scene->statistics[i].field);
     for (int i = 0; i < scene->derived_count; i++)
         for (int k = 0; k < scene->derived[i].input_count; k++)
             is_in = is_in || is_of_corners(mesh, &scene->derived[i].inputs[k]);
-    for (int i = 0; i < scene->image_count && !is_in; i++) is_in = is_in_image(mesh, &scene->images[i]);
+    for (int i = 0; i < scene->image_count && !is_in; i++) is_in = is_mesh_used_by_image(mesh, &scene->images[i]);
     return is_in;
 }
 
 /* ---- one mesh ------------------------------------------------------------------------------------------------- */
 
-static int64_t origin_of(const session_discontinuous *vertices, const insitu_mesh *given, int64_t corner)
+static int64_t find_shared_vertex_of_corner(const session_discontinuous *vertices, const insitu_mesh *given,
+                                            int64_t corner)
 {
     if (vertices->are_corners_entries)
         return grid_array_index(&vertices->shared_connectivity, session_entry_index(given, corner));
@@ -50,7 +51,7 @@ static int64_t origin_of(const session_discontinuous *vertices, const insitu_mes
 
 int64_t session_vertex_of_corner(const session_mesh *mesh, int64_t corner)
 {
-    return origin_of(&mesh->discontinuous, &mesh->given, corner);
+    return find_shared_vertex_of_corner(&mesh->discontinuous, &mesh->given, corner);
 }
 
 static insitu_status refuse_polyhedra(const session_mesh *mesh, base_error *error)
@@ -82,7 +83,7 @@ static bool copy_coordinates(const session_mesh *mesh, int threads, session_disc
             region_enter();
 #pragma omp for schedule(static) nowait
             for (int64_t corner = 0; corner < vertices->corner_count; corner++) {
-                const int64_t vertex = origin_of(vertices, &mesh->given, corner);
+                const int64_t vertex = find_shared_vertex_of_corner(vertices, &mesh->given, corner);
                 const bool is_vertex = vertex >= 0 && vertex < shared->vertex_count;
                 memcpy(to + corner * (int64_t)size, from.data + (is_vertex ? vertex : 0) * from.stride, size);
             }
@@ -115,7 +116,7 @@ static insitu_status number_corners(const session_mesh *mesh, int threads, sessi
 
 static insitu_status make_discontinuous(session_mesh *mesh, int threads, base_error *error)
 {
-    session_discontinuous vertices = {.is_active = true, .corner_count = session_corner_count(&mesh->given)};
+    session_discontinuous vertices = {.is_active = true, .corner_count = session_count_corners(&mesh->given)};
     insitu_status status = refuse_polyhedra(mesh, error);
     if (status) return status;
     status = number_corners(mesh, threads, &vertices, error);
@@ -123,11 +124,11 @@ static insitu_status make_discontinuous(session_mesh *mesh, int threads, base_er
     vertices.is_made = copy_coordinates(mesh, threads, &vertices);
     if (!vertices.is_made) {
         session_drop_discontinuous(&vertices);
-        return session_fail_for_memory(error, session_corner_count(&mesh->given) * 24, "corners' coordinates");
+        return session_fail_for_memory(error, session_count_corners(&mesh->given) * 24, "corners' coordinates");
     }
     session_drop_discontinuous(&mesh->discontinuous);
     mesh->discontinuous = vertices;
-    session_read_topology(mesh);
+    session_select_grid_arrays(mesh);
     return INSITU_OK;
 }
 
@@ -147,7 +148,7 @@ static insitu_status update_discontinuous_mesh(session_meshes *meshes, session_m
     const bool was_discontinuous = mesh->discontinuous.is_active;
     if (!is_discontinuous && was_discontinuous) {
         session_drop_discontinuous(&mesh->discontinuous);
-        session_read_topology(mesh);
+        session_select_grid_arrays(mesh);
     }
     if (is_discontinuous != was_discontinuous) drop_vertex_data(meshes, mesh);
     return is_discontinuous && !mesh->discontinuous.is_made ? make_discontinuous(mesh, threads, error) : INSITU_OK;
@@ -169,7 +170,7 @@ insitu_status session_make_discontinuous(session_meshes *meshes, const session_c
     for (int m = 0; m < meshes->count && !error->status; m++) {
         session_mesh *mesh = meshes->items[m];
         /* in a mesh with finer lattices cells do not share nodes, so that the mesh need not be made discontinuous */
-        const bool is_discontinuous = !mesh->finer.parts && is_named_in_scene(mesh, scene);
+        const bool is_discontinuous = !mesh->finer.parts && is_corner_field_used_by_scene(mesh, scene);
         if (mesh->is_given) update_discontinuous_mesh(meshes, mesh, is_discontinuous, team->threads, error);
     }
     return has_corners(catalogue) ? session_agree(team->comm, error) : INSITU_OK;

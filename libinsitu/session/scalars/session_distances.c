@@ -26,7 +26,7 @@ void session_find_plane_point(const scene_plane *plane, const session_extent *ex
                  point);
 }
 
-static session_plane plane_of_scene(const scene_plane *in)
+static session_plane convert_plane(const scene_plane *in)
 {
     session_plane out = {.is_central = !in->has_point, .offset = in->offset, .extent_fraction = in->extent_fraction};
     memcpy(out.normal, in->normal, sizeof out.normal);
@@ -48,7 +48,7 @@ static bool is_same_plane(const session_plane *a, const session_plane *b)
 
 session_scalar *session_find_distance(const session_mesh *mesh, const scene_plane *plane)
 {
-    const session_plane given = plane_of_scene(plane);
+    const session_plane given = convert_plane(plane);
     for (int i = 0; i < mesh->scalar_count; i++) {
         session_scalar *scalar = &mesh->scalars[i];
         if (session_is_distance(scalar) && is_same_plane(&scalar->plane, &given)) return scalar;
@@ -61,7 +61,7 @@ static session_scalar *add_distance(session_mesh *mesh, const scene_plane *plane
     session_scalar *scalar = session_add_scalar(mesh);
     if (!scalar) return NULL;
     scalar->field = -1;
-    scalar->plane = plane_of_scene(plane);
+    scalar->plane = convert_plane(plane);
     scalar->may_have_changed = false;
     return scalar;
 }
@@ -95,7 +95,7 @@ bool session_mark_distance(session_mesh *mesh, const scene_plane *plane, const s
 static void compute_distances(const session_mesh *mesh, const session_plane *plane, int threads, float *out)
 {
     const double *n = plane->normal, *p = plane->point;
-#pragma omp parallel num_threads(session_region_threads(threads, mesh->cells.vertex_count))
+#pragma omp parallel num_threads(session_choose_loop_threads(threads, mesh->cells.vertex_count))
     {
         region_enter();
 #pragma omp for schedule(static) nowait

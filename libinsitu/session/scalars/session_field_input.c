@@ -18,11 +18,11 @@ static session_field *add_field(session_mesh *mesh, const char *name, base_error
 }
 
 /* Returns the number of entries of the connectivity that are vertices of cells, without the unused ends of rows. */
-int64_t session_corner_count(const insitu_mesh *mesh)
+int64_t session_count_corners(const insitu_mesh *mesh)
 {
     if (mesh->cell_count == 0) return 0;
     if (mesh->offsets.data) return mesh->connectivity_count;
-    return mesh->cell_count * session_cell_nodes(mesh);
+    return mesh->cell_count * session_count_cell_nodes(mesh);
 }
 
 /* Returns the number of values that a field needs: the mesh's number of vertices, cells or corners, depending on the
@@ -31,8 +31,8 @@ int64_t session_count_field_positions(const insitu_mesh *mesh, const insitu_fiel
 {
     if (field->centring == INSITU_VERTEX) return mesh->vertex_count;
     if (field->centring == INSITU_CELL) return mesh->cell_count;
-    if (field->corner_row == 0 || mesh->cell_count == 0) return session_corner_count(mesh);
-    return (mesh->cell_count - 1) * field->corner_row + session_cell_nodes(mesh);
+    if (field->corner_row == 0 || mesh->cell_count == 0) return session_count_corners(mesh);
+    return (mesh->cell_count - 1) * field->corner_row + session_count_cell_nodes(mesh);
 }
 
 static const char *describe_centring(insitu_centring centring)
@@ -85,7 +85,7 @@ static insitu_status check_field_arrays(const session_mesh *mesh, const insitu_f
  * later, when the mesh is made discontinuous. */
 static insitu_status check_corners(const insitu_mesh *mesh, const insitu_field *field, base_error *error)
 {
-    const long long row = field->corner_row, vertices = session_cell_nodes(mesh);
+    const long long row = field->corner_row, vertices = session_count_cell_nodes(mesh);
     if (field->centring != INSITU_CORNER) {
         if (row == 0) return INSITU_OK;
         return base_fail(error, INSITU_ERROR_ARGUMENT, "corner_row is %lld, and its centring %d is not corners (%d)",
@@ -365,7 +365,8 @@ insitu_status session_set_part_field(session_meshes *meshes, session_mesh *mesh,
 
 /* Refuses a field whose mesh was refused. The next step returns the mesh's own error. Images that show the field need
  * the mesh, and are not drawn. */
-static insitu_status refuse_field(session_meshes *meshes, session_mesh *mesh, const char *name, base_error *error)
+static insitu_status fail_for_refused_mesh(session_meshes *meshes, session_mesh *mesh, const char *name,
+                                           base_error *error)
 {
     if (session_find_field(mesh, name) < 0 && !add_field(mesh, name, error)) {
         session_store_pending(meshes, error, NULL, NULL);
@@ -376,8 +377,8 @@ static insitu_status refuse_field(session_meshes *meshes, session_mesh *mesh, co
 
 /* Reports that the mesh or block does not exist. The message states if a block is requested of a mesh without blocks,
  * or no block of a mesh with blocks. */
-static void refuse_missing_mesh(const session_meshes *meshes, const char *name, int64_t block, const char *field,
-                                base_error *error)
+static void fail_for_missing_mesh(const session_meshes *meshes, const char *name, int64_t block, const char *field,
+                                  base_error *error)
 {
     const session_parts parts = session_find_parts(meshes, name);
     if (parts.count && block == SESSION_WHOLE)
@@ -403,9 +404,9 @@ insitu_status session_set_field(session_meshes *meshes, const char *name, int64_
     if (!name || !field_name || !*field_name)
         base_fail(error, INSITU_ERROR_ARGUMENT, "%s: no mesh, no field, or a field without a name", call);
     else if (!mesh)
-        refuse_missing_mesh(meshes, name, block, field_name, error);
+        fail_for_missing_mesh(meshes, name, block, field_name, error);
     else if (!mesh->is_given)
-        return refuse_field(meshes, mesh, field_name, error);
+        return fail_for_refused_mesh(meshes, mesh, field_name, error);
     else if (session_set_part_field(meshes, mesh, field, error) != INSITU_ERROR_MEMORY)
         return error->status;
     session_store_pending(meshes, error, name, field_name && *field_name ? field_name : NULL);
@@ -413,8 +414,8 @@ insitu_status session_set_field(session_meshes *meshes, const char *name, int64_
 }
 
 /* Checks that the filled field has the centring and the number of components that were declared. */
-static insitu_status check_filled(const session_mesh *mesh, const insitu_field *promised, const insitu_field *filled,
-                                  base_error *error)
+static insitu_status check_filled_field(const session_mesh *mesh, const insitu_field *promised,
+                                        const insitu_field *filled, base_error *error)
 {
     insitu_field values = *filled;
     values.fill = NULL;
@@ -430,7 +431,7 @@ insitu_status session_store_filled(session_mesh *mesh, int index, const insitu_f
     session_field *field = &mesh->fields[index];
     const insitu_field promised = field->given;
     base_error what = {0};
-    if (check_filled(mesh, &promised, filled, &what) || !copy_tables(field, filled, &what))
+    if (check_filled_field(mesh, &promised, filled, &what) || !copy_tables(field, filled, &what))
         return session_prefix_error(error, mesh->label, promised.name, &what);
     set_value_arrays(mesh, field, filled, false, (filled->changed & INSITU_CHANGED_VALUES) != 0);
     field->given.fill = promised.fill;

@@ -23,7 +23,7 @@ void session_mark_scalars_stale(session_mesh *mesh, int field);
 
 /* Returns the number of entries of the connectivity that are vertices of cells, without the unused ends of rows. The
  * mesh must not have polyhedra. */
-int64_t session_corner_count(const insitu_mesh *mesh);
+int64_t session_count_corners(const insitu_mesh *mesh);
 /* Returns the number of the field's values or, if it has an index, of the index's entries. For corners in rows it is
  * the smallest allowed number. */
 int64_t session_count_field_positions(const insitu_mesh *mesh, const insitu_field *field);

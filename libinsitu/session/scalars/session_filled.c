@@ -11,8 +11,8 @@ static bool is_needed(const session_mesh *mesh, int index, bool of_images)
     return is_used;
 }
 
-static insitu_status call_fill(session_meshes *meshes, const session_mesh *mesh, const insitu_field *given,
-                               insitu_field *out, base_error *error)
+static insitu_status call_fill_function(session_meshes *meshes, const session_mesh *mesh, const insitu_field *given,
+                                        insitu_field *out, base_error *error)
 {
     *out = *given;
     out->changed = INSITU_CHANGED_ALL;
@@ -37,11 +37,11 @@ insitu_status session_fill_field(session_meshes *meshes, session_mesh *mesh, int
     *error = field->fill_problem;
     if (field->is_filled) return error->status;
     field->is_filled = true;
-    insitu_status status = call_fill(meshes, mesh, &field->given, &filled, error);
+    insitu_status status = call_fill_function(meshes, mesh, &field->given, &filled, error);
     if (!status) status = session_store_filled(mesh, index, &filled, error);
     for (int i = 0; i < mesh->scalar_count && !status; i++)
         if (mesh->scalars[i].field == index)
-            mesh->scalars[i].original_values = session_caller_field(mesh, index, mesh->scalars[i].component);
+            mesh->scalars[i].original_values = session_get_caller_values(mesh, index, mesh->scalars[i].component);
     field->fill_problem = *error;
     return status;
 }

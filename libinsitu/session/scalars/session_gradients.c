@@ -122,8 +122,8 @@ static inline __attribute__((always_inline)) void add_numbers(const target *to, 
     }
 }
 
-void session_mean_gradients(const int64_t *sum, int field_count, const session_gradient_bounds *bounds, double length,
-                            double out[][3])
+void session_compute_mean_gradients(const int64_t *sum, int field_count, const session_gradient_bounds *bounds,
+                                    double length, double out[][3])
 {
     const int count = session_count_sum_numbers(field_count);
     double units[2], numbers[MOST_NUMBERS];
@@ -395,7 +395,7 @@ static bool is_summed(const session_gradient_basis *basis, int64_t cell)
 }
 
 /* Returns whether one of the caller's cells is drawn and has a node with a sum. The cells have polynomials. */
-static bool has_row_entry(const session_gradient_basis *basis, int64_t cell)
+static bool has_polynomial_cell_a_sum(const session_gradient_basis *basis, int64_t cell)
 {
     const session_polynomials *p = basis->polynomials;
     const int64_t size = session_row_size(&p->rows, cell);
@@ -403,13 +403,13 @@ static bool has_row_entry(const session_gradient_basis *basis, int64_t cell)
     while (piece < p->first_pieces[cell + 1] && !is_summed(basis, piece)) piece++;
     if (piece == p->first_pieces[cell + 1]) return false;
     for (int n = 0; n < size; n++)
-        if (basis->sum_indices[session_row_node(&p->rows, cell, n)] >= 0) return true;
+        if (basis->sum_indices[session_find_row_vertex(&p->rows, cell, n)] >= 0) return true;
     return false;
 }
 
-static bool has_entry(const session_gradient_basis *basis, int64_t cell)
+static bool does_cell_contribute(const session_gradient_basis *basis, int64_t cell)
 {
-    if (basis->polynomials) return has_row_entry(basis, cell);
+    if (basis->polynomials) return has_polynomial_cell_a_sum(basis, cell);
     if (!is_summed(basis, cell)) return false;
     grid_walk walk = grid_walk_cell(basis->cells, cell);
     int64_t vertex;
@@ -429,13 +429,13 @@ bool session_list_cells(const session_gradient_basis *basis, session_cell_list *
     uint64_t *bits = base_calloc((size_t)blocks * (BLOCK / 64) + 1, sizeof *bits);
     *out = (session_cell_list){0};
     if (!starts || !bits) goto done;
-#pragma omp parallel num_threads(session_region_threads(basis->threads, cells))
+#pragma omp parallel num_threads(session_choose_loop_threads(basis->threads, cells))
     {
         region_enter();
 #pragma omp for schedule(dynamic) nowait
         for (int64_t b = 0; b < blocks; b++)
             for (int64_t cell = b * BLOCK; cell < (b + 1) * BLOCK && cell < cells; cell++)
-                if (has_entry(basis, cell)) {
+                if (does_cell_contribute(basis, cell)) {
                     bits[cell / 64] |= (uint64_t)1 << cell % 64;
                     starts[b + 1]++;
                 }
@@ -445,7 +445,7 @@ bool session_list_cells(const session_gradient_basis *basis, session_cell_list *
     out->cells = base_alloc((size_t)(starts[blocks] ? starts[blocks] : 1) * sizeof *out->cells);
     if (!out->cells) goto done;
     out->count = starts[blocks];
-#pragma omp parallel num_threads(session_region_threads(basis->threads, cells))
+#pragma omp parallel num_threads(session_choose_loop_threads(basis->threads, cells))
     {
         region_enter();
 #pragma omp for schedule(dynamic) nowait
@@ -503,7 +503,7 @@ static void add_row_node(target *to, const session_derivatives *d, const node_li
 static bool read_row_node(target *to, int64_t cell, node_list *row, int n)
 {
     if (row->nodes[n].vertex >= 0) return true;
-    return read_node(to->basis, session_row_node(&to->basis->polynomials->rows, cell, n), to->scale,
+    return read_node(to->basis, session_find_row_vertex(&to->basis->polynomials->rows, cell, n), to->scale,
                      to->basis->field_count, &row->nodes[n]);
 }
 
@@ -515,7 +515,7 @@ static bool read_summed_nodes(target *to, int64_t cell, const session_derivative
     bool is_finite = true;
     for (int n = 0; n < size; n++) row->nodes[n].vertex = -1;
     for (int n = 0; n < size && is_finite; n++) {
-        if (to->basis->sum_indices[session_row_node(&p->rows, cell, n)] < 0) continue;
+        if (to->basis->sum_indices[session_find_row_vertex(&p->rows, cell, n)] < 0) continue;
         is_finite = read_row_node(to, cell, row, n);
         const int end = d->starts[d->axis_count * (n + 1)];
         for (int t = d->starts[d->axis_count * n]; t < end && is_finite; t++)
@@ -534,7 +534,7 @@ static bool read_all_nodes(target *to, int64_t cell, node_list *row, int size)
 
 /* Adds the contributions of one of the caller's cells. If its derivatives are not known, or a value is not finite, its
  * pieces contribute as linear cells. */
-static void add_row(target *to, int64_t cell, node_list *row)
+static void add_polynomial_cell(target *to, int64_t cell, node_list *row)
 {
     const session_polynomials *p = to->basis->polynomials;
     const int size = (int)session_row_size(&p->rows, cell);
@@ -542,7 +542,7 @@ static void add_row(target *to, int64_t cell, node_list *row)
     if (!reserve_nodes(row, size)) return;
     bool is_finite = is_finer || read_all_nodes(to, cell, row, size);
     const session_derivatives *d =
-        session_derivatives_of(p, cell, row->nodes->position, (int)(sizeof *row->nodes / sizeof(double)));
+        session_find_derivatives_of_cell(p, cell, row->nodes->position, (int)(sizeof *row->nodes / sizeof(double)));
     if (is_finer && d->axis_count) is_finite = read_summed_nodes(to, cell, d, row, size);
     if (is_finite && d->axis_count) {
         for (int n = 0; n < size; n++)
@@ -556,7 +556,7 @@ static void add_row(target *to, int64_t cell, node_list *row)
 static void add_cell(target *to, int64_t cell, node_list *buffer)
 {
     if (to->basis->polynomials)
-        add_row(to, cell, buffer);
+        add_polynomial_cell(to, cell, buffer);
     else
         add_linear_cell(to, cell, buffer);
 }
@@ -581,7 +581,7 @@ static void record_adding_threads(const target *to, int64_t cell)
 {
     const session_polynomials *p = to->basis->polynomials;
     const int64_t size = p ? session_row_size(&p->rows, cell) : 0;
-    for (int n = 0; n < size; n++) record_adding_thread(to, session_row_node(&p->rows, cell, n));
+    for (int n = 0; n < size; n++) record_adding_thread(to, session_find_row_vertex(&p->rows, cell, n));
     if (p) return;
     grid_walk walk = grid_walk_cell(to->basis->cells, cell);
     int64_t vertex;
@@ -594,7 +594,7 @@ static bool add_all_cells(const target *like, const session_cell_list *list, ses
 {
     double rise = 0, sharpness = 0;
     bool is_out_of_memory = false;
-#pragma omp parallel num_threads(session_region_threads(like->basis->threads, list->count))                            \
+#pragma omp parallel num_threads(session_choose_loop_threads(like->basis->threads, list->count))                       \
     reduction(max                                                                                                      \
               : rise, sharpness) reduction(||                                                                          \
                                            : is_out_of_memory)
@@ -626,7 +626,7 @@ bool session_bound_gradients(const session_gradient_basis *basis, const session_
     return add_all_cells(&to, list, out);
 }
 
-unsigned char *session_sum_owners(int64_t sum_count, int threads)
+unsigned char *session_create_sum_owners(int64_t sum_count, int threads)
 {
     const size_t count = threads > 1 ? (size_t)sum_count : 0;
     unsigned char *owners = base_alloc(count + 1);

@@ -33,7 +33,7 @@ static inline int session_count_sum_numbers(int field_count)
     return field_count == 1 ? 4 : field_count == 2 ? 8 : 10;
 }
 
-static inline int session_sum_words(int field_count)
+static inline int session_count_sum_words(int field_count)
 {
     return 2 * session_count_sum_numbers(field_count);
 }
@@ -62,16 +62,16 @@ bool session_bound_gradients(const session_gradient_basis *basis, const session_
 
 /* Returns an array with one byte per sum, in which session_add_gradients() records the number of the thread that adds
  * to the sum. It is allocated by base_alloc(); NULL if memory runs out. Local. */
-unsigned char *session_sum_owners(int64_t sum_count, int threads);
+unsigned char *session_create_sum_owners(int64_t sum_count, int threads);
 
-/* Adds the cells' contributions to the sums. Each sum has session_sum_words() words. bounds: the bounds over all grids
- * and ranks; owners: the array for these sums, shared by all grids. Returns false if memory runs out. Local. */
+/* Adds the cells' contributions to the sums. Each sum has session_count_sum_words() words. bounds: the bounds over all
+ * grids and ranks; owners: the array for these sums, shared by all grids. Returns false if memory runs out. Local. */
 bool session_add_gradients(const session_gradient_basis *basis, const session_cell_list *list,
                            const session_gradient_bounds *bounds, unsigned char *owners, int64_t *sums);
 
 /* Computes the mean gradients from a sum, in units of values divided by coordinates. They are NaN if no cell
  * contributed. length: session_gradient_basis.length of the sums. */
-void session_mean_gradients(const int64_t *sum, int field_count, const session_gradient_bounds *bounds, double length,
-                            double out[][3]);
+void session_compute_mean_gradients(const int64_t *sum, int field_count, const session_gradient_bounds *bounds,
+                                    double length, double out[][3]);
 
 #endif

@@ -63,7 +63,7 @@ static indexed_values make_indexed_values(const session_mesh *mesh, const sessio
     if (given->centring == INSITU_CELL) out.parents = mesh->topology.parents;
     if (given->corner_row) {
         out.row_length = given->corner_row;
-        out.used_length = session_cell_nodes(&mesh->original);
+        out.used_length = session_count_cell_nodes(&mesh->original);
     }
     return out;
 }
@@ -152,7 +152,7 @@ static insitu_status check_index(const session_mesh *mesh, const session_field *
                                  base_error *error)
 {
     const bool at_vertices = field->given.centring == INSITU_VERTEX;
-    const int64_t count = at_vertices ? mesh->original.vertex_count : session_corner_count(&mesh->original);
+    const int64_t count = at_vertices ? mesh->original.vertex_count : session_count_corners(&mesh->original);
     for (int64_t position = 0; position < count && v->index.data; position++) {
         const int64_t entry = find_value_entry(v, position), at = grid_array_index(&v->index, entry);
         if (at < 0 || at >= v->count) return describe_fault(mesh, field, v, entry, error);
@@ -203,13 +203,13 @@ static insitu_status update_copy(session_mesh *mesh, int index, int threads, bas
                                                                       : copy_values(mesh, field, threads, error);
     for (int i = 0; i < mesh->scalar_count && !status; i++)
         if (mesh->scalars[i].field == index)
-            mesh->scalars[i].original_values = session_caller_field(mesh, index, mesh->scalars[i].component);
+            mesh->scalars[i].original_values = session_get_caller_values(mesh, index, mesh->scalars[i].component);
     return status;
 }
 
 /* Updates the copy of a field that statistics or derived fields need. Statistics of higher order read the caller's
  * values, so that they need no copy at the nodes of finer lattices. */
-static insitu_status update_requested(session_mesh *mesh, int index, int threads, base_error *error)
+static insitu_status update_requested_copy(session_mesh *mesh, int index, int threads, base_error *error)
 {
     session_field *field = &mesh->fields[index];
     if (field->is_source || !session_is_interpolated(mesh, field)) return update_copy(mesh, index, threads, error);
@@ -217,14 +217,14 @@ static insitu_status update_requested(session_mesh *mesh, int index, int threads
     return check_index(mesh, field, &v, error);
 }
 
-insitu_status session_copy_requested(const session_meshes *meshes, int threads, base_error *error)
+insitu_status session_copy_requested_fields(const session_meshes *meshes, int threads, base_error *error)
 {
     insitu_status status = INSITU_OK;
     for (int m = 0; m < meshes->count; m++) {
         session_mesh *mesh = meshes->items[m];
         for (int f = 0; f < mesh->field_count; f++) {
             const bool is_needed = mesh->fields[f].is_in_statistics || mesh->fields[f].is_source;
-            if (is_needed && !status) status = update_requested(mesh, f, threads, error);
+            if (is_needed && !status) status = update_requested_copy(mesh, f, threads, error);
             mesh->fields[f].is_in_statistics = false;
         }
     }
@@ -238,7 +238,7 @@ static void copy_used_values(session_mesh *mesh, int index, int threads, base_er
     if (update_copy(mesh, index, threads, &own)) session_store_problem(&mesh->fields[index], &own, error);
 }
 
-insitu_status session_copy_used(const session_meshes *meshes, int threads, base_error *error)
+insitu_status session_copy_used_fields(const session_meshes *meshes, int threads, base_error *error)
 {
     for (int m = 0; m < meshes->count; m++) {
         session_mesh *mesh = meshes->items[m];

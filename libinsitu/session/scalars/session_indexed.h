@@ -12,11 +12,11 @@ void session_request_field(const session_meshes *meshes, const scene_field *fiel
 void session_clear_requested_fields(const session_meshes *meshes);
 
 /* Both functions copy values into the order of the mesh by their index, unless the copy is up to date.
- * session_copy_requested() copies the fields that statistics need, and clears their marks. session_copy_used() copies
- * the fields of scalars in use, and the fields from which derived fields are computed. They must be called before the
- * values are read. Local. */
-insitu_status session_copy_requested(const session_meshes *meshes, int threads, base_error *error);
-insitu_status session_copy_used(const session_meshes *meshes, int threads, base_error *error);
+ * session_copy_requested_fields() copies the fields that statistics need, and clears their marks.
+ * session_copy_used_fields() copies the fields of scalars in use, and the fields from which derived fields are
+ * computed. They must be called before the values are read. Local. */
+insitu_status session_copy_requested_fields(const session_meshes *meshes, int threads, base_error *error);
+insitu_status session_copy_used_fields(const session_meshes *meshes, int threads, base_error *error);
 
 /* Passes the caller's values at the nodes of cells of higher order to the function `use`. If the field has no values at
  * nodes, or has a fault, `use` is not called. Returns the status of `use`. Local. */

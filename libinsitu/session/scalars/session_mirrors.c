@@ -101,10 +101,10 @@ static void share_derived_field(session_mesh *image, const char *name)
     session_mark_scalars_stale(image, index);
     for (int i = 0; i < image->scalar_count; i++)
         if (image->scalars[i].field == index)
-            image->scalars[i].original_values = session_caller_field(image, index, image->scalars[i].component);
+            image->scalars[i].original_values = session_get_caller_values(image, index, image->scalars[i].component);
 }
 
-void session_share_derived(const session_meshes *meshes, const char *name)
+void session_share_derived_values(const session_meshes *meshes, const char *name)
 {
     for (int i = 0; i < meshes->count; i++)
         if (meshes->items[i]->source && meshes->items[i]->is_given) share_derived_field(meshes->items[i], name);
@@ -143,7 +143,8 @@ void session_update_mirrors(const scene *scene, session_meshes *meshes, int thre
 /* Bounds, over all ranks, of the meshes that the mirror draws: three minima, then three negated maxima. */
 enum { ENDS = 6 };
 
-static void find_ends(const scene_mirror *mirror, const scene *scene, const session_meshes *meshes, double ends[ENDS])
+static void find_bounds_of_mirrored_meshes(const scene_mirror *mirror, const scene *scene, const session_meshes *meshes,
+                                           double ends[ENDS])
 {
     for (int i = 0; i < ENDS; i++) ends[i] = INFINITY;
     for (int i = 0; i < meshes->count; i++) {
@@ -182,7 +183,8 @@ insitu_status session_check_mirrors(const scene *scene, const session_meshes *me
     double *ends = base_alloc((size_t)count * ENDS * sizeof *ends);
     if (!ends) session_fail_for_memory(error, count * ENDS * 8, "bounds of mirrored meshes");
     insitu_status status = session_agree(team->comm, error);
-    for (int i = 0; i < count && !status; i++) find_ends(&scene->mirrors[i], scene, meshes, ends + i * ENDS);
+    for (int i = 0; i < count && !status; i++)
+        find_bounds_of_mirrored_meshes(&scene->mirrors[i], scene, meshes, ends + i * ENDS);
     if (!status)
         status = session_check_mpi(
             error, MPI_Allreduce(MPI_IN_PLACE, ends, count * ENDS, MPI_DOUBLE, MPI_MIN, team->comm), "MPI_Allreduce");

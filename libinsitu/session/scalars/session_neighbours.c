@@ -24,13 +24,13 @@ static uint64_t find_mirrored_axes(const session_mesh *mesh, int64_t vertex)
     return axes;
 }
 
-static session_key key_of_id(const session_mesh *mesh, int64_t vertex)
+static session_key make_key_of_id(const session_mesh *mesh, int64_t vertex)
 {
     const grid_array ids = session_grid_array(&mesh->given.vertex_ids);
     return (session_key){{(uint64_t)grid_array_index(&ids, vertex), find_mirrored_axes(mesh, vertex), 0}};
 }
 
-static session_key key_of_position(const grid_array coordinates[3], int64_t vertex)
+static session_key make_key_of_position(const grid_array coordinates[3], int64_t vertex)
 {
     session_key key;
     for (int axis = 0; axis < 3; axis++) {
@@ -42,15 +42,16 @@ static session_key key_of_position(const grid_array coordinates[3], int64_t vert
 
 session_key session_vertex_key(const session_mesh *mesh, int64_t vertex, bool by_id)
 {
-    if (by_id) return key_of_id(mesh, mesh->discontinuous.is_made ? session_vertex_of_corner(mesh, vertex) : vertex);
-    return key_of_position(mesh->cells.coordinates, vertex);
+    if (by_id)
+        return make_key_of_id(mesh, mesh->discontinuous.is_made ? session_vertex_of_corner(mesh, vertex) : vertex);
+    return make_key_of_position(mesh->cells.coordinates, vertex);
 }
 
 session_key session_caller_vertex_key(const session_mesh *mesh, int64_t vertex, bool by_id)
 {
-    if (by_id) return key_of_id(mesh, vertex);
-    if (mesh->cells.lattice) return key_of_position(mesh->cells.coordinates, vertex);
+    if (by_id) return make_key_of_id(mesh, vertex);
+    if (mesh->cells.lattice) return make_key_of_position(mesh->cells.coordinates, vertex);
     grid_array coordinates[3];
     for (int axis = 0; axis < 3; axis++) coordinates[axis] = session_coordinates(&mesh->given, axis);
-    return key_of_position(coordinates, vertex);
+    return make_key_of_position(coordinates, vertex);
 }

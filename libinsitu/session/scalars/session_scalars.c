@@ -18,7 +18,7 @@ bool session_is_distance(const session_scalar *scalar)
     return scalar->field < 0;
 }
 
-const char *session_scalar_name(const session_mesh *mesh, const session_scalar *scalar)
+const char *session_get_scalar_name(const session_mesh *mesh, const session_scalar *scalar)
 {
     return session_is_distance(scalar) ? "distance from a slice" : mesh->fields[scalar->field].given.name;
 }
@@ -70,7 +70,7 @@ bool session_is_copied(const session_mesh *mesh, const session_field *field)
     if (mesh->finer.parts) return true;
     if (field->given.centring == INSITU_VERTEX) return mesh->discontinuous.is_active;
     if (field->given.centring == INSITU_CELL) return mesh->topology.is_split;
-    return field->given.corner_row && field->given.corner_row != session_cell_nodes(&mesh->given);
+    return field->given.corner_row && field->given.corner_row != session_count_cell_nodes(&mesh->given);
 }
 
 bool session_is_interpolated(const session_mesh *mesh, const session_field *field)
@@ -93,7 +93,7 @@ session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field 
                        find_mesh_group_name(mesh, field));
 }
 
-grid_field session_caller_field(const session_mesh *mesh, int index, int component)
+grid_field session_get_caller_values(const session_mesh *mesh, int index, int component)
 {
     const session_field *field = &mesh->fields[index];
     grid_field out = {.values = field->values,
@@ -122,18 +122,18 @@ bool session_find_values(const session_mesh *mesh, const scene_field *field, gri
 {
     const int index = find_field(mesh, field);
     if (index < 0) return false;
-    *out =
-        session_caller_field(mesh, index, session_resolve_component(field, mesh->fields[index].given.component_count));
+    *out = session_get_caller_values(mesh, index,
+                                     session_resolve_component(field, mesh->fields[index].given.component_count));
     return true;
 }
 
-grid_field session_scalar_field(const session_mesh *mesh, const session_scalar *scalar)
+grid_field session_get_scalar_values(const session_mesh *mesh, const session_scalar *scalar)
 {
     if (session_is_distance(scalar))
         return (grid_field){.values = {.data = (const char *)scalar->distances, .stride = (int64_t)sizeof(float)},
                             .component_stride = (int64_t)sizeof(float),
                             .component_count = 1};
-    if (!scalar->is_recentred) return session_caller_field(mesh, scalar->field, scalar->component);
+    if (!scalar->is_recentred) return session_get_caller_values(mesh, scalar->field, scalar->component);
     return (grid_field){
         .values = {.data = (const char *)scalar->vertex_values, .stride = (int64_t)sizeof(double), .is_wide = true},
         .component_stride = (int64_t)sizeof(double),
@@ -167,7 +167,7 @@ bool session_mark_scalar(session_mesh *mesh, const scene_field *field, bool need
         scalar->mesh_group_name = find_mesh_group_name(mesh, field);
     }
     scalar->is_used = true;
-    scalar->original_values = session_caller_field(mesh, index, scalar->component);
+    scalar->original_values = session_get_caller_values(mesh, index, scalar->component);
     scalar->needs_ranges = scalar->needs_ranges || needs_ranges;
     mesh->is_needed = mesh->is_needed || needs_ranges;
     *marked = scalar;
@@ -179,7 +179,7 @@ int64_t session_count_unusable(const session_mesh *mesh, const session_scalar *s
     const grid *g = &mesh->cells;
     int64_t count = 0;
     if (!mesh->topology.is_split || !scalar->unusable_count) return scalar->unusable_count;
-    const grid_field field = session_scalar_field(mesh, scalar);
+    const grid_field field = session_get_scalar_values(mesh, scalar);
     for (int64_t cell = 0; cell < mesh->given.cell_count; cell++) {
         bool is_any = false;
         for (int64_t piece = session_first_piece(mesh, cell); piece < session_first_piece(mesh, cell + 1); piece++)
@@ -191,7 +191,7 @@ int64_t session_count_unusable(const session_mesh *mesh, const session_scalar *s
 
 /* ---- ranges and extents -------------------------------------------------------------------------------------- */
 
-mmbvh_ranges session_scalar_ranges(const session_mesh *mesh, const session_scalar *scalar)
+mmbvh_ranges session_get_scalar_ranges(const session_mesh *mesh, const session_scalar *scalar)
 {
     return scalar->has_own_ranges ? mmbvh_own_ranges(&mesh->tree) : mmbvh_pair_ranges(scalar->node_ranges);
 }
@@ -207,7 +207,7 @@ static session_extremes find_extent(const grid *g, const grid_field *field, int 
                                     bool is_positive)
 {
     double least = INFINITY, most = -INFINITY;
-#pragma omp parallel num_threads(session_region_threads(threads, g->cell_count))
+#pragma omp parallel num_threads(session_choose_loop_threads(threads, g->cell_count))
     {
         region_enter();
 #pragma omp for schedule(static) reduction(min : least) reduction(max : most) nowait
@@ -223,13 +223,13 @@ static session_extremes find_extent(const grid *g, const grid_field *field, int 
     return (session_extremes){true, least, most};
 }
 
-void session_scalar_extent(const session_mesh *mesh, session_scalar *scalar, int threads, session_extent_kind kind,
-                           double *low, double *high)
+void session_find_scalar_extent(const session_mesh *mesh, session_scalar *scalar, int threads, session_extent_kind kind,
+                                double *low, double *high)
 {
     const bool is_same = kind == SESSION_SOLID && mesh->shell_count == 0;
     session_extremes *known = &scalar->extremes[is_same ? SESSION_SEEN : kind];
     if (!known->is_known) {
-        const grid_field field = session_scalar_field(mesh, scalar);
+        const grid_field field = session_get_scalar_values(mesh, scalar);
         *known = find_extent(&mesh->cells, &field, threads, includes_shells(scalar, kind), kind == SESSION_POSITIVE);
     }
     *low = known->low;

@@ -28,7 +28,7 @@ session_scalar *session_find_recentred(const session_mesh *mesh, const char *fie
 
 /* Returns the mesh's field, or a component of it, with the values that the caller has given, in the order of the
  * vertices or cells. */
-grid_field session_caller_field(const session_mesh *mesh, int field, int component);
+grid_field session_get_caller_values(const session_mesh *mesh, int field, int component);
 
 /* Returns whether the field's values are read from the session's copy, in the order of the vertices, cells or corners,
  * and not from the caller's arrays. */
@@ -52,21 +52,21 @@ session_scalar *session_add_scalar(session_mesh *mesh);
 /* Returns whether the scalar is the vertices' distance from a plane. */
 bool session_is_distance(const session_scalar *scalar);
 /* Returns the scalar's name for messages. */
-const char *session_scalar_name(const session_mesh *mesh, const session_scalar *scalar);
+const char *session_get_scalar_name(const session_mesh *mesh, const session_scalar *scalar);
 
 /* Returns the values of a scalar. */
-grid_field session_scalar_field(const session_mesh *mesh, const session_scalar *scalar);
+grid_field session_get_scalar_values(const session_mesh *mesh, const session_scalar *scalar);
 
 /* Returns the number of the caller's drawn cells that have a value which is not finite. Local. */
 int64_t session_count_unusable(const session_mesh *mesh, const session_scalar *scalar);
 
 /* Returns the ranges of a used scalar's values in the nodes of the tree. */
-mmbvh_ranges session_scalar_ranges(const session_mesh *mesh, const session_scalar *scalar);
+mmbvh_ranges session_get_scalar_ranges(const session_mesh *mesh, const session_scalar *scalar);
 
 /* Computes the minimum and maximum over the drawn cells all of whose values are finite; low > high if there are none.
  * Parallel. Local. */
-void session_scalar_extent(const session_mesh *mesh, session_scalar *scalar, int threads, session_extent_kind kind,
-                           double *low, double *high);
+void session_find_scalar_extent(const session_mesh *mesh, session_scalar *scalar, int threads, session_extent_kind kind,
+                                double *low, double *high);
 /* Marks the stored minima and maxima as unknown, because the values have changed. */
 void session_clear_extents(session_scalar *scalar);
 

@@ -31,7 +31,7 @@ double session_strain_rate(const double g[3][3])
 
 /* Returns the middle eigenvalue of a symmetric matrix with the entries xx, yy, zz, xy, xz, yz. It is computed from the
  * characteristic polynomial (Smith 1961). */
-static double middle_eigenvalue(const double m[6])
+static double compute_middle_eigenvalue(const double m[6])
 {
     const double mean = ((m[0] + m[1]) + m[2]) / 3, x = m[0] - mean, y = m[1] - mean, z = m[2] - mean;
     const double off = (m[3] * m[3] + m[4] * m[4]) + m[5] * m[5];
@@ -55,5 +55,5 @@ double session_lambda2(const double g[3][3])
         for (int k = 0; k < 3; k++) square[i][k] = (g[i][0] * g[0][k] + g[i][1] * g[1][k]) + g[i][2] * g[2][k];
     for (int i = 0; i < 6; i++)
         m[i] = 0.5 * (square[entries[i][0]][entries[i][1]] + square[entries[i][1]][entries[i][0]]);
-    return middle_eigenvalue(m);
+    return compute_middle_eigenvalue(m);
 }

@@ -101,7 +101,7 @@ static insitu_status warp_by_field(const warp_step *step, const scene_warp *warp
 }
 
 /* Warps the mesh if the scene requests it. An error is stored with the mesh, and the check of the mesh returns it. */
-static void update_mesh(const warp_step *step, session_mesh *mesh)
+static void update_warp_of_mesh(const warp_step *step, session_mesh *mesh)
 {
     const scene_warp *warp = scene_find_warp(step->scene, mesh->name);
     base_error problem = {.status = INSITU_OK};
@@ -121,7 +121,7 @@ void session_update_warps(const scene *scene, const char *scene_path, session_me
 {
     const warp_step step = {scene, scene_path, meshes, threads};
     for (int i = 0; i < meshes->count; i++)
-        if (meshes->items[i]->is_given && !meshes->items[i]->source) update_mesh(&step, meshes->items[i]);
+        if (meshes->items[i]->is_given && !meshes->items[i]->source) update_warp_of_mesh(&step, meshes->items[i]);
 }
 
 /* ---- warnings ---------------------------------------------------------------------------------------------------- */

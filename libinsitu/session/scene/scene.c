@@ -48,7 +48,7 @@ static bool is_sampling_unspecified(const scene_file_sampling *in)
 /* Chooses the default method for volumes. A single volume is integrated with an error bound, because samples are
  * cheaper but leave noise of unknown size. Several volumes are sampled, because their segments would have to be mixed
  * pixel by pixel. */
-static void choose_method(const scene_file_sampling *in, scene_image *out)
+static void choose_method_of_volumes(const scene_file_sampling *in, scene_image *out)
 {
     static const double default_error = 0.01;
     const bool by_default = is_sampling_unspecified(in) && out->volume_count == 1;
@@ -62,7 +62,7 @@ static insitu_status convert_sampling(const scene_document *d, const char *path,
 {
     static const scene_file_sampling none;
     if (!in) in = &none;
-    choose_method(in, out);
+    choose_method_of_volumes(in, out);
     out->step = in->step ? *in->step : 0;
     out->step_cells = in->step_cells ? *in->step_cells : SCENE_STEP_CELLS;
     out->jitter = in->jitter ? *in->jitter : true;
@@ -123,7 +123,7 @@ static insitu_status convert_image(const scene_document *d, const char *path, co
 
 /* Converts the variants of an image that differ in their layers (field, isovalue or plane). Of the views of each
  * variant, only the first is converted. */
-static insitu_status convert_layers_in_turn(const scene_document *d, const scene_file *in, int source, scene *out)
+static insitu_status convert_layer_variants(const scene_document *d, const scene_file *in, int source, scene *out)
 {
     char path[32];
     scene_series series;
@@ -141,7 +141,7 @@ static insitu_status convert_layers_in_turn(const scene_document *d, const scene
 
 /* Inserts the other views of orbits after the first view of each image. The loop starts at the last image, because
  * there is free space only behind it. */
-static void add_views(scene *s, int picture_count)
+static void add_orbit_views(scene *s, int picture_count)
 {
     int end = picture_count;
     for (int i = s->image_count - 1; i >= 0; i--) {
@@ -166,10 +166,10 @@ static insitu_status convert_images(const scene_document *d, const scene_file *i
     if (status) return status;
     out->images = base_calloc((size_t)count, sizeof *out->images);
     if (!out->images) return scene_fail_for_memory(d);
-    for (int i = 0; i < in->images_count && !status; i++) status = convert_layers_in_turn(d, in, i, out);
+    for (int i = 0; i < in->images_count && !status; i++) status = convert_layer_variants(d, in, i, out);
     if (!status) status = scene_find_databases(d, out);
     if (!status) status = scene_find_montages(d, out);
-    if (!status) add_views(out, count);
+    if (!status) add_orbit_views(out, count);
     return status;
 }
 

@@ -161,7 +161,7 @@ typedef struct scene_lines {
 } scene_lines;
 
 /* Returns the default width of contour lines, in pixels, in a picture of this height. */
-float scene_line_width(int height);
+float scene_default_line_width(int height);
 
 typedef enum scene_normal { SCENE_GRADIENT, SCENE_DIFFERENCES, SCENE_VERTEX } scene_normal;
 
@@ -548,7 +548,7 @@ typedef struct scene_field_walk {
 /* Returns the next field, or NULL after the last one. Only `image` must be set when an iteration begins. */
 scene_field *scene_next_field(scene_field_walk *walk);
 /* Returns the word for a kind of layer, for messages. */
-const char *scene_layer_word(scene_layer_kind kind);
+const char *scene_get_layer_word(scene_layer_kind kind);
 
 /* Returns whether the image is the first variant; results that all variants share are stored with it. */
 static inline bool scene_is_first_variant(const scene_image *image)
@@ -557,7 +557,7 @@ static inline bool scene_is_first_variant(const scene_image *image)
 }
 
 /* Returns whether text is drawn into pictures of the image. */
-static inline bool scene_has_words(const scene_image *image)
+static inline bool scene_draws_text(const scene_image *image)
 {
     const scene_decorations *d = &image->decorations;
     bool is_decorated = false;
@@ -679,7 +679,7 @@ typedef struct scene_placeholder_values {
     const char *field; /* name of the field that the sweep selects; NULL if there is no sweep of fields */
 } scene_placeholder_values;
 
-scene_placeholder_values scene_placeholder_values_of(const scene_image *image, int64_t cycle, double time);
+scene_placeholder_values scene_make_placeholder_values(const scene_image *image, int64_t cycle, double time);
 
 /* Returns the pattern with its placeholders replaced. The placeholders {cycle}, {view} and {plane} may have a format
  * such as {cycle:0N}, and {time} and {isovalue} a format such as {time:.Nf} (or e or g instead of f). {name} and

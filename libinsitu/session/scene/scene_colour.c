@@ -32,7 +32,7 @@ static insitu_status make_table(const scene_document *d, const char *name, int c
     return out->name && out->colours ? INSITU_OK : scene_fail_for_memory(d);
 }
 
-static insitu_status use_built_in_map(const scene_document *d, const char *name, scene_colour_map *out)
+static insitu_status copy_built_in_map(const scene_document *d, const char *name, scene_colour_map *out)
 {
     int count = 0;
     const float *table = colour_map_table(name, &count);
@@ -41,8 +41,8 @@ static insitu_status use_built_in_map(const scene_document *d, const char *name,
     return status;
 }
 
-static insitu_status use_bands(const scene_document *d, const scene_colour_points *bands, const char *name,
-                               scene_colour_map *out)
+static insitu_status fill_table_with_bands(const scene_document *d, const scene_colour_points *bands, const char *name,
+                                           scene_colour_map *out)
 {
     const insitu_status status = make_table(d, name, bands->count, out);
     out->is_banded = true;
@@ -51,10 +51,10 @@ static insitu_status use_bands(const scene_document *d, const scene_colour_point
     return status;
 }
 
-static insitu_status use_points(const scene_document *d, const scene_colour_points *points, const char *name,
-                                scene_colour_map *out)
+static insitu_status fill_table_from_points(const scene_document *d, const scene_colour_points *points,
+                                            const char *name, scene_colour_map *out)
 {
-    if (points->is_banded) return use_bands(d, points, name, out);
+    if (points->is_banded) return fill_table_with_bands(d, points, name, out);
     const insitu_status status = make_table(d, name, colour_table_entries(points->items, points->count), out);
     if (status == INSITU_OK) colour_fill_table(points->items, points->count, points->space, out->colours, out->count);
     return status;
@@ -83,7 +83,7 @@ static insitu_status read_positions(const scene_document *d, const char *path, s
     return INSITU_OK;
 }
 
-static insitu_status use_list(const scene_document *d, const char *path, scene_colour_map *out)
+static insitu_status read_colour_list(const scene_document *d, const char *path, scene_colour_map *out)
 {
     char key[path_size];
     scene_colour_points points = {.space = COLOUR_RGB};
@@ -97,7 +97,7 @@ static insitu_status use_list(const scene_document *d, const char *path, scene_c
             points.items[i].srgb[c] = scene_document_number(d, key);
         }
     insitu_status status = read_positions(d, path, &points);
-    if (status == INSITU_OK) status = use_points(d, &points, "", out);
+    if (status == INSITU_OK) status = fill_table_from_points(d, &points, "", out);
     base_free(points.items);
     return status;
 }
@@ -158,7 +158,7 @@ static insitu_status attach_file(const scene_document *d, const char *key, const
     return status;
 }
 
-static insitu_status use_file(const scene_document *d, const char *path, scene_colour_map *out)
+static insitu_status read_colour_map_file(const scene_document *d, const char *path, scene_colour_map *out)
 {
     char key[path_size], name_key[path_size];
     const char *file = NULL, *name = NULL;
@@ -173,7 +173,7 @@ static insitu_status use_file(const scene_document *d, const char *path, scene_c
     if (status != INSITU_OK) return status;
     status = scene_read_colour_file(attachment, file, name, &points, &reason);
     if (status == INSITU_OK)
-        status = use_points(d, &points, name ? name : "", out);
+        status = fill_table_from_points(d, &points, name ? name : "", out);
     else if (status == INSITU_ERROR_MEMORY)
         status = scene_fail_for_memory(d);
     else
@@ -198,7 +198,7 @@ static insitu_status convert_map(const scene_document *d, const char *parent, sc
     format_path(path, "%s.map", parent);
     if (scene_document_kind(d, path) != SCENE_MAPPING) {
         scene_document_texts(d, path, &name, 1);
-        return use_built_in_map(d, name, out);
+        return copy_built_in_map(d, name, out);
     }
     const bool has_list = has_key(d, path, "colours"), has_file = has_key(d, path, "file");
     if (has_list == has_file)
@@ -208,7 +208,7 @@ static insitu_status convert_map(const scene_document *d, const char *parent, sc
         return scene_fail_at_key(d, path, "at", "given beside file, expected with colours");
     if (has_list && has_key(d, path, "name"))
         return scene_fail_at_key(d, path, "name", "given beside colours, expected with file");
-    return has_list ? use_list(d, path, out) : use_file(d, path, out);
+    return has_list ? read_colour_list(d, path, out) : read_colour_map_file(d, path, out);
 }
 
 static void reverse_map(scene_colour_map *map)
@@ -273,7 +273,7 @@ static insitu_status read_range_ends(const scene_document *d, const char *path, 
                              ends[1]);
 }
 
-static scene_range_source range_source(const char *word)
+static scene_range_source find_range_source(const char *word)
 {
     return strcmp(word, "run") == 0         ? SCENE_RANGE_RUN
            : strcmp(word, "symmetric") == 0 ? SCENE_RANGE_SYMMETRIC
@@ -295,7 +295,7 @@ static insitu_status convert_range(const scene_document *d, const char *parent, 
     *out = (scene_range){.is_fixed = kind == SCENE_LIST,
                          .low = ends[0],
                          .high = ends[1],
-                         .source = kind == SCENE_MAPPING ? SCENE_RANGE_PERCENTILES : range_source(word)};
+                         .source = kind == SCENE_MAPPING ? SCENE_RANGE_PERCENTILES : find_range_source(word)};
     return status;
 }
 

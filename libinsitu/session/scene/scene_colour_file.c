@@ -141,7 +141,7 @@ static insitu_status read_map(const colour_file *f, const yaml_node_t *mapping, 
     return status ? status : read_points(f, points, out);
 }
 
-static insitu_status refuse_name(const colour_file *f, const yaml_node_t *root, const char *name, int count)
+static insitu_status fail_for_map_name(const colour_file *f, const yaml_node_t *root, const char *name, int count)
 {
     const char *first = node_text(find_value(f, find_node_by_index(f, root->data.sequence.items.start[0]), "Name"));
     if (name)
@@ -169,7 +169,7 @@ static insitu_status find_map(const colour_file *f, const char *name, const yaml
         if (name ? strcmp(node_text(find_value(f, map, "Name")), name) == 0 : count == 1) return INSITU_OK;
     }
     if (count == 0) return fail_at_node(f, root, "holds no colour map");
-    if (is_list) return refuse_name(f, root, name, count);
+    if (is_list) return fail_for_map_name(f, root, name, count);
     return base_fail(f->error, INSITU_ERROR_SCENE,
                      "%.300s: its colour map is not called \"%.100s\", expected \"%.100s\"", f->name, name,
                      node_text(find_value(f, root, "Name")));

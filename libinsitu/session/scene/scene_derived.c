@@ -110,7 +110,7 @@ static insitu_status read_scalar(const scene_document *d, const char *path, int 
 
 /* Finds the single key that gives the kind of the derived field. *found receives its index in `keys`, or -1 for an
  * expression. */
-static insitu_status find_key(const scene_document *d, const char *path, const scene_file_derived *in, int *found)
+static insitu_status find_kind_key(const scene_document *d, const char *path, const scene_file_derived *in, int *found)
 {
     const char *first = in->expression ? "expression" : NULL;
     *found = -1;
@@ -151,7 +151,7 @@ static insitu_status convert_derived(const scene_document *d, const char *path, 
     insitu_status status = check_name(d, path, s, in->name);
     out->name = base_strdup(in->name);
     if (!out->name) return scene_fail_for_memory(d);
-    if (!status) status = find_key(d, path, in, &key);
+    if (!status) status = find_kind_key(d, path, in, &key);
     if (!status) status = scene_convert_component(d, path, in->component, &out->component);
     if (!status && in->component && !takes_component(key))
         status =

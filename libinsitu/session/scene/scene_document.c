@@ -52,7 +52,7 @@ static insitu_status fail_for_syntax(const scene_document *d, const yaml_parser_
         line = count_lines_before(text, size, parser->problem_offset) + 1;
         snprintf(what, sizeof what, "not valid YAML: %.100s", parser->problem ? parser->problem : "unreadable");
     } else {
-        scene_syntax_words(parser, text, size, &line, what);
+        scene_describe_syntax_error(parser, text, size, &line, what);
     }
     return fail_at_line(d, line, what);
 }
@@ -196,7 +196,8 @@ bool scene_is_plain_name(const char *name)
 }
 
 /* Returns the entry of a list whose key `name` has this value, or NULL if there is none. */
-static const yaml_node_t *find_named(const scene_document *d, const yaml_node_t *list, const char *name, size_t length)
+static const yaml_node_t *find_entry_by_name(const scene_document *d, const yaml_node_t *list, const char *name,
+                                             size_t length)
 {
     for (int i = 0; i < count_items(list); i++) {
         const yaml_node_t *entry = find_node_by_index(d, list->data.sequence.items.start[i]);
@@ -227,7 +228,7 @@ static const yaml_node_t *find_node(const scene_document *d, const char *path, i
             path += *path == '.';
             const size_t length = strcspn(path, ".[");
             if (node->type == YAML_SEQUENCE_NODE) {
-                node = find_named(d, node, path, length);
+                node = find_entry_by_name(d, node, path, length);
                 if (!node) return NULL;
                 *line = node_line(node);
                 path += length;
@@ -347,7 +348,7 @@ static int list_choices(const cyaml_schema_value_t *value, const scene_key *key,
 
 /* Converts a text of numbers such as "640x480" or "0 0 5" into the text of the list that was probably meant, or "" if
  * the text does not consist of numbers. */
-static void list_of_numbers(const char *text, const cyaml_schema_value_t *value, char list[list_size])
+static void convert_text_to_list(const char *text, const cyaml_schema_value_t *value, char list[list_size])
 {
     static const char between[] = " ,;x*()";
     size_t used = 0;
@@ -379,7 +380,7 @@ static void suggest_for_empty_value(const scene_document *d, const yaml_node_t *
                                     char question[question_size])
 {
     size_t length;
-    const char *colour = scene_syntax_comment(d->text, d->size, (size_t)node_line(node), &length);
+    const char *colour = scene_find_colour_in_comment(d->text, d->size, (size_t)node_line(node), &length);
     if (colour)
         snprintf(question, question_size, " (did you mean \"%.*s\" in quotes?)", (int)length, colour);
     else if (value->type == CYAML_MAPPING)
@@ -434,7 +435,7 @@ static void suggest_form(const scene_document *d, const yaml_node_t *node, const
         suggest_for_empty_value(d, node, value, question);
     } else if (node->type == YAML_SCALAR_NODE && is_list) {
         const char *text = node_text(node), *digits = text + (strncmp(text, "0x", 2) == 0 ? 2 : 0);
-        if (entry == CYAML_INT || entry == CYAML_FLOAT) list_of_numbers(text, value, list);
+        if (entry == CYAML_INT || entry == CYAML_FLOAT) convert_text_to_list(text, value, list);
         if (scene_is_colour(value, key) && strspn(digits, "0123456789abcdefABCDEF") == 6 && !digits[6])
             snprintf(question, question_size, " (did you mean \"#%s\" in quotes?)", digits);
         else if (*list)
@@ -462,7 +463,7 @@ static insitu_status fail_for_value(const scene_document *d, const char *path, c
     const char *words[most_words];
     char quoted[quote_size], expected[SCENE_WORDS_SIZE], question[question_size];
     quote_node(node, quoted);
-    scene_expected_words(path, value, key, expected);
+    scene_describe_expected_value(path, value, key, expected);
     int count = list_choices(value, key, words, most_words);
     const bool is_switch = count == 0 && strstr(expected, "true or false");
     if (is_switch) words[count++] = "true", words[count++] = "false";
@@ -500,7 +501,7 @@ static const cyaml_strval_t *find_choice(const char *text, const cyaml_schema_va
     return NULL;
 }
 
-static bool is_scalar_right(const yaml_node_t *node, const cyaml_schema_value_t *value, const scene_key *key)
+static bool is_valid_scalar(const yaml_node_t *node, const cyaml_schema_value_t *value, const scene_key *key)
 {
     if (node->type != YAML_SCALAR_NODE) return false;
     const char *text = node_text(node);
@@ -572,7 +573,7 @@ static insitu_status fail_for_count(const scene_document *d, const char *path, i
                                     const cyaml_schema_value_t *value, const scene_key *key)
 {
     char expected[SCENE_WORDS_SIZE];
-    scene_value_words(value, key, expected);
+    scene_describe_value(value, key, expected);
     return scene_fail_at_key(d, path, "", "a list of %d is not allowed, expected %s", count, expected);
 }
 
@@ -601,14 +602,14 @@ static insitu_status check_names(scene_document *d, const char *path, const yaml
 {
     static const cyaml_schema_value_t one = {CYAML_VALUE_STRING(CYAML_FLAG_POINTER, char, 1, SCENE_NAME_BYTES)};
     if (node->type != YAML_SEQUENCE_NODE)
-        return is_scalar_right(node, value, key) ? INSITU_OK : fail_for_value(d, path, node, value, key);
+        return is_valid_scalar(node, value, key) ? INSITU_OK : fail_for_value(d, path, node, value, key);
     const int count = count_items(node);
     if (count < 1 || count > SCENE_MAX_NAMES) return fail_for_count(d, path, count, value, key);
     for (int i = 0; i < count; i++) {
         const yaml_node_t *item = find_node_by_index(d, node->data.sequence.items.start[i]);
         char item_path[path_size];
         snprintf(item_path, sizeof item_path, "%s[%d]", path, i);
-        if (!is_scalar_right(item, value, key)) return fail_for_value(d, item_path, item, &one, key);
+        if (!is_valid_scalar(item, value, key)) return fail_for_value(d, item_path, item, &one, key);
     }
     return INSITU_OK;
 }
@@ -630,7 +631,7 @@ static insitu_status check_forms(scene_document *d, const char *path, const yaml
     for (int i = 0; i < key->form_count; i++) {
         const scene_form *form = &key->forms[i];
         if (!accepts_node(&form->value, node)) continue;
-        if (node->type == YAML_SCALAR_NODE && !is_scalar_right(node, &form->value, &form->key)) break;
+        if (node->type == YAML_SCALAR_NODE && !is_valid_scalar(node, &form->value, &form->key)) break;
         return check_value(d, path, node, &form->value, &form->key, NULL);
     }
     return fail_for_value(d, path, node, value, key);
@@ -638,7 +639,7 @@ static insitu_status check_forms(scene_document *d, const char *path, const yaml
 
 /* Returns whether a name that the scene defines is allowed. Such names are part of paths in messages, and arguments of
  * calls by simulations. */
-static bool is_own_name(const yaml_node_t *name)
+static bool is_valid_scene_name(const yaml_node_t *name)
 {
     static const char letters[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ_", digits[] = "0123456789-";
     if (name->type != YAML_SCALAR_NODE || name->data.scalar.length > SCENE_KEY_BYTES) return false;
@@ -662,7 +663,7 @@ static insitu_status check_named(scene_document *d, const char *path, const yaml
         const yaml_node_t *name = find_node_by_index(d, p->key);
         char quoted[quote_size], own_path[path_size];
         quote_node(name, quoted);
-        if (!is_own_name(name))
+        if (!is_valid_scene_name(name))
             return base_fail(d->error, INSITU_ERROR_SCENE,
                              "%.300s:%d: %s: the name %s is not allowed, expected a letter or _ and then letters, "
                              "digits, _ or -, at most %d bytes",
@@ -679,7 +680,7 @@ static insitu_status check_named(scene_document *d, const char *path, const yaml
 
 /* Writes a question that suggests where an unknown key is allowed: at the top of the file, or in the only child mapping
  * that has a key of this name. */
-static void suggest_place(const yaml_node_t *name, const scene_mapping *mapping, char question[question_size])
+static void suggest_parent_of_key(const yaml_node_t *name, const scene_mapping *mapping, char question[question_size])
 {
     const char *text = name->type == YAML_SCALAR_NODE ? node_text(name) : "", *holder = NULL;
     int holders = 0;
@@ -706,10 +707,10 @@ static insitu_status fail_for_key(scene_document *d, const char *path, const yam
     char quoted[quote_size], expected[SCENE_WORDS_SIZE], question[question_size];
     int count = 0;
     quote_node(name, quoted);
-    scene_value_words(&value, &holder, expected);
+    scene_describe_value(&value, &holder, expected);
     for (const cyaml_schema_field_t *f = mapping->fields; f->key && count < most_words; f++) words[count++] = f->key;
     suggest_candidate(name, words, count, question);
-    if (!*question) suggest_place(name, mapping, question);
+    if (!*question) suggest_parent_of_key(name, mapping, question);
     return base_fail(d->error, INSITU_ERROR_SCENE, "%.300s:%d: %s%sthe key %s is %s%s, expected %s", d->file_name,
                      node_line(name), path, *path ? ": " : "", quoted, fault, question, expected);
 }
@@ -765,7 +766,7 @@ static insitu_status check_mapping(scene_document *d, const char *path, const ya
     for (int i = 0; mapping->fields[i].key && status == INSITU_OK; i++) {
         if (seen & 1u << i || mapping->fields[i].value.flags & CYAML_FLAG_OPTIONAL) continue;
         char expected[SCENE_WORDS_SIZE];
-        scene_expected_words(mapping->fields[i].key, &mapping->fields[i].value, &mapping->keys[i], expected);
+        scene_describe_expected_value(mapping->fields[i].key, &mapping->fields[i].value, &mapping->keys[i], expected);
         status = scene_fail_at_key(d, path, mapping->fields[i].key, "missing, expected %s", expected);
     }
     return status;
@@ -784,7 +785,7 @@ static insitu_status check_value(scene_document *d, const char *path, const yaml
     case CYAML_IGNORE:
         return (key->named ? check_named : key->forms ? check_forms : check_names)(d, path, node, value, key);
     default:
-        return is_scalar_right(node, value, key) ? store_scalar(d, node, value, to)
+        return is_valid_scalar(node, value, key) ? store_scalar(d, node, value, to)
                                                  : fail_for_value(d, path, node, value, key);
     }
 }

@@ -132,7 +132,7 @@ static bool push_operand(parser *p, scene_operation operation, int input, double
     return add_instruction(p, operation, input, number);
 }
 
-static bool add_binary(parser *p, scene_operation operation)
+static bool add_operator_instruction(parser *p, scene_operation operation)
 {
     p->stack_count--;
     return add_instruction(p, operation, 0, 0);
@@ -144,7 +144,7 @@ static bool add_power(parser *p)
     const scene_instruction *last = &p->expression->instructions[p->expression->count - 1];
     const double exponent = last->number;
     if (last->operation != SCENE_OP_PUSH_NUMBER || exponent != floor(exponent) || fabs(exponent) > MOST_WHOLE_POWER)
-        return add_binary(p, SCENE_OP_POWER);
+        return add_operator_instruction(p, SCENE_OP_POWER);
     p->expression->count--;
     p->stack_count--;
     return add_instruction(p, SCENE_OP_WHOLE_POWER, 0, exponent);
@@ -224,7 +224,7 @@ static bool parse_operands(parser *p, int function)
     if (!accept_character(p, ')')) return fail_expecting(p, "an operator, a comma or )");
     if (found != expected) return fail(p, "%s has %d operands, expected %d", functions[function].name, found, expected);
     if (functions[function].operation == SCENE_OP_POWER) return add_power(p);
-    return expected == 2 ? add_binary(p, functions[function].operation)
+    return expected == 2 ? add_operator_instruction(p, functions[function].operation)
                          : add_instruction(p, functions[function].operation, 0, 0);
 }
 
@@ -329,7 +329,7 @@ static bool parse_product(parser *p)
     if (!parse_sign(p)) return false;
     while (peek_character(p) == '*' || *p->cursor == '/') {
         const scene_operation operation = *p->cursor++ == '*' ? SCENE_OP_MULTIPLY : SCENE_OP_DIVIDE;
-        if (!parse_sign(p) || !add_binary(p, operation)) return false;
+        if (!parse_sign(p) || !add_operator_instruction(p, operation)) return false;
     }
     return true;
 }
@@ -339,7 +339,7 @@ static bool parse_sum(parser *p)
     if (!parse_product(p)) return false;
     while (peek_character(p) == '+' || *p->cursor == '-') {
         const scene_operation operation = *p->cursor++ == '+' ? SCENE_OP_ADD : SCENE_OP_SUBTRACT;
-        if (!parse_product(p) || !add_binary(p, operation)) return false;
+        if (!parse_product(p) || !add_operator_instruction(p, operation)) return false;
     }
     return true;
 }
@@ -369,7 +369,7 @@ void scene_expression_free(scene_expression *expression)
 #define FOR_EACH(...)                                                                                                  \
     for (int i = 0; i < count; i++) __VA_ARGS__
 
-static double integer_power(double base, int exponent)
+static double compute_integer_power(double base, int exponent)
 {
     double power = 1;
     for (int left = abs(exponent); left; left >>= 1, base *= base)
@@ -382,7 +382,7 @@ static void raise_to_integer(double *restrict a, int exponent, int count)
     if (exponent == 2)
         FOR_EACH(a[i] *= a[i]);
     else
-        FOR_EACH(a[i] = integer_power(a[i], exponent));
+        FOR_EACH(a[i] = compute_integer_power(a[i], exponent));
 }
 
 static void apply_function(scene_operation operation, double *restrict a, int count)

@@ -123,7 +123,7 @@ scene_field *scene_next_field(scene_field_walk *walk)
     }
 }
 
-const char *scene_layer_word(scene_layer_kind kind)
+const char *scene_get_layer_word(scene_layer_kind kind)
 {
     static const char *const words[] = {"isosurface", "volume", "slice", "surface"};
     return words[kind];

@@ -161,7 +161,7 @@ static insitu_status count_layers(const scene_document *d, const char *path, con
     return status;
 }
 
-static const char *layer_word(const scene_file_layer *layer)
+static const char *get_file_layer_word(const scene_file_layer *layer)
 {
     return layer->volume ? "volume" : layer->slice ? "slice" : layer->surface ? "surface" : "isosurface";
 }
@@ -219,7 +219,7 @@ insitu_status scene_convert_layers(const scene_document *d, const char *path, co
         const scene_file_layer *layer = &in->layers[i];
         /* shorter than SCENE_PATH_SIZE, so that keys of the layer can be appended */
         char layer_path[SCENE_PATH_SIZE - 16];
-        snprintf(layer_path, sizeof layer_path, "%s.layers[%d].%s", path, i, layer_word(layer));
+        snprintf(layer_path, sizeof layer_path, "%s.layers[%d].%s", path, i, get_file_layer_word(layer));
         status = convert_layer(d, layer_path, layer, values, out);
         if (!status) status = convert_layer_clip(d, layer_path, layer, out);
         if (!status) set_layer_number(layer, i, out);

@@ -37,8 +37,9 @@ static insitu_status convert_values(const scene_document *d, const char *path, c
 }
 
 /* Handles contour lines for which the scene gives no field: uses the field that colours the layer. */
-static insitu_status use_field_of_colours(const scene_document *d, const char *layer, const char *path,
-                                          const scene_file_lines *in, const scene_field *colours, scene_lines *out)
+static insitu_status use_field_that_colours_layer(const scene_document *d, const char *layer, const char *path,
+                                                  const scene_file_lines *in, const scene_field *colours,
+                                                  scene_lines *out)
 {
     if (in->component) return scene_fail_at_key(d, path, "component", "given without field, expected both");
     if (!colours)
@@ -50,7 +51,7 @@ static insitu_status use_field_of_colours(const scene_document *d, const char *l
     return out->field.name ? scene_convert_meshes(d, layer, &out->field) : scene_fail_for_memory(d);
 }
 
-float scene_line_width(int height)
+float scene_default_line_width(int height)
 {
     return fmaxf(1.5F, (float)height / 600);
 }
@@ -62,13 +63,13 @@ insitu_status scene_convert_lines(const scene_document *d, const char *layer, co
     if (!in) return INSITU_OK;
     snprintf(path, sizeof path, "%s.lines", layer);
     out->is_given = true;
-    out->width = in->width ? (float)*in->width : scene_line_width(height);
+    out->width = in->width ? (float)*in->width : scene_default_line_width(height);
     for (int i = 0; i < 3 * SCENE_MAX_LINES; i++)
         out->colours[i] = colour_linear_from_srgb(in->colour ? (float)in->colour[i % 3] : 0.1F);
     out->field.at_vertices = true;
     out->field.joins_corners = colours && colours->joins_corners;
     const insitu_status status = convert_values(d, path, in, out);
     if (status) return status;
-    if (!in->field) return use_field_of_colours(d, layer, path, in, colours, out);
+    if (!in->field) return use_field_that_colours_layer(d, layer, path, in, colours, out);
     return scene_convert_field(d, layer, path, in->field, in->component, &out->field);
 }

@@ -31,7 +31,7 @@ static insitu_status convert_warp(const scene_document *d, const char *path, con
 }
 
 /* Reads a mirror for which the scene gives only axes. Its mirror planes are at the coordinate 0. */
-static insitu_status read_axes(const scene_document *d, const char *path, scene_mirror *out)
+static insitu_status read_mirror_axes(const scene_document *d, const char *path, scene_mirror *out)
 {
     const char *texts[3];
     const int count = scene_document_texts(d, path, texts, 3);
@@ -43,7 +43,7 @@ static insitu_status read_axes(const scene_document *d, const char *path, scene_
     return INSITU_OK;
 }
 
-static insitu_status read_planes(const scene_document *d, const char *path, scene_mirror *out)
+static insitu_status read_mirror_planes(const scene_document *d, const char *path, scene_mirror *out)
 {
     for (int axis = 0; axis < 3; axis++) {
         char plane_path[SCENE_PATH_SIZE + 24];
@@ -63,8 +63,8 @@ static insitu_status convert_mirror(const scene_document *d, const char *path, c
     scene_mirror *mirror = &s->mirrors[s->mirror_count++];
     *mirror = (scene_mirror){.mesh = base_strdup(in->name), .line = scene_document_line(d, path)};
     if (!mirror->mesh) return scene_fail_for_memory(d);
-    if (scene_document_kind(d, mirror_path) == SCENE_MAPPING) return read_planes(d, mirror_path, mirror);
-    return read_axes(d, mirror_path, mirror);
+    if (scene_document_kind(d, mirror_path) == SCENE_MAPPING) return read_mirror_planes(d, mirror_path, mirror);
+    return read_mirror_axes(d, mirror_path, mirror);
 }
 
 static insitu_status convert_mesh(const scene_document *d, const scene_file *in, int index, scene *s)

@@ -204,8 +204,8 @@ static insitu_status convert_deep(const scene_document *d, const char *path, con
 }
 
 /* Converts the keys that combine several pictures in one file (montages and insets). */
-static insitu_status convert_place(const scene_document *d, const char *path, const scene_file_output *in,
-                                   scene_output *out)
+static insitu_status convert_montage_keys(const scene_document *d, const char *path, const scene_file_output *in,
+                                          scene_output *out)
 {
     const char *key = in->inset ? "inset" : "grid";
     out->montage = -1;
@@ -234,7 +234,7 @@ static insitu_status convert_output(const scene_document *d, const char *path, c
     if (out->has_data && out->format != SCENE_EXR)
         return scene_fail_at_key(d, path, "data", "given for a PNG, expected for an EXR only");
     status = convert_deep(d, path, in, out);
-    if (!status) status = convert_place(d, path, in, out);
+    if (!status) status = convert_montage_keys(d, path, in, out);
     if (status) return status;
     out->has_decorations = in->decorations ? *in->decorations : out->format != SCENE_EXR;
     if (out->shares_bars && !(out->has_decorations && image->decorations.has_bars))
@@ -267,7 +267,7 @@ insitu_status scene_convert_outputs(const scene_document *d, const char *path, c
 static const long long sample_cycle = 123456789012345678;
 static const double sample_time = 0.5;
 
-scene_placeholder_values scene_placeholder_values_of(const scene_image *image, int64_t cycle, double time)
+scene_placeholder_values scene_make_placeholder_values(const scene_image *image, int64_t cycle, double time)
 {
     const scene_variant *v = &image->variant;
     return (scene_placeholder_values){image->name,     (long long)cycle,  time, v->view, v->plane,
@@ -289,15 +289,15 @@ static int compare_files(const void *a, const void *b)
 }
 
 /* Returns the name of a placeholder that would make the paths of these two pictures of an image differ. */
-static const char *missing_placeholder(const scene_variant *a, const scene_variant *b)
+static const char *find_missing_placeholder(const scene_variant *a, const scene_variant *b)
 {
     if (a->view != b->view) return "view";
     if (a->plane != b->plane) return "plane";
     return a->isovalue != b->isovalue ? "isovalue" : "field";
 }
 
-static insitu_status refuse_file(const scene_document *d, const scene *s, const written_file *first,
-                                 const written_file *second)
+static insitu_status fail_for_repeated_file(const scene_document *d, const scene *s, const written_file *first,
+                                            const written_file *second)
 {
     const scene_variant *a = &s->images[first->image].variant, *b = &s->images[second->image].variant;
     const scene_output *output = &s->images[second->image].outputs[second->output];
@@ -306,7 +306,7 @@ static insitu_status refuse_file(const scene_document *d, const scene *s, const 
     snprintf(path, sizeof path, "images[%d].outputs[%d]", b->source, second->output);
     if (a->source != b->source || first->output != second->output)
         return scene_fail_at_key(d, path, "path", "\"%.100s\" is another output's file too, expected its own", pattern);
-    const char *word = missing_placeholder(a, b);
+    const char *word = find_missing_placeholder(a, b);
     return scene_fail_at_key(d, path, "path", "\"%.100s\" is one file for several %ss, expected {%s} in it", pattern,
                              word, word);
 }
@@ -318,7 +318,8 @@ static const scene_output *find_output(const scene *s, const written_file *file)
 
 /* Returns an error for the first output whose path equals that of an earlier output, unless both outputs belong to a
  * montage. files: sorted by path. */
-static insitu_status check_files(const scene_document *d, const scene *s, const written_file *files, int count)
+static insitu_status check_files_are_distinct(const scene_document *d, const scene *s, const written_file *files,
+                                              int count)
 {
     int found = -1;
     for (int i = 1; i < count; i++) {
@@ -326,7 +327,7 @@ static insitu_status check_files(const scene_document *d, const scene *s, const 
         if (find_output(s, &files[i - 1])->montage >= 0 && find_output(s, &files[i])->montage >= 0) continue;
         if (found < 0 || files[i].output_index < files[found].output_index) found = i;
     }
-    return found < 0 ? INSITU_OK : refuse_file(d, s, &files[found - 1], &files[found]);
+    return found < 0 ? INSITU_OK : fail_for_repeated_file(d, s, &files[found - 1], &files[found]);
 }
 
 insitu_status scene_check_outputs(const scene_document *d, const scene *s)
@@ -338,7 +339,7 @@ insitu_status scene_check_outputs(const scene_document *d, const scene *s)
     int count = 0;
     insitu_status status = INSITU_OK;
     for (int i = 0; i < s->image_count && !status; i++) {
-        const scene_placeholder_values moment = scene_placeholder_values_of(&s->images[i], sample_cycle, sample_time);
+        const scene_placeholder_values moment = scene_make_placeholder_values(&s->images[i], sample_cycle, sample_time);
         for (int o = 0; o < s->images[i].output_count && !status; o++) {
             files[count] = (written_file){scene_expand(s->images[i].outputs[o].path, &moment), i, o, count};
             if (files[count++].path == NULL) status = scene_fail_for_memory(d);
@@ -346,7 +347,7 @@ insitu_status scene_check_outputs(const scene_document *d, const scene *s)
     }
     if (!status) {
         qsort(files, (size_t)count, sizeof *files, compare_files);
-        status = check_files(d, s, files, count);
+        status = check_files_are_distinct(d, s, files, count);
     }
     for (int i = 0; i < count; i++) base_free(files[i].path);
     base_free(files);

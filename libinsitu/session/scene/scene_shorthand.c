@@ -227,7 +227,7 @@ static void expand_slice(rewrite *r, int *value)
 /* Expands a mapping with names as keys to a list of mappings with the key `name`. A value that is not a mapping is
  * first expanded to a mapping with the single key text_key. If text_key is NULL, such a value remains unchanged, and
  * the schema refuses it. */
-static void expand_named(rewrite *r, const char *text_key, int *value)
+static void expand_mapping_to_named_list(rewrite *r, const char *text_key, int *value)
 {
     if (find_node_by_index(r, *value)->type != YAML_MAPPING_NODE) return;
     const int list = make_list(r), from = *value;
@@ -247,12 +247,12 @@ static void expand_named(rewrite *r, const char *text_key, int *value)
 
 static void expand_fields(rewrite *r, int *value)
 {
-    expand_named(r, "expression", value);
+    expand_mapping_to_named_list(r, "expression", value);
 }
 
 static void expand_meshes(rewrite *r, int *value)
 {
-    expand_named(r, NULL, value);
+    expand_mapping_to_named_list(r, NULL, value);
 }
 
 /* ---- whole documents --------------------------------------------------------------------------------------------- */
@@ -292,7 +292,7 @@ static const struct {
     {"warp", expand_field, "a field's name"},
 };
 
-const char *scene_shorthand_words(const char *key, size_t length)
+const char *scene_describe_short_form(const char *key, size_t length)
 {
     for (size_t i = 0; i < sizeof rules / sizeof *rules; i++)
         if (strlen(rules[i].key) == length && memcmp(rules[i].key, key, length) == 0) return rules[i].words;
@@ -380,7 +380,7 @@ bool scene_expand_shorthand(yaml_document_t *document)
 
 enum { LONGEST_WORD = 63 };
 
-static int least_of(int a, int b)
+static int find_smallest_value_of_code(int a, int b)
 {
     return a < b ? a : b;
 }
@@ -396,9 +396,10 @@ static int count_edits(const char *a, const char *b)
         const int *above = rows[(i + 2) % 3], *second = rows[(i + 1) % 3];
         row[0] = i;
         for (int j = 1; j <= n; j++) {
-            row[j] = least_of(least_of(above[j], row[j - 1]) + 1, above[j - 1] + (a[i - 1] != b[j - 1]));
+            row[j] = find_smallest_value_of_code(find_smallest_value_of_code(above[j], row[j - 1]) + 1,
+                                                 above[j - 1] + (a[i - 1] != b[j - 1]));
             if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
-                row[j] = least_of(row[j], second[j - 2] + 1);
+                row[j] = find_smallest_value_of_code(row[j], second[j - 2] + 1);
         }
     }
     return rows[m % 3][n];

@@ -13,7 +13,7 @@ bool scene_expand_shorthand(yaml_document_t *document);
 
 /* Returns a description of the short forms that the value of a key may have, such as "true or false", or NULL if it has
  * none. */
-const char *scene_shorthand_words(const char *key, size_t length);
+const char *scene_describe_short_form(const char *key, size_t length);
 
 /* Returns the candidate that was probably meant by the word. This is the schema's equivalent of a word of other
  * programs, or the candidate with the fewest edits (insertion, removal or replacement of a letter, exchange of two

@@ -111,7 +111,7 @@ static const char *find_colour_comment(text_line l, size_t *length)
     return NULL;
 }
 
-const char *scene_syntax_comment(const char *text, size_t size, size_t line, size_t *length)
+const char *scene_find_colour_in_comment(const char *text, size_t size, size_t line, size_t *length)
 {
     return find_colour_comment(find_line(text, size, line - 1), length);
 }
@@ -126,7 +126,7 @@ static bool report_colour_comment(const fault *f, text_line l)
 }
 
 /* Returns the length of a placeholder such as {cycle:04} at the start of a text, or 0 if there is none. */
-static size_t placeholder_length(const char *at, const char *end)
+static size_t measure_placeholder(const char *at, const char *end)
 {
     const char *p = at + 1;
     if (at >= end || *at != '{') return 0;
@@ -140,7 +140,7 @@ static size_t word_length(const char *at, const char *end)
 {
     const char *p = at;
     while (p < end) {
-        const size_t placeholder = placeholder_length(p, end);
+        const size_t placeholder = measure_placeholder(p, end);
         if (placeholder == 0 && strchr(" \t,{}[]\"'", *p)) break;
         p += placeholder ? placeholder : 1;
     }
@@ -149,7 +149,7 @@ static size_t word_length(const char *at, const char *end)
 
 /* Returns the length of a text whose first word has the length `word`. The text ends after the word if a comma, a # or
  * another key follows on the line, and otherwise at the end of the line. */
-static size_t text_length(const char *at, size_t word, const char *end)
+static size_t measure_unquoted_text(const char *at, size_t word, const char *end)
 {
     while (end > at && (end[-1] == ' ' || end[-1] == '\t')) end--;
     for (const char *p = at + word; p < end; p++)
@@ -165,14 +165,14 @@ static bool report_bare_placeholder(const fault *f, text_line l)
     for (const char *p = l.start + l.indent; p < end; p++) {
         if (is_in_quotes(l, p, &quote)) continue;
         const bool begins = p > l.start && strchr(" \t[{,", p[-1]) && !strchr(" \t,{}[]", *p);
-        const bool is_placeholder = *p == '{' && placeholder_length(p, end) > 0;
+        const bool is_placeholder = *p == '{' && measure_placeholder(p, end) > 0;
         if (!begins && !is_placeholder) continue;
         const size_t length = word_length(p, end);
         if (!memchr(p, '{', length)) continue;
         /* a text that consists only of {name} could also be a mapping */
-        if (is_placeholder && length == placeholder_length(p, end) && f->is_flow) continue;
+        if (is_placeholder && length == measure_placeholder(p, end) && f->is_flow) continue;
         return set_fault(f, l.number, "a text with { } needs quotes, expected \"%.*s\"",
-                         (int)(f->is_flow ? length : text_length(p, length, end)), p);
+                         (int)(f->is_flow ? length : measure_unquoted_text(p, length, end)), p);
     }
     return false;
 }
@@ -365,7 +365,7 @@ static bool report_bad_start(const fault *f)
 
 /* ---- the search ------------------------------------------------------------------------------------------------- */
 
-static bool report_in_lines(const fault *f, bool (*rule)(const fault *f, text_line l))
+static bool apply_rule_to_lines(const fault *f, bool (*rule)(const fault *f, text_line l))
 {
     for (text_line l = find_line(f->text, f->size, f->first_line); l.number <= f->last_line;
          l = find_next_line(l, f->text + f->size))
@@ -373,8 +373,8 @@ static bool report_in_lines(const fault *f, bool (*rule)(const fault *f, text_li
     return false;
 }
 
-void scene_syntax_words(const yaml_parser_t *parser, const char *text, size_t size, size_t *line,
-                        char words[SCENE_SYNTAX_SIZE])
+void scene_describe_syntax_error(const yaml_parser_t *parser, const char *text, size_t size, size_t *line,
+                                 char words[SCENE_SYNTAX_SIZE])
 {
     const char *context = parser->context ? parser->context : "";
     fault f = {.parser = parser, .text = text, .size = size, .line = line, .words = words};
@@ -383,8 +383,8 @@ void scene_syntax_words(const yaml_parser_t *parser, const char *text, size_t si
     const bool is_before = (f.is_flow || strstr(context, "scan")) && parser->context_mark.line < f.last_line;
     f.first_line = is_before ? parser->context_mark.line : f.last_line;
     const text_line begin = find_line(text, size, f.first_line), stop = find_line(text, size, f.last_line);
-    if (report_in_lines(&f, report_tab_indent) || report_in_lines(&f, report_colour_comment) ||
-        report_in_lines(&f, report_bare_placeholder))
+    if (apply_rule_to_lines(&f, report_tab_indent) || apply_rule_to_lines(&f, report_colour_comment) ||
+        apply_rule_to_lines(&f, report_bare_placeholder))
         return;
     if (report_unclosed_quote(&f, begin) || report_unclosed_bracket(&f, begin) || report_incomplete_line(&f, stop))
         return;

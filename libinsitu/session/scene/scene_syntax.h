@@ -10,11 +10,11 @@
 enum { SCENE_SYNTAX_SIZE = 300 };
 
 /* Describes the error that a parser found in the text, and sets *line, counted from 1. */
-void scene_syntax_words(const yaml_parser_t *parser, const char *text, size_t size, size_t *line,
-                        char words[SCENE_SYNTAX_SIZE]);
+void scene_describe_syntax_error(const yaml_parser_t *parser, const char *text, size_t size, size_t *line,
+                                 char words[SCENE_SYNTAX_SIZE]);
 
 /* Returns the text of the value that a # turned into a comment on the line (from 1), such as #ff0000 in "colour:
  * #ff0000", and stores its length; returns NULL if there is none. */
-const char *scene_syntax_comment(const char *text, size_t size, size_t line, size_t *length);
+const char *scene_find_colour_in_comment(const char *text, size_t size, size_t line, size_t *length);
 
 #endif

@@ -29,8 +29,8 @@ static insitu_status convert_up(const scene_document *d, const char *path, const
     return INSITU_OK;
 }
 
-static insitu_status convert_explicit(const scene_document *d, const char *path, const scene_file_camera *in,
-                                      scene_camera *out)
+static insitu_status convert_given_position(const scene_document *d, const char *path, const scene_file_camera *in,
+                                            scene_camera *out)
 {
     if (in->automatic) {
         return scene_fail_at_key(d, path, "automatic", "given beside %s, expected one of the two",
@@ -86,7 +86,7 @@ static insitu_status convert_position(const scene_document *d, const char *path,
     const bool is_explicit = (in->position || in->focal) && !in->path && !in->orbit;
     insitu_status status = INSITU_OK;
     if (is_explicit)
-        status = convert_explicit(d, path, in, out);
+        status = convert_given_position(d, path, in, out);
     else if (!in->path)
         status = convert_automatic(d, path, in->automatic, out);
     if (!status && in->orbit) return scene_convert_orbit(d, path, in, out);
@@ -128,7 +128,7 @@ static insitu_status convert_light(const scene_document *d, const char *path, co
 
 /* Sets the default lights: a key light and a fill light. The fill light brightens surfaces that the key light does not
  * reach, but is too weak to make shapes look flat. */
-static void default_lights(scene_light lights[2])
+static void set_default_lights(scene_light lights[2])
 {
     lights[0] = (scene_light){.direction = {0.5, 0.7, 1}, .colour = {1, 1, 1}};
     lights[1] = (scene_light){.direction = {-0.8, 0.1, 0.6}, .colour = {0.35F, 0.35F, 0.35F}};
@@ -145,7 +145,7 @@ insitu_status scene_convert_lights(const scene_document *d, const char *path, co
     out->light_count = count;
     out->has_lights = in->lights != NULL;
     if (!in->lights) {
-        default_lights(out->lights);
+        set_default_lights(out->lights);
         return INSITU_OK;
     }
     insitu_status status = INSITU_OK;

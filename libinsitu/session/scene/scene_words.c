@@ -68,12 +68,12 @@ static void append_forms(char words[SCENE_WORDS_SIZE], const scene_key *key)
 {
     for (int i = 0; i < key->form_count; i++) {
         char form[SCENE_WORDS_SIZE];
-        scene_value_words(&key->forms[i].value, &key->forms[i].key, form);
+        scene_describe_value(&key->forms[i].value, &key->forms[i].key, form);
         append_words(words, "%s%s", i ? "; or " : "", form);
     }
 }
 
-void scene_value_words(const cyaml_schema_value_t *value, const scene_key *key, char words[SCENE_WORDS_SIZE])
+void scene_describe_value(const cyaml_schema_value_t *value, const scene_key *key, char words[SCENE_WORDS_SIZE])
 {
     words[0] = '\0';
     switch (value->type) {
@@ -91,7 +91,7 @@ void scene_value_words(const cyaml_schema_value_t *value, const scene_key *key, 
     case CYAML_IGNORE:
         if (key->named) {
             char each[SCENE_WORDS_SIZE];
-            scene_value_words(&key->named->value, &key->named->key, each);
+            scene_describe_value(&key->named->value, &key->named->key, each);
             append_words(words, "a mapping of at most %d names of your own, each with %s", SCENE_MAX_NAMES, each);
             break;
         }
@@ -107,23 +107,23 @@ void scene_value_words(const cyaml_schema_value_t *value, const scene_key *key, 
 }
 
 /* Returns the last key of a path, or "" for an entry of a list. */
-static const char *last_key(const char *path)
+static const char *find_last_key(const char *path)
 {
     const char *dot = strrchr(path, '.'), *key = dot ? dot + 1 : path;
     return *key && path[strlen(path) - 1] == ']' ? "" : key;
 }
 
-void scene_expected_words(const char *path, const cyaml_schema_value_t *value, const scene_key *key,
-                          char expected[SCENE_WORDS_SIZE])
+void scene_describe_expected_value(const char *path, const cyaml_schema_value_t *value, const scene_key *key,
+                                   char expected[SCENE_WORDS_SIZE])
 {
-    scene_value_words(value, key, expected);
+    scene_describe_value(value, key, expected);
     if (value->type == CYAML_SEQUENCE && value->sequence.entry->type == CYAML_MAPPING && key->child) {
         const scene_key entry = {.child = key->child};
         char keys[SCENE_WORDS_SIZE];
-        scene_value_words(value->sequence.entry, &entry, keys);
+        scene_describe_value(value->sequence.entry, &entry, keys);
         append_words(expected, "%s", keys + strlen("a mapping"));
     }
     /* for lists of names and values of several forms, the words already include all forms */
-    const char *name = last_key(path), *short_form = scene_shorthand_words(name, strlen(name));
+    const char *name = find_last_key(path), *short_form = scene_describe_short_form(name, strlen(name));
     if (short_form && value->type != CYAML_IGNORE) append_words(expected, ", or %s", short_form);
 }

@@ -41,18 +41,18 @@ enum {
 
 /* ---- numbers of points ----------------------------------------------------------------------------------------- */
 
-static int points_of_degree(int degree)
+static int count_points_of_degree(int degree)
 {
     return degree / 2 + 1;
 }
 
-static int count_first_points(const session_nodes *of, bool is_bent)
+static int count_points_of_first_factor(const session_nodes *of, bool is_bent)
 {
     const int p = of->order;
     if (grid_is_shell_type(of->type)) return 4 * p;
-    if (of->type == GRID_WEDGE) return points_of_degree(is_bent ? 5 * p - 2 : 2 * p + 1);
-    if (of->type == GRID_HEX) return points_of_degree(is_bent ? 5 * p - 1 : 2 * p + 2);
-    const int straight = points_of_degree(2 * p), bent = points_of_degree(5 * p - 3);
+    if (of->type == GRID_WEDGE) return count_points_of_degree(is_bent ? 5 * p - 2 : 2 * p + 1);
+    if (of->type == GRID_HEX) return count_points_of_degree(is_bent ? 5 * p - 1 : 2 * p + 2);
+    const int straight = count_points_of_degree(2 * p), bent = count_points_of_degree(5 * p - 3);
     const int most = straight > MOST_TET_POINTS ? straight : MOST_TET_POINTS;
     return !is_bent ? straight : bent < most ? bent : most;
 }
@@ -60,7 +60,7 @@ static int count_first_points(const session_nodes *of, bool is_bent)
 static int count_line_points(const session_nodes *of, bool is_bent)
 {
     const int p = of->order;
-    return grid_is_shell_type(of->type) ? 4 * p : points_of_degree(is_bent ? 5 * p - 1 : 2 * p + 2);
+    return grid_is_shell_type(of->type) ? 4 * p : count_points_of_degree(is_bent ? 5 * p - 1 : 2 * p + 2);
 }
 
 /* ---- functions of nodes ---------------------------------------------------------------------------------------- */
@@ -114,7 +114,7 @@ static void find_simplex_functions(const session_rule_factor *factor, const doub
 }
 
 /* Returns the number of doubles that the functions and their slopes at one block of points take. */
-static size_t count_block(const session_rule_factor *factor)
+static size_t count_block_numbers(const session_rule_factor *factor)
 {
     return (size_t)(1 + factor->rule.dimensions) * (size_t)factor->node_count * (size_t)factor->width;
 }
@@ -143,10 +143,10 @@ static bool make_factor(int dimensions, int order, bool is_lobatto, int points, 
     const int whole = (out->rule.count + LANES - 1) / LANES * LANES;
     out->width = whole < BLOCK ? whole : BLOCK;
     const size_t blocks = (size_t)((out->rule.count - 1) / out->width + 1);
-    if (dimensions > 1 && blocks * count_block(out) > MOST_FUNCTIONS) return true;
-    out->functions = base_calloc(blocks * count_block(out), sizeof *out->functions);
+    if (dimensions > 1 && blocks * count_block_numbers(out) > MOST_FUNCTIONS) return true;
+    out->functions = base_calloc(blocks * count_block_numbers(out), sizeof *out->functions);
     for (size_t b = 0; b < blocks && out->functions; b++)
-        fill_block(out, (int)b * out->width, out->functions + b * count_block(out));
+        fill_block(out, (int)b * out->width, out->functions + b * count_block_numbers(out));
     return out->functions;
 }
 
@@ -160,7 +160,8 @@ static bool is_box(int type)
 static bool make_rule(const session_nodes *of, int line_count, bool is_lobatto, bool is_bent, session_product_rule *out)
 {
     const int axes = grid_is_shell_type(of->type) ? 2 : AXES;
-    return make_factor(axes - line_count, of->order, is_lobatto, count_first_points(of, is_bent), &out->first) &&
+    return make_factor(axes - line_count, of->order, is_lobatto, count_points_of_first_factor(of, is_bent),
+                       &out->first) &&
            (line_count == 0 || make_factor(1, of->order, is_lobatto, count_line_points(of, is_bent), &out->line));
 }
 
@@ -244,7 +245,7 @@ typedef struct cell_visit {
     void *of;
 } cell_visit;
 
-static size_t count_lattice(const session_cell_rules *rules, int lines)
+static size_t count_lattice_nodes(const session_cell_rules *rules, int lines)
 {
     size_t count = (size_t)rules->bent.first.node_count;
     for (int n = 0; n < lines; n++) count *= (size_t)rules->nodes.of.order + 1;
@@ -255,7 +256,7 @@ size_t session_cell_rules_work_size(const session_cell_rules *rules)
 {
     const size_t nodes = (size_t)(rules->nodes.complete.count + rules->lattice.count);
     size_t size = SIZE * nodes + (AXES + 1) * (size_t)rules->bent.first.node_count * BLOCK;
-    for (int lines = 0; lines <= rules->line_count; lines++) size += MOST_SIZE * count_lattice(rules, lines);
+    for (int lines = 0; lines <= rules->line_count; lines++) size += MOST_SIZE * count_lattice_nodes(rules, lines);
     return size;
 }
 
@@ -276,13 +277,14 @@ static inline __attribute__((always_inline)) void multiply_by_matrix(const doubl
     }
 }
 
-static void multiply_cell_by_matrix(const double *matrix, int node_count, int width, const double *values,
-                                    double (*out)[BLOCK])
+static void multiply_one_component(const double *matrix, int node_count, int width, const double *values,
+                                   double (*out)[BLOCK])
 {
     multiply_by_matrix(matrix, node_count, width, values, 1, out);
 }
 
-static void multiply_three(const double *matrix, int node_count, int width, const double *values, double (*out)[BLOCK])
+static void multiply_three_components(const double *matrix, int node_count, int width, const double *values,
+                                      double (*out)[BLOCK])
 {
     multiply_by_matrix(matrix, node_count, width, values, 3, out);
 }
@@ -307,11 +309,12 @@ static void visit_block(const cell_visit *v, int first, const double *functions,
     const double *in = v->lattices[0];
     double slopes[AXES][AXES][BLOCK], values[1][BLOCK], measures[BLOCK];
     for (int axis = 0; axis < dimensions; axis++)
-        multiply_three(functions + (1 + axis) * nodes * width, nodes, width, in, slopes[axis]);
-    multiply_cell_by_matrix(functions, nodes, width, in + 3 * nodes, values);
+        multiply_three_components(functions + (1 + axis) * nodes * width, nodes, width, in, slopes[axis]);
+    multiply_one_component(functions, nodes, width, in + 3 * nodes, values);
     /* the slopes along the last line are the first ones that were added to the components */
     for (int line = 0; line < lines; line++)
-        multiply_three(functions, nodes, width, in + (SIZE + 3 * line) * nodes, slopes[dimensions + lines - 1 - line]);
+        multiply_three_components(functions, nodes, width, in + (SIZE + 3 * line) * nodes,
+                                  slopes[dimensions + lines - 1 - line]);
     const int count = rest < width ? rest : width;
     for (int i = 0; i < count; i++)
         measures[i] = weight * factor->rule.weights[first + i] * find_measure(slopes, dimensions + lines, i);
@@ -325,7 +328,7 @@ static void visit_first(const cell_visit *v, double weight)
     for (int first = 0; first < factor->rule.count; first += factor->width) {
         if (!factor->functions) fill_block(factor, first, v->functions);
         visit_block(v, first, functions, weight);
-        if (factor->functions) functions += count_block(factor);
+        if (factor->functions) functions += count_block_numbers(factor);
     }
 }
 
@@ -340,12 +343,13 @@ static void sum_line(const session_rule_factor *line, const double *functions, s
 }
 
 /* Evaluates lattices[lines] at one point of the rule of its last line, and stores the result in lattices[lines - 1]. */
-static void reduce_line(const cell_visit *v, int lines, int point)
+static void evaluate_lattice_on_line(const cell_visit *v, int lines, int point)
 {
     const session_rule_factor *line = &v->rule->line;
-    const double *values = line->functions + (size_t)(point / line->width) * count_block(line) + point % line->width;
+    const double *values =
+        line->functions + (size_t)(point / line->width) * count_block_numbers(line) + point % line->width;
     const double *slopes = values + line->node_count * line->width;
-    const size_t size = count_lattice(v->rules, lines - 1), stride = size * (size_t)line->node_count;
+    const size_t size = count_lattice_nodes(v->rules, lines - 1), stride = size * (size_t)line->node_count;
     const int components = SIZE + 3 * (v->rules->line_count - lines);
     for (int c = 0; c < components; c++)
         sum_line(line, values, size, v->lattices[lines] + (size_t)c * stride,
@@ -360,9 +364,9 @@ static void visit_points(const cell_visit *v)
     const session_quadrature *line = &v->rule->line.rule;
     const int lines = v->rules->line_count, along = lines > 0 ? line->count : 1, across = lines > 1 ? line->count : 1;
     for (int k = 0; k < across; k++) {
-        if (lines > 1) reduce_line(v, 2, k);
+        if (lines > 1) evaluate_lattice_on_line(v, 2, k);
         for (int j = 0; j < along; j++) {
-            if (lines > 0) reduce_line(v, 1, j);
+            if (lines > 0) evaluate_lattice_on_line(v, 1, j);
             visit_first(v, (lines > 1 ? line->weights[k] : 1) * (lines > 0 ? line->weights[j] : 1));
         }
     }
@@ -399,7 +403,7 @@ void session_visit_cell(const session_cell_rules *rules, const double *tuples, d
     double *next = v.functions + (AXES + 1) * (size_t)rules->bent.first.node_count * BLOCK;
     for (int lines = 0; lines <= rules->line_count; lines++) {
         v.lattices[lines] = next;
-        next += MOST_SIZE * count_lattice(rules, lines);
+        next += MOST_SIZE * count_lattice_nodes(rules, lines);
     }
     session_complete_tuples(&rules->nodes, SIZE, tuples, complete);
     if (rules->collapse)

@@ -6,7 +6,7 @@
 #include "session_indexed.h"
 #include "session_statistics_file.h"
 
-bool session_is_statistics_due(const scene_statistics *statistics, int64_t cycle)
+bool session_are_statistics_due(const scene_statistics *statistics, int64_t cycle)
 {
     return statistics->cycle_interval <= 1 || cycle % statistics->cycle_interval == 0;
 }
@@ -14,7 +14,7 @@ bool session_is_statistics_due(const scene_statistics *statistics, int64_t cycle
 bool session_has_events(const scene *scene, int64_t cycle, bool images)
 {
     for (int i = 0; i < scene->statistics_count; i++)
-        if (session_is_statistics_due(&scene->statistics[i], cycle)) return true;
+        if (session_are_statistics_due(&scene->statistics[i], cycle)) return true;
     for (int i = 0; i < scene->image_count && images; i++)
         if (scene->images[i].condition.is_given) return true;
     return false;
@@ -46,7 +46,7 @@ static bool work_create(const scene *scene, int64_t cycle, const session_valid_e
     if (!w->requests || !w->results || !w->request_origins) return false;
     for (int i = 0; i < scene->statistics_count; i++) {
         const scene_statistics *s = &scene->statistics[i];
-        if (!session_is_statistics_due(s, cycle) || !(valid->statistics >> i & 1)) continue;
+        if (!session_are_statistics_due(s, cycle) || !(valid->statistics >> i & 1)) continue;
         w->requests[w->count] = (session_statistics_request){&s->field, s->bin_count, s->low, s->high};
         w->request_origins[w->count++] = i;
     }
@@ -101,7 +101,7 @@ insitu_status session_update_events(session_events *events, const scene *scene, 
     /* ranks agree on errors before fill functions are called, because fill functions may be collective */
     insitu_status status = session_agree(team->comm, error);
     if (!status) session_fill_fields(meshes, catalogue, false, error);
-    if (!error->status) session_copy_requested(meshes, team->threads, error);
+    if (!error->status) session_copy_requested_fields(meshes, team->threads, error);
     status = session_agree(team->comm, error);
     if (!status)
         status = session_find_statistics(meshes, catalogue, team, work.requests, work.count, work.results, error);
@@ -114,7 +114,7 @@ insitu_status session_update_events(session_events *events, const scene *scene, 
     return status;
 }
 
-uint64_t session_drawable_images(const session_events *events, const scene *scene)
+uint64_t session_find_drawable_images(const session_events *events, const scene *scene)
 {
     uint64_t drawable = 0;
     for (int i = 0; i < scene->image_count; i++) {

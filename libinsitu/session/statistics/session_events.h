@@ -27,7 +27,7 @@ typedef struct session_valid_events {
 /* Returns whether the step needs statistics. images: true if the step may draw images, so that statistics for their
  * conditions are needed. Local. */
 bool session_has_events(const scene *scene, int64_t cycle, bool images);
-bool session_is_statistics_due(const scene_statistics *statistics, int64_t cycle);
+bool session_are_statistics_due(const scene_statistics *statistics, int64_t cycle);
 
 /* Computes the statistics that are due and writes them to their files. Also computes the statistics on which images'
  * conditions depend, and stores which conditions hold. Only the events in `valid`, which must be the same on all ranks,
@@ -40,6 +40,6 @@ insitu_status session_update_events(session_events *events, const scene *scene, 
 
 /* Returns the images that may be drawn in this step, one bit for each. An image may be drawn if its condition holds,
  * unless the scene draws it only once and it has been drawn before. */
-uint64_t session_drawable_images(const session_events *events, const scene *scene);
+uint64_t session_find_drawable_images(const session_events *events, const scene *scene);
 
 #endif

@@ -42,7 +42,7 @@ typedef struct order_buffer {
 /* ---- values at nodes --------------------------------------------------------------------------------------------- */
 
 /* Returns the component of a tuple, or its magnitude, bitwise equal to the result of grid_field_value(). */
-static double component_of(const grid_field *field, const double *tuple)
+static double find_component_of_tuple(const grid_field *field, const double *tuple)
 {
     if (field->component >= 0) return tuple[field->component];
     double sum = 0;
@@ -59,7 +59,7 @@ static void read_caller_values(const order_pass *p, int64_t cell, int count, dou
                      values->is_by_entry ? session_row_entry(&p->rows, cell, n)
                                          : session_row_vertex(&p->rows, first + n),
                      tuple);
-        out[n] = component_of(&p->of->values, tuple);
+        out[n] = find_component_of_tuple(&p->of->values, tuple);
     }
 }
 
@@ -79,7 +79,7 @@ static void read_lattice_values(const order_pass *p, const session_interpolation
         if (position >= nodes->of.count) continue;
         const int finer =
             session_node_index(&fine, INSITU_ORDER_LEXICOGRAPHIC, step * at[0], step * at[1], step * at[2]);
-        out[position] = grid_field_value(&p->of->values, session_row_node(&p->lattice, cell, finer));
+        out[position] = grid_field_value(&p->of->values, session_find_row_vertex(&p->lattice, cell, finer));
     }
 }
 
@@ -96,7 +96,7 @@ static void read_values(const order_pass *p, const session_interpolation *nodes,
         read_lattice_values(p, nodes, cell, out);
     } else {
         for (int n = 0; n < count; n++)
-            out[n] = grid_field_value(&p->of->values, session_row_node(&p->lattice, cell, n));
+            out[n] = grid_field_value(&p->of->values, session_find_row_vertex(&p->lattice, cell, n));
     }
 }
 
@@ -244,7 +244,7 @@ static session_cell_value integrate_cell(const order_pass *p, const session_cell
 
 static session_cell_value find_value(const order_pass *p, int64_t cell, order_buffer *buffer)
 {
-    const int kind = session_kind_of(&p->rows, cell);
+    const int kind = session_find_kind_of_cell(&p->rows, cell);
     const session_nodes *nodes = &p->rows.kinds[kind].nodes;
     if (grid_is_ghost(&p->rows.cells, cell) ||
         !grid_has_own_value(&p->of->values, session_first_piece(p->of->mesh, cell)))
@@ -292,7 +292,7 @@ static void bin_cell(const order_pass *p, int64_t cell, order_buffer *buffer, in
 {
     const session_binned_volumes *binned = p->binned;
     const session_cell_value *value = &p->cells[cell];
-    const int kind = session_kind_of(&p->rows, cell);
+    const int kind = session_find_kind_of_cell(&p->rows, cell);
     if (!value->is_counted || !value->is_integral || value->is_shell != binned->is_of_shells) return;
     cell_bins own = {.binned = binned, .minimum = value->minimum, .maximum = value->maximum};
     if (is_summed(&p->rows.kinds[kind].nodes)) {
@@ -353,7 +353,7 @@ static bool visit_cells(const order_pass *p, int64_t *sums, int sum_count)
 {
     const int64_t cells = p->rows.cells.cell_count;
     bool is_lacking = false;
-#pragma omp parallel num_threads(session_region_threads(p->of->threads, cells)) reduction(|| : is_lacking)             \
+#pragma omp parallel num_threads(session_choose_loop_threads(p->of->threads, cells)) reduction(|| : is_lacking)             \
     reduction(+ : sums[:sum_count])
     {
         region_enter();
@@ -402,7 +402,7 @@ static insitu_status visit_field(order_pass *p, base_error *error)
 
 insitu_status session_find_order_values(const session_order_field *of, session_cell_value **out, base_error *error)
 {
-    const int64_t cells = session_whole_count(of->mesh);
+    const int64_t cells = session_count_whole_cells(of->mesh);
     *out = base_calloc((size_t)cells + 1, sizeof **out);
     if (!*out)
         return session_fail_for_memory(error, cells * (int64_t)sizeof **out, "integrals over cells of higher order");

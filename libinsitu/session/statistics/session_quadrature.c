@@ -11,7 +11,7 @@
 #include "memory.h"
 
 /* Computes Jacobi's polynomial of order n > 0 with the weight function (1 - x)^alpha, and its derivative. */
-static double jacobi_value(int n, int alpha, double x, double *slope)
+static double evaluate_jacobi_polynomial(int n, int alpha, double x, double *slope)
 {
     double last = 1, value = 0.5 * (alpha + (alpha + 2) * x);
     for (int k = 1; k < n; k++) {
@@ -35,14 +35,14 @@ static void find_line_rule(int count, int alpha, double *points, double *weights
         double x = -cos(acos(-1) * (2 * i + 1) / (2 * count));
         if (i > 0) x = 0.5 * (x + roots[i - 1]);
         for (int turn = 0; turn < 50; turn++) {
-            const double value = jacobi_value(count, alpha, x, &slope);
+            const double value = evaluate_jacobi_polynomial(count, alpha, x, &slope);
             double sum = 0;
             for (int k = 0; k < i; k++) sum += 1 / (x - roots[k]);
             const double step = value / (slope - sum * value);
             x -= step;
             if (fabs(step) < 1e-17) break;
         }
-        jacobi_value(count, alpha, x, &slope);
+        evaluate_jacobi_polynomial(count, alpha, x, &slope);
         roots[i] = x;
         points[i] = 0.5 + 0.5 * x;
         weights[i] = 1 / ((1 - x * x) * slope * slope);

@@ -34,7 +34,7 @@ typedef struct sum_basis {
 
 /* Returns the position of a cell's mean in the range of the values. The mean of a polynomial may be outside the range,
  * but not far enough to make sums overflow. */
-static double position_of_mean(const session_statistics *s, const session_cell_value *cell)
+static double find_position_of_mean(const session_statistics *s, const session_cell_value *cell)
 {
     static const double most = 1024;
     if (!cell->is_integral) return share_of_range(cell->mean, s->minimum, s->maximum);
@@ -50,7 +50,7 @@ static void add_cell(const sum_basis *b, const session_cell_value *cell, int64_t
 {
     const session_statistics *s = b->first_pass;
     const double volume = b->largest > 0 ? cell->volume / b->largest : 0;
-    const double place = position_of_mean(s, cell) - b->approximate_mean;
+    const double place = find_position_of_mean(s, cell) - b->approximate_mean;
     if (b->is_second) {
         const double half_range = 0.5 * s->maximum - 0.5 * s->minimum;
         const double deviation = half_range > 0 ? fmin(cell->half_deviation / half_range, 1024) : 0;
@@ -91,8 +91,8 @@ static void add_counted_cell(const statistics_pass *p, const sum_basis *b, int64
 
 static void add_cells(const statistics_pass *p, const sum_basis *b, int64_t *sums, int count)
 {
-    const int64_t cells = session_whole_count(p->mesh);
-#pragma omp parallel num_threads(session_region_threads(p->team->threads, cells))
+    const int64_t cells = session_count_whole_cells(p->mesh);
+#pragma omp parallel num_threads(session_choose_loop_threads(p->team->threads, cells))
     {
         region_enter();
 #pragma omp for schedule(static) reduction(+ : sums[:count]) nowait
@@ -117,8 +117,8 @@ static void find_cell_extremes(const statistics_pass *p, int64_t cell, double en
 
 static void find_extremes(const statistics_pass *p, double ends[KINDS * ENDS])
 {
-    const int64_t cells = session_whole_count(p->mesh);
-#pragma omp parallel num_threads(session_region_threads(p->team->threads, cells))
+    const int64_t cells = session_count_whole_cells(p->mesh);
+#pragma omp parallel num_threads(session_choose_loop_threads(p->team->threads, cells))
     {
         region_enter();
 #pragma omp for schedule(static) reduction(min : ends[:KINDS * ENDS]) nowait
@@ -166,7 +166,7 @@ static bool set_up_pass(const statistics_work *w, int request, int mesh, statist
     return of->is_given && !of->source && session_find_values(of, w->requests[request].field, &pass->field);
 }
 
-static session_order_field order_field(const statistics_work *w, int request, int mesh)
+static session_order_field describe_order_field(const statistics_work *w, int request, int mesh)
 {
     const session_mesh *of = w->meshes->items[mesh];
     const scene_field *field = w->requests[request].field;
@@ -180,7 +180,7 @@ static session_order_field order_field(const statistics_work *w, int request, in
 static void make_order_values(const statistics_work *w, int request, int mesh, statistics_pass *pass, base_error *error)
 {
     session_cell_value **values = find_order_values(w, request, mesh);
-    const session_order_field of = order_field(w, request, mesh);
+    const session_order_field of = describe_order_field(w, request, mesh);
     if (of.mesh->topology.is_split && !error->status) session_find_order_values(&of, values, error);
     pass->cells = *values;
 }
@@ -189,7 +189,7 @@ static void make_order_values(const statistics_work *w, int request, int mesh, s
 static void add_order_bins(const statistics_work *w, int request, int mesh, const sum_basis *basis, base_error *error)
 {
     const session_statistics_request *of = &w->requests[request];
-    const session_order_field field = order_field(w, request, mesh);
+    const session_order_field field = describe_order_field(w, request, mesh);
     const session_binned_volumes binned = {.bins = bins_of(basis->first_pass),
                                            .is_whole = of->low > of->high,
                                            .is_of_shells = basis->is_of_shells,
@@ -221,7 +221,7 @@ static const double *find_request_extremes(const statistics_work *w, int request
     return w->extremes + KINDS * ENDS * request + (is_of_shells(w, request) ? ENDS : 0);
 }
 
-static insitu_status reduce_ends(const statistics_work *w, base_error *error)
+static insitu_status reduce_extremes(const statistics_work *w, base_error *error)
 {
     const int size = KINDS * ENDS * w->count;
     for (int i = 0; i < w->count; i++) {
@@ -290,7 +290,7 @@ static void convert_sums(const statistics_work *w, int request, session_statisti
 
 static insitu_status find_all_statistics(const statistics_work *w, session_statistics *out, base_error *error)
 {
-    insitu_status status = reduce_ends(w, error);
+    insitu_status status = reduce_extremes(w, error);
     for (int i = 0; i < w->count && !status; i++) begin_statistics(w, i, &out[i]);
     if (!status) status = reduce_sums(w, out, false, error);
     for (int i = 0; i < w->count && !status; i++) convert_sums(w, i, &out[i]);

@@ -81,7 +81,7 @@ static insitu_status select_kept_lines(const char *path, file_content *old, new_
                          "it to begin anew)",
                          path, lines->header);
     lines->kept_text = old->text + header + 1;
-    lines->kept_bytes = text_keep_below(lines->kept_text, lines->cycle);
+    lines->kept_bytes = text_keep_lines_below(lines->kept_text, lines->cycle);
     return INSITU_OK;
 }
 

@@ -54,7 +54,7 @@ static int64_t *find_type_sums(const session_mesh *mesh, int64_t cell, int64_t s
 
 /* Adds the counts of a sample of the part's cells. share: number of this rank's parts of the mesh, among which the
  * samples are divided; each part gets at least one sample. */
-static void sum_orders(const session_mesh *mesh, int share, int64_t sums[CELL_SUMS])
+static void count_fitting_orders(const session_mesh *mesh, int share, int64_t sums[CELL_SUMS])
 {
     const int64_t samples = (SAMPLES + share - 1) / share, step = mesh->cells.cell_count / samples + 1;
     for (int64_t cell = 0; cell < mesh->cells.cell_count; cell += step) {
@@ -82,7 +82,7 @@ static void sum_cells(const session_meshes *meshes, const char *name, int thread
         sums[SPLIT] += part->topology.is_split;
         sums[BENT] += part->topology.is_split && session_has_bent_cells(part, threads);
         if (!part->topology.is_split)
-            sum_orders(part, parts.count, sums); /* pieces of split cells are always in VTK's order */
+            count_fitting_orders(part, parts.count, sums); /* pieces of split cells are always in VTK's order */
     }
 }
 

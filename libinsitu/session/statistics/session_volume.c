@@ -39,7 +39,7 @@ static double tet_volume(double (*p)[3])
 
 /* Returns, for each of the eight corners of a hex, the index of the cell's corner that takes its place. A wedge or
  * pyramid is thereby read as a hex with coincident corners. */
-static const signed char *corners_as_hex(int type)
+static const signed char *find_corners_as_hex(int type)
 {
     static const signed char hex[8] = {0, 1, 2, 3, 4, 5, 6, 7}, wedge[8] = {0, 1, 2, 2, 3, 4, 5, 5},
                              pyramid[8] = {0, 1, 2, 3, 4, 4, 4, 4};
@@ -91,7 +91,7 @@ static void read_positions(const grid *g, const closed_faces *c, double (*positi
 }
 
 /* Returns six times the volume of the cone from the origin over the bilinear patch. */
-static double patch_cone_volume(const double (*p)[3], const int v[4])
+static double compute_patch_cone_volume(const double (*p)[3], const int v[4])
 {
     const double *a = p[v[0]], *b = p[v[1]], *c = p[v[2]], *d = p[v[3]];
     return (determinant3(a, b, c) + determinant3(a, c, d) + determinant3(a, b, d) + determinant3(b, c, d)) / 2;
@@ -119,7 +119,8 @@ static double polyhedron_volume(const grid *g, int64_t cell, volume_buffer *buff
         if (!closed_face_is_patch(&c, c.triangles[i].face, positions)) volume += c.triangles[i].volume;
     for (int face = 0; face < c.face_count; face++)
         if (closed_face_is_patch(&c, face, positions))
-            volume += c.orientation[face] * patch_cone_volume(positions, c.entry_vertices + c.first_entries[face]);
+            volume +=
+                c.orientation[face] * compute_patch_cone_volume(positions, c.entry_vertices + c.first_entries[face]);
     return fabs(volume) / 6;
 }
 
@@ -171,5 +172,5 @@ double session_cell_volume(const grid *g, int64_t cell, volume_buffer *buffer)
     buffer->vertices = buffer->corners;
     buffer->vertex_count = grid_cell_vertices(g, cell, buffer->corners);
     for (int i = 0; i < buffer->vertex_count; i++) grid_vertex(g, buffer->corners[i], points[i]);
-    return fabs(type == GRID_TET ? tet_volume(points) : hex_volume(points, corners_as_hex(type)));
+    return fabs(type == GRID_TET ? tet_volume(points) : hex_volume(points, find_corners_as_hex(type)));
 }

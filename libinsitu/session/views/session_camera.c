@@ -149,7 +149,7 @@ static camera_frame find_free_frame(const scene_image *image, double most)
                           .down = reduce_fraction(most, (rulers + foot) * size, image->height)};
 }
 
-static corner_reach reach_of_corners(const session_extent *e, const render_camera *axes, const camera_frame *f)
+static corner_reach find_reach_of_corners(const session_extent *e, const render_camera *axes, const camera_frame *f)
 {
     corner_reach r = {-INFINITY, -INFINITY, -INFINITY, -INFINITY, -INFINITY};
     for (int corner = 0; corner < 8; corner++) {
@@ -165,7 +165,7 @@ static corner_reach reach_of_corners(const session_extent *e, const render_camer
     return r;
 }
 
-static corner_reach reach_of_sphere(double radius, const camera_frame *f)
+static corner_reach find_reach_of_sphere(double radius, const camera_frame *f)
 {
     return (corner_reach){radius * hypot(1, f->right), radius * hypot(1, f->left), radius * hypot(1, f->up),
                           radius * hypot(1, f->down), radius};
@@ -181,8 +181,9 @@ static camera_fit make_fit(const session_extent *e, const render_camera *axes, c
     camera_fit fit = {.frame_fractions = share, .is_centred = by_box};
     fit.tangents = (camera_frame){share.right * t.horizontal, share.left * t.horizontal, share.up * t.vertical,
                                   share.down * t.vertical};
-    fit.perspective_reach = by_box ? reach_of_corners(e, axes, &fit.tangents) : reach_of_sphere(radius, &fit.tangents);
-    fit.orthographic_reach = by_box ? reach_of_corners(e, axes, &nothing) : reach_of_sphere(radius, &nothing);
+    fit.perspective_reach =
+        by_box ? find_reach_of_corners(e, axes, &fit.tangents) : find_reach_of_sphere(radius, &fit.tangents);
+    fit.orthographic_reach = by_box ? find_reach_of_corners(e, axes, &nothing) : find_reach_of_sphere(radius, &nothing);
     return fit;
 }
 
@@ -199,7 +200,7 @@ static double find_eye_distance(const camera_fit *fit, double half_diagonal)
 
 /* Returns half the height of an orthographic picture in which all data fits. aspect: width of the picture divided by
  * its height. */
-static double fitting_height(const camera_fit *fit, double aspect)
+static double find_fitting_height(const camera_fit *fit, double aspect)
 {
     const double across = (fit->orthographic_reach.right + fit->orthographic_reach.left) /
                           (fit->frame_fractions.right + fit->frame_fractions.left) / aspect;
@@ -234,7 +235,7 @@ static void set_orthographic(const scene_image *image, double half_height, rende
 
 /* Computes an automatic camera. Positions are relative to the centre of the bounds until the camera is complete, so
  * that bounds far from 0 do not lose digits. Returns false if there is no direction of view. */
-static bool automatic_camera(const session_extent *extent, const scene_image *image, render_camera *out)
+static bool make_automatic_camera(const session_extent *extent, const scene_image *image, render_camera *out)
 {
     const scene_camera *c = &image->camera;
     const double radius = extent->half_diagonal > 0 ? extent->half_diagonal : 1;
@@ -248,7 +249,7 @@ static bool automatic_camera(const session_extent *extent, const scene_image *im
     const bool is_flat = c->is_orthographic;
     const double aspect = (double)image->width / image->height;
     const double back = is_flat ? 2 * radius : find_eye_distance(&fit, extent->half_diagonal) / c->zoom;
-    const double half_height = find_half_height(image, fitting_height(&fit, aspect) / c->zoom);
+    const double half_height = find_half_height(image, find_fitting_height(&fit, aspect) / c->zoom);
     const corner_reach *reach = is_flat ? &fit.orthographic_reach : &fit.perspective_reach;
     const camera_frame *f = is_flat ? &fit.frame_fractions : &fit.tangents;
     const double across = is_flat ? half_height * aspect : back, high = is_flat ? half_height : back;
@@ -265,7 +266,7 @@ static bool automatic_camera(const session_extent *extent, const scene_image *im
     return true;
 }
 
-static bool explicit_camera(const scene_image *image, render_camera *out)
+static bool make_explicit_camera(const scene_image *image, render_camera *out)
 {
     const scene_camera *c = &image->camera;
     if (!render_camera_look_at(out, c->eye, c->focal, c->up, c->angle, image->width, image->height)) return false;
@@ -277,7 +278,7 @@ static bool explicit_camera(const scene_image *image, render_camera *out)
 /* ---- defaults from the data ------------------------------------------------------------------------------------ */
 
 /* Directs the camera at flat data, so that the data's first axis points to the right and its second axis points up. */
-static void face_flat_data(int axis, scene_camera *c)
+static void turn_camera_to_flat_data(int axis, scene_camera *c)
 {
     static const double towards[3][3] = {{1, 0, 0}, {0, -1, 0}, {0, 0, 1}};
     static const double upward[3][3] = {{0, 0, 1}, {0, 0, 1}, {0, 1, 0}};
@@ -287,7 +288,7 @@ static void face_flat_data(int axis, scene_camera *c)
     if (!c->has_fit) c->fits_box = true;
 }
 
-static bool camera_by_bounds(const session_extent *data, const scene_image *image, render_camera *out)
+static bool make_camera_by_bounds(const session_extent *data, const scene_image *image, render_camera *out)
 {
     session_extent extent = *data;
     scene_image seen = *image;
@@ -300,11 +301,11 @@ static bool camera_by_bounds(const session_extent *data, const scene_image *imag
         extent.half_diagonal = vector3_length(half);
     }
     const int axis = session_flat_axis(&extent);
-    if (axis >= 0 && c->orbit.view_count == 0) face_flat_data(axis, c);
-    return automatic_camera(&extent, &seen, out);
+    if (axis >= 0 && c->orbit.view_count == 0) turn_camera_to_flat_data(axis, c);
+    return make_automatic_camera(&extent, &seen, out);
 }
 
 bool session_make_camera(const session_extent *extent, const scene_image *image, render_camera *out)
 {
-    return image->camera.is_automatic ? camera_by_bounds(extent, image, out) : explicit_camera(image, out);
+    return image->camera.is_automatic ? make_camera_by_bounds(extent, image, out) : make_explicit_camera(image, out);
 }

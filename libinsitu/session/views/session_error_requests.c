@@ -39,7 +39,7 @@ insitu_status session_make_due_views(const scene *scene, const session_moment *m
     if (session_agree(comm, error)) return error->status;
     for (int i = 0; i < out->count; i++) {
         const scene_image *image = &scene->images[i];
-        out->are_due[i] = session_is_due(image, moment);
+        out->are_due[i] = session_is_image_due(image, moment);
         needs_extent =
             needs_extent ||
             (out->are_due[i] && (image->camera.is_automatic || image->slice_count > 0 || image->volume_count > 0));
@@ -57,7 +57,7 @@ insitu_status session_make_due_views(const scene *scene, const session_moment *m
  * sphere. In perspective, a displacement d of a point at the depth z along the camera's axis, at the distance s from
  * the eye, appears at most as large as d s / z^2 on the plane at depth 1. A sphere that is nearer than its radius is
  * treated as if its depth were its radius. */
-static double size_in_view(const render_camera *camera, const double centre[3], double radius)
+static double find_pixel_size_in_view(const render_camera *camera, const double centre[3], double radius)
 {
     const double aspect = (double)camera->width / camera->height, half = camera->half_height;
     double to[3];
@@ -78,7 +78,8 @@ double session_error_request_pixel_size(const void *of, const double centre[3], 
     const session_error_request *request = of;
     double least = INFINITY;
     for (int i = 0; i < request->views->count; i++)
-        if (request->images[i]) least = fmin(least, size_in_view(&request->views->cameras[i], centre, radius));
+        if (request->images[i])
+            least = fmin(least, find_pixel_size_in_view(&request->views->cameras[i], centre, radius));
     return least;
 }
 
@@ -158,9 +159,9 @@ static void add_value(session_error_requests *requests, session_error_request *r
     request->values = values;
 }
 
-static const session_catalogue_field *find_shown(const session_catalogue_mesh *mesh, const scene_field *field)
+static const session_catalogue_field *find_shown_field(const session_catalogue_mesh *mesh, const scene_field *field)
 {
-    return scene_field_is_on(field, mesh->name) ? session_catalogue_find(mesh, field->name) : NULL;
+    return scene_field_is_on(field, mesh->name) ? session_catalogue_find_field(mesh, field->name) : NULL;
 }
 
 /* Returns whether the layer shows the caller's values, which do not depend on other cells. */
@@ -183,7 +184,7 @@ static void add_isosurface(session_error_requests *requests, const session_due_v
                            session_report *report)
 {
     const scene_isosurface *shown = &image->isosurfaces[layer];
-    const session_catalogue_field *field = find_shown(mesh, &shown->field);
+    const session_catalogue_field *field = find_shown_field(mesh, &shown->field);
     session_error_request like = {.field = NULL};
     if (!field) return;
     const bool is_bounded = is_polynomial(mesh, field, &shown->field);
@@ -206,7 +207,7 @@ static void add_slice(session_error_requests *requests, const session_due_views 
                       const session_catalogue_mesh *mesh, const scene_image *image, int index, int layer)
 {
     const scene_slice *shown = &image->slices[layer];
-    if (!find_shown(mesh, &shown->field)) return;
+    if (!find_shown_field(mesh, &shown->field)) return;
     for (int i = 0; i < shown->plane_count; i++) {
         session_error_request like = {.has_plane = true};
         memcpy(like.plane.normal, shown->planes[i].normal, sizeof like.plane.normal);
@@ -220,7 +221,7 @@ static void add_volume(session_error_requests *requests, const session_due_views
 {
     static const double usual_error = 0.01; /* allowed error of volumes for which the scene gives no max_error */
     const scene_volume *shown = &image->volumes[layer];
-    const session_catalogue_field *field = find_shown(mesh, &shown->field);
+    const session_catalogue_field *field = find_shown_field(mesh, &shown->field);
     if (!field || !is_polynomial(mesh, field, &shown->field)) return;
     const session_error_request like = {.field = field->name,
                                         .component = session_resolve_component(&shown->field, field->component_count),
@@ -237,7 +238,7 @@ static void add_whole_layers(session_error_requests *requests, const session_due
     const scene_image *image = &views->scene->images[index];
     const session_error_request positions = {.field = NULL};
     for (int i = 0; i < image->volume_count; i++) {
-        if (!find_shown(mesh, &image->volumes[i].field)) continue;
+        if (!find_shown_field(mesh, &image->volumes[i].field)) continue;
         requests->needs_all = true;
         show_request(requests, views, &positions, index);
     }
@@ -253,7 +254,7 @@ static bool has_fields_of_neighbours(const session_catalogue_mesh *mesh, const s
 {
     scene_field_walk walk = {.image = image};
     for (const scene_field *field; (field = scene_next_field(&walk)) != NULL;) {
-        const session_catalogue_field *of = find_shown(mesh, field);
+        const session_catalogue_field *of = find_shown_field(mesh, field);
         if (of && !is_own(mesh, of, field)) return true;
     }
     return false;

@@ -96,8 +96,8 @@ static grid_field make_absent_field(void)
 static void set_scalar_field(session_layers *layers, ptrdiff_t at, const session_mesh *mesh,
                              const session_scalar *scalar, bool needs_ranges)
 {
-    layers->fields[at] = scalar ? session_scalar_field(mesh, scalar) : make_absent_field();
-    if (scalar && needs_ranges) layers->ranges[at] = session_scalar_ranges(mesh, scalar);
+    layers->fields[at] = scalar ? session_get_scalar_values(mesh, scalar) : make_absent_field();
+    if (scalar && needs_ranges) layers->ranges[at] = session_get_scalar_ranges(mesh, scalar);
 }
 
 /* Stores the fields of all parts for a layer in section `slot` of the array of fields; a section consists of part_count
@@ -242,7 +242,7 @@ static insitu_status fill_surface(const session_layer_basis *basis, const scene_
 /* Returns whether the layer shows the iterator's current part. The part must be a mesh of outer faces. */
 static bool is_shown(const session_part_walk *walk, const scene_surface *layer)
 {
-    return walk->outer && session_surface_is_on(layer, walk->whole) &&
+    return walk->outer && session_is_surface_on_mesh(layer, walk->whole) &&
            session_find_outer(walk->whole, &layer->threshold) == walk->outer;
 }
 
@@ -256,8 +256,8 @@ static render_field set_face_field(const session_meshes *meshes, session_layers 
         if (!is_part(mesh)) continue;
         layers->fields[at] = make_absent_field();
         if (is_shown(&walk, layer)) {
-            layers->fields[at] = session_scalar_field(mesh, &mesh->scalars[0]);
-            layers->ranges[at] = session_scalar_ranges(mesh, &mesh->scalars[0]);
+            layers->fields[at] = session_get_scalar_values(mesh, &mesh->scalars[0]);
+            layers->ranges[at] = session_get_scalar_ranges(mesh, &mesh->scalars[0]);
         }
         at++;
     }
@@ -283,7 +283,7 @@ static const render_vertex_gradients *set_face_normals(const session_meshes *mes
 static bool gather_values(const session_mesh *whole, const session_outer *outer, const session_scalar *scalar,
                           double **values, grid_field *out)
 {
-    const grid_field field = session_scalar_field(whole, scalar);
+    const grid_field field = session_get_scalar_values(whole, scalar);
     *values = session_gather_outer_values(outer, &field);
     *out = (grid_field){.values = {.data = (const char *)*values, .stride = (int64_t)sizeof **values, .is_wide = true},
                         .component_stride = (int64_t)sizeof **values,
@@ -312,7 +312,7 @@ static bool set_gathered_field(const session_meshes *meshes, session_layers *lay
 
 /* Returns the material of a layer. A picture of flat data is a map: if the scene sets no light and no material, its
  * colours are exactly those of the colour bar. */
-static const scene_material *material_of_faces(const session_layer_basis *basis, const scene_surface *layer)
+static const scene_material *choose_face_material(const session_layer_basis *basis, const scene_surface *layer)
 {
     static const scene_material bare = {.ambient = 1};
     return basis->is_flat && !layer->has_material && !basis->image->has_lights ? &bare : &layer->material;
@@ -322,7 +322,7 @@ static insitu_status fill_outer(const session_layer_basis *basis, const scene_su
                                 session_layers *layers, base_error *error)
 {
     const bool is_curved = session_has_curved_faces(basis->catalogue);
-    const scene_material *m = material_of_faces(basis, layer);
+    const scene_material *m = choose_face_material(basis, layer);
     render_surface_layer *out = &layers->surfaces[surface];
     *out = (render_surface_layer){.field = set_face_field(basis->meshes, layers, 2 * surface, layer),
                                   .value_count = 1,

@@ -63,7 +63,7 @@ typedef struct part_work {
                                   of the request are measured */
 } part_work;
 
-static insitu_status use_request(part_work *work, base_error *error)
+static insitu_status apply_request(part_work *work, base_error *error)
 {
     const mesh_work *w = work->of;
     const int threads = w->basis->team->threads;
@@ -75,10 +75,10 @@ static insitu_status use_values(void *of, const session_node_values *values, bas
 {
     part_work *work = of;
     work->request.values = values;
-    return use_request(work, error);
+    return apply_request(work, error);
 }
 
-static void use_part(part_work *work, const session_error_request *request, base_error *error)
+static void use_request_in_part(part_work *work, const session_error_request *request, base_error *error)
 {
     static const double zero = 0;
     const mesh_work *w = work->of;
@@ -95,7 +95,7 @@ static void use_part(part_work *work, const session_error_request *request, base
         work->request.isovalues =
             (session_isovalues){1, &zero, 2 * SESSION_BORDER_SHARE * request->views->extent.half_diagonal};
     const int field = request->field ? session_find_field(work->mesh, request->field) : -1;
-    if (!request->field) use_request(work, error);
+    if (!request->field) apply_request(work, error);
     if (field >= 0) session_read_nodes(work->mesh, field, use_values, work, error);
 }
 
@@ -106,7 +106,8 @@ static void measure_part(const mesh_work *w, const session_mesh *mesh, session_c
     if (marks && w->requests.needs_outer) work.request.measured = mesh->finer.outer_faces;
     for (int n = 0; n < w->requests.count && !error->status; n++) {
         const session_error_request *request = &w->requests.items[n];
-        if (request->is_shown && !request->volume && (!w->marks_only || marks)) use_part(&work, request, error);
+        if (request->is_shown && !request->volume && (!w->marks_only || marks))
+            use_request_in_part(&work, request, error);
     }
     for (int64_t cell = 0; work.request.measured && cell < session_nodal_mesh(mesh)->cell_count; cell++)
         if (work.request.measured[cell]) cells[cell] = 1;
@@ -114,20 +115,21 @@ static void measure_part(const mesh_work *w, const session_mesh *mesh, session_c
 }
 
 /* Adds the pieces of refined cells that the requests need to the part's set of pieces. */
-static void choose_part(const mesh_work *w, const session_mesh *mesh, session_cell_marks *marks, base_error *error)
+static void choose_pieces_of_part(const mesh_work *w, const session_mesh *mesh, session_cell_marks *marks,
+                                  base_error *error)
 {
     part_work work = {.of = w, .mesh = mesh, .pieces = &marks->pieces};
     session_begin_piece_set(mesh, marks->cells, w->choice->parts, work.pieces, error);
     for (int n = 0; n < w->requests.count && !error->status; n++) {
         const session_error_request *request = &w->requests.items[n];
-        if (request->is_shown && (request->field || request->has_plane)) use_part(&work, request, error);
+        if (request->is_shown && (request->field || request->has_plane)) use_request_in_part(&work, request, error);
     }
     if (w->requests.needs_outer && !error->status) session_add_outer_pieces(mesh, w->choice->parts, work.pieces, error);
 }
 
 /* Measures the errors in all parts of a mesh. If the number of pieces has been chosen already, selects the pieces of
  * refined cells instead. */
-static void use_parts(const mesh_work *w, const char *name, base_error *error)
+static void measure_or_choose_parts(const mesh_work *w, const char *name, base_error *error)
 {
     const session_parts parts = session_find_parts(w->basis->meshes, name);
     const bool is_chosen = w->choice->parts > 1;
@@ -137,14 +139,15 @@ static void use_parts(const mesh_work *w, const char *name, base_error *error)
         const session_mesh *mesh = parts.items[i];
         if (!mesh->is_given || !mesh->topology.is_split) continue;
         if (is_chosen)
-            choose_part(w, mesh, &w->choice->marks[i], error);
+            choose_pieces_of_part(w, mesh, &w->choice->marks[i], error);
         else
             measure_part(w, mesh, session_marks_of(w->choice, i), error);
     }
 }
 
-static void use_mesh(const session_pieces_basis *basis, const session_due_views *views, int mesh,
-                     session_finer_choice *choice, piece_error *out, session_report *report, base_error *error)
+static void measure_or_choose_mesh(const session_pieces_basis *basis, const session_due_views *views, int mesh,
+                                   session_finer_choice *choice, piece_error *out, session_report *report,
+                                   base_error *error)
 {
     const scene *scene = basis->scene;
     mesh_work *w = base_alloc(sizeof *w);
@@ -157,7 +160,7 @@ static void use_mesh(const session_pieces_basis *basis, const session_due_views 
                                     &w->requests, scene->is_surface_error_given ? report : NULL);
         out->needs_all = w->requests.needs_all;
         out->is_shown = w->requests.is_shown || (w->marks_only && w->requests.needs_all);
-        if (w->requests.is_complete) use_parts(w, basis->catalogue->meshes[mesh].name, error);
+        if (w->requests.is_complete) measure_or_choose_parts(w, basis->catalogue->meshes[mesh].name, error);
     }
     if (!w || !w->requests.is_complete) session_fail_for_memory(error, sizeof *w, "bounds of isosurfaces");
     if (w) session_free_error_requests(&w->requests);
@@ -291,7 +294,7 @@ static insitu_status find_errors(const session_pieces_basis *basis, const sessio
     fill_fields(basis, views);
     for (int m = 0; m < basis->catalogue->mesh_count && !error->status; m++)
         if (choices[m].order > 0 && !choices[m].excluded_count)
-            use_mesh(basis, views, m, &choices[m], &errors[m], report, error);
+            measure_or_choose_mesh(basis, views, m, &choices[m], &errors[m], report, error);
     if (reduce_errors(errors, basis->catalogue->mesh_count, basis->team->comm, error)) return error->status;
     return estimate_all_volumes(basis, views, choices, errors, error);
 }
@@ -302,7 +305,7 @@ static insitu_status list_pieces(const session_pieces_basis *basis, const sessio
 {
     for (int m = 0; m < basis->catalogue->mesh_count && !error->status; m++)
         if (choices[m].parts > 1 && choices[m].mark_count > 0)
-            use_mesh(basis, views, m, &choices[m], &errors[m], NULL, error);
+            measure_or_choose_mesh(basis, views, m, &choices[m], &errors[m], NULL, error);
     return session_agree(basis->team->comm, error);
 }
 
@@ -322,8 +325,8 @@ static int find_pieces(const scene *scene, const session_finer_choice *choice, c
     return parts;
 }
 
-static void choose_fixed(const char *mesh, const scene *scene, const piece_error *of, session_finer_choice *choice,
-                         session_report *report)
+static void choose_fixed_piece_count(const char *mesh, const scene *scene, const piece_error *of,
+                                     session_finer_choice *choice, session_report *report)
 {
     const int wanted = scene->finer_pieces, most = session_most_parts(choice);
     choice->parts = choice->excluded_count || !of->is_shown ? 1 : wanted < most ? wanted : most;
@@ -333,8 +336,8 @@ static void choose_fixed(const char *mesh, const scene *scene, const piece_error
                  mesh, choice->order, most, wanted, NODES_MOST_ORDER);
 }
 
-static void choose_by_error(const char *mesh, const scene *scene, const piece_error *of, session_finer_choice *choice,
-                            session_report *report)
+static void choose_piece_count_by_error(const char *mesh, const scene *scene, const piece_error *of,
+                                        session_finer_choice *choice, session_report *report)
 {
     choice->parts = choice->excluded_count || choice->order < 2 ? 1 : find_pieces(scene, choice, of);
     const double met = of->all.error / (choice->parts * choice->parts);
@@ -464,9 +467,9 @@ static void choose_all(const session_pieces_basis *basis, piece_error *errors, p
         if (!choices[m].order) continue;
         warn_of_pyramids(name, scene, &choices[m], report);
         if (scene->finer_pieces)
-            choose_fixed(name, scene, &errors[m], &choices[m], report);
+            choose_fixed_piece_count(name, scene, &errors[m], &choices[m], report);
         else
-            choose_by_error(name, scene, &errors[m], &choices[m], report);
+            choose_piece_count_by_error(name, scene, &errors[m], &choices[m], report);
         errors[m].components = count_components(scene, &catalogue->meshes[m]);
         errors[m].wanted = choices[m].parts;
     }

@@ -75,7 +75,7 @@ static void fill_view(const session_space *space, const scene_image *image, sess
 static const double sample_seconds = 1e-7;
 
 /* Returns the length of the part of a pixel's ray that lies within the bounds. */
-static double chord_of_bounds(const session_extent *e, const render_camera *camera, int x, int y)
+static double measure_chord_in_bounds(const session_extent *e, const render_camera *camera, int x, int y)
 {
     double base[3], direction[3], begin = 0, end = INFINITY;
     render_camera_ray(camera, x, y, base, direction);
@@ -101,7 +101,7 @@ static double estimate_samples(const session_extent *e, const scene_image *image
         const int column = i % PROBES, row = i / PROBES;
         const int x = (int)((column + 0.5) * camera->width / PROBES);
         const int y = (int)((row + 0.5) * camera->height / PROBES);
-        sum += chord_of_bounds(e, camera, x, y);
+        sum += measure_chord_in_bounds(e, camera, x, y);
     }
     const double rays = (double)image->width * image->height * image->frames;
     return sum / (PROBES * PROBES) / view->step * rays * image->volume_count;

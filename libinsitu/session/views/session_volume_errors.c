@@ -174,7 +174,7 @@ void session_free_volume_ranges(session_value_ranges *ranges)
 
 /* ---- transfer functions ------------------------------------------------------------------------------------------ */
 
-static double position_of(const render_transfer *t, double value)
+static double find_position_in_range(const render_transfer *t, double value)
 {
     const double low = render_scaled(t->scale, t->threshold, t->low);
     const double high = render_scaled(t->scale, t->threshold, t->high);
@@ -185,10 +185,11 @@ static double position_of(const render_transfer *t, double value)
 static double find_extinction(const render_transfer *t, double position)
 {
     int i = 0;
-    while (i < t->opacity_count && position_of(t, t->opacity_values[i]) <= position) i++;
+    while (i < t->opacity_count && find_position_in_range(t, t->opacity_values[i]) <= position) i++;
     double opacity = (double)t->opacities[i < t->opacity_count ? i : i - 1];
     if (i > 0 && i < t->opacity_count) {
-        const double from = position_of(t, t->opacity_values[i - 1]), to = position_of(t, t->opacity_values[i]);
+        const double from = find_position_in_range(t, t->opacity_values[i - 1]),
+                     to = find_position_in_range(t, t->opacity_values[i]);
         const double share = (position - from) / (to - from), before = (double)t->opacities[i - 1];
         opacity = before + share * (opacity - before);
     }
@@ -273,7 +274,7 @@ static void end_estimate(volume_errors *errors)
 /* ---- cells ------------------------------------------------------------------------------------------------------- */
 
 /* Returns an integral over the range from 0 to a position. */
-static double integral_at(const volume_errors *of, int quantity, double position)
+static double find_integral_at(const volume_errors *of, int quantity, double position)
 {
     if (position <= 0) return position * of->slopes[0][quantity];
     if (position >= 1) return of->integrals[POSITIONS][quantity] + (position - 1) * of->slopes[1][quantity];
@@ -295,8 +296,9 @@ static void find_light(const volume_errors *of, const session_value_cell *cell, 
         low = fmin(low, cell->tuples[n][3] - error);
         high = fmax(high, cell->tuples[n][3] + error);
     }
-    const double from = position_of(t, low) - least_width, to = position_of(t, high) + least_width;
-    for (int q = 0; q < QUANTITIES; q++) out[q] = integral_at(of, q, to) - integral_at(of, q, from);
+    const double from = find_position_in_range(t, low) - least_width,
+                 to = find_position_in_range(t, high) + least_width;
+    for (int q = 0; q < QUANTITIES; q++) out[q] = find_integral_at(of, q, to) - find_integral_at(of, q, from);
     for (int q = EMISSION; q < QUANTITIES; q++) out[q] /= to - from;
     for (int q = 0; q < EMISSION; q++) out[q] *= error > 0 ? error / (high - low) : 0;
 }
@@ -336,7 +338,7 @@ static bool project_cell(const render_camera *camera, const session_value_cell *
     return true;
 }
 
-static double share_of(const covered_part *part, int axis, int at)
+static double find_covered_share(const covered_part *part, int axis, int at)
 {
     const double width = part->high[axis] - part->low[axis];
     return (fmin(part->high[axis], at + 1) - fmax(part->low[axis], at)) / width;
@@ -368,7 +370,7 @@ static void add_cell(void *of, const session_value_cell *cell)
         }
         for (int j = first[1]; j <= last[1]; j++)
             for (int i = first[0]; i <= last[0]; i++) {
-                const double share = length * share_of(&part, 0, i) * share_of(&part, 1, j);
+                const double share = length * find_covered_share(&part, 0, i) * find_covered_share(&part, 1, j);
                 int64_t *sums = errors->sums + QUANTITIES * ((v * GRID_SIZE + j) * GRID_SIZE + i);
                 for (int q = 0; q < QUANTITIES; q++) add_sum(&sums[q], share * light[q]);
             }

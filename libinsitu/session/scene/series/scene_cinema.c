@@ -39,7 +39,7 @@ static insitu_status check_file(const scene_document *d, const char *path, const
     return INSITU_OK;
 }
 
-static const char *default_file(const scene_image *image, char file[96])
+static const char *make_default_file_name(const scene_image *image, char file[96])
 {
     snprintf(file, 96, "{name}_{cycle:06}%s%s%s%s.png", image->camera.orbit.view_count ? "_{view:03}" : "",
              image->has_isovalue ? "_{isovalue}" : "", image->has_plane ? "_{plane:02}" : "",
@@ -69,7 +69,8 @@ insitu_status scene_convert_cinema(const scene_document *d, const char *path, co
     if (!status) status = check_file(d, path, image, in->path);
     if (!status && out->format == SCENE_EXR)
         status = scene_fail_at_key(d, path, "path", "\"%.100s\" is no PNG, expected .png in a database", in->path);
-    return status ? status : join_output_path(d, folder, in->path ? in->path : default_file(image, file), out);
+    return status ? status
+                  : join_output_path(d, folder, in->path ? in->path : make_default_file_name(image, file), out);
 }
 
 /* ---- databases ------------------------------------------------------------------------------------------------- */

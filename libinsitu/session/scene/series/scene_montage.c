@@ -10,9 +10,9 @@
 
 /* Returns the output's path, expanded for a sample cycle and time. Outputs are the same file if these paths are equal
  * (scene_outputs.c). */
-static char *name_at_sample(const scene_image *image, const scene_output *output, int view)
+static char *expand_path_for_comparison(const scene_image *image, const scene_output *output, int view)
 {
-    scene_placeholder_values moment = scene_placeholder_values_of(image, 123456789012345678, 0.5);
+    scene_placeholder_values moment = scene_make_placeholder_values(image, 123456789012345678, 0.5);
     moment.view = view;
     return scene_expand(output->path, &moment);
 }
@@ -20,7 +20,7 @@ static char *name_at_sample(const scene_image *image, const scene_output *output
 static insitu_status check_views(const scene_document *d, const char *path, const scene_image *image,
                                  const scene_output *output, const char *name)
 {
-    char *other = name_at_sample(image, output, 1);
+    char *other = expand_path_for_comparison(image, output, 1);
     if (!other) return scene_fail_for_memory(d);
     const bool differs = strcmp(other, name) != 0;
     base_free(other);
@@ -110,7 +110,7 @@ static insitu_status check_panels(const scene_document *d, const char *path, con
 
 /* Returns the rectangle of an inset of the image's size. Insets lie over the panels, not over the strip for shared
  * colour bars. */
-static scene_rectangle find_inset(const scene_montage *m, scene_anchor corner, const scene_image *image)
+static scene_rectangle compute_inset_rectangle(const scene_montage *m, scene_anchor corner, const scene_image *image)
 {
     const bool is_right = corner == SCENE_TOP_RIGHT || corner == SCENE_BOTTOM_RIGHT;
     const bool is_low = corner == SCENE_BOTTOM_LEFT || corner == SCENE_BOTTOM_RIGHT;
@@ -136,7 +136,7 @@ static bool overlaps_another(const scene_montage *m, const scene_rectangle *a)
 static insitu_status check_inset(const scene_document *d, const char *path, const scene_image *image,
                                  const scene_output *output, const scene_montage *m)
 {
-    const scene_rectangle own = find_inset(m, output->corner, image);
+    const scene_rectangle own = compute_inset_rectangle(m, output->corner, image);
     const int most_width = m->width * m->columns - 2 * m->inset_margin;
     const int most_height = m->height * m->rows - 2 * m->inset_margin;
     if (image->camera.orbit.view_count)
@@ -171,7 +171,7 @@ static insitu_status add_inset(const scene_document *d, const char *path, scene 
     if (status) return status;
     output->montage = index;
     output->first_panel = m->columns * m->rows;
-    m->insets[output->corner] = find_inset(m, output->corner, image);
+    m->insets[output->corner] = compute_inset_rectangle(m, output->corner, image);
     return INSITU_OK;
 }
 
@@ -201,7 +201,7 @@ static insitu_status add_output_to_montage(const scene_document *d, scene *s, sc
     char path[64];
     output->montage = -1;
     if (!output->columns && !output->is_inset) return INSITU_OK;
-    char *name = name_at_sample(image, output, 0);
+    char *name = expand_path_for_comparison(image, output, 0);
     if (!name) return scene_fail_for_memory(d);
     snprintf(path, sizeof path, "images[%d].outputs[%d]", image->variant.source, index);
     if (!output->is_inset) return add_panels(d, path, s, image, output, name);

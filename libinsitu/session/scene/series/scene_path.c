@@ -31,7 +31,7 @@ typedef struct cubic_points {
 } cubic_points;
 
 /* Returns the slope of the curve at point i, which is 1 or 2. */
-static double slope_at(const cubic_points *p, int i)
+static double compute_slope(const cubic_points *p, int i)
 {
     const double before = p->times[i] - p->times[i - 1], after = p->times[i + 1] - p->times[i];
     const double down = (p->values[i] - p->values[i - 1]) / before, up = (p->values[i + 1] - p->values[i]) / after;
@@ -45,7 +45,7 @@ static double slope_at(const cubic_points *p, int i)
 static double cubic_value(const cubic_points *p, double share)
 {
     const double h = p->times[2] - p->times[1], a = p->values[1], b = p->values[2], t = share;
-    const double from = p->has_first ? h * slope_at(p, 1) : 0, to = p->has_last ? h * slope_at(p, 2) : 0;
+    const double from = p->has_first ? h * compute_slope(p, 1) : 0, to = p->has_last ? h * compute_slope(p, 2) : 0;
     const double value = a + (b - a) * t * t * (3 - 2 * t) + t * (1 - t) * ((1 - t) * from - t * to);
     return fmax(fmin(a, b), fmin(fmax(a, b), value));
 }

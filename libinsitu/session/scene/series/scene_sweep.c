@@ -6,12 +6,12 @@
 #include "memory.h"
 #include "scene_convert.h"
 
-static bool is_over_isovalues(const scene_file_image *in)
+static bool sweeps_over_isovalues(const scene_file_image *in)
 {
     return in->sweep && in->sweep->isovalues && *in->sweep->isovalues;
 }
 
-static bool is_over_planes(const scene_file_image *in)
+static bool sweeps_over_planes(const scene_file_image *in)
 {
     return in->sweep && in->sweep->planes && *in->sweep->planes;
 }
@@ -60,13 +60,13 @@ static insitu_status find_values(const scene_document *d, const char *path, cons
     const scene_file_isosurface *isosurface = NULL;
     const scene_file_slice *slice = NULL;
     const int isosurfaces = find_isosurface(in, &isosurface), slices = find_slice(in, &slice);
-    if (is_over_isovalues(in) && isosurfaces != 1)
+    if (sweeps_over_isovalues(in) && isosurfaces != 1)
         return scene_fail_at_key(d, path, "sweep.isovalues", "the image has %d isosurface layers, expected one",
                                  isosurfaces);
-    if (is_over_planes(in) && slices != 1)
+    if (sweeps_over_planes(in) && slices != 1)
         return scene_fail_at_key(d, path, "sweep.planes", "the image has %d slice layers, expected one", slices);
-    if (is_over_isovalues(in)) out->isovalues = isosurface->values_count;
-    if (is_over_planes(in)) out->planes = scene_count_planes(slice);
+    if (sweeps_over_isovalues(in)) out->isovalues = isosurface->values_count;
+    if (sweeps_over_planes(in)) out->planes = scene_count_planes(slice);
     return INSITU_OK;
 }
 
@@ -79,7 +79,7 @@ insitu_status scene_find_series(const scene_document *d, const char *path, const
     snprintf(camera, sizeof camera, "%s.camera", path);
     *out = (scene_series){field_count ? field_count : 1, 1, 1, scene_count_views(d, camera, in->camera)};
     if (!in->sweep) return INSITU_OK;
-    if (!is_over_isovalues(in) && !is_over_planes(in) && field_count == 0)
+    if (!sweeps_over_isovalues(in) && !sweeps_over_planes(in) && field_count == 0)
         return scene_fail_at_key(d, path, "sweep",
                                  "holds nothing, expected isovalues: true, planes: true, fields or several");
     const insitu_status status = find_values(d, path, in, out);
@@ -167,8 +167,8 @@ insitu_status scene_apply_sweep(const scene_document *d, const char *path, const
 {
     const char *fields[SCENE_MAX_NAMES];
     const int field_count = in->sweep ? list_fields(d, path, fields) : 0;
-    if (is_over_isovalues(in)) select_isovalue(out, out->variant.isovalue);
-    if (is_over_planes(in)) select_plane(out, out->variant.plane);
+    if (sweeps_over_isovalues(in)) select_isovalue(out, out->variant.isovalue);
+    if (sweeps_over_planes(in)) select_plane(out, out->variant.plane);
     if (field_count == 0) return INSITU_OK;
     char key[SCENE_PATH_SIZE];
     int replaced;
