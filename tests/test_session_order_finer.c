@@ -499,6 +499,47 @@ static void mixed_cells_draw_the_same(void **state)
     order_mesh_free(&mesh);
 }
 
+/* Declares every second hex of 27 nodes as a linear hex with the same corners. */
+static void make_linear_cells(order_mesh *mesh, int64_t *offsets, unsigned char *types)
+{
+    int64_t count = 0;
+    for (int64_t cell = 0; cell < mesh->cell_count; cell++) {
+        const int64_t first = cell * mesh->nodes, nodes = cell % 2 ? 8 : mesh->nodes;
+        types[cell] = (unsigned char)(cell % 2 ? INSITU_HEX : INSITU_TRIQUADRATIC_HEX);
+        offsets[cell] = count;
+        memmove(mesh->connectivity + count, mesh->connectivity + first, (size_t)nodes * sizeof *mesh->connectivity);
+        count += nodes;
+    }
+    offsets[mesh->cell_count] = count;
+    mesh->mesh.connectivity_count = count;
+    mesh->mesh.offsets = (insitu_array){offsets, INSITU_INT64, 0};
+    mesh->mesh.cell_types = (insitu_array){types, INSITU_UINT8, 0};
+}
+
+/* Checks that the common face of two neighbours is not an outer face if their orders differ. The surface is
+ * transparent, so that each further face on a ray would change the opacity by 0.25 at least. The cells are straight, so
+ * that colours differ only by rounding errors of normals. */
+static void faces_between_orders_are_not_outer(void **state)
+{
+    (void)state;
+#define CLEAR IMAGE("a", "surface: {colour: [1, 1, 1], opacity: 0.5}")
+    const order_kind kind = {"hex 27", INSITU_TRIQUADRATIC_HEX, INSITU_ORDER_VTK, 2};
+    order_mesh mesh;
+    int64_t offsets[65];
+    unsigned char types[64];
+    for (int pieces = 1; pieces <= 2; pieces++) {
+        const char *scene = pieces == 1 ? FINER("1") CLEAR : FINER("2") CLEAR;
+        order_mesh_create(&kind, 2, 0, order_wave_field, own_rank, rank_count, &mesh);
+        drawn plain = draw_mesh(scene, &mesh);
+        make_linear_cells(&mesh, offsets, types);
+        drawn mixed = draw_mesh(scene, &mesh);
+        everywhere(own_rank || largest_colour_difference(&plain.pictures[0], &mixed.pictures[0]) <= 1e-4);
+        free_picture_set(&plain);
+        free_picture_set(&mixed);
+        order_mesh_free(&mesh);
+    }
+}
+
 /* ---- cells that are not shown ------------------------------------------------------------------------------------ */
 
 /* Images that need few cells: a small sphere in the middle, and a plane through a corner. */
@@ -685,6 +726,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(out_of_range_index_is_reported),
         cmocka_unit_test(cells_are_counted_as_the_caller_gave_them),
         cmocka_unit_test(mixed_cells_draw_the_same),
+        cmocka_unit_test(faces_between_orders_are_not_outer),
         cmocka_unit_test(other_cells_are_not_refined),
         cmocka_unit_test(pieces_that_nothing_crosses_are_not_made),
         cmocka_unit_test(surfaces_are_made_of_pieces_on_outer_faces),
