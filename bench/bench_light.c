@@ -13,8 +13,8 @@
 
 enum { SAMPLES = 16 };
 
-/* The radius of the sky's occlusion is a sixth of the mesh's side. This is about a tenth of the mesh's diagonal, as in
- * scenes by default. */
+/* The radius of ambient occlusion is 1/3. This is a sixth of the mesh's side, which is 2, and about a tenth of its
+ * diagonal, which is the default of scenes. */
 static const render_occlusion shadows = {1, 0, 1}, sky = {0, SAMPLES, 1.0 / 3};
 
 /* The rays of one kind, shadow or occlusion rays. */

@@ -328,7 +328,7 @@ static insitu_session *open_session(const bench_session *s, const char *ending)
     return bench_open_session(s->scene, write_scene, &written);
 }
 
-static bool is_building(const bench_session *s)
+static bool was_tree_built(const bench_session *s)
 {
     return insitu_last_report(s->session)->build_ms > 0;
 }
@@ -344,7 +344,7 @@ void bench_session_create(bench_session *s, const bench_scene *scene, bench_pict
     s->session = open_session(s, ".png");
     set_mesh(s, s->session, INSITU_CHANGED_ALL);
     set_field(s, s->session);
-    for (int i = 0; i < WARM_UP || (i < MOST_WARM_UP && change != BENCH_NEW_MESH && is_building(s)); i++)
+    for (int i = 0; i < WARM_UP || (i < MOST_WARM_UP && change != BENCH_NEW_MESH && was_tree_built(s)); i++)
         bench_session_step(s, 0);
 }
 

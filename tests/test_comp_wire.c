@@ -27,8 +27,8 @@ static uint32_t draw_random(void)
     return (uint32_t)(state >> 32);
 }
 
-/* How the values of a 32-bit word are filled over the pixels of a sheet. AS_BEFORE repeats the preceding word of the
- * same pixel. */
+/* Which values one of a fragment's 32-bit words has in the pixels of a sheet. AS_BEFORE: in each pixel, the value of
+ * the preceding word. */
 enum filling { ANY_BITS, SMOOTH, CONSTANT, AS_BEFORE, NOT_A_NUMBER, FILLING_COUNT };
 
 static uint32_t get_float_bits(float value)

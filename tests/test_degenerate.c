@@ -363,9 +363,9 @@ static split_edge *find_split(split_edges *edges, test_mesh *mesh, int64_t a, in
     return e;
 }
 
-/* Returns whether the face contains the vertex in the middle of the edge that begins at vertex `low`. The result is the
- * same for both cells at the face. */
-static bool contains_face_edge_middle(int64_t face, int64_t low)
+/* Decides by a hash whether the middle of the edge that begins at vertex `low` is inserted into the face. Both cells at
+ * the face get the same decision. */
+static bool inserts_edge_middle(int64_t face, int64_t low)
 {
     return test_uniform((uint64_t)(face * 1000 + low), 4) < 0.5;
 }
@@ -377,7 +377,7 @@ static void add_middle_to_face(const test_mesh *mesh, int64_t face, split_edges 
         const int64_t a = get_face_vertex(mesh, face, i);
         const split_edge *e = find_split(edges, copy, a, get_face_vertex(mesh, face, i + 1));
         loop[count++] = a;
-        if (e && contains_face_edge_middle(face, e->low)) loop[count++] = e->middle;
+        if (e && inserts_edge_middle(face, e->low)) loop[count++] = e->middle;
     }
     test_mesh_add_face(copy, loop, count);
 }
@@ -397,7 +397,7 @@ static int add_flat_faces_to_cell(const test_mesh *mesh, int64_t cell, split_edg
                 const int64_t a = get_face_vertex(mesh, faces[i], k), b = get_face_vertex(mesh, faces[i], k + 1);
                 if ((a < b ? a : b) != edge->low || (a < b ? b : a) != edge->high) continue;
                 at_edge++;
-                with += contains_face_edge_middle(faces[i], edge->low);
+                with += inserts_edge_middle(faces[i], edge->low);
             }
         if (at_edge != 2 || with != 1) continue;
         if (edge->face < 0)

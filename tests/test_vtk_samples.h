@@ -18,7 +18,8 @@ enum class lattice { image, rectilinear, curved };
 /* Returns a grid with the point field "x" and the cell field "c", whose values are the cells' numbers. */
 vtkSmartPointer<vtkDataSet> make_structured_grid(lattice kind);
 
-/* Returns the grid of make_structured_grid() as a list of hexahedra, made only from the lattice's indices. */
+/* Returns the grid of make_structured_grid() as a list of hexahedra, whose vertices are computed from the indices i, j
+ * and k without VTK's structured grids. */
 vtkSmartPointer<vtkUnstructuredGrid> make_hex_grid(lattice kind);
 
 /* Returns a row of unit cubes along x, beginning at `first`. If is_mixed is set, every second cube is a polyhedron;

@@ -75,7 +75,7 @@ static void reload_scene(insitu_session *s, session_changes *changes)
 
 /* Makes all ranks use the lowest of their instruction sets. Instruction sets round differently. If ranks used different
  * ones, volumes would overlap or leave gaps at faces between cells of two ranks. */
-static void use_common_kernels(const session_changes *changes, session_report *report)
+static void select_lowest_instruction_set(const session_changes *changes, session_report *report)
 {
     render_isa_limit(changes->isa_level);
     session_warn(report, &(session_warning){WARNING_ISA, NULL, NULL, 1}, changes->isa_level < changes->isa_best,
@@ -317,7 +317,7 @@ static insitu_status run_phases(insitu_session *s, session_changes *changes, con
         *error = refused;
         return error->status;
     }
-    use_common_kernels(changes, &s->report);
+    select_lowest_instruction_set(changes, &s->report);
     status = session_begin_threads(&s->threads, &s->team, s->scene_file.scene.threads,
                                    changes->needs_more_threads || changes->is_scene_changed, guard, &s->report, error);
     if (status) return status;

@@ -116,8 +116,7 @@ static void report_field(session_report *out, copied_reasons *copied, const sess
                                               : "at the corners of a discontinuous mesh");
     if (is_field_in_use(mesh, index) && !mesh->source)
         out->public_report.bytes_borrowed +=
-            value_bytes(field) +
-            count_array_bytes(&field->index, session_count_field_positions(&mesh->original, field)) +
+            value_bytes(field) + count_array_bytes(&field->index, session_count_field_entries(&mesh->original, field)) +
             count_patch_bytes(field);
 }
 

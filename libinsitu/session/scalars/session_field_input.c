@@ -27,7 +27,7 @@ int64_t session_count_corners(const insitu_mesh *mesh)
 
 /* Returns the number of values that a field needs: the mesh's number of vertices, cells or corners, depending on the
  * field's centring. For corners in rows, it is the number of all entries from the first to the last corner. */
-int64_t session_count_field_positions(const insitu_mesh *mesh, const insitu_field *field)
+int64_t session_count_field_entries(const insitu_mesh *mesh, const insitu_field *field)
 {
     if (field->centring == INSITU_VERTEX) return mesh->vertex_count;
     if (field->centring == INSITU_CELL) return mesh->cell_count;
@@ -44,7 +44,7 @@ static const char *describe_centring(insitu_centring centring)
  * index's type shows whether there is one. */
 static bool is_by_index(const session_mesh *mesh, const insitu_field *field)
 {
-    return field->index.data || (field->index.type && session_count_field_positions(&mesh->original, field) == 0);
+    return field->index.data || (field->index.type && session_count_field_entries(&mesh->original, field) == 0);
 }
 
 /* Checks a field whose components are given as separate arrays. */
@@ -63,7 +63,7 @@ static insitu_status check_component_arrays(const insitu_field *field, int64_t c
 
 static insitu_status check_field_arrays(const session_mesh *mesh, const insitu_field *field, base_error *error)
 {
-    const int64_t position_count = session_count_field_positions(&mesh->original, field);
+    const int64_t position_count = session_count_field_entries(&mesh->original, field);
     const bool has_index = is_by_index(mesh, field), has_rows = field->corner_row != 0;
     if (field->count < 0 || (!has_index && (has_rows ? field->count < position_count : field->count != position_count)))
         return base_fail(error, INSITU_ERROR_FIELD, "has %lld values, the mesh has %lld %s%s", (long long)field->count,

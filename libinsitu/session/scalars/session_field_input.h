@@ -26,6 +26,6 @@ void session_mark_scalars_stale(session_mesh *mesh, int field);
 int64_t session_count_corners(const insitu_mesh *mesh);
 /* Returns the number of the field's values or, if it has an index, of the index's entries. For corners in rows it is
  * the smallest allowed number. */
-int64_t session_count_field_positions(const insitu_mesh *mesh, const insitu_field *field);
+int64_t session_count_field_entries(const insitu_mesh *mesh, const insitu_field *field);
 
 #endif

@@ -41,7 +41,8 @@ static inline int session_count_sum_words(int field_count)
 /* Bounds of the numbers that cells add to sums. The bounds for several grids or ranks are the maxima of each member. */
 typedef struct session_gradient_bounds {
     double largest_difference; /* largest difference of a field's values along an edge of a corner */
-    /* largest value of 1 / (sum of the squares of a corner's edges, in units of `length`); 0: there are no corners */
+    /* largest value of 1 / (sum of the squared lengths of the edges at a cell's corner), with lengths as multiples of
+     * the `length` that scales all gradients; 0: there are no corners */
     double largest_inverse_square;
 } session_gradient_bounds;
 

@@ -192,8 +192,8 @@ static insitu_status make_lines(const session_layer_basis *basis, const scene_li
     return status;
 }
 
-/* Sets the field of the contour lines of an isosurface or of a slice's plane, and computes the lines. The values are
- * those of the meshes' own cells, unlike the gathered values of outer surfaces. Collective. */
+/* Sets the field of the contour lines of an isosurface or of a slice's plane, and computes the lines. The field
+ * is read from the meshes' cells, while that of an outer surface is a copy (set_gathered_field()). Collective. */
 static insitu_status set_lines(const session_layer_basis *basis, const scene_lines *in, int surface,
                                session_layers *layers, base_error *error)
 {
