@@ -154,7 +154,7 @@ if(INSITU_VTK) # reads a real grid
   insitu_session_program(test_session_order_pictures)
   target_sources(test_session_order_pictures PRIVATE test_mesh_order.c)
   target_link_libraries(test_session_order_pictures PRIVATE test_data_cells)
-  insitu_add_mpi_test(session_order_pictures test_session_order_pictures 2 WHOLE 1 3 7 TIMEOUT 120
+  insitu_add_mpi_test(session_order_pictures test_session_order_pictures 2 WHOLE 1 3 7 TIMEOUT 240
     ARGS ${CMAKE_CURRENT_BINARY_DIR})
 endif()
 

@@ -155,6 +155,21 @@ static void measure_values(const deviation_work *w, const session_bound *of, int
     if (bound.is_crossed) request->use_cell(request->of_values, &read);
 }
 
+/* Returns the estimated number of pixels in which an isosurface is seen in a cell, in units of 1/16. A plane with a
+ * random position and direction that crosses a cell has the mean area V / B in it, where V is the cell's volume and B
+ * its mean width. A quarter of the area of a closed surface is seen: the projected area is half of the area in the
+ * mean, and half of the surface is behind. The result is a whole number, so that sums over cells do not depend on their
+ * order. size: the size of a pixel. */
+static int64_t estimate_area(const session_cell_bound *bound, const session_nodes *of, double size)
+{
+    /* V / (4 B) of regular cells whose edges have the length 1 */
+    static const double tet = 0.032, pyramid = 0.055, wedge = 0.09, hex = 0.167;
+    const int type = of->type;
+    const double share = type == GRID_TET ? tet : type == GRID_PYRAMID ? pyramid : type == GRID_WEDGE ? wedge : hex;
+    const double edge = bound->node_distance * of->order / size;
+    return (int64_t)fmin(16 * share * edge * edge, 1e12);
+}
+
 /* Measures a cell, and updates *out. A cell whose error is below the largest error so far does not affect the result,
  * so its bound is not refined. The result therefore does not depend on the order of cells. */
 static void measure_cell(const deviation_work *w, int64_t cell, double *buffer, session_deviation *out)
@@ -172,6 +187,7 @@ static void measure_cell(const deviation_work *w, int64_t cell, double *buffer, 
         error = find_surface_error(w, of, cell, out->error * size, &bound, buffer);
         out->cell_count++;
         out->unbounded_count += error > limit_error(&bound);
+        out->area += estimate_area(&bound, &of->nodes.of, size);
         error = fmin(error, limit_error(&bound));
     }
     out->error = fmax(out->error, error / size);
@@ -183,9 +199,9 @@ static bool measure_cells(const deviation_work *w, int threads, session_deviatio
     const size_t buffer_size = find_buffer_size(w);
     bool is_lacking = false;
     double error = out->error, low = out->low, high = out->high;
-    int64_t count = 0, unbounded = 0;
+    int64_t count = 0, unbounded = 0, area = 0;
 #pragma omp parallel num_threads(session_choose_loop_threads(threads, cells)) reduction(|| : is_lacking)                    \
-    reduction(max : error, high) reduction(min : low) reduction(+ : count, unbounded)
+    reduction(max : error, high) reduction(min : low) reduction(+ : count, unbounded, area)
     {
         region_enter();
         double *buffer = base_alloc(buffer_size * sizeof *buffer);
@@ -199,6 +215,7 @@ static bool measure_cells(const deviation_work *w, int threads, session_deviatio
         high = own.high;
         count = own.cell_count;
         unbounded = own.unbounded_count;
+        area = own.area;
         base_free(buffer);
         region_leave();
     }
@@ -207,6 +224,7 @@ static bool measure_cells(const deviation_work *w, int threads, session_deviatio
     out->high = high;
     out->cell_count += count;
     out->unbounded_count += unbounded;
+    out->area += area;
     return !is_lacking;
 }
 

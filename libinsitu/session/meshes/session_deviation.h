@@ -55,6 +55,8 @@ typedef struct session_deviation {
     /* cell_count: number of cells that an isosurface may cross. unbounded_count: number of these cells whose bound was
      * replaced by a smaller limit, because their nodes are too far apart to resolve the isosurface */
     int64_t cell_count, unbounded_count;
+    /* estimated number of pixels that show the isosurfaces, in units of 1/16 of a pixel */
+    int64_t area;
     double low, high; /* if is_of_values: the range of the values at nodes */
 } session_deviation;
 

@@ -14,7 +14,9 @@
  * done before the catalogue is updated. Local. */
 void session_drop_ids(const session_meshes *meshes);
 
-enum { FINER_MOST_PARTS = 8 };
+/* Maximum number of parts of an edge between two nodes. Lattices have at most the order NODES_MOST_ORDER, which limits
+ * cells of order 3 and more further. */
+enum { FINER_MOST_PARTS = 12 };
 
 /* Size of finer lattices in bytes: of their pieces and nodes, and of the values of one component of a field. */
 typedef struct session_finer_bytes {

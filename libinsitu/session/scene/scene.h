@@ -620,7 +620,7 @@ typedef struct scene {
     int derived_count;      /* number of derived fields, 0 .. SCENE_MAX_DERIVED */
     scene_derived *derived; /* derived fields; each comes after those from which it is derived */
     int threads;            /* number of threads per rank; 0: the node's cores divided by its number of ranks */
-    /* number of linear pieces along an edge between two nodes of a cell of higher order, 1 .. 8; 0: the number is
+    /* number of linear pieces along an edge between two nodes of a cell of higher order, 1 .. 12; 0: the number is
      * chosen by surface_error */
     int finer_pieces;
     double surface_error;        /* bound of the error of these pieces in pixels, > 0; used if finer_pieces is 0 */

@@ -499,15 +499,15 @@ static const scene_form parameter_form = {{CYAML_VALUE_FLOAT(CYAML_FLAG_DEFAULT,
               "come closer to the polynomial's: with twice as many pieces, their error is divided by 4. Memory "       \
               "and time grow with the number of pieces. See [Cells of higher order](high_order.md#finer-pieces). "     \
               "Linear cells are not affected.",                                                                        \
-      .default_text = "by `surface_error`", .low = 1, .high = 8)                                                       \
+      .default_text = "by `surface_error`", .low = 1, .high = 12)                                                      \
     X(CYAML_FIELD_FLOAT_PTR("surface_error", OPTIONAL, scene_file, surface_error),                                     \
       .help =                                                                                                          \
           "The largest distance, in pixels, of isosurfaces and of positions in other layers from those of the "        \
           "polynomials of cells of higher order. Such cells are drawn as linear pieces. For each mesh and step, the "  \
-          "smallest number of pieces from 1 to 8 is chosen that keeps this error. The report states the numbers and "  \
+          "smallest number of pieces from 1 to 12 is chosen that keeps this error. The report states the numbers and " \
           "the bounds. Volumes get as many pieces as their `max_error` needs. If all cells of a mesh are refined for " \
-          "other reasons, it has at most 2 pieces, unless the scene gives this key. See [Cells of higher "             \
-          "order](high_order.md#an-error-in-pixels).",                                                                 \
+          "other reasons, it has at most 2 pieces, unless the scene gives this key. By default, isosurfaces that "     \
+          "cover few pixels have a smaller error. See [Cells of higher order](high_order.md#an-error-in-pixels).",     \
       .default_text = "`0.25`", .low = 0, .is_low_excluded = true, .high = 1000)                                       \
     X(CYAML_FIELD_FLOAT_PTR("finer_memory", OPTIONAL, scene_file, finer_memory),                                       \
       .help = "Memory in MiB that finer pieces, their nodes and the values there may take on all ranks together. If "  \
