@@ -25,22 +25,6 @@ enum { ITEMS = 1024, MOST_ITEMS = 64 * ITEMS, VOLUME_ITEMS = 1024 * ITEMS };
  * (docs/development/decisions/find.md). SAMPLES: number of tree nodes from which their share is estimated. */
 enum { SMALL_CELLS = 8, SMALL_CROSSED = 3, SAMPLES = 512 };
 
-/* ---- subtrees ------------------------------------------------------------------------------------------------- */
-
-/* Divides the trees of all surfaces, or of the volume, into subtrees. Returns false if there is no memory. */
-static bool cut_trees(const kernel_frame *f, bool is_volume, render_subtrees *list)
-{
-    const render_job *job = f->job;
-    const int first = is_volume ? -1 : 0, end = is_volume ? 0 : f->surface_count;
-    if (!render_subtrees_begin(list, (int64_t)(end - first) * job->part_count)) return false;
-    for (int s = first; s < end; s++) {
-        const render_field *field = is_volume ? &job->volumes[0].field : &f->surfaces[s].layer->field;
-        for (int part = 0; part < job->part_count; part++)
-            if (field->ranges[part].low && job->parts[part].tree->node_count) render_subtrees_add(list, f, s, part);
-    }
-    return true;
-}
-
 /* ---- cells ---------------------------------------------------------------------------------------------------- */
 
 /* Adds a chunk to the list; returns false if the bound is reached or memory runs out. Such a list stays full, because
@@ -322,8 +306,8 @@ void render_trees_cover(kernel_frame *f)
 
 /* Searches all subtrees in parallel. Each thread bins its own cells, at most `most`, as soon as no subtree is left,
  * without waiting for the others. */
-static void run(const kernel_frame *frame, const render_subtrees *subtrees, struct kernel_bins *bins, int64_t most,
-                kernel_thread *thread_of, int threads)
+static void run(const kernel_frame *frame, const kernel_subtree *subtrees, int64_t count, struct kernel_bins *bins,
+                int64_t most, kernel_thread *thread_of, int threads)
 {
     const kernel_table *kernels = render_kernels();
     const int64_t tiles = tile_count(frame);
@@ -333,9 +317,9 @@ static void run(const kernel_frame *frame, const render_subtrees *subtrees, stru
         const int me = omp_get_thread_num();
         kernel_candidate_list *list = &bins[me].list;
 #pragma omp for schedule(dynamic, 1) nowait
-        for (int64_t i = 0; i < subtrees->count; i++) {
+        for (int64_t i = 0; i < count; i++) {
             list->is_full = list->is_full || !render_thread_begin(kernels, &thread_of[me]);
-            if (!list->is_full) kernels->find_candidates(frame, &thread_of[me], &subtrees->items[i], list, grow);
+            if (!list->is_full) kernels->find_candidates(frame, &thread_of[me], &subtrees[i], list, grow);
         }
         if (list->chunk) list->chunk->count = list->count;
         list->is_full = list->is_full || !bins_fill(&bins[me], tiles, most);
@@ -380,11 +364,12 @@ static struct kernel_bins *find(kernel_frame *frame, bool is_volume, kernel_thre
     const int64_t cells = is_volume && pixels < VOLUME_ITEMS ? VOLUME_ITEMS : pixels;
     int64_t bound = cells + ITEMS * (int64_t)threads;
     const int64_t most = 2 * bound;
-    render_subtrees subtrees = {0};
+    int64_t count;
     struct kernel_bins *bins = begin_bins(frame, &bound, threads);
-    const bool is_begun = bins && cut_trees(frame, is_volume, &subtrees);
-    if (is_begun) run(frame, &subtrees, bins, most, thread_of, threads);
-    base_free(subtrees.items);
+    kernel_subtree *subtrees = render_subtrees(frame, is_volume ? -1 : 0, is_volume ? 0 : frame->surface_count, &count);
+    const bool is_begun = bins && subtrees;
+    if (is_begun) run(frame, subtrees, count, bins, most, thread_of, threads);
+    base_free(subtrees);
     if (!is_begun || !is_complete(bins, tile_count(frame), most)) {
         bins_free(bins);
         return NULL;

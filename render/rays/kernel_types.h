@@ -345,9 +345,10 @@ typedef struct kernel_table {
      * hits[i]. */
     void (*sample_pending)(const kernel_frame *frame, kernel_thread *thread, const render_pending_hit *hits,
                            render_difference_samples *out, int64_t count);
-    /* Computes the fragments out[i] of the list's hits i from samples[i], first <= i < first + count. */
-    void (*light_pending)(const kernel_frame *frame, kernel_thread *thread, const render_pending_list *list,
-                          const render_difference_samples *samples, int64_t first, int64_t count, fragment *out);
+    /* Computes the fragments out[i] of `count` hits from samples[i]. */
+    void (*light_pending)(const kernel_frame *frame, kernel_thread *thread, const render_pending_hit *hits,
+                          float (*shadings)[2][3], const render_difference_samples *samples, fragment *out,
+                          int64_t count);
 } kernel_table;
 
 extern const kernel_table kernel_table_plain, kernel_table_sse42, kernel_table_avx2, kernel_table_avx512;
