@@ -235,7 +235,7 @@ SIMD_INLINE vf kernel_corner_edge(const kernel_face_search *s, int from, int to)
 
 /* Computes values and reference coordinates at a crossing of a quad's bilinear patch. The isoparametric maps of both
  * cells contain this patch, so the field is continuous across the face. */
-SIMD_INLINE void kernel_quad_values(const kernel_face_search *s, const int corner[4], const kernel_quad_point *at,
+SIMD_INLINE void kernel_quad_values(const kernel_face_search *s, const int corner[4], const kernel_point *at,
                                     kernel_point *out)
 {
     const kernel_cell *c = s->cell;
@@ -244,11 +244,11 @@ SIMD_INLINE void kernel_quad_values(const kernel_face_search *s, const int corne
     for (int i = 0; i < 4; i++) f[i] = vf_set(c->f[corner[i]]);
     out->mask = at->mask;
     out->t = at->t;
-    out->value = kernel_bilinear(f, at->s, at->r);
+    out->value = kernel_bilinear(f, at->r[0], at->r[1]);
     for (int a = 0; a < 3; a++) {
         const float base = shape->corners[corner[0]][a];
-        out->r[a] =
-            (base + at->s * (shape->corners[corner[1]][a] - base)) + at->r * (shape->corners[corner[3]][a] - base);
+        out->r[a] = (base + at->r[0] * (shape->corners[corner[1]][a] - base)) +
+                    at->r[1] * (shape->corners[corner[3]][a] - base);
     }
 }
 
@@ -308,7 +308,7 @@ SIMD_INLINE int kernel_quad_crossings(const kernel_face_search *s, const int cor
 {
     const kernel_cell *c = s->cell;
     kernel_quad quad;
-    kernel_quad_point places[2];
+    kernel_point places[2];
     vm once = vm_none();
     for (int half = 0; half < 2; half++) {
         const int corners[3] = {corner[0], corner[half + 1], corner[half + 2]};

@@ -124,17 +124,17 @@ SIMD_INLINE void kernel_curved_corners_gather(const kernel_transformed_curved *h
     kernel_curved_corners_project(&p->rays, out);
 }
 
-SIMD_INLINE void kernel_curved_quad_point(int type, const kernel_curved_corners *c, const kernel_quad_point *place,
+SIMD_INLINE void kernel_curved_quad_point(int type, const kernel_curved_corners *c, const kernel_point *place,
                                           kernel_point *out)
 {
     const vf f[4] = {c->at[0][3], c->at[1][3], c->at[2][3], c->at[3][3]};
     out->t = place->t;
-    out->value = kernel_bilinear(f, place->s, place->r);
+    out->value = kernel_bilinear(f, place->r[0], place->r[1]);
     for (int a = 0; a < 3; a++) {
         vf at[4];
         for (int i = 0; i < 4; i++)
             at[i] = kernel_curved_vertex_coordinate(kernel_cell_shape(type), grid_type_vertices(type), a, c->vertex[i]);
-        out->r[a] = (at[0] + place->s * (at[1] - at[0])) + place->r * (at[3] - at[0]);
+        out->r[a] = (at[0] + place->r[0] * (at[1] - at[0])) + place->r[1] * (at[3] - at[0]);
     }
 }
 
@@ -217,7 +217,7 @@ SIMD_INLINE void kernel_curved_cross_corners(const kernel_transformed_curved *h,
     if (kernel_has_triangles(type)) memset(out, 0, 2 * sizeof *out);
     if (kernel_is_box(type) || vm_any(vm_or(on_quad[0], on_quad[1]))) {
         kernel_quad quad[2];
-        kernel_quad_point places[2];
+        kernel_point places[2];
         for (int n = 0; n < quads; n++)
             for (int i = 0; i < 4; i++) {
                 quad[n].x[i] = corners[n].at[i][0];

@@ -77,15 +77,12 @@ typedef struct kernel_poly_crossings {
     kernel_subtet_interval *segments;
     int segment_count;
     bool has_sheets;
-} kernel_poly_crossings;
-
-/* One interval of each ray inside the cell. `interval` has the faces' values; u_in and u_out are the field's values
- * just inside. */
-typedef struct kernel_polyhedron_interval {
+    /* The current interval of each ray inside the cell (kernel_poly_next()), with the faces' values; the crossings at
+     * its ends; and the field's values just inside. */
     kernel_interval interval;
     kernel_triangle_crossings in, out;
     vf u_in, u_out;
-} kernel_polyhedron_interval;
+} kernel_poly_crossings;
 
 SIMD_INLINE void *kernel_scratch_alloc(char **at, size_t bytes)
 {
@@ -236,14 +233,14 @@ SIMD_INLINE void kernel_quad_of_facets(const kernel_poly_crossings *r, const pol
 /* Stores a point of the quad's patch as the face's point of a surface triangle's crossing, for the rays in `mine`,
  * whose crossing belongs to this triangle. Rays that do not cross the triangle itself use the patch's point for
  * both. */
-SIMD_INLINE void kernel_facet_face(const polyhedron *c, const int corner[4], const kernel_quad_point *at, vm mine,
+SIMD_INLINE void kernel_facet_face(const polyhedron *c, const int corner[4], const kernel_point *at, vm mine,
                                    bool has_colour, kernel_triangle_crossings *m)
 {
     vf f[4], g[4];
     for (int i = 0; i < 4; i++) f[i] = vf_set(c->f[corner[i]]), g[i] = vf_set(has_colour ? c->g[corner[i]] : 0);
     m->t_face = vf_select(mine, at->t, m->t_face);
-    m->v_face = vf_select(mine, kernel_bilinear(f, at->s, at->r), m->v_face);
-    m->w_face = has_colour ? vf_select(mine, kernel_bilinear(g, at->s, at->r), m->w_face) : vf_set(0);
+    m->v_face = vf_select(mine, kernel_bilinear(f, at->r[0], at->r[1]), m->v_face);
+    m->w_face = has_colour ? vf_select(mine, kernel_bilinear(g, at->r[0], at->r[1]), m->w_face) : vf_set(0);
     const vm apart = vm_andnot(mine, m->mask);
     m->t = vf_select(apart, m->t_face, m->t);
     m->v = vf_select(apart, m->v_face, m->v);
@@ -253,17 +250,13 @@ SIMD_INLINE void kernel_facet_face(const polyhedron *c, const int corner[4], con
 /* For rays that cross the patch twice and both triangles, exchanges the two points if necessary, so that the nearer
  * point belongs to the nearer triangle. */
 static __attribute__((noinline, cold)) void kernel_quad_points_pair(kernel_triangle_crossings *const m[2],
-                                                                    kernel_quad_point places[2])
+                                                                    kernel_point places[2])
 {
     const vm both = vm_and(places[1].mask, vm_and(m[0]->mask, m[1]->mask));
     const vm swap = vm_and(both, vm_xor(vf_lt(places[0].t, places[1].t), vf_lt(m[0]->t, m[1]->t)));
-    const kernel_quad_point own = places[0];
-    places[0].s = vf_select(swap, places[1].s, own.s);
-    places[0].r = vf_select(swap, places[1].r, own.r);
-    places[0].t = vf_select(swap, places[1].t, own.t);
-    places[1].s = vf_select(swap, own.s, places[1].s);
-    places[1].r = vf_select(swap, own.r, places[1].r);
-    places[1].t = vf_select(swap, own.t, places[1].t);
+    const kernel_point own = places[0];
+    kernel_point_move(swap, &places[1], &places[0]);
+    kernel_point_move(swap, &own, &places[1]);
 }
 
 /* Computes the crossings of a quad's bilinear patch, which are the same bits as in a hex that shares it. first: number
@@ -276,7 +269,7 @@ static void kernel_poly_quad(kernel_poly_crossings *r, int first)
     kernel_cell ranks;
     kernel_weights w;
     kernel_quad quad;
-    kernel_quad_point places[2];
+    kernel_point places[2];
     int corner[4];
     /* vertices are sorted, so that their numbers are ranks in the order of coordinates */
     for (int i = 0; i < 4; i++) ranks.rank[i] = around[i];
@@ -354,17 +347,17 @@ SIMD_INLINE bool kernel_poly_take_nearest(kernel_poly_crossings *r, kernel_trian
 }
 
 /* Computes the next interval of each ray inside the cell. Returns false after the last one. */
-static bool kernel_poly_next(kernel_poly_crossings *r, kernel_polyhedron_interval *out)
+static bool kernel_poly_next(kernel_poly_crossings *r)
 {
-    if (!kernel_poly_take_nearest(r, &out->in) || !kernel_poly_take_nearest(r, &out->out)) return false;
-    kernel_interval *i = &out->interval;
-    i->mask = vm_and(out->in.mask, out->out.mask);
-    i->t_in = out->in.t_face;
-    i->t_out = out->out.t_face;
-    i->v_in = out->u_in = out->in.v_face;
-    i->v_out = out->u_out = out->out.v_face;
-    i->w_in = out->in.w_face;
-    i->w_out = out->out.w_face;
+    kernel_interval *i = &r->interval;
+    if (!kernel_poly_take_nearest(r, &r->in) || !kernel_poly_take_nearest(r, &r->out)) return false;
+    i->mask = vm_and(r->in.mask, r->out.mask);
+    i->t_in = r->in.t_face;
+    i->t_out = r->out.t_face;
+    i->v_in = r->u_in = r->in.v_face;
+    i->v_out = r->u_out = r->out.v_face;
+    i->w_in = r->in.w_face;
+    i->w_out = r->out.w_face;
     return true;
 }
 
@@ -467,13 +460,11 @@ static void kernel_poly_sum(const kernel_poly_crossings *r, vm rays, vf t, bool 
 
 /* Returns the rays for which the sheet lies in the interval: between the crossings of triangles, and between those of
  * faces. Sheets beyond the triangles belong to tets that extend out of the cell, and are not part of its field. */
-SIMD_INLINE vm kernel_polyhedron_interval_contains(const kernel_polyhedron_interval *polyhedron_interval,
-                                                   const kernel_triangle_crossings *sheet)
+SIMD_INLINE vm kernel_poly_interval_contains(const kernel_poly_crossings *r, const kernel_triangle_crossings *sheet)
 {
-    const vm inside = vm_and(vf_lt(polyhedron_interval->interval.t_in, sheet->t),
-                             vf_lt(sheet->t, polyhedron_interval->interval.t_out));
-    const vm within = vm_and(vf_lt(polyhedron_interval->in.t, sheet->t), vf_lt(sheet->t, polyhedron_interval->out.t));
-    return vm_and(vm_and(polyhedron_interval->interval.mask, sheet->mask), vm_and(inside, within));
+    const vm inside = vm_and(vf_lt(r->interval.t_in, sheet->t), vf_lt(sheet->t, r->interval.t_out));
+    const vm within = vm_and(vf_lt(r->in.t, sheet->t), vf_lt(sheet->t, r->out.t));
+    return vm_and(vm_and(r->interval.mask, sheet->mask), vm_and(inside, within));
 }
 
 /* Computes the field just inside an end of the interval: the face's value, plus the fields of all tets other than the
@@ -489,17 +480,17 @@ SIMD_INLINE void kernel_poly_inner_value(const kernel_poly_crossings *r, vm rays
 
 /* Prepares the profile of the interval, which is the piecewise linear field along each ray: computes the field at the
  * crossed sheets and at both ends. */
-static void kernel_poly_profile(kernel_poly_crossings *r, kernel_polyhedron_interval *polyhedron_interval)
+static void kernel_poly_profile(kernel_poly_crossings *r)
 {
-    kernel_interval *i = &polyhedron_interval->interval;
+    kernel_interval *i = &r->interval;
     kernel_poly_sheets(r);
     if (r->cell->is_star_shaped) return;
     kernel_poly_segments(r);
-    kernel_poly_inner_value(r, i->mask, &polyhedron_interval->in, false, &polyhedron_interval->u_in, &i->w_in);
-    kernel_poly_inner_value(r, i->mask, &polyhedron_interval->out, true, &polyhedron_interval->u_out, &i->w_out);
+    kernel_poly_inner_value(r, i->mask, &r->in, false, &r->u_in, &i->w_in);
+    kernel_poly_inner_value(r, i->mask, &r->out, true, &r->u_out, &i->w_out);
     for (int n = 0; n < r->sheet_count; n++) {
         kernel_triangle_crossings *sheet = &r->sheets[r->met_sheets[n]];
-        const vm held = kernel_polyhedron_interval_contains(polyhedron_interval, sheet);
+        const vm held = kernel_poly_interval_contains(r, sheet);
         vf v = sheet->v, w = sheet->w;
         if (!vm_any(held)) continue;
         kernel_poly_sum(r, held, sheet->t, false, &v, &w);
@@ -510,26 +501,24 @@ static void kernel_poly_profile(kernel_poly_crossings *r, kernel_polyhedron_inte
 
 /* Sets *piece to a piece of length zero at the begin of each ray's profile, which is the piecewise linear field along
  * the ray. */
-SIMD_INLINE void kernel_profile_begin(const kernel_polyhedron_interval *polyhedron_interval, kernel_interval *piece)
+SIMD_INLINE void kernel_profile_begin(const kernel_poly_crossings *r, kernel_interval *piece)
 {
-    const kernel_interval *i = &polyhedron_interval->interval;
+    const kernel_interval *i = &r->interval;
     piece->mask = i->mask;
     piece->t_in = piece->t_out = i->t_in;
-    piece->v_in = piece->v_out = polyhedron_interval->u_in;
+    piece->v_in = piece->v_out = r->u_in;
     piece->w_in = piece->w_out = i->w_in;
 }
 
 /* Replaces *piece by the next linear piece of the field along each ray. v_out is the value at the end of the ray's
  * interval. */
-SIMD_INLINE void kernel_profile_next(const kernel_poly_crossings *r,
-                                     const kernel_polyhedron_interval *polyhedron_interval, vf v_out,
-                                     kernel_interval *piece)
+SIMD_INLINE void kernel_profile_next(const kernel_poly_crossings *r, vf v_out, kernel_interval *piece)
 {
-    vf t = polyhedron_interval->interval.t_out, v = v_out, w = polyhedron_interval->interval.w_out;
+    vf t = r->interval.t_out, v = v_out, w = r->interval.w_out;
     for (int n = 0; n < r->sheet_count; n++) {
         const kernel_triangle_crossings *sheet = &r->sheets[r->met_sheets[n]];
-        const vm nearer = vm_and(kernel_polyhedron_interval_contains(polyhedron_interval, sheet),
-                                 vm_and(vf_lt(piece->t_out, sheet->t), vf_lt(sheet->t, t)));
+        const vm nearer =
+            vm_and(kernel_poly_interval_contains(r, sheet), vm_and(vf_lt(piece->t_out, sheet->t), vf_lt(sheet->t, t)));
         t = vf_select(nearer, sheet->t, t);
         v = vf_select(nearer, sheet->v_face, v);
         w = vf_select(nearer, sheet->w_face, w);
@@ -543,10 +532,9 @@ SIMD_INLINE void kernel_profile_next(const kernel_poly_crossings *r,
 }
 
 /* Returns those of the given rays on which the field has further linear pieces behind the given one. */
-SIMD_INLINE vm kernel_profile_continues(const kernel_polyhedron_interval *polyhedron_interval,
-                                        const kernel_interval *piece, vm mask)
+SIMD_INLINE vm kernel_profile_continues(const kernel_poly_crossings *r, const kernel_interval *piece, vm mask)
 {
-    return vm_and(mask, vf_lt(piece->t_out, polyhedron_interval->interval.t_out));
+    return vm_and(mask, vf_lt(piece->t_out, r->interval.t_out));
 }
 
 #endif

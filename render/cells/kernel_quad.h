@@ -36,6 +36,7 @@
 #include <string.h>
 
 #include "grid.h"
+#include "kernel_packet.h"
 #include "kernel_shapes.h"
 #include "simd.h"
 
@@ -46,12 +47,8 @@ typedef struct kernel_quad {
     vf e01, e32, e03, e12;
 } kernel_quad;
 
-/* The points at which rays meet a quad's bilinear patch: parameter s from corner 0 to corner 1, parameter r from corner
- * 0 to corner 3, and depth t. */
-typedef struct kernel_quad_point {
-    vm mask;
-    vf s, r, t;
-} kernel_quad_point;
+/* Below, a kernel_point is a point at which rays meet a quad's bilinear patch. Its coordinates r[0] and r[1] are the
+ * patch's parameters s, from corner 0 to corner 1, and r, from corner 0 to corner 3; r[2] and the value are not set. */
 
 SIMD_INLINE vf kernel_bilinear(const vf f[4], vf s, vf r)
 {
@@ -193,16 +190,16 @@ static inline kernel_scalar_quad kernel_scalar_of(const kernel_quad *q, int lane
     return flat;
 }
 
-static inline void kernel_quad_store_point(kernel_quad_point *out, int lane, const double place[3])
+static inline void kernel_quad_store_point(kernel_point *out, int lane, const double place[3])
 {
-    out->s[lane] = (float)place[0];
-    out->r[lane] = (float)place[1];
+    out->r[0][lane] = (float)place[0];
+    out->r[1][lane] = (float)place[1];
     out->t[lane] = (float)place[2];
 }
 
 /* Computes the points of the wanted rays, each of which crosses exactly one of the two triangles. They are few:
  * Newton's method in float32 is accurate enough for most rays (kernel_patch_converged()). */
-static __attribute__((noinline)) void kernel_quad_single_point(const kernel_quad *q, vm wanted, kernel_quad_point *out)
+static __attribute__((noinline)) void kernel_quad_single_point(const kernel_quad *q, vm wanted, kernel_point *out)
 {
     for (unsigned bits = vm_bits(wanted); bits; bits &= bits - 1) {
         const int lane = __builtin_ctz(bits);
@@ -215,8 +212,7 @@ static __attribute__((noinline)) void kernel_quad_single_point(const kernel_quad
 
 /* Computes the points of the wanted rays that meet the patch twice: one in out[0], the other in out[1]. Returns these
  * rays. */
-static __attribute__((noinline, cold)) vm kernel_quad_two_points(const kernel_quad *q, vm wanted,
-                                                                 kernel_quad_point out[2])
+static __attribute__((noinline, cold)) vm kernel_quad_two_points(const kernel_quad *q, vm wanted, kernel_point out[2])
 {
     unsigned found = 0;
     for (unsigned bits = vm_bits(wanted); bits; bits &= bits - 1) {
@@ -299,7 +295,7 @@ SIMD_INLINE vf kernel_quad_between(const kernel_quad *q, int i, int j, int k, in
 
 /* Computes the points of rays that meet no edge. The edge functions are computed from the projected corners. */
 static __attribute__((noinline)) void kernel_quad_single_point_off_edges(const kernel_quad *q, vm wanted,
-                                                                         kernel_quad_point *out)
+                                                                         kernel_point *out)
 {
     kernel_quad own = *q;
     own.e01 = vf_diff_of_products(q->x[0], q->y[1], q->x[1], q->y[0]);
@@ -313,7 +309,7 @@ static __attribute__((noinline)) void kernel_quad_single_point_off_edges(const k
  * triangle of quad n. Quads are processed together because each step of Newton's method depends on the one before.
  * are_off_edges: set if no ray meets an edge; the quads' edge functions are then not read and need not be set. */
 SIMD_INLINE void kernel_quads_cross(const kernel_quad *q, int count, const vm once[2], bool are_off_edges,
-                                    kernel_quad_point *out)
+                                    kernel_point *out)
 {
     kernel_patch patch[2];
     vf s[2], r[2];
@@ -326,7 +322,10 @@ SIMD_INLINE void kernel_quads_cross(const kernel_quad *q, int count, const vm on
         for (int n = 0; n < count; n++) kernel_patch_step(&patch[n], &s[n], &r[n]);
     for (int n = 0; n < count; n++) {
         const vm left = vm_andnot(once[n], kernel_patch_converged(&patch[n], s[n], r[n]));
-        out[n] = (kernel_quad_point){once[n], s[n], r[n], kernel_bilinear(q[n].z, s[n], r[n])};
+        out[n].mask = once[n];
+        out[n].r[0] = s[n];
+        out[n].r[1] = r[n];
+        out[n].t = kernel_bilinear(q[n].z, s[n], r[n]);
         if (__builtin_expect(!vm_any(left), 1)) continue;
         if (are_off_edges)
             kernel_quad_single_point_off_edges(&q[n], left, &out[n]);
@@ -403,9 +402,8 @@ SIMD_INLINE vm kernel_curved_may_cross_twice(const vf x[8], const vf y[8], const
 
 /* Computes the points at which rays meet the patch. Rays in `once` meet it once; rays in `twice` meet it twice or
  * never. Returns how many entries of out are set, 0 to 2. */
-SIMD_INLINE int kernel_quad_points(const kernel_quad *q, vm once, vm twice, kernel_quad_point out[2])
+SIMD_INLINE int kernel_quad_points(const kernel_quad *q, vm once, vm twice, kernel_point out[2])
 {
-    const vf zero = vf_set(0);
     int count = 0;
     if (vm_any(once)) {
         const vm all[2] = {once, once};
@@ -415,8 +413,8 @@ SIMD_INLINE int kernel_quad_points(const kernel_quad *q, vm once, vm twice, kern
     if (!vm_any(twice)) return count;
     const vm bends = kernel_quad_may_cross_twice(q, twice);
     if (__builtin_expect(!vm_any(bends), 1)) return count;
-    if (!count) out[0] = (kernel_quad_point){vm_none(), zero, zero, zero};
-    out[1] = (kernel_quad_point){vm_none(), zero, zero, zero};
+    if (!count) out[0] = (kernel_point){.mask = vm_none()};
+    out[1] = (kernel_point){.mask = vm_none()};
     out[1].mask = kernel_quad_two_points(q, bends, out);
     out[0].mask = vm_or(out[0].mask, out[1].mask);
     return vm_any(out[1].mask) ? 2 : count;

@@ -176,15 +176,10 @@ SIMD_INLINE void kernel_tet_normal(const kernel_packet *p, const kernel_cell *c,
 
 /* ---- hits of a packet ---- */
 
-typedef struct kernel_surface_state {
-    const kernel_surface *surface;
-    int layer;
-    kernel_hits *hits;
-    bool is_opaque;
-    /* set if the lanes' contraction test has already been done for these rays and has not decided them
-     * (kernel_contraction.h) */
-    bool is_contracted;
-} kernel_surface_state;
+SIMD_INLINE bool kernel_is_opaque(const kernel_packet *p, const kernel_surface *s)
+{
+    return s < p->frame->surfaces + p->frame->opaque_count;
+}
 
 /* Transforms gradients from tile space to camera axes, by undoing the shear. */
 SIMD_INLINE void kernel_unshear(const kernel_tile *tile, vf g[3])
@@ -383,7 +378,7 @@ SIMD_INLINE unsigned kernel_ray_accept(kernel_tile_trace *t, int at, const kerne
     const kernel_surface *s = t->surface;
     const int ray = at % SIMD_WIDTH;
     kernel_packet *p = &t->packets[at / SIMD_WIDTH];
-    kernel_hits *hits = &t->hits[at / SIMD_WIDTH];
+    kernel_hits *hits = p->hits;
     const float far = p->t_far[ray];
     if (!(hit->depth <= far) || !(vm_bits(p->active) >> ray & 1)) return 0;
     if (hit->depth == far && far < INFINITY) {

@@ -74,12 +74,13 @@ static void kernel_curved_batch_begin(kernel_curved_batch *h)
     memset(h->lines, 0, sizeof h->lines);
 }
 
-SIMD_INLINE kernel_curved kernel_curved_batch_cells(const kernel_curved_batch *h)
+SIMD_INLINE kernel_curved kernel_curved_batch_cells(kernel_curved_batch *h)
 {
     return (kernel_curved){.type = h->queued->type,
-                           .at = (const float(*)[8][SIMD_WIDTH])h->transformed.at,
-                           .colours = (const float(*)[SIMD_WIDTH])h->colours,
-                           .bounds = &h->bounds};
+                           .at = h->transformed.at,
+                           .colours = h->colours,
+                           .bounds = &h->bounds,
+                           .is_ready = true};
 }
 
 /* ---- single cells of the batch ---- */
@@ -104,6 +105,7 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_trace_singly(kerne
                                                                            vi at_lanes, unsigned wanted)
 {
     kernel_curved curved = kernel_curved_batch_cells(h);
+    curved.is_contracted = true;
     unsigned blocks = 0;
     int32_t at[SIMD_WIDTH];
     memcpy(at, &at_lanes, sizeof at);
@@ -118,15 +120,10 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_trace_singly(kerne
             }
         }
         kernel_packet *p = &t->packets[at[i] / SIMD_WIDTH];
-        kernel_surface_state state = {.surface = t->surface,
-                                      .layer = t->layer,
-                                      .hits = &t->hits[at[i] / SIMD_WIDTH],
-                                      .is_opaque = true,
-                                      .is_contracted = true};
         p->is_nearer = false;
         kernel_curved_ready(t, h, n);
         curved.lane = n;
-        kernel_cell_surface(p, &state, &h->cells[n], &curved, h->queued->value[n],
+        kernel_cell_surface(p, t->surface, &h->cells[n], &curved, h->queued->value[n],
                             vm_and(p->active, vm_from_bits(same)));
         if (p->is_nearer) blocks |= 1u << at[i] / (KERNEL_BLOCK * KERNEL_BLOCK);
     }

@@ -260,7 +260,7 @@ static __attribute__((noinline, unused)) bool kernel_search_cells(kernel_search 
     kernel_search_begin(s);
     wanted = kernel_ends_decide(c, rays, lane, wanted, &s->low, &s->high, &s->found);
     if (!vm_any(vm_or(wanted, s->found))) return false;
-    kernel_maps_of_type(c->at, lane, c->type, &s->map);
+    kernel_maps_of_type((const float(*)[8][SIMD_WIDTH])c->at, lane, c->type, &s->map);
     if (vm_any(wanted)) {
         kernel_search_bounds(c->bounds, lane, s);
         kernel_search_whole(s, wanted);

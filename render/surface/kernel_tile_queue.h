@@ -40,7 +40,7 @@ static void kernel_tile_process_candidate(kernel_tile_trace *t, const kernel_til
     kernel_cell_move_to_tile_space(c, t->frame, &t->tile, g);
     kernel_cell_relative(c, layer->values[value]);
     kernel_tile_prepare_cell(t, part);
-    t->curved->bounds = NULL;
+    t->curved->is_ready = false;
     kernel_blocks_trace(t, blocks, part, c->index, c, value);
 }
 
