@@ -60,13 +60,16 @@ typedef struct kernel_bound {
     float extinction_low, extinction_high, extinction_slope, colour_slope;
 } kernel_bound;
 
-/* Bounds of a transfer function over a range of values that contains no step of the opacity. A field error d changes
- * the light by at most cost * d per unit distance. For fixed light from the front and from behind, that change varies
- * by at most variation * d. */
-typedef struct kernel_light_variation {
-    float variation, cost;
-    float extinction, steepness; /* maximum of the extinction, and of its slope times the contrast */
-} kernel_light_variation;
+/* Entries of a row of bounds of a transfer function over a range of values that contains no step of the opacity. A
+ * field error d changes the light by at most the cost times d per unit distance. For fixed light from the front and
+ * from behind, that change varies by at most the variation times d. */
+enum {
+    KERNEL_LIGHT_VARIATION,
+    KERNEL_LIGHT_COST,
+    KERNEL_LIGHT_EXTINCTION, /* maximum of the extinction */
+    KERNEL_LIGHT_STEEPNESS,  /* maximum of the extinction's slope times the contrast */
+    KERNEL_LIGHT_ENTRIES
+};
 
 /* A bin of the table of sums for preintegration (kernel_preintegral.h), in integer units. Each array holds the
  * extinction first, then the emission in three channels. The struct is read as rows of four floats. */
@@ -97,9 +100,9 @@ typedef struct kernel_pieces {
     kernel_real bin_first[KERNEL_PIECE_BINS];
     /* Bounds over ranges of values, in a table of KERNEL_VARIATION_WIDTHS × KERNEL_VARIATION_BINS: its row is the
      * range's class of width, its column the equal-width bin in which the range begins; bins begin at bin_low
-     * (kernel_light_variation_entry()). */
+     * (kernel_light_bounds()). */
     float variation_inverse;
-    kernel_light_variation *variations;
+    float (*variations)[KERNEL_LIGHT_ENTRIES];
     /* Set if a ramp of the opacity is so narrow that the rounding of its ends is visible: values near it then use the
      * ends' rounding errors (KERNEL_PIECE_LOW_REST). */
     bool has_rests;

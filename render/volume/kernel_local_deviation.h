@@ -52,7 +52,7 @@ typedef struct kernel_local_bounds {
     float residual_limit[SIMD_WIDTH]; /* largest residual for which the field's value is valid */
     float tolerance[SIMD_WIDTH];      /* Newton's method stops at a residual of at most this */
     /* Bounds of the change of light due to a field error, over the values from low to high, which are those of the
-     * lane's cell (kernel_light_variation). cost: maximum of that change; error_variation: its variation. */
+     * lane's cell (kernel_light_bounds()). cost: maximum of that change; error_variation: its variation. */
     float low[SIMD_WIDTH], high[SIMD_WIDTH];
     float cost[SIMD_WIDTH], error_variation[SIMD_WIDTH];
     /* upper bound of the change of the error's weight per depth: cost + R |s'|, as defined in kernel_local_budget.h */
@@ -66,6 +66,7 @@ typedef struct kernel_local_pairs {
     kernel_point ends[2];
     vm active;
     vf begin;        /* depth at which the ray's window begins */
+    vf per_t;        /* unit distances of the transfer function per t */
     vf count;        /* number of segments into which the interval is divided */
     float share;     /* share of the ray's whole interval in its cell */
     vf field[3];     /* the field minus its chord, at a quarter, the middle and three quarters of the interval */

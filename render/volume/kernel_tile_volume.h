@@ -114,14 +114,14 @@ static __attribute__((noinline)) unsigned kernel_tet_samples_small(kernel_tile_t
 {
     kernel_tile_volume *b = t->thread->tile_volume;
     const unsigned others = kernel_tile_list_small_tets(t, lanes, KERNEL_TET_SAMPLE_PIXELS);
-    const kernel_pixel_list *rays = &t->thread->tile_cells->lanes.rays;
+    const kernel_pixel_list *rays = &t->thread->tile_cells->rays;
     for (int n = 0; n < rays->count; n += SIMD_WIDTH) {
         kernel_lane_rays r;
         kernel_interval i;
         kernel_lane_rays_begin(&r, t, rays, n);
         const vi at = r.at;
         r.active = vm_and(r.active, vf_lt(vf_set(-INFINITY), vf_gather(b->far, at)));
-        kernel_tet_rays_interval(&t->thread->tile_cells->transformed, &r, &i);
+        kernel_tet_rays_interval(&t->thread->tile_cells->tets, &r, &i);
         if (vm_any(i.mask)) kernel_tet_samples_fill(t, b, &i, at);
     }
     return others;
