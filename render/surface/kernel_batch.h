@@ -175,13 +175,10 @@ SIMD_INLINE unsigned kernel_batch_accept_coloured(kernel_tile_trace *t, kernel_b
     for (; hit; hit &= hit - 1) {
         const int i = __builtin_ctz(hit), n = lanes[i];
         const float *plain = t->surface->layer->colours + 3 * b->queued->value[n];
-        kernel_ray_hit one = {.part = b->queued->part,
-                              .value = b->queued->value[n],
-                              .cell = b->queued->cell[n],
-                              .depth = depth[i],
-                              .normal = {b->normal[0][n], b->normal[1][n], b->normal[2][n]}};
-        for (int a = 0; a < 3; a++) one.colour[a] = colours ? colours[a][i] : plain[a];
-        blocks |= kernel_ray_accept(t, at[i], &one);
+        const float normal[3] = {b->normal[0][n], b->normal[1][n], b->normal[2][n]};
+        float colour[3];
+        for (int a = 0; a < 3; a++) colour[a] = colours ? colours[a][i] : plain[a];
+        blocks |= kernel_ray_accept(t, at[i], b->queued, n, depth[i], normal, colour);
     }
     return blocks;
 }

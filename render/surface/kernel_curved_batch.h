@@ -349,16 +349,12 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile
     if (has_own) kernel_curved_batch_colours(t, h, rays->lane + first, p, points, colours);
     memcpy(at, &p->at, sizeof at);
     for (; hit; hit &= hit - 1) {
-        const int i = __builtin_ctz(hit), value = h->queued->value[rays->lane[first + i]];
-        const float *plain = layer->colours + 3 * value;
-        const kernel_ray_hit one = {.part = h->queued->part,
-                                    .value = value,
-                                    .cell = h->queued->cell[rays->lane[first + i]],
-                                    .depth = points->t[i],
-                                    .normal = {normal[0][i], normal[1][i], normal[2][i]},
-                                    .colour = {has_own ? colours[0][i] : plain[0], has_own ? colours[1][i] : plain[1],
-                                               has_own ? colours[2][i] : plain[2]}};
-        blocks |= kernel_ray_accept(t, at[i], &one);
+        const int i = __builtin_ctz(hit), n = rays->lane[first + i];
+        const float *plain = layer->colours + 3 * h->queued->value[n];
+        const float own_normal[3] = {normal[0][i], normal[1][i], normal[2][i]};
+        float colour[3];
+        for (int a = 0; a < 3; a++) colour[a] = has_own ? colours[a][i] : plain[a];
+        blocks |= kernel_ray_accept(t, at[i], h->queued, n, points->t[i], own_normal, colour);
     }
     return blocks;
 }
