@@ -112,38 +112,6 @@ static inline void kernel_lattice_indices(const grid_lattice *l, uint32_t cell, 
     for (int i = 0; i < vertices; i++) out[i * out_stride] = (int32_t)(first + l->corner_offsets[i]);
 }
 
-/* Reads the vertex indices of `count` cells into lanes lane, lane + 1, ... of `out`. vertices: number of vertices of
- * each cell, which callers pass as a constant. */
-SIMD_INLINE void kernel_arrays_indices(const kernel_arrays *p, const uint32_t *cells, int count, int vertices,
-                                       int32_t (*out)[SIMD_WIDTH], int lane)
-{
-    const grid_array c = p->cells->connectivity;
-    const int32_t base = (int32_t)c.base;
-    if (__builtin_expect(p->cells->lattice != NULL, 0)) {
-        for (int n = 0; n < count; n++, lane++)
-            kernel_lattice_indices(p->cells->lattice, cells[n], vertices, out[0] + lane, SIMD_WIDTH);
-        return;
-    }
-    for (int n = 0; n < count; n++, lane++) {
-        const char *at = c.data + kernel_arrays_first(p->cells, cells[n], vertices) * c.stride;
-        if (c.is_wide)
-            for (int i = 0; i < vertices; i++, at += c.stride)
-                out[i][lane] = (int32_t) * (const int64_t *)(const void *)at - base;
-        else
-            for (int i = 0; i < vertices; i++, at += c.stride) out[i][lane] = *(const int32_t *)(const void *)at - base;
-    }
-}
-
-/* Prefetches the coordinates and values of the vertices of `count` cells, from the given lane on. */
-SIMD_INLINE void kernel_arrays_prefetch(const kernel_arrays *p, int count, int vertices,
-                                        int32_t (*const vertex)[SIMD_WIDTH], int lane)
-{
-    for (int n = lane; n < lane + count; n++)
-        for (int i = 0; i < vertices; i++)
-            for (int k = 0; k < 4; k++)
-                __builtin_prefetch(p->prefetched[k].data + vertex[i][n] * p->prefetched[k].stride);
-}
-
 /* Stores a cell's vertex indices, that of vertex i in out[i * out_stride], and prefetches the coordinates and values of
  * these vertices. */
 SIMD_INLINE void kernel_arrays_vertices(const kernel_arrays *p, uint32_t cell, int vertices, int32_t *out,
@@ -152,32 +120,28 @@ SIMD_INLINE void kernel_arrays_vertices(const kernel_arrays *p, uint32_t cell, i
     const grid_array c = p->cells->connectivity;
     if (__builtin_expect(p->cells->lattice != NULL, 0)) {
         kernel_lattice_indices(p->cells->lattice, cell, vertices, out, out_stride);
-        return;
+    } else {
+        const char *at = c.data + kernel_arrays_first(p->cells, cell, vertices) * c.stride;
+        for (int i = 0; i < vertices; i++, at += c.stride) {
+            const int64_t index = c.is_wide ? *(const int64_t *)(const void *)at : *(const int32_t *)(const void *)at;
+            out[i * out_stride] = (int32_t)(index - c.base);
+        }
     }
-    const char *at = c.data + kernel_arrays_first(p->cells, cell, vertices) * c.stride;
-    for (int i = 0; i < vertices; i++, at += c.stride) {
-        const int64_t index = c.is_wide ? *(const int64_t *)(const void *)at : *(const int32_t *)(const void *)at;
-        const int32_t vertex = (int32_t)(index - c.base);
-        for (int k = 0; k < 4; k++) __builtin_prefetch(p->prefetched[k].data + vertex * p->prefetched[k].stride);
-        out[i * out_stride] = vertex;
-    }
+    for (int i = 0; i < vertices; i++)
+        for (int k = 0; k < 4; k++)
+            __builtin_prefetch(p->prefetched[k].data + out[i * out_stride] * p->prefetched[k].stride);
 }
 
-/* Stores the vertex indices of cells of one type in lanes, from the given lane on, and prefetches the vertices'
- * coordinates and values. */
-SIMD_INLINE void kernel_arrays_cells(const kernel_arrays *p, const uint32_t *cells, int count, int vertices,
-                                     int32_t (*out)[SIMD_WIDTH], int lane)
+/* As above, for cells of any type; loops over the vertices of tets and hexes have constant lengths. */
+SIMD_INLINE void kernel_arrays_vertices_of_any(const kernel_arrays *p, uint32_t cell, int vertices, int32_t *out,
+                                               int out_stride)
 {
-    if (vertices == 4) {
-        kernel_arrays_indices(p, cells, count, 4, out, lane);
-        kernel_arrays_prefetch(p, count, 4, out, lane);
-    } else if (vertices == 8) {
-        kernel_arrays_indices(p, cells, count, 8, out, lane);
-        kernel_arrays_prefetch(p, count, 8, out, lane);
-    } else {
-        kernel_arrays_indices(p, cells, count, vertices, out, lane);
-        kernel_arrays_prefetch(p, count, vertices, out, lane);
-    }
+    if (vertices == 4)
+        kernel_arrays_vertices(p, cell, 4, out, out_stride);
+    else if (vertices == 8)
+        kernel_arrays_vertices(p, cell, 8, out, out_stride);
+    else
+        kernel_arrays_vertices(p, cell, vertices, out, out_stride);
 }
 
 /* Returns the lanes of the given ones (a bit mask) whose cells are drawn: their value in source_cells is finite. */
