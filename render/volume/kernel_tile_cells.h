@@ -547,12 +547,6 @@ static __attribute__((noinline)) void kernel_tile_process_window(kernel_tile_tra
 
 /* ---- windows of depth ---- */
 
-/* Returns the depth at which the tile's first cell begins; +inf if cells are found only by traversing the trees. */
-SIMD_INLINE float kernel_tile_cells_near(const kernel_tile_trace *t)
-{
-    return t->frame->volume_candidates ? t->thread->tile_cells->items[0].near : INFINITY;
-}
-
 /* Returns the blocks that the bounding box of some tree may meet, and the range of these boxes' depths. */
 SIMD_INLINE kernel_placement kernel_tile_trees_placement(const kernel_tile_trace *t)
 {

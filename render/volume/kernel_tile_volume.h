@@ -136,14 +136,6 @@ static const kernel_volume_method kernel_volume_by_samples = {
     .finish = kernel_local_fill,
 };
 
-/* Returns whether small tets, hexes, wedges and pyramids are sampled in lanes. They are not if the frame has surfaces,
- * which may end rays and need the ends of intervals (kernel_blend_breaks()), nor if each sample becomes a fragment of
- * its own. */
-SIMD_INLINE bool kernel_samples_use_lanes(const kernel_frame *f)
-{
-    return !f->surface_count && !f->job->separate_samples;
-}
-
 /* Prepares the packet for samples of a volume. Extends *first .. *last to include the numbers of its rays' samples
  * between the depths near and far. */
 SIMD_INLINE void kernel_ray_samples_begin(kernel_packet *p, kernel_samples *s, float near, float far, int *first,
@@ -228,11 +220,14 @@ SIMD_INLINE void kernel_tile_window_blend(kernel_tile_trace *t, kernel_tile_volu
 static void kernel_tile_volumes(kernel_tile_trace *t)
 {
     kernel_tile_volume *v = t->thread->tile_volume;
-    const bool has_lanes = kernel_samples_use_lanes(t->frame);
+    /* Small cells are not sampled in lanes if the frame has surfaces, which may end rays and need the ends of intervals
+     * (kernel_blend_breaks()), nor if each sample becomes a fragment of its own. */
+    const bool has_lanes = !t->frame->surface_count && !t->frame->job->separate_samples;
     if (!kernel_tile_cells_begin(t, &kernel_volume_by_samples, has_lanes, has_lanes)) return;
     kernel_placement reach = kernel_tile_trees_placement(t);
     const unsigned blocks = reach.blocks;
-    const float cells_near = kernel_tile_cells_near(t);
+    /* depth at which the tile's first cell begins; +inf if cells are found only by traversing the trees */
+    const float cells_near = t->frame->volume_candidates ? t->thread->tile_cells->items[0].near : INFINITY;
     if (cells_near < INFINITY) reach.near = fmaxf(reach.near, cells_near);
     int packets[KERNEL_TILE_PACKETS], first = INT_MAX, last = INT_MIN;
     const int count = kernel_tile_volume_begin(t, blocks, packets);
