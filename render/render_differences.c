@@ -127,26 +127,24 @@ static insitu_status process_chunks(const render_job *job, const render_pending_
     const kernel_table *kernels = render_kernels();
     const int threads = job->threads > 0 ? job->threads : omp_get_max_threads();
     kernel_frame frame;
-    render_job surfaces = *job;
+    render_job surfaces;
     bool has_memory = true;
-    surfaces.volume_count = 0;
-    surfaces.separate_samples = surfaces.reproducible = false;
-    insitu_status status = render_prepare(&surfaces, &frame, error);
+    insitu_status status = render_prepare_surfaces(job, &surfaces, &frame, error);
     if (status != INSITU_OK) return status;
 #pragma omp parallel num_threads(threads) reduction(&& : has_memory)
     {
         region_enter();
         kernel_thread thread = {0};
-        has_memory = render_thread_begin(kernels, &thread);
+        has_memory = render_thread_begin(&frame, kernels, &thread);
 #pragma omp for schedule(dynamic, 1) nowait
         for (int64_t at = 0; at < count; at += CHUNK_HITS) {
             const int64_t chunk = count - at < CHUNK_HITS ? count - at : CHUNK_HITS;
-            if (thread.memory && out)
+            if (has_memory && out)
                 kernels->light_pending(&frame, &thread, hits + at, shadings + at, samples + at, out + at, chunk);
-            else if (thread.memory)
+            else if (has_memory)
                 kernels->sample_pending(&frame, &thread, hits + at, samples + at, chunk);
         }
-        base_free(thread.memory);
+        render_thread_end(&thread);
         region_leave();
     }
     render_unprepare(&frame);

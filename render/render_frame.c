@@ -7,7 +7,6 @@
 
 #include "error.h"
 #include "fragment.h"
-#include "grid.h"
 #include "insitu/status.h"
 #include "kernel_types.h"
 #include "memory.h"
@@ -46,7 +45,7 @@ static void trace_tiles(const kernel_table *kernels, const kernel_frame *frame, 
     render_folding fold = {.job = frame->job, .has_segments = frame->has_segments};
 #pragma omp for schedule(dynamic, KERNEL_TILES_PER_TASK) nowait
     for (int tile = 0; tile < columns * rows; tile++) {
-        if (!render_thread_begin(kernels, thread)) continue;
+        if (!render_thread_begin(frame, kernels, thread)) continue;
         if (thread->polyhedra) polyhedra_reset(thread->polyhedra);
         const pixel_area area = area_of(camera, tile % columns, tile / columns);
         thread->out_of_memory = thread->out_of_memory || !render_candidates_gather(frame, thread, area.x, area.y);
@@ -112,31 +111,14 @@ bool render_reserve_fragments(fragment_list *list, int64_t more)
     return true;
 }
 
-/* Initializes the states of all threads, including those that OpenMP may not start. */
-static void begin_threads(const kernel_frame *frame, kernel_thread *states, int threads)
-{
-    bool has_polyhedra = false;
-    for (int i = 0; i < frame->job->part_count; i++)
-        has_polyhedra = has_polyhedra || grid_has_faces(frame->job->parts[i].cells);
-    for (int i = 0; i < threads; i++)
-        states[i] = (kernel_thread){.polyhedra = has_polyhedra ? polyhedra_create() : NULL};
-    for (int i = 0; i < threads && has_polyhedra; i++) states[i].out_of_memory = !states[i].polyhedra;
-}
-
 static bool end_threads(const render_job *job, kernel_thread *states, int threads, render_statistics *statistics)
 {
     bool has_memory = true;
     double surface = 0, volume = 0;
     for (int i = 0; i < threads; i++) {
-        polyhedra_free(states[i].polyhedra);
-        base_free(states[i].out.items);
-        base_free(states[i].memory);
-        base_free(states[i].bin.buffer);
-        base_free(states[i].volume_bin.buffer);
         has_memory = has_memory && !states[i].out_of_memory;
         if (has_memory && job->waiting) has_memory = append_pending(job->waiting, &states[i].waiting);
-        base_free(states[i].waiting.items);
-        base_free(states[i].waiting.shadings);
+        render_thread_end(&states[i]);
         surface = fmax(surface, states[i].surface_seconds);
         volume = fmax(volume, states[i].volume_seconds);
         statistics->map_failures += states[i].map_failures;
@@ -155,7 +137,6 @@ static bool trace_frame(kernel_frame *frame, fragment_callback *take, void *stat
     const int64_t pixels = (int64_t)job->camera.width * job->camera.height;
     kernel_thread *states = base_calloc((size_t)threads, sizeof *states);
     if (!states) return false;
-    begin_threads(frame, states, threads);
     *statistics = (render_statistics){.rays = job->pixels ? pixel_set_count(job->pixels, pixels) : pixels};
     if (frame->is_binned && !render_surfaces_are_small(frame)) {
         const double start = render_seconds();

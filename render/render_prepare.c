@@ -3,6 +3,7 @@
 #include "kernel_types.h"
 #include "render.h"
 #include "render_pieces.h"
+#include "render_polyhedra.h"
 #include "render_scale.h"
 
 #include <math.h>
@@ -372,12 +373,23 @@ void render_unprepare(kernel_frame *frame)
     for (int i = 0; i < RENDER_MAX_VOLUMES; i++) render_pieces_free(&frame->pieces[i]);
 }
 
+insitu_status render_prepare_surfaces(const render_job *job, render_job *surfaces, kernel_frame *frame,
+                                      base_error *error)
+{
+    *surfaces = *job;
+    surfaces->volume_count = 0;
+    surfaces->separate_samples = surfaces->reproducible = false;
+    return render_prepare(surfaces, frame, error);
+}
+
 insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_error *error)
 {
     const insitu_status status = check_job(job, error);
     if (status != INSITU_OK) return status;
     memset(frame, 0, sizeof *frame);
     frame->job = job;
+    for (int i = 0; i < job->part_count; i++)
+        frame->has_polyhedra = frame->has_polyhedra || grid_has_faces(job->parts[i].cells);
     frame->surfaces = base_calloc((size_t)job->surface_count, sizeof *frame->surfaces);
     if (!frame->surfaces) return base_fail(error, INSITU_ERROR_MEMORY, "no memory for %d layers", job->surface_count);
     prepare_camera(frame);
@@ -394,4 +406,27 @@ insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_er
     /* tracing consumes a tile's list of cells, so the volume must need only one pass over it */
     frame->bins_volume = bins && job->volume_count == 1 && frame->volume_intervals <= 1;
     return segments;
+}
+
+/* ---- threads ---- */
+
+bool render_thread_begin(const kernel_frame *frame, const kernel_table *kernels, kernel_thread *thread)
+{
+    if (thread->memory || thread->out_of_memory) return !thread->out_of_memory;
+    thread->memory = base_alloc(kernels->memory_bytes);
+    if (frame->has_polyhedra) thread->polyhedra = polyhedra_create();
+    thread->out_of_memory = !thread->memory || (frame->has_polyhedra && !thread->polyhedra);
+    if (!thread->out_of_memory) kernels->begin(thread);
+    return !thread->out_of_memory;
+}
+
+void render_thread_end(kernel_thread *thread)
+{
+    polyhedra_free(thread->polyhedra);
+    base_free(thread->out.items);
+    base_free(thread->memory);
+    base_free(thread->bin.buffer);
+    base_free(thread->volume_bin.buffer);
+    base_free(thread->waiting.items);
+    base_free(thread->waiting.shadings);
 }

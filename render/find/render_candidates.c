@@ -8,6 +8,7 @@
 #include "kernel_types.h"
 #include "render.h"
 #include "render_kernels.h"
+#include "render_prepare.h"
 #include "render_subtrees.h"
 
 #include <math.h>
@@ -318,7 +319,7 @@ static void run(const kernel_frame *frame, const kernel_subtree *subtrees, int64
         kernel_candidate_list *list = &bins[me].list;
 #pragma omp for schedule(dynamic, 1) nowait
         for (int64_t i = 0; i < count; i++) {
-            list->is_full = list->is_full || !render_thread_begin(kernels, &thread_of[me]);
+            list->is_full = list->is_full || !render_thread_begin(frame, kernels, &thread_of[me]);
             if (!list->is_full) kernels->find_candidates(frame, &thread_of[me], &subtrees[i], list, grow);
         }
         if (list->chunk) list->chunk->count = list->count;

@@ -279,10 +279,11 @@ typedef struct kernel_frame {
      * own. */
     int volume_intervals;
     bool has_transparent;
-    bool is_binned;    /* set if the cells of surfaces are binned by tile, unless there are too many */
-    bool bins_volume;  /* set if the cells of the only volume are binned by tile */
-    bool needs_planes; /* set if tiles traverse the trees, for which they need planes */
-    bool has_segments; /* set if volumes are integrated by segments; otherwise they are sampled */
+    bool has_polyhedra; /* set if a mesh part has them */
+    bool is_binned;     /* set if the cells of surfaces are binned by tile, unless there are too many */
+    bool bins_volume;   /* set if the cells of the only volume are binned by tile */
+    bool needs_planes;  /* set if tiles traverse the trees, for which they need planes */
+    bool has_segments;  /* set if volumes are integrated by segments; otherwise they are sampled */
     /* set if the ends of intervals in tets and of bisected intervals are computed in double (kernel_exact.h) */
     bool is_double;
     kernel_pieces pieces[RENDER_MAX_VOLUMES];
@@ -312,7 +313,7 @@ typedef struct kernel_thread {
     bool out_of_memory;
     /* counters for render_statistics: failed inversions of cells' maps, and cells visited by volumes */
     int64_t map_failures, volume_cells;
-    /* The tile's polyhedra (render_polyhedra.h); NULL if no mesh has any. */
+    /* The tile's polyhedra (render_polyhedra.h); NULL if no mesh part has any. */
     struct polyhedron_store *polyhedra;
     double surface_seconds, volume_seconds;
 } kernel_thread;
