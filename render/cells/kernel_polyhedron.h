@@ -19,7 +19,7 @@
  * own value. Otherwise tets overlap, and extend out of the cell. The field at a point is then the sum over the tets
  * that contain it, each with its sign. (A point inside is contained in one more positive than negative tet. At a sheet
  * with its two tets on different sides the sum does not jump; a sheet with both on one side adds or removes f - f = 0.)
- * That sum is computed at sheets, from each tet's interval [t0, t1).
+ * That sum is computed at sheets, from each tet's interval [t_in, t_out).
  *
  * On which side of an isovalue a ray enters and leaves is decided by the faces' own values (kernel_surface.h):
  * triangles are linear, quads bilinear as their neighbours may have them, larger faces linear on their triangles. In a
@@ -47,15 +47,6 @@ typedef struct kernel_triangle_crossings {
     vf t_face, v_face, w_face;
 } kernel_triangle_crossings;
 
-/* The intervals of rays in the tet of surface triangle number `facet`: the value at t is v0 + (t - t0) (v1 - v0) / (t1
- * - t0). sign is the tet's sign. */
-typedef struct kernel_subtet_interval {
-    vm mask;
-    vf t0, t1, v0, v1, w0, w1;
-    float sign;
-    int facet;
-} kernel_subtet_interval;
-
 /* The crossings of a packet with one polyhedron. Its arrays are in the thread's scratch memory. */
 typedef struct kernel_poly_crossings {
     const kernel_packet *packet;
@@ -74,9 +65,8 @@ typedef struct kernel_poly_crossings {
     kernel_triangle_crossings *sheets; /* crossings of sheets by edge number; only those listed in met_sheets are set */
     int *met_sheets;
     int sheet_count;
-    kernel_subtet_interval *segments;
-    int segment_count;
-    bool has_sheets;
+    kernel_interval *tets; /* for each surface triangle, the intervals of the rays in its tet */
+    bool has_sheets, has_tets;
     /* The current interval of each ray inside the cell (kernel_poly_next()), with the faces' values; the crossings at
      * its ends; and the field's values just inside. */
     kernel_interval interval;
@@ -99,7 +89,7 @@ static bool kernel_poly_allocate(const kernel_packet *p, const polyhedron *c, ke
     const size_t pieces = 11, spare = 64 * pieces;
     const size_t bytes =
         points * 2 * sizeof(vf) + (edges + points) * (sizeof(vf) + sizeof(int)) +
-        facets * (sizeof(kernel_triangle_crossings) + sizeof(vm) + sizeof(int) + sizeof(kernel_subtet_interval)) +
+        facets * (sizeof(kernel_triangle_crossings) + sizeof(vm) + sizeof(int) + sizeof(kernel_interval)) +
         edges * sizeof(kernel_triangle_crossings) + spare;
     char *at = polyhedra_scratch(p->thread->polyhedra, bytes);
     if (!at) {
@@ -116,9 +106,9 @@ static bool kernel_poly_allocate(const kernel_packet *p, const polyhedron *c, ke
     out->met = kernel_scratch_alloc(&at, facets * sizeof(int));
     out->sheets = kernel_scratch_alloc(&at, edges * sizeof(kernel_triangle_crossings));
     out->met_sheets = kernel_scratch_alloc(&at, edges * sizeof(int));
-    out->segments = kernel_scratch_alloc(&at, facets * sizeof(kernel_subtet_interval));
-    out->met_count = out->sheet_count = out->segment_count = 0;
-    out->has_sheets = false;
+    out->tets = kernel_scratch_alloc(&at, facets * sizeof(kernel_interval));
+    out->met_count = out->sheet_count = 0;
+    out->has_sheets = out->has_tets = false;
     out->uneven = vm_none();
     return true;
 }
@@ -382,55 +372,54 @@ static void kernel_poly_sheets(kernel_poly_crossings *r)
     }
 }
 
-SIMD_INLINE void kernel_segment_add(kernel_subtet_interval *s, const kernel_triangle_crossings *m, vm hit)
+/* Extends the intervals of the rays in `hit` to a crossing of one of the tet's faces. */
+SIMD_INLINE void kernel_subtet_add(kernel_interval *s, const kernel_triangle_crossings *m, vm hit)
 {
-    const vm first = vm_and(hit, vf_lt(m->t, s->t0)), last = vm_andnot(hit, vf_lt(m->t, s->t1));
-    s->t0 = vf_select(first, m->t, s->t0);
-    s->v0 = vf_select(first, m->v, s->v0);
-    s->w0 = vf_select(first, m->w, s->w0);
-    s->t1 = vf_select(last, m->t, s->t1);
-    s->v1 = vf_select(last, m->v, s->v1);
-    s->w1 = vf_select(last, m->w, s->w1);
+    const vm first = vm_and(hit, vf_lt(m->t, s->t_in)), last = vm_andnot(hit, vf_lt(m->t, s->t_out));
+    s->t_in = vf_select(first, m->t, s->t_in);
+    s->v_in = vf_select(first, m->v, s->v_in);
+    s->w_in = vf_select(first, m->w, s->w_in);
+    s->t_out = vf_select(last, m->t, s->t_out);
+    s->v_out = vf_select(last, m->v, s->v_out);
+    s->w_out = vf_select(last, m->w, s->w_out);
     s->mask = vm_or(s->mask, hit);
 }
 
-/* Computes the intervals of the rays in all tets of the cell. Tets without volume are left out. */
-static void kernel_poly_segments(kernel_poly_crossings *r)
+/* Computes the intervals of the rays in all tets of the cell, but none in tets without volume. */
+static void kernel_poly_tets(kernel_poly_crossings *r)
 {
     const polyhedron *c = r->cell;
-    if (r->segment_count) return;
+    if (r->has_tets) return;
+    r->has_tets = true;
     for (int i = 0; i < c->facet_count; i++) {
         const polyhedron_facet *t = &c->facets[i];
-        kernel_subtet_interval *s = &r->segments[r->segment_count];
-        if (t->sign == 0) continue;
+        kernel_interval *s = &r->tets[i];
         s->mask = vm_none();
-        s->t0 = vf_set(INFINITY);
-        s->t1 = vf_set(-INFINITY);
-        s->v0 = s->v1 = s->w0 = s->w1 = vf_set(0);
+        if (t->sign == 0) continue;
+        s->t_in = vf_set(INFINITY);
+        s->t_out = vf_set(-INFINITY);
+        s->v_in = s->v_out = s->w_in = s->w_out = vf_set(0);
         for (int k = 0; k < 3; k++)
             if (vm_any(r->sheets[t->edge[k]].mask))
-                kernel_segment_add(s, &r->sheets[t->edge[k]], r->sheets[t->edge[k]].mask);
+                kernel_subtet_add(s, &r->sheets[t->edge[k]], r->sheets[t->edge[k]].mask);
         /* a ray in the tet crosses at least one of its sheets; it crosses the tet's surface triangle if it is inside
          * all three edges */
         const vm hit = kernel_inside(r->rays, r->edge[t->edge[0]], r->edge[t->edge[1]], r->edge[t->edge[2]]);
-        if (vm_any(hit)) kernel_segment_add(s, &r->facets[i], hit);
-        if (!vm_any(s->mask)) continue;
-        s->sign = t->sign;
-        s->facet = i;
-        r->segment_count++;
+        if (vm_any(hit)) kernel_subtet_add(s, &r->facets[i], hit);
     }
 }
 
-/* Returns the rays for which t is in the tet's interval: [t0, t1), or (t0, t1] if the field just before t is needed. */
-SIMD_INLINE vm kernel_subtet_interval_contains(const kernel_subtet_interval *s, vf t, bool before)
+/* Returns the rays for which t is in the tet's interval: [t_in, t_out), or (t_in, t_out] if the field just before t is
+ * needed. */
+SIMD_INLINE vm kernel_subtet_contains(const kernel_interval *s, vf t, bool before)
 {
-    if (before) return vm_and(s->mask, vm_and(vf_lt(s->t0, t), vf_le(t, s->t1)));
-    return vm_and(s->mask, vm_and(vf_le(s->t0, t), vf_lt(t, s->t1)));
+    if (before) return vm_and(s->mask, vm_and(vf_lt(s->t_in, t), vf_le(t, s->t_out)));
+    return vm_and(s->mask, vm_and(vf_le(s->t_in, t), vf_lt(t, s->t_out)));
 }
 
-SIMD_INLINE vf kernel_segment_at(const kernel_subtet_interval *s, vf t, vf v0, vf v1)
+SIMD_INLINE vf kernel_subtet_at(const kernel_interval *s, vf t, vf v_in, vf v_out)
 {
-    return v0 + (t - s->t0) * ((v1 - v0) / (s->t1 - s->t0));
+    return v_in + (t - s->t_in) * ((v_out - v_in) / (s->t_out - s->t_in));
 }
 
 /* Computes the signed sum of the tets' fields at t. Rounding may put the ends of neighbouring tets, which meet at one
@@ -443,13 +432,15 @@ static void kernel_poly_sum(const kernel_poly_crossings *r, vm rays, vf t, bool 
     for (int k = 0; k < 7 && vm_any(open); k++) {
         const vf at = t + (vf_abs(t) + 1.0f) * (shifts[k] * 2.4e-7f);
         vf cover = vf_set(0), sum = vf_set(0), colour = vf_set(0);
-        for (int n = 0; n < r->segment_count; n++) {
-            const kernel_subtet_interval *s = &r->segments[n];
-            const vm in = vm_and(open, kernel_subtet_interval_contains(s, at, before));
+        for (int n = 0; n < r->cell->facet_count; n++) {
+            const kernel_interval *s = &r->tets[n];
+            if (!vm_any(s->mask)) continue;
+            const vm in = vm_and(open, kernel_subtet_contains(s, at, before));
             if (!vm_any(in)) continue;
-            cover = vf_select(in, cover + s->sign, cover);
-            sum = vf_select(in, sum + s->sign * kernel_segment_at(s, at, s->v0, s->v1), sum);
-            colour = vf_select(in, colour + s->sign * kernel_segment_at(s, at, s->w0, s->w1), colour);
+            const float sign = r->cell->facets[n].sign;
+            cover = vf_select(in, cover + sign, cover);
+            sum = vf_select(in, sum + sign * kernel_subtet_at(s, at, s->v_in, s->v_out), sum);
+            colour = vf_select(in, colour + sign * kernel_subtet_at(s, at, s->w_in, s->w_out), colour);
         }
         const vm good = vm_and(open, vf_eq(cover, vf_set(1)));
         *v = vf_select(good, sum, *v);
@@ -485,7 +476,7 @@ static void kernel_poly_profile(kernel_poly_crossings *r)
     kernel_interval *i = &r->interval;
     kernel_poly_sheets(r);
     if (r->cell->is_star_shaped) return;
-    kernel_poly_segments(r);
+    kernel_poly_tets(r);
     kernel_poly_inner_value(r, i->mask, &r->in, false, &r->u_in, &i->w_in);
     kernel_poly_inner_value(r, i->mask, &r->out, true, &r->u_out, &i->w_out);
     for (int n = 0; n < r->sheet_count; n++) {

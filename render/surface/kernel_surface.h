@@ -336,14 +336,15 @@ static void kernel_polyhedron_gradient(const kernel_packet *p, const polyhedron 
 static vm kernel_polyhedron_sum_normals(const kernel_packet *p, const kernel_poly_crossings *r, vm hit, vf t, vf out[3])
 {
     vf cover = vf_set(0);
-    for (int n = 0; n < r->segment_count; n++) {
-        const kernel_subtet_interval *s = &r->segments[n];
-        const vm in = vm_and(hit, kernel_subtet_interval_contains(s, t, false));
+    for (int n = 0; n < r->cell->facet_count; n++) {
+        if (!vm_any(r->tets[n].mask)) continue;
+        const vm in = vm_and(hit, kernel_subtet_contains(&r->tets[n], t, false));
         if (!vm_any(in)) continue;
+        const float sign = r->cell->facets[n].sign;
         double g[3];
-        kernel_polyhedron_gradient(p, r->cell, s->facet, g);
-        cover = vf_select(in, cover + s->sign, cover);
-        for (int a = 0; a < 3; a++) out[a] = vf_select(in, out[a] + s->sign * (float)g[a], out[a]);
+        kernel_polyhedron_gradient(p, r->cell, n, g);
+        cover = vf_select(in, cover + sign, cover);
+        for (int a = 0; a < 3; a++) out[a] = vf_select(in, out[a] + sign * (float)g[a], out[a]);
     }
     return vm_and(hit, vf_eq(cover, vf_set(1)));
 }
@@ -354,13 +355,13 @@ static void kernel_polyhedron_facets(const kernel_poly_crossings *r, vm hit, vf 
 {
     vf nearest = vf_set(INFINITY);
     vi facet = vi_set(-1);
-    for (int n = 0; n < r->segment_count; n++) {
-        const kernel_subtet_interval *s = &r->segments[n];
-        const vf away = vf_max(vf_max(s->t0 - t, t - s->t1), vf_set(0));
+    for (int n = 0; n < r->cell->facet_count; n++) {
+        const kernel_interval *s = &r->tets[n];
+        if (r->cell->facets[n].sign < 0 || !vm_any(s->mask)) continue;
+        const vf away = vf_max(vf_max(s->t_in - t, t - s->t_out), vf_set(0));
         const vm nearer = vm_and(vm_and(hit, s->mask), vf_lt(away, nearest));
-        if (s->sign < 0) continue;
         nearest = vf_select(nearer, away, nearest);
-        facet = vi_select(nearer, vi_set(s->facet), facet);
+        facet = vi_select(nearer, vi_set(n), facet);
     }
     memcpy(out, &facet, sizeof facet);
 }
@@ -612,7 +613,7 @@ static void kernel_polyhedron_accept(kernel_packet *p, const kernel_surface *s, 
 {
     kernel_surface_hits at = {.value = value, .t = walk->t, .w = walk->w};
     if (!vm_any(hit)) return;
-    kernel_poly_segments(r);
+    kernel_poly_tets(r);
     if (s->layer->normal == RENDER_VERTEX)
         kernel_polyhedron_smooth(p, r->cell, s->layer, r, hit, walk->t, at.normal);
     else
