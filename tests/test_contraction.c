@@ -176,7 +176,7 @@ static void run_contraction(batch *b, kernel_point *out, vm *none, kernel_bounds
     KERNEL_OF_TYPE(b->type, kernel_contract, &c, vm_all_lanes(), out, none);
     kernel_maps_of_type((const float(*)[8][SIMD_WIDTH])b->at, lanes, b->type, &map);
     out->t += vf_load(b->at[2][0]);
-    kernel_polish_near(&b->rays, &map, out->mask, KERNEL_CONTRACTION_END, out);
+    kernel_polish_near(&b->rays, &map, out->mask, out);
 }
 
 /* ---- reference ---- */

@@ -32,12 +32,12 @@ SIMD_INLINE void kernel_sorted_swap(kernel_sorted_vertices *h, bool is_narrow, v
 
 /* Transforms one vertex per lane into tile space. */
 SIMD_INLINE void kernel_lanes_transform(const kernel_frame *f, const kernel_tile *tile,
-                                        const kernel_wide_doubles *const world[3], vf out[3])
+                                        const kernel_wide_doubles world[3], vf out[3])
 {
     const double *eye = f->job->camera.eye;
     for (int half = 0; half < 2; half++) {
         kernel_f64 d[3], at[3];
-        for (int a = 0; a < 3; a++) d[a] = world[a]->half[half] - eye[a];
+        for (int a = 0; a < 3; a++) d[a] = world[a].half[half] - eye[a];
         for (int a = 0; a < 3; a++)
             at[a] = f->scaled_axes[a][0] * d[0] + f->scaled_axes[a][1] * d[1] + f->scaled_axes[a][2] * d[2];
         const kernel_f64 depth = f->job->camera.is_orthographic ? f->job->space.scale + 0 * at[2] : at[2];

@@ -46,7 +46,7 @@ typedef struct kernel_transformed_curved {
      * field by vertex; the corners' words by face */
     float rows[SIMD_WIDTH < KERNEL_LOCAL_ROW ? 1 : SIMD_WIDTH][KERNEL_LOCAL_ROWS][KERNEL_LOCAL_ROW];
     /* The following members are used only by kernel_transformed_curved_cell(), which extracts one lane's cell. */
-    kernel_wide_doubles world[3][8];
+    kernel_wide_doubles world[8][3];
     int32_t rank[8][SIMD_WIDTH], vertex[8][SIMD_WIDTH];
 } kernel_transformed_curved;
 
@@ -208,7 +208,7 @@ SIMD_INLINE vm kernel_sorted_curved_fetch(kernel_transformed_curved *out, const 
     kernel_sorted_curved_sort(&h, is_narrow, type);
     for (int i = 0; i < count; i++) {
         const vi own_rank = vi_from_vf(h.rank[i]);
-        for (int a = 0; a < 3; a++) out->world[a][i] = kernel_raw_to_double(is_narrow, &h.at[i][a]);
+        for (int a = 0; a < 3; a++) out->world[i][a] = kernel_raw_to_double(is_narrow, &h.at[i][a]);
         memcpy(out->rank[i], &own_rank, sizeof own_rank);
         memcpy(out->vertex[i], &h.vertex[i], sizeof h.vertex[i]);
     }
@@ -388,7 +388,7 @@ SIMD_INLINE void kernel_lattice_cells_store(const kernel_wide_doubles (*cells)[3
         const vi own_rank = vi_set(rank[i]);
         memcpy(out->vertex[i], vertices[(int)given[i]], sizeof out->vertex[i]);
         memcpy(out->rank[i], &own_rank, sizeof own_rank);
-        for (int axis = 0; axis < 3; axis++) out->world[axis][i] = cells[rank[i] >> (2 - axis) & 1][axis];
+        for (int axis = 0; axis < 3; axis++) out->world[i][axis] = cells[rank[i] >> (2 - axis) & 1][axis];
     }
     for (int half = 0; half < 2; half++) kernel_lattice_cells_transform(cells, f, tile, half, out, type);
     out->cuboids = vm_bits(vm_all_lanes());
@@ -412,9 +412,8 @@ SIMD_INLINE vm kernel_transform_curved_vertices(kernel_transformed_curved *out, 
     const vm collapsed = p->has_narrow_positions ? kernel_sorted_curved_fetch(out, p, true, type, vertices)
                                                  : kernel_sorted_curved_fetch(out, p, false, type, vertices);
     for (int i = 0; i < grid_type_vertices(type); i++) {
-        const kernel_wide_doubles *const world[3] = {&out->world[0][i], &out->world[1][i], &out->world[2][i]};
         vf at[3];
-        kernel_lanes_transform(f, tile, world, at);
+        kernel_lanes_transform(f, tile, out->world[i], at);
         for (int a = 0; a < 3; a++) vf_store(out->at[a][i], at[a]);
     }
     return collapsed;
@@ -465,7 +464,7 @@ static __attribute__((noinline)) void kernel_transformed_curved_cell(const kerne
         c->z[i] = h->at[2][i][n];
         c->f[i] = h->at[3][i][n];
         c->rank[i] = h->rank[i][n];
-        for (int a = 0; a < 3; a++) c->world[i][a] = kernel_wide_doubles_lane(&h->world[a][i], n);
+        for (int a = 0; a < 3; a++) c->world[i][a] = kernel_wide_doubles_lane(&h->world[i][a], n);
     }
 }
 

@@ -431,7 +431,7 @@ SIMD_INLINE unsigned kernel_curved_batch_hit_of(kernel_tile_trace *t, kernel_cur
         kernel_maps_of((const float(*)[8][SIMD_WIDTH])h->transformed.at, p.lane, &map, type);
         if (is_contracted) {
             at = ends[0];
-            kernel_polish_near(&p.rays, &map, p.active, KERNEL_CONTRACTION_END, &at);
+            kernel_polish_near(&p.rays, &map, p.active, &at);
         } else {
             open = kernel_polish_lanes(&p.rays, &map, p.active, &ends[0], &ends[1], &at);
         }

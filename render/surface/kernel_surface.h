@@ -251,7 +251,7 @@ static __attribute__((noinline)) vm kernel_curved_accept_contracted(kernel_packe
     if (vm_any(at.mask)) {
         kernel_map map;
         kernel_maps_of_type((const float(*)[8][SIMD_WIDTH])curved->at, lane, curved->type, &map);
-        kernel_polish_near(&rays, &map, at.mask, KERNEL_CONTRACTION_END, &at);
+        kernel_polish_near(&rays, &map, at.mask, &at);
         kernel_curved_accept(p, s, c, curved, value, &map, at.mask, &at);
     }
     return vm_or(at.mask, none);
@@ -397,13 +397,28 @@ static void kernel_polyhedron_mean_gradient(const kernel_frame *f, const polyhed
     }
 }
 
+/* Computes the barycentric coordinates of a ray's point at depth t in the tet of surface triangle number `facet`, and
+ * lists the numbers of the tet's corners. */
+static void kernel_polyhedron_shares(const kernel_packet *p, const polyhedron *c, int facet, int ray, float t,
+                                     int corners[4], double share[4])
+{
+    double place[4][3], point[3];
+    for (int i = 0; i < 4; i++) {
+        const int v = corners[i] = i < 3 ? c->facets[facet].vertex[i] : c->vertex_count;
+        place[i][0] = (double)c->x[v];
+        place[i][1] = (double)c->y[v];
+        place[i][2] = (double)c->z[v];
+    }
+    kernel_ray_point(p, ray, t, point);
+    kernel_barycentric((const double(*)[3])place, point, share);
+}
+
 /* Computes normals by interpolating the vertices' gradients in the tets (RENDER_VERTEX). */
 static __attribute__((noinline)) void kernel_polyhedron_smooth(const kernel_packet *p, const polyhedron *c,
                                                                const render_surface_layer *layer,
                                                                const kernel_poly_crossings *r, vm hit, vf t, vf out[3])
 {
     const render_vertex_gradients *gradients = &layer->gradients[c->part];
-    const int centre = c->vertex_count;
     int32_t facets[SIMD_WIDTH];
     double of_centre[3];
     kernel_polyhedron_facets(r, hit, t, facets);
@@ -412,17 +427,11 @@ static __attribute__((noinline)) void kernel_polyhedron_smooth(const kernel_pack
     for (unsigned left = vm_bits(hit); left; left &= left - 1) {
         const int ray = __builtin_ctz(left);
         if (facets[ray] < 0) continue;
-        double corner[4][3], g[4][3], point[3], share[4];
-        for (int i = 0; i < 4; i++) {
-            const int v = i < 3 ? c->facets[facets[ray]].vertex[i] : centre;
-            corner[i][0] = (double)c->x[v];
-            corner[i][1] = (double)c->y[v];
-            corner[i][2] = (double)c->z[v];
-            if (i < 3) kernel_vertex_gradient(p->frame, gradients, c->vertices[v], g[i]);
-        }
+        int corners[4];
+        double g[4][3], share[4];
+        kernel_polyhedron_shares(p, c, facets[ray], ray, t[ray], corners, share);
+        for (int i = 0; i < 3; i++) kernel_vertex_gradient(p->frame, gradients, c->vertices[corners[i]], g[i]);
         memcpy(g[3], of_centre, sizeof g[3]);
-        kernel_ray_point(p, ray, t[ray], point);
-        kernel_barycentric((const double(*)[3])corner, point, share);
         for (int a = 0; a < 3; a++)
             out[a][ray] =
                 (float)((share[0] * g[0][a] + share[1] * g[1][a]) + (share[2] * g[2][a] + share[3] * g[3][a]));
@@ -586,17 +595,14 @@ static __attribute__((noinline)) void kernel_polyhedron_line_field(const kernel_
     for (unsigned left = vm_bits(hit); left; left &= left - 1) {
         const int ray = __builtin_ctz(left);
         if (facets[ray] < 0) continue;
+        int corners[4];
         const double *corner[4];
-        double place[4][3], value[4], point[3], share[4], g[3], n[3];
+        double value[4], share[4], g[3], n[3];
+        kernel_polyhedron_shares(p, c, facets[ray], ray, t[ray], corners, share);
         for (int i = 0; i < 4; i++) {
-            const int v = i < 3 ? c->facets[facets[ray]].vertex[i] : c->vertex_count;
-            const double at[3] = {(double)c->x[v], (double)c->y[v], (double)c->z[v]};
-            memcpy(place[i], at, sizeof at);
-            corner[i] = c->world[v];
-            value[i] = i < 3 ? kernel_lines_value(s, field, c->vertices[v]) : mean;
+            corner[i] = c->world[corners[i]];
+            value[i] = i < 3 ? kernel_lines_value(s, field, c->vertices[corners[i]]) : mean;
         }
-        kernel_ray_point(p, ray, t[ray], point);
-        kernel_barycentric((const double(*)[3])place, point, share);
         kernel_tet_gradient(p->frame, corner, value, g);
         kernel_polyhedron_gradient(p, c, facets[ray], n);
         out->value[ray] =
