@@ -1,5 +1,5 @@
-/* Finds candidates in parallel. Subtrees are distributed among threads. Each thread lists the cells that it finds,
- * counts them by tile, and bins its own cells; threads do not synchronize in between. The thread that traces a tile
+/* Finds candidates in parallel. Subtrees are distributed among threads. Each thread lists the cells that it finds, and
+ * bins them by tile; threads do not synchronize in between. The thread that traces a tile
  * gathers the tile's cells from the bins of all threads. A bound on the number of cells limits memory and wasted time:
  * if there is more than one cell per pixel, most listed cells are hidden or smaller than a pixel. Cells of a volume are
  * not hidden, so a million of them may be listed in any case. */
@@ -91,21 +91,26 @@ static void bins_free(struct kernel_bins *bins)
     base_free(bins);
 }
 
-/* Copies the cells to their tiles' bins. at[tile] is the index at which the tile's next cell is stored. */
+/* Advances at[tile] for each cell of a tile. Copies the cells to their tiles' bins, unless `out` is NULL: at[tile] is
+ * the index at which the tile's next cell is stored. */
 static void bin_tiles(const kernel_candidate_chunk *chunk, int64_t across, uint32_t *at, kernel_tile_candidate *out)
 {
-    for (const kernel_candidate *s = chunk->items, *end = s + chunk->count; s < end; s++)
-        for (int y = s->y0 / KERNEL_TILE; y <= s->y1 / KERNEL_TILE; y++)
-            for (int x = s->x0 / KERNEL_TILE; x <= s->x1 / KERNEL_TILE; x++)
-                out[at[y * across + x]++] = kernel_candidate_in_tile(s, x * KERNEL_TILE, y * KERNEL_TILE);
+    for (; chunk; chunk = chunk->before)
+        for (const kernel_candidate *s = chunk->items, *end = s + chunk->count; s < end; s++)
+            for (int y = s->y0 / KERNEL_TILE; y <= s->y1 / KERNEL_TILE; y++)
+                for (int x = s->x0 / KERNEL_TILE; x <= s->x1 / KERNEL_TILE; x++) {
+                    const uint32_t n = at[y * across + x]++;
+                    if (out) out[n] = kernel_candidate_in_tile(s, x * KERNEL_TILE, y * KERNEL_TILE);
+                }
 }
 
-/* Bins the cells that a thread has found. On entry starts[1 + tile] must be the number of cells in each tile. Returns
- * false if the sum is more than `most`, or memory runs out. */
-static bool bins_fill(struct kernel_bins *bin, int64_t tiles, int64_t most)
+/* Bins the cells that a thread has found. Returns false if they are more than `most`, counted once for each of their
+ * tiles, or memory runs out. */
+static bool bins_fill(struct kernel_bins *bin, int64_t across, int64_t tiles, int64_t most)
 {
     uint32_t *starts = bin->starts;
     uint64_t sum = 0;
+    bin_tiles(bin->list.chunk, across, starts + 1, NULL);
     for (int64_t tile = 0; tile < tiles; tile++) {
         const uint32_t count = starts[1 + tile];
         /* bin_tiles() advances this index from the tile's first cell to the next tile's first cell */
@@ -115,8 +120,7 @@ static bool bins_fill(struct kernel_bins *bin, int64_t tiles, int64_t most)
     if (sum > (uint64_t)most) return false;
     bin->items = base_alloc(sum * sizeof *bin->items);
     if (!bin->items) return false;
-    for (const kernel_candidate_chunk *c = bin->list.chunk; c; c = c->before)
-        bin_tiles(c, bin->list.tile_columns, starts + 1, bin->items);
+    bin_tiles(bin->list.chunk, across, starts + 1, bin->items);
     return true;
 }
 
@@ -323,7 +327,7 @@ static void run(const kernel_frame *frame, const kernel_subtree *subtrees, int64
             if (!list->is_full) kernels->find_candidates(frame, &thread_of[me], &subtrees[i], list, grow);
         }
         if (list->chunk) list->chunk->count = list->count;
-        list->is_full = list->is_full || !bins_fill(&bins[me], tiles, most);
+        list->is_full = list->is_full || !bins_fill(&bins[me], tiles_across(frame), tiles, most);
         region_leave();
     }
 }
@@ -341,8 +345,7 @@ static struct kernel_bins *begin_bins(const kernel_frame *frame, int64_t *bound,
         }
         if (t) bins[t - 1].next = &bins[t];
         bins[t].starts = starts;
-        bins[t].list =
-            (kernel_candidate_list){.bound = bound, .counts = starts + 1, .tile_columns = (int)tiles_across(frame)};
+        bins[t].list.bound = bound;
     }
     return bins;
 }

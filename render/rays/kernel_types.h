@@ -238,9 +238,6 @@ typedef struct kernel_candidate_list {
     kernel_candidate_chunk *chunk; /* the current chunk; NULL at first */
     kernel_candidate *items;       /* items of the current chunk */
     int64_t count, capacity;       /* number of items in the current chunk, and how many fit */
-    /* number of candidates, over all chunks, that meet each of the picture's tiles, row by row */
-    uint32_t *counts;
-    int tile_columns;
     /* set if no more candidates can be added, because memory ran out or the maximum number is reached */
     bool is_full;
     int64_t *bound; /* number of candidates that may still be added, shared by all threads' lists */
