@@ -376,13 +376,23 @@ SIMD_INLINE bool kernel_take_nearest(kernel_point *list, int count, kernel_point
     for (int n = 0; n < count; n++) {
         const vm nearer = vm_and(list[n].mask, vf_lt(list[n].t, out->t));
         out->mask = vm_or(out->mask, nearer);
-        out->t = vf_select(nearer, list[n].t, out->t);
-        out->value = vf_select(nearer, list[n].value, out->value);
-        for (int a = 0; a < 3; a++) out->r[a] = vf_select(nearer, list[n].r[a], out->r[a]);
+        kernel_point_move(nearer, &list[n], out);
         taken = (vi)vf_select(nearer, (vf)vi_set(n), (vf)taken);
     }
     for (int n = 0; n < count; n++) list[n].mask = vm_andnot(list[n].mask, vf_eq(vf_from_vi(taken), vf_set((float)n)));
     return vm_any(out->mask);
+}
+
+/* Sets the interval's members, except for the colour field, from its ends. */
+SIMD_INLINE void kernel_interval_of(vm mask, const kernel_point *in, const kernel_point *out, kernel_interval *i)
+{
+    i->mask = mask;
+    i->t_in = in->t;
+    i->t_out = out->t;
+    i->v_in = in->value;
+    i->v_out = out->value;
+    memcpy(i->r_in, in->r, sizeof in->r);
+    memcpy(i->r_out, out->r, sizeof out->r);
 }
 
 /* Sorts each ray's crossings and combines them in pairs to intervals. Returns the largest number of intervals of any
@@ -396,13 +406,7 @@ static __attribute__((noinline, unused)) int kernel_curved_intervals(const kerne
     int n = 0;
     while (n < KERNEL_MAX_CELL_INTERVALS && kernel_take_nearest(list, crossings, &in) &&
            kernel_take_nearest(list, crossings, &next)) {
-        out[n].mask = vm_and(in.mask, next.mask);
-        out[n].t_in = in.t;
-        out[n].t_out = next.t;
-        out[n].v_in = in.value;
-        out[n].v_out = next.value;
-        memcpy(out[n].r_in, in.r, sizeof in.r);
-        memcpy(out[n].r_out, next.r, sizeof next.r);
+        kernel_interval_of(vm_and(in.mask, next.mask), &in, &next, &out[n]);
         n++;
     }
     return n;

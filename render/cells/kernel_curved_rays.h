@@ -254,23 +254,34 @@ SIMD_INLINE void kernel_curved_cross(const kernel_transformed_curved *h, const k
     kernel_curved_cross_corners(h, p, p->active, type, face, corners, out);
 }
 
-/* Appends rays of the list `met`, from index n on, to the list `rays`. out: for both ends of the interval of each of
- * these, depth, value and reference coordinates. */
-SIMD_INLINE void kernel_curved_ends_add(const kernel_pixel_list *met, int n, const kernel_point ends[2], unsigned bits,
-                                        kernel_pixel_list *rays, float (*out)[5][KERNEL_LIST_ROOM])
+/* Appends rays of the list `met`, from index n on, to the list `rays`. out: for the `end_count` ends of the interval of
+ * each of these, depth, value and reference coordinates. */
+SIMD_INLINE void kernel_curved_ends_add(const kernel_pixel_list *met, int n, const kernel_point *ends, int end_count,
+                                        unsigned bits, kernel_pixel_list *rays, float (*out)[5][KERNEL_LIST_ROOM])
 {
     if (!bits) return;
     float lanes[2][5][SIMD_WIDTH];
-    for (int e = 0; e < 2; e++) {
+    for (int e = 0; e < end_count; e++) {
         vf_store(lanes[e][0], ends[e].t);
         vf_store(lanes[e][1], ends[e].value);
         for (int a = 0; a < 3; a++) vf_store(lanes[e][2 + a], ends[e].r[a]);
     }
     for (; bits; bits &= bits - 1) {
         const int i = __builtin_ctz(bits), to = rays->count;
-        for (int e = 0; e < 2; e++)
+        for (int e = 0; e < end_count; e++)
             for (int k = 0; k < 5; k++) out[e][k][to] = lanes[e][k][i];
         kernel_curved_ray_add(rays, met, n + i);
+    }
+}
+
+/* Loads the ends of the intervals of rays from index n on. */
+SIMD_INLINE void kernel_curved_ends_load(float (*const ends)[5][KERNEL_LIST_ROOM], int n, int end_count,
+                                         kernel_point *out)
+{
+    for (int e = 0; e < end_count; e++) {
+        out[e].t = vf_load(ends[e][0] + n);
+        out[e].value = vf_load(ends[e][1] + n);
+        for (int a = 0; a < 3; a++) out[e].r[a] = vf_load(ends[e][2 + a] + n);
     }
 }
 
