@@ -229,7 +229,7 @@ static void trace_hemisphere(tracer *t, const render_hit *hit, kernel_undecided_
         ray_of[k] = undecided[i].ray;
         if (t->rays[undecided[i].ray].is_open) open |= (uint64_t)1 << k;
     }
-    const uint64_t prefetched = open;
+    const uint64_t open_at_first = open;
     for (int64_t i = 0; i < count && open; i++) {
         const int32_t occluder = undecided[i].occluder;
         if (occluder == TESTED) continue;
@@ -245,7 +245,7 @@ static void trace_hemisphere(tracer *t, const render_hit *hit, kernel_undecided_
         test_cell(t, occluder);
         open &= ~(before & ~t->bundle.open);
     }
-    for (uint64_t closed = prefetched & ~open; closed; closed &= closed - 1)
+    for (uint64_t closed = open_at_first & ~open; closed; closed &= closed - 1)
         t->rays[ray_of[__builtin_ctzll(closed)]].is_open = false;
 }
 

@@ -364,8 +364,8 @@ SIMD_INLINE vm kernel_curved_may_cross_twice(const vf x[8], const vf y[8], const
     const vm outside = vm_and(rays, vm_and(vm_xor(side[0], side[2]), vm_xor(side[1], side[3])));
     const vf across = vf_diff_of_products(x[a], y[c], x[c], y[a]), other = vf_diff_of_products(x[d], y[b], x[b], y[d]);
     const vf slack = 2e-6f * (vf_abs(across) + vf_abs(other)), sum = across + other, difference = across - other;
-    const vm nonlinear_part = vf_le(vf_select(side[0], -sum, sum), slack);
-    const vm bends = vm_and(outside, vm_and(nonlinear_part, vf_le(vf_select(side[3], difference, -difference), slack)));
+    const vm b_bends = vf_le(vf_select(side[0], -sum, sum), slack);
+    const vm bends = vm_and(outside, vm_and(b_bends, vf_le(vf_select(side[3], difference, -difference), slack)));
     return __builtin_expect(vm_any(bends), 0)
                ? kernel_curved_may_cross_twice_by_discriminant(x, y, loop, bends, across, other)
                : bends;

@@ -105,8 +105,8 @@ static __attribute__((noinline)) void kernel_occlusion_curved(kernel_packet *p, 
     const int count = kernel_curved_intervals(p, c, rays, list);
     for (int n = 0; n < count; n++) {
         const kernel_interval *i = &list[n];
-        const vm room_left = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
-        const vm wanted = vm_and(kernel_is_near(p, i), room_left);
+        const vm nonempty = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
+        const vm wanted = vm_and(kernel_is_near(p, i), nonempty);
         if (!vm_any(wanted)) continue;
         if (!curved.is_ready) kernel_curved_single_bounds(c, &beam, &curved);
         kernel_occlusion_roots(p, o, &curved, i, wanted);
@@ -193,9 +193,9 @@ static void kernel_occlude_by_cell(const kernel_frame *f, kernel_thread *thread,
         kernel_occlusion o = {&f->surfaces[occluder->surface], b, first, NULL, 0};
         if (!(b->open >> first & (((uint64_t)1 << SIMD_WIDTH) - 1))) continue;
         kernel_bundle_packet(&p, f, thread, b, first);
-        const unsigned prefetched = vm_bits(p.active);
+        const unsigned before = vm_bits(p.active);
         kernel_occlusion_cell(&p, &o, occluder);
-        b->open &= ~((uint64_t)(prefetched & ~vm_bits(p.active)) << first);
+        b->open &= ~((uint64_t)(before & ~vm_bits(p.active)) << first);
     }
 }
 

@@ -264,15 +264,15 @@ static __attribute__((noinline)) void kernel_curved_surface(kernel_packet *p, co
     const render_surface_layer *layer = s->layer;
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     const int count = kernel_curved_intervals(p, c, rays, list);
-    vm prefetched[KERNEL_MAX_CELL_INTERVALS], any = vm_none(), known = vm_none();
+    vm reached[KERNEL_MAX_CELL_INTERVALS], any = vm_none(), known = vm_none();
     for (int n = 0; n < count; n++) {
         kernel_interval *i = &list[n];
         i->v_out = kernel_end_in_cell(i->v_in, i->v_out, layer->is_of_faces);
         /* If a ray crosses both triangles of a quad but not its patch, both ends of the interval are the same point
          * outside the ray; such an interval is skipped. */
         const vm nonempty = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
-        prefetched[n] = vm_and(kernel_is_near(p, i), nonempty);
-        any = vm_or(any, prefetched[n]);
+        reached[n] = vm_and(kernel_is_near(p, i), nonempty);
+        any = vm_or(any, reached[n]);
     }
     if (!vm_any(any)) return;
     if (!curved->is_ready) {
@@ -282,7 +282,7 @@ static __attribute__((noinline)) void kernel_curved_surface(kernel_packet *p, co
     if (!curved->is_contracted) known = kernel_curved_accept_contracted(p, s, c, curved, value, any);
     for (int n = 0; n < count; n++) {
         kernel_interval *i = &list[n];
-        const vm wanted = vm_andnot(vm_and(prefetched[n], kernel_is_near(p, i)), known);
+        const vm wanted = vm_andnot(vm_and(reached[n], kernel_is_near(p, i)), known);
         if (vm_any(wanted)) kernel_curved_robust(p, s, c, curved, value, i, wanted);
     }
 }

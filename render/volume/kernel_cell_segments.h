@@ -273,9 +273,9 @@ static void kernel_step_side(const kernel_bisection *h, double inside, float sid
 /* Rounds x to float and clamps it to the range between two neighbouring steps; *rest: the rounding error. */
 static void kernel_step_round(const float side[2], double x, float *v, double *rest)
 {
-    const double active = fmax(fmin(x, (double)side[1]), (double)side[0]);
-    *v = (float)active;
-    *rest = side[0] < *v && *v < side[1] ? active - (double)*v : 0;
+    const double clamped = fmax(fmin(x, (double)side[1]), (double)side[0]);
+    *v = (float)clamped;
+    *rest = side[0] < *v && *v < side[1] ? clamped - (double)*v : 0;
 }
 
 /* Returns bounds of the transfer function over the subinterval's values. step: a step among the values, or NULL. */

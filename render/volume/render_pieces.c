@@ -140,11 +140,11 @@ static int cut_ramps(const render_transfer *t, double tolerance, kernel_real *cu
  * kept. */
 static int collect_cuts(const render_transfer *t, double tolerance, kernel_real *cuts, kept_entry *entries)
 {
-    int count = cut_ramps(t, tolerance, cuts), active = 0;
+    int count = cut_ramps(t, tolerance, cuts), kept = 0;
     for (int i = 0; i < t->colour_count - 1; i = next_entry(t, i, tolerance))
-        entries[active++] = (kept_entry){i, render_entry_position(t, i)};
-    entries[active++] = (kept_entry){t->colour_count - 1, render_entry_position(t, t->colour_count - 1)};
-    for (int i = 0; i < active; i++) cuts[count++] = (kernel_real)entries[i].place;
+        entries[kept++] = (kept_entry){i, render_entry_position(t, i)};
+    entries[kept++] = (kept_entry){t->colour_count - 1, render_entry_position(t, t->colour_count - 1)};
+    for (int i = 0; i < kept; i++) cuts[count++] = (kernel_real)entries[i].place;
     for (int i = 0; i < t->opacity_count; i++) cuts[count++] = (kernel_real)render_domain_of(t, t->opacity_values[i]);
     qsort(cuts, (size_t)count, sizeof *cuts, compare_cuts);
     int unique = 1;
