@@ -156,7 +156,7 @@ SIMD_INLINE unsigned kernel_arrays_drawn(const kernel_arrays *p, const uint32_t 
 
 /* Computes the vertices' coordinates along one axis of a rectilinear lattice from the position of each vertex on that
  * axis. It does for one vertex per lane what grid_index_along() does for one vertex. */
-static void kernel_axis_coordinates(const grid_axis *axis, vi vertex, kernel_wide_doubles *out)
+static void kernel_axis_coordinates(const grid_axis *axis, vi vertex, kernel_f64 out[2])
 {
     const grid_numbering *of = axis->vertices;
     const double outer = of->outer[axis->axis], inverse_outer = of->inverse_outer[axis->axis];
@@ -173,8 +173,7 @@ static void kernel_axis_coordinates(const grid_axis *axis, vi vertex, kernel_wid
     memcpy(out, places, sizeof places);
 }
 
-static __attribute__((noinline)) void kernel_numbers_gather_scalar(const kernel_numbers *c, vi index,
-                                                                   kernel_wide_doubles *out)
+static __attribute__((noinline)) void kernel_numbers_gather_scalar(const kernel_numbers *c, vi index, kernel_f64 out[2])
 {
     double v[SIMD_WIDTH];
     int32_t at[SIMD_WIDTH];
@@ -192,7 +191,7 @@ static __attribute__((noinline)) void kernel_numbers_gather_scalar(const kernel_
  * in `wide`. */
 typedef struct kernel_raw_numbers {
     vf narrow;
-    kernel_wide_doubles wide;
+    kernel_f64 wide[2];
 } kernel_raw_numbers;
 
 SIMD_INLINE void kernel_numbers_gather_raw(const kernel_numbers *c, vi index, kernel_raw_numbers *out)
@@ -200,40 +199,48 @@ SIMD_INLINE void kernel_numbers_gather_raw(const kernel_numbers *c, vi index, ke
     if (kernel_numbers_are_narrow(c)) {
         out->narrow = vf_gather(c->data, index * c->stride);
     } else if (c->data) {
-        for (int half = 0; half < 2; half++) out->wide.half[half] = vd_gather(c->data, index * c->stride, half);
+        for (int half = 0; half < 2; half++) out->wide[half] = vd_gather(c->data, index * c->stride, half);
     } else {
-        kernel_numbers_gather_scalar(c, index, &out->wide);
+        kernel_numbers_gather_scalar(c, index, out->wide);
     }
 }
 
-SIMD_INLINE kernel_wide_doubles kernel_numbers_gather(const kernel_numbers *c, vi index)
+/* Converts numbers to double. is_narrow: whether they are stored as float32. */
+SIMD_INLINE void kernel_raw_widen(bool is_narrow, const kernel_raw_numbers *v, kernel_f64 out[2])
 {
-    kernel_raw_numbers out;
-    kernel_numbers_gather_raw(c, index, &out);
-    return kernel_numbers_are_narrow(c) ? kernel_wide_doubles_widen(out.narrow) : out.wide;
+    if (is_narrow)
+        kernel_halves_widen(v->narrow, out);
+    else
+        memcpy(out, v->wide, sizeof v->wide);
+}
+
+SIMD_INLINE void kernel_numbers_gather(const kernel_numbers *c, vi index, kernel_f64 out[2])
+{
+    kernel_raw_numbers raw;
+    kernel_numbers_gather_raw(c, index, &raw);
+    kernel_raw_widen(kernel_numbers_are_narrow(c), &raw, out);
 }
 
 /* Returns a < b per lane. is_narrow: whether both are stored as float32. */
 SIMD_INLINE vm kernel_raw_lt(bool is_narrow, const kernel_raw_numbers *a, const kernel_raw_numbers *b)
 {
-    return is_narrow ? vf_lt(a->narrow, b->narrow) : vd_lt(a->wide.half, b->wide.half);
+    return is_narrow ? vf_lt(a->narrow, b->narrow) : vd_lt(a->wide, b->wide);
 }
 
 SIMD_INLINE vm kernel_raw_eq(bool is_narrow, const kernel_raw_numbers *a, const kernel_raw_numbers *b)
 {
-    return is_narrow ? vf_eq(a->narrow, b->narrow) : vd_eq(a->wide.half, b->wide.half);
+    return is_narrow ? vf_eq(a->narrow, b->narrow) : vd_eq(a->wide, b->wide);
 }
 
 SIMD_INLINE void kernel_raw_swap(bool is_narrow, vm lanes, kernel_raw_numbers *a, kernel_raw_numbers *b)
 {
-    const kernel_raw_numbers was = *a;
+    const kernel_raw_numbers was = *a, other = *b;
     if (is_narrow) {
-        a->narrow = vf_select(lanes, b->narrow, was.narrow);
-        b->narrow = vf_select(lanes, was.narrow, b->narrow);
+        a->narrow = vf_select(lanes, other.narrow, was.narrow);
+        b->narrow = vf_select(lanes, was.narrow, other.narrow);
     } else {
-        const kernel_wide_doubles other = b->wide;
-        vd_select(lanes, other.half, was.wide.half, a->wide.half);
-        vd_select(lanes, was.wide.half, other.half, b->wide.half);
+        vd_select(lanes, other.wide, was.wide, a->wide);
+        vd_select(lanes, was.wide, other.wide, b->wide);
     }
 }
 
@@ -255,13 +262,8 @@ SIMD_INLINE void kernel_arrays_positions(const kernel_arrays *p, bool is_narrow,
         if (is_narrow)
             out[a].narrow = vf_gather(p->coordinates[a].data, vertex * p->coordinates[a].stride);
         else
-            out[a].wide = kernel_numbers_gather(&p->coordinates[a], vertex);
+            kernel_numbers_gather(&p->coordinates[a], vertex, out[a].wide);
     }
-}
-
-SIMD_INLINE kernel_wide_doubles kernel_raw_to_double(bool is_narrow, const kernel_raw_numbers *v)
-{
-    return is_narrow ? kernel_wide_doubles_widen(v->narrow) : v->wide;
 }
 
 /* ---- cells of uniform and rectilinear lattices ---- */
@@ -274,7 +276,7 @@ SIMD_INLINE bool kernel_arrays_have_axes(const kernel_arrays *p)
 /* Reads the coordinates of hexes of a uniform or rectilinear lattice, given each hex's first vertex: those of its lower
  * end (cells[0]) and upper end (cells[1]), by axis. It reads 6 numbers per hex instead of 24. */
 static __attribute__((noinline)) void kernel_lattice_cells_read(const kernel_arrays *p, const int32_t first[SIMD_WIDTH],
-                                                                kernel_wide_doubles cells[2][3])
+                                                                kernel_f64 cells[2][3][2])
 {
     for (int axis = 0; axis < 3; axis++) {
         const grid_axis *along = p->coordinates[axis].array.axis;
@@ -319,8 +321,8 @@ SIMD_INLINE kernel_level kernel_level_of(double value)
 /* Returns the lanes in which the number v is below the level. The comparison is exact. */
 SIMD_INLINE vm kernel_raw_below(const kernel_numbers *c, const kernel_raw_numbers *v, const kernel_level *level)
 {
-    const kernel_wide_doubles value = kernel_wide_doubles_set(level->value);
-    return kernel_numbers_are_narrow(c) ? vf_lt(v->narrow, vf_set(level->least)) : vd_lt(v->wide.half, value.half);
+    const kernel_f64 half = (kernel_f64){0} + level->value, value[2] = {half, half};
+    return kernel_numbers_are_narrow(c) ? vf_lt(v->narrow, vf_set(level->least)) : vd_lt(v->wide, value);
 }
 
 /* Returns the number v minus the level, rounded to float32. */
@@ -328,7 +330,7 @@ SIMD_INLINE vf kernel_raw_minus(const kernel_numbers *c, const kernel_raw_number
 {
     vf out;
     if (kernel_numbers_are_narrow(c)) return (v->narrow - level->middle) - level->rest;
-    for (int half = 0; half < 2; half++) kernel_f64_store_lanes(&out, half, v->wide.half[half] - level->value);
+    for (int half = 0; half < 2; half++) kernel_f64_store_lanes(&out, half, v->wide[half] - level->value);
     return out;
 }
 

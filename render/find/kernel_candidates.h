@@ -49,7 +49,7 @@ static __attribute__((noinline)) void kernel_find_volumes(kernel_finder *s, cons
         kernel_raw_numbers value;
         vf place[3], at[3];
         kernel_arrays_values(&s->arrays, vertex, c->cell, &value);
-        v[i] = kernel_numbers_are_narrow(&s->arrays.values) ? value.narrow : kernel_wide_doubles_narrow(&value.wide);
+        v[i] = kernel_numbers_are_narrow(&s->arrays.values) ? value.narrow : kernel_halves_narrow(value.wide);
         fitting = vm_and(fitting, vf_lt(vf_abs(v[i]), vf_set(1e30f)));
         kernel_finder_positions(s, vertex, place);
         fitting = kernel_positions_fit_lanes(fitting, place);

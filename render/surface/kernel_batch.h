@@ -58,8 +58,7 @@ static __attribute__((noinline)) void kernel_batch_normals(kernel_batch *b, cons
         kernel_f64 d[3][3], df[3], g[3], largest = {0};
         for (int i = 0; i < 3; i++) {
             df[i] = kernel_f64_of(&b->tets.f[i + 1], half) - kernel_f64_of(&b->tets.f[0], half);
-            for (int a = 0; a < 3; a++)
-                d[i][a] = (b->tets.world[i + 1][a].half[half] - b->tets.world[0][a].half[half]) * scale;
+            for (int a = 0; a < 3; a++) d[i][a] = (b->tets.world[i + 1][a][half] - b->tets.world[0][a][half]) * scale;
         }
         for (int a = 0; a < 3; a++) {
             const int p = (a + 1) % 3, q = (a + 2) % 3;

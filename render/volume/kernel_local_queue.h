@@ -97,9 +97,10 @@ SIMD_INLINE vm kernel_local_domain(const kernel_transfer *t, const kernel_tile_c
     for (int i = 0; i < count; i++) {
         vi vertex;
         memcpy(&vertex, p->is_by_cell ? (const void *)cells->current->cell : cells->curved.vertex[i], sizeof vertex);
-        const kernel_wide_doubles all = kernel_numbers_gather(&p->values, vertex);
+        kernel_f64 all[2];
+        kernel_numbers_gather(&p->values, vertex, all);
         for (int half = 0; half < 2; half++) {
-            const kernel_f64 v = all.half[half];
+            const kernel_f64 v = all[half];
             kernel_f64_store_lanes(&odd, half, v - v);
             kernel_f64_store_lanes(&plain[i], half, kernel_f64_clamp(v, 3e38));
             kernel_f64_store_lanes(&values[i], half, kernel_f64_clamp((v - t->low) * t->inverse_width, 1e18));

@@ -187,7 +187,7 @@ SIMD_INLINE void kernel_transformed_domain(kernel_transformed_tets *transformed,
 {
     for (int half = 0; half < 2; half++)
         for (int i = 0; i < 4; i++) {
-            const kernel_f64 f = (transformed->values[i].half[half] - t->low) * t->inverse_width;
+            const kernel_f64 f = (transformed->values[i][half] - t->low) * t->inverse_width;
             kernel_f64_store_lanes(&transformed->f[i], half, kernel_f64_clamp(f, 1e18));
         }
 }
@@ -203,7 +203,7 @@ SIMD_INLINE unsigned kernel_transformed_tets_visible(const kernel_tile_trace *t,
     vm is_finite = vm_all_lanes();
     for (int i = 0; i < 4; i++) {
         for (int half = 0; half < 2; half++) {
-            const kernel_f64 own = transformed->values[i].half[half];
+            const kernel_f64 own = transformed->values[i][half];
             kernel_f64_store_lanes(&odd, half, own - own);
             kernel_f64_store_lanes(&v[i], half, kernel_f64_clamp(own, 3e38));
         }
