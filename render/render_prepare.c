@@ -55,26 +55,6 @@ int render_visible_intervals(const render_transfer *t, mmbvh_interval out[RENDER
     return count;
 }
 
-static void prepare_isovalues(kernel_visible_values *visible_values, const render_surface_layer *layer)
-{
-    visible_values->count = layer->value_count;
-    for (int i = 0; i < layer->value_count; i++) {
-        const mmbvh_interval interval = render_isovalue_interval(layer->values[i]);
-        visible_values->low[i] = interval.low;
-        visible_values->high[i] = interval.high;
-    }
-}
-
-static void prepare_visible(kernel_visible_values *visible_values, const render_transfer *t)
-{
-    mmbvh_interval intervals[RENDER_MAX_INTERVALS];
-    visible_values->count = render_visible_intervals(t, intervals);
-    for (int i = 0; i < visible_values->count; i++) {
-        visible_values->low[i] = intervals[i].low;
-        visible_values->high[i] = intervals[i].high;
-    }
-}
-
 static void prepare_scale(kernel_transfer *out, const render_transfer *t)
 {
     const double low = render_scaled(t->scale, t->threshold, t->low);
@@ -120,7 +100,7 @@ static void prepare_transfer(kernel_transfer *out, const render_transfer *t, dou
         out->ramp_rise[i] = t->opacities[i + 1] - t->opacities[i];
     }
     out->exponent = (float)(step / t->unit_distance);
-    prepare_visible(&out->visible_values, t);
+    out->visible_values.count = render_visible_intervals(t, out->visible_values.intervals);
 }
 
 static void prepare_lines(kernel_lines *out, const render_lines *l)
@@ -217,12 +197,13 @@ static void prepare_surfaces(kernel_frame *f)
                 s->layer = layer;
                 s->first_kind = kind;
                 s->own_clips = job->clip_count ? layer->clips & ~f->common_clips : 0;
-                prepare_isovalues(&s->visible_values, layer);
                 if (layer->normal == RENDER_DIFFERENCES) s->value_scale = value_scale(job, i);
                 if (layer->colour_map) prepare_transfer(&s->colour, layer->colour_map, 1);
                 if (layer->lines) prepare_lines(&s->lines, layer->lines);
                 f->opaque_count += is_opaque;
+                s->visible_values.count = layer->value_count;
                 for (int value = 0; value < layer->value_count; value++) {
+                    s->visible_values.intervals[value] = render_isovalue_interval(layer->values[value]);
                     f->isovalue_surface[isovalues] = f->surface_count - 1;
                     f->isovalue_number[isovalues++] = value;
                 }

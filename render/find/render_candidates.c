@@ -255,8 +255,10 @@ static void sample_leaves(const kernel_frame *f, const kernel_surface *s, int pa
         memcpy(&low, ranges->low + node * ranges->stride, sizeof low);
         memcpy(&high, ranges->high + node * ranges->stride, sizeof high);
         *cells += count;
-        for (int i = 0; i < s->visible_values.count; i++)
-            if (low <= s->visible_values.high[i] && high >= s->visible_values.low[i]) *crossed += count;
+        for (int i = 0; i < s->visible_values.count; i++) {
+            const mmbvh_interval own = s->visible_values.intervals[i];
+            if (low <= own.high && high >= own.low) *crossed += count;
+        }
     }
 }
 

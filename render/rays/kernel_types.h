@@ -7,6 +7,7 @@
 
 #include "fragment.h"
 #include "grid.h"
+#include "mmbvh.h"
 #include "render.h"
 
 enum {
@@ -132,7 +133,7 @@ typedef struct kernel_tile {
 /* Intervals of visible values, rounded outward: a node whose range meets none of them is skipped. */
 typedef struct kernel_visible_values {
     int count;
-    float low[KERNEL_MAX_INTERVALS], high[KERNEL_MAX_INTERVALS];
+    mmbvh_interval intervals[KERNEL_MAX_INTERVALS];
 } kernel_visible_values;
 
 /* A transfer function in its own domain, in which low is 0 and low + 1 / inverse_width is 1. The domain is the range
