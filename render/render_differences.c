@@ -68,54 +68,50 @@ bool render_differences_meet(const render_job *job, const render_pending_hit *hi
 
 /* ---- order ----------------------------------------------------------------------------------------------------- */
 
-typedef struct hit_location {
-    uint64_t tile;         /* 256 times the number of the tile, plus the number of the block in the tile */
-    uint32_t kind, within; /* kind of the hit, and number of its pixel in the block */
-    int64_t index;         /* index of the hit among those that are sorted together */
-} hit_location;
-
-static int compare_locations(const void *a, const void *b)
-{
-    const hit_location *x = a, *y = b;
-    if (x->tile != y->tile) return x->tile < y->tile ? -1 : 1;
-    if (x->kind != y->kind) return x->kind < y->kind ? -1 : 1;
-    if (x->within != y->within) return x->within < y->within ? -1 : 1;
-    return (x->index > y->index) - (x->index < y->index);
-}
-
-static hit_location place_of(const render_camera *camera, const render_pending_hit *hit, int64_t index)
+/* Returns a number by which hits are sorted: by tile, block, isovalue and pixel in the block. Its last bits are the
+ * index of the hit among those that are sorted together. */
+static uint64_t sort_key(const render_camera *camera, const render_pending_hit *hit, uint64_t index)
 {
     const uint32_t x = hit->pixel % (uint32_t)camera->width, y = hit->pixel / (uint32_t)camera->width;
     const uint64_t tile = (uint64_t)(y / KERNEL_TILE) << 16 | x / KERNEL_TILE;
     const uint32_t block = y % KERNEL_TILE / KERNEL_BLOCK * KERNEL_BLOCK + x % KERNEL_TILE / KERNEL_BLOCK;
-    return (hit_location){tile << 8 | block, hit->kind, y % KERNEL_BLOCK * KERNEL_BLOCK + x % KERNEL_BLOCK, index};
+    const uint32_t within = y % KERNEL_BLOCK * KERNEL_BLOCK + x % KERNEL_BLOCK;
+    const uint64_t block_value = (tile * 16 + block) * RENDER_MAX_ISOVALUES + (hit->kind - FRAGMENT_SURFACE);
+    return (block_value * 16 + within) * SORTED_HITS + index;
+}
+
+static int compare_keys(const void *a, const void *b)
+{
+    const uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
+    return (x > y) - (x < y);
 }
 
 static void sort_hits(const render_camera *camera, render_pending_list *list, int64_t first, int64_t count,
-                      hit_location *places, render_pending_list *scratch)
+                      uint64_t *keys, render_pending_list *scratch)
 {
-    for (int64_t i = 0; i < count; i++) places[i] = place_of(camera, &list->items[first + i], i);
+    for (int64_t i = 0; i < count; i++) keys[i] = sort_key(camera, &list->items[first + i], (uint64_t)i);
     memcpy(scratch->items, list->items + first, (size_t)count * sizeof *scratch->items);
     memcpy(scratch->shadings, list->shadings + first, (size_t)count * sizeof *scratch->shadings);
-    qsort(places, (size_t)count, sizeof *places, compare_locations);
+    qsort(keys, (size_t)count, sizeof *keys, compare_keys);
     for (int64_t i = 0; i < count; i++) {
-        list->items[first + i] = scratch->items[places[i].index];
-        memcpy(list->shadings[first + i], scratch->shadings[places[i].index], sizeof *list->shadings);
+        const uint64_t from = keys[i] % SORTED_HITS;
+        list->items[first + i] = scratch->items[from];
+        memcpy(list->shadings[first + i], scratch->shadings[from], sizeof *list->shadings);
     }
 }
 
 bool render_differences_sort(const render_job *job, render_pending_list *list)
 {
     const int64_t most = list->count < SORTED_HITS ? list->count : SORTED_HITS;
-    hit_location *places = base_alloc((size_t)(most + 1) * sizeof *places);
+    uint64_t *keys = base_alloc((size_t)(most + 1) * sizeof *keys);
     render_pending_list scratch = {.items = base_alloc((size_t)(most + 1) * sizeof *scratch.items),
                                    .shadings = base_alloc((size_t)(most + 1) * sizeof *scratch.shadings)};
-    const bool has_memory = places && scratch.items && scratch.shadings;
+    const bool has_memory = keys && scratch.items && scratch.shadings;
     for (int64_t first = 0; first < list->count && has_memory; first += most) {
         const int64_t left = list->count - first;
-        sort_hits(&job->camera, list, first, left < most ? left : most, places, &scratch);
+        sort_hits(&job->camera, list, first, left < most ? left : most, keys, &scratch);
     }
-    base_free(places);
+    base_free(keys);
     base_free(scratch.items);
     base_free(scratch.shadings);
     return has_memory;
@@ -123,51 +119,35 @@ bool render_differences_sort(const render_job *job, render_pending_list *list)
 
 /* ---- samples and light ----------------------------------------------------------------------------------------- */
 
-/* The work of all threads: sampling around hits, or lighting them, chunk by chunk. */
-typedef struct chunk_work {
+/* Samples around `count` hits, or lights them if `out` is not NULL, in parallel, chunk by chunk. samples: the hits'
+ * samples, which are written, or read to light the hits; shadings: those of the hits to be lit. */
+static insitu_status process_chunks(const render_job *job, const render_pending_hit *hits, float (*shadings)[2][3],
+                                    render_difference_samples *samples, fragment *out, int64_t count, base_error *error)
+{
+    const kernel_table *kernels = render_kernels();
+    const int threads = job->threads > 0 ? job->threads : omp_get_max_threads();
     kernel_frame frame;
-    const kernel_table *kernels;
-    int threads;
-    const render_pending_hit *hits;          /* hits around which samples are taken */
-    render_difference_samples *samples;      /* the samples that are taken */
-    const render_pending_list *list;         /* hits to be lit; NULL if samples are to be taken */
-    const render_difference_samples *merged; /* samples of all ranks around the hits in `list` */
-    fragment *out;
-} chunk_work;
-
-static void process_chunk(chunk_work *work, kernel_thread *thread, int64_t first, int64_t count)
-{
-    if (work->list)
-        work->kernels->light_pending(&work->frame, thread, work->list, work->merged, first, count, work->out);
-    else
-        work->kernels->sample_pending(&work->frame, thread, work->hits + first, work->samples + first, count);
-}
-
-static insitu_status process_chunks(const render_job *job, chunk_work *work, int64_t first, int64_t count,
-                                    base_error *error)
-{
-    work->kernels = render_kernels();
-    work->threads = job->threads > 0 ? job->threads : omp_get_max_threads();
-    render_job surfaces = *job;
+    render_job surfaces;
     bool has_memory = true;
-    surfaces.volume_count = 0;
-    surfaces.separate_samples = surfaces.reproducible = false;
-    insitu_status status = render_prepare(&surfaces, &work->frame, error);
+    insitu_status status = render_prepare_surfaces(job, &surfaces, &frame, error);
     if (status != INSITU_OK) return status;
-#pragma omp parallel num_threads(work->threads) reduction(&& : has_memory)
+#pragma omp parallel num_threads(threads) reduction(&& : has_memory)
     {
         region_enter();
         kernel_thread thread = {0};
-        has_memory = render_thread_begin(work->kernels, &thread);
+        has_memory = render_thread_begin(&frame, kernels, &thread);
 #pragma omp for schedule(dynamic, 1) nowait
-        for (int64_t at = first; at < first + count; at += CHUNK_HITS) {
-            const int64_t left = first + count - at;
-            if (thread.memory) process_chunk(work, &thread, at, left < CHUNK_HITS ? left : CHUNK_HITS);
+        for (int64_t at = 0; at < count; at += CHUNK_HITS) {
+            const int64_t chunk = count - at < CHUNK_HITS ? count - at : CHUNK_HITS;
+            if (has_memory && out)
+                kernels->light_pending(&frame, &thread, hits + at, shadings + at, samples + at, out + at, chunk);
+            else if (has_memory)
+                kernels->sample_pending(&frame, &thread, hits + at, samples + at, chunk);
         }
-        base_free(thread.memory);
+        render_thread_end(&thread);
         region_leave();
     }
-    render_unprepare(&work->frame);
+    render_unprepare(&frame);
     if (!has_memory)
         status = base_fail(error, INSITU_ERROR_MEMORY, "no memory for normals of %lld hits", (long long)count);
     return status;
@@ -176,10 +156,9 @@ static insitu_status process_chunks(const render_job *job, chunk_work *work, int
 insitu_status render_sample_pending_hits(const render_job *job, const render_pending_hit *hits,
                                          render_difference_samples *out, int64_t count, base_error *error)
 {
-    chunk_work work = {.hits = hits, .samples = out};
     if (count && !job->part_count) memset(out, 0, (size_t)count * sizeof *out);
     if (!count || !job->part_count) return INSITU_OK;
-    return process_chunks(job, &work, 0, count, error);
+    return process_chunks(job, hits, NULL, out, NULL, count, error);
 }
 
 void render_differences_merge(render_difference_samples *into, const render_difference_samples *other)
@@ -193,12 +172,9 @@ void render_differences_merge(render_difference_samples *into, const render_diff
 }
 
 insitu_status render_light_pending_hits(const render_job *job, const render_pending_list *list,
-                                        const render_difference_samples *samples, int64_t first, int64_t count,
-                                        fragment *out, base_error *error)
+                                        render_difference_samples *samples, int64_t first, int64_t count, fragment *out,
+                                        base_error *error)
 {
-    /* the pointers are advanced to hit `first`, so that index 0 belongs to the same hit in the list, in `samples` and
-     * in `out` */
-    const render_pending_list some = {list->items + first, list->shadings + first, count, count};
-    chunk_work work = {.list = &some, .merged = samples, .out = out};
-    return count ? process_chunks(job, &work, 0, count, error) : INSITU_OK;
+    if (!count) return INSITU_OK;
+    return process_chunks(job, list->items + first, list->shadings + first, samples, out, count, error);
 }

@@ -40,7 +40,7 @@ void render_differences_merge(render_difference_samples *into, const render_diff
  * hit `first`), and lights the hits as job->paint requests. The fragments are those that render_frame() would have
  * computed. Local. */
 insitu_status render_light_pending_hits(const render_job *job, const render_pending_list *list,
-                                        const render_difference_samples *samples, int64_t first, int64_t count,
-                                        fragment *out, base_error *error);
+                                        render_difference_samples *samples, int64_t first, int64_t count, fragment *out,
+                                        base_error *error);
 
 #endif

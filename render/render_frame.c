@@ -7,7 +7,6 @@
 
 #include "error.h"
 #include "fragment.h"
-#include "grid.h"
 #include "insitu/status.h"
 #include "kernel_types.h"
 #include "memory.h"
@@ -46,7 +45,7 @@ static void trace_tiles(const kernel_table *kernels, const kernel_frame *frame, 
     render_folding fold = {.job = frame->job, .has_segments = frame->has_segments};
 #pragma omp for schedule(dynamic, KERNEL_TILES_PER_TASK) nowait
     for (int tile = 0; tile < columns * rows; tile++) {
-        if (!render_thread_begin(kernels, thread)) continue;
+        if (!render_thread_begin(frame, kernels, thread)) continue;
         if (thread->polyhedra) polyhedra_reset(thread->polyhedra);
         const pixel_area area = area_of(camera, tile % columns, tile / columns);
         thread->out_of_memory = thread->out_of_memory || !render_candidates_gather(frame, thread, area.x, area.y);
@@ -112,31 +111,14 @@ bool render_reserve_fragments(fragment_list *list, int64_t more)
     return true;
 }
 
-/* Initializes the states of all threads, including those that OpenMP may not start. */
-static void begin_threads(const kernel_frame *frame, kernel_thread *states, int threads)
-{
-    bool has_polyhedra = false;
-    for (int i = 0; i < frame->job->part_count; i++)
-        has_polyhedra = has_polyhedra || grid_has_faces(frame->job->parts[i].cells);
-    for (int i = 0; i < threads; i++)
-        states[i] = (kernel_thread){.polyhedra = has_polyhedra ? polyhedra_create() : NULL};
-    for (int i = 0; i < threads && has_polyhedra; i++) states[i].out_of_memory = !states[i].polyhedra;
-}
-
 static bool end_threads(const render_job *job, kernel_thread *states, int threads, render_statistics *statistics)
 {
     bool has_memory = true;
     double surface = 0, volume = 0;
     for (int i = 0; i < threads; i++) {
-        polyhedra_free(states[i].polyhedra);
-        base_free(states[i].out.items);
-        base_free(states[i].memory);
-        base_free(states[i].bin.buffer);
-        base_free(states[i].volume_bin.buffer);
         has_memory = has_memory && !states[i].out_of_memory;
         if (has_memory && job->waiting) has_memory = append_pending(job->waiting, &states[i].waiting);
-        base_free(states[i].waiting.items);
-        base_free(states[i].waiting.shadings);
+        render_thread_end(&states[i]);
         surface = fmax(surface, states[i].surface_seconds);
         volume = fmax(volume, states[i].volume_seconds);
         statistics->map_failures += states[i].map_failures;
@@ -155,7 +137,6 @@ static bool trace_frame(kernel_frame *frame, fragment_callback *take, void *stat
     const int64_t pixels = (int64_t)job->camera.width * job->camera.height;
     kernel_thread *states = base_calloc((size_t)threads, sizeof *states);
     if (!states) return false;
-    begin_threads(frame, states, threads);
     *statistics = (render_statistics){.rays = job->pixels ? pixel_set_count(job->pixels, pixels) : pixels};
     if (frame->is_binned && !render_surfaces_are_small(frame)) {
         const double start = render_seconds();
@@ -183,16 +164,6 @@ static bool trace_frame(kernel_frame *frame, fragment_callback *take, void *stat
 
 /* ---- fragments of all tiles in one list ---------------------------------------------------------------------- */
 
-/* A list to which threads append the fragments of their tiles at once, in any order; the order differs from run to run,
- * the set does not. Once the list has no space for a tile, the fragments of that tile and of later ones are stored in
- * lists of the threads, which are appended at the end. */
-typedef struct shared_list {
-    fragment_list *out;
-    int64_t end;  /* number of fragments of all tiles, whether they fit into `out` or not */
-    int64_t used; /* number of fragments in `out`, once a tile has not fitted; -1 before */
-    fragment_list *rest;
-} shared_list;
-
 static bool append_fragments(fragment_list *to, const fragment *items, int64_t count)
 {
     if (!count) return true;
@@ -202,20 +173,19 @@ static bool append_fragments(fragment_list *to, const fragment *items, int64_t c
     return true;
 }
 
-static bool append_tile(void *state, int thread, const pixel_area *area, fragment *items, int64_t count)
+/* Appends a tile's fragments to lists[0], which all threads share, in any order; the order differs from run to run, the
+ * set does not. Once that list has no space for a tile, the fragments of that tile and of later ones are stored in the
+ * thread's own list, lists[1 + thread]. lists[0].count is the number of fragments of all tiles, wherever they are. */
+static bool append_tile(void *lists, int thread, const pixel_area *area, fragment *items, int64_t count)
 {
-    shared_list *list = state;
-    fragment_list *out = list->out;
+    fragment_list *shared = lists, *own = shared + 1 + thread;
     int64_t end;
     (void)area;
 #pragma omp atomic capture
-    end = list->end += count;
-    if (end <= out->capacity) {
-        if (count) memcpy(out->items + end - count, items, (size_t)count * sizeof *items);
-        return true;
-    }
-    if (end - count <= out->capacity) list->used = end - count; /* true for the first tile that does not fit */
-    return append_fragments(&list->rest[thread], items, count);
+    end = shared->count += count;
+    if (end > shared->capacity) return append_fragments(own, items, count);
+    if (count) memcpy(shared->items + end - count, items, (size_t)count * sizeof *items);
+    return true;
 }
 
 /* Traces a frame and appends its fragments to `out`. Memory is reserved for a fragment at every other pixel; reserved
@@ -224,16 +194,20 @@ static bool trace_to_list(kernel_frame *frame, int threads, fragment_list *out, 
 {
     const render_job *job = frame->job;
     const int64_t first = out->count, expected = job->pixels ? 0 : (int64_t)job->camera.width * job->camera.height / 2;
-    shared_list list = {.out = out, .end = first, .used = -1, .rest = base_calloc((size_t)threads, sizeof *list.rest)};
-    bool is_well = list.rest && render_reserve_fragments(out, expected) &&
-                   trace_frame(frame, append_tile, &list, threads, statistics);
-    out->count = list.used < 0 ? list.end : list.used;
-    for (int i = 0; list.rest && i < threads; i++) {
-        is_well = is_well && append_fragments(out, list.rest[i].items, list.rest[i].count);
-        base_free(list.rest[i].items);
+    fragment_list *lists = base_calloc((size_t)threads + 1, sizeof *lists);
+    bool is_well = lists && render_reserve_fragments(out, expected);
+    if (is_well) {
+        lists[0] = *out;
+        is_well = trace_frame(frame, append_tile, lists, threads, statistics);
+        *out = lists[0];
     }
-    base_free(list.rest);
-    if (job->waiting) drop_placeholders(out, first);
+    for (int i = 1; lists && i <= threads; i++) out->count -= lists[i].count;
+    for (int i = 1; lists && i <= threads; i++) {
+        is_well = is_well && append_fragments(out, lists[i].items, lists[i].count);
+        base_free(lists[i].items);
+    }
+    base_free(lists);
+    if (is_well && job->waiting) drop_placeholders(out, first);
     return is_well;
 }
 

@@ -105,7 +105,8 @@ typedef struct kernel_memory {
     kernel_cell packet_cells[KERNEL_CACHE_CELLS];
     kernel_cell tile_cell;
     kernel_curved tile_curved;
-    kernel_curved_storage tile_curved_storage;
+    float curved_at[4][8][SIMD_WIDTH], curved_colours[8][SIMD_WIDTH]; /* memory for tile_curved */
+    kernel_bounds curved_bounds;
     kernel_tile_trace tile;
     kernel_tile_volume volume;
     kernel_tile_segments segments;
@@ -227,7 +228,7 @@ static void begin(kernel_thread *thread)
     thread->finder = &m->finder;
     m->tile.cell = &m->tile_cell;
     m->tile.curved = &m->tile_curved;
-    m->tile_curved.storage = &m->tile_curved_storage;
+    m->tile_curved = (kernel_curved){.at = m->curved_at, .colours = m->curved_colours, .bounds = &m->curved_bounds};
     m->tile.search = &m->search;
     for (int i = 0; i < KERNEL_CACHE_CELLS; i++) m->packet_cells[i].serial = 0;
     m->segments.depth = 0;

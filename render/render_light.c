@@ -7,7 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "grid.h"
 #include "kernel_bundle.h"
 #include "kernel_types.h"
 #include "memory.h"
@@ -72,9 +71,8 @@ enum { LIGHT_TILES = 32 };
 
 struct render_occluders {
     const kernel_table *kernels;
-    render_job job;      /* the job that the caller gave */
-    render_job surfaces; /* the same job without volumes */
-    kernel_frame frame;  /* constants of a frame whose job contains only the surfaces of the given job */
+    render_job job;     /* the job that the caller gave, without volumes */
+    kernel_frame frame; /* the constants of its frame */
     kernel_occluders trees;
     int threads;
 };
@@ -83,8 +81,7 @@ struct render_occluders {
  * tile space has a different camera. */
 typedef struct tracer {
     const render_occluders *of;
-    const kernel_table *kernels;
-    const render_job *job; /* the job that the caller gave */
+    const render_job *job; /* that of the occluders */
     render_job moved_job;  /* the job with the camera of the current tile space, used by `frame` */
     kernel_frame frame;
     kernel_thread thread;
@@ -213,7 +210,7 @@ static int by_ray(const void *a, const void *b)
 
 static void test_cell(tracer *t, int32_t occluder)
 {
-    t->kernels->occlude_by_cell(&t->frame, &t->thread, &t->bundle, &t->of->trees.cells[occluder]);
+    t->of->kernels->occlude_by_cell(&t->frame, &t->thread, &t->bundle, &t->of->trees.cells[occluder]);
 }
 
 /* Occluder index that marks an undecided ray-cell pair as done: its cell has been tested with all rays that must be
@@ -232,7 +229,7 @@ static void trace_hemisphere(tracer *t, const render_hit *hit, kernel_undecided_
         ray_of[k] = undecided[i].ray;
         if (t->rays[undecided[i].ray].is_open) open |= (uint64_t)1 << k;
     }
-    const uint64_t prefetched = open;
+    const uint64_t open_at_first = open;
     for (int64_t i = 0; i < count && open; i++) {
         const int32_t occluder = undecided[i].occluder;
         if (occluder == TESTED) continue;
@@ -248,7 +245,7 @@ static void trace_hemisphere(tracer *t, const render_hit *hit, kernel_undecided_
         test_cell(t, occluder);
         open &= ~(before & ~t->bundle.open);
     }
-    for (uint64_t closed = prefetched & ~open; closed; closed &= closed - 1)
+    for (uint64_t closed = open_at_first & ~open; closed; closed &= closed - 1)
         t->rays[ray_of[__builtin_ctzll(closed)]].is_open = false;
 }
 
@@ -288,7 +285,7 @@ static void trace_chunk(tracer *t, const render_hit *hits, render_hit_rays *rays
     s->count = 0;
     s->undecided_count = 0;
     for (int i = 0; i < count; i++) add_hit(t, i, &hits[i], &rays[i]);
-    t->kernels->occlude(&t->frame, &t->thread, &t->of->trees, s);
+    t->of->kernels->occlude(&t->frame, &t->thread, &t->of->trees, s);
     if (s->undecided_count) trace_undecided(t, hits);
     for (int i = 0; i < s->count; i++) {
         const kernel_secondary_ray *ray = &t->rays[i];
@@ -304,27 +301,17 @@ static void trace_chunk(tracer *t, const render_hit *hits, render_hit_rays *rays
 
 static tracer *tracer_create(const render_occluders *of)
 {
-    bool has_polyhedra = false;
     tracer *t = base_calloc(1, sizeof *t);
     if (!t) return NULL;
-    for (int i = 0; i < of->job.part_count; i++)
-        has_polyhedra = has_polyhedra || grid_has_faces(of->job.parts[i].cells);
     t->of = of;
-    t->kernels = of->kernels;
     t->job = &of->job;
-    t->moved_job = of->surfaces;
+    t->moved_job = of->job;
     t->frame = of->frame;
     t->frame.job = &t->moved_job;
     t->frame.depth_shift = t->moved_job.space.depth_origin = 0;
     t->secondary_rays = (kernel_secondary_rays){.rays = t->rays};
-    t->thread = (kernel_thread){.memory = base_alloc(t->kernels->memory_bytes),
-                                .polyhedra = has_polyhedra ? polyhedra_create() : NULL};
-    if (t->thread.memory) t->kernels->begin(&t->thread);
-    if (t->thread.memory && (t->thread.polyhedra || !has_polyhedra)) return t;
-    polyhedra_free(t->thread.polyhedra);
-    base_free(t->thread.memory);
-    base_free(t);
-    return NULL;
+    render_thread_begin(&t->frame, of->kernels, &t->thread);
+    return t;
 }
 
 /* Frees the tracer; returns false if memory ran out. */
@@ -332,8 +319,7 @@ static bool tracer_free(tracer *t)
 {
     if (!t) return false;
     const bool is_well = !t->thread.out_of_memory;
-    polyhedra_free(t->thread.polyhedra);
-    base_free(t->thread.memory);
+    render_thread_end(&t->thread);
     base_free(t->secondary_rays.undecided);
     base_free(t);
     return is_well;
@@ -358,12 +344,9 @@ static bool trace_all(const render_occluders *of, const render_hit *hits, render
     return is_well;
 }
 
-static insitu_status prepare(render_occluders *of, base_error *error)
+static insitu_status prepare(render_occluders *of, const render_job *job, base_error *error)
 {
-    of->surfaces = of->job;
-    of->surfaces.volume_count = 0;
-    of->surfaces.separate_samples = of->surfaces.reproducible = false;
-    const insitu_status status = render_prepare(&of->surfaces, &of->frame, error);
+    const insitu_status status = render_prepare_surfaces(job, &of->job, &of->frame, error);
     if (status) return status;
     of->kernels = render_kernels();
     of->threads = of->job.threads > 0 ? of->job.threads : omp_get_max_threads();
@@ -376,8 +359,7 @@ insitu_status render_occluders_create(const render_job *job, render_occluders **
     if (!job->part_count) return INSITU_OK;
     render_occluders *of = base_calloc(1, sizeof *of);
     if (!of) return base_fail(error, INSITU_ERROR_MEMORY, "no memory for what blocks rays from hits");
-    of->job = *job;
-    const insitu_status status = prepare(of, error);
+    const insitu_status status = prepare(of, job, error);
     if (status)
         render_occluders_free(of);
     else

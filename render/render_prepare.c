@@ -3,6 +3,7 @@
 #include "kernel_types.h"
 #include "render.h"
 #include "render_pieces.h"
+#include "render_polyhedra.h"
 #include "render_scale.h"
 
 #include <math.h>
@@ -54,26 +55,6 @@ int render_visible_intervals(const render_transfer *t, mmbvh_interval out[RENDER
     return count;
 }
 
-static void prepare_isovalues(kernel_visible_values *visible_values, const render_surface_layer *layer)
-{
-    visible_values->count = layer->value_count;
-    for (int i = 0; i < layer->value_count; i++) {
-        const mmbvh_interval interval = render_isovalue_interval(layer->values[i]);
-        visible_values->low[i] = interval.low;
-        visible_values->high[i] = interval.high;
-    }
-}
-
-static void prepare_visible(kernel_visible_values *visible_values, const render_transfer *t)
-{
-    mmbvh_interval intervals[RENDER_MAX_INTERVALS];
-    visible_values->count = render_visible_intervals(t, intervals);
-    for (int i = 0; i < visible_values->count; i++) {
-        visible_values->low[i] = intervals[i].low;
-        visible_values->high[i] = intervals[i].high;
-    }
-}
-
 static void prepare_scale(kernel_transfer *out, const render_transfer *t)
 {
     const double low = render_scaled(t->scale, t->threshold, t->low);
@@ -119,7 +100,7 @@ static void prepare_transfer(kernel_transfer *out, const render_transfer *t, dou
         out->ramp_rise[i] = t->opacities[i + 1] - t->opacities[i];
     }
     out->exponent = (float)(step / t->unit_distance);
-    prepare_visible(&out->visible_values, t);
+    out->visible_values.count = render_visible_intervals(t, out->visible_values.intervals);
 }
 
 static void prepare_lines(kernel_lines *out, const render_lines *l)
@@ -216,12 +197,13 @@ static void prepare_surfaces(kernel_frame *f)
                 s->layer = layer;
                 s->first_kind = kind;
                 s->own_clips = job->clip_count ? layer->clips & ~f->common_clips : 0;
-                prepare_isovalues(&s->visible_values, layer);
                 if (layer->normal == RENDER_DIFFERENCES) s->value_scale = value_scale(job, i);
                 if (layer->colour_map) prepare_transfer(&s->colour, layer->colour_map, 1);
                 if (layer->lines) prepare_lines(&s->lines, layer->lines);
                 f->opaque_count += is_opaque;
+                s->visible_values.count = layer->value_count;
                 for (int value = 0; value < layer->value_count; value++) {
+                    s->visible_values.intervals[value] = render_isovalue_interval(layer->values[value]);
                     f->isovalue_surface[isovalues] = f->surface_count - 1;
                     f->isovalue_number[isovalues++] = value;
                 }
@@ -372,12 +354,23 @@ void render_unprepare(kernel_frame *frame)
     for (int i = 0; i < RENDER_MAX_VOLUMES; i++) render_pieces_free(&frame->pieces[i]);
 }
 
+insitu_status render_prepare_surfaces(const render_job *job, render_job *surfaces, kernel_frame *frame,
+                                      base_error *error)
+{
+    *surfaces = *job;
+    surfaces->volume_count = 0;
+    surfaces->separate_samples = surfaces->reproducible = false;
+    return render_prepare(surfaces, frame, error);
+}
+
 insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_error *error)
 {
     const insitu_status status = check_job(job, error);
     if (status != INSITU_OK) return status;
     memset(frame, 0, sizeof *frame);
     frame->job = job;
+    for (int i = 0; i < job->part_count; i++)
+        frame->has_polyhedra = frame->has_polyhedra || grid_has_faces(job->parts[i].cells);
     frame->surfaces = base_calloc((size_t)job->surface_count, sizeof *frame->surfaces);
     if (!frame->surfaces) return base_fail(error, INSITU_ERROR_MEMORY, "no memory for %d layers", job->surface_count);
     prepare_camera(frame);
@@ -394,4 +387,27 @@ insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_er
     /* tracing consumes a tile's list of cells, so the volume must need only one pass over it */
     frame->bins_volume = bins && job->volume_count == 1 && frame->volume_intervals <= 1;
     return segments;
+}
+
+/* ---- threads ---- */
+
+bool render_thread_begin(const kernel_frame *frame, const kernel_table *kernels, kernel_thread *thread)
+{
+    if (thread->memory || thread->out_of_memory) return !thread->out_of_memory;
+    thread->memory = base_alloc(kernels->memory_bytes);
+    if (frame->has_polyhedra) thread->polyhedra = polyhedra_create();
+    thread->out_of_memory = !thread->memory || (frame->has_polyhedra && !thread->polyhedra);
+    if (!thread->out_of_memory) kernels->begin(thread);
+    return !thread->out_of_memory;
+}
+
+void render_thread_end(kernel_thread *thread)
+{
+    polyhedra_free(thread->polyhedra);
+    base_free(thread->out.items);
+    base_free(thread->memory);
+    base_free(thread->bin.buffer);
+    base_free(thread->volume_bin.buffer);
+    base_free(thread->waiting.items);
+    base_free(thread->waiting.shadings);
 }

@@ -33,7 +33,6 @@ static void chord_trace_polyhedron(kernel_packet *p, const chord_state *state, c
 {
     polyhedron *c = polyhedra_find(p->thread->polyhedra, p->frame->job->parts[part].cells, field, part, 0, index);
     kernel_poly_crossings r;
-    kernel_polyhedron_interval stay;
     if (!c) p->thread->out_of_memory = true;
     if (!c) return;
     if (!c->is_transformed) {
@@ -41,8 +40,7 @@ static void chord_trace_polyhedron(kernel_packet *p, const chord_state *state, c
         for (int i = 0; i <= c->vertex_count; i++) c->f[i] = 0;
     }
     if (!kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
-    while (kernel_poly_next(&r, &stay))
-        chord_store_intervals(state, stay.interval.mask, stay.interval.t_in, stay.interval.t_out);
+    while (kernel_poly_next(&r)) chord_store_intervals(state, r.interval.mask, r.interval.t_in, r.interval.t_out);
 }
 
 static void chord_trace_cell(kernel_packet *p, const chord_state *state, const grid_field *field, int part,

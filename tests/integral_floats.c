@@ -28,8 +28,9 @@ void integral_compute_variations(const render_transfer *t, int count, const doub
     if (render_variations_build(&pieces, t, &error) != INSITU_OK) abort();
     for (int i = 0; i < count; i++) {
         const vf low = vf_set((float)ranges[i][0]), high = vf_set((float)ranges[i][1]);
-        const float *found = &pieces.variations->variation + kernel_light_variation_entry(&pieces, low, high)[0];
-        for (int n = 0; n < 4; n++) out[i][n] = (double)found[n];
+        vf found[KERNEL_LIGHT_ENTRIES];
+        kernel_light_bounds(&pieces, low, high, found);
+        for (int n = 0; n < KERNEL_LIGHT_ENTRIES; n++) out[i][n] = (double)found[n][0];
     }
     render_pieces_free(&pieces);
 }

@@ -161,7 +161,7 @@ static void make_batch(batch *b, int type, shape s)
 
 /* ---- contraction ---- */
 
-static void run_contraction(const batch *b, kernel_point *out, vm *none, kernel_bounds *bounds)
+static void run_contraction(batch *b, kernel_point *out, vm *none, kernel_bounds *bounds)
 {
     const kernel_curved cells = {.type = b->type, .at = b->at, .bounds = bounds};
     int32_t own[SIMD_WIDTH];
@@ -170,13 +170,13 @@ static void run_contraction(const batch *b, kernel_point *out, vm *none, kernel_
     kernel_map map;
     for (int lane = 0; lane < SIMD_WIDTH; lane++) own[lane] = lane;
     memcpy(&lanes, own, sizeof lanes);
-    kernel_bounds_of(b->type, b->at, &b->beam, bounds);
+    kernel_bounds_of(b->type, (const float(*)[8][SIMD_WIDTH])b->at, &b->beam, bounds);
     kernel_contraction_ray(&cells, &b->rays, lanes, &c);
     kernel_contraction_of(bounds, lanes, b->type, &c);
     KERNEL_OF_TYPE(b->type, kernel_contract, &c, vm_all_lanes(), out, none);
-    kernel_maps_of_type(b->at, lanes, b->type, &map);
+    kernel_maps_of_type((const float(*)[8][SIMD_WIDTH])b->at, lanes, b->type, &map);
     out->t += vf_load(b->at[2][0]);
-    kernel_polish_near(&b->rays, &map, out->mask, KERNEL_CONTRACTION_END, out);
+    kernel_polish_near(&b->rays, &map, out->mask, out);
 }
 
 /* ---- reference ---- */

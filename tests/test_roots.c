@@ -248,10 +248,11 @@ typedef struct rates {
 static void verify_bundle(bundle *b, rates *r)
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
-    kernel_curved_storage room;
-    kernel_curved curved = {.storage = &room};
+    float corners[4][8][SIMD_WIDTH], colours[8][SIMD_WIDTH];
+    kernel_bounds bounds;
+    kernel_curved curved = {.at = corners, .colours = colours, .bounds = &bounds};
     const int intervals = bundle_find_intervals(b, list, &curved);
-    r->monotone += room.bounds.jump[0] >= 0;
+    r->monotone += bounds.jump[0] >= 0;
     for (int n = 0; n < intervals; n++) {
         vf t, hits;
         const vm change = vm_xor(vf_lt(list[n].v_in, vf_set(0)), vf_lt(list[n].v_out, vf_set(0)));

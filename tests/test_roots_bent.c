@@ -406,8 +406,9 @@ static void verify_bundle(bundle *b, const reference_cell *cell, ray_profile *c,
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     kernel_map map;
-    kernel_curved_storage room;
-    kernel_curved curved = {.storage = &room};
+    float corners[4][8][SIMD_WIDTH], colours[8][SIMD_WIDTH];
+    kernel_bounds bounds;
+    kernel_curved curved = {.at = corners, .colours = colours, .bounds = &bounds};
     const int intervals = bundle_find_intervals(b, list, &curved);
     kernel_map_setup(&map, &b->cell);
     for (int i = 0; i < intervals; i++) {

@@ -112,38 +112,6 @@ static inline void kernel_lattice_indices(const grid_lattice *l, uint32_t cell, 
     for (int i = 0; i < vertices; i++) out[i * out_stride] = (int32_t)(first + l->corner_offsets[i]);
 }
 
-/* Reads the vertex indices of `count` cells into lanes lane, lane + 1, ... of `out`. vertices: number of vertices of
- * each cell, which callers pass as a constant. */
-SIMD_INLINE void kernel_arrays_indices(const kernel_arrays *p, const uint32_t *cells, int count, int vertices,
-                                       int32_t (*out)[SIMD_WIDTH], int lane)
-{
-    const grid_array c = p->cells->connectivity;
-    const int32_t base = (int32_t)c.base;
-    if (__builtin_expect(p->cells->lattice != NULL, 0)) {
-        for (int n = 0; n < count; n++, lane++)
-            kernel_lattice_indices(p->cells->lattice, cells[n], vertices, out[0] + lane, SIMD_WIDTH);
-        return;
-    }
-    for (int n = 0; n < count; n++, lane++) {
-        const char *at = c.data + kernel_arrays_first(p->cells, cells[n], vertices) * c.stride;
-        if (c.is_wide)
-            for (int i = 0; i < vertices; i++, at += c.stride)
-                out[i][lane] = (int32_t) * (const int64_t *)(const void *)at - base;
-        else
-            for (int i = 0; i < vertices; i++, at += c.stride) out[i][lane] = *(const int32_t *)(const void *)at - base;
-    }
-}
-
-/* Prefetches the coordinates and values of the vertices of `count` cells, from the given lane on. */
-SIMD_INLINE void kernel_arrays_prefetch(const kernel_arrays *p, int count, int vertices,
-                                        int32_t (*const vertex)[SIMD_WIDTH], int lane)
-{
-    for (int n = lane; n < lane + count; n++)
-        for (int i = 0; i < vertices; i++)
-            for (int k = 0; k < 4; k++)
-                __builtin_prefetch(p->prefetched[k].data + vertex[i][n] * p->prefetched[k].stride);
-}
-
 /* Stores a cell's vertex indices, that of vertex i in out[i * out_stride], and prefetches the coordinates and values of
  * these vertices. */
 SIMD_INLINE void kernel_arrays_vertices(const kernel_arrays *p, uint32_t cell, int vertices, int32_t *out,
@@ -152,32 +120,28 @@ SIMD_INLINE void kernel_arrays_vertices(const kernel_arrays *p, uint32_t cell, i
     const grid_array c = p->cells->connectivity;
     if (__builtin_expect(p->cells->lattice != NULL, 0)) {
         kernel_lattice_indices(p->cells->lattice, cell, vertices, out, out_stride);
-        return;
+    } else {
+        const char *at = c.data + kernel_arrays_first(p->cells, cell, vertices) * c.stride;
+        for (int i = 0; i < vertices; i++, at += c.stride) {
+            const int64_t index = c.is_wide ? *(const int64_t *)(const void *)at : *(const int32_t *)(const void *)at;
+            out[i * out_stride] = (int32_t)(index - c.base);
+        }
     }
-    const char *at = c.data + kernel_arrays_first(p->cells, cell, vertices) * c.stride;
-    for (int i = 0; i < vertices; i++, at += c.stride) {
-        const int64_t index = c.is_wide ? *(const int64_t *)(const void *)at : *(const int32_t *)(const void *)at;
-        const int32_t vertex = (int32_t)(index - c.base);
-        for (int k = 0; k < 4; k++) __builtin_prefetch(p->prefetched[k].data + vertex * p->prefetched[k].stride);
-        out[i * out_stride] = vertex;
-    }
+    for (int i = 0; i < vertices; i++)
+        for (int k = 0; k < 4; k++)
+            __builtin_prefetch(p->prefetched[k].data + out[i * out_stride] * p->prefetched[k].stride);
 }
 
-/* Stores the vertex indices of cells of one type in lanes, from the given lane on, and prefetches the vertices'
- * coordinates and values. */
-SIMD_INLINE void kernel_arrays_cells(const kernel_arrays *p, const uint32_t *cells, int count, int vertices,
-                                     int32_t (*out)[SIMD_WIDTH], int lane)
+/* As above, for cells of any type; loops over the vertices of tets and hexes have constant lengths. */
+SIMD_INLINE void kernel_arrays_vertices_of_any(const kernel_arrays *p, uint32_t cell, int vertices, int32_t *out,
+                                               int out_stride)
 {
-    if (vertices == 4) {
-        kernel_arrays_indices(p, cells, count, 4, out, lane);
-        kernel_arrays_prefetch(p, count, 4, out, lane);
-    } else if (vertices == 8) {
-        kernel_arrays_indices(p, cells, count, 8, out, lane);
-        kernel_arrays_prefetch(p, count, 8, out, lane);
-    } else {
-        kernel_arrays_indices(p, cells, count, vertices, out, lane);
-        kernel_arrays_prefetch(p, count, vertices, out, lane);
-    }
+    if (vertices == 4)
+        kernel_arrays_vertices(p, cell, 4, out, out_stride);
+    else if (vertices == 8)
+        kernel_arrays_vertices(p, cell, 8, out, out_stride);
+    else
+        kernel_arrays_vertices(p, cell, vertices, out, out_stride);
 }
 
 /* Returns the lanes of the given ones (a bit mask) whose cells are drawn: their value in source_cells is finite. */
@@ -192,7 +156,7 @@ SIMD_INLINE unsigned kernel_arrays_drawn(const kernel_arrays *p, const uint32_t 
 
 /* Computes the vertices' coordinates along one axis of a rectilinear lattice from the position of each vertex on that
  * axis. It does for one vertex per lane what grid_index_along() does for one vertex. */
-static void kernel_axis_coordinates(const grid_axis *axis, vi vertex, kernel_wide_doubles *out)
+static void kernel_axis_coordinates(const grid_axis *axis, vi vertex, kernel_f64 out[2])
 {
     const grid_numbering *of = axis->vertices;
     const double outer = of->outer[axis->axis], inverse_outer = of->inverse_outer[axis->axis];
@@ -209,8 +173,7 @@ static void kernel_axis_coordinates(const grid_axis *axis, vi vertex, kernel_wid
     memcpy(out, places, sizeof places);
 }
 
-static __attribute__((noinline)) void kernel_numbers_gather_scalar(const kernel_numbers *c, vi index,
-                                                                   kernel_wide_doubles *out)
+static __attribute__((noinline)) void kernel_numbers_gather_scalar(const kernel_numbers *c, vi index, kernel_f64 out[2])
 {
     double v[SIMD_WIDTH];
     int32_t at[SIMD_WIDTH];
@@ -228,7 +191,7 @@ static __attribute__((noinline)) void kernel_numbers_gather_scalar(const kernel_
  * in `wide`. */
 typedef struct kernel_raw_numbers {
     vf narrow;
-    kernel_wide_doubles wide;
+    kernel_f64 wide[2];
 } kernel_raw_numbers;
 
 SIMD_INLINE void kernel_numbers_gather_raw(const kernel_numbers *c, vi index, kernel_raw_numbers *out)
@@ -236,40 +199,48 @@ SIMD_INLINE void kernel_numbers_gather_raw(const kernel_numbers *c, vi index, ke
     if (kernel_numbers_are_narrow(c)) {
         out->narrow = vf_gather(c->data, index * c->stride);
     } else if (c->data) {
-        for (int half = 0; half < 2; half++) out->wide.half[half] = vd_gather(c->data, index * c->stride, half);
+        for (int half = 0; half < 2; half++) out->wide[half] = vd_gather(c->data, index * c->stride, half);
     } else {
-        kernel_numbers_gather_scalar(c, index, &out->wide);
+        kernel_numbers_gather_scalar(c, index, out->wide);
     }
 }
 
-SIMD_INLINE kernel_wide_doubles kernel_numbers_gather(const kernel_numbers *c, vi index)
+/* Converts numbers to double. is_narrow: whether they are stored as float32. */
+SIMD_INLINE void kernel_raw_widen(bool is_narrow, const kernel_raw_numbers *v, kernel_f64 out[2])
 {
-    kernel_raw_numbers out;
-    kernel_numbers_gather_raw(c, index, &out);
-    return kernel_numbers_are_narrow(c) ? kernel_wide_doubles_widen(out.narrow) : out.wide;
+    if (is_narrow)
+        kernel_halves_widen(v->narrow, out);
+    else
+        memcpy(out, v->wide, sizeof v->wide);
+}
+
+SIMD_INLINE void kernel_numbers_gather(const kernel_numbers *c, vi index, kernel_f64 out[2])
+{
+    kernel_raw_numbers raw;
+    kernel_numbers_gather_raw(c, index, &raw);
+    kernel_raw_widen(kernel_numbers_are_narrow(c), &raw, out);
 }
 
 /* Returns a < b per lane. is_narrow: whether both are stored as float32. */
 SIMD_INLINE vm kernel_raw_lt(bool is_narrow, const kernel_raw_numbers *a, const kernel_raw_numbers *b)
 {
-    return is_narrow ? vf_lt(a->narrow, b->narrow) : vd_lt(a->wide.half, b->wide.half);
+    return is_narrow ? vf_lt(a->narrow, b->narrow) : vd_lt(a->wide, b->wide);
 }
 
 SIMD_INLINE vm kernel_raw_eq(bool is_narrow, const kernel_raw_numbers *a, const kernel_raw_numbers *b)
 {
-    return is_narrow ? vf_eq(a->narrow, b->narrow) : vd_eq(a->wide.half, b->wide.half);
+    return is_narrow ? vf_eq(a->narrow, b->narrow) : vd_eq(a->wide, b->wide);
 }
 
 SIMD_INLINE void kernel_raw_swap(bool is_narrow, vm lanes, kernel_raw_numbers *a, kernel_raw_numbers *b)
 {
-    const kernel_raw_numbers was = *a;
+    const kernel_raw_numbers was = *a, other = *b;
     if (is_narrow) {
-        a->narrow = vf_select(lanes, b->narrow, was.narrow);
-        b->narrow = vf_select(lanes, was.narrow, b->narrow);
+        a->narrow = vf_select(lanes, other.narrow, was.narrow);
+        b->narrow = vf_select(lanes, was.narrow, other.narrow);
     } else {
-        const kernel_wide_doubles other = b->wide;
-        vd_select(lanes, other.half, was.wide.half, a->wide.half);
-        vd_select(lanes, was.wide.half, other.half, b->wide.half);
+        vd_select(lanes, other.wide, was.wide, a->wide);
+        vd_select(lanes, was.wide, other.wide, b->wide);
     }
 }
 
@@ -291,13 +262,8 @@ SIMD_INLINE void kernel_arrays_positions(const kernel_arrays *p, bool is_narrow,
         if (is_narrow)
             out[a].narrow = vf_gather(p->coordinates[a].data, vertex * p->coordinates[a].stride);
         else
-            out[a].wide = kernel_numbers_gather(&p->coordinates[a], vertex);
+            kernel_numbers_gather(&p->coordinates[a], vertex, out[a].wide);
     }
-}
-
-SIMD_INLINE kernel_wide_doubles kernel_raw_to_double(bool is_narrow, const kernel_raw_numbers *v)
-{
-    return is_narrow ? kernel_wide_doubles_widen(v->narrow) : v->wide;
 }
 
 /* ---- cells of uniform and rectilinear lattices ---- */
@@ -310,7 +276,7 @@ SIMD_INLINE bool kernel_arrays_have_axes(const kernel_arrays *p)
 /* Reads the coordinates of hexes of a uniform or rectilinear lattice, given each hex's first vertex: those of its lower
  * end (cells[0]) and upper end (cells[1]), by axis. It reads 6 numbers per hex instead of 24. */
 static __attribute__((noinline)) void kernel_lattice_cells_read(const kernel_arrays *p, const int32_t first[SIMD_WIDTH],
-                                                                kernel_wide_doubles cells[2][3])
+                                                                kernel_f64 cells[2][3][2])
 {
     for (int axis = 0; axis < 3; axis++) {
         const grid_axis *along = p->coordinates[axis].array.axis;
@@ -355,8 +321,8 @@ SIMD_INLINE kernel_level kernel_level_of(double value)
 /* Returns the lanes in which the number v is below the level. The comparison is exact. */
 SIMD_INLINE vm kernel_raw_below(const kernel_numbers *c, const kernel_raw_numbers *v, const kernel_level *level)
 {
-    const kernel_wide_doubles value = kernel_wide_doubles_set(level->value);
-    return kernel_numbers_are_narrow(c) ? vf_lt(v->narrow, vf_set(level->least)) : vd_lt(v->wide.half, value.half);
+    const kernel_f64 half = (kernel_f64){0} + level->value, value[2] = {half, half};
+    return kernel_numbers_are_narrow(c) ? vf_lt(v->narrow, vf_set(level->least)) : vd_lt(v->wide, value);
 }
 
 /* Returns the number v minus the level, rounded to float32. */
@@ -364,7 +330,7 @@ SIMD_INLINE vf kernel_raw_minus(const kernel_numbers *c, const kernel_raw_number
 {
     vf out;
     if (kernel_numbers_are_narrow(c)) return (v->narrow - level->middle) - level->rest;
-    for (int half = 0; half < 2; half++) kernel_f64_store_lanes(&out, half, v->wide.half[half] - level->value);
+    for (int half = 0; half < 2; half++) kernel_f64_store_lanes(&out, half, v->wide[half] - level->value);
     return out;
 }
 

@@ -535,18 +535,13 @@ typedef struct kernel_curved {
     int type;
     int lane; /* lane of the cell that contains all rays of a packet */
     /* x, y, z in tile space, and the field minus the isovalue, scaled; by vertex and lane */
-    const float (*at)[8][SIMD_WIDTH];
-    const float (*colours)[SIMD_WIDTH]; /* colour field by vertex and lane (kernel_cell.g), set if the layer has one */
-    /* bounds of the cells; NULL if those of a single cell have not been computed yet */
-    const kernel_bounds *bounds;
-    struct kernel_curved_storage *storage; /* memory for the data and bounds of a single cell */
+    float (*at)[8][SIMD_WIDTH];
+    float (*colours)[SIMD_WIDTH]; /* colour field by vertex and lane (kernel_cell.g), set if the layer has one */
+    kernel_bounds *bounds;
+    bool is_ready; /* set if the data and bounds have been computed; those of a single cell are computed when needed */
+    /* set if contraction has already been tried for the rays and has not decided them (kernel_contraction.h) */
+    bool is_contracted;
 } kernel_curved;
-
-/* Memory for the data of a single cell, which are copied to all lanes. */
-typedef struct kernel_curved_storage {
-    float at[4][8][SIMD_WIDTH], colours[8][SIMD_WIDTH];
-    kernel_bounds bounds;
-} kernel_curved_storage;
 
 /* Returns the range of directions and origins of the tile's rays. */
 SIMD_INLINE kernel_beam kernel_tile_beam(const kernel_frame *f, const kernel_tile *tile)
@@ -556,20 +551,17 @@ SIMD_INLINE kernel_beam kernel_tile_beam(const kernel_frame *f, const kernel_til
     return (kernel_beam){.spread = flat ? 0 : radius, .offset = flat ? radius : radius * shift};
 }
 
-/* Computes the bounds of a single cell, and stores the cell's data in all lanes. */
+/* Computes the bounds of a single cell, and stores the cell's data in all lanes of out's memory. */
 static __attribute__((noinline, unused)) void kernel_curved_single_bounds(const kernel_cell *c, const kernel_beam *beam,
                                                                           kernel_curved *out)
 {
-    kernel_curved_storage *storage = out->storage;
     const float *const numbers[4] = {c->x, c->y, c->z, c->f};
-    for (int n = 0; n < 4; n++) kernel_map_spread(numbers[n], c->count, storage->at[n]);
-    kernel_map_spread(c->g, c->count, storage->colours);
-    kernel_bounds_of(c->type, (const float(*)[8][SIMD_WIDTH])storage->at, beam, &storage->bounds);
+    for (int n = 0; n < 4; n++) kernel_map_spread(numbers[n], c->count, out->at[n]);
+    kernel_map_spread(c->g, c->count, out->colours);
+    kernel_bounds_of(c->type, (const float(*)[8][SIMD_WIDTH])out->at, beam, out->bounds);
     out->type = c->type;
     out->lane = 0;
-    out->at = (const float(*)[8][SIMD_WIDTH])storage->at;
-    out->colours = (const float(*)[SIMD_WIDTH])storage->colours;
-    out->bounds = &storage->bounds;
+    out->is_ready = true;
 }
 
 #endif

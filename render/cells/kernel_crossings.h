@@ -235,7 +235,7 @@ SIMD_INLINE vf kernel_corner_edge(const kernel_face_search *s, int from, int to)
 
 /* Computes values and reference coordinates at a crossing of a quad's bilinear patch. The isoparametric maps of both
  * cells contain this patch, so the field is continuous across the face. */
-SIMD_INLINE void kernel_quad_values(const kernel_face_search *s, const int corner[4], const kernel_quad_point *at,
+SIMD_INLINE void kernel_quad_values(const kernel_face_search *s, const int corner[4], const kernel_point *at,
                                     kernel_point *out)
 {
     const kernel_cell *c = s->cell;
@@ -244,11 +244,11 @@ SIMD_INLINE void kernel_quad_values(const kernel_face_search *s, const int corne
     for (int i = 0; i < 4; i++) f[i] = vf_set(c->f[corner[i]]);
     out->mask = at->mask;
     out->t = at->t;
-    out->value = kernel_bilinear(f, at->s, at->r);
+    out->value = kernel_bilinear(f, at->r[0], at->r[1]);
     for (int a = 0; a < 3; a++) {
         const float base = shape->corners[corner[0]][a];
-        out->r[a] =
-            (base + at->s * (shape->corners[corner[1]][a] - base)) + at->r * (shape->corners[corner[3]][a] - base);
+        out->r[a] = (base + at->r[0] * (shape->corners[corner[1]][a] - base)) +
+                    at->r[1] * (shape->corners[corner[3]][a] - base);
     }
 }
 
@@ -308,7 +308,7 @@ SIMD_INLINE int kernel_quad_crossings(const kernel_face_search *s, const int cor
 {
     const kernel_cell *c = s->cell;
     kernel_quad quad;
-    kernel_quad_point places[2];
+    kernel_point places[2];
     vm once = vm_none();
     for (int half = 0; half < 2; half++) {
         const int corners[3] = {corner[0], corner[half + 1], corner[half + 2]};
@@ -376,13 +376,23 @@ SIMD_INLINE bool kernel_take_nearest(kernel_point *list, int count, kernel_point
     for (int n = 0; n < count; n++) {
         const vm nearer = vm_and(list[n].mask, vf_lt(list[n].t, out->t));
         out->mask = vm_or(out->mask, nearer);
-        out->t = vf_select(nearer, list[n].t, out->t);
-        out->value = vf_select(nearer, list[n].value, out->value);
-        for (int a = 0; a < 3; a++) out->r[a] = vf_select(nearer, list[n].r[a], out->r[a]);
+        kernel_point_move(nearer, &list[n], out);
         taken = (vi)vf_select(nearer, (vf)vi_set(n), (vf)taken);
     }
     for (int n = 0; n < count; n++) list[n].mask = vm_andnot(list[n].mask, vf_eq(vf_from_vi(taken), vf_set((float)n)));
     return vm_any(out->mask);
+}
+
+/* Sets the interval's members, except for the colour field, from its ends. */
+SIMD_INLINE void kernel_interval_of(vm mask, const kernel_point *in, const kernel_point *out, kernel_interval *i)
+{
+    i->mask = mask;
+    i->t_in = in->t;
+    i->t_out = out->t;
+    i->v_in = in->value;
+    i->v_out = out->value;
+    memcpy(i->r_in, in->r, sizeof in->r);
+    memcpy(i->r_out, out->r, sizeof out->r);
 }
 
 /* Sorts each ray's crossings and combines them in pairs to intervals. Returns the largest number of intervals of any
@@ -396,13 +406,7 @@ static __attribute__((noinline, unused)) int kernel_curved_intervals(const kerne
     int n = 0;
     while (n < KERNEL_MAX_CELL_INTERVALS && kernel_take_nearest(list, crossings, &in) &&
            kernel_take_nearest(list, crossings, &next)) {
-        out[n].mask = vm_and(in.mask, next.mask);
-        out[n].t_in = in.t;
-        out[n].t_out = next.t;
-        out[n].v_in = in.value;
-        out[n].v_out = next.value;
-        memcpy(out[n].r_in, in.r, sizeof in.r);
-        memcpy(out[n].r_out, next.r, sizeof next.r);
+        kernel_interval_of(vm_and(in.mask, next.mask), &in, &next, &out[n]);
         n++;
     }
     return n;

@@ -124,17 +124,17 @@ SIMD_INLINE void kernel_curved_corners_gather(const kernel_transformed_curved *h
     kernel_curved_corners_project(&p->rays, out);
 }
 
-SIMD_INLINE void kernel_curved_quad_point(int type, const kernel_curved_corners *c, const kernel_quad_point *place,
+SIMD_INLINE void kernel_curved_quad_point(int type, const kernel_curved_corners *c, const kernel_point *place,
                                           kernel_point *out)
 {
     const vf f[4] = {c->at[0][3], c->at[1][3], c->at[2][3], c->at[3][3]};
     out->t = place->t;
-    out->value = kernel_bilinear(f, place->s, place->r);
+    out->value = kernel_bilinear(f, place->r[0], place->r[1]);
     for (int a = 0; a < 3; a++) {
         vf at[4];
         for (int i = 0; i < 4; i++)
             at[i] = kernel_curved_vertex_coordinate(kernel_cell_shape(type), grid_type_vertices(type), a, c->vertex[i]);
-        out->r[a] = (at[0] + place->s * (at[1] - at[0])) + place->r * (at[3] - at[0]);
+        out->r[a] = (at[0] + place->r[0] * (at[1] - at[0])) + place->r[1] * (at[3] - at[0]);
     }
 }
 
@@ -217,7 +217,7 @@ SIMD_INLINE void kernel_curved_cross_corners(const kernel_transformed_curved *h,
     if (kernel_has_triangles(type)) memset(out, 0, 2 * sizeof *out);
     if (kernel_is_box(type) || vm_any(vm_or(on_quad[0], on_quad[1]))) {
         kernel_quad quad[2];
-        kernel_quad_point places[2];
+        kernel_point places[2];
         for (int n = 0; n < quads; n++)
             for (int i = 0; i < 4; i++) {
                 quad[n].x[i] = corners[n].at[i][0];
@@ -254,23 +254,34 @@ SIMD_INLINE void kernel_curved_cross(const kernel_transformed_curved *h, const k
     kernel_curved_cross_corners(h, p, p->active, type, face, corners, out);
 }
 
-/* Appends rays of the list `met`, from index n on, to the list `rays`. out: for both ends of the interval of each of
- * these, depth, value and reference coordinates. */
-SIMD_INLINE void kernel_curved_ends_add(const kernel_pixel_list *met, int n, const kernel_point ends[2], unsigned bits,
-                                        kernel_pixel_list *rays, float (*out)[5][KERNEL_LIST_ROOM])
+/* Appends rays of the list `met`, from index n on, to the list `rays`. out: for the `end_count` ends of the interval of
+ * each of these, depth, value and reference coordinates. */
+SIMD_INLINE void kernel_curved_ends_add(const kernel_pixel_list *met, int n, const kernel_point *ends, int end_count,
+                                        unsigned bits, kernel_pixel_list *rays, float (*out)[5][KERNEL_LIST_ROOM])
 {
     if (!bits) return;
     float lanes[2][5][SIMD_WIDTH];
-    for (int e = 0; e < 2; e++) {
+    for (int e = 0; e < end_count; e++) {
         vf_store(lanes[e][0], ends[e].t);
         vf_store(lanes[e][1], ends[e].value);
         for (int a = 0; a < 3; a++) vf_store(lanes[e][2 + a], ends[e].r[a]);
     }
     for (; bits; bits &= bits - 1) {
         const int i = __builtin_ctz(bits), to = rays->count;
-        for (int e = 0; e < 2; e++)
+        for (int e = 0; e < end_count; e++)
             for (int k = 0; k < 5; k++) out[e][k][to] = lanes[e][k][i];
         kernel_curved_ray_add(rays, met, n + i);
+    }
+}
+
+/* Loads the ends of the intervals of rays from index n on. */
+SIMD_INLINE void kernel_curved_ends_load(float (*const ends)[5][KERNEL_LIST_ROOM], int n, int end_count,
+                                         kernel_point *out)
+{
+    for (int e = 0; e < end_count; e++) {
+        out[e].t = vf_load(ends[e][0] + n);
+        out[e].value = vf_load(ends[e][1] + n);
+        for (int a = 0; a < 3; a++) out[e].r[a] = vf_load(ends[e][2 + a] + n);
     }
 }
 

@@ -31,13 +31,13 @@ SIMD_INLINE void kernel_sorted_swap(kernel_sorted_vertices *h, bool is_narrow, v
 }
 
 /* Transforms one vertex per lane into tile space. */
-SIMD_INLINE void kernel_lanes_transform(const kernel_frame *f, const kernel_tile *tile,
-                                        const kernel_wide_doubles *const world[3], vf out[3])
+SIMD_INLINE void kernel_lanes_transform(const kernel_frame *f, const kernel_tile *tile, const kernel_f64 (*world)[2],
+                                        vf out[3])
 {
     const double *eye = f->job->camera.eye;
     for (int half = 0; half < 2; half++) {
         kernel_f64 d[3], at[3];
-        for (int a = 0; a < 3; a++) d[a] = world[a]->half[half] - eye[a];
+        for (int a = 0; a < 3; a++) d[a] = world[a][half] - eye[a];
         for (int a = 0; a < 3; a++)
             at[a] = f->scaled_axes[a][0] * d[0] + f->scaled_axes[a][1] * d[1] + f->scaled_axes[a][2] * d[2];
         const kernel_f64 depth = f->job->camera.is_orthographic ? f->job->space.scale + 0 * at[2] : at[2];
@@ -49,14 +49,14 @@ SIMD_INLINE void kernel_lanes_transform(const kernel_frame *f, const kernel_tile
 
 /* Subtracts each lane's isovalue from `count` values in double, and scales the differences of each lane by a power of
  * two that brings the largest near 1. */
-SIMD_INLINE void kernel_lanes_relative(const kernel_wide_doubles *values, int count, const double isovalues[SIMD_WIDTH],
+SIMD_INLINE void kernel_lanes_relative(const kernel_f64 (*values)[2], int count, const double isovalues[SIMD_WIDTH],
                                        vf *out)
 {
     for (int half = 0; half < 2; half++) {
         kernel_f64 isovalue, v[8], largest = {0};
         memcpy(&isovalue, isovalues + half * KERNEL_HALF, sizeof isovalue);
         for (int i = 0; i < count; i++) {
-            v[i] = values[i].half[half] - isovalue;
+            v[i] = values[i][half] - isovalue;
             largest = kernel_f64_max(kernel_f64_abs(v[i]), largest);
         }
         /* exponent of the largest value, limited so that its negation is the exponent of a normal number */

@@ -19,7 +19,7 @@
  * own value. Otherwise tets overlap, and extend out of the cell. The field at a point is then the sum over the tets
  * that contain it, each with its sign. (A point inside is contained in one more positive than negative tet. At a sheet
  * with its two tets on different sides the sum does not jump; a sheet with both on one side adds or removes f - f = 0.)
- * That sum is computed at sheets, from each tet's interval [t0, t1).
+ * That sum is computed at sheets, from each tet's interval [t_in, t_out).
  *
  * On which side of an isovalue a ray enters and leaves is decided by the faces' own values (kernel_surface.h):
  * triangles are linear, quads bilinear as their neighbours may have them, larger faces linear on their triangles. In a
@@ -47,15 +47,6 @@ typedef struct kernel_triangle_crossings {
     vf t_face, v_face, w_face;
 } kernel_triangle_crossings;
 
-/* The intervals of rays in the tet of surface triangle number `facet`: the value at t is v0 + (t - t0) (v1 - v0) / (t1
- * - t0). sign is the tet's sign. */
-typedef struct kernel_subtet_interval {
-    vm mask;
-    vf t0, t1, v0, v1, w0, w1;
-    float sign;
-    int facet;
-} kernel_subtet_interval;
-
 /* The crossings of a packet with one polyhedron. Its arrays are in the thread's scratch memory. */
 typedef struct kernel_poly_crossings {
     const kernel_packet *packet;
@@ -74,18 +65,14 @@ typedef struct kernel_poly_crossings {
     kernel_triangle_crossings *sheets; /* crossings of sheets by edge number; only those listed in met_sheets are set */
     int *met_sheets;
     int sheet_count;
-    kernel_subtet_interval *segments;
-    int segment_count;
-    bool has_sheets;
-} kernel_poly_crossings;
-
-/* One interval of each ray inside the cell. `interval` has the faces' values; u_in and u_out are the field's values
- * just inside. */
-typedef struct kernel_polyhedron_interval {
+    kernel_interval *tets; /* for each surface triangle, the intervals of the rays in its tet */
+    bool has_sheets, has_tets;
+    /* The current interval of each ray inside the cell (kernel_poly_next()), with the faces' values; the crossings at
+     * its ends; and the field's values just inside. */
     kernel_interval interval;
     kernel_triangle_crossings in, out;
     vf u_in, u_out;
-} kernel_polyhedron_interval;
+} kernel_poly_crossings;
 
 SIMD_INLINE void *kernel_scratch_alloc(char **at, size_t bytes)
 {
@@ -102,7 +89,7 @@ static bool kernel_poly_allocate(const kernel_packet *p, const polyhedron *c, ke
     const size_t pieces = 11, spare = 64 * pieces;
     const size_t bytes =
         points * 2 * sizeof(vf) + (edges + points) * (sizeof(vf) + sizeof(int)) +
-        facets * (sizeof(kernel_triangle_crossings) + sizeof(vm) + sizeof(int) + sizeof(kernel_subtet_interval)) +
+        facets * (sizeof(kernel_triangle_crossings) + sizeof(vm) + sizeof(int) + sizeof(kernel_interval)) +
         edges * sizeof(kernel_triangle_crossings) + spare;
     char *at = polyhedra_scratch(p->thread->polyhedra, bytes);
     if (!at) {
@@ -119,9 +106,9 @@ static bool kernel_poly_allocate(const kernel_packet *p, const polyhedron *c, ke
     out->met = kernel_scratch_alloc(&at, facets * sizeof(int));
     out->sheets = kernel_scratch_alloc(&at, edges * sizeof(kernel_triangle_crossings));
     out->met_sheets = kernel_scratch_alloc(&at, edges * sizeof(int));
-    out->segments = kernel_scratch_alloc(&at, facets * sizeof(kernel_subtet_interval));
-    out->met_count = out->sheet_count = out->segment_count = 0;
-    out->has_sheets = false;
+    out->tets = kernel_scratch_alloc(&at, facets * sizeof(kernel_interval));
+    out->met_count = out->sheet_count = 0;
+    out->has_sheets = out->has_tets = false;
     out->uneven = vm_none();
     return true;
 }
@@ -236,14 +223,14 @@ SIMD_INLINE void kernel_quad_of_facets(const kernel_poly_crossings *r, const pol
 /* Stores a point of the quad's patch as the face's point of a surface triangle's crossing, for the rays in `mine`,
  * whose crossing belongs to this triangle. Rays that do not cross the triangle itself use the patch's point for
  * both. */
-SIMD_INLINE void kernel_facet_face(const polyhedron *c, const int corner[4], const kernel_quad_point *at, vm mine,
+SIMD_INLINE void kernel_facet_face(const polyhedron *c, const int corner[4], const kernel_point *at, vm mine,
                                    bool has_colour, kernel_triangle_crossings *m)
 {
     vf f[4], g[4];
     for (int i = 0; i < 4; i++) f[i] = vf_set(c->f[corner[i]]), g[i] = vf_set(has_colour ? c->g[corner[i]] : 0);
     m->t_face = vf_select(mine, at->t, m->t_face);
-    m->v_face = vf_select(mine, kernel_bilinear(f, at->s, at->r), m->v_face);
-    m->w_face = has_colour ? vf_select(mine, kernel_bilinear(g, at->s, at->r), m->w_face) : vf_set(0);
+    m->v_face = vf_select(mine, kernel_bilinear(f, at->r[0], at->r[1]), m->v_face);
+    m->w_face = has_colour ? vf_select(mine, kernel_bilinear(g, at->r[0], at->r[1]), m->w_face) : vf_set(0);
     const vm apart = vm_andnot(mine, m->mask);
     m->t = vf_select(apart, m->t_face, m->t);
     m->v = vf_select(apart, m->v_face, m->v);
@@ -253,17 +240,13 @@ SIMD_INLINE void kernel_facet_face(const polyhedron *c, const int corner[4], con
 /* For rays that cross the patch twice and both triangles, exchanges the two points if necessary, so that the nearer
  * point belongs to the nearer triangle. */
 static __attribute__((noinline, cold)) void kernel_quad_points_pair(kernel_triangle_crossings *const m[2],
-                                                                    kernel_quad_point places[2])
+                                                                    kernel_point places[2])
 {
     const vm both = vm_and(places[1].mask, vm_and(m[0]->mask, m[1]->mask));
     const vm swap = vm_and(both, vm_xor(vf_lt(places[0].t, places[1].t), vf_lt(m[0]->t, m[1]->t)));
-    const kernel_quad_point own = places[0];
-    places[0].s = vf_select(swap, places[1].s, own.s);
-    places[0].r = vf_select(swap, places[1].r, own.r);
-    places[0].t = vf_select(swap, places[1].t, own.t);
-    places[1].s = vf_select(swap, own.s, places[1].s);
-    places[1].r = vf_select(swap, own.r, places[1].r);
-    places[1].t = vf_select(swap, own.t, places[1].t);
+    const kernel_point own = places[0];
+    kernel_point_move(swap, &places[1], &places[0]);
+    kernel_point_move(swap, &own, &places[1]);
 }
 
 /* Computes the crossings of a quad's bilinear patch, which are the same bits as in a hex that shares it. first: number
@@ -276,7 +259,7 @@ static void kernel_poly_quad(kernel_poly_crossings *r, int first)
     kernel_cell ranks;
     kernel_weights w;
     kernel_quad quad;
-    kernel_quad_point places[2];
+    kernel_point places[2];
     int corner[4];
     /* vertices are sorted, so that their numbers are ranks in the order of coordinates */
     for (int i = 0; i < 4; i++) ranks.rank[i] = around[i];
@@ -354,17 +337,17 @@ SIMD_INLINE bool kernel_poly_take_nearest(kernel_poly_crossings *r, kernel_trian
 }
 
 /* Computes the next interval of each ray inside the cell. Returns false after the last one. */
-static bool kernel_poly_next(kernel_poly_crossings *r, kernel_polyhedron_interval *out)
+static bool kernel_poly_next(kernel_poly_crossings *r)
 {
-    if (!kernel_poly_take_nearest(r, &out->in) || !kernel_poly_take_nearest(r, &out->out)) return false;
-    kernel_interval *i = &out->interval;
-    i->mask = vm_and(out->in.mask, out->out.mask);
-    i->t_in = out->in.t_face;
-    i->t_out = out->out.t_face;
-    i->v_in = out->u_in = out->in.v_face;
-    i->v_out = out->u_out = out->out.v_face;
-    i->w_in = out->in.w_face;
-    i->w_out = out->out.w_face;
+    kernel_interval *i = &r->interval;
+    if (!kernel_poly_take_nearest(r, &r->in) || !kernel_poly_take_nearest(r, &r->out)) return false;
+    i->mask = vm_and(r->in.mask, r->out.mask);
+    i->t_in = r->in.t_face;
+    i->t_out = r->out.t_face;
+    i->v_in = r->u_in = r->in.v_face;
+    i->v_out = r->u_out = r->out.v_face;
+    i->w_in = r->in.w_face;
+    i->w_out = r->out.w_face;
     return true;
 }
 
@@ -389,55 +372,54 @@ static void kernel_poly_sheets(kernel_poly_crossings *r)
     }
 }
 
-SIMD_INLINE void kernel_segment_add(kernel_subtet_interval *s, const kernel_triangle_crossings *m, vm hit)
+/* Extends the intervals of the rays in `hit` to a crossing of one of the tet's faces. */
+SIMD_INLINE void kernel_subtet_add(kernel_interval *s, const kernel_triangle_crossings *m, vm hit)
 {
-    const vm first = vm_and(hit, vf_lt(m->t, s->t0)), last = vm_andnot(hit, vf_lt(m->t, s->t1));
-    s->t0 = vf_select(first, m->t, s->t0);
-    s->v0 = vf_select(first, m->v, s->v0);
-    s->w0 = vf_select(first, m->w, s->w0);
-    s->t1 = vf_select(last, m->t, s->t1);
-    s->v1 = vf_select(last, m->v, s->v1);
-    s->w1 = vf_select(last, m->w, s->w1);
+    const vm first = vm_and(hit, vf_lt(m->t, s->t_in)), last = vm_andnot(hit, vf_lt(m->t, s->t_out));
+    s->t_in = vf_select(first, m->t, s->t_in);
+    s->v_in = vf_select(first, m->v, s->v_in);
+    s->w_in = vf_select(first, m->w, s->w_in);
+    s->t_out = vf_select(last, m->t, s->t_out);
+    s->v_out = vf_select(last, m->v, s->v_out);
+    s->w_out = vf_select(last, m->w, s->w_out);
     s->mask = vm_or(s->mask, hit);
 }
 
-/* Computes the intervals of the rays in all tets of the cell. Tets without volume are left out. */
-static void kernel_poly_segments(kernel_poly_crossings *r)
+/* Computes the intervals of the rays in all tets of the cell, but none in tets without volume. */
+static void kernel_poly_tets(kernel_poly_crossings *r)
 {
     const polyhedron *c = r->cell;
-    if (r->segment_count) return;
+    if (r->has_tets) return;
+    r->has_tets = true;
     for (int i = 0; i < c->facet_count; i++) {
         const polyhedron_facet *t = &c->facets[i];
-        kernel_subtet_interval *s = &r->segments[r->segment_count];
-        if (t->sign == 0) continue;
+        kernel_interval *s = &r->tets[i];
         s->mask = vm_none();
-        s->t0 = vf_set(INFINITY);
-        s->t1 = vf_set(-INFINITY);
-        s->v0 = s->v1 = s->w0 = s->w1 = vf_set(0);
+        if (t->sign == 0) continue;
+        s->t_in = vf_set(INFINITY);
+        s->t_out = vf_set(-INFINITY);
+        s->v_in = s->v_out = s->w_in = s->w_out = vf_set(0);
         for (int k = 0; k < 3; k++)
             if (vm_any(r->sheets[t->edge[k]].mask))
-                kernel_segment_add(s, &r->sheets[t->edge[k]], r->sheets[t->edge[k]].mask);
+                kernel_subtet_add(s, &r->sheets[t->edge[k]], r->sheets[t->edge[k]].mask);
         /* a ray in the tet crosses at least one of its sheets; it crosses the tet's surface triangle if it is inside
          * all three edges */
         const vm hit = kernel_inside(r->rays, r->edge[t->edge[0]], r->edge[t->edge[1]], r->edge[t->edge[2]]);
-        if (vm_any(hit)) kernel_segment_add(s, &r->facets[i], hit);
-        if (!vm_any(s->mask)) continue;
-        s->sign = t->sign;
-        s->facet = i;
-        r->segment_count++;
+        if (vm_any(hit)) kernel_subtet_add(s, &r->facets[i], hit);
     }
 }
 
-/* Returns the rays for which t is in the tet's interval: [t0, t1), or (t0, t1] if the field just before t is needed. */
-SIMD_INLINE vm kernel_subtet_interval_contains(const kernel_subtet_interval *s, vf t, bool before)
+/* Returns the rays for which t is in the tet's interval: [t_in, t_out), or (t_in, t_out] if the field just before t is
+ * needed. */
+SIMD_INLINE vm kernel_subtet_contains(const kernel_interval *s, vf t, bool before)
 {
-    if (before) return vm_and(s->mask, vm_and(vf_lt(s->t0, t), vf_le(t, s->t1)));
-    return vm_and(s->mask, vm_and(vf_le(s->t0, t), vf_lt(t, s->t1)));
+    if (before) return vm_and(s->mask, vm_and(vf_lt(s->t_in, t), vf_le(t, s->t_out)));
+    return vm_and(s->mask, vm_and(vf_le(s->t_in, t), vf_lt(t, s->t_out)));
 }
 
-SIMD_INLINE vf kernel_segment_at(const kernel_subtet_interval *s, vf t, vf v0, vf v1)
+SIMD_INLINE vf kernel_subtet_at(const kernel_interval *s, vf t, vf v_in, vf v_out)
 {
-    return v0 + (t - s->t0) * ((v1 - v0) / (s->t1 - s->t0));
+    return v_in + (t - s->t_in) * ((v_out - v_in) / (s->t_out - s->t_in));
 }
 
 /* Computes the signed sum of the tets' fields at t. Rounding may put the ends of neighbouring tets, which meet at one
@@ -450,13 +432,15 @@ static void kernel_poly_sum(const kernel_poly_crossings *r, vm rays, vf t, bool 
     for (int k = 0; k < 7 && vm_any(open); k++) {
         const vf at = t + (vf_abs(t) + 1.0f) * (shifts[k] * 2.4e-7f);
         vf cover = vf_set(0), sum = vf_set(0), colour = vf_set(0);
-        for (int n = 0; n < r->segment_count; n++) {
-            const kernel_subtet_interval *s = &r->segments[n];
-            const vm in = vm_and(open, kernel_subtet_interval_contains(s, at, before));
+        for (int n = 0; n < r->cell->facet_count; n++) {
+            const kernel_interval *s = &r->tets[n];
+            if (!vm_any(s->mask)) continue;
+            const vm in = vm_and(open, kernel_subtet_contains(s, at, before));
             if (!vm_any(in)) continue;
-            cover = vf_select(in, cover + s->sign, cover);
-            sum = vf_select(in, sum + s->sign * kernel_segment_at(s, at, s->v0, s->v1), sum);
-            colour = vf_select(in, colour + s->sign * kernel_segment_at(s, at, s->w0, s->w1), colour);
+            const float sign = r->cell->facets[n].sign;
+            cover = vf_select(in, cover + sign, cover);
+            sum = vf_select(in, sum + sign * kernel_subtet_at(s, at, s->v_in, s->v_out), sum);
+            colour = vf_select(in, colour + sign * kernel_subtet_at(s, at, s->w_in, s->w_out), colour);
         }
         const vm good = vm_and(open, vf_eq(cover, vf_set(1)));
         *v = vf_select(good, sum, *v);
@@ -467,13 +451,11 @@ static void kernel_poly_sum(const kernel_poly_crossings *r, vm rays, vf t, bool 
 
 /* Returns the rays for which the sheet lies in the interval: between the crossings of triangles, and between those of
  * faces. Sheets beyond the triangles belong to tets that extend out of the cell, and are not part of its field. */
-SIMD_INLINE vm kernel_polyhedron_interval_contains(const kernel_polyhedron_interval *polyhedron_interval,
-                                                   const kernel_triangle_crossings *sheet)
+SIMD_INLINE vm kernel_poly_interval_contains(const kernel_poly_crossings *r, const kernel_triangle_crossings *sheet)
 {
-    const vm inside = vm_and(vf_lt(polyhedron_interval->interval.t_in, sheet->t),
-                             vf_lt(sheet->t, polyhedron_interval->interval.t_out));
-    const vm within = vm_and(vf_lt(polyhedron_interval->in.t, sheet->t), vf_lt(sheet->t, polyhedron_interval->out.t));
-    return vm_and(vm_and(polyhedron_interval->interval.mask, sheet->mask), vm_and(inside, within));
+    const vm inside = vm_and(vf_lt(r->interval.t_in, sheet->t), vf_lt(sheet->t, r->interval.t_out));
+    const vm within = vm_and(vf_lt(r->in.t, sheet->t), vf_lt(sheet->t, r->out.t));
+    return vm_and(vm_and(r->interval.mask, sheet->mask), vm_and(inside, within));
 }
 
 /* Computes the field just inside an end of the interval: the face's value, plus the fields of all tets other than the
@@ -489,17 +471,17 @@ SIMD_INLINE void kernel_poly_inner_value(const kernel_poly_crossings *r, vm rays
 
 /* Prepares the profile of the interval, which is the piecewise linear field along each ray: computes the field at the
  * crossed sheets and at both ends. */
-static void kernel_poly_profile(kernel_poly_crossings *r, kernel_polyhedron_interval *polyhedron_interval)
+static void kernel_poly_profile(kernel_poly_crossings *r)
 {
-    kernel_interval *i = &polyhedron_interval->interval;
+    kernel_interval *i = &r->interval;
     kernel_poly_sheets(r);
     if (r->cell->is_star_shaped) return;
-    kernel_poly_segments(r);
-    kernel_poly_inner_value(r, i->mask, &polyhedron_interval->in, false, &polyhedron_interval->u_in, &i->w_in);
-    kernel_poly_inner_value(r, i->mask, &polyhedron_interval->out, true, &polyhedron_interval->u_out, &i->w_out);
+    kernel_poly_tets(r);
+    kernel_poly_inner_value(r, i->mask, &r->in, false, &r->u_in, &i->w_in);
+    kernel_poly_inner_value(r, i->mask, &r->out, true, &r->u_out, &i->w_out);
     for (int n = 0; n < r->sheet_count; n++) {
         kernel_triangle_crossings *sheet = &r->sheets[r->met_sheets[n]];
-        const vm held = kernel_polyhedron_interval_contains(polyhedron_interval, sheet);
+        const vm held = kernel_poly_interval_contains(r, sheet);
         vf v = sheet->v, w = sheet->w;
         if (!vm_any(held)) continue;
         kernel_poly_sum(r, held, sheet->t, false, &v, &w);
@@ -510,26 +492,24 @@ static void kernel_poly_profile(kernel_poly_crossings *r, kernel_polyhedron_inte
 
 /* Sets *piece to a piece of length zero at the begin of each ray's profile, which is the piecewise linear field along
  * the ray. */
-SIMD_INLINE void kernel_profile_begin(const kernel_polyhedron_interval *polyhedron_interval, kernel_interval *piece)
+SIMD_INLINE void kernel_profile_begin(const kernel_poly_crossings *r, kernel_interval *piece)
 {
-    const kernel_interval *i = &polyhedron_interval->interval;
+    const kernel_interval *i = &r->interval;
     piece->mask = i->mask;
     piece->t_in = piece->t_out = i->t_in;
-    piece->v_in = piece->v_out = polyhedron_interval->u_in;
+    piece->v_in = piece->v_out = r->u_in;
     piece->w_in = piece->w_out = i->w_in;
 }
 
 /* Replaces *piece by the next linear piece of the field along each ray. v_out is the value at the end of the ray's
  * interval. */
-SIMD_INLINE void kernel_profile_next(const kernel_poly_crossings *r,
-                                     const kernel_polyhedron_interval *polyhedron_interval, vf v_out,
-                                     kernel_interval *piece)
+SIMD_INLINE void kernel_profile_next(const kernel_poly_crossings *r, vf v_out, kernel_interval *piece)
 {
-    vf t = polyhedron_interval->interval.t_out, v = v_out, w = polyhedron_interval->interval.w_out;
+    vf t = r->interval.t_out, v = v_out, w = r->interval.w_out;
     for (int n = 0; n < r->sheet_count; n++) {
         const kernel_triangle_crossings *sheet = &r->sheets[r->met_sheets[n]];
-        const vm nearer = vm_and(kernel_polyhedron_interval_contains(polyhedron_interval, sheet),
-                                 vm_and(vf_lt(piece->t_out, sheet->t), vf_lt(sheet->t, t)));
+        const vm nearer =
+            vm_and(kernel_poly_interval_contains(r, sheet), vm_and(vf_lt(piece->t_out, sheet->t), vf_lt(sheet->t, t)));
         t = vf_select(nearer, sheet->t, t);
         v = vf_select(nearer, sheet->v_face, v);
         w = vf_select(nearer, sheet->w_face, w);
@@ -543,10 +523,9 @@ SIMD_INLINE void kernel_profile_next(const kernel_poly_crossings *r,
 }
 
 /* Returns those of the given rays on which the field has further linear pieces behind the given one. */
-SIMD_INLINE vm kernel_profile_continues(const kernel_polyhedron_interval *polyhedron_interval,
-                                        const kernel_interval *piece, vm mask)
+SIMD_INLINE vm kernel_profile_continues(const kernel_poly_crossings *r, const kernel_interval *piece, vm mask)
 {
-    return vm_and(mask, vf_lt(piece->t_out, polyhedron_interval->interval.t_out));
+    return vm_and(mask, vf_lt(piece->t_out, r->interval.t_out));
 }
 
 #endif

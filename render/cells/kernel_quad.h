@@ -36,6 +36,7 @@
 #include <string.h>
 
 #include "grid.h"
+#include "kernel_packet.h"
 #include "kernel_shapes.h"
 #include "simd.h"
 
@@ -46,12 +47,8 @@ typedef struct kernel_quad {
     vf e01, e32, e03, e12;
 } kernel_quad;
 
-/* The points at which rays meet a quad's bilinear patch: parameter s from corner 0 to corner 1, parameter r from corner
- * 0 to corner 3, and depth t. */
-typedef struct kernel_quad_point {
-    vm mask;
-    vf s, r, t;
-} kernel_quad_point;
+/* Below, a kernel_point is a point at which rays meet a quad's bilinear patch. Its coordinates r[0] and r[1] are the
+ * patch's parameters s, from corner 0 to corner 1, and r, from corner 0 to corner 3; r[2] and the value are not set. */
 
 SIMD_INLINE vf kernel_bilinear(const vf f[4], vf s, vf r)
 {
@@ -61,35 +58,37 @@ SIMD_INLINE vf kernel_bilinear(const vf f[4], vf s, vf r)
 
 /* ---- one ray, in double ---- */
 
-typedef struct kernel_scalar_quad {
-    double x[4], y[4], z[4];
-    bool e01, e32, e03, e12; /* sign bits of the edge functions: true if negative */
-} kernel_scalar_quad;
-
 /* The quadratic (1-x)² c0 + 2 x (1-x) c1 + x² c2, and the exact sign bits of c0 and c2. */
 typedef struct kernel_scalar_quadratic {
     double c0, c1, c2;
     bool is_negative0, is_negative2;
 } kernel_scalar_quadratic;
 
+static inline bool kernel_is_negative(vf v, int lane)
+{
+    return __builtin_signbit(v[lane]) != 0;
+}
+
 /* Returns the cross product of corners i and j in double, which has a single rounding for float32 corners. */
-static inline double kernel_scalar_cross(const kernel_scalar_quad *q, int i, int j)
+static inline double kernel_scalar_cross(const kernel_quad *q, int lane, int i, int j)
 {
-    return q->x[i] * q->y[j] - q->x[j] * q->y[i];
+    return (double)q->x[i][lane] * (double)q->y[j][lane] - (double)q->x[j][lane] * (double)q->y[i][lane];
 }
 
-static inline kernel_scalar_quadratic kernel_scalar_b(const kernel_scalar_quad *q)
+static inline kernel_scalar_quadratic kernel_scalar_b(const kernel_quad *q, int lane)
 {
-    return (kernel_scalar_quadratic){kernel_scalar_cross(q, 0, 1),
-                                     0.5 * (kernel_scalar_cross(q, 0, 2) + kernel_scalar_cross(q, 3, 1)),
-                                     kernel_scalar_cross(q, 3, 2), q->e01, q->e32};
+    return (kernel_scalar_quadratic){kernel_scalar_cross(q, lane, 0, 1),
+                                     0.5 * (kernel_scalar_cross(q, lane, 0, 2) + kernel_scalar_cross(q, lane, 3, 1)),
+                                     kernel_scalar_cross(q, lane, 3, 2), kernel_is_negative(q->e01, lane),
+                                     kernel_is_negative(q->e32, lane)};
 }
 
-static inline kernel_scalar_quadratic kernel_scalar_a(const kernel_scalar_quad *q)
+static inline kernel_scalar_quadratic kernel_scalar_a(const kernel_quad *q, int lane)
 {
-    return (kernel_scalar_quadratic){kernel_scalar_cross(q, 0, 3),
-                                     0.5 * (kernel_scalar_cross(q, 0, 2) + kernel_scalar_cross(q, 1, 3)),
-                                     kernel_scalar_cross(q, 1, 2), q->e03, q->e12};
+    return (kernel_scalar_quadratic){kernel_scalar_cross(q, lane, 0, 3),
+                                     0.5 * (kernel_scalar_cross(q, lane, 0, 2) + kernel_scalar_cross(q, lane, 1, 3)),
+                                     kernel_scalar_cross(q, lane, 1, 2), kernel_is_negative(q->e03, lane),
+                                     kernel_is_negative(q->e12, lane)};
 }
 
 static inline bool kernel_scalar_changes_sign(const kernel_scalar_quadratic *c)
@@ -127,32 +126,37 @@ static inline double kernel_scalar_zero(double v0, double v1)
 
 /* Returns the root of the quadratic A or B (see the top of this file) as a limit, for a quadratic that is zero for all
  * parameters. The two lines are from corner i to i2 and from corner j to j2. */
-static inline double kernel_scalar_limit(const kernel_scalar_quad *q, int i, int i2, int j, int j2)
+static inline double kernel_scalar_limit(const kernel_quad *q, int lane, int i, int i2, int j, int j2)
 {
-    const double y0 = q->y[i2] - q->y[i], y1 = q->y[j2] - q->y[j];
-    return y0 != y1 ? kernel_scalar_zero(y0, y1) : kernel_scalar_zero(q->x[i2] - q->x[i], q->x[j2] - q->x[j]);
+    double x[4], y[4];
+    for (int k = 0; k < 4; k++) x[k] = (double)q->x[k][lane], y[k] = (double)q->y[k][lane];
+    const double y0 = y[i2] - y[i], y1 = y[j2] - y[j];
+    return y0 != y1 ? kernel_scalar_zero(y0, y1) : kernel_scalar_zero(x[i2] - x[i], x[j2] - x[j]);
 }
 
-/* Computes the point of the patch (parameters s and r, and depth) at which the patch's Jacobian has the sign of `root`.
+/* Computes one lane of the point of the patch at which the patch's Jacobian has the sign of `root`.
  * The magnitude of root is the square root of the discriminant D. */
-static inline void kernel_scalar_point(const kernel_scalar_quad *q, const kernel_scalar_quadratic *a,
-                                       const kernel_scalar_quadratic *b, double root, double place[3])
+static inline void kernel_scalar_point(const kernel_quad *q, int lane, const kernel_scalar_quadratic *a,
+                                       const kernel_scalar_quadratic *b, double root, kernel_point *out)
 {
-    const double s = kernel_scalar_vanishes(a) ? kernel_scalar_limit(q, 0, 3, 1, 2) : kernel_scalar_root(a, root);
-    const double r = kernel_scalar_vanishes(b) ? kernel_scalar_limit(q, 0, 1, 3, 2) : kernel_scalar_root(b, -root);
-    place[0] = s;
-    place[1] = r;
-    place[2] = (1 - r) * ((1 - s) * q->z[0] + s * q->z[1]) + r * ((1 - s) * q->z[3] + s * q->z[2]);
+    const double s = kernel_scalar_vanishes(a) ? kernel_scalar_limit(q, lane, 0, 3, 1, 2) : kernel_scalar_root(a, root);
+    const double r =
+        kernel_scalar_vanishes(b) ? kernel_scalar_limit(q, lane, 0, 1, 3, 2) : kernel_scalar_root(b, -root);
+    double z[4];
+    for (int k = 0; k < 4; k++) z[k] = (double)q->z[k][lane];
+    out->r[0][lane] = (float)s;
+    out->r[1][lane] = (float)r;
+    out->t[lane] = (float)((1 - r) * ((1 - s) * z[0] + s * z[1]) + r * ((1 - s) * z[3] + s * z[2]));
 }
 
 /* Computes the point of a ray that crosses exactly one of the two triangles. */
-static inline void kernel_scalar_single_point(const kernel_scalar_quad *q, double place[3])
+static inline void kernel_scalar_single_point(const kernel_quad *q, int lane, kernel_point *out)
 {
-    const kernel_scalar_quadratic a = kernel_scalar_a(q), b = kernel_scalar_b(q);
+    const kernel_scalar_quadratic a = kernel_scalar_a(q, lane), b = kernel_scalar_b(q, lane);
     const bool by_b = kernel_scalar_changes_sign(&b);
     const double root = __builtin_sqrt(kernel_scalar_discriminant(by_b ? &b : &a));
     const bool is_rising = by_b ? b.is_negative0 : a.is_negative0;
-    kernel_scalar_point(q, &a, &b, by_b != is_rising ? root : -root, place);
+    kernel_scalar_point(q, lane, &a, &b, by_b != is_rising ? root : -root, out);
 }
 
 /* Returns whether the quadratic may have two roots in (0, 1): its ends have one sign, and its middle coefficient has
@@ -163,70 +167,33 @@ static inline bool kernel_scalar_may_have_two_roots(const kernel_scalar_quadrati
 }
 
 /* Computes the two points of a ray that crosses both triangles or none. Returns false if it does not meet the patch. */
-static inline bool kernel_scalar_two_points(const kernel_scalar_quad *q, double places[2][3])
+static inline bool kernel_scalar_two_points(const kernel_quad *q, int lane, kernel_point out[2])
 {
-    const kernel_scalar_quadratic a = kernel_scalar_a(q), b = kernel_scalar_b(q);
+    const kernel_scalar_quadratic a = kernel_scalar_a(q, lane), b = kernel_scalar_b(q, lane);
     if (!kernel_scalar_may_have_two_roots(&a) || !kernel_scalar_may_have_two_roots(&b)) return false;
     const double root = __builtin_sqrt(kernel_scalar_discriminant(&b));
     if (!(root > 0)) return false;
-    kernel_scalar_point(q, &a, &b, root, places[0]);
-    kernel_scalar_point(q, &a, &b, -root, places[1]);
+    kernel_scalar_point(q, lane, &a, &b, root, &out[0]);
+    kernel_scalar_point(q, lane, &a, &b, -root, &out[1]);
     return true;
-}
-
-static inline bool kernel_is_negative(vf v, int lane)
-{
-    return __builtin_signbit(v[lane]) != 0;
-}
-
-static inline kernel_scalar_quad kernel_scalar_of(const kernel_quad *q, int lane)
-{
-    kernel_scalar_quad flat = {.e01 = kernel_is_negative(q->e01, lane),
-                               .e32 = kernel_is_negative(q->e32, lane),
-                               .e03 = kernel_is_negative(q->e03, lane),
-                               .e12 = kernel_is_negative(q->e12, lane)};
-    for (int i = 0; i < 4; i++) {
-        flat.x[i] = (double)q->x[i][lane];
-        flat.y[i] = (double)q->y[i][lane];
-        flat.z[i] = (double)q->z[i][lane];
-    }
-    return flat;
-}
-
-static inline void kernel_quad_store_point(kernel_quad_point *out, int lane, const double place[3])
-{
-    out->s[lane] = (float)place[0];
-    out->r[lane] = (float)place[1];
-    out->t[lane] = (float)place[2];
 }
 
 /* Computes the points of the wanted rays, each of which crosses exactly one of the two triangles. They are few:
  * Newton's method in float32 is accurate enough for most rays (kernel_patch_converged()). */
-static __attribute__((noinline)) void kernel_quad_single_point(const kernel_quad *q, vm wanted, kernel_quad_point *out)
+static __attribute__((noinline)) void kernel_quad_single_point(const kernel_quad *q, vm wanted, kernel_point *out)
 {
-    for (unsigned bits = vm_bits(wanted); bits; bits &= bits - 1) {
-        const int lane = __builtin_ctz(bits);
-        const kernel_scalar_quad flat = kernel_scalar_of(q, lane);
-        double place[3];
-        kernel_scalar_single_point(&flat, place);
-        kernel_quad_store_point(out, lane, place);
-    }
+    for (unsigned bits = vm_bits(wanted); bits; bits &= bits - 1)
+        kernel_scalar_single_point(q, __builtin_ctz(bits), out);
 }
 
 /* Computes the points of the wanted rays that meet the patch twice: one in out[0], the other in out[1]. Returns these
  * rays. */
-static __attribute__((noinline, cold)) vm kernel_quad_two_points(const kernel_quad *q, vm wanted,
-                                                                 kernel_quad_point out[2])
+static __attribute__((noinline, cold)) vm kernel_quad_two_points(const kernel_quad *q, vm wanted, kernel_point out[2])
 {
     unsigned found = 0;
     for (unsigned bits = vm_bits(wanted); bits; bits &= bits - 1) {
         const int lane = __builtin_ctz(bits);
-        const kernel_scalar_quad flat = kernel_scalar_of(q, lane);
-        double places[2][3];
-        if (!kernel_scalar_two_points(&flat, places)) continue;
-        kernel_quad_store_point(&out[0], lane, places[0]);
-        kernel_quad_store_point(&out[1], lane, places[1]);
-        found |= 1u << lane;
+        if (kernel_scalar_two_points(q, lane, out)) found |= 1u << lane;
     }
     return vm_from_bits(found);
 }
@@ -299,7 +266,7 @@ SIMD_INLINE vf kernel_quad_between(const kernel_quad *q, int i, int j, int k, in
 
 /* Computes the points of rays that meet no edge. The edge functions are computed from the projected corners. */
 static __attribute__((noinline)) void kernel_quad_single_point_off_edges(const kernel_quad *q, vm wanted,
-                                                                         kernel_quad_point *out)
+                                                                         kernel_point *out)
 {
     kernel_quad own = *q;
     own.e01 = vf_diff_of_products(q->x[0], q->y[1], q->x[1], q->y[0]);
@@ -313,7 +280,7 @@ static __attribute__((noinline)) void kernel_quad_single_point_off_edges(const k
  * triangle of quad n. Quads are processed together because each step of Newton's method depends on the one before.
  * are_off_edges: set if no ray meets an edge; the quads' edge functions are then not read and need not be set. */
 SIMD_INLINE void kernel_quads_cross(const kernel_quad *q, int count, const vm once[2], bool are_off_edges,
-                                    kernel_quad_point *out)
+                                    kernel_point *out)
 {
     kernel_patch patch[2];
     vf s[2], r[2];
@@ -326,7 +293,10 @@ SIMD_INLINE void kernel_quads_cross(const kernel_quad *q, int count, const vm on
         for (int n = 0; n < count; n++) kernel_patch_step(&patch[n], &s[n], &r[n]);
     for (int n = 0; n < count; n++) {
         const vm left = vm_andnot(once[n], kernel_patch_converged(&patch[n], s[n], r[n]));
-        out[n] = (kernel_quad_point){once[n], s[n], r[n], kernel_bilinear(q[n].z, s[n], r[n])};
+        out[n].mask = once[n];
+        out[n].r[0] = s[n];
+        out[n].r[1] = r[n];
+        out[n].t = kernel_bilinear(q[n].z, s[n], r[n]);
         if (__builtin_expect(!vm_any(left), 1)) continue;
         if (are_off_edges)
             kernel_quad_single_point_off_edges(&q[n], left, &out[n]);
@@ -394,8 +364,8 @@ SIMD_INLINE vm kernel_curved_may_cross_twice(const vf x[8], const vf y[8], const
     const vm outside = vm_and(rays, vm_and(vm_xor(side[0], side[2]), vm_xor(side[1], side[3])));
     const vf across = vf_diff_of_products(x[a], y[c], x[c], y[a]), other = vf_diff_of_products(x[d], y[b], x[b], y[d]);
     const vf slack = 2e-6f * (vf_abs(across) + vf_abs(other)), sum = across + other, difference = across - other;
-    const vm nonlinear_part = vf_le(vf_select(side[0], -sum, sum), slack);
-    const vm bends = vm_and(outside, vm_and(nonlinear_part, vf_le(vf_select(side[3], difference, -difference), slack)));
+    const vm b_bends = vf_le(vf_select(side[0], -sum, sum), slack);
+    const vm bends = vm_and(outside, vm_and(b_bends, vf_le(vf_select(side[3], difference, -difference), slack)));
     return __builtin_expect(vm_any(bends), 0)
                ? kernel_curved_may_cross_twice_by_discriminant(x, y, loop, bends, across, other)
                : bends;
@@ -403,9 +373,8 @@ SIMD_INLINE vm kernel_curved_may_cross_twice(const vf x[8], const vf y[8], const
 
 /* Computes the points at which rays meet the patch. Rays in `once` meet it once; rays in `twice` meet it twice or
  * never. Returns how many entries of out are set, 0 to 2. */
-SIMD_INLINE int kernel_quad_points(const kernel_quad *q, vm once, vm twice, kernel_quad_point out[2])
+SIMD_INLINE int kernel_quad_points(const kernel_quad *q, vm once, vm twice, kernel_point out[2])
 {
-    const vf zero = vf_set(0);
     int count = 0;
     if (vm_any(once)) {
         const vm all[2] = {once, once};
@@ -415,8 +384,8 @@ SIMD_INLINE int kernel_quad_points(const kernel_quad *q, vm once, vm twice, kern
     if (!vm_any(twice)) return count;
     const vm bends = kernel_quad_may_cross_twice(q, twice);
     if (__builtin_expect(!vm_any(bends), 1)) return count;
-    if (!count) out[0] = (kernel_quad_point){vm_none(), zero, zero, zero};
-    out[1] = (kernel_quad_point){vm_none(), zero, zero, zero};
+    if (!count) out[0] = (kernel_point){.mask = vm_none()};
+    out[1] = (kernel_point){.mask = vm_none()};
     out[1].mask = kernel_quad_two_points(q, bends, out);
     out[0].mask = vm_or(out[0].mask, out[1].mask);
     return vm_any(out[1].mask) ? 2 : count;

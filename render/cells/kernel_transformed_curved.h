@@ -46,7 +46,7 @@ typedef struct kernel_transformed_curved {
      * field by vertex; the corners' words by face */
     float rows[SIMD_WIDTH < KERNEL_LOCAL_ROW ? 1 : SIMD_WIDTH][KERNEL_LOCAL_ROWS][KERNEL_LOCAL_ROW];
     /* The following members are used only by kernel_transformed_curved_cell(), which extracts one lane's cell. */
-    kernel_wide_doubles world[3][8];
+    kernel_f64 world[8][3][2];
     int32_t rank[8][SIMD_WIDTH], vertex[8][SIMD_WIDTH];
 } kernel_transformed_curved;
 
@@ -208,7 +208,7 @@ SIMD_INLINE vm kernel_sorted_curved_fetch(kernel_transformed_curved *out, const 
     kernel_sorted_curved_sort(&h, is_narrow, type);
     for (int i = 0; i < count; i++) {
         const vi own_rank = vi_from_vf(h.rank[i]);
-        for (int a = 0; a < 3; a++) out->world[a][i] = kernel_raw_to_double(is_narrow, &h.at[i][a]);
+        for (int a = 0; a < 3; a++) kernel_raw_widen(is_narrow, &h.at[i][a], out->world[i][a]);
         memcpy(out->rank[i], &own_rank, sizeof own_rank);
         memcpy(out->vertex[i], &h.vertex[i], sizeof h.vertex[i]);
     }
@@ -344,17 +344,17 @@ static __attribute__((noinline)) void kernel_transformed_faces(kernel_transforme
 /* ---- cells of lattices ---- */
 
 /* Returns whether coordinates increase along all axes, so that the sorted order of vertices is known. */
-SIMD_INLINE bool kernel_lattice_cells_are_sorted(const kernel_wide_doubles (*cells)[3])
+SIMD_INLINE bool kernel_lattice_cells_are_sorted(const kernel_f64 (*cells)[3][2])
 {
     vm sorted = vm_all_lanes();
-    for (int axis = 0; axis < 3; axis++) sorted = vm_and(sorted, vd_lt(cells[0][axis].half, cells[1][axis].half));
+    for (int axis = 0; axis < 3; axis++) sorted = vm_and(sorted, vd_lt(cells[0][axis], cells[1][axis]));
     return vm_bits(sorted) == vm_bits(vm_all_lanes());
 }
 
 /* Transforms the vertices of cuboids, as kernel_lanes_transform() does for single vertices, with the same bits: each
  * product is computed once for the vertices that share it. In the sorted order, bits 0, 1 and 2 of a vertex's reference
  * coordinates stand for z, y and x. */
-SIMD_INLINE void kernel_lattice_cells_transform(const kernel_wide_doubles (*cells)[3], const kernel_frame *f,
+SIMD_INLINE void kernel_lattice_cells_transform(const kernel_f64 (*cells)[3][2], const kernel_frame *f,
                                                 const kernel_tile *tile, int half, kernel_transformed_curved *out,
                                                 int type)
 {
@@ -362,7 +362,7 @@ SIMD_INLINE void kernel_lattice_cells_transform(const kernel_wide_doubles (*cell
     kernel_f64 parts[3][3][2];
     for (int axis = 0; axis < 3; axis++)
         for (int end = 0; end < 2; end++) {
-            const kernel_f64 d = cells[end][axis].half[half] - eye[axis];
+            const kernel_f64 d = cells[end][axis][half] - eye[axis];
             for (int a = 0; a < 3; a++) parts[a][axis][end] = f->scaled_axes[a][axis] * d;
         }
     for (int i = 0; i < 8; i++) {
@@ -378,9 +378,9 @@ SIMD_INLINE void kernel_lattice_cells_transform(const kernel_wide_doubles (*cell
 }
 
 /* Stores lattice cells in sorted order. The result has the same bits as that of other hexes. */
-SIMD_INLINE void kernel_lattice_cells_store(const kernel_wide_doubles (*cells)[3],
-                                            int32_t (*const vertices)[SIMD_WIDTH], const kernel_frame *f,
-                                            const kernel_tile *tile, kernel_transformed_curved *out, int type)
+SIMD_INLINE void kernel_lattice_cells_store(const kernel_f64 (*cells)[3][2], int32_t (*const vertices)[SIMD_WIDTH],
+                                            const kernel_frame *f, const kernel_tile *tile,
+                                            kernel_transformed_curved *out, int type)
 {
     /* for each vertex in sorted order: its number in the lattice's order, and its rank */
     static const signed char given[8] = {0, 4, 7, 3, 1, 5, 6, 2}, rank[8] = {0, 1, 3, 2, 4, 5, 7, 6};
@@ -388,7 +388,8 @@ SIMD_INLINE void kernel_lattice_cells_store(const kernel_wide_doubles (*cells)[3
         const vi own_rank = vi_set(rank[i]);
         memcpy(out->vertex[i], vertices[(int)given[i]], sizeof out->vertex[i]);
         memcpy(out->rank[i], &own_rank, sizeof own_rank);
-        for (int axis = 0; axis < 3; axis++) out->world[axis][i] = cells[rank[i] >> (2 - axis) & 1][axis];
+        for (int axis = 0; axis < 3; axis++)
+            memcpy(out->world[i][axis], cells[rank[i] >> (2 - axis) & 1][axis], sizeof out->world[i][axis]);
     }
     for (int half = 0; half < 2; half++) kernel_lattice_cells_transform(cells, f, tile, half, out, type);
     out->cuboids = vm_bits(vm_all_lanes());
@@ -402,19 +403,18 @@ SIMD_INLINE vm kernel_transform_curved_vertices(kernel_transformed_curved *out, 
                                                 int32_t vertices[8][SIMD_WIDTH], int type)
 {
     if (kernel_is_box(type) && kernel_arrays_have_axes(p)) {
-        kernel_wide_doubles lattice[2][3];
+        kernel_f64 lattice[2][3][2];
         kernel_lattice_cells_read(p, vertices[0], lattice);
-        if (kernel_lattice_cells_are_sorted((const kernel_wide_doubles(*)[3])lattice)) {
-            kernel_lattice_cells_store((const kernel_wide_doubles(*)[3])lattice, vertices, f, tile, out, type);
+        if (kernel_lattice_cells_are_sorted((const kernel_f64(*)[3][2])lattice)) {
+            kernel_lattice_cells_store((const kernel_f64(*)[3][2])lattice, vertices, f, tile, out, type);
             return vm_none();
         }
     }
     const vm collapsed = p->has_narrow_positions ? kernel_sorted_curved_fetch(out, p, true, type, vertices)
                                                  : kernel_sorted_curved_fetch(out, p, false, type, vertices);
     for (int i = 0; i < grid_type_vertices(type); i++) {
-        const kernel_wide_doubles *const world[3] = {&out->world[0][i], &out->world[1][i], &out->world[2][i]};
         vf at[3];
-        kernel_lanes_transform(f, tile, world, at);
+        kernel_lanes_transform(f, tile, (const kernel_f64(*)[2])out->world[i], at);
         for (int a = 0; a < 3; a++) vf_store(out->at[a][i], at[a]);
     }
     return collapsed;
@@ -426,15 +426,15 @@ SIMD_INLINE vm kernel_transform_curved_of_type(kernel_transformed_curved *out, c
                                                int type)
 {
     const int count = grid_type_vertices(type);
-    kernel_wide_doubles values[8];
+    kernel_f64 values[8][2];
     vf relative[8];
     const vm collapsed = kernel_transform_curved_vertices(out, p, f, tile, vertices, type);
     for (int i = 0; i < count; i++) {
         vi vertex;
         memcpy(&vertex, out->vertex[i], sizeof vertex);
-        values[i] = kernel_numbers_gather(&p->values, vertex);
+        kernel_numbers_gather(&p->values, vertex, values[i]);
     }
-    kernel_lanes_relative(values, count, isovalues, relative);
+    kernel_lanes_relative((const kernel_f64(*)[2])values, count, isovalues, relative);
     for (int i = 0; i < count; i++) vf_store(out->at[3][i], relative[i]);
     return collapsed;
 }
@@ -465,7 +465,7 @@ static __attribute__((noinline)) void kernel_transformed_curved_cell(const kerne
         c->z[i] = h->at[2][i][n];
         c->f[i] = h->at[3][i][n];
         c->rank[i] = h->rank[i][n];
-        for (int a = 0; a < 3; a++) c->world[i][a] = kernel_wide_doubles_lane(&h->world[a][i], n);
+        for (int a = 0; a < 3; a++) c->world[i][a] = kernel_halves_lane(h->world[i][a], n);
     }
 }
 

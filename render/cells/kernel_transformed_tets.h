@@ -19,7 +19,7 @@
 
 /* The data of a kernel_cell for one tet per lane; the caller sets f. */
 typedef struct kernel_transformed_tets {
-    kernel_wide_doubles world[3][4], values[4]; /* coordinates and values as the caller of the library passed them */
+    kernel_f64 world[4][3][2], values[4][2]; /* coordinates and values as the caller of the library passed them */
     vf at[3][4], f[4];
     vf c[KERNEL_TET_EDGES], cu[KERNEL_TET_EDGES], cv[KERNEL_TET_EDGES], bound[KERNEL_TET_EDGES];
     vf doubt, least[4];
@@ -41,8 +41,8 @@ SIMD_INLINE void kernel_transformed_sort(kernel_transformed_tets *out, const ker
             kernel_sorted_swap(&h, is_narrow, kernel_raw_before(is_narrow, h.at[i + 1], h.at[i]), i, i + 1);
     for (int i = 0; i < 4; i++) {
         out->vertex[i] = h.vertex[i];
-        out->values[i] = kernel_numbers_gather(&p->values, h.vertex[i]);
-        for (int a = 0; a < 3; a++) out->world[a][i] = kernel_raw_to_double(is_narrow, &h.at[i][a]);
+        kernel_numbers_gather(&p->values, h.vertex[i], out->values[i]);
+        for (int a = 0; a < 3; a++) kernel_raw_widen(is_narrow, &h.at[i][a], out->world[i][a]);
     }
 }
 
@@ -50,9 +50,8 @@ SIMD_INLINE void kernel_transformed_positions(kernel_transformed_tets *out, cons
                                               const kernel_tile *tile)
 {
     for (int i = 0; i < 4; i++) {
-        const kernel_wide_doubles *const world[3] = {&out->world[0][i], &out->world[1][i], &out->world[2][i]};
         vf at[3];
-        kernel_lanes_transform(f, tile, world, at);
+        kernel_lanes_transform(f, tile, (const kernel_f64(*)[2])out->world[i], at);
         for (int a = 0; a < 3; a++) out->at[a][i] = at[a];
     }
 }
@@ -124,8 +123,8 @@ SIMD_INLINE void kernel_transformed_tets_cell(const kernel_transformed_tets *tra
 SIMD_INLINE void kernel_transformed_tets_double(const kernel_transformed_tets *transformed, int n, kernel_cell *c)
 {
     for (int i = 0; i < 4; i++) {
-        c->values[i] = kernel_wide_doubles_lane(&transformed->values[i], n);
-        for (int a = 0; a < 3; a++) c->world[i][a] = kernel_wide_doubles_lane(&transformed->world[a][i], n);
+        c->values[i] = kernel_halves_lane(transformed->values[i], n);
+        for (int a = 0; a < 3; a++) c->world[i][a] = kernel_halves_lane(transformed->world[i][a], n);
     }
 }
 

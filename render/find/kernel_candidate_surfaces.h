@@ -154,7 +154,7 @@ static __attribute__((noinline)) void kernel_lattice_lanes_transform(const kerne
 {
     const render_camera *camera = &s->frame->job->camera;
     const double *axes[3] = {camera->right, camera->up, camera->forward};
-    kernel_wide_doubles cells[2][3];
+    kernel_f64 cells[2][3][2];
     vf parts[3][3][2];
     kernel_lattice_cells_read(&s->arrays, c->vertex[0], cells);
     l->count = 8;
@@ -162,7 +162,7 @@ static __attribute__((noinline)) void kernel_lattice_lanes_transform(const kerne
     for (int end = 0; end < 2; end++) {
         vf place[3];
         for (int k = 0; k < 3; k++) {
-            const kernel_raw_numbers world = {.wide = cells[end][k]};
+            const kernel_raw_numbers world = {.wide = {cells[end][k][0], cells[end][k][1]}};
             place[k] =
                 kernel_raw_minus(&s->arrays.coordinates[k], &world, &s->eye[k]) * (float)s->frame->job->space.scale;
             for (int a = 0; a < 3; a++) parts[a][k][end] = place[k] * (float)axes[a][k];

@@ -49,7 +49,7 @@ static __attribute__((noinline)) void kernel_find_volumes(kernel_finder *s, cons
         kernel_raw_numbers value;
         vf place[3], at[3];
         kernel_arrays_values(&s->arrays, vertex, c->cell, &value);
-        v[i] = kernel_numbers_are_narrow(&s->arrays.values) ? value.narrow : kernel_wide_doubles_narrow(&value.wide);
+        v[i] = kernel_numbers_are_narrow(&s->arrays.values) ? value.narrow : kernel_halves_narrow(value.wide);
         fitting = vm_and(fitting, vf_lt(vf_abs(v[i]), vf_set(1e30f)));
         kernel_finder_positions(s, vertex, place);
         fitting = kernel_positions_fit_lanes(fitting, place);
@@ -101,21 +101,18 @@ static __attribute__((noinline)) void kernel_find_single_cell(kernel_finder *s, 
 static void kernel_find_queued(kernel_finder *s)
 {
     const kernel_arrays *p = &s->arrays;
-    for (int n = 0, end; n < s->queued_count; n = end) {
-        const int type = kernel_arrays_type(p, s->queued[n]);
-        end = n + 1;
+    for (int n = 0; n < s->queued_count; n++) {
+        const uint32_t cell = s->queued[n];
+        const int type = kernel_arrays_type(p, cell);
         if (kernel_has_own_faces(type) || !p->has_lanes) {
-            kernel_find_single_cell(s, s->queued[n]);
+            kernel_find_single_cell(s, cell);
             continue;
         }
         kernel_cells *c = &s->pending[kernel_lane_type_index(type)];
         if (c->count == SIMD_WIDTH) kernel_find_pending(s, c);
-        const int free_lanes = SIMD_WIDTH - c->count,
-                  last = free_lanes < s->queued_count - n ? n + free_lanes : s->queued_count;
-        while (end < last && kernel_arrays_type(p, s->queued[end]) == type) end++;
-        for (int k = n; k < end; k++) c->cell[c->count + k - n] = s->queued[k];
-        kernel_arrays_cells(p, s->queued + n, end - n, c->vertices, c->vertex, c->count);
-        c->count += end - n;
+        c->cell[c->count] = cell;
+        kernel_arrays_vertices_of_any(p, cell, c->vertices, c->vertex[0] + c->count, SIMD_WIDTH);
+        c->count++;
     }
     s->queued_count = 0;
 }

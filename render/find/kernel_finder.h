@@ -115,25 +115,6 @@ static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, 
     s->row_0 = (float)(-f->slope_y0 / f->slope_dy);
 }
 
-/* Counts the candidate in each tile that its box of pixels meets. Most candidates lie in one tile or two adjacent ones,
- * which a branch could not predict, so up to four tiles are counted without branches. */
-SIMD_INLINE void kernel_count_tiles(kernel_candidate_list *list, int x0, int x1, int y0, int y1)
-{
-    const int left = x0 / KERNEL_TILE, columns = x1 / KERNEL_TILE - left, top = y0 / KERNEL_TILE,
-              rows = y1 / KERNEL_TILE - top;
-    uint32_t *first = list->counts + top * list->tile_columns + left;
-    if (columns <= 1 && rows <= 1) {
-        const int below = rows * list->tile_columns;
-        first[0]++;
-        first[columns] += (uint32_t)columns;
-        first[below] += (uint32_t)rows;
-        first[below + columns] += (uint32_t)(rows & columns);
-        return;
-    }
-    for (int y = 0; y <= rows; y++)
-        for (int x = 0; x <= columns; x++) first[y * list->tile_columns + x]++;
-}
-
 /* ---- cells in lanes ---- */
 
 /* Bounds of one isovalue's surface in each lane's cell: depths from the eye, and positions in columns and rows of
@@ -246,7 +227,6 @@ static void kernel_add_lanes(kernel_finder *s, const kernel_view_bounds *e, unsi
                                                         .x1 = (uint16_t)ends[1][n],
                                                         .y0 = (uint16_t)ends[2][n],
                                                         .y1 = (uint16_t)ends[3][n]};
-        if (list->counts) kernel_count_tiles(list, ends[0][n], ends[1][n], ends[2][n], ends[3][n]);
     }
 }
 

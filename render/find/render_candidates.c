@@ -1,5 +1,5 @@
-/* Finds candidates in parallel. Subtrees are distributed among threads. Each thread lists the cells that it finds,
- * counts them by tile, and bins its own cells; threads do not synchronize in between. The thread that traces a tile
+/* Finds candidates in parallel. Subtrees are distributed among threads. Each thread lists the cells that it finds, and
+ * bins them by tile; threads do not synchronize in between. The thread that traces a tile
  * gathers the tile's cells from the bins of all threads. A bound on the number of cells limits memory and wasted time:
  * if there is more than one cell per pixel, most listed cells are hidden or smaller than a pixel. Cells of a volume are
  * not hidden, so a million of them may be listed in any case. */
@@ -8,6 +8,7 @@
 #include "kernel_types.h"
 #include "render.h"
 #include "render_kernels.h"
+#include "render_prepare.h"
 #include "render_subtrees.h"
 
 #include <math.h>
@@ -24,22 +25,6 @@ enum { ITEMS = 1024, MOST_ITEMS = 64 * ITEMS, VOLUME_ITEMS = 1024 * ITEMS };
  * volume, or of a surface, count as small. For a surface only the cells in leaves that isovalues may cross are counted
  * (docs/development/decisions/find.md). SAMPLES: number of tree nodes from which their share is estimated. */
 enum { SMALL_CELLS = 8, SMALL_CROSSED = 3, SAMPLES = 512 };
-
-/* ---- subtrees ------------------------------------------------------------------------------------------------- */
-
-/* Divides the trees of all surfaces, or of the volume, into subtrees. Returns false if there is no memory. */
-static bool cut_trees(const kernel_frame *f, bool is_volume, render_subtrees *list)
-{
-    const render_job *job = f->job;
-    const int first = is_volume ? -1 : 0, end = is_volume ? 0 : f->surface_count;
-    if (!render_subtrees_begin(list, (int64_t)(end - first) * job->part_count)) return false;
-    for (int s = first; s < end; s++) {
-        const render_field *field = is_volume ? &job->volumes[0].field : &f->surfaces[s].layer->field;
-        for (int part = 0; part < job->part_count; part++)
-            if (field->ranges[part].low && job->parts[part].tree->node_count) render_subtrees_add(list, f, s, part);
-    }
-    return true;
-}
 
 /* ---- cells ---------------------------------------------------------------------------------------------------- */
 
@@ -106,21 +91,26 @@ static void bins_free(struct kernel_bins *bins)
     base_free(bins);
 }
 
-/* Copies the cells to their tiles' bins. at[tile] is the index at which the tile's next cell is stored. */
+/* Advances at[tile] for each cell of a tile. Copies the cells to their tiles' bins, unless `out` is NULL: at[tile] is
+ * the index at which the tile's next cell is stored. */
 static void bin_tiles(const kernel_candidate_chunk *chunk, int64_t across, uint32_t *at, kernel_tile_candidate *out)
 {
-    for (const kernel_candidate *s = chunk->items, *end = s + chunk->count; s < end; s++)
-        for (int y = s->y0 / KERNEL_TILE; y <= s->y1 / KERNEL_TILE; y++)
-            for (int x = s->x0 / KERNEL_TILE; x <= s->x1 / KERNEL_TILE; x++)
-                out[at[y * across + x]++] = kernel_candidate_in_tile(s, x * KERNEL_TILE, y * KERNEL_TILE);
+    for (; chunk; chunk = chunk->before)
+        for (const kernel_candidate *s = chunk->items, *end = s + chunk->count; s < end; s++)
+            for (int y = s->y0 / KERNEL_TILE; y <= s->y1 / KERNEL_TILE; y++)
+                for (int x = s->x0 / KERNEL_TILE; x <= s->x1 / KERNEL_TILE; x++) {
+                    const uint32_t n = at[y * across + x]++;
+                    if (out) out[n] = kernel_candidate_in_tile(s, x * KERNEL_TILE, y * KERNEL_TILE);
+                }
 }
 
-/* Bins the cells that a thread has found. On entry starts[1 + tile] must be the number of cells in each tile. Returns
- * false if the sum is more than `most`, or memory runs out. */
-static bool bins_fill(struct kernel_bins *bin, int64_t tiles, int64_t most)
+/* Bins the cells that a thread has found. Returns false if they are more than `most`, counted once for each of their
+ * tiles, or memory runs out. */
+static bool bins_fill(struct kernel_bins *bin, int64_t across, int64_t tiles, int64_t most)
 {
     uint32_t *starts = bin->starts;
     uint64_t sum = 0;
+    bin_tiles(bin->list.chunk, across, starts + 1, NULL);
     for (int64_t tile = 0; tile < tiles; tile++) {
         const uint32_t count = starts[1 + tile];
         /* bin_tiles() advances this index from the tile's first cell to the next tile's first cell */
@@ -130,8 +120,7 @@ static bool bins_fill(struct kernel_bins *bin, int64_t tiles, int64_t most)
     if (sum > (uint64_t)most) return false;
     bin->items = base_alloc(sum * sizeof *bin->items);
     if (!bin->items) return false;
-    for (const kernel_candidate_chunk *c = bin->list.chunk; c; c = c->before)
-        bin_tiles(c, bin->list.tile_columns, starts + 1, bin->items);
+    bin_tiles(bin->list.chunk, across, starts + 1, bin->items);
     return true;
 }
 
@@ -266,8 +255,10 @@ static void sample_leaves(const kernel_frame *f, const kernel_surface *s, int pa
         memcpy(&low, ranges->low + node * ranges->stride, sizeof low);
         memcpy(&high, ranges->high + node * ranges->stride, sizeof high);
         *cells += count;
-        for (int i = 0; i < s->visible_values.count; i++)
-            if (low <= s->visible_values.high[i] && high >= s->visible_values.low[i]) *crossed += count;
+        for (int i = 0; i < s->visible_values.count; i++) {
+            const mmbvh_interval own = s->visible_values.intervals[i];
+            if (low <= own.high && high >= own.low) *crossed += count;
+        }
     }
 }
 
@@ -322,8 +313,8 @@ void render_trees_cover(kernel_frame *f)
 
 /* Searches all subtrees in parallel. Each thread bins its own cells, at most `most`, as soon as no subtree is left,
  * without waiting for the others. */
-static void run(const kernel_frame *frame, const render_subtrees *subtrees, struct kernel_bins *bins, int64_t most,
-                kernel_thread *thread_of, int threads)
+static void run(const kernel_frame *frame, const kernel_subtree *subtrees, int64_t count, struct kernel_bins *bins,
+                int64_t most, kernel_thread *thread_of, int threads)
 {
     const kernel_table *kernels = render_kernels();
     const int64_t tiles = tile_count(frame);
@@ -333,12 +324,12 @@ static void run(const kernel_frame *frame, const render_subtrees *subtrees, stru
         const int me = omp_get_thread_num();
         kernel_candidate_list *list = &bins[me].list;
 #pragma omp for schedule(dynamic, 1) nowait
-        for (int64_t i = 0; i < subtrees->count; i++) {
-            list->is_full = list->is_full || !render_thread_begin(kernels, &thread_of[me]);
-            if (!list->is_full) kernels->find_candidates(frame, &thread_of[me], &subtrees->items[i], list, grow);
+        for (int64_t i = 0; i < count; i++) {
+            list->is_full = list->is_full || !render_thread_begin(frame, kernels, &thread_of[me]);
+            if (!list->is_full) kernels->find_candidates(frame, &thread_of[me], &subtrees[i], list, grow);
         }
         if (list->chunk) list->chunk->count = list->count;
-        list->is_full = list->is_full || !bins_fill(&bins[me], tiles, most);
+        list->is_full = list->is_full || !bins_fill(&bins[me], tiles_across(frame), tiles, most);
         region_leave();
     }
 }
@@ -356,8 +347,7 @@ static struct kernel_bins *begin_bins(const kernel_frame *frame, int64_t *bound,
         }
         if (t) bins[t - 1].next = &bins[t];
         bins[t].starts = starts;
-        bins[t].list =
-            (kernel_candidate_list){.bound = bound, .counts = starts + 1, .tile_columns = (int)tiles_across(frame)};
+        bins[t].list.bound = bound;
     }
     return bins;
 }
@@ -380,11 +370,12 @@ static struct kernel_bins *find(kernel_frame *frame, bool is_volume, kernel_thre
     const int64_t cells = is_volume && pixels < VOLUME_ITEMS ? VOLUME_ITEMS : pixels;
     int64_t bound = cells + ITEMS * (int64_t)threads;
     const int64_t most = 2 * bound;
-    render_subtrees subtrees = {0};
+    int64_t count;
     struct kernel_bins *bins = begin_bins(frame, &bound, threads);
-    const bool is_begun = bins && cut_trees(frame, is_volume, &subtrees);
-    if (is_begun) run(frame, &subtrees, bins, most, thread_of, threads);
-    base_free(subtrees.items);
+    kernel_subtree *subtrees = render_subtrees(frame, is_volume ? -1 : 0, is_volume ? 0 : frame->surface_count, &count);
+    const bool is_begun = bins && subtrees;
+    if (is_begun) run(frame, subtrees, count, bins, most, thread_of, threads);
+    base_free(subtrees);
     if (!is_begun || !is_complete(bins, tile_count(frame), most)) {
         bins_free(bins);
         return NULL;

@@ -5,6 +5,7 @@
 #include <math.h>
 
 #include "kernel_clip.h"
+#include "kernel_hits.h"
 #include "kernel_types.h"
 #include "mmbvh.h"
 #include "pixel_set.h"
@@ -15,7 +16,8 @@ typedef struct kernel_packet {
     const kernel_frame *frame;
     const kernel_tile *tile;
     kernel_thread *thread;
-    int x0, y0; /* column and row of the packet's upper left pixel */
+    kernel_hits *hits; /* hits on surfaces; set only for packets of a tile that is being traced */
+    int x0, y0;        /* column and row of the packet's upper left pixel */
     vm active;
     bool is_nearer; /* set when t_far of some ray has decreased since the flag was last cleared */
     bool has_view;

@@ -61,6 +61,7 @@ SIMD_INLINE void kernel_block_begin(kernel_tile_trace *t, int block)
         kernel_packet_begin(&t->packets[i], t->frame, &t->tile, t->thread, x + n % across * KERNEL_PACKET_COLUMNS,
                             y + n / across * KERNEL_PACKET_ROWS);
         kernel_hits_begin(&t->hits[i]);
+        t->packets[i].hits = &t->hits[i];
     }
 }
 

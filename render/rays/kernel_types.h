@@ -7,6 +7,7 @@
 
 #include "fragment.h"
 #include "grid.h"
+#include "mmbvh.h"
 #include "render.h"
 
 enum {
@@ -60,13 +61,16 @@ typedef struct kernel_bound {
     float extinction_low, extinction_high, extinction_slope, colour_slope;
 } kernel_bound;
 
-/* Bounds of a transfer function over a range of values that contains no step of the opacity. A field error d changes
- * the light by at most cost * d per unit distance. For fixed light from the front and from behind, that change varies
- * by at most variation * d. */
-typedef struct kernel_light_variation {
-    float variation, cost;
-    float extinction, steepness; /* maximum of the extinction, and of its slope times the contrast */
-} kernel_light_variation;
+/* Entries of a row of bounds of a transfer function over a range of values that contains no step of the opacity. A
+ * field error d changes the light by at most the cost times d per unit distance. For fixed light from the front and
+ * from behind, that change varies by at most the variation times d. */
+enum {
+    KERNEL_LIGHT_VARIATION,
+    KERNEL_LIGHT_COST,
+    KERNEL_LIGHT_EXTINCTION, /* maximum of the extinction */
+    KERNEL_LIGHT_STEEPNESS,  /* maximum of the extinction's slope times the contrast */
+    KERNEL_LIGHT_ENTRIES
+};
 
 /* A bin of the table of sums for preintegration (kernel_preintegral.h), in integer units. Each array holds the
  * extinction first, then the emission in three channels. The struct is read as rows of four floats. */
@@ -97,9 +101,9 @@ typedef struct kernel_pieces {
     kernel_real bin_first[KERNEL_PIECE_BINS];
     /* Bounds over ranges of values, in a table of KERNEL_VARIATION_WIDTHS × KERNEL_VARIATION_BINS: its row is the
      * range's class of width, its column the equal-width bin in which the range begins; bins begin at bin_low
-     * (kernel_light_variation_entry()). */
+     * (kernel_light_bounds()). */
     float variation_inverse;
-    kernel_light_variation *variations;
+    float (*variations)[KERNEL_LIGHT_ENTRIES];
     /* Set if a ramp of the opacity is so narrow that the rounding of its ends is visible: values near it then use the
      * ends' rounding errors (KERNEL_PIECE_LOW_REST). */
     bool has_rests;
@@ -129,7 +133,7 @@ typedef struct kernel_tile {
 /* Intervals of visible values, rounded outward: a node whose range meets none of them is skipped. */
 typedef struct kernel_visible_values {
     int count;
-    float low[KERNEL_MAX_INTERVALS], high[KERNEL_MAX_INTERVALS];
+    mmbvh_interval intervals[KERNEL_MAX_INTERVALS];
 } kernel_visible_values;
 
 /* A transfer function in its own domain, in which low is 0 and low + 1 / inverse_width is 1. The domain is the range
@@ -235,9 +239,6 @@ typedef struct kernel_candidate_list {
     kernel_candidate_chunk *chunk; /* the current chunk; NULL at first */
     kernel_candidate *items;       /* items of the current chunk */
     int64_t count, capacity;       /* number of items in the current chunk, and how many fit */
-    /* number of candidates, over all chunks, that meet each of the picture's tiles, row by row */
-    uint32_t *counts;
-    int tile_columns;
     /* set if no more candidates can be added, because memory ran out or the maximum number is reached */
     bool is_full;
     int64_t *bound; /* number of candidates that may still be added, shared by all threads' lists */
@@ -276,10 +277,11 @@ typedef struct kernel_frame {
      * own. */
     int volume_intervals;
     bool has_transparent;
-    bool is_binned;    /* set if the cells of surfaces are binned by tile, unless there are too many */
-    bool bins_volume;  /* set if the cells of the only volume are binned by tile */
-    bool needs_planes; /* set if tiles traverse the trees, for which they need planes */
-    bool has_segments; /* set if volumes are integrated by segments; otherwise they are sampled */
+    bool has_polyhedra; /* set if a mesh part has them */
+    bool is_binned;     /* set if the cells of surfaces are binned by tile, unless there are too many */
+    bool bins_volume;   /* set if the cells of the only volume are binned by tile */
+    bool needs_planes;  /* set if tiles traverse the trees, for which they need planes */
+    bool has_segments;  /* set if volumes are integrated by segments; otherwise they are sampled */
     /* set if the ends of intervals in tets and of bisected intervals are computed in double (kernel_exact.h) */
     bool is_double;
     kernel_pieces pieces[RENDER_MAX_VOLUMES];
@@ -309,7 +311,7 @@ typedef struct kernel_thread {
     bool out_of_memory;
     /* counters for render_statistics: failed inversions of cells' maps, and cells visited by volumes */
     int64_t map_failures, volume_cells;
-    /* The tile's polyhedra (render_polyhedra.h); NULL if no mesh has any. */
+    /* The tile's polyhedra (render_polyhedra.h); NULL if no mesh part has any. */
     struct polyhedron_store *polyhedra;
     double surface_seconds, volume_seconds;
 } kernel_thread;
@@ -345,9 +347,10 @@ typedef struct kernel_table {
      * hits[i]. */
     void (*sample_pending)(const kernel_frame *frame, kernel_thread *thread, const render_pending_hit *hits,
                            render_difference_samples *out, int64_t count);
-    /* Computes the fragments out[i] of the list's hits i from samples[i], first <= i < first + count. */
-    void (*light_pending)(const kernel_frame *frame, kernel_thread *thread, const render_pending_list *list,
-                          const render_difference_samples *samples, int64_t first, int64_t count, fragment *out);
+    /* Computes the fragments out[i] of `count` hits from samples[i]. */
+    void (*light_pending)(const kernel_frame *frame, kernel_thread *thread, const render_pending_hit *hits,
+                          float (*shadings)[2][3], const render_difference_samples *samples, fragment *out,
+                          int64_t count);
 } kernel_table;
 
 extern const kernel_table kernel_table_plain, kernel_table_sse42, kernel_table_avx2, kernel_table_avx512;

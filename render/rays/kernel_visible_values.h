@@ -11,7 +11,7 @@
 SIMD_INLINE bool kernel_visible_values_overlap(const kernel_visible_values *visible_values, float low, float high)
 {
     for (int i = 0; i < visible_values->count; i++)
-        if (low <= visible_values->high[i] && high >= visible_values->low[i]) return true;
+        if (low <= visible_values->intervals[i].high && high >= visible_values->intervals[i].low) return true;
     return false;
 }
 
@@ -19,9 +19,10 @@ SIMD_INLINE bool kernel_visible_values_overlap(const kernel_visible_values *visi
 SIMD_INLINE vm kernel_visible_values_overlap_lanes(const kernel_visible_values *visible_values, vf low, vf high)
 {
     vm meets = vm_none();
-    for (int i = 0; i < visible_values->count; i++)
-        meets = vm_or(meets,
-                      vm_and(vf_le(low, vf_set(visible_values->high[i])), vf_le(vf_set(visible_values->low[i]), high)));
+    for (int i = 0; i < visible_values->count; i++) {
+        const mmbvh_interval own = visible_values->intervals[i];
+        meets = vm_or(meets, vm_and(vf_le(low, vf_set(own.high)), vf_le(vf_set(own.low), high)));
+    }
     return meets;
 }
 

@@ -94,33 +94,24 @@ SIMD_INLINE kernel_f64 kernel_f64_clamp(kernel_f64 v, double limit)
     return kernel_f64_select((kernel_f64_mask)(most < v), most, v);
 }
 
-/* A vector of SIMD_WIDTH doubles, one per lane, stored as two halves. */
-typedef struct kernel_wide_doubles {
-    kernel_f64 half[2];
-} kernel_wide_doubles;
+/* ---- SIMD_WIDTH doubles, one per lane, as two halves ---- */
 
-SIMD_INLINE kernel_wide_doubles kernel_wide_doubles_set(double x)
+SIMD_INLINE void kernel_halves_widen(vf v, kernel_f64 out[2])
 {
-    const kernel_f64 all = (kernel_f64){0} + x;
-    return (kernel_wide_doubles){{all, all}};
+    for (int half = 0; half < 2; half++) out[half] = kernel_f64_of(&v, half);
 }
 
-SIMD_INLINE kernel_wide_doubles kernel_wide_doubles_widen(vf v)
-{
-    return (kernel_wide_doubles){{kernel_f64_of(&v, 0), kernel_f64_of(&v, 1)}};
-}
-
-SIMD_INLINE vf kernel_wide_doubles_narrow(const kernel_wide_doubles *v)
+SIMD_INLINE vf kernel_halves_narrow(const kernel_f64 v[2])
 {
     vf out;
-    for (int half = 0; half < 2; half++) kernel_f64_store_lanes(&out, half, v->half[half]);
+    for (int half = 0; half < 2; half++) kernel_f64_store_lanes(&out, half, v[half]);
     return out;
 }
 
 /* Returns the double in the given lane. */
-SIMD_INLINE double kernel_wide_doubles_lane(const kernel_wide_doubles *v, int lane)
+SIMD_INLINE double kernel_halves_lane(const kernel_f64 v[2], int lane)
 {
-    return v->half[lane / KERNEL_HALF][lane % KERNEL_HALF];
+    return v[lane / KERNEL_HALF][lane % KERNEL_HALF];
 }
 
 #endif

@@ -105,11 +105,11 @@ static void grow_box(render_box *box, const render_space *s, const mmbvh *tree)
     }
 }
 
-render_box hit_box(const render_job *job, bool (*has_active_pixel)(const render_surface_layer *layer))
+render_box hit_box(const render_job *job, bool (*is_wanted)(const render_surface_layer *layer))
 {
     render_box out = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
     for (int i = 0; i < job->surface_count; i++) {
-        if (!has_active_pixel(&job->surfaces[i])) continue;
+        if (!is_wanted(&job->surfaces[i])) continue;
         for (int part = 0; part < job->part_count; part++)
             if (job->surfaces[i].field.ranges[part].low && job->parts[part].tree->node_count)
                 grow_box(&out, &job->space, job->parts[part].tree);

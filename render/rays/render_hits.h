@@ -18,7 +18,7 @@ static inline double hit_dot(const double a[3], const double b[3])
 
 /* Returns the bounding box, in the scene's coordinates, of this rank's trees on which a surface layer accepted by
  * is_wanted() has values. */
-render_box hit_box(const render_job *job, bool (*has_active_pixel)(const render_surface_layer *layer));
+render_box hit_box(const render_job *job, bool (*is_wanted)(const render_surface_layer *layer));
 
 /* Computes an orthonormal set of axes (right, up, forward) whose last one is the unit vector n. */
 void hit_axes_around(const double n[3], double axes[3][3]);

@@ -8,7 +8,6 @@
 #include <string.h>
 
 #include "cpu.h"
-#include "memory.h"
 
 static pthread_once_t once = PTHREAD_ONCE_INIT;
 static cpu_isa chosen;
@@ -67,14 +66,4 @@ const char *render_isa_warning(void)
 {
     pthread_once(&once, choose);
     return warning;
-}
-
-bool render_thread_begin(const kernel_table *kernels, kernel_thread *thread)
-{
-    if (!thread->memory && !thread->out_of_memory) {
-        thread->memory = base_alloc(kernels->memory_bytes);
-        thread->out_of_memory = !thread->memory;
-        if (thread->memory) kernels->begin(thread);
-    }
-    return !thread->out_of_memory;
 }

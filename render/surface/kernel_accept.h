@@ -13,6 +13,7 @@
 #include "kernel_lines.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
+#include "kernel_surface_cells.h"
 #include "kernel_tile_trace.h"
 #include "kernel_types.h"
 #include "render.h"
@@ -176,15 +177,10 @@ SIMD_INLINE void kernel_tet_normal(const kernel_packet *p, const kernel_cell *c,
 
 /* ---- hits of a packet ---- */
 
-typedef struct kernel_surface_state {
-    const kernel_surface *surface;
-    int layer;
-    kernel_hits *hits;
-    bool is_opaque;
-    /* set if the lanes' contraction test has already been done for these rays and has not decided them
-     * (kernel_contraction.h) */
-    bool is_contracted;
-} kernel_surface_state;
+SIMD_INLINE bool kernel_is_opaque(const kernel_packet *p, const kernel_surface *s)
+{
+    return s < p->frame->surfaces + p->frame->opaque_count;
+}
 
 /* Transforms gradients from tile space to camera axes, by undoing the shear. */
 SIMD_INLINE void kernel_unshear(const kernel_tile *tile, vf g[3])
@@ -351,56 +347,51 @@ SIMD_INLINE vm kernel_visible(const kernel_packet *p, const kernel_surface *s, v
 
 /* ---- hits of rays in lanes, each with its own cell ---- */
 
-/* The hit of one ray. */
-typedef struct kernel_ray_hit {
-    int part, value;
-    uint32_t cell;
-    float depth;
-    float normal[3]; /* a normal or reference coordinates, as in kernel_hits */
-    float colour[3]; /* colour before lighting */
-} kernel_ray_hit;
-
 /* Emits one ray's hit that has the same depth as the nearest one. */
 static __attribute__((noinline, cold)) void kernel_ray_emit_equal_depth(kernel_packet *p, const kernel_surface *s,
-                                                                        int ray, const kernel_ray_hit *hit)
+                                                                        int ray, const kernel_surface_cells *cells,
+                                                                        int n, float depth, const float normal[3],
+                                                                        const float colour[3])
 {
     const vm tied = vm_from_bits(1u << ray);
-    kernel_surface_hits h = {.value = hit->value, .t = vf_set(hit->depth)};
+    kernel_surface_hits h = {.value = cells->value[n], .t = vf_set(depth)};
     for (int a = 0; a < 3; a++) {
-        h.normal[a] = vf_set(hit->normal[a]);
-        h.colour[a] = vf_set(hit->colour[a]);
+        h.normal[a] = vf_set(normal[a]);
+        h.colour[a] = vf_set(colour[a]);
     }
     if (s->layer->normal == RENDER_VERTEX)
-        kernel_vertex_normals(p, s, tied, h.t, vi_set(hit->part), vi_set((int32_t)hit->cell), h.normal);
+        kernel_vertex_normals(p, s, tied, h.t, vi_set(cells->part), vi_set((int32_t)cells->cell[n]), h.normal);
     kernel_emit_tied(p, s, tied, &h);
 }
 
-/* Keeps one ray's hit if it is the ray's nearest, as kernel_accept() does for the rays of a packet. Several lanes may
- * hold rays of the same pixel, so hits in lanes are accepted one by one. Returns the bit of the ray's block if the hit
- * is nearer than the last one, else 0. */
-SIMD_INLINE unsigned kernel_ray_accept(kernel_tile_trace *t, int at, const kernel_ray_hit *hit)
+/* Keeps the hit of ray number `at` of the tile on the n-th of the cells if it is the ray's nearest, as kernel_accept()
+ * does for the rays of a packet. normal: as in kernel_hits; colour: that before lighting. Several lanes may hold rays
+ * of the same pixel, so hits in lanes are accepted one by one. Returns the bit of the ray's block if the hit is nearer
+ * than the last one, else 0. */
+SIMD_INLINE unsigned kernel_ray_accept(kernel_tile_trace *t, int at, const kernel_surface_cells *cells, int n,
+                                       float depth, const float normal[3], const float colour[3])
 {
     const kernel_surface *s = t->surface;
     const int ray = at % SIMD_WIDTH;
     kernel_packet *p = &t->packets[at / SIMD_WIDTH];
-    kernel_hits *hits = &t->hits[at / SIMD_WIDTH];
+    kernel_hits *hits = p->hits;
     const float far = p->t_far[ray];
-    if (!(hit->depth <= far) || !(vm_bits(p->active) >> ray & 1)) return 0;
-    if (hit->depth == far && far < INFINITY) {
-        kernel_ray_emit_equal_depth(p, s, ray, hit);
+    if (!(depth <= far) || !(vm_bits(p->active) >> ray & 1)) return 0;
+    if (depth == far && far < INFINITY) {
+        kernel_ray_emit_equal_depth(p, s, ray, cells, n, depth, normal, colour);
         return 0;
     }
-    p->t_far[ray] = hit->depth;
+    p->t_far[ray] = depth;
     vm_set_lane(&hits->found, ray);
     for (int a = 0; a < 3; a++) {
-        hits->normal[a][ray] = hit->normal[a];
-        hits->colour[a][ray] = hit->colour[a];
+        hits->normal[a][ray] = normal[a];
+        hits->colour[a][ray] = colour[a];
     }
     if (s->layer->normal == RENDER_VERTEX) {
-        hits->part[ray] = hit->part;
-        hits->cell[ray] = (int32_t)hit->cell;
+        hits->part[ray] = cells->part;
+        hits->cell[ray] = (int32_t)cells->cell[n];
     }
-    hits->kind[ray] = (float)((int)s->first_kind + hit->value);
+    hits->kind[ray] = (float)((int)s->first_kind + cells->value[n]);
     return 1u << at / (KERNEL_BLOCK * KERNEL_BLOCK);
 }
 

@@ -58,8 +58,7 @@ static __attribute__((noinline)) void kernel_batch_normals(kernel_batch *b, cons
         kernel_f64 d[3][3], df[3], g[3], largest = {0};
         for (int i = 0; i < 3; i++) {
             df[i] = kernel_f64_of(&b->tets.f[i + 1], half) - kernel_f64_of(&b->tets.f[0], half);
-            for (int a = 0; a < 3; a++)
-                d[i][a] = (b->tets.world[a][i + 1].half[half] - b->tets.world[a][0].half[half]) * scale;
+            for (int a = 0; a < 3; a++) d[i][a] = (b->tets.world[i + 1][a][half] - b->tets.world[0][a][half]) * scale;
         }
         for (int a = 0; a < 3; a++) {
             const int p = (a + 1) % 3, q = (a + 2) % 3;
@@ -117,15 +116,12 @@ SIMD_INLINE vm kernel_batch_hit(const kernel_batch *b, float t_near, const kerne
 /* Computes the field of the contour lines in lane n's cell. */
 static __attribute__((noinline)) void kernel_batch_line_field(const kernel_tile_trace *t, kernel_batch *b, int n)
 {
-    const grid_field *field = &t->surface->layer->lines->field.fields[b->queued->part];
-    double world[4][3], value[4];
-    const double *const corner[4] = {world[0], world[1], world[2], world[3]};
+    kernel_cell c;
     kernel_tet_line line;
-    for (int i = 0; i < 4; i++) {
-        value[i] = kernel_lines_value(t->surface, field, b->tets.vertex[i][n]);
-        for (int a = 0; a < 3; a++) world[i][a] = kernel_wide_doubles_lane(&b->tets.world[a][i], n);
-    }
-    kernel_tet_line_of(t->frame, &t->tile, corner, value, &line);
+    c.part = b->queued->part;
+    for (int i = 0; i < 4; i++) c.vertices[i] = b->tets.vertex[i][n];
+    kernel_transformed_tets_double(&b->tets, n, &c);
+    kernel_cell_line_of(t->frame, &t->tile, t->surface, &c, &line);
     b->line_value[n] = line.value;
     b->line_along[n] = line.along;
     for (int a = 0; a < 3; a++) b->line_gradient[a][n] = line.gradient[a];
@@ -175,13 +171,10 @@ SIMD_INLINE unsigned kernel_batch_accept_coloured(kernel_tile_trace *t, kernel_b
     for (; hit; hit &= hit - 1) {
         const int i = __builtin_ctz(hit), n = lanes[i];
         const float *plain = t->surface->layer->colours + 3 * b->queued->value[n];
-        kernel_ray_hit one = {.part = b->queued->part,
-                              .value = b->queued->value[n],
-                              .cell = b->queued->cell[n],
-                              .depth = depth[i],
-                              .normal = {b->normal[0][n], b->normal[1][n], b->normal[2][n]}};
-        for (int a = 0; a < 3; a++) one.colour[a] = colours ? colours[a][i] : plain[a];
-        blocks |= kernel_ray_accept(t, at[i], &one);
+        const float normal[3] = {b->normal[0][n], b->normal[1][n], b->normal[2][n]};
+        float colour[3];
+        for (int a = 0; a < 3; a++) colour[a] = colours ? colours[a][i] : plain[a];
+        blocks |= kernel_ray_accept(t, at[i], b->queued, n, depth[i], normal, colour);
     }
     return blocks;
 }

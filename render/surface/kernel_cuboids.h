@@ -56,7 +56,7 @@ SIMD_INLINE void kernel_cuboids_normals(const kernel_transformed_curved *cells, 
     const double shear_y = f->job->camera.is_orthographic ? 0 : tile->centre_y;
     for (int i = 0; i < 3; i++) {
         const int axis = 2 - i;
-        const kernel_f64 size = cells->world[axis][neighbour[i]].half[half] - cells->world[axis][0].half[half];
+        const kernel_f64 size = cells->world[neighbour[i]][axis][half] - cells->world[0][axis][half];
         const kernel_f64 inverse = 1 / (size * (scale * scale));
         kernel_f64 row[3];
         for (int a = 0; a < 3; a++) row[a] = f->scaled_axes[a][axis] * inverse;

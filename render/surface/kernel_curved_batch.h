@@ -62,8 +62,8 @@ typedef struct kernel_curved_batch {
     kernel_pixel_list rays, met, found, others;
     /* for each ray in `met`, the two faces that it crosses: number of the first plus 8 times that of the second */
     uint8_t faces[KERNEL_LIST_ROOM];
-    /* depths, values and reference coordinates of the rays in `found` and in `others` */
-    /* the ends of these rays' intervals (kernel_curved_ends_add()) */
+    /* the ends of the intervals of the rays in `found` and in `others` (kernel_curved_ends_add()); if a root is known
+     * by contraction, it is stored instead of the first end */
     float found_ends[2][5][KERNEL_LIST_ROOM], other_ends[2][5][KERNEL_LIST_ROOM];
 } kernel_curved_batch;
 
@@ -74,12 +74,13 @@ static void kernel_curved_batch_begin(kernel_curved_batch *h)
     memset(h->lines, 0, sizeof h->lines);
 }
 
-SIMD_INLINE kernel_curved kernel_curved_batch_cells(const kernel_curved_batch *h)
+SIMD_INLINE kernel_curved kernel_curved_batch_cells(kernel_curved_batch *h)
 {
     return (kernel_curved){.type = h->queued->type,
-                           .at = (const float(*)[8][SIMD_WIDTH])h->transformed.at,
-                           .colours = (const float(*)[SIMD_WIDTH])h->colours,
-                           .bounds = &h->bounds};
+                           .at = h->transformed.at,
+                           .colours = h->colours,
+                           .bounds = &h->bounds,
+                           .is_ready = true};
 }
 
 /* ---- single cells of the batch ---- */
@@ -104,6 +105,7 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_trace_singly(kerne
                                                                            vi at_lanes, unsigned wanted)
 {
     kernel_curved curved = kernel_curved_batch_cells(h);
+    curved.is_contracted = true;
     unsigned blocks = 0;
     int32_t at[SIMD_WIDTH];
     memcpy(at, &at_lanes, sizeof at);
@@ -118,15 +120,10 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_trace_singly(kerne
             }
         }
         kernel_packet *p = &t->packets[at[i] / SIMD_WIDTH];
-        kernel_surface_state state = {.surface = t->surface,
-                                      .layer = t->layer,
-                                      .hits = &t->hits[at[i] / SIMD_WIDTH],
-                                      .is_opaque = true,
-                                      .is_contracted = true};
         p->is_nearer = false;
         kernel_curved_ready(t, h, n);
         curved.lane = n;
-        kernel_cell_surface(p, &state, &h->cells[n], &curved, h->queued->value[n],
+        kernel_cell_surface(p, t->surface, &h->cells[n], &curved, h->queued->value[n],
                             vm_and(p->active, vm_from_bits(same)));
         if (p->is_nearer) blocks |= 1u << at[i] / (KERNEL_BLOCK * KERNEL_BLOCK);
     }
@@ -166,18 +163,13 @@ SIMD_INLINE int kernel_curved_batch_keep(kernel_curved_batch *h, int n, unsigned
     return kept;
 }
 
-/* Appends the rays in at->mask to the list `found`, and their depths and reference coordinates to found_ends. The rays
- * in `undecided` are stored in the list `rays` from index `kept` on. Returns the new number of kept rays. */
-SIMD_INLINE int kernel_curved_batch_part(kernel_curved_batch *h, int n, const kernel_point *at, vf depth,
-                                         unsigned undecided, int kept)
+/* Loads rays of a list, from index n on; those whose cells lie behind their nearest hits are inactive. */
+SIMD_INLINE void kernel_curved_batch_load(const kernel_tile_trace *t, const kernel_curved_batch *h,
+                                          const kernel_pixel_list *rays, int n, kernel_lane_rays *out)
 {
-    for (unsigned bits = vm_bits(at->mask); bits; bits &= bits - 1) {
-        const int i = __builtin_ctz(bits), to = h->found.count;
-        h->found_ends[0][0][to] = depth[i];
-        for (int a = 0; a < 3; a++) h->found_ends[0][2 + a][to] = at->r[a][i];
-        kernel_curved_ray_add(&h->found, &h->rays, n + i);
-    }
-    return kernel_curved_batch_keep(h, n, undecided, kept);
+    kernel_lane_rays_begin(out, t, rays, n);
+    out->far = kernel_pixel_far(t, out->at);
+    out->active = vm_and(out->active, vf_le(kernel_gather_lane(h->queued->near, out->lane), out->far));
 }
 
 /* Decides as many rays as possible without intersecting faces: by the slab that contains the isosurface, and by
@@ -192,16 +184,16 @@ SIMD_INLINE void kernel_curved_batch_contract_of(const kernel_tile_trace *t, ker
         kernel_contraction c;
         kernel_point at;
         vm none;
-        kernel_lane_rays_begin(&p, t, &h->rays, n);
-        p.far = kernel_pixel_far(t, p.at);
-        p.active = vm_and(p.active, vf_le(kernel_gather_lane(h->queued->near, p.lane), p.far));
+        kernel_curved_batch_load(t, h, &h->rays, n, &p);
         kernel_contraction_ray(&cells, &p.rays, p.lane, &c);
         p.active = vm_andnot(p.active, kernel_curved_batch_beside(h, p.lane, &c));
         if (!vm_any(p.active)) continue;
         kernel_contraction_of(&h->bounds, p.lane, type, &c);
         kernel_contract(&c, p.active, &at, &none, type);
-        const vf depth = at.t + kernel_gather_lane(h->transformed.at[2][0], p.lane);
-        kept = kernel_curved_batch_part(h, n, &at, depth, vm_bits(vm_andnot(p.active, vm_or(at.mask, none))), kept);
+        at.t += kernel_gather_lane(h->transformed.at[2][0], p.lane);
+        at.value = vf_set(0);
+        kernel_curved_ends_add(&h->rays, n, &at, 1, vm_bits(at.mask), &h->found, h->found_ends);
+        kept = kernel_curved_batch_keep(h, n, vm_bits(vm_andnot(p.active, vm_or(at.mask, none))), kept);
     }
     h->rays.count = kept;
     kernel_pixel_list_close(&h->rays);
@@ -224,9 +216,7 @@ SIMD_INLINE unsigned kernel_curved_batch_find_faces_of_type(kernel_tile_trace *t
         vm two, alone;
         vi face[2];
         uint8_t faces[SIMD_WIDTH];
-        kernel_lane_rays_begin(&p, t, &h->rays, n);
-        p.far = kernel_pixel_far(t, p.at);
-        p.active = vm_and(p.active, vf_le(kernel_gather_lane(h->queued->near, p.lane), p.far));
+        kernel_curved_batch_load(t, h, &h->rays, n, &p);
         if (!vm_any(p.active)) continue;
         kernel_curved_faces(&h->transformed, &p, type, &two, &alone, face);
         const vi both = face[0] | face[1] << 3;
@@ -269,8 +259,8 @@ SIMD_INLINE void kernel_curved_batch_cross_of(const kernel_tile_trace *t, kernel
         const vm change = vm_xor(vf_lt(ends[0].value, zero), vf_lt(ends[1].value, zero));
         const vm nonempty = vm_and(near, vm_or(change, vf_lt(ends[0].t, ends[1].t)));
         const vm left = kernel_ends_decide(&cells, &p.rays, p.lane, nonempty, &ends[0], &ends[1], &found);
-        kernel_curved_ends_add(&h->met, n, ends, vm_bits(found), &h->found, h->found_ends);
-        kernel_curved_ends_add(&h->met, n, ends, vm_bits(left), &h->others, h->other_ends);
+        kernel_curved_ends_add(&h->met, n, ends, 2, vm_bits(found), &h->found, h->found_ends);
+        kernel_curved_ends_add(&h->met, n, ends, 2, vm_bits(left), &h->others, h->other_ends);
     }
 }
 
@@ -352,16 +342,12 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile
     if (has_own) kernel_curved_batch_colours(t, h, rays->lane + first, p, points, colours);
     memcpy(at, &p->at, sizeof at);
     for (; hit; hit &= hit - 1) {
-        const int i = __builtin_ctz(hit), value = h->queued->value[rays->lane[first + i]];
-        const float *plain = layer->colours + 3 * value;
-        const kernel_ray_hit one = {.part = h->queued->part,
-                                    .value = value,
-                                    .cell = h->queued->cell[rays->lane[first + i]],
-                                    .depth = points->t[i],
-                                    .normal = {normal[0][i], normal[1][i], normal[2][i]},
-                                    .colour = {has_own ? colours[0][i] : plain[0], has_own ? colours[1][i] : plain[1],
-                                               has_own ? colours[2][i] : plain[2]}};
-        blocks |= kernel_ray_accept(t, at[i], &one);
+        const int i = __builtin_ctz(hit), n = rays->lane[first + i];
+        const float *plain = layer->colours + 3 * h->queued->value[n];
+        const float own_normal[3] = {normal[0][i], normal[1][i], normal[2][i]};
+        float colour[3];
+        for (int a = 0; a < 3; a++) colour[a] = has_own ? colours[a][i] : plain[a];
+        blocks |= kernel_ray_accept(t, at[i], h->queued, n, points->t[i], own_normal, colour);
     }
     return blocks;
 }
@@ -399,9 +385,7 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_cross_cuboids(kern
         kernel_point root;
         vm none;
         vf gradient[3], normal[3];
-        kernel_lane_rays_begin(&p, t, &h->rays, n);
-        p.far = kernel_pixel_far(t, p.at);
-        p.active = vm_and(p.active, vf_le(kernel_gather_lane(h->queued->near, p.lane), p.far));
+        kernel_curved_batch_load(t, h, &h->rays, n, &p);
         const vm cuboid = vf_lt(kernel_gather_lane(h->cuboids.domain_margin, p.lane), vf_set(INFINITY));
         const vm rays = vm_and(p.active, cuboid);
         kernel_cuboid_roots_of(&h->cuboids, at, &p, rays, &root, &none, gradient);
@@ -430,15 +414,11 @@ SIMD_INLINE unsigned kernel_curved_batch_hit_of(kernel_tile_trace *t, kernel_cur
         vm open = vm_none();
         kernel_lane_rays_begin(&p, t, &h->found, n);
         p.far = kernel_pixel_far(t, p.at);
-        for (int e = 0; e < (is_contracted ? 1 : 2); e++) {
-            ends[e].t = vf_load(h->found_ends[e][0] + n);
-            ends[e].value = vf_load(h->found_ends[e][1] + n);
-            for (int a = 0; a < 3; a++) ends[e].r[a] = vf_load(h->found_ends[e][2 + a] + n);
-        }
+        kernel_curved_ends_load(h->found_ends, n, is_contracted ? 1 : 2, ends);
         kernel_maps_of((const float(*)[8][SIMD_WIDTH])h->transformed.at, p.lane, &map, type);
         if (is_contracted) {
             at = ends[0];
-            kernel_polish_near(&p.rays, &map, p.active, KERNEL_CONTRACTION_END, &at);
+            kernel_polish_near(&p.rays, &map, p.active, &at);
         } else {
             open = kernel_polish_lanes(&p.rays, &map, p.active, &ends[0], &ends[1], &at);
         }
@@ -465,8 +445,8 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_hit(kernel_tile_tr
 static __attribute__((noinline)) unsigned kernel_curved_batch_search(kernel_tile_trace *t, kernel_curved_batch *h,
                                                                      int n)
 {
-    const float(*ends)[5][KERNEL_LIST_ROOM] = (const float(*)[5][KERNEL_LIST_ROOM])h->other_ends;
     kernel_lane_rays p;
+    kernel_point ends[2];
     kernel_interval i = {.w_in = vf_set(0), .w_out = vf_set(0)};
     kernel_point first = {.t = vf_set(0)};
     vf normals[3] = {vf_set(0), vf_set(0), vf_set(0)};
@@ -474,15 +454,8 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_search(kernel_tile
     vm hits = vm_none();
     kernel_lane_rays_begin(&p, t, &h->others, n);
     p.far = kernel_pixel_far(t, p.at);
-    i.mask = p.active;
-    i.t_in = vf_load(ends[0][0] + n);
-    i.t_out = vf_load(ends[1][0] + n);
-    i.v_in = vf_load(ends[0][1] + n);
-    i.v_out = vf_load(ends[1][1] + n);
-    for (int a = 0; a < 3; a++) {
-        i.r_in[a] = vf_load(ends[0][2 + a] + n);
-        i.r_out[a] = vf_load(ends[1][2 + a] + n);
-    }
+    kernel_curved_ends_load(h->other_ends, n, 2, ends);
+    kernel_interval_of(p.active, &ends[0], &ends[1], &i);
     const kernel_curved cells = kernel_curved_batch_cells(h);
     if (!kernel_search_cells(&s, &cells, &p.rays, p.lane, &i, p.active, &t->thread->map_failures)) return 0;
     do {

@@ -7,6 +7,7 @@
 #include "grid.h"
 #include "kernel_cell.h"
 #include "kernel_cell_cache.h"
+#include "kernel_cell_values.h"
 #include "kernel_crossings.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
@@ -44,10 +45,8 @@ typedef struct kernel_probe {
 /* Sets c->f to the values minus the isovalue, times a scale that is the same for all cells. */
 SIMD_INLINE void kernel_probe_values(const kernel_probe *probe, kernel_cell *c)
 {
-    for (int i = 0; i < c->count; i++) {
-        const double v = (c->values[i] - probe->isovalue) * probe->surface->value_scale;
-        c->f[i] = (float)(v < -1e18 ? -1e18 : v > 1e18 ? 1e18 : v);
-    }
+    for (int i = 0; i < c->count; i++)
+        c->f[i] = kernel_clamp((c->values[i] - probe->isovalue) * probe->surface->value_scale, 1e18);
 }
 
 SIMD_INLINE void kernel_probe_cell(kernel_packet *p, kernel_probe *probe, const kernel_cell *c, vm rays)

@@ -68,29 +68,21 @@ SIMD_INLINE void kernel_tet_gradient(const kernel_frame *f, const double *const 
     }
 }
 
-/* Computes the contour lines' field in the tet with these corners. */
-static __attribute__((noinline)) void kernel_tet_line_of(const kernel_frame *f, const kernel_tile *tile,
-                                                         const double *const corner[4], const double value[4],
-                                                         kernel_tet_line *out)
+/* Computes the contour lines' field in a tet. c->world must be set. */
+static __attribute__((noinline)) void kernel_cell_line_of(const kernel_frame *f, const kernel_tile *tile,
+                                                          const kernel_surface *s, const kernel_cell *c,
+                                                          kernel_tet_line *out)
 {
-    double g[3];
+    const grid_field *field = &s->layer->lines->field.fields[c->part];
+    const double *const corner[4] = {c->world[0], c->world[1], c->world[2], c->world[3]};
+    double value[4], g[3];
+    for (int i = 0; i < 4; i++) value[i] = kernel_lines_value(s, field, c->vertices[i]);
     kernel_tet_gradient(f, corner, value, g);
     /* in tile space the third axis is the direction of the tile's middle ray */
     const double shear[2] = {(double)tile->shear_x, (double)tile->shear_y};
     out->value = (float)value[3];
     out->along = (float)(g[2] + (g[0] * shear[0] + g[1] * shear[1]));
     for (int a = 0; a < 3; a++) out->gradient[a] = (float)g[a];
-}
-
-/* Computes the contour lines' field in a tet. c->world must be set. */
-SIMD_INLINE void kernel_cell_line_of(const kernel_frame *f, const kernel_tile *tile, const kernel_surface *s,
-                                     const kernel_cell *c, kernel_tet_line *out)
-{
-    const grid_field *field = &s->layer->lines->field.fields[c->part];
-    const double *const corner[4] = {c->world[0], c->world[1], c->world[2], c->world[3]};
-    double value[4];
-    for (int i = 0; i < 4; i++) value[i] = kernel_lines_value(s, field, c->vertices[i]);
-    kernel_tet_line_of(f, tile, corner, value, out);
 }
 
 /* Adds to out->value, the contour lines' field at the last corner of each lane's tet, its change from there to the hits

@@ -27,7 +27,6 @@
 
 typedef struct kernel_occlusion {
     const kernel_surface *surface;
-    int layer;
     const kernel_bundle *bundle;
     int first; /* index, in the bundle, of the packet's first ray */
     /* world coordinates of the vertices of the cell in which the rays are traced */
@@ -100,27 +99,27 @@ static __attribute__((noinline)) void kernel_occlusion_curved(kernel_packet *p, 
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     const kernel_beam beam = kernel_tile_beam(p->frame, p->tile);
-    kernel_curved_storage storage;
-    kernel_curved curved = {.storage = &storage};
+    float at[4][8][SIMD_WIDTH], colours[8][SIMD_WIDTH];
+    kernel_bounds bounds;
+    kernel_curved curved = {.at = at, .colours = colours, .bounds = &bounds};
     const int count = kernel_curved_intervals(p, c, rays, list);
     for (int n = 0; n < count; n++) {
         const kernel_interval *i = &list[n];
-        const vm room_left = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
-        const vm wanted = vm_and(kernel_is_near(p, i), room_left);
+        const vm nonempty = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
+        const vm wanted = vm_and(kernel_is_near(p, i), nonempty);
         if (!vm_any(wanted)) continue;
-        if (!curved.bounds) kernel_curved_single_bounds(c, &beam, &curved);
+        if (!curved.is_ready) kernel_curved_single_bounds(c, &beam, &curved);
         kernel_occlusion_roots(p, o, &curved, i, wanted);
     }
 }
 
-static void kernel_occlusion_interval(kernel_packet *p, const kernel_occlusion *o, vm wanted, kernel_poly_crossings *r,
-                                      kernel_polyhedron_interval *polyhedron_interval)
+static void kernel_occlusion_interval(kernel_packet *p, const kernel_occlusion *o, vm wanted, kernel_poly_crossings *r)
 {
     kernel_profile_walk walk;
-    kernel_poly_profile(r, polyhedron_interval);
-    kernel_profile_walk_begin(polyhedron_interval, wanted, &walk);
+    kernel_poly_profile(r);
+    kernel_profile_walk_begin(r, wanted, &walk);
     do {
-        const vm found = kernel_profile_walk_next(r, polyhedron_interval, &walk);
+        const vm found = kernel_profile_walk_next(r, &walk);
         walk.open = vm_andnot(walk.open, kernel_occlusion_block(p, o, found, walk.t));
     } while (vm_any(walk.open));
 }
@@ -128,13 +127,11 @@ static void kernel_occlusion_interval(kernel_packet *p, const kernel_occlusion *
 static void kernel_occlusion_polyhedron(kernel_packet *p, const kernel_occlusion *o, polyhedron *c, vm rays)
 {
     kernel_poly_crossings r;
-    kernel_polyhedron_interval polyhedron_interval;
     if (!kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
-    while (kernel_poly_next(&r, &polyhedron_interval)) {
-        const vm changes = kernel_changes_sign(&polyhedron_interval.interval);
-        const vm wanted = vm_and(kernel_is_near(p, &polyhedron_interval.interval),
-                                 vm_or(changes, kernel_polyhedron_may_cross(p, c, &r, &polyhedron_interval)));
-        if (vm_any(wanted)) kernel_occlusion_interval(p, o, wanted, &r, &polyhedron_interval);
+    while (kernel_poly_next(&r)) {
+        const vm changes = kernel_changes_sign(&r.interval);
+        const vm wanted = vm_and(kernel_is_near(p, &r.interval), vm_or(changes, kernel_polyhedron_may_cross(p, c, &r)));
+        if (vm_any(wanted)) kernel_occlusion_interval(p, o, wanted, &r);
     }
 }
 
@@ -144,7 +141,8 @@ static void kernel_occlusion_polyhedra(kernel_packet *p, kernel_occlusion *o, co
 {
     const int part = occluder->part;
     const double value = o->surface->layer->values[occluder->value];
-    polyhedron *c = kernel_polyhedron_find(p, &o->surface->layer->field.fields[part], part, o->layer, occluder->cell);
+    polyhedron *c =
+        kernel_polyhedron_find(p, &o->surface->layer->field.fields[part], part, occluder->surface, occluder->cell);
     if (!c) return;
     c->has_slopes = c->is_transformed = false;
     o->world = c->world;
@@ -169,8 +167,8 @@ SIMD_INLINE void kernel_occlusion_transform(const kernel_packet *p, kernel_cell 
 static void kernel_occlusion_cell(kernel_packet *p, kernel_occlusion *o, const kernel_occluder *occluder)
 {
     const render_surface_layer *layer = o->surface->layer;
-    kernel_cell *c =
-        kernel_cell_cache_find(p, o->layer, occluder->part, &layer->field.fields[occluder->part], occluder->cell);
+    kernel_cell *c = kernel_cell_cache_find(p, occluder->surface, occluder->part, &layer->field.fields[occluder->part],
+                                            occluder->cell);
     if (kernel_has_own_faces(c->type)) {
         kernel_occlusion_polyhedra(p, o, occluder);
         return;
@@ -192,12 +190,12 @@ static void kernel_occlude_by_cell(const kernel_frame *f, kernel_thread *thread,
 {
     for (int first = 0; first < b->count; first += SIMD_WIDTH) {
         kernel_packet p;
-        kernel_occlusion o = {&f->surfaces[occluder->surface], occluder->surface, b, first, NULL, 0};
+        kernel_occlusion o = {&f->surfaces[occluder->surface], b, first, NULL, 0};
         if (!(b->open >> first & (((uint64_t)1 << SIMD_WIDTH) - 1))) continue;
         kernel_bundle_packet(&p, f, thread, b, first);
-        const unsigned prefetched = vm_bits(p.active);
+        const unsigned before = vm_bits(p.active);
         kernel_occlusion_cell(&p, &o, occluder);
-        b->open &= ~((uint64_t)(prefetched & ~vm_bits(p.active)) << first);
+        b->open &= ~((uint64_t)(before & ~vm_bits(p.active)) << first);
     }
 }
 

@@ -50,22 +50,22 @@ SIMD_INLINE void kernel_emit_opaque(kernel_packet *p, kernel_hits *hits)
     }
 }
 
-/* Lights `count` hits of the list of pending hits, from index `first` on, by the merged samples of all ranks. out[i]
- * becomes the fragment of hit i. */
-static void kernel_light_pending(const kernel_frame *f, kernel_thread *thread, const render_pending_list *list,
-                                 const render_difference_samples *samples, int64_t first, int64_t count, fragment *out)
+/* Lights pending hits by the merged samples of all ranks. out[i] becomes the fragment of hit i. */
+static void kernel_light_pending(const kernel_frame *f, kernel_thread *thread, const render_pending_hit *hits,
+                                 float (*shadings)[2][3], const render_difference_samples *samples, fragment *out,
+                                 int64_t count)
 {
     kernel_pending_group run;
     kernel_pending_packet_begin(&run);
-    for (int64_t i = first; i < first + count; i += run.count) {
+    for (int64_t i = 0; i < count; i += run.count) {
         vm found[RENDER_DIFFERENCE_SAMPLES];
         vf values[RENDER_DIFFERENCE_SAMPLES], normal[3], colour[3];
-        kernel_pending_group_begin(&run, f, thread, list->items + i, first + count - i);
+        kernel_pending_group_begin(&run, f, thread, hits + i, count - i);
         for (int a = 0; a < 3; a++) {
             normal[a] = colour[a] = vf_set(0);
             for (int n = 0; n < run.count; n++) {
-                normal[a][run.lanes[n]] = list->shadings[i + n][0][a];
-                colour[a][run.lanes[n]] = list->shadings[i + n][1][a];
+                normal[a][run.lanes[n]] = shadings[i + n][0][a];
+                colour[a][run.lanes[n]] = shadings[i + n][1][a];
             }
         }
         kernel_load_difference_samples(&run, samples + i, found, values);
@@ -79,9 +79,9 @@ static void kernel_light_pending(const kernel_frame *f, kernel_thread *thread, c
         for (int n = 0; n < run.count; n++) {
             const int lane = run.lanes[n];
             out[i + n] =
-                (fragment){list->items[i + n].pixel, lit.t_in[lane],
-                           lit.t_out[lane],          {lit.colour[0][lane], lit.colour[1][lane], lit.colour[2][lane]},
-                           lit.transmittance[lane],  list->items[i + n].kind};
+                (fragment){hits[i + n].pixel,       lit.t_in[lane],
+                           lit.t_out[lane],         {lit.colour[0][lane], lit.colour[1][lane], lit.colour[2][lane]},
+                           lit.transmittance[lane], hits[i + n].kind};
         }
     }
 }

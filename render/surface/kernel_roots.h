@@ -38,6 +38,7 @@
 
 #include "kernel_bounds.h"
 #include "kernel_cell.h"
+#include "kernel_contraction.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
 #include "kernel_wide.h"
@@ -260,7 +261,7 @@ static __attribute__((noinline, unused)) bool kernel_search_cells(kernel_search 
     kernel_search_begin(s);
     wanted = kernel_ends_decide(c, rays, lane, wanted, &s->low, &s->high, &s->found);
     if (!vm_any(vm_or(wanted, s->found))) return false;
-    kernel_maps_of_type(c->at, lane, c->type, &s->map);
+    kernel_maps_of_type((const float(*)[8][SIMD_WIDTH])c->at, lane, c->type, &s->map);
     if (vm_any(wanted)) {
         kernel_search_bounds(c->bounds, lane, s);
         kernel_search_whole(s, wanted);
@@ -448,12 +449,12 @@ SIMD_INLINE void kernel_polish_last(const kernel_rays *rays, const kernel_map *m
     kernel_point_move(vm_andnot(wanted, away), &last, out);
 }
 
-/* Does the last step of Newton's method, from points whose reference coordinates have an error of at most `end`.
- * Changes the map's tolerance. */
-SIMD_INLINE void kernel_polish_near(const kernel_rays *rays, kernel_map *map, vm wanted, float end, kernel_point *at)
+/* Does the last step of Newton's method, from points whose reference coordinates have an error of at most
+ * KERNEL_CONTRACTION_END. Changes the map's tolerance. */
+SIMD_INLINE void kernel_polish_near(const kernel_rays *rays, kernel_map *map, vm wanted, kernel_point *at)
 {
     const kernel_point low = {.t = vf_set(-INFINITY)}, high = {.t = vf_set(INFINITY)};
-    map->tolerance = 4 * end;
+    map->tolerance = 4 * KERNEL_CONTRACTION_END;
     at->value = vf_set(0);
     kernel_polish_last(rays, map, wanted, &low, &high, at);
 }

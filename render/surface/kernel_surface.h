@@ -63,11 +63,9 @@ static __attribute__((noinline, cold)) void kernel_accept_equal_depth(kernel_pac
 }
 
 /* Stores hits of an opaque surface as the nearest ones of their rays. */
-SIMD_INLINE void kernel_accept_opaque(kernel_packet *p, kernel_surface_state *state, vm hit,
-                                      const kernel_surface_hits *h)
+SIMD_INLINE void kernel_accept_opaque(kernel_packet *p, const kernel_surface *s, vm hit, const kernel_surface_hits *h)
 {
-    const kernel_surface *s = state->surface;
-    kernel_hits *hits = state->hits;
+    kernel_hits *hits = p->hits;
     const vm tied = vm_and(vm_and(hit, hits->found), vf_eq(h->t, p->t_far));
     if (__builtin_expect(vm_any(tied), 0)) {
         kernel_accept_equal_depth(p, s, tied, h);
@@ -89,12 +87,10 @@ SIMD_INLINE void kernel_accept_opaque(kernel_packet *p, kernel_surface_state *st
 }
 
 /* Computes the lighting of a transparent surface's hits, and emits them as fragments. */
-SIMD_INLINE void kernel_accept_transparent(kernel_packet *p, kernel_surface_state *state, vm hit,
-                                           kernel_surface_hits *h)
+SIMD_INLINE void kernel_accept_transparent(kernel_packet *p, const kernel_surface *s, vm hit, kernel_surface_hits *h)
 {
-    const kernel_surface *s = state->surface;
     const uint32_t kind = s->first_kind + (uint32_t)h->value;
-    kernel_hits_add_crossing(state->hits, hit, h->t);
+    kernel_hits_add_crossing(p->hits, hit, h->t);
     hit = kernel_hit_normals(p, s, hit, h);
     kernel_fragments f = {h->t, h->t, {h->colour[0], h->colour[1], h->colour[2]}, 1.0f - h->opacity, vf_set(0)};
     kernel_paint(p, s, h->normal, vf_set((float)kind), &f);
@@ -123,10 +119,9 @@ static __attribute__((noinline)) vm kernel_accept_lines(const kernel_packet *p, 
 /* Accepts hits: those of an opaque surface are kept as the nearest ones; those of a transparent surface are emitted at
  * once. c: the cell; NULL for polyhedra. The caller sets the members of *h from `value` to `along`, except for the
  * colour. */
-SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c, vm hit,
+SIMD_INLINE void kernel_accept(kernel_packet *p, const kernel_surface *s, const kernel_cell *c, vm hit,
                                kernel_surface_hits *h)
 {
-    const kernel_surface *s = state->surface;
     h->part = vi_set(c ? c->part : -1);
     h->cell = vi_set(c ? (int32_t)c->index : -1);
     /* polyhedra have normals from the gradient in the cell or at the vertices, never by differences */
@@ -138,25 +133,25 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, co
         kernel_draw_edges(p, s->layer, c, h->t, h->colour);
     h->opacity = vf_set(s->layer->opacity);
     if (__builtin_expect(h->along != NULL, 0)) hit = kernel_accept_lines(p, s, hit, h);
-    if (state->is_opaque)
-        kernel_accept_opaque(p, state, hit, h);
+    if (kernel_is_opaque(p, s))
+        kernel_accept_opaque(p, s, hit, h);
     else
-        kernel_accept_transparent(p, state, hit, h);
+        kernel_accept_transparent(p, s, hit, h);
 }
 
 /* Traces the isosurface in a tet. It is separate from the function for other cells, which needs more vectors, so that
  * its own vectors stay in registers. */
-static __attribute__((noinline)) void kernel_tet_surface(kernel_packet *p, kernel_surface_state *state,
+static __attribute__((noinline)) void kernel_tet_surface(kernel_packet *p, const kernel_surface *s,
                                                          const kernel_cell *c, int value, vm rays)
 {
-    const bool has_colour = state->surface->layer->colour_map != NULL;
+    const bool has_colour = s->layer->colour_map != NULL;
     kernel_interval i;
     kernel_tet_interval(p, c, rays, has_colour, &i);
-    i.v_out = kernel_end_in_cell(i.v_in, i.v_out, state->surface->layer->is_of_faces);
+    i.v_out = kernel_end_in_cell(i.v_in, i.v_out, s->layer->is_of_faces);
     const vm change = vm_and(kernel_is_near(p, &i), kernel_changes_sign(&i));
     if (!vm_any(change)) return;
     const vf t = kernel_secant(i.t_in, i.v_in, i.t_out, i.v_out);
-    const vm hit = kernel_visible(p, state->surface, change, t);
+    const vm hit = kernel_visible(p, s, change, t);
     if (!vm_any(hit)) return;
     kernel_surface_hits at = {.value = value, .t = t};
     kernel_tet_normal(p, c, at.normal);
@@ -166,11 +161,11 @@ static __attribute__((noinline)) void kernel_tet_surface(kernel_packet *p, kerne
         at.w = i.w_in + along * (i.w_out - i.w_in);
     }
     kernel_line_field along;
-    if (state->surface->layer->lines) {
-        kernel_tet_line_field(p, state->surface, c, t, at.normal, &along);
+    if (s->layer->lines) {
+        kernel_tet_line_field(p, s, c, t, at.normal, &along);
         at.along = &along;
     }
-    kernel_accept(p, state, c, hit, &at);
+    kernel_accept(p, s, c, hit, &at);
 }
 
 /* Returns a field at the reference coordinates r in each ray's own cell. It does the same as kernel_maps_value(), but
@@ -182,45 +177,46 @@ static __attribute__((noinline)) vf kernel_maps_value_of_type(const float (*valu
 }
 
 /* Accepts those of the found crossings of the isovalue that are visible, and returns them. */
-SIMD_INLINE vm kernel_curved_accept(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c,
+SIMD_INLINE vm kernel_curved_accept(kernel_packet *p, const kernel_surface *s, const kernel_cell *c,
                                     const kernel_curved *curved, int value, const kernel_map *map, vm found,
                                     const kernel_point *at)
 {
-    const vm hit = kernel_visible(p, state->surface, found, at->t);
+    const vm hit = kernel_visible(p, s, found, at->t);
     if (!vm_any(hit)) return hit;
     kernel_surface_hits h = {.value = value, .t = at->t};
-    if (state->surface->layer->normal == RENDER_VERTEX) {
+    if (s->layer->normal == RENDER_VERTEX) {
         memcpy(h.normal, at->r, sizeof h.normal);
     } else {
         kernel_lanes_normal(map, at->r, h.normal);
         kernel_unshear(p->tile, h.normal);
     }
-    if (state->surface->layer->colour_map)
-        h.w = kernel_maps_value_of_type(curved->colours, vi_set(curved->lane), at->r, curved->type);
+    if (s->layer->colour_map)
+        h.w = kernel_maps_value_of_type((const float(*)[SIMD_WIDTH])curved->colours, vi_set(curved->lane), at->r,
+                                        curved->type);
     kernel_line_field along;
-    if (state->surface->layer->lines) {
-        kernel_curved_line_field(p, state->surface, c, map, at->r, &along);
+    if (s->layer->lines) {
+        kernel_curved_line_field(p, s, c, map, at->r, &along);
         h.along = &along;
     }
-    kernel_accept(p, state, c, hit, &h);
+    kernel_accept(p, s, c, hit, &h);
     return hit;
 }
 
 /* Accepts the crossings of the interval one after the other. A ray ends at the first visible one of an opaque
  * surface. */
-SIMD_INLINE void kernel_curved_robust(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c,
+SIMD_INLINE void kernel_curved_robust(kernel_packet *p, const kernel_surface *s, const kernel_cell *c,
                                       const kernel_curved *curved, int value, const kernel_interval *i, vm wanted)
 {
     const kernel_rays rays = kernel_packet_rays(p);
-    kernel_search s;
-    if (!kernel_search_cells(&s, curved, &rays, vi_set(curved->lane), i, wanted, &p->thread->map_failures)) return;
+    kernel_search search;
+    if (!kernel_search_cells(&search, curved, &rays, vi_set(curved->lane), i, wanted, &p->thread->map_failures)) return;
     do {
         kernel_point at;
-        if (!vm_any(s.found)) continue;
-        kernel_polish(&s, &at);
-        const vm hit = kernel_curved_accept(p, state, c, curved, value, &s.map, s.found, &at);
-        if (state->is_opaque) kernel_search_close(&s, hit);
-    } while (kernel_search_continue(&s));
+        if (!vm_any(search.found)) continue;
+        kernel_polish(&search, &at);
+        const vm hit = kernel_curved_accept(p, s, c, curved, value, &search.map, search.found, &at);
+        if (kernel_is_opaque(p, s)) kernel_search_close(&search, hit);
+    } while (kernel_search_continue(&search));
 }
 
 SIMD_INLINE void kernel_contract_rays(const kernel_curved *c, const kernel_rays *rays, vi lane, vm wanted,
@@ -243,7 +239,7 @@ static __attribute__((noinline)) void kernel_contract_packet(const kernel_curved
 
 /* Accepts the crossings that are computed by contraction (kernel_contraction.h). Returns the rays that contraction has
  * decided. */
-static __attribute__((noinline)) vm kernel_curved_accept_contracted(kernel_packet *p, kernel_surface_state *state,
+static __attribute__((noinline)) vm kernel_curved_accept_contracted(kernel_packet *p, const kernel_surface *s,
                                                                     const kernel_cell *c, const kernel_curved *curved,
                                                                     int value, vm wanted)
 {
@@ -254,52 +250,52 @@ static __attribute__((noinline)) vm kernel_curved_accept_contracted(kernel_packe
     kernel_contract_packet(curved, &rays, lane, wanted, &at, &none);
     if (vm_any(at.mask)) {
         kernel_map map;
-        kernel_maps_of_type(curved->at, lane, curved->type, &map);
-        kernel_polish_near(&rays, &map, at.mask, KERNEL_CONTRACTION_END, &at);
-        kernel_curved_accept(p, state, c, curved, value, &map, at.mask, &at);
+        kernel_maps_of_type((const float(*)[8][SIMD_WIDTH])curved->at, lane, curved->type, &map);
+        kernel_polish_near(&rays, &map, at.mask, &at);
+        kernel_curved_accept(p, s, c, curved, value, &map, at.mask, &at);
     }
     return vm_or(at.mask, none);
 }
 
-static __attribute__((noinline)) void kernel_curved_surface(kernel_packet *p, kernel_surface_state *state,
+static __attribute__((noinline)) void kernel_curved_surface(kernel_packet *p, const kernel_surface *s,
                                                             const kernel_cell *c, kernel_curved *curved, int value,
                                                             vm rays)
 {
-    const render_surface_layer *layer = state->surface->layer;
+    const render_surface_layer *layer = s->layer;
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     const int count = kernel_curved_intervals(p, c, rays, list);
-    vm prefetched[KERNEL_MAX_CELL_INTERVALS], any = vm_none(), known = vm_none();
+    vm reached[KERNEL_MAX_CELL_INTERVALS], any = vm_none(), known = vm_none();
     for (int n = 0; n < count; n++) {
         kernel_interval *i = &list[n];
         i->v_out = kernel_end_in_cell(i->v_in, i->v_out, layer->is_of_faces);
         /* If a ray crosses both triangles of a quad but not its patch, both ends of the interval are the same point
          * outside the ray; such an interval is skipped. */
         const vm nonempty = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
-        prefetched[n] = vm_and(kernel_is_near(p, i), nonempty);
-        any = vm_or(any, prefetched[n]);
+        reached[n] = vm_and(kernel_is_near(p, i), nonempty);
+        any = vm_or(any, reached[n]);
     }
     if (!vm_any(any)) return;
-    if (!curved->bounds) {
+    if (!curved->is_ready) {
         const kernel_beam beam = kernel_tile_beam(p->frame, p->tile);
         kernel_curved_single_bounds(c, &beam, curved);
     }
-    if (!state->is_contracted) known = kernel_curved_accept_contracted(p, state, c, curved, value, any);
+    if (!curved->is_contracted) known = kernel_curved_accept_contracted(p, s, c, curved, value, any);
     for (int n = 0; n < count; n++) {
         kernel_interval *i = &list[n];
-        const vm wanted = vm_andnot(vm_and(prefetched[n], kernel_is_near(p, i)), known);
-        if (vm_any(wanted)) kernel_curved_robust(p, state, c, curved, value, i, wanted);
+        const vm wanted = vm_andnot(vm_and(reached[n], kernel_is_near(p, i)), known);
+        if (vm_any(wanted)) kernel_curved_robust(p, s, c, curved, value, i, wanted);
     }
 }
 
 /* Traces one isovalue's surface in a cell with finite values that is not a polyhedron. The cell must have been
  * transformed into tile space. */
-SIMD_INLINE void kernel_cell_surface(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c,
+SIMD_INLINE void kernel_cell_surface(kernel_packet *p, const kernel_surface *s, const kernel_cell *c,
                                      kernel_curved *curved, int value, vm rays)
 {
     if (kernel_is_linear(c->type))
-        kernel_tet_surface(p, state, c, value, rays);
+        kernel_tet_surface(p, s, c, value, rays);
     else
-        kernel_curved_surface(p, state, c, curved, value, rays);
+        kernel_curved_surface(p, s, c, curved, value, rays);
 }
 
 /* A ray's profile is the piecewise linear field along the ray in a polyhedron (kernel_polyhedron.h). Hits on
@@ -337,39 +333,52 @@ static void kernel_polyhedron_gradient(const kernel_packet *p, const polyhedron 
 
 /* Computes the signed sum of the gradients of overlapping tets at the hits. Returns the rays for which the signs sum to
  * 1, so that the sum is valid. */
-static vm kernel_polyhedron_sum_normals(const kernel_packet *p, const polyhedron *c, const kernel_poly_crossings *r,
-                                        vm hit, vf t, vf out[3])
+static vm kernel_polyhedron_sum_normals(const kernel_packet *p, const kernel_poly_crossings *r, vm hit, vf t, vf out[3])
 {
     vf cover = vf_set(0);
-    for (int n = 0; n < r->segment_count; n++) {
-        const kernel_subtet_interval *s = &r->segments[n];
-        const vm in = vm_and(hit, kernel_subtet_interval_contains(s, t, false));
+    for (int n = 0; n < r->cell->facet_count; n++) {
+        if (!vm_any(r->tets[n].mask)) continue;
+        const vm in = vm_and(hit, kernel_subtet_contains(&r->tets[n], t, false));
         if (!vm_any(in)) continue;
+        const float sign = r->cell->facets[n].sign;
         double g[3];
-        kernel_polyhedron_gradient(p, c, s->facet, g);
-        cover = vf_select(in, cover + s->sign, cover);
-        for (int a = 0; a < 3; a++) out[a] = vf_select(in, out[a] + s->sign * (float)g[a], out[a]);
+        kernel_polyhedron_gradient(p, r->cell, n, g);
+        cover = vf_select(in, cover + sign, cover);
+        for (int a = 0; a < 3; a++) out[a] = vf_select(in, out[a] + sign * (float)g[a], out[a]);
     }
     return vm_and(hit, vf_eq(cover, vf_set(1)));
 }
 
-/* Computes the gradient at the hits: that of the tet with positive sign that contains the hit or is nearest to it along
- * the ray. */
-static void kernel_polyhedron_normal(const kernel_packet *p, const polyhedron *c, const kernel_poly_crossings *r,
-                                     vm hit, vf t, vf out[3])
+/* Finds, for each hit, the tet of non-negative sign that contains it or is nearest to it along the ray; -1 if there is
+ * none. */
+static void kernel_polyhedron_facets(const kernel_poly_crossings *r, vm hit, vf t, int32_t out[SIMD_WIDTH])
 {
-    for (int a = 0; a < 3; a++) out[a] = vf_set(0);
-    if (!c->is_star_shaped) hit = vm_andnot(hit, kernel_polyhedron_sum_normals(p, c, r, hit, t, out));
     vf nearest = vf_set(INFINITY);
-    for (int n = 0; n < r->segment_count; n++) {
-        const kernel_subtet_interval *s = &r->segments[n];
-        const vf away = vf_max(vf_max(s->t0 - t, t - s->t1), vf_set(0));
+    vi facet = vi_set(-1);
+    for (int n = 0; n < r->cell->facet_count; n++) {
+        const kernel_interval *s = &r->tets[n];
+        if (r->cell->facets[n].sign < 0 || !vm_any(s->mask)) continue;
+        const vf away = vf_max(vf_max(s->t_in - t, t - s->t_out), vf_set(0));
         const vm nearer = vm_and(vm_and(hit, s->mask), vf_lt(away, nearest));
-        if (!vm_any(nearer) || s->sign < 0) continue;
-        double g[3];
-        kernel_polyhedron_gradient(p, c, s->facet, g);
         nearest = vf_select(nearer, away, nearest);
-        for (int a = 0; a < 3; a++) out[a] = vf_select(nearer, vf_set((float)g[a]), out[a]);
+        facet = vi_select(nearer, vi_set(n), facet);
+    }
+    memcpy(out, &facet, sizeof facet);
+}
+
+/* Computes the gradient at the hits: that of the tet of kernel_polyhedron_facets(). */
+static void kernel_polyhedron_normal(const kernel_packet *p, const kernel_poly_crossings *r, vm hit, vf t, vf out[3])
+{
+    int32_t facets[SIMD_WIDTH];
+    for (int a = 0; a < 3; a++) out[a] = vf_set(0);
+    if (!r->cell->is_star_shaped) hit = vm_andnot(hit, kernel_polyhedron_sum_normals(p, r, hit, t, out));
+    kernel_polyhedron_facets(r, hit, t, facets);
+    for (unsigned left = vm_bits(hit); left; left &= left - 1) {
+        const int ray = __builtin_ctz(left);
+        double g[3];
+        if (facets[ray] < 0) continue;
+        kernel_polyhedron_gradient(p, r->cell, facets[ray], g);
+        for (int a = 0; a < 3; a++) out[a][ray] = (float)g[a];
     }
 }
 
@@ -388,21 +397,20 @@ static void kernel_polyhedron_mean_gradient(const kernel_frame *f, const polyhed
     }
 }
 
-/* Finds, for each hit, the tet of non-negative sign that contains it or is nearest to it along the ray; -1 if there is
- * none. */
-static void kernel_polyhedron_facets(const kernel_poly_crossings *r, vm hit, vf t, int32_t out[SIMD_WIDTH])
+/* Computes the barycentric coordinates of a ray's point at depth t in the tet of surface triangle number `facet`, and
+ * lists the numbers of the tet's corners. */
+static void kernel_polyhedron_shares(const kernel_packet *p, const polyhedron *c, int facet, int ray, float t,
+                                     int corners[4], double share[4])
 {
-    vf nearest = vf_set(INFINITY);
-    vi facet = vi_set(-1);
-    for (int n = 0; n < r->segment_count; n++) {
-        const kernel_subtet_interval *s = &r->segments[n];
-        const vf away = vf_max(vf_max(s->t0 - t, t - s->t1), vf_set(0));
-        const vm nearer = vm_and(vm_and(hit, s->mask), vf_lt(away, nearest));
-        if (s->sign < 0) continue;
-        nearest = vf_select(nearer, away, nearest);
-        facet = vi_select(nearer, vi_set(s->facet), facet);
+    double place[4][3], point[3];
+    for (int i = 0; i < 4; i++) {
+        const int v = corners[i] = i < 3 ? c->facets[facet].vertex[i] : c->vertex_count;
+        place[i][0] = (double)c->x[v];
+        place[i][1] = (double)c->y[v];
+        place[i][2] = (double)c->z[v];
     }
-    memcpy(out, &facet, sizeof facet);
+    kernel_ray_point(p, ray, t, point);
+    kernel_barycentric((const double(*)[3])place, point, share);
 }
 
 /* Computes normals by interpolating the vertices' gradients in the tets (RENDER_VERTEX). */
@@ -411,7 +419,6 @@ static __attribute__((noinline)) void kernel_polyhedron_smooth(const kernel_pack
                                                                const kernel_poly_crossings *r, vm hit, vf t, vf out[3])
 {
     const render_vertex_gradients *gradients = &layer->gradients[c->part];
-    const int centre = c->vertex_count;
     int32_t facets[SIMD_WIDTH];
     double of_centre[3];
     kernel_polyhedron_facets(r, hit, t, facets);
@@ -420,17 +427,11 @@ static __attribute__((noinline)) void kernel_polyhedron_smooth(const kernel_pack
     for (unsigned left = vm_bits(hit); left; left &= left - 1) {
         const int ray = __builtin_ctz(left);
         if (facets[ray] < 0) continue;
-        double corner[4][3], g[4][3], point[3], share[4];
-        for (int i = 0; i < 4; i++) {
-            const int v = i < 3 ? c->facets[facets[ray]].vertex[i] : centre;
-            corner[i][0] = (double)c->x[v];
-            corner[i][1] = (double)c->y[v];
-            corner[i][2] = (double)c->z[v];
-            if (i < 3) kernel_vertex_gradient(p->frame, gradients, c->vertices[v], g[i]);
-        }
+        int corners[4];
+        double g[4][3], share[4];
+        kernel_polyhedron_shares(p, c, facets[ray], ray, t[ray], corners, share);
+        for (int i = 0; i < 3; i++) kernel_vertex_gradient(p->frame, gradients, c->vertices[corners[i]], g[i]);
         memcpy(g[3], of_centre, sizeof g[3]);
-        kernel_ray_point(p, ray, t[ray], point);
-        kernel_barycentric((const double(*)[3])corner, point, share);
         for (int a = 0; a < 3; a++)
             out[a][ray] =
                 (float)((share[0] * g[0][a] + share[1] * g[1][a]) + (share[2] * g[2][a] + share[3] * g[3][a]));
@@ -483,19 +484,18 @@ SIMD_INLINE vf kernel_slope_of(const polyhedron *c, double slope)
 /* Returns the rays that may be on the other side of the isovalue between two faces of the same sign. The bound is not
  * valid if tets overlap, or if a ray crosses a quad's triangles but not its patch or the reverse; such rays are always
  * returned. */
-SIMD_INLINE vm kernel_polyhedron_may_cross(const kernel_packet *p, polyhedron *c, const kernel_poly_crossings *r,
-                                           const kernel_polyhedron_interval *polyhedron_interval)
+SIMD_INLINE vm kernel_polyhedron_may_cross(const kernel_packet *p, polyhedron *c, const kernel_poly_crossings *r)
 {
-    const kernel_interval *i = &polyhedron_interval->interval;
+    const kernel_interval *i = &r->interval;
     const vm longer = vm_and(i->mask, vf_lt(i->t_in, i->t_out));
     if (!c->is_star_shaped || !p->is_pencil) return longer;
     if (!c->has_slopes) kernel_polyhedron_slopes(c, p);
     const vf zero = vf_set(0), fall = kernel_slope_of(c, c->fall), rise = kernel_slope_of(c, c->rise);
-    const vf in = polyhedron_interval->in.v, out = polyhedron_interval->out.v;
+    const vf in = r->in.v, out = r->out.v;
     const vm below = vf_lt(i->v_in, zero);
     const vm differs = vm_or(vm_xor(vf_lt(in, zero), below), vm_xor(vf_lt(out, zero), below));
     const vf away = vf_select(below, fall, rise) * vf_abs(in) + vf_select(below, rise, fall) * vf_abs(out);
-    const vm turns = vf_lt(away, fall * rise * (polyhedron_interval->out.t - polyhedron_interval->in.t));
+    const vm turns = vf_lt(away, fall * rise * (r->out.t - r->in.t));
     return vm_and(longer, vm_or(turns, vm_or(differs, r->uneven)));
 }
 
@@ -513,17 +513,16 @@ typedef struct kernel_profile_walk {
     vf t, w;               /* depth of the crossing that was found, and the colour field there */
 } kernel_profile_walk;
 
-static void kernel_profile_walk_begin(const kernel_polyhedron_interval *polyhedron_interval, vm rays,
-                                      kernel_profile_walk *walk)
+static void kernel_profile_walk_begin(const kernel_poly_crossings *r, vm rays, kernel_profile_walk *walk)
 {
-    const kernel_interval *i = &polyhedron_interval->interval;
+    const kernel_interval *i = &r->interval;
     const vf zero = vf_set(0);
     const vm below = vf_lt(i->v_in, zero);
     walk->open = rays;
-    walk->below = vf_lt(polyhedron_interval->u_in, zero);
+    walk->below = vf_lt(r->u_in, zero);
     walk->jump_in = vm_and(rays, vm_xor(walk->below, below));
-    walk->jump_out = vm_and(rays, vm_xor(vf_lt(polyhedron_interval->u_out, zero), vf_lt(i->v_out, zero)));
-    kernel_profile_begin(polyhedron_interval, &walk->piece);
+    walk->jump_out = vm_and(rays, vm_xor(vf_lt(r->u_out, zero), vf_lt(i->v_out, zero)));
+    kernel_profile_begin(r, &walk->piece);
 }
 
 SIMD_INLINE void kernel_piece_select(vm rays, const kernel_interval *from, kernel_interval *to)
@@ -540,20 +539,17 @@ SIMD_INLINE void kernel_piece_select(vm rays, const kernel_interval *from, kerne
  * the last face counts as a piece. A value inside the cell that equals the isovalue up to rounding is treated as if it
  * were on the side from which the ray comes: at one point a ray may meet several faces between tets, whose values are
  * rounded differently, so that their signs would alternate. The values at the faces are not changed. */
-SIMD_INLINE vm kernel_profile_walk_advance(const kernel_poly_crossings *r,
-                                           const kernel_polyhedron_interval *polyhedron_interval, vm left,
-                                           kernel_profile_walk *walk)
+SIMD_INLINE vm kernel_profile_walk_advance(const kernel_poly_crossings *r, vm left, kernel_profile_walk *walk)
 {
     kernel_interval next = walk->piece;
     const vf zero = vf_set(0);
-    const vm inside = kernel_profile_continues(polyhedron_interval, &next, left);
-    kernel_profile_next(r, polyhedron_interval,
-                        vf_select(inside, polyhedron_interval->u_out, polyhedron_interval->interval.v_out), &next);
-    const vm rounding = vm_and(kernel_profile_continues(polyhedron_interval, &next, inside),
-                               vf_le(vf_abs(next.v_out), vf_set(KERNEL_ROOT_BAND)));
+    const vm inside = kernel_profile_continues(r, &next, left);
+    kernel_profile_next(r, vf_select(inside, r->u_out, r->interval.v_out), &next);
+    const vm rounding =
+        vm_and(kernel_profile_continues(r, &next, inside), vf_le(vf_abs(next.v_out), vf_set(KERNEL_ROOT_BAND)));
     next.v_out = vf_select(rounding, vf_select(walk->below, vf_set(-1e-30f), zero), next.v_out);
     kernel_piece_select(left, &next, &walk->piece);
-    return vm_and(inside, vm_or(walk->jump_out, kernel_profile_continues(polyhedron_interval, &next, inside)));
+    return vm_and(inside, vm_or(walk->jump_out, kernel_profile_continues(r, &next, inside)));
 }
 
 /* Returns a number that is larger than t by one or two units in the last place. */
@@ -563,14 +559,13 @@ SIMD_INLINE vf kernel_next_float(vf t)
 }
 
 /* Finds the next crossing of each open ray; returns the rays that have one. */
-static vm kernel_profile_walk_next(const kernel_poly_crossings *r,
-                                   const kernel_polyhedron_interval *polyhedron_interval, kernel_profile_walk *walk)
+static vm kernel_profile_walk_next(const kernel_poly_crossings *r, kernel_profile_walk *walk)
 {
     const vm jump = walk->jump_in;
     vm found = jump, left = vm_andnot(walk->open, jump);
     walk->jump_in = vm_none();
     while (vm_any(left)) {
-        const vm on = kernel_profile_walk_advance(r, polyhedron_interval, left, walk);
+        const vm on = kernel_profile_walk_advance(r, left, walk);
         const vm cross = vm_and(left, vm_xor(vf_lt(walk->piece.v_out, vf_set(0)), walk->below));
         walk->below = vm_xor(walk->below, cross);
         walk->open = vm_andnot(walk->open, vm_andnot(left, on));
@@ -600,17 +595,14 @@ static __attribute__((noinline)) void kernel_polyhedron_line_field(const kernel_
     for (unsigned left = vm_bits(hit); left; left &= left - 1) {
         const int ray = __builtin_ctz(left);
         if (facets[ray] < 0) continue;
+        int corners[4];
         const double *corner[4];
-        double place[4][3], value[4], point[3], share[4], g[3], n[3];
+        double value[4], share[4], g[3], n[3];
+        kernel_polyhedron_shares(p, c, facets[ray], ray, t[ray], corners, share);
         for (int i = 0; i < 4; i++) {
-            const int v = i < 3 ? c->facets[facets[ray]].vertex[i] : c->vertex_count;
-            const double at[3] = {(double)c->x[v], (double)c->y[v], (double)c->z[v]};
-            memcpy(place[i], at, sizeof at);
-            corner[i] = c->world[v];
-            value[i] = i < 3 ? kernel_lines_value(s, field, c->vertices[v]) : mean;
+            corner[i] = c->world[corners[i]];
+            value[i] = i < 3 ? kernel_lines_value(s, field, c->vertices[corners[i]]) : mean;
         }
-        kernel_ray_point(p, ray, t[ray], point);
-        kernel_barycentric((const double(*)[3])place, point, share);
         kernel_tet_gradient(p->frame, corner, value, g);
         kernel_polyhedron_gradient(p, c, facets[ray], n);
         out->value[ray] =
@@ -622,58 +614,56 @@ static __attribute__((noinline)) void kernel_polyhedron_line_field(const kernel_
     }
 }
 
-static void kernel_polyhedron_accept(kernel_packet *p, kernel_surface_state *state, int value, kernel_poly_crossings *r,
+static void kernel_polyhedron_accept(kernel_packet *p, const kernel_surface *s, int value, kernel_poly_crossings *r,
                                      vm hit, const kernel_profile_walk *walk)
 {
     kernel_surface_hits at = {.value = value, .t = walk->t, .w = walk->w};
     if (!vm_any(hit)) return;
-    kernel_poly_segments(r);
-    if (state->surface->layer->normal == RENDER_VERTEX)
-        kernel_polyhedron_smooth(p, r->cell, state->surface->layer, r, hit, walk->t, at.normal);
+    kernel_poly_tets(r);
+    if (s->layer->normal == RENDER_VERTEX)
+        kernel_polyhedron_smooth(p, r->cell, s->layer, r, hit, walk->t, at.normal);
     else
-        kernel_polyhedron_normal(p, r->cell, r, hit, walk->t, at.normal);
+        kernel_polyhedron_normal(p, r, hit, walk->t, at.normal);
     kernel_line_field along;
-    if (state->surface->layer->lines) {
-        kernel_polyhedron_line_field(p, state->surface, r, hit, walk->t, &along);
+    if (s->layer->lines) {
+        kernel_polyhedron_line_field(p, s, r, hit, walk->t, &along);
         at.along = &along;
     }
-    kernel_accept(p, state, NULL, hit, &at);
+    kernel_accept(p, s, NULL, hit, &at);
 }
 
 /* Accepts the crossings of one interval. A ray ends at the first crossing of an opaque surface in front of the eye. */
-static void kernel_polyhedron_cross(kernel_packet *p, kernel_surface_state *state, int value, vm wanted,
-                                    kernel_poly_crossings *r, kernel_polyhedron_interval *polyhedron_interval)
+static void kernel_polyhedron_cross(kernel_packet *p, const kernel_surface *s, int value, vm wanted,
+                                    kernel_poly_crossings *r)
 {
     kernel_profile_walk walk;
-    kernel_poly_profile(r, polyhedron_interval);
-    kernel_profile_walk_begin(polyhedron_interval, wanted, &walk);
+    kernel_poly_profile(r);
+    kernel_profile_walk_begin(r, wanted, &walk);
     do {
-        const vm found = kernel_profile_walk_next(r, polyhedron_interval, &walk);
-        const vm kept = kernel_unclipped_hits(p, state->surface, found, walk.t);
-        kernel_polyhedron_accept(p, state, value, r, vm_and(kept, vf_le(walk.t, p->t_far)), &walk);
-        if (state->is_opaque) walk.open = vm_andnot(walk.open, kept);
+        const vm found = kernel_profile_walk_next(r, &walk);
+        const vm kept = kernel_unclipped_hits(p, s, found, walk.t);
+        kernel_polyhedron_accept(p, s, value, r, vm_and(kept, vf_le(walk.t, p->t_far)), &walk);
+        if (kernel_is_opaque(p, s)) walk.open = vm_andnot(walk.open, kept);
     } while (vm_any(walk.open));
 }
 
-static void kernel_polyhedron_surface(kernel_packet *p, kernel_surface_state *state, polyhedron *c, int value, vm rays)
+static void kernel_polyhedron_surface(kernel_packet *p, const kernel_surface *s, polyhedron *c, int value, vm rays)
 {
-    const render_surface_layer *layer = state->surface->layer;
+    const render_surface_layer *layer = s->layer;
     kernel_poly_crossings r;
-    kernel_polyhedron_interval polyhedron_interval;
     if (!kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, rays, layer->colour_map != NULL)) return;
-    while (kernel_poly_next(&r, &polyhedron_interval)) {
-        const vm near = kernel_is_near(p, &polyhedron_interval.interval);
+    while (kernel_poly_next(&r)) {
+        const vm near = kernel_is_near(p, &r.interval);
         if (!vm_any(near)) continue;
-        const vm wanted = vm_and(near, vm_or(kernel_changes_sign(&polyhedron_interval.interval),
-                                             kernel_polyhedron_may_cross(p, c, &r, &polyhedron_interval)));
-        if (vm_any(wanted)) kernel_polyhedron_cross(p, state, value, wanted, &r, &polyhedron_interval);
+        const vm wanted = vm_and(near, vm_or(kernel_changes_sign(&r.interval), kernel_polyhedron_may_cross(p, c, &r)));
+        if (vm_any(wanted)) kernel_polyhedron_cross(p, s, value, wanted, &r);
     }
 }
 
-static void kernel_polyhedron_surfaces(kernel_packet *p, kernel_surface_state *state, int part, uint32_t index, vm rays)
+static void kernel_polyhedron_surfaces(kernel_packet *p, const kernel_surface *s, int part, uint32_t index, vm rays)
 {
-    const render_surface_layer *layer = state->surface->layer;
-    polyhedron *c = kernel_polyhedron_find(p, &layer->field.fields[part], part, state->layer, index);
+    const render_surface_layer *layer = s->layer;
+    polyhedron *c = kernel_polyhedron_find(p, &layer->field.fields[part], part, (int)(s - p->frame->surfaces), index);
     if (!c) return;
     for (int value = 0; value < layer->value_count; value++) {
         if (!kernel_values_straddle(c->values, c->vertex_count, layer->values[value])) continue;
@@ -682,11 +672,11 @@ static void kernel_polyhedron_surfaces(kernel_packet *p, kernel_surface_state *s
             kernel_polyhedron_transform(c, p);
             if (layer->colour_map)
                 c->g[c->vertex_count] =
-                    (float)kernel_values_colours(state->surface, part, c->index, c->vertices, c->vertex_count, c->g);
+                    (float)kernel_values_colours(s, part, c->index, c->vertices, c->vertex_count, c->g);
         }
         if (is_fresh || layer->value_count > 1)
             c->scale = kernel_values_relative(c->values, c->vertex_count + 1, layer->values[value], c->f);
-        kernel_polyhedron_surface(p, state, c, value, rays);
+        kernel_polyhedron_surface(p, s, c, value, rays);
     }
 }
 
@@ -701,15 +691,11 @@ SIMD_INLINE void kernel_block_trace(kernel_tile_trace *t, int block, int part, u
     for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) {
         const int i = block * KERNEL_BLOCK_PACKETS + n;
         kernel_packet *p = &t->packets[i];
-        kernel_surface_state state = {.surface = t->surface,
-                                      .layer = t->layer,
-                                      .hits = &t->hits[i],
-                                      .is_opaque = t->layer < t->frame->opaque_count};
         p->is_nearer = false;
         if (cell)
-            kernel_cell_surface(p, &state, cell, t->curved, value, p->active);
+            kernel_cell_surface(p, t->surface, cell, t->curved, value, p->active);
         else
-            kernel_polyhedron_surfaces(p, &state, part, index, p->active);
+            kernel_polyhedron_surfaces(p, t->surface, part, index, p->active);
         is_nearer = is_nearer || p->is_nearer;
     }
     if (is_nearer) kernel_block_update_far(t, block);

@@ -33,7 +33,8 @@ SIMD_INLINE void kernel_surface_cells_add(const kernel_tile_trace *t, kernel_sur
     own->near[n] = candidate->near;
     own->value[n] = value;
     own->isovalue[n] = t->surface->layer->values[value];
-    kernel_arrays_cells(&own->arrays, &candidate->cell, 1, grid_type_vertices(own->type), own->vertex, n);
+    kernel_arrays_vertices_of_any(&own->arrays, candidate->cell, grid_type_vertices(own->type), own->vertex[0] + n,
+                                  SIMD_WIDTH);
 }
 
 /* Fills the unused lanes with copies of the first cell. */

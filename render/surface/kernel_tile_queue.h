@@ -40,7 +40,7 @@ static void kernel_tile_process_candidate(kernel_tile_trace *t, const kernel_til
     kernel_cell_move_to_tile_space(c, t->frame, &t->tile, g);
     kernel_cell_relative(c, layer->values[value]);
     kernel_tile_prepare_cell(t, part);
-    t->curved->bounds = NULL;
+    t->curved->is_ready = false;
     kernel_blocks_trace(t, blocks, part, c->index, c, value);
 }
 
@@ -60,17 +60,6 @@ SIMD_INLINE unsigned kernel_candidate_blocks(const kernel_tile_trace *t, const k
 
 /* Maximum number of queued cells that are traced one by one. */
 enum { KERNEL_ALONE = SIMD_WIDTH };
-
-/* Numbers of the planes of the tile (kernel_tile.h) that classify nodes. */
-enum {
-    KERNEL_FIND_LEFT,
-    KERNEL_FIND_RIGHT,
-    KERNEL_FIND_TOP,
-    KERNEL_FIND_BOTTOM,
-    KERNEL_FIND_DEPTH,
-    KERNEL_FIND_ALONG,
-    KERNEL_FIND_PLANES
-};
 
 /* A tile's cells that are queued for tracing: one vector of cells per type, and cells that are traced one by one
  * (alone). And the state of a tile's search for cells in trees (kernel_tile_surface.h). A thread keeps it from tile to
@@ -93,10 +82,6 @@ typedef struct kernel_tile_search {
     /* number of pixels per unit of slope or, if the camera is orthographic, per scaled unit */
     float column_scale, row_scale;
     float pad[2]; /* margins by which columns and rows are extended, in pixels */
-    /* Planes of kernel_planes (kernel_tile.h). A point's signed distance from one is normal . position + offset, with a
-     * rounding error of at most `error`. size: absolute values of the normal's components. */
-    float normal[3][KERNEL_FIND_PLANES], size[3][KERNEL_FIND_PLANES], offset[KERNEL_FIND_PLANES];
-    float error[KERNEL_FIND_PLANES];
 } kernel_tile_search;
 
 static void kernel_tile_queue_begin(kernel_tile_search *m)

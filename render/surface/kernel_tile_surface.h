@@ -60,13 +60,6 @@ static void kernel_tile_find_set_part(kernel_tile_trace *t, kernel_tile_search *
     finder->last[1] = t->tile.y0 + KERNEL_TILE < c->height ? t->tile.y0 + KERNEL_TILE - 1 : c->height - 1;
 }
 
-/* Searches a leaf's cells for the current layer's surface. */
-static void kernel_tile_find_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count)
-{
-    kernel_tile_find_set_part(t, t->search, part);
-    kernel_find_leaf(t->thread->finder, cells, count);
-}
-
 /* ---- traversal of nodes ---- */
 
 /* Number of nodes that are tested at once, one per lane, with siblings in neighbouring lanes. While these are tested,
@@ -145,36 +138,46 @@ SIMD_INLINE vm kernel_node_pixels(vf low, vf high, vf scale, float pad, vi *box,
     return vf_lt(vf_from_vi(from), vf_from_vi(to) + 0.5f);
 }
 
-/* Tests the nodes. Returns a mask of the lanes of those that may be visible. */
+/* Tests the nodes by six of the tile's planes. Returns a mask of the lanes of those that may be visible. */
 SIMD_INLINE unsigned kernel_tile_find_test(const kernel_tile_trace *t, kernel_node_lanes *nodes)
 {
+    enum { LEFT, RIGHT, TOP, BOTTOM, DEPTH, ALONG, PLANES };
+    static const int plane[PLANES] = {0,
+                                      KERNEL_BLOCKS_ACROSS,
+                                      KERNEL_ROWS_LANE,
+                                      KERNEL_ROWS_LANE + KERNEL_BLOCKS_ACROSS,
+                                      KERNEL_DEPTH_LANE,
+                                      KERNEL_ALONG_LANE};
     const kernel_tile_search *s = t->search;
-    vf at[KERNEL_FIND_PLANES], reach[KERNEL_FIND_PLANES], middle[3], half[3];
+    const kernel_planes *q = &t->tree_planes;
+    vf at[PLANES], reach[PLANES], middle[3], half[3];
     for (int a = 0; a < 3; a++) {
         middle[a] = 0.5f * (nodes->low[a] + nodes->high[a]);
         half[a] = 0.5f * (nodes->high[a] - nodes->low[a]);
     }
-    for (int n = 0; n < KERNEL_FIND_PLANES; n++) {
-        at[n] =
-            (s->normal[0][n] * middle[0] + s->normal[1][n] * middle[1]) + (s->normal[2][n] * middle[2] + s->offset[n]);
-        reach[n] = (s->size[0][n] * half[0] + s->size[1][n] * half[1]) + (s->size[2][n] * half[2] + s->error[n]);
+    for (int n = 0; n < PLANES; n++) {
+        const int v = plane[n] / SIMD_WIDTH, i = plane[n] % SIMD_WIDTH;
+        at[n] = (q->normal[0][v][i] * middle[0] + q->normal[1][v][i] * middle[1]) +
+                (q->normal[2][v][i] * middle[2] + q->offset[v][i]);
+        reach[n] =
+            (q->size[0][v][i] * half[0] + q->size[1][v][i] * half[1]) + (q->size[2][v][i] * half[2] + q->error[v][i]);
     }
-    const vf far = at[KERNEL_FIND_DEPTH] + reach[KERNEL_FIND_DEPTH];
+    const vf far = at[DEPTH] + reach[DEPTH];
     vf inverse = vf_set(1);
     vi box = vi_set(0);
     if (!t->frame->job->camera.is_orthographic)
         inverse = 1.0f / vf_max(far + (float)t->frame->depth_shift, vf_set(1e-20f));
     vm shown = vm_not(vf_lt(far, vf_set(t->t_near)));
     for (int a = 0; a < 2; a++) {
-        const int first = a ? KERNEL_FIND_TOP : KERNEL_FIND_LEFT, last = first + 1;
+        const int first = a ? TOP : LEFT, last = first + 1;
         const vf scale = inverse * (a ? s->row_scale : s->column_scale);
         shown = vm_and(
             shown, kernel_node_pixels(at[first] - reach[first], at[last] + reach[last], scale, s->pad[a], &box, 8 * a));
     }
     shown = vm_and(
         shown, kernel_visible_values_overlap_lanes(&t->surface->visible_values, nodes->range_low, nodes->range_high));
-    vf_store(nodes->near, vf_max(at[KERNEL_FIND_DEPTH] - reach[KERNEL_FIND_DEPTH], vf_set(-INFINITY)));
-    vf_store(nodes->along, at[KERNEL_FIND_ALONG]);
+    vf_store(nodes->near, vf_max(at[DEPTH] - reach[DEPTH], vf_set(-INFINITY)));
+    vf_store(nodes->along, at[ALONG]);
     memcpy(nodes->box, &box, sizeof box);
     return vm_bits(shown);
 }
@@ -239,7 +242,8 @@ SIMD_INLINE void kernel_tile_find_cells(kernel_tile_trace *t, int part)
             const kernel_tile_node e = stack[--top];
             if (!kernel_pixels_beyond(t, e.place, e.near)) continue;
             if (e.count) {
-                kernel_tile_find_leaf(t, part, tree->cells + e.ref, e.count);
+                kernel_tile_find_set_part(t, t->search, part);
+                kernel_find_leaf(t->thread->finder, tree->cells + e.ref, e.count);
             } else {
                 inner[inner_count++] = e.ref;
             }
@@ -268,26 +272,6 @@ SIMD_INLINE void kernel_tile_surface(kernel_tile_trace *t)
         kernel_tile_parts(t, 0, &part, 1, t->traced_blocks);
 }
 
-/* Copies six of the tile's planes out of the vectors in which kernel_planes stores them. */
-SIMD_INLINE void kernel_tile_find_planes(const kernel_planes *q, kernel_tile_search *out)
-{
-    static const int lanes[KERNEL_FIND_PLANES] = {0,
-                                                  KERNEL_BLOCKS_ACROSS,
-                                                  KERNEL_ROWS_LANE,
-                                                  KERNEL_ROWS_LANE + KERNEL_BLOCKS_ACROSS,
-                                                  KERNEL_DEPTH_LANE,
-                                                  KERNEL_ALONG_LANE};
-    for (int n = 0; n < KERNEL_FIND_PLANES; n++) {
-        const int v = lanes[n] / SIMD_WIDTH, i = lanes[n] % SIMD_WIDTH;
-        for (int a = 0; a < 3; a++) {
-            out->normal[a][n] = q->normal[a][v][i];
-            out->size[a][n] = q->size[a][v][i];
-        }
-        out->offset[n] = q->offset[v][i];
-        out->error[n] = q->error[v][i];
-    }
-}
-
 /* Sets up the search for a tile. */
 SIMD_INLINE void kernel_tile_find_begin(kernel_tile_trace *t)
 {
@@ -300,7 +284,6 @@ SIMD_INLINE void kernel_tile_find_begin(kernel_tile_trace *t)
     s->row_scale = (float)(1 / (fabs(f->slope_dy) * unit));
     s->pad[0] = 0.01f + error_bound * s->column_scale + 3e-5f * (float)f->job->camera.width;
     s->pad[1] = 0.01f + error_bound * s->row_scale + 3e-5f * (float)f->job->camera.height;
-    kernel_tile_find_planes(&t->tree_planes, s);
 }
 
 /* Traces the surfaces of all layers. */

@@ -13,24 +13,11 @@
 
 enum { MOST_LANES = 16 };
 
-static const float *rows_of(const occluder_pieces *p, int64_t i)
-{
-    return (const float *)(const void *)((const char *)p->first + (size_t)i * p->stride);
-}
-
-static void box_of(const occluder_pieces *p, int64_t i, float *lower, float *upper)
-{
-    const float *rows = rows_of(p, i);
-    for (int a = 0; a < 3; a++) {
-        const bool is_slab = p->rows == KERNEL_SLAB_ROWS;
-        lower[a] = is_slab ? rows[KERNEL_SLAB_LOWER + a] : fminf(fminf(rows[a], rows[3 + a]), rows[6 + a]);
-        upper[a] = is_slab ? rows[KERNEL_SLAB_UPPER + a] : fmaxf(fmaxf(rows[a], rows[3 + a]), rows[6 + a]);
-    }
-}
-
 /* The state of converting a binary tree to a tree with one child per lane. */
 typedef struct widening {
-    const occluder_pieces *of;
+    const occluder_piece *pieces;
+    int64_t piece_count;
+    int rows; /* number of rows of a piece */
     const mmbvh *binary;
     /* for each node, the pieces below it: index of the first in the binary tree's list of cells, and their number */
     int64_t *first, *count;
@@ -38,6 +25,16 @@ typedef struct widening {
     int width;
     kernel_occluder_tree *out;
 } widening;
+
+static void box_of(const widening *w, int64_t i, float *lower, float *upper)
+{
+    const float *rows = w->pieces[i].rows;
+    for (int a = 0; a < 3; a++) {
+        const bool is_slab = w->rows == KERNEL_SLAB_ROWS;
+        lower[a] = is_slab ? rows[KERNEL_SLAB_LOWER + a] : fminf(fminf(rows[a], rows[3 + a]), rows[6 + a]);
+        upper[a] = is_slab ? rows[KERNEL_SLAB_UPPER + a] : fmaxf(fmaxf(rows[a], rows[3 + a]), rows[6 + a]);
+    }
+}
 
 static void grow_box(float box[6], const float *lower, const float *upper)
 {
@@ -58,7 +55,7 @@ static void sum_up(widening *w)
         w->first[node] = count ? ref : w->first[ref];
         w->count[node] = count ? count : w->count[ref] + w->count[ref + 1];
         for (int64_t n = 0; n < count; n++) {
-            box_of(w->of, w->binary->cells[ref + n], lower, upper);
+            box_of(w, w->binary->cells[ref + n], lower, upper);
             grow_box(box, lower, upper);
         }
         for (int64_t n = 0; n < (count ? 0 : 2); n++)
@@ -91,7 +88,7 @@ static piece_range leaf_part(const widening *w, int64_t first, int64_t count)
     piece_range out = {-1, first, count, {INFINITY, INFINITY, INFINITY, -INFINITY, -INFINITY, -INFINITY}};
     float lower[3], upper[3];
     for (int64_t n = 0; n < count; n++) {
-        box_of(w->of, w->binary->cells[first + n], lower, upper);
+        box_of(w, w->binary->cells[first + n], lower, upper);
         grow_box(out.box, lower, upper);
     }
     return out;
@@ -135,13 +132,13 @@ static int divide_all(const widening *w, const piece_range *whole, piece_range *
 static int32_t make_leaf(widening *w, const piece_range *of)
 {
     const int32_t leaf = w->out->leaf_count++;
-    const int rows = w->of->rows, width = w->width;
+    const int rows = w->rows, width = w->width;
     float *to = w->out->leaves + (int64_t)leaf * rows * width;
     int32_t *sources = w->out->sources + (int64_t)leaf * width;
     for (int64_t i = 0; i < width; i++) {
         const bool is_there = i < of->count;
         const int64_t piece = w->binary->cells[of->first + (is_there ? i : 0)];
-        const float *from = rows_of(w->of, piece);
+        const float *from = w->pieces[piece].rows;
         sources[i] = is_there ? (int32_t)piece : -1;
         for (int row = 0; row < rows; row++) to[row * width + i] = is_there ? from[row] : NAN;
         for (int row = 0; !is_there && rows == KERNEL_SLAB_ROWS && row < 6; row++)
@@ -174,7 +171,7 @@ static bool reserve(const widening *w, size_t nodes, size_t leaves)
     const size_t width = (size_t)w->width;
     w->out->boxes = base_reserve(nodes * 6 * width * sizeof(float));
     w->out->children = base_reserve(nodes * width * sizeof(int32_t));
-    w->out->leaves = base_reserve(leaves * (size_t)w->of->rows * width * sizeof(float));
+    w->out->leaves = base_reserve(leaves * (size_t)w->rows * width * sizeof(float));
     w->out->sources = base_reserve(leaves * width * sizeof(int32_t));
     return w->out->boxes && w->out->children && w->out->leaves && w->out->sources;
 }
@@ -184,7 +181,7 @@ static void count_used_bytes(const widening *w)
     const size_t width = (size_t)w->width, nodes = (size_t)w->out->node_count, leaves = (size_t)w->out->leaf_count;
     base_set_used_bytes(w->out->boxes, nodes * 6 * width * sizeof(float));
     base_set_used_bytes(w->out->children, nodes * width * sizeof(int32_t));
-    base_set_used_bytes(w->out->leaves, leaves * (size_t)w->of->rows * width * sizeof(float));
+    base_set_used_bytes(w->out->leaves, leaves * (size_t)w->rows * width * sizeof(float));
     base_set_used_bytes(w->out->sources, leaves * width * sizeof(int32_t));
 }
 
@@ -208,25 +205,26 @@ static bool widen(widening *w)
     return is_well;
 }
 
-static insitu_status build_boxes(const occluder_pieces *of, int threads, mmbvh *out, base_error *error)
+static insitu_status build_boxes(const widening *w, int threads, mmbvh *out, base_error *error)
 {
-    const size_t bytes = (size_t)of->count * 3 * sizeof(float);
+    const int64_t count = w->piece_count;
+    const size_t bytes = (size_t)count * 3 * sizeof(float);
     float *lower = base_alloc(bytes), *upper = base_alloc(bytes),
-          *ranges = base_calloc((size_t)of->count * 2, sizeof(float));
+          *ranges = base_calloc((size_t)count * 2, sizeof(float));
     const mmbvh_options options = {.threads = threads, .layout = MMBVH_REFERENCE, .builder = MMBVH_SAH};
     insitu_status status = INSITU_OK;
     if (!lower || !upper || !ranges) {
         status = base_fail(error, INSITU_ERROR_MEMORY, "no memory for the boxes of %lld pieces of surfaces",
-                           (long long)of->count);
+                           (long long)count);
     } else {
 #pragma omp parallel num_threads(threads)
         {
             region_enter();
 #pragma omp for schedule(static) nowait
-            for (int64_t i = 0; i < of->count; i++) box_of(of, i, lower + 3 * i, upper + 3 * i);
+            for (int64_t i = 0; i < count; i++) box_of(w, i, lower + 3 * i, upper + 3 * i);
             region_leave();
         }
-        status = mmbvh_build_boxes(lower, upper, ranges, of->count, &options, out, error);
+        status = mmbvh_build_boxes(lower, upper, ranges, count, &options, out, error);
     }
     base_free(lower);
     base_free(upper);
@@ -234,16 +232,16 @@ static insitu_status build_boxes(const occluder_pieces *of, int threads, mmbvh *
     return status;
 }
 
-insitu_status occluder_tree_build(const occluder_pieces *of, int width, int threads, kernel_occluder_tree *out,
-                                  base_error *error)
+insitu_status occluder_tree_build(const occluder_piece *pieces, int64_t count, int rows, int width, int threads,
+                                  kernel_occluder_tree *out, base_error *error)
 {
     mmbvh binary = {0};
-    widening w = {.of = of, .binary = &binary, .width = width, .out = out};
-    if (!of->count) return INSITU_OK;
-    insitu_status status = build_boxes(of, threads, &binary, error);
+    widening w = {.pieces = pieces, .piece_count = count, .rows = rows, .binary = &binary, .width = width, .out = out};
+    if (!count) return INSITU_OK;
+    insitu_status status = build_boxes(&w, threads, &binary, error);
     if (!status && !widen(&w))
-        status = base_fail(error, INSITU_ERROR_MEMORY, "no memory for a tree of %lld pieces of surfaces",
-                           (long long)of->count);
+        status =
+            base_fail(error, INSITU_ERROR_MEMORY, "no memory for a tree of %lld pieces of surfaces", (long long)count);
     mmbvh_free(&binary);
     return status;
 }

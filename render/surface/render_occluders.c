@@ -23,16 +23,6 @@
 #include "render_occluder_tree.h"
 #include "render_subtrees.h"
 
-typedef struct triangle {
-    float rows[KERNEL_TRIANGLE_ROWS];
-    int32_t surface;
-} triangle;
-
-typedef struct slab {
-    float rows[KERNEL_SLAB_ROWS];
-    kernel_occluder cell;
-} slab;
-
 enum { HEX_BYTES = KERNEL_CURVED_RECORD_WORDS * sizeof(float) };
 
 /* A growing list of items of one size. */
@@ -41,20 +31,27 @@ typedef struct list {
     void *items;
 } list;
 
-/* The occluders that one thread has found, or those of all threads. */
-typedef struct occluder_list {
-    list triangles, slabs, hexes;
+/* The occluders that one thread, or all threads, have found, and the cell that is being searched. */
+typedef struct occluder_search {
+    const kernel_frame *frame;
+    list triangles, slabs; /* of occluder_piece */
+    list cells;            /* of kernel_occluder: the cells of the slabs */
+    list hexes;            /* records of hexes */
     bool out_of_memory;
-} occluder_list;
+    kernel_occluder cell; /* the cell that is being searched, and the isovalue */
+    int count; /* number of its vertices in `places` and `values`; a polyhedron lists some vertices several times */
+    list places, values;
+    double reach; /* distance from a hit, in tree space, within which the cell does not block the hit's rays */
+} occluder_search;
 
 /* Appends an item to a list and returns it; NULL if memory ran out. */
-static void *add(occluder_list *f, list *l, size_t size)
+static void *add(occluder_search *s, list *l, size_t size)
 {
     if (l->count == l->capacity) {
         const int64_t capacity = l->capacity + l->capacity / 2 + 256;
         void *items = base_realloc(l->items, (size_t)capacity * size);
         if (!items) {
-            f->out_of_memory = true;
+            s->out_of_memory = true;
             return NULL;
         }
         l->items = items;
@@ -63,25 +60,13 @@ static void *add(occluder_list *f, list *l, size_t size)
     return (char *)l->items + (size_t)l->count++ * size;
 }
 
-static void free_occluder_list(occluder_list *f)
+static void free_lists(occluder_search *s)
 {
-    base_free(f->triangles.items);
-    base_free(f->slabs.items);
-    base_free(f->hexes.items);
+    list *const lists[] = {&s->triangles, &s->slabs, &s->cells, &s->hexes, &s->places, &s->values};
+    for (int i = 0; i < 6; i++) base_free(lists[i]->items);
 }
 
 /* ---- a cell --------------------------------------------------------------------------------------------------- */
-
-/* The cell that is currently searched for occluders, and the isovalue for which it is searched. */
-typedef struct occluder_search {
-    occluder_list *into;
-    const kernel_frame *frame;
-    int surface, part, value;
-    uint32_t index;
-    int count; /* number of vertices in `places` and `values`; a polyhedron lists some vertices several times */
-    list places, values;
-    double reach; /* distance from a hit, in tree space, within which the cell does not block the hit's rays */
-} occluder_search;
 
 static const double *place_of(const occluder_search *s, int i)
 {
@@ -106,7 +91,7 @@ static void bounds_of(const occluder_search *s, double low[3], double high[3])
 static bool add_vertex(occluder_search *s, const double world[3], double value)
 {
     const render_space *space = &s->frame->job->space;
-    double *place = add(s->into, &s->places, 3 * sizeof *place), *kept = add(s->into, &s->values, sizeof *kept);
+    double *place = add(s, &s->places, 3 * sizeof *place), *kept = add(s, &s->values, sizeof *kept);
     if (!place || !kept) return false;
     for (int a = 0; a < 3; a++) place[a] = (world[a] - space->origin[a]) * space->scale;
     *kept = value;
@@ -127,13 +112,13 @@ static void cross_edge(const occluder_search *s, double isovalue, int i, int j, 
 
 static void add_triangle(occluder_search *s, float a[3], float b[3], float c[3])
 {
-    triangle *t = add(s->into, &s->into->triangles, sizeof *t);
+    occluder_piece *t = add(s, &s->triangles, sizeof *t);
     if (!t) return;
     memcpy(t->rows, a, 3 * sizeof *a);
     memcpy(t->rows + 3, b, 3 * sizeof *b);
     memcpy(t->rows + 6, c, 3 * sizeof *c);
     t->rows[KERNEL_TRIANGLE_REACH] = (float)s->reach;
-    t->surface = s->surface;
+    t->surface = s->cell.surface;
 }
 
 /* Adds the pieces of the isosurface in a tet, one or two triangles. The vertices must be in the order of
@@ -208,7 +193,7 @@ static double scale_of(const occluder_search *s, double isovalue)
     return kernel_mirrored_power(largest);
 }
 
-static void fill_slab(const occluder_search *s, double isovalue, slab *out)
+static void fill_slab(const occluder_search *s, double isovalue, occluder_piece *out)
 {
     double low[3], high[3], gradient[3], level, off = 0, steep = 0, size = 0;
     const double scale = scale_of(s, isovalue);
@@ -263,23 +248,26 @@ static int32_t add_hex(occluder_search *s, const kernel_cell *c, double isovalue
 {
     const double scale = scale_of(s, isovalue);
     if (s->frame->job->clip_count || collapses(c)) return -1;
-    float *record = add(s->into, &s->into->hexes, HEX_BYTES);
+    float *record = add(s, &s->hexes, HEX_BYTES);
     if (!record) return -1;
     for (int i = 0; i < 8; i++) {
         for (int a = 0; a < 3; a++) record[4 * i + a] = (float)place_of(s, i)[a];
         record[4 * i + 3] = (float)((value_of(s, i) - isovalue) * scale);
     }
     fill_faces(c, record);
-    return (int32_t)s->into->hexes.count - 1;
+    return (int32_t)s->hexes.count - 1;
 }
 
 static void add_slab(occluder_search *s, const kernel_cell *c, double isovalue)
 {
     const int32_t record = kernel_is_box(c->type) ? add_hex(s, c, isovalue) : -1;
-    slab *out = add(s->into, &s->into->slabs, sizeof *out);
-    if (!out) return;
+    occluder_piece *out = add(s, &s->slabs, sizeof *out);
+    kernel_occluder *cell = add(s, &s->cells, sizeof *cell);
+    if (!out || !cell) return;
     fill_slab(s, isovalue, out);
-    out->cell = (kernel_occluder){s->surface, s->value, s->part, s->index, record};
+    out->surface = s->cell.surface;
+    *cell = s->cell;
+    cell->record = record;
 }
 
 /* ---- collecting -------------------------------------------------------------------------------------------------- */
@@ -296,7 +284,7 @@ static bool list_cell_vertices(occluder_search *s, kernel_cell *c, const grid *g
 
 static bool list_polyhedron_vertices(occluder_search *s, const grid *g, const grid_field *field)
 {
-    grid_walk walk = grid_walk_cell(g, s->index);
+    grid_walk walk = grid_walk_cell(g, s->cell.cell);
     int64_t vertex;
     double world[3];
     while (grid_walk_next(&walk, &vertex)) {
@@ -308,11 +296,11 @@ static bool list_polyhedron_vertices(occluder_search *s, const grid *g, const gr
 
 static void find_in_cell(occluder_search *s)
 {
-    const render_surface_layer *layer = s->frame->surfaces[s->surface].layer;
-    const grid *g = s->frame->job->parts[s->part].cells;
-    const grid_field *field = &layer->field.fields[s->part];
+    const render_surface_layer *layer = s->frame->surfaces[s->cell.surface].layer;
+    const grid *g = s->frame->job->parts[s->cell.part].cells;
+    const grid_field *field = &layer->field.fields[s->cell.part];
     kernel_cell c = {.type = 0};
-    kernel_cell_fetch(&c, g, field, s->index);
+    kernel_cell_fetch(&c, g, field, s->cell.cell);
     const bool is_polyhedron = kernel_has_own_faces(c.type);
     if (!is_polyhedron && !c.is_finite) return;
     s->count = 0;
@@ -320,8 +308,8 @@ static void find_in_cell(occluder_search *s)
     if (is_polyhedron ? !list_polyhedron_vertices(s, g, field) : !list_cell_vertices(s, &c, g)) return;
     /* as kernel_occlusion_beyond() computes it */
     s->reach = layer->contact > 0 ? (double)layer->contact * kernel_cell_size(s->places.items, s->count) : 0;
-    for (s->value = 0; s->value < layer->value_count; s->value++) {
-        const double isovalue = layer->values[s->value];
+    for (s->cell.value = 0; s->cell.value < layer->value_count; s->cell.value++) {
+        const double isovalue = layer->values[s->cell.value];
         if (!kernel_values_straddle(s->values.items, s->count, isovalue)) continue;
         if (kernel_is_linear(c.type))
             add_tet(s, isovalue);
@@ -337,32 +325,21 @@ static void find_in_subtree(occluder_search *s, const kernel_subtree *subtree)
     const mmbvh_ranges *ranges = &surface->layer->field.ranges[subtree->part];
     int64_t stack[MMBVH_MAX_DEPTH];
     int top = 0;
-    s->surface = subtree->surface;
-    s->part = subtree->part;
+    s->cell.surface = subtree->surface;
+    s->cell.part = subtree->part;
     stack[top++] = subtree->node;
-    while (top && !s->into->out_of_memory) {
+    while (top && !s->out_of_memory) {
         const int64_t node = stack[--top], ref = mmbvh_node_ref(tree, node);
         const int count = mmbvh_node_count(tree, node);
         if (!kernel_node_is_visible(&surface->visible_values, ranges, node)) continue;
         for (int n = 0; n < count; n++) {
-            s->index = tree->cells[ref + n];
+            s->cell.cell = tree->cells[ref + n];
             find_in_cell(s);
         }
         if (count) continue;
         stack[top++] = ref + 1;
         stack[top++] = ref;
     }
-}
-
-static bool list_subtrees(const kernel_frame *frame, render_subtrees *out)
-{
-    const render_job *job = frame->job;
-    if (!render_subtrees_begin(out, (int64_t)frame->opaque_count * job->part_count + 1)) return false;
-    for (int i = 0; i < frame->opaque_count; i++)
-        for (int part = 0; part < job->part_count; part++)
-            if (frame->surfaces[i].layer->field.ranges[part].low && job->parts[part].tree->node_count)
-                render_subtrees_add(out, frame, i, part);
-    return true;
 }
 
 /* Moves the items of `from` to the end of `to`. Returns false if memory ran out. */
@@ -381,54 +358,50 @@ static bool join(list *to, list *from, size_t size)
     return true;
 }
 
-static bool join_occluder_lists(occluder_list *to, occluder_list *from)
+static bool join_lists(occluder_search *to, occluder_search *from)
 {
-    const int64_t hexes = to->hexes.count;
-    slab *slabs = from->slabs.items;
-    for (int64_t i = 0; i < from->slabs.count; i++)
-        if (slabs[i].cell.record >= 0) slabs[i].cell.record += (int32_t)hexes;
-    return !from->out_of_memory && join(&to->triangles, &from->triangles, sizeof(triangle)) &&
-           join(&to->slabs, &from->slabs, sizeof(slab)) && join(&to->hexes, &from->hexes, HEX_BYTES);
+    kernel_occluder *cells = from->cells.items;
+    for (int64_t i = 0; i < from->cells.count; i++)
+        if (cells[i].record >= 0) cells[i].record += (int32_t)to->hexes.count;
+    return !from->out_of_memory && join(&to->triangles, &from->triangles, sizeof(occluder_piece)) &&
+           join(&to->slabs, &from->slabs, sizeof(occluder_piece)) &&
+           join(&to->cells, &from->cells, sizeof(kernel_occluder)) && join(&to->hexes, &from->hexes, HEX_BYTES);
 }
 
-static bool find_all(const kernel_frame *frame, const render_subtrees *subtrees, int threads, occluder_list *out)
+static bool find_all(const kernel_frame *frame, int threads, occluder_search *out)
 {
-    bool is_well = true;
+    int64_t count;
+    kernel_subtree *subtrees = render_subtrees(frame, 0, frame->opaque_count, &count);
+    bool is_well = subtrees;
 #pragma omp parallel num_threads(threads) reduction(&& : is_well)
     {
         region_enter();
-        occluder_list own = {0};
-        occluder_search s = {.into = &own, .frame = frame};
+        occluder_search own = {.frame = frame};
 #pragma omp for schedule(dynamic, 1) nowait
-        for (int64_t i = 0; i < subtrees->count; i++) find_in_subtree(&s, &subtrees->items[i]);
+        for (int64_t i = 0; i < count; i++) find_in_subtree(&own, &subtrees[i]);
 #pragma omp critical(occluders)
-        is_well = join_occluder_lists(out, &own);
-        base_free(s.places.items);
-        base_free(s.values.items);
-        free_occluder_list(&own);
+        is_well = join_lists(out, &own);
+        free_lists(&own);
         region_leave();
     }
+    base_free(subtrees);
     return is_well;
 }
 
 /* ---- building the trees ------------------------------------------------------------------------------------------ */
 
-static insitu_status build_trees(const occluder_list *f, int threads, kernel_occluders *out, base_error *error)
+static insitu_status build_trees(const occluder_search *found, int threads, kernel_occluders *out, base_error *error)
 {
-    const triangle *t = f->triangles.items;
-    const slab *s = f->slabs.items;
-    const occluder_pieces triangles = {f->triangles.items, sizeof *t, f->triangles.count, KERNEL_TRIANGLE_ROWS};
-    const occluder_pieces slabs = {f->slabs.items, sizeof *s, f->slabs.count, KERNEL_SLAB_ROWS};
-    insitu_status status = occluder_tree_build(&triangles, out->width, threads, &out->triangles, error);
-    if (!status) status = occluder_tree_build(&slabs, out->width, threads, &out->slabs, error);
+    const occluder_piece *triangles = found->triangles.items;
+    insitu_status status = occluder_tree_build(triangles, found->triangles.count, KERNEL_TRIANGLE_ROWS, out->width,
+                                               threads, &out->triangles, error);
+    if (!status)
+        status = occluder_tree_build(found->slabs.items, found->slabs.count, KERNEL_SLAB_ROWS, out->width, threads,
+                                     &out->slabs, error);
     if (status) return status;
-    out->cells = base_alloc((size_t)f->slabs.count * sizeof *out->cells);
-    if (!out->cells)
-        return base_fail(error, INSITU_ERROR_MEMORY, "no memory for %lld cells", (long long)f->slabs.count);
-    for (int64_t i = 0; i < f->slabs.count; i++) out->cells[i] = s[i].cell;
     for (int64_t i = 0; i < out->triangles.leaf_count * out->width; i++) {
         int32_t *source = &out->triangles.sources[i];
-        *source = *source < 0 ? -1 : t[*source].surface;
+        *source = *source < 0 ? -1 : triangles[*source].surface;
     }
     return INSITU_OK;
 }
@@ -436,20 +409,19 @@ static insitu_status build_trees(const occluder_list *f, int threads, kernel_occ
 insitu_status occluders_build(const kernel_frame *frame, int width, int threads, kernel_occluders *out,
                               base_error *error)
 {
-    render_subtrees subtrees = {0};
-    occluder_list all = {0};
+    occluder_search all = {0};
     insitu_status status = INSITU_OK;
     *out = (kernel_occluders){.width = width};
-    if (!list_subtrees(frame, &subtrees) || !find_all(frame, &subtrees, threads, &all))
+    if (!find_all(frame, threads, &all))
         status = base_fail(error, INSITU_ERROR_MEMORY, "no memory for what blocks rays from hits");
     if (!status && (all.triangles.count > INT32_MAX / 2 || all.slabs.count > INT32_MAX / 64))
         status = base_fail(error, INSITU_ERROR_MEMORY, "shadows: %lld pieces of surfaces on a rank are too many",
                            (long long)all.triangles.count + (long long)all.slabs.count);
     if (!status) status = build_trees(&all, threads, out, error);
+    out->cells = all.cells.items;
     out->hexes = all.hexes.items;
-    all.hexes.items = NULL;
-    free_occluder_list(&all);
-    base_free(subtrees.items);
+    all.cells.items = all.hexes.items = NULL;
+    free_lists(&all);
     return status;
 }
 

@@ -273,9 +273,9 @@ static void kernel_step_side(const kernel_bisection *h, double inside, float sid
 /* Rounds x to float and clamps it to the range between two neighbouring steps; *rest: the rounding error. */
 static void kernel_step_round(const float side[2], double x, float *v, double *rest)
 {
-    const double active = fmax(fmin(x, (double)side[1]), (double)side[0]);
-    *v = (float)active;
-    *rest = side[0] < *v && *v < side[1] ? active - (double)*v : 0;
+    const double clamped = fmax(fmin(x, (double)side[1]), (double)side[0]);
+    *v = (float)clamped;
+    *rest = side[0] < *v && *v < side[1] ? clamped - (double)*v : 0;
 }
 
 /* Returns bounds of the transfer function over the subinterval's values. step: a step among the values, or NULL. */
@@ -471,18 +471,17 @@ SIMD_INLINE void kernel_polyhedron_domain(polyhedron *c, const kernel_transfer *
 }
 
 /* Sets the window's samples in one interval of the rays inside the polyhedron. */
-static void kernel_polyhedron_interval_fill(kernel_packet *p, kernel_samples *s, kernel_poly_crossings *r,
-                                            kernel_polyhedron_interval *polyhedron_interval)
+static void kernel_polyhedron_interval_fill(kernel_packet *p, kernel_samples *s, kernel_poly_crossings *r)
 {
-    const kernel_interval *i = &polyhedron_interval->interval;
+    const kernel_interval *i = &r->interval;
     kernel_interval piece;
     int begin, end;
     kernel_sample_range(p, s, i, &begin, &end);
     if (begin >= end) return;
-    if (!r->cell->is_constant) kernel_poly_profile(r, polyhedron_interval);
-    kernel_profile_begin(polyhedron_interval, &piece);
-    while (vm_any(kernel_profile_continues(polyhedron_interval, &piece, i->mask))) {
-        kernel_profile_next(r, polyhedron_interval, polyhedron_interval->u_out, &piece);
+    if (!r->cell->is_constant) kernel_poly_profile(r);
+    kernel_profile_begin(r, &piece);
+    while (vm_any(kernel_profile_continues(r, &piece, i->mask))) {
+        kernel_profile_next(r, r->u_out, &piece);
         kernel_fill(p, s, NULL, &piece, i);
     }
 }
@@ -506,9 +505,8 @@ static void kernel_polyhedron_volume(kernel_packet *p, kernel_samples *s, int pa
 {
     const polyhedron *c = kernel_polyhedron_prepare(p, s->volume, part, index);
     kernel_poly_crossings r;
-    kernel_polyhedron_interval polyhedron_interval;
     if (!c || !kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
-    while (kernel_poly_next(&r, &polyhedron_interval)) kernel_polyhedron_interval_fill(p, s, &r, &polyhedron_interval);
+    while (kernel_poly_next(&r)) kernel_polyhedron_interval_fill(p, s, &r);
 }
 
 /* Adds the segments of a polyhedron: the pieces of the ray's profile, on which the field is exactly linear. */
@@ -516,16 +514,15 @@ static void kernel_polyhedron_segments(kernel_packet *p, kernel_segments *list, 
 {
     const polyhedron *c = kernel_polyhedron_prepare(p, list->volume, part, index);
     kernel_poly_crossings r;
-    kernel_polyhedron_interval polyhedron_interval;
     kernel_interval piece;
     if (!c || !kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
-    while (kernel_poly_next(&r, &polyhedron_interval)) {
-        if (!c->is_constant) kernel_poly_profile(&r, &polyhedron_interval);
-        kernel_profile_begin(&polyhedron_interval, &piece);
+    while (kernel_poly_next(&r)) {
+        if (!c->is_constant) kernel_poly_profile(&r);
+        kernel_profile_begin(&r, &piece);
         for (;;) {
-            piece.mask = kernel_profile_continues(&polyhedron_interval, &piece, piece.mask);
+            piece.mask = kernel_profile_continues(&r, &piece, piece.mask);
             if (!vm_any(piece.mask)) break;
-            kernel_profile_next(&r, &polyhedron_interval, polyhedron_interval.u_out, &piece);
+            kernel_profile_next(&r, r.u_out, &piece);
             const kernel_unit_segment whole =
                 kernel_unit_segment_of((piece.t_out - piece.t_in) * list->per_t, piece.v_in, piece.v_out);
             kernel_linear_segments(p, list, &piece, (const vf[2]){p->t_near, list->t_cut}, &whole);

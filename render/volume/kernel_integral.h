@@ -63,16 +63,17 @@ SIMD_INLINE vf kernel_exp(vf x)
     return vf_exp2(x * 1.4426950f);
 }
 
-/* Returns the offset, in floats, into the table of variations of the entry with the bounds for the values from low to
- * high. */
-SIMD_INLINE vi kernel_light_variation_entry(const kernel_pieces *t, vf low, vf high)
+/* Reads the bounds for the values from low to high (KERNEL_LIGHT_VARIATION etc.). */
+SIMD_INLINE void kernel_light_bounds(const kernel_pieces *t, vf low, vf high, vf out[KERNEL_LIGHT_ENTRIES])
 {
     const vf zero = vf_set(0), last = vf_set(KERNEL_VARIATION_BINS - 1);
     const vf begin = vf_clamp((low - t->bin_low) * t->variation_inverse, zero, last);
     const vf end = vf_clamp((high - t->bin_low) * t->variation_inverse, begin, last);
     /* The number of bins that the values cover, plus 1, is classified by quarters of an octave. */
     const vi width = (vi_from_bits((end - begin) + 1.0f) >> 21) - (127 << 2);
-    return (width * KERNEL_VARIATION_BINS + vi_from_vf(begin)) * (int)(sizeof(kernel_light_variation) / sizeof(float));
+    int32_t at[SIMD_WIDTH];
+    vi_store(at, (width * KERNEL_VARIATION_BINS + vi_from_vf(begin)) * KERNEL_LIGHT_ENTRIES);
+    vf_gather_rows(t->variations[0], at, out);
 }
 #endif
 

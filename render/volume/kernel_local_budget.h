@@ -6,7 +6,7 @@
  * polynomial's own error, so that only the variation of T g along the segment counts: the error is at most half the
  * oscillation of T g times the integral of |v - f|. g depends on the value and on b. Over a range of values it is at
  * most `cost`, and varies by `swing` for fixed b; g is linear in b, so both follow from b's two bounds
- * (kernel_light_variation). Let D be the segment's depth and R the colours' contrast. Along the segment T falls by
+ * (kernel_light_bounds()). Let D be the segment's depth and R the colours' contrast. Along the segment T falls by
  * min(D, 1), and b changes by R min(D, 1):
  *
  *     oscillation of T g <= T (swing + min(D, 1) (cost + R |s'|)),      and no more than 2 T cost.
@@ -63,28 +63,17 @@ enum { KERNEL_LOCAL_PIXELS = KERNEL_TILE * KERNEL_TILE, KERNEL_LOCAL_LEVELS = 5,
  * most 4e-7; ten times as much is counted as an error of the field if the opacity has narrow ramps. */
 #define KERNEL_VALUE_ROUNDING 4e-6f
 
-/* The error budget of a tile's rays in a volume. */
-typedef struct kernel_local_budget {
-    const kernel_pieces *pieces;
-    const kernel_transfer *transfer;
-    /* allowance: error allowed per share of the ray's length and of its absorption; if it is 0, segments are at most as
-     * long as the sampling step */
-    float allowance, reach;
-    float step;                       /* the sampling step in unit distances */
-    float per_t[KERNEL_LOCAL_PIXELS]; /* unit distances per t, by packet and lane */
-} kernel_local_budget;
-
 /* ---- cells ---- */
 
 /* Sets each lane's bounds from the values at its cell's vertices. They must also hold at the ends of chords, which may
  * lie outside of these values. If there is one chord, its ends exceed them by at most three sixteenths of the values'
  * range (kernel_local_leaves_range()). If there are several, their ends exceed them by a sixth of the parabola's
  * maximum, which is less than that range. */
-SIMD_INLINE void kernel_local_bound(const kernel_local_budget *b, const float (*values)[SIMD_WIDTH], int type,
+SIMD_INLINE void kernel_local_bound(const kernel_frame *f, int volume, const float (*values)[SIMD_WIDTH], int type,
                                     kernel_local_bounds *out)
 {
-    const kernel_pieces *t = b->pieces;
-    vf low = vf_load(values[0]), high = low, error_variation, cost, extinction, steepness;
+    const kernel_pieces *t = &f->pieces[volume];
+    vf low = vf_load(values[0]), high = low, light[KERNEL_LIGHT_ENTRIES];
     for (int i = 1; i < grid_type_vertices(type); i++) {
         low = vf_min(vf_load(values[i]), low);
         high = vf_max(vf_load(values[i]), high);
@@ -92,31 +81,30 @@ SIMD_INLINE void kernel_local_bound(const kernel_local_budget *b, const float (*
     const vf margin = 0.1875f * (high - low);
     low -= margin;
     high += margin;
-    const vi entry = kernel_light_variation_entry(t, low, high);
-    vf_gather_pair(&t->variations->variation, entry, &error_variation, &cost);
-    vf_gather_pair(&t->variations->extinction, entry, &extinction, &steepness);
+    kernel_light_bounds(t, low, high, light);
+    const vf cost = light[KERNEL_LIGHT_COST];
     vf_store(out->cost, cost);
-    vf_store(out->error_variation, error_variation);
-    vf_store(out->weight_change, cost + steepness);
-    vf_store(out->extinction, extinction);
+    vf_store(out->error_variation, light[KERNEL_LIGHT_VARIATION]);
+    vf_store(out->weight_change, cost + light[KERNEL_LIGHT_STEEPNESS]);
+    vf_store(out->extinction, light[KERNEL_LIGHT_EXTINCTION]);
     vf_store(out->low, low);
     vf_store(out->high, high);
     /* the residual of Newton's method may cause a share of the error that is allowed for the ray's length alone */
-    const vf slack = vf_set(KERNEL_LOCAL_SLACK * b->allowance / b->reach) / (cost * vf_load(out->sensitivity));
+    const vf slack = vf_set(KERNEL_LOCAL_SLACK * f->allowance / f->reach[volume]) / (cost * vf_load(out->sensitivity));
     const vf tolerance = vf_min(vf_max(slack, vf_set(1e-6f)), vf_load(out->residual_limit));
     vf_store(out->tolerance, tolerance);
 }
 
 /* Sets the same bounds in all lanes, for a cell that is too nonlinear for lanes: its derivatives are not bounded, so
  * the bend is taken as 1, and the sum of the nonlinear terms' slopes as the range of the values. */
-SIMD_INLINE void kernel_local_bound_of_cell(const kernel_local_budget *b, const kernel_cell *c,
+SIMD_INLINE void kernel_local_bound_of_cell(const kernel_frame *f, int volume, const kernel_cell *c,
                                             kernel_local_bounds *out)
 {
     float values[8][SIMD_WIDTH];
     for (int i = 0; i < c->count; i++) vf_store(values[i], vf_set(c->f[i]));
     vf_store(out->sensitivity, vf_set(0));
     vf_store(out->residual_limit, vf_set(0));
-    kernel_local_bound(b, (const float(*)[SIMD_WIDTH])values, c->type, out);
+    kernel_local_bound(f, volume, (const float(*)[SIMD_WIDTH])values, c->type, out);
     vf_store(out->bend, vf_set(1));
     vf_store(out->unsampled, kernel_local_nonlinear_unsampled(c->type) * (vf_load(out->high) - vf_load(out->low)));
 }
@@ -165,26 +153,30 @@ SIMD_INLINE vm kernel_local_ray_bound(const kernel_pieces *t, const kernel_local
     const vf wide = 0.85f * vf_abs(d[2] - d[0]) + 10.0f * quartic;
     const vf low = vf_min(v0, v1) + (1.17f * vf_min(d[1], zero) - wide);
     const vf high = vf_max(v0, v1) + (1.17f * vf_max(d[1], zero) + wide);
-    vf_gather_pair(&t->variations->variation, kernel_light_variation_entry(t, low, high), error_variation, cost);
+    vf light[KERNEL_LIGHT_ENTRIES];
+    kernel_light_bounds(t, low, high, light);
+    *error_variation = light[KERNEL_LIGHT_VARIATION];
+    *cost = light[KERNEL_LIGHT_COST];
     const vf rounding = KERNEL_VALUE_ROUNDING * vf_max(vf_max(vf_abs(v0), vf_abs(v1)), vf_set(1));
     return kernel_values_have_step(t, low - rounding, high + rounding);
 }
 
 /* Sets the number of segments per ray, with an allowed error that includes the ray's absorption. length: that of the
  * interval in unit distances. Returns the rays for which no number is enough. */
-static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_local_budget *b, vf mean, vf quartic,
+static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_frame *f, int volume, vf mean, vf quartic,
                                                                 vf residual_error, vf weight_change, vf length,
                                                                 vf least, kernel_local_pairs *p)
 {
+    const kernel_transfer *transfer = &f->volumes[volume];
     const vf v0 = p->ends[0].value, v1 = p->ends[1].value, one = vf_set(1);
-    vf opacities = 0.125f * (kernel_opacity(b->transfer, v0) + kernel_opacity(b->transfer, v1)), error_variation, cost;
+    vf opacities = 0.125f * (kernel_opacity(transfer, v0) + kernel_opacity(transfer, v1)), error_variation, cost;
     for (int i = 0; i < 3; i++) {
         const vf value = v0 + (float)(i + 1) * 0.25f * (v1 - v0) + p->field[i];
-        opacities += 0.25f * kernel_opacity(b->transfer, value);
+        opacities += 0.25f * kernel_opacity(transfer, value);
     }
-    const vm has_step = kernel_local_ray_bound(b->pieces, p, quartic, &error_variation, &cost);
+    const vm has_step = kernel_local_ray_bound(&f->pieces[volume], p, quartic, &error_variation, &cost);
     /* The error of light that is allowed per unit distance. */
-    const vf allowed = b->allowance * (vf_set(1 / b->reach) + opacities / vf_muladd(length, opacities, one));
+    const vf allowed = f->allowance * (vf_set(1 / f->reach[volume]) + opacities / vf_muladd(length, opacities, one));
     const vm few =
         vf_le(kernel_local_single_segment_error(mean, quartic, residual_error, weight_change, error_variation, cost),
               allowed);
@@ -196,12 +188,12 @@ static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_loc
     return vm_or(vm_andnot(fails, few), has_step);
 }
 
-/* Sets the number of segments per ray so that none is longer than the sampling step. Returns the rays that need so many
- * that one polynomial is not accurate enough for them. */
-SIMD_INLINE vm kernel_local_count_by_step(const kernel_local_budget *b, kernel_local_pairs *p)
+/* Sets the number of segments per ray so that none is longer than the sampling step, which is given in unit distances
+ * like the length of the interval. Returns the rays that need so many that one polynomial is not accurate enough for
+ * them. */
+SIMD_INLINE vm kernel_local_count_by_step(float step, vf length, kernel_local_pairs *p)
 {
-    const vf length = (p->ends[1].t - p->ends[0].t) * vf_gather(b->per_t, p->rays.at);
-    const vf wanted = vf_max(-vf_floor(length * (-1 / b->step)), vf_set(1));
+    const vf wanted = vf_max(-vf_floor(length * (-1 / step)), vf_set(1));
     p->count = vf_min(wanted, vf_set(KERNEL_LOCAL_PIECES));
     return p->share > KERNEL_LOCAL_LEAST_SHARE ? vf_lt(vf_set(4), wanted) : vm_none();
 }
@@ -209,12 +201,13 @@ SIMD_INLINE vm kernel_local_count_by_step(const kernel_local_budget *b, kernel_l
 /* Sets the number of segments per ray; returns the rays for which no number is enough. It first tests whether one
  * segment is enough, with the ray's length alone and the bounds over all of the cell's values; only other rays use
  * kernel_local_count_by_depth(). */
-SIMD_INLINE vm kernel_local_count(const kernel_local_budget *b, const kernel_local_bounds *bounds,
+SIMD_INLINE vm kernel_local_count(const kernel_frame *f, int volume, const kernel_local_bounds *bounds,
                                   kernel_local_pairs *p)
 {
+    const kernel_pieces *pieces = &f->pieces[volume];
     const vi lane = p->rays.lane;
-    if (!(b->allowance > 0)) return kernel_local_count_by_step(b, p);
-    const vf *d = p->field, length = (p->ends[1].t - p->ends[0].t) * vf_gather(b->per_t, p->rays.at);
+    const vf *d = p->field, length = (p->ends[1].t - p->ends[0].t) * p->per_t;
+    if (!(f->allowance > 0)) return kernel_local_count_by_step(f->volumes[volume].exponent, length, p);
     const vf parabola = vf_abs(d[1]), cubic = 0.5f * vf_abs(d[2] - d[0]);
     const float square = p->share * p->share, unsampled = p->share < 1 ? 2 * square * square : 1;
     const vf unseen = unsampled * kernel_gather_lane(bounds->unsampled, lane);
@@ -224,11 +217,11 @@ SIMD_INLINE vm kernel_local_count(const kernel_local_budget *b, const kernel_loc
     const vf mean = 0.26f * parabola + (1.09f * cubic + 4.0f * quartic);
     const vf weight_change = kernel_gather_lane(bounds->weight_change, lane) * depth;
     vf residual_error = kernel_gather_lane(bounds->sensitivity, lane) * p->residual;
-    if (__builtin_expect(b->pieces->has_rests, 0)) {
+    if (__builtin_expect(pieces->has_rests, 0)) {
         const vf largest = vf_max(vf_max(vf_abs(p->ends[0].value), vf_abs(p->ends[1].value)), vf_set(1));
         residual_error += KERNEL_VALUE_ROUNDING * largest;
     }
-    const vf one = vf_set(1), allowed = vf_set(b->allowance * (1 / b->reach));
+    const vf one = vf_set(1), allowed = vf_set(f->allowance * (1 / f->reach[volume]));
     const vf error_variation = kernel_gather_lane(bounds->error_variation, lane),
              cost = kernel_gather_lane(bounds->cost, lane);
     const vm strays = kernel_local_leaves_range(bounds, p);
@@ -236,12 +229,12 @@ SIMD_INLINE vm kernel_local_count(const kernel_local_budget *b, const kernel_loc
         vf_le(kernel_local_single_segment_error(mean, quartic, residual_error, weight_change, error_variation, cost),
               allowed),
         strays);
-    if (__builtin_expect(b->pieces->step_count > 0, 0))
-        enough = vm_andnot(enough, kernel_values_have_step(b->pieces, kernel_gather_lane(bounds->low, lane),
+    if (__builtin_expect(pieces->step_count > 0, 0))
+        enough = vm_andnot(enough, kernel_values_have_step(pieces, kernel_gather_lane(bounds->low, lane),
                                                            kernel_gather_lane(bounds->high, lane)));
     p->count = one;
     if (!vm_any(vm_andnot(p->active, enough))) return vm_none();
-    const vm none = kernel_local_count_by_depth(b, mean, quartic, residual_error, weight_change, length,
+    const vm none = kernel_local_count_by_depth(f, volume, mean, quartic, residual_error, weight_change, length,
                                                 vf_select(strays, 2.0f * one, one), p);
     p->count = vf_select(enough, one, p->count);
     return vm_andnot(none, enough);

@@ -52,7 +52,7 @@ typedef struct kernel_local_bounds {
     float residual_limit[SIMD_WIDTH]; /* largest residual for which the field's value is valid */
     float tolerance[SIMD_WIDTH];      /* Newton's method stops at a residual of at most this */
     /* Bounds of the change of light due to a field error, over the values from low to high, which are those of the
-     * lane's cell (kernel_light_variation). cost: maximum of that change; error_variation: its variation. */
+     * lane's cell (kernel_light_bounds()). cost: maximum of that change; error_variation: its variation. */
     float low[SIMD_WIDTH], high[SIMD_WIDTH];
     float cost[SIMD_WIDTH], error_variation[SIMD_WIDTH];
     /* upper bound of the change of the error's weight per depth: cost + R |s'|, as defined in kernel_local_budget.h */
@@ -66,6 +66,7 @@ typedef struct kernel_local_pairs {
     kernel_point ends[2];
     vm active;
     vf begin;        /* depth at which the ray's window begins */
+    vf per_t;        /* unit distances of the transfer function per t */
     vf count;        /* number of segments into which the interval is divided */
     float share;     /* share of the ray's whole interval in its cell */
     vf field[3];     /* the field minus its chord, at a quarter, the middle and three quarters of the interval */
@@ -217,15 +218,15 @@ static __attribute__((noinline)) void kernel_local_map_deviations(const kernel_l
     }
 }
 
-/* Evaluates the field at the places first, first + step and so on before the last one, from guesses of their reference
+/* Evaluates the field at the places 1, 1 + step and so on before the last one, from guesses of their reference
  * coordinates. ends: the ends of the whole interval. */
-SIMD_INLINE void kernel_local_evaluate(const kernel_local_chord *c, const kernel_point *ends, int first, int step,
-                                       vm rays, int type, kernel_local_places *p)
+SIMD_INLINE void kernel_local_evaluate(const kernel_local_chord *c, const kernel_point *ends, int step, vm rays,
+                                       int type, kernel_local_places *p)
 {
     kernel_point at[3];
     vf u[3], off[3], residual;
     int count = 0;
-    for (int i = first; i < 4; i += step, count++) {
+    for (int i = 1; i < 4; i += step, count++) {
         u[count] = vf_set(p->u + 0.25f * (float)i * p->width);
         memcpy(at[count].r, p->r[i], sizeof p->r[i]);
     }
@@ -235,7 +236,7 @@ SIMD_INLINE void kernel_local_evaluate(const kernel_local_chord *c, const kernel
         p->is_known = vm_and(p->is_known, kernel_local_newton(c, u, count, rays, type, at, &residual));
         p->residual = vf_max(residual, p->residual);
     }
-    for (int i = first, n = 0; i < 4; i += step, n++) {
+    for (int i = 1, n = 0; i < 4; i += step, n++) {
         memcpy(p->r[i], at[n].r, sizeof p->r[i]);
         p->off[i] = type == GRID_NO_TYPE ? off[n] : at[n].value;
     }
@@ -263,7 +264,7 @@ SIMD_INLINE void kernel_local_places_of(const kernel_local_chord *c, const kerne
             out->r[4][a] = ends[1].r[a];
         }
     }
-    kernel_local_evaluate(c, ends, 1, 1, rays, type, out);
+    kernel_local_evaluate(c, ends, 1, rays, type, out);
 }
 
 /* Evaluates the field at the five places of one half of a part. */
@@ -279,7 +280,7 @@ SIMD_INLINE void kernel_local_places_halve(const kernel_local_chord *c, const ke
     }
     for (int i = 1; i < 4; i += 2)
         for (int a = 0; a < 3; a++) out->r[i][a] = 0.5f * (out->r[i - 1][a] + out->r[i + 1][a]);
-    kernel_local_evaluate(c, ends, 1, 2, rays, type, out);
+    kernel_local_evaluate(c, ends, 2, rays, type, out);
 }
 
 /* Returns the position of the part's end on the whole interval, from `first` to `last`. */

@@ -1,5 +1,5 @@
-/* Queues of cells of volumes, one per type, for arrays of any layout. When a queue is full, a vector of its cells is
- * transformed at once (kernel_tile_cells.h). */
+/* The cells of a volume in a tile, with a queue for each type, for arrays of any layout. When a queue is full, a vector
+ * of its cells is transformed at once (kernel_tile_cells.h). */
 #ifndef RENDER_KERNEL_LOCAL_QUEUE_H
 #define RENDER_KERNEL_LOCAL_QUEUE_H
 
@@ -11,7 +11,9 @@
 #include "kernel_cell.h"
 #include "kernel_visible_values.h"
 #include "kernel_local.h"
+#include "kernel_map.h"
 #include "kernel_transformed_curved.h"
+#include "kernel_transformed_tets.h"
 #include "kernel_tile.h"
 #include "kernel_tile_trace.h"
 #include "kernel_types.h"
@@ -34,51 +36,71 @@ typedef struct kernel_local_queue {
     int32_t vertex[8][KERNEL_LOCAL_ROOM];
 } kernel_local_queue;
 
-/* The queued cells of a volume in a mesh part, and the vector of cells that is being processed. */
-typedef struct kernel_local_lanes {
-    int volume, part;     /* part: -1 if there is none yet */
-    kernel_arrays arrays; /* the arrays of the volume's field on the mesh part */
+enum { KERNEL_SORT_ENDS = 48, KERNEL_BLOCK_VECTORS = KERNEL_BLOCKS / SIMD_WIDTH };
+
+/* The cells of a volume in the tile: candidates, queued cells of a mesh part, and the cells that are being processed.
+ */
+typedef struct kernel_tile_cells {
+    /* The candidates. The first open_count items begin before the end of the last window and end behind its begin;
+     * `next` is the first item that no window has reached. Only the first `sorted` items are sorted, because a tile
+     * that soon becomes dark does not need the others. `ends` are the partition points of the quicksort, the nearest
+     * one last: no item before such a point is farther than any item behind it. */
+    kernel_tile_candidate *items;
+    int count, open_count, next;
+    int sorted, end_count, ends[KERNEL_SORT_ENDS];
+    const struct kernel_volume_method *method;
+    bool has_tet_lanes;    /* set if small tets are processed in lanes */
+    bool has_curved_lanes; /* set if hexes, wedges and pyramids are processed in lanes */
+    int volume, part;      /* volume and mesh part of the queued cells; part: -1 if there is none yet */
+    kernel_arrays arrays;  /* the arrays of the volume's field on the mesh part */
     kernel_local_queue queues[KERNEL_LANE_TYPES];
-    const kernel_local_queue *current;     /* queue of the vector of cells that is being processed */
-    kernel_transformed_curved transformed; /* its affine edge functions are not set */
-    kernel_local_cells cells;
+    kernel_cell cell;                  /* the cell that packets are tracing */
+    kernel_map map;                    /* inverse map of that cell */
+    kernel_transformed_tets tets;      /* the vector of tets that is being processed */
+    const kernel_local_queue *current; /* queue of the vector of other cells that is being processed */
+    kernel_transformed_curved curved;  /* these cells; their affine edge functions are not set */
+    kernel_local_cells maps;           /* their maps */
     /* first and last column, first and last row of pixels in which each lane's cell may be visible
      * (kernel_local_pixels()) */
-    int32_t ends[4][SIMD_WIDTH];
+    int32_t pixel_ends[4][SIMD_WIDTH];
     int alone; /* the lane whose cell is the tile's current cell (kernel_tile_make_current()); -1 if there is none */
     kernel_pixel_list rays;
-} kernel_local_lanes;
+    /* the (u, v) at the middle of each block, and half of their extent in a block */
+    vf block_u[KERNEL_BLOCK_VECTORS], block_v[KERNEL_BLOCK_VECTORS];
+    float half_u, half_v;
+} kernel_tile_cells;
 
-SIMD_INLINE void kernel_local_lanes_begin(kernel_local_lanes *l, int volume)
+SIMD_INLINE void kernel_tile_cells_begin_volume(kernel_tile_cells *cells, int volume)
 {
-    l->volume = volume;
-    l->part = -1;
-    for (int i = 0; i < KERNEL_LANE_TYPES; i++) l->queues[i].count = l->queues[i].indexed_count = 0;
+    cells->volume = volume;
+    cells->part = -1;
+    for (int i = 0; i < KERNEL_LANE_TYPES; i++) cells->queues[i].count = cells->queues[i].indexed_count = 0;
 }
 
 /* Makes the mesh part with index `part` the one whose cells are queued from now on. The queues must be empty. */
-SIMD_INLINE void kernel_local_lanes_set_part(const kernel_tile_trace *t, kernel_local_lanes *l, int part)
+SIMD_INLINE void kernel_tile_cells_set_part(const kernel_tile_trace *t, kernel_tile_cells *cells, int part)
 {
-    l->part = part;
-    kernel_arrays_begin(&l->arrays, t->frame->job->parts[part].cells,
-                        &t->frame->job->volumes[l->volume].field.fields[part]);
+    cells->part = part;
+    kernel_arrays_begin(&cells->arrays, t->frame->job->parts[part].cells,
+                        &t->frame->job->volumes[cells->volume].field.fields[part]);
 }
 
 /* ---- cells ---- */
 
 /* Reads the field at the transformed cells' vertices, and converts it to the transfer function's domain, clamped to
  * +-1e18. Returns the lanes whose cells are drawn and whose values are all finite and are visible. */
-SIMD_INLINE vm kernel_local_domain(const kernel_transfer *t, const kernel_local_lanes *l, int count, vf values[8])
+SIMD_INLINE vm kernel_local_domain(const kernel_transfer *t, const kernel_tile_cells *cells, int count, vf values[8])
 {
-    const kernel_arrays *p = &l->arrays;
+    const kernel_arrays *p = &cells->arrays;
     vf plain[8], odd = vf_set(0);
-    vm finite = vm_from_bits(kernel_arrays_drawn(p, l->current->cell, (1u << SIMD_WIDTH) - 1));
+    vm finite = vm_from_bits(kernel_arrays_drawn(p, cells->current->cell, (1u << SIMD_WIDTH) - 1));
     for (int i = 0; i < count; i++) {
         vi vertex;
-        memcpy(&vertex, p->is_by_cell ? (const void *)l->current->cell : l->transformed.vertex[i], sizeof vertex);
-        const kernel_wide_doubles all = kernel_numbers_gather(&p->values, vertex);
+        memcpy(&vertex, p->is_by_cell ? (const void *)cells->current->cell : cells->curved.vertex[i], sizeof vertex);
+        kernel_f64 all[2];
+        kernel_numbers_gather(&p->values, vertex, all);
         for (int half = 0; half < 2; half++) {
-            const kernel_f64 v = all.half[half];
+            const kernel_f64 v = all[half];
             kernel_f64_store_lanes(&odd, half, v - v);
             kernel_f64_store_lanes(&plain[i], half, kernel_f64_clamp(v, 3e38));
             kernel_f64_store_lanes(&values[i], half, kernel_f64_clamp((v - t->low) * t->inverse_width, 1e18));
@@ -138,30 +160,30 @@ SIMD_INLINE bool kernel_local_clip_box(int32_t ends[4][SIMD_WIDTH], int lane, un
 /* Reads, sorts and transforms the vertices of the queue's first SIMD_WIDTH cells, and computes their maps, which must
  * be less nonlinear than most_bent. Returns a mask of the visible cells. *lanes: mask of those that can be processed in
  * lanes. */
-SIMD_INLINE unsigned kernel_local_transform_of_type(const kernel_tile_trace *t, kernel_local_lanes *l, float most_bent,
-                                                    unsigned *lanes, int type)
+SIMD_INLINE unsigned kernel_local_transform_of_type(const kernel_tile_trace *t, kernel_tile_cells *cells,
+                                                    float most_bent, unsigned *lanes, int type)
 {
     const int count = grid_type_vertices(type);
-    kernel_transformed_curved *h = &l->transformed;
+    kernel_transformed_curved *h = &cells->curved;
     int32_t vertices[8][SIMD_WIDTH];
     vf places[3][8], values[8];
-    for (int i = 0; i < count; i++) memcpy(vertices[i], l->current->vertex[i], sizeof vertices[i]);
-    const vm collapsed = kernel_transform_curved_vertices(h, &l->arrays, t->frame, &t->tile, vertices, type);
-    const vm shows = kernel_local_domain(&t->frame->volumes[l->volume], l, count, values);
+    for (int i = 0; i < count; i++) memcpy(vertices[i], cells->current->vertex[i], sizeof vertices[i]);
+    const vm collapsed = kernel_transform_curved_vertices(h, &cells->arrays, t->frame, &t->tile, vertices, type);
+    const vm shows = kernel_local_domain(&t->frame->volumes[cells->volume], cells, count, values);
     for (int i = 0; i < count; i++) {
         for (int a = 0; a < 3; a++) places[a][i] = vf_load(h->at[a][i]);
         vf_store(h->at[3][i], values[i]);
     }
-    kernel_local_pixels(t, count, (const vf(*)[8])places, l->ends);
-    const vm smooth = kernel_local_setup(type, (const vf(*)[8])places, values, most_bent, &l->cells);
+    kernel_local_pixels(t, count, (const vf(*)[8])places, cells->pixel_ends);
+    const vm smooth = kernel_local_setup(type, (const vf(*)[8])places, values, most_bent, &cells->maps);
     *lanes = vm_bits(vm_andnot(vm_and(shows, smooth), collapsed));
     return vm_bits(shows);
 }
 
-static __attribute__((noinline)) unsigned kernel_local_transform(const kernel_tile_trace *t, kernel_local_lanes *l,
+static __attribute__((noinline)) unsigned kernel_local_transform(const kernel_tile_trace *t, kernel_tile_cells *cells,
                                                                  float most_bent, unsigned *lanes, int type)
 {
-    return KERNEL_OF_TYPE(type, kernel_local_transform_of_type, t, l, most_bent, lanes);
+    return KERNEL_OF_TYPE(type, kernel_local_transform_of_type, t, cells, most_bent, lanes);
 }
 
 /* Reads the vertex indices of all queued cells before index `end` that have not been read yet. */
@@ -174,16 +196,16 @@ SIMD_INLINE void kernel_local_read_indices(const kernel_arrays *p, kernel_local_
 
 /* Makes the first SIMD_WIDTH cells of the queue the current vector, and reads their vertex indices. Returns the mask of
  * lanes that have a cell; the other lanes get copies of the first cell. */
-SIMD_INLINE unsigned kernel_local_begin_vector(kernel_local_lanes *l, kernel_local_queue *q, int type)
+SIMD_INLINE unsigned kernel_local_begin_vector(kernel_tile_cells *cells, kernel_local_queue *q, int type)
 {
     const int count = q->count < SIMD_WIDTH ? q->count : SIMD_WIDTH;
-    kernel_local_read_indices(&l->arrays, q, count, type);
+    kernel_local_read_indices(&cells->arrays, q, count, type);
     for (int n = count; n < SIMD_WIDTH; n++) {
         q->cell[n] = q->cell[0];
         for (int i = 0; i < grid_type_vertices(type); i++) q->vertex[i][n] = q->vertex[i][0];
     }
-    l->current = q;
-    l->alone = -1;
+    cells->current = q;
+    cells->alone = -1;
     return (1u << count) - 1;
 }
 

@@ -120,7 +120,7 @@ static __attribute__((noinline, cold)) void kernel_local_sample_by_crossings(ker
 /* Computes the values of a vector of samples, from index n on, that lie inside their cells. */
 SIMD_INLINE void kernel_local_fill_lanes(kernel_tile_trace *t, kernel_tile_volume *b, int type, int n)
 {
-    const kernel_local_lanes *l = &t->thread->tile_cells->lanes;
+    const kernel_tile_cells *cells = t->thread->tile_cells;
     const int left = b->sample_count - n;
     const vm active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
     const vi bits = vi_from_bits(vf_load(b->bits + n));
@@ -131,13 +131,13 @@ SIMD_INLINE void kernel_local_fill_lanes(kernel_tile_trace *t, kernel_tile_volum
     kernel_lane_rays_of(&rays, &t->tile, bits & (KERNEL_TILE_PIXELS - 1), bits >> KERNEL_LOCAL_LANE);
     const vf place[3] = {rays.rays.origin_x + rays.rays.slope_x * depth, rays.rays.origin_y + rays.rays.slope_y * depth,
                          depth};
-    const vm known = kernel_local_find(type, &l->cells, rays.lane, place, &points);
+    const vm known = kernel_local_find(type, &cells->maps, rays.lane, place, &points);
     const vf inside = kernel_local_border_distance(type, points.r),
-             error_bound = kernel_gather_lane(l->cells.error_bound, rays.lane);
+             error_bound = kernel_gather_lane(cells->maps.error_bound, rays.lane);
     const vm own = vm_and(vm_and(active, known), vf_lt(error_bound, inside));
     const vm doubt = vm_andnot(vm_andnot(active, own), vm_and(known, vf_lt(inside, -error_bound)));
     const vi numbers = bits >> KERNEL_LOCAL_NUMBER;
-    const vf value = kernel_local_value(type, &l->cells, rays.lane, &points);
+    const vf value = kernel_local_value(type, &cells->maps, rays.lane, &points);
     unsigned undecided = vm_bits(doubt) | kernel_local_store_samples(b, own, rays.at, numbers, value);
     memcpy(at, &rays.at, sizeof at);
     memcpy(number, &numbers, sizeof number);
@@ -167,17 +167,17 @@ static __attribute__((noinline)) void kernel_local_fill(kernel_tile_trace *t, in
 /* ---- pixels ---- */
 
 /* Queues the samples of the list's rays n .. n + SIMD_WIDTH - 1 that may lie inside their cells. */
-SIMD_INLINE void kernel_local_queue_samples_lanes(kernel_tile_trace *t, const kernel_local_lanes *l, int type, int n)
+SIMD_INLINE void kernel_local_queue_samples_lanes(kernel_tile_trace *t, const kernel_tile_cells *cells, int type, int n)
 {
     kernel_tile_volume *b = t->thread->tile_volume;
-    const int left = l->rays.count - n;
+    const int left = cells->rays.count - n;
     const vm active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
-    const vi pixel = kernel_load_bytes(l->rays.pixel + n);
+    const vi pixel = kernel_load_bytes(cells->rays.pixel + n);
     kernel_lane_rays rays;
     vf base, step, near, far, number, last;
-    kernel_lane_rays_of(&rays, &t->tile, pixel, kernel_load_bytes(l->rays.lane + n));
-    const vf depth = kernel_gather_lane(l->cells.origin[2], rays.lane);
-    kernel_local_slab_interval(&l->cells, &rays, depth, &near, &far);
+    kernel_lane_rays_of(&rays, &t->tile, pixel, kernel_load_bytes(cells->rays.lane + n));
+    const vf depth = kernel_gather_lane(cells->maps.origin[2], rays.lane);
+    kernel_local_slab_interval(&cells->maps, &rays, depth, &near, &far);
     vf_gather_pair(b->steps, 2 * rays.at, &base, &step);
     kernel_local_sample_range(b, base, step, depth + near, vf_min(depth + far, vf_gather(b->far, rays.at)), &number,
                               &last);
@@ -192,18 +192,19 @@ SIMD_INLINE void kernel_local_queue_samples_lanes(kernel_tile_trace *t, const ke
     }
 }
 
-static __attribute__((noinline)) void kernel_local_queue_samples(kernel_tile_trace *t, kernel_local_lanes *l, int type)
+static __attribute__((noinline)) void kernel_local_queue_samples(kernel_tile_trace *t, int type)
 {
-    kernel_pixel_list_close(&l->rays);
-    for (int n = 0; n < l->rays.count; n += SIMD_WIDTH) kernel_local_queue_samples_lanes(t, l, type, n);
-    l->rays.count = 0;
+    kernel_tile_cells *cells = t->thread->tile_cells;
+    kernel_pixel_list_close(&cells->rays);
+    for (int n = 0; n < cells->rays.count; n += SIMD_WIDTH) kernel_local_queue_samples_lanes(t, cells, type, n);
+    cells->rays.count = 0;
 }
 
 /* ---- cells ---- */
 
-static unsigned kernel_local_transform_lanes(kernel_tile_trace *t, kernel_local_lanes *l, int type, unsigned *lanes)
+static unsigned kernel_local_transform_lanes(kernel_tile_trace *t, int type, unsigned *lanes)
 {
-    return kernel_local_transform(t, l, KERNEL_LOCAL_BENT, lanes, type);
+    return kernel_local_transform(t, t->thread->tile_cells, KERNEL_LOCAL_BENT, lanes, type);
 }
 
 /* Prepares the sampling of a volume in a window, for the packets of the given blocks, which must be set up. */

@@ -43,7 +43,8 @@ typedef struct kernel_tile_segments {
     kernel_double_face precise[4]; /* the current tet in double; set only if the frame is in double */
     float depth;                   /* depth of the next window; 0 if it has not been determined yet */
     unsigned blocks;               /* blocks of the current window */
-    kernel_local_budget budget;
+    int volume;
+    float per_t[KERNEL_LOCAL_PIXELS]; /* unit distances of the transfer function per t, by packet and lane */
     kernel_local_bounds bounds;
     bool is_double; /* set if the ends of segments are stored in double */
     bool has_cuts;  /* set if transparent surfaces cut segments */
@@ -60,7 +61,7 @@ SIMD_INLINE void kernel_local_store_segments(kernel_tile_segments *b, vi places,
     int32_t at[SIMD_WIDTH];
     memcpy(at, &places, sizeof at);
     vf length = vf_set(0);
-    if (b->is_double) length = (t_out - t_in) * vf_gather(b->budget.per_t, places);
+    if (b->is_double) length = (t_out - t_in) * vf_gather(b->per_t, places);
     const kernel_unit_segment run = kernel_unit_segment_of(length, v_in, v_out);
     kernel_segments_add_at(b->packets, b->is_double, at, rays, t_in, t_out, &run);
 }
@@ -142,7 +143,7 @@ SIMD_INLINE void kernel_local_divide_intervals(kernel_tile_trace *t, const kerne
         kernel_local_pairs part;
         kernel_local_pairs_of(whole, &places, mine[count], &part);
         part.active = vm_and(part.active, vf_lt(part.begin, part.ends[1].t));
-        const vm fails = vm_or(kernel_local_count(&b->budget, bounds, &part), part.has_diverged);
+        const vm fails = vm_or(kernel_local_count(t->frame, b->volume, bounds, &part), part.has_diverged);
         /* in the cells of packets, nothing bounds what the first three places do not show */
         const vm good = type == GRID_NO_TYPE && part.share == 1 ? vm_none() : vm_andnot(part.active, fails);
         const vm rest = vm_andnot(part.active, good);
@@ -168,7 +169,7 @@ SIMD_INLINE void kernel_local_segments_parts_of(kernel_tile_trace *t, const kern
 {
     const kernel_local_bounds *bounds = &t->thread->tile_segments->bounds;
     kernel_local_chord chord;
-    kernel_local_chord_of(&t->thread->tile_cells->lanes.cells, bounds, whole->rays.lane, whole->ends, type, &chord);
+    kernel_local_chord_of(&t->thread->tile_cells->maps, bounds, whole->rays.lane, whole->ends, type, &chord);
     kernel_local_divide_intervals(t, bounds, &chord, whole, rays, type);
 }
 
@@ -193,9 +194,9 @@ static __attribute__((noinline)) void kernel_curved_segments(kernel_tile_trace *
     kernel_interval intervals[KERNEL_MAX_CELL_INTERVALS];
     kernel_local_bounds bounds;
     kernel_local_chord chord = {.packet = p, .map = map, .cell = c};
-    kernel_local_pairs whole = {.begin = list->t_begin, .share = share};
+    kernel_local_pairs whole = {.begin = list->t_begin, .per_t = list->per_t, .share = share};
     const int count = kernel_curved_intervals(p, c, rays, intervals);
-    if (count && map) kernel_local_bound_of_cell(&b->budget, c, &bounds);
+    if (count && map) kernel_local_bound_of_cell(t->frame, b->volume, c, &bounds);
     for (int i = 0; i < SIMD_WIDTH; i++) whole.rays.at[i] = packet * SIMD_WIDTH + i;
     for (int k = 0; k < count; k++) {
         vf from, end;
@@ -264,7 +265,7 @@ static __attribute__((noinline)) vf kernel_local_next_cut(const kernel_tile_trac
 SIMD_INLINE void kernel_local_segments_cut_of(kernel_tile_trace *t, kernel_tile_segments *b,
                                               const kernel_local_pairs *whole, vm rays, const vf reach[2], int type)
 {
-    const kernel_local_cells *cells = &t->thread->tile_cells->lanes.cells;
+    const kernel_local_cells *cells = &t->thread->tile_cells->maps;
     const vf end = vf_min(whole->ends[1].t, reach[1]);
     kernel_local_pairs part = *whole;
     kernel_local_chord chord;
@@ -313,7 +314,7 @@ SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_tile_s
     vm two, alone;
     vi words, face[2];
     const vm all = kernel_local_list_load(b, KERNEL_LOCAL_MET, &t->tile, n, &words, &rays);
-    kernel_local_find_faces(&t->thread->tile_cells->lanes.transformed, &rays, all, type, &two, &alone, face);
+    kernel_local_find_faces(&t->thread->tile_cells->curved, &rays, all, type, &two, &alone, face);
     const vm on_quad = kernel_curved_on_quad(type, 0, face[0]);
     words = words | face[0] << KERNEL_LOCAL_FACES | face[1] << (KERNEL_LOCAL_FACES + 3);
     kernel_local_list_add(b, KERNEL_LOCAL_CROSSED, vm_and(two, on_quad), words);
@@ -329,14 +330,15 @@ SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_tile_s
 /* Adds the segments of a vector of rays, from index n on, each of which crosses two faces of its cell. */
 SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_tile_segments *b, int list, int type, int n)
 {
-    const kernel_local_lanes *l = &t->thread->tile_cells->lanes;
+    const kernel_tile_cells *cells = t->thread->tile_cells;
     kernel_local_pairs p;
     vi words;
     vf end, reach[2];
     p.share = 1;
     p.active = kernel_local_list_load(b, list, &t->tile, n, &words, &p.rays);
     const vi face[2] = {words >> KERNEL_LOCAL_FACES & 7, words >> (KERNEL_LOCAL_FACES + 3) & 7};
-    kernel_local_cross(&l->transformed, &p.rays, p.active, type, face, p.ends);
+    kernel_local_cross(&cells->curved, &p.rays, p.active, type, face, p.ends);
+    p.per_t = vf_gather(b->per_t, p.rays.at);
     vf_gather_pair(b->window, 2 * p.rays.at, &p.begin, &end);
     vf_gather_pair(b->reach, 2 * p.rays.at, &reach[0], &reach[1]);
     p.active = vm_and(p.active, vm_and(vf_lt(p.begin, p.ends[1].t), vf_lt(p.ends[0].t, end)));
@@ -346,10 +348,10 @@ SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_tile_s
     cut = vm_and(cut, p.active);
     if (__builtin_expect(vm_any(cut), 0)) kernel_local_segments_cut(t, b, &p, cut, reach, type);
     p.active = vm_andnot(p.active, cut);
-    kernel_local_deviations_of(&l->cells, &b->bounds, &p, type);
+    kernel_local_deviations_of(&cells->maps, &b->bounds, &p, type);
     const vm alone = vm_and(p.active, p.has_diverged);
     p.active = vm_andnot(p.active, alone);
-    const vm coarse = vm_and(p.active, kernel_local_count(&b->budget, &b->bounds, &p));
+    const vm coarse = vm_and(p.active, kernel_local_count(t->frame, b->volume, &b->bounds, &p));
     kernel_local_emit(b, &p, vm_andnot(p.active, coarse));
     if (__builtin_expect(vm_any(coarse), 0)) kernel_local_segments_parts(t, &p, coarse, type);
     if (__builtin_expect(vm_any(alone), 0))
@@ -357,17 +359,17 @@ SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_tile_s
 }
 
 /* Lists those of the rays from index n on that may meet their cells within the window. */
-SIMD_INLINE void kernel_local_segments_overlap(const kernel_tile_trace *t, const kernel_local_lanes *l,
+SIMD_INLINE void kernel_local_segments_overlap(const kernel_tile_trace *t, const kernel_tile_cells *cells,
                                                kernel_tile_segments *b, int n)
 {
-    const int left = l->rays.count - n;
+    const int left = cells->rays.count - n;
     const vm active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
-    const vi pixel = kernel_load_bytes(l->rays.pixel + n), lane = kernel_load_bytes(l->rays.lane + n);
+    const vi pixel = kernel_load_bytes(cells->rays.pixel + n), lane = kernel_load_bytes(cells->rays.lane + n);
     kernel_lane_rays rays;
     vf near, far, begin, end;
     kernel_lane_rays_of(&rays, &t->tile, pixel, lane);
-    const vf depth = kernel_gather_lane(l->cells.origin[2], rays.lane);
-    kernel_local_slab_interval(&l->cells, &rays, depth, &near, &far);
+    const vf depth = kernel_gather_lane(cells->maps.origin[2], rays.lane);
+    kernel_local_slab_interval(&cells->maps, &rays, depth, &near, &far);
     vf_gather_pair(b->window, 2 * rays.at, &begin, &end);
     const vm meets = vm_and(vf_le(near, far), vm_and(vf_le(begin, depth + far), vf_le(depth + near, end)));
     kernel_local_list_add(b, KERNEL_LOCAL_MET, vm_and(active, meets), pixel | lane << KERNEL_LOCAL_CELL);
@@ -382,35 +384,37 @@ SIMD_INLINE void kernel_local_segments_met(kernel_tile_trace *t, kernel_tile_seg
         for (int n = 0; n < b->list_count[list]; n += SIMD_WIDTH) kernel_local_segments_lanes(t, b, list, type, n);
 }
 
-static __attribute__((noinline)) void kernel_local_segments_cast(kernel_tile_trace *t, kernel_local_lanes *l, int type)
+static __attribute__((noinline)) void kernel_local_segments_cast(kernel_tile_trace *t, int type)
 {
+    kernel_tile_cells *cells = t->thread->tile_cells;
     kernel_tile_segments *b = t->thread->tile_segments;
-    kernel_pixel_list_close(&l->rays);
+    kernel_pixel_list_close(&cells->rays);
     b->list_count[KERNEL_LOCAL_MET] = 0;
-    for (int n = 0; n < l->rays.count; n += SIMD_WIDTH) kernel_local_segments_overlap(t, l, b, n);
+    for (int n = 0; n < cells->rays.count; n += SIMD_WIDTH) kernel_local_segments_overlap(t, cells, b, n);
     KERNEL_OF_TYPE(type, kernel_local_segments_met, t, b);
-    l->rays.count = 0;
+    cells->rays.count = 0;
 }
 
 /* ---- cells ---- */
 
 /* Computes what segments need of the vector of cells: their faces and error budget. */
-SIMD_INLINE void kernel_local_segments_prepare(const kernel_tile_trace *t, kernel_local_lanes *l,
+SIMD_INLINE void kernel_local_segments_prepare(const kernel_tile_trace *t, kernel_tile_cells *cells,
                                                kernel_tile_segments *s, int type)
 {
-    kernel_local_faces_of(&t->tile, &l->transformed, l->ends, type);
-    kernel_local_nonlinear_of(&l->cells, type, &s->bounds);
-    kernel_local_bound(&s->budget, (const float(*)[SIMD_WIDTH])l->transformed.at[3], type, &s->bounds);
+    kernel_local_faces_of(&t->tile, &cells->curved, cells->pixel_ends, type);
+    kernel_local_nonlinear_of(&cells->maps, type, &s->bounds);
+    kernel_local_bound(t->frame, s->volume, (const float(*)[SIMD_WIDTH])cells->curved.at[3], type, &s->bounds);
 }
 
 /* Transforms the queue's cells into tile space; returns the visible ones, and stores in *lanes those that can be
  * processed in lanes. */
-static __attribute__((noinline)) unsigned kernel_local_segments_transform(kernel_tile_trace *t, kernel_local_lanes *l,
-                                                                          int type, unsigned *lanes)
+static __attribute__((noinline)) unsigned kernel_local_segments_transform(kernel_tile_trace *t, int type,
+                                                                          unsigned *lanes)
 {
+    kernel_tile_cells *cells = t->thread->tile_cells;
     kernel_tile_segments *s = t->thread->tile_segments;
-    const unsigned showing = kernel_local_transform(t, l, KERNEL_LOCAL_BENT_MOST, lanes, type);
-    KERNEL_OF_TYPE(type, kernel_local_segments_prepare, t, l, s);
+    const unsigned showing = kernel_local_transform(t, cells, KERNEL_LOCAL_BENT_MOST, lanes, type);
+    KERNEL_OF_TYPE(type, kernel_local_segments_prepare, t, cells, s);
     return showing;
 }
 
@@ -449,11 +453,7 @@ static void kernel_local_segments_begin(const kernel_tile_trace *t, kernel_tile_
                                         int volume)
 {
     const kernel_frame *f = t->frame;
-    b->budget.pieces = &f->pieces[volume];
-    b->budget.transfer = &f->volumes[volume];
-    b->budget.allowance = f->allowance;
-    b->budget.reach = f->reach[volume];
-    b->budget.step = f->volumes[volume].exponent;
+    b->volume = volume;
     b->is_double = f->is_double && !f->job->separate_samples;
     b->has_cuts = f->has_transparent && !f->job->separate_samples;
     b->blocks = blocks;
@@ -464,7 +464,7 @@ static void kernel_local_segments_begin(const kernel_tile_trace *t, kernel_tile_
             const kernel_packet *p = &t->packets[i];
             const kernel_segments *list = &b->packets[i];
             const vf from = vf_select(p->active, list->t_begin, vf_set(INFINITY));
-            vf_store(b->budget.per_t + i * SIMD_WIDTH, list->per_t);
+            vf_store(b->per_t + i * SIMD_WIDTH, list->per_t);
             for (int n = 0; n < SIMD_WIDTH; n++) {
                 const int at = 2 * (i * SIMD_WIDTH + n);
                 b->window[at] = from[n];

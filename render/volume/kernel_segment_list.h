@@ -310,11 +310,10 @@ SIMD_INLINE vf kernel_mixed_share(const kernel_segments *list, const kernel_unit
 {
     const kernel_pieces *t = list->pieces;
     const vf low = vf_min(run->v_in, run->v_out), high = vf_max(run->v_in, run->v_out);
-    const vi entry = kernel_light_variation_entry(t, low, high);
-    vf variation, cost, extinction, steepness;
-    vf_gather_pair(&t->variations->variation, entry, &variation, &cost);
-    vf_gather_pair(&t->variations->extinction, entry, &extinction, &steepness);
-    const vf moved = (high - low) * (cost + 2.0f * steepness) * run->length * 0.25f;
+    vf bounds[KERNEL_LIGHT_ENTRIES];
+    kernel_light_bounds(t, low, high, bounds);
+    const vf steepness = bounds[KERNEL_LIGHT_STEEPNESS];
+    const vf moved = (high - low) * (bounds[KERNEL_LIGHT_COST] + 2.0f * steepness) * run->length * 0.25f;
     const vf count = vf_min(-vf_floor(-vf_sqrt(moved / list->mixing)), vf_set(KERNEL_MAX_SUBDIVISIONS));
     return 1.0f / vf_max(count, vf_set(1));
 }

@@ -31,12 +31,7 @@
 #include "render.h"
 #include "simd.h"
 
-enum {
-    KERNEL_OPEN_PIECE = 16,
-    KERNEL_SORT_PIECE = 64,
-    KERNEL_SORT_ENDS = 48,
-    KERNEL_BLOCK_VECTORS = KERNEL_BLOCKS / SIMD_WIDTH
-};
+enum { KERNEL_OPEN_PIECE = 16, KERNEL_SORT_PIECE = 64 };
 
 /* Callbacks by which a volume is sampled (kernel_tile_volume.h) or integrated (kernel_tile_segments.h) in its cells. */
 typedef struct kernel_volume_method {
@@ -49,32 +44,12 @@ typedef struct kernel_volume_method {
     unsigned (*process_tets)(kernel_tile_trace *t, unsigned lanes);
     /* Transforms a fetched vector of hexes, wedges or pyramids; returns the visible ones. *lanes: those of them that
      * can be processed in lanes. */
-    unsigned (*transform)(kernel_tile_trace *t, kernel_local_lanes *l, int type, unsigned *lanes);
+    unsigned (*transform)(kernel_tile_trace *t, int type, unsigned *lanes);
     /* Processes the listed pixels of these cells, and empties the list. */
-    void (*process_pixels)(kernel_tile_trace *t, kernel_local_lanes *l, int type);
+    void (*process_pixels)(kernel_tile_trace *t, int type);
     /* called after all pixels of a vector of cells have been listed and processed */
     void (*finish)(kernel_tile_trace *t, int type);
 } kernel_volume_method;
-
-/* The cells of a volume in the tile. The first open_count items begin before the end of the last window and end behind
- * its begin; `next` is the first item that no window has reached. Only the first `sorted` items are sorted, because a
- * tile that soon becomes dark does not need the others. `ends` are the partition points of the quicksort, the nearest
- * one last: no item before such a point is farther than any item behind it. */
-typedef struct kernel_tile_cells {
-    kernel_tile_candidate *items;
-    int count, open_count, next;
-    int sorted, end_count, ends[KERNEL_SORT_ENDS];
-    kernel_cell cell; /* the cell that packets are tracing */
-    kernel_map map;   /* inverse map of that cell */
-    const kernel_volume_method *method;
-    bool has_tet_lanes;    /* set if small tets are processed in lanes */
-    bool has_curved_lanes; /* set if hexes, wedges and pyramids are processed in lanes */
-    kernel_local_lanes lanes;
-    kernel_transformed_tets transformed; /* a vector of tets from the queue */
-    /* the (u, v) at the middle of each block, and half of their extent in a block */
-    vf block_u[KERNEL_BLOCK_VECTORS], block_v[KERNEL_BLOCK_VECTORS];
-    float half_u, half_v;
-} kernel_tile_cells;
 
 /* ---- the blocks that a tet's outline meets ----
  *
@@ -142,7 +117,7 @@ SIMD_INLINE unsigned kernel_tet_blocks(const kernel_tile_cells *cells, const ker
 static __attribute__((noinline)) unsigned kernel_tile_transform_cell(kernel_tile_trace *t, kernel_tile_cells *cells,
                                                                      const grid *g, unsigned blocks)
 {
-    const kernel_transfer *transfer = &t->frame->volumes[cells->lanes.volume];
+    const kernel_transfer *transfer = &t->frame->volumes[cells->volume];
     kernel_cell *c = &cells->cell;
     const float *const places[3] = {c->x, c->y, c->z};
     if (!c->is_finite || !kernel_cell_is_visible(c, transfer)) return 0;
@@ -162,14 +137,13 @@ static __attribute__((noinline)) unsigned kernel_tile_transform_cell(kernel_tile
 static __attribute__((noinline, cold)) bool kernel_tile_make_current(kernel_tile_trace *t, int lane)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
-    kernel_local_lanes *l = &cells->lanes;
-    const grid *g = l->arrays.cells;
-    if (l->alone == lane) return true;
-    l->alone = -1;
-    kernel_cell_fetch(&cells->cell, g, &t->frame->job->volumes[l->volume].field.fields[l->part],
-                      l->current->cell[lane]);
+    const grid *g = cells->arrays.cells;
+    if (cells->alone == lane) return true;
+    cells->alone = -1;
+    kernel_cell_fetch(&cells->cell, g, &t->frame->job->volumes[cells->volume].field.fields[cells->part],
+                      cells->current->cell[lane]);
     if (!kernel_tile_transform_cell(t, cells, g, KERNEL_ALL_BLOCKS)) return false;
-    l->alone = lane;
+    cells->alone = lane;
     return true;
 }
 
@@ -182,7 +156,7 @@ static __attribute__((noinline)) void kernel_tile_process_cell(kernel_tile_trace
     kernel_cell *c = &cells->cell;
     const grid *g = t->frame->job->parts[part].cells;
     t->thread->volume_cells++;
-    kernel_cell_fetch(c, g, &t->frame->job->volumes[cells->lanes.volume].field.fields[part], index);
+    kernel_cell_fetch(c, g, &t->frame->job->volumes[cells->volume].field.fields[part], index);
     if (kernel_has_own_faces(c->type)) {
         take(t, part, c, NULL, blocks);
         return;
@@ -213,7 +187,7 @@ SIMD_INLINE void kernel_transformed_domain(kernel_transformed_tets *transformed,
 {
     for (int half = 0; half < 2; half++)
         for (int i = 0; i < 4; i++) {
-            const kernel_f64 f = (transformed->values[i].half[half] - t->low) * t->inverse_width;
+            const kernel_f64 f = (transformed->values[i][half] - t->low) * t->inverse_width;
             kernel_f64_store_lanes(&transformed->f[i], half, kernel_f64_clamp(f, 1e18));
         }
 }
@@ -229,7 +203,7 @@ SIMD_INLINE unsigned kernel_transformed_tets_visible(const kernel_tile_trace *t,
     vm is_finite = vm_all_lanes();
     for (int i = 0; i < 4; i++) {
         for (int half = 0; half < 2; half++) {
-            const kernel_f64 own = transformed->values[i].half[half];
+            const kernel_f64 own = transformed->values[i][half];
             kernel_f64_store_lanes(&odd, half, own - own);
             kernel_f64_store_lanes(&v[i], half, kernel_f64_clamp(own, 3e38));
         }
@@ -248,18 +222,18 @@ SIMD_INLINE unsigned kernel_transformed_tets_visible(const kernel_tile_trace *t,
 SIMD_INLINE unsigned kernel_tile_transform_tets(kernel_tile_trace *t, kernel_tile_cells *cells, kernel_local_queue *q,
                                                 int count)
 {
-    const kernel_arrays *arrays = &cells->lanes.arrays;
-    const kernel_transfer *transfer = &t->frame->volumes[cells->lanes.volume];
+    const kernel_arrays *arrays = &cells->arrays;
+    const kernel_transfer *transfer = &t->frame->volumes[cells->volume];
     int32_t vertices[4][SIMD_WIDTH];
     float near[SIMD_WIDTH];
     unsigned lanes = 0;
     t->thread->volume_cells += count;
     kernel_local_read_indices(arrays, q, count, GRID_TET);
     for (int i = 0; i < 4; i++) memcpy(vertices[i], q->vertex[i], sizeof vertices[i]);
-    kernel_transform_tets(&cells->transformed, arrays, t->frame, &t->tile, vertices, count);
-    kernel_transformed_domain(&cells->transformed, transfer);
+    kernel_transform_tets(&cells->tets, arrays, t->frame, &t->tile, vertices, count);
+    kernel_transformed_domain(&cells->tets, transfer);
     unsigned candidates =
-        kernel_transformed_tets_visible(t, &cells->transformed, &transfer->visible_values, near) & ((1u << count) - 1);
+        kernel_transformed_tets_visible(t, &cells->tets, &transfer->visible_values, near) & ((1u << count) - 1);
     candidates = kernel_arrays_drawn(arrays, q->cell, candidates);
     for (; candidates; candidates &= candidates - 1) {
         const int n = __builtin_ctz(candidates);
@@ -280,23 +254,22 @@ _Static_assert(SIMD_WIDTH *(KERNEL_TET_PIXELS + 1) <= KERNEL_LIST_ROOM, "a vecto
 static unsigned kernel_tile_list_small_tets(const kernel_tile_trace *t, unsigned lanes, int most)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
-    kernel_local_lanes *l = &cells->lanes;
     vf places[3][8];
     unsigned others = 0;
     for (int a = 0; a < 3; a++)
-        for (int i = 0; i < 4; i++) places[a][i] = cells->transformed.at[a][i];
-    kernel_local_pixels(t, 4, (const vf(*)[8])places, l->ends);
-    l->rays.count = 0;
+        for (int i = 0; i < 4; i++) places[a][i] = cells->tets.at[a][i];
+    kernel_local_pixels(t, 4, (const vf(*)[8])places, cells->pixel_ends);
+    cells->rays.count = 0;
     for (; lanes; lanes &= lanes - 1) {
         const int n = __builtin_ctz(lanes);
-        unsigned box = l->queues[KERNEL_CURVED_TYPES].box[n];
-        if (!kernel_local_clip_box(l->ends, n, &box)) continue;
+        unsigned box = cells->queues[KERNEL_CURVED_TYPES].box[n];
+        if (!kernel_local_clip_box(cells->pixel_ends, n, &box)) continue;
         if (kernel_box_pixels(box) > most)
             others |= 1u << n;
         else
-            kernel_pixel_list_add_box(&l->rays, box, n);
+            kernel_pixel_list_add_box(&cells->rays, box, n);
     }
-    kernel_pixel_list_close(&l->rays);
+    kernel_pixel_list_close(&cells->rays);
     return others;
 }
 
@@ -308,11 +281,11 @@ SIMD_INLINE void kernel_tile_process_tets(kernel_tile_trace *t, kernel_tile_cell
     if (cells->has_tet_lanes && lanes) lanes = cells->method->process_tets(t, lanes);
     for (; lanes; lanes &= lanes - 1) {
         const int n = __builtin_ctz(lanes);
-        kernel_transformed_tets_cell(&cells->transformed, n, &cells->cell);
-        if (t->frame->is_double) kernel_transformed_tets_double(&cells->transformed, n, &cells->cell);
+        kernel_transformed_tets_cell(&cells->tets, n, &cells->cell);
+        if (t->frame->is_double) kernel_transformed_tets_double(&cells->tets, n, &cells->cell);
         const unsigned blocks = q->blocks[n] & kernel_tet_blocks(cells, &cells->cell);
         cells->cell.index = q->cell[n];
-        if (blocks) cells->method->take(t, cells->lanes.part, &cells->cell, NULL, blocks);
+        if (blocks) cells->method->take(t, cells->part, &cells->cell, NULL, blocks);
     }
 }
 
@@ -324,25 +297,24 @@ SIMD_INLINE void kernel_tile_process_curved(kernel_tile_trace *t, kernel_tile_ce
                                             int type)
 {
     const kernel_volume_method *method = cells->method;
-    kernel_local_lanes *l = &cells->lanes;
     unsigned transformed;
-    const unsigned all = KERNEL_OF_TYPE(type, kernel_local_begin_vector, l, q);
-    const unsigned showing = method->transform(t, l, type, &transformed) & all;
+    const unsigned all = KERNEL_OF_TYPE(type, kernel_local_begin_vector, cells, q);
+    const unsigned showing = method->transform(t, type, &transformed) & all;
     transformed &= all;
     t->thread->volume_cells += __builtin_popcount(all & ~(showing & ~transformed));
-    l->rays.count = 0;
+    cells->rays.count = 0;
     for (unsigned lanes = transformed; lanes; lanes &= lanes - 1) {
         const int n = __builtin_ctz(lanes);
         unsigned box = q->box[n];
-        if (!kernel_local_clip_box(l->ends, n, &box)) continue;
-        kernel_pixel_list_add_box(&l->rays, box, n);
-        if (l->rays.count >= KERNEL_LIST_PIXELS) method->process_pixels(t, l, type);
+        if (!kernel_local_clip_box(cells->pixel_ends, n, &box)) continue;
+        kernel_pixel_list_add_box(&cells->rays, box, n);
+        if (cells->rays.count >= KERNEL_LIST_PIXELS) method->process_pixels(t, type);
     }
-    method->process_pixels(t, l, type);
+    method->process_pixels(t, type);
     method->finish(t, type);
     for (unsigned lanes = showing & ~transformed; lanes; lanes &= lanes - 1) {
         const int n = __builtin_ctz(lanes);
-        kernel_tile_process_cell(t, l->part, q->cell[n], q->blocks[n]);
+        kernel_tile_process_cell(t, cells->part, q->cell[n], q->blocks[n]);
     }
 }
 
@@ -352,7 +324,7 @@ SIMD_INLINE void kernel_tile_process_curved(kernel_tile_trace *t, kernel_tile_ce
 static __attribute__((noinline)) void kernel_tile_process_queue(kernel_tile_trace *t, int index)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
-    kernel_local_queue *q = &cells->lanes.queues[index];
+    kernel_local_queue *q = &cells->queues[index];
     const int type = kernel_lane_types[index];
     if (kernel_is_linear(type))
         kernel_tile_process_tets(t, cells, q);
@@ -365,7 +337,7 @@ static __attribute__((noinline)) void kernel_tile_process_queue(kernel_tile_trac
 SIMD_INLINE void kernel_tile_process_queues(kernel_tile_trace *t)
 {
     for (int i = 0; i < KERNEL_LANE_TYPES; i++)
-        while (t->thread->tile_cells->lanes.queues[i].count) kernel_tile_process_queue(t, i);
+        while (t->thread->tile_cells->queues[i].count) kernel_tile_process_queue(t, i);
 }
 
 /* Returns whether cells of this type in the mesh part are queued. Polyhedra, cells with indices too large for lanes,
@@ -375,7 +347,7 @@ SIMD_INLINE bool kernel_tile_queues_type(const kernel_tile_trace *t, int part, i
     const kernel_tile_cells *cells = t->thread->tile_cells;
     if (kernel_has_own_faces(type) || !kernel_arrays_have_small_indices(t->frame->job->parts[part].cells)) return false;
     if (!kernel_is_linear(type)) return cells->has_curved_lanes;
-    return !t->frame->job->volumes[cells->lanes.volume].field.fields[part].is_cell_centred;
+    return !t->frame->job->volumes[cells->volume].field.fields[part].is_cell_centred;
 }
 
 /* Queues a cell; if the queue of its type is full, a vector of its cells is processed. Returns false if the cell must
@@ -384,16 +356,16 @@ static __attribute__((noinline)) bool kernel_tile_enqueue(kernel_tile_trace *t, 
                                                           unsigned blocks, unsigned box)
 {
     const int type = grid_cell_type(t->frame->job->parts[part].cells, cell);
-    kernel_local_lanes *l = &t->thread->tile_cells->lanes;
+    kernel_tile_cells *cells = t->thread->tile_cells;
     if (!kernel_tile_queues_type(t, part, type)) return false;
-    if (part != l->part) {
+    if (part != cells->part) {
         kernel_tile_process_queues(t);
-        kernel_local_lanes_set_part(t, l, part);
+        kernel_tile_cells_set_part(t, cells, part);
     }
     const int index = kernel_lane_type_index(type);
-    kernel_local_queue *q = &l->queues[index];
-    if (kernel_is_linear(type) ? kernel_local_push(&l->arrays, q, cell, blocks, box, GRID_TET)
-                               : KERNEL_OF_TYPE(type, kernel_local_push, &l->arrays, q, cell, blocks, box))
+    kernel_local_queue *q = &cells->queues[index];
+    if (kernel_is_linear(type) ? kernel_local_push(&cells->arrays, q, cell, blocks, box, GRID_TET)
+                               : KERNEL_OF_TYPE(type, kernel_local_push, &cells->arrays, q, cell, blocks, box))
         kernel_tile_process_queue(t, index);
     return true;
 }
@@ -404,7 +376,7 @@ static __attribute__((noinline)) bool kernel_tile_enqueue(kernel_tile_trace *t, 
 static void kernel_volume_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks)
 {
     const grid *g = t->frame->job->parts[part].cells;
-    const int volume = t->thread->tile_cells->lanes.volume;
+    const int volume = t->thread->tile_cells->volume;
     const unsigned box = kernel_blocks_box(blocks);
     uint32_t others[MMBVH_MAX_LEAF];
     int left = 0;
@@ -418,7 +390,7 @@ static void kernel_volume_leaf(kernel_tile_trace *t, int part, const uint32_t *c
 /* Traverses the trees of the given mesh parts (kernel_tile_visit), skipping nodes whose values are invisible. */
 static void kernel_volume_parts(kernel_tile_trace *t, int unused, const uint32_t *parts, int count, unsigned blocks)
 {
-    const int volume = t->thread->tile_cells->lanes.volume;
+    const int volume = t->thread->tile_cells->volume;
     const render_field *field = &t->frame->job->volumes[volume].field;
     (void)unused;
     for (int n = 0; n < count; n++) {
@@ -565,7 +537,7 @@ SIMD_INLINE void kernel_volume_candidates(kernel_tile_trace *t, unsigned blocks)
 /* Processes all cells of a volume that may overlap the window of the given blocks. */
 static __attribute__((noinline)) void kernel_tile_process_window(kernel_tile_trace *t, int volume, unsigned blocks)
 {
-    kernel_local_lanes_begin(&t->thread->tile_cells->lanes, volume);
+    kernel_tile_cells_begin_volume(t->thread->tile_cells, volume);
     if (t->frame->volume_candidates)
         kernel_volume_candidates(t, blocks);
     else
@@ -574,12 +546,6 @@ static __attribute__((noinline)) void kernel_tile_process_window(kernel_tile_tra
 }
 
 /* ---- windows of depth ---- */
-
-/* Returns the depth at which the tile's first cell begins; +inf if cells are found only by traversing the trees. */
-SIMD_INLINE float kernel_tile_cells_near(const kernel_tile_trace *t)
-{
-    return t->frame->volume_candidates ? t->thread->tile_cells->items[0].near : INFINITY;
-}
 
 /* Returns the blocks that the bounding box of some tree may meet, and the range of these boxes' depths. */
 SIMD_INLINE kernel_placement kernel_tile_trees_placement(const kernel_tile_trace *t)

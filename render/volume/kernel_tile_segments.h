@@ -74,7 +74,7 @@ static __attribute__((noinline, cold)) void kernel_tet_segments_cut(kernel_tile_
     memcpy(lane, &lanes, sizeof lane);
     for (; rays; rays &= rays - 1) {
         const int i = __builtin_ctz(rays), packet = at[i] / SIMD_WIDTH;
-        kernel_transformed_tets_cell(&cells->transformed, lane[i], &cells->cell);
+        kernel_transformed_tets_cell(&cells->tets, lane[i], &cells->cell);
         kernel_tet_segments(&t->packets[packet], &s->packets[packet], &cells->cell, NULL,
                             vm_from_bits(1u << at[i] % SIMD_WIDTH));
     }
@@ -85,7 +85,7 @@ static __attribute__((noinline)) unsigned kernel_tet_segments_small(kernel_tile_
 {
     kernel_tile_segments *s = t->thread->tile_segments;
     const unsigned others = kernel_tile_list_small_tets(t, lanes, KERNEL_TET_PIXELS);
-    const kernel_pixel_list *rays = &t->thread->tile_cells->lanes.rays;
+    const kernel_pixel_list *rays = &t->thread->tile_cells->rays;
     for (int n = 0; n < rays->count; n += SIMD_WIDTH) {
         kernel_lane_rays r;
         kernel_interval i;
@@ -94,7 +94,7 @@ static __attribute__((noinline)) unsigned kernel_tet_segments_small(kernel_tile_
         const vi at = r.at;
         vf_gather_pair(s->window, 2 * at, &begin, &end);
         r.active = vm_and(r.active, vf_lt(begin, end));
-        kernel_tet_rays_interval(&t->thread->tile_cells->transformed, &r, &i);
+        kernel_tet_rays_interval(&t->thread->tile_cells->tets, &r, &i);
         if (!vm_any(i.mask)) continue;
         vf_gather_pair(s->reach, 2 * at, &near, &far);
         const vm met = vm_and(i.mask, vm_and(vf_le(begin, i.t_out), vf_lt(i.t_in, end)));

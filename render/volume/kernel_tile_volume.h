@@ -114,14 +114,14 @@ static __attribute__((noinline)) unsigned kernel_tet_samples_small(kernel_tile_t
 {
     kernel_tile_volume *b = t->thread->tile_volume;
     const unsigned others = kernel_tile_list_small_tets(t, lanes, KERNEL_TET_SAMPLE_PIXELS);
-    const kernel_pixel_list *rays = &t->thread->tile_cells->lanes.rays;
+    const kernel_pixel_list *rays = &t->thread->tile_cells->rays;
     for (int n = 0; n < rays->count; n += SIMD_WIDTH) {
         kernel_lane_rays r;
         kernel_interval i;
         kernel_lane_rays_begin(&r, t, rays, n);
         const vi at = r.at;
         r.active = vm_and(r.active, vf_lt(vf_set(-INFINITY), vf_gather(b->far, at)));
-        kernel_tet_rays_interval(&t->thread->tile_cells->transformed, &r, &i);
+        kernel_tet_rays_interval(&t->thread->tile_cells->tets, &r, &i);
         if (vm_any(i.mask)) kernel_tet_samples_fill(t, b, &i, at);
     }
     return others;
@@ -135,14 +135,6 @@ static const kernel_volume_method kernel_volume_by_samples = {
     .process_pixels = kernel_local_queue_samples,
     .finish = kernel_local_fill,
 };
-
-/* Returns whether small tets, hexes, wedges and pyramids are sampled in lanes. They are not if the frame has surfaces,
- * which may end rays and need the ends of intervals (kernel_blend_breaks()), nor if each sample becomes a fragment of
- * its own. */
-SIMD_INLINE bool kernel_samples_use_lanes(const kernel_frame *f)
-{
-    return !f->surface_count && !f->job->separate_samples;
-}
 
 /* Prepares the packet for samples of a volume. Extends *first .. *last to include the numbers of its rays' samples
  * between the depths near and far. */
@@ -228,11 +220,14 @@ SIMD_INLINE void kernel_tile_window_blend(kernel_tile_trace *t, kernel_tile_volu
 static void kernel_tile_volumes(kernel_tile_trace *t)
 {
     kernel_tile_volume *v = t->thread->tile_volume;
-    const bool has_lanes = kernel_samples_use_lanes(t->frame);
+    /* Small cells are not sampled in lanes if the frame has surfaces, which may end rays and need the ends of intervals
+     * (kernel_blend_breaks()), nor if each sample becomes a fragment of its own. */
+    const bool has_lanes = !t->frame->surface_count && !t->frame->job->separate_samples;
     if (!kernel_tile_cells_begin(t, &kernel_volume_by_samples, has_lanes, has_lanes)) return;
     kernel_placement reach = kernel_tile_trees_placement(t);
     const unsigned blocks = reach.blocks;
-    const float cells_near = kernel_tile_cells_near(t);
+    /* depth at which the tile's first cell begins; +inf if cells are found only by traversing the trees */
+    const float cells_near = t->frame->volume_candidates ? t->thread->tile_cells->items[0].near : INFINITY;
     if (cells_near < INFINITY) reach.near = fmaxf(reach.near, cells_near);
     int packets[KERNEL_TILE_PACKETS], first = INT_MAX, last = INT_MIN;
     const int count = kernel_tile_volume_begin(t, blocks, packets);

@@ -140,11 +140,11 @@ static int cut_ramps(const render_transfer *t, double tolerance, kernel_real *cu
  * kept. */
 static int collect_cuts(const render_transfer *t, double tolerance, kernel_real *cuts, kept_entry *entries)
 {
-    int count = cut_ramps(t, tolerance, cuts), active = 0;
+    int count = cut_ramps(t, tolerance, cuts), kept = 0;
     for (int i = 0; i < t->colour_count - 1; i = next_entry(t, i, tolerance))
-        entries[active++] = (kept_entry){i, render_entry_position(t, i)};
-    entries[active++] = (kept_entry){t->colour_count - 1, render_entry_position(t, t->colour_count - 1)};
-    for (int i = 0; i < active; i++) cuts[count++] = (kernel_real)entries[i].place;
+        entries[kept++] = (kept_entry){i, render_entry_position(t, i)};
+    entries[kept++] = (kept_entry){t->colour_count - 1, render_entry_position(t, t->colour_count - 1)};
+    for (int i = 0; i < kept; i++) cuts[count++] = (kernel_real)entries[i].place;
     for (int i = 0; i < t->opacity_count; i++) cuts[count++] = (kernel_real)render_domain_of(t, t->opacity_values[i]);
     qsort(cuts, (size_t)count, sizeof *cuts, compare_cuts);
     int unique = 1;
@@ -350,17 +350,17 @@ static int variation_in_bin(const kernel_pieces *t, int bin, int piece, const do
     return piece;
 }
 
-static void sum_up_variation(const value_variation *s, double contrast, kernel_light_variation *out)
+static void sum_up_variation(const value_variation *s, double contrast, float out[KERNEL_LIGHT_ENTRIES])
 {
     double variation = 0, cost = 0;
     for (int kind = 0; kind < VARIATION_KINDS; kind++) {
         variation = fmax(variation, s->high[kind] - s->low[kind]);
         cost = fmax(cost, fmax(-s->low[kind], s->high[kind]));
     }
-    *out = (kernel_light_variation){.variation = (float)fmin(variation * (1 + rounding), 1e30),
-                                    .cost = (float)fmin(cost * (1 + rounding), 1e30),
-                                    .extinction = (float)s->extinction,
-                                    .steepness = (float)fmin(fmax(-s->low[0], s->high[0]) * contrast, 1e30)};
+    out[KERNEL_LIGHT_VARIATION] = (float)fmin(variation * (1 + rounding), 1e30);
+    out[KERNEL_LIGHT_COST] = (float)fmin(cost * (1 + rounding), 1e30);
+    out[KERNEL_LIGHT_EXTINCTION] = (float)s->extinction;
+    out[KERNEL_LIGHT_STEEPNESS] = (float)fmin(fmax(-s->low[0], s->high[0]) * contrast, 1e30);
 }
 
 /* Fills the table of bounds, which is indexed by the class of a range's width and by the bin in which the range begins.
@@ -375,7 +375,7 @@ static void fill_variations(kernel_pieces *out, const double behind[2])
         for (int width = 0, last = first; width < KERNEL_VARIATION_WIDTHS; width++) {
             const int wanted = first + (int)ceil(ldexp(1 + 0.25 * (width % 4 + 1), width / 4)) - 1;
             for (; last < wanted && last + 1 < KERNEL_VARIATION_BINS; last++) unite_variations(&all, &bins[last + 1]);
-            sum_up_variation(&all, behind[1] - behind[0], &out->variations[width * KERNEL_VARIATION_BINS + first]);
+            sum_up_variation(&all, behind[1] - behind[0], out->variations[width * KERNEL_VARIATION_BINS + first]);
         }
     }
 }
