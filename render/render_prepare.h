@@ -21,9 +21,10 @@ void render_unprepare(kernel_frame *frame);
  * range[1] if no part has the field. */
 void render_surface_range(const render_job *job, int surface, double range[2]);
 
-/* Allocates and sets up the memory of a thread, whose members are zero, at its first use. It is called by that thread,
- * so that the thread touches the memory first. kernels: those of the thread that opened the parallel region. Returns
- * false, with thread->out_of_memory set, if there is no memory. */
+/* Allocates and sets up the thread's memory, unless a former call has done so; at first all members of *thread must be
+ * zero. It must be called by the thread itself, so that the memory is on the thread's NUMA node. kernels: the result of
+ * render_kernels() in the thread that opened the parallel region. Returns false, with thread->out_of_memory set, if
+ * there is no memory. */
 bool render_thread_begin(const kernel_frame *frame, const kernel_table *kernels, kernel_thread *thread);
 
 /* Frees everything that the thread has. */
