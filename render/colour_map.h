@@ -2,7 +2,7 @@
 #ifndef RENDER_COLOUR_MAP_H
 #define RENDER_COLOUR_MAP_H
 
-/* Lists every built-in map, by the suffix of its constant and by its name. */
+/* Lists every built-in colour map: X(suffix of its constant COLOUR_MAP_..., name in scenes). */
 #define COLOUR_MAPS(X)                                                                                                 \
     X(VIRIDIS, "viridis")                                                                                              \
     X(PLASMA, "plasma")                                                                                                \
@@ -32,8 +32,8 @@
 #define COLOUR_MAP_CONSTANT(word, name) COLOUR_MAP_##word,
 typedef enum colour_map { COLOUR_MAPS(COLOUR_MAP_CONSTANT) COLOUR_MAP_COUNT } colour_map;
 
-/* Returns the map's table (colour_count × 3 floats, linear light, evenly spaced, static), or NULL if there is no map of
- * this name. */
+/* Returns the table of the colour map, which must not be freed, or NULL if there is no map of this name. The table has
+ * *colour_count entries, evenly spaced, of 3 floats: red, green and blue in linear light. */
 const float *colour_map_table(const char *name, int *colour_count);
 
 /* Converts one sRGB component in [0, 1] to linear light. */

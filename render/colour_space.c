@@ -69,7 +69,8 @@ static void interpolate_lab(const double a[3], const double b[3], double share, 
 
 /* ---- Moreland's diverging interpolation ------------------------------------------------------------------------ */
 
-/* A colour in the polar form of CIELAB. m: distance from black; s: angle from the grey axis; h: hue. */
+/* A colour in Msh, the polar form of CIELAB. m: distance from black; s: angle from the axis of greys; h: angle of the
+ * hue; angles in radians. */
 typedef struct msh {
     double m, s, h;
 } msh;
@@ -92,8 +93,8 @@ static void linear_from_msh(msh colour, float linear[3])
     linear_from_lab(lab, linear);
 }
 
-/* Returns the hue to use for a neutral colour at distance m from black, on the path from a saturated colour, so that
- * the hue does not rotate along the path. */
+/* Returns the hue that a neutral colour at distance m from black gets at the end of a path from a saturated colour. A
+ * neutral colour has no hue of its own; this one avoids a visible change of hue along the path (Moreland 2009). */
 static double neutral_hue(msh end, double m)
 {
     if (end.m >= m - 0.1) return end.h;

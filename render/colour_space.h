@@ -6,8 +6,8 @@
 
 /* The space in which colours are interpolated: sRGB; hue, saturation and value of sRGB (the hue's path does not cross
  * 0); CIELAB (D65); or Moreland's Msh, the polar form of CIELAB, in which the path between two saturated colours of
- * different hues leads through a neutral colour that is lighter than both. COLOUR_STEP: no interpolation, the colour of
- * the second point. */
+ * different hues leads through a neutral colour that is lighter than both. COLOUR_STEP: not interpolated; the colour
+ * between two points is that of the second point. */
 typedef enum colour_space { COLOUR_RGB, COLOUR_HSV, COLOUR_LAB, COLOUR_DIVERGING, COLOUR_STEP } colour_space;
 
 /* Interpolates between the sRGB colours a and b (components in [0, 1]); the result is linear light in [0, 1]. */
@@ -21,9 +21,9 @@ typedef struct colour_point {
     double srgb[3]; /* sRGB components in [0, 1] */
 } colour_point;
 
-/* Returns how many entries an evenly spaced table through the points (2 or more) should have: 256 or a few more if the
- * points are evenly spaced, so that each is an entry; else 1025, where a step between two points at one position is
- * spread over the interval between two entries. */
+/* Returns how many entries an evenly spaced table through the points (2 or more) should have. If the points are evenly
+ * spaced, it is 256 or a few more, so that each point is an entry. Otherwise it is 1025; a step, given by two points at
+ * one position, is then spread over the distance between two entries. */
 int colour_table_entries(const colour_point *points, int count);
 /* Fills the table (entries × 3, linear light), from the first point to the last. */
 void colour_fill_table(const colour_point *points, int count, colour_space space, float *table, int entries);

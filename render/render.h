@@ -1,27 +1,27 @@
 /* Renders local cells to local fragments: camera, layers, and the one call that draws a frame. It does not use MPI.
  *
  * A ray through pixel (x, y) is p(z) = eye + offset + z (forward + slope), where z is the depth along the camera's
- * axis: perspective cameras have the slope, orthographic ones the offset. The ray's parameter everywhere is t = (z -
- * depth_origin) * scale, so that float32 t has its resolution where the cells are. Samples of a volume lie at distances
- * (k + jitter) * step from the eye (perspective) or the eye's plane (orthographic), k = 0, 1, ...
+ * axis: perspective cameras have the slope, orthographic ones the offset. In all files of render/ the ray's parameter
+ * is t = (z - depth_origin) * scale, so that float32 t has its resolution where the cells are. Samples of a volume lie
+ * at distances (k + jitter) * step from the eye (perspective) or the eye's plane (orthographic), k = 0, 1, ...
  *
- * The result of a frame is a function of the cells and the job alone. It does not depend on the rank that holds a cell,
- * the order of the cells, the trees, or the number of threads.
+ * The result of a frame depends only on the cells and the job. It does not depend on the rank that holds a cell, the
+ * order of the cells, the trees, or the number of threads.
  *
  * If cells overlap, each contributes its own sample. If several cells or several volumes have a sample at one position,
  * the light that they absorb together is divided among them in proportion to what each would absorb alone. A rank
- * cannot know which cells of other ranks overlap its own. If its own cells overlap, a frame therefore keeps one cell's
- * sample, and marks the ray by a second fragment at the same depth. Compositing finds the pixels in which fragments of
- * any ranks overlap (comp.h), and these are traced again with separate_samples, which leaves the sharing to
- * compositing. Until then the result in such pixels is undefined. Volumes that are integrated by segments work the same
- * way: if cells overlap, each cell's segments become separate fragments; segments of several volumes do so on all
- * pixels.
+ * cannot know which cells of other ranks overlap its own. If cells of one rank overlap, its frame therefore keeps the
+ * sample of one of these cells, and marks the ray by a second fragment at the same depth. Compositing finds the pixels
+ * in which fragments of any ranks overlap (comp.h), and these are traced again with separate_samples, which leaves the
+ * sharing to compositing. Until then the result in such pixels is undefined. Volumes that are integrated by segments
+ * work the same way: if cells overlap, each cell's segments become separate fragments; segments of several volumes do
+ * so on all pixels.
  *
- * Faces that coincide but do not have the same bits, as at hanging nodes, leave overlaps and gaps of the size of
- * rounding. Segments whose overlap is that small are not reported to compositing: each has its own length, and the sum
- * of lengths is the same on any partition. A sample in such an overlap marks its ray. Separate samples are flagged if
- * they are near an end of the ray's interval in their cell, so that compositing can distinguish such an overlap by
- * rounding from cells that really overlap. */
+ * Faces that coincide but whose coordinates or depths are not bit-identical, as at hanging nodes, leave overlaps and
+ * gaps of the size of rounding. Segments whose overlap is that small are not reported to compositing: each has its own
+ * length, and the sum of lengths is the same on any partition. A sample in such an overlap marks its ray. Separate
+ * samples are flagged if they are near an end of the ray's interval in their cell, so that compositing can distinguish
+ * such an overlap by rounding from cells that really overlap. */
 #ifndef RENDER_RENDER_H
 #define RENDER_RENDER_H
 
@@ -44,12 +44,12 @@ typedef struct render_camera {
     double offset[2];
 } render_camera;
 
-/* Computes the offset of sample k of count (1, 2, 4, 8 or 16) in a pixel. Along either axis the samples are evenly
- * spaced, and their mean is the pixel's centre. */
+/* Computes the offset from a pixel's centre, in pixels, of sample k of `count` (1, 2, 4, 8 or 16) samples in the pixel.
+ * Along either axis the samples are evenly spaced, and their mean is the pixel's centre. */
 void render_camera_sample(int count, int k, double offset[2]);
 
-/* Sets a camera at eye that looks at focal. vertical_degrees: the whole vertical angle, in (0, 180). Returns false if
- * eye equals focal, or up is parallel to the view. */
+/* Sets up a camera at the position `eye` that looks at the position `focal`. vertical_degrees: the whole vertical
+ * angle, in (0, 180). Returns false if eye equals focal, or up is parallel to the line of sight. */
 bool render_camera_look_at(render_camera *camera, const double eye[3], const double focal[3], const double up[3],
                            double vertical_degrees, int width, int height);
 
@@ -62,7 +62,7 @@ void render_camera_ray(const render_camera *camera, int x, int y, double base[3]
 typedef struct render_space {
     double origin[3];
     double scale;
-    double depth_origin; /* depth z from the eye's plane at which the ray parameter t is 0 */
+    double depth_origin; /* depth z from the eye's plane, in scene units, at which the ray parameter t is 0 */
 } render_space;
 
 /* The spacing of values along a colour table: linear, logarithmic (for which low > 0), or symmetric logarithmic
@@ -75,11 +75,12 @@ typedef enum render_scale { RENDER_LINEAR, RENDER_LOG, RENDER_SYMLOG } render_sc
 double render_scaled(render_scale scale, double threshold, double value);
 double render_unscaled(render_scale scale, double threshold, double scaled);
 
-/* Colour and opacity of a value. A value's position is (s(value) - s(low)) / (s(high) - s(low)), s being the scale.
- * Colours are a table of linear RGB, evenly spaced over the positions from 0 to 1, interpolated linearly by position
- * (in volumes with a scale, by value between entries), clamped outside. Opacity is piecewise linear by position through
- * points of rising value (two of the same value make a step), constant outside; with a scale the points lie between low
- * and high. Opacity is per unit_distance: extinction = -ln(1 - opacity) / unit_distance. */
+/* Colour and opacity of a value. A value's position in the colour table is (s(value) - s(low)) / (s(high) - s(low)), s
+ * being the scale. Colours are a table of linear RGB, evenly spaced over the positions from 0 to 1, interpolated
+ * linearly by position (in volumes with a scale, by value between entries), clamped outside. Opacity is piecewise
+ * linear by position through points of rising value (two of the same value make a step), constant outside; with a scale
+ * the points lie between low and high. Opacities are those of a path of length unit_distance: extinction = -ln(1 -
+ * opacity) / unit_distance. */
 typedef struct render_transfer {
     double low, high;
     int colour_count;     /* number of entries in the colour table, >= 2 */
@@ -90,7 +91,7 @@ typedef struct render_transfer {
      * 1. */
     bool is_banded;
     /* For surfaces only: the colours of values below low, above high, and of NaN, 3 numbers each. Values within
-     * RENDER_END of an end belong to the range. NULL: such values get the colours of low and high, and
+     * RENDER_END of an end belong to the range. NULL: values outside get the colours of low and high, and NaN gets
      * RENDER_NO_COLOUR. */
     const float *outside;
     /* number of opacity points, 1 .. RENDER_MAX_OPACITY_POINTS; 0 for surfaces, whose transfer functions have no
@@ -145,12 +146,12 @@ enum { RENDER_DIFFERENCE_SAMPLES = 6 };
  * bytes. */
 typedef struct render_pending_hit {
     uint32_t pixel, kind; /* pixel and kind of the fragment that will be made of the hit */
-    /* t: depth of the hit; reach: distance from the hit to its samples, which lie before and behind it along each axis;
-     * scaled units */
+    /* in scaled units: t: the ray's parameter at the hit; reach: distance from the hit to its six samples, which lie
+     * before and behind it along each world axis */
     float t, reach;
 } render_pending_hit;
 
-/* Growing lists of pending hits and of the data for lighting them; both have `count` entries. Memory comes from
+/* Growing lists of pending hits and of the data for lighting them; both have `count` entries and are allocated by
  * memory.h. */
 typedef struct render_pending_list {
     render_pending_hit *items;
@@ -205,8 +206,8 @@ typedef struct render_surface_layer {
     float opacity; /* opacity of the surface, 0 .. 1; at 1 it ends the ray */
     render_material material;
     render_normal normal;
-    /* distance h between a hit and its samples for central differences, in sizes of the hit's cell (the cube root of
-     * its bounding box's volume), > 0 */
+    /* distance h between the two samples of a central difference, which lie h / 2 before and behind the hit; in sizes
+     * of the hit's cell (the cube root of its bounding box's volume), > 0 */
     double difference;
     const render_vertex_gradients *gradients; /* gradients at the vertices of each part; used by RENDER_VERTEX */
     const render_lines *lines;                /* contour lines on the surface; NULL if there are none */
@@ -218,8 +219,8 @@ typedef struct render_surface_layer {
      * such a face only in an edge, so that its interval in the cell has length zero, then also hits the surface. */
     bool is_of_faces;
     uint32_t clips; /* clips of the job that cut the surface: bit i stands for clips[i] */
-    /* For rays from hits (render_light.h): a cell blocks such a ray only if it is met farther from the hit than this
-     * number of cell sizes; 0: every cell blocks. */
+    /* Used for shadows and ambient occlusion, whose rays begin at hits (render_light.h). A cell of this surface that a
+     * ray meets nearer to its hit than this number of cell sizes does not occlude the hit. 0: every cell occludes. */
     float contact;
 } render_surface_layer;
 
@@ -239,15 +240,17 @@ typedef struct render_volume_layer {
 typedef struct render_part {
     const grid *cells;
     const mmbvh *tree; /* min-max tree over the cells, in the coordinates of the job's space */
-    /* Vertex loops of polygons, for layers with edge lines. If loops[cell] is 0, every edge between vertices in the
-     * surface is drawn. Otherwise the cell stands on a part of a polygon, which is described by the entries from
-     * loops[loops[cell]] on: the number of vertices around the polygon, the number of segments into which each of its
-     * edges is divided, and the vertices in cyclic order, beginning with a corner. NULL: the mesh has no polygons. */
+    /* Vertex loops of polygons, for layers with edge lines. If loops[cell] is 0, all edges of the cell whose two
+     * vertices lie in the surface are drawn. Otherwise the cell's face in the surface is one of the faces into which a
+     * polygon was divided, and only the polygon's edges are drawn. The entries from loops[loops[cell]] on describe the
+     * polygon: the number of vertices around the polygon, the number of segments into which each of its edges is
+     * divided, and the vertices in cyclic order, beginning with a corner. NULL: the mesh has no polygons. */
     const int64_t *loops;
 } render_part;
 
-/* The method by which tiles of 16 x 16 rays find their visible cells. The picture is the same to the last bit; only the
- * speed differs. Pictures by segments may differ by the order of segments that begin at the same t, by at most 5e-7. */
+/* The method by which tiles of 16 x 16 rays find their visible cells. The picture is bit-identical with both; only the
+ * speed differs. The only exception is a volume that is integrated by segments: its colours may differ by 5e-7, because
+ * segments that begin at the same t may be blended in a different order. */
 typedef enum render_traversal {
     /* One traversal finds the cells of isosurfaces and of a single volume for the whole picture, and bins them by tile.
      * If too many cells are visible, or the job has several volumes, tiles traverse the trees as with RENDER_TILES. */
@@ -255,19 +258,20 @@ typedef enum render_traversal {
     RENDER_TILES /* each tile traverses the trees */
 } render_traversal;
 
-/* The method that integrates volumes: samples (thesis, 4.4), whose error depends on the step, or segments, which are
- * exact if the field is linear along the ray (tets) and of second order in the pieces of other cells. Segments of
- * several volumes need separate_samples: without it several volumes are sampled. */
+/* The method that integrates volumes. RENDER_SAMPLES sums samples (thesis, 4.4); the error depends on the step.
+ * RENDER_SEGMENTS divides a ray's interval in each cell into segments with a linear field. It is exact in tets, in
+ * which the field is linear, and of second order in the segments' length in other cells. Segments of several volumes
+ * need separate_samples; without it, several volumes are sampled. */
 typedef enum render_integration { RENDER_SAMPLES, RENDER_SEGMENTS } render_integration;
 
-/* Largest allowed error of a colour, in linear light, of overlapping segments that compositing blends; used if the job
- * gives no max_error. */
+/* Largest error of a colour, in linear light, that is allowed where compositing mixes overlapping segments; used if the
+ * job gives no max_error. */
 #define RENDER_MIXING_ERROR 1e-4
 
 typedef enum render_clip_kind { RENDER_CLIP_PLANE, RENDER_CLIP_BOX, RENDER_CLIP_SPHERE } render_clip_kind;
 
-/* A half space, box or sphere that clips layers: only what lies inside it is drawn, or only what lies outside if
- * is_outside is set. */
+/* A half space, box or sphere that clips layers. Only the parts of a layer inside it are drawn, or only the parts
+ * outside it if is_outside is set. */
 typedef struct render_clip {
     render_clip_kind kind;
     bool is_outside;
@@ -277,15 +281,17 @@ typedef struct render_clip {
     double centre[3], radius;  /* centre and radius of a sphere, in world coordinates */
 } render_clip;
 
-/* The contents of the fragments of hits: lit or unlit colours, or numbers of the pixel's nearest surface as red, green
- * and blue. With numbers, all surfaces must be opaque and there must be no volumes. */
+/* The contents of the fragments of hits: lit or unlit colours, or, in place of red, green and blue, numbers that
+ * describe the pixel's nearest surface (RENDER_NORMALS, RENDER_VALUES). With such numbers, all surfaces must be opaque
+ * and there must be no volumes. */
 typedef enum render_paint {
     RENDER_LIGHT,
     /* Surfaces that take light get their colours before lighting, and their normal in place of t_out and transmittance.
      * render_light_fragment() computes from these the fragments that RENDER_LIGHT would have given (render_light.h). */
     RENDER_UNLIT,
-    RENDER_NORMALS, /* the unit normal in world axes, on the side of the eye */
-    /* the value of the colour field, or the isovalue if there is none; and the index of the isovalue among the job's */
+    RENDER_NORMALS, /* the unit normal in world axes, on the side of the surface that faces the eye */
+    /* the value of the colour field, or the isovalue if the layer has no colour field; and the isovalue's index among
+     * all isovalues of the job */
     RENDER_VALUES
 } render_paint;
 
@@ -325,26 +331,31 @@ typedef struct render_job {
     int light_count;
     double step; /* distance between the samples of volumes, in scene units, > 0 */
     render_integration integration;
-    /* Error bound for segments. > 0: intervals in cells other than tets are divided until no channel of a pixel errs by
-     * more, in linear light. 0: they are divided into parts no longer than step. */
+    /* Error bound for RENDER_SEGMENTS. > 0: intervals in cells other than tets are divided into so many segments that
+     * no channel of a pixel errs by more than this, in linear light. 0: they are divided into segments no longer than
+     * `step`. */
     double max_error;
-    /* Upper bound of the length of rays in the cells of all ranks, in scene units; used with max_error. It must be the
-     * same on all ranks, so that all divide intervals in the same way. 0: the bound for this rank's cells is used. */
+    /* Upper bound of the length of a ray inside the cells of all ranks together, in scene units; used with max_error.
+     * It must be the same on all ranks, so that all of them divide intervals into the same segments. 0: the bound for
+     * this rank's cells is used. */
     double extent;
     /* number of samples of a ray that are looked up together, 1 .. RENDER_MAX_GROUP: the N of the thesis's sample
      * position packets (section 4.4.1) */
     int sample_group;
-    /* Set if the position of a ray's first sample is a hash of pixel and frame; otherwise it is half a step. */
+    /* Set if a ray's first sample is displaced by a hash of pixel and frame, between 0 and 1 steps (render_jitter());
+     * otherwise it is displaced by half a step. */
     bool jitter;
     int frame;     /* number of this frame among those that are averaged, from 0 on */
     bool is_alone; /* Set if no other rank holds cells: all samples of a ray may then be blended into one fragment. */
     /* Set of the pixels to trace (pixel_set.h); NULL: all pixels. */
     const unsigned char *pixels;
-    /* Set if each sample of each cell and volume becomes a fragment of length 0, and each segment one or several
-     * fragments, which compositing can mix. */
+    /* Set if samples and segments are not blended by this rank but passed on, so that compositing can mix those of
+     * overlapping cells and of several volumes. Each sample then becomes a fragment of length 0, and each segment one
+     * or several fragments. */
     bool separate_samples;
     /* Set if this rank's samples or segments are folded (blended in the fixed order of fragment_fold.h), so that the
-     * picture has the same bits on any partition. There must be only one volume. Not allowed with separate_samples. */
+     * picture is bit-identical for any partition of the mesh. There must be only one volume. Not allowed with
+     * separate_samples. */
     bool reproducible;
     int threads; /* number of threads, >= 1; 0: OpenMP's default */
 } render_job;
@@ -352,21 +363,23 @@ typedef struct render_job {
 typedef struct render_statistics {
     int64_t rays;         /* number of traced rays, one per pixel */
     int64_t map_failures; /* number of points for which the inversion of a cell's map failed */
-    int64_t volume_cells; /* cells that were transformed for volumes, counted once per tile and window of depth */
+    /* number of cells that were transformed for volumes; a cell counts once for each tile, and for each window (range
+     * of depths that a tile traces at a time) in it */
+    int64_t volume_cells;
     double surface_ms, volume_ms;
 } render_statistics;
 
 /* Returns the position in [0, 1) of a pixel's first sample in a frame, in steps. It is a hash of both numbers. */
 double render_jitter(uint32_t pixel, uint32_t frame);
 
-/* Compute intervals of visible values: a cell whose range, rounded to float, meets none of them is invisible.
- * render_isovalue_interval() returns the interval of an isovalue. render_visible_intervals() computes the intervals in
- * which a transfer function is not transparent, and returns their number, at most RENDER_MAX_INTERVALS. */
+/* Compute intervals of visible values: a cell is invisible if its range of values, rounded to float, overlaps none of
+ * them. render_isovalue_interval() returns the interval of an isovalue. render_visible_intervals() computes the
+ * intervals in which a transfer function is not transparent, and returns their number, at most RENDER_MAX_INTERVALS. */
 mmbvh_interval render_isovalue_interval(double value);
 int render_visible_intervals(const render_transfer *t, mmbvh_interval out[RENDER_MAX_INTERVALS]);
 
-/* Traces every pixel of the camera against this rank's parts and appends the fragments to out (memory from memory.h;
- * freed by the caller with base_free(out->items)). Parallel over tiles. statistics may be NULL. */
+/* Traces every pixel of the camera against this rank's parts and appends the fragments to *out. The caller must free
+ * them with base_free(out->items). Tiles are traced in parallel. statistics may be NULL. */
 insitu_status render_frame(const render_job *job, fragment_list *out, render_statistics *statistics, base_error *error);
 
 /* Draws as render_frame() does, but passes the fragments to take() tile by tile. Every pixel of the camera lies in one
@@ -380,8 +393,8 @@ insitu_status render_frame_tiles(const render_job *job, fragment_callback *take,
 const char *render_isa(void);
 const char *render_isa_warning(void);
 
-/* A bounding box of those cells of a rank that may affect hits of other ranks. Ranks exchange these boxes to find which
- * ranks a hit needs. It is in scene units, and empty if lower > upper. */
+/* A bounding box, in scene units, of those cells of a rank that may affect hits of other ranks. Ranks exchange these
+ * boxes to find which ranks' cells a hit's normal or light depends on. The box is empty if lower > upper. */
 typedef struct render_box {
     double lower[3], upper[3];
 } render_box;

@@ -42,19 +42,19 @@ render_box render_differences_box(const render_job *job)
 }
 
 /* Margin by which boxes are extended, in scaled units, in which the size of a scene is about 1. It is larger than the
- * errors of points and of float32 boxes. */
+ * rounding errors of sample points and of float32 boxes. */
 static const double box_margin = 1e-5;
 
-/* The six sample points are the ends of three segments, one along each axis, that are centred at the hit and 2 * reach
- * long. The function tests whether one of the segments meets the box. */
+/* The six sample points are the ends of three line segments, one along each axis, that are centred at the hit and 2 *
+ * reach long. The function tests whether one of these line segments meets the box. */
 bool render_differences_meet(const render_job *job, const render_pending_hit *hit, const render_box *box)
 {
     const uint32_t width = (uint32_t)job->camera.width;
     const double z = (double)hit->t / job->space.scale + job->space.depth_origin;
     const double reach = (double)hit->reach / job->space.scale, margin = box_margin / job->space.scale;
     double base[3], direction[3];
-    /* beside: number of axes along which the hit is outside the box; beyond: number of axes along which all sample
-     * points are. */
+    /* beside: number of axes along which the hit is outside the box; beyond: number of axes along which all six sample
+     * points are outside the box */
     int beside = 0, beyond = 0;
     render_camera_ray(&job->camera, (int)(hit->pixel % width), (int)(hit->pixel / width), base, direction);
     for (int a = 0; a < 3; a++) {
@@ -119,8 +119,9 @@ bool render_differences_sort(const render_job *job, render_pending_list *list)
 
 /* ---- samples and light ----------------------------------------------------------------------------------------- */
 
-/* Samples around `count` hits, or lights them if `out` is not NULL, in parallel, chunk by chunk. samples: the hits'
- * samples, which are written, or read to light the hits; shadings: those of the hits to be lit. */
+/* Processes `count` pending hits in parallel, CHUNK_HITS at a time. If `out` is NULL, the field is sampled around the
+ * hits and stored in `samples`. Otherwise the hits are lit: samples and shadings are read, and the fragments are stored
+ * in `out`. */
 static insitu_status process_chunks(const render_job *job, const render_pending_hit *hits, float (*shadings)[2][3],
                                     render_difference_samples *samples, fragment *out, int64_t count, base_error *error)
 {

@@ -1,11 +1,11 @@
-/* Computes normals by central differences whose samples lie in the cells of any rank.
+/* Computes normals by central differences of the field if some of the samples around a hit lie in cells of other ranks.
  *
  * First a frame is traced whose job has a list of pending hits (render_job.waiting); its hits with normals by
  * differences are added to that list. The field is then sampled at six points around each hit, by this rank and by
  * every rank whose box contains one of the points. The samples are merged, and their differences give the normal with
  * which the hit is lit. Each rank computes the hit's pixel, tile and ray from the camera, which all ranks have, and
- * samples in the same tile space as the rank of the hit. So the result has the same bits as if one rank had all cells.
- * If several cells contain a point, on whichever ranks, the sample is the minimum of their values. */
+ * samples in the same tile space as the rank of the hit. So the result is bit-identical to that of one rank with all
+ * cells. If several cells contain a point, on whichever ranks, the sample is the minimum of their values. */
 #ifndef RENDER_RENDER_DIFFERENCES_H
 #define RENDER_RENDER_DIFFERENCES_H
 
@@ -30,7 +30,8 @@ bool render_differences_sort(const render_job *job, render_pending_list *list);
 /* Returns whether one of the six sample points of the hit may be in the box. */
 bool render_differences_meet(const render_job *job, const render_pending_hit *hit, const render_box *box);
 
-/* Samples this rank's cells around the hits, which may belong to any rank. Local. */
+/* Samples the field in this rank's cells around the hits, which may belong to any rank. out[i]: samples of hits[i].
+ * Local. */
 insitu_status render_sample_pending_hits(const render_job *job, const render_pending_hit *hits,
                                          render_difference_samples *out, int64_t count, base_error *error);
 

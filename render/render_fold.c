@@ -1,7 +1,9 @@
-/* A run is a sequence of a pixel's samples or segments that touch each other, without a surface in between. No other
- * rank has fragments between the begin and the end of a run. So the intervals and halved intervals of t
- * (fragment_fold.h) that lie within a run can be folded. If only this rank has cells (job->is_alone), everything
- * between two surfaces can be folded. */
+/* To fold fragments means to blend them into one, in the fixed order of fragment_fold.h: a pixel's ray is cut into
+ * intervals of t, which are halved repeatedly, and fragments are folded half by half. A run is a sequence of a pixel's
+ * samples or segments that follow each other without a gap and without a surface in between. No other rank has
+ * fragments between the begin and the end of a run. So the fragments of each interval, or half of one, that lies
+ * within a run can be folded. If only this rank has cells (job->is_alone), all fragments between two surfaces can be
+ * folded. */
 #include "render_fold.h"
 
 #include <math.h>
@@ -46,8 +48,8 @@ static void collect(render_folding *folding, const pixel_area *area, const fragm
     starts[pixels] = count;
 }
 
-/* Sorts fragments by depth; they are nearly sorted already. The mark on a run's first fragment must not affect the
- * order, so kinds are not compared. */
+/* Sorts fragments by depth; they are nearly sorted already. The kind of a run's first fragment marks it as such. This
+ * mark must not affect the order, so kinds are not compared. */
 static void sort(fragment *items, int64_t count)
 {
     for (int64_t i = 1; i < count; i++) {
@@ -65,22 +67,22 @@ static void sort(fragment *items, int64_t count)
     }
 }
 
-/* Returns the error bound, in t, of a segment's end. If another rank's segment ends or begins within this distance, the
- * two may touch. */
+/* Returns the error bound of a segment's end at t. If a segment of another rank begins or ends within this distance,
+ * the two may be parts of touching cells. */
 static float error_at(float t)
 {
     return fmaxf(fabsf(t), 1) * RENDER_FACE_ERROR;
 }
 
-/* Moves the end of each fragment of a run forward, towards the eye, by its error bound, so that compositing does not
- * take touching fragments for overlapping ones (kernel_segments.h). */
+/* Moves the end of each folded fragment towards the eye by its error bound, so that compositing does not take fragments
+ * of touching cells for overlapping ones (kernel_segments.h). Samples need no such margin. */
 static void shorten(const render_folding *folding, fragment *items, int64_t count)
 {
     for (int64_t i = 0; i < count && folding->has_segments; i++) items[i].t_out -= error_at(items[i].t_out);
 }
 
-/* Folds the fragments of one run, interval by interval (fragment_interval_number()), and writes the result from `out`
- * on. Returns the end of the output. */
+/* Folds the `count` fragments of one run, interval by interval (fragment_interval_number()). Stores the resulting
+ * fragments at `out`, and returns the address behind the last one. */
 static fragment *fold_run(const render_folding *folding, fragment *run, int64_t count, fragment *out)
 {
     const bool is_alone = folding->job->is_alone;

@@ -1,5 +1,5 @@
 /* Folds a rank's samples and segments of a volume: blends them in the fixed order that fragment_fold.h defines, so that
- * the picture has the same bits on any partition. */
+ * the picture is bit-identical for any partition of the mesh. */
 #ifndef RENDER_RENDER_FOLD_H
 #define RENDER_RENDER_FOLD_H
 
@@ -8,7 +8,8 @@
 #include "fragment.h"
 #include "render.h"
 
-/* The state of one thread while it folds tiles. It owns its buffers; the job is borrowed. */
+/* The state of one thread while it folds tiles. items, starts: buffers, freed by render_folding_free(); the job is not
+ * copied. */
 typedef struct render_folding {
     const render_job *job;
     bool has_segments; /* set if volumes are integrated by segments, else by samples */
@@ -16,10 +17,11 @@ typedef struct render_folding {
     int64_t capacity, *starts;
 } render_folding;
 
-/* Folds the list of a tile's fragments, each of which is one sample or segment. If this rank has
- * all of a pixel's volume fragments in a halved interval of fragment_fold.h, they become one fragment. FRAGMENT_EARLY
- * marks a fragment in front of which a surface or another rank's fragment may lie; FRAGMENT_LATE marks overlapping
- * cells. Returns false if memory ran out. */
+/* Folds the list of a tile's fragments, in which each sample or segment of the volume is one fragment. Where this rank
+ * certainly has all volume fragments of a pixel in one of the halved intervals of fragment_fold.h, they become one
+ * fragment. In the list, the kind FRAGMENT_EARLY marks a fragment in front of which a surface or another rank's
+ * fragment may lie. FRAGMENT_LATE marks the extra fragment of a ray on which cells overlap. Returns false if memory ran
+ * out. */
 bool render_fold(render_folding *folding, const pixel_area *area, fragment_list *list);
 
 void render_folding_free(render_folding *folding);

@@ -1,5 +1,5 @@
-/* A frame is drawn by tiles that are distributed among threads. Tiles are small (16 × 16 pixels) and assigned a few at
- * a time, because a picture's middle costs far more than its border. */
+/* Draws a frame: tiles are distributed among threads. Tiles are small (16 × 16 pixels), and a thread gets only a few of
+ * them at a time, because tiles in the middle of a picture cost far more than tiles at its border. */
 #include <math.h>
 #include <omp.h>
 #include <string.h>
@@ -87,7 +87,8 @@ static bool append_pending(render_pending_list *to, const render_pending_list *f
     return true;
 }
 
-/* Removes the placeholder fragments of hits that still need samples of other ranks. */
+/* Removes the placeholder fragments of pending hits (RENDER_PENDING_TRANSMITTANCE) from the list, from index `first`
+ * on. */
 static void drop_placeholders(fragment_list *list, int64_t first)
 {
     fragment *to = list->items + first;
@@ -173,9 +174,10 @@ static bool append_fragments(fragment_list *to, const fragment *items, int64_t c
     return true;
 }
 
-/* Appends a tile's fragments to lists[0], which all threads share, in any order; the order differs from run to run, the
- * set does not. Once that list has no space for a tile, the fragments of that tile and of later ones are stored in the
- * thread's own list, lists[1 + thread]. lists[0].count is the number of fragments of all tiles, wherever they are. */
+/* Appends a tile's fragments to lists[0], which all threads share. The order of the tiles in it differs from run to
+ * run. Once that list has no space for a tile, the fragments of that tile and of all later ones are stored in the list
+ * of the thread that traced them, lists[1 + thread]. lists[0].count is the total number of fragments of all tiles in
+ * all lists. */
 static bool append_tile(void *lists, int thread, const pixel_area *area, fragment *items, int64_t count)
 {
     fragment_list *shared = lists, *own = shared + 1 + thread;
@@ -188,8 +190,9 @@ static bool append_tile(void *lists, int thread, const pixel_area *area, fragmen
     return true;
 }
 
-/* Traces a frame and appends its fragments to `out`. Memory is reserved for a fragment at every other pixel; reserved
- * memory that is never written costs nothing. If only a set of pixels is traced, no memory is reserved. */
+/* Traces a frame and appends its fragments to `out`. Space is reserved at once for half as many fragments as there are
+ * pixels; memory that is reserved but never written costs nothing. If only a set of pixels is traced, no memory is
+ * reserved. */
 static bool trace_to_list(kernel_frame *frame, int threads, fragment_list *out, render_statistics *statistics)
 {
     const render_job *job = frame->job;
@@ -211,7 +214,8 @@ static bool trace_to_list(kernel_frame *frame, int threads, fragment_list *out, 
     return is_well;
 }
 
-/* Draws a frame. The fragments are appended to out, or, if out is NULL, passed to take() tile by tile. */
+/* Draws a frame. If out is not NULL, the fragments are appended to it; otherwise they are passed to take() tile by
+ * tile. */
 static insitu_status draw(const render_job *job, fragment_list *out, fragment_callback *take, void *state,
                           render_statistics *statistics, base_error *error)
 {

@@ -1,6 +1,7 @@
-/* Selects the instruction set that frames use. A process has one (render_isa() in render.h), and the calling thread may
- * be limited to a lower one. All ranks of a picture must use the same set, the highest that all of them have, because
- * sets round differently, and the cells on both sides of a face must give the same bits. */
+/* Selects the instruction set that frames use. It is the process's instruction set (render_isa() in render.h), unless
+ * the calling thread has been limited to a lower one. All ranks that draw a picture together must use the same set, the
+ * highest that all of them have. The reason: results are rounded differently with different sets, and the cells on both
+ * sides of a face, which may be on different ranks, must give bit-identical crossings. */
 #ifndef RENDER_RENDER_ISA_H
 #define RENDER_RENDER_ISA_H
 

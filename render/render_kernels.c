@@ -1,6 +1,6 @@
-/* The kernels: this one file is compiled once per instruction set and exports one table (kernel_types.h). A tile traces
- * surfaces before volumes, because opaque hits end the rays. It traces the cells that have been binned for it, or finds
- * cells by traversing the trees itself. */
+/* The kernels: this one file is compiled once per instruction set and exports one table (kernel_types.h). In each tile
+ * surfaces are traced before volumes, because opaque hits end the rays. The cells to be traced are the tile's
+ * candidates, if they have been found before; otherwise they are found by traversing the trees for this tile. */
 #include "grid.h"
 #include "kernel_arrays.h"
 #include "kernel_bins.h"
@@ -30,8 +30,8 @@
 
 /* ---- isosurfaces in the cells that are binned in a tile ---- */
 
-/* Sorts prefetched cells by their part, and leaves them in order of depth within each: a batch contains cells of one
- * part only, and cells of different blocks of a mesh alternate in depth. */
+/* Sorts candidates by mesh part; within a part they stay in order of depth. Cells are traced in batches (up to
+ * SIMD_WIDTH cells, kernel_batch.h) of one part only, and without sorting, cells of different parts would alternate. */
 static void kernel_prefetched_sort(const kernel_tile_candidate **items, int count)
 {
     for (int n = 1; n < count; n++) {
@@ -43,7 +43,8 @@ static void kernel_prefetched_sort(const kernel_tile_candidate **items, int coun
     }
 }
 
-/* Prefetches the vertices of all prefetched cells, then queues them for tracing. */
+/* Prefetches the vertices of the cells in m->prefetched, whose connectivity has been prefetched, then queues these
+ * cells for tracing. */
 static __attribute__((noinline)) void kernel_tile_queue_prefetched(kernel_tile_trace *t, kernel_tile_search *m)
 {
     const kernel_tile_candidate **items = m->prefetched;
@@ -54,7 +55,7 @@ static __attribute__((noinline)) void kernel_tile_queue_prefetched(kernel_tile_t
         if (m->layer < 0) kernel_tile_queue_set_part(t, m, part);
         if (m->layer == t->layer && m->part == part &&
             kernel_is_traced_in_vectors(m, items[n], kernel_arrays_type(&m->arrays, items[n]->cell)))
-            continue; /* cells in vectors are prefetched by their queue */
+            continue; /* cells that are traced in vectors are prefetched by kernel_tile_queue.h */
         kernel_prefetch_vertices(t->frame->job->parts[part].cells, &t->surface->layer->field.fields[part],
                                  items[n]->cell);
     }
@@ -100,7 +101,7 @@ SIMD_INLINE void kernel_tile_surface_candidates(kernel_tile_trace *t)
 
 /* ---- tiles ---- */
 
-/* The memory that a thread keeps from tile to tile of a frame. */
+/* The memory of one thread, which is used for all tiles of a frame that the thread traces. */
 typedef struct kernel_memory {
     kernel_cell packet_cells[KERNEL_CACHE_CELLS];
     kernel_cell tile_cell;
@@ -115,7 +116,7 @@ typedef struct kernel_memory {
     kernel_tile_search search;
 } kernel_memory;
 
-/* Returns whether one of the pixels of the block that begins at (x0, y0) must be traced. */
+/* Returns whether a pixel of the block whose upper left pixel is (x0, y0) must be traced. */
 static bool has_active_pixel(const render_job *job, int x0, int y0)
 {
     if (!job->pixels) return x0 < job->camera.width && y0 < job->camera.height;
@@ -164,7 +165,7 @@ static void trace_tile_volumes(kernel_tile_trace *t)
     t->thread->volume_seconds += render_seconds() - start;
 }
 
-/* Returns whether the tile meets the part of the picture in which some tree may be visible. */
+/* Returns whether the tile overlaps the rectangle of pixels in which some tree may be visible (kernel_frame.cover). */
 static bool is_covered(const kernel_frame *f, int x0, int y0)
 {
     return x0 <= f->cover[0][1] && x0 + KERNEL_TILE > f->cover[0][0] && y0 <= f->cover[1][1] &&
@@ -215,7 +216,7 @@ static void find_candidates(const kernel_frame *f, kernel_thread *thread, const 
     kernel_find_candidates(finder, subtree->node);
 }
 
-/* Sets up a thread's memory. The struct has a size of megabytes, most of which may stay unused in a frame, so that only
+/* Sets up a thread's memory. The memory has a size of megabytes, most of which may stay unused in a frame. So only
  * members that are read before they are written are initialized. */
 static void begin(kernel_thread *thread)
 {

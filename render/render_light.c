@@ -1,5 +1,6 @@
-/* Transforms the rays of hits to the spaces in which kernels trace them (tree space in kernel_occluders.h, tile space
- * in kernel_bundle.h), and lights the hits. */
+/* Traces the rays of hits towards lights and into the hemisphere above the surface, and lights the hits. First all rays
+ * are tested in tree space (kernel_occluders.h). Rays that these tests leave undecided for some cell are transformed
+ * into a tile space of their own and tested exactly in that cell (kernel_bundle.h). */
 #include "render_light.h"
 
 #include <math.h>
@@ -42,7 +43,7 @@ bool render_hit_of(const render_job *job, const fragment *f, render_hit *hit, re
 {
     double n[3];
     if (f->kind < FRAGMENT_SURFACE || !render_takes_light(&layer_of(job, f)->material)) return false;
-    /* a gradient that is NaN or infinite gives a normal that is not finite */
+    /* unlit fragments store the normal here; it is not finite if the field's gradient is NaN or infinite */
     if (!isfinite(f->t_out) || !isfinite(f->transmittance)) return false;
     *hit = (render_hit){f->pixel, f->t_in, {f->t_out, f->transmittance}};
     *rays = (render_hit_rays){all_samples(job->occlusion->samples), 0, 0};
@@ -62,11 +63,11 @@ void render_hit_samples(const render_job *job, const render_hit *hit, double sta
 
 /* ---- tracing ------------------------------------------------------------------------------------------------- */
 
-/* Number of hits that a thread processes at once; cells that it has read for one of these hits are cached for the
- * others. */
+/* CHUNK_HITS: number of hits that a thread processes together; cells that it has read for one of these hits are cached
+ * for the others. CHUNK_RAYS: maximum number of their rays. */
 enum { CHUNK_HITS = 64, CHUNK_RAYS = CHUNK_HITS * (RENDER_MAX_SAMPLES + RENDER_MAX_LIGHTS) };
 
-/* Number of tiles per scaled unit in the lattice of tiles across a light's direction. */
+/* Number of tiles per scaled unit, along each axis, in the plane across a light's direction. */
 enum { LIGHT_TILES = 32 };
 
 struct render_occluders {
@@ -213,12 +214,12 @@ static void test_cell(tracer *t, int32_t occluder)
     t->of->kernels->occlude_by_cell(&t->frame, &t->thread, &t->bundle, &t->of->trees.cells[occluder]);
 }
 
-/* Occluder index that marks an undecided ray-cell pair as done: its cell has been tested with all rays that must be
- * tested in it. */
+/* Occluder index that marks an undecided ray-cell pair as tested: the cell has been tested with all rays for which it
+ * was undecided. */
 enum { TESTED = -1 };
 
-/* Tests a hit's rays into the hemisphere exactly, in the cells of its `count` undecided pairs, and closes the rays that
- * are blocked. */
+/* Tests a hit's rays into the hemisphere exactly, in the cells of its `count` undecided ray-cell pairs, and clears
+ * is_open of the rays that are blocked. */
 static void trace_hemisphere(tracer *t, const render_hit *hit, kernel_undecided_pair *undecided, int64_t count)
 {
     uint64_t open = 0;
@@ -395,10 +396,12 @@ render_box render_occluder_box(const render_job *job)
     return hit_box(job, is_opaque);
 }
 
-/* Margin by which boxes are extended, in scaled units: it is larger than the errors of rays and of float32 boxes. */
+/* Margin by which boxes are extended, in scaled units. It is larger than the rounding errors of rays and of float32
+ * boxes. */
 static const double box_margin = 1e-5;
 
-/* Returns whether a ray from a point, of length `reach`, may meet the box extended by the margin. */
+/* Returns whether a ray may meet the box, extended by the margin. from: point at which it begins; direction: unit
+ * vector; reach: the ray's length; all in scene units. */
 static bool meets_box(const double from[3], const double direction[3], double reach, double margin,
                       const render_box *box)
 {
@@ -407,7 +410,8 @@ static bool meets_box(const double from[3], const double direction[3], double re
         const double low = box->lower[a] - margin - from[a], high = box->upper[a] + margin - from[a];
         if (!(low <= high)) return false;
         if (fabs(direction[a]) < 1e-9) {
-            /* the slope is so small that a ray could leave the slab only if it were far longer than the scene */
+            /* the ray is almost parallel to the box's two faces on this axis; it could enter or leave the space between
+             * them only if it were far longer than the scene */
             if (low > 0 || high < 0) return false;
             continue;
         }
@@ -451,7 +455,8 @@ void render_rays_to_boxes(const render_job *job, const render_hit *hit, const re
 
 /* ---- colours ------------------------------------------------------------------------------------------------- */
 
-/* Computes the diffuse and specular light that kernel_shade() computes, in double, and only from the given lights. */
+/* Computes the factors of the diffuse and specular light of a hit as kernel_shade() does, but in double and only from
+ * the lights whose bits are set in `lights`. */
 static void shade(const render_job *job, const render_material *m, const hit_frame *p, uint32_t lights,
                   double diffuse[3], double specular[3])
 {

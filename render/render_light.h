@@ -1,17 +1,18 @@
-/* Computes shadows and ambient occlusion of hits: determines which of a hit's rays are unblocked, and computes the
- * resulting colour.
+/* Computes shadows and ambient occlusion of hits: finds which of the rays that begin at a hit are blocked by opaque
+ * surfaces, and computes the resulting colour. A ray is called open as long as no surface has been found that blocks
+ * it.
  *
  * A frame painted RENDER_UNLIT is traced first. Each of its hits then has one ray towards each light that casts shadows
  * and that it faces, and a set of rays into the hemisphere above it. Each rank tests which of these rays its opaque
- * surfaces block; a ray is open if no rank's do. Whether a cell blocks a ray depends on the ray and the cell alone, so
- * the picture does not depend on the partition. Transparent surfaces and volumes block nothing; transparent surfaces
- * are lit like opaque ones. A surface that takes no light (its material is purely ambient) gets its colours in the
- * first frame, and has no rays.
+ * surfaces block; a ray stays open if those of no rank block it. Whether a cell blocks a ray depends on the ray and the
+ * cell alone, so the picture does not depend on the partition. Transparent surfaces and volumes block nothing;
+ * transparent surfaces are lit like opaque ones. A surface whose material is purely ambient takes no light from lights:
+ * it gets its final colours in the first frame, and its hits have no rays.
  *
  * Where rays begin: a hit deviates from its surface by the rounding of its depth and of the numbers from which the
  * depth was computed, by at most 1e-6 in the space's scaled units (twice KERNEL_WEIGHT_ERROR, and t's own rounding).
- * Rays begin RENDER_LIFT scaled units above it, along the normal. So a ray leaves the cell that was hit instead of
- * meeting it again. Anything closer than that to a surface is not distinguished from it. */
+ * Rays begin RENDER_LIFT scaled units above it, along the normal. So a ray does not meet the surface at its own hit.
+ * Another surface that is closer to the hit than RENDER_LIFT is not seen by the rays. */
 #ifndef RENDER_RENDER_LIGHT_H
 #define RENDER_RENDER_LIGHT_H
 
@@ -31,14 +32,15 @@ typedef struct render_hit {
     float t, normal[2];
 } render_hit;
 
-/* The state of a hit's rays: one bit for each ray into the hemisphere (samples), and one for each ray towards a light.
- * A bit is set while the ray is open. */
+/* The open rays of a hit. samples: one bit for each ray into the hemisphere; lights: one bit for each ray towards a
+ * light of the job. A bit is set as long as the ray is open. */
 typedef struct render_hit_rays {
     uint64_t samples;
     uint32_t lights, unused;
 } render_hit_rays;
 
-/* Computes the hit of an unlit fragment of the job, with its rays. Returns false if it is lit without rays. */
+/* Computes the hit of an unlit fragment of the job, and the rays that it has, all open. Returns false if the fragment
+ * needs no rays to be lit. */
 bool render_hit_of(const render_job *job, const fragment *f, render_hit *hit, render_hit_rays *rays);
 
 /* Computes the point at which the hit's rays begin, in scene units, and the unit directions of its rays into the
@@ -46,7 +48,7 @@ bool render_hit_of(const render_job *job, const fragment *f, render_hit *hit, re
 void render_hit_samples(const render_job *job, const render_hit *hit, double start[3],
                         double directions[RENDER_MAX_SAMPLES][3]);
 
-/* This rank's occluders: the cells whose opaque surfaces may block rays of the job's hits. */
+/* This rank's occluders: the cells that contain an opaque surface, which may block rays of the job's hits. */
 typedef struct render_occluders render_occluders;
 
 /* Collects the occluders once for all hits of a frame. The job must not change until they are freed, except for its
@@ -54,22 +56,22 @@ typedef struct render_occluders render_occluders;
 insitu_status render_occluders_create(const render_job *job, render_occluders **out, base_error *error);
 void render_occluders_free(render_occluders *occluders);
 
-/* Clears the bits of rays that are blocked by this rank's opaque surfaces. occluders may be NULL. Local; after an error
- * the rays are in an undefined state. */
+/* Clears the bits of the rays that this rank's opaque surfaces block. hits[i] has the rays rays[i]. occluders may be
+ * NULL. Local; after an error the contents of `rays` are undefined. */
 insitu_status render_occlude(const render_occluders *occluders, const render_hit *hits, render_hit_rays *rays,
                              int64_t count, base_error *error);
 
 /* Returns the bounding box of all cells of this rank that may block rays. */
 render_box render_occluder_box(const render_job *job);
 
-/* render_rays_to_boxes() calls take(state, box number, rays) for each of `count` boxes that rays of the hit may meet,
- * with these rays. */
+/* render_rays_to_boxes() calls take(state, i, rays) for each of the `count` boxes that open rays of the hit may meet.
+ * i: index of the box; rays: those rays that may meet it. */
 typedef void render_box_callback(void *state, int box, const render_hit_rays *rays);
 void render_rays_to_boxes(const render_job *job, const render_hit *hit, const render_hit_rays *rays,
                           const render_box *boxes, int count, render_box_callback *take, void *state);
 
-/* Lights an unlit fragment by its open rays, giving the fragment that RENDER_LIGHT would have given if nothing were
- * blocked. Fragments of volumes are left unchanged. */
+/* Lights an unlit fragment by the rays in *open. If all rays are open, the result is the fragment that RENDER_LIGHT
+ * would have given. Fragments of volumes are left unchanged. */
 void render_light_fragment(const render_job *job, const render_hit_rays *open, fragment *f);
 
 #endif

@@ -27,7 +27,8 @@ static float above(double v)
     return (double)f < v ? nextafterf(f, INFINITY) : f;
 }
 
-/* Appends an interval to the list, or extends the last one if the two touch. Returns the new number of intervals. */
+/* Appends the interval from low to high, rounded outward, to the list of `count` intervals, or extends the last one if
+ * the two touch. Returns the new number of intervals. */
 static int add_interval(mmbvh_interval *intervals, int count, double low, double high)
 {
     if (count && intervals[count - 1].high >= below(low)) {
@@ -60,8 +61,8 @@ static void prepare_scale(kernel_transfer *out, const render_transfer *t)
     const double low = render_scaled(t->scale, t->threshold, t->low);
     const double high = render_scaled(t->scale, t->threshold, t->high);
     const double slope = high > low ? 1 / (high - low) : 1;
-    /* Logarithms are taken relative to a value that is below low by more than RENDER_END of the table, so that smaller
-     * values are still recognized as below the range. */
+    /* Values are raised to low / 2 before logarithms are taken. Its position is below that of `low` by more than
+     * RENDER_END of the table, so that smaller values still count as below the range. */
     const double least = t->scale == RENDER_LOG ? t->low / 2 : t->threshold;
     const double begin = t->scale == RENDER_LOG ? log(least) : 0;
     out->scale = t->scale;
@@ -71,8 +72,7 @@ static void prepare_scale(kernel_transfer *out, const render_transfer *t)
     out->scale_shift = (float)((begin - low) * slope);
 }
 
-/* Returns the position in the colour table of a value at which an opacity is given, as kernel_colour_position()
- * computes it. */
+/* Returns the position in the colour table of a value, as kernel_colour_position() computes it in float32. */
 static double ramp_position(const kernel_transfer *out, const render_transfer *t, double value)
 {
     if (t->scale == RENDER_LINEAR) return (value - out->low) * out->inverse_width;
@@ -153,8 +153,8 @@ void render_surface_range(const render_job *job, int surface, double range[2])
     }
 }
 
-/* Returns 1 / the width of the field's range on all parts, rounded to a power of two. The range is that of all ranks if
- * normals by differences use samples of other ranks. */
+/* Returns 1 / the width of the range of a surface's field, rounded to a power of two. The range is that on all ranks if
+ * normals by differences use samples of other ranks (job->waiting), otherwise that on this rank. */
 static double value_scale(const render_job *job, int surface)
 {
     double range[2];
@@ -166,8 +166,8 @@ static double value_scale(const render_job *job, int surface)
     return width > 0 && isfinite(width) ? ldexp(1, -ilogb(width)) : 1;
 }
 
-/* Finds the clips that all layers share and that leave a single interval of a ray (common_clips), and computes into how
- * many intervals the remaining clips of volumes can divide a ray (volume_intervals). */
+/* Sets common_clips to the clips that all layers share and that leave a single interval of a ray, and volume_intervals
+ * to the largest number of intervals that the clips of volumes can leave of a ray. */
 static void prepare_clips(kernel_frame *f)
 {
     const render_job *job = f->job;
@@ -181,8 +181,8 @@ static void prepare_clips(kernel_frame *f)
         f->volume_intervals = 1 + __builtin_popcount(job->volume_clips & outside);
 }
 
-/* Fills frame->surfaces, opaque layers first. A fragment's kind is FRAGMENT_SURFACE plus the number of its isovalue
- * among those of the job, in the job's order of layers. */
+/* Fills frame->surfaces, opaque layers first. Fragments of an isovalue get the kind FRAGMENT_SURFACE + its number among
+ * all isovalues of the job, in the job's order of layers. */
 static void prepare_surfaces(kernel_frame *f)
 {
     const render_job *job = f->job;
@@ -280,8 +280,8 @@ static insitu_status check_job(const render_job *job, base_error *error)
     return INSITU_OK;
 }
 
-/* Returns an upper bound of the length of a ray in the cells, in scaled units: the diagonal of the bounding box of all
- * trees. */
+/* Returns an upper bound of the length of a ray inside this rank's cells, in scaled units: the diagonal of the bounding
+ * box of all trees. */
 static double scene_reach(const render_job *job)
 {
     double low[3] = {1e300, 1e300, 1e300}, high[3] = {-1e300, -1e300, -1e300}, square = 0;
@@ -299,8 +299,9 @@ static double scene_reach(const render_job *job)
     return sqrt(square);
 }
 
-/* Below this max_error the ends of tets' intervals are computed in double. The largest error measured with float32,
- * over random tets and functions with steps and opacities up to 1, was 3.4e-5. */
+/* If max_error is smaller than this, the ends of rays' intervals in tets are computed in double
+ * (kernel_frame.is_double). The largest error measured with float32, over random tets and functions with steps and
+ * opacities up to 1, was 3.4e-5. */
 static const double double_error = 2e-4;
 
 /* Returns whether the job may have hexes, wedges or pyramids, whose segments are computed in lanes
@@ -330,9 +331,9 @@ static insitu_status prepare_segments(kernel_frame *f, base_error *error)
     const double error_of_each = max_error / job->volume_count;
     f->allowance = (float)((is_apart ? 0.2 : 0.4) * error_of_each);
     if (is_apart) f->mixing = (float)(0.4 * error_of_each);
-    /* Whether a rank finds overlaps that lie clearly in front of a surface depends on the partition. So segments that
-     * are cut at a surface must give the same result, to 1e-6, whether compositing or a rank cuts them. Segments of
-     * several volumes are always cut by compositing. */
+    /* Whether a rank finds overlaps that lie clearly in front of a surface depends on the partition. Therefore it also
+     * depends on the partition whether a segment is cut at the surface by the rank or by compositing. Both must give
+     * the same result, to 1e-6. Segments of several volumes are always cut by compositing. */
     if (is_apart && job->surface_count && job->volume_count == 1) f->mixing = fminf(f->mixing, 5e-7f);
     const double reach = job->extent > 0 ? job->extent * job->space.scale : scene_reach(job);
     for (int i = 0; i < job->volume_count && status == INSITU_OK; i++) {
@@ -384,7 +385,8 @@ insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_er
     if (segments != INSITU_OK) render_unprepare(frame);
     const bool bins = job->traversal == RENDER_BINNED && !job->pixels;
     frame->is_binned = bins && frame->surface_count;
-    /* tracing consumes a tile's list of cells, so the volume must need only one pass over it */
+    /* a tile's list of candidates is consumed when it is traced, so the volume is binned only if its clips leave one
+     * interval of a ray, for which one pass suffices */
     frame->bins_volume = bins && job->volume_count == 1 && frame->volume_intervals <= 1;
     return segments;
 }

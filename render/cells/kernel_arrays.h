@@ -1,7 +1,8 @@
 /* Reads a mesh part's coordinates, values and connectivity for one cell per lane, from arrays of any layout and meshes
- * of one or several cell types. Numbers whose byte offset fits in 32 bits are read by gather instructions, others one
- * by one. float32 numbers are compared and subtracted in float32, others in double; both give the same bits. After that
- * all numbers are doubles. Meshes whose vertex or cell indices do not fit in 32 bits are not processed in lanes. */
+ * of one or several cell types. Arrays of float32 or float64 that are small enough are read by gather instructions,
+ * others number by number. float32 numbers are compared with each other, and with an isovalue, in float32, others in
+ * double; both give the same result. For all other computations numbers are converted to double. Meshes whose vertex or
+ * cell indices do not fit in 32 bits are not processed in lanes. */
 #ifndef RENDER_KERNEL_ARRAYS_H
 #define RENDER_KERNEL_ARRAYS_H
 
@@ -13,14 +14,14 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
-/* An array of numbers that is read by vertex or cell index. */
+/* One coordinate or component of the field, as an array that is read by vertex or cell index. */
 typedef struct kernel_numbers {
     /* first number; NULL if the array cannot be gathered: it is too large, or neither float32 nor float64 */
     const float *data;
     int32_t stride;   /* distance between consecutive numbers, in units of four bytes */
     bool is_wide;     /* set if the numbers are float64, not float32 */
     grid_array array; /* the array itself, read one by one if data is NULL */
-    /* if not NULL, numbers are read by grid_field_value() of this field instead of from `array` */
+    /* if not NULL and `data` is NULL, numbers are read by grid_field_value() of this field instead of from `array` */
     const grid_field *field;
 } kernel_numbers;
 
@@ -31,16 +32,18 @@ SIMD_INLINE bool kernel_numbers_are_narrow(const kernel_numbers *c)
 
 typedef struct kernel_arrays {
     bool has_lanes;            /* set if indices fit in 32 bits, so that cells can be processed in lanes */
-    bool is_narrow;            /* set if the coordinates and the field are all float32 and can be gathered */
-    bool has_narrow_positions; /* set if the coordinates are float32 and can be gathered */
+    bool is_narrow;            /* set if the coordinates and the field are float32 and can be read by gathers */
+    bool has_narrow_positions; /* set if the coordinates are float32 and can be read by gathers */
     const grid *cells;         /* the mesh part's cells */
     int type;                  /* type of all cells, or GRID_NO_TYPE if the mesh has several types */
-    /* cell field from which the vertex values were averaged; cells in which it is not finite are not drawn; NULL: none
-     */
+    /* cell-centred field from which the vertex values were averaged, or NULL; cells in which it is not finite are not
+     * drawn */
     const grid_field *source_cells;
     bool is_by_cell; /* set if values belong to cells, not to vertices */
     kernel_numbers coordinates[3], values;
-    struct { /* the arrays that are prefetched by vertex index: coordinates and values */
+    /* the three coordinate arrays and the field's array, which are prefetched by vertex index (a cell-centred field is
+     * replaced by the first coordinate) */
+    struct {
         const char *data;
         int64_t stride;
     } prefetched[4];
@@ -132,7 +135,8 @@ SIMD_INLINE void kernel_arrays_vertices(const kernel_arrays *p, uint32_t cell, i
             __builtin_prefetch(p->prefetched[k].data + out[i * out_stride] * p->prefetched[k].stride);
 }
 
-/* As above, for cells of any type; loops over the vertices of tets and hexes have constant lengths. */
+/* Calls kernel_arrays_vertices() for cells of any type. For tets and hexes the number of vertices is passed as a
+ * constant, so that loops over vertices have constant lengths. */
 SIMD_INLINE void kernel_arrays_vertices_of_any(const kernel_arrays *p, uint32_t cell, int vertices, int32_t *out,
                                                int out_stride)
 {
@@ -144,7 +148,8 @@ SIMD_INLINE void kernel_arrays_vertices_of_any(const kernel_arrays *p, uint32_t 
         kernel_arrays_vertices(p, cell, vertices, out, out_stride);
 }
 
-/* Returns the lanes of the given ones (a bit mask) whose cells are drawn: their value in source_cells is finite. */
+/* Returns those of the given lanes (a bit mask) whose cells are drawn: those with a finite value in source_cells, or
+ * all if there is no such field. */
 SIMD_INLINE unsigned kernel_arrays_drawn(const kernel_arrays *p, const uint32_t *cells, unsigned lanes)
 {
     for (unsigned left = p->source_cells ? lanes : 0; left; left &= left - 1)
@@ -154,8 +159,8 @@ SIMD_INLINE unsigned kernel_arrays_drawn(const kernel_arrays *p, const uint32_t 
 
 /* ---- numbers ---- */
 
-/* Computes the vertices' coordinates along one axis of a rectilinear lattice from the position of each vertex on that
- * axis. It does for one vertex per lane what grid_index_along() does for one vertex. */
+/* Computes the coordinates along one axis of vertices of a uniform or rectilinear lattice, one vertex per lane. The
+ * index along the axis is computed from the vertex index as in grid_index_along(). */
 static void kernel_axis_coordinates(const grid_axis *axis, vi vertex, kernel_f64 out[2])
 {
     const grid_numbering *of = axis->vertices;
@@ -187,8 +192,8 @@ static __attribute__((noinline)) void kernel_numbers_gather_scalar(const kernel_
     memcpy(out, v, sizeof v);
 }
 
-/* Numbers in the precision in which they were read: in `narrow` if the array is float32, which saves operations, else
- * in `wide`. */
+/* One number per lane, in the precision of its array: in `narrow` if the array is float32 and gathered, which saves
+ * operations, otherwise in `wide`. */
 typedef struct kernel_raw_numbers {
     vf narrow;
     kernel_f64 wide[2];
@@ -254,8 +259,8 @@ SIMD_INLINE vm kernel_raw_before(bool is_narrow, const kernel_raw_numbers a[3], 
     return before;
 }
 
-/* Reads the coordinates of one vertex per lane. is_narrow: whether all three arrays are float32 that can be
- * gathered. */
+/* Reads the coordinates of one vertex per lane. is_narrow: whether all three arrays are float32 and can be read by
+ * gathers (has_narrow_positions). */
 SIMD_INLINE void kernel_arrays_positions(const kernel_arrays *p, bool is_narrow, vi vertex, kernel_raw_numbers out[3])
 {
     for (int a = 0; a < 3; a++) {
@@ -273,8 +278,9 @@ SIMD_INLINE bool kernel_arrays_have_axes(const kernel_arrays *p)
     return p->coordinates[0].array.axis != NULL;
 }
 
-/* Reads the coordinates of hexes of a uniform or rectilinear lattice, given each hex's first vertex: those of its lower
- * end (cells[0]) and upper end (cells[1]), by axis. It reads 6 numbers per hex instead of 24. */
+/* Reads the coordinates of hexes of a uniform or rectilinear lattice, one per lane. first: index of each hex's first
+ * vertex; cells: coordinates of that vertex (cells[0]) and of the opposite one (cells[1]), by axis. It reads 6 numbers
+ * per hex instead of 24. */
 static __attribute__((noinline)) void kernel_lattice_cells_read(const kernel_arrays *p, const int32_t first[SIMD_WIDTH],
                                                                 kernel_f64 cells[2][3][2])
 {
@@ -292,8 +298,8 @@ static __attribute__((noinline)) void kernel_lattice_cells_read(const kernel_arr
 
 /* ---- comparisons with a value ---- */
 
-/* A value with which numbers are compared: in double, as a sum of two float32 (middle + rest), and the smallest float32
- * that is not below it (least). */
+/* A value that numbers are compared with or subtracted from. value: in double; middle + rest: as the sum of two
+ * float32; least: smallest float32 that is not below it. */
 typedef struct kernel_level {
     double value;
     float middle, rest, least;
@@ -334,7 +340,8 @@ SIMD_INLINE vf kernel_raw_minus(const kernel_numbers *c, const kernel_raw_number
     return out;
 }
 
-/* Reads the field for one vertex per lane; a cell-centred field is read by the lanes' cells instead. */
+/* Reads the field at one vertex per lane. If the field is cell-centred, its value in the lane's cell is read
+ * instead. */
 SIMD_INLINE void kernel_arrays_values(const kernel_arrays *p, vi vertex, const uint32_t *cells, kernel_raw_numbers *out)
 {
     if (__builtin_expect(p->is_by_cell, 0)) memcpy(&vertex, cells, sizeof vertex);

@@ -2,7 +2,8 @@
  * of a tile; the header comment of kernel_roots.h defines the quantities that are bounded. A derivative that does not
  * depend on all three coordinates is computed once for all corners that share it.
  *
- * Let the position X and the field F be functions of the reference coordinates r, J the Jacobian of X, L a linear
+ * Let the position X and the field F be functions of the reference coordinates r, J the Jacobian of X, and J0 its value
+ * at the cell's centre. N is the nonlinear part of J0^-1 X, so that J0^-1 X = r + N(r) + const. Let L be a linear
  * function of the position whose gradient is the field's at the cell's centre, and E = F - L(X). E is a polynomial like
  * F, and small if the field is smooth. Along a ray of direction d, L(X) is linear and r has the derivative J^-1 d. If
  * |grad L . d| is larger than the maximum of grad E . J^-1 d, F is monotone along every ray in the cell. And if L at
@@ -23,26 +24,28 @@
 
 /* Bounds for one cell and isovalue per lane. */
 typedef struct kernel_bounds {
-    /* Upper bound of the difference between the value at a face and the field on the ray next to it. It is negative if
-     * the field has not been proved to be monotone along the rays. */
+    /* Upper bound of the difference between the value at a computed crossing of a face and the field on the ray there.
+     * Negative: it has not been proved that the field is monotone along all rays in the cell. */
     float jump[SIMD_WIDTH];
-    /* The linear function L that approximates the field: its value at vertex 0, its gradient in tile space, and the
-     * bound of |E| = |field - L| including rounding. The bound is infinite if nothing is proved about the cell. */
+    /* The linear function L that approximates the field. level: its value at vertex 0; gradient: in tile space;
+     * thickness: upper bound of |E| = |F - L| including rounding, infinite if nothing has been proved about the
+     * cell. */
     float level[SIMD_WIDTH], gradient[3][SIMD_WIDTH], thickness[SIMD_WIDTH];
-    /* normal: inverse of the map's Jacobian at the cell's centre. Its rows are the normals of three pairs of planes
-     * between which the cell lies: low <= normal . (X - vertex 0) <= high. */
+    /* normal: inverse of the map's Jacobian at the cell's centre. Each of its rows i is the normal of two planes
+     * between which the cell lies: low[i] <= normal[i] . (X - vertex 0) <= high[i]. */
     float normal[3][3][SIMD_WIDTH], low[3][SIMD_WIDTH], high[3][SIMD_WIDTH];
-    float nonlinear_part[3][4][SIMD_WIDTH]; /* coefficients 4 to 7 of the nonlinear part N of the map */
+    /* coefficients 4 to 7 (of the products of coordinates, kernel_map.h) of the map's nonlinear part N */
+    float nonlinear_part[3][4][SIMD_WIDTH];
     /* upper bounds that kernel_roots.h calls L (of how much the inverse map stretches distances) and G (of the field's
      * gradient) */
     float stretch[SIMD_WIDTH], slope[SIMD_WIDTH];
     /* upper bounds that kernel_roots.h calls H and K, of the second derivatives of the field and the map; for a pyramid
      * they are multiplied by its coordinate k */
     float field_curvature[SIMD_WIDTH], map_curvature[SIMD_WIDTH];
-    /* Coefficients from which surface/kernel_contraction.h computes a ray's only root. J0^-1 (X - vertex 0) + offset
-     * equals r + N(r), where J0 is the map's Jacobian at the domain's middle, r is counted from that middle (or from
-     * the apex of a pyramid), and terms has the coefficients of N. The field is L + middle + a polynomial with the
-     * coefficients field_terms, in the same products of coordinates as N. */
+    /* Coefficients from which surface/kernel_contraction.h computes a ray's crossing of the isovalue if it is the only
+     * one in the cell. J0^-1 (X - vertex 0) + offset equals r + N(r), where r is counted from the reference domain's
+     * middle (in a pyramid from the apex), and terms has the coefficients of N. The field is L + middle + a polynomial
+     * with the coefficients field_terms, in the same products of coordinates as N. */
     float offset[3][SIMD_WIDTH], middle[SIMD_WIDTH], terms[4][3][SIMD_WIDTH], field_terms[4][SIMD_WIDTH];
     /* K / (1 - K), where K < 1 is the contraction constant of the iteration for reference coordinates; infinite if the
      * iteration is not a contraction */
@@ -52,31 +55,34 @@ typedef struct kernel_bounds {
 
 /* Intermediate results in double for SIMD_WIDTH / 2 cells. */
 typedef struct kernel_bounds_lanes {
-    /* exact: polynomial coefficients of the positions (0 to 2) and the field (3); apart: positions of the vertices
-     * relative to vertex 0 */
+    /* exact: polynomial coefficients (kernel_map.h) of the positions x, y, z (0 to 2) and of the field (3); apart:
+     * positions of the vertices relative to vertex 0 */
     kernel_f64 exact[4][8], apart[3][8];
     /* nonlinear_part: coefficients 4 to 7 of the map's nonlinear part N; inverse: inverse of the Jacobian at the
-     * centre; reach: largest magnitude of the vertices' coordinates */
+     * centre; reach: largest |X|, |Y| and |Z| of the vertices in tile space */
     kernel_f64 nonlinear_part[3][4], inverse[3][3], reach[3];
     kernel_f64_mask is_solid;     /* cells whose Jacobian at the centre has an inverse */
     kernel_f64 gradient[3], e[8]; /* gradient of the linear function L, and the coefficients of E = F - L */
-    /* The derivatives that differ from corner to corner, of the map's nonlinear part N minus those at the centre
-     * (bend), of the field (df) and of E (de). The indices are the component of N (for bend only), the axis, and the
-     * number in the table of derivatives (kernel_domain). */
+    /* Derivatives along the reference coordinates at the domain's corners: of the map's nonlinear part N minus those at
+     * the centre (bend), of the field (df) and of E (de). Derivatives that are equal at several corners are stored
+     * once. The indices are the component of N (for bend only), the axis, and the number in the table of derivatives
+     * (kernel_domain). */
     kernel_f64 bend[3][3][4], df[3][4], de[3][4];
-    /* upper bounds over the cell, in reference coordinates: of |grad F| (slope), of the norm of J0^-1 J - I (theta), of
-     * |grad E| (slant), of grad E . w and of |N' w|, where w is a ray's direction in reference coordinates */
+    /* upper bounds over the cell of derivatives along the reference coordinates. slope: of |grad F|; theta: of the norm
+     * of J0^-1 J - I; slant: of |grad E|; most_along: of |grad E . w|; most_turn: of |N' w|, where w = J0^-1 d is the
+     * direction of the middle ray */
     kernel_f64 slope, theta, slant, most_along, most_turn;
     kernel_f64 across; /* rounding error of positions across the rays */
-    /* upper bounds of the distance of a face's computed crossing from its ray (gap), and of |J0^-1 d| over the rays'
-     * directions d (length); lower bound of |grad L . d| (rise) */
+    /* gap: upper bound, in reference coordinates, of the distance between the computed crossing of a face and its ray;
+     * length: upper bound of |J0^-1 d| over the directions d of the tile's rays; rise: lower bound of |grad L . d| */
     kernel_f64 gap, length, rise;
     kernel_f64_mask is_regular; /* cells that are solid, and whose theta is below 0.9 */
 } kernel_bounds_lanes;
 
 /* KERNEL_LOW and KERNEL_HIGH are the ends of the reference domain [0, 1], extended by KERNEL_DOMAIN_RIM to both sides
- * for points that rounding moves out of it. KERNEL_WIDE is the end along a leg of a wedge's triangle, which is extended
- * twice as far. For a pyramid the coordinates are a / k, b / k and k. */
+ * for points that rounding moves out of it. KERNEL_WIDE is the upper end of r and s in a wedge, which is extended twice
+ * as far because the third side of the triangle is oblique. For a pyramid the coordinates are a / k, b / k and k
+ * (kernel_map.h). */
 #define KERNEL_DOMAIN_RIM 0.03125
 #define KERNEL_LOW -KERNEL_DOMAIN_RIM
 #define KERNEL_HIGH (1 + KERNEL_DOMAIN_RIM)
@@ -93,11 +99,11 @@ static const double kernel_wedge_corners[6][3] = {
     {KERNEL_LOW, KERNEL_WIDE, KERNEL_LOW},  {KERNEL_LOW, KERNEL_LOW, KERNEL_HIGH},
     {KERNEL_WIDE, KERNEL_LOW, KERNEL_HIGH}, {KERNEL_LOW, KERNEL_WIDE, KERNEL_HIGH}};
 
-/* The extended reference domain of a cell type: its middle and corners, and which derivatives of a map are different at
- * the corners, for each of the three axes: their number (slope_count), the corner at which each occurs first, and which
- * one each corner has. For a hex a derivative depends on the two other coordinates. For a wedge it depends on the last
- * coordinate alone, or along the last axis on the two others. For a pyramid it depends only on the coordinate along
- * which it is taken. */
+/* The extended reference domain of a cell type: its middle and its corners. Derivatives of a polynomial along axis a
+ * are equal at some corners. slope_count[a]: number of different derivatives; first[a][n]: corner at which derivative n
+ * is computed; at[a][c]: number of the derivative that corner c has. For a hex a derivative depends on the two other
+ * coordinates. For a wedge it depends only on the last coordinate; along the last axis it depends on the two others.
+ * For a pyramid it depends only on the coordinate along which it is taken. */
 typedef struct kernel_domain {
     double centre[3];
     const double (*corners)[3];
@@ -136,7 +142,7 @@ SIMD_INLINE kernel_f64 kernel_f64_set(double x)
     return (kernel_f64){0} + x;
 }
 
-/* Returns v rounded to float32, as a double. */
+/* Returns v rounded to float32 and converted to double again. */
 SIMD_INLINE kernel_f64 kernel_f64_rounded(kernel_f64 v)
 {
     return kernel_f64_widen(kernel_f64_narrow(v));
@@ -147,7 +153,8 @@ SIMD_INLINE kernel_f64 kernel_f64_more(kernel_f64 v, kernel_f64 most)
     return kernel_f64_select((kernel_f64_mask)(v > most), v, most);
 }
 
-/* Returns the derivative along axis a, at the reference point r, of a polynomial with coefficients c. */
+/* Returns the derivative along reference coordinate a, at the reference coordinates r, of a polynomial with
+ * coefficients c (kernel_map.h). */
 SIMD_INLINE kernel_f64 kernel_f64_slope(int type, const kernel_f64 c[8], int a, const double r[3])
 {
     if (kernel_has_apex(type)) return c[1 + a] + c[4] * (a == 2 ? -r[2] : r[a]);
@@ -157,8 +164,8 @@ SIMD_INLINE kernel_f64 kernel_f64_slope(int type, const kernel_f64 c[8], int a, 
     return kernel_is_box(type) ? out + c[7] * (r[(a + 1) % 3] * r[(a + 2) % 3]) : out;
 }
 
-/* Returns the difference between the derivative along axis a at the reference coordinates r and that at the domain's
- * centre, for a polynomial whose coefficients 4 to 7 are nonlinear_part. */
+/* Returns the derivative along reference coordinate a at the reference coordinates r, minus that at the domain's
+ * centre, of a polynomial whose coefficients 4 to 7 are nonlinear_part. */
 SIMD_INLINE kernel_f64 kernel_f64_bend(int type, const kernel_f64 nonlinear_part[4], int a, const double r[3])
 {
     const double *centre = kernel_domain_of(type)->centre;
@@ -226,7 +233,8 @@ SIMD_INLINE void kernel_bounds_lanes_bend(kernel_bounds_lanes *b, int type)
 }
 
 /* Computes the gradient of the linear function L that approximates the field, rounded to float32, and the coefficients
- * of the difference E = field - L. Returns a scale for the rounding of L at positions in the cell. */
+ * of the difference E = field - L. Returns the sum of the magnitudes of L's terms, to which the rounding error of L at
+ * positions in the cell is proportional. */
 SIMD_INLINE kernel_f64 kernel_bounds_lanes_linear(kernel_bounds_lanes *b, int type)
 {
     const double *centre = kernel_domain_of(type)->centre;
@@ -301,8 +309,8 @@ SIMD_INLINE kernel_f64 kernel_f64_eighth(const kernel_f64 m[3][3])
     return sum;
 }
 
-/* Computes the maxima of several norms over the corners of the domain. w: the middle ray's direction in reference
- * coordinates. */
+/* Computes the members theta, slope, most_along, slant and most_turn, which are maxima over the corners of the domain.
+ * w: direction of the tile's middle ray in reference coordinates, J0^-1 (0, 0, 1). */
 SIMD_INLINE void kernel_bounds_lanes_corners(kernel_bounds_lanes *b, int type, const kernel_f64 w[3])
 {
     const kernel_domain *table = kernel_domain_of(type);
@@ -338,7 +346,7 @@ SIMD_INLINE void kernel_bounds_lanes_corners(kernel_bounds_lanes *b, int type, c
 }
 
 /* Computes the two planes, perpendicular to row i of the inverse Jacobian at the centre, between which all vertices
- * lie. They are moved outward by `pad`, the error of a ray's positions. */
+ * lie. They are moved outward by `pad`, an upper bound of the error of a ray's positions in reference coordinates. */
 SIMD_INLINE void kernel_f64_planes(const kernel_bounds_lanes *b, int type, int i, kernel_f64 pad, int half,
                                    kernel_bounds *out)
 {
@@ -354,8 +362,8 @@ SIMD_INLINE void kernel_f64_planes(const kernel_bounds_lanes *b, int type, int i
     kernel_f64_store(out->high[i], half, high + pad);
 }
 
-/* Converts the nonlinear coefficients of a polynomial to coordinates about the domain's middle. They multiply the
- * products of two coordinates, and for a hex also of all three. */
+/* Converts the coefficients of a polynomial's nonlinear terms (products of two coordinates, for a hex also of all
+ * three) to coordinates that are counted from the domain's middle. */
 SIMD_INLINE void kernel_f64_terms(int type, const kernel_f64 nonlinear_part[4], kernel_f64 out[4])
 {
     const int first = kernel_is_prism(type) ? 1 : 0;
@@ -468,9 +476,10 @@ static __attribute__((noinline)) void kernel_f64_contraction(const kernel_bounds
     KERNEL_OF_TYPE(type, kernel_f64_contraction_of, b, half, out);
 }
 
-/* Computes, for rays close to the direction (0, 0, 1), how far the field differs from L, how fast L rises along the
- * rays, and how large the jump of the field at a face can be: the face's value is that of its patch at the computed
- * coordinates, and that point differs from the ray by the rounding of positions.
+/* Computes all bounds for half of the lanes, for the rays of `beam`, whose directions are near (0, 0, 1). They state
+ * how far the field differs from L, how fast L rises along the rays, and how much the value at a crossing of a face can
+ * differ from the field on the ray (jump): the value is computed at a point of the face that differs from the ray by
+ * the rounding of positions. at: x, y, z in tile space and values, by vertex and lane.
  *
  * To prove that F is monotone along the rays: with M = J0^-1 J - I, whose norm is at most theta, and w = J0^-1 d, E
  * changes the derivative of L by grad E . (I + M)^-1 w = grad E . (w - M w + M M (I + M)^-1 w). Each of the three terms
@@ -530,20 +539,23 @@ static __attribute__((noinline)) void kernel_bounds_of(int type, const float at[
     for (int half = 0; half < 2; half++) KERNEL_OF_TYPE(type, kernel_f64_bounds, at, half, beam, out);
 }
 
-/* Hexes, wedges or pyramids of one type, one per lane, as the search for roots reads them. */
+/* Hexes, wedges or pyramids of one type, one per lane, in the form that the search for crossings of the isovalue reads
+ * (kernel_roots.h). */
 typedef struct kernel_curved {
     int type;
-    int lane; /* lane of the cell that contains all rays of a packet */
+    int lane; /* if all rays of a packet have one cell: its lane */
     /* x, y, z in tile space, and the field minus the isovalue, scaled; by vertex and lane */
     float (*at)[8][SIMD_WIDTH];
     float (*colours)[SIMD_WIDTH]; /* colour field by vertex and lane (kernel_cell.g), set if the layer has one */
     kernel_bounds *bounds;
-    bool is_ready; /* set if the data and bounds have been computed; those of a single cell are computed when needed */
-    /* set if contraction has already been tried for the rays and has not decided them (kernel_contraction.h) */
+    /* set if `at` and `bounds` have been computed; for a single cell this is done when they are first needed */
+    bool is_ready;
+    /* set if kernel_contraction.h has been tried for these rays already, and could not decide whether they meet the
+     * isosurface */
     bool is_contracted;
 } kernel_curved;
 
-/* Returns the range of directions and origins of the tile's rays. */
+/* Returns bounds of the directions and origins of the tile's rays in tile space. */
 SIMD_INLINE kernel_beam kernel_tile_beam(const kernel_frame *f, const kernel_tile *tile)
 {
     const bool flat = f->job->camera.is_orthographic;
@@ -551,7 +563,7 @@ SIMD_INLINE kernel_beam kernel_tile_beam(const kernel_frame *f, const kernel_til
     return (kernel_beam){.spread = flat ? 0 : radius, .offset = flat ? radius : radius * shift};
 }
 
-/* Computes the bounds of a single cell, and stores the cell's data in all lanes of out's memory. */
+/* Computes the bounds of a single cell. All lanes of *out get the data of this cell. */
 static __attribute__((noinline, unused)) void kernel_curved_single_bounds(const kernel_cell *c, const kernel_beam *beam,
                                                                           kernel_curved *out)
 {

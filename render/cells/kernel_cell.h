@@ -1,18 +1,31 @@
 /* Intersects a ray with a cell: computes the points at which the ray enters and leaves the cell, and the field there.
  *
- * Which faces a ray crosses is decided on triangles: the triangular faces, and the quads split in two by the diagonal
- * from their smallest vertex, in the lexicographic order of coordinates. The crossing point on a quad is then computed
- * on the quad's bilinear patch, which is the image of the face under the isoparametric maps of both its cells.
- * Everything about a face is computed from its vertices alone, taken in that same order, so that two cells that share a
- * face compute the same bits on it, whatever their numbering, orientation or rank.
+ * Terms of the files in cells/:
+ *     order of coordinates   lexicographic order of vertices by their world coordinates x, y, z; a vertex's number in
+ *                            this order, among the vertices of its cell, is its rank
+ *     edge function          a number whose sign states on which side of an edge a ray passes (see below)
+ *     line                   an edge's edge function, as an affine function of a ray's slope or origin (u, v)
+ *     i, j, k                a triangle's vertices in the order of coordinates; ij, jk, ik: the edge functions of its
+ *                            edges on a ray
+ *     weights                at the crossing of a triangle: jk for vertex i, -ik for j and ij for k, all of one sign;
+ *                            the mean with these weights interpolates depths and values between the vertices
+ *     quad, patch            a face with four vertices; the bilinear surface through its four edges
+ *     to project             to subtract a ray's position at a vertex's depth from the vertex's position
  *
- * In the ray's own plane (x, y with the ray at the origin) the edge function of edge ab is xa yb - xb ya: positive on
- * one side. It is computed so that its sign is exact (simd.h). If it is zero, the ray is treated as if it were moved by
- * (e, e²) for an e smaller than every number; the same rule holds for all edges and decides every tie. So a ray meets
- * exactly those triangles that contain it, never both or neither of two that share an edge, and it crosses a closed
- * surface an even number of times. (Woop, Benthin and Wald 2013 for the edge functions in the ray's plane; Edelsbrunner
- * and Mücke 1990 for the ties.) Sorted along the ray, the crossings form pairs, which are the intervals inside the
- * cell. The cell's orientation does not matter. */
+ * Which faces a ray crosses is decided on triangles: the triangular faces, and the quads split in two by the diagonal
+ * from their first vertex in the order of coordinates. The crossing point on a quad is then computed on the quad's
+ * bilinear patch, which is the image of the face under the isoparametric maps of both its cells. Everything about a
+ * face is computed from its vertices alone, taken in that same order, so that two cells that share a face compute
+ * bit-identical crossings, whatever the numbering and orientation of their vertices, and on whatever rank they are.
+ *
+ * Let x and y be coordinates across the ray, with the ray at the origin. The edge function of the edge from a to b is
+ * xa yb - xb ya. It is positive if the ray passes on one side of the edge and negative on the other; its sign is
+ * computed exactly (simd.h). If it is zero, the ray is treated as if it were moved by (e, e²) for an e smaller than
+ * every number; the same rule holds for all edges and decides every tie. So a ray meets exactly those triangles that
+ * contain it, never both or neither of two that share an edge, and it crosses a closed surface an even number of times.
+ * (Woop, Benthin and Wald 2013 for the edge functions in the ray's plane; Edelsbrunner and Mücke 1990 for the ties.)
+ * Sorted along the ray, the crossings form pairs, which are the intervals inside the cell. The cell's orientation does
+ * not matter. */
 #ifndef RENDER_KERNEL_CELL_H
 #define RENDER_KERNEL_CELL_H
 
@@ -25,20 +38,20 @@
 #include "render_polyhedra.h"
 #include "simd.h"
 
-/* The edge function of a cell's edge, for all rays of a tile.
+/* How the edge function of a cell's edge is computed for all rays of a tile.
  *
  * In the plane of the ray with parameters u, v (its slopes, or its origin if the camera is orthographic) a vertex at X,
  * Y, Z in tile space is at x = X - u D, y = Y - v D, where D is its depth from the eye, or 1 if the camera is
  * orthographic. The edge function is then affine in u and v, because the products u v cancel:
  *     e = xa yb - xb ya = (Xa Yb - Xb Ya) + u (Db Ya - Da Yb) + v (Da Xb - Db Xa)
  * Its coefficients are computed once per cell and tile, from the edge's two vertices in the order of coordinates, so
- * that all cells of the edge have the same bits; a packet then needs two multiply-adds. For rays for which the sign of
- * that sum is uncertain, which depends on the edge and the ray alone, e is computed from the projected vertices
+ * that they are bit-identical in all cells of the edge; a packet then needs two multiply-adds. For rays for which the
+ * sign of that sum is uncertain, which depends on the edge and the ray alone, e is computed from the projected vertices
  * instead, by vf_diff_of_products(), with its exact sign.
  *
- * The bound of uncertainty. Let r = 2^-24, W the maximum of |u| and |v| over the tile, reach the eye's distance from
- * the origin of depth (0 if orthographic), M = |Z| + reach >= |D| (1 if orthographic), N = 2 max(|X|, |Y|) + 5 W M; so
- * |x|, |y| <= N / 2, |c| <= Na Nb / 2 and |cu| W, |cv| W <= Na Nb / 5.
+ * The error bound below which the sign is uncertain (kernel_line.bound). Let r = 2^-24, W the maximum of |u| and |v|
+ * over the tile, reach the eye's distance from the depth origin (0 if orthographic), M = |Z| + reach >= |D| (1 if
+ * orthographic), N = 2 max(|X|, |Y|) + 5 W M; so |x|, |y| <= N / 2, |c| <= Na Nb / 2 and |cu| W, |cv| W <= Na Nb / 5.
  * - The affine form errs by r of each coefficient, of u and of v, and, without fused operations, of two products and
  *   two sums: by at most r (3 |c| + 5 |cu| W + 4 |cv| W) <= 3.3 r Na Nb.
  * - The projection, (X - origin) - slope Z, errs by r of the origin, of the first difference, twice of slope Z (the
@@ -46,21 +59,24 @@
  *   therefore the edge function of vertices that are displaced by r N: it errs by at most 4 r Na Nb / 2. The sum is 5.3
  *   r Na Nb; a factor of 6 leaves room for products of errors and for the bound's own roundings.
  *
- * Weights. Signs are exact, magnitudes are not. At a crossing of a triangle, depth and value are means of the vertices'
- * depths and values, weighted by the opposite edges' functions, whose sum is A (twice the triangle's projected area).
- * An error d of one weight moves the depth t by d |z - t| / A, where z is its vertex's depth. So all three errors move
- * it by no more than D S / A, where D is the sum of the three d, and S the triangle's extent in depth; the point across
- * the ray moves by as much with the extent across. By the count above d is at most r (3 |c| + 4 |cu| W + 3 |cv| W); the
- * rounding of u and v moves the ray equally for all triangles. So if A is at least D S / KERNEL_WEIGHT_ERROR, the
- * weights' roundings move the crossing by no more than KERNEL_WEIGHT_ERROR along the ray: 4 r in the worst case, while
- * t itself is rounded by up to r / 2. Extents across the ray are weighted by a quarter: a crossing may move 4 times as
- * far there, because that changes the value alone. If A is less (the triangle is seen edge on, or the tile is wide
- * beside it), all three edges are projected: then the vertices are displaced by r N as above, equally for all their
- * triangles, and the weights are exact to a few r each. Which of the two methods is used depends on the triangle and
- * the ray alone. (An uncertain edge has been projected in any case: for a ray that crosses the triangle its e errs by
- * no more than r N times the edges next to it, which equals a displacement of the vertices.) */
+ * The accuracy of weights. The signs of edge functions are exact, their magnitudes are not. At a crossing of a
+ * triangle, depth and value are means of the vertices' depths and values, weighted by the opposite edges' functions,
+ * whose sum is A (twice the triangle's projected area). An error d of one weight moves the depth t by d |z - t| / A,
+ * where z is its vertex's depth. So all three errors move it by no more than D S / A, where D is the sum of the three
+ * d, and S the triangle's extent in depth; the point across the ray moves by as much with the extent across. By the
+ * count above d is at most r (3 |c| + 4 |cu| W + 3 |cv| W); the rounding of u and v moves the ray equally for all
+ * triangles. So if A is at least D S / KERNEL_WEIGHT_ERROR, the weights' roundings move the crossing by no more than
+ * KERNEL_WEIGHT_ERROR along the ray: 4 r in the worst case, while t itself is rounded by up to r / 2. Extents across
+ * the ray are weighted by a quarter: a crossing may move 4 times as far there, because that changes only the value. If
+ * A is less, because the ray lies almost in the triangle's plane or the tile is much wider than the triangle, all three
+ * edge functions are computed from the projected vertices: then the vertices are displaced by r N as above, equally for
+ * all their triangles, and the weights are exact to a few r each. Which of the two methods is used depends only on the
+ * triangle and the ray. (An edge function of uncertain sign is computed from projected vertices in any case: for a ray
+ * that crosses the triangle its e errs by no more than r N times the edges next to it, which equals a displacement of
+ * the vertices.) */
 
-/* The affine edge function c + cu u + cv v; its sign is certain if its magnitude exceeds `bound`. */
+/* A line: the affine edge function c + cu u + cv v of an edge, where (u, v) are the parameters of a ray. Its sign is
+ * certain if its magnitude exceeds `bound`. */
 typedef struct kernel_line {
     float c, cu, cv, bound;
 } kernel_line;
@@ -70,8 +86,8 @@ typedef struct kernel_tile_position {
     float x, y, z;
 } kernel_tile_position;
 
-/* Returns the measure N of a vertex's size in the tile's projection, from which the error bounds of edge functions are
- * computed. */
+/* Returns N as defined above kernel_line: twice an upper bound of |x| and |y| of a projected vertex over the tile's
+ * rays. The error bounds of edge functions are computed from it. */
 SIMD_INLINE float kernel_position_size(const kernel_frame *f, const kernel_tile *tile, kernel_tile_position a)
 {
     const float depth = f->job->camera.is_orthographic ? 1 : fabsf(a.z) + fabsf((float)f->depth_shift);
@@ -97,8 +113,8 @@ SIMD_INLINE kernel_line kernel_line_between(const kernel_frame *f, kernel_tile_p
  * interval then use half of the 1e-6 that it may err by (tests/test_chords.c). */
 #define KERNEL_WEIGHT_ERROR 2.4e-7f
 
-/* Properties of an edge by which accurate weights are recognized: the largest error d of its edge function, as derived
- * at kernel_line, and its extent, in which distances across the ray count for a quarter. */
+/* Properties of an edge from which the accuracy of weights is computed. error: largest error d of its edge function, as
+ * derived above kernel_line. extent: its extent in depth plus a quarter of its extents across the ray. */
 typedef struct kernel_edge_error {
     float error, extent;
 } kernel_edge_error;
@@ -111,14 +127,15 @@ SIMD_INLINE kernel_edge_error kernel_line_error(const kernel_line *l, float radi
                                z + 0.25f * (x + y)};
 }
 
-/* Returns the least sum of weights that is accurate enough for a triangle, computed from the sums of its edges' errors
- * and extents. Along any axis the edges' extents sum to twice the triangle's extent, hence the factor 1/2. */
+/* Returns the least sum of a triangle's weights (A above kernel_line) at which its crossing errs by at most
+ * KERNEL_WEIGHT_ERROR. errors, extents: sums over its three edges (kernel_edge_error). Along any axis the edges'
+ * extents sum to twice the triangle's extent, hence the factor 1/2. */
 SIMD_INLINE float kernel_least_weight(float errors, float extents)
 {
     return errors * extents * (0.5f / KERNEL_WEIGHT_ERROR);
 }
 
-/* Returns the larger error and the larger extent of two edges. */
+/* Returns the maximum of two edges' errors and the maximum of their extents. */
 SIMD_INLINE kernel_edge_error kernel_edge_error_max(kernel_edge_error a, kernel_edge_error b)
 {
     return (kernel_edge_error){a.error < b.error ? b.error : a.error, a.extent < b.extent ? b.extent : a.extent};
@@ -133,11 +150,12 @@ SIMD_INLINE float kernel_least_weight_bound(kernel_edge_error most)
 
 enum { KERNEL_MAX_CROSSINGS = 12, KERNEL_MAX_CELL_INTERVALS = KERNEL_MAX_CROSSINGS / 2 };
 
-/* The field of contour lines in a tet, in the domain of the levels (kernel_lines.h). */
+/* The field of contour lines, which is linear in a tet. Values are in the domain of kernel_lines, in which the first
+ * level is 0. */
 typedef struct kernel_tet_line {
-    float value;       /* at the last corner */
+    float value;       /* value at the tet's last vertex */
     float gradient[3]; /* per scaled unit, in camera axes */
-    float along;       /* change per unit along the third axis of tile space, which is the tile's middle ray */
+    float along;       /* change of the value per scaled unit of depth along the tile's middle ray */
 } kernel_tet_line;
 
 typedef struct kernel_cell {
@@ -153,21 +171,24 @@ typedef struct kernel_cell {
     double values[GRID_MAX_CELL_VERTICES];
     /* coordinates of the vertices in tile space */
     float x[GRID_MAX_CELL_VERTICES], y[GRID_MAX_CELL_VERTICES], z[GRID_MAX_CELL_VERTICES];
-    /* vertex values as the layer needs them: relative to an isovalue, or in the transfer function's domain */
+    /* vertex values as the layer needs them: minus an isovalue and scaled (kernel_cell_relative()), or in the domain of
+     * a volume's transfer function */
     float f[GRID_MAX_CELL_VERTICES];
     float g[GRID_MAX_CELL_VERTICES];     /* vertex values of the colour field, in its transfer function's domain */
     int rank[GRID_MAX_CELL_VERTICES];    /* rank of each vertex in the lexicographic order of coordinates */
     kernel_line lines[KERNEL_MAX_LINES]; /* edge functions of the edges, then of the quads' diagonals */
-    float doubt;                         /* for a tet: largest error bound of its edge functions */
-    /* least sum of weights that is accurate enough: for a tet, that of each face; for other cells, least[0] is an upper
-     * bound for all triangles */
+    float doubt;                         /* for a tet: the largest `bound` of its lines */
+    /* least sum of weights at which a crossing is accurate (kernel_least_weight()): for a tet, that of each face; for
+     * other cells, least[0] is an upper bound for all triangles */
     float least[4];
-    float normal[3];      /* for a tet: gradient from kernel_tet_normal(); valid if has_normal is set */
+    /* for a tet: direction of the field's gradient, by kernel_tet_normal(); valid if has_normal is set */
+    float normal[3];
     kernel_tet_line line; /* for a tet: the field of contour lines; valid if has_line_field is set */
 } kernel_cell;
 
-/* The interval of each ray inside the cell, between two crossings: depths t, values v of kernel_cell.f and w of
- * kernel_cell.g, and reference coordinates r. */
+/* An interval of each ray inside a cell. _in and _out: at the crossings at which the ray enters and leaves. t: ray
+ * parameter; v: interpolated values of kernel_cell.f; w: of kernel_cell.g; r: reference coordinates. mask: the rays
+ * that have an interval. */
 typedef struct kernel_interval {
     vm mask;
     vf t_in, t_out, v_in, v_out;
@@ -216,9 +237,9 @@ static int kernel_face_corners(const grid *g, int64_t face, int64_t vertices[4],
     return corners;
 }
 
-/* Returns whether a polyhedron is a tet with a linear field; it is then drawn as a tet, to the same bits. Each triangle
- * must lack a different vertex, because two triangles that each occur twice enclose no volume. Faces that have
- * collapsed to a point are ignored. */
+/* Returns whether a polyhedron is a tet, and lists its vertices. It is then drawn as a tet with these vertices would
+ * be, bit for bit. Each triangle must lack a different vertex, because two triangles that each occur twice enclose no
+ * volume. Faces that have collapsed to a point are ignored. */
 static bool kernel_is_tet(const grid *g, int64_t cell, int64_t vertices[4])
 {
     int64_t first, end;
@@ -254,9 +275,10 @@ SIMD_INLINE bool kernel_rank_before(const kernel_cell *c, int i, int j)
     return c->rank[i] < c->rank[j];
 }
 
-/* Computes the canonical order of a cell's vertices: it begins at the vertex of least rank and continues along its
- * edges in the order of ranks. from[i] is the vertex at position i. The order may mirror the cell, because orientation
- * does not matter here. */
+/* Computes the canonical order of the vertices of a hex, wedge or pyramid. It begins at the vertex of least rank (of
+ * the base, for a pyramid). The neighbours of that vertex then follow in the order of their ranks, as far as the cell's
+ * shape allows. from[i] is the present number of the vertex that becomes vertex i. The order may mirror the cell,
+ * because intersections do not depend on orientation. */
 SIMD_INLINE void kernel_cell_canonical_order(const kernel_cell *c, int from[GRID_MAX_CELL_VERTICES])
 {
     /* maps a hex's vertex number to the bits of its reference coordinates x, y, z, and back */
@@ -268,7 +290,8 @@ SIMD_INLINE void kernel_cell_canonical_order(const kernel_cell *c, int from[GRID
     if (kernel_is_box(c->type)) {
         int axes[3] = {1, 2, 4};
         for (int k = 0; k < 3; k++) {
-            const int at = k == 1; /* compares axes 0 and 1, then 1 and 2, then 0 and 1 again, which sorts all three */
+            /* sorts the three axes by comparing axes 0 and 1, then 1 and 2, then 0 and 1 again */
+            const int at = k == 1;
             if (kernel_rank_before(c, corner[corner[least] ^ axes[at + 1]], corner[corner[least] ^ axes[at]]))
                 swap = axes[at], axes[at] = axes[at + 1], axes[at + 1] = swap;
         }
@@ -307,7 +330,7 @@ SIMD_INLINE void kernel_rank_positions(double (*const world)[3], const int count
         }
 }
 
-/* Permutes everything stored by vertex except colours, which are read later: vertex from[i] moves to position i. */
+/* Permutes all members that are stored per vertex, except g, which is read later: vertex from[i] becomes vertex i. */
 SIMD_INLINE void kernel_cell_permute(kernel_cell *c, const int *from, const int count)
 {
     double world[GRID_MAX_CELL_VERTICES][3], values[GRID_MAX_CELL_VERTICES];
@@ -329,8 +352,9 @@ SIMD_INLINE void kernel_cell_permute(kernel_cell *c, const int *from, const int 
 }
 
 /* Puts a cell's vertices in their canonical order. The vertices of a tet, which is symmetric, are sorted by
- * coordinates. Other cells get ranks, and their vertices are permuted by kernel_cell_canonical_order(). Then nothing
- * depends on how the simulation numbers a cell's vertices, not even if its map is folded and has several solutions. */
+ * coordinates. In other cells, ranks are computed, and the vertices are permuted by kernel_cell_canonical_order(). So
+ * no result depends on how the simulation numbers a cell's vertices, not even if the cell's map is folded, so that a
+ * point has several reference coordinates. */
 static __attribute__((noinline, unused)) void kernel_cell_order(kernel_cell *c)
 {
     int from[GRID_MAX_CELL_VERTICES], rank[GRID_MAX_CELL_VERTICES];
@@ -347,7 +371,7 @@ static __attribute__((noinline, unused)) void kernel_cell_order(kernel_cell *c)
     for (int i = 0; i < c->count; i++) c->rank[i] = rank[i];
 }
 
-/* Transforms a position into tile space (kernel_packet.h). */
+/* Transforms a position in world coordinates into tile space (kernel_types.h). */
 SIMD_INLINE void kernel_transform_in_tile(const kernel_frame *f, const kernel_tile *tile, const double *world,
                                           float *out_x, float *out_y, float *out_z)
 {
@@ -362,7 +386,8 @@ SIMD_INLINE void kernel_transform_in_tile(const kernel_frame *f, const kernel_ti
     *out_z = (float)(z - tile->depth_shift);
 }
 
-/* Transforms the cell's vertices into tile space. They are not yet in canonical order, and have no edge functions. */
+/* Reads the positions of the cell's vertices and transforms them into tile space. They are not put in canonical order,
+ * and no edge functions are computed. */
 static __attribute__((noinline, unused)) void kernel_cell_move_to_tile_space(kernel_cell *c, const kernel_frame *f,
                                                                              const kernel_tile *tile, const grid *g)
 {
@@ -384,7 +409,8 @@ SIMD_INLINE kernel_tile_position kernel_cell_position(const kernel_cell *c, int 
     return (kernel_tile_position){c->x[i], c->y[i], c->z[i]};
 }
 
-/* Computes a quad's corners in cyclic order, from the smallest vertex towards its smaller neighbour. */
+/* Lists a quad's corners in cyclic order. The first is the vertex of smallest rank, the second is that one of its
+ * neighbours with the smaller rank. loop: the quad's vertices in the cell, in cyclic order. */
 SIMD_INLINE void kernel_quad_corners(const kernel_cell *c, const signed char *loop, int corner[4])
 {
     int first = 0;
@@ -452,7 +478,8 @@ SIMD_INLINE void kernel_curved_lines(kernel_cell *c, const kernel_frame *f, cons
         if (kernel_has_triangles(c->type))
             most = kernel_edge_error_max(most, kernel_line_error(&c->lines[n], tile->radius, from, to));
     }
-    /* hexes have triangles only if a quad has collapsed, so their weights are always checked exactly */
+    /* A hex has triangles only if a quad has collapsed. The bound of infinity makes kernel_weights_recompute() always
+     * compute the triangle's own limit. */
     c->least[0] = kernel_is_box(c->type) ? (float)INFINITY : kernel_least_weight_bound(most);
 }
 

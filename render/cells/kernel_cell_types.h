@@ -1,5 +1,6 @@
-/* Properties of the cell types. No other file of render/ compares types: others use the properties here, and tables
- * that are indexed by kernel_shape_number() (kernel_shapes.h). */
+/* Properties of the cell types. Hexes, wedges and pyramids are called curved in the names of functions, because their
+ * quadrilateral faces may be warped. No other file of render/ compares types: other files use the properties defined
+ * here, and tables that are indexed by kernel_shape_number() (kernel_shapes.h). */
 #ifndef RENDER_KERNEL_CELL_TYPES_H
 #define RENDER_KERNEL_CELL_TYPES_H
 
@@ -29,14 +30,15 @@ static inline bool kernel_has_apex(int type)
 enum { KERNEL_CURVED_TYPES = 3 };
 static const int kernel_curved_types[KERNEL_CURVED_TYPES] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID};
 
-/* The types whose cells are processed in lanes: those with quadrilateral faces, and tets. */
+/* The types whose cells can be processed SIMD_WIDTH at a time, one per lane: those with quadrilateral faces, and
+ * tets. */
 enum { KERNEL_LANE_TYPES = KERNEL_CURVED_TYPES + 1 };
 static const int kernel_lane_types[KERNEL_LANE_TYPES] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID, GRID_TET};
 
-/* Indices of the types in tables of types with quadrilateral faces, for use in switches. */
+/* Indices in kernel_curved_types, as constants. */
 enum { KERNEL_SHAPE_HEX, KERNEL_SHAPE_WEDGE, KERNEL_SHAPE_PYRAMID };
 
-/* Returns the index in these tables of a type with quadrilateral faces. */
+/* Returns the index in kernel_curved_types of a type with quadrilateral faces. */
 static inline int kernel_shape_number(int type)
 {
     return type == GRID_HEX ? KERNEL_SHAPE_HEX : type == GRID_WEDGE ? KERNEL_SHAPE_WEDGE : KERNEL_SHAPE_PYRAMID;

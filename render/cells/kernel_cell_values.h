@@ -1,4 +1,5 @@
-/* A cell's values as layers need them: relative to an isovalue, in the domain of a transfer function, as colours. */
+/* Converts a cell's vertex values to the forms that layers need: minus an isovalue, or in the domain of a transfer
+ * function. */
 #ifndef RENDER_KERNEL_CELL_VALUES_H
 #define RENDER_KERNEL_CELL_VALUES_H
 
@@ -22,8 +23,8 @@ SIMD_INLINE bool kernel_values_straddle(const double *values, int count, double 
     return below && above;
 }
 
-/* Returns a power of two that scales `largest` to near 1. It is computed from the bits, by negating the exponent, which
- * is limited so that the result is a normal number. */
+/* Returns a power of two by which `largest` (>= 0) is multiplied to bring it near 1. Its exponent is the negated
+ * exponent of `largest`, limited so that the result is a normal number. */
 SIMD_INLINE double kernel_mirrored_power(double largest)
 {
     uint64_t bits;
@@ -36,7 +37,8 @@ SIMD_INLINE double kernel_mirrored_power(double largest)
     return scale;
 }
 
-/* Subtracts the isovalue, and scales the values by a power of two, which it returns, so that the largest is near 1. */
+/* Stores the values minus the isovalue, multiplied by a power of two that brings the largest magnitude near 1. Returns
+ * that power of two. */
 SIMD_INLINE double kernel_values_relative(const double *values, int count, double isovalue, float *out)
 {
     double largest = 0;
@@ -54,7 +56,8 @@ SIMD_INLINE void kernel_cell_relative(kernel_cell *c, double isovalue)
     kernel_values_relative(c->values, c->count, isovalue, c->f);
 }
 
-/* Converts the colour field at a cell's vertices to its transfer's domain; returns the mean. */
+/* Reads the colour field at a cell's vertices and converts it to the domain of its transfer function. Returns the
+ * mean. */
 SIMD_INLINE double kernel_values_colours(const kernel_surface *s, int part, uint32_t cell, const int64_t *vertices,
                                          int count, float *out)
 {
@@ -75,7 +78,7 @@ SIMD_INLINE float kernel_clamp(double v, double limit)
     return (float)(v < -limit ? -limit : v > limit ? limit : v);
 }
 
-/* Returns whether some value between the smallest and the largest of these is visible with the transfer function. */
+/* Returns whether the range from the smallest to the largest value contains a value at which the volume is visible. */
 SIMD_INLINE bool kernel_values_are_visible(const double *values, int count, const kernel_transfer *t)
 {
     double low = values[0], high = low;
@@ -91,7 +94,8 @@ SIMD_INLINE bool kernel_cell_is_visible(const kernel_cell *c, const kernel_trans
     return kernel_values_are_visible(c->values, c->count, t);
 }
 
-/* Sets f to the values in the transfer function's domain, clamped to +-1e18 so that interpolation cannot overflow. */
+/* Sets c->f to the values in the transfer function's domain, clamped to +-1e18 so that interpolation cannot overflow,
+ * and c->is_constant. */
 SIMD_INLINE void kernel_cell_domain(kernel_cell *c, const kernel_transfer *t)
 {
     c->is_constant = true;

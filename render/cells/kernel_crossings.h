@@ -1,5 +1,6 @@
-/* Crossings of a packet's rays with a cell's faces: the edge functions on the rays, from the cell's lines
- * (kernel_cell.h), then the crossings of cells that have quads. Tets: kernel_tets.h. */
+/* Computes the crossings of a packet's rays with the faces of one cell. First edge functions are computed on the rays
+ * from the cell's lines (kernel_cell.h defines these terms), then the crossings of hexes, wedges and pyramids.
+ * kernel_tets.h computes those of tets. */
 #ifndef RENDER_KERNEL_CROSSINGS_H
 #define RENDER_KERNEL_CROSSINGS_H
 
@@ -30,9 +31,9 @@ SIMD_INLINE vf kernel_project_y(const kernel_packet *p, kernel_tile_position a)
 }
 
 /* Decides the sign of the edge function on rays on which it is almost zero. The sign is computed in double, where
- * products of float32 are exact. The function's magnitude is negligible next to any other edge's, but not all weights
- * may be zero, so it gets a small nonzero one. If the function is exactly zero, the tie is decided by the rule of
- * kernel_cell.h, and stored as the sign of the zero. */
+ * products of float32 are exact. The magnitude of such a function is negligible next to those of other edges. It is set
+ * to KERNEL_EDGE_LEAST, because the weights of a triangle must not all be zero. If the function is exactly zero, the
+ * tie is decided by the rule of kernel_cell.h, and stored as the sign of the zero. */
 static __attribute__((noinline, cold)) vf kernel_edge_tied(vf ax, vf ay, vf bx, vf by, vf e)
 {
     for (int lane = 0; lane < SIMD_WIDTH; lane++) {
@@ -47,9 +48,10 @@ static __attribute__((noinline, cold)) vf kernel_edge_tied(vf ax, vf ay, vf bx, 
     return e;
 }
 
-/* Returns the value at an interval's end. If the surface is a set of the cell's faces (is_of_faces of render.h) and a
- * ray meets only an edge of it, both ends have the isovalue; then the end's value is taken to be inside the cell, below
- * the isovalue. */
+/* Returns the value at an interval's end. v_in, v_out: values minus the isovalue where the ray enters and leaves a
+ * cell. If the surface consists of faces of cells (is_of_faces of render.h) and a ray meets such a face only in an
+ * edge, both are 0. Then the value at the end is set to slightly below 0, as inside the cell, so that the ray has a
+ * crossing. */
 SIMD_INLINE vf kernel_end_in_cell(vf v_in, vf v_out, bool is_of_faces)
 {
     if (!is_of_faces) return v_out;
@@ -57,7 +59,8 @@ SIMD_INLINE vf kernel_end_in_cell(vf v_in, vf v_out, bool is_of_faces)
     return vf_select(is_edge, vf_set(-KERNEL_EDGE_LEAST), v_out);
 }
 
-/* Returns the edge function of two projected points; its sign is exact for these points. */
+/* Returns the edge function of the edge from a to b, given by x and y of the two projected points; its sign is exact
+ * for these points. */
 SIMD_INLINE vf kernel_edge_between(vf ax, vf ay, vf bx, vf by)
 {
     const vf e = vf_diff_of_products(ax, by, bx, ay);
@@ -82,8 +85,8 @@ SIMD_INLINE vf kernel_line_at(const kernel_packet *p, const kernel_line *l)
     return vf_muladd(vf_set(l->cv), p->v, vf_muladd(vf_set(l->cu), p->u, vf_set(l->c)));
 }
 
-/* Returns the edge function of the edge from a to b on the packet's rays. a must be before b in the order of
- * coordinates; l is the edge's line. The sign bit is clear on the positive side, and ties are decided. */
+/* Returns the edge function of the edge from a to b on the packet's rays, with exact signs and ties decided: the sign
+ * bit states the side, even of a zero. a must be before b in the order of coordinates; l: the edge's line. */
 SIMD_INLINE vf kernel_edge(const kernel_packet *p, const kernel_line *l, kernel_tile_position a, kernel_tile_position b)
 {
     if (!p->is_pencil) return kernel_edge_projected(p, a, b);
@@ -92,16 +95,16 @@ SIMD_INLINE vf kernel_edge(const kernel_packet *p, const kernel_line *l, kernel_
     return __builtin_expect(vm_any(doubt), 0) ? kernel_edge_recomputed(p, a, b, doubt, e) : e;
 }
 
-/* Returns the rays that cross the triangle i, j, k, by its edge functions. i, j and k are in the order of
- * coordinates. */
+/* Returns those of the given rays that cross the triangle i, j, k. ij, jk, ik: its edge functions on the rays. */
 SIMD_INLINE vm kernel_inside(vm rays, vf ij, vf jk, vf ik)
 {
     const vi a = vi_from_bits(ij), b = vi_from_bits(jk), c = vi_from_bits(ik);
     return vm_and(rays, vm_sign(~(a ^ b) & (a ^ c)));
 }
 
-/* Returns the sum of a value (depth or field) over a crossed triangle's vertices, weighted by the edge functions of the
- * opposite edges. It must still be divided by the sum of the weights. All terms of the sum have the same sign. */
+/* Returns the weighted sum of a quantity (depth or field) over the vertices of a crossed triangle. i, j, k: the
+ * quantity at the vertices; ij, jk, ik: the edge functions, which give the weights (kernel_cell.h). Divided by
+ * kernel_weight() it is the quantity at the crossing. */
 SIMD_INLINE vf kernel_weighted_value(vf ij, vf jk, vf ik, float i, float j, float k)
 {
     return vf_muladd(ij, vf_set(k), vf_muladd(-ik, vf_set(j), jk * i));
@@ -119,8 +122,8 @@ SIMD_INLINE kernel_edge_error kernel_edge_error_between(const kernel_packet *p, 
     return kernel_line_error(&l, p->tile->radius, a, b);
 }
 
-/* Returns the least sum of weights that is accurate enough for the triangle i, j, k, whose vertices are in the order of
- * coordinates (kernel_least_weight()). */
+/* Returns the sum of weights from which on crossings of the triangle i, j, k are accurate (kernel_least_weight()). The
+ * vertices must be in the order of coordinates. */
 static __attribute__((noinline, cold)) float kernel_triangle_least(const kernel_packet *p, kernel_tile_position i,
                                                                    kernel_tile_position j, kernel_tile_position k)
 {
@@ -129,13 +132,15 @@ static __attribute__((noinline, cold)) float kernel_triangle_least(const kernel_
     return kernel_least_weight((ij.error + jk.error) + ik.error, (ij.extent + jk.extent) + ik.extent);
 }
 
-/* Returns the rays that cross a triangle but whose sum of weights is too small to be accurate. */
+/* Returns those of the rays that cross a triangle (hit) whose sum of weights is smaller than `least`, so that their
+ * crossing is not accurate enough. */
 SIMD_INLINE vm kernel_is_inaccurate(vm hit, vf weight, float least)
 {
     return vm_and(hit, vf_lt(vf_abs(weight), vf_set(least)));
 }
 
-/* Computes the triangle's edge functions again on the given rays, from its projected vertices. */
+/* Replaces the triangle's edge functions on the rays in `weak` by those computed from its projected vertices. ijk: the
+ * vertices in the order of coordinates. */
 static __attribute__((noinline, cold)) void
 kernel_triangle_recompute(const kernel_packet *p, const kernel_tile_position ijk[3], vm weak, vf *ij, vf *jk, vf *ik)
 {
@@ -152,8 +157,8 @@ SIMD_INLINE void kernel_transform(const kernel_packet *p, const double *world, f
     kernel_transform_in_tile(p->frame, p->tile, world, out_x, out_y, out_z);
 }
 
-/* The following functions intersect rays with hexes, wedges and pyramids, which have quadrilateral faces and may be
- * entered more than once by a ray (kernel_cell.h). */
+/* The following functions intersect rays with hexes, wedges and pyramids. Their quadrilateral faces may be warped, so
+ * that a ray may enter such a cell more than once. */
 
 SIMD_INLINE void kernel_cell_transform(kernel_cell *c, const kernel_packet *p, const grid *g)
 {
@@ -161,8 +166,9 @@ SIMD_INLINE void kernel_cell_transform(kernel_cell *c, const kernel_packet *p, c
     if (p->is_pencil) kernel_cell_lines(c, p->frame, p->tile);
 }
 
-/* The weights of a crossed triangle i, j, k in the order of coordinates, which are its edge functions, and 1 divided by
- * their sum. Tets use the same weights, so that a face's depth and value have the same bits in both of its cells. */
+/* The weights of crossings of a triangle. i, j, k: numbers of its vertices in the cell, in the order of coordinates;
+ * ij, jk, ik: its edge functions; inverse: 1 divided by the sum of the weights. Tets use the same weights, so that
+ * depth and value of a crossing are bit-identical in both cells of a face. */
 typedef struct kernel_weights {
     int i, j, k;
     vf ij, jk, ik, inverse;
@@ -173,8 +179,9 @@ SIMD_INLINE kernel_weights kernel_weights_of(int i, int j, int k, vf ij, vf jk, 
     return (kernel_weights){i, j, k, ij, jk, ik, 1.0f / kernel_weight(ij, jk, ik)};
 }
 
-/* Computes the weights of the triangle i, j, k again on rays for which they are not accurate enough. least: an upper
- * bound of kernel_triangle_least() for the triangle, tested first. */
+/* Computes the weights of the triangle i, j, k from its projected vertices on those of the rays in `hit` for which they
+ * are not accurate enough. least: an upper bound of kernel_triangle_least() for the triangle, with which most calls
+ * return early. */
 SIMD_INLINE void kernel_weights_recompute(const kernel_packet *p, float least, vm hit, kernel_tile_position i,
                                           kernel_tile_position j, kernel_tile_position k, kernel_weights *w)
 {
@@ -198,19 +205,19 @@ SIMD_INLINE vf kernel_weighted_depth(const kernel_weights *w, const float *z)
     return kernel_weighted_sum(w, z[w->i], z[w->j], z[w->k]);
 }
 
-/* What is common to all faces of a cell in a search for crossings. */
+/* The data that all faces of a cell share in a search for crossings. */
 typedef struct kernel_face_search {
     const kernel_packet *packet;
     const kernel_cell *cell;
     const kernel_shape *shape;
     vm rays;
     vf x[GRID_MAX_CELL_VERTICES], y[GRID_MAX_CELL_VERTICES]; /* the cell's vertices, projected along each ray */
-    /* Edge functions by pairs of vertices: of the cell's edges and of its quads' diagonals. edge[a][b] is set for a
-     * before b in the order of coordinates. */
+    /* Edge functions of the cell's edges and of its quads' diagonals. edge[a][b] is that of the edge from vertex a to
+     * vertex b, set only if a is before b in the order of coordinates. */
     vf edge[GRID_MAX_CELL_VERTICES][GRID_MAX_CELL_VERTICES];
 } kernel_face_search;
 
-/* Computes the edge function of line number n of the cell, between the vertices i and j. */
+/* Computes the edge function of line number n of the cell, which connects the vertices i and j in any order. */
 SIMD_INLINE void kernel_curved_edge(kernel_face_search *s, int n, int i, int j)
 {
     const kernel_cell *c = s->cell;
@@ -227,13 +234,15 @@ SIMD_INLINE void kernel_triangle_values(const kernel_face_search *s, const kerne
         out->r[a] = kernel_weighted_sum(w, shape->corners[w->i][a], shape->corners[w->j][a], shape->corners[w->k][a]);
 }
 
-/* Returns the edge function from one corner to another, negated if they are not in the order of coordinates. */
+/* Returns the edge function of the edge from one vertex to another. It is computed in the order of coordinates and
+ * negated if necessary. */
 SIMD_INLINE vf kernel_corner_edge(const kernel_face_search *s, int from, int to)
 {
     return s->cell->rank[from] < s->cell->rank[to] ? s->edge[from][to] : -s->edge[to][from];
 }
 
-/* Computes values and reference coordinates at a crossing of a quad's bilinear patch. The isoparametric maps of both
+/* Computes the field and the cell's reference coordinates at a crossing of a quad's bilinear patch. corner: the quad's
+ * vertices; at->r[0], at->r[1]: the patch's parameters at the crossing (kernel_quad.h). The isoparametric maps of both
  * cells contain this patch, so the field is continuous across the face. */
 SIMD_INLINE void kernel_quad_values(const kernel_face_search *s, const int corner[4], const kernel_point *at,
                                     kernel_point *out)
@@ -289,8 +298,8 @@ SIMD_INLINE bool kernel_triangle_crossing(const kernel_face_search *s, const int
     return true;
 }
 
-/* Computes the crossings of a quad that has collapsed to a triangle, and returns their number, as
- * kernel_quad_crossings() does. */
+/* Computes the crossings of a quad that has collapsed to a triangle, as those of its two halves. Returns how many
+ * entries of `out` are set. */
 static __attribute__((noinline, cold)) int kernel_collapsed_crossings(const kernel_face_search *s, const int corner[4],
                                                                       kernel_point *out)
 {
@@ -302,8 +311,8 @@ static __attribute__((noinline, cold)) int kernel_collapsed_crossings(const kern
     return n;
 }
 
-/* Computes the crossings of rays with a quad, and returns how many entries of out are set (0 to 2). A ray that meets
- * the patch twice has a crossing in both entries. */
+/* Computes the crossings of rays with a quad. corner: its vertices, from kernel_quad_corners(). Returns how many
+ * entries of `out` are set (0 to 2). A ray that crosses the patch twice has a crossing in both entries. */
 SIMD_INLINE int kernel_quad_crossings(const kernel_face_search *s, const int corner[4], kernel_point *out)
 {
     const kernel_cell *c = s->cell;
@@ -333,8 +342,8 @@ SIMD_INLINE int kernel_quad_crossings(const kernel_face_search *s, const int cor
     return n;
 }
 
-/* Computes all crossings of rays with a cell that has quadrilateral faces. Returns the number of entries of `out` that
- * are set; each entry contains the mask of rays to which it applies. */
+/* Computes all crossings of rays with the faces of a hex, wedge or pyramid. Returns how many entries of `out` are set;
+ * out[n].mask has the rays that have crossing n. */
 SIMD_INLINE int kernel_curved_crossings(const kernel_packet *p, const kernel_cell *c, vm rays,
                                         kernel_point out[KERNEL_MAX_CROSSINGS])
 {
@@ -383,7 +392,7 @@ SIMD_INLINE bool kernel_take_nearest(kernel_point *list, int count, kernel_point
     return vm_any(out->mask);
 }
 
-/* Sets the interval's members, except for the colour field, from its ends. */
+/* Sets all members of the interval except w_in and w_out from the crossings at its two ends. */
 SIMD_INLINE void kernel_interval_of(vm mask, const kernel_point *in, const kernel_point *out, kernel_interval *i)
 {
     i->mask = mask;
@@ -395,7 +404,8 @@ SIMD_INLINE void kernel_interval_of(vm mask, const kernel_point *in, const kerne
     memcpy(i->r_out, out->r, sizeof out->r);
 }
 
-/* Sorts each ray's crossings and combines them in pairs to intervals. Returns the largest number of intervals of any
+/* Computes the intervals of rays inside a hex, wedge or pyramid: each ray's crossings are sorted by depth, and each two
+ * of them are the ends of an interval. Returns how many entries of `out` are set; entry n has the n-th interval of each
  * ray. */
 static __attribute__((noinline, unused)) int kernel_curved_intervals(const kernel_packet *p, const kernel_cell *c,
                                                                      vm rays,

@@ -1,6 +1,8 @@
-/* Intersects rays with hexes, wedges or pyramids, one ray-cell pair per lane (kernel_curved_batch.h,
- * kernel_occlusion_hexes.h, kernel_local_segments.h): finds the two faces of its cell that each ray crosses, and the
- * crossing points. Each lane gathers its cell's numbers from vectors in which lanes are cells. */
+/* Intersects rays with hexes, wedges or pyramids, each ray with a cell of its own: finds the two faces of its cell that
+ * each ray crosses, and the crossings. Lanes are rays; each lane gathers its cell's numbers from vectors whose lanes
+ * are cells. A ray for which this is not enough, because it may cross more than two faces, one face twice, or an edge,
+ * is added to the mask *alone. Callers trace such rays cell by cell, by kernel_crossings.h. Used by
+ * kernel_curved_batch.h, kernel_occlusion_hexes.h and kernel_local_segments.h. */
 #ifndef RENDER_KERNEL_CURVED_RAYS_H
 #define RENDER_KERNEL_CURVED_RAYS_H
 
@@ -25,8 +27,8 @@ SIMD_INLINE void kernel_curved_ray_add(kernel_pixel_list *to, const kernel_pixel
 
 /* ---- faces that each ray crosses ---- */
 
-/* Returns the bits of the edge function from vertex a to b of vertices that are projected along the rays; its sign bit
- * is exact. Lowers *least to the function's magnitude if that is smaller. */
+/* Returns the edge function of the edge from vertex a to vertex b as an integer vector, of which only the exact sign
+ * bits are used. x, y: the projected vertices. Lowers *least to the function's magnitude if that is smaller. */
 SIMD_INLINE vi kernel_curved_side(const vf x[8], const vf y[8], int a, int b, vf *least)
 {
     const vf e = vf_diff_of_products(x[a], y[b], x[b], y[a]);
@@ -34,9 +36,10 @@ SIMD_INLINE vi kernel_curved_side(const vf x[8], const vf y[8], int a, int b, vf
     return vi_from_bits(e);
 }
 
-/* Returns a mask of the rays that cross exactly one of a quad's two triangles, even if the quad does not look convex;
- * the result does not depend on the diagonal along which the quad is split. around: the sides of the quad's edges, in
- * cyclic order. Rays that may cross the quad's patch twice are added to *alone, the rays to be traced cell by cell. */
+/* Returns the rays that cross exactly one of a quad's two triangles. Unlike a test of the four edges, this is right
+ * even if the quad does not look convex along the ray; the result does not depend on the diagonal along which the quad
+ * is split. around: edge functions of the quad's edges in cyclic order; diagonal: that from corner 0 to corner 2; of
+ * both only the sign bits are used. Rays that may cross the quad's patch twice are added to *alone. */
 SIMD_INLINE vm kernel_curved_cross_one_triangle(const vf x[8], const vf y[8], const signed char *loop,
                                                 const vi around[4], vi diagonal, vm rays, vm *alone)
 {
@@ -46,9 +49,10 @@ SIMD_INLINE vm kernel_curved_cross_one_triangle(const vf x[8], const vf y[8], co
     return kernel_cross_one_triangle(side, vm_sign(diagonal));
 }
 
-/* Finds the two faces that each ray crosses once: those whose edge functions all have the same sign. Rays for which
- * there are not exactly two such faces are added to *alone, to be traced cell by cell. at: the cells' vertices, per
- * lane. nonconvex: per ray, one bit for each quad that may not look convex; NULL: there are no such quads. */
+/* Finds the rays that cross exactly two faces of their cells, each once (*two), and the numbers of these faces (face).
+ * A ray crosses a face if all edge functions of the face have the same sign. *alone: rays that must be traced cell by
+ * cell. Rays in neither mask miss their cells. at: x, y and z of the cells' vertices, by vertex and lane. nonconvex:
+ * per ray, one bit for each quad that may not look convex; NULL: there are no such quads. */
 SIMD_INLINE void kernel_curved_find(const float (*at)[8][SIMD_WIDTH], const kernel_lane_rays *r, const vi *nonconvex,
                                     vm rays, vm *two, vm *alone, vi face[2], int type)
 {
@@ -95,14 +99,15 @@ SIMD_INLINE void kernel_curved_faces(const kernel_transformed_curved *h, const k
 
 /* ---- crossing points ---- */
 
-/* The corners of one face of each ray's cell, in the order of the face's word: vertex number, position in the ray's
- * plane (x and y), depth, and field. The fourth corner of a triangle is meaningless. */
+/* The corners of one face of each ray's cell, in the order of kernel_transformed_curved.corners. vertex: number in the
+ * cell; at[i]: x, y (relative to the ray once they are projected), depth, and field of corner i. The fourth corner of a
+ * triangle is meaningless. */
 typedef struct kernel_curved_corners {
     vi vertex[4];
     vf at[4][4];
 } kernel_curved_corners;
 
-/* Projects the corners, whose positions are in tile space, along the rays. */
+/* Replaces the corners' x and y in tile space by those relative to the ray at the corner's depth. */
 SIMD_INLINE void kernel_curved_corners_project(const kernel_rays *rays, kernel_curved_corners *c)
 {
     for (int i = 0; i < 4; i++) {
@@ -147,8 +152,8 @@ SIMD_INLINE void kernel_curved_triangle_edges(const kernel_curved_corners *c, vf
     e[2] = vf_diff_of_products(i[0], k[1], k[0], i[1]);
 }
 
-/* Returns the rays on which the sum of the triangle's weights is too small to be accurate. number: number of each ray's
- * triangle. */
+/* Returns the rays on which the sum of the triangle's weights is too small for an accurate crossing. number: number of
+ * each ray's triangle among its cell's triangles; e: edge functions ij, jk, ik. */
 SIMD_INLINE vm kernel_curved_triangle_inaccurate(const kernel_transformed_curved *h, vi lane, vm rays, vi number,
                                                  const vf e[3])
 {
@@ -156,7 +161,8 @@ SIMD_INLINE vm kernel_curved_triangle_inaccurate(const kernel_transformed_curved
                   vf_lt(vf_abs(kernel_weight(e[0], e[1], e[2])), vf_gather(h->least[0], number * SIMD_WIDTH + lane)));
 }
 
-/* Computes edge functions of uncertain sign, and those of inaccurate weights, again from projected corners. */
+/* Replaces edge functions by those of projected corners: each of uncertain sign (doubt), and all three of a triangle
+ * whose weights are not accurate enough. */
 static __attribute__((noinline, cold)) void kernel_curved_triangle_recompute(const kernel_transformed_curved *h,
                                                                              vi lane, vm rays, vi number,
                                                                              const vm doubt[3],
@@ -169,8 +175,8 @@ static __attribute__((noinline, cold)) void kernel_curved_triangle_recompute(con
     for (int i = 0; i < 3; i++) e[i] = vf_select(weak, exact[i], e[i]);
 }
 
-/* Computes the edge functions ij, jk and ik of the triangle `face` on the given rays from the cells' affine functions;
- * other lanes get meaningless numbers. */
+/* Computes the edge functions ij, jk and ik of the triangular face number `face` on the given rays, from the lines of
+ * the cells; other lanes get meaningless numbers. */
 SIMD_INLINE void kernel_curved_triangle_lines(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type,
                                               vm rays, vi face, const kernel_curved_corners *c, vf e[3])
 {
@@ -188,7 +194,8 @@ SIMD_INLINE void kernel_curved_triangle_lines(const kernel_transformed_curved *h
     if (__builtin_expect(vm_any(any), 0)) kernel_curved_triangle_recompute(h, p->lane, rays, number, doubt, c, e);
 }
 
-/* Computes the crossings of triangles, as means of their corners, weighted by the edge functions e. */
+/* Computes the crossings of triangles: depth, field and reference coordinates, as means of those of the corners,
+ * weighted by the edge functions e (ij, jk, ik). */
 SIMD_INLINE void kernel_curved_triangle_point(int type, const kernel_curved_corners *c, const vf e[3],
                                               kernel_point *out)
 {
@@ -205,8 +212,9 @@ SIMD_INLINE void kernel_curved_triangle_point(int type, const kernel_curved_corn
     *out = (kernel_point){.t = v[0][0], .value = v[1][0], .r = {v[2][0], v[3][0], v[4][0]}};
 }
 
-/* Computes the two crossings of each active ray, the nearer one first. corners: those of the two faces `face`. h: the
- * cells, whose affine edge functions are used for triangles; NULL: edge functions are computed from the corners. */
+/* Computes the two crossings of each active ray, the nearer one first. face: numbers of the two crossed faces; corners:
+ * their projected corners. h: the cells, whose lines are used for triangles; NULL: edge functions are computed from the
+ * corners. */
 SIMD_INLINE void kernel_curved_cross_corners(const kernel_transformed_curved *h, const kernel_lane_rays *p, vm active,
                                              int type, const vi face[2], const kernel_curved_corners corners[2],
                                              kernel_point out[2])
@@ -224,7 +232,7 @@ SIMD_INLINE void kernel_curved_cross_corners(const kernel_transformed_curved *h,
                 quad[n].y[i] = corners[n].at[i][1];
                 quad[n].z[i] = corners[n].at[i][2];
             }
-        /* these rays' edge functions have certain signs, so no ray meets an edge */
+        /* rays that meet an edge are in the mask `alone` of kernel_curved_find(), so none of these rays does */
         kernel_quads_cross(quad, quads, on_quad, true, places);
         for (int n = 0; n < quads; n++) kernel_curved_quad_point(type, &corners[n], &places[n], &out[n]);
     }
@@ -243,8 +251,8 @@ SIMD_INLINE void kernel_curved_cross_corners(const kernel_transformed_curved *h,
     kernel_points_order(out);
 }
 
-/* Computes entry and exit of the active rays, which cross two faces. faces: number of the first face plus 8 times that
- * of the second. */
+/* Computes the crossings at which the active rays enter and leave their cells. faces: the numbers of the two faces that
+ * each ray crosses, the first plus 8 times the second. */
 SIMD_INLINE void kernel_curved_cross(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type, vi faces,
                                      kernel_point out[2])
 {
@@ -254,8 +262,9 @@ SIMD_INLINE void kernel_curved_cross(const kernel_transformed_curved *h, const k
     kernel_curved_cross_corners(h, p, p->active, type, face, corners, out);
 }
 
-/* Appends rays of the list `met`, from index n on, to the list `rays`. out: for the `end_count` ends of the interval of
- * each of these, depth, value and reference coordinates. */
+/* Appends those of the rays n to n + SIMD_WIDTH - 1 of the list `met` whose bit is set in `bits` to the list `rays`.
+ * ends: `end_count` crossings of each of these rays; their depth, value and reference coordinates are appended to
+ * `out`. */
 SIMD_INLINE void kernel_curved_ends_add(const kernel_pixel_list *met, int n, const kernel_point *ends, int end_count,
                                         unsigned bits, kernel_pixel_list *rays, float (*out)[5][KERNEL_LIST_ROOM])
 {
@@ -274,7 +283,7 @@ SIMD_INLINE void kernel_curved_ends_add(const kernel_pixel_list *met, int n, con
     }
 }
 
-/* Loads the ends of the intervals of rays from index n on. */
+/* Loads the crossings of SIMD_WIDTH rays, from index n on, that kernel_curved_ends_add() has stored. */
 SIMD_INLINE void kernel_curved_ends_load(float (*const ends)[5][KERNEL_LIST_ROOM], int n, int end_count,
                                          kernel_point *out)
 {

@@ -1,6 +1,7 @@
 /* Operations on one vertex or one edge per lane, each lane with a cell of its own: positions in tile space, values
- * relative to an isovalue, and edge functions (kernel_cell.h). Computations in double are done in two halves of the
- * lanes. The operations and their order are those for a single cell, so the results are the same to the bit. */
+ * relative to an isovalue, and edge functions (kernel_cell.h). Computations in double are done for one half of the
+ * lanes (kernel_wide.h) after the other. The operations and their order are those for a single cell, so the results are
+ * bit-identical. */
 #ifndef RENDER_KERNEL_LANES_CELL_H
 #define RENDER_KERNEL_LANES_CELL_H
 
@@ -13,8 +14,8 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
-/* The vertices of each lane's cell while they are sorted: coordinates, vertex index, and rank, which is not set for
- * tets. */
+/* The vertices of one cell per lane while they are being sorted. at: coordinates; vertex: index in the mesh; rank: rank
+ * in the order of coordinates, not set for tets. */
 typedef struct kernel_sorted_vertices {
     kernel_raw_numbers at[8][3];
     vi vertex[8];
@@ -30,7 +31,7 @@ SIMD_INLINE void kernel_sorted_swap(kernel_sorted_vertices *h, bool is_narrow, v
     h->vertex[j] = vi_select(lanes, was, h->vertex[j]);
 }
 
-/* Transforms one vertex per lane into tile space. */
+/* Transforms one vertex per lane from world coordinates into tile space. */
 SIMD_INLINE void kernel_lanes_transform(const kernel_frame *f, const kernel_tile *tile, const kernel_f64 (*world)[2],
                                         vf out[3])
 {
@@ -47,8 +48,8 @@ SIMD_INLINE void kernel_lanes_transform(const kernel_frame *f, const kernel_tile
     }
 }
 
-/* Subtracts each lane's isovalue from `count` values in double, and scales the differences of each lane by a power of
- * two that brings the largest near 1. */
+/* Subtracts each lane's isovalue from `count` values in double, and multiplies the differences of each lane by a power
+ * of two that brings the largest magnitude near 1. */
 SIMD_INLINE void kernel_lanes_relative(const kernel_f64 (*values)[2], int count, const double isovalues[SIMD_WIDTH],
                                        vf *out)
 {
@@ -69,8 +70,8 @@ SIMD_INLINE void kernel_lanes_relative(const kernel_f64 (*values)[2], int count,
     }
 }
 
-/* Returns, for one vertex per lane in tile space, the measure of its size in the tile's projection (N in
- * kernel_cell.h). */
+/* Returns N of kernel_cell.h for one vertex per lane: twice an upper bound of |x| and |y| of the projected vertex over
+ * the tile's rays. */
 SIMD_INLINE vf kernel_lanes_size(const kernel_frame *f, const kernel_tile *tile, const vf at[3])
 {
     vf depth = vf_set(1);
@@ -78,7 +79,8 @@ SIMD_INLINE vf kernel_lanes_size(const kernel_frame *f, const kernel_tile *tile,
     return 2 * vf_max(vf_abs(at[0]), vf_abs(at[1])) + 5 * tile->radius * depth;
 }
 
-/* Returns the error bound of the edge function between two vertices whose sizes are given (kernel_lanes_size()). */
+/* Returns the magnitude above which the sign of the edge function of two vertices is certain. size_a, size_b:
+ * kernel_lanes_size() of the vertices. */
 SIMD_INLINE vf kernel_lanes_edge_error(vf size_a, vf size_b)
 {
     return 6 * 6e-8f * (size_a * size_b);
@@ -100,7 +102,8 @@ SIMD_INLINE void kernel_lanes_edge_function(const kernel_frame *f, const vf a[3]
     }
 }
 
-/* Computes the error that the edge function may have, and the edge's extent (kernel_edge_error). */
+/* Computes the largest error of the edge function and the edge's extent (kernel_edge_error). line: c, cu and cv of the
+ * edge function; radius: that of the tile. */
 SIMD_INLINE void kernel_lanes_edge_extent(const vf line[3], float radius, const vf a[3], const vf b[3], vf *error,
                                           vf *extent)
 {

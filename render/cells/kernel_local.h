@@ -1,21 +1,21 @@
 /* Computes the reference coordinates of points in cells, one point per lane, each in its own cell.
  *
- * A cell's map takes its reference coordinates r to X(r). About the cell's middle the map is linear except for a few
- * nonlinear terms:
+ * A cell's map takes its reference coordinates r to the position X(r). In coordinates that are counted from the cell's
+ * middle, the map is linear except for a few nonlinear terms:
  *     X(r) = X0 + M r + (nonlinear terms)      and so with A = 1 / M      y = A (X - X0) = r + n(r)
- * n is small if the cell is not far from a parallelepiped. With y known, r is computed by one step of Newton's method
- * and one more with the same derivatives. Hexes have the nonlinear terms ρσ, ρκ, σκ and ρσκ, wedges ρκ and σκ, and
- * a pyramid αβ / k:
+ * n, the map's nonlinear part, is small if the cell is not far from a parallelepiped. y, an affine function of the
+ * position, approximates r. From y, r is computed by Newton's method, usually in two steps with the same derivatives.
+ * Hexes have the nonlinear terms ρσ, ρκ, σκ and ρσκ, wedges ρκ and σκ, and a pyramid αβ / k:
  *              r                              inside
  *     hex      (ρ, σ, κ) from the middle      |ρ|, |σ|, |κ| <= 1/2
  *     wedge    ρ, σ from the triangle's       ρ, σ >= -1/3, ρ + σ <= 1/3, |κ| <= 1/2
  *              centroid, κ from the middle
  *     pyramid  α, β from the axis; k is 0     |α|, |β| <= k / 2, k <= 1
  *              at the apex
- * The Frobenius norm of n's derivative must be less than 0.78 or 0.89 at every corner; other cells are not processed in
- * lanes. The norm is convex along each coordinate, so it is nowhere larger in the cell, and so r -> r + n(r) maps no
- * two points of the cell to the same point. The choice of the origin of the coordinates does not affect the position of
- * a point. */
+ * The Frobenius norm of n's derivative must be less than 0.78 or 0.89 (KERNEL_LOCAL_BENT) at every corner; other cells
+ * are not processed in lanes. The norm is convex along each coordinate, so it is nowhere larger in the cell, and so r
+ * -> r + n(r) maps no two points of the cell to the same point. The choice of the origin of the coordinates does not
+ * affect the position of a point. */
 #ifndef RENDER_KERNEL_LOCAL_H
 #define RENDER_KERNEL_LOCAL_H
 
@@ -29,23 +29,24 @@
 
 enum { KERNEL_NONLINEAR_TERMS = 4, KERNEL_LOCAL_STEPS = 4 };
 
-/* Squares of the largest norm of the derivative of the map's nonlinear part: 0.78, and 0.89 for callers that bound the
- * error of the reference coordinates themselves. */
+/* Limits of the square of the norm of n's derivative, for norms of 0.78 and 0.89. The second is for callers that bound
+ * the error of the reference coordinates themselves. */
 #define KERNEL_LOCAL_BENT 0.6f
 #define KERNEL_LOCAL_BENT_MOST 0.8f
 
-/* The maps of one cell per lane. `field` has the field's value at the middle, its derivatives along the reference
- * coordinates, and the coefficients of its nonlinear terms. */
+/* The maps of one cell per lane. field: the field at the middle, its derivatives along the three reference coordinates
+ * there, and the coefficients of its nonlinear terms. */
 typedef struct kernel_local_cells {
     /* affine approximation y of the reference coordinates of a position X: y = inverse (X - origin) + offset */
     float origin[3][SIMD_WIDTH], inverse[3][3][SIMD_WIDTH], offset[3][SIMD_WIDTH];
     float nonlinear_part[KERNEL_NONLINEAR_TERMS][3][SIMD_WIDTH];
     float field[4 + KERNEL_NONLINEAR_TERMS][SIMD_WIDTH];
-    /* bounds, over all points inside the cell, of the affine approximation y of the reference coordinates */
+    /* bounds of y, the affine approximation of the reference coordinates, over all points inside the cell */
     float low[3][SIMD_WIDTH], high[3][SIMD_WIDTH];
     /* square of an upper bound of the Frobenius norm of n's derivative */
     float bend[SIMD_WIDTH];
-    /* error bound of the reference coordinates: a point closer to the cell's border may be on either side of it */
+    /* error bound of the reference coordinates: a point whose r is closer than this to the border of the reference
+     * domain may be inside or outside the cell */
     float error_bound[SIMD_WIDTH];
 } kernel_local_cells;
 
@@ -54,9 +55,9 @@ SIMD_INLINE int kernel_nonlinear_count(int type)
     return KERNEL_BY_SHAPE(type, 4, 2, 1);
 }
 
-/* Computes the coefficients of the field or of a coordinate from its values at a hex's vertices: the value at the
- * middle, the linear terms in the reference coordinates, and the nonlinear terms. The functions below do the same for
- * other types. */
+/* Computes the polynomial coefficients of the field, or of one coordinate, from its values v at a hex's vertices. out:
+ * the value at the middle, then the coefficients of the three linear terms, then those of the nonlinear terms. The
+ * functions below do the same for other types. */
 SIMD_INLINE void kernel_hex_terms(const vf v[8], vf out[8])
 {
     const vf p0 = v[0] + v[1], p1 = v[3] + v[2], p2 = v[4] + v[5], p3 = v[7] + v[6];
@@ -104,8 +105,8 @@ SIMD_INLINE void kernel_local_terms(int type, const vf *v, vf out[8])
         kernel_pyramid_terms(v, out);
 }
 
-/* Computes the nonlinear terms of a cell's map at the reference coordinates r, and their derivatives `slopes` along
- * each of these. */
+/* Computes the products of reference coordinates that are the nonlinear terms of a cell's map. term[k]: product k at r;
+ * slopes[k][i]: its derivative along reference coordinate i. */
 SIMD_INLINE void kernel_nonlinear_terms_at(int type, const vf r[3], vf term[KERNEL_NONLINEAR_TERMS],
                                            vf slopes[KERNEL_NONLINEAR_TERMS][3])
 {
@@ -133,7 +134,7 @@ SIMD_INLINE void kernel_nonlinear_terms_at(int type, const vf r[3], vf term[KERN
     }
 }
 
-/* Converts reference coordinates r of kernel_map.h to those of this file. */
+/* Converts reference coordinates r of kernel_map.h, which are counted from a corner, to those of this file. */
 SIMD_INLINE void kernel_local_of_reference(int type, vf r[3])
 {
     vf middle = vf_set(kernel_is_box(type) ? 0.5f : 1.0f / 3);
@@ -142,7 +143,8 @@ SIMD_INLINE void kernel_local_of_reference(int type, vf r[3])
     if (!kernel_has_apex(type)) r[2] -= 0.5f;
 }
 
-/* Returns the distance of r from the cell's border, in reference coordinates; it is negative outside. */
+/* Returns the distance, in reference coordinates, of r from the border of the reference domain; it is negative
+ * outside. */
 SIMD_INLINE vf kernel_local_border_distance(int type, const vf r[3])
 {
     if (kernel_is_box(type)) return 0.5f - vf_max(vf_max(vf_abs(r[0]), vf_abs(r[1])), vf_abs(r[2]));
@@ -193,7 +195,7 @@ SIMD_INLINE vf kernel_local_nonlinearity(int type, const vf nonlinear_part[KERNE
     return most;
 }
 
-/* Inverts the 3 × 3 matrix whose columns are m[.][1], m[.][2] and m[.][3]. Returns its determinant. */
+/* Inverts the 3 × 3 matrix whose row a is m[a][1], m[a][2], m[a][3]. Returns its determinant. */
 SIMD_INLINE vf kernel_local_invert(const vf m[3][8], vf inverse[3][3])
 {
     for (int i = 0; i < 3; i++) {
@@ -209,9 +211,9 @@ SIMD_INLINE vf kernel_local_invert(const vf m[3][8], vf inverse[3][3])
     return det;
 }
 
-/* Computes bounds of the affine approximation y of the reference coordinates: its range over all vertices, widened by
- * the error bound of kernel_local_error_bound(). No point of the cell is outside of these bounds, because each is a
- * mean of the vertices with non-negative weights. */
+/* Computes the bounds `low` and `high` of the affine function y: its range over all vertices, widened by the error
+ * bound. They hold in the whole cell, because each of its points is a mean of the vertices with non-negative weights.
+ * at: positions of the vertices relative to vertex 0. */
 SIMD_INLINE void kernel_local_affine_bounds(int count, const vf at[3][8], const vf inverse[3][3], const vf offset[3],
                                             kernel_local_cells *out)
 {
@@ -228,10 +230,10 @@ SIMD_INLINE void kernel_local_affine_bounds(int count, const vf at[3][8], const 
     }
 }
 
-/* Computes the error bound of r, within which a point may be on either side of the border. Crossings of faces
- * (kernel_quad.h) err by 3e-7 of the cell's size and by half a unit in the last place of their depth; projected
- * vertices err by a few units of their positions across the ray; and r errs by the 2e-6 that Newton's method leaves,
- * and by as many units of a position. */
+/* Computes the error bound of r (kernel_local_cells.error_bound). Crossings of faces (kernel_quad.h) err by 3e-7 of the
+ * cell's size and by half a unit in the last place of their depth; projected vertices err by a few units of their
+ * positions across the ray; and r errs by the 2e-6 that Newton's method leaves, and by a few units in the last place of
+ * a position. */
 SIMD_INLINE void kernel_local_error_bound(int count, const vf places[3][8], const vf inverse[3][3],
                                           kernel_local_cells *out)
 {
@@ -247,9 +249,9 @@ SIMD_INLINE void kernel_local_error_bound(int count, const vf places[3][8], cons
     vf_store(out->error_bound, 4e-6f + 1.2e-7f * most);
 }
 
-/* Computes the coefficients of one cell of this type per lane, from vertices in tile space and the field at them.
- * Returns the lanes whose nonlinearity (`bend`, a square) is below most_bent; results of other lanes must not be
- * used. */
+/* Computes the maps of one cell of this type per lane. places: vertices in tile space; values: the field at them.
+ * Returns the lanes whose map can be inverted: those with `bend` below most_bent and a small error bound. The data of
+ * other lanes must not be used. */
 SIMD_INLINE vm kernel_local_setup(int type, const vf places[3][8], const vf values[8], float most_bent,
                                   kernel_local_cells *out)
 {
@@ -283,12 +285,14 @@ SIMD_INLINE vm kernel_local_setup(int type, const vf places[3][8], const vf valu
 
 /* ---- points ---- */
 
-/* Points, one per lane, each in the cell of its lane. */
+/* Points, one per lane, each with the data of its own cell. */
 typedef struct kernel_local_points {
     vf y[3], r[3], nonlinear_part[KERNEL_NONLINEAR_TERMS][3];
     /* nonlinear terms of the map at the current reference coordinates r, and their derivatives */
     vf term[KERNEL_NONLINEAR_TERMS], slopes[KERNEL_NONLINEAR_TERMS][3];
-    vf column[3][3], det; /* columns of the adjugate of the derivatives' matrix, and 1 / its determinant in det */
+    /* column: columns of the adjugate of the matrix of derivatives of r + n(r); det: 1 divided by the determinant of
+     * that matrix */
+    vf column[3][3], det;
 } kernel_local_points;
 
 /* Computes the residual y - (r + n(r)) of Newton's method, where y is the affine approximation of the reference
@@ -324,8 +328,8 @@ SIMD_INLINE void kernel_local_derivatives(int type, kernel_local_points *p)
     p->det = 1.0f / vf_muladd(j[0][0], c[0], vf_muladd(j[0][1], c[1], j[0][2] * c[2]));
 }
 
-/* Does a step of Newton's method in the given lanes, with the derivatives computed last. Returns the size of the
- * largest component of each lane's step. */
+/* Does a step of Newton's method in the given lanes, with the derivatives that the last call of
+ * kernel_local_derivatives() computed. Returns the magnitude of the largest component of each lane's step. */
 SIMD_INLINE vf kernel_local_step(int type, kernel_local_points *p, vm lanes)
 {
     const vf most = vf_set(1), far = vf_set(1.25f);
@@ -342,9 +346,9 @@ SIMD_INLINE vf kernel_local_step(int type, kernel_local_points *p, vm lanes)
     return largest;
 }
 
-/* Computes the reference coordinates r of the points at the positions `at` in tile space. lane is the lane that holds
- * each point's cell. Returns the lanes whose r is accurate to 1e-6. A lane's result does not depend on the other
- * lanes. */
+/* Computes the reference coordinates r of the points at the positions `at` in tile space. lane: the lane that holds
+ * each point's cell in `cells`. Returns the lanes whose r is accurate to 1e-6. A lane's result does not depend on the
+ * other lanes. */
 SIMD_INLINE vm kernel_local_find(int type, const kernel_local_cells *cells, vi lane, const vf at[3],
                                  kernel_local_points *p)
 {
@@ -372,7 +376,7 @@ SIMD_INLINE vm kernel_local_find(int type, const kernel_local_cells *cells, vi l
     return vm_not(open);
 }
 
-/* Returns the field at the reference coordinates r in each lane's cell. */
+/* Returns the field at the reference coordinates r in each point's cell. lane: the lane that holds the cell. */
 SIMD_INLINE vf kernel_local_value(int type, const kernel_local_cells *cells, vi lane, const kernel_local_points *p)
 {
     vf v = kernel_gather_lane(cells->field[0], lane);

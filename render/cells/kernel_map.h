@@ -23,12 +23,13 @@
 
 enum { KERNEL_MAP_STEPS = 10 };
 
-/* Newton's method ends with a step smaller than this. The remaining error is the square of the step times the map's
- * curvature: the next step would be below float32's resolution for all but the most warped cells. */
+/* Newton's method ends after a step that is smaller than this in reference coordinates. The remaining error is the
+ * square of the step times the map's curvature; except in extremely warped cells, this is below float32's
+ * resolution. */
 #define KERNEL_MAP_TOLERANCE 5e-5f
 
-/* Computes the coefficients c of a hex from the numbers v at its vertices; both may be doubles or vectors of
- * doubles. */
+/* Computes the polynomial coefficients c of a hex's coordinate or field from its values v at the vertices. c and v are
+ * arrays of doubles or of vectors of doubles. */
 #define KERNEL_HEX_FIT(c, v)                                                                                           \
     do {                                                                                                               \
         (c)[0] = (v)[0];                                                                                               \
@@ -41,7 +42,8 @@ enum { KERNEL_MAP_STEPS = 10 };
         (c)[7] = ((v)[6] - (v)[5] - (v)[7] + (v)[4]) - (c)[4];                                                         \
     } while (0)
 
-/* Compute the nonzero polynomial coefficients of a wedge and of a pyramid from the numbers v at their vertices. */
+/* Compute the nonzero polynomial coefficients c of a wedge's or a pyramid's coordinate or field from its values v at
+ * the vertices. */
 #define KERNEL_WEDGE_FIT(c, v)                                                                                         \
     do {                                                                                                               \
         (c)[0] = (v)[0];                                                                                               \
@@ -77,13 +79,14 @@ SIMD_INLINE void kernel_polynomial_fit(double out[8], int type, const double v[G
     KERNEL_FIT(type, out, v);
 }
 
-/* Computes the polynomials of SIMD_WIDTH / 2 cells from the numbers v at their vertices. */
+/* Computes the polynomial coefficients of SIMD_WIDTH / 2 cells from the values v at their vertices. */
 SIMD_INLINE void kernel_f64_fit(int type, kernel_f64 c[8], const kernel_f64 v[8])
 {
     KERNEL_FIT(type, c, v);
 }
 
-/* The product m in the map's polynomial, and its derivatives along r, s and q. */
+/* The product m in the map's polynomial (the top of this file), and its derivatives along the three reference
+ * coordinates. */
 typedef struct kernel_product {
     vf m, dr, ds, dq;
 } kernel_product;
@@ -133,8 +136,8 @@ SIMD_INLINE vf kernel_dot(const vf a[3], const vf b[3])
     return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
 }
 
-/* Computes the cross products of the rows of the Jacobian, whose rows are the gradients of the three positions:
- * cross[i] = row i+1 × row i+2, with indices modulo 3. Returns the determinant. Divided by it, the cross products are
+/* Computes the map's Jacobian at r, whose row i is the gradient of the position's component i, and from it cross[i] =
+ * row i+1 × row i+2, with indices modulo 3. Returns the Jacobian's determinant. Divided by it, the cross products are
  * the columns of the inverse Jacobian. */
 SIMD_INLINE vf kernel_jacobian(const vf position[3][8], bool is_pyramid, const kernel_product *m, const vf r[3],
                                vf cross[3][3])
@@ -145,18 +148,18 @@ SIMD_INLINE vf kernel_jacobian(const vf position[3][8], bool is_pyramid, const k
     return kernel_dot(row[0], cross[0]);
 }
 
-/* The maps of cells of one type, one per lane. Positions are relative to vertex 0 in tile space, so that they are of
- * the cell's size. */
+/* The maps of cells of one type, one per lane: polynomial coefficients of the positions and of the field. Positions are
+ * in tile space and relative to vertex 0, so that their rounding errors are relative to the cell's size. */
 typedef struct kernel_map {
     bool is_pyramid;
-    float tolerance; /* size of a step of Newton's method below which that step is the last */
+    float tolerance; /* Newton's method ends after a step smaller than this, in reference coordinates */
     vf origin[3];    /* vertex 0 in tile space */
     vf position[3][8], field[8];
     kernel_f64 exact[2][4][8]; /* the coefficients of positions and field in double, by halves of the lanes */
 } kernel_map;
 
-/* Computes the map of each ray's own cell. at: x, y, z and the field by vertex, in vectors whose lanes are cells; lane:
- * lane of each ray's cell. */
+/* Computes the map of each ray's own cell. at: x, y, z and the field, by vertex, in arrays whose lanes are cells; lane:
+ * the lane of each ray's cell in these arrays. */
 SIMD_INLINE void kernel_maps_of(const float (*at)[8][SIMD_WIDTH], vi lane, kernel_map *out, int type)
 {
     const int count = grid_type_vertices(type);
@@ -183,13 +186,13 @@ static __attribute__((noinline)) void kernel_maps_of_type(const float (*at)[8][S
     KERNEL_OF_TYPE(type, kernel_maps_of, at, lane, out);
 }
 
-/* Writes the numbers of a cell's vertices to all lanes. */
+/* Stores a cell's `count` vertex numbers in all lanes, and 0 for missing vertices. */
 SIMD_INLINE void kernel_map_spread(const float *numbers, int count, float out[8][SIMD_WIDTH])
 {
     for (int i = 0; i < 8; i++) vf_store(out[i], vf_set(i < count ? numbers[i] : 0));
 }
 
-/* Computes the map of one cell, which contains all rays' points. */
+/* Computes the map of one cell, the same in all lanes. */
 SIMD_INLINE void kernel_map_setup(kernel_map *m, const kernel_cell *c)
 {
     const float *const numbers[4] = {c->x, c->y, c->z, c->f};
@@ -198,7 +201,8 @@ SIMD_INLINE void kernel_map_setup(kernel_map *m, const kernel_cell *c)
     kernel_maps_of_type((const float(*)[8][SIMD_WIDTH])at, vi_set(0), c->type, m);
 }
 
-/* Computes the polynomial of a field in each ray's own cell, from its values at the cells' vertices. */
+/* Computes the polynomial coefficients c of a field in each ray's own cell. values: the field by vertex, in arrays
+ * whose lanes are cells; lane: the lane of each ray's cell. */
 SIMD_INLINE void kernel_maps_polynomial(const float (*values)[SIMD_WIDTH], vi lane, vf c[8], int type)
 {
     const int count = grid_type_vertices(type);
@@ -212,8 +216,8 @@ SIMD_INLINE void kernel_maps_polynomial(const float (*values)[SIMD_WIDTH], vi la
     }
 }
 
-/* Returns the value of a field at the reference coordinates r in each ray's own cell, computed from the field's values
- * at the cells' vertices. */
+/* Returns a field at the reference coordinates r in each ray's own cell. values and lane: as for
+ * kernel_maps_polynomial(). */
 SIMD_INLINE vf kernel_maps_value(const float (*values)[SIMD_WIDTH], vi lane, const vf r[3], int type)
 {
     const kernel_product m = kernel_product_at(kernel_has_apex(type), r);
@@ -257,7 +261,7 @@ SIMD_INLINE vm kernel_map_newton(const kernel_rays *rays, const kernel_map *map,
     return open;
 }
 
-/* Returns how far r lies outside the reference domain [0, 1]^3, as the largest excess of a coordinate. */
+/* Returns by how much a coordinate of r is below 0 or above 1, at most; 0 if r is in [0, 1]^3. */
 SIMD_INLINE vf kernel_map_distance_outside(const vf r[3])
 {
     vf most = vf_set(0);
@@ -265,14 +269,15 @@ SIMD_INLINE vf kernel_map_distance_outside(const vf r[3])
     return most;
 }
 
-/* Largest excess of reference coordinates that still counts as a point of the cell. Points between the triangles of a
- * warped face and its bilinear patch lie outside the domain, and so do points of cells so flat that rounding
- * matters. */
+/* Points whose reference coordinates are outside of [0, 1] by no more than this are accepted as points of the cell.
+ * Points between the triangles of a warped face and its bilinear patch lie outside the domain, and so do points of
+ * cells so flat that rounding matters. */
 #define KERNEL_MAP_BEYOND 0.25f
 
-/* Computes the reference coordinates of the points at depth t. From a poor guess, or in a folded cell, Newton's method
- * may diverge or find another solution outside the cell; it is then repeated from the middle of the cell. Returns the
- * rays without a solution in or near the cell, whose r must not be used. */
+/* Computes the reference coordinates r of the points at depth t, for the rays in `wanted`, from a guess in r. From a
+ * poor guess, or in a folded cell, Newton's method may diverge or find another solution outside the cell; it is then
+ * repeated from the middle of the cell. Returns the rays without a solution in or near the cell, whose r must not be
+ * used. */
 SIMD_INLINE vm kernel_map_invert(const kernel_rays *rays, const kernel_map *map, vm wanted, vf t, vf r[3])
 {
     const vf most = vf_set(KERNEL_MAP_BEYOND);
@@ -286,8 +291,8 @@ SIMD_INLINE vm kernel_map_invert(const kernel_rays *rays, const kernel_map *map,
     return vm_andnot(again, better);
 }
 
-/* Computes the direction of the field's gradient at the reference coordinates r, in tile space, of any length and of
- * either sign. */
+/* Computes a vector parallel to the field's gradient at the reference coordinates r, in tile space, of any length and
+ * of either sign. */
 SIMD_INLINE void kernel_lanes_normal(const kernel_map *map, const vf r[3], vf out[3])
 {
     const kernel_product m = kernel_product_at(map->is_pyramid, r);
@@ -299,10 +304,10 @@ SIMD_INLINE void kernel_lanes_normal(const kernel_map *map, const vf r[3], vf ou
     for (int a = 0; a < 3; a++) out[a] = kernel_dot(cross[a], g);
 }
 
-/* The following functions evaluate the field along a ray through a cell: by linear interpolation between the faces, or
- * by the inverse map. */
+/* The following functions evaluate the field along a ray through a cell: by linear interpolation between its two
+ * crossings of faces, or exactly, by the inverse map. */
 
-/* Returns the depth at which the line through the two ends is zero. */
+/* Returns the depth at which the line through the points (t0, v0) and (t1, v1) is zero, clamped to [t0, t1]. */
 SIMD_INLINE vf kernel_secant(vf t0, vf v0, vf t1, vf v1)
 {
     return vf_clamp(t0 - v0 * ((t1 - t0) / (v1 - v0)), t0, t1);
@@ -315,8 +320,9 @@ SIMD_INLINE vf kernel_interval_fraction(const kernel_interval *i, vf t)
     return vf_select(vf_lt(vf_set(0), length), (t - i->t_in) / length, vf_set(0));
 }
 
-/* Return, for depth t, the value and a guess of the reference coordinates, both interpolated linearly between the
- * faces. */
+/* kernel_line_value() returns the field at depth t, interpolated linearly between the interval's ends.
+ * kernel_reference_on_chord() interpolates the reference coordinates in the same way; inside a warped cell they are
+ * only a guess. */
 SIMD_INLINE vf kernel_line_value(const kernel_interval *i, vf t)
 {
     return i->v_in + kernel_interval_fraction(i, t) * (i->v_out - i->v_in);
@@ -328,8 +334,9 @@ SIMD_INLINE void kernel_reference_on_chord(const kernel_interval *i, vf t, vf r[
     for (int a = 0; a < 3; a++) r[a] = i->r_in[a] + along * (i->r_out[a] - i->r_in[a]);
 }
 
-/* Returns the field at depth t, and computes the reference coordinates from the guess in r. For rays for which the
- * inverse map fails, both are interpolated linearly between the faces, and *failures counts them. */
+/* Returns the field at depth t on the rays in `wanted`, and replaces the guess in r by the reference coordinates. For
+ * rays for which the map cannot be inverted, both are interpolated linearly between the interval's ends, and *failures
+ * is increased by the number of these rays. */
 SIMD_INLINE vf kernel_solve_lanes(const kernel_rays *rays, const kernel_map *map, const kernel_interval *i, vm wanted,
                                   vf t, vf r[3], int64_t *failures)
 {
@@ -346,7 +353,7 @@ SIMD_INLINE vf kernel_solve_lanes(const kernel_rays *rays, const kernel_map *map
     return has_failed ? vf_select(failed, kernel_line_value(i, t), value) : value;
 }
 
-/* Returns the field at depth t for a packet's rays in a single cell. */
+/* Returns the field at depth t on a packet's rays, in the single cell of `map` and the interval i. */
 static __attribute__((noinline, unused)) vf kernel_value_at(kernel_packet *p, const kernel_map *map,
                                                             const kernel_interval *i, vm rays, vf t)
 {
@@ -374,10 +381,11 @@ SIMD_INLINE void kernel_reference_between(const kernel_point *low, const kernel_
     for (int a = 0; a < 3; a++) r[a] = low->r[a] + along * (high->r[a] - low->r[a]);
 }
 
-/* Largest difference that rounding causes between a face's value and the field there. */
+/* Largest difference, by rounding, between the value computed on a face and the field of the cell at the same point, if
+ * the largest vertex value is near 1. */
 #define KERNEL_FACE_BAND 1e-6f
 
-/* A range of rays: their directions are (0, 0, 1) plus up to `spread` in x and y. */
+/* Bounds of rays in tile space. spread: their directions are (x, y, 1) with |x| and |y| up to this. */
 typedef struct kernel_beam {
     float spread;
     float offset; /* largest |origin_x| and |origin_y| of the rays */

@@ -1,13 +1,13 @@
 /* Intersects rays with a polyhedron (render_polyhedra.h): computes its intervals inside, and the field along them.
  *
- * The surface is intersected as for other cells (kernel_cell.h): by edge functions of the unique edges and by
- * triangles. Between the crossings, sorted and paired, the ray is inside. The number of intervals is not limited: the
- * list is as long as the list of triangles.
+ * The polyhedron's surface consists of triangles, called facets. It is intersected as for other cells (kernel_cell.h):
+ * edge functions are computed once per edge, and from them the crossings of triangles. The sorted crossings form pairs,
+ * between which the ray is inside. The number of intervals is not limited.
  *
- * The field is linear on each tet that joins a surface triangle to the centre. Neighbouring tets share a triangle that
- * joins an edge to the centre, called a sheet. Along the ray the field is continuous and piecewise linear, and its
- * slope changes only at sheets. So a profile consists of the interval's ends and the crossed sheets between them,
- * sorted by depth:
+ * The cell is divided into tets, each of which connects a surface triangle to the centre, the mean of the vertices. The
+ * field is linear in each tet. Neighbouring tets share a triangle that connects an edge to the centre, called a sheet.
+ * Along the ray the field is continuous and piecewise linear, and its slope changes only at sheets. So a profile
+ * consists of the interval's ends and the crossed sheets between them, sorted by depth:
  *
  *      v |        .sheet
  *        |      .'      '.        .exit
@@ -21,10 +21,10 @@
  * with its two tets on different sides the sum does not jump; a sheet with both on one side adds or removes f - f = 0.)
  * That sum is computed at sheets, from each tet's interval [t_in, t_out).
  *
- * On which side of an isovalue a ray enters and leaves is decided by the faces' own values (kernel_surface.h):
- * triangles are linear, quads bilinear as their neighbours may have them, larger faces linear on their triangles. In a
- * cell that is not star-shaped the field just inside may be on the other side of the isovalue than the face: then it
- * jumps at the face, and the isosurface is there. */
+ * On which side of an isovalue a ray enters and leaves is decided by the values on the faces themselves
+ * (kernel_surface.h). These are linear on triangles, bilinear on quads, as in a hex on the other side, and linear on
+ * the triangles of larger faces. In a cell that is not star-shaped, the field just inside may be on the other side of
+ * the isovalue than the value on the face. The field then jumps at the face, and the isosurface lies in the face. */
 #ifndef RENDER_KERNEL_POLYHEDRON_H
 #define RENDER_KERNEL_POLYHEDRON_H
 
@@ -38,27 +38,30 @@
 #include "render_polyhedra.h"
 #include "simd.h"
 
-/* Crossings of rays with a triangle, at depth t with value v and colour value w, both linear on the triangle. For a
- * surface triangle t_face, v_face and w_face are those of its face, which differ for quads, because these are bilinear.
- * For a sheet v_face and w_face are the field's values there. */
+/* Crossings of rays with a triangle. t: depth; v: value; w: value of the colour field; all are linear on the triangle.
+ * t_face, v_face and w_face: for a surface triangle, the same on its face, which is a bilinear patch if it is a quad;
+ * for a sheet, v_face and w_face are the fields of the cell there. */
 typedef struct kernel_triangle_crossings {
     vm mask;
     vf t, v, w;
     vf t_face, v_face, w_face;
 } kernel_triangle_crossings;
 
-/* The crossings of a packet with one polyhedron. Its arrays are in the thread's scratch memory. */
+/* The crossings of a packet's rays with one polyhedron. The arrays are in the thread's scratch memory
+ * (polyhedra_scratch()). */
 typedef struct kernel_poly_crossings {
     const kernel_packet *packet;
     const polyhedron *cell;
     vm rays;         /* rays for which crossings are computed */
     bool has_colour; /* whether colour values w are computed too */
-    vf *x, *y;       /* vertices and centre, projected along the rays */
+    vf *x, *y;       /* x and y, relative to the rays, of the projected vertices and centre */
     vf *edge;        /* edge functions of the edges, then of the lines from each vertex to the centre */
     kernel_triangle_crossings
-        *facets;    /* crossings of surface triangles by number; only those listed in `met` are set */
+        /* crossings of surface triangles by number; only those of triangles that are listed in `met` are set */
+        *facets;
     vm *unassigned; /* for each surface triangle, the rays whose crossing has not been assigned to an interval yet */
-    /* rays that cross both triangles of a quad but not its bilinear patch, or the patch twice but no triangle */
+    /* rays that cross both triangles of a quad but do not cross its bilinear patch, or cross the patch twice but
+     * neither triangle */
     vm uneven;
     int *met;
     int met_count;
@@ -67,8 +70,8 @@ typedef struct kernel_poly_crossings {
     int sheet_count;
     kernel_interval *tets; /* for each surface triangle, the intervals of the rays in its tet */
     bool has_sheets, has_tets;
-    /* The current interval of each ray inside the cell (kernel_poly_next()), with the faces' values; the crossings at
-     * its ends; and the field's values just inside. */
+    /* interval: the current interval of each ray inside the cell (kernel_poly_next()), with the values on the faces;
+     * in, out: the crossings at its ends; u_in, u_out: the field just inside the ends */
     kernel_interval interval;
     kernel_triangle_crossings in, out;
     vf u_in, u_out;
@@ -81,8 +84,7 @@ SIMD_INLINE void *kernel_scratch_alloc(char **at, size_t bytes)
     return p;
 }
 
-/* Carves the arrays for the cell's crossings out of the thread's scratch memory. Returns false if there is no
- * memory. */
+/* Allocates the arrays for the cell's crossings in the thread's scratch memory. Returns false if there is no memory. */
 static bool kernel_poly_allocate(const kernel_packet *p, const polyhedron *c, kernel_poly_crossings *out)
 {
     const size_t points = (size_t)c->vertex_count + 1, edges = (size_t)c->edge_count, facets = (size_t)c->facet_count;
@@ -177,9 +179,8 @@ SIMD_INLINE void kernel_poly_recompute(const kernel_poly_crossings *r, vm hit, k
                              kernel_polyhedron_position(c, w->j), kernel_polyhedron_position(c, w->k), w);
 }
 
-/* Computes the crossings of a surface triangle and returns the rays that have one. *w gets the weights before
- * inaccurate ones are computed again. They serve as a guess for the quad's patch, and are the same as in a hex that
- * shares the face. */
+/* Computes the crossings of a surface triangle and returns the rays that have one. *w gets the weights as computed from
+ * lines, also for rays on which they are not accurate enough. */
 static vm kernel_poly_facet(const kernel_poly_crossings *r, const polyhedron_facet *t, kernel_weights *w,
                             kernel_triangle_crossings *out)
 {
@@ -193,7 +194,8 @@ static vm kernel_poly_facet(const kernel_poly_crossings *r, const polyhedron_fac
     return out->mask;
 }
 
-/* Returns the edge function from one of the triangle's vertices to another. */
+/* Returns the edge function of the edge from one of the triangle's vertices to another, negated if `from` is after
+ * `to`. */
 SIMD_INLINE vf kernel_facet_side(const polyhedron_facet *t, const kernel_poly_crossings *r, int from, int to)
 {
     const int low = from < to ? from : to, high = from < to ? to : from;
@@ -220,9 +222,8 @@ SIMD_INLINE void kernel_quad_of_facets(const kernel_poly_crossings *r, const pol
     out->e32 = kernel_facet_side(t[1], r, corner[3], corner[2]);
 }
 
-/* Stores a point of the quad's patch as the face's point of a surface triangle's crossing, for the rays in `mine`,
- * whose crossing belongs to this triangle. Rays that do not cross the triangle itself use the patch's point for
- * both. */
+/* Sets t_face, v_face and w_face of a surface triangle's crossing *m from a crossing of its quad's patch (at), for the
+ * rays in `mine`. For those of them that do not cross the triangle itself, t, v and w are also set from the patch. */
 SIMD_INLINE void kernel_facet_face(const polyhedron *c, const int corner[4], const kernel_point *at, vm mine,
                                    bool has_colour, kernel_triangle_crossings *m)
 {
@@ -237,8 +238,8 @@ SIMD_INLINE void kernel_facet_face(const polyhedron *c, const int corner[4], con
     m->w = vf_select(apart, m->w_face, m->w);
 }
 
-/* For rays that cross the patch twice and both triangles, exchanges the two points if necessary, so that the nearer
- * point belongs to the nearer triangle. */
+/* For rays that cross the patch twice and also both triangles, exchanges the two points of the patch if necessary, so
+ * that the nearer one belongs to the triangle that is crossed first. */
 static __attribute__((noinline, cold)) void kernel_quad_points_pair(kernel_triangle_crossings *const m[2],
                                                                     kernel_point places[2])
 {
@@ -249,8 +250,8 @@ static __attribute__((noinline, cold)) void kernel_quad_points_pair(kernel_trian
     kernel_point_move(swap, &own, &places[1]);
 }
 
-/* Computes the crossings of a quad's bilinear patch, which are the same bits as in a hex that shares it. first: number
- * of the first of its two triangles. */
+/* Computes the crossings of a quad's bilinear patch and of its two triangles; those of the patch are bit-identical to
+ * the crossings in a hex that shares the quad. first: number of the first of the two triangles. */
 static void kernel_poly_quad(kernel_poly_crossings *r, int first)
 {
     static const signed char loop[4] = {0, 1, 2, 3};
@@ -261,7 +262,7 @@ static void kernel_poly_quad(kernel_poly_crossings *r, int first)
     kernel_quad quad;
     kernel_point places[2];
     int corner[4];
-    /* vertices are sorted, so that their numbers are ranks in the order of coordinates */
+    /* the polyhedron's vertices are numbered in the order of coordinates, so that a vertex's number is its rank */
     for (int i = 0; i < 4; i++) ranks.rank[i] = around[i];
     kernel_quad_corners(&ranks, loop, corner);
     for (int i = 0; i < 4; i++) corner[i] = around[corner[i]];
@@ -312,8 +313,8 @@ static bool kernel_poly_cross(kernel_poly_crossings *r, vm rays, bool has_colour
     return r->met_count > 0;
 }
 
-/* Removes each ray's nearest crossing, by the depth of its face, from the list and returns it in *out. Returns false if
- * no ray has one left. */
+/* Removes each ray's nearest crossing (least t_face) from the list and stores it in *out. Returns false if no ray has a
+ * crossing left. */
 SIMD_INLINE bool kernel_poly_take_nearest(kernel_poly_crossings *r, kernel_triangle_crossings *out)
 {
     const vf zero = vf_set(0);
@@ -372,7 +373,8 @@ static void kernel_poly_sheets(kernel_poly_crossings *r)
     }
 }
 
-/* Extends the intervals of the rays in `hit` to a crossing of one of the tet's faces. */
+/* Extends the intervals s of the rays in `hit` inside a tet, so that they contain the crossings m of one of the tet's
+ * faces. */
 SIMD_INLINE void kernel_subtet_add(kernel_interval *s, const kernel_triangle_crossings *m, vm hit)
 {
     const vm first = vm_and(hit, vf_lt(m->t, s->t_in)), last = vm_andnot(hit, vf_lt(m->t, s->t_out));
@@ -385,7 +387,7 @@ SIMD_INLINE void kernel_subtet_add(kernel_interval *s, const kernel_triangle_cro
     s->mask = vm_or(s->mask, hit);
 }
 
-/* Computes the intervals of the rays in all tets of the cell, but none in tets without volume. */
+/* Computes the intervals of the rays in all tets of the cell (r->tets). Tets without volume get none. */
 static void kernel_poly_tets(kernel_poly_crossings *r)
 {
     const polyhedron *c = r->cell;
@@ -409,8 +411,8 @@ static void kernel_poly_tets(kernel_poly_crossings *r)
     }
 }
 
-/* Returns the rays for which t is in the tet's interval: [t_in, t_out), or (t_in, t_out] if the field just before t is
- * needed. */
+/* Returns the rays for which t is in the interval inside the tet: [t_in, t_out), or (t_in, t_out] if `before` is set,
+ * because the field just before t is needed. */
 SIMD_INLINE vm kernel_subtet_contains(const kernel_interval *s, vf t, bool before)
 {
     if (before) return vm_and(s->mask, vm_and(vf_lt(s->t_in, t), vf_le(t, s->t_out)));
@@ -422,9 +424,10 @@ SIMD_INLINE vf kernel_subtet_at(const kernel_interval *s, vf t, vf v_in, vf v_ou
     return v_in + (t - s->t_in) * ((v_out - v_in) / (s->t_out - s->t_in));
 }
 
-/* Computes the signed sum of the tets' fields at t. Rounding may put the ends of neighbouring tets, which meet at one
- * point, in the wrong order. So if the signs at t do not sum to 1, the sum is computed slightly before and behind; if
- * that fails too, *v and *w keep their values. */
+/* Computes the field *v and the colour field *w at depth t, as sums over the tets that contain the ray's point, each
+ * with the tet's sign. The signs of these tets should sum to 1. By rounding they may not, because the ends of
+ * neighbouring tets' intervals, which should be equal, are in the wrong order. Then the sum is computed at slightly
+ * smaller and larger t; if that fails too, *v and *w are left unchanged. */
 static void kernel_poly_sum(const kernel_poly_crossings *r, vm rays, vf t, bool before, vf *v, vf *w)
 {
     static const float shifts[7] = {0, 1, -1, 4, -4, 16, -16};
@@ -449,8 +452,9 @@ static void kernel_poly_sum(const kernel_poly_crossings *r, vm rays, vf t, bool 
     }
 }
 
-/* Returns the rays for which the sheet lies in the interval: between the crossings of triangles, and between those of
- * faces. Sheets beyond the triangles belong to tets that extend out of the cell, and are not part of its field. */
+/* Returns the rays whose crossing of the sheet lies in the current interval: between the crossings of the surface
+ * triangles at its ends, and between those of the faces. Sheets beyond the triangles belong to tets that extend out of
+ * the cell, and are not part of its field. */
 SIMD_INLINE vm kernel_poly_interval_contains(const kernel_poly_crossings *r, const kernel_triangle_crossings *sheet)
 {
     const vm inside = vm_and(vf_lt(r->interval.t_in, sheet->t), vf_lt(sheet->t, r->interval.t_out));
@@ -458,8 +462,8 @@ SIMD_INLINE vm kernel_poly_interval_contains(const kernel_poly_crossings *r, con
     return vm_and(vm_and(r->interval.mask, sheet->mask), vm_and(inside, within));
 }
 
-/* Computes the field just inside an end of the interval: the face's value, plus the fields of all tets other than the
- * one whose triangle is crossed. */
+/* Computes the field just inside an end of the interval: the value on the face, plus the signed sum of the fields of
+ * all tets other than the one whose surface triangle is crossed. */
 SIMD_INLINE void kernel_poly_inner_value(const kernel_poly_crossings *r, vm rays, const kernel_triangle_crossings *end,
                                          bool before, vf *u, vf *w)
 {
@@ -469,8 +473,8 @@ SIMD_INLINE void kernel_poly_inner_value(const kernel_poly_crossings *r, vm rays
     *w = end->w_face + (w_sum - end->w);
 }
 
-/* Prepares the profile of the interval, which is the piecewise linear field along each ray: computes the field at the
- * crossed sheets and at both ends. */
+/* Prepares the profile of the current interval (the piecewise linear field along each ray): computes the field at the
+ * crossed sheets and just inside both ends. */
 static void kernel_poly_profile(kernel_poly_crossings *r)
 {
     kernel_interval *i = &r->interval;
@@ -490,8 +494,8 @@ static void kernel_poly_profile(kernel_poly_crossings *r)
     }
 }
 
-/* Sets *piece to a piece of length zero at the begin of each ray's profile, which is the piecewise linear field along
- * the ray. */
+/* Sets *piece to a piece of length zero at the begin of each ray's profile, the piecewise linear field along the
+ * ray. */
 SIMD_INLINE void kernel_profile_begin(const kernel_poly_crossings *r, kernel_interval *piece)
 {
     const kernel_interval *i = &r->interval;

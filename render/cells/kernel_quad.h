@@ -1,13 +1,13 @@
 /* Intersects rays with a quad's bilinear patch: computes how often they meet it, and at which points.
  *
- * Corners 0 to 3 are in cyclic order; in the ray's plane, with the ray at the origin, they are c0 to c3. The patch's
- * point (s, r) is (1-r) ((1-s) c0 + s c1) + r ((1-s) c3 + s c2). For a given r these are the points of the line from u
- * = (1-r) c0 + r c3 to w = (1-r) c1 + r c2, which passes through the origin if B(r) = u × w = 0. In the same way A(s) =
- * 0 is the condition for s:
+ * Corners 0 to 3 are in cyclic order. Projected along the ray, with the ray at the origin, they are the two-dimensional
+ * vectors c0 to c3. The patch's point with the parameters (s, r) is (1-r) ((1-s) c0 + s c1) + r ((1-s) c3 + s c2). For
+ * a given r these are the points of the line from u = (1-r) c0 + r c3 to w = (1-r) c1 + r c2, which passes through the
+ * origin if B(r) = u × w = 0. In the same way A(s) = 0 is the condition for s:
  *     B(r) = (1-r)² b0 + 2 r (1-r) b1 + r² b2,   b0 = c0×c1,  2 b1 = c0×c2 + c3×c1,  b2 = c3×c2
  *     A(s) = (1-s)² a0 + 2 s (1-s) a1 + s² a2,   a0 = c0×c3,  2 a1 = c0×c2 + c1×c3,  a2 = c1×c2
  * b0, b2, a0 and a2 are the edge functions of the four sides. Their exact signs, with ties decided, are the same for
- * all cells of the face. They decide almost everything:
+ * all cells of the face. These signs decide almost everything:
  * - The ray meets the patch an odd number of times if and only if it meets the quad's two triangles an odd number of
  *   times, because both surfaces have the same border. A bilinear patch is met at most twice; so odd means once.
  * - The two discriminants b1² - b0 b2 and a1² - a0 a2 are the same number D. At a root the patch's Jacobian in the
@@ -19,15 +19,15 @@
  *   patch's silhouette, whose two points then differ by less than 1e-8; all cells of the face decide it from the same
  *   numbers.
  * If b0 and b2 differ in sign, D is a sum of two positive terms, and a root is a quotient of sums of terms of one sign:
- * nothing cancels. So what is computed in double from the corners' float32 is exact except for rounding, however
- * edge-on, thin or warped the quad is: the crossings of two quads at their common edge come in the order given by the
- * corners' float32 positions. Therefore a ray's intervals do not overlap.
+ * nothing cancels. So a point that is computed in double from the corners' float32 positions has only rounding errors
+ * of double, even if the quad is almost parallel to the ray, thin or warped: near the common edge of two quads, a ray's
+ * crossings come in the order that follows from the float32 positions. Therefore a ray's intervals do not overlap.
  *
  * If B(r) = 0 for all r, the ray runs along the patch (along an edge, or a ruling), and the point is the limit of those
  * of rays moved by (e, e²), as kernel_cell.h defines for ties: there B(r) is -e times the y of w - u.
  *
- * Most rays meet a quad well inside and not nearly edge-on. Newton's method in float32 is then accurate enough, because
- * no other crossing of the cell is near. */
+ * Most rays meet a quad far from its border, and not at a small angle. Newton's method in float32 is then accurate
+ * enough, because no other crossing of the cell is near. */
 #ifndef RENDER_KERNEL_QUAD_H
 #define RENDER_KERNEL_QUAD_H
 
@@ -40,8 +40,8 @@
 #include "kernel_shapes.h"
 #include "simd.h"
 
-/* A quad's corners, projected along each ray, and the edge functions of its sides. e01 is that from corner 0 to corner
- * 1; the sign bits are exact. */
+/* A quad. x, y: projected corners, relative to each ray; z: depths of the corners; e01, e32, e03, e12: edge functions
+ * of the four sides, e01 from corner 0 to corner 1 and so on, with exact sign bits. */
 typedef struct kernel_quad {
     vf x[4], y[4], z[4];
     vf e01, e32, e03, e12;
@@ -69,7 +69,8 @@ static inline bool kernel_is_negative(vf v, int lane)
     return __builtin_signbit(v[lane]) != 0;
 }
 
-/* Returns the cross product of corners i and j in double, which has a single rounding for float32 corners. */
+/* Returns the cross product of corners i and j in double. The products of float32 numbers are exact, so only their
+ * difference is rounded. */
 static inline double kernel_scalar_cross(const kernel_quad *q, int lane, int i, int j)
 {
     return (double)q->x[i][lane] * (double)q->y[j][lane] - (double)q->x[j][lane] * (double)q->y[i][lane];
@@ -107,8 +108,8 @@ static inline double kernel_scalar_discriminant(const kernel_scalar_quadratic *c
     return d > 0 ? d : 0;
 }
 
-/* Returns the root x in [0, 1] of the quadratic at which half of its derivative equals `turn`. There are two formulas
- * for the root; the one in which digits do not cancel is used. */
+/* Returns the root x in [0, 1] of the quadratic at which half of its derivative equals `turn` (plus or minus the square
+ * root of the discriminant). There are two formulas for the root; the one in which digits do not cancel is used. */
 static inline double kernel_scalar_root(const kernel_scalar_quadratic *c, double turn)
 {
     const bool is_sum = c->c1 * turn <= 0;
@@ -124,8 +125,9 @@ static inline double kernel_scalar_zero(double v0, double v1)
     return x >= 0 ? fmin(x, 1) : 0;
 }
 
-/* Returns the root of the quadratic A or B (see the top of this file) as a limit, for a quadratic that is zero for all
- * parameters. The two lines are from corner i to i2 and from corner j to j2. */
+/* Returns the patch's parameter for a quadratic A or B (see the top of this file) that is zero for all parameters, as
+ * the limit for rays that are moved by (e, e²). The quad's two sides at the ends of the parameter's range are from
+ * corner i to i2 and from corner j to j2. */
 static inline double kernel_scalar_limit(const kernel_quad *q, int lane, int i, int i2, int j, int j2)
 {
     double x[4], y[4];
@@ -134,8 +136,8 @@ static inline double kernel_scalar_limit(const kernel_quad *q, int lane, int i, 
     return y0 != y1 ? kernel_scalar_zero(y0, y1) : kernel_scalar_zero(x[i2] - x[i], x[j2] - x[j]);
 }
 
-/* Computes one lane of the point of the patch at which the patch's Jacobian has the sign of `root`.
- * The magnitude of root is the square root of the discriminant D. */
+/* Computes, for one lane, the point of the patch at which the patch's Jacobian J has the sign of `root`. The magnitude
+ * of root is the square root of the discriminant D. */
 static inline void kernel_scalar_point(const kernel_quad *q, int lane, const kernel_scalar_quadratic *a,
                                        const kernel_scalar_quadratic *b, double root, kernel_point *out)
 {
@@ -149,7 +151,7 @@ static inline void kernel_scalar_point(const kernel_quad *q, int lane, const ker
     out->t[lane] = (float)((1 - r) * ((1 - s) * z[0] + s * z[1]) + r * ((1 - s) * z[3] + s * z[2]));
 }
 
-/* Computes the point of a ray that crosses exactly one of the two triangles. */
+/* Computes the point at which a ray that crosses exactly one of the quad's two triangles meets the patch. */
 static inline void kernel_scalar_single_point(const kernel_quad *q, int lane, kernel_point *out)
 {
     const kernel_scalar_quadratic a = kernel_scalar_a(q, lane), b = kernel_scalar_b(q, lane);
@@ -166,7 +168,8 @@ static inline bool kernel_scalar_may_have_two_roots(const kernel_scalar_quadrati
     return !kernel_scalar_changes_sign(c) && (c->is_negative0 ? c->c1 > 0 : c->c1 < 0);
 }
 
-/* Computes the two points of a ray that crosses both triangles or none. Returns false if it does not meet the patch. */
+/* Computes the two points at which a ray that crosses both triangles or none meets the patch. Returns false if it does
+ * not meet the patch. */
 static inline bool kernel_scalar_two_points(const kernel_quad *q, int lane, kernel_point out[2])
 {
     const kernel_scalar_quadratic a = kernel_scalar_a(q, lane), b = kernel_scalar_b(q, lane);
@@ -178,16 +181,17 @@ static inline bool kernel_scalar_two_points(const kernel_quad *q, int lane, kern
     return true;
 }
 
-/* Computes the points of the wanted rays, each of which crosses exactly one of the two triangles. They are few:
- * Newton's method in float32 is accurate enough for most rays (kernel_patch_converged()). */
+/* Computes in double the points at which the wanted rays, each of which crosses exactly one of the two triangles, meet
+ * the patch. These rays are few: Newton's method in float32 is accurate enough for most rays
+ * (kernel_patch_converged()). */
 static __attribute__((noinline)) void kernel_quad_single_point(const kernel_quad *q, vm wanted, kernel_point *out)
 {
     for (unsigned bits = vm_bits(wanted); bits; bits &= bits - 1)
         kernel_scalar_single_point(q, __builtin_ctz(bits), out);
 }
 
-/* Computes the points of the wanted rays that meet the patch twice: one in out[0], the other in out[1]. Returns these
- * rays. */
+/* Computes the points of those of the wanted rays that meet the patch twice: one in out[0], the other in out[1].
+ * Returns these rays. */
 static __attribute__((noinline, cold)) vm kernel_quad_two_points(const kernel_quad *q, vm wanted, kernel_point out[2])
 {
     unsigned found = 0;
@@ -200,12 +204,14 @@ static __attribute__((noinline, cold)) vm kernel_quad_two_points(const kernel_qu
 
 /* ---- a packet, in float32 ---- */
 
-/* The patch as corner 0 (a), the edges to corner 1 (e) and to corner 3 (g), and corner 0 - 1 + 2 - 3 (h), in the ray's
- * plane; ez and gz are the largest extents of the edges along the ray. */
+/* The patch's point, relative to the ray, is a + s e + r g + s r h. a: corner 0; e: corner 1 - corner 0; g: corner 3 -
+ * corner 0; h: corner 0 - corner 1 + corner 2 - corner 3. ez and gz: larger extent in depth of the two sides along s,
+ * and of the two along r. */
 typedef struct kernel_patch {
     vf ax, ay, ex, ey, gx, gy, hx, hy;
     vf ez, gz;
-    /* derivatives at the parameters (s, r), their determinant, and the distance from the point to the ray */
+    /* sx, sy, rx, ry: derivatives of the patch's point along s and along r, at the current parameters (s, r); det:
+     * their determinant; dx, dy: vector from the point to the ray */
     vf sx, sy, rx, ry, det, dx, dy;
 } kernel_patch;
 
@@ -227,8 +233,8 @@ SIMD_INLINE void kernel_patch_evaluate(kernel_patch *p, vf s, vf r)
     p->det = p->sx * p->ry - p->sy * p->rx;
 }
 
-/* Number of steps of Newton's method that compute a ray's point on the patch. The parameters are clamped to [0, 1].
- * Each step squares the error, so that four steps reduce it from 0.2 to 1e-9. */
+/* Number of steps of Newton's method by which the parameters (s, r) of a ray's point are computed; they are clamped to
+ * [0, 1]. Each step squares the error, so that four steps reduce it from 0.2 to 1e-9. */
 enum { KERNEL_PATCH_STEPS = 4 };
 
 SIMD_INLINE void kernel_patch_step(kernel_patch *p, vf *s, vf *r)
@@ -241,9 +247,10 @@ SIMD_INLINE void kernel_patch_step(kernel_patch *p, vf *s, vf *r)
 }
 
 /* Returns the rays whose points are accurate: the distance from the point to the ray is at most float32's resolution of
- * the quad's size. Three kinds of rays are excluded: those for which the quad is so steep that the error along the ray
- * would be 8 times as large, those for which it is nearly folded, and those whose point is so near the quad's border
- * that a neighbouring face's crossing, with an error of 1e-6 of the face's size, could come in the wrong order. */
+ * the quad's size. Three kinds of rays are excluded: those that meet the quad at so small an angle that the error along
+ * the ray would be 8 times as large, those for which the projected quad is nearly folded, and those whose point is so
+ * near the quad's border that it and a neighbouring face's crossing, with errors of 1e-6 of the face's size, could come
+ * in the wrong order. */
 SIMD_INLINE vm kernel_patch_converged(kernel_patch *p, vf s, vf r)
 {
     const vf one = vf_set(1);
@@ -255,8 +262,9 @@ SIMD_INLINE vm kernel_patch_converged(kernel_patch *p, vf s, vf r)
     return vm_and(inside, vf_le(vf_abs(p->dx) + vf_abs(p->dy), (e + g) * 1.2e-7f));
 }
 
-/* Returns a first guess of the patch parameter s or r: the relative distance of the ray from two opposite sides of the
- * quad, computed from the areas of the triangles that it forms with each. */
+/* Returns a first guess of the patch parameter s or r: the distance of the ray from one side of the quad, divided by
+ * the sum of its distances from this and the opposite side. Instead of distances, the areas of the triangles that the
+ * ray forms with the sides are used. The first side has the corners i and j, the opposite one k and l. */
 SIMD_INLINE vf kernel_quad_between(const kernel_quad *q, int i, int j, int k, int l)
 {
     const vf near = vf_abs(q->x[i] * q->y[j] - q->x[j] * q->y[i]), far = vf_abs(q->x[k] * q->y[l] - q->x[l] * q->y[k]);
@@ -264,7 +272,8 @@ SIMD_INLINE vf kernel_quad_between(const kernel_quad *q, int i, int j, int k, in
     return vf_select(vf_lt(vf_set(0), sum), near / sum, vf_set(0.5f));
 }
 
-/* Computes the points of rays that meet no edge. The edge functions are computed from the projected corners. */
+/* Computes the points of the wanted rays as kernel_quad_single_point() does, for rays that meet no edge. The edge
+ * functions need not be set: they are computed from the projected corners. */
 static __attribute__((noinline)) void kernel_quad_single_point_off_edges(const kernel_quad *q, vm wanted,
                                                                          kernel_point *out)
 {
@@ -276,9 +285,10 @@ static __attribute__((noinline)) void kernel_quad_single_point_off_edges(const k
     kernel_quad_single_point(&own, wanted, out);
 }
 
-/* Computes the points at which rays meet the patches of `count` quads. once[n] has the rays that cross exactly one
- * triangle of quad n. Quads are processed together because each step of Newton's method depends on the one before.
- * are_off_edges: set if no ray meets an edge; the quads' edge functions are then not read and need not be set. */
+/* Computes the points at which rays meet the patches of `count` (1 or 2) quads. once[n]: the rays that cross exactly
+ * one triangle of quad n. Two quads are processed alternately, because each step of Newton's method waits for the
+ * result of the one before. are_off_edges: set if no ray meets an edge; the quads' edge functions are then not read and
+ * need not be set. */
 SIMD_INLINE void kernel_quads_cross(const kernel_quad *q, int count, const vm once[2], bool are_off_edges,
                                     kernel_point *out)
 {
@@ -305,8 +315,8 @@ SIMD_INLINE void kernel_quads_cross(const kernel_quad *q, int count, const vm on
     }
 }
 
-/* Returns the rays that may meet the patch twice, by the signs of its sides alone. A ray that crosses exactly one
- * triangle is never among them. */
+/* Returns those of the rays that may meet the patch twice, as far as the signs of the edge functions of its sides tell.
+ * A ray that crosses exactly one triangle is never among them. */
 SIMD_INLINE vm kernel_quad_sides(vm rays, vf e01, vf e32, vf e03, vf e12)
 {
     const vi b = vi_from_bits(e01) ^ vi_from_bits(e32), a = vi_from_bits(e03) ^ vi_from_bits(e12);
@@ -319,8 +329,8 @@ SIMD_INLINE vf kernel_flip_sign(vf v, vf other)
     return vf_from_bits(vi_from_bits(v) ^ (vi_from_bits(other) & vi_set((int32_t)0x80000000u)));
 }
 
-/* Returns those of the rays given by kernel_quad_sides() that may still meet the patch twice when the middle
- * coefficients are tested, too. */
+/* Returns those of the rays that may meet the patch twice if the signs of a1 and b1 are considered too. rays: the
+ * result of kernel_quad_sides(). */
 SIMD_INLINE vm kernel_quad_may_cross_twice(const kernel_quad *q, vm rays)
 {
     const vf across = vf_diff_of_products(q->x[0], q->y[2], q->x[2], q->y[0]);
@@ -341,9 +351,9 @@ SIMD_INLINE vm kernel_cross_one_triangle(const vm around[4], vm side)
     return vm_xor(half0, half1);
 }
 
-/* Returns the rays that may still meet a quad's patch twice when the discriminant is tested, too. A ray is excluded
- * only if the discriminant is negative by more than its rounding in float32, which is below a millionth of its
- * terms. */
+/* Returns those of the rays that may meet a quad's patch twice if the discriminant is considered too. across, other:
+ * cross products of corners 0 and 2, and of corners 3 and 1. A ray is excluded only if the discriminant is negative by
+ * more than its rounding in float32, which is below a millionth of its terms. */
 static __attribute__((noinline)) vm kernel_curved_may_cross_twice_by_discriminant(const vf x[8], const vf y[8],
                                                                                   const signed char *loop, vm rays,
                                                                                   vf across, vf other)
@@ -354,9 +364,10 @@ static __attribute__((noinline)) vm kernel_curved_may_cross_twice_by_discriminan
     return vm_andnot(rays, vf_lt(b1 * b1 - product, -1e-6f * (most * most + vf_abs(product))));
 }
 
-/* Returns the rays that may meet a quad's patch twice: those of kernel_quad_may_cross_twice() and a few more. loop:
- * corners 0 to 3 in cyclic order; side[i]: side of the edge from corner i to the next. Only rays that are on different
- * sides of opposite edges are tested. */
+/* Returns the rays that may meet a quad's patch twice: those of kernel_quad_may_cross_twice() and, because of rounding,
+ * a few more. x, y: projected vertices; loop: corners 0 to 3 in cyclic order; side[i]: the rays on the negative side of
+ * the edge from corner i to the next. Only rays that are on different sides of opposite edges, taken in cyclic order,
+ * can meet it twice. */
 SIMD_INLINE vm kernel_curved_may_cross_twice(const vf x[8], const vf y[8], const signed char *loop, vm rays,
                                              const vm side[4])
 {
@@ -372,7 +383,7 @@ SIMD_INLINE vm kernel_curved_may_cross_twice(const vf x[8], const vf y[8], const
 }
 
 /* Computes the points at which rays meet the patch. Rays in `once` meet it once; rays in `twice` meet it twice or
- * never. Returns how many entries of out are set, 0 to 2. */
+ * never. Returns how many entries of `out` are set, 0 to 2. Rays that meet it twice have a point in both. */
 SIMD_INLINE int kernel_quad_points(const kernel_quad *q, vm once, vm twice, kernel_point out[2])
 {
     int count = 0;
@@ -391,13 +402,12 @@ SIMD_INLINE int kernel_quad_points(const kernel_quad *q, vm once, vm twice, kern
     return vm_any(out[1].mask) ? 2 : count;
 }
 
-/* ---- quads that look convex, one cell per lane ----
- * Seen along a ray, a quad is convex if all its corners turn in the same direction; otherwise it looks folded or
- * dented. A ray crosses a convex quad once if it is on the same side of all four edges, else never: neither the quad's
- * diagonal nor the curvature of its patch need be tested. The turn at a corner is p × q of the projected edges p and q
- * there, which is N · (u, v, 1) with their normal N = p × q in space and the ray's slopes u and v. Over a box of rays
- * it differs from the middle ray's by at most |Nx| half width + |Ny| half height, which is no more than |p| |q| (half
- * width + half height).
+/* ---- quads that look convex, one cell per lane ---- A quad looks convex along a ray if, going around the projected
+ * quad, all its corners turn in the same direction. A ray crosses a convex quad once if it is on the same side of all
+ * four edges, else never: neither the quad's diagonal nor the curvature of its patch need be tested. The turn at a
+ * corner is p × q of the projected edges p and q there, which is N · (u, v, 1) with their normal N = p × q in space and
+ * the ray's slopes u and v. Over a box of rays (the rays through a rectangle of pixels) it differs from the middle
+ * ray's by at most |Nx| half width + |Ny| half height, which is no more than |p| |q| (half width + half height).
  *
  * Rounding: let l be the longest edge, h the sum of the largest |u| and |v|, and S a bound of positions minus origins
  * plus slopes times depth. A projected edge is no longer than k = sqrt(2 + h h) l, as |x| + |y| + h |z|. A vertex
@@ -426,8 +436,9 @@ SIMD_INLINE vm kernel_quad_is_convex(const vf (*edge)[2], const vf *square, vf s
     return vm_or(left, right);
 }
 
-/* Returns a mask of the quads that may look other than convex along some ray of a box. slope and origin: [axis][end]
- * has those of the first and the last ray along each axis of the tile. */
+/* Returns, per lane, a mask of the cell's faces with the bits of the quads that may not look convex along some ray of a
+ * box. at: x, y, z of the cells' vertices. slope and origin: [axis][end] has those of the first and the last ray of the
+ * box along each axis of the tile. */
 SIMD_INLINE vi kernel_curved_nonconvex_quads(vf (*const at)[8], vf (*const slope)[2], vf (*const origin)[2], int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);

@@ -11,8 +11,8 @@
 enum { KERNEL_TET_EDGES = 6 };
 static const signed char kernel_tet_edge[KERNEL_TET_EDGES][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
 
-/* For each face of a tet (without vertex 3, 2, 1, 0): its vertices i, j, k, then the numbers of its edges ij, jk,
- * ik. */
+/* The faces of a tet; face n does not have vertex 3 - n. For each face: its vertices i, j, k, then the numbers of the
+ * edges ij, jk and ik in kernel_tet_edge. */
 static const signed char kernel_tet_face[4][6] = {
     {0, 1, 2, 0, 3, 1}, {0, 1, 3, 0, 4, 2}, {0, 2, 3, 1, 5, 2}, {1, 2, 3, 3, 5, 4}};
 
@@ -25,14 +25,15 @@ typedef struct kernel_shape {
     struct {
         int count;
         signed char vertices[4];
-        /* for each side of the face, the number of its edge, and whether the edge has the opposite direction */
+        /* for the side from each vertex of the face to the next: the number of the cell's edge along it, and 1 if that
+         * edge has the opposite direction, otherwise 0 */
         signed char sides[4][2];
     } faces[6];
     float corners[GRID_MAX_CELL_VERTICES][3]; /* reference coordinates of the vertices */
 } kernel_shape;
 
-/* The shapes of the hex, the wedge and the pyramid. A pyramid's vertices have the coordinates a = (1-q) r, b = (1-q) s,
- * k = 1-q (kernel_map.h). */
+/* The shapes of the hex, the wedge and the pyramid. The reference coordinates of a pyramid's vertices are a, b and k of
+ * kernel_map.h: k is 0 at the apex and 1 at the base. */
 static const kernel_shape kernel_shapes[3] = {
     {12,
      {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {4, 5}, {5, 6}, {6, 7}, {7, 4}, {0, 4}, {1, 5}, {2, 6}, {3, 7}},
@@ -69,11 +70,12 @@ SIMD_INLINE const kernel_shape *kernel_cell_shape(int type)
     return &kernel_shapes[kernel_shape_number(type)];
 }
 
-/* Magnitude of an edge function below which errors of its products may be too small to be represented in float32. */
+/* Magnitude of an edge function (kernel_cell.h) below which its sign may be wrong in float32, because the rounding
+ * errors of its products may underflow. */
 #define KERNEL_EDGE_LEAST 1e-30f
 
-/* Sets the sign bit for the rays that are on the same side of all edges of a face with `count` edges. around: the sides
- * on which the rays lie, in the signs of the edge functions. */
+/* Returns a vector whose sign bits are set for the rays that are on the same side of all edges of a face with `count`
+ * edges. around: edge functions of the face's edges, in cyclic order; only their sign bits are used. */
 SIMD_INLINE vi kernel_sides_agree(const vi around[4], int count)
 {
     vi differ = (around[0] ^ around[1]) | (around[1] ^ around[2]);
@@ -81,7 +83,8 @@ SIMD_INLINE vi kernel_sides_agree(const vi around[4], int count)
     return ~differ;
 }
 
-/* Returns the reference coordinate on an axis, which is 0 or 1, of each ray's vertex number `corner`. */
+/* Returns one of a vertex's reference coordinates, which is 0 or 1. corner: number of the vertex for each ray; axis: 0,
+ * 1 or 2. */
 SIMD_INLINE vf kernel_curved_vertex_coordinate(const kernel_shape *shape, int count, int axis, vi corner)
 {
     int bits = 0;
@@ -89,8 +92,9 @@ SIMD_INLINE vf kernel_curved_vertex_coordinate(const kernel_shape *shape, int co
     return vf_from_vi(vi_set(bits) >> corner & 1);
 }
 
-/* Returns the rays whose n-th crossed face (0: the first, 1: the last of two) is a quad. Faces are compared by their
- * numbers in the shape: a wedge's triangles and a pyramid's quad come first. */
+/* Returns the rays for which `face`, the number of a crossed face, is that of a quad. Each ray crosses two faces; n: 0
+ * for the one of smaller number, 1 for the other. In a wedge, faces 0 and 1 are triangles. In a pyramid, face 0 is the
+ * only quad, so that it is never the second. */
 SIMD_INLINE vm kernel_curved_on_quad(int type, int n, vi face)
 {
     const vf number = vf_from_vi(face);
@@ -98,8 +102,8 @@ SIMD_INLINE vm kernel_curved_on_quad(int type, int n, vi face)
                            n ? vm_none() : vf_lt(number, vf_set(0.5f)));
 }
 
-/* Calls a function whose last argument is the cell type, and passes the type as a constant. If the function is inlined,
- * its loops then have constant lengths. */
+/* Calls a function whose last argument is the cell type, and passes the type as a compile-time constant, so that loops
+ * over vertices or faces have constant lengths if the function is inlined. */
 #define KERNEL_OF_TYPE(type, function, ...)                                                                            \
     KERNEL_BY_SHAPE(type, function(__VA_ARGS__, GRID_HEX), function(__VA_ARGS__, GRID_WEDGE),                          \
                     function(__VA_ARGS__, GRID_PYRAMID))

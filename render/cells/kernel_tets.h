@@ -1,6 +1,6 @@
-/* Crossings of rays with tets: four triangles, of which a ray crosses two or none (kernel_cell.h). The same source is
- * compiled for a packet of rays and one tet, and for rays that have a tet each: kernel_tets.is_one is a compile-time
- * constant wherever these functions are inlined. */
+/* Computes the interval of rays in tets. A ray crosses two or none of a tet's four faces (kernel_cell.h). The same
+ * source is compiled for a packet of rays that share one tet, and for rays that each have a tet of their own:
+ * kernel_tets.is_one is a compile-time constant wherever these functions are inlined. */
 #ifndef RENDER_KERNEL_TETS_H
 #define RENDER_KERNEL_TETS_H
 
@@ -14,8 +14,8 @@
 #include "kernel_tile_trace.h"
 #include "simd.h"
 
-/* Rays with tets: a packet of rays that share one tet, or rays that have a tet each, in the lane of a vector of
- * tets. */
+/* Rays and their tets. is_one: `packet` has the rays, and all share the tet `one`. Otherwise lane_rays has the rays,
+ * and each has its own tet, in the lane lane_rays->lane of `transformed`. */
 typedef struct kernel_tets {
     bool is_one;
     const kernel_packet *packet;
@@ -60,7 +60,7 @@ SIMD_INLINE void kernel_tets_edges_projected(const kernel_tets *t, vf e[KERNEL_T
     }
 }
 
-/* Recomputes the edge functions whose sign is uncertain from projected vertices, which gives the exact sign. */
+/* Replaces the edge functions whose sign is uncertain by those of the projected vertices, whose signs are exact. */
 static __attribute__((noinline)) void kernel_tets_in_double(const kernel_tets *t, vf e[KERNEL_TET_EDGES])
 {
     vf exact[KERNEL_TET_EDGES];
@@ -71,8 +71,8 @@ static __attribute__((noinline)) void kernel_tets_in_double(const kernel_tets *t
     }
 }
 
-/* Computes the edge functions on the rays. is_pencil: the tile's own primary rays, for which edges have affine
- * functions (kernel_cell.h). */
+/* Computes the edge functions e of the tets' six edges on the rays. is_pencil: set if the rays are the tile's own
+ * primary rays, for which the edges' lines are valid (kernel_cell.h). */
 SIMD_INLINE void kernel_tets_edges(const kernel_tets *t, vm rays, bool is_pencil, vf e[KERNEL_TET_EDGES])
 {
     const vf u = t->is_one ? t->packet->u : t->lane_rays->u, v = t->is_one ? t->packet->v : t->lane_rays->v;
@@ -95,7 +95,7 @@ SIMD_INLINE void kernel_tets_edges(const kernel_tets *t, vm rays, bool is_pencil
     }
 }
 
-/* Finds the rays that cross each of a tet's four faces, in the order of kernel_tet_face. */
+/* Sets hit[n] to those of the rays that cross face n of their tets (kernel_tet_face). */
 SIMD_INLINE void kernel_tets_faces(vm rays, const vf e[KERNEL_TET_EDGES], vm hit[4])
 {
     for (int n = 0; n < 4; n++) {
@@ -104,7 +104,9 @@ SIMD_INLINE void kernel_tets_faces(vm rays, const vf e[KERNEL_TET_EDGES], vm hit
     }
 }
 
-/* Sums of numbers at the vertices of a crossed triangle, weighted by the edge functions (kernel_cell.h). */
+/* At the crossings of a face: the sums of the depths, values and colour values of the face's three vertices, each
+ * multiplied by the vertex's weight (kernel_cell.h), and the sum of the weights. A sum divided by the sum of the
+ * weights is the number at the crossing. */
 typedef struct kernel_sums {
     vf depth, value, colour, weight;
 } kernel_sums;
@@ -114,7 +116,8 @@ typedef struct kernel_sums {
               vf_muladd(-(ik), KERNEL_TET_NUMBER(t, of_one[(int)(face)[1]], of_transformed[(int)(face)[1]]),           \
                         (jk)*KERNEL_TET_NUMBER(t, of_one[(int)(face)[0]], of_transformed[(int)(face)[0]])))
 
-/* Returns the weighted sums for a face. has_colour: the colour field is included, which only a single tet has. */
+/* Returns the weighted sums of a face (kernel_sums). face: its entry of kernel_tet_face; ij, jk, ik: its edge
+ * functions; has_colour: set if the colour field is included, for which all rays must share one tet. */
 SIMD_INLINE kernel_sums kernel_tets_sums(const kernel_tets *t, const signed char *face, vf ij, vf jk, vf ik,
                                          bool has_colour)
 {
@@ -130,7 +133,8 @@ SIMD_INLINE kernel_sums kernel_sums_select(vm m, const kernel_sums *a, const ker
                          vf_select(m, a->colour, b->colour), vf_select(m, a->weight, b->weight)};
 }
 
-/* Selects, for each ray, the first and the last of the four faces that it crosses; either may be the nearer one. */
+/* Selects, for each ray, the sums of the two faces that it crosses: that of smaller number in ends[0], the other in
+ * ends[1]. Either may be the nearer one. */
 SIMD_INLINE void kernel_tets_choose(const vm hit[4], const kernel_sums sums[4], kernel_sums ends[2])
 {
     const kernel_sums a = kernel_sums_select(hit[1], &sums[1], &sums[2]);
@@ -139,7 +143,8 @@ SIMD_INLINE void kernel_tets_choose(const vm hit[4], const kernel_sums sums[4], 
     ends[1] = kernel_sums_select(hit[3], &sums[3], &b);
 }
 
-/* Divides each crossing's sums by its weight, and stores the nearer crossing as the entry, the other as the exit. */
+/* Computes depth and values of both crossings by dividing their sums by the sum of the weights. The nearer crossing
+ * becomes the begin of the interval (t_in and so on), the other its end. */
 SIMD_INLINE void kernel_tets_order(const kernel_sums ends[2], bool has_colour, kernel_interval *out)
 {
     const vf scale_a = 1.0f / ends[0].weight, scale_b = 1.0f / ends[1].weight;
@@ -156,14 +161,14 @@ SIMD_INLINE void kernel_tets_order(const kernel_sums ends[2], bool has_colour, k
     out->w_out = vf_select(swap, w_a, w_b);
 }
 
-/* Returns the rays that cross face n but whose sum of weights is too small to be accurate. */
+/* Returns those of the rays that cross face n (hit) whose sum of weights is too small for an accurate crossing. */
 SIMD_INLINE vm kernel_tets_inaccurate(const kernel_tets *t, int n, vm hit, vf weight)
 {
     return vm_and(hit, vf_lt(vf_abs(weight), KERNEL_TET_NUMBER(t, least[n], least[n])));
 }
 
-/* Selects the crossings as kernel_tets_choose() does, with edge functions of projected vertices for rays whose weights
- * are not accurate enough. */
+/* Computes the sums of the two crossed faces, as kernel_tets_choose() selects them. For rays whose weights are not
+ * accurate enough, the edge functions of projected vertices are used. */
 SIMD_INLINE void kernel_tets_choose_in_double(const kernel_tets *t, vm rays, const vf e[KERNEL_TET_EDGES],
                                               bool has_colour, kernel_sums ends[2])
 {
@@ -200,8 +205,9 @@ kernel_tets_recompute(const kernel_tets *t, vm rays, const vf e[KERNEL_TET_EDGES
         kernel_tets_choose_in_double(&several, rays, e, false, ends);
 }
 
-/* Computes where the rays enter and leave their tets, and the values there. It computes the sums of all four faces
- * without branches, and selects those of the first and the last face that each ray crosses. */
+/* Computes the depths at which the rays enter and leave their tets, and the values there. The weighted sums
+ * (kernel_sums) of all four faces are computed without branches; then those of the two faces that each ray crosses are
+ * selected. */
 SIMD_INLINE void kernel_tets_interval(const kernel_tets *t, vm rays, bool is_pencil, bool has_colour,
                                       kernel_interval *out)
 {

@@ -1,8 +1,9 @@
 /* Reads, sorts and transforms hexes, wedges or pyramids of one type, one per lane, and computes the edge functions of
  * their triangular faces. The operations are those of kernel_cell_relative(), kernel_transform_in_tile(),
- * kernel_cell_order() and kernel_curved_lines(), and so the results have the same bits. Vertices are sorted by
- * coordinates first, so that everything computed from them is in order. Computations in double are done in two halves
- * of the lanes. Callers pass the type as a constant, so that loops have constant lengths. */
+ * kernel_cell_order() and kernel_curved_lines(), so the results are bit-identical. Vertices are put in canonical order
+ * first (kernel_cell_canonical_order()), so that all data are stored in that order. Computations in double are done for
+ * one half of the lanes (kernel_wide.h) after the other. Callers pass the type as a constant, so that loops have
+ * constant lengths. */
 #ifndef RENDER_KERNEL_TRANSFORMED_CURVED_H
 #define RENDER_KERNEL_TRANSFORMED_CURVED_H
 
@@ -28,24 +29,27 @@ enum {
 
 /* Transformed cells of one type, one per lane. */
 typedef struct kernel_transformed_curved {
-    float at[4][8][SIMD_WIDTH]; /* x, y, z in tile space, and the field minus the isovalue, scaled; by vertex */
-    /* For each face, a word that lists its corners, four bits each, in the order of kernel_quad_corners() or
-     * kernel_triangle_order(). */
+    /* x, y, z in tile space, and the field minus the isovalue, scaled (kernel_cell_relative()); by vertex and lane */
+    float at[4][8][SIMD_WIDTH];
+    /* By face and lane, a word with the vertex numbers of the face's corners, four bits each, from bit 0 on. Quads are
+     * in the order of kernel_quad_corners(), triangles in the order of coordinates (kernel_triangle_order()). */
     int32_t corners[KERNEL_CURVED_FACES * SIMD_WIDTH];
-    /* Edge functions of the triangular faces, in the shape's order. A triangle's corners are i, j, k in the order of
-     * coordinates. Its four rows are the members c, cu, cv and bound of kernel_line, each for the edges ij, jk and ik
-     * from the smaller vertex. */
+    /* Lines of the triangular faces, which come in the order of the faces in kernel_shape. By triangle: the members c,
+     * cu, cv and bound of kernel_line, each for the edges ij, jk and ik, where i, j, k are the triangle's corners in
+     * the order of coordinates. */
     float triangles[KERNEL_MAX_TRIANGLES][4][3][SIMD_WIDTH];
-    /* least sum of weights of each triangle that is accurate enough (kernel_triangle_least()) */
+    /* for each triangle, the sum of weights from which on its crossings are accurate (kernel_triangle_least()) */
     float least[KERNEL_MAX_TRIANGLES][SIMD_WIDTH];
-    unsigned cuboids; /* mask of the lanes with a hex whose edges are parallel to the axes */
+    unsigned cuboids; /* mask of the lanes with a hex whose edges are parallel to the world axes */
     /* The following two members are used only for segments of volumes (kernel_local_crossings.h). Per cell, a bit for
      * each quad that may not look convex on some of the cell's pixels (kernel_curved_nonconvex_quads()). */
     float nonconvex[SIMD_WIDTH];
-    /* for vectors of 16 lanes, the cells' data per cell, in three rows of 16 numbers: x and y by vertex; z and the
-     * field by vertex; the corners' words by face */
+    /* for vectors of 16 lanes: a copy of the data, cell by cell instead of lane by lane, in three rows of 16 numbers: x
+     * and y by vertex; z and the field by vertex; `corners` by face */
     float rows[SIMD_WIDTH < KERNEL_LOCAL_ROW ? 1 : SIMD_WIDTH][KERNEL_LOCAL_ROWS][KERNEL_LOCAL_ROW];
-    /* The following members are used only by kernel_transformed_curved_cell(), which extracts one lane's cell. */
+    /* The following members are used only by kernel_transformed_curved_cell(), which copies one lane's cell. world:
+     * coordinates by vertex and axis, in two halves of the lanes; rank: rank in the order of coordinates; vertex: index
+     * in the mesh. */
     kernel_f64 world[8][3][2];
     int32_t rank[8][SIMD_WIDTH], vertex[8][SIMD_WIDTH];
 } kernel_transformed_curved;
@@ -58,9 +62,9 @@ SIMD_INLINE int kernel_first_triangle(int type)
 
 /* ---- numbers of each ray's own cell ---- */
 
-/* Returns of[corner][lane] for each ray: the number that `of` contains for vertex (or face) `corner` of the cell in
- * `lane`. Cells have `count` vertices (or faces). With 16 lanes, permutations of all rows are faster than a gather;
- * with 8 they are slower. */
+/* Returns of[corner][lane] for each ray: the number of vertex (or face) `corner` of the cell in `lane`. Cells have
+ * `count` vertices (or faces). With 16 lanes, permutations of all rows are faster than a gather; with 8 they are
+ * slower. */
 SIMD_INLINE vf kernel_curved_gather_vertex(const float (*of)[SIMD_WIDTH], int count, vi lane, vi corner)
 {
     if (SIMD_WIDTH < 16) return vf_gather(of[0], corner * SIMD_WIDTH + lane);
@@ -99,8 +103,8 @@ SIMD_INLINE void kernel_sorted_curved_rank(kernel_sorted_vertices *h, bool is_na
         }
 }
 
-/* Permutes a hex's vertices: the smallest comes first, then the axes are ordered by the ranks of its three
- * neighbours. */
+/* Permutes a hex's vertices: the one of smallest rank becomes vertex 0. The reference coordinates are then exchanged so
+ * that the ranks of its three neighbours along them increase. */
 SIMD_INLINE void kernel_sorted_curved_hex(kernel_sorted_vertices *h, bool is_narrow)
 {
     /* vertex number for the bits of its reference coordinates x, y, z */
@@ -123,7 +127,8 @@ SIMD_INLINE void kernel_sorted_curved_hex(kernel_sorted_vertices *h, bool is_nar
     }
 }
 
-/* Permutes a wedge's vertices: the smallest comes first, then its smaller neighbour in its triangle. */
+/* Permutes a wedge's vertices: the one of smallest rank becomes vertex 0, the neighbour of smaller rank in its triangle
+ * vertex 1. */
 SIMD_INLINE void kernel_sorted_curved_wedge(kernel_sorted_vertices *h, bool is_narrow)
 {
     vm over = vm_none();
@@ -139,8 +144,8 @@ SIMD_INLINE void kernel_sorted_curved_wedge(kernel_sorted_vertices *h, bool is_n
     kernel_sorted_curved_swap(h, is_narrow, swap, 4, 5);
 }
 
-/* Permutes a pyramid's vertices: the smallest vertex of the base comes first, then its smaller neighbour in the base;
- * the apex stays last. */
+/* Permutes a pyramid's vertices: the vertex of the base of smallest rank becomes vertex 0, its neighbour of smaller
+ * rank in the base vertex 1; the apex stays last. */
 SIMD_INLINE void kernel_sorted_curved_pyramid(kernel_sorted_vertices *h, bool is_narrow)
 {
     const vf least = vf_min(vf_min(h->rank[0], h->rank[1]), vf_min(h->rank[2], h->rank[3]));
@@ -163,8 +168,8 @@ SIMD_INLINE void kernel_sorted_curved_sort(kernel_sorted_vertices *h, bool is_na
         kernel_sorted_curved_pyramid(h, is_narrow);
 }
 
-/* Returns the lanes with an edge of length zero: a face has collapsed (kernel_quad_collapses()), or a triangle has an
- * edge without length. */
+/* Returns the lanes whose cell has an edge of length zero, so that a quad has collapsed to a triangle
+ * (kernel_quad_collapses()) or a triangle to a line. */
 SIMD_INLINE vm kernel_sorted_curved_collapsed(const kernel_sorted_vertices *h, bool is_narrow, int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
@@ -179,8 +184,9 @@ SIMD_INLINE vm kernel_sorted_curved_collapsed(const kernel_sorted_vertices *h, b
     return out;
 }
 
-/* Returns the lanes whose hex has edges parallel to the axes: in sorted order the reference coordinates are those along
- * z, y and x, and each coordinate of a vertex is that of vertex 0 or of its neighbour along the axis. */
+/* Returns the lanes whose hex has edges parallel to the world axes. In canonical order, the reference coordinates of
+ * such a hex run along z, y and x. Each coordinate of a vertex then equals that of vertex 0 or that of the neighbour of
+ * vertex 0 along the axis. */
 SIMD_INLINE vm kernel_sorted_curved_cuboids(const kernel_sorted_vertices *h, bool is_narrow, int type)
 {
     static const int neighbours[3] = {4, 3, 1};
@@ -193,8 +199,8 @@ SIMD_INLINE vm kernel_sorted_curved_cuboids(const kernel_sorted_vertices *h, boo
     return out;
 }
 
-/* Reads the vertices and permutes them into canonical order; stores vertex indices, coordinates and ranks. Returns the
- * lanes with an edge of length zero. */
+/* Reads the vertices, permutes them into canonical order, and stores their indices, coordinates and ranks. Returns the
+ * lanes whose cell has an edge of length zero. */
 SIMD_INLINE vm kernel_sorted_curved_fetch(kernel_transformed_curved *out, const kernel_arrays *p, bool is_narrow,
                                           int type, int32_t (*const vertices)[SIMD_WIDTH])
 {
@@ -218,18 +224,20 @@ SIMD_INLINE vm kernel_sorted_curved_fetch(kernel_transformed_curved *out, const 
 
 /* ---- edge functions ---- */
 
-/* Returns a word with the vertex numbers of a quad's corners, four bits each. They begin at the smallest corner and go
- * around the quad towards the smaller of its neighbours. */
+/* Returns a word with the vertex numbers of a quad's corners, four bits each, from bit 0 on. They begin at the corner
+ * of smallest rank and go around the quad towards that one of its neighbours with the smaller rank. loop: the quad's
+ * vertices in cyclic order. */
 SIMD_INLINE vi kernel_curved_quad_word(const signed char *loop, const vf rank[8])
 {
     const vf r[4] = {rank[loop[0]], rank[loop[1]], rank[loop[2]], rank[loop[3]]};
-    /* lanes in which corner 2 is smaller than 0, corner 3 is smaller than 1, and the smallest of all is 1 or 3 */
+    /* lanes in which corner 2 has a smaller rank than corner 0 (second), corner 3 a smaller rank than corner 1
+     * (fourth), and corner 1 or 3 has the smallest of all ranks (odd) */
     const vm second = vf_lt(r[2], r[0]), fourth = vf_lt(r[3], r[1]),
              odd = vf_lt(vf_min(r[1], r[3]), vf_min(r[0], r[2]));
-    /* lanes in which the smallest vertex is number 2 or 3 */
+    /* lanes in which corner 2 or 3 has the smallest rank */
     const vm far = vm_or(vm_and(odd, fourth), vm_andnot(second, odd));
-    /* lanes in which the next vertex of the loop is smaller than the previous one; the neighbours of 0 and 2 are 1 and
-     * 3, those of 1 and 3 are 2 and 0 */
+    /* lanes in which the next corner in the loop has a smaller rank than the previous one; the neighbours of corners 0
+     * and 2 are 1 and 3, those of corners 1 and 3 are 2 and 0 */
     const vm ahead = vm_xor(far, vm_or(vm_and(odd, second), vm_andnot(vm_not(fourth), odd)));
     const vi one = vi_set(1), none = vi_set(0);
     const vi first = vi_select(odd, one, none) + (vi_select(far, one, none) << 1);
@@ -240,9 +248,9 @@ SIMD_INLINE vi kernel_curved_quad_word(const signed char *loop, const vf rank[8]
     return word;
 }
 
-/* Returns a triangle's corners in the order of coordinates, four bits each. first[n] and last[n]: the lanes in which
- * vertex n of the loop is the smallest (i) and the largest (k); falls: for each side 01, 12, 20 of the loop, the lanes
- * in which the rank decreases along it. */
+/* Returns a word with the vertex numbers of a triangle's corners, sorted by rank, four bits each, from bit 0 on.
+ * first[n], last[n]: the lanes in which vertex n of the loop has the smallest and the largest rank; falls[n]: the lanes
+ * in which the rank decreases from vertex n of the loop to the next. */
 SIMD_INLINE vi kernel_triangle_word(const signed char *loop, const vf rank[8], vm first[3], vm last[3], vm falls[3])
 {
     const vf r[3] = {rank[(int)loop[0]], rank[(int)loop[1]], rank[(int)loop[2]]};
@@ -257,8 +265,9 @@ SIMD_INLINE vi kernel_triangle_word(const signed char *loop, const vf rank[8], v
     return word;
 }
 
-/* Permutes three numbers that belong to a triangle's sides, given by the opposite corner, into the order ij, jk, ik.
- * The sides ij, jk and ik are opposite to the corners k, i and j. */
+/* Permutes three numbers that belong to a triangle's sides into the order ij, jk, ik, where i, j, k are the corners
+ * sorted by rank. opposite[n]: number of the side that is opposite to corner n of the loop. first, last: from
+ * kernel_triangle_word(). The sides ij, jk and ik are opposite to the corners k, i and j. */
 SIMD_INLINE void kernel_order_sides(const vm first[3], const vm last[3], const vf opposite[3], vf out[3])
 {
     out[0] = vf_select(last[0], opposite[0], vf_select(last[1], opposite[1], opposite[2]));
@@ -267,8 +276,8 @@ SIMD_INLINE void kernel_order_sides(const vm first[3], const vm last[3], const v
     for (int i = 0; i < 2; i++) out[2] = vf_select(vm_not(vm_or(first[i], last[i])), opposite[i], out[2]);
 }
 
-/* Computes, for each edge of the shape, from its first vertex to its second: the coefficients of the edge function and
- * its bound, then the error and extent that kernel_edge_error defines. */
+/* Computes six numbers for each edge of the shape, from its first vertex to its second: c, cu, cv and bound of
+ * kernel_line, then error and extent of kernel_edge_error. */
 SIMD_INLINE void kernel_lanes_edge_functions(const kernel_transformed_curved *transformed, const kernel_frame *f,
                                              const kernel_tile *tile, int type, vf out[KERNEL_CURVED_EDGES][6])
 {
@@ -286,8 +295,8 @@ SIMD_INLINE void kernel_lanes_edge_functions(const kernel_transformed_curved *tr
     }
 }
 
-/* Stores a triangle's corners in the order of coordinates, the edge functions of its edges, and the least sum of
- * weights that is accurate enough. */
+/* Stores the data of a triangular face: its corners sorted by rank, the lines of its edges, and the sum of weights from
+ * which on its crossings are accurate. face: its number in the shape; lines: from kernel_lanes_edge_functions(). */
 SIMD_INLINE void kernel_transformed_triangle(kernel_transformed_curved *out, int type, int face, const vf rank[8],
                                              vf (*const lines)[6])
 {
@@ -334,7 +343,7 @@ SIMD_INLINE void kernel_transformed_faces_of(kernel_transformed_curved *out, con
     }
 }
 
-/* Computes the corners of all faces, and the edge functions of the triangular ones. */
+/* Computes the words with the corners of all faces, and the lines of the triangular faces. */
 static __attribute__((noinline)) void kernel_transformed_faces(kernel_transformed_curved *out, const kernel_frame *f,
                                                                const kernel_tile *tile, int type)
 {
@@ -343,7 +352,8 @@ static __attribute__((noinline)) void kernel_transformed_faces(kernel_transforme
 
 /* ---- cells of lattices ---- */
 
-/* Returns whether coordinates increase along all axes, so that the sorted order of vertices is known. */
+/* Returns whether in all lanes the coordinates increase along all axes of the lattice, so that the order of coordinates
+ * is known without sorting. */
 SIMD_INLINE bool kernel_lattice_cells_are_sorted(const kernel_f64 (*cells)[3][2])
 {
     vm sorted = vm_all_lanes();
@@ -351,9 +361,9 @@ SIMD_INLINE bool kernel_lattice_cells_are_sorted(const kernel_f64 (*cells)[3][2]
     return vm_bits(sorted) == vm_bits(vm_all_lanes());
 }
 
-/* Transforms the vertices of cuboids, as kernel_lanes_transform() does for single vertices, with the same bits: each
- * product is computed once for the vertices that share it. In the sorted order, bits 0, 1 and 2 of a vertex's reference
- * coordinates stand for z, y and x. */
+/* Transforms the vertices of cuboids into tile space. The results are bit-identical to those of
+ * kernel_lanes_transform() for single vertices, but each product is computed once for all vertices that share it. In
+ * the canonical order, bits 0, 1 and 2 of a vertex's reference coordinates stand for z, y and x. */
 SIMD_INLINE void kernel_lattice_cells_transform(const kernel_f64 (*cells)[3][2], const kernel_frame *f,
                                                 const kernel_tile *tile, int half, kernel_transformed_curved *out,
                                                 int type)
@@ -377,12 +387,13 @@ SIMD_INLINE void kernel_lattice_cells_transform(const kernel_f64 (*cells)[3][2],
     }
 }
 
-/* Stores lattice cells in sorted order. The result has the same bits as that of other hexes. */
+/* Stores cells of a lattice in canonical order. The result is bit-identical to that of the functions for general
+ * hexes. */
 SIMD_INLINE void kernel_lattice_cells_store(const kernel_f64 (*cells)[3][2], int32_t (*const vertices)[SIMD_WIDTH],
                                             const kernel_frame *f, const kernel_tile *tile,
                                             kernel_transformed_curved *out, int type)
 {
-    /* for each vertex in sorted order: its number in the lattice's order, and its rank */
+    /* for each vertex in canonical order: its number in the lattice's cell, and its rank */
     static const signed char given[8] = {0, 4, 7, 3, 1, 5, 6, 2}, rank[8] = {0, 1, 3, 2, 4, 5, 7, 6};
     for (int i = 0; i < 8; i++) {
         const vi own_rank = vi_set(rank[i]);
@@ -397,7 +408,8 @@ SIMD_INLINE void kernel_lattice_cells_store(const kernel_f64 (*cells)[3][2], int
 
 /* ---- whole cells ---- */
 
-/* Sorts and transforms the vertices. Returns the lanes with an edge of length zero. */
+/* Reads the vertices, puts them in canonical order and transforms them. Returns the lanes whose cell has an edge of
+ * length zero. */
 SIMD_INLINE vm kernel_transform_curved_vertices(kernel_transformed_curved *out, const kernel_arrays *p,
                                                 const kernel_frame *f, const kernel_tile *tile,
                                                 int32_t vertices[8][SIMD_WIDTH], int type)
@@ -439,8 +451,9 @@ SIMD_INLINE vm kernel_transform_curved_of_type(kernel_transformed_curved *out, c
     return collapsed;
 }
 
-/* Fetches, permutes and transforms cells of one type, given their vertex indices by vertex and lane. Returns the lanes
- * with an edge of length zero. kernel_transformed_faces() computes their faces. */
+/* Fetches cells of one type, puts their vertices in canonical order, and transforms them. vertices: indices in the
+ * mesh, by vertex and lane. Returns the lanes whose cell has an edge of length zero. kernel_transformed_faces() must be
+ * called for the data of faces. */
 static __attribute__((noinline)) vm kernel_transform_curved(kernel_transformed_curved *out, const kernel_arrays *p,
                                                             const kernel_frame *f, const kernel_tile *tile,
                                                             int32_t vertices[8][SIMD_WIDTH],
@@ -475,9 +488,9 @@ SIMD_INLINE vi kernel_least_bit(vi bits)
     return ((vi_from_bits(vf_from_vi(bits & -bits)) >> 23) - 127) & 7;
 }
 
-/* Finds the rays that cross exactly two faces (*two), and the numbers of these faces. faces: per ray, one bit for each
- * face that the ray crosses once. *alone: rays that must be traced cell by cell whatever they cross; rays that cross
- * more than two faces are added to them. */
+/* Finds those of the rays that cross exactly two faces (*two), and the numbers of these faces (face), the smaller one
+ * first. faces: per ray, one bit for each face that the ray crosses once. *alone: on entry, rays that must be traced
+ * cell by cell in any case; those of the rays that cross more than two faces are added. */
 SIMD_INLINE void kernel_curved_count(vi faces, vm rays, vm *two, vm *alone, vi face[2])
 {
     const vi others = faces & (faces - 1), more = others & (others - 1);

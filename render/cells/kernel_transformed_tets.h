@@ -1,7 +1,7 @@
 /* Reads, sorts and transforms tets, one per lane, and computes their edge functions. The operations are those of
- * kernel_cell_move_to_tile_space(), kernel_cell_order() and kernel_tet_lines(), and so the results have the same bits.
- * Vertices are sorted by coordinates first, so that everything computed from them is in order. Computations in double
- * are done in two halves of the lanes. */
+ * kernel_cell_move_to_tile_space(), kernel_cell_order() and kernel_tet_lines(), so the results are bit-identical.
+ * Vertices are sorted by coordinates first, so that all data are stored in that order. Computations in double are done
+ * for one half of the lanes (kernel_wide.h) after the other. */
 #ifndef RENDER_KERNEL_TRANSFORMED_TETS_H
 #define RENDER_KERNEL_TRANSFORMED_TETS_H
 
@@ -17,17 +17,20 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
-/* The data of a kernel_cell for one tet per lane; the caller sets f. */
+/* The data of kernel_cell for one tet per lane. at: x, y and z in tile space, by vertex; c, cu, cv and bound: the
+ * members of kernel_line, by edge; doubt, least: as in kernel_cell; vertex: indices in the mesh. The caller sets f, the
+ * values as the layer needs them. */
 typedef struct kernel_transformed_tets {
-    kernel_f64 world[4][3][2], values[4][2]; /* coordinates and values as the caller of the library passed them */
+    /* world coordinates and values as the caller of the library passed them, in two halves of the lanes */
+    kernel_f64 world[4][3][2], values[4][2];
     vf at[3][4], f[4];
     vf c[KERNEL_TET_EDGES], cu[KERNEL_TET_EDGES], cv[KERNEL_TET_EDGES], bound[KERNEL_TET_EDGES];
     vf doubt, least[4];
     vi vertex[4];
 } kernel_transformed_tets;
 
-/* Reads the vertices and sorts them by coordinates. It is a bubble sort, which only exchanges neighbours that differ;
- * so vertices with equal coordinates keep their order. */
+/* Reads the vertices and sorts them by coordinates. A bubble sort is used, because it keeps the order of vertices with
+ * equal coordinates. */
 SIMD_INLINE void kernel_transformed_sort(kernel_transformed_tets *out, const kernel_arrays *p, bool is_narrow,
                                          int32_t (*const vertices)[SIMD_WIDTH])
 {
@@ -84,8 +87,8 @@ SIMD_INLINE void kernel_transformed_lines(kernel_transformed_tets *out, const ke
     }
 }
 
-/* Fetches, sorts and transforms `count` tets, given their vertex indices by vertex and lane. The remaining lanes get
- * the vertices of the first tet. */
+/* Fetches, sorts and transforms `count` tets. vertices: their indices in the mesh, by vertex and lane. The remaining
+ * lanes get the vertices of the first tet. */
 static __attribute__((noinline)) void kernel_transform_tets(kernel_transformed_tets *out, const kernel_arrays *p,
                                                             const kernel_frame *f, const kernel_tile *tile,
                                                             int32_t vertices[4][SIMD_WIDTH], int count)

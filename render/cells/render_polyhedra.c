@@ -4,12 +4,12 @@
  * surface (each face is cut as polygon.h defines), the unique edges, and the centre, which forms with each triangle a
  * tet on which the field is linear. All of this is computed when a ray of a tile first meets the cell, and deleted with
  * the tile: no copy of the mesh is kept. A polyhedron of v vertices has 2 v - 4 triangles and 3 v - 6 edges, and takes
- * about 200 v bytes here, about 6 KB for a Voronoi cell of 27 vertices. A store that is full is emptied; its memory
- * grows up to STORE_LIMIT bytes, or to the size of one cell.
+ * about 200 v bytes here, about 6 KB for a Voronoi cell of 27 vertices. When a store is full, all of its polyhedra are
+ * removed, and its memory is doubled, up to STORE_LIMIT bytes or, if that is more, the size of one polyhedron.
  *
  * Vertices are sorted by coordinates, triangles by their vertices, and edges are stored in the order in which the
- * triangles first use them. So the polyhedron is the same to the bit for any numbering of the mesh and any order of
- * faces or of a face's vertices.
+ * triangles first use them. So the polyhedron is bit-identical for any numbering of the mesh and any order of faces or
+ * of a face's vertices.
  *
  * The sign of a tet is that of its volume, with its triangle oriented outward (closed_faces.h). */
 #include "render_polyhedra.h"
@@ -72,7 +72,7 @@ void *polyhedra_scratch(polyhedron_store *store, size_t bytes)
     return grown(&store->scratch, &store->scratch_bytes, bytes);
 }
 
-/* Returns memory for a polyhedron; removes all others if there is no space. */
+/* Returns memory for a polyhedron. If there is no space, all other polyhedra are removed from the store. */
 static void *store_alloc(polyhedron_store *store, size_t bytes)
 {
     bytes = rounded(bytes);
@@ -184,7 +184,7 @@ static size_t lay_out_polyhedron(polyhedron *c, char *buffer, int quads)
     return at.used;
 }
 
-/* Stores the vertices and values in their order, and the centre as their mean, summed in this order. */
+/* Stores the sorted vertices and their values, and the centre as their mean, summed in this order. */
 static void store_vertices(const work *w, int64_t cell, polyhedron *c)
 {
     double sum[4] = {0, 0, 0, 0};

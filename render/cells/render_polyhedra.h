@@ -1,5 +1,6 @@
-/* Polyhedra in the form that kernels use. They are decomposed once per tile, into memory of one thread;
- * render_polyhedra.c explains how. */
+/* Polyhedra in the form that kernels use: the faces are divided into triangles (facets), and a centre, the mean of the
+ * vertices, forms a tet with each triangle. A polyhedron is decomposed once per tile, in memory of the thread that
+ * traces the tile; render_polyhedra.c explains how. */
 #ifndef RENDER_RENDER_POLYHEDRA_H
 #define RENDER_RENDER_POLYHEDRA_H
 
@@ -7,7 +8,8 @@
 
 #include "grid.h"
 
-/* A triangle of the surface: numbers of its vertices a < b < c, and of its edges ab, bc, ac. */
+/* A triangle of the surface. vertex: numbers of its vertices a < b < c in the polyhedron; edge: numbers of its edges
+ * ab, bc and ac. */
 typedef struct polyhedron_facet {
     int vertex[3];
     int edge[3];
@@ -19,8 +21,8 @@ typedef struct polyhedron_facet {
 } polyhedron_facet;
 
 /* A decomposed polyhedron. Vertices are numbered in the lexicographic order of coordinates, so that a < b means that
- * vertex a comes first; the centre is number vertex_count, after all others. The order of everything depends on
- * coordinates and values alone. */
+ * vertex a comes first; the centre is number vertex_count, after all others. The numbering of vertices, edges and
+ * facets depends only on the vertices' coordinates and values. */
 typedef struct polyhedron {
     struct polyhedron *next; /* next polyhedron in the same slot of the store's hash table */
     uint32_t index;
@@ -33,21 +35,21 @@ typedef struct polyhedron {
     int vertex_count, edge_count, facet_count;
     double (*world)[3]; /* the arrays from `world` to `lines` have one entry for each vertex, and one for the centre */
     double *values;
-    float *x, *y, *z; /* vertices in tile space */
-    /* vertex values of the layer's field, relative to an isovalue or in a transfer function's domain; values of the
-     * colour field */
+    float *x, *y, *z; /* vertices and centre in tile space */
+    /* f: vertex values of the layer's field, minus an isovalue and scaled, or in a transfer function's domain; g:
+     * vertex values of the colour field, in its transfer function's domain */
     float *f, *g;
-    double scale; /* factor by which values in f are scaled */
+    double scale; /* factor by which the differences from the isovalue are multiplied in f */
     /* maximum rates, per unit of depth, at which values decrease and increase along the tile's rays */
     double fall, rise;
-    /* edge functions (kernel_cell.h): of the edges, then of the lines from each vertex to the centre */
+    /* members of kernel_line (kernel_cell.h): for the edges, then for the edges from each vertex to the centre */
     float (*lines)[4];
-    /* least sum of weights that is accurate enough for all triangles (kernel_least_weight_bound()) */
+    /* sum of weights from which on the crossings of all triangles are accurate (kernel_least_weight_bound()) */
     float least;
     int64_t *vertices; /* vertex indices in the mesh, vertex_count of them */
     int (*edges)[2];
     polyhedron_facet *facets;
-    int (*quads)[4]; /* corners in cyclic order of the faces that have four vertices at four different positions */
+    int (*quads)[4]; /* for each face that has four vertices at four different positions: its corners in cyclic order */
 } polyhedron;
 
 /* Returns whether two neighbouring corners of a quad are at the same position. Such a quad is treated as a triangle,
@@ -70,9 +72,9 @@ void polyhedra_free(polyhedron_store *store);
 /* Removes all polyhedra from the store; its memory is kept for new ones. */
 void polyhedra_reset(polyhedron_store *store);
 
-/* Returns the polyhedron with the field's values. If it is new, it is not yet in tile space. A pointer that an earlier
- * call returned may be invalid after this call. layer is part of the key, because layers have different fields. Returns
- * NULL if there is no memory. */
+/* Returns cell `index` of the mesh part from the store, with the field's values; if it is not in the store, it is
+ * decomposed, and its members in tile space are not set yet. Pointers that earlier calls returned may be invalid after
+ * this call. The layer is part of the key, because layers have different fields. Returns NULL if there is no memory. */
 polyhedron *polyhedra_find(polyhedron_store *store, const grid *g, const grid_field *field, int part, int layer,
                            uint32_t index);
 

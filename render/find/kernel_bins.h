@@ -1,17 +1,18 @@
-/* Defines how a tile reads the cells that render_candidates.c has binned for it, and sorts them by depth. */
+/* Converts candidates to the form in which the bin of one tile stores them, and sorts a bin by depth (kernel_types.h
+ * defines candidates and bins). */
 #ifndef RENDER_KERNEL_BINS_H
 #define RENDER_KERNEL_BINS_H
 
 #include "kernel_types.h"
 #include "simd.h"
 
-/* Computes the candidate of the tile whose first pixel is (x0, y0). */
+/* Converts a candidate of the picture to one of the tile whose upper left pixel is (x0, y0). */
 static inline kernel_tile_candidate kernel_candidate_in_tile(const kernel_candidate *c, int x0, int y0)
 {
     /* first and last column, first and last row of the cell's pixels in the tile */
     const int ends[4] = {c->x0 > x0 ? c->x0 - x0 : 0, c->x1 - x0 < KERNEL_TILE - 1 ? c->x1 - x0 : KERNEL_TILE - 1,
                          c->y0 > y0 ? c->y0 - y0 : 0, c->y1 - y0 < KERNEL_TILE - 1 ? c->y1 - y0 : KERNEL_TILE - 1};
-    unsigned blocks[2]; /* columns and rows of blocks that contain one of the pixels */
+    unsigned blocks[2]; /* masks of the columns and of the rows of blocks that contain one of the pixels */
     for (int a = 0; a < 2; a++)
         blocks[a] = ~0u << ends[2 * a] / KERNEL_BLOCK & ((2u << ends[2 * a + 1] / KERNEL_BLOCK) - 1);
     return (kernel_tile_candidate){.near = c->near,
@@ -22,7 +23,8 @@ static inline kernel_tile_candidate kernel_candidate_in_tile(const kernel_candid
                                    .box = (uint16_t)(ends[0] | ends[1] << 4 | ends[2] << 8 | ends[3] << 12)};
 }
 
-/* Returns the number of the bin that contains a depth. It never decreases as the depth grows. */
+/* Returns the number of the depth bin for cells that begin at the depth `near`. It never decreases as the depth
+ * grows. */
 SIMD_INLINE int kernel_depth_bin(const kernel_bin *q, float near)
 {
     const float bin = (near - q->low) * q->scale;

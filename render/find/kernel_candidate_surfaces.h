@@ -4,27 +4,29 @@
  *     cells that do, one per lane:       the slab that contains the isosurface and its box of pixels; for tets the
  *                                        points where the isovalue crosses their edges
  *
- * In a tet the isosurface is flat: a triangle or quadrangle whose corners are the points on the edges at which the
- * field is zero. Hits in float32 lie on it as well. The weights from which a face's depth and value are computed all
- * have one sign (kernel_cell.h) and err by a few units in the last place. So both are exact for some point of the face
- * very close to the ray, and the line between two such points with values of opposite signs passes through the
- * isosurface.
+ * Below, the field is the values minus the isovalue, so that the isosurface is where the field is zero. In a tet the
+ * isosurface is flat: a triangle or quadrangle whose corners are the points on the edges at which the field is zero.
+ * Hits that are computed in float32 lie on it too. The reason: the weights from which depth and value at a crossing of
+ * a face are computed all have one sign (kernel_cell.h) and err by a few units in the last place. So depth and value
+ * are exact for some point of the face very close to the ray, and the line between two such points with values of
+ * opposite signs passes through the isosurface.
  *
- * Other cells: let L be linear in the point, and E its largest difference from the field F at a vertex. F - L is the
- * mean of these differences, weighted by the shape functions, which are non-negative in the cell and sum to 1. So |F -
- * L| <= E in the whole cell, however distorted it is; the values of faces, on their patches, are the field's. A hit is
- * a zero of F, or is interpolated between two values of opposite signs, so that |L| <= E there too: it lies in a slab
- * of the cell's hull, which is thin if the field is smooth. This holds for points with reference coordinates in the
- * cell. If the cell's map is folded, solutions up to a quarter outside are accepted (kernel_map.h), where the weights'
- * absolute values sum to at most 1.5³. The map is not folded if the derivative of its nonlinear part has a Frobenius
- * norm of less than 1 (kernel_local.h): then no two reference points have the same position, and points between a ray's
- * crossings of the faces are in the cell.
+ * In other cells, let L be a linear function of the position, and E its largest difference from the field F at a
+ * vertex. F - L is the mean of these differences, weighted by the shape functions, which are non-negative in the cell
+ * and sum to 1. So |F - L| <= E in the whole cell, however distorted it is; on the cell's faces too, the interpolated
+ * values are those of F. A hit is a zero of F, or is interpolated between two values of opposite signs, so that |L| <=
+ * E there too: it lies in a slab, the part of the cell's convex hull between the planes L = -E and L = E, which is thin
+ * if the field is smooth. This holds for points with reference coordinates in the cell. If the cell's map is folded,
+ * points whose reference coordinates are outside by up to 1/4 are accepted as well (kernel_map.h). There the absolute
+ * values of the shape functions sum to at most 1.5³. The map is not folded if the derivative of its nonlinear part has
+ * a Frobenius norm of less than 1 (kernel_local.h): then no two reference points have the same position, and points
+ * between a ray's crossings of the faces are in the cell.
  *
- * Positions are differences from the eye in float32, along the camera's axes. The slab is computed from the same
- * rounded positions as the hit's mean of the vertices. The hit's error is then at most that of the vertices, 8
- * roundings of their distance from the eye, which is less than the margins of kernel_add_lanes(). That cells whose map
- * is not folded contain their hits also holds only up to rounding; cells whose size is near the rounding error lie
- * within the margins anyway. */
+ * Positions are differences from the eye in float32, along the camera's axes. A hit is a mean of the vertices, and the
+ * slab is computed from rounded vertices. The computed slab is therefore wrong by at most the error of the vertices, 8
+ * roundings of their distance from the eye, which is less than the margins of kernel_add_lanes(). Also the statement
+ * that cells whose map is not folded contain their hits holds only up to rounding; cells as small as the rounding error
+ * lie within the margins anyway. */
 #ifndef RENDER_KERNEL_CANDIDATE_SURFACES_H
 #define RENDER_KERNEL_CANDIDATE_SURFACES_H
 
@@ -44,19 +46,20 @@
 
 typedef struct kernel_curved_lanes {
     int count; /* number of vertices of each cell */
-    /* at: vertex positions relative to the eye, along the camera's axes; f: vertex values minus the isovalue, scaled as
-     * by kernel_cell_relative() */
+    /* at: vertex positions relative to the eye, in scaled units along the camera's axes; f: vertex values minus the
+     * isovalue, scaled as by kernel_cell_relative() */
     vf at[8][3], f[8];
-    /* lanes whose numbers are in float32's range and not NaN; the cells of other lanes are tested one by one */
+    /* lanes in which positions and values are not NaN and neither too large nor too small for computations in float32;
+     * the cells of other lanes are tested one by one */
     vm fitting_lanes;
-    /* The linear function L at the vertices. The isosurface lies in the slab |L| <= thickness; the thickness is
-     * infinite if no such slab is known. Not set for tets. */
+    /* level: the linear function L (the top of this file) at the vertices; thickness: the isosurface lies in the slab
+     * |L| <= thickness; infinite if no slab is known. Not set for tets. */
     vf level[8], thickness;
 } kernel_curved_lanes;
 
-/* Returns the lanes whose cells are not folded. terms: the coefficients of the three coordinates; inverse: the inverse
- * of the matrix of their linear terms. The limit 0.9, instead of the exact 1, leaves a margin far larger than all
- * rounding. */
+/* Returns the lanes whose cells' maps are not folded. terms: the polynomial coefficients of the three coordinates
+ * (kernel_local.h); inverse: the inverse of the matrix of their linear terms. The square of the norm must be below 0.9
+ * instead of 1, which leaves a margin far larger than all rounding errors. */
 SIMD_INLINE vm kernel_curved_lanes_unfolded(int type, const vf terms[4][8], const vf inverse[3][3])
 {
     vf nonlinear_part[KERNEL_NONLINEAR_TERMS][3];
@@ -67,9 +70,9 @@ SIMD_INLINE vm kernel_curved_lanes_unfolded(int type, const vf terms[4][8], cons
     return vf_lt(kernel_local_nonlinearity(type, (const vf(*)[3])nonlinear_part), vf_set(0.9f));
 }
 
-/* Computes the linear function L at the vertices, and the thickness of the slab that contains the isosurface. |f| is at
- * most about 1. With r the rounding error of one coordinate, positions have an error of at most r, and their mean has
- * one of at most 8 r. Lanes whose volume is near float32's minimum are removed from fitting_lanes. */
+/* Computes the members level and thickness, which define the slab that contains the isosurface. |f| is at most about 1.
+ * With r the rounding error of one coordinate, positions have an error of at most r, and their mean has one of at most
+ * 8 r. Lanes in which the cell's volume is near float32's minimum are removed from fitting_lanes. */
 SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, int type)
 {
     const int count = grid_type_vertices(type);
@@ -108,8 +111,8 @@ static __attribute__((noinline)) void kernel_curved_lanes_slab(kernel_curved_lan
     KERNEL_OF_TYPE(type, kernel_curved_lanes_slab_of, l);
 }
 
-/* Computes the bounds of the slab's polytope: of the vertices that lie in the slab, and of the points where lines
- * between two vertices cross the slab's sides. */
+/* Computes the bounds of the part of the cell's convex hull in the slab. Its corners are among the vertices that lie in
+ * the slab and the points at which lines between two vertices cross the slab's two planes. */
 static __attribute__((noinline)) void
 kernel_curved_lanes_view_bounds(const kernel_finder *s, const kernel_curved_lanes *l, kernel_view_bounds *e)
 {
@@ -130,8 +133,8 @@ kernel_curved_lanes_view_bounds(const kernel_finder *s, const kernel_curved_lane
     }
 }
 
-/* Computes the bounds of the points where the isovalue crosses the edges of tets. negative: the vertices whose values
- * are below the isovalue, compared exactly. */
+/* Computes the bounds of the points on the edges of tets at which the field is the isovalue. negative: for each vertex
+ * the lanes in which its value is below the isovalue, compared exactly. */
 SIMD_INLINE void kernel_tet_lanes_view_bounds(const kernel_finder *s, const kernel_curved_lanes *l,
                                               const vm negative[4], kernel_view_bounds *e)
 {
@@ -139,15 +142,15 @@ SIMD_INLINE void kernel_tet_lanes_view_bounds(const kernel_finder *s, const kern
     for (int n = 0; n < KERNEL_TET_EDGES; n++) {
         const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
         const vm crossed = vm_xor(negative[i], negative[j]);
-        const vf along = vf_max(l->f[i] / (l->f[i] - l->f[j]), vf_set(0)); /* max() replaces the NaN of 0 / 0 by 0 */
+        const vf along = vf_max(l->f[i] / (l->f[i] - l->f[j]), vf_set(0)); /* vf_max() replaces the NaN of 0 / 0 by 0 */
         vf point[3];
         for (int a = 0; a < 3; a++) point[a] = l->at[i][a] + along * (l->at[j][a] - l->at[i][a]);
         kernel_view_bounds_add(s, e, point, crossed);
     }
 }
 
-/* Computes the positions of hexes of a uniform or rectilinear lattice in the camera's axes. The result has the same
- * bits as that of kernel_curved_lanes_transform(), but each product is computed once for all vertices that share a
+/* Computes l->at and l->fitting_lanes for hexes of a uniform or rectilinear lattice. The result is bit-identical to
+ * that of kernel_curved_lanes_transform(), but each product is computed once for all vertices that share a
  * coordinate. */
 static __attribute__((noinline)) void kernel_lattice_lanes_transform(const kernel_finder *s, const kernel_cells *c,
                                                                      kernel_curved_lanes *l)
@@ -176,7 +179,8 @@ static __attribute__((noinline)) void kernel_lattice_lanes_transform(const kerne
     }
 }
 
-/* Reads the vertices' positions and rotates them into the camera's axes. */
+/* Computes l->at and l->fitting_lanes: reads the vertices' positions relative to the eye and rotates them into the
+ * camera's axes. */
 SIMD_INLINE void kernel_curved_lanes_transform(const kernel_finder *s, const kernel_cells *c, int count,
                                                kernel_curved_lanes *l)
 {
@@ -194,8 +198,8 @@ SIMD_INLINE void kernel_curved_lanes_transform(const kernel_finder *s, const ker
     }
 }
 
-/* Sets f to the values minus the isovalue, and removes lanes whose values are too large, too small or NaN from
- * fitting_lanes. Returns the largest |f| of each lane. */
+/* Sets l->f to the values v minus the isovalue, not yet scaled, and removes lanes whose values are too large, too small
+ * or NaN from l->fitting_lanes. Returns the largest |f| of each lane. */
 SIMD_INLINE vf kernel_curved_lanes_values(const kernel_finder *s, const kernel_raw_numbers *v, int count,
                                           const kernel_level *level, kernel_curved_lanes *l)
 {
@@ -209,8 +213,9 @@ SIMD_INLINE vf kernel_curved_lanes_values(const kernel_finder *s, const kernel_r
     return size;
 }
 
-/* Adds the cells of the lanes in `crossed`, which the isovalue crosses, to the candidates. Cells in lanes that are not
- * in `fitting`, whose numbers are outside the range of float32 or NaN, are tested one by one. */
+/* Adds the cells of the lanes in `crossed` (a bit mask), which the isovalue crosses, to the candidates; e has the
+ * bounds of the isosurface in them. Cells in lanes that are not in `fitting`, whose numbers are too large, too small or
+ * NaN, are tested one by one. */
 SIMD_INLINE void kernel_add_crossed(kernel_finder *s, const kernel_cells *c, int value, vm fitting, unsigned crossed,
                                     const kernel_view_bounds *e)
 {
@@ -255,7 +260,8 @@ static __attribute__((noinline)) void kernel_find_tets(kernel_finder *s, const k
 
 /* ---- hexes, wedges and pyramids ---- */
 
-/* Adds the cells, which an isovalue crosses, to the candidates, with the bounds of the isosurface in them. */
+/* Adds the cells of the list to the candidates, with the bounds of the isosurface in them. The isovalue c->value
+ * crosses all of them. */
 SIMD_INLINE void kernel_crossed_process(kernel_finder *s, const kernel_cells *c, int vertices)
 {
     const kernel_level level = kernel_level_of(s->surface->layer->values[c->value]);
@@ -265,7 +271,8 @@ SIMD_INLINE void kernel_crossed_process(kernel_finder *s, const kernel_cells *c,
     for (int i = 0; i < vertices; i++) kernel_arrays_values(&s->arrays, kernel_cells_vertex(c, i), c->cell, &v[i]);
     kernel_curved_lanes_transform(s, c, vertices, &l);
     const vf size = kernel_curved_lanes_values(s, v, vertices, &level, &l);
-    /* the bits of a power of two that scales the largest value to near 1: the exponent is that of the value, negated */
+    /* the bits of a power of two that brings the largest magnitude near 1: its exponent is the negated exponent of that
+     * magnitude */
     const vi power = (254 << 23) - (vi_from_bits(size) & vi_set(0x7f800000));
     for (int i = 0; i < vertices; i++) l.f[i] *= vf_from_bits(power);
     kernel_curved_lanes_slab(&l, c->type);
@@ -284,8 +291,9 @@ static __attribute__((noinline)) void kernel_find_crossed(kernel_finder *s, kern
     c->count = 0;
 }
 
-/* Queues the cells of the given lanes, which the isovalue crosses. A queue holds cells of one isovalue; if the isovalue
- * changes, the queue is processed first. */
+/* Appends the cells of the given lanes (a bit mask), which the isovalue number `value` of the layer crosses, to the
+ * list s->crossed of their type. A list has cells of one isovalue; if it is full or has another isovalue, its cells are
+ * processed first. */
 SIMD_INLINE void kernel_crossed_add(kernel_finder *s, const kernel_cells *from, int vertices, int value, unsigned lanes)
 {
     kernel_cells *c = &s->crossed[kernel_lane_type_index(from->type)];
@@ -299,7 +307,7 @@ SIMD_INLINE void kernel_crossed_add(kernel_finder *s, const kernel_cells *from, 
     }
 }
 
-/* Queues the cells that have vertex values on both sides of an isovalue. */
+/* Finds the cells that have vertex values on both sides of an isovalue, and appends them to the lists s->crossed. */
 SIMD_INLINE void kernel_find_straddling(kernel_finder *s, const kernel_cells *c, int vertices)
 {
     const render_surface_layer *layer = s->surface->layer;

@@ -1,19 +1,20 @@
-/* Finds the cells in which isosurfaces and volumes may be visible by one traversal per frame. The trees are traversed
- * once for the whole picture. Each cell that the surface crosses, or whose values are visible in the volume, is fetched
- * and transformed once, and the pixels in which it may be visible are computed. The cells are then binned by tile
- * (render_candidates.c; sort-middle in the terms of Molnar et al. 1994). Tiles trace them roughly front to back, and
- * skip blocks that have nearer hits (render_kernels.c, kernel_batch.h; for volumes kernel_tile_cells.h):
+/* Finds candidates: the cells in which isosurfaces and volumes may be visible. Once per frame, the trees are traversed
+ * for the whole picture. Each cell that an isovalue crosses, or whose values are visible in the volume, is fetched and
+ * transformed once, and the pixels in which it may be visible are computed. The candidates are then binned by tile:
+ * each tile gets a list of its candidates, called a bin (render_candidates.c; sort-middle in the terms of Molnar et al.
+ * 1994). Tiles trace them roughly front to back, and skip blocks that have nearer hits (render_kernels.c,
+ * kernel_batch.h; for volumes kernel_tile_cells.h):
  *
  *     nodes --- ranges, picture's planes ---> cells --- surfaces' boxes ---> tiles --- nearest first ---> blocks
  *
  * Alternatively each tile traverses the trees (kernel_tile_surface.h). It then tests many of the nodes that its
  * neighbours test too, and transforms cells that mostly lie beside the tile. That is faster if most cells are hidden,
- * because it skips everything behind the hits. It is used for opaque surfaces with several cells per pixel, and for
- * frames in which too many cells are visible.
+ * because it skips everything behind the hits. Tiles therefore traverse the trees themselves if opaque surfaces have
+ * several cells per pixel, or if too many cells are visible in the frame.
  *
  * A cell's pixels are the bounding box of the surface in it (kernel_candidate_surfaces.h), widened by a margin that is
- * larger than all rounding errors. Rays then test the cells themselves, so the picture is the same to the last bit for
- * any traversal. */
+ * larger than all rounding errors. A candidate only selects pixels; whether a ray meets the surface is decided by
+ * intersecting the cell. So the picture is bit-identical for any traversal. */
 #ifndef RENDER_KERNEL_CANDIDATES_H
 #define RENDER_KERNEL_CANDIDATES_H
 
@@ -38,7 +39,7 @@ SIMD_INLINE void kernel_finder_fetch_cell(kernel_finder *s, uint32_t cell)
     kernel_cell_fetch(&s->cell, s->frame->job->parts[s->part].cells, &s->field->fields[s->part], cell);
 }
 
-/* Adds the cells whose values are visible in the volume to the candidates. All cells of the list have one type. */
+/* Adds those cells of the list whose values are visible in the volume to the candidates. */
 static __attribute__((noinline)) void kernel_find_volumes(kernel_finder *s, const kernel_cells *c)
 {
     kernel_view_bounds e = kernel_view_bounds_empty();
@@ -68,7 +69,8 @@ static __attribute__((noinline)) void kernel_find_volumes(kernel_finder *s, cons
 
 /* ---- cells ---- */
 
-/* Adds the pending cells that may be visible to the candidates. All pending cells in the list have one type. */
+/* Tests the cells of a list of pending cells, adds those that may be visible to the candidates (or to s->crossed), and
+ * empties the list. */
 static void kernel_find_pending(kernel_finder *s, kernel_cells *c)
 {
     if (!c->count) return;
@@ -84,7 +86,7 @@ static void kernel_find_pending(kernel_finder *s, kernel_cells *c)
 
 /* ---- leaves ---- */
 
-/* Tests one cell that cannot be processed in lanes, and adds it to the candidates if it is visible. */
+/* Tests one cell that cannot be processed in lanes, and adds it to the candidates if it may be visible. */
 static __attribute__((noinline)) void kernel_find_single_cell(kernel_finder *s, uint32_t cell)
 {
     kernel_finder_fetch_cell(s, cell);
@@ -96,8 +98,8 @@ static __attribute__((noinline)) void kernel_find_single_cell(kernel_finder *s, 
         for (int value = 0; value < s->surface->layer->value_count; value++) kernel_find_surface(s, &s->cell, value);
 }
 
-/* Moves the queued cells, whose connectivity has been prefetched, to the lists of pending cells, and prefetches their
- * vertices. A pending list that is full is processed first. */
+/* Moves the cells of s->queued, whose connectivity has been prefetched, to the lists s->pending, and prefetches their
+ * vertices. A list that is full is processed first. */
 static void kernel_find_queued(kernel_finder *s)
 {
     const kernel_arrays *p = &s->arrays;
@@ -140,11 +142,12 @@ static void kernel_find_flush(kernel_finder *s)
     for (int i = 0; i < KERNEL_CURVED_TYPES; i++) kernel_find_crossed(s, &s->crossed[i]);
 }
 
-/* Number of nodes that are tested at a time, so that their prefetches overlap in time. */
+/* KERNEL_FRONT: number of nodes that are tested together, so that the memory accesses of their prefetches overlap.
+ * KERNEL_FRONT_ROOM: number of entries of the stack. */
 enum { KERNEL_FRONT = 16, KERNEL_FRONT_ROOM = KERNEL_FRONT * MMBVH_MAX_DEPTH };
 
-/* Returns whether the node may be visible in the picture. Sets *is_inside if it lies completely in the picture: then
- * its children need not be tested. */
+/* Returns whether the node's box may be visible in the picture. *is_inside: set if the whole box lies in the picture,
+ * so that its children need not be tested; on entry, that of the node's parent. */
 SIMD_INLINE bool kernel_node_in_picture(const kernel_finder *s, const mmbvh *tree, int64_t node, bool *is_inside)
 {
     if (*is_inside) return true;
@@ -155,9 +158,9 @@ SIMD_INLINE bool kernel_node_in_picture(const kernel_finder *s, const mmbvh *tre
     return placement.blocks && !(placement.far < s->t_near);
 }
 
-/* Selects the entries whose values are visible and whose boxes are in the picture, and returns their number. An entry
- * is 2 * node, plus 1 if the node lies completely in the picture. The test of values has no branch, because it rejects
- * about half of the entries unpredictably. */
+/* Keeps those entries whose nodes have visible values and a box that may be visible in the picture, and returns their
+ * number. An entry is 2 * node, plus 1 if the node lies completely in the picture. The test of values has no branch,
+ * because it rejects about half of the entries unpredictably. */
 SIMD_INLINE int kernel_front_choose(const kernel_finder *s, const mmbvh *tree, const mmbvh_ranges *ranges,
                                     int64_t entries[KERNEL_FRONT], int count)
 {
@@ -175,9 +178,9 @@ SIMD_INLINE int kernel_front_choose(const kernel_finder *s, const mmbvh *tree, c
     return chosen;
 }
 
-/* Traverses a subtree depth first, from the left, KERNEL_FRONT nodes at a time, and so roughly in the order of leaves
- * in memory. If the stack is almost full, it takes one node at a time, which needs no more space than the tree's
- * depth. */
+/* Finds the candidates in a subtree. It is traversed depth first, left children first, with up to KERNEL_FRONT nodes
+ * taken from the stack at a time, so that leaves are visited roughly in the order of memory. If the stack is almost
+ * full, one node is taken at a time, which needs no more space than the tree's depth. */
 static void kernel_find_candidates(kernel_finder *s, int64_t root)
 {
     const mmbvh *tree = s->frame->job->parts[s->part].tree;
@@ -191,8 +194,8 @@ static void kernel_find_candidates(kernel_finder *s, int64_t root)
         int count = top < most ? top : most, leaf_count = 0, child_count = 0;
         for (int n = 0; n < count; n++) front[n] = stack[--top];
         count = kernel_front_choose(s, tree, ranges, front, count);
-        /* splits the nodes into leaves and the left children of inner nodes, and prefetches the leaves' cells and the
-         * children's ranges of values */
+        /* lists the leaves among the nodes, and the left children of the inner nodes; prefetches the leaves' cells and
+         * the children's ranges of values */
         for (int n = 0; n < count; n++) {
             const int64_t node = front[n] >> 1, ref = mmbvh_node_ref(tree, node);
             const bool is_leaf = mmbvh_node_count(tree, node);

@@ -7,12 +7,13 @@
 #include "kernel_packet.h"
 #include "simd.h"
 
-/* A hash table of cells without collision chains. A cell is fetched, sorted and transformed into tile space once for
- * all the tile's packets and all of a volume's windows of depth, unless another cell replaces it in its slot. */
+/* The cache is a hash table with one cell per slot. So a cell is fetched, sorted and transformed into tile space only
+ * once for all packets of a tile, and for all windows (the ranges of depth into which volumes are divided), unless
+ * another cell replaces it in its slot. */
 enum { KERNEL_CACHE_BITS = 8, KERNEL_CACHE_CELLS = 1 << KERNEL_CACHE_BITS };
 
-/* Returns the cell from the cache, or fetches it if it is missing. A cached cell may already be transformed. layer is
- * part of the key, because each layer fetches cells with its own field. */
+/* Returns the cell from the cache; if it is missing, it is fetched first. A cached cell may already be in tile space
+ * (is_transformed). layer is part of the key, because each layer fetches cells with its own field. */
 SIMD_INLINE kernel_cell *kernel_cell_cache_find(const kernel_packet *p, int layer, int part, const grid_field *field,
                                                 uint32_t index)
 {

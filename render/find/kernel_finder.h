@@ -1,6 +1,8 @@
-/* Searches a subtree for visible cells (kernel_candidates.h), and computes the pixels in which a single cell may be
- * visible. Cells are tested SIMD_WIDTH at a time (kernel_candidate_surfaces.h, kernel_candidates.h). Cells whose
- * numbers are too large, too small or NaN for lanes are tested one by one, by the bounds of their vertices. */
+/* The state of a search for candidates (kernel_candidates.h), and functions that compute the pixels in which a cell may
+ * be visible. Cells are tested SIMD_WIDTH at a time, one per lane (kernel_candidate_surfaces.h, kernel_candidates.h).
+ * Cells whose numbers are NaN, or too large or too small for float32, are tested one by one, and their pixels are those
+ * of the bounding box of their vertices. On the way to the candidates a cell is in several lists: in `queued` while its
+ * connectivity is being prefetched, in `pending` while its vertices are, and in `crossed` if an isovalue crosses it. */
 #ifndef RENDER_KERNEL_FINDER_H
 #define RENDER_KERNEL_FINDER_H
 
@@ -20,14 +22,14 @@
 
 /* A list of up to SIMD_WIDTH cells of one type, one per lane. */
 typedef struct kernel_cells {
-    int type, vertices; /* VTK's cell type, and the number of vertices of each cell */
+    int type, vertices; /* cell type (grid.h), and number of vertices of each cell */
     int count;
     int value; /* for cells that an isovalue crosses: its index in the layer, the same for all cells */
     uint32_t cell[SIMD_WIDTH];
     int32_t vertex[8][SIMD_WIDTH];
 } kernel_cells;
 
-/* Empties the list and sets its type; callers add cell and vertex numbers one by one. */
+/* Empties the list and sets its type. Callers append to cell[] and vertex[] themselves. */
 static inline void kernel_cells_begin(kernel_cells *c, int type)
 {
     c->type = type;
@@ -44,7 +46,7 @@ SIMD_INLINE void kernel_cells_fill(kernel_cells *c)
     }
 }
 
-/* Returns, per lane, the mesh's index of the cell's vertex i. */
+/* Returns, per lane, the index in the mesh of the cell's vertex i. */
 SIMD_INLINE vi kernel_cells_vertex(const kernel_cells *c, int i)
 {
     vi vertex;
@@ -52,7 +54,8 @@ SIMD_INLINE vi kernel_cells_vertex(const kernel_cells *c, int i)
     return vertex;
 }
 
-/* The state of a search for candidates: that of one subtree, or that of one tile. */
+/* The state of a search for candidates: in one subtree, or, if tiles traverse the trees themselves, in all trees for
+ * one tile. */
 typedef struct kernel_finder {
     const kernel_frame *frame;
     const kernel_surface *surface;   /* the surface layer that is searched; NULL if a volume is searched */
@@ -62,16 +65,16 @@ typedef struct kernel_finder {
     kernel_candidate_list *list;
     bool (*grow)(kernel_candidate_list *list);
     int part;
-    uint32_t source; /* candidates' `source` number for the layer's first isovalue */
+    uint32_t source; /* kernel_candidate.source for the first isovalue of the layer, or for the volume */
     kernel_planes planes;
     float t_near; /* ray parameter t at the eye's plane */
-    /* pixels per unit of slope (per scaled unit if the camera is orthographic) along columns and rows, and the pixel
-     * coordinates of the axis of view */
+    /* column_scale, row_scale: number of pixels per unit of slope (per scaled unit if the camera is orthographic);
+     * column_0, row_0: column and row, as real numbers, of the ray along the camera's axis */
     float column_scale, row_scale, column_0, row_0;
-    int first[2], last[2]; /* first and last column, and row, of pixels to which candidates are clipped */
+    int first[2], last[2]; /* first and last column ([0]) and row ([1]) of the pixels to which candidates are clipped */
     kernel_level eye[3];   /* the eye's position in world coordinates */
     kernel_cell cell;
-    uint32_t queued[SIMD_WIDTH]; /* cells whose connectivity is being prefetched */
+    uint32_t queued[SIMD_WIDTH]; /* cells of leaves whose connectivity is being prefetched */
     int queued_count;
     /* per type (kernel_lane_type_index()), cells whose vertices are being prefetched */
     kernel_cells pending[KERNEL_LANE_TYPES];
@@ -117,13 +120,13 @@ static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, 
 
 /* ---- cells in lanes ---- */
 
-/* Bounds of one isovalue's surface in each lane's cell: depths from the eye, and positions in columns and rows of
- * pixels. */
+/* Bounds of what is visible of each lane's cell: near, far: depth from the eye in scaled units; left, right, top,
+ * bottom: pixels, counted from the ray along the camera's axis. */
 typedef struct kernel_view_bounds {
     vf near, far, left, right, top, bottom;
 } kernel_view_bounds;
 
-/* Reads each lane's vertex as a position relative to the eye, multiplied by the space's scale. */
+/* Reads one vertex per lane and computes its position relative to the eye, in scaled units along the world axes. */
 SIMD_INLINE void kernel_finder_positions(const kernel_finder *s, vi vertex, vf out[3])
 {
     const render_job *job = s->frame->job;
@@ -135,8 +138,8 @@ SIMD_INLINE void kernel_finder_positions(const kernel_finder *s, vi vertex, vf o
     }
 }
 
-/* Returns the lanes of `fitting` whose coordinates are not NaN and small enough for computations in float32. The cells
- * of all other lanes are tested one by one. */
+/* Returns those of the lanes in `fitting` in which the coordinates are not NaN and not too large for computations in
+ * float32. The cells of all other lanes are tested one by one. */
 SIMD_INLINE vm kernel_positions_fit_lanes(vm fitting, const vf place[3])
 {
     for (int a = 0; a < 3; a++) fitting = vm_and(fitting, vf_lt(vf_abs(place[a]), vf_set(1e15f)));
@@ -173,10 +176,10 @@ SIMD_INLINE kernel_view_bounds kernel_view_bounds_empty(void)
     return (kernel_view_bounds){most, -most, most, -most, most, -most};
 }
 
-/* Computes the first and the last pixel between each lane's bounds low and high, clipped to the pixels from ends[0] to
- * ends[1]. zero: the pixel at which the bounds' coordinate is 0. error_bound: error of the bounds, in pixels. The
- * bounds are widened by it, by 1/100 pixel and by 3e-5 of the numbers, which is more than the error of rays that hit
- * only by rounding. Returns the lanes that contain a pixel. */
+/* Computes the first and the last column (or row) of pixels between each lane's bounds low and high, clipped to the
+ * range from ends[0] to ends[1]. zero: the column at which the bounds' coordinate is 0; error_bound: error of the
+ * bounds, in pixels. The bounds are widened by error_bound, by 1/100 pixel and by 3e-5 of their magnitude and that of
+ * `zero`, so that rays that hit the cell only by rounding are included. Returns the lanes that contain a pixel. */
 SIMD_INLINE vm kernel_pixel_range(vf low, vf high, float zero, float error_bound, const int ends[2], vf *first,
                                   vf *last)
 {
@@ -186,8 +189,9 @@ SIMD_INLINE vm kernel_pixel_range(vf low, vf high, float zero, float error_bound
     return vf_le(*first, *last);
 }
 
-/* Adds the cells of the given lanes (a bit mask) that may be visible to the candidates. A cell near or behind the eye's
- * plane may be anywhere, so its candidate covers the whole picture. */
+/* Adds the cells of the given lanes (a bit mask) to the candidates, unless they are outside the picture or behind the
+ * eye's plane. e: bounds of each lane's cell. A cell that extends to near the eye's plane or behind it may be visible
+ * anywhere, so its candidate covers the whole picture. */
 static void kernel_add_lanes(kernel_finder *s, const kernel_view_bounds *e, unsigned lanes, const uint32_t *cells,
                              uint32_t source)
 {
@@ -198,7 +202,7 @@ static void kernel_add_lanes(kernel_finder *s, const kernel_view_bounds *e, unsi
     float near[SIMD_WIDTH], far[SIMD_WIDTH];
     int32_t ends[4][SIMD_WIDTH];
     const vf size = vf_abs(e->far) + fabsf(s->t_near), pad = KERNEL_OUTLINE_PAD * size;
-    /* All lanes use the error bound of the lane with the largest one. */
+    /* One error bound is used for all lanes, the largest one. */
     const float error_bound = 2e-6f * (flat ? vf_reduce_max(vf_select(vm_from_bits(lanes), size, vf_set(0))) + 1 : 1);
     const int columns[2] = {s->first[0], s->last[0]}, rows[2] = {s->first[1], s->last[1]};
     vm candidates = kernel_pixel_range(e->left, e->right, s->column_0, error_bound * fabsf(s->column_scale), columns,
@@ -214,7 +218,7 @@ static void kernel_add_lanes(kernel_finder *s, const kernel_view_bounds *e, unsi
         memcpy(ends[2 * a], &from, sizeof from);
         memcpy(ends[2 * a + 1], &to, sizeof to);
     }
-    vf_store(near, vf_max((e->near + s->t_near) - pad, vf_set(-INFINITY))); /* max() replaces a NaN depth by -inf */
+    vf_store(near, vf_max((e->near + s->t_near) - pad, vf_set(-INFINITY))); /* vf_max() replaces a NaN depth by -inf */
     vf_store(far, -vf_max(-((e->far + s->t_near) + pad), vf_set(-INFINITY)));
     if (list->capacity - list->count < SIMD_WIDTH && !s->grow(list)) return;
     for (; lanes; lanes &= lanes - 1) {
@@ -232,7 +236,7 @@ static void kernel_add_lanes(kernel_finder *s, const kernel_view_bounds *e, unsi
 
 /* ---- cells that are tested one by one ---- */
 
-/* Extends the bounds, in all lanes, so that they contain a vertex of the mesh. */
+/* Extends the bounds, equally in all lanes, so that they contain a vertex of the mesh. */
 SIMD_INLINE void kernel_view_bounds_add_vertex(const kernel_finder *s, int64_t vertex, kernel_view_bounds *e)
 {
     const double *eye = s->frame->job->camera.eye;
@@ -247,7 +251,7 @@ SIMD_INLINE void kernel_view_bounds_add_vertex(const kernel_finder *s, int64_t v
     kernel_view_bounds_add(s, e, at, vm_all_lanes());
 }
 
-/* Adds a polyhedron to the candidates, with the pixels of its vertices' bounds. */
+/* Adds a polyhedron to the candidates, with the pixels of the bounding box of its vertices. */
 static void kernel_find_polyhedron(kernel_finder *s, uint32_t index)
 {
     kernel_view_bounds e = kernel_view_bounds_empty();
@@ -257,7 +261,7 @@ static void kernel_find_polyhedron(kernel_finder *s, uint32_t index)
     kernel_add_lanes(s, &e, 1, &index, s->source);
 }
 
-/* Adds the fetched cell to the candidates, with the pixels of its vertices' bounds. */
+/* Adds the fetched cell c to the candidates, with the pixels of the bounding box of its vertices. */
 static __attribute__((noinline)) void kernel_add_cell_box(kernel_finder *s, const kernel_cell *c, uint32_t source)
 {
     kernel_view_bounds e = kernel_view_bounds_empty();
@@ -265,14 +269,14 @@ static __attribute__((noinline)) void kernel_add_cell_box(kernel_finder *s, cons
     kernel_add_lanes(s, &e, 1, &c->index, source);
 }
 
-/* Adds the fetched cell to the candidates if the isovalue crosses it. */
+/* Adds the fetched cell c to the candidates if the isovalue number `value` of the layer crosses it. */
 SIMD_INLINE void kernel_find_surface(kernel_finder *s, const kernel_cell *c, int value)
 {
     if (c->is_finite && kernel_values_straddle(c->values, c->count, s->surface->layer->values[value]))
         kernel_add_cell_box(s, c, s->source + (uint32_t)value);
 }
 
-/* Adds the fetched cell to the candidates if its values are visible in the volume. */
+/* Adds the fetched cell s->cell to the candidates if its values are visible in the volume. */
 SIMD_INLINE void kernel_find_volume(kernel_finder *s)
 {
     if (s->cell.is_finite && kernel_cell_is_visible(&s->cell, s->transfer)) kernel_add_cell_box(s, &s->cell, s->source);

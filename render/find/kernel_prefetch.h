@@ -6,8 +6,8 @@
 #include "kernel_arrays.h"
 #include "simd.h"
 
-/* Prefetches a cell's vertex indices and its type. The cell's offset into the connectivity is read directly, without a
- * prefetch: only this function is delayed by the read. */
+/* Prefetches a cell's vertex indices and its type. The cell's offset into the connectivity has not been prefetched, so
+ * this function may have to wait for it. */
 SIMD_INLINE void kernel_prefetch_indices(const grid *g, uint32_t cell)
 {
     if (g->lattice) return;

@@ -1,8 +1,8 @@
-/* Finds candidates in parallel. Subtrees are distributed among threads. Each thread lists the cells that it finds, and
- * bins them by tile; threads do not synchronize in between. The thread that traces a tile
- * gathers the tile's cells from the bins of all threads. A bound on the number of cells limits memory and wasted time:
- * if there is more than one cell per pixel, most listed cells are hidden or smaller than a pixel. Cells of a volume are
- * not hidden, so a million of them may be listed in any case. */
+/* Finds candidates in parallel. Subtrees are distributed among threads. Each thread lists the candidates that it finds,
+ * then sorts them by tile into bins of its own; threads do not wait for each other in between. The thread that traces a
+ * tile gathers the tile's candidates from the bins of all threads. A bound on the number of cells limits memory and
+ * wasted time: if there is more than one cell per pixel, most listed cells are hidden or smaller than a pixel. Cells of
+ * a volume do not hide each other, so for a volume at least a million may be listed. */
 #include "render_candidates.h"
 #include "kernel_bins.h"
 #include "kernel_types.h"
@@ -21,15 +21,16 @@
 
 enum { ITEMS = 1024, MOST_ITEMS = 64 * ITEMS, VOLUME_ITEMS = 1024 * ITEMS };
 
-/* SMALL_CELLS and SMALL_CROSSED: number of cells per pixel of their trees' bounding boxes above which the cells of a
- * volume, or of a surface, count as small. For a surface only the cells in leaves that isovalues may cross are counted
- * (docs/development/decisions/find.md). SAMPLES: number of tree nodes from which their share is estimated. */
+/* Cells count as small, so that tiles traverse the trees themselves, if there are more than this many per pixel of the
+ * trees' bounding boxes in the picture. SMALL_CELLS: for volumes. SMALL_CROSSED: for surfaces, of which only the cells
+ * in leaves that isovalues may cross are counted (docs/development/decisions/find.md). SAMPLES: number of tree nodes
+ * from which the number of these cells is estimated. */
 enum { SMALL_CELLS = 8, SMALL_CROSSED = 3, SAMPLES = 512 };
 
 /* ---- cells ---------------------------------------------------------------------------------------------------- */
 
-/* Adds a chunk to the list; returns false if the bound is reached or memory runs out. Such a list stays full, because
- * the cells that did not fit are missing from it. */
+/* Adds a chunk of memory to the list. Returns false, and marks the list as full, if the maximum number of candidates is
+ * reached or memory runs out. A full list stays full, because candidates are missing from it. */
 static bool grow(kernel_candidate_list *list)
 {
     if (list->is_full) return false;
@@ -62,10 +63,10 @@ static void free_list(kernel_candidate_list *list)
 
 /* ---- tiles ---------------------------------------------------------------------------------------------------- */
 
-/* The cells that one thread has found, sorted by tile: the cells of a tile are items[starts[tile]] to items[starts[tile
- * + 1] - 1]. The bins of all threads that have searched are one array; `next` is NULL in the last. */
+/* The candidates that one thread has found, sorted by tile: those of a tile are items[starts[tile]] to
+ * items[starts[tile + 1] - 1]. The bins of all threads that have searched are one array; `next` is NULL in the last. */
 struct kernel_bins {
-    kernel_candidate_list list; /* the cells as they were found; empty after the search */
+    kernel_candidate_list list; /* the candidates in the order in which they were found; empty after the search */
     kernel_tile_candidate *items;
     uint32_t *starts;
     struct kernel_bins *next;
@@ -91,8 +92,8 @@ static void bins_free(struct kernel_bins *bins)
     base_free(bins);
 }
 
-/* Advances at[tile] for each cell of a tile. Copies the cells to their tiles' bins, unless `out` is NULL: at[tile] is
- * the index at which the tile's next cell is stored. */
+/* Goes through the candidates of all chunks and increases at[tile] by 1 for each tile in which a candidate may be
+ * visible. If `out` is not NULL, at[tile] is the index at which the tile's next candidate is stored in `out`. */
 static void bin_tiles(const kernel_candidate_chunk *chunk, int64_t across, uint32_t *at, kernel_tile_candidate *out)
 {
     for (; chunk; chunk = chunk->before)
@@ -104,8 +105,8 @@ static void bin_tiles(const kernel_candidate_chunk *chunk, int64_t across, uint3
                 }
 }
 
-/* Bins the cells that a thread has found. Returns false if they are more than `most`, counted once for each of their
- * tiles, or memory runs out. */
+/* Sorts the candidates that a thread has found by tile. Returns false if there are more than `most`, where each
+ * candidate counts once for each of its tiles, or if memory runs out. */
 static bool bins_fill(struct kernel_bins *bin, int64_t across, int64_t tiles, int64_t most)
 {
     uint32_t *starts = bin->starts;
@@ -113,7 +114,8 @@ static bool bins_fill(struct kernel_bins *bin, int64_t across, int64_t tiles, in
     bin_tiles(bin->list.chunk, across, starts + 1, NULL);
     for (int64_t tile = 0; tile < tiles; tile++) {
         const uint32_t count = starts[1 + tile];
-        /* bin_tiles() advances this index from the tile's first cell to the next tile's first cell */
+        /* the second call of bin_tiles() increases this index from that of the tile's first candidate to that of the
+         * next tile's */
         starts[1 + tile] = (uint32_t)sum;
         sum += count;
     }
@@ -138,8 +140,8 @@ static int count_in_tile(const struct kernel_bins *bins, int64_t tile)
     return (int)(bins->starts[tile + 1] - bins->starts[tile]);
 }
 
-/* Gathers a tile's cells in *bin. If a single thread has found them all, they are used where they are; otherwise they
- * are copied to the bin's own memory. Returns false if there is no memory. */
+/* Gathers a tile's candidates in *bin. If a single thread has found all of them, bin->items points to that thread's
+ * bins; otherwise they are copied to bin->buffer. Returns false if there is no memory. */
 static bool gather(const struct kernel_bins *bins, int64_t tile, kernel_bin *bin)
 {
     const struct kernel_bins *last = NULL;
@@ -172,8 +174,8 @@ bool render_candidates_gather(const kernel_frame *frame, kernel_thread *thread, 
 
 /* ---- positions of cells in the picture ---------------------------------------------------------------------- */
 
-/* Extends the ranges, low and high, of columns (spans[0]) and rows (spans[1]) of pixels by a point in the trees' space.
- * Returns the point's depth from the eye, or 1 if the camera is orthographic. */
+/* Extends the ranges of columns (spans[0], low and high) and of rows (spans[1]) of pixels so that they contain a point,
+ * which is given in tree space. Returns the point's depth from the eye, or 1 if the camera is orthographic. */
 static double widen(const kernel_frame *f, const double point[3], double spans[2][2])
 {
     const render_camera *c = &f->job->camera;
@@ -194,7 +196,8 @@ static double widen(const kernel_frame *f, const double point[3], double spans[2
     return depth;
 }
 
-/* Extends the ranges of columns and rows by all corners of the tree's box. Returns the smallest depth of a corner. */
+/* Extends the ranges of columns and rows (widen()) by all corners of the tree's bounding box. Returns the smallest
+ * depth of a corner. */
 static double widen_by_tree(const kernel_frame *f, const mmbvh *tree, double spans[2][2])
 {
     float lower[4], upper[4];
@@ -208,9 +211,10 @@ static double widen_by_tree(const kernel_frame *f, const mmbvh *tree, double spa
     return least;
 }
 
-/* Counts the cells of the parts on which the field exists (ranges[part].low is set), or of all parts if ranges is NULL.
- * *pixels: sum of the areas of the parts' bounding boxes in the picture; all: ranges of columns and rows that the boxes
- * together cover. Returns false if a part does not lie completely in front of the eye. */
+/* Measures the parts on which the field exists (ranges[part].low is set), or all parts if ranges is NULL. *cells:
+ * number of their cells; *pixels: sum of the areas of their bounding boxes in the picture, in pixels; all: ranges of
+ * columns and rows that the boxes together cover. Returns false if a part does not lie completely in front of the
+ * eye. */
 static bool measure_parts(const kernel_frame *f, const mmbvh_ranges *ranges, double *cells, double *pixels,
                           double all[2][2])
 {
@@ -240,8 +244,9 @@ static bool volume_cells_are_small(const kernel_frame *f)
     return measure_parts(f, f->job->volumes[0].field.ranges, &cells, &pixels, all) && cells > SMALL_CELLS * pixels;
 }
 
-/* Adds counts over `samples` nodes that are spread evenly over the part's tree: of cells, and of cells that isovalues
- * may cross, once per isovalue. About half of the nodes are leaves; inner nodes have no cells and add 0. */
+/* Adds numbers of cells, counted in `samples` nodes that are spread evenly over the part's tree. *cells: all cells of
+ * these nodes; *crossed: cells of nodes whose range of values contains an isovalue, counted once per isovalue. About
+ * half of the nodes are leaves; inner nodes have no cells and add 0. */
 static void sample_leaves(const kernel_frame *f, const kernel_surface *s, int part, int64_t samples, double *cells,
                           double *crossed)
 {
@@ -262,14 +267,14 @@ static void sample_leaves(const kernel_frame *f, const kernel_surface *s, int pa
     }
 }
 
-/* Returns whether opaque surfaces have several cells per pixel. Most of these cells are hidden or lie between pixels,
- * so that tiles which traverse the trees themselves read fewer of them. */
+/* If opaque surfaces have several cells per pixel, most of these cells are hidden or contain no pixel's centre. Tiles
+ * that traverse the trees themselves read fewer of them. */
 bool render_surfaces_are_small(const kernel_frame *f)
 {
     double cells, boxes, all[2][2], crossed = 0;
     int values = 0;
     if (f->has_transparent || !measure_parts(f, NULL, &cells, &boxes, all)) return false;
-    /* area of at least one tile, because parts may be seen edge on */
+    /* at least the area of one tile, because the boxes of flat parts may have no area in the picture */
     const double pixels =
         fmax(fmin(boxes, (all[0][1] - all[0][0]) * (all[1][1] - all[1][0])), KERNEL_TILE * KERNEL_TILE);
     for (int s = 0; s < f->surface_count; s++) values += f->surfaces[s].layer->value_count;
@@ -311,8 +316,8 @@ void render_trees_cover(kernel_frame *f)
 
 /* ---- the search ----------------------------------------------------------------------------------------------- */
 
-/* Searches all subtrees in parallel. Each thread bins its own cells, at most `most`, as soon as no subtree is left,
- * without waiting for the others. */
+/* Searches all subtrees in parallel. As soon as no subtree is left, each thread sorts its own candidates by tile (at
+ * most `most`), without waiting for the other threads. */
 static void run(const kernel_frame *frame, const kernel_subtree *subtrees, int64_t count, struct kernel_bins *bins,
                 int64_t most, kernel_thread *thread_of, int threads)
 {
@@ -352,7 +357,8 @@ static struct kernel_bins *begin_bins(const kernel_frame *frame, int64_t *bound,
     return bins;
 }
 
-/* Returns whether every thread has binned all of its cells, and the number of all cells is at most `most`. */
+/* Returns whether every thread has sorted all of its candidates into its bins, and their number on all threads is at
+ * most `most`. */
 static bool is_complete(const struct kernel_bins *bins, int64_t tiles, int64_t most)
 {
     int64_t count = 0;

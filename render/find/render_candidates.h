@@ -5,20 +5,22 @@
 
 #include "kernel_types.h"
 
-/* Returns whether opaque surfaces have so many cells per pixel that tiles should traverse the trees themselves. */
+/* Returns whether all surfaces are opaque and have so many cells per pixel that tiles should traverse the trees
+ * themselves. */
 bool render_surfaces_are_small(const kernel_frame *frame);
 
-/* Finds the cells of all surfaces and stores them in frame->candidates, which render_candidates_free() frees.
+/* Finds the candidates of all surfaces and stores them in frame->candidates, which render_candidates_free() frees.
  * thread_of: one state per thread. If too many cells are visible, or memory runs out, frame->candidates stays NULL, and
  * tiles traverse the trees themselves. */
 void render_candidates_find(kernel_frame *frame, kernel_thread *thread_of, int threads);
-/* Finds the cells of the frame's only volume and stores them in frame->volume_candidates. If the cells are too small or
- * too many, or memory runs out, frame->volume_candidates stays NULL, and tiles traverse the tree themselves. */
+/* Finds the candidates of the frame's only volume and stores them in frame->volume_candidates. If the cells are too
+ * small or too many, or memory runs out, frame->volume_candidates stays NULL, and tiles traverse the tree
+ * themselves. */
 void render_candidates_find_volume(kernel_frame *frame, kernel_thread *thread_of, int threads);
-/* Gathers the cells of the tile whose upper left pixel is (x0, y0) in thread->bin and volume_bin, for the kernels.
- * Returns false if there is no memory. */
+/* Gathers the candidates of the tile whose upper left pixel is (x0, y0), from the bins of all threads, in thread->bin
+ * (surfaces) and thread->volume_bin. Returns false if there is no memory. */
 bool render_candidates_gather(const kernel_frame *frame, kernel_thread *thread, int x0, int y0);
-/* Sets frame->cover to the pixels in which some tree may be visible, from the bounding boxes of all trees. */
+/* Sets frame->cover to the rectangle of pixels in which the bounding box of some tree may be visible. */
 void render_trees_cover(kernel_frame *frame);
 void render_candidates_free(kernel_frame *frame);
 

@@ -6,9 +6,9 @@
 #include "memory.h"
 #include "mmbvh.h"
 
-/* SUBTREES is the maximum number of subtrees of a tree, SUBTREE_CELLS about the minimum number of cells of a subtree.
- * Each search of a subtree has a fixed cost and ends with vectors that are not full, so small trees, such as those of
- * blocks, are not divided. */
+/* SUBTREES: maximum number of subtrees of a tree. SUBTREE_CELLS: about the minimum number of cells of a subtree. Each
+ * search of a subtree has a fixed cost and ends with vectors that are not full, so small trees, such as those of a mesh
+ * that consists of many blocks, are not divided. */
 enum { SUBTREES = 128, SUBTREE_CELLS = 512 };
 
 /* Divides the tree of a mesh part into subtrees and stores them in `list`. Returns their number. */

@@ -1,11 +1,12 @@
 /* Rays that begin at hits: towards lights, and into the hemisphere above a surface.
  *
- * The cells that such a ray meets must not depend on the partition. Rays are traced by the functions for primary rays,
- * which decide everything about a face from its vertices alone once these are in tile space. So the tile space must
- * depend only on the ray. For the rays of a hit's hemisphere, the eye of the tile space is the hit, and depth is
- * measured along the hit's normal. For rays to a light, depth is measured along the light's direction, and tiles form a
- * lattice across it; a ray belongs to the tile in which it lies. Rays of one tile space are a bundle, and the result
- * does not depend on which of them are traced together. */
+ * The cells that such a ray meets must not depend on the partition. Rays are traced by the functions for primary rays.
+ * These decide from the face's vertices in tile space alone whether and where a ray crosses a face. For the result to
+ * depend only on the ray and the cell, the tile space must depend only on the ray. For the rays of a hit's hemisphere,
+ * the eye of the tile space is the hit, and depth is measured along the hit's normal. For rays to a light, depth is
+ * measured along the light's direction, and the plane across it is divided into square tiles; a ray belongs to the tile
+ * in which it lies. A bundle is a set of rays with the same tile space. The result does not depend on which of them are
+ * in one bundle. */
 #ifndef RENDER_KERNEL_BUNDLE_H
 #define RENDER_KERNEL_BUNDLE_H
 
@@ -18,17 +19,17 @@
 enum { KERNEL_BUNDLE_RAYS = 64 };
 
 typedef struct kernel_bundle {
-    /* tile of the bundle; only its centre and radius are used, because the bundle has rays of its own */
+    /* tile of the bundle; only its centre and radius are set, other members are 0; the rays are stored below */
     kernel_tile tile;
     int count;
-    /* One bit per ray: set while the ray is not blocked. Only these rays are traced; in the end they are the unblocked
-     * ones. */
+    /* One bit per ray: set as long as no opaque surface has been found that blocks the ray. Only rays whose bit is set
+     * are traced. */
     uint64_t open;
     /* The rays in tile space. Each is traced from depth t_near to t_far. */
     float origin_x[KERNEL_BUNDLE_RAYS], origin_y[KERNEL_BUNDLE_RAYS];
     float slope_x[KERNEL_BUNDLE_RAYS], slope_y[KERNEL_BUNDLE_RAYS];
     float t_near[KERNEL_BUNDLE_RAYS], t_far[KERNEL_BUNDLE_RAYS];
-    kernel_clip_ray rays[KERNEL_BUNDLE_RAYS]; /* The same rays in tree space, against which clips are tested. */
+    kernel_clip_ray rays[KERNEL_BUNDLE_RAYS]; /* the same rays in tree space; used to test clips */
 } kernel_bundle;
 
 SIMD_INLINE vf kernel_bundle_load(const float *list, int count)
@@ -38,7 +39,8 @@ SIMD_INLINE vf kernel_bundle_load(const float *list, int count)
     return vf_load(lanes);
 }
 
-/* Makes a packet of the bundle's rays `first` to `first` + SIMD_WIDTH - 1; only unblocked rays are active. */
+/* Sets up a packet of the bundle's rays `first` to `first` + SIMD_WIDTH - 1. Only rays whose bit in b->open is set are
+ * active. */
 static inline void kernel_bundle_packet(kernel_packet *p, const kernel_frame *f, kernel_thread *thread,
                                         const kernel_bundle *b, int first)
 {

@@ -1,9 +1,10 @@
 /* Computes the intervals of a ray that a job's clips (render.h) keep, in double. They depend only on the ray and are
  * the same on all ranks.
  *
- * The half spaces, boxes and spheres that clip every layer leave one interval of a ray, with which packets begin and
- * end. Surfaces with further clips test each hit. Volumes with further clips are traced in turns, one interval of each
- * ray per turn, because a body that is cut out may divide a ray. */
+ * Clips whose inside is kept leave one interval of a ray. Those of them that all layers share are applied first:
+ * packets trace only that interval. For surfaces with further clips, each hit is tested. Volumes with further clips are
+ * traced several times, for one interval of each ray at a time, because a clip that cuts out a body divides a ray into
+ * several intervals. */
 #ifndef RENDER_KERNEL_CLIP_H
 #define RENDER_KERNEL_CLIP_H
 
@@ -13,7 +14,7 @@
 
 #include "render.h"
 
-/* An interval of a ray between two depths; empty if begin > end. */
+/* An interval of a ray between two values of t; empty if begin > end. */
 typedef struct kernel_ray_part {
     double begin, end;
 } kernel_ray_part;
@@ -30,7 +31,8 @@ static inline double kernel_clip_dot(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Returns the scaled distance from the ray's point at t = 0 to the clip plane. */
+/* Returns the distance, in scaled units times the length of the plane's normal, from the ray's point at t = 0 to the
+ * clip plane along the normal; negative if the point is beyond the plane. */
 static inline double kernel_clip_plane_distance(const render_clip *c, const render_space *s, const kernel_clip_ray *ray)
 {
     return (c->distance - kernel_clip_dot(c->normal, s->origin)) * s->scale - kernel_clip_dot(c->normal, ray->base);
@@ -94,7 +96,7 @@ static inline int kernel_clip_add_hole(kernel_ray_part *holes, int count, kernel
     return count + 1;
 }
 
-/* Returns interval `number`, counted from 0, among those that a set of clips leaves of a ray behind the depth `begin`;
+/* Returns interval `number`, counted from 0, of the intervals that a set of clips leaves of a ray beyond t = `begin`;
  * KERNEL_NO_PART if there are fewer. clips: one bit per clip of the job. */
 static inline kernel_ray_part kernel_clip_part(const render_job *job, uint32_t clips, const kernel_clip_ray *ray,
                                                double begin, int number)

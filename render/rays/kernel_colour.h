@@ -16,7 +16,8 @@
 SIMD_INLINE vf kernel_transmittance(vf opacity, float exponent, vf *absorbed)
 {
     const vf clear = 1.0f - opacity;
-    /* Rounding 1 - opacity loses at most half a unit in the last place; `rest` restores it to first order. */
+    /* The rounding of 1 - opacity is an error of at most half a unit in the last place. `rest` is that error, by which
+     * the logarithm is corrected to first order. */
     const vf rest = (1.0f - clear) - opacity;
     const vf safe = vf_max(clear, vf_set(1.2e-38f));
     const vf log = vf_select(vf_le(clear, vf_set(0)), vf_set(-1e30f), vf_log2(safe) + rest / safe * 1.4426950f);
@@ -40,8 +41,9 @@ SIMD_INLINE vf kernel_transmittance(vf opacity, float exponent, vf *absorbed)
     return vf_select(small, 1.0f - series, power);
 }
 
-/* Returns the position in the colour table, with 0 and 1 as its ends, of a value on a logarithmic or symlog scale. The
- * result is that of render_scaled(), mapped to the table, with a relative error of 3e-7. */
+/* Returns the position in the colour table, whose ends are 0 and 1, of a value x on a logarithmic or symmetric
+ * logarithmic scale. x is given in the transfer function's domain. The scale's function (render_scaled()) is computed
+ * with a relative error of 3e-7. */
 static __attribute__((noinline)) vf kernel_scaled_position(const kernel_transfer *t, vf x)
 {
     const vf threshold = vf_set(t->threshold), size = vf_max(vf_abs(x), threshold);
@@ -109,7 +111,8 @@ SIMD_INLINE vf kernel_inverse_length(const vf v[3], vm *is_zero)
     return scale / vf_sqrt((a * a + b * b) + c * c);
 }
 
-/* Computes the unit vector along n, a vector of any length in camera axes, that points to the eye's side. */
+/* Computes the unit vector parallel to n that points towards the eye. n: a vector of any length and either sign, in
+ * camera axes; if it is zero, the result is the direction to the eye. */
 SIMD_INLINE void kernel_facing_normal(const kernel_packet *p, const vf n[3], vf unit[3])
 {
     vm flat;
@@ -123,8 +126,8 @@ SIMD_INLINE void kernel_facing_normal(const kernel_packet *p, const vf n[3], vf 
     for (int a = 0; a < 3; a++) unit[a] *= turn;
 }
 
-/* Shades a colour by the Blinn-Phong model (render.h). n is any vector along the gradient, of any length, in camera
- * axes. */
+/* Shades a colour by the Blinn-Phong model (render.h). n: the gradient of the field at the hit, of any length and
+ * either sign, in camera axes. */
 SIMD_INLINE void kernel_shade(const kernel_packet *p, const render_material *m, const vf n[3], vf colour[3])
 {
     const render_job *job = p->frame->job;
@@ -153,12 +156,12 @@ SIMD_INLINE void kernel_shade(const kernel_packet *p, const render_material *m, 
     for (int a = 0; a < 3; a++) colour[a] = colour[a] * diffuse[a] + specular[a];
 }
 
-/* One fragment per ray. The lane's `kind` is an offset that is added to the kind given to kernel_emit(). */
+/* One fragment per ray (fragment.h). `kind` of each lane is added to the kind that is passed to kernel_emit(). */
 typedef struct kernel_fragments {
     vf t_in, t_out, colour[3], transmittance, kind;
 } kernel_fragments;
 
-/* Returns which rays have a visible fragment: one that absorbs light or is not black (fragment_shows()). */
+/* Returns the rays whose fragment is visible: it absorbs light or its colour is not black (fragment_shows()). */
 SIMD_INLINE vm kernel_fragment_is_visible(const vf colour[3], vf transmittance)
 {
     const vf zero = vf_set(0);

@@ -20,8 +20,9 @@ SIMD_INLINE vf vf_exp2(vf x)
     return vf_select(vf_lt(x, vf_set(-126)), vf_set(0), p * scale);
 }
 
-/* Returns log2(x) for normal x > 0. It brings the mantissa m to [sqrt(1/2), sqrt(2)) and sums 2 atanh(s) / ln 2 with s
- * = (m-1)/(m+1), |s| < 0.172; the first omitted term is s^10 / 11 < 3e-9 relative. */
+/* Returns log2(x) for x > 0 that is not denormal. x is 2^exponent times m with m in [sqrt(1/2), sqrt(2)), and log2(m)
+ * is 2 atanh(s) / ln 2 with s = (m-1)/(m+1), |s| < 0.172, computed as a power series. The first omitted term is s^10 /
+ * 11 < 3e-9 of the sum. */
 SIMD_INLINE vf vf_log2(vf x)
 {
     const vi bits = vi_from_bits(x);

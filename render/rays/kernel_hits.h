@@ -6,7 +6,8 @@
 
 #include "simd.h"
 
-/* Maximum number of crossings of transparent surfaces stored per ray; volume fragments are split at them. */
+/* Maximum number of crossings of transparent surfaces that are stored per ray. Volume fragments are split at these
+ * crossings. */
 enum { KERNEL_MAX_CUTS = 32 };
 
 typedef struct kernel_hits {
@@ -14,16 +15,19 @@ typedef struct kernel_hits {
     /* A vector of any length along the gradient, in camera axes. With normals from vertices (RENDER_VERTEX) it holds
      * the hit's reference coordinates in its cell until the tile ends. */
     vf normal[3];
-    /* The cell that each ray has hit: mesh part and index in it; set only with normals from vertices (RENDER_VERTEX). A
-     * part of -1 means that the cell is not needed again. */
+    /* The cell that each ray has hit: mesh part and index in it; set only with normals from vertices (RENDER_VERTEX).
+     * Part -1: the hit's normal has been computed, or there is no hit, so that the cell is not needed. */
     vi part, cell;
     vf colour[3]; /* colour of each hit before lighting */
-    /* distance from the hit at which central differences take samples; set only if normals come from differences */
+    /* distance from the hit, in scaled units, at which the field is sampled for central differences; set only if
+     * normals come from differences */
     vf reach;
     vf kind;
-    int cut_count;           /* number of rows in `cut` */
-    vf cut[KERNEL_MAX_CUTS]; /* row n holds the n-th crossing found of each ray, unsorted; +inf if a ray has fewer */
-    vm overflowed;           /* rays with more than KERNEL_MAX_CUTS crossings */
+    int cut_count; /* number of rows in `cut` */
+    /* row n holds t of the crossing of each ray that was found as its n-th, so that rows are not sorted; +inf if a ray
+     * has fewer */
+    vf cut[KERNEL_MAX_CUTS];
+    vm overflowed; /* rays with more than KERNEL_MAX_CUTS crossings */
 } kernel_hits;
 
 static inline void kernel_hits_begin(kernel_hits *hits)
@@ -35,8 +39,8 @@ static inline void kernel_hits_begin(kernel_hits *hits)
     for (int a = 0; a < 3; a++) hits->normal[a] = hits->colour[a] = vf_set(0);
 }
 
-/* Adds a crossing at t to each ray in `hit`. Each ray fills its own rows in order, so that the positions where
- * fragments are split depend neither on the traversal nor on the other rays of the packet. */
+/* Adds a crossing at t to each ray in `hit`. Each ray fills its own lane from row 0 on, whatever the other rays of the
+ * packet do. So the depths at which a ray's fragments are split do not depend on the other rays. */
 SIMD_INLINE void kernel_hits_add_crossing(kernel_hits *hits, vm hit, vf t)
 {
     for (int n = 0; vm_any(hit); n++) {

@@ -1,4 +1,5 @@
-/* A packet is SIMD_WIDTH rays of one tile, in tile space. */
+/* Defines the packet: SIMD_WIDTH rays of one tile, one per lane, in tile space (kernel_types.h), with the interval of
+ * depths in which each ray is traced. */
 #ifndef RENDER_KERNEL_PACKET_H
 #define RENDER_KERNEL_PACKET_H
 
@@ -19,7 +20,7 @@ typedef struct kernel_packet {
     kernel_hits *hits; /* hits on surfaces; set only for packets of a tile that is being traced */
     int x0, y0;        /* column and row of the packet's upper left pixel */
     vm active;
-    bool is_nearer; /* set when t_far of some ray has decreased since the flag was last cleared */
+    bool is_nearer; /* set when a nearer hit has decreased t_far of some ray; callers clear it */
     bool has_view;
     /* the rays in tile space: at depth Z they are at origin + slope * Z */
     vf origin_x, origin_y, slope_x, slope_y;
@@ -27,21 +28,23 @@ typedef struct kernel_packet {
      * camera is orthographic, their origin (kernel_cell.h). */
     bool is_pencil;
     vf u, v;
-    vf t_near; /* depth at which the rays begin: that of the eye's plane, or clip_in if that is farther */
-    vf t_far;  /* depth at which the rays end: that of the nearest opaque hit so far; initially +inf or clip_out */
+    vf t_near; /* t at which the rays begin: that of the eye's plane, or clip_in if that is farther */
+    vf t_far;  /* t at which the rays end: that of the nearest opaque hit so far; initially +inf or clip_out */
     uint32_t pixel[SIMD_WIDTH];
     /* unit vector from the scene to the eye in camera axes, for shading; valid if has_view is set */
     vf view[3];
-    /* samples are at t = sample_base + m * sample_step for integers m >= sample_first */
+    /* samples of volumes are at t = sample_base + m * sample_step for integers m >= sample_first; sample_inverse is 1 /
+     * sample_step */
     vf sample_base, sample_step, sample_inverse;
     int sample_first;
-    /* The interval of depths that clips leave of each ray for volumes; -inf and +inf if there are no clips. */
+    /* The interval of t that clips leave of each ray for volumes; -inf and +inf if there are no clips. Set only if the
+     * frame has volumes or common clips. */
     vf clip_in, clip_out;
-    /* Exact length of that interval, divided by the rounded one, clip_out - clip_in. The two differ much if a ray
-     * grazes a sphere. */
+    /* Exact length of the interval from clip_in to clip_out, divided by the difference of these two rounded numbers.
+     * The ratio is far from 1 if a ray grazes a sphere, so that the interval is very short. */
     vf clip_length_ratio;
-    /* The active rays and the interval that surfaces leave of them, saved while volumes are traced with clips of their
-     * own. */
+    /* Saved values of active, t_near and t_far after the surfaces have been traced. They are restored for each of the
+     * intervals that the clips of volumes leave (kernel_packet_clip_volumes()). */
     vm all_active;
     vf surface_near, surface_far;
 } kernel_packet;
@@ -49,7 +52,8 @@ typedef struct kernel_packet {
 /* A packet covers a rectangle of 4 × 4, 4 × 2 or 2 × 2 pixels, for vectors of 16, 8 or 4 lanes. */
 enum { KERNEL_PACKET_COLUMNS = SIMD_WIDTH == 4 ? 2 : 4, KERNEL_PACKET_ROWS = SIMD_WIDTH / KERNEL_PACKET_COLUMNS };
 
-/* Computes the ray with column and row parameters (px, py) in tree space: its point at t is base + t * direction. */
+/* Computes a ray in tree space: its point at t is base + t * direction. px, py: slope or offset of the ray's column and
+ * row of pixels (kernel_column(), kernel_row()). */
 static inline void kernel_tree_ray(const kernel_frame *f, double px, double py, double base[3], double direction[3])
 {
     const render_camera *c = &f->job->camera;
@@ -63,7 +67,7 @@ static inline void kernel_tree_ray(const kernel_frame *f, double px, double py, 
     }
 }
 
-/* Computes the column and row parameters of a packet's rays (kernel_tree_ray()). */
+/* Computes the slopes or offsets of the columns and rows of a packet's rays (px and py of kernel_tree_ray()). */
 static inline void kernel_packet_lanes(const kernel_packet *p, double px[SIMD_WIDTH], double py[SIMD_WIDTH])
 {
     for (int i = 0; i < SIMD_WIDTH; i++) {
@@ -89,7 +93,8 @@ static inline void kernel_packet_tile_rays(kernel_packet *p)
     p->slope_y = vf_load(lanes[3]);
 }
 
-/* Computes the directions to the eye, if that has not been done; kernel_shade() needs them. */
+/* Computes the directions from the scene to the eye (p->view) unless they are already set; kernel_shade() needs
+ * them. */
 static inline void kernel_packet_view(kernel_packet *p)
 {
     if (p->has_view) return;
@@ -111,9 +116,9 @@ static inline void kernel_packet_view(kernel_packet *p)
     for (int a = 0; a < 3; a++) p->view[a] = vf_load(view[a]);
 }
 
-/* Returns the number of the first sample of a ray, which is the sample at the eye; it is at most 0. Numbers are counted
- * from a sample near the depth origin, so that float32 represents the samples' depths well. They depend only on the
- * camera. */
+/* Returns the number of a ray's first sample, the one next to the eye; it is 0 or negative. Sample 0 is near the depth
+ * origin, in the scene, so that products of number and step have small rounding errors there. The numbers depend only
+ * on the camera and the step. */
 static inline int kernel_sample_first(const kernel_frame *f)
 {
     const double count = floor(f->depth_shift / f->scaled_step);
@@ -138,8 +143,8 @@ static inline void kernel_packet_samples(kernel_packet *p, const double px[SIMD_
     p->sample_inverse = 1.0f / p->sample_step;
 }
 
-/* Sets clip_in and clip_out to interval `number`, counted from 0, of those that the clips keep of each ray in front of
- * the eye. */
+/* Sets clip_in and clip_out to interval `number`, counted from 0, of the intervals that the given clips (a bit mask)
+ * leave of the part of each ray in front of the eye. */
 static __attribute__((noinline, cold)) void kernel_packet_part(kernel_packet *p, uint32_t clips, int number)
 {
     const kernel_frame *f = p->frame;
@@ -161,7 +166,8 @@ static __attribute__((noinline, cold)) void kernel_packet_part(kernel_packet *p,
     p->clip_length_ratio = vf_load(stretch);
 }
 
-/* Cuts the packet's rays at the clips that all layers have in common. */
+/* Restricts the packet's rays to the interval that the frame's common clips leave, and deactivates rays of which
+ * nothing is left. */
 static inline void kernel_packet_clip(kernel_packet *p)
 {
     kernel_packet_part(p, p->frame->common_clips, 0);
@@ -185,7 +191,8 @@ static inline void kernel_packet_clip_volumes(kernel_packet *p, int turn)
     p->active = vm_and(p->all_active, vf_le(p->t_near, p->t_far));
 }
 
-/* Sets up the packet at pixel (x0, y0) for tracing in cells. The tile's rays must have been set. */
+/* Sets up the packet whose upper left pixel is (x0, y0). kernel_tile_rays() must have been called for the tile. Members
+ * for shading and samples are not set. */
 static inline void kernel_packet_begin(kernel_packet *p, const kernel_frame *f, const kernel_tile *tile,
                                        kernel_thread *thread, int x0, int y0)
 {
@@ -225,8 +232,9 @@ typedef struct kernel_rays {
     vf origin_x, origin_y, slope_x, slope_y;
 } kernel_rays;
 
-/* A point of each ray in its cell: its depth t, the field's value there, and its reference coordinates r. mask: the
- * rays that have the point; set only for crossings of faces and for points whose comments mention it. */
+/* A point on each ray inside a cell. t: the ray's parameter; value: the field there; r: reference coordinates in the
+ * cell. mask: the rays that have such a point; set only for crossings of faces and for points whose comments mention
+ * it. */
 typedef struct kernel_point {
     vf t, value, r[3];
     vm mask;
@@ -240,7 +248,7 @@ SIMD_INLINE void kernel_point_move(vm mask, const kernel_point *from, kernel_poi
     for (int a = 0; a < 3; a++) to->r[a] = vf_select(mask, from->r[a], to->r[a]);
 }
 
-/* Exchanges the two points of each ray whose second point is the nearer one. */
+/* Exchanges the two points on rays whose second point is nearer than the first. */
 SIMD_INLINE void kernel_points_order(kernel_point ends[2])
 {
     const vm swap = vf_lt(ends[1].t, ends[0].t);

@@ -9,11 +9,12 @@
  *          2     +-----+-----+-----+-----+      border may touch the columns on both sides. The masks of columns and
  *                                               of rows together give a mask of blocks.
  *
- * Each plane is one lane of a vector, and so are the depth and the distance along the tile's direction: a body is
- * classified against all of them at once. Planes through the eye classify only bodies in front of the eye; everything
- * else lies before the rays begin. A body that straddles the eye's plane is on both sides of the borders that it may
- * meet, so it is not lost. Bodies are extended by more than all rounding, so masks are never too small. Masks only
- * select where to test; they never change the result. */
+ * A body is a node's box, or the convex hull of points of a cell. Each plane is one lane of a vector. Two more lanes
+ * are the depth and the distance along the direction of the tile's middle ray. So a body's extents in all lanes are
+ * computed at once. Planes through the eye give correct masks only for bodies in front of the eye; all others lie
+ * before the rays begin. A body that intersects the eye's plane lies on both sides of the borders of all blocks in
+ * which it may be visible, so these blocks are in the mask. Bodies are extended by more than all rounding, so masks are
+ * never too small. Masks only select where to test; they never change the result. */
 #ifndef RENDER_KERNEL_TILE_H
 #define RENDER_KERNEL_TILE_H
 
@@ -39,7 +40,8 @@ static inline void kernel_tile_setup(kernel_tile *tile, const kernel_frame *f, i
     tile->radius = (float)(0.5 * KERNEL_TILE * widest);
 }
 
-/* Returns the factor by which a ray's slope is multiplied to get its origin at Z = 0 in tile space. */
+/* Returns the factor by which a ray's slope (orthographic: offset) minus that of the tile's centre is multiplied to get
+ * its origin at Z = 0 in tile space. */
 static inline double kernel_slope_to_origin(const kernel_frame *f)
 {
     return f->job->camera.is_orthographic ? f->job->space.scale : f->depth_shift;
@@ -65,7 +67,8 @@ enum {
     KERNEL_BLOCK_PACKETS = KERNEL_BLOCK * KERNEL_BLOCK / SIMD_WIDTH,
     KERNEL_TILE_PACKETS = KERNEL_BLOCKS * KERNEL_BLOCK_PACKETS,
     KERNEL_ALL_BLOCKS = (1 << KERNEL_BLOCKS) - 1,
-    /* Lanes: five borders of columns, five of rows, depth (in tree space: t), distance along the tile's direction. */
+    /* Lanes of the vectors: the 5 planes that bound the 4 columns of blocks, the 5 planes that bound the 4 rows, the
+     * depth t, and the distance along the direction of the tile's middle ray. */
     KERNEL_ROWS_LANE = KERNEL_BLOCKS_ACROSS + 1,
     KERNEL_DEPTH_LANE = 2 * KERNEL_ROWS_LANE,
     KERNEL_ALONG_LANE,
@@ -73,16 +76,16 @@ enum {
     KERNEL_LANE_VECTORS = KERNEL_LANES / SIMD_WIDTH
 };
 
-/* One plane per lane: the signed distance is normal · position + offset. `size` is the normal's absolute values;
- * `error` bounds the rounding of the distance at positions near the scene. */
+/* One plane per lane: a position's signed distance from it is normal · position + offset. size: absolute values of the
+ * normal's components; error: upper bound of the rounding error of the distance at positions near the scene. */
 typedef struct kernel_planes {
     vf normal[3][KERNEL_LANE_VECTORS], size[3][KERNEL_LANE_VECTORS];
     vf offset[KERNEL_LANE_VECTORS], error[KERNEL_LANE_VECTORS];
 } kernel_planes;
 
-/* Computes the slopes (perspective) or offsets (orthographic) of all borders between the tile's blocks. If tile is
- * NULL, these are the borders of the whole picture. Block 0 then stands for the picture: a body that may be visible in
- * it is reported to be in block 0. */
+/* Computes the slopes (perspective) or offsets (orthographic) of the five borders of columns (x) and of rows (y) of the
+ * tile's blocks. If tile is NULL, block 0 stands for the whole picture: the borders 0 are its left and upper border,
+ * all others its right and lower border. A body that may be visible in the picture then gets the mask of block 0. */
 static inline void kernel_borders(const kernel_frame *f, const kernel_tile *tile, double x[KERNEL_BLOCKS_ACROSS + 1],
                                   double y[KERNEL_BLOCKS_ACROSS + 1])
 {
@@ -118,7 +121,7 @@ static inline void kernel_planes_from_eye(const kernel_frame *f, const kernel_ti
     axes[1][KERNEL_ALONG_LANE] = flat || !tile ? 0 : tile->centre_y;
 }
 
-/* Loads planes, one per number of each list. */
+/* Loads planes from lists with one number per lane. */
 static inline void kernel_planes_load(kernel_planes *q, float (*const normal)[KERNEL_LANES], const float *offset,
                                       const float *error)
 {
@@ -134,7 +137,7 @@ static inline void kernel_planes_load(kernel_planes *q, float (*const normal)[KE
 
 /* Computes the planes of the tile, or of the whole picture if tile is NULL, in tree space, for boxes. Normals are
  * rounded before the offsets are computed, so that the planes still pass through the eye. The remaining error is a
- * rotation by one rounding, at a distance of at most the eye's and the scene's. */
+ * rotation of the planes about the eye by the rounding of the normals. */
 static inline void kernel_tree_planes(kernel_planes *q, const kernel_frame *f, const kernel_tile *tile)
 {
     const render_camera *c = &f->job->camera;
@@ -163,7 +166,7 @@ static inline void kernel_tree_planes(kernel_planes *q, const kernel_frame *f, c
 }
 
 /* Computes the planes in tile space, against which cells are tested: X - slope * Z - origin for columns, and likewise Y
- * for rows. The lane of the distance along the direction is not used. */
+ * for rows. The lane of the distance along the tile's middle ray is not used. */
 static inline void kernel_tile_planes(kernel_planes *q, const kernel_frame *f, const kernel_tile *tile)
 {
     const bool flat = f->job->camera.is_orthographic;
@@ -192,12 +195,13 @@ typedef struct kernel_placement {
      * which part has a distance >= 0. The bit of a plane that cuts the body is set in both. */
     unsigned below, above;
     unsigned blocks; /* the blocks that the body may meet */
-    /* the body's least and greatest depth, and its position along the tile's direction, by which bodies are sorted */
+    /* near, far: the body's least and greatest depth; along: distance of a box's middle along the tile's middle ray, by
+     * which boxes are sorted */
     float near, far, along;
 } kernel_placement;
 
-/* Adds one vector of planes to the placement: `low` and `high` are the body's least and greatest distance to each
- * plane. */
+/* Sets the bits of one vector of planes in the placement. v: number of the vector; low, high: the body's least and
+ * greatest signed distance from each plane. */
 SIMD_INLINE void kernel_placement_add(kernel_placement *placement, int v, vf low, vf high)
 {
     placement->below |= vm_bits(vf_le(low, vf_set(0))) << v * SIMD_WIDTH;
@@ -207,14 +211,14 @@ SIMD_INLINE void kernel_placement_add(kernel_placement *placement, int v, vf low
     placement->far = high[KERNEL_DEPTH_LANE % SIMD_WIDTH];
 }
 
-/* Computes the blocks for which the body is on the inner side of all borders. */
+/* Computes the mask of the blocks of which the body is, at least with a part, on the inner side of all four borders. */
 SIMD_INLINE void kernel_placement_close(kernel_placement *placement)
 {
     const unsigned inner = placement->above & placement->below >> 1;
     placement->blocks = kernel_blocks_at(inner & 15, inner >> KERNEL_ROWS_LANE & 15);
 }
 
-/* Classifies a node's box. */
+/* Computes a node's extent in all lanes, and from this the blocks in which its box may be visible. */
 SIMD_INLINE kernel_placement kernel_box_placement(const kernel_planes *q, const mmbvh *tree, int64_t node)
 {
     float lower[4], upper[4];
@@ -233,11 +237,12 @@ SIMD_INLINE kernel_placement kernel_box_placement(const kernel_planes *q, const 
     return placement;
 }
 
-/* Relative margin that is added to the extent of a cell's points, so that rays that hit the cell only by rounding stay
- * within it. */
+/* Margin by which the extent of a cell's points is widened, relative to the size of their coordinates. It is larger
+ * than all rounding errors, so that a ray that hits the cell only by rounding is still inside. */
 #define KERNEL_OUTLINE_PAD 1e-5f
 
-/* Classifies the convex hull of points in tile space. places: the points' x, y and z. */
+/* Computes the extent of points in tile space in all lanes, and from this the blocks in which their convex hull may be
+ * visible. places: the points' x, y and z. */
 SIMD_INLINE kernel_placement kernel_points_placement(const kernel_planes *q, const float *const places[3], int count)
 {
     kernel_placement placement = {0};

@@ -1,6 +1,7 @@
-/* The state of the tile that is being traced: its rays, the nearest hits of its blocks, its traversal of a tree, and
- * lists of pixels of several cells that are processed side by side. A block's packets are set up when the first cell
- * meets the block. */
+/* The state of the tile that a thread is tracing: its rays, the depths of its blocks' nearest hits, and its traversal
+ * of a tree. A block's packets are set up when the first cell is found that may be visible in the block. The last part
+ * defines lists of rays, in which each ray has a cell of its own, so that the pixels of several small cells are
+ * processed in one vector. */
 #ifndef RENDER_KERNEL_TILE_TRACE_H
 #define RENDER_KERNEL_TILE_TRACE_H
 
@@ -21,12 +22,12 @@ typedef struct kernel_tile_trace {
     kernel_thread *thread;
     kernel_tile tile;
     kernel_planes tree_planes, tile_planes;
-    unsigned traced_blocks; /* mask of the blocks with pixels to trace */
+    unsigned traced_blocks; /* mask of the blocks that contain pixels to trace */
     unsigned begun;         /* mask of the blocks whose packets have been set up */
     /* number of the interval, counted from 0, in which volumes are being traced on each ray (kernel_clip.h) */
     int clip_interval;
     float t_near;
-    vf far[KERNEL_BLOCKS / SIMD_WIDTH]; /* farthest t_far of the rays of each block, one block per lane */
+    vf far[KERNEL_BLOCKS / SIMD_WIDTH]; /* for each block the largest t_far of its rays, one block per lane */
     /* t_far of each pixel, row by row; kept only if the tile traverses the trees for surfaces */
     float pixel_far[KERNEL_TILE * KERNEL_TILE];
     /* The following members describe the surface layer that is being traced. */
@@ -39,7 +40,8 @@ typedef struct kernel_tile_trace {
     kernel_hits hits[KERNEL_TILE_PACKETS];
 } kernel_tile_trace;
 
-/* Returns a mask of the blocks that contain a ray without a hit nearer than this depth. */
+/* Returns a mask of the blocks that contain a ray whose nearest hit is not nearer than the depth `near`, so that a cell
+ * at this depth may be visible. */
 SIMD_INLINE unsigned kernel_blocks_beyond(const kernel_tile_trace *t, float near)
 {
     unsigned bits = 0;
@@ -65,7 +67,7 @@ SIMD_INLINE void kernel_block_begin(kernel_tile_trace *t, int block)
     }
 }
 
-/* Returns the farthest t_far of the block's active rays. */
+/* Returns the largest t_far of the block's active rays. */
 SIMD_INLINE float kernel_block_far(const kernel_tile_trace *t, int block)
 {
     vf far = vf_set(-INFINITY);
@@ -76,7 +78,7 @@ SIMD_INLINE float kernel_block_far(const kernel_tile_trace *t, int block)
     return vf_reduce_max(far);
 }
 
-/* Updates the farthest t_far of the block and of its pixels after new hits. */
+/* Updates, after new hits, the block's largest t_far in t->far and the t_far of its pixels in t->pixel_far. */
 SIMD_INLINE void kernel_block_update_far(kernel_tile_trace *t, int block)
 {
     t->far[block / SIMD_WIDTH][block % SIMD_WIDTH] = kernel_block_far(t, block);
@@ -94,8 +96,8 @@ SIMD_INLINE void kernel_block_update_far(kernel_tile_trace *t, int block)
     }
 }
 
-/* Returns whether a box of pixels contains a pixel without a hit nearer than this depth. The box has four bits each for
- * first and last column, first and last row. */
+/* Returns whether a box of pixels contains one whose nearest hit is not nearer than the depth `near`. box: first and
+ * last column, first and last row in the tile, 4 bits each, from bit 0 on. */
 SIMD_INLINE bool kernel_pixels_beyond(const kernel_tile_trace *t, unsigned box, float near)
 {
     const unsigned columns = (2u << (box >> 4 & 15)) - (1u << (box & 15));
@@ -109,8 +111,8 @@ SIMD_INLINE bool kernel_pixels_beyond(const kernel_tile_trace *t, unsigned box, 
     return false;
 }
 
-/* Returns those of the given blocks in which a cell with these vertices, whose x, y and z are given, may be visible: it
- * meets the block, and is not hidden by nearer hits. */
+/* Returns those of the given blocks in which a cell may be visible: it overlaps the block in the picture, and not all
+ * rays of the block have nearer hits. places: x, y and z of the cell's `count` vertices in tile space. */
 SIMD_INLINE unsigned kernel_tile_visible_blocks(const kernel_tile_trace *t, const float *const places[3], int count,
                                                 unsigned blocks)
 {
@@ -119,7 +121,7 @@ SIMD_INLINE unsigned kernel_tile_visible_blocks(const kernel_tile_trace *t, cons
     return blocks & placement.blocks & kernel_blocks_beyond(t, placement.near);
 }
 
-/* Returns the farthest t_far of all rays in blocks that are traced. */
+/* Returns the largest t_far of all rays in blocks that are traced. */
 SIMD_INLINE float kernel_tile_far(const kernel_tile_trace *t)
 {
     const unsigned lanes = (1u << SIMD_WIDTH) - 1;
@@ -150,9 +152,9 @@ SIMD_INLINE void kernel_tile_begin(kernel_tile_trace *t, const kernel_frame *f, 
     kernel_tile_planes(&t->tile_planes, f, &t->tile);
 }
 
-/* A node on a traversal's stack. A tile traverses a tree once for all its blocks, with a mask of the blocks that a node
- * may meet in front of their nearest hits; or once for its pixels, with the box of pixels that a node may meet
- * (kernel_tile_surface.h). */
+/* A node on a traversal's stack. A tile traverses a tree in one of two ways: by blocks, with a mask of the blocks in
+ * which the node may be visible in front of their hits; or by pixels, with the box of pixels in which the node may be
+ * visible (kernel_tile_surface.h). */
 typedef struct kernel_tile_node {
     /* index of the node; or, in traversals by pixels, index of a leaf's first cell or of an inner node's left child */
     int64_t ref;
@@ -166,13 +168,14 @@ typedef void kernel_tile_visit(kernel_tile_trace *t, int part, const uint32_t *c
 struct kernel_cell;
 struct kernel_map;
 
-/* Callback for a cell that is ready for tracing; for a polyhedron only the cell's index is set. map is NULL if the cell
- * needs no inverse map. */
+/* Callback that traces a cell, whose data are complete, in the given blocks. If the cell is a polyhedron, only its
+ * index is set. map: the map of a hex, wedge or pyramid, to be inverted for reference coordinates (kernel_map.h); NULL
+ * if that is not needed. */
 typedef void kernel_tile_trace_cell(kernel_tile_trace *t, int part, const struct kernel_cell *c,
                                     const struct kernel_map *map, unsigned blocks);
 
-/* Returns the node's placement with those of the given blocks that it may meet; none if its values are invisible.
- * interest is NULL if all values are visible. */
+/* Returns the node's placement, with those of the given blocks in which it may be visible; with no blocks if the node
+ * contains no visible values. visible_values: NULL if all values are visible. */
 SIMD_INLINE kernel_placement kernel_tile_classify_node(const kernel_tile_trace *t, const mmbvh *tree,
                                                        const mmbvh_ranges *ranges,
                                                        const kernel_visible_values *visible_values, int64_t node,
@@ -183,7 +186,7 @@ SIMD_INLINE kernel_placement kernel_tile_classify_node(const kernel_tile_trace *
     placement = kernel_box_placement(&t->tree_planes, tree, node);
     placement.blocks &= placement.far < t->t_near ? 0 : blocks;
     if (placement.blocks) {
-        /* Prefetches what the traversal reads next: the cells of a leaf, or the children of an inner node. */
+        /* Prefetches the data that the traversal reads next: the cells of a leaf, or the children of an inner node. */
         const int64_t ref = mmbvh_node_ref(tree, node);
         if (mmbvh_node_count(tree, node)) {
             __builtin_prefetch(tree->cells + ref);
@@ -257,7 +260,7 @@ SIMD_INLINE void kernel_pixel_list_add_box(kernel_pixel_list *rays, unsigned box
     }
 }
 
-/* Pads the list with zeros, so that whole vectors can be read at its end. */
+/* Pads the list with zeros, so that its last rays can be read as a whole vector. */
 SIMD_INLINE void kernel_pixel_list_close(kernel_pixel_list *rays)
 {
     memset(rays->pixel + rays->count, 0, SIMD_WIDTH);
@@ -272,7 +275,7 @@ SIMD_INLINE vi kernel_load_bytes(const uint8_t *bytes)
     return __builtin_convertvector(lanes, vi);
 }
 
-/* Returns entries[index] for each lane. `entries` has one number per column, or per row, of the tile. */
+/* Returns entries[index] for each lane. entries: one number for each column, or for each row, of the tile. */
 SIMD_INLINE vf kernel_gather_tile_numbers(const float entries[KERNEL_TILE], vi index)
 {
     return SIMD_WIDTH == KERNEL_TILE ? vf_permute(vf_load(entries), index) : vf_gather(entries, index);
@@ -294,17 +297,19 @@ SIMD_INLINE vf kernel_pixel_far(const kernel_tile_trace *t, vi at)
                      at / SIMD_WIDTH * stride + (at & (SIMD_WIDTH - 1)));
 }
 
-/* Rays of a vector of pixels, each with a cell of its own. */
+/* The rays of SIMD_WIDTH pixels, one per lane, each of which has a cell of its own. */
 typedef struct kernel_lane_rays {
-    vi lane, at; /* lane that holds the ray's cell; position of its pixel among the tile's packets */
+    /* lane: the lane in which the cells' vectors hold the ray's cell; at: position of its pixel among the tile's
+     * packets (kernel_pixel_position()) */
+    vi lane, at;
     kernel_rays rays;
-    /* lanes that have a ray; set, like u and v, if the rays are those of a list */
+    /* lanes that have a ray; active, u and v are set only by kernel_lane_rays_begin() */
     vm active;
     vf u, v; /* slope of the ray or, if the camera is orthographic, its origin */
-    vf far;  /* nearest hit so far; set only when surfaces are traced */
+    vf far;  /* t of the ray's nearest hit so far; set only when surfaces are traced */
 } kernel_lane_rays;
 
-/* Computes the rays of the tile's pixels, each with the lane of its cell. */
+/* Computes the rays through the given pixels of the tile (16 * row + column). lane: lane of each ray's cell. */
 SIMD_INLINE void kernel_lane_rays_of(kernel_lane_rays *out, const kernel_tile *tile, vi pixel, vi lane)
 {
     const vi column = pixel & (KERNEL_TILE - 1), row = pixel >> 4 & (KERNEL_TILE - 1);
@@ -333,8 +338,8 @@ static inline void kernel_tile_set_layer(kernel_tile_trace *t, int layer)
     t->surface = &t->frame->surfaces[layer];
 }
 
-/* Returns whether the current layer's hits can be accepted for rays in lanes, each with its own cell
- * (kernel_ray_accept()). */
+/* Returns whether hits on the current layer can be processed for rays that each have a cell of their own
+ * (kernel_ray_accept()); otherwise they are processed by packets that share one cell. */
 SIMD_INLINE bool kernel_tile_layer_batches(const kernel_tile_trace *t)
 {
     const render_surface_layer *l = t->surface->layer;

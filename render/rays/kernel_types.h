@@ -1,5 +1,23 @@
 /* The constants of a frame in the forms that inner loops use. render_prepare.c computes them once per frame, and the
- * kernels of every instruction set read them. Kernel headers contain only static inline code and these types. */
+ * kernels of every instruction set read them. Kernel headers contain only static inline code and these types.
+ *
+ * Terms of all kernel headers:
+ *     t            a ray's parameter: depth along the camera's axis, counted from the depth origin, in scaled units
+ *     tree space   the coordinates of the trees: (world position - space.origin) * space.scale; its unit of length, in
+ *                  which the scene has a size near 1, is a scaled unit
+ *     tile space   tree space relative to the eye, along the camera's axes (right, up, forward), sheared so that the
+ *                  tile's middle ray is the axis X = Y = 0 (orthographic: moved sideways for that); Z is t
+ *     tile         16 × 16 pixels, which one thread traces
+ *     block        4 × 4 pixels of a tile
+ *     packet       rays through SIMD_WIDTH neighbouring pixels, one per lane of a vector (kernel_packet.h)
+ *     part         one mesh of this rank (render_part)
+ *     hit          the point at which a ray meets an isosurface
+ *     crossing     the point at which a ray passes through a face of a cell
+ *     interval     the part of a ray between two values of t, for example inside a cell; or a range of values
+ *     candidate    a cell that may be visible, found before tiles are traced; a bin has the candidates of one tile
+ *     segment      a part of a ray's interval in a cell, on which the field is taken as linear for volumes
+ *     piece        a range of values on which a transfer function's opacity and colour are linear
+ *     half         the first or the last SIMD_WIDTH / 2 lanes of a vector (kernel_wide.h) */
 #ifndef RENDER_KERNEL_TYPES_H
 #define RENDER_KERNEL_TYPES_H
 
@@ -22,7 +40,8 @@ enum {
 _Static_assert((int)KERNEL_MAX_INTERVALS >= (int)RENDER_MAX_INTERVALS, "a volume's intervals fit");
 
 /* KERNEL_BLACK: transmittance below which the rest of a segment is dropped. KERNEL_SHORT: shortest integration step, in
- * unit distances and as a share of the ray's interval in a piece (kernel_integral.h). */
+ * unit distances (render_transfer), and also as a share of the ray's interval in a piece of the transfer function
+ * (kernel_integral.h). */
 #if defined(KERNEL_REAL_IS_DOUBLE)
 typedef double kernel_real;
 #define KERNEL_BLACK 1e-16
@@ -35,10 +54,10 @@ typedef float kernel_real;
 
 enum { KERNEL_PIECE_BINS = 256, KERNEL_VARIATION_BINS = 128, KERNEL_VARIATION_WIDTHS = 29 };
 
-/* Entries of a piece: a part of a transfer function on which opacity and colour are linear. At a value x they are
- * entry[..] + (x - low) * slope. 1 - opacity has entries of its own, because near an opacity of 1 the difference would
- * be only rounding. If the function is constant beyond its ends, the outermost pieces end at -+2^100, so that INVERSE
- * times the width is 1. */
+/* Entries of a piece of a transfer function: a range of values on which opacity and colour are linear. At a value x in
+ * the range from low to high, each is its value at low + (x - low) * its slope. 1 - opacity has entries of its own,
+ * because near an opacity of 1 the difference would consist of rounding errors only. If the function is constant beyond
+ * its ends, the outermost pieces end at -+2^100, so that KERNEL_PIECE_INVERSE times the width is still 1. */
 enum {
     KERNEL_PIECE_LOW,
     KERNEL_PIECE_HIGH,
@@ -55,35 +74,40 @@ enum {
     KERNEL_PIECE_ENTRIES = KERNEL_PIECE_COLOUR_SLOPE + 3
 };
 
-/* Bounds of a transfer function over a range of values that contains no step of the opacity. Extinctions are per unit
- * distance; slopes are per unit of the domain, whose width is 1. */
+/* Bounds of a transfer function over a range of values in which the opacity has no step. Extinctions are per unit
+ * distance (render_transfer). Slopes are derivatives by the value, in the function's domain (kernel_transfer). */
 typedef struct kernel_bound {
     float extinction_low, extinction_high, extinction_slope, colour_slope;
 } kernel_bound;
 
-/* Entries of a row of bounds of a transfer function over a range of values that contains no step of the opacity. A
- * field error d changes the light by at most the cost times d per unit distance. For fixed light from the front and
- * from behind, that change varies by at most the variation times d. */
+/* Entries of a row of kernel_pieces.variations: bounds of a transfer function over a range of values in which the
+ * opacity has no step. If the field errs by d over one unit distance of a ray, a pixel's light changes by at most the
+ * cost times d. Within the range of values, for fixed light from behind, that change varies by at most the variation
+ * times d. */
 enum {
     KERNEL_LIGHT_VARIATION,
     KERNEL_LIGHT_COST,
     KERNEL_LIGHT_EXTINCTION, /* maximum of the extinction */
-    KERNEL_LIGHT_STEEPNESS,  /* maximum of the extinction's slope times the contrast */
+    KERNEL_LIGHT_STEEPNESS,  /* maximum of the extinction's slope, times the contrast of colours */
     KERNEL_LIGHT_ENTRIES
 };
 
-/* A bin of the table of sums for preintegration (kernel_preintegral.h), in integer units. Each array holds the
- * extinction first, then the emission in three channels. The struct is read as rows of four floats. */
+/* A bin (a range of values) of the table of sums for preintegration (kernel_preintegral.h). Each array holds the sum of
+ * the extinction first, then those of the emission in three channels. Sums are integers: a sum divided by its number of
+ * bins is the mean extinction in units of depth_unit, or the mean emission in units of light_unit. The struct is read
+ * as rows of four floats. */
 typedef struct kernel_preint_entry {
     int32_t before[4]; /* sums over all earlier bins */
     float own[4];
-    int32_t colour;    /* colour at the bin's middle, 10 bits per channel */
-    float table_error; /* variation of extinction and emission within the bin, as light */
+    int32_t colour; /* colour at the bin's middle, 10 bits per channel, in units of colour_unit */
+    /* error bound of a segment's light per unit distance, due to the variation of extinction and emission in the bin */
+    float table_error;
     float unused[2];
 } kernel_preint_entry;
 
 typedef struct kernel_preintegral {
-    int bin_count;                /* number of bins of equal width; one infinite entry before and one behind them */
+    /* number of bins of equal width; entries[0] and the last entry are bins for all values below and above them */
+    int bin_count;
     kernel_preint_entry *entries; /* array of bin_count + 2 bins */
     float low, inverse;           /* value at which the first bin begins, and 1 / the width of a bin */
     float depth_unit, light_unit;
@@ -94,27 +118,30 @@ typedef struct kernel_preintegral {
 
 typedef struct kernel_pieces {
     int count;
-    kernel_real (*pieces)[KERNEL_PIECE_ENTRIES]; /* sorted by value; the first and the last are infinite */
-    /* Equal-width bins from bin_low on, by which the piece of a value is found: each holds the number of the piece at
-     * the bin's begin. */
+    /* pieces of the transfer function, sorted by value; the first begins at about -infinity, the last ends at about
+     * +infinity */
+    kernel_real (*pieces)[KERNEL_PIECE_ENTRIES];
+    /* A table to find the piece of a value: KERNEL_PIECE_BINS bins of equal width (1 / bin_inverse), the first of which
+     * begins at bin_low. Each holds the number of the piece in which the bin begins. */
     kernel_real bin_low, bin_inverse;
     kernel_real bin_first[KERNEL_PIECE_BINS];
-    /* Bounds over ranges of values, in a table of KERNEL_VARIATION_WIDTHS × KERNEL_VARIATION_BINS: its row is the
-     * range's class of width, its column the equal-width bin in which the range begins; bins begin at bin_low
-     * (kernel_light_bounds()). */
+    /* Bounds over ranges of values, in a table of KERNEL_VARIATION_WIDTHS × KERNEL_VARIATION_BINS. The row is the class
+     * of the range's width. The column is the bin in which the range begins; these bins have the width 1 /
+     * variation_inverse, and the first begins at bin_low (kernel_light_bounds()). */
     float variation_inverse;
     float (*variations)[KERNEL_LIGHT_ENTRIES];
     /* Set if a ramp of the opacity is so narrow that the rounding of its ends is visible: values near it then use the
      * ends' rounding errors (KERNEL_PIECE_LOW_REST). */
     bool has_rests;
     int step_count;
-    double steps[RENDER_MAX_OPACITY_POINTS]; /* values of the opacity's steps, sorted; pieces end at them, rounded */
+    /* values at which the opacity has a step, sorted; pieces end at these values, rounded to kernel_real */
+    double steps[RENDER_MAX_OPACITY_POINTS];
     /* largest difference between two colours of the function in any channel; black and white count as its colours */
     float contrast;
     kernel_preintegral *preintegral; /* table of sums; NULL if the job allows no error (max_error) */
 } kernel_pieces;
 
-/* Returns the value at which pieces end at a step of the opacity. */
+/* Returns the rounded value at which the pieces on both sides of a step of the opacity end. */
 static inline float kernel_step_cut(double step)
 {
     return (float)(kernel_real)step;
@@ -122,32 +149,36 @@ static inline float kernel_step_cut(double step)
 
 typedef struct kernel_tile {
     int x0, y0;                /* column and row of the tile's upper left pixel */
-    double centre_x, centre_y; /* slope (perspective) or offset (orthographic) of the tile's centre */
+    double centre_x, centre_y; /* slope (perspective) or offset (orthographic) of the ray through the tile's centre */
     double depth_shift;        /* copy of the frame's depth_shift */
-    float shear_x, shear_y;    /* slope of the tile's centre; 0 if the camera is orthographic */
-    /* The tile's rays in tile space: x by column, y by row of the tile. */
+    float shear_x, shear_y;    /* slope of the ray through the tile's centre; 0 if the camera is orthographic */
+    /* The tile's rays in tile space: x for each column, y for each row of pixels. A ray's point at depth Z is its
+     * origin plus Z times its slope. */
     float origin_x[KERNEL_TILE], origin_y[KERNEL_TILE], slope_x[KERNEL_TILE], slope_y[KERNEL_TILE];
-    float radius; /* upper bound of |u| and |v| over the tile's rays */
+    /* upper bound of |u| and |v| over the tile's rays; (u, v) is a ray's slope or, if the camera is orthographic, its
+     * origin */
+    float radius;
 } kernel_tile;
 
-/* Intervals of visible values, rounded outward: a node whose range meets none of them is skipped. */
+/* Intervals of visible values, rounded outward: nodes and cells whose range of values overlaps none of them are
+ * skipped. */
 typedef struct kernel_visible_values {
     int count;
     mmbvh_interval intervals[KERNEL_MAX_INTERVALS];
 } kernel_visible_values;
 
-/* A transfer function in its own domain, in which low is 0 and low + 1 / inverse_width is 1. The domain is the range
- * [low, high]; with a logarithmic scale it goes from 0 to the largest magnitude, so that small values keep their
- * digits. Opacity is the first point's plus a sum of ramps (a step is a ramp of infinite slope), by position in the
- * colour table. */
+/* A transfer function in its own domain: values are mapped linearly, so that low becomes 0 and low + 1 / inverse_width
+ * becomes 1. With a linear scale these two are the ends of the function's range. With a logarithmic scale they are the
+ * value 0 and the largest magnitude of the range, so that small values keep their digits. The opacity is that of the
+ * first point plus a sum of ramps over the position in the colour table (a step is a ramp of infinite slope). */
 typedef struct kernel_transfer {
     double low, inverse_width; /* a value x is mapped to the domain by (x - low) * inverse_width */
     const float *colours;
     int colour_count;
     /* The position in the colour table on a logarithmic or symlog scale s is s(value) * scale_slope + scale_shift. */
     render_scale scale;
-    /* symmetric logarithmic scale: s is linear for magnitudes up to it; logarithmic scale: smaller values are raised to
-     * it */
+    /* in the domain; symmetric logarithmic scale: s is linear for magnitudes up to the threshold; logarithmic scale:
+     * smaller values are raised to the threshold */
     float threshold;
     float inverse_threshold; /* 1 divided by the threshold */
     float scale_slope, scale_shift;
@@ -158,12 +189,13 @@ typedef struct kernel_transfer {
     float base_opacity;
     float ramp_start[RENDER_MAX_OPACITY_POINTS], ramp_inverse[RENDER_MAX_OPACITY_POINTS];
     float ramp_rise[RENDER_MAX_OPACITY_POINTS];
-    float exponent; /* step / unit_distance: the power of (1 - opacity) that gives the transmittance of a sample */
+    float exponent; /* step / unit_distance; a sample's transmittance is (1 - opacity) to this power */
     kernel_visible_values visible_values;
 } kernel_transfer;
 
-/* The levels of contour lines, in a domain in which the first level is 0 and the last, if there are several, is 1. gap:
- * distance from each level to its nearest neighbour, infinite if there is none. */
+/* The levels of contour lines (values of the field on the lines), mapped linearly so that the first level is 0 and the
+ * last, if there are several, is 1. gap: distance from each level to the nearest other level, infinite if there is
+ * none. */
 typedef struct kernel_lines {
     double low, inverse_width; /* a value x is mapped to the domain by (x - low) * inverse_width */
     int count;
@@ -176,21 +208,24 @@ typedef struct kernel_surface {
     kernel_transfer colour;               /* transfer function of the colour field; set if the layer has a colour_map */
     kernel_lines lines;                   /* contour lines on the surface; set if the layer has lines */
     uint32_t own_clips;  /* one bit per clip of this layer that is not among the frame's common_clips */
-    uint32_t first_kind; /* fragment kind of the layer's first isovalue */
-    double value_scale;  /* power of two that scales the field's range to near 1, for differences */
+    uint32_t first_kind; /* fragment kind (fragment.h) of the layer's first isovalue */
+    /* power of two that scales the width of the field's range to near 1; set for normals by differences */
+    double value_scale;
 } kernel_surface;
 
-/* A cell whose isosurface or volume may be visible: its range of depths, and the box of pixels that it may cover, from
- * column x0 to x1 and row y0 to y1, both included. */
+/* A candidate: a cell in which an isosurface or the volume may be visible. near, far: its range of t; x0, x1, y0, y1:
+ * first and last column, first and last row of the pixels that it may cover. */
 typedef struct kernel_candidate {
     uint32_t cell;
-    uint32_t source; /* part * RENDER_MAX_ISOVALUES + index into the frame's isovalues; for a volume just the part */
+    /* for a surface: index of the mesh part * RENDER_MAX_ISOVALUES + index of the isovalue in the frame; for a volume:
+     * index of the mesh part */
+    uint32_t source;
     float near, far;
     uint16_t x0, x1, y0, y1;
 } kernel_candidate;
 
-/* A candidate as stored for one tile. blocks: one bit per block that it may meet. box: first and last column, first and
- * last row of its pixels within the tile, 4 bits each, from bit 0 on. */
+/* A candidate as stored for one tile. blocks: one bit for each of the tile's blocks in which it may be visible. box:
+ * first and last column, first and last row of its pixels within the tile, 4 bits each, from bit 0 on. */
 typedef struct kernel_tile_candidate {
     float near;
     union {
@@ -205,15 +240,16 @@ typedef struct kernel_tile_candidate {
  * skip cells that are hidden. */
 enum { KERNEL_DEPTHS = 32 };
 
-/* The candidates of a tile, unordered; kernels may reorder them. */
+/* The candidates of a tile, in any order; kernels may reorder them. */
 typedef struct kernel_bin {
     kernel_tile_candidate *items;
     int count;
-    /* The following members are set by kernel_sort_by_depth(). Index of each depth bin's first item; the nearest bin
-     * comes first. Items of a depth bin are linked by `next`, which is -1 at the end. */
+    /* The following members are set by kernel_sort_by_depth(). first: index of the first item of each depth bin, or -1;
+     * the nearest depth bin comes first. Items of a depth bin are linked by `next`, which is -1 at the end. low: least
+     * t of an item; scale: number of depth bins per unit of t. */
     int first[KERNEL_DEPTHS];
     float low, scale;
-    /* buffer in which candidates found by several threads are put together; `capacity` items */
+    /* buffer for `capacity` items, in which candidates that several threads have found are gathered */
     kernel_tile_candidate *buffer;
     int64_t capacity;
 } kernel_bin;
@@ -231,7 +267,7 @@ static inline unsigned kernel_blocks_at(unsigned columns, unsigned rows)
 /* A list of candidates is a chain of chunks, which are never moved in memory. */
 typedef struct kernel_candidate_chunk {
     struct kernel_candidate_chunk *before;
-    int64_t count; /* number of items; set when the chunk is full */
+    int64_t count; /* number of items; set when the next chunk is begun or the search ends */
     kernel_candidate items[];
 } kernel_candidate_chunk;
 
@@ -241,7 +277,7 @@ typedef struct kernel_candidate_list {
     int64_t count, capacity;       /* number of items in the current chunk, and how many fit */
     /* set if no more candidates can be added, because memory ran out or the maximum number is reached */
     bool is_full;
-    int64_t *bound; /* number of candidates that may still be added, shared by all threads' lists */
+    int64_t *bound; /* number of candidates for which space may still be added; shared by the lists of all threads */
 } kernel_candidate_list;
 
 /* A unit of work in the search for candidates: a subtree of one mesh's tree, searched for one layer. */
@@ -261,7 +297,8 @@ typedef struct kernel_frame {
     struct kernel_bins *candidates;
     /* binned candidates of the volume; NULL if tiles traverse the tree themselves */
     struct kernel_bins *volume_candidates;
-    /* first and last column, and row, of the pixels in which some tree may be visible; set only if needs_planes */
+    /* pixels in which the bounding box of some tree may be visible: first and last column in cover[0], first and last
+     * row in cover[1]; set only if needs_planes */
     int cover[2][2];
     kernel_transfer volumes[RENDER_MAX_VOLUMES];
     double scaled_axes[3][3]; /* right, up, forward, each times the space's scale */
@@ -272,7 +309,8 @@ typedef struct kernel_frame {
     double slope_y0, slope_dy;
     double scaled_step;                          /* distance between samples in scaled units: the job's step * scale */
     float light_direction[RENDER_MAX_LIGHTS][3]; /* unit vectors to the lights, in camera axes */
-    uint32_t common_clips; /* one bit per clip that all layers share and that leaves a single interval of a ray */
+    /* the clips that apply to all layers and that leave a single interval of a ray; one bit per clip of the job */
+    uint32_t common_clips;
     /* Maximum number of intervals that the clips of volumes may leave of a ray; 0 if volumes have no clips of their
      * own. */
     int volume_intervals;
@@ -280,13 +318,15 @@ typedef struct kernel_frame {
     bool has_polyhedra; /* set if a mesh part has them */
     bool is_binned;     /* set if the cells of surfaces are binned by tile, unless there are too many */
     bool bins_volume;   /* set if the cells of the only volume are binned by tile */
-    bool needs_planes;  /* set if tiles traverse the trees, for which they need planes */
-    bool has_segments;  /* set if volumes are integrated by segments; otherwise they are sampled */
+    /* set if tiles traverse the trees and therefore need the planes between their blocks (kernel_tile.h) */
+    bool needs_planes;
+    bool has_segments; /* set if volumes are integrated by segments; otherwise they are sampled */
     /* set if the ends of intervals in tets and of bisected intervals are computed in double (kernel_exact.h) */
     bool is_double;
     kernel_pieces pieces[RENDER_MAX_VOLUMES];
-    /* Limits for segments: the error allowed for the field and for mixing with other volumes; length of the scene in
-     * unit distances. */
+    /* Limits for segments. allowance: error allowed for the approximation of the field; mixing: error allowed for the
+     * mixing of overlapping segments; reach: for each volume, upper bound of the length of a ray in the scene, in its
+     * unit distances (render_transfer). */
     float allowance, mixing, reach[RENDER_MAX_VOLUMES];
     /* Set if volume fragments must end at gaps between this rank's cells, because other ranks may have surfaces
      * there. */
@@ -297,7 +337,7 @@ typedef struct kernel_frame {
 typedef struct kernel_thread {
     /* The thread's memory, of the kernel table's memory_bytes. The table's begin() sets the pointers below into it. */
     void *memory;
-    struct kernel_cell *cells; /* cells that single packets have met (kernel_cell_cache.h) */
+    struct kernel_cell *cells; /* cache of the cells that have been fetched for single packets (kernel_cell_cache.h) */
     struct kernel_tile_trace *tile;
     struct kernel_tile_cells *tile_cells;
     struct kernel_tile_volume *tile_volume;
@@ -307,7 +347,7 @@ typedef struct kernel_thread {
     kernel_bin bin, volume_bin;
     uint32_t serial;   /* number of the current tile, counted from 1; cached cells of other tiles are out of date */
     fragment_list out; /* fragments of the current tile */
-    render_pending_list waiting; /* hits whose normals need samples of other ranks' cells */
+    render_pending_list waiting; /* pending hits: hits whose normals need samples from the cells of other ranks */
     bool out_of_memory;
     /* counters for render_statistics: failed inversions of cells' maps, and cells visited by volumes */
     int64_t map_failures, volume_cells;
@@ -337,17 +377,18 @@ typedef struct kernel_table {
     /* Adds to the list the candidates of a subtree. grow() adds space, or marks the list as full. */
     void (*find_candidates)(const kernel_frame *frame, kernel_thread *thread, const kernel_subtree *subtree,
                             kernel_candidate_list *list, bool (*grow)(kernel_candidate_list *list));
-    /* Removes the rays that an opaque surface certainly blocks, and records the cells that must be tested exactly. */
+    /* Closes those of the secondary rays (rays from hits to lights or into the hemisphere) that an opaque surface
+     * certainly blocks, and records the ray-cell pairs that must be tested exactly. */
     void (*occlude)(const kernel_frame *frame, kernel_thread *thread, const struct kernel_occluders *occluders,
                     struct kernel_secondary_rays *rays);
-    /* Clears the open bits of the bundle's rays that this cell blocks. */
+    /* Clears the bits in bundle->open of the rays that the surface in this cell blocks. */
     void (*occlude_by_cell)(const kernel_frame *frame, kernel_thread *thread, struct kernel_bundle *bundle,
                             const struct kernel_occluder *occluder);
     /* Samples this rank's cells around each of `count` hits, for normals by central differences; out[i] belongs to
      * hits[i]. */
     void (*sample_pending)(const kernel_frame *frame, kernel_thread *thread, const render_pending_hit *hits,
                            render_difference_samples *out, int64_t count);
-    /* Computes the fragments out[i] of `count` hits from samples[i]. */
+    /* Computes the fragments out[i] of `count` hits from the samples around them, samples[i]. */
     void (*light_pending)(const kernel_frame *frame, kernel_thread *thread, const render_pending_hit *hits,
                           float (*shadings)[2][3], const render_difference_samples *samples, fragment *out,
                           int64_t count);

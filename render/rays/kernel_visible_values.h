@@ -15,7 +15,7 @@ SIMD_INLINE bool kernel_visible_values_overlap(const kernel_visible_values *visi
     return false;
 }
 
-/* Tests one range of values per lane against the visible intervals; returns the lanes that meet one. */
+/* Returns the lanes whose range of values, from low to high, overlaps a visible interval. */
 SIMD_INLINE vm kernel_visible_values_overlap_lanes(const kernel_visible_values *visible_values, vf low, vf high)
 {
     vm meets = vm_none();
@@ -26,8 +26,8 @@ SIMD_INLINE vm kernel_visible_values_overlap_lanes(const kernel_visible_values *
     return meets;
 }
 
-/* Tests one cell per lane, each with `count` vertex values, against the visible intervals; returns the lanes that meet
- * one. */
+/* Returns the lanes whose cell has a range of values that overlaps a visible interval. v: `count` vertex values of one
+ * cell per lane. */
 SIMD_INLINE vm kernel_visible_values_overlap_cells(const kernel_visible_values *visible_values, const vf *v, int count)
 {
     vf low = v[0], high = v[0];

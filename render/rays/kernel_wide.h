@@ -1,5 +1,7 @@
-/* Vectors of doubles, and permutations that give each ray the numbers of its own cell. A kernel_f64 has SIMD_WIDTH
- * / 2 doubles and fills one register; compilers split larger vectors and compare their lanes one by one. */
+/* Vectors of doubles, and permutations by which each ray gets the numbers of its own cell from vectors in which lanes
+ * are cells. A kernel_f64 has SIMD_WIDTH / 2 doubles and fills one register, because compilers split larger vectors and
+ * compare their lanes one by one. SIMD_WIDTH doubles, one per lane, are therefore stored as two halves: half 0 has the
+ * first SIMD_WIDTH / 2 lanes, half 1 the others. A parameter `half` selects one of them. */
 #ifndef RENDER_KERNEL_WIDE_H
 #define RENDER_KERNEL_WIDE_H
 
@@ -13,7 +15,7 @@ typedef vd kernel_f64;
 typedef int64_t kernel_f64_mask __attribute__((vector_size(8 * KERNEL_HALF)));
 typedef float kernel_f64_floats __attribute__((vector_size(4 * KERNEL_HALF)));
 
-/* Returns of[lane] for each ray, where `lane` is the lane that holds the ray's cell. */
+/* Returns of[lane] for each ray. of: one number per cell; lane: the lane that holds the ray's cell. */
 SIMD_INLINE vf kernel_gather_lane(const float *of, vi lane)
 {
     return vf_permute(vf_load(of), lane);
@@ -29,7 +31,8 @@ SIMD_INLINE kernel_f64_floats kernel_f64_narrow(kernel_f64 v)
     return __builtin_convertvector(v, kernel_f64_floats);
 }
 
-/* Returns the first half (0) or the second half (1) of a mask's lanes. */
+/* Returns the mask of half the lanes, the first half (half = 0) or the second half (half = 1), for vectors of
+ * doubles. */
 SIMD_INLINE kernel_f64_mask kernel_f64_of_mask(vm m, int half)
 {
     typedef int32_t kernel_f64_ints __attribute__((vector_size(4 * KERNEL_HALF)));
@@ -46,7 +49,8 @@ SIMD_INLINE kernel_f64 kernel_f64_select(kernel_f64_mask m, kernel_f64 a, kernel
     return (kernel_f64)(((kernel_f64_mask)a & m) | ((kernel_f64_mask)b & ~m));
 }
 
-/* Returns the first half (0) or the second half (1) of v's lanes, converted to double. */
+/* Returns the numbers in the first half (half = 0) or the second half (half = 1) of the lanes of *v, converted to
+ * double. */
 SIMD_INLINE kernel_f64 kernel_f64_of(const vf *v, int half)
 {
     kernel_f64_floats f;
@@ -60,7 +64,7 @@ SIMD_INLINE void kernel_f64_store_lanes(vf *v, int half, kernel_f64 d)
     memcpy((char *)v + half * (int)sizeof f, &f, sizeof f);
 }
 
-/* As above, for lanes in memory. */
+/* Rounds doubles to float32 and stores them in one half of an array with one number per lane. */
 SIMD_INLINE void kernel_f64_store(float lanes[SIMD_WIDTH], int half, kernel_f64 v)
 {
     const kernel_f64_floats floats = kernel_f64_narrow(v);

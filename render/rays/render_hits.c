@@ -1,8 +1,9 @@
-/* The rays of a hemisphere lie on a spiral with steps of equal area, projected upwards from the disk below (Malley's
- * method), so that their density follows the cosine: the fraction of unblocked rays is the light of the sky. Each pixel
- * rotates the spiral by an angle that differs from all its neighbours' (interleaved gradient noise, Jimenez 2014), and
- * shifts its begin. Both depend only on the pixel and on the frame's number among those that are averaged, so a surface
- * that does not move has the same samples at every step. */
+/* The rays into the hemisphere above a hit pass through points on a spiral in the unit disk, spaced by equal areas and
+ * projected upwards to the hemisphere (Malley's method). So their density is proportional to the cosine of the angle to
+ * the normal, and the fraction of rays that no surface blocks is the hit's ambient light. Each pixel rotates the spiral
+ * by an angle that differs from all its neighbours' (interleaved gradient noise, Jimenez 2014), and shifts its begin.
+ * Both depend only on the pixel and on the frame's number among those that are averaged, so a surface that does not
+ * move has the same samples at every step. */
 #include "render_hits.h"
 
 #include <math.h>
@@ -67,7 +68,8 @@ static double part_of(double x)
 static const double golden[2] = {-0.7373688780783197, 0.6754902942615239};
 
 /* The pixel's spiral begins at a position within its first step, and is rotated by `turn`. The last directions are kept
- * away from the horizon, where a rounding error of the surface would become a large error of distance. */
+ * away from the horizon, because for rays almost parallel to the surface a rounding error of its position becomes a
+ * large error of the distance at which they meet it. */
 void hit_hemisphere(const render_job *job, uint32_t pixel, double (*out)[3])
 {
     const uint32_t width = (uint32_t)job->camera.width, column = pixel % width, row = pixel / width;

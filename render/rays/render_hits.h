@@ -1,12 +1,12 @@
-/* Computes a hit's position in the scene, the directions of its rays into the hemisphere above the surface, and the box
- * of the cells that these rays may meet. */
+/* Computes a hit's position in the scene, the directions of its rays into the hemisphere above the surface, and the
+ * bounding box of the cells that may affect hits. */
 #ifndef RENDER_RENDER_HITS_H
 #define RENDER_RENDER_HITS_H
 
 #include "render.h"
 
-/* The point at which a hit's rays begin, the unit direction to the eye, and orthonormal axes: right, up, and the normal
- * as forward. */
+/* start: point at which a hit's rays begin, in scene units; view: unit vector to the eye; axes: orthonormal axes right,
+ * up and forward, with the surface's normal as forward. All are along the world axes. */
 typedef struct hit_frame {
     double start[3], view[3], axes[3][3];
 } hit_frame;
@@ -30,9 +30,10 @@ void hit_normal(const float folded[2], double n[3]);
  * surface. */
 hit_frame hit_frame_of(const render_job *job, uint32_t pixel, float t, const float normal[2], double lift);
 
-/* Computes occlusion->samples unit directions for the pixel's hit, relative to the surface: z is along the normal. */
+/* Computes the unit directions of the rays for ambient occlusion of the pixel's hit (job->occlusion->samples of them),
+ * in axes whose third one is the surface's normal. */
 void hit_hemisphere(const render_job *job, uint32_t pixel, double (*out)[3]);
-/* Computes the same unit directions as hit_hemisphere(), but rotated into the scene's axes. */
+/* Computes the unit directions of hit_hemisphere(), rotated into the world axes. axes: those of the hit_frame. */
 void hit_directions(const render_job *job, uint32_t pixel, const double (*axes)[3], double (*out)[3]);
 
 #endif

@@ -6,7 +6,8 @@
 
 /* Computes the value at which the transfer function's domain begins, and 1 / the domain's width. */
 void render_transfer_domain(const render_transfer *t, double *low, double *inverse_width);
-/* Return the position in the transfer function's domain of a value, and of the i-th entry of its colour table. */
+/* render_domain_of() maps a value to the transfer function's domain. render_entry_position() returns the position in
+ * the domain of the i-th entry of the colour table. */
 double render_domain_of(const render_transfer *t, double value);
 double render_entry_position(const render_transfer *t, int i);
 
