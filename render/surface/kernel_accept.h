@@ -1,5 +1,12 @@
 /* Processes the hits of rays on isosurfaces: tests clips, computes normals and colours, and keeps each ray's nearest
- * hit (thesis, sections 4.3.4 and 4.3.5). */
+ * hit (thesis, sections 4.3.4 and 4.3.5). Terms of this file and of those that include it:
+ *     hit           crossing of a ray with an isosurface; it is accepted if the clips keep it and no nearer hit hides
+ * it depth t       a hit's position on its ray: z in tile space, in scaled units (render_space); 0 at the depth origin
+ *     kind          number that a fragment has for its isovalue: the surface's first_kind plus the isovalue's index
+ *     tied hit      hit of an opaque surface with exactly the same depth as the nearest hit of its ray
+ *     reach         distance from a hit to the points at which central differences sample the field, in scaled units
+ *     pending hit   hit whose normal needs samples of other ranks' cells, so that it is lit after the frame is traced
+ */
 #ifndef RENDER_KERNEL_ACCEPT_H
 #define RENDER_KERNEL_ACCEPT_H
 
@@ -20,13 +27,13 @@
 #include "simd.h"
 
 /* Normals from gradients at the vertices (RENDER_VERTEX). The gradient's three components are interpolated in the hit's
- * cell like values. They are continuous from cell to cell, so that the surface's lighting is, too.
+ * cell like values. The interpolated gradient is continuous from cell to cell, and so is the surface's lighting.
  *
- * Such normals are computed for visible hits only. While a nearer hit may still be found, a hit stores its cell, and
- * its reference coordinates in place of the normal. When all cells have been traced, the rays are processed one by one,
- * and consecutive rays that hit the same cell share its coefficients. */
+ * Normals from vertices are computed for visible hits only. While a nearer hit may still be found, a hit stores its
+ * cell and, in place of the normal, its reference coordinates in that cell. When all cells have been traced, the rays
+ * are processed one by one, and consecutive rays that hit the same cell share its coefficients. */
 
-/* Computes the gradient at a vertex, in camera axes; 0 if the vertex has none. */
+/* Computes the gradient that the caller gives at a vertex, rotated into camera axes; 0 if the caller gives none. */
 SIMD_INLINE void kernel_vertex_gradient(const kernel_frame *f, const render_vertex_gradients *gradients, int64_t vertex,
                                         double out[3])
 {
@@ -38,8 +45,9 @@ SIMD_INLINE void kernel_vertex_gradient(const kernel_frame *f, const render_vert
     }
 }
 
-/* Fetches a cell, and computes the three components of the gradient in camera axes: in a tet their values at the
- * vertices, otherwise the coefficients of their interpolating polynomials. */
+/* Reads a cell and transforms it into tile space. gradient[k] receives component k of the gradient, in camera axes: in
+ * a tet the values at the vertices, in other cells the coefficients of the polynomial that interpolates these values.
+ */
 static void kernel_smooth_setup(const kernel_packet *p, const render_surface_layer *layer, int part, uint32_t index,
                                 kernel_cell *c, double gradient[3][GRID_MAX_CELL_VERTICES])
 {
@@ -59,8 +67,8 @@ static void kernel_smooth_setup(const kernel_packet *p, const render_surface_lay
     }
 }
 
-/* Computes a point's barycentric coordinates in a tet. They are 1/4 each if the tet has no volume or the point is far
- * outside. */
+/* Computes a point's barycentric coordinates in a tet. Each coordinate outside [-1, 2], which occurs only if the point
+ * is far outside or the tet has no volume, is replaced by 1/4. */
 SIMD_INLINE void kernel_barycentric(const double corner[4][3], const double point[3], double out[4])
 {
     double d[4][3], sum = 0;
@@ -93,8 +101,8 @@ SIMD_INLINE double kernel_polynomial_at(const double c[8], bool is_pyramid, cons
     return is_pyramid ? v : v + r[2] * ((r[0] * c[5] + r[1] * c[6]) + m * c[7]);
 }
 
-/* Computes the gradient at a point by interpolation. gradient: as computed by kernel_smooth_setup(); place: the
- * reference coordinates or, in a tet, the position in tile space. */
+/* Computes the gradient at a point by interpolation, in camera axes. gradient: computed by kernel_smooth_setup();
+ * place: the point's reference coordinates or, in a tet, its position in tile space. */
 SIMD_INLINE void kernel_smooth_at(const kernel_cell *c, double (*const gradient)[GRID_MAX_CELL_VERTICES],
                                   const double place[3], float out[3])
 {
@@ -115,7 +123,7 @@ SIMD_INLINE void kernel_smooth_at(const kernel_cell *c, double (*const gradient)
     }
 }
 
-/* Computes each ray's point at depth t, in tile space. */
+/* Computes the point at depth t on the ray in lane `ray` of the packet, in tile space. */
 SIMD_INLINE void kernel_ray_point(const kernel_packet *p, int ray, float t, double out[3])
 {
     out[0] = (double)p->origin_x[ray] + (double)p->slope_x[ray] * (double)t;
@@ -123,8 +131,8 @@ SIMD_INLINE void kernel_ray_point(const kernel_packet *p, int ray, float t, doub
     out[2] = (double)t;
 }
 
-/* Replaces the reference coordinates stored in `normal` by normals, in camera axes. Hits without a cell already have
- * their normals. */
+/* Replaces the reference coordinates that are stored in `normal` by normals, in camera axes. A hit whose mesh part is
+ * -1 (a hit in a polyhedron) already has its normal. */
 static __attribute__((noinline)) void kernel_vertex_normals(const kernel_packet *p, const kernel_surface *s, vm rays,
                                                             vf t, vi parts, vi cells, vf normal[3])
 {
@@ -148,8 +156,8 @@ static __attribute__((noinline)) void kernel_vertex_normals(const kernel_packet 
     }
 }
 
-/* Computes the direction of the gradient of a tet's field by Cramer's rule in double. Its length and sign are
- * arbitrary. */
+/* Computes a vector along the gradient of a tet's field, in camera axes, by Cramer's rule in double. The vector's
+ * length and sign are arbitrary. */
 SIMD_INLINE void kernel_tet_normal(const kernel_packet *p, const kernel_cell *c, vf out[3])
 {
     double d[3][3], df[3], g[3];
@@ -182,7 +190,7 @@ SIMD_INLINE bool kernel_is_opaque(const kernel_packet *p, const kernel_surface *
     return s < p->frame->surfaces + p->frame->opaque_count;
 }
 
-/* Transforms gradients from tile space to camera axes, by undoing the shear. */
+/* Transforms a gradient from tile space, which is sheared along the tile's middle ray, to camera axes. */
 SIMD_INLINE void kernel_unshear(const kernel_tile *tile, vf g[3])
 {
     g[2] -= g[0] * tile->shear_x + g[1] * tile->shear_y;
@@ -198,8 +206,8 @@ SIMD_INLINE void kernel_world_normal(const kernel_packet *p, const vf normal[3],
         out[a] = (unit[0] * (float)c->right[a] + unit[1] * (float)c->up[a]) + unit[2] * (float)c->forward[a];
 }
 
-/* Stores the unit normal in world axes (RENDER_NORMALS), or the number of the isovalue (RENDER_VALUES), as the hit's
- * colour. */
+/* Stores numbers in place of the hit's colour: the unit normal in world axes (RENDER_NORMALS); or (RENDER_VALUES) the
+ * index of the isovalue among all isovalues of the frame, behind the value that the colour already holds. */
 static __attribute__((noinline, cold)) void kernel_paint_numbers(const kernel_packet *p, const vf normal[3], vf kind,
                                                                  vf colour[3])
 {
@@ -211,8 +219,9 @@ static __attribute__((noinline, cold)) void kernel_paint_numbers(const kernel_pa
     kernel_world_normal(p, normal, colour);
 }
 
-/* Stores the normal of an unlit hit in t_out and transmittance, as a point of the octahedron |x| + |y| + |z| = 1 whose
- * lower half is folded over the upper one (Meyer et al. 2010). */
+/* Stores the unit normal of a hit that is lit later in the fragment's members t_out and transmittance: the normal is
+ * projected to the octahedron |x| + |y| + |z| = 1, whose lower half is folded over the upper one (Meyer et al. 2010).
+ */
 static __attribute__((noinline)) void kernel_paint_unlit(const kernel_packet *p, const vf normal[3],
                                                          kernel_fragments *f)
 {
@@ -226,8 +235,9 @@ static __attribute__((noinline)) void kernel_paint_unlit(const kernel_packet *p,
     f->transmittance = vf_select(is_below, (1.0f - vf_abs(u)) * side_v, v);
 }
 
-/* Computes the fragments' colours as the job's `paint` requests: lit, unlit with the normal, or numbers. kind: the
- * fragments' kind. Surfaces that take no light are finished at once even if the job is unlit. */
+/* Computes the fragments' colours as the job's `paint` requests: lit, unlit together with the normal, or numbers in
+ * place of colours. kind: the fragments' kind, as a float. A surface whose material takes no light gets its final
+ * colour here even if the job's surfaces are lit later (RENDER_UNLIT). */
 SIMD_INLINE void kernel_paint(kernel_packet *p, const kernel_surface *s, const vf normal[3], vf kind,
                               kernel_fragments *f)
 {
@@ -242,23 +252,25 @@ SIMD_INLINE void kernel_paint(kernel_packet *p, const kernel_surface *s, const v
         kernel_paint_numbers(p, normal, kind, f->colour);
 }
 
-/* Hits of a vector of rays on one isovalue of a surface. */
+/* Hits on one isovalue of a surface, one ray per lane. */
 typedef struct kernel_surface_hits {
     int value; /* index of the isovalue in the layer */
-    vf t;
+    vf t;      /* depth of each hit, in scaled units */
     /* a vector of any length along the normal, in camera axes; or, until kernel_vertex_normals() replaces them, the
      * reference coordinates of the hits */
     vf normal[3];
-    vf colour[3];                   /* the unlit colour */
-    vf w;                           /* value of the colour field */
+    vf colour[3];                   /* colour before lighting, linear RGB */
+    vf w;                           /* value of the colour field, in its transfer function's domain */
     const kernel_line_field *along; /* the field of contour lines; NULL if the surface has none */
-    vf reach;                       /* distance to the samples of differences; 0 if there are none */
-    vf opacity;                     /* used only by transparent surfaces */
-    vi part, cell;                  /* the cells that are hit, as in kernel_hits */
+    /* distance to the samples of central differences, in scaled units; 0: the hit needs no samples */
+    vf reach;
+    vf opacity;    /* used only by transparent surfaces */
+    vi part, cell; /* the cells that are hit, as in kernel_hits */
 } kernel_surface_hits;
 
-/* Emits hits with the same depth as their ray's nearest hit, which occur if a cell's map is folded, as separate
- * fragments. Compositing selects one of them by their bits, so that the order of cells does not matter. */
+/* Emits each tied hit (a hit with the same depth as its ray's nearest hit) as a fragment of its own. Tied hits occur if
+ * a cell's map is folded. Compositing compares the bits of fragments of equal depth to select one of them, so that the
+ * order of cells does not matter. */
 static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, const kernel_surface *s, vm tied,
                                                              const kernel_surface_hits *h)
 {
@@ -268,9 +280,9 @@ static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, c
     kernel_emit(p, tied, kind, &lit);
 }
 
-/* Adds hits whose normals need samples of other ranks to the thread's list of pending hits, and emits a placeholder
- * fragment for each, so that volumes end there. Returns the remaining hits: those with reach 0, which need no
- * samples. */
+/* Adds the hits with a reach above 0, whose normals need samples of other ranks' cells, to the thread's list of pending
+ * hits, and emits a placeholder fragment for each, so that volumes end there. Returns the remaining hits: those with a
+ * reach of 0, which need no samples. */
 static __attribute__((noinline, cold)) vm kernel_defer_hits(kernel_packet *p, const kernel_surface *s, vm hit,
                                                             const kernel_surface_hits *h)
 {
@@ -297,21 +309,21 @@ static __attribute__((noinline, cold)) vm kernel_defer_hits(kernel_packet *p, co
     return vm_andnot(hit, waits);
 }
 
-/* Returns the value that colours the surface, in the field's units, or the isovalue if there is no colour field. w: the
- * value in the colour map's domain. */
+/* Returns the value of the field that colours the surface, in that field's units. If there is no colour field, returns
+ * the isovalue. w: the value in the domain of the colour field's transfer function; value: index of the isovalue. */
 SIMD_INLINE vf kernel_surface_value(const kernel_surface *s, int value, vf w)
 {
     if (!s->layer->colour_map) return vf_set((float)s->layer->values[value]);
     return w * (float)(1 / s->colour.inverse_width) + (float)s->colour.low;
 }
 
-/* Returns the rays on which the field's sign differs at the two ends of the interval. */
+/* Returns the rays on which the field minus the isovalue has different signs at the two ends of the interval. */
 SIMD_INLINE vm kernel_changes_sign(const kernel_interval *i)
 {
     return vm_xor(vf_lt(i->v_in, vf_set(0)), vf_lt(i->v_out, vf_set(0)));
 }
 
-/* Returns the rays whose interval begins before the nearest hit and ends behind the eye's plane. */
+/* Returns the rays whose interval in the cell begins in front of their nearest hit and ends behind the eye's plane. */
 SIMD_INLINE vm kernel_is_near(const kernel_packet *p, const kernel_interval *i)
 {
     return vm_and(i->mask, vm_and(vf_le(i->t_in, p->t_far), vf_le(p->t_near, i->t_out)));
@@ -347,7 +359,8 @@ SIMD_INLINE vm kernel_visible(const kernel_packet *p, const kernel_surface *s, v
 
 /* ---- hits of rays in lanes, each with its own cell ---- */
 
-/* Emits one ray's hit that has the same depth as the nearest one. */
+/* Emits a ray's hit on the n-th of the cells as a fragment, if the ray's nearest hit has the same depth. ray: lane of
+ * the packet p. */
 static __attribute__((noinline, cold)) void kernel_ray_emit_equal_depth(kernel_packet *p, const kernel_surface *s,
                                                                         int ray, const kernel_surface_cells *cells,
                                                                         int n, float depth, const float normal[3],
@@ -364,10 +377,10 @@ static __attribute__((noinline, cold)) void kernel_ray_emit_equal_depth(kernel_p
     kernel_emit_tied(p, s, tied, &h);
 }
 
-/* Keeps the hit of ray number `at` of the tile on the n-th of the cells if it is the ray's nearest, as kernel_accept()
- * does for the rays of a packet. normal: as in kernel_hits; colour: that before lighting. Several lanes may hold rays
- * of the same pixel, so hits in lanes are accepted one by one. Returns the bit of the ray's block if the hit is nearer
- * than the last one, else 0. */
+/* Accepts a hit on the n-th of the cells: keeps it if it is the nearest hit of its ray, as kernel_accept() does for the
+ * rays of a packet. at: position of the ray among those of the tile's packets (packet * SIMD_WIDTH + lane); normal: as
+ * in kernel_hits; colour: before lighting. Hits are accepted one by one, because several lanes may hold rays of the
+ * same pixel. Returns the bit of the ray's block if the hit is nearer than the ray's previous one, and otherwise 0. */
 SIMD_INLINE unsigned kernel_ray_accept(kernel_tile_trace *t, int at, const kernel_surface_cells *cells, int n,
                                        float depth, const float normal[3], const float colour[3])
 {

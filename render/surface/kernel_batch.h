@@ -1,11 +1,14 @@
-/* Traces batches of SIMD_WIDTH tets in a tile:
+/* Traces tets in a tile by batches. A batch is the vector of up to SIMD_WIDTH cells, one per lane, that a queue
+ * (kernel_surface_cells) has collected:
  *     lanes are cells:     fetched, sorted, transformed; edge functions computed    (once per batch)
  *     lanes are pixels:    each uses the edge functions of its own cell             (cells of few pixels)
  *                          or a packet of a block's rays, all with one cell         (other cells)
- * If cells are small, most rays of a block's packet miss the cell. So the pixels of several cells' boxes are processed
- * side by side instead, and each lane reads its cell's numbers from the batch's vectors by a permutation. All
- * operations are those for a single cell (kernel_crossings.h, kernel_surface.h) in the same order, so a hit has the
- * same bits whichever way it is computed. */
+ * A block is a square of 4 × 4 pixels of the tile; the box of a cell is the rectangle of the tile's pixels that may see
+ * the cell. If cells are small, most rays of a block's packet miss the cell. So the pixels of several cells' boxes are
+ * listed one after the other, and SIMD_WIDTH of these rays are traced at once. Each lane then has a ray and the index
+ * of the lane that holds its cell, and reads the cell's numbers from the batch's vectors by a permutation. All
+ * operations are those for a single cell (kernel_crossings.h, kernel_surface.h) in the same order, so the two methods
+ * compute bit-identical hits. */
 #ifndef RENDER_KERNEL_BATCH_H
 #define RENDER_KERNEL_BATCH_H
 
@@ -29,7 +32,7 @@
 #include "simd.h"
 
 enum {
-    /* maximum number of pixels in a cell's box; a cell with more of them is traced block by block */
+    /* maximum number of pixels in a cell's box; a cell with more pixels is traced block by block */
     KERNEL_BATCH_PIXELS = 32
 };
 
@@ -37,20 +40,22 @@ _Static_assert(SIMD_WIDTH *KERNEL_BATCH_PIXELS <= KERNEL_LIST_PIXELS, "a batch's
 
 typedef struct kernel_batch {
     const kernel_surface_cells *queued; /* the cells that are being traced */
-    kernel_transformed_tets tets;       /* transformed cells; f is the field minus the isovalue, scaled */
-    bool is_of_faces;                   /* copy of the layer's is_of_faces */
-    bool has_normals;
-    vf normal[3];
-    /* field of the contour lines in each lane's cell; valid in the lanes whose bits are set in line_lanes */
+    /* the cells in tile space; f is the field minus the isovalue, times a power of two */
+    kernel_transformed_tets tets;
+    bool is_of_faces; /* copy of the layer's is_of_faces */
+    bool has_normals; /* set if `normal` is computed */
+    vf normal[3];     /* a vector along the gradient in each cell, of any length, in camera axes */
+    /* the contour lines' field in each lane's cell (members of kernel_tet_line); valid in the lanes whose bits are set
+     * in line_lanes */
     unsigned line_lanes;
     float line_value[SIMD_WIDTH], line_gradient[3][SIMD_WIDTH], line_along[SIMD_WIDTH];
-    kernel_pixel_list rays; /* list of rays to be traced */
+    kernel_pixel_list rays; /* rays to be traced: pixel, and lane of the cell */
 } kernel_batch;
 
 /* ---- lanes are cells ---- */
 
-/* Computes the gradients in all cells of the batch, by the operations of kernel_tet_normal(). It is called when one of
- * the cells is hit for the first time. */
+/* Computes a vector along the gradient in each cell of the batch, by the operations of kernel_tet_normal(). It is
+ * called when one of the cells is hit for the first time. */
 static __attribute__((noinline)) void kernel_batch_normals(kernel_batch *b, const kernel_frame *f)
 {
     const double scale = f->job->space.scale;
@@ -78,6 +83,7 @@ static __attribute__((noinline)) void kernel_batch_normals(kernel_batch *b, cons
 
 /* ---- a cell of the batch that is traced by blocks ---- */
 
+/* Copies the cell in lane n of the batch to *c, with all that kernel_blocks_trace() needs. */
 static __attribute__((noinline)) void kernel_batch_cell(const kernel_tile_trace *t, const kernel_batch *b, int n,
                                                         kernel_cell *c)
 {
@@ -97,8 +103,8 @@ static __attribute__((noinline)) void kernel_batch_cell(const kernel_tile_trace 
 
 /* ---- lanes are pixels ---- */
 
-/* Returns the rays that hit the surface in their cells, and stores the depths of the hits in *out. t_near: depth at
- * which the rays begin. */
+/* Returns the rays that hit the surface in their cells between t_near, the depth at which rays begin, and their
+ * previous nearest hits (r->far). *out: depths of the hits. */
 SIMD_INLINE vm kernel_batch_hit(const kernel_batch *b, float t_near, const kernel_lane_rays *r, vf *out)
 {
     const vf far = r->far;
@@ -128,7 +134,8 @@ static __attribute__((noinline)) void kernel_batch_line_field(const kernel_tile_
     b->line_lanes |= 1U << n;
 }
 
-/* Draws contour lines over the colours of hits. lanes: the lane that holds each hit's cell; it is below SIMD_WIDTH. */
+/* Computes the colours of hits: those of their isovalues, with contour lines drawn over them. lanes[i]: the lane that
+ * holds the cell of hit i, below SIMD_WIDTH; hit: mask of the lanes with a hit. */
 static __attribute__((noinline)) void kernel_batch_draw_lines(const kernel_tile_trace *t, kernel_batch *b,
                                                               const kernel_lane_rays *r, const uint8_t *lanes,
                                                               unsigned hit, vf depth, float colour[3][SIMD_WIDTH])
@@ -159,8 +166,10 @@ static __attribute__((noinline)) void kernel_batch_draw_lines(const kernel_tile_
     for (int a = 0; a < 3; a++) vf_store(colour[a], drawn[a]);
 }
 
-/* Accepts the hits of one vector of rays. colours: the hits' colours; NULL: those of their isovalues. Returns a mask of
- * the blocks that contain a ray whose hit is nearer than its previous one. */
+/* Accepts the hits of one vector of rays (kernel_ray_accept()). places: position of each ray among the tile's packets;
+ * lanes[i]: the lane that holds the cell of ray i; hit: mask of the rays that hit; colours: the hits' colours, or NULL
+ * for those of their isovalues. Returns a mask of the blocks that contain a ray whose hit is nearer than its previous
+ * one. */
 SIMD_INLINE unsigned kernel_batch_accept_coloured(kernel_tile_trace *t, kernel_batch *b, vi places,
                                                   const uint8_t *lanes, unsigned hit, vf depth,
                                                   const float (*colours)[SIMD_WIDTH])
@@ -186,7 +195,7 @@ static unsigned kernel_batch_accept(kernel_tile_trace *t, kernel_batch *b, vi pl
     return kernel_batch_accept_coloured(t, b, places, lanes, hit, depth, NULL);
 }
 
-/* Does the same as kernel_batch_accept_coloured(), and draws contour lines over the hits' colours. */
+/* Accepts the hits of one vector of rays as kernel_batch_accept() does, with contour lines drawn over their colours. */
 static __attribute__((noinline)) unsigned kernel_batch_accept_lined(kernel_tile_trace *t, kernel_batch *b,
                                                                     const kernel_lane_rays *r, const uint8_t *lanes,
                                                                     unsigned hit, vf depth)
@@ -197,6 +206,7 @@ static __attribute__((noinline)) unsigned kernel_batch_accept_lined(kernel_tile_
     return kernel_batch_accept_coloured(t, b, r->at, lanes, hit, depth, (const float(*)[SIMD_WIDTH])drawn);
 }
 
+/* Traces all rays in the batch's list, and empties the list. */
 SIMD_INLINE void kernel_batch_trace(kernel_tile_trace *t, kernel_batch *b)
 {
     unsigned nearer = 0;
@@ -223,6 +233,8 @@ SIMD_INLINE void kernel_batch_trace(kernel_tile_trace *t, kernel_batch *b)
 
 /* ---- batches ---- */
 
+/* Traces the queue's cells, and empties the queue: lists the rays of small cells, traces larger cells block by block,
+ * and then traces the listed rays. */
 static __attribute__((noinline)) void kernel_batch_process(kernel_tile_trace *t, kernel_batch *b,
                                                            kernel_surface_cells *queued)
 {

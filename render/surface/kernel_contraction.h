@@ -1,9 +1,10 @@
 /* Computes a ray's only crossing of the isovalue in a cell that is nearly affine, without intersecting the cell's
  * faces.
  *
- * With J0 the Jacobian at the middle of the reference domain, Y = J0^-1 X is r + N(r), and with L linear in space the
- * field is L(X) + E(r) (kernel_bounds.h); N and E contain only products of reference coordinates. On a ray X = X0 + t
- * d, with y = J0^-1 X0 and w = J0^-1 d, the two equations
+ * Let X be a position in tile space, r its reference coordinates in the cell, and J0 the Jacobian of X(r) at the middle
+ * of the reference domain. Then J0^-1 X = r + N(r), and the field minus the isovalue is L(X) + E(r), with a linear
+ * function L (kernel_bounds.h). N and E contain only products of reference coordinates. On a ray X = X0 + t d, with y =
+ * J0^-1 X0 and w = J0^-1 d, the two equations
  *     r + N(r) = y + t w                          r is on the ray
  *     L(X0) + t grad L . d + E(r) = 0             the field is the isovalue there
  * become one equation when the second is used to eliminate t:
@@ -16,11 +17,12 @@
  *     none    A root x in a convex part D of the domain satisfies |f(q) - x| <= K |q - x|, hence
  *             |s|^2 <= 2 s . (x - q), which is at most its maximum over the corners of D. If |s|^2 is larger, D has no
  *             root. With q = f(q) moved to the nearest point of D, that is the case whenever f(q) is outside.
- * Rounding: f has an error of at most error_bound, which comes from the rounding of positions, and from that of the
- * field times |w| / |grad L . d|. Crossings of faces have rounding errors of their own, which move a root by at most
- * domain_margin, including the factor 1 / (1 - K). A root is accepted if it is inside by more than that, and excluded
- * if the domain widened by domain_margin has none. For rays with a root closer to a face, the faces are intersected. So
- * the result agrees with that of the faces, in this cell and in its neighbour. */
+ * Rounding: the computed f has an error of at most error_bound, which comes from the rounding of positions, and from
+ * that of the field times |w| / |grad L . d|. The crossings of rays with faces, which decide for other rays, have
+ * rounding errors of their own, which move a root by at most domain_margin, including the factor 1 / (1 - K). A root is
+ * accepted if its distance from the domain's border is more than domain_margin plus its own error, and excluded if the
+ * domain widened by domain_margin has no root. For rays with a root closer to a face, the faces are intersected. So the
+ * result agrees with that of intersecting the faces, in this cell and in its neighbour. */
 #ifndef RENDER_KERNEL_CONTRACTION_H
 #define RENDER_KERNEL_CONTRACTION_H
 
@@ -37,21 +39,22 @@
 
 enum { KERNEL_CONTRACTION_STEPS = 7 };
 
-/* Error of the reference coordinates r below which only one more step of Newton's method is done. That step leaves 2 K
- * / (1 - K) times the square of the error, where K is the contraction constant, because the derivative of f changes by
- * about 4 K per unit length: 1.8e-7 at most. */
+/* Error of the reference coordinates r below which one more step of Newton's method is sufficient. That step leaves an
+ * error of 2 K / (1 - K) times the square of this one, where K is the contraction constant, because the derivative of f
+ * changes by about 4 K per unit length: 1.8e-7 at most. */
 #define KERNEL_CONTRACTION_END 1e-4f
 
-/* A ray in the reference space of its cell, and the cell's coefficients and error bounds. */
+/* A ray in the reference space of its cell, and the cell's coefficients and error bounds; one ray per lane. */
 typedef struct kernel_contraction {
-    /* y and w are defined at the top of this file, with the ray's point at the depth of vertex 0 as X0. level: L at
-     * that point; rise: the derivative of L along the ray. */
+    /* y and w are defined at the top of this file; X0 is the ray's point at the depth of vertex 0. level: L at X0;
+     * rise: the change of L per unit of depth along the ray (grad L . d). */
     vf y[3], w[3], level, rise;
-    /* members of kernel_bounds, gathered from each ray's own cell */
+    /* copies of members of kernel_bounds, gathered from the lane of each ray's cell */
     vf offset[3], middle, terms[4][3], field_terms[4], error_growth, error_bound, domain_margin;
 } kernel_contraction;
 
-/* Computes the rays in the reference spaces of their cells. */
+/* Computes the members of *out that depend on the ray (y, w, level and rise). lane: the lane that holds each ray's
+ * cell. */
 SIMD_INLINE void kernel_contraction_ray(const kernel_curved *c, const kernel_rays *rays, vi lane,
                                         kernel_contraction *out)
 {
@@ -71,6 +74,7 @@ SIMD_INLINE void kernel_contraction_ray(const kernel_curved *c, const kernel_ray
     out->rise = (g[0] * rays->slope_x + g[1] * rays->slope_y) + g[2];
 }
 
+/* Gathers the members of *out that depend only on the cell. */
 SIMD_INLINE void kernel_contraction_of(const kernel_bounds *b, vi lane, int type, kernel_contraction *out)
 {
     for (int i = 0; i < 3; i++) out->offset[i] = kernel_gather_lane(b->offset[i], lane);
@@ -84,8 +88,8 @@ SIMD_INLINE void kernel_contraction_of(const kernel_bounds *b, vi lane, int type
     out->domain_margin = kernel_gather_lane(b->domain_margin, lane);
 }
 
-/* Moves the reference coordinates r to the nearest point of the domain D, which is widened by domain_margin for hexes
- * and wedges. For a pyramid, r is moved to a point that is only close to the nearest one. */
+/* Moves the reference coordinates r to the nearest point of the domain D: the reference domain, for hexes and wedges
+ * widened by domain_margin. For a pyramid, r is moved to a point that is only close to the nearest one. */
 SIMD_INLINE void kernel_contraction_clamp(int type, vf domain_margin, vf r[3])
 {
     const vf half = 0.5f + domain_margin;
@@ -110,7 +114,7 @@ SIMD_INLINE void kernel_contraction_clamp(int type, vf domain_margin, vf r[3])
     }
 }
 
-/* Returns the maximum of the dot product s . x over all points x of the reference domain D. */
+/* Returns the maximum of the dot product s . x over all points x of the domain D (kernel_contraction_clamp()). */
 SIMD_INLINE vf kernel_contraction_support(int type, vf domain_margin, const vf s[3])
 {
     const vf half = 0.5f + domain_margin;
@@ -122,8 +126,8 @@ SIMD_INLINE vf kernel_contraction_support(int type, vf domain_margin, const vf s
     return vf_max((vf_max(s[0], vf_set(0)) + vf_max(s[1], vf_set(0))) + s[2], vf_set(0));
 }
 
-/* Converts the reference coordinates r to those of kernel_local.h: for a pyramid, a and b are then counted from the
- * axis. */
+/* Converts the reference coordinates r to those of kernel_local.h, which differ only for a pyramid: there the first two
+ * are counted from the pyramid's axis. */
 SIMD_INLINE void kernel_contraction_local(int type, const vf r[3], vf out[3])
 {
     for (int i = 0; i < 3; i++) out[i] = r[i];
@@ -131,8 +135,8 @@ SIMD_INLINE void kernel_contraction_local(int type, const vf r[3], vf out[3])
     for (int i = 0; i < 2; i++) out[i] -= 0.5f * r[2];
 }
 
-/* Returns a lower bound of the distance from the reference coordinates r to the domain's border. It is negative if r is
- * outside of the domain. */
+/* Returns a lower bound of the distance from the reference coordinates r to the border of the reference domain. It is
+ * negative if r is outside. */
 SIMD_INLINE vf kernel_contraction_border_distance(int type, const vf r[3])
 {
     vf local[3];
@@ -141,20 +145,23 @@ SIMD_INLINE vf kernel_contraction_border_distance(int type, const vf r[3])
     return inside * (kernel_is_box(type) ? 1.0f : 0.7f);
 }
 
-/* Returns the rays for which the step s of the iteration at the point q proves that the reference domain D contains no
- * root. If there were a root, |s| would be at most two diameters of D; so 8 error_bound is an upper bound of the
- * rounding error, 2 error_bound times (|s| + 2), and a thousandth of |s|^2 covers the rest. */
+/* Returns the rays for which the step s = f(q) - q of the iteration proves that the domain D contains no root (case
+ * "none" at the top of this file). If there were a root, |s| would be at most two diameters of D. So the rounding error
+ * of both sides is at most 2 error_bound (|s| + 2), for which 8 error_bound and a thousandth of |s|^2 are more than
+ * enough. */
 SIMD_INLINE vm kernel_contraction_excludes_root(int type, const kernel_contraction *c, const vf q[3], const vf s[3])
 {
     const vf most = kernel_contraction_support(type, c->domain_margin, s) - kernel_dot(s, q);
     vf error_bound = 8.0f * c->error_bound;
-    /* twice the error of crossings of faces, because the reference domain of a pyramid is not widened */
+    /* for a pyramid, whose domain D is not widened, the maximum over D is raised by twice the error of face crossings
+     * instead */
     if (kernel_has_apex(type)) error_bound = 4.0f * c->domain_margin;
     return vf_lt(2.0f * most + error_bound, 0.999f * kernel_dot(s, s));
 }
 
-/* Tests rays without crossings of faces. out->mask: rays with exactly one crossing, and its depth relative to vertex 0
- * and its reference coordinates, which are accurate to KERNEL_CONTRACTION_END. *none: rays without a crossing. */
+/* Finds each ray's only crossing of the isovalue in its cell, or proves that there is none, without intersecting faces.
+ * out->mask: rays with exactly one crossing; out->t: its depth relative to vertex 0; out->r: its reference coordinates.
+ * The crossing is accurate to KERNEL_CONTRACTION_END. *none: rays without a crossing. The other rays are undecided. */
 SIMD_INLINE void kernel_contract(const kernel_contraction *c, vm rays, kernel_point *out, vm *none, int type)
 {
     const int terms = kernel_nonlinear_count(type);
@@ -172,7 +179,7 @@ SIMD_INLINE void kernel_contract(const kernel_contraction *c, vm rays, kernel_po
         kernel_contraction_clamp(type, c->domain_margin, q);
         kernel_contraction_local(type, q, local);
         kernel_nonlinear_terms_at(type, local, term, unused);
-        /* kernel_bounds.h computes the Jacobian at the centre with a b / k² = 1/2 instead of 1/4, which leaves this
+        /* kernel_bounds.h computes J0 with a b / k^2 = 1/2 instead of 1/4, the value at the centre, which leaves this
          * linear term */
         if (kernel_has_apex(type)) term[0] += 0.25f * q[2];
         for (int i = 0; i < 3; i++) {

@@ -7,10 +7,11 @@
  * exact if it is 0 or 1 (Descartes' rule of signs; Farouki, "The Bernstein polynomial basis", 2012):
  *     none    All coefficients have the same sign: the ray has no root in the cell.
  *     one     They change their sign once: Newton's method finds the root.
- * Rays with two or three sign changes are left to kernel_curved_batch.h. So are rays with a root so close to a face
- * that rounding decides in which cell it is. Therefore the interval is that of the cell widened by domain_margin, a
- * root is accepted only if it is inside the cell by more than domain_margin, and the sign of a coefficient counts only
- * if its magnitude exceeds value_error. */
+ * Rays with two or three sign changes are undecided: kernel_curved_batch.h traces them by the methods for all hexes. So
+ * are rays with a root so close to a face that rounding decides in which cell it is. To recognize these, the interval
+ * is that of the cell widened by domain_margin (in reference coordinates), a root is accepted only if it is inside the
+ * cell by more than domain_margin, and the sign of a coefficient counts only if its magnitude exceeds value_error. The
+ * field is that of kernel_bounds.h: minus the isovalue, scaled so that its largest magnitude at a vertex is near 1. */
 #ifndef RENDER_KERNEL_CUBOIDS_H
 #define RENDER_KERNEL_CUBOIDS_H
 
@@ -28,26 +29,27 @@
 
 enum { KERNEL_CUBOID_STEPS = 8 };
 
-/* Step of Newton's method, in units of the interval, below which only the last step remains. Its error is at most the
- * square of that times half the ratio of second to first derivative. */
+/* Newton's method has converged when a step in s is shorter than this; one last step follows. The error of that step is
+ * at most the square of this number, times half the ratio of the polynomial's second derivative to its first. */
 #define KERNEL_CUBOID_END 1e-4f
 
-/* Upper bound of the rounding error of a Bernstein coefficient, with u = 6e-8. Values are at most 2, so the field's
- * coefficients are at most 2, three times 4, three times 8, and 16, and have errors of at most u times 4, 24 and 72
- * each: 1e-5 together. The sums of the absolute values of all terms of k0 to k3 are at most 54, 108, 72 and 16; each
- * term has up to nine roundings, which amounts to 9 u × 250 = 1.4e-4. */
+/* Upper bound of the rounding error of a Bernstein coefficient, with u = 6e-8. The field's magnitude at vertices is at
+ * most 2. So the eight coefficients of the field's polynomial are at most 2, three times 4, three times 8, and 16, and
+ * have errors of at most u times 4, 24 and 72 each: 1e-5 together. The sums of the absolute values of all terms of k0
+ * to k3 are at most 54, 108, 72 and 16; each term has up to nine roundings, which amounts to 9 u × 250 = 1.4e-4. */
 #define KERNEL_CUBOID_ROUNDING 1.5e-4f
 
 /* Coefficients and error bounds of cuboids, one cuboid per lane. */
 typedef struct kernel_cuboids {
-    float normal[3][3][SIMD_WIDTH];  /* rows of the inverse of the map's Jacobian, in tile space */
-    float field[8][SIMD_WIDTH];      /* coefficients of the field's polynomial (kernel_map.h) */
-    float value_error[SIMD_WIDTH];   /* error bound of the field's Bernstein coefficients along a ray */
-    float domain_margin[SIMD_WIDTH]; /* infinite for cells that are not cuboids */
+    float normal[3][3][SIMD_WIDTH]; /* rows of the inverse of the map's Jacobian; columns: axes of tile space */
+    float field[8][SIMD_WIDTH];     /* coefficients of the field's polynomial (kernel_map.h) */
+    /* error bound of the field's Bernstein coefficients along a ray, relative to a field near 1 */
+    float value_error[SIMD_WIDTH];
+    float domain_margin[SIMD_WIDTH]; /* margin in reference coordinates; infinite for cells that are not cuboids */
 } kernel_cuboids;
 
-/* Computes the rows of the inverse Jacobians in tile space, for half of the lanes. The sorted vertices 1, 3 and 4 are
- * the neighbours of vertex 0 along z, y and x. */
+/* Computes the rows of the inverse Jacobians in tile space, for the first (half = 0) or the second half of the lanes.
+ * After sorting by coordinates, vertices 1, 3 and 4 are the neighbours of vertex 0 along z, y and x. */
 SIMD_INLINE void kernel_cuboids_normals(const kernel_transformed_curved *cells, const kernel_frame *f,
                                         const kernel_tile *tile, int half, kernel_cuboids *out)
 {
@@ -65,7 +67,8 @@ SIMD_INLINE void kernel_cuboids_normals(const kernel_transformed_curved *cells, 
     }
 }
 
-/* Returns an upper bound of the field's derivative along reference axis i. */
+/* Returns an upper bound of the magnitude of the field's derivative along reference axis i, by the differences along
+ * the cell's four edges in that direction. */
 SIMD_INLINE vf kernel_cuboids_slope(const float values[8][SIMD_WIDTH], int i)
 {
     static const signed char edges[3][4][2] = {
@@ -76,9 +79,10 @@ SIMD_INLINE vf kernel_cuboids_slope(const float values[8][SIMD_WIDTH], int i)
     return most;
 }
 
-/* Computes value_error and domain_margin. In the code, gap is the distance of a face's computed crossing from the ray,
- * and own is the error of a ray's reference coordinates. Both are derived at kernel_f64_bounds() and kernel_f64_rate(),
- * and are doubled as there. */
+/* Computes value_error and domain_margin of the lanes in `cuboid`. gap: upper bound of the distance between a face's
+ * computed crossing and the ray; own: error bound of a ray's reference coordinates; reach: largest magnitude of the
+ * vertices' coordinates. gap and own are derived at kernel_f64_bounds() and kernel_f64_rate(), and are doubled as
+ * there. */
 SIMD_INLINE void kernel_cuboids_errors(const kernel_transformed_curved *cells, const kernel_beam *beam, vm cuboid,
                                        kernel_cuboids *out)
 {
@@ -121,7 +125,7 @@ static __attribute__((noinline)) void kernel_cuboids_of(const kernel_transformed
     kernel_cuboids_errors(cells, &beam, vm_from_bits(cells->cuboids), out);
 }
 
-/* A ray's interval in its widened cell, and the field along it. */
+/* A ray's interval in its cell widened by domain_margin, and the field along it, one ray per lane. */
 typedef struct kernel_cuboid_ray {
     vf normal[3][3], field[8], value_error, domain_margin; /* copies of the members of kernel_cuboids */
     vf origin[3];                                          /* vertex 0 in tile space */
@@ -130,7 +134,8 @@ typedef struct kernel_cuboid_ray {
     vf k[4];          /* coefficients k0 to k3 of the field's polynomial in s */
 } kernel_cuboid_ray;
 
-/* Computes the interval of each ray in its widened cell. Returns the rays that have one. */
+/* Computes the interval of each ray in its widened cell, and stores it in *out. at: x, y and z of the cells' vertices,
+ * by vertex and lane. Returns the rays that have an interval. */
 SIMD_INLINE vm kernel_cuboid_interval(const kernel_cuboids *cells, const float (*at)[8][SIMD_WIDTH],
                                       const kernel_lane_rays *p, kernel_cuboid_ray *out)
 {
@@ -160,7 +165,8 @@ SIMD_INLINE vm kernel_cuboid_interval(const kernel_cuboids *cells, const float (
     return vf_le(begin, end);
 }
 
-/* Computes the coefficients of the field along each ray's interval. */
+/* Computes the coefficients k0 to k3 of the field along each ray's interval. lane: the lane that holds each ray's cell.
+ */
 SIMD_INLINE void kernel_cuboid_polynomial(const kernel_cuboids *cells, vi lane, kernel_cuboid_ray *ray)
 {
     const vf *c = ray->field, *r = ray->r, *d = ray->d;
@@ -176,8 +182,9 @@ SIMD_INLINE void kernel_cuboid_polynomial(const kernel_cuboids *cells, vi lane, 
     ray->k[3] = c[7] * (d[0] * (d[1] * d[2]));
 }
 
-/* Finds the rays without a root in their interval (`none`) and those with exactly one (`one`). For the latter, *s
- * becomes the zero of the line through the values at the interval's ends. */
+/* Finds the rays without a root in their interval (*none) and those with exactly one (*one), by the signs of the
+ * Bernstein coefficients. For rays with one root, *s becomes the zero of the line through the field's values at the
+ * interval's ends. */
 SIMD_INLINE void kernel_cuboid_count(const kernel_cuboid_ray *ray, vm *none, vm *one, vf *s)
 {
     const vf *k = ray->k, error = ray->value_error, zero = vf_set(0), third = vf_set(1.0f / 3);
@@ -193,14 +200,15 @@ SIMD_INLINE void kernel_cuboid_count(const kernel_cuboid_ray *ray, vm *none, vm 
     *s = vf_select(ends, b[0] / (b[0] - b[3]), zero);
 }
 
+/* Returns the derivative of the field's polynomial at s. */
 SIMD_INLINE vf kernel_cuboid_rate(const vf k[4], vf s)
 {
     return k[1] + s * (2 * k[2] + s * (3 * k[3]));
 }
 
-/* Refines the root *s of the given rays by Newton's method, and by bisection if that leaves the bracket. Returns those
- * that have not converged. A ray that has converged is not changed any more, so that its root does not depend on the
- * other rays. */
+/* Refines the root *s of the given rays by Newton's method; a step that leaves the bracket of the root is replaced by a
+ * bisection. Returns the rays that have not converged. A ray that has converged is not changed any more, so that its
+ * root does not depend on the other rays. */
 SIMD_INLINE vm kernel_cuboid_newton(const kernel_cuboid_ray *ray, vm rays, vf *s)
 {
     vf low = vf_set(0), high = vf_set(1);
@@ -220,8 +228,8 @@ SIMD_INLINE vm kernel_cuboid_newton(const kernel_cuboid_ray *ray, vm rays, vf *s
     return open;
 }
 
-/* Returns the field at the reference coordinates r, interpolated between the values at the vertices. Its error is four
- * roundings of the largest value, which is less than the polynomial's error. */
+/* Returns the field at the reference coordinates r in each ray's cell, interpolated between the values at the vertices.
+ * Its error is four roundings of the largest value, which is less than the error of the field's polynomial. */
 SIMD_INLINE vf kernel_cuboid_value(const float values[8][SIMD_WIDTH], vi lane, const vf r[3])
 {
     vf v[8];
@@ -233,8 +241,9 @@ SIMD_INLINE vf kernel_cuboid_value(const float values[8][SIMD_WIDTH], vi lane, c
     return v[0] + r[2] * (v[4] - v[0]);
 }
 
-/* Finds the roots of the given rays, all of which have cuboids, and the field's gradients there, in tile space.
- * out->mask: rays with exactly one root; *none: rays without a root. */
+/* Finds the roots of the given rays, whose cells must be cuboids. at: x, y, z and the field of the cells' vertices, by
+ * vertex and lane. out->mask: rays with exactly one root; *none: rays without a root; other rays are undecided.
+ * gradient: the field's gradient at the roots, in tile space. */
 SIMD_INLINE void kernel_cuboid_roots_of(const kernel_cuboids *cells, const float (*at)[8][SIMD_WIDTH],
                                         const kernel_lane_rays *p, vm rays, kernel_point *out, vm *none, vf gradient[3])
 {

@@ -1,6 +1,7 @@
-/* Traces batches of SIMD_WIDTH hexes, wedges or pyramids of one type in a tile. A cell of a few pixels would leave most
- * lanes of a block's packet idle, and half of the rays in the cell have no crossing. So rays of several cells are
- * processed side by side, and after each stage the remaining rays are put side by side again:
+/* Traces batches of SIMD_WIDTH hexes, wedges or pyramids of one type in a tile (kernel_batch.h defines batch, block and
+ * box). A cell of a few pixels would leave most lanes of a block's packet idle, and half of the rays in the cell have
+ * no crossing. So rays of several cells are listed one after the other and traced in vectors, each lane with a ray and
+ * the index of the lane that holds its cell. After each stage the undecided rays are moved together again:
  *     pixels of boxes       where is the only root in a cuboid?             kernel_cuboids.h
  *     undecided rays        is the only crossing known, or is there none?   kernel_contraction.h
  *     undecided rays        which faces does the ray cross?                 signs of edge functions
@@ -10,10 +11,10 @@
  * If the field is known to be monotone along all of the tile's rays (kernel_roots.h), the signs at the faces decide
  * whether there is a root. Rays of other cells are searched for roots.
  *
- * Rays with an edge function of uncertain sign, and rays that do not cross exactly two faces once each, are traced one
- * by one in the cell (kernel_surface.h). All operations but those of kernel_cuboids.h are those for a single cell in
- * the same order, so a hit has the same bits whichever way it is computed. Which rays kernel_cuboids.h decides depends
- * on their own cell alone. */
+ * Rays with an edge function of uncertain sign, and rays that do not cross exactly two faces once each, are traced cell
+ * by cell (kernel_surface.h). All operations except those of kernel_cuboids.h are those for a single cell in the same
+ * order, so the two methods compute bit-identical hits. Which rays kernel_cuboids.h decides depends only on the ray and
+ * its cell. */
 #ifndef RENDER_KERNEL_CURVED_BATCH_H
 #define RENDER_KERNEL_CURVED_BATCH_H
 
@@ -47,8 +48,8 @@
 enum { KERNEL_CURVED_PIXELS = 64 };
 
 typedef struct kernel_curved_batch {
-    const kernel_surface_cells *queued; /* the cells that are being traced */
-    kernel_transformed_curved transformed;
+    const kernel_surface_cells *queued;    /* the cells that are being traced */
+    kernel_transformed_curved transformed; /* these cells in tile space */
     /* colour field by vertex and lane, as in kernel_cell.g; set only if the layer has one */
     float colours[8][SIMD_WIDTH];
     float lines[8][SIMD_WIDTH]; /* field of the contour lines by vertex and lane; set only if the layer has lines */
@@ -57,8 +58,8 @@ typedef struct kernel_curved_batch {
     kernel_bounds bounds;
     unsigned copied_lanes; /* mask of the lanes whose cells have been copied to `cells` */
     kernel_cell cells[SIMD_WIDTH];
-    /* rays: undecided rays; met: rays that cross two faces; found: rays with exactly one root; others: rays that are
-     * searched for roots */
+    /* rays: undecided rays; met: rays that cross two faces of their cells; found: rays with exactly one root; others:
+     * rays whose roots must be searched for */
     kernel_pixel_list rays, met, found, others;
     /* for each ray in `met`, the two faces that it crosses: number of the first plus 8 times that of the second */
     uint8_t faces[KERNEL_LIST_ROOM];
@@ -74,6 +75,7 @@ static void kernel_curved_batch_begin(kernel_curved_batch *h)
     memset(h->lines, 0, sizeof h->lines);
 }
 
+/* Returns the batch's cells in the form that the functions for rays in cells take. */
 SIMD_INLINE kernel_curved kernel_curved_batch_cells(kernel_curved_batch *h)
 {
     return (kernel_curved){.type = h->queued->type,
@@ -98,8 +100,9 @@ SIMD_INLINE void kernel_curved_ready(const kernel_tile_trace *t, kernel_curved_b
     for (int i = 0; i < h->cells[n].count; i++) h->cells[n].vertices[i] = h->transformed.vertex[i][n];
 }
 
-/* Traces the rays in `wanted` cell by cell; rays with the same cell and packet are traced together. Returns a mask of
- * the blocks that contain a ray whose hit is nearer than its previous one. */
+/* Traces some of the rays from index `first` on in the list `rays` cell by cell; rays with the same cell and packet are
+ * traced together. at_lanes: position of each ray among the tile's packets; wanted: mask of the rays to trace. Returns
+ * a mask of the blocks that contain a ray whose hit is nearer than its previous one. */
 static __attribute__((noinline)) unsigned kernel_curved_batch_trace_singly(kernel_tile_trace *t, kernel_curved_batch *h,
                                                                            const kernel_pixel_list *rays, int first,
                                                                            vi at_lanes, unsigned wanted)
@@ -132,9 +135,9 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_trace_singly(kerne
 
 /* ---- rays ---- */
 
-/* Returns the rays that have no root because they do not meet the slab |L| <= thickness that contains the isosurface
- * (kernel_bounds.h) between the cell's bounding planes. The values at the faces then have L's sign. Depths are relative
- * to vertex 0. */
+/* Returns the rays that have no root because they stay outside of the slab |L| <= thickness in which the isosurface
+ * lies (kernel_bounds.h), as long as they are between the cell's bounding planes. The field at the faces then has L's
+ * sign. */
 SIMD_INLINE vm kernel_curved_batch_beside(const kernel_curved_batch *h, vi lane, const kernel_contraction *ray)
 {
     const vf thick = kernel_gather_lane(h->bounds.thickness, lane);
@@ -150,8 +153,8 @@ SIMD_INLINE vm kernel_curved_batch_beside(const kernel_curved_batch *h, vi lane,
     return vm_or(vf_lt(thick, vf_min(begin, end)), vf_lt(vf_max(begin, end), -thick));
 }
 
-/* Moves rays of the list `rays` towards its front: of the vector of rays that begins at index n, those whose bits are
- * set are stored from index `kept` on. Returns the new number of kept rays. */
+/* Keeps rays in the list h->rays, by moving them towards its front: of the vector of rays that begins at index n, those
+ * whose bits are set in `rays` are stored from index `kept` on. Returns the new number of kept rays. */
 SIMD_INLINE int kernel_curved_batch_keep(kernel_curved_batch *h, int n, unsigned rays, int kept)
 {
     for (; rays; rays &= rays - 1) {
@@ -163,7 +166,7 @@ SIMD_INLINE int kernel_curved_batch_keep(kernel_curved_batch *h, int n, unsigned
     return kept;
 }
 
-/* Loads rays of a list, from index n on; those whose cells lie behind their nearest hits are inactive. */
+/* Loads a vector of rays of a list, from index n on. Rays whose cells lie behind their nearest hits are inactive. */
 SIMD_INLINE void kernel_curved_batch_load(const kernel_tile_trace *t, const kernel_curved_batch *h,
                                           const kernel_pixel_list *rays, int n, kernel_lane_rays *out)
 {
@@ -173,7 +176,8 @@ SIMD_INLINE void kernel_curved_batch_load(const kernel_tile_trace *t, const kern
 }
 
 /* Decides as many rays as possible without intersecting faces: by the slab that contains the isosurface, and by
- * contraction. Rays with a crossing are moved to `found`; undecided rays remain in `rays`. */
+ * contraction (kernel_contraction.h). Rays with exactly one crossing are moved to `found`, rays without one are
+ * dropped, and undecided rays remain in `rays`. */
 SIMD_INLINE void kernel_curved_batch_contract_of(const kernel_tile_trace *t, kernel_curved_batch *h, int type)
 {
     const kernel_curved cells = kernel_curved_batch_cells(h);
@@ -205,8 +209,9 @@ static __attribute__((noinline)) void kernel_curved_batch_contract(const kernel_
     KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_contract_of, t, h);
 }
 
-/* Lists the rays that cross two faces of their cells in `met`, with the numbers of these faces. Other rays are traced
- * cell by cell. Returns a mask of the blocks that contain a ray whose hit is nearer than its previous one. */
+/* Adds the rays that cross exactly two faces of their cells once each to the list `met`, and the numbers of these faces
+ * to `faces`. Rays for which that is not certain are traced cell by cell. Returns a mask of the blocks that contain a
+ * ray whose hit is nearer than its previous one. */
 SIMD_INLINE unsigned kernel_curved_batch_find_faces_of_type(kernel_tile_trace *t, kernel_curved_batch *h, int type)
 {
     unsigned nearer = 0;
@@ -239,8 +244,9 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_find_faces(kernel_
     return KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_find_faces_of_type, t, h);
 }
 
-/* Computes the points at which rays enter and leave their cells. Rays with exactly one root, by the values at the ends,
- * go to `found`; rays that must be searched for roots go to `others`. */
+/* Computes the points at which the rays in `met` enter and leave their cells, and the field there. Rays with exactly
+ * one root according to these values are added to `found`. Rays whose roots must be searched for are added to `others`.
+ */
 SIMD_INLINE void kernel_curved_batch_cross_of(const kernel_tile_trace *t, kernel_curved_batch *h, int type)
 {
     const kernel_curved cells = kernel_curved_batch_cells(h);
@@ -306,7 +312,8 @@ static __attribute__((noinline)) void kernel_curved_batch_fetch_lines(const kern
             h->lines[i][n] = (float)kernel_lines_value(t->surface, field, h->transformed.vertex[i][n]);
 }
 
-/* Computes the colours of hits if the surface has a colour field or contour lines. */
+/* Computes the colours of hits, before lighting, if the surface has a colour field or contour lines. lanes[i]: the lane
+ * that holds the cell of hit i. */
 static __attribute__((noinline)) void kernel_curved_batch_colours(const kernel_tile_trace *t,
                                                                   const kernel_curved_batch *h, const uint8_t *lanes,
                                                                   const kernel_lane_rays *p, const kernel_point *at,
@@ -327,8 +334,9 @@ static __attribute__((noinline)) void kernel_curved_batch_colours(const kernel_t
     kernel_draw_lines(t->frame, &t->tile, t->surface, &p->rays, at->t, &along, colours);
 }
 
-/* Accepts the hits in `hit`, a mask of lanes. normal: normals or reference coordinates, as in kernel_hits. Returns a
- * mask of the blocks that contain a ray whose hit is nearer than its previous one. */
+/* Accepts hits of the vector of rays from index `first` on in a list (kernel_ray_accept()). hit: mask of the rays that
+ * hit; normal: as in kernel_hits, a vector along the normal or reference coordinates. Returns a mask of the blocks that
+ * contain a ray whose hit is nearer than its previous one. */
 static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile_trace *t, const kernel_curved_batch *h,
                                                                      const kernel_pixel_list *rays, int first,
                                                                      const kernel_lane_rays *p, unsigned hit,
@@ -352,9 +360,9 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile
     return blocks;
 }
 
-/* Rotates gradients of the field from tile space into camera axes. If the layer has normals from vertices
- * (RENDER_VERTEX), the reference coordinates r are stored instead, from which kernel_vertex_normals() computes normals
- * later. */
+/* Computes what hits store as their normals: the field's gradients, transformed from tile space into camera axes. If
+ * the layer has normals from vertices (RENDER_VERTEX), the reference coordinates r are stored instead;
+ * kernel_vertex_normals() computes the normals from these later. */
 SIMD_INLINE void kernel_curved_batch_orient(const kernel_tile_trace *t, const vf gradient[3], const vf r[3],
                                             vf normal[3])
 {
@@ -371,9 +379,9 @@ SIMD_INLINE void kernel_curved_batch_normal(const kernel_tile_trace *t, const ke
     kernel_curved_batch_orient(t, gradient, r, normal);
 }
 
-/* Accepts the visible hits of rays in cuboids that have exactly one root. Rays whose roots are uncertain, and rays in
- * other cells, remain in `rays`. Returns a mask of the blocks that contain a ray whose hit is nearer than its previous
- * one. */
+/* Accepts the visible hits of those rays that have exactly one root in a cuboid. Rays for which that is uncertain, and
+ * rays in other cells, remain in `rays`. Returns a mask of the blocks that contain a ray whose hit is nearer than its
+ * previous one. */
 static __attribute__((noinline)) unsigned kernel_curved_batch_cross_cuboids(kernel_tile_trace *t,
                                                                             kernel_curved_batch *h)
 {
@@ -401,8 +409,9 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_cross_cuboids(kern
     return nearer;
 }
 
-/* Refines the roots that have been found, and accepts those that are visible. is_contracted: the roots come from
- * kernel_curved_batch_contract(), and are so accurate that they need no bracket. */
+/* Refines the roots of the rays in `found`, and accepts those that are visible. is_contracted: the roots come from
+ * kernel_curved_batch_contract(), and are so accurate that they need no bracket. Returns a mask of the blocks that
+ * contain a ray whose hit is nearer than its previous one. */
 SIMD_INLINE unsigned kernel_curved_batch_hit_of(kernel_tile_trace *t, kernel_curved_batch *h, bool is_contracted,
                                                 int type)
 {
@@ -440,8 +449,8 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_hit(kernel_tile_tr
                          : KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_hit_of, t, h, false);
 }
 
-/* Searches for the first visible root of each of a vector of rays in `others`, from index n on, and accepts it. Returns
- * a mask of the blocks that contain a ray whose hit is nearer than its previous one. */
+/* Searches for the first visible root of each ray in the vector that begins at index n of `others`, and accepts it.
+ * Returns a mask of the blocks that contain a ray whose hit is nearer than its previous one. */
 static __attribute__((noinline)) unsigned kernel_curved_batch_search(kernel_tile_trace *t, kernel_curved_batch *h,
                                                                      int n)
 {
@@ -475,7 +484,7 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_search(kernel_tile
 
 /* ---- batches ---- */
 
-/* Computes the cells' faces and bounds, unless that has been done. */
+/* Computes the faces and the bounds (kernel_bounds) of the batch's cells, unless that has been done. */
 static void kernel_curved_batch_set_bounds(const kernel_tile_trace *t, kernel_curved_batch *h)
 {
     const kernel_beam beam = kernel_tile_beam(t->frame, &t->tile);
@@ -521,8 +530,9 @@ SIMD_INLINE void kernel_curved_batch_rays_of(kernel_tile_trace *t, kernel_curved
     if (h->rays.count >= KERNEL_LIST_PIXELS) kernel_curved_batch_trace(t, h);
 }
 
-/* Transforms the queued cells, and lists their rays; cells whose rays are not traced in lanes are traced one by one in
- * packets. */
+/* Transforms the queued cells into tile space, and lists the rays of their boxes. A cell is instead traced block by
+ * block at once if the layer's rays cannot be traced in lanes (kernel_tile_layer_batches()), or if one of the cell's
+ * faces has collapsed. */
 static __attribute__((noinline)) void kernel_curved_batch_transform(kernel_tile_trace *t, kernel_curved_batch *h,
                                                                     kernel_surface_cells *queued)
 {
@@ -554,6 +564,7 @@ static __attribute__((noinline)) void kernel_curved_batch_transform(kernel_tile_
     t->curved = alone;
 }
 
+/* Traces the queue's cells, which become the current batch, and empties the queue. */
 static __attribute__((noinline)) void kernel_curved_batch_process(kernel_tile_trace *t, kernel_curved_batch *h,
                                                                   kernel_surface_cells *queued)
 {

@@ -1,4 +1,8 @@
-/* Computes normals by central differences of the field. */
+/* Computes normals by central differences of the field. Terms:
+ *     sample     value of the field at a point near a hit; there are six per hit, two along each world axis
+ *     reach      distance from a hit to each of its six sample points, in scaled units; at 0 the hit has no samples
+ *     probe      the state of taking one sample per ray of a packet
+ *     pending    a hit is pending until the samples of all ranks' cells have been merged (render_differences.h) */
 #ifndef RENDER_KERNEL_DIFFERENCES_H
 #define RENDER_KERNEL_DIFFERENCES_H
 
@@ -17,38 +21,41 @@
 #include "render.h"
 #include "simd.h"
 
-/* Normals by central differences (thesis, section 4.3.4). The field is sampled half an offset before and behind the hit
- * along each axis. The trees are traversed to the leaves whose boxes contain one of the packet's points. In a leaf, the
- * line through the point along the tile's depth axis is intersected with the cells like any ray, by the same exact
- * decisions, and the point belongs to the cell whose interval [t_in, t_out) contains its depth: to one cell of a mesh
- * or none.
+/* Normals by central differences (thesis, section 4.3.4). The field is sampled at the distance `reach` before and
+ * behind the hit along each world axis. The trees are traversed to the leaves whose boxes contain one of the packet's
+ * points. In a leaf, the line through the point along the tile's depth axis is intersected with the cells like any ray,
+ * by the same exact decisions, and the point belongs to the cell whose interval [t_in, t_out) contains its depth: to
+ * one cell of a mesh or none.
  *
  * Samples are the field minus the isovalue, so that the hit's own value is 0. If cells overlap, several contain a
  * point: the sample is the least of their values, whichever is tested first and on whichever rank.
  *
- * If other ranks have cells, their samples are needed too. Hits are then pending until the samples of all ranks have
- * been merged (render_differences.h). The second half of this file samples around pending hits and lights them, in the
- * same tiles and packets in which they were hit. */
+ * If other ranks may have cells around the hits (job->waiting is set), their samples are needed too, and hits become
+ * pending. The second half of this file samples around pending hits and lights them, in the same tiles and packets in
+ * which they were hit. */
 
 /* One point per ray at which the field is sampled, for normals by central differences, and the field there. */
 typedef struct kernel_probe {
     const kernel_surface *surface;
     int layer; /* number of the layer, which is part of the key of cached cells */
     double isovalue;
-    vf z;      /* depths of the points at which the field is sampled */
-    vf at[3];  /* the same points in tree space */
-    float pad; /* margin by which boxes of nodes are extended: more than all rounding of the points */
-    vm found;  /* rays whose point is in a cell */
+    vf z;     /* depth in tile space of each ray's sample point */
+    vf at[3]; /* the sample points in tree space */
+    /* margin by which the trees' boxes are extended, in scaled units: more than all rounding of the points */
+    float pad;
+    vm found;  /* rays whose sample point is in a cell visited so far */
     vf sample; /* least value of the field at the point over the cells that contain it */
 } kernel_probe;
 
-/* Sets c->f to the values minus the isovalue, times a scale that is the same for all cells. */
+/* Sets c->f to the vertex values minus the isovalue, times a scale that is the same for all cells of the surface. */
 SIMD_INLINE void kernel_probe_values(const kernel_probe *probe, kernel_cell *c)
 {
     for (int i = 0; i < c->count; i++)
         c->f[i] = kernel_clamp((c->values[i] - probe->isovalue) * probe->surface->value_scale, 1e18);
 }
 
+/* Takes the sample in the cell c on those of the given rays whose sample point lies in it. A ray that already has a
+ * sample keeps the lesser of the two values. */
 SIMD_INLINE void kernel_probe_cell(kernel_packet *p, kernel_probe *probe, const kernel_cell *c, vm rays)
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
@@ -94,6 +101,8 @@ SIMD_INLINE vm kernel_probe_in_box(const kernel_packet *p, const kernel_probe *p
     return rays;
 }
 
+/* Takes samples in the cells of a leaf of the tree of mesh part `part`. Cells with values that are not finite, and
+ * polyhedra, are skipped. */
 static void kernel_probe_leaf(kernel_packet *p, kernel_probe *probe, int part, const uint32_t *cells, int count,
                               vm rays)
 {
@@ -109,7 +118,7 @@ static void kernel_probe_leaf(kernel_packet *p, kernel_probe *probe, int part, c
     }
 }
 
-/* Returns the active rays whose points may be in the node's box. */
+/* Returns the active rays whose sample points may be in the node's box. */
 SIMD_INLINE vm kernel_probe_in_node(const kernel_packet *p, const kernel_probe *probe, const mmbvh *tree, int64_t node)
 {
     float lower[4], upper[4];
@@ -122,8 +131,8 @@ SIMD_INLINE vm kernel_probe_in_node(const kernel_packet *p, const kernel_probe *
     return inside;
 }
 
-/* Samples the field in the cells of a tree. part: the tree's mesh part; -1 for the tree over all parts, whose leaves
- * list parts. */
+/* Takes samples in the cells of a tree. part: the mesh part whose cells the tree holds; -1 for the tree over all parts,
+ * whose leaves list parts. */
 static void kernel_probe_tree(kernel_packet *p, kernel_probe *probe, const mmbvh *tree, int part)
 {
     const render_part *parts = p->frame->job->parts;
@@ -148,8 +157,8 @@ static void kernel_probe_tree(kernel_packet *p, kernel_probe *probe, const mmbvh
     }
 }
 
-/* Computes the points at depth t on the rays in tree space, and the margin of boxes. The points err by a few roundings
- * (6e-8) of positions near the scene and the eye, at most 16 together. */
+/* Computes probe->at, the points at depth t on the rays in tree space, and probe->pad, the margin of boxes. The points
+ * have an error of at most 16 roundings (6e-8) of the size of positions near the scene and the eye. */
 static void kernel_probe_points(const kernel_packet *p, vf t, kernel_probe *probe)
 {
     double px[SIMD_WIDTH], py[SIMD_WIDTH];
@@ -166,8 +175,8 @@ static void kernel_probe_points(const kernel_packet *p, vf t, kernel_probe *prob
     probe->pad = 16 * 6e-8f * ((float)size + 2);
 }
 
-/* Samples the field at the rays' points at depth t, moved by `offset` along a world axis (in scaled units). Returns the
- * rays whose point is in a cell. */
+/* Takes one sample per ray: at the ray's point at depth t, moved by `offset` scaled units along world axis number
+ * `axis`. Returns the rays whose sample point is in a cell. */
 SIMD_INLINE vm kernel_probe_at(const kernel_packet *p, kernel_probe *probe, vm rays, vf t, int axis, vf offset)
 {
     const render_job *job = p->frame->job;
@@ -191,8 +200,9 @@ SIMD_INLINE vm kernel_probe_at(const kernel_packet *p, kernel_probe *probe, vm r
     return probe->found;
 }
 
-/* Takes six samples of the field around each hit at depth t, at the distance `reach` from it: before and behind the hit
- * along the first axis, then along the second and the third. s must be one of the frame's surfaces. */
+/* Takes six samples of the field around each hit at depth t, at the distance `reach` (scaled units) from it: before and
+ * behind the hit along the first world axis, then along the second and the third. value: index of the isovalue, which
+ * is subtracted; found[i]: rays whose sample i lies in a cell. s must be one of the frame's surfaces. */
 static __attribute__((noinline)) void kernel_sample_differences(const kernel_packet *p, const kernel_surface *s,
                                                                 int value, vm hit, vf t, vf reach,
                                                                 vm found[RENDER_DIFFERENCE_SAMPLES],
@@ -231,7 +241,8 @@ SIMD_INLINE void kernel_normals_from_samples(const kernel_packet *p, const vm fo
     }
 }
 
-/* Takes samples around the hits and computes normals from them, for hits with a reach above 0. */
+/* Computes the normals of the hits whose reach is above 0 from samples around them, which are taken in this rank's
+ * cells. Other hits keep their normals. */
 SIMD_INLINE void kernel_normals_by_differences(const kernel_packet *p, const kernel_surface *s, int value, vm hit, vf t,
                                                vf reach, vf normal[3])
 {
@@ -242,7 +253,8 @@ SIMD_INLINE void kernel_normals_by_differences(const kernel_packet *p, const ker
     kernel_normals_from_samples(p, found, values, hit, normal);
 }
 
-/* Returns half the distance between two samples of a difference, in scaled units. */
+/* Returns the reach of hits in the cell c: half the distance between the two samples of a difference, in scaled units.
+ */
 SIMD_INLINE float kernel_difference_reach(const kernel_packet *p, const render_surface_layer *layer,
                                           const kernel_cell *c)
 {
@@ -262,11 +274,13 @@ typedef struct kernel_pending_group {
     vf t, reach;           /* members of render_pending_hit, by lane */
 } kernel_pending_group;
 
+/* Marks the tile of a new group as not yet set up. */
 SIMD_INLINE void kernel_pending_packet_begin(kernel_pending_group *group)
 {
     group->tile.x0 = group->tile.y0 = -1;
 }
 
+/* Finds the surface and the isovalue to which a pending hit's kind belongs. */
 SIMD_INLINE void kernel_pending_surface(kernel_pending_group *group, const kernel_frame *f, uint32_t kind)
 {
     for (int n = 0; n < f->surface_count; n++) {
@@ -277,8 +291,8 @@ SIMD_INLINE void kernel_pending_surface(kernel_pending_group *group, const kerne
     }
 }
 
-/* Sets up the group that begins with hits[0], and stores its number of hits in group->count. count: number of hits that
- * remain in the list. */
+/* Sets up the group that begins with hits[0]: its tile, packet, surface and isovalue, and its hits, of which
+ * group->count becomes the number. count: number of hits that remain in the list. */
 static void kernel_pending_group_begin(kernel_pending_group *group, const kernel_frame *f, kernel_thread *thread,
                                        const render_pending_hit *hits, int64_t count)
 {
@@ -335,6 +349,7 @@ static void kernel_sample_pending(const kernel_frame *f, kernel_thread *thread, 
     }
 }
 
+/* Loads the samples of a group's hits into vectors by lane; samples[n] belongs to the group's n-th hit. */
 SIMD_INLINE void kernel_load_difference_samples(const kernel_pending_group *group,
                                                 const render_difference_samples *samples,
                                                 vm found[RENDER_DIFFERENCE_SAMPLES],

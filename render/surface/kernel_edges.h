@@ -1,6 +1,7 @@
-/* Draws lines along edges of cells that lie in the surface. The cells are tets and pyramids, each built on a face of a
- * mesh by the session (outer surfaces). The distance from a hit to an edge is measured in the picture, so that lines
- * have the same width for any orientation of a face. */
+/* Draws lines along those edges of cells that lie in the surface, over the colours of hits. The cells are tets and
+ * pyramids, each built on a face of a mesh by the session (outer surfaces). The distance from a hit to an edge is
+ * measured in the picture, so that lines have the same width for any orientation of a face. In the following, a ray's
+ * plane is the plane x, y of tile space with the ray at the origin (kernel_cell.h). */
 #ifndef RENDER_KERNEL_EDGES_H
 #define RENDER_KERNEL_EDGES_H
 
@@ -20,8 +21,8 @@ SIMD_INLINE vf kernel_square_between(const vf a[2], const vf b[2])
     return x * x + y * y;
 }
 
-/* Returns the squared distance from each ray to the edge between vertices a and b, which are given in the ray's
- * plane. */
+/* Returns the squared distance from each ray, which is at the origin, to the edge between vertices a and b, which are
+ * given in the ray's plane. */
 SIMD_INLINE vf kernel_edge_distance(const vf a[2], const vf b[2])
 {
     const vf zero = vf_set(0), one = vf_set(1);
@@ -32,15 +33,17 @@ SIMD_INLINE vf kernel_edge_distance(const vf a[2], const vf b[2])
     return x * x + y * y;
 }
 
-/* Computes a vertex's position relative to each ray, in the plane at the vertex's depth. */
+/* Computes the position of a vertex of tile space in each ray's plane: x and y minus those of the ray at the vertex's
+ * depth. */
 SIMD_INLINE void kernel_edge_position(const kernel_packet *p, float x, float y, float z, vf out[2])
 {
     out[0] = x - (p->origin_x + p->slope_x * z);
     out[1] = y - (p->origin_y + p->slope_y * z);
 }
 
-/* Returns the squared distance from each ray to the nearest edge of a polygon. *length becomes the squared length of
- * the polygon's longest edge if that is larger. loop: the polygon's entries in render_part.loops. */
+/* Returns the squared distance from each ray to the nearest edge of a polygon, in the ray's plane. *length is raised to
+ * the squared length of the polygon's longest edge. loop: the polygon's entries in render_part.loops: number of
+ * vertices around it, number of segments per edge, and the vertices. */
 SIMD_INLINE vf kernel_nearest_of_loop(const kernel_packet *p, const grid *g, const int64_t *loop, vf *length)
 {
     const int64_t count = loop[0], step = loop[1], *corners = loop + 2;
@@ -59,8 +62,8 @@ SIMD_INLINE vf kernel_nearest_of_loop(const kernel_packet *p, const grid *g, con
     return nearest;
 }
 
-/* Returns the squared distance from each ray to the nearest edge of the cell's face in the surface. *length: the
- * squared length of the longest edge. */
+/* Returns the squared distance from each ray to the nearest edge of that face of the cell that lies in the surface, in
+ * the ray's plane. *length: the squared length of the face's longest edge there. */
 SIMD_INLINE vf kernel_nearest_edge(const kernel_packet *p, const kernel_cell *c, vf *length)
 {
     const render_part *part = &p->frame->job->parts[c->part];
@@ -78,9 +81,9 @@ SIMD_INLINE vf kernel_nearest_edge(const kernel_packet *p, const kernel_cell *c,
     return nearest;
 }
 
-/* Draws edge lines over the unlit colours of hits at depth t. The weight of the line's colour is the share of the pixel
- * that a strip of the line's width covers. Lines fade on faces that are hardly wider than a line, because otherwise
- * only lines would be visible there. */
+/* Draws edge lines over the colours, before lighting, of hits at depth t. The weight of the line's colour is the share
+ * of the pixel that a strip of the line's width covers. Lines fade out on faces whose longest edge is shorter than six
+ * line widths, because otherwise only lines would be visible there. */
 static __attribute__((noinline)) void kernel_draw_edges(const kernel_packet *p, const render_surface_layer *layer,
                                                         const kernel_cell *c, vf t, vf colour[3])
 {

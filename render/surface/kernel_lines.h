@@ -3,8 +3,9 @@
  *
  * A hit's distance from the line of a level, in pixels, is |f - level| divided by the change of f from one pixel to the
  * next. That change is taken along the surface: the rays through the neighbouring pixels meet the surface's tangent
- * plane next to the hit. With a ray of direction d (1 along the view's axis), a surface normal n and the gradient g of
- * f, a step across the view at the hit's depth, and then along the ray back to the plane, changes f by
+ * plane next to the hit. All vectors are in camera axes, z along the view. Let d be the ray's direction, with d.z = 1,
+ * n the surface's normal and g the gradient of f. A step parallel to the picture at the hit's depth, followed by a step
+ * along the ray back to the tangent plane, changes f by
  *      G = (gx, gy) - (nx, ny) (g.d) / (n.d)
  * times the step's length, which is a pixel's size at that depth. The weight of the line's colour is the share of a box
  * of one pixel that a strip of the line's width covers: with the distance from the line it falls along a ramp that is
@@ -27,13 +28,14 @@
 #include "render.h"
 #include "simd.h"
 
-/* The contour lines' field at hits: its value in the levels' domain; its gradient per scaled unit, and a vector of any
- * length along the surface's normal, both in camera axes. */
+/* The contour lines' field at hits, one hit per lane. value: in the domain of the levels, in which the first level is 0
+ * and the last is 1 (kernel_lines); gradient: change of that value per scaled unit, in camera axes; normal: a vector of
+ * any length along the surface's normal, in camera axes. */
 typedef struct kernel_line_field {
     vf value, gradient[3], normal[3];
 } kernel_line_field;
 
-/* Returns the value, in the levels' domain, of the contour lines' field at a vertex; it may be NaN. */
+/* Returns the value of the contour lines' field at a vertex, in the domain of the levels; it may be NaN. */
 SIMD_INLINE double kernel_lines_value(const kernel_surface *s, const grid_field *field, int64_t vertex)
 {
     return (grid_field_value(field, vertex) - s->lines.low) * s->lines.inverse_width;
@@ -51,7 +53,8 @@ SIMD_INLINE void kernel_gradient(const double d[3][3], const double df[3], doubl
     for (int a = 0; a < 3; a++) g[a] = (df[0] * n[0][a] + df[1] * n[1][a] + df[2] * n[2][a]) / volume;
 }
 
-/* Computes the gradient of a linear field in the tet with these corners, per scaled unit, in camera axes. */
+/* Computes the gradient of a linear field in a tet, per scaled unit, in camera axes. corner: world coordinates of the
+ * corners; value: the field there. */
 SIMD_INLINE void kernel_tet_gradient(const kernel_frame *f, const double *const corner[4], const double value[4],
                                      double out[3])
 {
@@ -68,7 +71,7 @@ SIMD_INLINE void kernel_tet_gradient(const kernel_frame *f, const double *const 
     }
 }
 
-/* Computes the contour lines' field in a tet. c->world must be set. */
+/* Computes the contour lines' field in the tet c, whose world coordinates and vertex indices must be set. */
 static __attribute__((noinline)) void kernel_cell_line_of(const kernel_frame *f, const kernel_tile *tile,
                                                           const kernel_surface *s, const kernel_cell *c,
                                                           kernel_tet_line *out)
@@ -85,9 +88,9 @@ static __attribute__((noinline)) void kernel_cell_line_of(const kernel_frame *f,
     for (int a = 0; a < 3; a++) out->gradient[a] = (float)g[a];
 }
 
-/* Adds to out->value, the contour lines' field at the last corner of each lane's tet, its change from there to the hits
- * of depth t. last: the position of that corner in tile space; along: the field's change along the tile's middle ray.
- */
+/* Moves the contour lines' field from the last corner of each lane's tet to the hit at depth t: adds the field's change
+ * between the two points to out->value, which holds the value at the corner. last: the corner's position in tile space;
+ * along: the field's change per unit of depth along the tile's middle ray. */
 SIMD_INLINE void kernel_line_field_move(kernel_line_field *out, const kernel_rays *rays, vf t, const vf last[3],
                                         vf along)
 {
@@ -95,8 +98,8 @@ SIMD_INLINE void kernel_line_field_move(kernel_line_field *out, const kernel_ray
     out->value = (out->value + x * out->gradient[0]) + (y * out->gradient[1] + (t - last[2]) * along);
 }
 
-/* Computes the contour lines' field, its gradient and the surface's normal at the hits of a packet in one tet. t,
- * normal: depths of the hits, and normals from kernel_tet_normal(). */
+/* Computes the contour lines' field, its gradient and the surface's normal at a packet's hits in the tet c. t: depths
+ * of the hits; normal: the normals that kernel_tet_normal() computes. */
 static __attribute__((noinline)) void kernel_tet_line_field(const kernel_packet *p, const kernel_surface *s,
                                                             const kernel_cell *c, vf t, const vf normal[3],
                                                             kernel_line_field *out)
@@ -147,8 +150,8 @@ static __attribute__((noinline)) void kernel_curved_line_field(const kernel_pack
     kernel_map_line_field(p->tile, map, line, r, out);
 }
 
-/* Computes which line is nearest to each hit (*line), and returns the share of the pixel that it covers: 0 if the field
- * is constant or NaN. */
+/* Finds the line that is nearest to each hit (*line: index of its level), and returns the share of the hit's pixel that
+ * this line covers. The share is 0 if the field is constant or NaN there. */
 static __attribute__((noinline)) vf kernel_lines_coverage(const kernel_frame *f, const kernel_tile *tile,
                                                           const kernel_surface *s, const kernel_rays *rays, vf t,
                                                           const kernel_line_field *at, vi *line)
@@ -179,8 +182,8 @@ static __attribute__((noinline)) vf kernel_lines_coverage(const kernel_frame *f,
     return vf_select(vm_andnot(vf_lt(zero, covered), still), covered * fade, zero);
 }
 
-/* Draws contour lines over the unlit colours of hits at depth t. Returns the share of each hit's pixel that a line
- * covers. */
+/* Draws contour lines over the colours, before lighting, of hits at depth t. Returns the share of each hit's pixel that
+ * a line covers. */
 SIMD_INLINE vf kernel_draw_lines(const kernel_frame *f, const kernel_tile *tile, const kernel_surface *s,
                                  const kernel_rays *rays, vf t, const kernel_line_field *at, vf colour[3])
 {

@@ -1,5 +1,5 @@
-/* Lights a packet's nearest opaque hits and emits them as fragments. Also lights pending hits, for which the samples of
- * all ranks have been merged. */
+/* Lights a packet's nearest opaque hits and emits them as fragments. Also lights pending hits: hits whose normals need
+ * samples of other ranks' cells, after the samples of all ranks have been merged (render_differences.h). */
 #ifndef RENDER_KERNEL_PACKET_SURFACE_H
 #define RENDER_KERNEL_PACKET_SURFACE_H
 
@@ -14,8 +14,9 @@
 #include "render.h"
 #include "simd.h"
 
-/* Computes normals by differences for the nearest opaque hits of a surface. Returns the hits that have a normal; the
- * others are added to the list of pending hits, because they need samples of other ranks. */
+/* Computes normals by central differences for the nearest opaque hits of the surface s, on the given rays. Returns the
+ * hits that have a normal. The other hits are added to the list of pending hits, because they need samples of other
+ * ranks' cells. */
 SIMD_INLINE vm kernel_opaque_differences(kernel_packet *p, const kernel_surface *s, vm rays, kernel_hits *hits)
 {
     vm ready = vm_none();
@@ -50,7 +51,9 @@ SIMD_INLINE void kernel_emit_opaque(kernel_packet *p, kernel_hits *hits)
     }
 }
 
-/* Lights pending hits by the merged samples of all ranks. out[i] becomes the fragment of hit i. */
+/* Computes the normals of pending hits from the samples that have been merged over all ranks, and lights the hits.
+ * shadings: per hit, the gradient in its own cell, in camera axes, and its colour before lighting. out[i] becomes the
+ * fragment of hit i. */
 static void kernel_light_pending(const kernel_frame *f, kernel_thread *thread, const render_pending_hit *hits,
                                  float (*shadings)[2][3], const render_difference_samples *samples, fragment *out,
                                  int64_t count)

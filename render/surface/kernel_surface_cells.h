@@ -1,5 +1,5 @@
-/* A queue of cells of one type, layer and mesh part, in which the layer's surface is to be traced when SIMD_WIDTH cells
- * are queued. */
+/* A queue of cells of one type, surface layer and mesh part, one cell per lane. When SIMD_WIDTH cells are queued, the
+ * layer's surface is traced in all of them together (kernel_batch.h, kernel_curved_batch.h). */
 #ifndef RENDER_KERNEL_SURFACE_CELLS_H
 #define RENDER_KERNEL_SURFACE_CELLS_H
 
@@ -10,19 +10,21 @@
 #include "simd.h"
 
 typedef struct kernel_surface_cells {
-    int type, count;
-    int layer, part;      /* layer and mesh part of the queued cells; -1: there are none yet */
-    kernel_arrays arrays; /* arrays of the layer's field on the mesh part */
-    uint32_t cell[SIMD_WIDTH];
-    /* copies of the members of kernel_tile_candidate */
+    int type, count;           /* type of the cells; number of queued cells */
+    int layer, part;           /* layer and mesh part of the queued cells; -1: no cell has been queued yet */
+    kernel_arrays arrays;      /* arrays of the layer's field on the mesh part */
+    uint32_t cell[SIMD_WIDTH]; /* index of the cell in the mesh part */
+    /* copies of the members of kernel_tile_candidate: the blocks and the box of pixels that the cell may meet, and its
+     * least depth */
     uint16_t blocks[SIMD_WIDTH], box[SIMD_WIDTH];
     float near[SIMD_WIDTH];
     int value[SIMD_WIDTH]; /* index of the isovalue in the layer */
     double isovalue[SIMD_WIDTH];
-    int32_t vertex[8][SIMD_WIDTH];
+    int32_t vertex[8][SIMD_WIDTH]; /* indices of the vertices in the mesh part, by vertex and lane */
 } kernel_surface_cells;
 
-/* Adds a cell that the current layer's surface crosses; the queue must not be full. */
+/* Adds a cell that the current layer's surface crosses; the queue must not be full. value: index of the isovalue in the
+ * layer. */
 SIMD_INLINE void kernel_surface_cells_add(const kernel_tile_trace *t, kernel_surface_cells *own,
                                           const kernel_tile_candidate *candidate, int value)
 {
@@ -37,7 +39,7 @@ SIMD_INLINE void kernel_surface_cells_add(const kernel_tile_trace *t, kernel_sur
                                   SIMD_WIDTH);
 }
 
-/* Fills the unused lanes with copies of the first cell. */
+/* Fills the unused lanes with the vertices and the isovalue of the first cell, so that all lanes can be transformed. */
 SIMD_INLINE void kernel_surface_cells_close(kernel_surface_cells *own)
 {
     for (int n = own->count; n < SIMD_WIDTH; n++) {

@@ -1,5 +1,7 @@
-/* Queues a tile's cells between search and tracing, by type, until a vector of them is full. Cells that are traced in
- * no vector are listed, and traced one by one. */
+/* Queues the cells that a tile's search has found until they are traced. Cells of a type that can be traced in lanes
+ * are collected in a queue per type (kernel_surface_cells), until it holds SIMD_WIDTH cells, which are traced together
+ * as a batch. Other cells are collected in a list, and are traced one by one by the packets of the blocks that they may
+ * meet. */
 #ifndef RENDER_KERNEL_TILE_QUEUE_H
 #define RENDER_KERNEL_TILE_QUEUE_H
 
@@ -16,7 +18,8 @@
 #include "render.h"
 #include "simd.h"
 
-/* Sorts a transformed cell's vertices and computes its edge functions and colours, ready for tracing. */
+/* Sorts the vertices of the tile's current cell, which is in tile space, and computes its edge functions and, if the
+ * surface has a colour field, that field's values. */
 SIMD_INLINE void kernel_tile_prepare_cell(kernel_tile_trace *t, int part)
 {
     t->cell->part = part;
@@ -26,6 +29,8 @@ SIMD_INLINE void kernel_tile_prepare_cell(kernel_tile_trace *t, int part)
         kernel_values_colours(t->surface, part, t->cell->index, t->cell->vertices, t->cell->count, t->cell->g);
 }
 
+/* Traces one isovalue's surface (in a polyhedron those of all isovalues) in a candidate by the packets of the given
+ * blocks. */
 static void kernel_tile_process_candidate(kernel_tile_trace *t, const kernel_tile_candidate *candidate, int part,
                                           int value, unsigned blocks)
 {
@@ -44,8 +49,8 @@ static void kernel_tile_process_candidate(kernel_tile_trace *t, const kernel_til
     kernel_blocks_trace(t, blocks, part, c->index, c, value);
 }
 
-/* Makes the surface layer of the candidate the current layer. source: kernel_candidate.source. Stores the candidate's
- * mesh part in *part, and returns the number of its isovalue in the layer. */
+/* Makes the surface layer to which a candidate belongs the tile's current layer. source: kernel_candidate.source.
+ * Stores the candidate's mesh part in *part, and returns the index of its isovalue in the layer. */
 SIMD_INLINE int kernel_tile_set_source(kernel_tile_trace *t, uint32_t source, int *part)
 {
     *part = (int)(source / RENDER_MAX_ISOVALUES);
@@ -53,23 +58,25 @@ SIMD_INLINE int kernel_tile_set_source(kernel_tile_trace *t, uint32_t source, in
     return t->frame->isovalue_number[source % RENDER_MAX_ISOVALUES];
 }
 
+/* Returns the blocks in which the candidate may be visible: traced blocks that it may meet, with a ray that has no
+ * nearer hit. */
 SIMD_INLINE unsigned kernel_candidate_blocks(const kernel_tile_trace *t, const kernel_tile_candidate *candidate)
 {
     return candidate->blocks & t->traced_blocks & kernel_blocks_beyond(t, candidate->near);
 }
 
-/* Maximum number of queued cells that are traced one by one. */
+/* Maximum number of cells in the list of those that are traced one by one. */
 enum { KERNEL_ALONE = SIMD_WIDTH };
 
-/* A tile's cells that are queued for tracing: one vector of cells per type, and cells that are traced one by one
- * (alone). And the state of a tile's search for cells in trees (kernel_tile_surface.h). A thread keeps it from tile to
- * tile. */
+/* A tile's cells that are queued for tracing, and the state of the tile's search for cells in trees
+ * (kernel_tile_surface.h). A thread keeps the struct from tile to tile. */
 typedef struct kernel_tile_search {
-    int layer, part;      /* layer and mesh part of the last queued cell; -1: there is none yet */
+    int layer, part;      /* layer and mesh part of the cells that are being queued; -1: no cell has been queued yet */
     kernel_arrays arrays; /* arrays of the layer's field on the mesh part */
-    kernel_surface_cells pending[KERNEL_LANE_TYPES];
+    kernel_surface_cells pending[KERNEL_LANE_TYPES]; /* one queue per type of cells that are traced in lanes */
     kernel_batch batch;
     kernel_curved_batch curved_batch;
+    /* candidates that are traced one by one, and their number */
     int alone_count;
     kernel_tile_candidate alone[KERNEL_ALONE];
     /* binned candidates whose cells' vertex indices are being prefetched */
@@ -105,9 +112,9 @@ SIMD_INLINE void kernel_tile_queue_set_part(const kernel_tile_trace *t, kernel_t
     kernel_arrays_begin(&m->arrays, t->frame->job->parts[part].cells, &t->surface->layer->field.fields[part]);
 }
 
-/* Returns whether a cell of the queue's layer and part is to be queued in the vector of its type. Polyhedra never are.
- * In a mesh of mixed types a tile has few large wedges or pyramids of one type; these are traced one by one, because
- * their hits then hide other cells sooner. */
+/* Returns whether a candidate of the current layer and part is queued for a batch of its type. Polyhedra never are. In
+ * a mesh of mixed types a tile has few large wedges or pyramids of one type; these are traced one by one, because their
+ * hits then hide other cells sooner. */
 SIMD_INLINE bool kernel_is_traced_in_vectors(const kernel_tile_search *m, const kernel_tile_candidate *candidate,
                                              int type)
 {
@@ -116,7 +123,7 @@ SIMD_INLINE bool kernel_is_traced_in_vectors(const kernel_tile_search *m, const 
            kernel_box_pixels(candidate->box) <= KERNEL_CURVED_PIXELS;
 }
 
-/* Traces the pending cells of a type. */
+/* Traces the cells of one queue as a batch, and empties the queue. */
 static void kernel_tile_queue_trace(kernel_tile_trace *t, kernel_tile_search *m, kernel_surface_cells *own)
 {
     const int layer = t->layer;
@@ -129,6 +136,8 @@ static void kernel_tile_queue_trace(kernel_tile_trace *t, kernel_tile_search *m,
     kernel_tile_set_layer(t, layer);
 }
 
+/* Adds a candidate to the queue of its type. If the queue is full, or its cells have another layer or part, its cells
+ * are traced first. */
 SIMD_INLINE void kernel_tile_queue_append(kernel_tile_trace *t, kernel_tile_search *m, kernel_surface_cells *own,
                                           const kernel_tile_candidate *candidate, int value)
 {
@@ -142,8 +151,8 @@ SIMD_INLINE void kernel_tile_queue_append(kernel_tile_trace *t, kernel_tile_sear
     kernel_surface_cells_add(t, own, candidate, value);
 }
 
-/* Traces the cells that are in no vector, one by one. The vectors of cells are traced before, because their cells were
- * found earlier and their hits may hide the single cells. */
+/* Traces the listed single cells one by one. All queued cells are traced first, because they were found earlier and
+ * their hits may hide the single cells. */
 static void kernel_tile_queue_trace_singly(kernel_tile_trace *t, kernel_tile_search *m)
 {
     if (!m->alone_count) return;
@@ -157,8 +166,8 @@ static void kernel_tile_queue_trace_singly(kernel_tile_trace *t, kernel_tile_sea
     m->alone_count = 0;
 }
 
-/* Queues a cell of the current layer and the given part for tracing: in a batch if it fits one, else in the list of
- * single cells. */
+/* Adds a candidate of the current layer and the given part to the queue of its type or, if it cannot be traced in a
+ * batch, to the list of single cells. value: index of the isovalue in the layer. */
 SIMD_INLINE void kernel_tile_queue_add(kernel_tile_trace *t, kernel_tile_search *m,
                                        const kernel_tile_candidate *candidate, int part, int value)
 {
@@ -172,7 +181,7 @@ SIMD_INLINE void kernel_tile_queue_add(kernel_tile_trace *t, kernel_tile_search 
     m->alone[m->alone_count++] = *candidate;
 }
 
-/* Traces all cells that are still queued. */
+/* Traces all cells that are still queued or listed. */
 static void kernel_tile_queue_finish(kernel_tile_trace *t, kernel_tile_search *m)
 {
     kernel_tile_queue_trace_singly(t, m);
