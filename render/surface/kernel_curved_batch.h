@@ -531,8 +531,8 @@ SIMD_INLINE void kernel_curved_batch_rays_of(kernel_tile_trace *t, kernel_curved
 }
 
 /* Transforms the queued cells into tile space, and lists the rays of their boxes. A cell is instead traced block by
- * block at once if the layer's rays cannot be traced in lanes (kernel_tile_layer_batches()), or if one of the cell's
- * faces has collapsed. */
+ * block at once if the layer's rays cannot be traced in lanes (kernel_tile_layer_batches()), or if the cell has an edge
+ * of length zero. */
 static __attribute__((noinline)) void kernel_curved_batch_transform(kernel_tile_trace *t, kernel_curved_batch *h,
                                                                     kernel_surface_cells *queued)
 {

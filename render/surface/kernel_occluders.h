@@ -1,18 +1,26 @@
-/* Occluders are the cells that an isovalue of this rank's opaque surfaces crosses, which may block rays from hits.
+/* Tests whether rays from hits, towards lights or into the hemisphere above a surface, are blocked. Terms:
+ *     occluder          cell of this rank that an isovalue of an opaque surface crosses; its surface may block rays
+ *     blocked           a ray is blocked if it crosses an opaque surface between its begin (or the reach) and its end
+ *     open              not known to be blocked
+ *     reach             distance from a ray's hit within which a cell does not block the ray (contact of the layer)
+ *     slab              space between two parallel planes that contains the surface in a cell: |L| <= thickness
+ *     record            the numbers of a hex from which a ray's crossings of its faces are computed
+ *     undecided pair    a ray and a cell for which neither slab nor record decides; the ray is traced in the cell
  *
- * Once per frame they are put into trees of their own, whose nodes have as many children as a vector has lanes. A ray
- * traverses a tree alone and tests all children of a node, or all pieces of a leaf, at once. So rays need not be
- * coherent, and the traversal ends as soon as the ray is known to be blocked.
- *     tets              their pieces of the surface are stored as triangles, which a ray meets or not
- *     other cells       a box, and two planes between which the surface lies: most rays pass outside
- *     hexes             the faces and the values there decide next, one ray-hex pair per lane
- *                       (kernel_occlusion_hexes.h)
- *     undecided rays    are traced in the cell like primary rays (kernel_occlusion.h)
- * Everything is in tree space in float32, translated to the ray's origin and sheared along its largest axis (Woop,
- * Benthin and Wald 2013). A triangle's vertices lie on edges of the mesh and are computed from the edge alone. An edge
- * function is the same number with the other sign in both triangles of an edge, and 0 counts as inside for both: so no
- * ray passes between two triangles. In tree space positions below 1 are rounded by at most 6e-8: so are vertices, and
- * the ray's origin; the lift of 4e-6 (render_light.h) is much larger.
+ * Once per frame occluders are put into trees of their own, whose nodes have as many children as a vector has lanes.
+ * Each ray traverses a tree on its own, and tests all children of a node, or all triangles or slabs of a leaf, at once.
+ * So rays need not be coherent, and the traversal ends as soon as the ray is known to be blocked.
+ *     tets               the surface in the tet is stored as one or two triangles, which the ray crosses or not
+ *     other cells        are stored as a box and a slab, both of which most rays miss
+ *     hexes              that are met: the values at the two crossed faces decide most rays, one ray-hex pair per lane
+ *                        (kernel_occlusion_hexes.h)
+ *     undecided pairs    the ray is traced in the cell like a primary ray (kernel_occlusion.h)
+ * Positions are in tree space (scaled units) in float32. For the test of triangles they are translated to the ray's
+ * origin and sheared along the axis of its largest component (Woop, Benthin and Wald 2013). A triangle's vertices lie
+ * on edges of the mesh and are computed from the edge alone. The edge functions of an edge in its two triangles differ
+ * only in their sign, and 0 counts as inside for both, so that no ray passes between two triangles. In tree space,
+ * positions below 1 are rounded by at most 6e-8: the vertices, and the ray's origin. The distance of 4e-6 by which
+ * origins are lifted off the surface (render_light.h) is much larger.
  *
  * A box test may accept a ray that misses the box, but never the reverse. Everything else depends on the ray and the
  * cell alone. So results do not depend on the trees, on their order, or on which rank holds a cell. */
@@ -27,11 +35,11 @@
 #include "mmbvh.h"
 #include "simd.h"
 
-/* Indices of the rows of floats that a leaf consists of. A row has one float per lane. Triangles and slabs have
- * different rows. */
+/* Indices of the rows of floats that a leaf consists of. A row has one float per lane, and each lane has one triangle
+ * or one slab. Leaves of triangles have the first set of rows, leaves of slabs the second. */
 enum {
     KERNEL_TRIANGLE_CORNERS = 0, /* x, y, z of the three corners */
-    KERNEL_TRIANGLE_REACH = 9,   /* distance from a ray's hit within which the cell does not block the ray */
+    KERNEL_TRIANGLE_REACH = 9,   /* reach: distance from a ray's hit within which the cell does not block it */
     KERNEL_TRIANGLE_ROWS,
     KERNEL_SLAB_LOWER = 0, /* bounding box of the cell: lower and upper corner */
     KERNEL_SLAB_UPPER = 3,
@@ -40,21 +48,22 @@ enum {
     KERNEL_SLAB_GRADIENT = 6,
     KERNEL_SLAB_LEVEL = 9,
     KERNEL_SLAB_THICKNESS,
-    KERNEL_SLAB_ERROR, /* rounding error of the slab's linear function L, divided by the size of positions */
-    KERNEL_SLAB_REACH, /* distance from a ray's hit within which the cell does not block the ray */
+    KERNEL_SLAB_ERROR, /* rounding error of L, divided by the largest magnitude of positions */
+    KERNEL_SLAB_REACH, /* reach: distance from a ray's hit within which the cell does not block it */
     KERNEL_SLAB_ROWS
 };
 
-/* A hex's record: 8 vertices with their values less the isovalue, and the corners of its faces as in
- * kernel_transformed_curved. */
+/* A hex's record consists of floats: per vertex x, y, z (tree space) and the field minus the isovalue; then, from
+ * KERNEL_CURVED_RECORD_QUADS on, the corners of its six faces, packed as in kernel_transformed_curved. It has
+ * KERNEL_CURVED_RECORD_WORDS floats. */
 enum { KERNEL_CURVED_RECORD_QUADS = 32, KERNEL_CURVED_RECORD_WORDS = 40 };
 
-/* A cell that an opaque isosurface crosses, together with the isovalue. */
+/* An occluder: a cell that an opaque isosurface crosses, and the isovalue. */
 typedef struct kernel_occluder {
     /* index of the surface in the frame, of the isovalue in the surface's layer, and of the mesh part */
     int32_t surface, value, part;
     uint32_t cell;
-    int32_t record; /* index of the cell's record among those of hexes; -1 if it has none */
+    int32_t record; /* index of the cell's record in kernel_occluders.hexes; -1 if it has none */
 } kernel_occluder;
 
 /* A tree whose nodes have one child per lane. Lanes without a child have an empty box. */
@@ -63,7 +72,8 @@ typedef struct kernel_occluder_tree {
     float *boxes;                   /* boxes of the nodes' children: per node 6 rows of lanes, lower and upper corner */
     int32_t *children;              /* per node and lane: the index of a child node, or ~index of a leaf */
     float *leaves;                  /* the rows of all leaves */
-    /* per leaf and lane: a triangle's surface or a slab's occluder; -1 if the lane is empty */
+    /* per leaf and lane: index of the triangle's surface in the frame, or index of the slab's cell in
+     * kernel_occluders.cells; -1 if the lane is empty */
     int32_t *sources;
     float size; /* upper bound of the magnitude of all coordinates */
 } kernel_occluder_tree;
@@ -71,11 +81,12 @@ typedef struct kernel_occluder_tree {
 typedef struct kernel_occluders {
     int width; /* number of lanes of the kernels that traverse the trees */
     kernel_occluder_tree triangles, slabs;
-    kernel_occluder *cells;
-    float *hexes; /* records of hexes (KERNEL_CURVED_RECORD_WORDS floats each) */
+    kernel_occluder *cells; /* the cells of all slabs */
+    float *hexes;           /* records of hexes (KERNEL_CURVED_RECORD_WORDS floats each) */
 } kernel_occluders;
 
-/* A ray from a hit, in tree space. It ends at the distance `far`, and is open until something blocks it. */
+/* A ray from a hit, in tree space. It ends at the distance `far` from its origin, in scaled units. is_open: set until
+ * something is found that blocks it. */
 typedef struct kernel_secondary_ray {
     float origin[3], direction[3]; /* the direction has unit length */
     float far;
@@ -85,7 +96,8 @@ typedef struct kernel_secondary_ray {
     int16_t hit, number;
 } kernel_secondary_ray;
 
-/* A ray that the trees cannot decide for a cell, so that it must be traced in that cell. */
+/* A ray and an occluder in whose cell the ray must be traced; indices into kernel_secondary_rays.rays and
+ * kernel_occluders.cells. */
 typedef struct kernel_undecided_pair {
     int32_t ray, occluder;
 } kernel_undecided_pair;
@@ -97,22 +109,23 @@ typedef struct kernel_secondary_rays {
     kernel_undecided_pair *undecided; /* undecided ray-cell pairs, sorted by ray */
 } kernel_secondary_rays;
 
-/* Grows the list of undecided pairs; returns false if memory runs out. */
+/* Enlarges the list of undecided pairs; returns false if memory ran out. */
 bool render_grow_undecided(kernel_secondary_rays *s);
 
 /* ---- a ray, prepared for traversal ---- */
 
 typedef struct kernel_prepared_ray {
     const kernel_secondary_ray *ray;
-    /* The ray meets an axis-aligned plane at the distance plane * inverse + shift. The shifts for near and far planes
-     * differ so that boxes are extended by more than the rounding error. */
+    /* The ray meets the plane at position x along an axis at the distance x * inverse + shift. The shifts for a box's
+     * near and far planes differ, so that boxes are extended by more than the rounding error. */
     vf inverse[3], near_shift[3], far_shift[3];
-    /* for each axis, offset in a node's rows of boxes of the plane that the ray meets first, and of the other one */
+    /* for each axis, offset among a node's rows of boxes of the row with the planes that the ray meets first, and of
+     * the row with the planes on the boxes' far side */
     int near_row[3], far_row[3];
     int kx, ky, kz; /* kz is the axis with the largest component of the direction; kx and ky follow it cyclically */
     /* with d the ray's direction: d[kx] / d[kz], d[ky] / d[kz] and 1 / d[kz] */
     float shear_x, shear_y, stretch;
-    float size; /* size of positions, from which the rounding error of the slabs' linear functions is computed */
+    float size; /* upper bound of positions' magnitudes, from which the rounding error of the slabs' L is computed */
 } kernel_prepared_ray;
 
 SIMD_INLINE void kernel_prepared_ray_axes(const kernel_secondary_ray *ray, kernel_prepared_ray *p)
@@ -126,9 +139,9 @@ SIMD_INLINE void kernel_prepared_ray_axes(const kernel_secondary_ray *ray, kerne
     p->shear_y = ray->direction[p->ky] * p->stretch;
 }
 
-/* Prepares a ray for a tree. The computed distance to a plane (two products and a difference) has an error of at most 3
- * rounding units (6e-8) of the positions' size, and the rounding of `inverse` adds one; boxes are extended by more than
- * that. */
+/* Prepares a ray for the traversal of a tree whose coordinates have magnitudes of at most tree_size. The computed
+ * distance to a plane (two products and a difference) has an error of at most 3 rounding units (6e-8) of the positions'
+ * magnitude, and the rounding of `inverse` adds one. Boxes are extended by 16 such units. */
 SIMD_INLINE void kernel_prepared_ray_begin(const kernel_secondary_ray *ray, float tree_size, kernel_prepared_ray *p)
 {
     float size = tree_size;
@@ -148,7 +161,8 @@ SIMD_INLINE void kernel_prepared_ray_begin(const kernel_secondary_ray *ray, floa
     kernel_prepared_ray_axes(ray, p);
 }
 
-/* Returns the boxes, given in six rows, that the ray meets; stores the distances at which it enters and leaves them. */
+/* Returns the boxes, given in six rows of lanes (lower and upper corners), that the ray meets; stores the distances at
+ * which it enters and leaves them. */
 SIMD_INLINE vm kernel_prepared_ray_boxes(const kernel_prepared_ray *p, const float *rows, vf *low, vf *high)
 {
     *low = vf_set(0);
@@ -162,7 +176,8 @@ SIMD_INLINE vm kernel_prepared_ray_boxes(const kernel_prepared_ray *p, const flo
 
 /* ---- triangles ---- */
 
-/* Returns the triangles of a leaf that the ray meets, and stores the distances of the crossings in *t. */
+/* Returns the triangles of a leaf that the ray crosses farther from its origin than their reach and before its end.
+ * Stores the distances of the crossings in *t. */
 SIMD_INLINE vm kernel_prepared_ray_triangles(const kernel_prepared_ray *p, const float *rows, vf *t)
 {
     const float *o = p->ray->origin;
@@ -185,8 +200,8 @@ SIMD_INLINE vm kernel_prepared_ray_triangles(const kernel_prepared_ray *p, const
 
 /* ---- slabs ---- */
 
-/* Computes the linear function L of each slab along the ray, as level + rise * t, and the slab's thickness including
- * rounding. */
+/* Computes, for each slab of a leaf, its linear function L along the ray, which is level + rise * t at the distance t,
+ * and the slab's thickness, enlarged by the rounding error of L. */
 SIMD_INLINE void kernel_prepared_ray_level(const kernel_prepared_ray *p, const float *rows, vf *level, vf *rise,
                                            vf *thickness)
 {
@@ -201,8 +216,8 @@ SIMD_INLINE void kernel_prepared_ray_level(const kernel_prepared_ray *p, const f
         vf_load(rows + KERNEL_SLAB_ERROR * SIMD_WIDTH) * p->size + vf_load(rows + KERNEL_SLAB_THICKNESS * SIMD_WIDTH);
 }
 
-/* Returns the cells of a leaf in which the ray may meet the surface: it meets the cell's box, and the slab within the
- * box. */
+/* Returns the slabs of a leaf in whose cells the ray may cross the surface: the ray meets the cell's box and, within
+ * the box and farther away than the reach, the slab. level, rise, thickness: as in kernel_prepared_ray_level(). */
 SIMD_INLINE vm kernel_prepared_ray_slabs(const kernel_prepared_ray *p, const float *rows, vf *level, vf *rise,
                                          vf *thickness)
 {
@@ -213,7 +228,7 @@ SIMD_INLINE vm kernel_prepared_ray_slabs(const kernel_prepared_ray *p, const flo
     low = vf_max(0.9999f * vf_load(rows + KERNEL_SLAB_REACH * SIMD_WIDTH), low);
     kernel_prepared_ray_level(p, rows, level, rise, thickness);
     const vf first = *level + *rise * low, last = *level + *rise * high;
-    /* A ray without an end leaves the box at a finite distance, so `high` is finite. */
+    /* Even for a ray without an end `high` is finite, because the ray leaves the box at a finite distance. */
     const vm beside = vm_or(vf_lt(*thickness, vf_min(first, last)), vf_lt(vf_max(first, last), -*thickness));
     return vm_andnot(vm_and(met, vf_le(low, high)), beside);
 }

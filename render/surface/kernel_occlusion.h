@@ -1,6 +1,7 @@
 /* Tests exactly whether a cell's opaque surface blocks rays from hits, towards lights or into the hemisphere. Any root
- * in [t_near, t_far) blocks the ray, so the result does not depend on the order of cells or on the partition. Roots are
- * found as for primary rays, but no normal, no colour and no order is needed. */
+ * of the field minus the isovalue at a depth in [t_near, t_far) blocks the ray, so the result does not depend on the
+ * order of cells or on the partition. Roots are found as for primary rays, but no normal and no colour is computed, and
+ * the roots need no order. The rays are those of a bundle (kernel_bundle.h), and are traced in its tile space. */
 #ifndef RENDER_KERNEL_OCCLUSION_H
 #define RENDER_KERNEL_OCCLUSION_H
 
@@ -34,7 +35,8 @@ typedef struct kernel_occlusion {
     int vertex_count;
 } kernel_occlusion;
 
-/* Returns the rays whose root at t is at least as far from the hit as the layer's `contact` times the cell's size. */
+/* Returns the rays whose root at depth t may block them: its distance from the hit is at least the layer's `contact`
+ * times the cell's size. */
 static __attribute__((noinline)) vm kernel_occlusion_beyond(const kernel_packet *p, const kernel_occlusion *o, vf t)
 {
     const double size = kernel_cell_size((const double(*)[3])o->world, o->vertex_count);
@@ -43,7 +45,7 @@ static __attribute__((noinline)) vm kernel_occlusion_beyond(const kernel_packet 
     return vf_le(vf_set((float)reach), (t - p->t_near) * length);
 }
 
-/* Returns the rays of `hit` whose root at t is kept by all clips of the layer. */
+/* Returns the rays of `hit` whose root at depth t all clips of the layer keep. */
 static __attribute__((noinline, cold)) vm kernel_occlusion_clip(const kernel_packet *p, const kernel_occlusion *o,
                                                                 vm hit, vf t)
 {
@@ -59,7 +61,8 @@ static __attribute__((noinline, cold)) vm kernel_occlusion_clip(const kernel_pac
     return vm_from_bits(kept);
 }
 
-/* Ends the rays whose roots at t block them, and returns these rays. */
+/* Makes the rays inactive whose roots at depth t block them, and returns these rays. found: rays that have a root at t.
+ */
 SIMD_INLINE vm kernel_occlusion_block(kernel_packet *p, const kernel_occlusion *o, vm found, vf t)
 {
     vm hit = vm_and(found, vm_and(vf_le(p->t_near, t), vf_lt(t, p->t_far)));
@@ -71,6 +74,7 @@ SIMD_INLINE vm kernel_occlusion_block(kernel_packet *p, const kernel_occlusion *
     return hit;
 }
 
+/* Makes the rays inactive that the surface in a tet blocks. */
 SIMD_INLINE void kernel_occlusion_tet(kernel_packet *p, const kernel_occlusion *o, const kernel_cell *c, vm rays)
 {
     kernel_interval i;
@@ -79,7 +83,7 @@ SIMD_INLINE void kernel_occlusion_tet(kernel_packet *p, const kernel_occlusion *
     if (vm_any(change)) kernel_occlusion_block(p, o, change, kernel_secant(i.t_in, i.v_in, i.t_out, i.v_out));
 }
 
-/* Finds the roots of the interval one after the other, until each ray is blocked or has no more roots. */
+/* Finds the roots in the rays' interval i one after the other, until each ray is blocked or has no more roots. */
 SIMD_INLINE void kernel_occlusion_roots(kernel_packet *p, const kernel_occlusion *o, const kernel_curved *curved,
                                         const kernel_interval *i, vm wanted)
 {
@@ -94,6 +98,7 @@ SIMD_INLINE void kernel_occlusion_roots(kernel_packet *p, const kernel_occlusion
     } while (kernel_search_continue(&s));
 }
 
+/* Makes the rays inactive that the surface in a hex, wedge or pyramid blocks. */
 static __attribute__((noinline)) void kernel_occlusion_curved(kernel_packet *p, const kernel_occlusion *o,
                                                               const kernel_cell *c, vm rays)
 {
@@ -113,6 +118,8 @@ static __attribute__((noinline)) void kernel_occlusion_curved(kernel_packet *p, 
     }
 }
 
+/* Makes the rays inactive that are blocked in the current interval of r, by following the profile of the field along
+ * them (kernel_surface.h). */
 static void kernel_occlusion_interval(kernel_packet *p, const kernel_occlusion *o, vm wanted, kernel_poly_crossings *r)
 {
     kernel_profile_walk walk;
@@ -135,8 +142,8 @@ static void kernel_occlusion_polyhedron(kernel_packet *p, const kernel_occlusion
     }
 }
 
-/* Tests a polyhedron. Decomposed polyhedra stay in the thread's store from bundle to bundle, and each bundle transforms
- * them into its own space. */
+/* Makes the rays inactive that the surface in a polyhedron blocks. Decomposed polyhedra stay in the thread's store from
+ * bundle to bundle, and each bundle transforms them into its own tile space. */
 static void kernel_occlusion_polyhedra(kernel_packet *p, kernel_occlusion *o, const kernel_occluder *occluder)
 {
     const int part = occluder->part;
@@ -153,6 +160,8 @@ static void kernel_occlusion_polyhedra(kernel_packet *p, kernel_occlusion *o, co
     kernel_occlusion_polyhedron(p, o, c, p->active);
 }
 
+/* Transforms the cell into the bundle's tile space. If it has been transformed before, its world coordinates are
+ * already known. */
 SIMD_INLINE void kernel_occlusion_transform(const kernel_packet *p, kernel_cell *c, int part)
 {
     if (!c->is_transformed) {
@@ -184,7 +193,7 @@ static void kernel_occlusion_cell(kernel_packet *p, kernel_occlusion *o, const k
         kernel_occlusion_curved(p, o, c, p->active);
 }
 
-/* Clears the open bits of the bundle's rays that the cell's surface blocks. */
+/* Clears the `open` bits of the bundle's rays that the surface in the occluder's cell blocks. */
 static void kernel_occlude_by_cell(const kernel_frame *f, kernel_thread *thread, kernel_bundle *b,
                                    const kernel_occluder *occluder)
 {

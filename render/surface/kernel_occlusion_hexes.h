@@ -1,7 +1,9 @@
-/* Tests whether hexes block rays from hits, one ray-hex pair per lane. If the ray crosses two faces, the values there
- * decide in most cases; the remaining pairs are undecided, and are traced in the cell like primary rays. Crossings of
- * faces are computed by the operations of kernel_curved_rays.h, from positions that depend on the ray and the vertex
- * alone. So if two hexes share a face, on whichever ranks, the ray leaves one exactly where it enters the other. */
+/* Tests whether the surfaces in hexes block rays from hits, one ray-hex pair per lane (kernel_occluders.h defines the
+ * terms). If the ray crosses exactly two faces of the hex, the field there decides in most cases: a change of sign
+ * between the faces means that the ray crosses the surface. The remaining pairs are undecided, and their rays are
+ * traced in the cell like primary rays. Crossings of faces are computed by the operations of kernel_curved_rays.h, from
+ * positions that depend on the ray and the vertex alone. So if two hexes share a face, on whichever ranks, the ray
+ * leaves one exactly where it enters the other. */
 #ifndef RENDER_KERNEL_OCCLUSION_HEXES_H
 #define RENDER_KERNEL_OCCLUSION_HEXES_H
 
@@ -16,19 +18,22 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
-/* Ray-hex pairs, one per lane. level and rise: the slab's linear function L along the ray is level + rise * t;
- * thickness and reach: those of the slab (kernel_occluders.h). */
+/* Ray-hex pairs, one per lane: index of the ray, and index of the hex among the occluders. The hex's slab has the
+ * linear function L = level + rise * t at the distance t along the ray. thickness, reach: the slab's rows of
+ * kernel_occluders.h. */
 typedef struct kernel_curved_pairs {
     int count;
     int32_t ray[SIMD_WIDTH], occluder[SIMD_WIDTH];
     float level[SIMD_WIDTH], rise[SIMD_WIDTH], thickness[SIMD_WIDTH], reach[SIMD_WIDTH];
-    /* The pairs' rays. Origins and shears are along each ray's own axes kx, ky and kz (kernel_prepared_ray). */
+    /* The following members describe the pairs' rays, as in kernel_prepared_ray. Components of origins and shears are
+     * in the order kx, ky, kz of each ray's own axes. */
     int32_t record[SIMD_WIDTH]; /* index of the first float of the hex's record */
     float axis[SIMD_WIDTH];     /* number of the axis kz, as a float; kx and ky follow it cyclically */
     float origin[3][SIMD_WIDTH], shear[2][SIMD_WIDTH], stretch[SIMD_WIDTH], far[SIMD_WIDTH];
     kernel_transformed_curved transformed;
 } kernel_curved_pairs;
 
+/* Adds a pair to the list of undecided pairs; returns false if memory ran out. */
 SIMD_INLINE bool kernel_undecided_add(kernel_secondary_rays *s, int32_t ray, int32_t occluder)
 {
     if (s->undecided_count == s->capacity && !render_grow_undecided(s)) return false;
@@ -36,6 +41,7 @@ SIMD_INLINE bool kernel_undecided_add(kernel_secondary_rays *s, int32_t ray, int
     return true;
 }
 
+/* Fills the given lane of the pairs with a ray and the index of a record of a hex. */
 SIMD_INLINE void kernel_pair_ray(const kernel_secondary_ray *ray, int32_t record, int lane, kernel_curved_pairs *out)
 {
     kernel_prepared_ray p;
@@ -57,8 +63,8 @@ SIMD_INLINE vi kernel_load_ints(const int32_t *from)
     return out;
 }
 
-/* Transforms each hex's vertices to the space of its ray: x and y across the ray, which is at their origin, and the
- * distance along the ray. */
+/* Reads the record of each pair's hex, and transforms the vertices to the space of the pair's ray: x and y are measured
+ * across the ray, which is at their origin; z is the distance along the ray. */
 SIMD_INLINE void kernel_pairs_transform(kernel_curved_pairs *pairs, const float *hexes)
 {
     kernel_transformed_curved *h = &pairs->transformed;
@@ -81,15 +87,14 @@ SIMD_INLINE void kernel_pairs_transform(kernel_curved_pairs *pairs, const float 
         vf_store((float *)(void *)(h->corners + face * SIMD_WIDTH), words[face / 4][face % 4]);
 }
 
-/* Returns the value, at the distance t along each ray, of the linear function L that defines the slab around the
- * surface. */
+/* Returns L, the linear function of each pair's slab, at the distance t along the ray. */
 SIMD_INLINE vf kernel_pairs_level(const kernel_curved_pairs *pairs, vf t)
 {
     return vf_load(pairs->level) + vf_load(pairs->rise) * t;
 }
 
-/* Returns the pairs for which |L| exceeds the slab's thickness with the same sign at both distances, so that the
- * surface is not met between them. */
+/* Returns the pairs whose ray does not meet the surface between the distances `from` and `to`: at both, |L| exceeds the
+ * slab's thickness, with the same sign. */
 SIMD_INLINE vm kernel_pairs_clear(const kernel_curved_pairs *pairs, vf from, vf to)
 {
     const vf first = kernel_pairs_level(pairs, from), last = kernel_pairs_level(pairs, to);
@@ -97,8 +102,9 @@ SIMD_INLINE vm kernel_pairs_clear(const kernel_curved_pairs *pairs, vf from, vf 
     return vm_or(vf_lt(thick, vf_min(first, last)), vf_lt(vf_max(first, last), -thick));
 }
 
-/* Returns the pairs for which the field is monotone along the ray and at both ends farther from 0 than the jumps at
- * faces: its signs at the ends then decide. */
+/* Returns the pairs for which the field is monotone along the ray, and at both ends farther from 0 than the jumps at
+ * faces (the difference between a face's value and the field next to it). The signs at the ends then decide whether
+ * there is a root. */
 static __attribute__((noinline)) vm kernel_pairs_monotone(const kernel_curved_pairs *pairs, const kernel_point ends[2])
 {
     static const kernel_beam beam = {.spread = 0};
@@ -108,8 +114,8 @@ static __attribute__((noinline)) vm kernel_pairs_monotone(const kernel_curved_pa
     return vm_and(vf_le(vf_set(0), jump), vf_lt(jump, vf_min(vf_abs(ends[0].value), vf_abs(ends[1].value))));
 }
 
-/* Returns the pairs whose hex blocks the ray. *undecided becomes the pairs that must be traced exactly; in all other
- * pairs the hex does not block the ray. */
+/* Returns the pairs in which the hex's surface certainly blocks the ray. *undecided becomes the pairs whose ray must be
+ * traced in the cell. In all other pairs the surface does not block the ray. */
 SIMD_INLINE vm kernel_pairs_classify(const kernel_curved_pairs *pairs, vm active, vm *undecided)
 {
     const vf zero = vf_set(0), reach = vf_load(pairs->reach), far = vf_load(pairs->far);
@@ -127,8 +133,9 @@ SIMD_INLINE vm kernel_pairs_classify(const kernel_curved_pairs *pairs, vm active
     const vf from = vf_max(ends[0].t, reach), to = vf_min(ends[1].t, far);
     const vm near = vm_and(two, vf_le(from, to));
     const vm change = vm_xor(vf_lt(ends[0].value, zero), vf_lt(ends[1].value, zero));
-    /* If the sign changes, the interval has a root. The root blocks the ray only if it lies between `from` and `to`, so
-     * the parts of the interval before and behind these must be known to have none. */
+    /* If the sign changes, the ray's interval in the hex has a root. The root blocks the ray only if it lies between
+     * `from` and `to`. So the parts of the interval in front of `from` and behind `to` must be known to have no root.
+     */
     const vm before = vm_or(vf_eq(from, ends[0].t), kernel_pairs_clear(pairs, ends[0].t, from));
     const vm behind = vm_or(vm_and(vf_eq(to, ends[1].t), vf_lt(to, far)), kernel_pairs_clear(pairs, to, ends[1].t));
     const vm blocked = vm_and(near, vm_and(change, vm_and(before, behind)));
@@ -140,6 +147,8 @@ SIMD_INLINE vm kernel_pairs_classify(const kernel_curved_pairs *pairs, vm active
     return blocked;
 }
 
+/* Classifies the collected pairs: closes rays that are blocked, and adds undecided pairs to their list. Empties *pairs.
+ * Returns false if memory ran out. */
 static __attribute__((noinline)) bool kernel_pairs_process(const kernel_occluders *o, kernel_secondary_rays *s,
                                                            kernel_curved_pairs *pairs)
 {

@@ -1,4 +1,4 @@
-/* Traverses the trees of occluders (kernel_occluders.h) with rays from hits, one ray at a time. */
+/* Traverses the trees of occluders with rays from hits, one ray at a time. kernel_occluders.h defines the terms. */
 #ifndef RENDER_KERNEL_OCCLUSION_RAYS_H
 #define RENDER_KERNEL_OCCLUSION_RAYS_H
 
@@ -10,13 +10,13 @@
 #include "render.h"
 #include "simd.h"
 
-/* Size of the stack of nodes that a ray has yet to visit; leaves are stored as ~leaf. On each level of the tree all
+/* Size of the stack of nodes that a ray has not visited yet; a leaf is stored as ~index. On each level of the tree all
  * children of a node but one may be left on the stack, and the tree is at most one level deeper than the binary tree
  * from which it was built. */
 enum { KERNEL_PATH_STACK = (MMBVH_MAX_DEPTH + 1) * (SIMD_WIDTH - 1) + 1 };
 
-/* Returns the next leaf that the ray may meet, or -1. *top: number of nodes on the stack, which at first has the root
- * alone. */
+/* Returns the index of the next leaf that the ray may meet; -1 if there is none. *top: number of nodes on the stack,
+ * which at first has only the root. */
 SIMD_INLINE int32_t kernel_path_next(const kernel_occluder_tree *tree, int32_t *stack, int *top,
                                      const kernel_prepared_ray *p)
 {
@@ -31,7 +31,8 @@ SIMD_INLINE int32_t kernel_path_next(const kernel_occluder_tree *tree, int32_t *
     return -1;
 }
 
-/* Returns whether the clips keep the ray's crossing of at least one of the surfaces in `met`. */
+/* Returns whether the clips keep at least one of the ray's crossings with triangles. met: mask of the lanes with
+ * crossed triangles; surfaces: per lane, index of the triangle's surface; t: distances of the crossings. */
 static __attribute__((noinline, cold)) bool kernel_secondary_ray_unclipped(const kernel_frame *f,
                                                                            const kernel_secondary_ray *ray,
                                                                            const int32_t *surfaces, unsigned met, vf t)
@@ -49,6 +50,7 @@ static __attribute__((noinline, cold)) bool kernel_secondary_ray_unclipped(const
     return false;
 }
 
+/* Returns whether a triangle of the tree blocks the ray. */
 static bool kernel_meets_triangles(const kernel_frame *f, const kernel_occluder_tree *tree,
                                    const kernel_secondary_ray *ray)
 {
@@ -70,9 +72,9 @@ static bool kernel_meets_triangles(const kernel_frame *f, const kernel_occluder_
 
 /* ---- slabs --------------------------------------------------------------------------------------------------- */
 
-/* Finds the cells whose slabs a ray meets, and adds the pair of the ray and each cell to a queue: to the ray-hex pairs
- * if the cell is a hex with a record, and otherwise to the pairs that are traced exactly. Returns false if memory ran
- * out. */
+/* Finds the cells whose slabs a ray meets, and adds the pair of the ray and each of these cells to a list: to the
+ * ray-hex pairs if the cell is a hex with a record, and otherwise to the undecided pairs. ray: index of the ray.
+ * Returns false if memory ran out. */
 static bool kernel_meets_slabs(const kernel_occluders *o, kernel_secondary_rays *s, kernel_curved_pairs *pairs, int ray)
 {
     const kernel_occluder_tree *tree = &o->slabs;
@@ -105,8 +107,8 @@ static bool kernel_meets_slabs(const kernel_occluders *o, kernel_secondary_rays 
     return is_well;
 }
 
-/* Closes the rays that opaque surfaces certainly block. For all other rays, lists the cells in which they must be
- * traced exactly. */
+/* Clears is_open of the rays that opaque surfaces certainly block. For the rays that stay open, lists the undecided
+ * pairs: the cells in which they must be traced. */
 static void kernel_occlude(const kernel_frame *f, kernel_thread *thread, const kernel_occluders *o,
                            kernel_secondary_rays *s)
 {

@@ -1,36 +1,41 @@
-/* Computes all crossings of an isovalue in a ray's interval in a cell. Each crossing is isolated, then refined.
+/* Computes all crossings of an isovalue in a ray's interval in a cell. Each crossing is isolated, then refined. In this
+ * file, a piece is a part of the interval, X(r) the position and F(r) the field minus the isovalue at the reference
+ * coordinates r, and a root is a point of the ray at which F is 0.
  *
- * Along the ray a point has the reference coordinates r*(u), 0 <= u <= 1, a curve whose image X(r*(u)) is straight, and
- * the field is F(r*(u)). On a piece of the curve from a to b take the chord c(u) = a + u (b - a). F(c(u)) is a cubic,
- * because F is trilinear. Its values and slopes at both ends are known; they determine its four Bernstein coefficients,
- * which bound it. The distance from the chord to the curve is bounded as follows. Let Y = J0^-1 X with J0 the Jacobian
- * at the cell's centre: Y(r) = r + N(r) + const, where N's derivative is at most theta (computed at the corners of the
- * reference domain, as a norm is convex along each axis). So |r1 - r2| <= L |Y(r1) - Y(r2)|, L = 1 / (1 - theta). And
- * Y(c(u)) - Y(r*(u)) = e(u) is N(c(u)) minus the line between its ends: again a cubic, with the known coefficients 0,
- * e1, e2, 0. Hence
+ * Along a piece, the ray's points have the reference coordinates r*(u), 0 <= u <= 1: a curve from a to b whose image
+ * X(r*(u)) is straight. The field on the ray is F(r*(u)). It is approximated by the field F(c(u)) on the chord c(u) = a
+ * + u (b - a). F(c(u)) is a cubic, because F is trilinear. Its values and slopes at both ends are known; they determine
+ * its four Bernstein coefficients, which bound it. The distance from the chord to the curve is bounded as follows. Let
+ * Y = J0^-1 X with J0 the Jacobian of X at the cell's centre: Y(r) = r + N(r) + const, where the norm of N's derivative
+ * is at most theta. (It is computed at the corners of the reference domain, because a norm is convex along each axis.)
+ * So |r1 - r2| <= L |Y(r1) - Y(r2)| with L = 1 / (1 - theta). And Y(c(u)) - Y(r*(u)) = e(u) is N(c(u)) minus the line
+ * between its ends: again a cubic, with the known Bernstein coefficients 0, e1, e2, 0. Hence
  *     |c - r*| <= dev = L 3/4 max(|e1|, |e2|),          |F(c) - F(r*)| <= G dev,
  *     |c' - r*'| <= L (K dev |b - a| + |e'|) = dev',    |F(c)' - F(r*)'| <= H dev (|b - a| + dev') + G dev',
- * with G, H, K bounds of F's gradient, F's Hessian and N's Hessian. dev decreases by a factor of four when a piece is
- * halved, and is 0 if the map is affine: then F(c(u)) is the field itself.
+ * where primes are derivatives along u, and G, H and K are bounds of F's gradient, F's Hessian and N's Hessian. dev
+ * decreases by a factor of four when a piece is halved, and is 0 if the map is affine: then F(c(u)) is the field
+ * itself.
  *
- * A piece whose coefficients are all farther from 0 than G dev has no root. A piece whose derivative's coefficients are
- * all of one sign and farther from 0 than their bound has one root if the ends' signs differ, else none. Any other
- * piece is halved, and the nearer half is processed first. Bisection ends at 2^-12 of the interval: a pair of roots
- * that is missed there dips below 0 by at most |F''| (2^-12)^2 / 8 < 16 · 7.5e-9 of the range, which is float32's own
- * rounding of F.
+ * A piece whose Bernstein coefficients are all of one sign and farther from 0 than G dev has no root. A piece on which
+ * the coefficients of the derivative are all of one sign and farther from 0 than the bound of |F(c)' - F(r*)'| has one
+ * root if F's signs at the ends differ, and otherwise none. Any other piece is halved, and the nearer half is processed
+ * first. Bisection ends at 2^-12 of the interval: a pair of roots that is missed there dips below 0 by at most |F''|
+ * (2^-12)^2 / 8 < 16 · 7.5e-9 of the range, which is float32's own rounding of F.
  *
- * Before that, bounds of the whole cell are tested (kernel_bounds.h): if the field is monotone along every ray in the
- * cell, the signs at the faces decide; if it is far from the isovalue at both faces, there is no root.
+ * Before any piece, bounds of the whole cell are tested (kernel_bounds.h): if the field is monotone along every ray in
+ * the cell, the signs at the faces decide; if a linear function that approximates the field is far enough from 0 at
+ * both faces, with the same sign, there is no root.
  *
- * The pyramid's m = a b / k is not a polynomial, but its second derivative along a line has one sign. So F(c(u)) lies
- * between its chord and its end tangents, and e(u) below e's tangents: the same two slopes at the ends bound them.
+ * In a pyramid the term m = a b / k (kernel_map.h) is not a polynomial, but its second derivative along a line has one
+ * sign. So F(c(u)) lies between its chord and the tangents at its ends, and e(u) between 0 and its tangents: the slopes
+ * at both ends bound both.
  *
- * The signs at the faces are those of the face values, as in kernel_surface.h: if the interpolant just inside a warped
- * face has the other sign, the crossing is at the face. So crossings alternate in direction along a ray, through all
- * its cells.
+ * The signs at the faces are those of the values that are interpolated on the faces, as in kernel_surface.h. If the
+ * field just inside a warped face has the other sign than the face's value, there is a crossing at the face itself. So
+ * F alternately rises and falls through 0 at the crossings along a ray, through all cells that the ray meets.
  *
- * If theta is 0.9 or more (the cell is folded or nearly so), nothing is proved: then L = 10, and at least 8 pieces are
- * used. */
+ * If theta is 0.9 or more (the map is not one-to-one, or nearly so), the bounds are not proved: then L is taken as 10,
+ * and the interval is divided into at least 8 pieces. */
 #ifndef RENDER_KERNEL_ROOTS_H
 #define RENDER_KERNEL_ROOTS_H
 
@@ -44,28 +49,30 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
-#define KERNEL_ROOT_BAND 3e-7f /* rounding error of the field F if its largest magnitude at a vertex is near 1 */
+#define KERNEL_ROOT_BAND 3e-7f /* rounding error of F if F's largest magnitude at a vertex is near 1 */
+/* Length, as a share of the interval, of the pieces at which bisection ends. */
 #define KERNEL_SMALLEST_PIECE 0x1p-12f
 enum { KERNEL_ROOT_PIECES = 256, KERNEL_POLISH_STEPS = 8, KERNEL_BRACKET_STEPS = 48 };
 
-/* The state of a search for roots, per ray. The interval is divided into pieces, which are processed in order; the
- * current piece extends from number * size to (number + 1) * size. */
+/* The state of a search for roots, one ray per lane. The interval is divided into pieces, which are processed from the
+ * nearest to the farthest. The current piece extends from number * size to (number + 1) * size, as shares of the
+ * interval's length. */
 typedef struct kernel_search {
     kernel_rays rays;
-    /* The following members are set only if the values at the ends of the interval do not decide all rays: the cell's
-     * map, and members of kernel_bounds, gathered from each ray's own cell. */
+    /* The following members are set only if some ray is not decided by the values at the ends of its interval: the
+     * cell's map, and members of kernel_bounds, gathered from each ray's own cell. */
     kernel_map map;
     vf nonlinear_part[3][8], inverse[3][3], stretch, slope, field_curvature, map_curvature;
-    vf coarsest; /* pieces longer than this share of the interval are always halved */
-    vm is_monotone;
+    vf coarsest;    /* pieces longer than this share of the interval are always halved */
+    vm is_monotone; /* rays on which the field is monotone in the whole cell */
     const kernel_interval *interval;
-    int64_t *failures; /* number of failed inversions of the map */
-    vm open;           /* rays that have unprocessed pieces */
-    vm ended;          /* rays whose last piece has been processed; `side` is then the field's sign at its end */
-    vf side;           /* sign of the field at `from`: 1 or -1 */
-    vf number, size, pieces;
-    kernel_point from, end;
-    vm found; /* rays with a root between the points low and high */
+    int64_t *failures;       /* number of failed inversions of the map */
+    vm open;                 /* rays that have unprocessed pieces */
+    vm ended;                /* rays whose last piece has been processed; `side` is then the field's sign at its end */
+    vf side;                 /* sign of the field at the begin of the current piece (`from`): 1 or -1 */
+    vf number, size, pieces; /* the current piece; number of pieces that have been tested */
+    kernel_point from, end;  /* begin of the current piece; end of the interval */
+    vm found;                /* rays with a root between the points low and high */
     kernel_point low, high;
 } kernel_search;
 
@@ -87,9 +94,9 @@ SIMD_INLINE void kernel_search_bounds(const kernel_bounds *b, vi lane, kernel_se
     out->is_monotone = vf_le(vf_set(0), kernel_gather_lane(b->jump, lane));
 }
 
-/* Computes how far the map bends along the chord between two points in reference coordinates: the largest of |e1| and
- * |e2| (*size), and of the coefficients of e's derivative divided by 3 (*slope). m: the map's product at both ends;
- * move: to - from. */
+/* Computes how far the map bends along the chord between two points in reference coordinates. *size: the larger of |e1|
+ * and |e2| (the top of this file); *slope: the largest Bernstein coefficient of e's derivative, divided by 3. m: the
+ * map's product (kernel_map.h) at both ends; move: to - from. */
 SIMD_INLINE void kernel_chord_bend(const kernel_search *s, const vf from[3], const vf to[3], const kernel_product m[2],
                                    const vf move[3], vf *size, vf *slope)
 {
@@ -111,10 +118,10 @@ SIMD_INLINE void kernel_chord_bend(const kernel_search *s, const vf from[3], con
     *slope = vf_sqrt(vf_max(largest, between));
 }
 
-/* Returns the rays for which the piece between two points has no root: the field has the sign s->side everywhere, 1 or
- * -1, which is its sign at `from`. *monotone: rays on which the field is monotone, so that the piece has at most one
- * root; *negligible: rays on which the field is within rounding of 0 everywhere, so that its sign is not significant.
- * gap: upper bound of the distance of Y(from) and Y(to) from the ray. */
+/* Returns the rays for which the piece between two points has no root: the field has the sign s->side, which is its
+ * sign at `from`, on the whole piece. *monotone: rays on which the field is monotone, so that the piece has at most one
+ * root; *negligible: rays on which the field is 0 within rounding on the whole piece, so that its sign is not
+ * significant. gap: upper bound of the distance of Y(from) and Y(to) from the ray (Y: see the top of this file). */
 SIMD_INLINE vm kernel_classify_piece(const kernel_search *s, const kernel_point *from, const kernel_point *to, vf gap,
                                      vm *monotone, vm *negligible)
 {
@@ -151,20 +158,22 @@ SIMD_INLINE vm kernel_classify_piece(const kernel_search *s, const kernel_point 
     return vf_lt(bound, least);
 }
 
+/* Returns -1 for negative numbers and 1 for others. */
 SIMD_INLINE vf kernel_side(vf v)
 {
     return vf_select(vf_lt(v, vf_set(0)), vf_set(-1), vf_set(1));
 }
 
-/* Computes the field just inside a face. If it equals the face's value up to rounding, the face's value is used. */
+/* Sets at->value to the field just inside a face, at the point *at of each ray. If it equals `face`, the face's own
+ * value, up to rounding, that is used. */
 SIMD_INLINE void kernel_search_value_inside(const kernel_search *s, vm rays, vf face, kernel_point *at)
 {
     const vf inside = kernel_solve_lanes(&s->rays, &s->map, s->interval, rays, at->t, at->r, s->failures);
     at->value = vf_select(vf_le(vf_abs(inside - face), vf_set(KERNEL_FACE_BAND)), face, inside);
 }
 
-/* Returns the distance between the ray and the point Y (see the top of this file) at the reference coordinates of a
- * face's crossing. */
+/* Returns the distance of Y(r) from the ray's point at the same depth, mapped to Y (see the top of this file). r: the
+ * reference coordinates of a crossing of a face, which are rounded or belong to a point beside the ray. */
 SIMD_INLINE vf kernel_face_gap(const kernel_search *s, const kernel_point *at)
 {
     const kernel_map *map = &s->map;
@@ -180,7 +189,7 @@ SIMD_INLINE vf kernel_face_gap(const kernel_search *s, const kernel_point *at)
     return vf_sqrt(sum);
 }
 
-/* Initializes a search; only the interval's ends are known. */
+/* Initializes a search in which only the ends of the interval are known. */
 SIMD_INLINE void kernel_search_begin(kernel_search *s)
 {
     kernel_point_ends(s->interval, &s->low, &s->high);
@@ -204,8 +213,9 @@ SIMD_INLINE vf kernel_linear_at(const kernel_curved *c, const kernel_rays *rays,
     return (kernel_gather_lane(c->bounds->level, lane) + g[0] * x) + (g[1] * y + g[2] * (t - at[2]));
 }
 
-/* Decides rays by the values at the ends of their intervals and the bounds of their cells. *found becomes the rays with
- * exactly one root. Returns the rays that remain undecided. Rays in neither mask have no root. */
+/* Decides as many rays as possible by the values at the ends of their intervals (in, out) and the bounds of their
+ * cells. *found becomes the rays with exactly one root. Returns the rays that remain undecided. Rays in neither mask
+ * have no root. */
 SIMD_INLINE vm kernel_ends_decide(const kernel_curved *c, const kernel_rays *rays, vi lane, vm wanted,
                                   const kernel_point *in, const kernel_point *out, vm *found)
 {
@@ -249,7 +259,9 @@ SIMD_INLINE void kernel_search_whole(kernel_search *s, vm rays)
     s->found = vm_or(s->found, jumps);
 }
 
-/* Begins a search for rays, each in its own cell. Returns false if no ray has a root. */
+/* Begins a search for the roots of rays, each in its own cell. lane: the lane that holds each ray's cell; i: the rays'
+ * intervals in their cells. Afterwards s->found has the rays whose first root is isolated. Returns false if no ray has
+ * a root. */
 static __attribute__((noinline, unused)) bool kernel_search_cells(kernel_search *s, const kernel_curved *c,
                                                                   const kernel_rays *rays, vi lane,
                                                                   const kernel_interval *i, vm wanted,
@@ -269,7 +281,7 @@ static __attribute__((noinline, unused)) bool kernel_search_cells(kernel_search 
     return true;
 }
 
-/* Computes the end of each ray's current piece. */
+/* Computes the end of each ray's current piece: depth, reference coordinates and field. */
 SIMD_INLINE void kernel_search_piece(const kernel_search *s, vm rays, kernel_point *to)
 {
     const kernel_interval *i = s->interval;
@@ -283,7 +295,8 @@ SIMD_INLINE void kernel_search_piece(const kernel_search *s, vm rays, kernel_poi
     kernel_point_move(inner, &at, to);
 }
 
-/* Advances rays to the next piece, which is the longest that begins at this position. */
+/* Advances rays to the next piece, which begins at the end of the current one (to). It is the longest piece that
+ * bisection of the whole interval produces there. */
 SIMD_INLINE void kernel_search_advance(kernel_search *s, vm rays, const kernel_point *to)
 {
     kernel_point_move(rays, to, &s->from);
@@ -312,7 +325,7 @@ SIMD_INLINE void kernel_search_next(kernel_search *s)
         const vm decided = vm_and(going, vm_or(vm_or(certain, negligible), small));
         const vm roots = vm_andnot(decided, vf_eq(kernel_side(to.value), s->side));
         const vm halve = vm_andnot(going, decided);
-        /* divisions are counted per ray, so that a ray's result does not depend on the other rays */
+        /* tested pieces are counted per ray, so that a ray's result does not depend on the other rays */
         s->pieces += vf_select(going, vf_set(1), vf_set(0));
         kernel_point_move(roots, &s->from, &s->low);
         kernel_point_move(roots, &to, &s->high);
@@ -325,8 +338,8 @@ SIMD_INLINE void kernel_search_next(kernel_search *s)
     }
 }
 
-/* Tests the exit faces of rays whose last piece is done: if the field just inside has the other sign than the face's
- * value, there is a root at the face itself. */
+/* Tests the exit faces of rays whose last piece has been processed: if the field just inside the face has the other
+ * sign than the face's value, there is a root at the face itself. */
 SIMD_INLINE void kernel_search_end(kernel_search *s)
 {
     s->found = vm_andnot(s->ended, vf_eq(kernel_side(s->interval->v_out), s->side));
@@ -354,8 +367,8 @@ SIMD_INLINE void kernel_search_close(kernel_search *s, vm rays)
     s->ended = vm_andnot(s->ended, rays);
 }
 
-/* Refines roots between low and high by regula falsi in the Illinois variant, which halves the value of an end that is
- * kept; every third step is a bisection. */
+/* Refines roots between the points s->low and s->high by regula falsi in the Illinois variant, which halves the value
+ * at an end that is kept; every third step is a bisection. */
 SIMD_INLINE void kernel_bracket(const kernel_search *s, vm rays, kernel_point *out)
 {
     kernel_point low = s->low, high = s->high;
@@ -376,14 +389,15 @@ SIMD_INLINE void kernel_bracket(const kernel_search *s, vm rays, kernel_point *o
 
 /* ---- the last step of a refinement ---- */
 
+/* Returns the polynomial with the coefficients c (kernel_map.h) at the reference coordinates r; m: its product term. */
 SIMD_INLINE kernel_f64 kernel_f64_value(const kernel_f64 c[8], const kernel_f64 r[3], kernel_f64 m)
 {
     return ((c[0] + r[0] * c[1]) + (r[1] * c[2] + r[2] * c[3])) + m * c[4] +
            r[2] * ((r[0] * c[5] + r[1] * c[6]) + m * c[7]);
 }
 
-/* Computes in double the differences between the points at reference coordinates r and the rays' points at depth t, and
- * the field there. The results are exact except for the rounding of r and t. */
+/* Computes residuals in double: the ray's point at depth t minus the position at the reference coordinates r (off), and
+ * the field at r (*value). They are exact except for the rounding of r and t. */
 SIMD_INLINE void kernel_residuals(const kernel_rays *rays, const kernel_map *map, const kernel_point *at, vf off[3],
                                   vf *value)
 {
@@ -407,9 +421,9 @@ SIMD_INLINE void kernel_residuals(const kernel_rays *rays, const kernel_map *map
     }
 }
 
-/* Does a step of Newton's method for the four equations X(r) = ray(t) and F(r) = 0 at once; t stays between low and
- * high. off, value: the equations' residuals, which are 0 if the point lies on the ray and has the isovalue. Returns
- * the rays that have not converged. */
+/* Does a step of Newton's method for the four equations X(r) = (the ray's point at depth t) and F(r) = 0 at once; t
+ * stays between low->t and high->t. off, value: the equations' residuals, which are 0 if the point lies on the ray and
+ * has the isovalue. Returns the rays that have not converged. */
 SIMD_INLINE vm kernel_polish_step(const kernel_rays *rays, const kernel_map *map, const kernel_point *low,
                                   const kernel_point *high, vm wanted, const vf off[3], vf value, kernel_point *out)
 {
@@ -449,7 +463,7 @@ SIMD_INLINE void kernel_polish_last(const kernel_rays *rays, const kernel_map *m
     kernel_point_move(vm_andnot(wanted, away), &last, out);
 }
 
-/* Does the last step of Newton's method, from points whose reference coordinates have an error of at most
+/* Does the last step of Newton's method for points whose reference coordinates have an error of at most
  * KERNEL_CONTRACTION_END. Changes the map's tolerance. */
 SIMD_INLINE void kernel_polish_near(const kernel_rays *rays, kernel_map *map, vm wanted, kernel_point *at)
 {
@@ -459,8 +473,8 @@ SIMD_INLINE void kernel_polish_near(const kernel_rays *rays, kernel_map *map, vm
     kernel_polish_last(rays, map, wanted, &low, &high, at);
 }
 
-/* Refines the roots between low and high by Newton's method; residuals of the last step are in double. Returns those of
- * the wanted rays for which it does not converge. */
+/* Refines the roots between the points low and high by Newton's method; the residuals of the last step are computed in
+ * double. Returns those of the wanted rays for which it does not converge. */
 SIMD_INLINE vm kernel_polish_lanes(const kernel_rays *rays, const kernel_map *map, vm wanted, const kernel_point *low,
                                    const kernel_point *high, kernel_point *out)
 {

@@ -1,10 +1,12 @@
 /* Intersects rays with isosurfaces in cells, and accepts the hits (thesis, sections 4.3.3 to 4.3.5).
  *
- * Within a cell, the isovalue is subtracted from values in double before they are rounded, so that their signs are
- * exact, and they are scaled by a power of two. Whether the surface crosses an interval an odd number of times is
- * decided by the signs at its two faces alone (non-negative counts as inside). Both signs are those of the faces
- * themselves, so of two cells that share a face exactly one has a crossing next to it. kernel_roots.h computes all
- * crossings of an interval. The second half of this file handles polyhedra (kernel_polyhedron.h). */
+ * A ray's interval in a cell lies between two crossings of the ray with the cell's faces. Within a cell, the isovalue
+ * is subtracted from the values at the vertices in double before they are rounded, so that their signs are exact, and
+ * the differences are scaled by a power of two. The signs of the field minus the isovalue at the two ends of an
+ * interval decide whether the ray crosses the surface an odd number of times between them (non-negative counts as
+ * inside). The field at an end is interpolated on the face alone. So if the sign changes near a face that two cells
+ * share, exactly one of them has the crossing. kernel_roots.h computes all crossings of an interval. The second half of
+ * this file handles polyhedra (kernel_polyhedron.h). kernel_accept.h defines hit, reach and pending hit. */
 #ifndef RENDER_KERNEL_SURFACE_H
 #define RENDER_KERNEL_SURFACE_H
 
@@ -36,9 +38,9 @@
 #include "render_polyhedra.h"
 #include "simd.h"
 
-/* Computes the normals of hits by differences, and returns the hits. If other ranks may have samples (job->waiting is
- * set), hits with a reach above 0 are added to the list of pending hits instead, and only the remaining hits are
- * returned. */
+/* Computes the normals of hits by central differences from this rank's cells, and returns all hits. But if other ranks
+ * may have cells around the hits (job->waiting is set), the hits that need samples (h->reach > 0) are added to the list
+ * of pending hits instead, and only the remaining hits are returned. */
 SIMD_INLINE vm kernel_sample_or_defer_hits(kernel_packet *p, const kernel_surface *s, vm hit, kernel_surface_hits *h)
 {
     if (p->frame->job->waiting) return kernel_defer_hits(p, s, hit, h);
@@ -46,14 +48,15 @@ SIMD_INLINE vm kernel_sample_or_defer_hits(kernel_packet *p, const kernel_surfac
     return hit;
 }
 
-/* Computes the normals of hits that do not have those of their cells. Returns the hits that have a normal. */
+/* Computes the normals of hits for layers that do not use the gradient in the hit's cell, which is already set. Returns
+ * the hits that have a normal; the others are pending. */
 SIMD_INLINE vm kernel_hit_normals(kernel_packet *p, const kernel_surface *s, vm hit, kernel_surface_hits *h)
 {
     if (s->layer->normal == RENDER_VERTEX) kernel_vertex_normals(p, s, hit, h->t, h->part, h->cell, h->normal);
     return s->layer->normal == RENDER_DIFFERENCES ? kernel_sample_or_defer_hits(p, s, hit, h) : hit;
 }
 
-/* Emits hits with the same depth as their ray's nearest hit as separate fragments. */
+/* Emits tied hits (hits with the same depth as their ray's nearest hit) as fragments of their own. */
 static __attribute__((noinline, cold)) void kernel_accept_equal_depth(kernel_packet *p, const kernel_surface *s,
                                                                       vm tied, const kernel_surface_hits *h)
 {
@@ -98,8 +101,9 @@ SIMD_INLINE void kernel_accept_transparent(kernel_packet *p, const kernel_surfac
     kernel_emit(p, hit, kind, &f);
 }
 
-/* Draws contour lines over the hits' colours, unless numbers are painted. Returns the visible hits: if only lines are
- * drawn, those that a line covers. */
+/* Draws contour lines over the hits' colours or, if the picture is one of values (RENDER_VALUES), stores the lines'
+ * field as the hits' value if the surface has no colour field. Returns the visible hits: if only the lines of the
+ * surface are drawn, those on a line. */
 static __attribute__((noinline)) vm kernel_accept_lines(const kernel_packet *p, const kernel_surface *s, vm hit,
                                                         kernel_surface_hits *h)
 {
@@ -116,15 +120,15 @@ static __attribute__((noinline)) vm kernel_accept_lines(const kernel_packet *p, 
     return vm_and(hit, vf_lt(vf_set(0), share));
 }
 
-/* Accepts hits: those of an opaque surface are kept as the nearest ones; those of a transparent surface are emitted at
- * once. c: the cell; NULL for polyhedra. The caller sets the members of *h from `value` to `along`, except for the
- * colour. */
+/* Accepts hits: a hit of an opaque surface is stored as the nearest hit of its ray; hits of a transparent surface are
+ * lit and emitted as fragments at once. c: the cell that is hit; NULL for polyhedra. The caller must have set the
+ * members of *h from `value` to `along`, except for the colour. */
 SIMD_INLINE void kernel_accept(kernel_packet *p, const kernel_surface *s, const kernel_cell *c, vm hit,
                                kernel_surface_hits *h)
 {
     h->part = vi_set(c ? c->part : -1);
     h->cell = vi_set(c ? (int32_t)c->index : -1);
-    /* polyhedra have normals from the gradient in the cell or at the vertices, never by differences */
+    /* in polyhedra normals are gradients in the cell or from the vertices, never central differences */
     h->reach = vf_set(s->layer->normal == RENDER_DIFFERENCES && c ? kernel_difference_reach(p, s->layer, c) : 0);
     kernel_base_colour(s, h->value, h->w, h->colour);
     if (__builtin_expect(p->frame->job->paint == RENDER_VALUES, 0))
@@ -139,8 +143,8 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, const kernel_surface *s, const 
         kernel_accept_transparent(p, s, hit, h);
 }
 
-/* Traces the isosurface in a tet. It is separate from the function for other cells, which needs more vectors, so that
- * its own vectors stay in registers. */
+/* Traces an isosurface in a tet. This function is separate from that for other cells, which needs more vectors, so that
+ * its own vectors stay in registers. value: index of the isovalue in the layer. */
 static __attribute__((noinline)) void kernel_tet_surface(kernel_packet *p, const kernel_surface *s,
                                                          const kernel_cell *c, int value, vm rays)
 {
@@ -168,15 +172,17 @@ static __attribute__((noinline)) void kernel_tet_surface(kernel_packet *p, const
     kernel_accept(p, s, c, hit, &at);
 }
 
-/* Returns a field at the reference coordinates r in each ray's own cell. It does the same as kernel_maps_value(), but
- * is a single function for all types that is not inlined. */
+/* Returns a field at the reference coordinates r in each ray's own cell, from its values by vertex and lane. lane: the
+ * lane that holds each ray's cell. It computes the same as kernel_maps_value(), but is a single function for all cell
+ * types that is not inlined. */
 static __attribute__((noinline)) vf kernel_maps_value_of_type(const float (*values)[SIMD_WIDTH], vi lane, const vf r[3],
                                                               int type)
 {
     return KERNEL_OF_TYPE(type, kernel_maps_value, values, lane, r);
 }
 
-/* Accepts those of the found crossings of the isovalue that are visible, and returns them. */
+/* Accepts those of the found crossings of the isovalue in a hex, wedge or pyramid that are visible, and returns them.
+ * at: the crossings. */
 SIMD_INLINE vm kernel_curved_accept(kernel_packet *p, const kernel_surface *s, const kernel_cell *c,
                                     const kernel_curved *curved, int value, const kernel_map *map, vm found,
                                     const kernel_point *at)
@@ -202,8 +208,8 @@ SIMD_INLINE vm kernel_curved_accept(kernel_packet *p, const kernel_surface *s, c
     return hit;
 }
 
-/* Accepts the crossings of the interval one after the other. A ray ends at the first visible one of an opaque
- * surface. */
+/* Finds the crossings in the rays' interval i one after the other, by kernel_roots.h, and accepts them. A ray ends at
+ * the first visible crossing of an opaque surface. */
 SIMD_INLINE void kernel_curved_robust(kernel_packet *p, const kernel_surface *s, const kernel_cell *c,
                                       const kernel_curved *curved, int value, const kernel_interval *i, vm wanted)
 {
@@ -229,16 +235,16 @@ SIMD_INLINE void kernel_contract_rays(const kernel_curved *c, const kernel_rays 
     out->t += kernel_gather_lane(c->at[2][0], lane);
 }
 
-/* Tests the rays of a packet in one cell by contraction (kernel_contraction.h), without intersecting the cell's
- * faces. */
+/* Computes the only crossing of each ray of a packet in one cell by contraction (kernel_contract()), without
+ * intersecting the cell's faces. */
 static __attribute__((noinline)) void kernel_contract_packet(const kernel_curved *c, const kernel_rays *rays, vi lane,
                                                              vm wanted, kernel_point *out, vm *none)
 {
     KERNEL_OF_TYPE(c->type, kernel_contract_rays, c, rays, lane, wanted, out, none);
 }
 
-/* Accepts the crossings that are computed by contraction (kernel_contraction.h). Returns the rays that contraction has
- * decided. */
+/* Accepts the crossings that contraction finds (kernel_contraction.h). Returns the rays that contraction has decided:
+ * those with exactly one crossing, and those without one. */
 static __attribute__((noinline)) vm kernel_curved_accept_contracted(kernel_packet *p, const kernel_surface *s,
                                                                     const kernel_cell *c, const kernel_curved *curved,
                                                                     int value, vm wanted)
@@ -268,8 +274,8 @@ static __attribute__((noinline)) void kernel_curved_surface(kernel_packet *p, co
     for (int n = 0; n < count; n++) {
         kernel_interval *i = &list[n];
         i->v_out = kernel_end_in_cell(i->v_in, i->v_out, layer->is_of_faces);
-        /* If a ray crosses both triangles of a quad but not its patch, both ends of the interval are the same point
-         * outside the ray; such an interval is skipped. */
+        /* If a ray crosses both triangles of a quad but not its bilinear patch, both ends of the interval are the same
+         * point beside the ray; such an interval is skipped. */
         const vm nonempty = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
         reached[n] = vm_and(kernel_is_near(p, i), nonempty);
         any = vm_or(any, reached[n]);
@@ -302,8 +308,8 @@ SIMD_INLINE void kernel_cell_surface(kernel_packet *p, const kernel_surface *s, 
  * isosurfaces are the points of the profile at which the sign changes. They are exact, because a linear piece has at
  * most one root. All of them are computed, even on rays that are on the same side of the isovalue at both faces.
  *
- * Most such rays stay on that side, and need not be followed. A bound identifies many of them, from the faces' values
- * alone:
+ * Most such rays stay on that side, and need not be followed. A bound identifies many of them, from the values at the
+ * faces' triangles alone, where values are relative to the isovalue:
  *
  *      v |                               along the tile's rays no tet's field falls faster than `fall` or rises faster
  *        | in                . out       than `rise`. So between the faces' triangles the field is above both lines,
@@ -317,7 +323,8 @@ SIMD_INLINE void kernel_cell_surface(kernel_packet *p, const kernel_surface *s, 
  * range, but trees and the session's plan assume that a cell has surfaces only for isovalues between its vertices'
  * values. */
 
-/* Computes the gradient of the field in the tet of a surface triangle, in camera axes and in double. */
+/* Computes the gradient of the field in the tet between a surface triangle (index `facet`) and the polyhedron's centre,
+ * in camera axes and in double. */
 static void kernel_polyhedron_gradient(const kernel_packet *p, const polyhedron *c, int facet, double out[3])
 {
     const double *corner[4];
@@ -331,8 +338,8 @@ static void kernel_polyhedron_gradient(const kernel_packet *p, const polyhedron 
     for (int a = 0; a < 3; a++) out[a] = out[a] > 1e18 ? 1e18 : out[a] >= -1e18 ? out[a] : -1e18;
 }
 
-/* Computes the signed sum of the gradients of overlapping tets at the hits. Returns the rays for which the signs sum to
- * 1, so that the sum is valid. */
+/* Computes, for each hit, the sum over all tets that contain it of the field's gradients, each times the tet's sign.
+ * Returns the hits for which these signs sum to 1, so that the sum is valid. */
 static vm kernel_polyhedron_sum_normals(const kernel_packet *p, const kernel_poly_crossings *r, vm hit, vf t, vf out[3])
 {
     vf cover = vf_set(0);
@@ -349,8 +356,8 @@ static vm kernel_polyhedron_sum_normals(const kernel_packet *p, const kernel_pol
     return vm_and(hit, vf_eq(cover, vf_set(1)));
 }
 
-/* Finds, for each hit, the tet of non-negative sign that contains it or is nearest to it along the ray; -1 if there is
- * none. */
+/* Finds, for each hit at depth t, the tet of non-negative sign that contains it or is nearest to it along the ray.
+ * out[ray] becomes the index of the tet's surface triangle; -1 if there is none. */
 static void kernel_polyhedron_facets(const kernel_poly_crossings *r, vm hit, vf t, int32_t out[SIMD_WIDTH])
 {
     vf nearest = vf_set(INFINITY);
@@ -366,7 +373,8 @@ static void kernel_polyhedron_facets(const kernel_poly_crossings *r, vm hit, vf 
     memcpy(out, &facet, sizeof facet);
 }
 
-/* Computes the gradient at the hits: that of the tet of kernel_polyhedron_facets(). */
+/* Computes the field's gradient at the hits, in camera axes: that in the tet of kernel_polyhedron_facets() or, if tets
+ * overlap, the signed sum of the gradients in the tets that contain the hit. */
 static void kernel_polyhedron_normal(const kernel_packet *p, const kernel_poly_crossings *r, vm hit, vf t, vf out[3])
 {
     int32_t facets[SIMD_WIDTH];
@@ -384,8 +392,8 @@ static void kernel_polyhedron_normal(const kernel_packet *p, const kernel_poly_c
 
 /* ---- gradients at vertices ---- */
 
-/* Computes the mean of the vertices' gradients, in camera axes. It is the gradient at the centre, just as the centre's
- * value is the mean of values. */
+/* Computes the mean of the vertices' gradients, in camera axes. It is used as the gradient at the polyhedron's centre,
+ * just as the centre's value is the mean of the vertices' values. */
 static void kernel_polyhedron_mean_gradient(const kernel_frame *f, const polyhedron *c,
                                             const render_vertex_gradients *gradients, double out[3])
 {
@@ -397,8 +405,9 @@ static void kernel_polyhedron_mean_gradient(const kernel_frame *f, const polyhed
     }
 }
 
-/* Computes the barycentric coordinates of a ray's point at depth t in the tet of surface triangle number `facet`, and
- * lists the numbers of the tet's corners. */
+/* Computes the barycentric coordinates (share) of a ray's point at depth t in the tet of surface triangle `facet`.
+ * corners: indices of the tet's corners among the polyhedron's vertices, of which the last is the centre. ray: lane of
+ * the packet. */
 static void kernel_polyhedron_shares(const kernel_packet *p, const polyhedron *c, int facet, int ray, float t,
                                      int corners[4], double share[4])
 {
@@ -413,7 +422,8 @@ static void kernel_polyhedron_shares(const kernel_packet *p, const polyhedron *c
     kernel_barycentric((const double(*)[3])place, point, share);
 }
 
-/* Computes normals by interpolating the vertices' gradients in the tets (RENDER_VERTEX). */
+/* Computes the hits' normals, in camera axes, by interpolating the vertices' gradients in the tets that contain the
+ * hits (RENDER_VERTEX). */
 static __attribute__((noinline)) void kernel_polyhedron_smooth(const kernel_packet *p, const polyhedron *c,
                                                                const render_surface_layer *layer,
                                                                const kernel_poly_crossings *r, vm hit, vf t, vf out[3])
@@ -440,7 +450,8 @@ static __attribute__((noinline)) void kernel_polyhedron_smooth(const kernel_pack
 
 /* ---- rays whose profiles need not be followed ---- */
 
-/* Computes upper bounds of how fast a tet's field falls and rises along the tile's rays, per unit of depth. */
+/* Computes upper bounds of how fast a tet's field falls and rises along the tile's rays, per unit of depth. spread:
+ * upper bound of the rays' |slope_x| and |slope_y|. */
 static void kernel_tet_slopes(const polyhedron *c, const polyhedron_facet *facet, double spread, double *fall,
                               double *rise)
 {
@@ -459,8 +470,8 @@ static void kernel_tet_slopes(const polyhedron *c, const polyhedron_facet *facet
     *rise = aside + g[2];
 }
 
-/* Computes the maxima, over all tets of the cell, of how fast the field falls and rises along the tile's rays. They are
- * infinite if a tet has no volume. */
+/* Computes c->fall and c->rise: upper bounds of how fast the field falls and rises along the tile's rays in any tet of
+ * the cell, per unit of depth. They are infinite if a tet has no volume. */
 static __attribute__((noinline)) void kernel_polyhedron_slopes(polyhedron *c, const kernel_packet *p)
 {
     const double spread = p->frame->job->camera.is_orthographic ? 0 : (double)p->tile->radius;
@@ -474,16 +485,17 @@ static __attribute__((noinline)) void kernel_polyhedron_slopes(polyhedron *c, co
     }
 }
 
-/* Scales the bound by the factor of the cell's values, and limits it so that products of two bounds are finite. */
+/* Returns a bound of the field's slope for the scaled values c->f, limited so that products of two bounds are finite.
+ */
 SIMD_INLINE vf kernel_slope_of(const polyhedron *c, double slope)
 {
     const double scaled = slope * c->scale;
     return vf_set(scaled <= 1e15 ? (float)scaled : 1e15f);
 }
 
-/* Returns the rays that may be on the other side of the isovalue between two faces of the same sign. The bound is not
- * valid if tets overlap, or if a ray crosses a quad's triangles but not its patch or the reverse; such rays are always
- * returned. */
+/* Returns the rays whose field may cross the isovalue between two faces at which it has the same sign. The bounds fall
+ * and rise are not valid if tets overlap, or if a ray crosses a quad's triangles but not its patch or the reverse; such
+ * rays are always returned. */
 SIMD_INLINE vm kernel_polyhedron_may_cross(const kernel_packet *p, polyhedron *c, const kernel_poly_crossings *r)
 {
     const kernel_interval *i = &r->interval;
@@ -501,18 +513,19 @@ SIMD_INLINE vm kernel_polyhedron_may_cross(const kernel_packet *p, polyhedron *c
 
 /* ---- along the profile ---- */
 
-/* The state of rays that follow their profiles from crossing to crossing. If tets overlap at a face, the field just
- * behind it may be on the other side of the isovalue than the face's own value, which decides. The field then jumps at
- * the face, and the jump is a crossing. */
+/* The state of a search along the rays' profiles, from crossing to crossing. A face's own value decides on which side
+ * of the isovalue the field is there. If tets overlap at a face, the profile just behind the face may be on the other
+ * side. The field then jumps at the face, and the jump is a crossing. */
 typedef struct kernel_profile_walk {
-    vm open;  /* rays whose profile continues */
+    vm open;  /* rays on which more crossings may follow */
     vm below; /* rays that are below the isovalue at the end of the current piece */
-    /* rays whose face value and profile are on different sides of the isovalue, at the entry and at the exit */
+    /* rays whose face value and profile are on different sides of the isovalue: at the entry, at the exit */
     vm jump_in, jump_out;
     kernel_interval piece; /* current linear piece of each ray's profile */
-    vf t, w;               /* depth of the crossing that was found, and the colour field there */
+    vf t, w;               /* depth of the crossing that was found last; value of the colour field there */
 } kernel_profile_walk;
 
+/* Begins the search at the entry faces of the rays' current interval. */
 static void kernel_profile_walk_begin(const kernel_poly_crossings *r, vm rays, kernel_profile_walk *walk)
 {
     const kernel_interval *i = &r->interval;
@@ -525,6 +538,7 @@ static void kernel_profile_walk_begin(const kernel_poly_crossings *r, vm rays, k
     kernel_profile_begin(r, &walk->piece);
 }
 
+/* Copies the ends of the given rays' pieces from one interval to another. */
 SIMD_INLINE void kernel_piece_select(vm rays, const kernel_interval *from, kernel_interval *to)
 {
     to->t_in = vf_select(rays, from->t_in, to->t_in);
@@ -535,10 +549,11 @@ SIMD_INLINE void kernel_piece_select(vm rays, const kernel_interval *from, kerne
     to->w_out = vf_select(rays, from->w_out, to->w_out);
 }
 
-/* Advances the rays in `left` to the next piece. Returns the rays whose profile continues behind that piece; a jump at
- * the last face counts as a piece. A value inside the cell that equals the isovalue up to rounding is treated as if it
- * were on the side from which the ray comes: at one point a ray may meet several faces between tets, whose values are
- * rounded differently, so that their signs would alternate. The values at the faces are not changed. */
+/* Advances the rays in `left` to the next linear piece of their profiles. Returns the rays whose profile continues
+ * behind that piece; a jump at the last face counts as a piece. A value inside the cell that equals the isovalue up to
+ * rounding is treated as if it were on the side from which the ray comes: at one point a ray may meet several faces
+ * between tets, whose values are rounded differently, so that their signs would alternate. The values at the cell's
+ * faces are not changed. */
 SIMD_INLINE vm kernel_profile_walk_advance(const kernel_poly_crossings *r, vm left, kernel_profile_walk *walk)
 {
     kernel_interval next = walk->piece;
@@ -558,7 +573,7 @@ SIMD_INLINE vf kernel_next_float(vf t)
     return t + (vf_abs(t) * 2.4e-7f + 1e-30f);
 }
 
-/* Finds the next crossing of each open ray; returns the rays that have one. */
+/* Finds the next crossing of each ray in walk->open, and returns the rays that have one. */
 static vm kernel_profile_walk_next(const kernel_poly_crossings *r, kernel_profile_walk *walk)
 {
     const vm jump = walk->jump_in;
@@ -614,6 +629,7 @@ static __attribute__((noinline)) void kernel_polyhedron_line_field(const kernel_
     }
 }
 
+/* Computes the normals of hits in a polyhedron, and accepts the hits. */
 static void kernel_polyhedron_accept(kernel_packet *p, const kernel_surface *s, int value, kernel_poly_crossings *r,
                                      vm hit, const kernel_profile_walk *walk)
 {
@@ -632,7 +648,8 @@ static void kernel_polyhedron_accept(kernel_packet *p, const kernel_surface *s, 
     kernel_accept(p, s, NULL, hit, &at);
 }
 
-/* Accepts the crossings of one interval. A ray ends at the first crossing of an opaque surface in front of the eye. */
+/* Finds the crossings in the current interval of the rays in `wanted`, and accepts them. A ray ends at the first
+ * crossing of an opaque surface in front of the eye. */
 static void kernel_polyhedron_cross(kernel_packet *p, const kernel_surface *s, int value, vm wanted,
                                     kernel_poly_crossings *r)
 {
@@ -647,6 +664,7 @@ static void kernel_polyhedron_cross(kernel_packet *p, const kernel_surface *s, i
     } while (vm_any(walk.open));
 }
 
+/* Traces the surface of one isovalue in a polyhedron, in all intervals of the rays. */
 static void kernel_polyhedron_surface(kernel_packet *p, const kernel_surface *s, polyhedron *c, int value, vm rays)
 {
     const render_surface_layer *layer = s->layer;
@@ -660,6 +678,7 @@ static void kernel_polyhedron_surface(kernel_packet *p, const kernel_surface *s,
     }
 }
 
+/* Traces the surfaces of all isovalues of a layer in a polyhedron. part, index: the cell. */
 static void kernel_polyhedron_surfaces(kernel_packet *p, const kernel_surface *s, int part, uint32_t index, vm rays)
 {
     const render_surface_layer *layer = s->layer;
@@ -682,7 +701,9 @@ static void kernel_polyhedron_surfaces(kernel_packet *p, const kernel_surface *s
 
 /* ---- the blocks of a tile that a cell may meet ---- */
 
-/* Traces the cell with the block's rays. cell is NULL for a polyhedron, for which all isovalues are traced. */
+/* Traces a cell with the rays of a block (a square of 4 × 4 pixels). cell: the cell in tile space; NULL for the
+ * polyhedron with this part and index, for which all isovalues of the layer are traced. value: index of the isovalue.
+ */
 SIMD_INLINE void kernel_block_trace(kernel_tile_trace *t, int block, int part, uint32_t index, const kernel_cell *cell,
                                     int value)
 {
@@ -701,6 +722,7 @@ SIMD_INLINE void kernel_block_trace(kernel_tile_trace *t, int block, int part, u
     if (is_nearer) kernel_block_update_far(t, block);
 }
 
+/* Traces a cell with the rays of each of the given blocks (kernel_block_trace()). */
 SIMD_INLINE void kernel_blocks_trace(kernel_tile_trace *t, unsigned blocks, int part, uint32_t index,
                                      const kernel_cell *cell, int value)
 {

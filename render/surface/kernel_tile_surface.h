@@ -1,12 +1,14 @@
-/* Traces isosurfaces in a tile that traverses the trees itself, roughly front to back. Cells behind the hits that the
- * tile's pixels already have are not fetched:
- *     nodes, one per lane:  ranges, depths, box of pixels ---> stack, the nearest on top
- *     from the stack:       has any pixel of the box no nearer hit?
+/* Traces isosurfaces in a tile that traverses the trees itself, roughly front to back. (In other frames the cells of
+ * all tiles are found in advance, kernel_candidates.h.) Cells behind the hits that the tile's pixels already have are
+ * not fetched. The box of a node or cell is the rectangle of the tile's pixels that may see it:
+ *     nodes, one per lane:  range of values, depth, box ---> stack, the nearest node on top
+ *     from the stack:       does the box have a pixel without a nearer hit?
  *     leaves' cells:        tested in lanes (kernel_candidates.h), restricted to the tile's pixels
  *     cells with pixels:    queued and traced in batches (kernel_tile_queue.h), whose hits hide what is behind
- * A node whose box contains no pixel's centre is skipped, too. The box of pixels is computed from the distances of the
- * node's box to the planes through the tile's borders, divided by the box's farthest depth: that gives a lower bound of
- * how far beyond a border the box is. Margins are larger than all rounding errors. */
+ * A node whose box of pixels is empty, because it lies between the pixels' centres, is skipped, too. The box of pixels
+ * is computed from the distances of the node's bounding box to the planes through the tile's borders, divided by the
+ * farthest depth of the bounding box. The quotient is a lower bound of how far beyond a border of the tile the node is.
+ * The margins are larger than all rounding errors. */
 #ifndef RENDER_KERNEL_TILE_SURFACE_H
 #define RENDER_KERNEL_TILE_SURFACE_H
 
@@ -27,7 +29,8 @@
 
 /* ---- cells of leaves ---- */
 
-/* Queues the cells found so far for tracing, unless nearer hits hide them. */
+/* Queues the cells in the list, which the search has found, for tracing, unless nearer hits hide them. Empties the
+ * list. It always returns true, as the callback kernel_finder.grow must. */
 static bool kernel_tile_find_flush(kernel_candidate_list *list)
 {
     kernel_tile_search *s = (kernel_tile_search *)((char *)list - offsetof(kernel_tile_search, list));
@@ -44,7 +47,8 @@ static bool kernel_tile_find_flush(kernel_candidate_list *list)
     return true;
 }
 
-/* Prepares the search for another mesh part. Pending cells of the previous part are processed first. */
+/* Prepares the search for cells of a mesh part, if it is not the current one. Cells of the previous part that the
+ * finder has collected are processed first. */
 static void kernel_tile_find_set_part(kernel_tile_trace *t, kernel_tile_search *s, int part)
 {
     kernel_finder *finder = t->thread->finder;
@@ -62,12 +66,13 @@ static void kernel_tile_find_set_part(kernel_tile_trace *t, kernel_tile_search *
 
 /* ---- traversal of nodes ---- */
 
-/* Number of nodes that are tested at once, one per lane, with siblings in neighbouring lanes. While these are tested,
- * the data of further nodes are prefetched. */
+/* KERNEL_NODES_AT_ONCE: number of inner nodes whose children are tested at once, one child per lane, with siblings in
+ * neighbouring lanes. While they are tested, the data of further nodes are prefetched. */
 enum { KERNEL_NODES_AT_ONCE = SIMD_WIDTH / 2, KERNEL_NODES_ROOM = (KERNEL_NODES_AT_ONCE + 1) * MMBVH_MAX_DEPTH };
 
-/* One node per lane: its box and range of values, and the results of testing it: its least depth (near), box of pixels
- * (box), and position along the tile's direction, by which nodes are sorted (along). */
+/* One node per lane: its bounding box in tree space and its range of values, and the results of testing it. near: its
+ * least depth; box: its box of pixels (first and last column, first and last row, 4 bits each from bit 0 on); along:
+ * the position of its middle along the tile's direction, by which siblings are sorted. */
 typedef struct kernel_node_lanes {
     vf low[3], high[3], range_low, range_high;
     float near[SIMD_WIDTH], along[SIMD_WIDTH];
@@ -97,8 +102,8 @@ static __attribute__((noinline)) void kernel_nodes_fetch_scalar(const mmbvh *tre
     out->range_high = vf_load(range[1]);
 }
 
-/* Reads boxes and ranges of one node per lane. Compact nodes within the reach of a gather are decoded in lanes (the
- * version in lanes of compact_decode()). */
+/* Reads the bounding box and the range of values of one node per lane. If the nodes are compact, and few enough for the
+ * 32-bit indices of a gather, they are decoded in lanes, by the operations of compact_decode(). */
 SIMD_INLINE void kernel_nodes_fetch(const mmbvh *tree, const mmbvh_ranges *ranges, const int64_t node[SIMD_WIDTH],
                                     kernel_node_lanes *out)
 {
@@ -125,9 +130,10 @@ SIMD_INLINE void kernel_nodes_fetch(const mmbvh *tree, const mmbvh_ranges *range
     out->range_high = vf_gather((const float *)(const void *)ranges->high, pair);
 }
 
-/* Adds the first and last column (shift 0) or row (shift 8) to the boxes of pixels. low: lower bound of the signed
- * distance from the tile's first border; high: upper bound of that from its last border. Returns the lanes that meet a
- * pixel. A NaN counts as meeting all pixels. */
+/* Computes the first and last column (shift 0) or row (shift 8) of pixels that each lane's node may meet, and adds them
+ * to its box of pixels. low: lower bound of the signed distance from the tile's first border; high: upper bound of the
+ * signed distance from its last border; scale: pixels per unit of distance; pad: margin in pixels. Returns the lanes
+ * that meet a pixel. A NaN counts as meeting all pixels. */
 SIMD_INLINE vm kernel_node_pixels(vf low, vf high, vf scale, float pad, vi *box, int shift)
 {
     const vf end = vf_set(KERNEL_TILE), zero = vf_set(0);
@@ -138,7 +144,8 @@ SIMD_INLINE vm kernel_node_pixels(vf low, vf high, vf scale, float pad, vi *box,
     return vf_lt(vf_from_vi(from), vf_from_vi(to) + 0.5f);
 }
 
-/* Tests the nodes by six of the tile's planes. Returns a mask of the lanes of those that may be visible. */
+/* Tests the nodes by six of the tile's planes and by the surface's isovalues, and computes the results in *nodes.
+ * Returns a mask of the lanes whose nodes may be visible. */
 SIMD_INLINE unsigned kernel_tile_find_test(const kernel_tile_trace *t, kernel_node_lanes *nodes)
 {
     enum { LEFT, RIGHT, TOP, BOTTOM, DEPTH, ALONG, PLANES };
@@ -202,8 +209,9 @@ SIMD_INLINE int kernel_tile_find_push(const mmbvh *tree, const mmbvh_ranges *ran
     return 1;
 }
 
-/* Tests the children of `count` inner nodes, the nearest node first, and pushes those that may be visible; the nearest
- * are on top. Returns how many are pushed. */
+/* Tests the children of `count` inner nodes, and pushes those that may be visible on the stack, so that the nearest are
+ * on top. left: index of each inner node's left child, the nearest inner node first. Returns the number of pushed
+ * nodes. */
 SIMD_INLINE int kernel_tile_find_children(const kernel_tile_trace *t, const mmbvh *tree, const mmbvh_ranges *ranges,
                                           const int64_t *left, int count, kernel_tile_node *stack)
 {
@@ -224,8 +232,8 @@ SIMD_INLINE int kernel_tile_find_children(const kernel_tile_trace *t, const mmbv
     return top;
 }
 
-/* Finds the cells of a mesh part. If the stack is almost full, it takes one node at a time, which needs no more space
- * than the tree's depth. */
+/* Finds the cells of a mesh part that the current layer's surface may cross in the tile. If the stack is almost full,
+ * one node is taken from it at a time, which needs no more space than the tree's depth. */
 SIMD_INLINE void kernel_tile_find_cells(kernel_tile_trace *t, int part)
 {
     const mmbvh *tree = t->frame->job->parts[part].tree;
@@ -254,13 +262,15 @@ SIMD_INLINE void kernel_tile_find_cells(kernel_tile_trace *t, int part)
 
 /* ---- surfaces ---- */
 
+/* Finds the cells of the given mesh parts; a callback for a leaf of the tree over all parts. */
 static void kernel_tile_parts(kernel_tile_trace *t, int unused, const uint32_t *parts, int count, unsigned blocks)
 {
     (void)unused, (void)blocks;
     for (int n = 0; n < count; n++) kernel_tile_find_cells(t, (int)parts[n]);
 }
 
-/* Traces the current layer's surface on all mesh parts. Opaque hits are then stored in the packets. */
+/* Traces the current layer's surface on all mesh parts. The nearest opaque hits are then stored in the tile's packets.
+ */
 SIMD_INLINE void kernel_tile_surface(kernel_tile_trace *t)
 {
     const render_job *job = t->frame->job;
@@ -272,7 +282,7 @@ SIMD_INLINE void kernel_tile_surface(kernel_tile_trace *t)
         kernel_tile_parts(t, 0, &part, 1, t->traced_blocks);
 }
 
-/* Sets up the search for a tile. */
+/* Computes the scales and margins by which the boxes of pixels of the tile's nodes are computed. */
 SIMD_INLINE void kernel_tile_find_begin(kernel_tile_trace *t)
 {
     kernel_tile_search *s = t->search;

@@ -26,6 +26,7 @@ typedef struct widening {
     kernel_occluder_tree *out;
 } widening;
 
+/* Computes the bounding box of the piece with index i. */
 static void box_of(const widening *w, int64_t i, float *lower, float *upper)
 {
     const float *rows = w->pieces[i].rows;
@@ -44,8 +45,8 @@ static void grow_box(float box[6], const float *lower, const float *upper)
     }
 }
 
-/* Computes the boxes and the numbers of pieces of all nodes, from the last node to the first, because children come
- * after their parents. */
+/* Computes, for all nodes of the binary tree, their boxes and the pieces below them. It goes from the last node to the
+ * first, because children have larger indices than their parents. */
 static void sum_up(widening *w)
 {
     for (int64_t node = w->binary->node_count - 1; node >= 0; node--) {
@@ -69,7 +70,7 @@ static float area_of(const float box[6])
     return x * y + y * z + z * x;
 }
 
-/* A range of pieces in the binary tree's order: all pieces below a node, or some pieces of a leaf. */
+/* A range of the list of pieces in the binary tree's order: all pieces below a node, or a part of a leaf's pieces. */
 typedef struct piece_range {
     int64_t node; /* index of the node; -1 if the range is a part of a leaf's pieces */
     int64_t first, count;
@@ -94,7 +95,8 @@ static piece_range leaf_part(const widening *w, int64_t first, int64_t count)
     return out;
 }
 
-/* Divides a range that has more pieces than there are lanes into two. */
+/* Divides a range into two: an inner node's range into those of its children, and the pieces of a leaf or of a part of
+ * a leaf into halves. The range must have more pieces than there are lanes. */
 static void divide(const widening *w, const piece_range *whole, piece_range out[2])
 {
     const int64_t half = whole->count / 2;
@@ -107,8 +109,8 @@ static void divide(const widening *w, const piece_range *whole, piece_range out[
     memcpy(out, both, sizeof both);
 }
 
-/* Divides the range with the largest box, repeatedly, until there are as many ranges as lanes or each fits into a leaf.
- * Returns their number. */
+/* Divides the range `whole` into the ranges of a node's children: the range with the largest box is divided repeatedly,
+ * until there are as many ranges as lanes, or each fits into a leaf. Returns the number of ranges. */
 static int divide_all(const widening *w, const piece_range *whole, piece_range *out)
 {
     int count = 1;
@@ -127,8 +129,8 @@ static int divide_all(const widening *w, const piece_range *whole, piece_range *
     return count;
 }
 
-/* Creates a leaf and returns ~index. Its sources are the pieces' indices. Lanes without a piece get NaN or empty boxes,
- * so that no ray meets them. */
+/* Creates a leaf of the pieces in a range, and returns ~index of the leaf. Lanes without a piece get NaN or empty
+ * boxes, so that no ray meets them. */
 static int32_t make_leaf(widening *w, const piece_range *of)
 {
     const int32_t leaf = w->out->leaf_count++;
@@ -147,6 +149,7 @@ static int32_t make_leaf(widening *w, const piece_range *of)
     return ~leaf;
 }
 
+/* Creates a node for a range of pieces, and all nodes and leaves below it. Returns its index. */
 static int32_t make_node(widening *w, const piece_range *of)
 {
     piece_range children[MOST_LANES];

@@ -8,14 +8,16 @@
 #include "insitu/status.h"
 #include "kernel_occluders.h"
 
-/* A triangle or a slab. Triangles have fewer rows (KERNEL_TRIANGLE_ROWS). */
+/* A piece of a surface: a triangle in a tet, or the slab of another cell (kernel_occluders.h), with its number in each
+ * row of a leaf. Triangles use only the first KERNEL_TRIANGLE_ROWS rows. */
 typedef struct occluder_piece {
     float rows[KERNEL_SLAB_ROWS];
     int32_t surface; /* index of the surface in the frame */
 } occluder_piece;
 
-/* Builds a tree of `count` pieces with the given number of rows, for kernels with `width` lanes, at most 16. Its
- * sources are the pieces' indices. The caller must free it with occluder_tree_free(), even after an error. Parallel. */
+/* Builds a tree of `count` pieces, which must all be triangles or all be slabs, for kernels with `width` lanes, at most
+ * 16. rows: KERNEL_TRIANGLE_ROWS or KERNEL_SLAB_ROWS. out->sources are the pieces' indices. The caller must free the
+ * tree with occluder_tree_free(), even after an error. Uses `threads` threads. */
 insitu_status occluder_tree_build(const occluder_piece *pieces, int64_t count, int rows, int width, int threads,
                                   kernel_occluder_tree *out, base_error *error);
 void occluder_tree_free(kernel_occluder_tree *tree);

@@ -31,17 +31,18 @@ typedef struct list {
     void *items;
 } list;
 
-/* The occluders that one thread, or all threads, have found, and the cell that is being searched. */
+/* The occluders that one thread has found, or all threads together, and the cell that is being searched. */
 typedef struct occluder_search {
     const kernel_frame *frame;
-    list triangles, slabs; /* of occluder_piece */
-    list cells;            /* of kernel_occluder: the cells of the slabs */
-    list hexes;            /* records of hexes */
+    list triangles, slabs; /* items are occluder_piece */
+    list cells;            /* items are kernel_occluder: the cells of the slabs, in the same order */
+    list hexes;            /* records of hexes (kernel_occluders.h), HEX_BYTES each */
     bool out_of_memory;
     kernel_occluder cell; /* the cell that is being searched, and the isovalue */
-    int count; /* number of its vertices in `places` and `values`; a polyhedron lists some vertices several times */
-    list places, values;
-    double reach; /* distance from a hit, in tree space, within which the cell does not block the hit's rays */
+    /* number of entries in `places` and `values`: the cell's vertices, some several times if it is a polyhedron */
+    int count;
+    list places, values; /* positions of the vertices in tree space (3 doubles each), and the field there (double) */
+    double reach;        /* distance from a hit, in tree space, within which the cell does not block the hit's rays */
 } occluder_search;
 
 /* Appends an item to a list and returns it; NULL if memory ran out. */
@@ -101,8 +102,8 @@ static bool add_vertex(occluder_search *s, const double world[3], double value)
 
 /* ---- tets ------------------------------------------------------------------------------------------------------ */
 
-/* Computes the point at which the surface crosses the edge between two vertices. They must be given in the order of
- * coordinates, so that all cells of the edge compute the same bits. */
+/* Computes the point, in tree space, at which the surface crosses the edge between vertices i and j. These must be in
+ * the lexicographic order of coordinates, so that all cells of the edge compute the same bits. */
 static void cross_edge(const occluder_search *s, double isovalue, int i, int j, float out[3])
 {
     const double *a = place_of(s, i), *b = place_of(s, j);
@@ -121,7 +122,7 @@ static void add_triangle(occluder_search *s, float a[3], float b[3], float c[3])
     t->surface = s->cell.surface;
 }
 
-/* Adds the pieces of the isosurface in a tet, one or two triangles. The vertices must be in the order of
+/* Adds the isosurface in a tet as one or two triangles. The tet's vertices must be in the lexicographic order of
  * coordinates. */
 static void add_tet(occluder_search *s, double isovalue)
 {
@@ -132,8 +133,8 @@ static void add_tet(occluder_search *s, double isovalue)
             below[belows++] = i;
         else
             above[aboves++] = i;
-    /* the crossings must be in cyclic order around the piece, so the edges from every second vertex below the isovalue
-     * are visited in reverse order */
+    /* the crossings must be in cyclic order around the surface in the tet, so the edges from every second vertex below
+     * the isovalue are visited in reverse order */
     for (int i = 0; i < belows; i++)
         for (int k = 0; k < aboves; k++) {
             const int j = i % 2 ? aboves - 1 - k : k, p = below[i], q = above[j];
@@ -163,8 +164,8 @@ static void solve(double m[3][3], const double b[3], double x[3])
     }
 }
 
-/* Computes the linear function L that fits the values best, by least squares about the mean of the vertices. Values are
- * taken minus the isovalue, times `scale`. *level receives L at the origin. */
+/* Computes the linear function L that fits the values at the vertices best, by least squares about the mean of the
+ * vertices. The values are taken minus the isovalue, times `scale`. *level receives L at the origin of tree space. */
 static void fit_linear_function(const occluder_search *s, double isovalue, double scale, double gradient[3],
                                 double *level)
 {
@@ -186,6 +187,7 @@ static void fit_linear_function(const occluder_search *s, double isovalue, doubl
     for (int a = 0; a < 3; a++) *level -= gradient[a] * mean[a];
 }
 
+/* Returns the power of two by which the cell's values minus the isovalue are scaled to near 1. */
 static double scale_of(const occluder_search *s, double isovalue)
 {
     double largest = 0;
@@ -193,6 +195,7 @@ static double scale_of(const occluder_search *s, double isovalue)
     return kernel_mirrored_power(largest);
 }
 
+/* Computes the rows of the current cell's slab. */
 static void fill_slab(const occluder_search *s, double isovalue, occluder_piece *out)
 {
     double low[3], high[3], gradient[3], level, off = 0, steep = 0, size = 0;
@@ -233,6 +236,7 @@ static void fill_faces(const kernel_cell *c, float *record)
     for (int n = KERNEL_CURVED_RECORD_QUADS + 6; n < KERNEL_CURVED_RECORD_WORDS; n++) record[n] = 0;
 }
 
+/* Returns whether one of the hex's faces has collapsed to a triangle. */
 static bool collapses(const kernel_cell *c)
 {
     for (int face = 0; face < 6; face++) {
@@ -243,7 +247,8 @@ static bool collapses(const kernel_cell *c)
     return false;
 }
 
-/* Appends the hex's record and returns its index; -1 if the hex must be traced one ray at a time. */
+/* Adds the hex's record, and returns its index. Returns -1 if the hex gets no record, because rays must be traced in it
+ * one by one: if the job has clips, if one of its faces has collapsed to a triangle, or if memory ran out. */
 static int32_t add_hex(occluder_search *s, const kernel_cell *c, double isovalue)
 {
     const double scale = scale_of(s, isovalue);
@@ -294,6 +299,7 @@ static bool list_polyhedron_vertices(occluder_search *s, const grid *g, const gr
     return s->count > 0;
 }
 
+/* Adds the occluders of the current cell (s->cell), for all isovalues of its surface's layer. */
 static void find_in_cell(occluder_search *s)
 {
     const render_surface_layer *layer = s->frame->surfaces[s->cell.surface].layer;
@@ -306,7 +312,7 @@ static void find_in_cell(occluder_search *s)
     s->count = 0;
     s->places.count = s->values.count = 0;
     if (is_polyhedron ? !list_polyhedron_vertices(s, g, field) : !list_cell_vertices(s, &c, g)) return;
-    /* as kernel_occlusion_beyond() computes it */
+    /* in tree space, in which the trees are; kernel_occlusion_beyond() computes the same from world coordinates */
     s->reach = layer->contact > 0 ? (double)layer->contact * kernel_cell_size(s->places.items, s->count) : 0;
     for (s->cell.value = 0; s->cell.value < layer->value_count; s->cell.value++) {
         const double isovalue = layer->values[s->cell.value];
@@ -318,6 +324,7 @@ static void find_in_cell(occluder_search *s)
     }
 }
 
+/* Adds the occluders in all cells of a subtree. */
 static void find_in_subtree(occluder_search *s, const kernel_subtree *subtree)
 {
     const mmbvh *tree = s->frame->job->parts[subtree->part].tree;
@@ -358,6 +365,7 @@ static bool join(list *to, list *from, size_t size)
     return true;
 }
 
+/* Moves all occluders of `from` to `to`, and adapts the indices of records. Returns false if memory ran out. */
 static bool join_lists(occluder_search *to, occluder_search *from)
 {
     kernel_occluder *cells = from->cells.items;
