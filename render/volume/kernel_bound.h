@@ -1,4 +1,5 @@
-/* Bounds of a transfer function over a range of values, from its pieces. */
+/* Bounds of a transfer function over a range of values, from its pieces: the ranges of values on which its opacity and
+ * colour are linear (kernel_types.h). Extinctions are -ln(1 - opacity), per unit distance. */
 #ifndef RENDER_KERNEL_BOUND_H
 #define RENDER_KERNEL_BOUND_H
 
@@ -6,7 +7,7 @@
 
 #include "kernel_types.h"
 
-/* Extinction per unit distance that stands for larger ones. */
+/* Upper limit of extinctions, per unit distance. Larger ones, up to infinity at an opacity of 1, are replaced by it. */
 static const double kernel_most_extinction = 1e6;
 
 static inline double kernel_extinction_of(double opacity)
@@ -14,13 +15,15 @@ static inline double kernel_extinction_of(double opacity)
     return opacity < 1 ? fmin(-log1p(-opacity), kernel_most_extinction) : kernel_most_extinction;
 }
 
+/* Returns the opacity at the value x in the piece p, between 0 and 1. */
 static inline double kernel_piece_opacity(const kernel_real *p, double x)
 {
     const double along = (x - (double)p[KERNEL_PIECE_LOW]) - (double)p[KERNEL_PIECE_LOW_REST];
     return fmin(fmax((double)p[KERNEL_PIECE_OPACITY] + along * (double)p[KERNEL_PIECE_SLOPE], 0), 1);
 }
 
-/* Computes the minimum and the maximum of the absolute slope of the extinction between two values of a piece. */
+/* Computes the minimum (out[0]) and the maximum (out[1]) of the extinction's absolute slope between two values of a
+ * piece, per unit of the transfer function's domain. */
 static inline void kernel_piece_steepness(const kernel_real *p, double from, double to, double out[2])
 {
     const double a0 = kernel_piece_opacity(p, from), a1 = kernel_piece_opacity(p, to), most = fmax(a0, a1);
@@ -29,7 +32,7 @@ static inline void kernel_piece_steepness(const kernel_real *p, double from, dou
     out[1] = steepness > 0 ? (most < 1 ? fmin(steepness / (1 - most), 1e30) : 1e30) : 0;
 }
 
-/* Widens the bounds by those of the piece between two of its values. */
+/* Widens the bounds *b so that they hold between two values of the piece p, too. */
 static inline void kernel_bound_widen(kernel_bound *b, const kernel_real *p, double from, double to)
 {
     const double a0 = kernel_piece_opacity(p, from), a1 = kernel_piece_opacity(p, to);

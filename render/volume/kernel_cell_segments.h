@@ -1,5 +1,6 @@
-/* Segments of the rays' intervals in cells (kernel_segments.h): those on which the field is linear, in tets, polyhedra
- * and constant cells, which only surfaces cut; and bisection in cells with a map. */
+/* Computes the segments of rays in cells (kernel_segments.h defines the terms): in tets, polyhedra and constant cells,
+ * where the field is linear along a ray and only surfaces cut its interval; and, by bisection, in parts of intervals in
+ * hexes, wedges and pyramids. */
 #ifndef RENDER_KERNEL_CELL_SEGMENTS_H
 #define RENDER_KERNEL_CELL_SEGMENTS_H
 
@@ -23,7 +24,7 @@
 #include "render_polyhedra.h"
 #include "simd.h"
 
-/* Returns whether the opacity has a step among each ray's values from low to high. */
+/* Returns the rays for which the opacity has a step at a value from low to high. */
 SIMD_INLINE vm kernel_values_have_step(const kernel_pieces *t, vf low, vf high)
 {
     vm any = vm_none();
@@ -34,8 +35,8 @@ SIMD_INLINE vm kernel_values_have_step(const kernel_pieces *t, vf low, vf high)
     return any;
 }
 
-/* Returns the rays on which a part of the interval lies between the two given depths, and computes where that part
- * begins and ends. */
+/* Returns the active rays whose interval in the cell overlaps the depths from reach[0] to reach[1] in front of the
+ * nearest opaque hit, and computes where the overlap begins and ends. */
 SIMD_INLINE vm kernel_interval_between(const kernel_packet *p, const kernel_interval *i, const vf reach[2], vf *from,
                                        vf *end)
 {
@@ -44,8 +45,9 @@ SIMD_INLINE vm kernel_interval_between(const kernel_packet *p, const kernel_inte
     return vm_and(i->mask, vm_and(p->active, vm_and(vf_lt(*from, *end), vf_lt(*from, p->t_far))));
 }
 
-/* Cuts an interval on which the field is linear at transparent surfaces, and adds the parts that begin in the window.
- * whole: the interval as a segment; reach: the depths between which segments are added. */
+/* Cuts each ray's interval, on which the field is linear, at transparent surfaces, and adds those of the resulting
+ * segments that begin in the window. whole: the interval as one segment; reach: first and last depth of the segments to
+ * add. */
 static __attribute__((noinline)) void kernel_linear_segments(const kernel_packet *p, kernel_segments *list,
                                                              const kernel_interval *i, const vf reach[2],
                                                              const kernel_unit_segment *whole)
@@ -62,44 +64,48 @@ static __attribute__((noinline)) void kernel_linear_segments(const kernel_packet
     }
 }
 
-/* Bisection of parts of a ray's interval in a cell for which no number of equal segments is accurate enough. At a step
- * of the opacity there is no slope that would bound the effect of a small field error on the light. If a curved field
- * barely reaches the step, the length beyond the step grows with the square root of the excess: at 800 optical depths a
- * field error of 1e-6 of the function's domain changes such a pixel by a tenth. So all of this is computed in double,
- * from the caller's coordinates and values and the ray's position in the picture, one ray at a time, and identically
- * for all instruction sets.
+/* Bisection divides those parts of a ray's interval in a cell for which no number of equal segments is accurate enough.
+ * At a step of the opacity there is no slope that would bound the effect of a small field error on the light. If a
+ * curved field barely reaches the step, the length beyond the step grows with the square root of the excess: at 800
+ * optical depths an error of the field of 1e-6 of the transfer function's domain changes such a pixel by a tenth. So
+ * the bisection is computed in double, from the caller's coordinates and values and the ray's position in the picture,
+ * one ray at a time, and identically for all instruction sets.
  *
- * Subintervals. The field is known at a subinterval's ends, quarters and middle; its deviation from the chord is taken
- * as at most d, 1.5 times the largest deviation at these (the three sample 7/8 of a cubic's). A cubic deviates from its
- * chord by s (1 - s) (u + q (s - 1/2)), s from 0 to 1, and its slope deviates from the chord's by at most u + q / 2, at
- * an end. If the deviation is at most e at the middle and the quarters, then |u| <= 4 e, |u| + |q| / 4 <= 16/3 e, and
- * the slope's deviation is at most 32/3 e. So if the chord rises by 12 e or more the field is monotone, with a margin
- * for nonlinear maps, and so is each part of it. Its values then lie between those at its ends, otherwise between these
- * widened by d. A subinterval that
+ * Subintervals. The chord of a subinterval is the linear function with the field's values at the two ends. The field is
+ * computed at the ends, quarters and middle; its deviation from the chord is taken as at most d, which is 1.5 times the
+ * largest deviation at the quarters and the middle. (For a cubic, that is at least 7/8 of the maximum.) A cubic
+ * deviates from its chord by s (1 - s) (u + q (s - 1/2)), s from 0 to 1, and its slope deviates from the chord's by at
+ * most u + q / 2, at an end. If the deviation is at most e at the middle and the quarters, then |u| <= 4 e, |u| + |q| /
+ * 4 <= 16/3 e, and the slope's deviation is at most 32/3 e. So if the chord rises by 12 e or more the field is
+ * monotone, with a margin for nonlinear maps, and so is each part of it. If it is monotone, its values lie between
+ * those at its ends, and otherwise between these widened by d to both sides. A subinterval that
  *   - lies on one side of each step and has a chord that is close enough becomes a segment;
  *   - is monotone, with a step strictly between its ends, is cut where the field has the step's value, to rounding;
  *   - is neither is halved, and the halves are treated in the same way, the nearer one first.
- * So a field that barely reaches a step is halved only about its extremum, until the subinterval there lies on one side
- * of the step or is too short to be visible.
+ * So where a field barely reaches a step, only the subintervals around its extremum are halved, until the subinterval
+ * there lies on one side of the step or is too short to be visible.
  *
- * The error of a subinterval of length L, T being the light that arrives at it from the interval's begin (see also
- * docs/development/error_budget.md). Over the subinterval's values let extinction range from s0 to s1 and change by at
- * most s' per value, the colour by c', and let R be the colours' contrast. A field error of d on average changes
- * extinction by ds <= s' d, and by at most s1 - s0. Light in the subinterval falls at least as exp(-s0 t), so that R ds
- * is visible over at most min(L, 1 / s0), and s1 dc over min(s1 L, 1) / s1: error <= R ds min(L, 1 / s0) + dc min(s1 L,
- * 1), times T. The error may be 7/8 of the share that equal segments have, with a = allowance: T error <= 7/8 a (L
- * / reach + T D / (1 + D)), D = s0 L. The rest is for subintervals at an extremum that touches a step, for which no
- * bisection suffices: a subinterval whose T error, from s1 - s0 alone, is at most 1/32 of a (interval / reach) is left
- * as it is. A cubic has two extrema, and four such subintervals use the remaining eighth. */
+ * The error of a subinterval (see also docs/development/error_budget.md). Let L be its length in unit distances, and T
+ * the share of the light that passes from it to the interval's begin. Over the subinterval's values let the extinction
+ * range from s0 to s1 and change by at most s' per value, let the colour change by at most c' per value, and let R be
+ * the colours' contrast. A field error of d on average changes the extinction by ds <= s' d, and by at most s1 - s0,
+ * and the colour by dc <= c' d. Light in the subinterval falls at least as exp(-s0 t), so that R ds is visible over at
+ * most min(L, 1 / s0), and s1 dc over min(s1 L, 1) / s1: error <= R ds min(L, 1 / s0) + dc min(s1 L, 1), times T. The
+ * error may be 7/8 of that which equal segments may have. With a = list->allowance, reach = list->reach (the longest
+ * ray, in unit distances) and D = s0 L: T error <= 7/8 a (L / reach + T D / (1 + D)). The remaining eighth is for
+ * subintervals at an extremum that touches a step, for which no bisection suffices: a subinterval is not divided
+ * further if T times its error for any d (from s1 - s0 alone) is at most 1/32 of a (length of the interval / reach). A
+ * cubic has two extrema, and four such subintervals use the remaining eighth. */
 
-/* KERNEL_BISECTION_DEPTH limits bisection, because 2^-40 of an interval is negligible in any medium.
- * KERNEL_BISECTION_SEGMENTS is a safeguard that no function in use reaches: after that many segments the rest of the
- * interval is not divided further. */
+/* KERNEL_BISECTION_DEPTH: maximum number of halvings; 2^-40 of an interval is negligible in any medium.
+ * KERNEL_BISECTION_ROOM: size of the stack of subintervals. KERNEL_BISECTION_SEGMENTS: after that many segments the
+ * rest of the interval is not divided further, a safeguard that no function in use reaches. */
 enum { KERNEL_BISECTION_DEPTH = 40, KERNEL_BISECTION_ROOM = 128, KERNEL_BISECTION_SEGMENTS = 8192 };
 
 /* ---- the field on a ray ---- */
 
-/* A point of the ray: depth t, value v of the field, and reference coordinates r in the cell. */
+/* A point of the ray: depth t, value v of the field in the transfer function's domain, and reference coordinates r in
+ * the cell. */
 typedef struct kernel_exact_point {
     double t, v, r[3];
 } kernel_exact_point;
@@ -107,15 +113,17 @@ typedef struct kernel_exact_point {
 /* State of the bisection of a ray's interval in a cell. */
 typedef struct kernel_bisection {
     kernel_segments *list;
-    const double (*map)[8]; /* coefficients of the cell's map (3 rows) and of the field */
+    /* polynomial coefficients of the cell's map (3 rows) and of the field (kernel_exact_setup()) */
+    const double (*map)[8];
     bool is_pyramid;
-    /* constants of the ray: at depth t its point is (u, v) * (slope * t + depth_offset) */
+    /* constants of the ray: at depth t its x and y in tile space are (u, v) * (slope * t + depth_offset) */
     double u, v, slope, depth_offset;
     kernel_exact_point in, out; /* ends of the interval, at the crossings of the faces */
-    /* unit distances per t; length of the interval; share of the light that reaches the current subinterval */
+    /* per_t: unit distances per unit of t; length: that of the interval, in unit distances; light: share of the light
+     * that passes from the current subinterval to the interval's begin */
     double per_t, length, light;
-    int64_t *map_failures;
-    int count;
+    int64_t *map_failures; /* counts points at which the map was not inverted */
+    int count;             /* number of segments so far */
 } kernel_bisection;
 
 static inline double kernel_interpolate(double from, double to, double share)
@@ -123,7 +131,9 @@ static inline double kernel_interpolate(double from, double to, double share)
     return from + (to - from) * share;
 }
 
-/* Computes the ray's point at depth t, as kernel_value_at() does: by Newton's method from the initial guess `guess`. */
+/* Computes the ray's point at depth t, as kernel_value_at() does, but in double: reference coordinates by Newton's
+ * method from the initial guess `guess`, then from the cell's middle. If both fail, they and the field are interpolated
+ * between the ends of the interval. */
 static kernel_exact_point kernel_exact_point_at(const kernel_bisection *h, double t, const double guess[3])
 {
     kernel_exact_point out = {.t = t};
@@ -145,6 +155,7 @@ static kernel_exact_point kernel_exact_point_at(const kernel_bisection *h, doubl
     return out;
 }
 
+/* Returns the ray's point between a and b, at a share of the depth between them. */
 static kernel_exact_point kernel_exact_point_between(const kernel_bisection *h, const kernel_exact_point *a,
                                                      const kernel_exact_point *b, double share)
 {
@@ -153,8 +164,8 @@ static kernel_exact_point kernel_exact_point_between(const kernel_bisection *h, 
     return kernel_exact_point_at(h, kernel_interpolate(a->t, b->t, share), guess);
 }
 
-/* Returns the point between a and b at which the field is x; the values at a and b lie on either side of x. It uses
- * regula falsi in the Illinois variant, which halves the value of an end that is kept. */
+/* Returns the ray's point between a and b at which the field is x. The values at a and b must lie on different sides of
+ * x. It uses regula falsi in the Illinois variant, which halves the value at an end that is kept. */
 static kernel_exact_point kernel_exact_point_where(const kernel_bisection *h, const kernel_exact_point *a,
                                                    const kernel_exact_point *b, double x)
 {
@@ -207,8 +218,9 @@ static kernel_bound kernel_bound_of_values(const kernel_pieces *t, double low, d
     return out;
 }
 
-/* A subinterval of a ray: its end and middle, its bisection depth, and whether the field has been proved to be monotone
- * on it. deviation: largest sampled deviation of the field from its chord; low, high: range of the field's values. */
+/* A subinterval of a ray's interval, which begins where the previous one ends. depth: number of halvings that made it;
+ * is_monotone: the field has been proved to be monotone on it; deviation: largest deviation of the field from its chord
+ * at the quarters and the middle; low, high: range of the field's values. */
 typedef struct kernel_subinterval {
     kernel_exact_point end, middle;
     int depth;
@@ -216,8 +228,8 @@ typedef struct kernel_subinterval {
     double deviation, low, high;
 } kernel_subinterval;
 
-/* Computes the subinterval's deviation from its chord, and the range of its values, from the field at its middle and
- * quarters. */
+/* Computes the deviation of the field from its chord on a subinterval, and the range of its values. from: begin of the
+ * subinterval; first, third: its points at one and three quarters. */
 static void kernel_subinterval_sample(const kernel_exact_point *from, kernel_subinterval *sub,
                                       const kernel_exact_point *first, const kernel_exact_point *third)
 {
@@ -232,8 +244,9 @@ static void kernel_subinterval_sample(const kernel_exact_point *from, kernel_sub
     sub->high += 1.5 * sub->deviation;
 }
 
-/* Returns a bound of the error of light if the subinterval becomes one segment. *all: the same bound for any deviation
- * of the field from the segment's chord. */
+/* Returns an upper bound of the error of light if the subinterval becomes one segment. s: bounds of the transfer
+ * function over its values; length: in unit distances; *all: an upper bound for any deviation of the field from its
+ * chord. */
 static double kernel_subinterval_error(const kernel_bisection *h, const kernel_subinterval *sub, const kernel_bound *s,
                                        double length, double *all)
 {
@@ -258,7 +271,8 @@ static const double *kernel_step_between(const kernel_bisection *h, double low, 
     return NULL;
 }
 
-/* Computes the range of float values between two neighbouring steps of the opacity, in which `inside` lies. */
+/* Computes the range of float32 values between the two neighbouring steps of the opacity between which `inside` lies.
+ */
 static void kernel_step_side(const kernel_bisection *h, double inside, float side[2])
 {
     const double *steps = h->list->pieces->steps;
@@ -270,7 +284,8 @@ static void kernel_step_side(const kernel_bisection *h, double inside, float sid
     if (n < h->list->pieces->step_count) side[1] = nextafterf(kernel_step_cut(steps[n]), side[0]);
 }
 
-/* Rounds x to float and clamps it to the range between two neighbouring steps; *rest: the rounding error. */
+/* Rounds x to float32 and clamps it to `side`, the range between two neighbouring steps; *rest: the rounding error, 0
+ * if the result is an end of the range. */
 static void kernel_step_round(const float side[2], double x, float *v, double *rest)
 {
     const double clamped = fmax(fmin(x, (double)side[1]), (double)side[0]);
@@ -278,7 +293,8 @@ static void kernel_step_round(const float side[2], double x, float *v, double *r
     *rest = side[0] < *v && *v < side[1] ? clamped - (double)*v : 0;
 }
 
-/* Returns bounds of the transfer function over the subinterval's values. step: a step among the values, or NULL. */
+/* Returns bounds of the transfer function over the values of the subinterval. step: a step of the opacity among these
+ * values, or NULL. */
 static kernel_bound kernel_subinterval_bound(const kernel_bisection *h, const kernel_subinterval *sub,
                                              const double *step)
 {
@@ -295,15 +311,17 @@ static kernel_bound kernel_subinterval_bound(const kernel_bisection *h, const ke
 
 /* ---- segments ---- */
 
-/* Returns a segment of the given length between two values, each the sum of two numbers of v and rest. */
+/* Returns a segment of the given length (in unit distances) in all lanes. The values at its ends are v[0] + rest[0] and
+ * v[1] + rest[1]. */
 static kernel_unit_segment kernel_exact_segment(double length, const float v[2], const double rest[2])
 {
     return (kernel_unit_segment){vf_set((float)length), vf_set(v[0]), vf_set(v[1]), vf_set((float)rest[0]),
                                  vf_set((float)rest[1])};
 }
 
-/* Adds the subinterval as a segment, on its chord. The chord is not raised to the field's mean, as those of equal
- * segments are, because it might then reach values that have not been checked. */
+/* Adds the subinterval as a segment whose field is the chord. Equal segments are raised so that their mean is that of
+ * the field (kernel_local_budget.h). This one is not, because it might then reach values for which no error bound has
+ * been computed. */
 static void kernel_subinterval_add_segment(const kernel_bisection *h, vm lane, const kernel_exact_point *from,
                                            const kernel_subinterval *sub)
 {
@@ -320,6 +338,8 @@ static void kernel_subinterval_add_segment(const kernel_bisection *h, vm lane, c
 
 /* ---- bisection of an interval ---- */
 
+/* Returns whether the error of light is small enough if the subinterval becomes one segment. is_cut: a step of the
+ * opacity lies among its values; length: in unit distances. */
 static bool kernel_subinterval_is_good(const kernel_bisection *h, const kernel_subinterval *sub, const kernel_bound *s,
                                        double length, bool is_cut)
 {
@@ -331,7 +351,8 @@ static bool kernel_subinterval_is_good(const kernel_bisection *h, const kernel_s
     return (is_cut || !sub->is_monotone) && h->light * all <= a * h->length / (32 * reach);
 }
 
-/* Divides an interval, whose ends and middle are known, into subintervals by bisection, and adds their segments. */
+/* Divides a part of a ray's interval, whose ends and middle are known, into subintervals by bisection, and adds their
+ * segments. lane: the ray's lane in its packet; from: begin of the part. */
 static void kernel_subinterval_halve(kernel_bisection *h, int lane, kernel_exact_point from, kernel_subinterval whole)
 {
     const kernel_segments *list = h->list;
@@ -369,8 +390,8 @@ static void kernel_subinterval_halve(kernel_bisection *h, int lane, kernel_exact
     }
 }
 
-/* Adds the segments of the rays' intervals from t0 to t1 by bisection; only those that begin in the window are kept. i:
- * the rays' intervals in the whole cell. */
+/* Divides the rays' intervals between the depths t0 and t1 by bisection, and adds those of their segments that begin in
+ * the window. i: the rays' intervals in the whole cell. */
 static __attribute__((noinline, cold)) void kernel_interval_bisect(kernel_packet *p, kernel_segments *list,
                                                                    const kernel_cell *c, const kernel_interval *i,
                                                                    vm rays, vf t0, vf t1)
@@ -415,7 +436,8 @@ static __attribute__((noinline, cold)) void kernel_interval_bisect(kernel_packet
 
 /* ---- cells in which the field is linear ---- */
 
-/* Returns a tet's interval as a segment, computed in double if the list is in double. */
+/* Returns a tet's interval as a segment, with its length in unit distances. It is computed in double if list->is_double
+ * is set; only then `faces` is read. */
 SIMD_INLINE kernel_unit_segment kernel_tet_segment(const kernel_packet *p, const kernel_segments *list,
                                                    const kernel_cell *c, const kernel_double_face faces[4],
                                                    const kernel_interval *i)
@@ -426,8 +448,8 @@ SIMD_INLINE kernel_unit_segment kernel_tet_segment(const kernel_packet *p, const
     return run;
 }
 
-/* Adds a tet's interval as one segment, which only surfaces cut. faces: the tet's faces in double; read only if the
- * list is in double. */
+/* Adds the rays' intervals in a tet as one segment each, which only surfaces cut. faces: the tet's faces in double
+ * (kernel_double_begin()); read only if list->is_double is set. */
 static __attribute__((noinline)) void kernel_tet_segments(kernel_packet *p, kernel_segments *list, const kernel_cell *c,
                                                           const kernel_double_face faces[4], vm rays)
 {
@@ -445,13 +467,14 @@ static __attribute__((noinline)) void kernel_tet_segments(kernel_packet *p, kern
         i.mask = cut;
         kernel_linear_segments(p, list, &i, (const vf[2]){p->t_near, list->t_cut}, &run);
     }
-    /* the length decides which segments are kept, because in double it may be positive if both ends are the same
-     * float32 */
+    /* segments are kept if their length is positive, not if t_in < t_out, because in double the length may be positive
+     * although both depths are the same float32 */
     kernel_segments_add(list, vm_and(mine, vf_lt(vf_set(0), run.length)), i.t_in, i.t_out, &run);
 }
 
-/* Adds the rays' intervals in a cell with quadrilateral faces whose field is constant. The value is computed in double
- * if the list is in double, because narrow ramps magnify its rounding. */
+/* Adds the rays' intervals in a hex, wedge or pyramid whose field is constant as segments. The value is computed in
+ * double if list->is_double is set, because narrow ramps magnify its rounding. reach: first and last depth of the
+ * segments to add. */
 static __attribute__((noinline)) void kernel_constant_segments(const kernel_packet *p, kernel_segments *list,
                                                                const kernel_cell *c, const kernel_interval *i,
                                                                const vf reach[2])
@@ -463,14 +486,16 @@ static __attribute__((noinline)) void kernel_constant_segments(const kernel_pack
     kernel_linear_segments(p, list, i, reach, &whole);
 }
 
-/* The following functions sample volumes in polyhedra, where the field along a ray is a piecewise linear profile. */
+/* The following functions compute samples and segments in polyhedra, where the field along a ray is piecewise linear:
+ * the ray's profile (kernel_polyhedron.h). */
 
+/* Sets c->f to the values at the vertices and the centre, in the transfer function's domain. */
 SIMD_INLINE void kernel_polyhedron_domain(polyhedron *c, const kernel_transfer *t)
 {
     for (int i = 0; i <= c->vertex_count; i++) c->f[i] = kernel_clamp((c->values[i] - t->low) * t->inverse_width, 1e18);
 }
 
-/* Sets the window's samples in one interval of the rays inside the polyhedron. */
+/* Computes the window's samples that lie in the current interval of the rays in a polyhedron. */
 static void kernel_polyhedron_interval_fill(kernel_packet *p, kernel_samples *s, kernel_poly_crossings *r)
 {
     const kernel_interval *i = &r->interval;
@@ -486,8 +511,8 @@ static void kernel_polyhedron_interval_fill(kernel_packet *p, kernel_samples *s,
     }
 }
 
-/* Returns the polyhedron in tile space, with its values in the transfer function's domain; NULL if it is invisible or
- * memory ran out. */
+/* Returns the polyhedron with this part and index, in tile space and with its values in the transfer function's domain.
+ * NULL if it is invisible or memory ran out. */
 static polyhedron *kernel_polyhedron_prepare(kernel_packet *p, int volume, int part, uint32_t index)
 {
     const kernel_transfer *transfer = &p->frame->volumes[volume];
@@ -509,7 +534,8 @@ static void kernel_polyhedron_volume(kernel_packet *p, kernel_samples *s, int pa
     while (kernel_poly_next(&r)) kernel_polyhedron_interval_fill(p, s, &r);
 }
 
-/* Adds the segments of a polyhedron: the pieces of the ray's profile, on which the field is exactly linear. */
+/* Adds the segments of the given rays in a polyhedron: the linear pieces of their profiles, on which the field is
+ * exactly linear. */
 static void kernel_polyhedron_segments(kernel_packet *p, kernel_segments *list, int part, uint32_t index, vm rays)
 {
     const polyhedron *c = kernel_polyhedron_prepare(p, list->volume, part, index);

@@ -1,23 +1,32 @@
-/* Computes cells in double, from the caller's coordinates and values: the ends of a ray's segment in a tet, and the map
- * and field of other cells at single points, which kernel_map.h computes in float32.
+/* Computes in double, from the caller's coordinates and values: the ends of a ray's segment in a tet, and the map and
+ * the field of other cells at single points, which kernel_map.h computes in float32. Terms:
+ *     (u, v)          a ray's parameters in its tile: its slopes or, if the camera is orthographic, its origin
+ *     t               depth: z in tile space, in scaled units
+ *     domain          values are mapped to the transfer function's domain, in which its range is 0 to 1
+ *     segment         a ray's interval in a cell, with its length and the values at its two ends (kernel_segments.h)
+ *     rest            rounding error of a float32 number; the sum of both is the value in double
+ *     edge on         a face is seen edge on if the ray lies nearly in its plane
+ *     half            a vector of SIMD_WIDTH floats has two halves (0 and 1), whose doubles fill one register each
  *
- * Ends of segments in double are used for segments that may have no error, or almost
- * none, and for transfer functions with extremely narrow ramps.
+ * Ends of segments are computed in double for jobs that allow no error, or almost none, and for transfer functions with
+ * extremely narrow ramps (kernel_frame.is_double).
  *
- * In float32 a face's value errs by about 4e-7 of the transfer function's domain: three weights, their sum, and the
- * vertices' positions and values have an error of 6e-8 each. A steep function magnifies that error, near an opacity of
- * 1 by a factor of a hundred. And the length of a short segment is the difference of two depths that are rounded on the
- * scale of the scene. So the decisions which faces a ray crosses, and in which order segments lie along it, are made in
- * float32 as for all other cells (kernel_cell.h), with the same bits. But the segment's length, and its values at both
- * ends, are computed from the caller's coordinates and values and from the ray's position in the picture, in double.
+ * In float32 the value at a crossing of a face has an error of about 4e-7 of the transfer function's domain: three
+ * weights, their sum, and the vertices' positions and values have an error of 6e-8 each. A steep function magnifies
+ * that error, near an opacity of 1 by a factor of a hundred. Besides, the length of a short segment is the difference
+ * of two depths that are rounded relative to the size of the scene. Which faces a ray crosses, and in which order
+ * segments lie along it, is decided in float32 as for all other cells (kernel_cell.h), with bit-identical results. But
+ * the segment's length, and its values at both ends, are computed in double, from the caller's coordinates and values
+ * and from the ray's position in the picture.
  *
- * An edge function is affine in the ray's u, v (kernel_cell.h). So are the sum D of a face's edge functions, and the
- * sums N of its vertices' depths and values, weighted by the opposite edges: nine coefficients per face, computed once
- * per cell and tile. A ray meets the face's plane at N / D. That point may lie outside the face, by as much as the
- * decision is rounded, about 1e-7 of the edges' terms. If D is less than KERNEL_DOUBLE_EDGE of these terms, the face is
- * seen so nearly edge on that the plane is met far outside the face, and the segment keeps both float32 ends.
- * Everything is computed from the face's vertices in their order and from the ray, so that both cells of a face compute
- * the same point if both use double. */
+ * An edge function is affine in the ray's u and v (kernel_cell.h). So are the sum D of a face's three edge functions,
+ * and the sum N of its vertices' depths, each times the opposite edge's function, and the same sum of their values:
+ * nine coefficients per face, computed once per cell and tile. The ray meets the face's plane at the depth N / D.
+ * Because the decision that the ray crosses the face is made in float32, that point may lie outside the face: an edge
+ * function there may be negative by about 1e-7 of its terms' magnitudes. If D is less than KERNEL_DOUBLE_EDGE times
+ * these magnitudes, the face is seen so nearly edge on that the point may be far outside the face, and the segment
+ * keeps both float32 ends. Everything is computed from the face's vertices in their order and from the ray, so that
+ * both cells of a face compute the same point if both use double. */
 #ifndef RENDER_KERNEL_EXACT_H
 #define RENDER_KERNEL_EXACT_H
 
@@ -35,17 +44,20 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
-/* A ray meets a face's plane outside the face by at most 1e-7 / KERNEL_DOUBLE_EDGE of the face's extent. */
+/* Smallest sum of a face's edge functions, relative to the sum of their terms' magnitudes, for which the face's point
+ * is used. A ray that crosses the face in float32 then meets the face's plane at most 1e-7 / KERNEL_DOUBLE_EDGE of the
+ * face's extent outside the face. */
 #define KERNEL_DOUBLE_EDGE 1e-3
 
-/* A tet's face: affine functions of the ray, c[0] + c[1] u + c[2] v. A tet has four, in the order of kernel_tet_face.
- */
+/* A face of a tet, as affine functions c[0] + c[1] u + c[2] v of the ray. depth, value: sums over the face's vertices
+ * of their depths t and values, each times the opposite edge's function; weight: sum of the three edge functions, by
+ * which both must be divided. A tet has four faces, in the order of kernel_tet_face. */
 typedef struct kernel_double_face {
     double depth[3], value[3], weight[3];
-    double least; /* the face is not seen edge on if the weight is larger than this */
+    double least; /* the face is not seen edge on if the magnitude of the weight is larger than this */
 } kernel_double_face;
 
-/* Computes the (u, v) of a packet's rays in double, relative to the tile's centre. */
+/* Computes the (u, v) of a packet's rays in double, relative to the tile's centre, in two halves of the lanes. */
 SIMD_INLINE void kernel_double_rays_of(const kernel_packet *p, kernel_f64 u[2], kernel_f64 v[2])
 {
     double px[SIMD_WIDTH], py[SIMD_WIDTH];
@@ -60,12 +72,13 @@ SIMD_INLINE void kernel_double_rays_of(const kernel_packet *p, kernel_f64 u[2], 
 
 /* ---- a cell ---- */
 
-/* A vertex in tile space before it is rounded to float32. `depth` is the factor of u and v in the vertex's projection;
- * t and value are the depth and the field. */
+/* A vertex in tile space in double. On the ray (u, v) it is projected to (x - u * depth, y - v * depth). t: z in tile
+ * space; value: the field in the transfer function's domain. */
 typedef struct kernel_double_vertex {
     double x, y, depth, t, value;
 } kernel_double_vertex;
 
+/* Transforms a vertex from world coordinates to tile space, without its value. */
 SIMD_INLINE kernel_double_vertex kernel_double_transform(const kernel_frame *f, const kernel_tile *tile,
                                                          const double *world)
 {
@@ -79,12 +92,13 @@ SIMD_INLINE kernel_double_vertex kernel_double_transform(const kernel_frame *f, 
                                   .t = place[2] - tile->depth_shift};
 }
 
-/* Returns the value in the transfer function's domain, clamped to +-1e18. */
+/* Maps a value of the field to the transfer function's domain, clamped to [-1e18, 1e18]. */
 static inline double kernel_double_domain(const kernel_transfer *transfer, double value)
 {
     return fmax(fmin((value - transfer->low) * transfer->inverse_width, 1e18), -1e18);
 }
 
+/* Computes the three coefficients of the edge function from a to b (kernel_cell.h). */
 SIMD_INLINE void kernel_double_edge(const kernel_double_vertex *a, const kernel_double_vertex *b, double edge[3])
 {
     edge[0] = a->x * b->y - b->x * a->y;
@@ -92,8 +106,8 @@ SIMD_INLINE void kernel_double_edge(const kernel_double_vertex *a, const kernel_
     edge[2] = a->depth * b->x - b->depth * a->x;
 }
 
-/* Computes the affine sums of one face (a row of kernel_tet_face) from the tet's vertices and edge functions. radius:
- * upper bound of the rays' |u| and |v|. */
+/* Computes the affine functions of one face from the tet's vertices (spots) and edge functions. face: a row of
+ * kernel_tet_face, with three vertices and three edges; radius: upper bound of the rays' |u| and |v|. */
 SIMD_INLINE void kernel_double_sums(const kernel_double_vertex *spots, double (*const edges)[3],
                                     const signed char *face, double radius, kernel_double_face *out)
 {
@@ -108,7 +122,7 @@ SIMD_INLINE void kernel_double_sums(const kernel_double_vertex *spots, double (*
     }
 }
 
-/* Computes the affine functions of a tet's faces. The tet must have been transformed and sorted. */
+/* Computes the affine functions of a tet's four faces. The tet's vertices must have been sorted by coordinates. */
 static __attribute__((noinline)) void kernel_double_begin(const kernel_frame *f, const kernel_tile *tile,
                                                           const kernel_cell *c, const kernel_transfer *transfer,
                                                           kernel_double_face faces[4])
@@ -126,20 +140,23 @@ static __attribute__((noinline)) void kernel_double_begin(const kernel_frame *f,
 
 /* ---- rays in a tet ---- */
 
+/* Returns the affine function with the coefficients c on the rays (u, v). */
 SIMD_INLINE kernel_f64 kernel_affine_at(const double c[3], kernel_f64 u, kernel_f64 v)
 {
     return (c[0] + c[1] * u) + c[2] * v;
 }
 
-/* Stores half of a vector of doubles, rounded to float32, and the rounding errors. */
+/* Rounds doubles to float32, and stores them in one half of the lanes of *v, and the rounding errors in the same half
+ * of *rest. */
 SIMD_INLINE void kernel_double_value(kernel_f64 value, int half, vf *v, vf *rest)
 {
     kernel_f64_store_lanes(v, half, value);
     kernel_f64_store_lanes(rest, half, value - kernel_f64_of(v, half));
 }
 
-/* Computes half of the lanes of a tet's interval as a segment, whose length is in t, on the rays at (u, v). Returns the
- * rays for which it is valid. hit: for each face, the rays that cross it. */
+/* Computes a tet's segment in double on the rays (u, v), and stores it in one half of the lanes of *out; the length is
+ * in units of t. hit: for each face, the rays that cross it, decided in float32. Returns the rays for which the segment
+ * is valid: those that cross two faces, none of which is seen edge on. */
 SIMD_INLINE kernel_f64_mask kernel_double_half(const kernel_double_face faces[4], kernel_f64 u, kernel_f64 v,
                                                const vm hit[4], int half, kernel_unit_segment *out)
 {
@@ -168,8 +185,8 @@ SIMD_INLINE kernel_f64_mask kernel_double_half(const kernel_double_face faces[4]
     return sound & met[0] & met[1];
 }
 
-/* Replaces, on the given rays, the length, in t, and the values of *run, a tet's interval in float32, by those computed
- * in double. */
+/* Replaces the length and the values of *run, a tet's segment in float32, by those computed in double, on the given
+ * rays for which these are valid. The length is in units of t. */
 static __attribute__((noinline)) void kernel_tet_double(const kernel_packet *p, const kernel_cell *c,
                                                         const kernel_double_face faces[4], const kernel_f64 u[2],
                                                         const kernel_f64 v[2], vm active, kernel_unit_segment *run)
@@ -194,7 +211,8 @@ enum { KERNEL_EXACT_STEPS = 24 };
 
 /* ---- the map and the field ---- */
 
-/* Computes the coefficients of the cell's map (3 rows), and of the field in the last row. */
+/* Computes the polynomial coefficients (kernel_map.h) of the map of a hex, wedge or pyramid to tile space (3 rows), and
+ * of the field in the transfer function's domain (last row). */
 static void kernel_exact_setup(double map[4][8], const kernel_packet *p, const kernel_cell *c,
                                const kernel_transfer *transfer)
 {
@@ -209,8 +227,8 @@ static void kernel_exact_setup(double map[4][8], const kernel_packet *p, const k
     for (int n = 0; n < 4; n++) kernel_polynomial_fit(map[n], c->type, d[n]);
 }
 
-/* Returns the bilinear product m, a term of the cell's map (kernel_map.h), at the reference coordinates r, and its
- * derivatives. */
+/* Returns the product term m of the cell's map (kernel_map.h) at the reference coordinates r, and its derivatives along
+ * r. */
 static inline double kernel_exact_product(bool is_pyramid, const double r[3], double slopes[3])
 {
     slopes[0] = r[1];
@@ -224,12 +242,14 @@ static inline double kernel_exact_product(bool is_pyramid, const double r[3], do
     return slopes[1] * r[1];
 }
 
+/* Returns the polynomial with the coefficients c at the reference coordinates r; m: its product term. */
 static inline double kernel_exact_value(const double c[8], const double r[3], double m)
 {
     return ((c[0] + r[0] * c[1]) + (r[1] * c[2] + r[2] * c[3])) + m * c[4] +
            r[2] * ((r[0] * c[5] + r[1] * c[6]) + m * c[7]);
 }
 
+/* Computes the polynomial's derivatives along r. m, slopes: results of kernel_exact_product(). */
 static inline void kernel_exact_gradient(const double c[8], const double r[3], double m, const double slopes[3],
                                          double out[3])
 {
@@ -239,8 +259,9 @@ static inline void kernel_exact_gradient(const double c[8], const double r[3], d
     out[2] = c[3] + (r[0] * c[5] + r[1] * c[6]) + m * c[7] + slopes[2] * of_m;
 }
 
-/* Inverts the map by Newton's method in double, until a step is below 1e-8, after which the error is below rounding.
- * Returns false if the method does not converge. */
+/* Finds the reference coordinates r of the point `target` in tile space by Newton's method in double, from an initial
+ * guess in r. A step below 1e-8 is the last one; the error is then below rounding. Returns false if the method does not
+ * converge. */
 static bool kernel_exact_newton(const double (*map)[8], bool is_pyramid, const double target[3], double r[3])
 {
     for (int n = 0; n < KERNEL_EXACT_STEPS; n++) {
@@ -266,6 +287,7 @@ static bool kernel_exact_newton(const double (*map)[8], bool is_pyramid, const d
     return false;
 }
 
+/* Returns whether r is in the reference domain [0, 1], or outside by at most KERNEL_MAP_BEYOND. */
 static inline bool kernel_exact_is_near(const double r[3])
 {
     bool near = true;

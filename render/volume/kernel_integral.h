@@ -1,8 +1,9 @@
 /* Integrates emission and absorption along a segment on which the field is linear.
  *
- * The transfer function is divided into pieces on which opacity and colour are linear in the value, and so along the
- * segment. The integration along a ray goes from piece to piece, in steps that are short enough for Gauss's rule: with
- * the extinction
+ * The transfer function is divided into pieces: ranges of values on which opacity and colour are linear in the value,
+ * and so along the segment. The integration along a ray goes from piece to piece, in one or more steps per piece that
+ * are short enough for Gauss's rule. Lengths are in unit distances (render_transfer), values in the transfer function's
+ * domain. `clear` is 1 - opacity, `rest` a rounding error. With the extinction
  *     sigma = -ln(1 - opacity)
  * at the nodes c_j, the optical depth up to node j is that of the polynomial through all nodes (the coefficients of the
  * Gauss collocation method), and
@@ -20,9 +21,9 @@
  * colour changes by as much as sigma, the sixth derivative is 720 d^3, where d is the depth caused by the change of
  * sigma, and the remainder is 3.6e-4 d^3; that depth is limited to 0.1, so that the remainder is less than 9e-7 of d
  * even in one step alone. Towards an opacity of 1, where sigma has a logarithmic pole, steps become ever shorter. But
- * for a step from the pole itself three nodes miss only 5 % of its integral (that of -ln s from 0 to 1 is computed as
- * 0.948), so no step need be shorter than KERNEL_SHORT, in unit distances and as a share of the ray's interval in the
- * piece.
+ * for a step that begins at the pole itself, three nodes miss only 5 % of sigma's integral (that of -ln s from 0 to 1
+ * is computed as 0.948), so no step need be shorter than KERNEL_SHORT, in unit distances and as a share of the ray's
+ * interval in the piece.
  *
  * A ray's position in a piece is stored as its distances to the piece's two ends, and opacity and 1 - opacity are
  * interpolated from both ends. The length in a piece is computed from the values that the ray takes there, not from
@@ -63,13 +64,14 @@ SIMD_INLINE vf kernel_exp(vf x)
     return vf_exp2(x * 1.4426950f);
 }
 
-/* Reads the bounds for the values from low to high (KERNEL_LIGHT_VARIATION etc.). */
+/* Reads upper bounds of the effect of a field error on light, over the values from low to high of each lane
+ * (KERNEL_LIGHT_VARIATION etc., kernel_types.h). */
 SIMD_INLINE void kernel_light_bounds(const kernel_pieces *t, vf low, vf high, vf out[KERNEL_LIGHT_ENTRIES])
 {
     const vf zero = vf_set(0), last = vf_set(KERNEL_VARIATION_BINS - 1);
     const vf begin = vf_clamp((low - t->bin_low) * t->variation_inverse, zero, last);
     const vf end = vf_clamp((high - t->bin_low) * t->variation_inverse, begin, last);
-    /* The number of bins that the values cover, plus 1, is classified by quarters of an octave. */
+    /* The class of width is the number of bins that the values cover, plus 1, rounded down to quarters of an octave. */
     const vi width = (vi_from_bits((end - begin) + 1.0f) >> 21) - (127 << 2);
     int32_t at[SIMD_WIDTH];
     vi_store(at, (width * KERNEL_VARIATION_BINS + vi_from_vf(begin)) * KERNEL_LIGHT_ENTRIES);
@@ -82,14 +84,16 @@ SIMD_INLINE void kernel_light_bounds(const kernel_pieces *t, vf low, vf high, vf
 #define KERNEL_STEP_DEPTH ((kernel_real)0.35)
 #define KERNEL_STEP_CHANGE ((kernel_real)0.1)
 #define KERNEL_STEP_RATIO ((kernel_real)0.3)
-/* Extinction of a piece whose opacity is 1 everywhere, per unit distance. */
+/* Extinction, per unit distance, of a piece on which the opacity is constantly 1. */
 #define KERNEL_OPAQUE ((kernel_real)1e6)
 /* Smallest argument of logarithms, and smallest change of a value that counts as a change. */
 #define KERNEL_TINY ((kernel_real)1e-30)
 
 /* The light of a segment: premultiplied colour and transmittance. */
 typedef struct kernel_light {
-    vf colour[3], depth; /* depth is -ln(transmittance); sums of depths have less rounding than products near 1 */
+    /* depth: optical depth, -ln(transmittance); sums of depths have less rounding than products of transmittances near
+     * 1 */
+    vf colour[3], depth;
     vf transmittance;
 } kernel_light;
 
@@ -98,26 +102,28 @@ SIMD_INLINE kernel_light kernel_light_none(void)
     return (kernel_light){{vf_set(0), vf_set(0), vf_set(0)}, vf_set(0), vf_set(1)};
 }
 
-/* A segment: its length in unit distances, and the values at its ends in the transfer function's domain. Each value is
- * v + rest, where rest is the rounding error of v as far as it is known; it matters because steps and poles of the
- * function magnify it. */
+/* One segment per lane: its length in unit distances, and the values at its ends in the transfer function's domain.
+ * Each value is v + rest, where rest is the rounding error of v as far as it is known; it matters because steps and
+ * poles of the function magnify it. */
 typedef struct kernel_unit_segment {
     vf length, v_in, v_out, rest_in, rest_out;
 } kernel_unit_segment;
 
+/* Returns a segment whose values have no known rounding errors. */
 SIMD_INLINE kernel_unit_segment kernel_unit_segment_of(vf length, vf v_in, vf v_out)
 {
     return (kernel_unit_segment){length, v_in, v_out, vf_set(0), vf_set(0)};
 }
 
-/* The piece of the transfer function that contains each ray's current value. If it is the same piece for all rays,
- * `common` points to it, which saves gathers. */
+/* The piece of the transfer function that contains each ray's current value (at: its index). If it is the same piece
+ * for all rays, `common` points to it, which saves gathers; otherwise `common` is NULL. */
 typedef struct kernel_piece_index {
     vi at;
     const kernel_real *common;
     vf low, high, low_rest, high_rest; /* values at the piece's two ends, and their rounding errors */
 } kernel_piece_index;
 
+/* Returns the given pieces without their ends. piece: index of each ray's piece. */
 SIMD_INLINE kernel_piece_index kernel_piece_index_of(const kernel_pieces *t, vm rays, vf piece)
 {
     const int lane = __builtin_ctz(vm_bits(rays));
@@ -127,13 +133,14 @@ SIMD_INLINE kernel_piece_index kernel_piece_index_of(const kernel_pieces *t, vm 
                                 .common = is_common ? t->pieces[first] : NULL};
 }
 
+/* Returns an entry (KERNEL_PIECE_OPACITY etc.) of each ray's piece. */
 SIMD_INLINE vf kernel_piece_entry(const kernel_pieces *t, const kernel_piece_index *place, int entry)
 {
     if (place->common) return vf_set(place->common[entry]);
     return vf_gather(t->pieces[0] + entry, place->at * KERNEL_PIECE_ENTRIES);
 }
 
-/* Sets the values at the ends of the pieces. */
+/* Reads the values at the two ends of the rays' pieces, and their rounding errors. */
 SIMD_INLINE void kernel_piece_read_ends(const kernel_pieces *t, kernel_piece_index *at)
 {
     at->low = kernel_piece_entry(t, at, KERNEL_PIECE_LOW);
@@ -145,8 +152,8 @@ SIMD_INLINE void kernel_piece_read_ends(const kernel_pieces *t, kernel_piece_ind
     }
 }
 
-/* Returns the number of the piece that contains the value x + rest. At a boundary that is the upper piece, or the lower
- * one for rays in `falling`. */
+/* Returns the index of the piece that contains each ray's value x + rest. If that is the boundary of two pieces, it is
+ * the upper piece or, for rays in `falling` (whose value decreases along the segment), the lower one. */
 SIMD_INLINE vf kernel_piece_find(const kernel_pieces *t, vm rays, vf x, vf rest, vm falling)
 {
     const vf spot = vf_clamp((x - t->bin_low) * t->bin_inverse, vf_set(0), vf_set(KERNEL_PIECE_BINS - 1));
@@ -168,7 +175,8 @@ SIMD_INLINE vf kernel_piece_find(const kernel_pieces *t, vm rays, vf x, vf rest,
     return piece;
 }
 
-/* A ray's position in a segment, and in a piece of the transfer function, and one step of the integration there. */
+/* The state of the integration of one segment per lane: the ray's position in the segment and in the current piece of
+ * the transfer function, and the current step. */
 typedef struct kernel_piece_state {
     vf below, above;     /* distances of the value to the piece's low and high end */
     vf remaining;        /* remaining change of the value within this piece */
@@ -178,18 +186,20 @@ typedef struct kernel_piece_state {
      * segment's begin */
     vf edge, rest;
     vm is_last; /* the segment ends in this piece */
-    /* The following members are the same in all pieces. */
+    /* The following members are the same in all pieces: falling: the value decreases along the ray; level: it is
+     * constant. */
     vm falling, level;
     vf sign;      /* sign of the value's change along the ray: 1 or -1 */
-    vf per_value; /* length of the ray per change of the value */
+    vf per_value; /* unit distances along the ray per change of the value */
     /* The following members describe the step. */
     vf opacity, clear; /* opacity at the step's begin, and 1 - opacity */
     vf rise;           /* change of the opacity over the part of the piece that lies ahead of the ray */
     vf share;          /* fraction of that part that the step covers */
     vf length;         /* length of the step, in unit distances */
-    vm is_opaque;
+    vm is_opaque;      /* the opacity is 1 on the whole step */
 } kernel_piece_state;
 
+/* Returns the state at the begin of a segment, before a piece is entered. */
 SIMD_INLINE kernel_piece_state kernel_piece_state_begin(const kernel_unit_segment *run)
 {
     const vf one = vf_set(1), rise = (run->v_out - run->v_in) + (run->rest_out - run->rest_in), change = vf_abs(rise);
@@ -201,7 +211,7 @@ SIMD_INLINE kernel_piece_state kernel_piece_state_begin(const kernel_unit_segmen
     return out;
 }
 
-/* Sets the positions of the rays in `fresh`, which enter a piece with the given ends. */
+/* Enters a new piece with the given ends, for the rays in `fresh`: sets their positions in the piece. */
 SIMD_INLINE void kernel_piece_state_enter(kernel_piece_state *s, const kernel_unit_segment *run, vm fresh,
                                           const kernel_piece_index *ends)
 {
@@ -221,8 +231,9 @@ SIMD_INLINE void kernel_piece_state_enter(kernel_piece_state *s, const kernel_un
     s->is_last = vm_or(vm_andnot(s->is_last, fresh), vm_and(fresh, vf_le(ahead, most)));
 }
 
-/* Interpolates between at_low and at_high from both ends of the piece. Near an end with value 0 the result is as exact
- * as the distance to that end. */
+/* Returns the number that is at_low at the piece's low end, at_high at its high end and linear between, at the rays'
+ * current values. inverse: 1 / the piece's width. It is interpolated from both ends: near an end with the number 0 the
+ * result is as exact as the distance to that end. */
 SIMD_INLINE vf kernel_piece_state_interpolate(const kernel_piece_state *s, vf inverse, vf at_low, vf at_high)
 {
     const vf zero = vf_set(0), one = vf_set(1);
@@ -231,6 +242,7 @@ SIMD_INLINE vf kernel_piece_state_interpolate(const kernel_piece_state *s, vf in
     return vf_min(from_low + from_high, one);
 }
 
+/* Computes opacity and 1 - opacity at the begin of a step, and the change of the opacity up to the end of the piece. */
 SIMD_INLINE void kernel_integration_step_begin(const kernel_pieces *t, const kernel_piece_index *at,
                                                kernel_piece_state *s)
 {
@@ -242,6 +254,7 @@ SIMD_INLINE void kernel_integration_step_begin(const kernel_pieces *t, const ker
     s->rise = s->sign * s->remaining * kernel_piece_entry(t, at, KERNEL_PIECE_SLOPE);
 }
 
+/* Chooses the length of the step by the limits that are derived at the top of this file. */
 SIMD_INLINE void kernel_integration_step_limit(kernel_piece_state *s)
 {
     const vf left = s->remaining_length, zero = vf_set(0), one = vf_set(1), rise = vf_abs(s->rise),
@@ -262,8 +275,8 @@ SIMD_INLINE void kernel_integration_step_limit(kernel_piece_state *s)
     s->length = left * s->share;
 }
 
-/* Computes the light that a step emits (*e0), and the first moment of the emission along the step (*e1). Returns the
- * step's optical depth. */
+/* Integrates a step: *e0 receives the integral of the extinction times the transmittance from the step's begin, and *e1
+ * the same integral with the position on the step, from 0 to 1, as a factor. Returns the step's optical depth. */
 SIMD_INLINE vf kernel_integration_step_sum(const kernel_piece_state *s, vf *e0, vf *e1)
 {
     vf sigma[KERNEL_NODES], depth = vf_set(0);
@@ -285,7 +298,7 @@ SIMD_INLINE vf kernel_integration_step_sum(const kernel_piece_state *s, vf *e0, 
     return depth;
 }
 
-/* Adds the light of one integration step, over which the value changes by `move`. */
+/* Adds the light of one step, over which the value changes by `move`, to *light, on the rays in `open`. */
 SIMD_INLINE void kernel_light_step(const kernel_pieces *t, const kernel_piece_index *at, vm open, vf move,
                                    const kernel_piece_state *s, kernel_light *light)
 {

@@ -1,37 +1,42 @@
-/* Errors of the segments of a ray in a hex, a wedge or a pyramid, and from these the number of segments
- * (kernel_local_segments.h defines the segments, docs/development/error_budget.md the allowed error).
+/* Computes the number of equal segments into which a ray's interval in a hex, wedge or pyramid is divided, from bounds
+ * of the error of light (docs/development/error_budget.md derives the allowed error). kernel_segments.h defines
+ * segments and their units.
  *
- * Let f be the field and v the segments' approximation of it. Light changes by the integral of T g (v - f) along the
- * ray, with g = (s c)' - s' b, where b is the light from behind. On each segment v - f has mean zero, apart from the
- * polynomial's own error, so that only the variation of T g along the segment counts: the error is at most half the
- * oscillation of T g times the integral of |v - f|. g depends on the value and on b. Over a range of values it is at
- * most `cost`, and varies by `swing` for fixed b; g is linear in b, so both follow from b's two bounds
- * (kernel_light_bounds()). Let D be the segment's depth and R the colours' contrast. Along the segment T falls by
- * min(D, 1), and b changes by R min(D, 1):
+ * Let f be the field on the ray, and v its approximation by segments, each of which is linear and has the mean of a
+ * polynomial that is fitted to f. Let s be the extinction, c the colour, b the light from behind, T the transmittance
+ * up to a point, and let primes be derivatives by the value. The approximation changes the light by the integral of T g
+ * (v - f) along the ray, with g = (s c)' - s' b. On each segment v - f has mean zero, apart from the polynomial's own
+ * error, so that only the variation of T g along the segment counts: the error is at most half the oscillation (maximum
+ * minus minimum) of T g, times the integral of |v - f|. Over a range of values |g| is at most `cost`, and for fixed b g
+ * varies by at most `swing` (error_variation in the code). g is linear in b, so both follow from the minimum and the
+ * maximum of b (kernel_light_bounds()). Let D be the segment's optical depth and R the colours' contrast. Along the
+ * segment T falls by at most min(D, 1), and b changes by at most R min(D, 1):
  *
  *     oscillation of T g <= T (swing + min(D, 1) (cost + R |s'|)),      and no more than 2 T cost.
  *
- * The mean of |v - f| is: 0.26 P for a parabola, P = |d2| being its maximum, at the middle; 1.09 A for the cubic part,
- * A = |d3 - d1| / 2 at the quarters (0.67 for one chord, which the cubic crosses in the middle; at most 1.082, times
- * n^2, for n >= 2); and at most 4 E for the quartic part, E = |(d1 + d3) / 2 - 3/4 d2|. With n equal segments all three
- * are divided by n^2.
+ * Let d1, d2 and d3 be the deviations of f from its chord over the whole interval, at a quarter, the middle and three
+ * quarters of it. The mean of |v - f| for one segment is the sum of three parts. The quadratic part is 0.26 P, where P
+ * = |d2|. The cubic part is 1.09 A, where A = |d3 - d1| / 2 (the factor is 0.67 for one segment; for n >= 2 segments it
+ * is at most 1.082 if the mean is multiplied by n^2). The quartic part is at most 4 E, where E = |(d1 + d3) / 2 - 3/4
+ * d2|. With n equal segments all three are divided by n^2.
  *
- * The polynomial's own error does not have mean zero. It is 3.1 E on average, but at most E in the ray's mean. So it
- * costs E, plus half the oscillation of T g times 3.1 E, which the 4 E of a single segment include; or 3.1 E in all if
- * that is less. The residual of Newton's method counts in full.
+ * The error of the polynomial itself does not have mean zero. The mean of its magnitude is 3.1 E, but its mean along
+ * the ray is at most E. So its effect on light is at most cost E, plus half the oscillation of T g times 3.1 E (which
+ * the 4 E of a single segment include); or 3.1 cost E in all if that is less. The error of f by the residual of
+ * Newton's method (kernel_local_deviation.h) is multiplied by the cost.
  *
- * Bounds are first taken over the cell's values. If these require more than one segment, they are taken over the ray's
- * own values, whose range is about a third of the cell's: from the lesser to the greater of the values at the faces,
- * extended by 1.17 P on the parabola's side (the ends of chords are raised by P / 6), and on both sides by 1.7 A (the
- * cubic has 1.03 A, chords' ends 0.67 A more) and 10 E (1.33 E and 0.71 E of the quartic, the rest for the polynomial's
- * error).
+ * cost and swing are first computed over all values in the cell. If the error is then too large for one segment, they
+ * are computed over the ray's own values, whose range is about a third of the cell's: from the lesser to the greater of
+ * the values at the faces, extended by 1.17 P on the side to which the quadratic part deviates (P, and P / 6 by which
+ * the ends of segments are raised), and on both sides by 1.7 A (1.03 A of the cubic part, and 0.67 A of the segments'
+ * ends) and 10 E (1.33 E and 0.71 E of the quartic part and the segments' ends, the rest for the polynomial's error).
  *
- * E may vanish although higher orders do not, and in hexes P and A may vanish too: values at eight vertices can be such
- * that the field is on its chord at all three places. So E is taken as at least 0.01 (P + A) N^2 + e N^2 S, where N is
- * the bend, S the sum of |h| times the nonlinear terms' slopes (kernel_local_deviation.h), and e is 0.0011 in hexes and
- * 0.0004 in wedges. Along a ray in a pyramid the field is a linear function and a piece of a conic section, whose three
- * numbers the three places determine: e is 0. A deviation that the three places do not show is of at least the fifth
- * order, so that 2 p^4 e is enough for a part of the interval with share p.
+ * E may vanish although parts of higher order do not, and in hexes P and A may vanish too: values at eight vertices can
+ * be such that the field equals its chord at all three places. So E is taken as at least 0.01 (P + A) N^2 + e N^2 S,
+ * where N is the bend, S the sum of |h| times the nonlinear terms' slopes (kernel_local_deviation.h), and e is 0.0011
+ * in hexes and 0.0004 in wedges. Along a ray in a pyramid the field is a linear function and a piece of a conic
+ * section, whose three numbers the three places determine: e is 0. A deviation that the three places do not show is of
+ * at least the fifth order, so that 2 p^4 e is enough for a part of the interval with share p.
  *
  * These constants are measured. The test set was random rays in 5,000 random cells with bends up to 0.89, and the
  * fields that have E = 0, or all three places on the chord, and the largest possible error of the mean. The
@@ -52,23 +57,27 @@
 #include "simd.h"
 
 /* An interval is halved up to KERNEL_LOCAL_LEVELS times into parts, each with a polynomial of its own.
- * KERNEL_LOCAL_PIECES: maximum number of segments of a part. */
+ * KERNEL_LOCAL_PIECES: maximum number of segments of a part. KERNEL_LOCAL_PIXELS: number of pixels in a tile. */
 enum { KERNEL_LOCAL_PIXELS = KERNEL_TILE * KERNEL_TILE, KERNEL_LOCAL_LEVELS = 5, KERNEL_LOCAL_PIECES = 32 };
+/* Length of the shortest parts, as a share of the interval. */
 #define KERNEL_LOCAL_LEAST_SHARE (1.0f / (1 << KERNEL_LOCAL_LEVELS))
 
 /* Share of the allowed error of light that the residual of Newton's method may cause. */
 #define KERNEL_LOCAL_SLACK 0.4f
 
-/* Rounding of an interval's values in float32, relative to max(1, |value|). docs/development/error_budget.md derives at
- * most 4e-7; ten times as much is counted as an error of the field if the opacity has narrow ramps. */
+/* Upper bound of the rounding of a ray's values in float32, relative to max(1, |value|). It is added to the errors of
+ * the field if the opacity has narrow ramps. docs/development/error_budget.md derives at most 4e-7; this is ten times
+ * as much. */
 #define KERNEL_VALUE_ROUNDING 4e-6f
 
 /* ---- cells ---- */
 
-/* Sets each lane's bounds from the values at its cell's vertices. They must also hold at the ends of chords, which may
- * lie outside of these values. If there is one chord, its ends exceed them by at most three sixteenths of the values'
- * range (kernel_local_leaves_range()). If there are several, their ends exceed them by a sixth of the parabola's
- * maximum, which is less than that range. */
+/* Computes, for the cell in each lane, the members of *out that depend on the range of its values: `low`, `high` and
+ * the members that follow from them, and `tolerance`. `sensitivity` and `residual_limit` must be set. values: the field
+ * at the cells' vertices, by vertex and lane. The bounds must also hold at the ends of segments, which may lie outside
+ * of the vertices' values. If there is one segment, its ends exceed them by at most 3/16 of the values' range
+ * (kernel_local_leaves_range()). If there are several, their ends exceed them by a sixth of the quadratic part's
+ * maximum, which is less than that. */
 SIMD_INLINE void kernel_local_bound(const kernel_frame *f, int volume, const float (*values)[SIMD_WIDTH], int type,
                                     kernel_local_bounds *out)
 {
@@ -89,14 +98,16 @@ SIMD_INLINE void kernel_local_bound(const kernel_frame *f, int volume, const flo
     vf_store(out->extinction, light[KERNEL_LIGHT_EXTINCTION]);
     vf_store(out->low, low);
     vf_store(out->high, high);
-    /* the residual of Newton's method may cause a share of the error that is allowed for the ray's length alone */
+    /* the residual of Newton's method may cause a share of that error of light which is allowed for the ray's length
+     * alone */
     const vf slack = vf_set(KERNEL_LOCAL_SLACK * f->allowance / f->reach[volume]) / (cost * vf_load(out->sensitivity));
     const vf tolerance = vf_min(vf_max(slack, vf_set(1e-6f)), vf_load(out->residual_limit));
     vf_store(out->tolerance, tolerance);
 }
 
-/* Sets the same bounds in all lanes, for a cell that is too nonlinear for lanes: its derivatives are not bounded, so
- * the bend is taken as 1, and the sum of the nonlinear terms' slopes as the range of the values. */
+/* Computes the bounds of a cell whose map is too nonlinear for processing in lanes, the same in all lanes. Its
+ * derivatives are not bounded, so the bend is taken as 1, and the sum of the nonlinear terms' slopes as the range of
+ * the values. */
 SIMD_INLINE void kernel_local_bound_of_cell(const kernel_frame *f, int volume, const kernel_cell *c,
                                             kernel_local_bounds *out)
 {
@@ -111,15 +122,16 @@ SIMD_INLINE void kernel_local_bound_of_cell(const kernel_frame *f, int volume, c
 
 /* ---- rays in cells ---- */
 
-/* Returns by how much a single chord must be raised so that its mean equals the field's mean. */
+/* Returns by how much a segment that replaces the whole interval must be raised above the field's chord, so that its
+ * mean equals the mean of the fitted polynomial. */
 SIMD_INLINE vf kernel_local_chord_offset(const kernel_local_pairs *p)
 {
     const vf *d = p->field;
     return (2.0f / 15) * d[1] + (16.0f / 45) * (d[0] + d[2]);
 }
 
-/* Returns the rays for which a single segment is not possible: the values at its ends, raised so that its mean equals
- * the field's, are outside the range of values for which the error bounds hold. */
+/* Returns the rays whose interval must not become a single segment: the values at its raised ends are outside of the
+ * range of values for which the error bounds hold (kernel_local_bounds.low and high). */
 SIMD_INLINE vm kernel_local_leaves_range(const kernel_local_bounds *b, const kernel_local_pairs *p)
 {
     const vf v0 = p->ends[0].value, v1 = p->ends[1].value, lift = kernel_local_chord_offset(p);
@@ -129,13 +141,13 @@ SIMD_INLINE vm kernel_local_leaves_range(const kernel_local_bounds *b, const ker
 }
 
 /* Errors of one segment that replaces a ray's whole interval in its cell:
- *     mean            mean of |v - f|; with n segments it is divided by n^2
- *     quartic         upper bound E of the quartic part of the field's deviation from its chord
+ *     mean            mean of |v - f| (top of this file); with n segments it is divided by n^2
+ *     quartic         E, the bound of the quartic part of the field's deviation from its chord
  *     residual_error  error of the field that the residual of Newton's method causes
- *     weight_change   variation of the error's weight g that the changes of T and b along the segment cause */
+ *     weight_change   oscillation of T g that the changes of T and b along the segment cause */
 
-/* Returns the error of light per unit distance if the interval becomes one segment: the part that varies along the
- * segment, plus the part of its mean. */
+/* Returns an upper bound of the error of light, per unit distance, if the interval becomes one segment: the effect of v
+ * - f with mean zero, plus the effect of the mean errors. */
 SIMD_INLINE vf kernel_local_single_segment_error(vf mean, vf quartic, vf residual_error, vf weight_change,
                                                  vf error_variation, vf cost)
 {
@@ -143,9 +155,8 @@ SIMD_INLINE vf kernel_local_single_segment_error(vf mean, vf quartic, vf residua
     return vf_muladd(half, mean, cost * (quartic + residual_error));
 }
 
-/* Computes the upper bounds of the change of light by a field error, over the range of the ray's own values, which
- * includes those of raised chords (see the top of this file). Returns the rays on which the opacity has a step in this
- * range. */
+/* Computes *error_variation (`swing` at the top of this file) and *cost over the range of the ray's own values, which
+ * includes the ends of raised segments. quartic: E. Returns the rays on which the opacity has a step in this range. */
 SIMD_INLINE vm kernel_local_ray_bound(const kernel_pieces *t, const kernel_local_pairs *p, vf quartic,
                                       vf *error_variation, vf *cost)
 {
@@ -161,8 +172,9 @@ SIMD_INLINE vm kernel_local_ray_bound(const kernel_pieces *t, const kernel_local
     return kernel_values_have_step(t, low - rounding, high + rounding);
 }
 
-/* Sets the number of segments per ray, with an allowed error that includes the ray's absorption. length: that of the
- * interval in unit distances. Returns the rays for which no number is enough. */
+/* Sets p->count, the number of segments of each ray, for an allowed error that includes the ray's absorption. length:
+ * of the interval, in unit distances; least: lower limit of the number. Returns the rays for which no number is enough.
+ */
 static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_frame *f, int volume, vf mean, vf quartic,
                                                                 vf residual_error, vf weight_change, vf length,
                                                                 vf least, kernel_local_pairs *p)
@@ -188,9 +200,9 @@ static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_fra
     return vm_or(vm_andnot(fails, few), has_step);
 }
 
-/* Sets the number of segments per ray so that none is longer than the sampling step, which is given in unit distances
- * like the length of the interval. Returns the rays that need so many that one polynomial is not accurate enough for
- * them. */
+/* Sets p->count, the number of segments of each ray, so that no segment is longer than the sampling step. step, length:
+ * the step and the interval in unit distances. Returns the rays that need more than 4 segments per part, for which one
+ * polynomial is not accurate enough; none if the parts are already as short as allowed. */
 SIMD_INLINE vm kernel_local_count_by_step(float step, vf length, kernel_local_pairs *p)
 {
     const vf wanted = vf_max(-vf_floor(length * (-1 / step)), vf_set(1));
@@ -198,9 +210,9 @@ SIMD_INLINE vm kernel_local_count_by_step(float step, vf length, kernel_local_pa
     return p->share > KERNEL_LOCAL_LEAST_SHARE ? vf_lt(vf_set(4), wanted) : vm_none();
 }
 
-/* Sets the number of segments per ray; returns the rays for which no number is enough. It first tests whether one
- * segment is enough, with the ray's length alone and the bounds over all of the cell's values; only other rays use
- * kernel_local_count_by_depth(). */
+/* Sets p->count, the number of segments of each ray; returns the rays for which no number is enough. It first tests
+ * whether one segment is enough, with the bounds over all of the cell's values, and the error that is allowed for the
+ * ray's length alone. Only other rays use kernel_local_count_by_depth(). */
 SIMD_INLINE vm kernel_local_count(const kernel_frame *f, int volume, const kernel_local_bounds *bounds,
                                   kernel_local_pairs *p)
 {

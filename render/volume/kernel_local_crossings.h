@@ -1,8 +1,8 @@
-/* Computes the crossings of rays of volumes with the faces of hexes, wedges and pyramids, one ray-cell pair per lane.
- * The crossed faces are found by the signs of projected edge functions; quads that look convex on all of a cell's
- * pixels need no more than their edges (kernel_quad.h). The operations are those of kernel_curved_intervals(), which
- * intersects a packet with one cell, so the results are the same to the bit. Callers pass the cell type as a constant.
- */
+/* Computes where rays enter and leave hexes, wedges and pyramids of volumes, one ray-cell pair per lane: each lane has
+ * a ray and the index of the lane that holds its cell. The crossed faces are found by the signs of projected edge
+ * functions; quads that look convex on all of a cell's pixels need no more than their edges (kernel_quad.h). The
+ * operations are those of kernel_curved_intervals(), which intersects a packet with one cell, so the results are
+ * bit-identical. Callers pass the cell type as a constant. */
 #ifndef RENDER_KERNEL_LOCAL_CROSSINGS_H
 #define RENDER_KERNEL_LOCAL_CROSSINGS_H
 
@@ -23,7 +23,7 @@
 /* ---- cells ---- */
 
 /* Does one step of a transposition of 16 × 16 floats, after vf_transpose() has transposed the 4 × 4 blocks: exchanges
- * blocks whose distance from each other is `apart` (4 or 8) vectors and lanes. number: 0 .. 15, one per lane. */
+ * the blocks that are `apart` (4 or 8) vectors and lanes away from each other. number: the lanes' numbers 0 to 15. */
 SIMD_INLINE void kernel_local_transpose(vf v[KERNEL_LOCAL_ROW], vi number, int apart)
 {
     const vi odd = -(number / apart & 1), low = number + (odd & (SIMD_WIDTH - apart)), high = low + apart;
@@ -35,7 +35,8 @@ SIMD_INLINE void kernel_local_transpose(vf v[KERNEL_LOCAL_ROW], vi number, int a
     }
 }
 
-/* Stores row number `row` of every cell, by transposing two lists of up to 8 vectors each, whose lanes are cells. */
+/* Stores row number `row` of the numbers of every lane's cell (out->rows), by transposing two lists of up to 8 vectors
+ * each, in which lanes are cells. */
 SIMD_INLINE void kernel_local_row_of(const float (*first)[SIMD_WIDTH], int first_count,
                                      const float (*second)[SIMD_WIDTH], int second_count, int row,
                                      kernel_transformed_curved *out)
@@ -54,7 +55,9 @@ SIMD_INLINE void kernel_local_row_of(const float (*first)[SIMD_WIDTH], int first
     for (int lane = 0; lane < SIMD_WIDTH; lane++) vf_store(out->rows[lane][row], v[lane]);
 }
 
-/* Reads, per lane, the slopes and origins of the tile's rays at the cell's first and last column and row. */
+/* Reads, per lane, the slopes and origins of the tile's rays in the first and last column and row of the lane's cell.
+ * ends: these columns and rows (kernel_local_pixels()). The first index of the results is 0 for columns and 1 for rows.
+ */
 SIMD_INLINE void kernel_local_ray_box(const kernel_tile *tile, int32_t ends[4][SIMD_WIDTH], vf slope[2][2],
                                       vf origin[2][2])
 {
@@ -69,8 +72,9 @@ SIMD_INLINE void kernel_local_ray_box(const kernel_tile *tile, int32_t ends[4][S
     }
 }
 
-/* Computes the faces of all lanes' cells, whose positions, ranks and field are stored in *cells. ends: first and last
- * column and row of each cell (kernel_local_pixels()). */
+/* Computes what rays need of the faces of all lanes' cells: the order of their corners, and which quads may look
+ * nonconvex. Positions, ranks and field must be set in *cells. ends: first and last column and row of each cell
+ * (kernel_local_pixels()). */
 SIMD_INLINE void kernel_local_faces_of(const kernel_tile *tile, kernel_transformed_curved *cells,
                                        int32_t ends[4][SIMD_WIDTH], int type)
 {
@@ -109,7 +113,8 @@ static __attribute__((noinline)) void kernel_local_find_faces_nonconvex(const ke
                    face);
 }
 
-/* Finds the two faces that each ray crosses once. All other rays are added to *alone, to be traced one by one. */
+/* Finds the rays that cross exactly two faces of their cells once each (*two), and the indices of these faces. Rays for
+ * which that is uncertain are added to *alone, to be processed cell by cell. */
 SIMD_INLINE void kernel_local_find_faces(const kernel_transformed_curved *cells, const kernel_lane_rays *own, vm rays,
                                          int type, vm *two, vm *alone, vi face[2])
 {
@@ -120,9 +125,10 @@ SIMD_INLINE void kernel_local_find_faces(const kernel_transformed_curved *cells,
         kernel_curved_find((const float(*)[8][SIMD_WIDTH])cells->at, own, NULL, rays, two, alone, face, type);
 }
 
-/* Reads the corners of each ray's face from the rows of cells, if the given rays have at most two different cells, as
- * most vectors of 16 rays have, because rays are listed cell by cell. One permutation of the two cells' rows then reads
- * a number of a vertex for each ray. Returns false if there are more cells, or fewer lanes. */
+/* Reads the corners of both faces of each ray by permutations of its cell's rows, which requires that the given rays
+ * have at most two different cells. Most vectors of 16 rays have, because rays are listed cell by cell. One permutation
+ * of the two cells' rows reads a number of a vertex for each ray. Returns false if there are more cells, or not 16
+ * lanes. */
 SIMD_INLINE bool kernel_local_corners_of_pair(const kernel_transformed_curved *cells, const kernel_lane_rays *own,
                                               vm rays, const vi face[2], kernel_curved_corners out[2])
 {
@@ -152,8 +158,8 @@ SIMD_INLINE bool kernel_local_corners_of_pair(const kernel_transformed_curved *c
     return true;
 }
 
-/* Computes entry and exit of the rays that cross two faces; the nearer point comes first. Reference coordinates are
- * those of kernel_local.h. */
+/* Computes the points at which rays enter and leave their cells, from the indices of the two crossed faces. out[0] is
+ * the nearer point. Reference coordinates are those of kernel_local.h. */
 SIMD_INLINE void kernel_local_cross(const kernel_transformed_curved *cells, const kernel_lane_rays *own, vm rays,
                                     int type, const vi face[2], kernel_point out[2])
 {

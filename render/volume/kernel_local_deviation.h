@@ -1,16 +1,24 @@
-/* Evaluates the field along rays between two faces of their hexes, wedges or pyramids, one ray-cell pair per lane. It
- * is evaluated at three places between the faces, or in each part of a ray's interval. Callers pass the cell type as a
- * constant; GRID_NO_TYPE means that a packet's rays are in one cell, and the field is computed by its inverse map.
+/* Evaluates the field along rays between two faces of their hexes, wedges or pyramids, one ray-cell pair per lane: each
+ * lane has a ray and the index of the lane that holds its cell. Terms:
+ *     interval     a ray's interval in its cell, between two faces; it may be halved repeatedly into parts
+ *     places       the ends, quarters and middle of an interval or part, at which the field is evaluated
+ *     chord        the linear function along the interval that has the field's values at its two ends
+ *     deviation    the field minus its chord
+ *     residual     error of the equation for reference coordinates that Newton's method leaves, defined below
+ *     bend         square of the bound N of the derivative of the map's nonlinear part
+ * Callers pass the cell type as a constant. GRID_NO_TYPE means that a packet's rays are in one cell, and the field is
+ * computed by that cell's inverse map.
  *
  * In kernel_local.h's reference coordinates r the field is f0 + g r + (its nonlinear terms), and y = r + n(r) is linear
  * along the ray, where the nonlinear terms are n = B b with products b of coordinates. So with r = y - n(r)
  *     field = f0 + g y + h b(r),   h = (the field's nonlinear terms) - g B.
- * The first part is linear along the ray. So the field deviates from its chord between the faces by h times the
- * deviation of b from its own chord. As that is small, r need not be known as accurately as for the field itself.
+ * f0 + g y is linear along the ray. So the field deviates from its chord by h times the deviation of b from b's chord.
+ * Because that is small, r need not be known as accurately as for computing the field itself.
  *
- * r is found by Newton's method, from the line between its values at the faces. In the middle of a cell n' is zero, so
- * that a step with the derivatives there adds the residual, and leaves |n'| of it to the next step. Such a step has a
- * third of the terms of a step with the derivatives at the current point, and all places are computed side by side.
+ * r is found by Newton's method, from the line between its values at the faces. A step uses the derivatives in the
+ * middle of the cell, where n' is zero: it adds the residual to r, and the next residual is about |n'| times as large.
+ * That needs a third of the terms of a step with the derivatives at the current point. All places are computed
+ * together.
  *
  * Error bound. Let the residual be the sum over the coordinates of |y - (r + n(r))|. The derivative of n is at most N
  * in the cell. If r lies slightly outside the cell (kernel_local_is_near()), the derivative is at most 1.082 N:
@@ -39,37 +47,39 @@ enum { KERNEL_DEVIATION_STEPS = 8 };
 /* Distance, in reference coordinates, by which points may lie outside the cell, which extends from -1/2 to 1/2. */
 #define KERNEL_DEVIATION_MARGIN 0.02f
 
-/* Bounds of the errors of one cell per lane (kernel_local_budget.h). */
+/* Error bounds of one cell per lane. kernel_local_budget.h defines the quantities and computes most of them. */
 typedef struct kernel_local_bounds {
-    /* h: coefficients of the field's deviation from linear (the file's opening comment) */
+    /* h: coefficients of the field's deviation from a linear function, by nonlinear term (the opening comment of this
+     * file) */
     float terms[KERNEL_NONLINEAR_TERMS][SIMD_WIDTH];
-    /* square of the upper bound of the derivative of the map's nonlinear part */
+    /* square of the upper bound N of the derivative of the map's nonlinear part */
     float bend[SIMD_WIDTH];
-    /* lower bound of the part of the field's deviation that is not visible at the three sampled places (the error E of
-     * kernel_local_budget.h) */
+    /* lower bound of what is taken as the quartic part E of the field's deviation (kernel_local_budget.h), because the
+     * three inner places may not show it */
     float unsampled[SIMD_WIDTH];
     float sensitivity[SIMD_WIDTH];    /* error bound of the field per unit of the residual */
     float residual_limit[SIMD_WIDTH]; /* largest residual for which the field's value is valid */
     float tolerance[SIMD_WIDTH];      /* Newton's method stops at a residual of at most this */
-    /* Bounds of the change of light due to a field error, over the values from low to high, which are those of the
-     * lane's cell (kernel_light_bounds()). cost: maximum of that change; error_variation: its variation. */
+    /* Bounds of the change of light by a field error, over the values from `low` to `high`: the range of the lane's
+     * cell, with a margin. cost: maximum of the change per unit of error and unit distance; error_variation: its
+     * variation (KERNEL_LIGHT_COST, KERNEL_LIGHT_VARIATION). */
     float low[SIMD_WIDTH], high[SIMD_WIDTH];
     float cost[SIMD_WIDTH], error_variation[SIMD_WIDTH];
-    /* upper bound of the change of the error's weight per depth: cost + R |s'|, as defined in kernel_local_budget.h */
+    /* upper bound of the change of T g per optical depth: cost + R |s'|, in the notation of kernel_local_budget.h */
     float weight_change[SIMD_WIDTH];
-    float extinction[SIMD_WIDTH];
+    float extinction[SIMD_WIDTH]; /* maximum of the extinction over these values, per unit distance */
 } kernel_local_bounds;
 
-/* A vector of rays, each with a cell of its own. */
+/* Ray-cell pairs, one per lane, and the rays' intervals in their cells. */
 typedef struct kernel_local_pairs {
     kernel_lane_rays rays;
-    kernel_point ends[2];
+    kernel_point ends[2]; /* begin and end of the interval */
     vm active;
     vf begin;        /* depth at which the ray's window begins */
-    vf per_t;        /* unit distances of the transfer function per t */
+    vf per_t;        /* unit distances of the transfer function per unit of t */
     vf count;        /* number of segments into which the interval is divided */
-    float share;     /* share of the ray's whole interval in its cell */
-    vf field[3];     /* the field minus its chord, at a quarter, the middle and three quarters of the interval */
+    float share;     /* length of this interval as a share of the ray's whole interval in its cell */
+    vf field[3];     /* deviation of the field at a quarter, the middle and three quarters of the interval */
     vf residual;     /* largest residual at these places, and at those of the parts that contain this one */
     vm has_diverged; /* rays for which Newton's method did not find the reference coordinates */
 } kernel_local_pairs;
@@ -82,8 +92,8 @@ SIMD_INLINE float kernel_local_nonlinear_slope(int type, int term)
     return kernel_is_prism(type) ? 0.88f : kernel_has_apex(type) ? 0.79f : term < 3 ? 0.74f : 0.47f;
 }
 
-/* Returns the factor e of kernel_local_budget.h: the part of the field's deviation that the three sampled places may
- * miss is at most e times its bound. */
+/* Returns the factor e of kernel_local_budget.h, by which the part of the field's deviation is bounded that the three
+ * inner places may miss. */
 SIMD_INLINE float kernel_local_nonlinear_unsampled(int type)
 {
     return kernel_is_box(type) ? 0.0011f : kernel_is_prism(type) ? 0.0004f : 0;
@@ -108,13 +118,14 @@ SIMD_INLINE void kernel_local_nonlinear_of(const kernel_local_cells *c, int type
 
 /* ---- rays in cells ---- */
 
-/* The line between the reference coordinates at a ray's two faces, and the chords of the nonlinear terms, per ray. A
- * position u on the ray goes from -1/2 to 1/2. */
+/* The line between the reference coordinates at a ray's two faces, and the chords of the nonlinear terms, one ray per
+ * lane. A position u on the whole interval goes from -1/2 at its begin to 1/2 at its end. */
 typedef struct kernel_local_chord {
     /* reference coordinates at the line's middle, and their difference between the line's ends */
     vf middle[3], span[3];
     /* the nonlinear terms' chords: value at the middle, and difference between the ends */
     vf mean[KERNEL_NONLINEAR_TERMS], rise[KERNEL_NONLINEAR_TERMS];
+    /* copies of the cell's numbers: coefficients of the map's nonlinear terms, and h (kernel_local_bounds.terms) */
     vf nonlinear_part[KERNEL_NONLINEAR_TERMS][3], own[KERNEL_NONLINEAR_TERMS];
     vf tolerance, residual_limit;
     /* Used instead of the members above if the type is GRID_NO_TYPE: the packet, its cell, the cell's inverse map, and
@@ -125,14 +136,15 @@ typedef struct kernel_local_chord {
     const kernel_interval *interval;
 } kernel_local_chord;
 
-/* Five places of a part of a ray's interval, evenly spaced from its begin to its end. */
+/* The five places of an interval or of a part of it, evenly spaced from its begin to its end, for one ray per lane. */
 typedef struct kernel_local_places {
-    float u, width;     /* position at which the part begins, and its length; the whole interval has a length of 1 */
-    vf r[5][3], off[5]; /* reference coordinates; the field minus the chord of the whole interval */
+    float u, width;     /* u: position at which the part begins; width: its length, as a share of the whole interval */
+    vf r[5][3], off[5]; /* r: reference coordinates; off: the field minus the chord of the whole interval */
     vf residual;        /* largest residual at these places, and at those of the parts that contain this one */
     vm is_known;        /* rays for which Newton's method found all reference coordinates */
 } kernel_local_places;
 
+/* Computes the nonlinear terms (products of coordinates) at the reference coordinates r. */
 SIMD_INLINE void kernel_local_nonlinear_at(int type, const vf r[3], vf out[KERNEL_NONLINEAR_TERMS])
 {
     vf unused[KERNEL_NONLINEAR_TERMS][3];
@@ -148,6 +160,8 @@ SIMD_INLINE vm kernel_local_is_near(int type, const vf r[3])
     return vm_and(vf_le(most, half * r[2]), vf_le(r[2], vf_set(1 + KERNEL_DEVIATION_MARGIN)));
 }
 
+/* Computes the chords between the ends of the rays' intervals, and gathers the numbers of their cells. lane: the lane
+ * that holds each ray's cell. */
 SIMD_INLINE void kernel_local_chord_of(const kernel_local_cells *cells, const kernel_local_bounds *bounds, vi lane,
                                        const kernel_point ends[2], int type, kernel_local_chord *out)
 {
@@ -168,8 +182,8 @@ SIMD_INLINE void kernel_local_chord_of(const kernel_local_cells *cells, const ke
     out->residual_limit = kernel_gather_lane(bounds->residual_limit, lane);
 }
 
-/* Computes the residual of the reference coordinates p->r at position u on the ray, and the field's deviation from its
- * chord there as p->value. */
+/* Computes the residual y - (r + n(r)) of the reference coordinates r = p->r at position u on the interval, and stores
+ * the field's deviation there as p->value. */
 SIMD_INLINE void kernel_local_residual(const kernel_local_chord *c, vf u, int type, kernel_point *p, vf residual[3])
 {
     vf term[KERNEL_NONLINEAR_TERMS];
@@ -183,10 +197,10 @@ SIMD_INLINE void kernel_local_residual(const kernel_local_chord *c, vf u, int ty
     for (int k = 1; k < kernel_nonlinear_count(type); k++) p->value = vf_muladd(c->own[k], term[k], p->value);
 }
 
-/* Refines the reference coordinates r at `count` places, at most 3, from initial guesses by Newton's method.
- * at[i].value becomes the field's deviation from its chord. *residual receives the largest residual left at any place.
- * Returns the rays for which r is valid at all places: in the cell or slightly outside, with a small enough residual.
- */
+/* Refines the reference coordinates at[i].r at `count` positions u on the interval (at most 3), from initial guesses,
+ * by Newton's method; places[i]: position i. at[i].value becomes the field's deviation. *residual becomes the largest
+ * residual that is left at any of them. Returns the rays for which r is valid at all of them: in the cell or slightly
+ * outside, with a small enough residual. */
 SIMD_INLINE vm kernel_local_newton(const kernel_local_chord *c, const vf *places, int count, vm rays, int type,
                                    kernel_point *at, vf *residual)
 {
@@ -207,7 +221,8 @@ SIMD_INLINE vm kernel_local_newton(const kernel_local_chord *c, const vf *places
     return is_near;
 }
 
-/* Computes the field minus the chord of the interval between `ends` at `count` positions, by the inverse map. */
+/* Computes the field's deviations at `count` positions u on the interval between `ends`, by the inverse map of the
+ * packet's cell. */
 static __attribute__((noinline)) void kernel_local_map_deviations(const kernel_local_chord *c, const kernel_point *ends,
                                                                   const vf *u, int count, vm rays, vf *out)
 {
@@ -218,8 +233,8 @@ static __attribute__((noinline)) void kernel_local_map_deviations(const kernel_l
     }
 }
 
-/* Evaluates the field at the places 1, 1 + step and so on before the last one, from guesses of their reference
- * coordinates. ends: the ends of the whole interval. */
+/* Evaluates the field at the inner places with the numbers 1, 1 + step and so on up to 3, from guesses of their
+ * reference coordinates in p->r. ends: the ends of the whole interval. */
 SIMD_INLINE void kernel_local_evaluate(const kernel_local_chord *c, const kernel_point *ends, int step, vm rays,
                                        int type, kernel_local_places *p)
 {
@@ -267,7 +282,7 @@ SIMD_INLINE void kernel_local_places_of(const kernel_local_chord *c, const kerne
     kernel_local_evaluate(c, ends, 1, rays, type, out);
 }
 
-/* Evaluates the field at the five places of one half of a part. */
+/* Evaluates the field at the five places of one half (0 or 1) of the part p. Three of them are places of the part. */
 SIMD_INLINE void kernel_local_places_halve(const kernel_local_chord *c, const kernel_point ends[2],
                                            const kernel_local_places *p, int half, vm rays, int type,
                                            kernel_local_places *out)
@@ -283,15 +298,16 @@ SIMD_INLINE void kernel_local_places_halve(const kernel_local_chord *c, const ke
     kernel_local_evaluate(c, ends, 2, rays, type, out);
 }
 
-/* Returns the position of the part's end on the whole interval, from `first` to `last`. */
+/* Returns the number at position u of a whole interval (-1/2 to 1/2), at whose ends it is `first` and `last`, by linear
+ * interpolation. */
 SIMD_INLINE vf kernel_local_along(vf first, vf last, float u)
 {
     if (u < 0.5f) return first + (last - first) * (u + 0.5f);
     return last;
 }
 
-/* Makes the part the interval of the rays: its ends, and the field's deviations from the chord between them. whole: the
- * rays with the whole interval. */
+/* Makes *out the rays with a part of their intervals: the part's ends, and the field's deviations from the chord
+ * between these. whole: the rays with their whole intervals; p: the part's places; rays: the active ones. */
 SIMD_INLINE void kernel_local_pairs_of(const kernel_local_pairs *whole, const kernel_local_places *p, vm rays,
                                        kernel_local_pairs *out)
 {
@@ -310,7 +326,7 @@ SIMD_INLINE void kernel_local_pairs_of(const kernel_local_pairs *whole, const ke
     out->has_diverged = vm_not(p->is_known);
 }
 
-/* Computes the field's deviations from its chord, of the whole interval in the cell. */
+/* Computes p->field, the field's deviations on the whole interval in the cell, and the residual. */
 SIMD_INLINE void kernel_local_deviations_of(const kernel_local_cells *cells, const kernel_local_bounds *bounds,
                                             kernel_local_pairs *p, int type)
 {
@@ -323,8 +339,8 @@ SIMD_INLINE void kernel_local_deviations_of(const kernel_local_cells *cells, con
     for (int i = 0; i < 3; i++) p->field[i] = places.off[i + 1];
 }
 
-/* Replaces an end of the rays in the mask, whose intervals have the given ends, by the point at depth t between them.
- * Returns the rays for which Newton's method did not find its reference coordinates. */
+/* Computes *out, the ray's point at depth t on its interval between `ends`, for the given rays. Returns the rays for
+ * which Newton's method did not find its reference coordinates. */
 SIMD_INLINE vm kernel_local_move_end(const kernel_local_chord *c, const kernel_point ends[2], vm rays, vf t, int type,
                                      kernel_point *out)
 {

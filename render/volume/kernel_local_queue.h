@@ -1,5 +1,12 @@
-/* The cells of a volume in a tile, with a queue for each type, for arrays of any layout. When a queue is full, a vector
- * of its cells is transformed at once (kernel_tile_cells.h). */
+/* Stores the cells of a volume in a tile, with a queue for each cell type, for arrays of any layout. When a queue is
+ * full, its first SIMD_WIDTH cells, one per lane, are transformed and processed together: they are the current vector
+ * of cells (kernel_tile_cells.h). Terms:
+ *     candidate    a cell that a search over the whole picture has found for the tile (kernel_types.h)
+ *     blocks       mask of those of the tile's 16 blocks (4 × 4 pixels each) in which a cell may be visible
+ *     box          the rectangle of the tile's pixels in which a cell may be visible: first and last column, first and
+ *                  last row, 4 bits each from bit 0 on
+ *     window       interval of depths that is processed before the next one (kernel_tile_volume.h,
+ * kernel_tile_segments.h) pair         a ray and the lane that holds its cell; pairs are processed one per lane */
 #ifndef RENDER_KERNEL_LOCAL_QUEUE_H
 #define RENDER_KERNEL_LOCAL_QUEUE_H
 
@@ -29,9 +36,10 @@ enum {
 
 /* A queue of cells of one type. When it is full, its first SIMD_WIDTH cells are processed together. */
 typedef struct kernel_local_queue {
-    /* number of cells; the first indexed_count of them have their vertex indices in `vertex` */
+    /* number of queued cells; number of those, at the begin of the queue, whose vertex indices have been read into
+     * `vertex` */
     int count, indexed_count;
-    uint32_t cell[KERNEL_LOCAL_ROOM];
+    uint32_t cell[KERNEL_LOCAL_ROOM]; /* index of the cell in the mesh part */
     uint16_t blocks[KERNEL_LOCAL_ROOM], box[KERNEL_LOCAL_ROOM];
     int32_t vertex[8][KERNEL_LOCAL_ROOM];
 } kernel_local_queue;
@@ -41,18 +49,19 @@ enum { KERNEL_SORT_ENDS = 48, KERNEL_BLOCK_VECTORS = KERNEL_BLOCKS / SIMD_WIDTH 
 /* The cells of a volume in the tile: candidates, queued cells of a mesh part, and the cells that are being processed.
  */
 typedef struct kernel_tile_cells {
-    /* The candidates. The first open_count items begin before the end of the last window and end behind its begin;
-     * `next` is the first item that no window has reached. Only the first `sorted` items are sorted, because a tile
-     * that soon becomes dark does not need the others. `ends` are the partition points of the quicksort, the nearest
-     * one last: no item before such a point is farther than any item behind it. */
+    /* The tile's candidates; used if the whole picture has been searched. The first open_count items overlap the last
+     * window in depth; `next` is the first item that begins behind all windows so far. Only the first `sorted` items
+     * are sorted by their least depth, because a tile that soon becomes dark does not need the others. `ends` are the
+     * partition points of the unfinished quicksort, the nearest one last: no item in front of such an index is farther
+     * than any item behind it. */
     kernel_tile_candidate *items;
     int count, open_count, next;
     int sorted, end_count, ends[KERNEL_SORT_ENDS];
-    const struct kernel_volume_method *method;
-    bool has_tet_lanes;    /* set if small tets are processed in lanes */
-    bool has_curved_lanes; /* set if hexes, wedges and pyramids are processed in lanes */
-    int volume, part;      /* volume and mesh part of the queued cells; part: -1 if there is none yet */
-    kernel_arrays arrays;  /* the arrays of the volume's field on the mesh part */
+    const struct kernel_volume_method *method; /* samples or segments */
+    bool has_tet_lanes;                        /* set if small tets are processed in lanes */
+    bool has_curved_lanes;                     /* set if hexes, wedges and pyramids are processed in lanes */
+    int volume, part;     /* volume and mesh part of the queued cells; part: -1 if there is none yet */
+    kernel_arrays arrays; /* the arrays of the volume's field on the mesh part */
     kernel_local_queue queues[KERNEL_LANE_TYPES];
     kernel_cell cell;                  /* the cell that packets are tracing */
     kernel_map map;                    /* inverse map of that cell */
@@ -60,16 +69,18 @@ typedef struct kernel_tile_cells {
     const kernel_local_queue *current; /* queue of the vector of other cells that is being processed */
     kernel_transformed_curved curved;  /* these cells; their affine edge functions are not set */
     kernel_local_cells maps;           /* their maps */
-    /* first and last column, first and last row of pixels in which each lane's cell may be visible
+    /* per lane: first and last column, first and last row of the tile's pixels in which the lane's cell may be visible
      * (kernel_local_pixels()) */
     int32_t pixel_ends[4][SIMD_WIDTH];
-    int alone; /* the lane whose cell is the tile's current cell (kernel_tile_make_current()); -1 if there is none */
-    kernel_pixel_list rays;
-    /* the (u, v) at the middle of each block, and half of their extent in a block */
+    int alone;              /* the lane whose cell is also stored in `cell` (kernel_tile_make_current()); -1: none */
+    kernel_pixel_list rays; /* pairs of a pixel, in a cell's box, and the lane of that cell */
+    /* block_u, block_v: the (u, v) of the ray through the middle of each block; half_u, half_v: half of the extent of
+     * (u, v) over a block's rays */
     vf block_u[KERNEL_BLOCK_VECTORS], block_v[KERNEL_BLOCK_VECTORS];
     float half_u, half_v;
 } kernel_tile_cells;
 
+/* Begins a volume with empty queues. */
 SIMD_INLINE void kernel_tile_cells_begin_volume(kernel_tile_cells *cells, int volume)
 {
     cells->volume = volume;
@@ -87,8 +98,9 @@ SIMD_INLINE void kernel_tile_cells_set_part(const kernel_tile_trace *t, kernel_t
 
 /* ---- cells ---- */
 
-/* Reads the field at the transformed cells' vertices, and converts it to the transfer function's domain, clamped to
- * +-1e18. Returns the lanes whose cells are drawn and whose values are all finite and are visible. */
+/* Reads the field at the vertices of the current vector's cells (`count` per cell), and converts it to the transfer
+ * function's domain, clamped to [-1e18, 1e18]. Returns the lanes whose cells are drawn, have only finite values, and
+ * have visible values. */
 SIMD_INLINE vm kernel_local_domain(const kernel_transfer *t, const kernel_tile_cells *cells, int count, vf values[8])
 {
     const kernel_arrays *p = &cells->arrays;
@@ -110,9 +122,9 @@ SIMD_INLINE vm kernel_local_domain(const kernel_transfer *t, const kernel_tile_c
     return vm_and(finite, kernel_visible_values_overlap_cells(&t->visible_values, plain, count));
 }
 
-/* Computes the tile's first and last column and row of pixels in which each lane's cell may be visible. The margin of
- * 1/100 pixel exceeds the rounding of vertices that are at least 1/1000 of the scene's distance in front of the eye; a
- * cell with a nearer vertex gets all pixels. */
+/* Computes the first and last column and row of the tile's pixels in which each lane's cell may be visible (ends).
+ * places: x, y and z of the cells' vertices in tile space. The margin of 1/100 pixel exceeds the rounding of vertices
+ * whose distance in front of the eye is at least 1/1000 of the scene's; a cell with a nearer vertex gets all pixels. */
 SIMD_INLINE void kernel_local_pixels(const kernel_tile_trace *t, int count, const vf places[3][8],
                                      int32_t ends[4][SIMD_WIDTH])
 {
@@ -142,8 +154,8 @@ SIMD_INLINE void kernel_local_pixels(const kernel_tile_trace *t, int count, cons
     }
 }
 
-/* Clips a box of pixels (four bits each: first and last column, first and last row) to the columns and rows in which
- * the lane's cell may be visible. Returns false if nothing is left. */
+/* Clips the box of the cell in the given lane to the columns and rows in which the cell may be visible. Returns false
+ * if the box becomes empty. */
 SIMD_INLINE bool kernel_local_clip_box(int32_t ends[4][SIMD_WIDTH], int lane, unsigned *box)
 {
     int end[4];
@@ -157,9 +169,9 @@ SIMD_INLINE bool kernel_local_clip_box(int32_t ends[4][SIMD_WIDTH], int lane, un
     return true;
 }
 
-/* Reads, sorts and transforms the vertices of the queue's first SIMD_WIDTH cells, and computes their maps, which must
- * be less nonlinear than most_bent. Returns a mask of the visible cells. *lanes: mask of those that can be processed in
- * lanes. */
+/* Reads the vertices of the current vector's cells, sorts them, transforms them into tile space, and computes the
+ * cells' maps. Returns a mask of the cells that may be visible. *lanes: mask of those that can be processed in lanes:
+ * no edge has length zero, and the bend of the map (kernel_local.h) is less than most_bent. */
 SIMD_INLINE unsigned kernel_local_transform_of_type(const kernel_tile_trace *t, kernel_tile_cells *cells,
                                                     float most_bent, unsigned *lanes, int type)
 {
@@ -186,7 +198,7 @@ static __attribute__((noinline)) unsigned kernel_local_transform(const kernel_ti
     return KERNEL_OF_TYPE(type, kernel_local_transform_of_type, t, cells, most_bent, lanes);
 }
 
-/* Reads the vertex indices of all queued cells before index `end` that have not been read yet. */
+/* Reads the vertex indices of the queue's cells up to index `end` (excluded), unless they have been read before. */
 SIMD_INLINE void kernel_local_read_indices(const kernel_arrays *p, kernel_local_queue *q, int end, int type)
 {
     for (; q->indexed_count < end; q->indexed_count++)
@@ -194,8 +206,8 @@ SIMD_INLINE void kernel_local_read_indices(const kernel_arrays *p, kernel_local_
                                KERNEL_LOCAL_ROOM);
 }
 
-/* Makes the first SIMD_WIDTH cells of the queue the current vector, and reads their vertex indices. Returns the mask of
- * lanes that have a cell; the other lanes get copies of the first cell. */
+/* Makes the first SIMD_WIDTH cells of the queue the current vector, and reads their vertex indices. Returns a mask of
+ * the lanes that have a cell. The other lanes get copies of the first cell. */
 SIMD_INLINE unsigned kernel_local_begin_vector(kernel_tile_cells *cells, kernel_local_queue *q, int type)
 {
     const int count = q->count < SIMD_WIDTH ? q->count : SIMD_WIDTH;
@@ -236,7 +248,8 @@ SIMD_INLINE bool kernel_local_push(const kernel_arrays *p, kernel_local_queue *q
 
 /* ---- intervals of rays in cells ---- */
 
-/* Computes the interval of depths, relative to `depth`, in which each ray may be inside its cell's slabs. */
+/* Computes the interval of depths, relative to `depth`, in which each ray may be inside its cell: it is between the
+ * three pairs of planes that bound the cell (kernel_local_cells.low and high). */
 SIMD_INLINE void kernel_local_slab_interval(const kernel_local_cells *cells, const kernel_lane_rays *rays, vf depth,
                                             vf *near, vf *far)
 {
@@ -253,7 +266,8 @@ SIMD_INLINE void kernel_local_slab_interval(const kernel_local_cells *cells, con
         const vf inverse = 1.0f / vf_muladd(row[0], rays->rays.slope_x, vf_muladd(row[1], rays->rays.slope_y, row[2]));
         const vf low = (kernel_gather_lane(cells->low[i], rays->lane) - at) * inverse;
         const vf high = (kernel_gather_lane(cells->high[i], rays->lane) - at) * inverse;
-        /* A ray parallel to a slab may give NaN here; max() and min() then keep the bounds of the other slabs. */
+        /* A ray parallel to a pair of planes may give NaN here; max() and min() then keep the bounds of the other
+         * pairs. */
         *near = vf_max(vf_min(low, high), *near);
         *far = vf_min(vf_max(low, high), *far);
     }

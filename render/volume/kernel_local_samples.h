@@ -1,12 +1,13 @@
-/* Computes samples of volumes, one sample per lane, for any rays and cells. A cell of a few pixels leaves most lanes of
- * a packet idle, and a sample's value requires an inverse map. So samples of several cells are processed side by side:
+/* Computes samples of volumes in hexes, wedges and pyramids, one sample per lane, each lane with its own ray and cell.
+ * A cell of a few pixels would leave most lanes of a packet idle, and each sample's value requires Newton's method. So
+ * the samples of several cells are listed one after the other and processed in vectors:
  *     cells of one type       where are they, and what are their maps?     kernel_local.h
  *     pixels of their boxes   which samples may be in the cell?           by planes around it
  *     samples                 where in the cell, and what is the field?   Newton's method
  * A sample belongs to the cell that contains it by the cell's reference coordinates. At a face one of these is at its
  * limit, so that the crossings of faces give the same result up to rounding. For samples near a face the crossings
- * decide (kernel_crossings.h), because neighbouring cells share their bits. For cells with strongly nonlinear maps the
- * crossings decide all samples. */
+ * decide (kernel_crossings.h), because they are bit-identical in both cells of the face. In cells with strongly
+ * nonlinear maps the crossings decide for all samples. */
 #ifndef RENDER_KERNEL_LOCAL_SAMPLES_H
 #define RENDER_KERNEL_LOCAL_SAMPLES_H
 
@@ -30,10 +31,11 @@
 #include "simd.h"
 
 enum {
+    /* maximum number of listed samples */
     KERNEL_LOCAL_SAMPLES = 1024,
     KERNEL_TILE_PIXELS = KERNEL_TILE * KERNEL_TILE,
-    /* Layout of a sample's word: its pixel in the tile begins at bit 0, the lane of its cell at bit KERNEL_LOCAL_LANE,
-     * and its number in the window at bit KERNEL_LOCAL_NUMBER. */
+    /* Layout of the 32-bit word that describes a listed sample: its pixel in the tile (16 * row + column) begins at bit
+     * 0, the lane of its cell at bit KERNEL_LOCAL_LANE, and its number in the window at bit KERNEL_LOCAL_NUMBER. */
     KERNEL_LOCAL_LANE = 8,
     KERNEL_LOCAL_NUMBER = 16
 };
@@ -41,17 +43,18 @@ enum {
 /* The samples of a tile's rays in a window. */
 typedef struct kernel_tile_volume {
     kernel_samples packets[KERNEL_TILE_PACKETS];
-    int first, count; /* number of the window's first sample, and number of samples in the window */
+    int first, count; /* number of the window's first sample on its ray; number of samples in the window */
     float pad;        /* error bound of sample numbers, as in kernel_samples */
-    /* For each packet and lane: depth of sample 0 and distance between samples, side by side; and the depth at which
-     * the window ends on the ray. */
+    /* steps: for each ray, by packet and lane, the depth of sample number 0 and the distance between samples in depth,
+     * side by side; far: the depth at which the window ends on the ray, -inf for inactive rays */
     float steps[2 * KERNEL_TILE_PIXELS], far[KERNEL_TILE_PIXELS];
-    /* samples of hexes, wedges and pyramids whose values are still to be computed: depth and word of each */
+    /* listed samples, whose values are still to be computed: depth and word of each */
     int sample_count;
     float t[KERNEL_LOCAL_SAMPLES + SIMD_WIDTH], bits[KERNEL_LOCAL_SAMPLES + SIMD_WIDTH];
-    /* The members from here on choose the depth of windows (kernel_tile_depth.h). */
-    /* Depth, relative to the begin of the last tile, at which at least half of those of its rays that lost light were
-     * dark; +inf if they did not become dark. */
+    /* The members from here on choose the depth of windows (kernel_tile_depth.h). A ray is dark if it has no light left
+     * (KERNEL_DARK); depths are in units of t. */
+    /* Depth, relative to the begin of the last tile, at which the last tile became dark: at least half of its rays that
+     * had lost light were dark. +inf if it did not become dark. */
     float dark;
     /* The following members describe the current tile. */
     float own_dark; /* depth, relative to `begin`, at which this tile became dark; +inf until it is known */
@@ -59,18 +62,19 @@ typedef struct kernel_tile_volume {
     bool has_met;   /* set if some ray of the tile has lost light */
     /* expected further depth until the rays are dark, computed from the light left after the last window */
     float expected;
-    float before; /* light of the brightest ray before the last window */
+    float before; /* light of the brightest ray at the begin of the last window */
     /* number of the last window's rays that have lost light, and number of those that are dark */
     int lit_count, dark_count;
-    /* first_lit: least depth of their samples; last_dark: greatest depth at which one of them became dark */
+    /* brightest: most light that one of these rays has left; first_lit: least depth of their samples; last_dark:
+     * greatest depth at which one of them became dark */
     float brightest, first_lit, last_dark;
 } kernel_tile_volume;
 
 /* ---- samples ---- */
 
-/* Finds the samples of the window that may lie between two depths on each ray: numbers in the window from *number to
- * *last. Rays that miss the window may have any number; their first one is that behind the window's last sample, so
- * that it does not overflow an int. base, step: depth of sample 0, and distance between samples. */
+/* Finds the samples of the window that may lie between the depths `near` and `far` on each ray: those with the numbers
+ * in the window from *number to *last; none if *last is less than *number. *number is limited to the window's end, so
+ * that it does not overflow an int. base, step: depth of sample number 0, and distance between samples in depth. */
 SIMD_INLINE void kernel_local_sample_range(const kernel_tile_volume *v, vf base, vf step, vf near, vf far, vf *number,
                                            vf *last)
 {
@@ -80,8 +84,9 @@ SIMD_INLINE void kernel_local_sample_range(const kernel_tile_volume *v, vf base,
     *last = vf_min(vf_floor(((far - base) * inverse - first) + v->pad), vf_set((float)(v->count - 1)));
 }
 
-/* Sets the values of the given lanes' samples, unless another cell has set them. Returns the lanes whose samples have a
- * value of another cell. numbers: the samples' numbers in the window. */
+/* Sets the values of the samples of the lanes in `own`, unless another cell has set them. places: position of each ray
+ * among the tile's packets; numbers: the samples' numbers in the window. Returns the lanes whose samples already have
+ * the value of another cell. */
 SIMD_INLINE unsigned kernel_local_store_samples(kernel_tile_volume *v, vm own, vi places, vi numbers, vf value)
 {
     int32_t at[SIMD_WIDTH], number[SIMD_WIDTH];
@@ -101,8 +106,9 @@ SIMD_INLINE unsigned kernel_local_store_samples(kernel_tile_volume *v, vm own, v
     return taken;
 }
 
-/* Decides, by the crossings of the cell's faces, whether a sample near the cell's border belongs to the cell, and sets
- * its value if it does. lane: the lane of the cell. */
+/* Decides, by the ray's crossings of the cell's faces, whether a sample near the cell's border belongs to the cell, and
+ * sets its value if it does. lane: the lane of the cell; at: position of the ray among the tile's packets; number: that
+ * of the sample in the window. */
 static __attribute__((noinline, cold)) void kernel_local_sample_by_crossings(kernel_tile_trace *t, int lane, int at,
                                                                              int number)
 {
@@ -117,7 +123,7 @@ static __attribute__((noinline, cold)) void kernel_local_sample_by_crossings(ker
         kernel_fill_some(p, s, cells->cell.is_constant ? NULL : &cells->map, &list[k], &list[k], number, number + 1);
 }
 
-/* Computes the values of a vector of samples, from index n on, that lie inside their cells. */
+/* Computes the values of a vector of listed samples, from index n on, if they lie inside their cells. */
 SIMD_INLINE void kernel_local_fill_lanes(kernel_tile_trace *t, kernel_tile_volume *b, int type, int n)
 {
     const kernel_tile_cells *cells = t->thread->tile_cells;
@@ -153,7 +159,7 @@ SIMD_INLINE void kernel_local_fill_all(kernel_tile_trace *t, kernel_tile_volume 
     for (int n = 0; n < b->sample_count; n += SIMD_WIDTH) kernel_local_fill_lanes(t, b, type, n);
 }
 
-/* Computes the listed samples, and empties the list. */
+/* Computes the values of all listed samples, and empties the list. */
 static __attribute__((noinline)) void kernel_local_fill(kernel_tile_trace *t, int type)
 {
     kernel_tile_volume *b = t->thread->tile_volume;
@@ -166,7 +172,8 @@ static __attribute__((noinline)) void kernel_local_fill(kernel_tile_trace *t, in
 
 /* ---- pixels ---- */
 
-/* Queues the samples of the list's rays n .. n + SIMD_WIDTH - 1 that may lie inside their cells. */
+/* Adds to the list of samples those that may lie inside their cells, for the rays n to n + SIMD_WIDTH - 1 of the list
+ * of rays. Computes the listed samples if the list is full. */
 SIMD_INLINE void kernel_local_queue_samples_lanes(kernel_tile_trace *t, const kernel_tile_cells *cells, int type, int n)
 {
     kernel_tile_volume *b = t->thread->tile_volume;
@@ -192,6 +199,7 @@ SIMD_INLINE void kernel_local_queue_samples_lanes(kernel_tile_trace *t, const ke
     }
 }
 
+/* Lists the samples of all listed rays, and empties the list of rays. */
 static __attribute__((noinline)) void kernel_local_queue_samples(kernel_tile_trace *t, int type)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
@@ -207,7 +215,8 @@ static unsigned kernel_local_transform_lanes(kernel_tile_trace *t, int type, uns
     return kernel_local_transform(t, t->thread->tile_cells, KERNEL_LOCAL_BENT, lanes, type);
 }
 
-/* Prepares the sampling of a volume in a window, for the packets of the given blocks, which must be set up. */
+/* Copies from the packets of the given blocks, which must be set up, what sampling a volume in a window needs, by
+ * pixel. */
 SIMD_INLINE void kernel_local_samples_begin(const kernel_tile_trace *t, kernel_tile_volume *b, unsigned blocks,
                                             int volume)
 {

@@ -1,6 +1,7 @@
-/* Computes segments of hexes, wedges and pyramids with one ray-cell pair per lane (kernel_segments.h explains
- * segments). Rays for which that is not possible are processed by packets, cell by cell, and their intervals are
- * divided by the same rule. */
+/* Computes the segments of rays in hexes, wedges and pyramids, one ray-cell pair per lane: each lane has a ray and the
+ * index of the lane that holds its cell. kernel_segments.h defines segment, window and cut; kernel_local_deviation.h
+ * defines interval, part and chord. Rays for which that is not possible are processed by packets, cell by cell, and
+ * their intervals are divided by the same rule. */
 #ifndef RENDER_KERNEL_LOCAL_SEGMENTS_H
 #define RENDER_KERNEL_LOCAL_SEGMENTS_H
 
@@ -29,32 +30,35 @@
 #include "kernel_types.h"
 #include "simd.h"
 
-/* Layout of a listed ray's word: its pixel in the tile begins at bit 0, the lane of its cell at bit KERNEL_LOCAL_CELL,
- * and the numbers of the two crossed faces, three bits each, at bit KERNEL_LOCAL_FACES. */
+/* Layout of the 32-bit word that describes a listed ray: its pixel in the tile begins at bit 0, the lane of its cell at
+ * bit KERNEL_LOCAL_CELL, and the indices of the two crossed faces, three bits each, at bit KERNEL_LOCAL_FACES. */
 enum { KERNEL_LOCAL_CELL = 8, KERNEL_LOCAL_FACES = 16 };
 
-/* Lists of rays that have passed a stage: those that meet their cells' slabs, and those that cross two faces; of the
- * latter the rays whose first face is a quad are listed apart. */
+/* Lists of rays that have passed a stage: those that may meet their cells (KERNEL_LOCAL_MET), and those that cross two
+ * faces. The latter are listed apart by whether the first crossed face is a quad (KERNEL_LOCAL_CROSSED) or a triangle.
+ */
 enum { KERNEL_LOCAL_MET, KERNEL_LOCAL_CROSSED, KERNEL_LOCAL_CROSSED_TRIANGLE, KERNEL_LOCAL_LISTS };
 
 /* The segments of a tile's rays in a window, and the state of the vector of cells that is being processed. */
 typedef struct kernel_tile_segments {
     kernel_segments packets[KERNEL_TILE_PACKETS];
-    kernel_double_face precise[4]; /* the current tet in double; set only if the frame is in double */
-    float depth;                   /* depth of the next window; 0 if it has not been determined yet */
+    kernel_double_face precise[4]; /* faces of the current tet in double; set only if frame->is_double is set */
+    float depth;                   /* length of the next window in depth; 0 if it has not been determined yet */
     unsigned blocks;               /* blocks of the current window */
     int volume;
-    float per_t[KERNEL_LOCAL_PIXELS]; /* unit distances of the transfer function per t, by packet and lane */
-    kernel_local_bounds bounds;
-    bool is_double; /* set if the ends of segments are stored in double */
-    bool has_cuts;  /* set if transparent surfaces cut segments */
+    float per_t[KERNEL_LOCAL_PIXELS]; /* unit distances of the transfer function per unit of t, by packet and lane */
+    kernel_local_bounds bounds;       /* error bounds of the current vector of cells */
+    bool is_double;                   /* set if the ends of segments are stored in double */
+    bool has_cuts;                    /* set if transparent surfaces cut segments */
     int list_count[KERNEL_LOCAL_LISTS];
     float list[KERNEL_LOCAL_LISTS][KERNEL_LIST_ROOM]; /* one word per ray */
-    /* For each packet and lane: begin and end of the window, side by side; likewise begin and end of the ray. */
+    /* For each ray, by packet and lane, depths side by side: begin and end of the ray's window (window), and begin and
+     * end of the part of the ray in which segments lie (reach). */
     float window[2 * KERNEL_LOCAL_PIXELS], reach[2 * KERNEL_LOCAL_PIXELS];
 } kernel_tile_segments;
 
-/* Adds one segment per lane to the lists of the given rays. */
+/* Adds one segment per lane, in the lanes `rays`, to the list of the lane's ray. places: position of each ray among the
+ * tile's packets; v_in, v_out: values in the transfer function's domain. */
 SIMD_INLINE void kernel_local_store_segments(kernel_tile_segments *b, vi places, vm rays, vf t_in, vf t_out, vf v_in,
                                              vf v_out)
 {
@@ -66,8 +70,8 @@ SIMD_INLINE void kernel_local_store_segments(kernel_tile_segments *b, vi places,
     kernel_segments_add_at(b->packets, b->is_double, at, rays, t_in, t_out, &run);
 }
 
-/* f: coefficients of a polynomial in u that is zero at u = -1/2 and 1/2. kernel_local_deviation() returns its value at
- * u, kernel_local_primitive() its integral from 0 to u. */
+/* The following two functions evaluate a polynomial in u that is 0 at u = -1/2 and 1/2, and has the coefficients f:
+ * kernel_local_deviation() returns its value at u, kernel_local_primitive() its integral from 0 to u. */
 SIMD_INLINE vf kernel_local_deviation(const vf f[3], vf u)
 {
     return (0.25f - u * u) * vf_muladd(vf_muladd(f[2], u, f[1]), u, f[0]);
@@ -80,7 +84,7 @@ SIMD_INLINE vf kernel_local_primitive(const vf f[3], vf u)
     return u * odd + f[1] * square * (0.125f - 0.25f * square);
 }
 
-/* Adds the segments of rays for which one segment is enough. */
+/* Adds the rays' intervals as one segment each, raised so that its mean is that of the field. */
 SIMD_INLINE void kernel_local_emit_one(kernel_tile_segments *b, const kernel_local_pairs *p, vm rays)
 {
     const vf t0 = p->ends[0].t, t1 = p->ends[1].t, lift = kernel_local_chord_offset(p);
@@ -88,8 +92,8 @@ SIMD_INLINE void kernel_local_emit_one(kernel_tile_segments *b, const kernel_loc
                                 p->ends[0].value + lift, p->ends[1].value + lift);
 }
 
-/* Adds the segments of rays that need several: equal subintervals of the interval, with chords that have the mean of
- * the polynomial through the sampled values. */
+/* Adds the segments of rays that need several (p->count): equal subintervals of the interval, on each of which the
+ * segment has the mean of the polynomial through the sampled values. */
 static __attribute__((noinline)) void kernel_local_emit_several(kernel_tile_segments *b, const kernel_local_pairs *p,
                                                                 vm rays)
 {
@@ -115,6 +119,7 @@ static __attribute__((noinline)) void kernel_local_emit_several(kernel_tile_segm
     }
 }
 
+/* Adds the segments of the given rays, whose numbers are p->count. */
 SIMD_INLINE void kernel_local_emit(kernel_tile_segments *b, const kernel_local_pairs *p, vm rays)
 {
     const vm single = vm_and(rays, vf_le(p->count, vf_set(1))), more = vm_andnot(rays, single);
@@ -127,9 +132,9 @@ SIMD_INLINE void kernel_local_emit(kernel_tile_segments *b, const kernel_local_p
 static void kernel_local_segments_process_singly(kernel_tile_trace *t, vi places, vi lanes, unsigned wanted,
                                                  const vf reach[2], float share);
 
-/* Adds the segments of the rays' intervals. Each interval is halved, and its parts again, until one polynomial is
- * accurate enough for a part. If it is not even for the shortest parts, these are passed on: from vectors of cells to
- * packets, and from packets to bisection in double. */
+/* Adds the segments of the rays' intervals. Each interval is halved, and its parts again, until the error bounds allow
+ * enough few segments in a part (kernel_local_count()). The shortest parts for which they do not are passed on: from
+ * vectors of cells to packets, and from packets to bisection in double. */
 SIMD_INLINE void kernel_local_divide_intervals(kernel_tile_trace *t, const kernel_local_bounds *bounds,
                                                const kernel_local_chord *chord, const kernel_local_pairs *whole,
                                                vm rays, int type)
@@ -144,7 +149,8 @@ SIMD_INLINE void kernel_local_divide_intervals(kernel_tile_trace *t, const kerne
         kernel_local_pairs_of(whole, &places, mine[count], &part);
         part.active = vm_and(part.active, vf_lt(part.begin, part.ends[1].t));
         const vm fails = vm_or(kernel_local_count(t->frame, b->volume, bounds, &part), part.has_diverged);
-        /* in the cells of packets, nothing bounds what the first three places do not show */
+        /* if packets process a cell, nothing bounds the deviation that the three inner places of the whole interval
+         * miss, so that it is always halved */
         const vm good = type == GRID_NO_TYPE && part.share == 1 ? vm_none() : vm_andnot(part.active, fails);
         const vm rest = vm_andnot(part.active, good);
         kernel_local_emit(b, &part, good);
@@ -173,7 +179,7 @@ SIMD_INLINE void kernel_local_segments_parts_of(kernel_tile_trace *t, const kern
     kernel_local_divide_intervals(t, bounds, &chord, whole, rays, type);
 }
 
-/* As above, for rays in the cells of the current vector. */
+/* Does the same as kernel_local_divide_intervals(), for rays in the current vector's cells. */
 static __attribute__((noinline)) void kernel_local_segments_parts(kernel_tile_trace *t, const kernel_local_pairs *whole,
                                                                   vm rays, int type)
 {
@@ -182,8 +188,9 @@ static __attribute__((noinline)) void kernel_local_segments_parts(kernel_tile_tr
 
 /* ---- packets of rays in one cell ---- */
 
-/* Adds the segments of a packet's rays in a cell with quadrilateral faces, between the depths `reach`, which are a
- * share of the rays' intervals in the cell. map: the cell's inverse map; NULL if the field is constant. */
+/* Adds the segments of a packet's rays in a hex, wedge or pyramid, between the depths reach[0] and reach[1]. share:
+ * length between these depths, as a share of the rays' intervals in the cell; map: the cell's inverse map, NULL if the
+ * field is constant. */
 static __attribute__((noinline)) void kernel_curved_segments(kernel_tile_trace *t, int packet, const kernel_cell *c,
                                                              const kernel_map *map, vm rays, const vf reach[2],
                                                              float share)
@@ -217,8 +224,9 @@ static __attribute__((noinline)) void kernel_curved_segments(kernel_tile_trace *
 
 /* ---- rays ---- */
 
-/* Processes the rays in `wanted`, between the depths `reach`, which are a share of their intervals, cell by cell; rays
- * with the same cell and packet are processed together. */
+/* Adds the segments of the rays in `wanted` (a mask of lanes) between the depths reach[0] and reach[1], by packets,
+ * cell by cell; rays with the same cell and packet are processed together. places: position of each ray among the
+ * tile's packets; lanes: the lane of its cell; share: as in kernel_curved_segments(). */
 static __attribute__((noinline)) void kernel_local_segments_process_singly(kernel_tile_trace *t, vi places, vi lanes,
                                                                            unsigned wanted, const vf reach[2],
                                                                            float share)
@@ -246,7 +254,8 @@ static __attribute__((noinline)) void kernel_local_segments_process_singly(kerne
     }
 }
 
-/* Returns for each given ray the depth of the first transparent surface behind t, +inf if there is none. */
+/* Returns for each ray in `rays` the depth of the first transparent surface behind the depth `from`; +inf if there is
+ * none. places: position of each ray among the tile's packets. */
 static __attribute__((noinline)) vf kernel_local_next_cut(const kernel_tile_trace *t, const kernel_tile_segments *b,
                                                           vi places, vm rays, vf from)
 {
@@ -261,7 +270,7 @@ static __attribute__((noinline)) vf kernel_local_next_cut(const kernel_tile_trac
     return vf_load(next);
 }
 
-/* Adds the segments of rays whose intervals surfaces cut, between the depths `reach`. */
+/* Adds the segments of rays whose intervals are cut by surfaces, between the depths reach[0] and reach[1]. */
 SIMD_INLINE void kernel_local_segments_cut_of(kernel_tile_trace *t, kernel_tile_segments *b,
                                               const kernel_local_pairs *whole, vm rays, const vf reach[2], int type)
 {
@@ -290,12 +299,13 @@ static __attribute__((noinline)) void kernel_local_segments_cut(kernel_tile_trac
     KERNEL_OF_TYPE(type, kernel_local_segments_cut_of, t, b, whole, rays, reach);
 }
 
+/* Adds the words of the given lanes to a list of rays. */
 SIMD_INLINE void kernel_local_list_add(kernel_tile_segments *b, int list, vm rays, vi words)
 {
     b->list_count[list] += vf_compress(b->list[list] + b->list_count[list], rays, vf_from_bits(words));
 }
 
-/* Loads a vector of rays of a list, from index n on. Returns the lanes that contain a ray. */
+/* Loads a vector of rays of a list, from index n on: their words and rays. Returns the lanes that contain a ray. */
 SIMD_INLINE vm kernel_local_list_load(const kernel_tile_segments *b, int list, const kernel_tile *tile, int n,
                                       vi *words, kernel_lane_rays *rays)
 {
@@ -306,8 +316,9 @@ SIMD_INLINE vm kernel_local_list_load(const kernel_tile_segments *b, int list, c
     return all;
 }
 
-/* Finds, for a vector of rays from index n on, the faces of their cells that they cross. Rays that cross two faces are
- * listed in `crossed`; rays for which this is uncertain are processed cell by cell. */
+/* Finds the faces that rays cross, for the vector of rays from index n on of the list KERNEL_LOCAL_MET. Rays that
+ * certainly cross exactly two faces once each are added to the lists of crossed faces. Rays for which that is uncertain
+ * are processed cell by cell. */
 SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_tile_segments *b, int type, int n)
 {
     kernel_lane_rays rays;
@@ -327,7 +338,7 @@ SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_tile_s
     }
 }
 
-/* Adds the segments of a vector of rays, from index n on, each of which crosses two faces of its cell. */
+/* Adds the segments of the vector of rays from index n on of a list of crossed faces. */
 SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_tile_segments *b, int list, int type, int n)
 {
     const kernel_tile_cells *cells = t->thread->tile_cells;
@@ -358,7 +369,8 @@ SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_tile_s
         kernel_local_segments_process_singly(t, p.rays.at, p.rays.lane, vm_bits(alone), reach, 1);
 }
 
-/* Lists those of the rays from index n on that may meet their cells within the window. */
+/* Adds those of the rays from index n on of the list of pixels to KERNEL_LOCAL_MET that may meet their cells within the
+ * window. */
 SIMD_INLINE void kernel_local_segments_overlap(const kernel_tile_trace *t, const kernel_tile_cells *cells,
                                                kernel_tile_segments *b, int n)
 {
@@ -375,6 +387,7 @@ SIMD_INLINE void kernel_local_segments_overlap(const kernel_tile_trace *t, const
     kernel_local_list_add(b, KERNEL_LOCAL_MET, vm_and(active, meets), pixel | lane << KERNEL_LOCAL_CELL);
 }
 
+/* Processes the rays in the list KERNEL_LOCAL_MET: finds the crossed faces, then adds the segments. */
 SIMD_INLINE void kernel_local_segments_met(kernel_tile_trace *t, kernel_tile_segments *b, int type)
 {
     const int met = b->list_count[KERNEL_LOCAL_MET];
@@ -384,6 +397,7 @@ SIMD_INLINE void kernel_local_segments_met(kernel_tile_trace *t, kernel_tile_seg
         for (int n = 0; n < b->list_count[list]; n += SIMD_WIDTH) kernel_local_segments_lanes(t, b, list, type, n);
 }
 
+/* Adds the segments of all rays in the list of pixels, and empties the list. */
 static __attribute__((noinline)) void kernel_local_segments_cast(kernel_tile_trace *t, int type)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
@@ -397,7 +411,7 @@ static __attribute__((noinline)) void kernel_local_segments_cast(kernel_tile_tra
 
 /* ---- cells ---- */
 
-/* Computes what segments need of the vector of cells: their faces and error budget. */
+/* Computes what segments need of the current vector of cells: their faces and error bounds. */
 SIMD_INLINE void kernel_local_segments_prepare(const kernel_tile_trace *t, kernel_tile_cells *cells,
                                                kernel_tile_segments *s, int type)
 {
@@ -406,8 +420,8 @@ SIMD_INLINE void kernel_local_segments_prepare(const kernel_tile_trace *t, kerne
     kernel_local_bound(t->frame, s->volume, (const float(*)[SIMD_WIDTH])cells->curved.at[3], type, &s->bounds);
 }
 
-/* Transforms the queue's cells into tile space; returns the visible ones, and stores in *lanes those that can be
- * processed in lanes. */
+/* Transforms the current vector of cells into tile space. Returns a mask of the visible cells; *lanes: mask of those
+ * that can be processed in lanes. */
 static __attribute__((noinline)) unsigned kernel_local_segments_transform(kernel_tile_trace *t, int type,
                                                                           unsigned *lanes)
 {
@@ -418,7 +432,7 @@ static __attribute__((noinline)) unsigned kernel_local_segments_transform(kernel
     return showing;
 }
 
-/* Stores the farthest depth at which the window of one of the block's active rays ends. */
+/* Stores in t->far the farthest depth at which the window of one of the block's active rays ends. */
 SIMD_INLINE void kernel_block_set_window_end(kernel_tile_trace *t, const kernel_segments *packets, int block)
 {
     vf end = vf_set(-INFINITY);
@@ -427,7 +441,8 @@ SIMD_INLINE void kernel_block_set_window_end(kernel_tile_trace *t, const kernel_
     t->far[block / SIMD_WIDTH][block % SIMD_WIDTH] = vf_reduce_max(end);
 }
 
-/* Lowers the farthest depth of those of the blocks in which the window of a ray has been shortened. */
+/* Lowers the depth in t->far of those of the given blocks in which the window of a ray has been shortened, because its
+ * list was full. */
 SIMD_INLINE void kernel_blocks_shorten(kernel_tile_trace *t, unsigned blocks)
 {
     kernel_segments *packets = t->thread->tile_segments->packets;
@@ -448,7 +463,8 @@ static void kernel_local_segments_finish(kernel_tile_trace *t, int unused)
     kernel_blocks_shorten(t, t->thread->tile_segments->blocks);
 }
 
-/* Copies, for each pixel, the window and the ends of the ray from the packets into arrays. */
+/* Copies what segments in lanes need of each ray from the packets of the given blocks into arrays by pixel: its window,
+ * and the part of the ray in which segments lie. */
 static void kernel_local_segments_begin(const kernel_tile_trace *t, kernel_tile_segments *b, unsigned blocks,
                                         int volume)
 {

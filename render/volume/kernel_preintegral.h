@@ -1,34 +1,37 @@
-/* Emission and absorption along a segment by sums over the transfer function's values, if an error is allowed
- * (max_error). Along a segment of length L on which the field goes from v0 to v1, optical depth and emission (without
- * absorption) are
+/* Computes emission and absorption along a segment from tables of the transfer function's integrals over the values, if
+ * the job allows an error (max_error). The tables have bins of equal width, and hold for each bin the integrals over
+ * all earlier bins. A knot is a value at which opacity or colour bends. Along a segment of length L on which the field
+ * goes from v0 to v1, optical depth and emission (without absorption) are
  *     D = L (S(v1) - S(v0)) / (v1 - v0),    E = L (K(v1) - K(v0)) / (v1 - v0),
  * where S and K are the integrals of the extinction s, and of s times the colour c, over the values (Max, Hanrahan and
- * Crawfis 1990; Engel, Kraus and Ertl 2001). Two ends are looked up; the cost does not depend on the number of knots
- * between them. Neighbouring segments share an end.
+ * Crawfis 1990; Engel, Kraus and Ertl 2001). S and K are looked up at the two ends; the time does not depend on the
+ * number of knots between them. Neighbouring segments share an end.
  *
- * How much of E the segment itself absorbs. If the colour c were E / D throughout, the light would be A E / D, with A =
- * 1 - exp(-D). The excess of this is the integral of c (m - exp(-t)) dt over the depth t from 0 to D, m = A / D. The
- * bracket is negative first, then positive. So among all c with values in a range R, the integral is largest if c jumps
- * from its minimum to its maximum where the bracket is zero. It is then R (1 - m + m ln m), or with u = 1 - m: R u^2 (1
- * / 2 + u / 6 + u^2 / 12 + ...) <= R U / 2, U = u^2 (1 + u). If c is linear in the value, from c0 to c1, it is monotone
- * in t however the depth is distributed, so that the excess is between 0 and (c1 - c0) U / 2: half of that is
- * subtracted, and the error is at most |c1 - c0| U / 4. If c deviates from that line by at most b, the error grows by b
- * U.
+ * How much of E the segment itself absorbs. If the colour c were E / D on the whole segment, the light would be A E /
+ * D, with the absorption A = 1 - exp(-D). That exceeds the segment's light by the integral of c (m - exp(-t)) dt over
+ * the optical depth t from 0 to D, with m = A / D. The bracket is negative first, then positive. So among all c whose
+ * values have a range of width R, the integral is largest if c jumps from its minimum to its maximum where the bracket
+ * is zero. It is then R (1 - m + m ln m), or with u = 1 - m: R u^2 (1 / 2 + u / 6 + u^2 / 12 + ...) <= R U / 2, U = u^2
+ * (1 + u). If c is linear in the value, from c0 to c1, it is monotone in t however the depth is distributed, so that
+ * the excess is between 0 and (c1 - c0) U / 2. Half of that is subtracted from the light, and the error is at most |c1
+ * - c0| U / 4. If c deviates from the chord between c0 and c1 by at most b, the error grows by b U.
  *
- * The deviation b from a chord over an interval of width h: a bend of the colour table by k at x in the interval adds
- * at most k (x - low) (high - x) / h, which over bends a distance d apart sums to k (h^2 / (6 d) + h / 4). At the ends
- * of the table, beyond which colours are constant, a bend adds k h / 4 more.
+ * The deviation b from a chord over an interval of values of width h, from low to high: a knot at x at which the slope
+ * of the colour changes by k adds at most k (x - low) (high - x) / h. The sum over knots at distances d is at most k
+ * (h^2 / (6 d) + h / 4). At the ends of the colour table, beyond which colours are constant, a knot adds k h / 4 more.
  *
- * The tables. S and K are exact at the borders of bins and linear within. In a bin of width w whose extinction varies
- * by o, the linear extinction errs by at most o, and S / w by o / 4. So the mean over an interval of n bins errs by at
- * most the sum of both ends' o times min(1, 1 / (2 n)); the same holds for K. S and K are stored as integers, so that
- * their differences are exact; o includes their rounding. The mean is computed as a sum of positive terms, so that
- * nothing cancels however close the two ends are.
+ * The tables. S and K are exact at the borders of bins and linear within a bin. In a bin of width w over which the
+ * extinction varies by o (maximum minus minimum), the extinction that S implies has an error of at most o, and S / w of
+ * at most o / 4. So the mean extinction over an interval of n bins has an error of at most the sum of both end bins' o
+ * times min(1, 1 / (2 n)); the same holds for K. S and K are stored as integers, so that their differences are exact; o
+ * includes their rounding. The mean is computed as a sum of positive terms, so that nothing cancels however close the
+ * two ends are.
  *
- * The budget (docs/development/error_budget.md). A segment may err by 0.15 max_error A + 0.05 max_error L / reach, both
- * times the light that arrives there: summed over a ray at most 0.2 max_error. If that does not suffice, the segment is
- * cut into subintervals of equal value ranges; the error of the absorption falls with the square of their number. If
- * too many would be needed, or a bin is too coarse, kernel_integrate() computes the segment. */
+ * The budget (docs/development/error_budget.md). The light of a segment may have an error of 0.15 max_error A + 0.05
+ * max_error L / reach, where reach is the length of the longest ray, times the transmittance in front of the segment:
+ * summed over a ray at most 0.2 max_error. If the error is larger, the segment is divided into subintervals over which
+ * the value changes by equal amounts; the error of the absorption falls with the square of their number. If too many
+ * would be needed, or a bin is too wide, kernel_integrate() computes the segment. */
 #ifndef RENDER_KERNEL_PREINTEGRAL_H
 #define RENDER_KERNEL_PREINTEGRAL_H
 
@@ -39,22 +42,27 @@
 /* Maximum number of subintervals of a segment. */
 #define KERNEL_PRE_PARTS 32.0f
 
-/* The position of a value in the tables of sums. */
+/* The position of a value in the table, one value per lane, and the entries of its bin (kernel_preint_entry). */
 typedef struct kernel_preint_end {
-    /* position: position within the bin, 0 .. 1; it may be outside this range in the first and the last bin */
+    /* bin: index of the bin; position: position within the bin, from 0 to 1, or outside this range in the first and the
+     * last bin */
     vf value, bin, position;
-    vf own[4], table_error; /* own: the bin's sums of extinction and emission; table_error: error bound of these */
-    vi before[4], colour;   /* sums over all bins before it */
+    /* own: the bin's integrals of extinction and emission in three channels, in integer units; table_error: their error
+     * bound, as light */
+    vf own[4], table_error;
+    /* before: the integrals over all earlier bins, in the same units; colour: packed colour at the bin's middle */
+    vi before[4], colour;
 } kernel_preint_end;
 
 /* The light of a segment or of a subinterval of it, and bounds of its error. */
 typedef struct kernel_preint_subinterval {
-    vf colour[3], depth, absorbed;
-    /* error: bound of the error of absorption within the segment; table_error: bound of the error of the tables' sums;
-     * allowed: the error budget */
+    vf colour[3], depth, absorbed; /* premultiplied colour; optical depth; 1 - transmittance */
+    /* Bounds of the error of light. error: caused by the absorption within the segment; table_error: caused by the
+     * table's integrals; allowed: the error that the segment may have. */
     vf error, table_error, allowed;
 } kernel_preint_subinterval;
 
+/* Looks up the bin of each lane's value. */
 SIMD_INLINE void kernel_preint_find(const kernel_preintegral *t, vf value, kernel_preint_end *e)
 {
     const vf y = (value - t->low) * t->inverse + 1.0f;
@@ -74,8 +82,8 @@ SIMD_INLINE void kernel_preint_find(const kernel_preintegral *t, vf value, kerne
     e->colour = vi_from_bits(rest[0]);
 }
 
-/* Returns 1 - exp(-y). *share receives this number divided by y. For small y the series is used, whose first omitted
- * term is y^6 / 5040. */
+/* Returns 1 - exp(-y); *share becomes this number divided by y. For small y a series is used, whose first omitted term
+ * is y^6 / 5040. */
 SIMD_INLINE vf kernel_absorbed_share(vf y, vf *share)
 {
     vf p = y * (-1.0f / 720) + 1.0f / 120;
@@ -93,6 +101,7 @@ SIMD_INLINE vf kernel_absorbed_share(vf y, vf *share)
     return gone;
 }
 
+/* Returns a channel of a packed colour. */
 SIMD_INLINE vf kernel_preint_channel(const kernel_preintegral *t, vi colour, int channel)
 {
     return vf_from_vi(colour >> (10 * channel) & 1023) * t->colour_unit;
@@ -107,6 +116,8 @@ SIMD_INLINE vf kernel_preint_bend(const kernel_preintegral *t, vf v0, vf v1)
     return bend + vf_select(outside, vf_min(width * t->bend_at_ends, vf_set(t->contrast)), vf_set(0));
 }
 
+/* Computes the light of a segment between the values a and b, and the bounds of its error. length: in unit distances.
+ */
 SIMD_INLINE void kernel_preint_between(const kernel_preintegral *t, const kernel_preint_end *a,
                                        const kernel_preint_end *b, vf length, kernel_preint_subinterval *out)
 {
@@ -122,7 +133,7 @@ SIMD_INLINE void kernel_preint_between(const kernel_preintegral *t, const kernel
     }
     out->depth = sum[0] * t->depth_unit;
     const vf gone = kernel_absorbed_share(0.5f * out->depth, &mean);
-    /* mean transmittance along the segment, which is its absorption divided by its optical depth */
+    /* mean: mean transmittance along the segment; it is the absorption divided by the optical depth */
     mean *= 1.0f - 0.5f * gone;
     const vf lost = 1.0f - mean, square = lost * lost * (1.0f + lost);
     mean *= t->light_unit;
@@ -138,8 +149,8 @@ SIMD_INLINE void kernel_preint_between(const kernel_preintegral *t, const kernel
     out->allowed = out->absorbed * t->allowed_absorbed + length * t->allowed_length;
 }
 
-/* Integrates the segment in `count` subintervals of equal value ranges. Each ray has its own count, and so its result
- * does not depend on other lanes. */
+/* Computes the light of each ray's segment from `count` subintervals over which the value changes by equal amounts.
+ * Each ray has its own count, so that its result does not depend on other lanes. most: maximum of the counts. */
 static __attribute__((noinline)) void kernel_preint_subdivide(const kernel_preintegral *t,
                                                               const kernel_preint_end *from, vf v_out, vf length,
                                                               vf count, int most, kernel_preint_subinterval *all)
@@ -173,7 +184,8 @@ SIMD_INLINE kernel_light kernel_light_select(vm m, const kernel_preint_subinterv
     return out;
 }
 
-/* Integrates the rays for which a single subinterval is not accurate enough. */
+/* Computes the light of segments for which a single subinterval is not accurate enough: by several subintervals or, if
+ * that is not accurate enough either, by kernel_integrate(). */
 static __attribute__((noinline)) void kernel_preint_refine(const kernel_pieces *pieces, vm rays,
                                                            const kernel_preint_end *from,
                                                            const kernel_unit_segment *run,
@@ -202,9 +214,9 @@ static __attribute__((noinline)) void kernel_preint_refine(const kernel_pieces *
     light->transmittance = vf_select(left, exact.transmittance, light->transmittance);
 }
 
-/* Returns the light of the segment alone, within the error budget; kernel_integrate() would compute it exactly. *end:
- * position in the tables of the ends of the previous segments. It is reused where a segment begins at the end of the
- * previous one, and is then replaced by the position of this segment's end. */
+/* Returns the light of one segment per ray, without what lies in front of it, within the allowed error. *end: the
+ * position in the table of the value at which the previous segments ended. It is reused if this segment begins with the
+ * same value, and is then replaced by the position of this segment's end. */
 SIMD_INLINE kernel_light kernel_preintegrated(const kernel_pieces *pieces, vm rays, const kernel_unit_segment *run,
                                               kernel_preint_end *end)
 {

@@ -2,8 +2,9 @@
  * each sample in an interval, t_in <= t < t_out, gets its value.
  *
  * A sample's position depends only on its number and its ray, so that all ranks use the same samples. Each sample
- * belongs to one cell, because neighbouring cells share the bits of t at their face; only if cells overlap it belongs
- * to several. */
+ * belongs to one cell, because the depth t of a face's crossing is bit-identical in both of its cells; only if cells
+ * overlap, a sample belongs to several. Samples are computed window by window: a window is a range of consecutive
+ * sample numbers. Values are in the transfer function's domain. */
 #ifndef RENDER_KERNEL_SAMPLES_H
 #define RENDER_KERNEL_SAMPLES_H
 
@@ -21,19 +22,22 @@
 #include "render_face_error.h"
 #include "simd.h"
 
-/* Share of light below which a rank drops a sample and everything behind it. Colours of at most 1 change by at most
- * this much light, so that a channel errs by at most this: a tenth of the 1e-6 by which partitions may differ, of which
- * rounding takes most. A rank counts only its own cells. Other ranks' cells absorb more light, so a rank drops less
- * than one rank with all cells would, and the bound holds for all ranks together: at the first sample that any rank
- * drops, its own cells already leave no more light than this. */
+/* Share of light below which a ray is dark: a rank drops the sample at which less light is left, and everything behind
+ * it. With colours of at most 1, a channel changes by at most this much: a tenth of the 1e-6 by which the pictures of
+ * different partitions may differ. (Rounding takes most of the 1e-6.) A rank counts only its own cells. Other ranks'
+ * cells absorb more light, so a rank drops less than one rank with all cells would, and the bound holds for all ranks
+ * together: at the first sample that any rank drops, its own cells already leave no more light than this. */
 #define KERNEL_DARK FRAGMENT_DARK_OF_RANK
 
-/* For each ray, the fragment to which samples or segments are being added front to back. */
+/* The fragment to which the samples or segments of a ray are being added from front to back, one ray per lane. */
 typedef struct kernel_blend {
-    vm open;
+    vm open; /* rays that have such a fragment */
+    /* t_first, t_last: depths at which the fragment begins and ends; contact_in, contact_out: ends of the interval, in
+     * its cell, that contains the last sample (kernel_frame.needs_contact) */
     vf t_first, t_last, contact_in, contact_out;
     vf colour[3], transmittance;
-    /* used for segments: -ln(transmittance), and the accumulated rounding errors of the colour sums */
+    /* used for segments: the fragment's optical depth, -ln(transmittance), and the accumulated rounding errors of its
+     * colour */
     vf depth, rounding_errors[3];
     vf light; /* share of the light that passes all of this rank's samples so far */
     /* Used if all samples and segments of a ray are folded into few fragments (render_fold.h). interval_number: index
@@ -47,29 +51,32 @@ SIMD_INLINE kernel_blend kernel_blend_begin(void)
     return (kernel_blend){.open = vm_none(), .light = vf_set(1), .transmittance = vf_set(1), .within = vf_set(1)};
 }
 
-/* The samples of a packet's rays in a window; a value is NaN if no cell of this rank contains the sample. */
+/* The samples of a packet's rays in a window. A value is NaN as long as no cell of this rank has been found that
+ * contains the sample. */
 typedef struct kernel_samples {
-    int volume; /* index of the volume whose samples are being computed */
-    int first, count;
-    float pad; /* error bound of sample numbers that are computed from depths */
+    int volume;       /* index of the volume whose samples are being computed */
+    int first, count; /* number of the window's first sample, and number of samples in the window */
+    float pad;        /* error bound of sample numbers that are computed from depths */
     vf value[RENDER_MAX_VOLUMES][KERNEL_MAX_GROUP];
-    /* ends of the interval that contains the sample; set only if the frame needs_contact */
+    /* depths of the ends of the ray's interval, in its cell, that contains the sample; set only if the frame
+     * needs_contact */
     vf t_in[KERNEL_MAX_GROUP], t_out[KERNEL_MAX_GROUP];
     vf overlap_depth; /* depth of the ray's nearest sample that lies in two cells, in this window and earlier ones */
     kernel_blend blend;
-    /* active rays of the packet, saved here because the packet's own mask is reduced to rays that still receive
-     * light */
+    /* active rays of the packet at its begin, saved here because p->active is reduced to rays that still receive light
+     */
     vm active;
 } kernel_samples;
 
+/* Returns the depth of sample number m on each ray. */
 SIMD_INLINE vf kernel_sample_t(const kernel_packet *p, int m)
 {
     return p->sample_base + p->sample_step * (float)m;
 }
 
-/* Sets the window to samples first .. first + count - 1. A number computed from t has three roundings; a t computed
- * from the number m has two, of step * m and of t. So they differ by at most 6e-8 (4 m + t / step), and t / step is at
- * most m + base / step. */
+/* Sets the window to the samples with numbers first .. first + count - 1, and computes the error bound s->pad. A number
+ * computed from a depth t has three roundings; a depth computed from a number m has two, of step * m and of t. So the
+ * two differ by at most 6e-8 (4 m + t / step), and t / step is at most m + base / step. */
 SIMD_INLINE void kernel_samples_window(const kernel_packet *p, kernel_samples *s, int first, int count)
 {
     const float base = vf_reduce_max(vf_select(p->active, vf_abs(p->sample_base * p->sample_inverse), vf_set(0)));
@@ -78,8 +85,8 @@ SIMD_INLINE void kernel_samples_window(const kernel_packet *p, kernel_samples *s
     s->pad = 1e-4f + 4e-7f * ((float)((first < 0 ? -first : first) + count) + base);
 }
 
-/* Finds the window's samples that may lie in the interval of some ray, as indices *begin .. *end - 1 into the
- * window. */
+/* Finds the window's samples that may lie in the interval i of at least one ray: those with the indices *begin .. *end
+ * - 1 in the window. */
 SIMD_INLINE void kernel_sample_range(const kernel_packet *p, const kernel_samples *s, const kernel_interval *i,
                                      int *begin, int *end)
 {
@@ -94,10 +101,11 @@ SIMD_INLINE void kernel_sample_range(const kernel_packet *p, const kernel_sample
     *end = (int)last;
 }
 
-/* Emits a sample as a fragment of its own, if it is in front of opaque surfaces. Unless samples are separate, this
- * happens because another cell already contains the sample, and it marks the ray as overlapping (render.h). Only the
- * nearest such sample is emitted, because others may be behind another rank's opaque surface. A clear fragment is
- * emitted with it, so that the two overlap. cell: the ray's interval in the sample's cell. */
+/* Emits one sample per ray of `mask` as a fragment of its own, if it lies in front of opaque surfaces. t, value: its
+ * depth and value; cell: the ray's interval in the sample's cell. With separate_samples (render.h) this is done with
+ * all samples. Otherwise it is done because another cell already contains the sample, and marks the ray as one on which
+ * cells overlap. Then only the nearest such sample is emitted, because others may be behind another rank's opaque
+ * surface, and a clear fragment is emitted with it, so that the two fragments overlap. */
 static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p, kernel_samples *s,
                                                                const kernel_interval *cell, vm mask, vf t, vf value)
 {
@@ -128,8 +136,9 @@ static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p,
     kernel_emit(p, mask, kind, &sample);
 }
 
-/* Sets those of the window's samples begin .. end - 1 that lie in the interval i. A sample keeps the value of the first
- * cell that contains it. cell: the rays' intervals in the whole cell, of which i is all or, in a polyhedron, a part. */
+/* Sets the values of those of the window's samples begin .. end - 1 that lie in the interval i. A sample keeps the
+ * value of the first cell that contains it. map: the cell's inverse map, NULL if the field is linear along i; cell: the
+ * rays' intervals in the whole cell, of which i is all or, in a polyhedron, a part. */
 SIMD_INLINE void kernel_fill_some(kernel_packet *p, kernel_samples *s, const kernel_map *map, const kernel_interval *i,
                                   const kernel_interval *cell, int begin, int end)
 {
@@ -160,6 +169,7 @@ SIMD_INLINE void kernel_fill_some(kernel_packet *p, kernel_samples *s, const ker
     }
 }
 
+/* Sets the values of the window's samples that lie in the interval i (kernel_fill_some()). */
 SIMD_INLINE void kernel_fill(kernel_packet *p, kernel_samples *s, const kernel_map *map, const kernel_interval *i,
                              const kernel_interval *cell)
 {
@@ -168,7 +178,7 @@ SIMD_INLINE void kernel_fill(kernel_packet *p, kernel_samples *s, const kernel_m
     if (begin < end) kernel_fill_some(p, s, map, i, cell, begin, end);
 }
 
-/* Ends the current fragments of the rays in mask, and emits them if they are visible. */
+/* Ends the current fragments of the rays in `mask`, and emits those that are visible. */
 SIMD_INLINE void kernel_blend_close(kernel_packet *p, kernel_blend *b, vm mask)
 {
     const vm closing = vm_and(b->open, mask);
@@ -179,9 +189,9 @@ SIMD_INLINE void kernel_blend_close(kernel_packet *p, kernel_blend *b, vm mask)
     b->open = vm_andnot(b->open, closing);
 }
 
-/* Emits each sample or segment as a fragment of its own, which render_fold.h folds later, and marks those in front of
- * which another rank may have fragments. The current fragment then has no light of its own, so that nothing is emitted
- * when it ends. */
+/* Emits one sample or segment per ray in `has` as a fragment of its own, which render_fold.c joins with others later,
+ * and marks those in front of which another rank may have fragments. The ray's current fragment then has no light of
+ * its own, so that nothing is emitted when it ends. */
 SIMD_INLINE void kernel_blend_separate(kernel_packet *p, kernel_blend *b, vm has, vf t_in, vf t_out, const vf colour[3],
                                        vf clear)
 {
@@ -199,8 +209,8 @@ SIMD_INLINE void kernel_blend_separate(kernel_packet *p, kernel_blend *b, vm has
     b->open = vm_or(b->open, has);
 }
 
-/* Returns the rays whose current fragment must end before the sample at t, because a surface lies in between, or may
- * lie there on another rank. */
+/* Returns the rays whose current fragment must end before sample n of the window, at depth t, is added: a surface lies
+ * between, or may lie there on another rank. */
 SIMD_INLINE vm kernel_blend_breaks(const kernel_packet *p, const kernel_samples *s, int n, const kernel_hits *hits,
                                    vf t)
 {
@@ -215,7 +225,8 @@ SIMD_INLINE vm kernel_blend_breaks(const kernel_packet *p, const kernel_samples 
     return broken;
 }
 
-/* Computes the premultiplied colour and the transmittance of all volumes' samples at one position. */
+/* Computes the premultiplied colour and the transmittance (*clear) of sample n of the window, from the samples of all
+ * volumes at its position. */
 SIMD_INLINE void kernel_sample_colour(const kernel_packet *p, const kernel_samples *s, int n, vf colour[3], vf *clear)
 {
     const kernel_frame *f = p->frame;
@@ -241,6 +252,7 @@ SIMD_INLINE void kernel_sample_colour(const kernel_packet *p, const kernel_sampl
     *clear = through;
 }
 
+/* Adds the light of the window's samples to the rays' fragments, from front to back. */
 SIMD_INLINE void kernel_blend_window(kernel_packet *p, kernel_samples *s, const kernel_hits *hits)
 {
     kernel_blend *b = &s->blend;

@@ -1,6 +1,6 @@
-/* Stores the segments of each ray until everything in front of them is known: one unsorted list of bounded length per
- * ray. kernel_segments.h explains how windows of depth work with this bounded length. Emits segments that compositing
- * mixes with other volumes. */
+/* Stores the segments of each ray, in an unsorted list of bounded length per ray, until everything in front of them is
+ * known. kernel_segments.h defines the terms, and explains how windows of depth keep the lists within their length.
+ * Also emits segments as fragments that compositing mixes with those of other volumes. */
 #ifndef RENDER_KERNEL_SEGMENT_LIST_H
 #define RENDER_KERNEL_SEGMENT_LIST_H
 
@@ -19,32 +19,36 @@
 #include "kernel_types.h"
 #include "simd.h"
 
-enum { KERNEL_WINDOW = 128 };
+enum { KERNEL_WINDOW = 128 }; /* maximum number of segments of a ray in a window */
 
 /* The segments of a packet's rays in a volume and a window of depth. */
 typedef struct kernel_segments {
-    int count[SIMD_WIDTH];
-    float items[SIMD_WIDTH][KERNEL_WINDOW][4]; /* t_in, t_out, v_in and v_out of each ray's segments, unsorted */
-    /* Set if the ends of segments are stored in double (kernel_unit_segment): each segment's length in unit distances,
-     * and the rounding errors of v_in and v_out. Its rows have four numbers too, so that one index serves both. */
+    int count[SIMD_WIDTH]; /* number of segments of each ray */
+    /* per ray and segment, unsorted: t_in and t_out (depths, in scaled units), v_in and v_out (in the transfer
+     * function's domain) */
+    float items[SIMD_WIDTH][KERNEL_WINDOW][4];
+    /* Set if the ends of segments are stored in double. `precise` then holds, per ray and segment, the length in unit
+     * distances and the rounding errors of v_in and v_out (kernel_unit_segment). Its rows have four numbers like those
+     * of `items`, so that one index serves both. */
     bool is_double;
     float precise[SIMD_WIDTH][KERNEL_WINDOW][4];
     int capacity; /* capacity of each ray's list; half as large in double, so that a tile's lists stay in the cache */
     kernel_f64 u[2], v[2]; /* (u, v) of the rays in double, relative to the tile's centre; set if is_double is */
-    /* Light of the segments that do not fit into a list because too many begin at the same t, as in meshes that overlap
-     * many times. Such segments have no order; they are integrated here at once, and blended behind the window. */
+    /* Light of the segments that do not fit into a ray's list because more than its capacity begin at the same depth,
+     * as in meshes that overlap many times. Such segments have no order. They are integrated at once, and this sum is
+     * blended behind the window's other segments. */
     kernel_light unsorted_light;
-    vf t_begin, t_end;      /* depth interval of each ray's window */
-    bool is_shortened;      /* set if t_end has been lowered since the flag was last cleared */
-    vf per_t;               /* number of unit distances (of the transfer function) per unit of t on each ray */
-    const kernel_hits *cut; /* the packet's crossings of transparent surfaces, which cut segments; NULL: no cuts */
-    int volume;
-    const kernel_pieces *pieces;
-    /* error allowed per share of the ray's length and of its absorption; 0: subintervals are as long as the sampling
-     * step */
+    vf t_begin, t_end;           /* depth interval of each ray's window */
+    bool is_shortened;           /* set if t_end has been lowered since the flag was last cleared */
+    vf per_t;                    /* number of unit distances (of the transfer function) per unit of t on each ray */
+    const kernel_hits *cut;      /* the packet's crossings of transparent surfaces, which cut segments; NULL: no cuts */
+    int volume;                  /* index of the volume */
+    const kernel_pieces *pieces; /* the volume's transfer function */
+    /* error of light that is allowed, times a segment's share of the ray's length or of its absorption
+     * (kernel_local_budget.h); 0: segments of hexes, wedges and pyramids are at most as long as the sampling step */
     float allowance;
-    /* > 0: error allowed by mixing; the window's segments are then emitted, to be mixed with other volumes
-     * (kernel_emit_segment()) */
+    /* > 0: segments are emitted to be mixed with other volumes (kernel_emit_segment()), with at most this error; 0:
+     * they are integrated here */
     float mixing;
     float reach; /* upper bound of a ray's length in the cells, in unit distances */
     kernel_blend blend;
@@ -52,7 +56,7 @@ typedef struct kernel_segments {
     /* Depth at which segments are cut: at an opaque surface. Segments that compositing mixes with other volumes are cut
      * only at clips, not at this rank's surfaces, so that they are the same on any partition. */
     vf t_cut;
-    /* active rays of the packet, saved here because the packet's own mask is reduced to rays that have not ended */
+    /* active rays of the packet at its begin, saved here because p->active is reduced to rays that have not ended */
     vm active;
 } kernel_segments;
 
@@ -67,8 +71,9 @@ SIMD_INLINE int kernel_packet_lane_of_pixel(const kernel_packet *p, uint32_t pix
     return -1;
 }
 
-/* Finds the next depth at which transparent surfaces cut each ray, by a search of all of the tile's fragments. It is
- * used if a ray has more such depths than kernel_hits stores. */
+/* Returns for each ray the depth of the first transparent surface at or behind `from` (only behind if `beyond` is set),
+ * by a search of all of the tile's fragments; +inf if there is none. It is used if a ray crosses more transparent
+ * surfaces than kernel_hits stores. */
 static vf kernel_next_cut_by_search(const kernel_packet *p, vf from, bool beyond)
 {
     float start[SIMD_WIDTH], next[SIMD_WIDTH];
@@ -101,6 +106,7 @@ SIMD_INLINE vf kernel_next_cut(const kernel_packet *p, const kernel_segments *li
 
 /* ---- a ray's segments ---- */
 
+/* Sets whether the ends of segments are stored in double, and what depends on it. */
 SIMD_INLINE void kernel_segments_set_double(const kernel_packet *p, kernel_segments *list, bool is_double)
 {
     list->is_double = is_double;
@@ -108,6 +114,7 @@ SIMD_INLINE void kernel_segments_set_double(const kernel_packet *p, kernel_segme
     if (is_double) kernel_double_rays_of(p, list->u, list->v);
 }
 
+/* Sorts the full list of the ray in `lane` by t_in. */
 static void kernel_items_sort(kernel_segments *list, int lane)
 {
     float(*items)[4] = list->items[lane], (*precise)[4] = list->precise[lane];
@@ -125,6 +132,7 @@ static void kernel_items_sort(kernel_segments *list, int lane)
     }
 }
 
+/* Sets the light of unsorted segments to none on the ray in `lane`. */
 SIMD_INLINE void kernel_heap_clear(kernel_light *unsorted_light, int lane)
 {
     for (int a = 0; a < 3; a++) unsorted_light->colour[a][lane] = 0;
@@ -132,9 +140,9 @@ SIMD_INLINE void kernel_heap_clear(kernel_light *unsorted_light, int lane)
     unsorted_light->transmittance[lane] = 1;
 }
 
-/* Makes space in a full list for a segment that begins at t_in: the window ends at the begin of one of its farther
- * segments, and all segments from there on are dropped. Returns false if all segments, including the new one, begin at
- * the same depth. */
+/* Makes space in the full list of a ray (lane) for a segment that begins at t_in: the window is shortened so that it
+ * ends where one of the list's farther segments begins, and all segments from there on are dropped; the ray's next
+ * window contains them. Returns false if all segments, including the new one, begin at the same depth. */
 static __attribute__((noinline, cold)) bool kernel_segments_shorten(kernel_segments *list, int lane, float t_in)
 {
     const float(*items)[4] = (const float(*)[4])list->items[lane];
@@ -158,7 +166,9 @@ static __attribute__((noinline, cold)) bool kernel_segments_shorten(kernel_segme
     return true;
 }
 
-/* Adds a segment to a ray's list. Returns false if the list is full and all its segments begin at the same t. */
+/* Adds a segment, given as rows of list->items and list->precise, to the list of the ray in `lane`. A segment that does
+ * not begin in front of the end of a shortened window is dropped. Returns false if the list is full and all its
+ * segments begin at the same depth as this one. */
 SIMD_INLINE bool kernel_segments_insert(kernel_segments *list, int lane, const float item[4], const float precise[4])
 {
     if (__builtin_expect(list->count[lane] == list->capacity, 0)) {
@@ -171,9 +181,10 @@ SIMD_INLINE bool kernel_segments_insert(kernel_segments *list, int lane, const f
     return true;
 }
 
-/* Adds a segment from t_in to t_out to the list of each given ray whose window does not end before it. Segments must
- * not begin before the rays' windows. at: position of each ray among the packets' rays, from `packets` on. The length
- * of `run` is used only if the lists are in double. */
+/* Adds one segment per lane, from t_in to t_out, to the list of the lane's ray, unless the ray's window ends in front
+ * of t_in. Segments must not begin in front of the rays' windows. at: position of each ray among the tile's packets
+ * (packet * SIMD_WIDTH + lane), whose lists begin at `packets`; rays: mask of the lanes that have a segment; run:
+ * values at the segments' ends. run->length is used only if the lists are in double. */
 SIMD_INLINE void kernel_segments_add_at(kernel_segments *packets, bool is_double, const int32_t at[SIMD_WIDTH], vm rays,
                                         vf t_in, vf t_out, const kernel_unit_segment *run)
 {
@@ -194,7 +205,7 @@ SIMD_INLINE void kernel_segments_add_at(kernel_segments *packets, bool is_double
     }
 }
 
-/* As above, for the rays of one packet: lane n is ray n. */
+/* Adds one segment per ray of a packet to the list of the packet's rays; otherwise as kernel_segments_add_at(). */
 static __attribute__((noinline)) void kernel_segments_add(kernel_segments *list, vm rays, vf t_in, vf t_out,
                                                           const kernel_unit_segment *run)
 {
@@ -202,22 +213,24 @@ static __attribute__((noinline)) void kernel_segments_add(kernel_segments *list,
     if (vm_any(rays)) kernel_segments_add_at(list, list->is_double, own, rays, t_in, t_out, run);
 }
 
+/* Returns member 0 to 3 of each ray's segment. item: position of the segment's row in floats, from list->items on. */
 SIMD_INLINE vf kernel_items_gather(const kernel_segments *list, int member, vi item)
 {
     return vf_gather(list->items[0][0] + member, item);
 }
 
-/* Returns the rays on which the two segments begin at the same t and `item` ends before `earlier`: it has length 0 in
- * float32 and must come first. */
+/* Returns those rays in `same` on which the segment `item` must come before the segment `earlier`: both begin at the
+ * same depth, and `item` ends in front of `earlier`'s end, because its length is 0 in float32. */
 static __attribute__((noinline, cold)) vm kernel_segments_begin_equal(const kernel_segments *list, vm same, vi item,
                                                                       vi earlier)
 {
     return vm_and(same, vf_lt(kernel_items_gather(list, 1, item), kernel_items_gather(list, 1, earlier)));
 }
 
-/* Sorts the segments of all rays by t_in. Row n of the results holds the n-th segment of each ray: where it begins,
- * +inf if a ray has fewer segments, and its position in floats from list->items on. Returns the number of rows. It
- * sorts by insertion, as the segments are nearly sorted already, because the traversal is front to back. */
+/* Sorts the segments of all rays by t_in. Element n of the results belongs to the n-th segment of each ray: the depth
+ * at which it begins (begins[n]; +inf if the ray has fewer segments), and its position in floats from list->items on
+ * (items[n]). Returns the largest number of segments of a ray. It uses insertion sort, because the segments are nearly
+ * sorted already: the traversal is front to back. */
 static int kernel_segments_sort(const kernel_segments *list, vf begins[KERNEL_WINDOW], vi items[KERNEL_WINDOW])
 {
     enum { FLOATS = sizeof list->items[0][0] / sizeof(float) };
@@ -259,7 +272,7 @@ static int kernel_segments_sort(const kernel_segments *list, vf begins[KERNEL_WI
 
 /* ---- parts of segments ---- */
 
-/* Maximum number of equal parts into which a segment is divided to be mixed. */
+/* Maximum number of equal parts into which a segment is divided for mixing. */
 enum { KERNEL_MAX_SUBDIVISIONS = 256 };
 /* Optical depth at which the transmittance exp(-depth) is KERNEL_BLACK or slightly more. */
 #define KERNEL_DARK_DEPTH 18.4f
@@ -286,8 +299,9 @@ SIMD_INLINE kernel_unit_segment kernel_unit_segment_part(const kernel_unit_segme
     return out;
 }
 
-/* Returns the positions, as shares of the segment's length, at which the pieces end that begin at `from`. share: length
- * of a piece; steps of the opacity end pieces too. */
+/* Returns where the part of a segment that begins at `from` ends, so that compositing can mix it. Positions are shares
+ * of the segment's length. share: length of a part (kernel_mixed_share()); parts also end where the opacity has a step.
+ */
 SIMD_INLINE vf kernel_mixed_end(const kernel_pieces *t, const kernel_unit_segment *whole, vf share, vf from)
 {
     const vf one = vf_set(1), inverse = one / (whole->v_out - whole->v_in);
@@ -299,13 +313,14 @@ SIMD_INLINE vf kernel_mixed_end(const kernel_pieces *t, const kernel_unit_segmen
     return to;
 }
 
-/* Returns the share of a segment's length that one fragment may have if compositing mixes it with other volumes, which
- * it treats as a uniform medium (comp.h). In an interval of depth d whose extinction and colour vary by a share v, at
- * most d v / 4 is displaced from its assumed position, and the effect on light is attenuated by the other volumes'
- * depth in the interval. That depth, times the light that arrives there, sums to 1 over a ray; so d v / 4 may be the
- * whole error allowed. Let s be the extinction, c the colour, R the contrast and s' and c' the slopes. Then d v is at
- * most (R |s'| + s |c'|) times the change of the value, and s |c'| <= cost + R |s'|, as the cost bounds s c' + s' (c -
- * b). */
+/* Returns the share of a segment's length that one fragment may have if compositing mixes it with fragments of other
+ * volumes. Compositing treats a fragment as a uniform medium (comp.h). Let d be the optical depth of the fragment, and
+ * v the relative variation of its extinction and colour. Then at most d v / 4 of its light is displaced, and the effect
+ * is proportional to the other volumes' optical depth in the same interval. That depth, times the light that arrives
+ * there, sums to at most 1 over a ray; so d v / 4 may be the whole error that mixing is allowed. Let s be the
+ * extinction, c the colour, b the light from behind, R the contrast, and s' and c' the derivatives by the value. Then d
+ * v is at most (R |s'| + s |c'|) times the change of the value times the length, and s |c'| <= cost + R |s'|, because
+ * the cost (kernel_light_bounds()) bounds |s c' + s' (c - b)|. */
 SIMD_INLINE vf kernel_mixed_share(const kernel_segments *list, const kernel_unit_segment *run)
 {
     const kernel_pieces *t = list->pieces;
@@ -318,10 +333,10 @@ SIMD_INLINE vf kernel_mixed_share(const kernel_segments *list, const kernel_unit
     return 1.0f / vf_max(count, vf_set(1));
 }
 
-/* Emits a segment as fragments, which compositing mixes with other volumes. kernel_integrate() stops once all but
- * KERNEL_BLACK of the light is absorbed, so that its depth is then too small; but compositing mixes fragments by their
- * depth. So a fragment that is so dense is bisected until its parts are not, and emission ends when no light is
- * left. */
+/* Emits one segment per ray as fragments, which compositing mixes with those of other volumes by their optical depths.
+ * kernel_integrate() stops once all light but KERNEL_BLACK is absorbed, so that the depth of a very dense fragment
+ * would be too small. Therefore such a fragment is bisected until its parts are less dense. Emission ends when no light
+ * is left. */
 static void kernel_emit_segment(kernel_packet *p, const kernel_segments *list, vm rays, vf t_in, vf t_out,
                                 const kernel_unit_segment *whole)
 {

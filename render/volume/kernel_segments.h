@@ -1,9 +1,18 @@
-/* Volumes by segments: the integral of emission and absorption instead of a sum over samples.
+/* Integrates emission and absorption of volumes along rays by segments, instead of a sum over samples. Terms:
+ *     segment          part of a ray in one cell, from t_in to t_out, on which the field is taken as linear from v_in
+ * to v_out t, v             depth (z in tile space, scaled units); value of the field in the transfer function's domain
+ *     unit distance    length to which the transfer function's opacities refer (render_transfer)
+ *     window           interval of depths whose segments are collected and then integrated; each ray has its own
+ *     cut              depth at which a ray crosses a transparent surface; segments end there
+ *     gap              part of a ray between two segments in which this rank has no cell
+ *     fragment         the light of consecutive segments, which is passed to compositing
+ *     mixing           compositing of fragments that overlap in depth, of several volumes or overlapping cells
  *
- * If the field is linear on a cell's interval on a ray (tets, constant cells), the interval is one segment; else it is
- * cut into equal segments with a linear field each. Segments are stored until everything in front of them is known, as
- * cells come in the order of the tree, not of the ray. Then the n-th segments of all rays are integrated together
- * (kernel_integral.h), which fills the lanes far better than cell by cell: few of a packet's rays meet a given cell.
+ * If the field is linear on a ray's interval in a cell (in tets and constant cells), the interval is one segment.
+ * Otherwise it is divided into segments of equal length. Segments are stored until everything in front of them is
+ * known, because cells are visited in the order of the tree, not of the ray. Then the n-th segments of all rays of a
+ * packet are integrated together (kernel_integral.h), which fills the lanes far better than cell by cell: few of a
+ * packet's rays meet a given cell.
  *
  * Each ray has a list of bounded length. When it is full, the window's end is lowered to the t_in of one of its farther
  * segments, and the segments from there on are dropped; the traversal, whose far limit is that end, visits only nearer
@@ -13,13 +22,14 @@
  *     |--cell--|--cell--|----cell----|-|--cell--|
  *              ^ t_in in window 1      ^ t_in == t_end: window 2
  *
- * A segment belongs to the window that contains its t_in and is never cut at the window's end, so that a ray's result
+ * A segment belongs to the window that contains its t_in. It is never cut at the window's end, so that a ray's result
  * depends neither on the windows nor on the other rays of its packet. Surfaces do cut segments. A fragment joins
- * segments whose t_out and t_in have the same bits, as neighbouring cells' have; it ends at a gap, which may belong to
- * another rank.
+ * consecutive segments if the t_out of one is bit-identical to the t_in of the next, as in neighbouring cells. It ends
+ * at a gap, in which another rank may have cells.
  *
  * If several volumes share a ray, or cells overlap, no rank has all segments at a position. With separate_samples
- * (render.h) a window's segments are not integrated but emitted, cut finely enough for compositing to mix them. */
+ * (render.h) a window's segments are not integrated here but emitted as fragments, which are short enough for
+ * compositing to mix them. */
 #ifndef RENDER_KERNEL_SEGMENTS_H
 #define RENDER_KERNEL_SEGMENTS_H
 
@@ -36,15 +46,16 @@
 
 /* ---- blending a ray's segments ---- */
 
-/* Returns t_out minus the error bound of crossings: an interval that begins before this depth really begins in front of
- * t_out. render_fold.c uses the same margin. */
+/* Returns t_out minus the error bound of crossings of faces. An interval that begins in front of this depth certainly
+ * begins in front of t_out. render_fold.c uses the same margin. */
 SIMD_INLINE vf kernel_segment_end(vf t_out)
 {
     return t_out - vf_max(vf_abs(t_out), vf_set(1)) * RENDER_FACE_ERROR;
 }
 
-/* Returns the rays whose fragment must end before the segment from t_in to t_out: a surface or a gap lies in between,
- * or cells overlap by more than rounding; compositing detects overlaps by the overlapping fragments (render.h). */
+/* Returns the rays whose current fragment must end before the segment from t_in to t_out is added: a surface or a gap
+ * lies between, or the segment's cell overlaps the previous one by more than rounding. (Compositing detects overlapping
+ * cells by their overlapping fragments, render.h.) */
 SIMD_INLINE vm kernel_segment_breaks(const kernel_packet *p, const kernel_segments *list, vf t_in, vf t_out)
 {
     const vf last = list->blend.t_last;
@@ -54,9 +65,9 @@ SIMD_INLINE vm kernel_segment_breaks(const kernel_packet *p, const kernel_segmen
     return broken;
 }
 
-/* Ends the fragments of the rays in mask, at a t_last that is reduced by the error bound, so that compositing does not
- * take touching fragments for overlapping ones. A fragment shorter than the error bound ends before it begins and
- * overlaps nothing (comp.h). */
+/* Ends the current fragments of the rays in `mask`. Their last depth, t_last, is reduced by the error bound of
+ * crossings, so that compositing does not take touching fragments for overlapping ones. A fragment shorter than the
+ * error bound then ends before it begins, and overlaps nothing (comp.h). */
 SIMD_INLINE void kernel_segments_close(kernel_packet *p, kernel_blend *b, vm mask)
 {
     const vf end = b->t_last;
@@ -65,7 +76,8 @@ SIMD_INLINE void kernel_segments_close(kernel_packet *p, kernel_blend *b, vm mas
     b->t_last = end;
 }
 
-/* Adds the light of segments from t_in to t_out, on the rays in `has`. */
+/* Adds the light of one segment per ray, from t_in to t_out, to the fragments of the rays in `has`, behind the light
+ * that they have. */
 SIMD_INLINE void kernel_blend_light(kernel_blend *b, vm has, vf t_in, vf t_out, const kernel_light *light)
 {
     const vm fresh = vm_andnot(has, b->open);
@@ -86,6 +98,8 @@ SIMD_INLINE void kernel_blend_light(kernel_blend *b, vm has, vf t_in, vf t_out, 
     b->open = vm_or(b->open, has);
 }
 
+/* Sorts the window's segments of each ray, integrates them from front to back, and adds their light to the rays'
+ * fragments. If several volumes are mixed (list->mixing > 0), emits each segment instead. */
 static void kernel_blend_segments(kernel_packet *p, kernel_segments *list)
 {
     const kernel_pieces *pieces = list->pieces;
@@ -135,7 +149,7 @@ static void kernel_blend_segments(kernel_packet *p, kernel_segments *list)
         kernel_blend_light(b, heaped, b->t_last, b->t_last, &list->unsorted_light);
 }
 
-/* Begins a window at list->t_begin with empty lists. t_end: depth at which each ray's window ends. */
+/* Begins a new window with empty lists, at the depth list->t_begin. t_end: depth at which each ray's window ends. */
 SIMD_INLINE void kernel_segments_begin(kernel_segments *list, vf t_end)
 {
     memset(list->count, 0, sizeof list->count);

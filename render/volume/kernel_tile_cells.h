@@ -1,8 +1,9 @@
-/* A volume's cells, for a whole tile and one window of depth. Cells are queued by type, and vectors of them are
- * transformed at once and passed to samples or segments (kernel_volume_method). Other cells are transformed one by one
- * and passed to the packets of the blocks that they may meet. If the whole picture has been traversed at once
+/* Processes the cells of a volume in a whole tile and one window, an interval of depths. kernel_local_queue.h defines
+ * the terms. Cells are queued by type; SIMD_WIDTH cells of a type are transformed at once and passed to the functions
+ * that compute samples or segments (kernel_volume_method). Other cells are transformed one by one and passed to the
+ * packets of the blocks that they may meet. If the trees have been traversed in advance for the whole picture
  * (kernel_candidates.h), the tile's cells are known: they are sorted by depth, and a window processes those that
- * overlap it. Else the tile traverses the trees once per window.
+ * overlap it. Otherwise the tile traverses the trees once per window.
  *
  *     cells, by where they begin   |--a--|  |---b---|    |-c-|
  *                                     |--d--|   |--e--|
@@ -31,21 +32,24 @@
 #include "render.h"
 #include "simd.h"
 
+/* KERNEL_OPEN_PIECE: number of cells between two prefetches; KERNEL_SORT_PIECE: ranges of at most that many candidates
+ * are sorted completely */
 enum { KERNEL_OPEN_PIECE = 16, KERNEL_SORT_PIECE = 64 };
 
 /* Callbacks by which a volume is sampled (kernel_tile_volume.h) or integrated (kernel_tile_segments.h) in its cells. */
 typedef struct kernel_volume_method {
     /* set if the rays of cells that are processed alone are the tile's own primary rays (kernel_packet.h) */
     bool is_pencil;
-    /* Processes a cell by the packets of the given blocks. */
+    /* Processes a cell, which is in tile space, with the rays of the packets of the given blocks. map: its inverse map;
+     * NULL if it needs none. */
     kernel_tile_trace_cell *take;
-    /* Processes those of the given lanes' tets for which one ray-tet pair per lane is faster. Returns the remaining
-     * lanes. */
+    /* Processes those of the transformed tets in the given lanes that are small, one ray-tet pair per lane, which is
+     * faster. Returns the lanes of the other tets. */
     unsigned (*process_tets)(kernel_tile_trace *t, unsigned lanes);
-    /* Transforms a fetched vector of hexes, wedges or pyramids; returns the visible ones. *lanes: those of them that
-     * can be processed in lanes. */
+    /* Transforms the current vector of cells of this type: hexes, wedges or pyramids. Returns a mask of the visible
+     * ones. *lanes: mask of those that can be processed in lanes. */
     unsigned (*transform)(kernel_tile_trace *t, int type, unsigned *lanes);
-    /* Processes the listed pixels of these cells, and empties the list. */
+    /* Processes the listed pixels of the current vector of cells, and empties the list. */
     void (*process_pixels)(kernel_tile_trace *t, int type);
     /* called after all pixels of a vector of cells have been listed and processed */
     void (*finish)(kernel_tile_trace *t, int type);
@@ -53,16 +57,17 @@ typedef struct kernel_volume_method {
 
 /* ---- the blocks that a tet's outline meets ----
  *
- * Finds which of a tile's blocks a tet's outline meets, one block per lane. The outline's bounding box
- * (kernel_points_placement()) also covers blocks beside its slanted edges; with it alone, two of five packets would be
- * traced for nothing.
+ * Finds which of a tile's blocks the outline of a tet in the picture meets, one block per lane. The outline's bounding
+ * box (kernel_points_placement()) also covers blocks beside slanted edges. If it were the only test, two of five
+ * packets would be traced although no ray meets the tet.
  *
- * An edge function is affine over the tile (kernel_cell.h), so that over a block it is its value at the block's middle,
- * plus or minus its slopes times half of the extent of the block's rays. If in a block no face can have its three edge
- * functions' signs as on a ray that crosses it, no ray of the block crosses the tet. */
+ * An edge function is an affine function of the ray's (u, v) (kernel_cell.h). So over a block it differs from its value
+ * at the block's middle by at most its slopes times half of the extent of (u, v) in the block. A ray crosses a face if
+ * the face's three edge functions, with the edges taken in cyclic order, have the same sign. If that is impossible for
+ * all faces in a block, no ray of the block crosses the tet. */
 
-/* Sets up the blocks of a tile whose rays are set. The half extents are those of the widest block, plus a thousandth
- * for all rounding. */
+/* Computes the (u, v) of the blocks' middles, and half of the extent of (u, v) in a block: that of the widest block,
+ * plus a thousandth for all rounding. The tile's rays must be set. */
 static inline void kernel_block_rays_setup(kernel_tile_cells *cells, const kernel_frame *f, const kernel_tile *tile)
 {
     const bool flat = f->job->camera.is_orthographic;
@@ -83,10 +88,10 @@ static inline void kernel_block_rays_setup(kernel_tile_cells *cells, const kerne
     }
 }
 
-/* Returns the blocks that may have a ray inside the tet, whose edge functions must be set. The middle's edge function
- * errs by at most as much as a ray's; for rays on which the sign is uncertain, or is computed from projected vertices,
- * it is decided within the same bound: twice the bound is more than both together. If a number is NaN, the block counts
- * as met. */
+/* Returns the blocks that may have a ray that crosses the tet, whose edge functions must be set. The edge function at a
+ * block's middle has a rounding error of at most the same bound as on a ray. On rays on which its sign is uncertain,
+ * the sign is computed from projected vertices, and is within that bound, too. So twice the bound is subtracted. If a
+ * number is NaN, the block counts as met. */
 SIMD_INLINE unsigned kernel_tet_blocks(const kernel_tile_cells *cells, const kernel_cell *c)
 {
     unsigned blocks = 0;
@@ -112,8 +117,8 @@ SIMD_INLINE unsigned kernel_tet_blocks(const kernel_tile_cells *cells, const ker
 
 /* ---- cells ---- */
 
-/* Transforms the cell that has been read, and prepares it for the rays of the blocks. Returns the blocks in which it
- * may be visible. */
+/* Transforms the cell that has been read into `cell`, and prepares it for the rays of the given blocks. Returns those
+ * of the blocks in which it may be visible. */
 static __attribute__((noinline)) unsigned kernel_tile_transform_cell(kernel_tile_trace *t, kernel_tile_cells *cells,
                                                                      const grid *g, unsigned blocks)
 {
@@ -132,8 +137,8 @@ static __attribute__((noinline)) unsigned kernel_tile_transform_cell(kernel_tile
     return meets;
 }
 
-/* Makes a cell of the current vector the tile's current cell, which is processed on its own by the rays of all blocks.
- * Does nothing if it already is the current cell. Returns false if it is invisible. */
+/* Makes the cell in the given lane of the current vector the tile's current cell (`cell`), to be processed by packets,
+ * for rays of any block. Does nothing if it already is the current cell. Returns false if it is invisible. */
 static __attribute__((noinline, cold)) bool kernel_tile_make_current(kernel_tile_trace *t, int lane)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
@@ -147,7 +152,7 @@ static __attribute__((noinline, cold)) bool kernel_tile_make_current(kernel_tile
     return true;
 }
 
-/* Processes a cell by packets. */
+/* Reads a cell, transforms it, and processes it by the packets of the given blocks. */
 static __attribute__((noinline)) void kernel_tile_process_cell(kernel_tile_trace *t, int part, uint32_t index,
                                                                unsigned blocks)
 {
@@ -165,7 +170,7 @@ static __attribute__((noinline)) void kernel_tile_process_cell(kernel_tile_trace
     if (blocks) take(t, part, c, kernel_is_linear(c->type) || c->is_constant ? NULL : &cells->map, blocks);
 }
 
-/* Returns the bounding box of the blocks' pixels, in the format of candidates (kernel_types.h). */
+/* Returns the bounding box of the blocks' pixels, packed as in kernel_tile_candidate.box. */
 SIMD_INLINE unsigned kernel_blocks_box(unsigned blocks)
 {
     int x0 = KERNEL_BLOCKS_ACROSS, x1 = 0, y0 = KERNEL_BLOCKS_ACROSS, y1 = 0;
@@ -182,7 +187,7 @@ SIMD_INLINE unsigned kernel_blocks_box(unsigned blocks)
 
 /* ---- SIMD_WIDTH tets at once ---- */
 
-/* Converts the values to the domain of the transfer function. */
+/* Sets f of the transformed tets to the values in the transfer function's domain. */
 SIMD_INLINE void kernel_transformed_domain(kernel_transformed_tets *transformed, const kernel_transfer *t)
 {
     for (int half = 0; half < 2; half++)
@@ -192,7 +197,8 @@ SIMD_INLINE void kernel_transformed_domain(kernel_transformed_tets *transformed,
         }
 }
 
-/* Returns the lanes whose cells are visible and reach into the window; stores the least depth of each cell. */
+/* Returns the lanes whose tets have finite and visible values and end behind the window's begin. near: least depth of
+ * each tet. */
 SIMD_INLINE unsigned kernel_transformed_tets_visible(const kernel_tile_trace *t,
                                                      const kernel_transformed_tets *transformed,
                                                      const kernel_visible_values *visible_values,
@@ -217,8 +223,8 @@ SIMD_INLINE unsigned kernel_transformed_tets_visible(const kernel_tile_trace *t,
     return vm_bits(vm_andnot(vm_and(is_finite, shows), vf_lt(back + pad, vf_set(t->t_near))));
 }
 
-/* Transforms the first `count` queued tets. Returns the lanes of those that are visible in a block in which some ray
- * has no nearer end. */
+/* Transforms the first `count` tets of the queue. Reduces their masks of blocks to those with a ray that has no nearer
+ * end, and returns the lanes of the visible tets for which a block is left. */
 SIMD_INLINE unsigned kernel_tile_transform_tets(kernel_tile_trace *t, kernel_tile_cells *cells, kernel_local_queue *q,
                                                 int count)
 {
@@ -248,9 +254,9 @@ enum { KERNEL_TET_PIXELS = 48 };
 
 _Static_assert(SIMD_WIDTH *(KERNEL_TET_PIXELS + 1) <= KERNEL_LIST_ROOM, "a vector of tets has room");
 
-/* Lists the pixels of those of the given lanes' tets whose bounding boxes have at most `most` pixels, for processing
- * with one ray-tet pair per lane: most of a packet's rays would miss such a tet. Skips tets that lie between pixels.
- * Returns the lanes of the larger tets. */
+/* Lists the pixels in the boxes of those tets in the given lanes whose boxes have at most `most` pixels, to be
+ * processed with one ray-tet pair per lane: most of a packet's rays would miss such a tet. Skips tets that lie between
+ * the pixels' centres. Returns the lanes of the larger tets. */
 static unsigned kernel_tile_list_small_tets(const kernel_tile_trace *t, unsigned lanes, int most)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
@@ -273,7 +279,7 @@ static unsigned kernel_tile_list_small_tets(const kernel_tile_trace *t, unsigned
     return others;
 }
 
-/* Processes the first vector of tets in the queue: small ones in lanes, the others by packets. */
+/* Processes the queue's first SIMD_WIDTH tets: small ones in lanes, the others by packets. */
 SIMD_INLINE void kernel_tile_process_tets(kernel_tile_trace *t, kernel_tile_cells *cells, kernel_local_queue *q)
 {
     const int count = q->count < SIMD_WIDTH ? q->count : SIMD_WIDTH;
@@ -291,8 +297,8 @@ SIMD_INLINE void kernel_tile_process_tets(kernel_tile_trace *t, kernel_tile_cell
 
 /* ---- SIMD_WIDTH hexes, wedges or pyramids at once ---- */
 
-/* Processes the first vector of cells in the queue: lists the pixels in which each may be visible, and passes these to
- * the method. Cells that cannot be processed in lanes are processed by packets. */
+/* Processes the queue's first SIMD_WIDTH cells: lists the pixels in which each may be visible, and passes these to the
+ * method. Cells that cannot be processed in lanes are processed by packets. */
 SIMD_INLINE void kernel_tile_process_curved(kernel_tile_trace *t, kernel_tile_cells *cells, kernel_local_queue *q,
                                             int type)
 {
@@ -320,7 +326,7 @@ SIMD_INLINE void kernel_tile_process_curved(kernel_tile_trace *t, kernel_tile_ce
 
 /* ---- queues ---- */
 
-/* Processes the first vector of cells in the queue of a type. */
+/* Processes the first SIMD_WIDTH cells of the queue with this index, and removes them. */
 static __attribute__((noinline)) void kernel_tile_process_queue(kernel_tile_trace *t, int index)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
@@ -340,8 +346,9 @@ SIMD_INLINE void kernel_tile_process_queues(kernel_tile_trace *t)
         while (t->thread->tile_cells->queues[i].count) kernel_tile_process_queue(t, i);
 }
 
-/* Returns whether cells of this type in the mesh part are queued. Polyhedra, cells with indices too large for lanes,
- * and tets with a field that is constant per cell, in which nothing is interpolated, are processed alone. */
+/* Returns whether cells of this type in the mesh part are queued for processing in vectors. Polyhedra, cells with
+ * vertex indices too large for lanes, and tets with a field that is constant per cell, in which nothing is
+ * interpolated, are processed one by one. */
 SIMD_INLINE bool kernel_tile_queues_type(const kernel_tile_trace *t, int part, int type)
 {
     const kernel_tile_cells *cells = t->thread->tile_cells;
@@ -350,8 +357,9 @@ SIMD_INLINE bool kernel_tile_queues_type(const kernel_tile_trace *t, int part, i
     return !t->frame->job->volumes[cells->volume].field.fields[part].is_cell_centred;
 }
 
-/* Queues a cell; if the queue of its type is full, a vector of its cells is processed. Returns false if the cell must
- * be processed alone. box: the cell's pixels, in a candidate's format. */
+/* Adds a cell to the queue of its type; if the queue is then full, its first SIMD_WIDTH cells are processed. Returns
+ * false if the cell must be processed on its own. blocks: mask of the blocks in which it may be visible; box: its box
+ * of pixels, packed as in kernel_tile_candidate. */
 static __attribute__((noinline)) bool kernel_tile_enqueue(kernel_tile_trace *t, int part, uint32_t cell,
                                                           unsigned blocks, unsigned box)
 {
@@ -372,7 +380,8 @@ static __attribute__((noinline)) bool kernel_tile_enqueue(kernel_tile_trace *t, 
 
 /* ---- cells found by traversing trees ---- */
 
-/* Processes a leaf's cells (kernel_tile_visit): queues those that are processed in lanes, and transforms the others. */
+/* Processes the cells of a tree's leaf, as a callback of the traversal (kernel_tile_visit): queues those that are
+ * processed in vectors, and then processes the others one by one. */
 static void kernel_volume_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks)
 {
     const grid *g = t->frame->job->parts[part].cells;
@@ -387,7 +396,8 @@ static void kernel_volume_leaf(kernel_tile_trace *t, int part, const uint32_t *c
     for (int n = 0; n < left; n++) kernel_tile_process_cell(t, part, others[n], blocks);
 }
 
-/* Traverses the trees of the given mesh parts (kernel_tile_visit), skipping nodes whose values are invisible. */
+/* Traverses the trees of the given mesh parts, as a callback of the traversal of the tree over all parts
+ * (kernel_tile_visit). Skips nodes whose values are invisible. */
 static void kernel_volume_parts(kernel_tile_trace *t, int unused, const uint32_t *parts, int count, unsigned blocks)
 {
     const int volume = t->thread->tile_cells->volume;
@@ -413,8 +423,8 @@ SIMD_INLINE void kernel_volume_trees(kernel_tile_trace *t, unsigned blocks)
 
 /* ---- cells found before, as candidates of the tile ---- */
 
-/* Partitions the items by depth: those before the returned index are no farther than the others. Neither part is
- * empty. */
+/* Partitions the items by their least depth: no item before the returned index is farther than the others. There is at
+ * least one item before the index and one from it on. */
 static inline int kernel_depth_bin_of(kernel_tile_candidate *items, int count)
 {
     const float a = items[0].near, b = items[count / 2].near, c = items[count - 1].near;
@@ -433,7 +443,8 @@ static inline int kernel_depth_bin_of(kernel_tile_candidate *items, int count)
     }
 }
 
-/* Sorts by quicksort down to short pieces. It recurses only into the shorter part, so that the stack stays small. */
+/* Sorts the items by their least depth: by quicksort down to ranges of a few items, and these by insertion. It recurses
+ * only into the shorter range, so that the stack stays small. */
 static void kernel_order_by_depth(kernel_tile_candidate *items, int count)
 {
     enum { PIECE = 8 };
@@ -452,7 +463,7 @@ static void kernel_order_by_depth(kernel_tile_candidate *items, int count)
     }
 }
 
-/* Continues the incremental quicksort until at least one more item is sorted. */
+/* Continues the quicksort of the tile's candidates until at least one more item is sorted. */
 static __attribute__((noinline)) void kernel_tile_cells_sort(kernel_tile_cells *cells)
 {
     kernel_tile_candidate *items = cells->items + cells->sorted;
@@ -484,7 +495,8 @@ SIMD_INLINE bool kernel_tile_cells_begin(kernel_tile_trace *t, const kernel_volu
     return cells->count > 0;
 }
 
-/* Moves the cells that overlap the window to the front of the list and sets open_count to their number. */
+/* Moves the candidates that overlap the window, from t->t_near to the farthest end of the tile's rays, to the front of
+ * the list, and sets open_count to their number. */
 SIMD_INLINE void kernel_tile_cells_select_window(const kernel_tile_trace *t, kernel_tile_cells *cells)
 {
     kernel_tile_candidate *items = cells->items;
@@ -500,8 +512,9 @@ SIMD_INLINE void kernel_tile_cells_select_window(const kernel_tile_trace *t, ker
     cells->open_count = count;
 }
 
-/* Prefetches the next cells of the window: the vertex indices of 2 * KERNEL_OPEN_PIECE cells, and the vertices of those
- * of KERNEL_OPEN_PIECE cells that are processed alone; queues prefetch the vertices of the others. */
+/* Prefetches data of the window's candidates from index `first` on: the vertex indices of 2 * KERNEL_OPEN_PIECE cells,
+ * and, among the first KERNEL_OPEN_PIECE of these, the vertices of the cells that are not queued; queues prefetch the
+ * vertices of the others. */
 SIMD_INLINE void kernel_tile_prefetch_window(const kernel_tile_trace *t, const kernel_tile_cells *cells, int first)
 {
     const render_job *job = t->frame->job;
@@ -518,7 +531,7 @@ SIMD_INLINE void kernel_tile_prefetch_window(const kernel_tile_trace *t, const k
     }
 }
 
-/* Processes all candidates of the tile that overlap the window. */
+/* Processes all candidates of the tile that overlap the window in one of the given blocks. */
 SIMD_INLINE void kernel_volume_candidates(kernel_tile_trace *t, unsigned blocks)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
@@ -534,7 +547,7 @@ SIMD_INLINE void kernel_volume_candidates(kernel_tile_trace *t, unsigned blocks)
 
 /* ---- windows of depth ---- */
 
-/* Processes all cells of a volume that may overlap the window of the given blocks. */
+/* Processes all cells of a volume that may overlap the window in one of the given blocks. */
 static __attribute__((noinline)) void kernel_tile_process_window(kernel_tile_trace *t, int volume, unsigned blocks)
 {
     kernel_tile_cells_begin_volume(t->thread->tile_cells, volume);
@@ -547,7 +560,8 @@ static __attribute__((noinline)) void kernel_tile_process_window(kernel_tile_tra
 
 /* ---- windows of depth ---- */
 
-/* Returns the blocks that the bounding box of some tree may meet, and the range of these boxes' depths. */
+/* Returns the blocks that the bounding box of at least one tree may meet, and the least and greatest depth of these
+ * boxes. */
 SIMD_INLINE kernel_placement kernel_tile_trees_placement(const kernel_tile_trace *t)
 {
     const render_job *job = t->frame->job;
@@ -562,7 +576,8 @@ SIMD_INLINE kernel_placement kernel_tile_trees_placement(const kernel_tile_trace
     return all;
 }
 
-/* Sets up the packets of the given blocks for tracing volumes, and stores them in a list. Returns their number. */
+/* Sets up the packets of the given blocks for tracing volumes, and stores their indices in `packets`. Returns their
+ * number. */
 SIMD_INLINE int kernel_tile_volume_begin(kernel_tile_trace *t, unsigned blocks, int packets[KERNEL_TILE_PACKETS])
 {
     int count = 0;

@@ -1,19 +1,20 @@
-/* Chooses the depth of a tile's next window of samples. A window's cells are transformed and traced for all of its
- * depth. In a dense medium no light reaches most of a deep window, so most of that work would be wasted:
+/* Chooses the depth (length along the rays, in units of t) of a tile's next window of samples. All cells in a window
+ * are transformed and traced. In a dense medium no light reaches most of a deep window, so most of that work would be
+ * wasted:
  *
  *     light   1 \__                                   windows of as many samples as fit:  |===============|=====...
  *                  \___                               as deep as light reaches:          |====|=|
  *             0 --------x----------------->  depth
  *
- * Neighbouring tiles become dark at similar depths, so this tile is expected to be dark at the last tile's depth. If
- * light is left there, the brightest ray is expected to continue losing it at the rate of the previous window. Rays
- * that keep their light have the deepest windows that fit, because cells at every boundary between windows are
- * transformed twice.
+ * A ray is dark if less light than KERNEL_DARK is left on it. Neighbouring tiles become dark at similar depths, so this
+ * tile is expected to be dark at the same depth as the previous tile, counted from the tiles' first cells. If light is
+ * left there, the brightest ray is expected to continue losing light at the rate of the previous window. Rays that keep
+ * their light have the deepest windows that fit, because cells at every boundary between windows are transformed twice.
  *
- * Samples do not depend on windows (kernel_tile_volume.h). But windows decide which overlaps of cells are detected
- * behind the depth at which all light is absorbed, and so whether a pixel is drawn a second time. So that windows do
- * not depend on the number of threads, a tile uses results only of earlier tiles in its run of KERNEL_TILES_PER_TASK
- * tiles, which one thread draws in order. */
+ * The values of samples do not depend on windows (kernel_tile_volume.h). But cells that overlap behind the depth at
+ * which all light is absorbed are detected only if they lie in a window, and a pixel with detected overlaps is drawn a
+ * second time. So that windows do not depend on the number of threads, a tile uses results only of earlier tiles in its
+ * run of KERNEL_TILES_PER_TASK tiles, which one thread draws in order. */
 #ifndef RENDER_KERNEL_TILE_DEPTH_H
 #define RENDER_KERNEL_TILE_DEPTH_H
 
@@ -23,7 +24,7 @@
 #include "kernel_samples.h"
 #include "simd.h"
 
-/* Begins a run of tiles, in which no earlier tile's depth is known. */
+/* Begins a run of tiles: for its first tile no earlier tile's depth is known. */
 SIMD_INLINE void kernel_depth_reset(kernel_tile_volume *d)
 {
     d->dark = INFINITY;
@@ -38,7 +39,7 @@ SIMD_INLINE void kernel_depth_begin_window(kernel_tile_volume *d)
     d->last_dark = -INFINITY;
 }
 
-/* Begins a tile. begin: depth of its first cell, or +inf if it is not known. */
+/* Begins a tile. begin: depth t of its first cell, or +inf if that is not known. */
 SIMD_INLINE void kernel_depth_begin(kernel_tile_volume *d, float begin)
 {
     if (d->has_met) d->dark = d->own_dark;
@@ -49,15 +50,15 @@ SIMD_INLINE void kernel_depth_begin(kernel_tile_volume *d, float begin)
     kernel_depth_begin_window(d);
 }
 
-/* Returns the depth of the next window, which begins at depth `at`: an eighth more than the depth at which the tile is
- * expected to become dark. */
+/* Returns the depth (length) of the next window, which begins at the depth `at`: an eighth more than up to the depth at
+ * which the tile is expected to be dark. */
 SIMD_INLINE float kernel_depth_next_window(const kernel_tile_volume *d, float at)
 {
     const float left = simd_min(d->begin, at) + d->dark - at;
     return 1.125f * simd_min(left > 0 ? left : INFINITY, d->expected);
 }
 
-/* Adds the light that is left on a packet's rays after the window. */
+/* Takes into account how much light is left on a packet's rays after the window. */
 SIMD_INLINE void kernel_depth_add(kernel_tile_volume *d, vm rays, const kernel_blend *b)
 {
     const vf far = vf_set(INFINITY);

@@ -1,11 +1,11 @@
-/* Integrates a volume by segments for a whole tile, window by window, for all the tile's blocks at once. A cell is
- * fetched and transformed once per window (kernel_tile_cells.h) and passed to the packets of the blocks that it may
- * meet. Their rays store the segments that begin in their window (kernel_segments.h), and sort and integrate them at
- * the end of the window.
+/* Integrates volumes by segments for a whole tile, window by window, for all blocks of the tile at once.
+ * kernel_segments.h defines segment and window. A cell is read and transformed once per window (kernel_tile_cells.h)
+ * and passed to the packets of the blocks that it may meet. For each ray, the segments that begin in its window are
+ * stored in a list, which is sorted and integrated at the end of the window.
  *
- * Windows are depth intervals in which some ray has most of its list filled: so as many cells as possible lie in a
- * single window, and the lists of all of a tile's rays stay in the cache. A ray with more segments than its list holds
- * ends its window before the tile's window ends, and begins the next one there:
+ * The depth of a window is chosen so that the longest list of a ray is nearly full: as many cells as possible then lie
+ * in a single window, and the lists of all of a tile's rays stay in the cache. If a ray has more segments than its list
+ * holds, its window ends in front of the end of the tile's window, and its next window begins there:
  *
  *     ray 0  |--s-s-s--s--s---s--|--s--s-...
  *     ray 1  |ssssssssssss|ssssss|sssssss...   full: the rest comes in the tile's next window
@@ -40,7 +40,7 @@
 
 /* ---- cells ---- */
 
-/* Adds the cell's segments on the rays of the given blocks. */
+/* Adds the segments of the rays of the given blocks in the cell. */
 static void kernel_tile_cell_segments(kernel_tile_trace *t, int part, const kernel_cell *c, const kernel_map *map,
                                       unsigned blocks)
 {
@@ -64,7 +64,8 @@ static void kernel_tile_cell_segments(kernel_tile_trace *t, int part, const kern
 
 /* ---- small tets ---- */
 
-/* Adds the segments of rays that begin or end inside their tet; `rays` is a mask of lanes. */
+/* Adds the segments of those rays that begin or end inside their tet, by packets. places: position of each ray among
+ * the tile's packets; lanes: the lane of its tet; rays: mask of lanes. */
 static __attribute__((noinline, cold)) void kernel_tet_segments_cut(kernel_tile_trace *t, kernel_tile_segments *s,
                                                                     vi places, vi lanes, unsigned rays)
 {
@@ -80,7 +81,8 @@ static __attribute__((noinline, cold)) void kernel_tet_segments_cut(kernel_tile_
     }
 }
 
-/* Adds the segments of those of the given lanes' pending tets that are small. Returns the lanes of the others. */
+/* Adds the segments in those of the transformed tets in the given lanes that have few pixels, one ray-tet pair per
+ * lane. Returns the lanes of the other tets. */
 static __attribute__((noinline)) unsigned kernel_tet_segments_small(kernel_tile_trace *t, unsigned lanes)
 {
     kernel_tile_segments *s = t->thread->tile_segments;
@@ -118,7 +120,8 @@ static const kernel_volume_method kernel_volume_by_segments = {
 
 /* ---- windows of depth ---- */
 
-/* Prepares the packet for segments of all volumes. hits: the packet's hits on surfaces. */
+/* Prepares the packet and its lists for segments of all volumes. far: depth behind all cells; hits: the packet's hits
+ * on surfaces. */
 SIMD_INLINE void kernel_ray_segments_begin(kernel_packet *p, kernel_segments *list, float far, const kernel_hits *hits)
 {
     const kernel_frame *f = p->frame;
@@ -133,7 +136,8 @@ SIMD_INLINE void kernel_ray_segments_begin(kernel_packet *p, kernel_segments *li
     kernel_segments_set_double(p, list, f->is_double && !f->job->separate_samples);
 }
 
-/* Prepares the packet for a volume: sets its error limits and its unit distances, and begins at the ray's begin. */
+/* Prepares the packet and its lists for one volume: sets the error limits and the unit distances, and begins the first
+ * window at the rays' begin. */
 SIMD_INLINE void kernel_ray_segments_of(kernel_packet *p, kernel_segments *list, int volume)
 {
     const kernel_frame *f = p->frame;
@@ -148,7 +152,8 @@ SIMD_INLINE void kernel_ray_segments_of(kernel_packet *p, kernel_segments *list,
     list->reach = f->reach[volume];
 }
 
-/* Deactivates rays that have ended or are dark; returns the least t_begin of the others, +inf if there are none. */
+/* Deactivates rays that have ended or are dark (have less light left than KERNEL_DARK). Returns the least depth at
+ * which the window of another ray begins; +inf if there are no other rays. */
 SIMD_INLINE float kernel_tile_segments_front(kernel_tile_trace *t, kernel_tile_segments *s, const int *packets,
                                              int count)
 {
@@ -163,7 +168,7 @@ SIMD_INLINE float kernel_tile_segments_front(kernel_tile_trace *t, kernel_tile_s
     return vf_reduce_min(front);
 }
 
-/* Stores, for all blocks, the segments of the window that ends at depth `end`. */
+/* Finds and stores the segments of all rays of the given blocks in the window that ends at depth `end`. */
 SIMD_INLINE void kernel_tile_segments_find(kernel_tile_trace *t, kernel_tile_segments *s, int volume, unsigned blocks,
                                            float end)
 {
@@ -180,8 +185,8 @@ SIMD_INLINE void kernel_tile_segments_find(kernel_tile_trace *t, kernel_tile_seg
     kernel_tile_process_window(t, volume, blocks);
 }
 
-/* Chooses the next window's depth from the lengths of this window's lists, so that the fullest list will be three
- * quarters full. */
+/* Chooses the next window's depth (s->depth) from the numbers of segments in this window, so that the longest list will
+ * be three quarters full. begin, end: depths at which this window begins and ends. */
 SIMD_INLINE void kernel_tile_segments_adapt_window(kernel_tile_segments *s, const int *packets, int count, float begin,
                                                    float end)
 {
@@ -197,7 +202,8 @@ SIMD_INLINE void kernel_tile_segments_adapt_window(kernel_tile_segments *s, cons
     s->depth = (vf_reduce_min(least) - begin) * (0.75f * (float)room) / (float)most;
 }
 
-/* Integrates a volume's segments, window by window. */
+/* Integrates a volume's segments, window by window. packets: indices of the `count` packets; reach: the depths and
+ * blocks in which there are cells. */
 SIMD_INLINE void kernel_tile_segments_windows(kernel_tile_trace *t, kernel_tile_segments *s, const int *packets,
                                               int count, int volume, const kernel_placement *reach)
 {
@@ -222,9 +228,10 @@ SIMD_INLINE void kernel_tile_segments_windows(kernel_tile_trace *t, kernel_tile_
 static void kernel_tile_segments_trace(kernel_tile_trace *t)
 {
     kernel_tile_segments *s = t->thread->tile_segments;
-    /* Tets are not processed in lanes if ends are in double, because these are computed per packet, nor if transparent
-     * surfaces cut segments, because packets are faster at searching for cuts. Lanes must not depend on how many cells
-     * the rank has, because segments of tets in packets do not have the same bits. */
+    /* Tets are not processed in lanes if ends of segments are computed in double, which is done per packet, nor if
+     * transparent surfaces cut segments, because packets are faster at searching for cuts. Whether tets are processed
+     * in lanes must not depend on how many cells the rank has, because the segments that are computed in lanes are not
+     * bit-identical to those that packets compute. */
     const bool has_cuts = t->frame->has_transparent && !t->frame->job->separate_samples;
     if (!kernel_tile_cells_begin(t, &kernel_volume_by_segments, !t->frame->is_double && !has_cuts, true)) return;
     const kernel_placement reach = kernel_tile_trees_placement(t);

@@ -1,17 +1,18 @@
-/* Samples volumes for a whole tile, one window of samples at a time, for all blocks of the tile. Hexes, wedges and
- * pyramids are processed one sample per lane (kernel_local_samples.h), and tets of few pixels one ray-tet pair per lane
- * (kernel_tets.h). Other cells are fetched, transformed and given their edge functions once per window
- * (kernel_tile_cells.h), and passed to the packets of the blocks that they may meet, where they fill the samples that
- * they own. Window boundaries are numbers of samples, at most job->sample_group apart:
+/* Samples volumes for a whole tile, one window at a time, for all blocks of the tile. A window is a range of sample
+ * numbers, which is the same on all of the tile's rays. Hexes, wedges and pyramids are processed one sample per lane
+ * (kernel_local_samples.h), and tets of few pixels one ray-tet pair per lane (kernel_tets.h). Other cells are read and
+ * transformed, and their edge functions computed, once per window (kernel_tile_cells.h). They are passed to the packets
+ * of the blocks that they may meet, which set the values of the samples that lie in them. A window has at most
+ * job->sample_group samples:
  *
  *     block 0  |--s--s--s--s--s--s--|--s--s--s--s--s--...
  *     block 1  |--s--s--s--s--s--s--|--s--s--x  opaque hit: its far ends here
  *     block 2  |--s--s--s--s--s--s--|  dark: takes no part in the next window
  *              ^ t_near of window 1 ^ t_near of window 2
  *
- * The traversal is that of surfaces (kernel_tile_trace.h), with the window's begin in place of the eye, and each
- * block's end of the window in place of its nearest hits. The picture does not depend on windows: samples are numbered
- * along the ray, and owned by cells. */
+ * The traversal is that for surfaces (kernel_tile_trace.h), with the window's begin in place of the eye, and the end of
+ * the window on a block's rays in place of their nearest hits. The picture does not depend on windows, because a
+ * sample's position and cell do not. */
 #ifndef RENDER_KERNEL_TILE_VOLUME_H
 #define RENDER_KERNEL_TILE_VOLUME_H
 
@@ -37,6 +38,7 @@
 
 /* ---- cells ---- */
 
+/* Sets the values of a packet's samples in a tet. */
 static __attribute__((noinline)) void kernel_tile_tet_samples(kernel_packet *p, kernel_samples *s, const kernel_cell *c)
 {
     kernel_interval i;
@@ -44,6 +46,8 @@ static __attribute__((noinline)) void kernel_tile_tet_samples(kernel_packet *p, 
     if (vm_any(i.mask)) kernel_fill(p, s, NULL, &i, &i);
 }
 
+/* Sets the values of a packet's samples in a hex, wedge or pyramid. map: its inverse map; NULL if the field is
+ * constant. */
 static __attribute__((noinline)) void kernel_tile_curved_samples(kernel_packet *p, kernel_samples *s,
                                                                  const kernel_cell *c, const kernel_map *map)
 {
@@ -52,7 +56,7 @@ static __attribute__((noinline)) void kernel_tile_curved_samples(kernel_packet *
     for (int k = 0; k < intervals; k++) kernel_fill(p, s, map, &list[k], &list[k]);
 }
 
-/* Sets the samples of the cell on the rays of the given blocks. */
+/* Sets the values of the samples in the cell, on the rays of the given blocks. */
 static void kernel_tile_samples(kernel_tile_trace *t, int part, const kernel_cell *c, const kernel_map *map,
                                 unsigned blocks)
 {
@@ -74,10 +78,11 @@ static void kernel_tile_samples(kernel_tile_trace *t, int part, const kernel_cel
 
 /* ---- small tets: sampled by the operations of kernel_samples.h, to the same bits ---- */
 
-/* Maximum number of pixels in the box of a tet that is sampled in lanes. Larger tets are sampled as fast by packets. */
+/* Maximum number of pixels in the box of a tet that is sampled in lanes. In larger tets, packets are as fast. */
 enum { KERNEL_TET_SAMPLE_PIXELS = 12 };
 
-/* Emits samples that also lie in another cell as fragments of their own; `lanes` is a mask. */
+/* Emits samples that also lie in another cell as fragments of their own. lanes: mask of the lanes that hold such a
+ * sample; places: position of each ray among the tile's packets; depth, value: of the samples. */
 static __attribute__((noinline, cold)) void kernel_tet_samples_separate(kernel_tile_trace *t, unsigned lanes, vi places,
                                                                         vf depth, vf value)
 {
@@ -91,7 +96,8 @@ static __attribute__((noinline, cold)) void kernel_tet_samples_separate(kernel_t
     }
 }
 
-/* Computes the values of the samples that lie in the rays' intervals. */
+/* Sets the values of the window's samples that lie in the rays' intervals i in their tets. at: position of each ray
+ * among the tile's packets. */
 SIMD_INLINE void kernel_tet_samples_fill(kernel_tile_trace *t, kernel_tile_volume *b, const kernel_interval *i, vi at)
 {
     vf base, step, number, last;
@@ -109,7 +115,8 @@ SIMD_INLINE void kernel_tet_samples_fill(kernel_tile_trace *t, kernel_tile_volum
     }
 }
 
-/* Samples those of the given lanes' pending tets that are small. Returns the lanes of the others. */
+/* Computes the samples in those of the transformed tets in the given lanes that have few pixels, one ray-tet pair per
+ * lane. Returns the lanes of the other tets. */
 static __attribute__((noinline)) unsigned kernel_tet_samples_small(kernel_tile_trace *t, unsigned lanes)
 {
     kernel_tile_volume *b = t->thread->tile_volume;
@@ -136,8 +143,8 @@ static const kernel_volume_method kernel_volume_by_samples = {
     .finish = kernel_local_fill,
 };
 
-/* Prepares the packet for samples of a volume. Extends *first .. *last to include the numbers of its rays' samples
- * between the depths near and far. */
+/* Prepares the packet for samples of volumes. Extends the range *first .. *last so that it includes the numbers of all
+ * samples of the packet's rays between the depths near and far. */
 SIMD_INLINE void kernel_ray_samples_begin(kernel_packet *p, kernel_samples *s, float near, float far, int *first,
                                           int *last)
 {
@@ -155,8 +162,9 @@ SIMD_INLINE void kernel_ray_samples_begin(kernel_packet *p, kernel_samples *s, f
     *last = highest > *last ? highest : *last;
 }
 
-/* Prepares the packet for a window. Returns the farthest depth of its rays' samples in the window, -inf if there are
- * none, and lowers *near to the least depth. */
+/* Prepares the packet for a window: deactivates rays without light, and resets the values of all samples: to NaN or, if
+ * every sample is emitted as a fragment of its own (separate_samples), to 0. Returns the farthest depth of its rays'
+ * samples in the window, -inf if there are none; lowers *near to the least depth of samples. */
 SIMD_INLINE float kernel_ray_window(kernel_packet *p, kernel_samples *s, int volumes, float *near)
 {
     const vf t_first = kernel_sample_t(p, s->first), t_last = kernel_sample_t(p, s->first + s->count - 1);
@@ -170,7 +178,8 @@ SIMD_INLINE float kernel_ray_window(kernel_packet *p, kernel_samples *s, int vol
     return vf_reduce_max(vf_select(p->active, t_end, vf_set(-INFINITY)));
 }
 
-/* Computes the samples with numbers first .. last for all blocks. Returns false if no ray receives light any more. */
+/* Computes the samples with the numbers first .. last of all volumes, for the given blocks. Returns false if no ray
+ * receives light any more. */
 SIMD_INLINE bool kernel_tile_window(kernel_tile_trace *t, kernel_tile_volume *v, unsigned blocks, int first, int last)
 {
     const render_job *job = t->frame->job;
@@ -203,7 +212,8 @@ SIMD_INLINE int kernel_tile_window_samples(const kernel_tile_volume *v, const ke
     return wanted < (float)most ? wanted < (float)least ? least : (int)wanted + 1 : most;
 }
 
-/* Blends the window's samples, front to back. */
+/* Adds the light of the window's samples to the rays' fragments, from front to back, and updates the estimate of
+ * depths. */
 SIMD_INLINE void kernel_tile_window_blend(kernel_tile_trace *t, kernel_tile_volume *v, const int *packets, int count,
                                           int samples)
 {
@@ -220,8 +230,8 @@ SIMD_INLINE void kernel_tile_window_blend(kernel_tile_trace *t, kernel_tile_volu
 static void kernel_tile_volumes(kernel_tile_trace *t)
 {
     kernel_tile_volume *v = t->thread->tile_volume;
-    /* Small cells are not sampled in lanes if the frame has surfaces, which may end rays and need the ends of intervals
-     * (kernel_blend_breaks()), nor if each sample becomes a fragment of its own. */
+    /* Cells are not sampled in lanes if the frame has surfaces, because these may end rays, and need the ends of
+     * intervals in cells (kernel_blend_breaks()); nor if each sample becomes a fragment of its own. */
     const bool has_lanes = !t->frame->surface_count && !t->frame->job->separate_samples;
     if (!kernel_tile_cells_begin(t, &kernel_volume_by_samples, has_lanes, has_lanes)) return;
     kernel_placement reach = kernel_tile_trees_placement(t);

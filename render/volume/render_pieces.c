@@ -1,14 +1,16 @@
-/* Divides a transfer function at every point of the opacity and every entry of the colour table, after entries that lie
- * on a line with others have been dropped. Opacity and colour are then linear between these cuts, exactly as
- * documented.
+/* Divides the values of a transfer function into pieces at cuts: at every point of the opacity, and at every entry of
+ * the colour table that does not lie on a line with its neighbours. Opacity and colour are linear between the cuts,
+ * exactly as documented.
  *
  * A ramp that is straight along a logarithmic scale is curved along the values. It is divided into pieces whose
- * extinction has a relative error of at most e. The effect on a pixel does not grow with the path through the medium:
- * for a pixel C = int T s c dt + T_end B, a change ds of the extinction s makes dC = int T ds (c - b) dt, where b is
- * the light from behind, and with |ds| <= e s that is at most e R int T s dt = e R (1 - T_end), where R is the contrast
- * of colours. If the ramp rises from an opacity of 0, the relative error of a piece from v to (1 + h) v is h / 2;
- * farther up, at a distance g in the logarithm, it is h^2 / (8 g). So sqrt(g / 2 e) pieces suffice, and halving makes
- * at most twice as many. Over 12 decades that is 105 pieces for e = 1.25e-3, and 370 for 1e-4. */
+ * extinction has a relative error of at most e. The effect on a pixel does not grow with the path through the medium: a
+ * pixel is C = int T s c dt + T_end B, with the transmittance T up to the depth t, the extinction s, the colour c, and
+ * the background B behind the transmittance T_end. A change ds of s changes C by dC = int T ds (c - b) dt, where b is
+ * the light from behind t. With |ds| <= e s that is at most e R int T s dt = e R (1 - T_end), where R is the contrast
+ * of colours. If the ramp rises from an opacity of 0, the relative error of a piece from the value v to (1 + h) v is h
+ * / 2; farther up, at a distance g from the ramp's begin along the logarithmic scale, it is h^2 / (8 g). So sqrt(g / 2
+ * e) pieces suffice, and halving makes at most twice as many. Over 12 decades that is 105 pieces for e = 1.25e-3, and
+ * 370 for 1e-4. */
 #include "render_pieces.h"
 #include "kernel_bound.h"
 #include "kernel_types.h"
@@ -25,7 +27,7 @@
 
 /* A value far outside every domain. It is finite so that 0 times it is 0. */
 static const kernel_real endless = (kernel_real)0x1p100;
-/* Upper bound of extinctions and of their slopes, per unit distance. */
+/* Relative rounding error that is added to bounds; also the least tolerance of colours. */
 static const double rounding = 1e-7;
 
 static int compare_cuts(const void *left, const void *right)
@@ -34,6 +36,7 @@ static int compare_cuts(const void *left, const void *right)
     return (a > b) - (a < b);
 }
 
+/* Returns a channel of the colour at a position in the colour table, counted in entries. */
 static double colour_at(const render_transfer *t, double place, int channel)
 {
     const int last = t->colour_count - 1;
@@ -42,6 +45,8 @@ static double colour_at(const render_transfer *t, double place, int channel)
     return low + (place - i) * (high - low);
 }
 
+/* Returns whether the table's entries between `from` and `to` lie on the line between these two, within the tolerance.
+ */
 static bool is_straight(const render_transfer *t, int from, int to, double tolerance)
 {
     for (int c = 0; c < 3; c++) {
@@ -53,8 +58,8 @@ static bool is_straight(const render_transfer *t, int from, int to, double toler
     return true;
 }
 
-/* Returns the last entry after i up to which all entries lie on a line within the tolerance. The search is quadratic,
- * so lines are limited to FARTHEST entries. */
+/* Returns the index of the farthest entry behind entry i up to which all entries lie on a line within the tolerance.
+ * The search takes quadratic time, so lines are limited to FARTHEST entries. */
 static int next_entry(const render_transfer *t, int i, double tolerance)
 {
     enum { FARTHEST = 256 };
@@ -64,7 +69,7 @@ static int next_entry(const render_transfer *t, int i, double tolerance)
     return next;
 }
 
-/* An entry of the colour table that is not dropped, and its position in the domain. */
+/* An entry of the colour table at which the function is cut, and its position in the transfer function's domain. */
 typedef struct kept_entry {
     int index;
     double place;
@@ -75,8 +80,8 @@ typedef struct kept_entry {
 /* Error bound of the extinction of ramps, relative to the extinction, if the job allows no error. */
 static const double exact_share = 1e-4;
 
-/* A ramp goes from the opacity point with index `ramp` to the next one. A part of it begins and ends at low and high,
- * which are shares of the ramp along the scale. */
+/* A ramp is the opacity between two neighbouring points of the transfer function, with the indices `ramp` and ramp + 1.
+ * A part of it lies between the positions low and high, which are shares of the ramp along the scale, from 0 to 1. */
 
 static double ramp_opacity(const render_transfer *t, int ramp, double share)
 {
@@ -84,7 +89,7 @@ static double ramp_opacity(const render_transfer *t, int ramp, double share)
     return low + share * (high - low);
 }
 
-/* Returns the value, in the domain, at a share of the ramp. */
+/* Returns the value, in the transfer function's domain, at a position on the ramp. */
 static double ramp_value(const render_transfer *t, int ramp, double share)
 {
     const double low = render_scaled(t->scale, t->threshold, t->opacity_values[ramp]);
@@ -92,8 +97,9 @@ static double ramp_value(const render_transfer *t, int ramp, double share)
     return render_domain_of(t, render_unscaled(t->scale, t->threshold, low + share * (high - low)));
 }
 
-/* Returns whether the relative error of the extinction along the part's chord exceeds the tolerance. It is largest at
- * an end with opacity 0, but the first sample is 1/32 of the part away from it; the factor 1.1 covers that. */
+/* Returns whether the relative error of the extinction exceeds the tolerance if the part of the ramp becomes one piece.
+ * It is largest at an end with opacity 0, but the first of the tested positions is 1/32 of the part away from it; the
+ * factor 1.1 covers that. */
 static bool is_bent(const render_transfer *t, int ramp, double low, double high, double tolerance)
 {
     enum { PLACES = 32 };
@@ -108,8 +114,8 @@ static bool is_bent(const render_transfer *t, int ramp, double low, double high,
     return false;
 }
 
-/* Stores the values at which the part must be cut, unless cuts is NULL. Returns their number. A part is not cut if
- * float32 cannot distinguish its middle from its ends. */
+/* Stores the values, in the domain, at which a part of a ramp must be cut, unless cuts is NULL. Returns their number. A
+ * part is not cut if float32 cannot distinguish its middle from its ends. */
 static int cut_part(const render_transfer *t, int ramp, double low, double high, double tolerance, kernel_real *cuts)
 {
     const double middle = 0.5 * (low + high), at = ramp_value(t, ramp, middle);
@@ -136,8 +142,8 @@ static int cut_ramps(const render_transfer *t, double tolerance, kernel_real *cu
 
 /* ---- pieces ---- */
 
-/* Stores the positions of all cuts in the domain, sorted and without duplicates, and the colours of the table that are
- * kept. */
+/* Stores the values of all cuts in the transfer function's domain, sorted and without duplicates, and the entries of
+ * the colour table among them. Returns the number of cuts. */
 static int collect_cuts(const render_transfer *t, double tolerance, kernel_real *cuts, kept_entry *entries)
 {
     int count = cut_ramps(t, tolerance, cuts), kept = 0;
@@ -153,7 +159,8 @@ static int collect_cuts(const render_transfer *t, double tolerance, kernel_real 
     return unique;
 }
 
-/* Returns the position of x between opacity point i and the next one, along the scale: 0 .. 1. */
+/* Returns the position of the value x (in the domain) on the ramp from opacity point i to the next one, along the
+ * scale, as a share from 0 to 1. */
 static double ramp_share(const render_transfer *t, int i, double x)
 {
     double low, inverse_width;
@@ -164,7 +171,7 @@ static double ramp_share(const render_transfer *t, int i, double x)
     return fmin(fmax((at - from) / (to - from), 0), 1);
 }
 
-/* Returns the opacity at x on the ramp that contains `middle`. */
+/* Returns the opacity at the value x on the ramp that contains the value `middle`; values in the domain. */
 static double opacity_on(const render_transfer *t, double middle, double x)
 {
     int i = 0;
@@ -176,6 +183,7 @@ static double opacity_on(const render_transfer *t, double middle, double x)
     return a < 0 ? 0 : a > 1 ? 1 : a;
 }
 
+/* Sets the piece's colours at its begin x, and their slopes. middle: a value inside of the piece. */
 static void set_colours(const render_transfer *t, const kept_entry *entries, double middle, double x,
                         kernel_real piece[KERNEL_PIECE_ENTRIES])
 {
@@ -193,8 +201,8 @@ static void set_colours(const render_transfer *t, const kept_entry *entries, dou
     }
 }
 
-/* Width of a ramp, as a share of the domain, below which float32's rounding of its ends and of values (3e-8) becomes
- * visible. */
+/* Width of a ramp in the transfer function's domain below which the rounding of its ends and of values to float32
+ * (3e-8) becomes visible. */
 static const double narrow_width = 0.01;
 
 static bool is_narrow(const render_transfer *t, int i)
@@ -203,8 +211,8 @@ static bool is_narrow(const render_transfer *t, int i)
     return 0 < width && width < narrow_width && t->opacities[i] != t->opacities[i + 1];
 }
 
-/* Returns the exact value of the cut in double if a narrow ramp begins or ends there. Otherwise, and if several points
- * coincide there (a step), returns the rounded cut. */
+/* Returns the value of a cut in double: the exact value if one opacity point lies there, at which a narrow ramp begins
+ * or ends. Otherwise, and if several points coincide there (a step), returns the rounded value `cut`. */
 static double exact_cut_value(const render_transfer *t, kernel_real cut)
 {
     double out = (double)cut;
@@ -218,6 +226,7 @@ static double exact_cut_value(const render_transfer *t, kernel_real cut)
     return count == 1 ? out : (double)cut;
 }
 
+/* Computes the entries of the piece between two cuts. */
 static void set_piece(const render_transfer *t, const kept_entry *entries, kernel_real low, kernel_real high,
                       kernel_real piece[KERNEL_PIECE_ENTRIES])
 {
@@ -238,6 +247,7 @@ static void set_piece(const render_transfer *t, const kept_entry *entries, kerne
 
 /* ---- bins and steps ---- */
 
+/* Fills the table by which the piece of a value is found. */
 static void fill_bins(kernel_pieces *out)
 {
     int piece = 0;
@@ -248,8 +258,8 @@ static void fill_bins(kernel_pieces *out)
     }
 }
 
-/* Finds the steps of the opacity. If several points have the same value, the first one's opacity belongs to the lower
- * side and the last one's to the upper side. */
+/* Stores the values of the steps of the opacity. If several points have the same value, the opacity just below it is
+ * the first point's, and that just above it the last one's. */
 static void fill_steps(kernel_pieces *out, const render_transfer *t)
 {
     int last;
@@ -263,7 +273,7 @@ static void fill_steps(kernel_pieces *out, const render_transfer *t)
     }
 }
 
-/* Computes the range of light intensities: from 0 to 1, extended to all colours of the table. */
+/* Computes the range of all colours of the table, extended to include 0 and 1. */
 static void range_of_light(const render_transfer *t, float *low, float *high)
 {
     *low = 0, *high = 1;
@@ -275,11 +285,14 @@ static void range_of_light(const render_transfer *t, float *low, float *high)
 
 /* ---- how bounds vary ----
  *
- * A field error d changes the light by T d g per unit distance, g = s' (c - b) + s c' in each channel, where the light
- * b from behind lies between the minimum and maximum of light. g is linear in b, so that over a range of values its
- * variation is largest at one of these two. For the alpha channel, g = s'. */
+ * A field error d changes the light by T d g per unit distance, where T is the transmittance, s the extinction, c a
+ * channel of the colour, primes are derivatives by the value, and g = s' (c - b) + s c'. The light b from behind lies
+ * in the range of light (range_of_light()). g is linear in b, so that over a range of values its variation is largest
+ * if b is the minimum or the maximum. For the alpha channel, g = s'. So there are seven kinds of g: alpha, and three
+ * channels with two b each. */
 enum { VARIATION_KINDS = 7 };
 
+/* Range of each kind of g over a range of values, and the maximum of the extinction. */
 typedef struct value_variation {
     double low[VARIATION_KINDS], high[VARIATION_KINDS];
     double extinction;
@@ -291,8 +304,8 @@ static void widen_variation(value_variation *variation, int kind, double low, do
     variation->high[kind] = fmax(variation->high[kind], fmin(high, 1e30));
 }
 
-/* Widens the ranges of a by those of b. Comparisons are used because fmin() and fmax() are function calls, of which a
- * frame would need 200,000. */
+/* Widens the ranges of a so that they include those of b. Comparisons are used because fmin() and fmax() are function
+ * calls, of which a frame would need 200,000. */
 static void unite_variations(value_variation *a, const value_variation *b)
 {
     for (int kind = 0; kind < VARIATION_KINDS; kind++) {
@@ -302,8 +315,8 @@ static void unite_variations(value_variation *a, const value_variation *b)
     a->extinction = b->extinction > a->extinction ? b->extinction : a->extinction;
 }
 
-/* Widens the bounds of the change of light by those of the piece between two of its values. behind: the minimum and
- * maximum of the light from behind. */
+/* Widens the ranges of g so that they hold between the values `from` and `to` of the piece p, too. behind: the minimum
+ * and maximum of the light from behind. */
 static void variation_in_piece(value_variation *variation, const kernel_real *p, double from, double to,
                                const double behind[2])
 {
@@ -330,8 +343,9 @@ static void variation_in_piece(value_variation *variation, const kernel_real *p,
     }
 }
 
-/* Computes the bounds over a bin, a little beyond its ends; the first and the last bin include everything beyond them.
- * No piece before `piece` may reach the bin; returns the first piece that reaches the next bin. */
+/* Computes the ranges of g over a bin of values, and a little beyond its ends; the first and the last bin include
+ * everything beyond them. piece: no earlier piece reaches the bin. Returns the first piece that reaches the bin, from
+ * which the search for the next bin's pieces begins. */
 static int variation_in_bin(const kernel_pieces *t, int bin, int piece, const double behind[2],
                             value_variation *variation)
 {
@@ -350,6 +364,7 @@ static int variation_in_bin(const kernel_pieces *t, int bin, int piece, const do
     return piece;
 }
 
+/* Computes a row of the table of bounds (KERNEL_LIGHT_VARIATION etc.) from the ranges of g. */
 static void sum_up_variation(const value_variation *s, double contrast, float out[KERNEL_LIGHT_ENTRIES])
 {
     double variation = 0, cost = 0;
@@ -364,7 +379,7 @@ static void sum_up_variation(const value_variation *s, double contrast, float ou
 }
 
 /* Fills the table of bounds, which is indexed by the class of a range's width and by the bin in which the range begins.
- * Wherever in its first bin a range of this class begins, it ends in bin `wanted` or before it. */
+ * A range of this class that begins anywhere in bin `first` ends in bin `wanted` or in front of it. */
 static void fill_variations(kernel_pieces *out, const double behind[2])
 {
     value_variation bins[KERNEL_VARIATION_BINS];

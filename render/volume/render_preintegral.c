@@ -1,4 +1,5 @@
-/* Integrates a transfer function over its values (kernel_preintegral.h): over each bin in double, piece by piece. */
+/* Integrates a transfer function over its values, for the table of kernel_preintegral.h: over each bin (a small range
+ * of values) in double, piece by piece (kernel_types.h). */
 #include <math.h>
 #include <string.h>
 
@@ -12,14 +13,15 @@
 
 enum { LEAST_BINS = 1024, MOST_BINS = 32768, CHANNELS = 4, COLOUR_LEVELS = 1023 };
 
-/* Upper bound of the sum over all bins, in units, so that differences of sums fit in 32 bits. */
+/* Upper bound of the integrals over all bins, in the integer units in which they are stored, so that differences fit in
+ * 32 bits. */
 static const double most_units = 0x1p30;
 static const double steepest = 1e6; /* same value as KERNEL_OPAQUE in kernel_integral.h */
 static const double absorbed_share = 0.15, length_share = 0.05;
 
-/* Returns the number of bins for an error bound. Segments whose ends are closer than a distance proportional to the
- * square of a bin's width divided by the error are not accurate enough. The table for 1e-2 has 196 KB, which fits into
- * a core's second-level cache next to a tile's rays. */
+/* Returns the number of bins for the error bound of a ray's light. The table is not accurate enough for segments whose
+ * end values are closer than a distance proportional to the square of a bin's width divided by the error. The table for
+ * 1e-2 has 196 KB, which fits into a core's second-level cache next to a tile's rays. */
 static int bin_count_for(double max_error)
 {
     int count = LEAST_BINS;
@@ -27,7 +29,8 @@ static int bin_count_for(double max_error)
     return count;
 }
 
-/* The integrals of the transfer function over a bin, before they are rounded to integers. */
+/* sum: the integrals over a bin of the extinction, and of the extinction times each channel of the colour, before they
+ * are rounded to integers; the other members are ranges within the bin. */
 typedef struct bin_sums {
     double sum[CHANNELS], low, high; /* minimum and maximum of the extinction in the bin */
     double colour_low[3], colour_high[3];
@@ -43,6 +46,7 @@ static double within(double x, double low, double high)
     return x < low ? low : x > high ? high : x;
 }
 
+/* Returns 1 - opacity at the value x in the piece p. */
 static double clear_at(const kernel_real *p, double x)
 {
     const double along = (x - entry_of(p, KERNEL_PIECE_LOW)) * entry_of(p, KERNEL_PIECE_INVERSE);
@@ -70,8 +74,8 @@ static double extinction_at(const kernel_real *p, double x)
     return extinction_of(clear_at(p, x));
 }
 
-/* Returns the extinction for 1 - opacity. last: the last argument and result, kept because consecutive bins share an
- * end, and the function is constant in many bins. */
+/* Returns the extinction for `clear`, which is 1 - opacity. last: the previous argument and result, kept because
+ * neighbouring bins share an end, and the function is constant in many bins. */
 static double extinction_again(double last[2], double clear)
 {
     if (clear != last[0]) {
@@ -87,8 +91,9 @@ static double colour_at(const kernel_real *p, double x, int c)
            (x - entry_of(p, KERNEL_PIECE_LOW)) * entry_of(p, KERNEL_PIECE_COLOUR_SLOPE + c);
 }
 
-/* Adds the integrals between two values of a piece, by three Gauss nodes. Intervals are halved repeatedly towards an
- * opacity of 1. If both ends have the same opacity, it is constant between them. */
+/* Adds the integrals between two values of a piece to `sum`, by Gauss's rule with three nodes. Ranges on which 1 -
+ * opacity changes much are halved repeatedly, as towards an opacity of 1. If both ends have the same opacity, it is
+ * constant between them. */
 static void integrate(const kernel_real *p, double from, double to, int depth, double last[2], double sum[CHANNELS])
 {
     static const double node[3] = {0.1127016653792583, 0.5, 0.8872983346207417};
@@ -107,6 +112,7 @@ static void integrate(const kernel_real *p, double from, double to, int depth, d
     }
 }
 
+/* Widens the bin's ranges of extinction and colour so that they include those at the value x of the piece p. */
 static void widen(bin_sums *bin, const kernel_real *p, double x, double last[2])
 {
     const double extinction = extinction_again(last, clear_at(p, x));
@@ -119,8 +125,8 @@ static void widen(bin_sums *bin, const kernel_real *p, double x, double last[2])
     }
 }
 
-/* Computes the integrals and ranges of the bin from begin to end. first: the piece that contains begin. Returns the
- * piece that contains end. */
+/* Computes the integrals and ranges of the bin between two values. first: index of the piece that contains `begin`.
+ * Returns the index of the piece that contains `end`. */
 static int fill_bin(const kernel_pieces *pieces, int first, double begin, double end, double last[2], bin_sums *bin)
 {
     *bin = (bin_sums){.low = INFINITY,
@@ -140,8 +146,8 @@ static int fill_bin(const kernel_pieces *pieces, int first, double begin, double
     }
 }
 
-/* Fills all bins. Below and above all knots the function is constant; each of these infinite ranges is represented by
- * one bin. */
+/* Computes the integrals and ranges of all bins. Below the first and above the last knot the function is constant; each
+ * of these infinite ranges is represented by one bin. low: value at which the other bins begin; count: their number. */
 static void fill_bins(const kernel_pieces *pieces, double low, double width, int count, bin_sums *bins)
 {
     /* an invalid value, because a transmittance is never -1; the cache is empty at the beginning */
@@ -162,6 +168,7 @@ static void fill_bins(const kernel_pieces *pieces, double low, double width, int
     }
 }
 
+/* Returns the colour at the middle of the bin's range, 10 bits per channel. */
 static int32_t pack_colour(const bin_sums *bin, double contrast)
 {
     int32_t packed = 0;
@@ -172,7 +179,7 @@ static int32_t pack_colour(const bin_sums *bin, double contrast)
     return packed;
 }
 
-/* Returns the largest change among the three channels. */
+/* Returns the largest change of a colour channel within the bin. */
 static double colour_change(const bin_sums *bin)
 {
     double change = 0;
@@ -180,7 +187,8 @@ static double colour_change(const bin_sums *bin)
     return change;
 }
 
-/* Stores the sums as integers. Returns the maximum deviation of the colour in a bin from that at its middle. */
+/* Stores the integrals as integers, and the bins' error bounds. Returns the maximum deviation of a colour within a bin
+ * from the colour at its middle. */
 static double fill_entries(kernel_preintegral *out, const bin_sums *bins, double width, double contrast)
 {
     double total[2] = {0, 0}, before[CHANNELS] = {0}, change = 0;
@@ -199,7 +207,7 @@ static double fill_entries(kernel_preintegral *out, const bin_sums *bins, double
             e->own[n] = (float)((int32_t)(before[n] / units[n > 0]) - begin);
         }
         e->colour = pack_colour(bin, contrast);
-        /* the integrals of a bin without extinction are exactly 0 */
+        /* a bin without extinction has no rounding error, because its integrals are exactly 0 */
         const double rounding = 2 * (units[0] * contrast + units[1]) / width;
         e->table_error = (float)fmin((bin->high - bin->low) * 2 * contrast + bin->high * colour_change(bin) +
                                          (bin->high > 0 ? rounding : 0),
@@ -211,9 +219,10 @@ static double fill_entries(kernel_preintegral *out, const bin_sums *bins, double
     return 0.5 * change;
 }
 
-/* Sets the bounds of colour bends for tables with unevenly spaced entries, assuming the sharpest bend at the closest
- * spacing. The bends towards the constant colours beyond the ends count too, because the ends need not be at 0 and
- * 1. */
+/* Computes out->bend_square and out->bend, which limit the deviation of colours from chords (kernel_preintegral.h), for
+ * tables whose entries are unevenly spaced in the domain. It assumes the largest change of slope at the closest
+ * spacing. The changes of slope towards the constant colours beyond the ends count too, because the ends need not be at
+ * 0 and 1. */
 static void fill_uneven_bends(kernel_preintegral *out, const render_transfer *t)
 {
     double bend = 0, closest = 1;
@@ -232,7 +241,8 @@ static void fill_uneven_bends(kernel_preintegral *out, const render_transfer *t)
     out->bend = (float)fmin(bend / 4, 1e30);
 }
 
-/* Sets the bounds of bends of the table's colours, which limit their deviation from chords. */
+/* Computes the members of *out that limit the deviation of colours from chords (kernel_preintegral.h), from the changes
+ * of the colours' slopes at the table's entries. */
 static void fill_bends(kernel_preintegral *out, const render_transfer *t)
 {
     const int last = t->colour_count - 1;
@@ -283,7 +293,7 @@ insitu_status render_preintegral_build(kernel_pieces *pieces, const render_trans
 {
     kernel_pieces exact;
     if (has_negative_colours(t)) return INSITU_OK;
-    /* with a nonlinear scale pieces are not exact, and their error replaces the error of merged colours */
+    /* with a nonlinear scale pieces cannot be exact, and this tolerance replaces the one for dropped colours */
     const double tolerance = t->scale == RENDER_LINEAR ? 0 : max_error / 8;
     const insitu_status status = render_pieces_build(&exact, t, tolerance, error);
     if (status != INSITU_OK) return status;
