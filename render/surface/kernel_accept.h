@@ -1,7 +1,7 @@
 /* Processes the hits of rays on isosurfaces: tests clips, computes normals and colours, and keeps each ray's nearest
  * hit (thesis, sections 4.3.4 and 4.3.5). Terms of this file and of those that include it:
- *     hit           crossing of a ray with an isosurface; it is accepted if the clips keep it and no nearer hit hides
- * it depth t       a hit's position on its ray: z in tile space, in scaled units (render_space); 0 at the depth origin
+ *     hit           crossing of a ray with an isosurface; it is accepted if clips keep it and no nearer hit hides it
+ *     depth t       a hit's position on its ray: z in tile space, in scaled units (render_space); 0 at depth_origin
  *     kind          number that a fragment has for its isovalue: the surface's first_kind plus the isovalue's index
  *     tied hit      hit of an opaque surface with exactly the same depth as the nearest hit of its ray
  *     reach         distance from a hit to the points at which central differences sample the field, in scaled units
@@ -185,6 +185,7 @@ SIMD_INLINE void kernel_tet_normal(const kernel_packet *p, const kernel_cell *c,
 
 /* ---- hits of a packet ---- */
 
+/* Returns whether the surface is one of the frame's opaque ones, which come first. */
 SIMD_INLINE bool kernel_is_opaque(const kernel_packet *p, const kernel_surface *s)
 {
     return s < p->frame->surfaces + p->frame->opaque_count;
@@ -329,7 +330,7 @@ SIMD_INLINE vm kernel_is_near(const kernel_packet *p, const kernel_interval *i)
     return vm_and(i->mask, vm_and(vf_le(i->t_in, p->t_far), vf_le(p->t_near, i->t_out)));
 }
 
-/* Returns those of the hits at t that all clips keep. clips: one bit per clip of the job. */
+/* Returns those of the hits at depth t that all of the given clips keep. clips: one bit per clip of the job. */
 static __attribute__((noinline, cold)) vm kernel_clip_hits(const kernel_packet *p, uint32_t clips, vm hit, vf t)
 {
     double px[SIMD_WIDTH], py[SIMD_WIDTH];
@@ -344,7 +345,7 @@ static __attribute__((noinline, cold)) vm kernel_clip_hits(const kernel_packet *
     return vm_from_bits(kept);
 }
 
-/* Returns those of the hits at t that are in front of the eye and are kept by the surface's own clips. */
+/* Returns those of the hits at depth t that are in front of the eye and that the surface's own clips keep. */
 SIMD_INLINE vm kernel_unclipped_hits(const kernel_packet *p, const kernel_surface *s, vm hit, vf t)
 {
     const vm in_front = vm_and(hit, vf_le(p->t_near, t));
@@ -352,6 +353,8 @@ SIMD_INLINE vm kernel_unclipped_hits(const kernel_packet *p, const kernel_surfac
     return kernel_clip_hits(p, s->own_clips, in_front, t);
 }
 
+/* Returns those of the hits at depth t that the clips keep, in front of the eye and not behind the rays' nearest hits.
+ */
 SIMD_INLINE vm kernel_visible(const kernel_packet *p, const kernel_surface *s, vm hit, vf t)
 {
     return kernel_unclipped_hits(p, s, vm_and(hit, vf_le(t, p->t_far)), t);

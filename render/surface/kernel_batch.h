@@ -188,6 +188,7 @@ SIMD_INLINE unsigned kernel_batch_accept_coloured(kernel_tile_trace *t, kernel_b
     return blocks;
 }
 
+/* Accepts the hits of one vector of rays with the colours of their isovalues (kernel_batch_accept_coloured()). */
 static unsigned kernel_batch_accept(kernel_tile_trace *t, kernel_batch *b, vi places, const uint8_t *lanes,
                                     unsigned hit, vf depth)
 {

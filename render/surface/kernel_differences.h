@@ -219,9 +219,9 @@ static __attribute__((noinline)) void kernel_sample_differences(const kernel_pac
     }
 }
 
-/* Replaces the cells' gradients in `normal` (camera axes) by differences of the samples, for the rays in `hit`. The
- * difference is one-sided if one sample of an axis is in no cell. If both are in no cell, the ray keeps its cell's
- * gradient. */
+/* Replaces the normals of the rays in `hit`, which are gradients in the hits' cells (camera axes), by differences of
+ * the samples. If one of the two samples along an axis is in no cell, that difference is one-sided. If neither is in a
+ * cell, the ray keeps its cell's gradient. */
 SIMD_INLINE void kernel_normals_from_samples(const kernel_packet *p, const vm found[RENDER_DIFFERENCE_SAMPLES],
                                              const vf values[RENDER_DIFFERENCE_SAMPLES], vm hit, vf normal[3])
 {

@@ -215,9 +215,10 @@ static void fill_slab(const occluder_search *s, double isovalue, occluder_piece 
         out->rows[KERNEL_SLAB_GRADIENT + a] = (float)gradient[a];
     }
     out->rows[KERNEL_SLAB_LEVEL] = (float)level;
-    /* The slab must also contain points at which the computed field is zero only by rounding. The thickness therefore
-     * includes 1e-5, which exceeds the rounding of values (6e-8 of the largest) and the error of roots
-     * (KERNEL_ROOT_BAND). KERNEL_SLAB_ERROR is the error of L by the rounding of positions, per unit of their size. */
+    /* The slab must also contain points at which the computed field is 0 only because of rounding. The thickness
+     * therefore includes 1e-5, which exceeds the rounding of values (6e-8 of the largest) and the error of roots
+     * (KERNEL_ROOT_BAND). KERNEL_SLAB_ERROR is the error of L by the rounding of positions, divided by the positions'
+     * magnitude. */
     out->rows[KERNEL_SLAB_THICKNESS] = (float)(off * 1.0001 + 1e-5);
     out->rows[KERNEL_SLAB_ERROR] = (float)(16 * 6e-8 * steep);
     out->rows[KERNEL_SLAB_REACH] = (float)s->reach;

@@ -33,17 +33,18 @@
  *
  * E may vanish although parts of higher order do not, and in hexes P and A may vanish too: values at eight vertices can
  * be such that the field equals its chord at all three places. So E is taken as at least 0.01 (P + A) N^2 + e N^2 S,
- * where N is the bend, S the sum of |h| times the nonlinear terms' slopes (kernel_local_deviation.h), and e is 0.0011
- * in hexes and 0.0004 in wedges. Along a ray in a pyramid the field is a linear function and a piece of a conic
- * section, whose three numbers the three places determine: e is 0. A deviation that the three places do not show is of
- * at least the fifth order, so that 2 p^4 e is enough for a part of the interval with share p.
+ * where N is the bound of the derivative of the map's nonlinear part, S the sum of |h| times the nonlinear terms'
+ * slopes (both in kernel_local_deviation.h), and e is 0.0011 in hexes and 0.0004 in wedges. Along a ray in a pyramid
+ * the field is a linear function and a piece of a conic section, whose three numbers the three places determine: e is
+ * 0. A deviation that the three places do not show is of at least the fifth order, so that 2 p^4 e is enough for a part
+ * of the interval with share p.
  *
- * These constants are measured. The test set was random rays in 5,000 random cells with bends up to 0.89, and the
- * fields that have E = 0, or all three places on the chord, and the largest possible error of the mean. The
- * polynomial's mean erred by at most 0.54 E on whole intervals, 0.57 E on halves, 0.72 E on quarters and 0.36 E on
- * eighths. The field itself deviated by at most 3.1 E on average, except for 19 of 133,000 of these fields (5.8 E), and
- * by 50 E for fields optimized to make E, P and A vanish in hexes that are hardly bent (N < 0.05). The bound of the
- * mean of |v - f| for one segment held in all of them; the bound for several segments is too small there. */
+ * These constants are measured. The test set was random rays in 5,000 random cells with N up to 0.89, and the fields
+ * that have E = 0, or all three places on the chord, and the largest possible error of the mean. The polynomial's mean
+ * erred by at most 0.54 E on whole intervals, 0.57 E on halves, 0.72 E on quarters and 0.36 E on eighths. The field
+ * itself deviated by at most 3.1 E on average, except for 19 of 133,000 of these fields (5.8 E), and by 50 E for fields
+ * optimized to make E, P and A vanish in hexes that are hardly bent (N < 0.05). The bound of the mean of |v - f| for
+ * one segment held in all of them; the bound for several segments is too small there. */
 #ifndef RENDER_KERNEL_LOCAL_BUDGET_H
 #define RENDER_KERNEL_LOCAL_BUDGET_H
 

@@ -6,6 +6,7 @@
  *     deviation    the field minus its chord
  *     residual     error of the equation for reference coordinates that Newton's method leaves, defined below
  *     bend         square of the bound N of the derivative of the map's nonlinear part
+ *
  * Callers pass the cell type as a constant. GRID_NO_TYPE means that a packet's rays are in one cell, and the field is
  * computed by that cell's inverse map.
  *
@@ -44,7 +45,8 @@
 
 enum { KERNEL_DEVIATION_STEPS = 8 };
 
-/* Distance, in reference coordinates, by which points may lie outside the cell, which extends from -1/2 to 1/2. */
+/* Distance, in the reference coordinates of kernel_local.h, by which points may lie outside their cell. (A hex extends
+ * from -1/2 to 1/2.) */
 #define KERNEL_DEVIATION_MARGIN 0.02f
 
 /* Error bounds of one cell per lane. kernel_local_budget.h defines the quantities and computes most of them. */

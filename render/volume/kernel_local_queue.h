@@ -5,8 +5,8 @@
  *     blocks       mask of those of the tile's 16 blocks (4 × 4 pixels each) in which a cell may be visible
  *     box          the rectangle of the tile's pixels in which a cell may be visible: first and last column, first and
  *                  last row, 4 bits each from bit 0 on
- *     window       interval of depths that is processed before the next one (kernel_tile_volume.h,
- * kernel_tile_segments.h) pair         a ray and the lane that holds its cell; pairs are processed one per lane */
+ *     window       interval of depths; a tile's windows are processed one after the other, from the nearest on
+ *     pair         a ray and the lane that holds its cell; pairs are processed one per lane */
 #ifndef RENDER_KERNEL_LOCAL_QUEUE_H
 #define RENDER_KERNEL_LOCAL_QUEUE_H
 
@@ -67,8 +67,9 @@ typedef struct kernel_tile_cells {
     kernel_map map;                    /* inverse map of that cell */
     kernel_transformed_tets tets;      /* the vector of tets that is being processed */
     const kernel_local_queue *current; /* queue of the vector of other cells that is being processed */
-    kernel_transformed_curved curved;  /* these cells; their affine edge functions are not set */
-    kernel_local_cells maps;           /* their maps */
+    /* the current vector of hexes, wedges or pyramids in tile space; affine edge functions are not set */
+    kernel_transformed_curved curved;
+    kernel_local_cells maps; /* their maps */
     /* per lane: first and last column, first and last row of the tile's pixels in which the lane's cell may be visible
      * (kernel_local_pixels()) */
     int32_t pixel_ends[4][SIMD_WIDTH];

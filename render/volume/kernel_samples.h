@@ -245,7 +245,7 @@ SIMD_INLINE void kernel_sample_colour(const kernel_packet *p, const kernel_sampl
         all += through * absorbed;
         through *= left;
     }
-    /* several media at one position absorb a common share of the light, which is divided among them in proportion to
+    /* several media at one position together absorb a share of the light, which is divided among them in proportion to
      * what each would absorb alone */
     const vf share = f->volume_count == 1 ? vf_set(1) : vf_select(vf_lt(vf_set(0), weight), all / weight, vf_set(0));
     for (int a = 0; a < 3; a++) colour[a] = sum[a] * share;

@@ -285,7 +285,8 @@ SIMD_INLINE vf kernel_exact_sum(vf a, vf b, vf *lost)
     return sum;
 }
 
-/* Returns the part of a segment between two positions, which are given as shares of the segment's length. */
+/* Returns the part of each ray's segment between the positions `from` and `to`, which are shares of the segment's
+ * length. */
 SIMD_INLINE kernel_unit_segment kernel_unit_segment_part(const kernel_unit_segment *whole, vf from, vf to)
 {
     const vf rise = (whole->v_out - whole->v_in) + (whole->rest_out - whole->rest_in);

@@ -1,6 +1,6 @@
 /* Integrates emission and absorption of volumes along rays by segments, instead of a sum over samples. Terms:
- *     segment          part of a ray in one cell, from t_in to t_out, on which the field is taken as linear from v_in
- * to v_out t, v             depth (z in tile space, scaled units); value of the field in the transfer function's domain
+ *     segment          part of a ray in one cell on which the field is taken as linear: t_in, t_out, v_in, v_out
+ *     t, v             depth (z in tile space, scaled units); value of the field in the transfer function's domain
  *     unit distance    length to which the transfer function's opacities refer (render_transfer)
  *     window           interval of depths whose segments are collected and then integrated; each ray has its own
  *     cut              depth at which a ray crosses a transparent surface; segments end there

@@ -38,7 +38,8 @@ enum { KERNEL_OPEN_PIECE = 16, KERNEL_SORT_PIECE = 64 };
 
 /* Callbacks by which a volume is sampled (kernel_tile_volume.h) or integrated (kernel_tile_segments.h) in its cells. */
 typedef struct kernel_volume_method {
-    /* set if the rays of cells that are processed alone are the tile's own primary rays (kernel_packet.h) */
+    /* set if the packets' rays are the tile's own primary rays (kernel_packet.is_pencil), for which cells need edge
+     * functions */
     bool is_pencil;
     /* Processes a cell, which is in tile space, with the rays of the packets of the given blocks. map: its inverse map;
      * NULL if it needs none. */

@@ -76,7 +76,7 @@ static void kernel_tile_samples(kernel_tile_trace *t, int part, const kernel_cel
     }
 }
 
-/* ---- small tets: sampled by the operations of kernel_samples.h, to the same bits ---- */
+/* ---- small tets: the results are bit-identical to those of kernel_samples.h ---- */
 
 /* Maximum number of pixels in the box of a tet that is sampled in lanes. In larger tets, packets are as fast. */
 enum { KERNEL_TET_SAMPLE_PIXELS = 12 };

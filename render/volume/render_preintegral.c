@@ -155,8 +155,8 @@ static void fill_bins(const kernel_pieces *pieces, double low, double width, int
     int piece = 0;
     for (int i = 0; i < count + 2; i++)
         piece = fill_bin(pieces, piece, low + (i - 1) * width, low + i * width, last, &bins[i]);
-    /* The outermost bins are computed again from the outermost pieces alone, so that they do not include a part of a
-     * neighbouring piece by rounding of their border. */
+    /* The first and the last bin are computed again, each from the outermost piece only: because its border is rounded,
+     * a bin may include a part of the neighbouring piece. */
     for (int end = 0; end < 2; end++) {
         const kernel_real *p = pieces->pieces[end ? pieces->count - 1 : 0];
         const double x = end ? low + (count + 0.5) * width : low - 0.5 * width;
