@@ -15,7 +15,7 @@
 #include "memory.h"
 #include "render_face_error.h"
 
-static int64_t place_in(const render_folding *folding, const pixel_area *area, uint32_t pixel)
+static int64_t pixel_index_in_area(const render_folding *folding, const pixel_area *area, uint32_t pixel)
 {
     const uint32_t width = (uint32_t)folding->job->camera.width;
     const int y = (int)(pixel / width) - area->y, x = (int)(pixel % width) - area->x;
@@ -42,9 +42,10 @@ static void collect(render_folding *folding, const pixel_area *area, const fragm
     const int64_t pixels = (int64_t)area->width * area->height;
     int64_t *starts = folding->starts;
     memset(starts, 0, (size_t)(pixels + 1) * sizeof *starts);
-    for (int64_t i = 0; i < count; i++) starts[place_in(folding, area, items[i].pixel)]++;
+    for (int64_t i = 0; i < count; i++) starts[pixel_index_in_area(folding, area, items[i].pixel)]++;
     for (int64_t k = 1; k < pixels; k++) starts[k] += starts[k - 1];
-    for (int64_t i = count; i-- > 0;) folding->items[--starts[place_in(folding, area, items[i].pixel)]] = items[i];
+    for (int64_t i = count; i-- > 0;)
+        folding->items[--starts[pixel_index_in_area(folding, area, items[i].pixel)]] = items[i];
     starts[pixels] = count;
 }
 

@@ -135,7 +135,7 @@ static void add_hit(tracer *t, int i, const render_hit *hit, const render_hit_ra
 
 /* ---- rays that must be tested exactly in a cell */
 
-static void tracer_set_camera(tracer *t, const double eye[3], const double (*axes)[3], bool is_orthographic)
+static void tracer_set_tile_space(tracer *t, const double eye[3], const double (*axes)[3], bool is_orthographic)
 {
     render_camera *c = &t->moved_job.camera;
     memcpy(c->eye, eye, sizeof c->eye);
@@ -156,7 +156,7 @@ static void set_hemisphere_rays(tracer *t, const render_hit *hit)
     kernel_bundle *b = &t->bundle;
     double directions[RENDER_MAX_SAMPLES][3];
     hit_hemisphere(t->job, hit->pixel, directions);
-    tracer_set_camera(t, p.start, (const double(*)[3])p.axes, false);
+    tracer_set_tile_space(t, p.start, (const double(*)[3])p.axes, false);
     b->tile.centre_x = b->tile.centre_y = 0;
     b->tile.radius = 0;
     for (int k = 0; k < o->samples; k++) {
@@ -186,7 +186,7 @@ static void set_light_ray(tracer *t, const render_hit *hit, int light)
     const double x = hit_dot(axes[0], from), y = hit_dot(axes[1], from);
     const double centre[2] = {(floor(x * LIGHT_TILES) + 0.5) / LIGHT_TILES,
                               (floor(y * LIGHT_TILES) + 0.5) / LIGHT_TILES};
-    tracer_set_camera(t, space->origin, (const double(*)[3])axes, true);
+    tracer_set_tile_space(t, space->origin, (const double(*)[3])axes, true);
     b->tile.centre_x = centre[0] / space->scale;
     b->tile.centre_y = centre[1] / space->scale;
     b->tile.radius = 0.5F / LIGHT_TILES;

@@ -282,7 +282,7 @@ static insitu_status check_job(const render_job *job, base_error *error)
 
 /* Returns an upper bound of the length of a ray inside this rank's cells, in scaled units: the diagonal of the bounding
  * box of all trees. */
-static double scene_reach(const render_job *job)
+static double longest_ray_in_scene(const render_job *job)
 {
     double low[3] = {1e300, 1e300, 1e300}, high[3] = {-1e300, -1e300, -1e300}, square = 0;
     for (int i = 0; i < job->part_count; i++) {
@@ -335,7 +335,7 @@ static insitu_status prepare_segments(kernel_frame *f, base_error *error)
      * depends on the partition whether a segment is cut at the surface by the rank or by compositing. Both must give
      * the same result, to 1e-6. Segments of several volumes are always cut by compositing. */
     if (is_apart && job->surface_count && job->volume_count == 1) f->mixing = fminf(f->mixing, 5e-7f);
-    const double reach = job->extent > 0 ? job->extent * job->space.scale : scene_reach(job);
+    const double reach = job->extent > 0 ? job->extent * job->space.scale : longest_ray_in_scene(job);
     for (int i = 0; i < job->volume_count && status == INSITU_OK; i++) {
         const render_transfer *t = job->volumes[i].transfer;
         f->reach[i] = (float)fmax(reach / (t->unit_distance * job->space.scale), 1e-30);

@@ -78,7 +78,7 @@ static inline vm bundle_find_hits(bundle *b, const kernel_curved *curved, const 
     do {
         kernel_point place;
         if (!vm_any(s.found)) continue;
-        kernel_polish(&s, &place);
+        kernel_refine_roots(&s, &place);
         *t = vf_select(vm_andnot(s.found, hit), place.t, *t);
         *hits += vf_select(s.found, vf_set(1), vf_set(0));
         hit = vm_or(hit, s.found);

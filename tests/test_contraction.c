@@ -102,7 +102,7 @@ static void place_cell_vertices(batch *b, shape s, int lane)
 }
 
 /* Sets values that are nearly linear or far from linear in the position. The values are relative to a random isovalue
- * within their range and scaled to a maximum of 1, as by kernel_cell_relative(). */
+ * within their range and scaled to a maximum of 1, as by kernel_cell_subtract_isovalue(). */
 static void place_cell_values(batch *b, int lane)
 {
     const int count = grid_type_vertices(b->type);
@@ -171,12 +171,12 @@ static void run_contraction(batch *b, kernel_point *out, vm *none, kernel_bounds
     for (int lane = 0; lane < SIMD_WIDTH; lane++) own[lane] = lane;
     memcpy(&lanes, own, sizeof lanes);
     kernel_bounds_of(b->type, (const float(*)[8][SIMD_WIDTH])b->at, &b->beam, bounds);
-    kernel_contraction_ray(&cells, &b->rays, lanes, &c);
-    kernel_contraction_of(bounds, lanes, b->type, &c);
+    kernel_contraction_set_ray(&cells, &b->rays, lanes, &c);
+    kernel_contraction_set_cell(bounds, lanes, b->type, &c);
     KERNEL_OF_TYPE(b->type, kernel_contract, &c, vm_all_lanes(), out, none);
     kernel_maps_of_type((const float(*)[8][SIMD_WIDTH])b->at, lanes, b->type, &map);
     out->t += vf_load(b->at[2][0]);
-    kernel_polish_near(&b->rays, &map, out->mask, out);
+    kernel_refine_accurate_roots(&b->rays, &map, out->mask, out);
 }
 
 /* ---- reference ---- */

@@ -160,7 +160,7 @@ static void aim_all_rays(bundle *b, bool is_near)
     }
 }
 
-/* Rounds the values to float32 after scaling them to a maximum of 1, as kernel_cell_relative() does. */
+/* Rounds the values to float32 after scaling them to a maximum of 1, as kernel_cell_subtract_isovalue() does. */
 static void scale_values_to_maximum_of_1(double values[8])
 {
     double largest = 0;

@@ -318,7 +318,7 @@ static void make_triple_root(bundle *b, const reference_cell *cell, ray_profile 
     }
 }
 
-/* Rounds the values to float32 after scaling them to a maximum of 1, as kernel_cell_relative() does. */
+/* Rounds the values to float32 after scaling them to a maximum of 1, as kernel_cell_subtract_isovalue() does. */
 static void scale_values_to_maximum_of_1(double *values, int count)
 {
     double largest = 0;

@@ -101,7 +101,7 @@ SIMD_INLINE int kernel_arrays_type(const kernel_arrays *p, uint32_t cell)
 
 /* Returns the index of the first connectivity entry of the cell; for a lattice, the index of the cell's first vertex.
  * vertices: number of vertices of each cell, used if the mesh has no offsets. */
-SIMD_INLINE int64_t kernel_arrays_first(const grid *g, uint32_t cell, int vertices)
+SIMD_INLINE int64_t kernel_arrays_first_entry(const grid *g, uint32_t cell, int vertices)
 {
     if (__builtin_expect(g->lattice != NULL, 0)) return grid_lattice_first(g->lattice, cell);
     return g->offsets.data ? grid_array_index(&g->offsets, cell) : (int64_t)cell * vertices;
@@ -124,7 +124,7 @@ SIMD_INLINE void kernel_arrays_vertices(const kernel_arrays *p, uint32_t cell, i
     if (__builtin_expect(p->cells->lattice != NULL, 0)) {
         kernel_lattice_indices(p->cells->lattice, cell, vertices, out, out_stride);
     } else {
-        const char *at = c.data + kernel_arrays_first(p->cells, cell, vertices) * c.stride;
+        const char *at = c.data + kernel_arrays_first_entry(p->cells, cell, vertices) * c.stride;
         for (int i = 0; i < vertices; i++, at += c.stride) {
             const int64_t index = c.is_wide ? *(const int64_t *)(const void *)at : *(const int32_t *)(const void *)at;
             out[i * out_stride] = (int32_t)(index - c.base);
@@ -150,7 +150,7 @@ SIMD_INLINE void kernel_arrays_vertices_of_any(const kernel_arrays *p, uint32_t 
 
 /* Returns those of the given lanes (a bit mask) whose cells are drawn: those with a finite value in source_cells, or
  * all if there is no such field. */
-SIMD_INLINE unsigned kernel_arrays_drawn(const kernel_arrays *p, const uint32_t *cells, unsigned lanes)
+SIMD_INLINE unsigned kernel_arrays_drawn_lanes(const kernel_arrays *p, const uint32_t *cells, unsigned lanes)
 {
     for (unsigned left = p->source_cells ? lanes : 0; left; left &= left - 1)
         if (!isfinite(grid_field_value(p->source_cells, cells[__builtin_ctz(left)]))) lanes &= ~(left & -left);
@@ -306,7 +306,7 @@ typedef struct kernel_level {
 } kernel_level;
 
 /* Returns the smallest float32 that is not below x. */
-SIMD_INLINE float kernel_not_below(double x)
+SIMD_INLINE float kernel_smallest_float_not_below(double x)
 {
     float f = (float)x;
     int32_t bits;
@@ -321,7 +321,7 @@ SIMD_INLINE float kernel_not_below(double x)
 SIMD_INLINE kernel_level kernel_level_of(double value)
 {
     const float middle = (float)value;
-    return (kernel_level){value, middle, (float)(value - (double)middle), kernel_not_below(value)};
+    return (kernel_level){value, middle, (float)(value - (double)middle), kernel_smallest_float_not_below(value)};
 }
 
 /* Returns the lanes in which the number v is below the level. The comparison is exact. */
@@ -336,7 +336,7 @@ SIMD_INLINE vf kernel_raw_minus(const kernel_numbers *c, const kernel_raw_number
 {
     vf out;
     if (kernel_numbers_are_narrow(c)) return (v->narrow - level->middle) - level->rest;
-    for (int half = 0; half < 2; half++) kernel_f64_store_lanes(&out, half, v->wide[half] - level->value);
+    for (int half = 0; half < 2; half++) kernel_f64_store_half_of_vector(&out, half, v->wide[half] - level->value);
     return out;
 }
 

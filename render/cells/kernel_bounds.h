@@ -166,7 +166,8 @@ SIMD_INLINE kernel_f64 kernel_f64_slope(int type, const kernel_f64 c[8], int a, 
 
 /* Returns the derivative along reference coordinate a at the reference coordinates r, minus that at the domain's
  * centre, of a polynomial whose coefficients 4 to 7 are nonlinear_part. */
-SIMD_INLINE kernel_f64 kernel_f64_bend(int type, const kernel_f64 nonlinear_part[4], int a, const double r[3])
+SIMD_INLINE kernel_f64 kernel_f64_slope_minus_centre(int type, const kernel_f64 nonlinear_part[4], int a,
+                                                     const double r[3])
 {
     const double *centre = kernel_domain_of(type)->centre;
     const int next = (a + 1) % 3, last = (a + 2) % 3;
@@ -186,7 +187,7 @@ SIMD_INLINE void kernel_bounds_lanes_fit(kernel_bounds_lanes *b, int type, const
         vf v[8];
         for (int i = 0; i < count; i++) {
             v[i] = vf_load(at[n][i]);
-            d[i] = kernel_f64_of(&v[i], half);
+            d[i] = kernel_f64_widen_half(&v[i], half);
         }
         if (n < 3) {
             b->reach[n] = kernel_f64_abs(d[0]);
@@ -254,7 +255,7 @@ SIMD_INLINE kernel_f64 kernel_bounds_lanes_linear(kernel_bounds_lanes *b, int ty
 }
 
 /* Returns the maximum over the domain's corners of |E|, where e has the coefficients of E. */
-SIMD_INLINE kernel_f64 kernel_f64_error(int type, const kernel_f64 e[8])
+SIMD_INLINE kernel_f64 kernel_f64_largest_error(int type, const kernel_f64 e[8])
 {
     const kernel_domain *table = kernel_domain_of(type);
     kernel_f64 most = {0};
@@ -282,11 +283,12 @@ SIMD_INLINE void kernel_bounds_lanes_slopes(kernel_bounds_lanes *b, int type)
             const double *r = table->corners[(int)table->first[a][n]];
             b->df[a][n] = kernel_f64_slope(type, field, a, r);
             b->de[a][n] = kernel_f64_slope(type, b->e, a, r);
-            for (int i = 0; i < 3; i++) b->bend[i][a][n] = kernel_f64_bend(type, b->nonlinear_part[i], a, r);
+            for (int i = 0; i < 3; i++)
+                b->bend[i][a][n] = kernel_f64_slope_minus_centre(type, b->nonlinear_part[i], a, r);
         }
 }
 
-SIMD_INLINE kernel_f64 kernel_f64_length(const kernel_f64 v[3])
+SIMD_INLINE kernel_f64 kernel_f64_squared_length(const kernel_f64 v[3])
 {
     return v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
 }
@@ -331,7 +333,8 @@ SIMD_INLINE void kernel_bounds_lanes_corners(kernel_bounds_lanes *b, int type, c
             steep += de[i] * de[i];
             turn += term * term;
         }
-        const kernel_f64 eighth = kernel_f64_eighth((const kernel_f64(*)[3])bend), square = kernel_f64_length(df);
+        const kernel_f64 eighth = kernel_f64_eighth((const kernel_f64(*)[3])bend),
+                         square = kernel_f64_squared_length(df);
         theta = n ? kernel_f64_more(eighth, theta) : eighth;
         slope = n ? kernel_f64_more(square, slope) : square;
         most_along = n ? kernel_f64_more(along * along, most_along) : along * along;
@@ -357,14 +360,14 @@ SIMD_INLINE void kernel_f64_planes(const kernel_bounds_lanes *b, int type, int i
         low = -kernel_f64_more(-at, -low);
         high = kernel_f64_more(at, high);
     }
-    for (int a = 0; a < 3; a++) kernel_f64_store(out->normal[i][a], half, b->inverse[i][a]);
-    kernel_f64_store(out->low[i], half, low - pad);
-    kernel_f64_store(out->high[i], half, high + pad);
+    for (int a = 0; a < 3; a++) kernel_f64_store_half(out->normal[i][a], half, b->inverse[i][a]);
+    kernel_f64_store_half(out->low[i], half, low - pad);
+    kernel_f64_store_half(out->high[i], half, high + pad);
 }
 
 /* Converts the coefficients of a polynomial's nonlinear terms (products of two coordinates, for a hex also of all
  * three) to coordinates that are counted from the domain's middle. */
-SIMD_INLINE void kernel_f64_terms(int type, const kernel_f64 nonlinear_part[4], kernel_f64 out[4])
+SIMD_INLINE void kernel_f64_terms_about_middle(int type, const kernel_f64 nonlinear_part[4], kernel_f64 out[4])
 {
     const int first = kernel_is_prism(type) ? 1 : 0;
     for (int j = 0; j < 4; j++) out[j] = (kernel_f64){0};
@@ -386,7 +389,7 @@ SIMD_INLINE void kernel_f64_terms(int type, const kernel_f64 nonlinear_part[4], 
  * error_bound is the sum of these errors. The computed crossings of faces lie within `gap` of the ray, and the values
  * there differ from the field by at most KERNEL_FACE_BAND. Each error moves the root by at most itself / (1 - K), and
  * domain_margin is twice the sum of all. */
-SIMD_INLINE void kernel_f64_rate(const kernel_bounds_lanes *b, int type, int half, kernel_bounds *out)
+SIMD_INLINE void kernel_f64_contraction_bounds(const kernel_bounds_lanes *b, int type, int half, kernel_bounds *out)
 {
     const kernel_f64 zero = {0}, one = zero + 1, speed = b->length / b->rise, wide = b->across * 5e5;
     const kernel_f64 rate = b->theta + b->slant * speed * 1.0001, rest = one - rate;
@@ -408,10 +411,10 @@ SIMD_INLINE void kernel_f64_rate(const kernel_bounds_lanes *b, int type, int hal
     const kernel_f64 domain_margin = 2 * ((face + error_bound) / rest) + 4e-6;
     const kernel_f64_mask contracts = b->is_regular & (kernel_f64_mask)(b->rise > 0) & (kernel_f64_mask)(rate < 0.9) &
                                       (kernel_f64_mask)(domain_margin < 0.015625);
-    kernel_f64_store(out->error_growth, half,
-                     kernel_f64_select(contracts, 1.0001 * rate / rest, kernel_f64_set((double)INFINITY)));
-    kernel_f64_store(out->error_bound, half, error_bound);
-    kernel_f64_store(out->domain_margin, half, domain_margin);
+    kernel_f64_store_half(out->error_growth, half,
+                          kernel_f64_select(contracts, 1.0001 * rate / rest, kernel_f64_set((double)INFINITY)));
+    kernel_f64_store_half(out->error_bound, half, error_bound);
+    kernel_f64_store_half(out->domain_margin, half, domain_margin);
 }
 
 SIMD_INLINE void kernel_f64_contraction_of(const kernel_bounds_lanes *b, int half, kernel_bounds *out, int type)
@@ -429,14 +432,14 @@ SIMD_INLINE void kernel_f64_contraction_of(const kernel_bounds_lanes *b, int hal
     for (int i = 0; i < 3; i++) {
         const kernel_f64 offset =
             -(b->inverse[i][0] * middle[0] + b->inverse[i][1] * middle[1] + b->inverse[i][2] * middle[2]);
-        kernel_f64_store(out->offset[i], half, offset);
-        kernel_f64_terms(type, b->nonlinear_part[i], terms);
-        for (int j = 0; j < kernel_nonlinear_count(type); j++) kernel_f64_store(out->terms[j][i], half, terms[j]);
+        kernel_f64_store_half(out->offset[i], half, offset);
+        kernel_f64_terms_about_middle(type, b->nonlinear_part[i], terms);
+        for (int j = 0; j < kernel_nonlinear_count(type); j++) kernel_f64_store_half(out->terms[j][i], half, terms[j]);
     }
-    kernel_f64_store(out->middle, half, middle[3]);
-    kernel_f64_terms(type, b->e + 4, terms);
-    for (int j = 0; j < kernel_nonlinear_count(type); j++) kernel_f64_store(out->field_terms[j], half, terms[j]);
-    kernel_f64_rate(b, type, half, out);
+    kernel_f64_store_half(out->middle, half, middle[3]);
+    kernel_f64_terms_about_middle(type, b->e + 4, terms);
+    for (int j = 0; j < kernel_nonlinear_count(type); j++) kernel_f64_store_half(out->field_terms[j], half, terms[j]);
+    kernel_f64_contraction_bounds(b, type, half, out);
 }
 
 /* Returns the square of the Frobenius norm of a polynomial's second derivatives over the extended domain. For a pyramid
@@ -455,19 +458,19 @@ SIMD_INLINE kernel_f64 kernel_f64_hessian(int type, const kernel_f64 c[4])
 }
 
 /* Stores the coefficients and bounds of the map and the field that the search for roots needs (kernel_roots.h). */
-SIMD_INLINE void kernel_f64_limits(const kernel_bounds_lanes *b, int type, kernel_f64 stretch, int half,
-                                   kernel_bounds *out)
+SIMD_INLINE void kernel_f64_store_search_bounds(const kernel_bounds_lanes *b, int type, kernel_f64 stretch, int half,
+                                                kernel_bounds *out)
 {
     kernel_f64 twist = {0}, field[4];
     for (int i = 0; i < 3; i++) {
-        for (int j = 0; j < 4; j++) kernel_f64_store(out->nonlinear_part[i][j], half, b->nonlinear_part[i][j]);
+        for (int j = 0; j < 4; j++) kernel_f64_store_half(out->nonlinear_part[i][j], half, b->nonlinear_part[i][j]);
         twist += kernel_f64_hessian(type, b->nonlinear_part[i]);
     }
     for (int j = 0; j < 4; j++) field[j] = kernel_f64_rounded(b->exact[3][4 + j]);
-    kernel_f64_store(out->stretch, half, stretch);
-    kernel_f64_store(out->slope, half, b->slope);
-    kernel_f64_store(out->field_curvature, half, kernel_f64_sqrt(kernel_f64_hessian(type, field)));
-    kernel_f64_store(out->map_curvature, half, kernel_f64_sqrt(twist));
+    kernel_f64_store_half(out->stretch, half, stretch);
+    kernel_f64_store_half(out->slope, half, b->slope);
+    kernel_f64_store_half(out->field_curvature, half, kernel_f64_sqrt(kernel_f64_hessian(type, field)));
+    kernel_f64_store_half(out->map_curvature, half, kernel_f64_sqrt(twist));
 }
 
 static __attribute__((noinline)) void kernel_f64_contraction(const kernel_bounds_lanes *b, int half, kernel_bounds *out,
@@ -510,7 +513,7 @@ SIMD_INLINE void kernel_f64_bounds(const float at[4][8][SIMD_WIDTH], int half, c
     const kernel_f64 stretch =
         kernel_f64_select(bends_little, kernel_f64_rounded(1 / (1 - b.theta)), kernel_f64_set(10));
     b.is_regular = b.is_solid & bends_little;
-    kernel_f64_limits(&b, type, stretch, half, out);
+    kernel_f64_store_search_bounds(&b, type, stretch, half, out);
     off = kernel_f64_sqrt(off);
     b.length = kernel_f64_sqrt(length) + off;
     b.gap = kernel_f64_sqrt(gap);
@@ -521,13 +524,13 @@ SIMD_INLINE void kernel_f64_bounds(const float at[4][8][SIMD_WIDTH], int half, c
     const kernel_f64 least = kernel_f64_select((kernel_f64_mask)(whole < apart), whole, apart);
     const kernel_f64_mask rises = b.is_regular & (kernel_f64_mask)(b.rise * 0.9999 > least);
     const kernel_f64_floats jump = kernel_f64_narrow(b.slope * stretch * b.gap) + KERNEL_FACE_BAND;
-    kernel_f64_store(out->jump, half, kernel_f64_select(rises, kernel_f64_widen(jump), -one));
+    kernel_f64_store_half(out->jump, half, kernel_f64_select(rises, kernel_f64_widen(jump), -one));
     const kernel_f64 level = kernel_f64_rounded(b.e[0]), endless = kernel_f64_set((double)INFINITY);
     b.e[0] -= level;
-    const kernel_f64 thickness = kernel_f64_error(type, b.e) + 1e-5 + 16 * 6e-8 * size;
-    kernel_f64_store(out->level, half, level);
-    for (int a = 0; a < 3; a++) kernel_f64_store(out->gradient[a], half, g[a]);
-    kernel_f64_store(out->thickness, half, kernel_f64_select(b.is_regular, thickness, endless));
+    const kernel_f64 thickness = kernel_f64_largest_error(type, b.e) + 1e-5 + 16 * 6e-8 * size;
+    kernel_f64_store_half(out->level, half, level);
+    for (int a = 0; a < 3; a++) kernel_f64_store_half(out->gradient[a], half, g[a]);
+    kernel_f64_store_half(out->thickness, half, kernel_f64_select(b.is_regular, thickness, endless));
     kernel_f64_contraction(&b, half, out, type);
 }
 

@@ -171,8 +171,8 @@ typedef struct kernel_cell {
     double values[GRID_MAX_CELL_VERTICES];
     /* coordinates of the vertices in tile space */
     float x[GRID_MAX_CELL_VERTICES], y[GRID_MAX_CELL_VERTICES], z[GRID_MAX_CELL_VERTICES];
-    /* vertex values as the layer needs them: minus an isovalue and scaled (kernel_cell_relative()), or in the domain of
-     * a volume's transfer function */
+    /* vertex values as the layer needs them: minus an isovalue and scaled (kernel_cell_subtract_isovalue()), or in the
+     * domain of a volume's transfer function */
     float f[GRID_MAX_CELL_VERTICES];
     float g[GRID_MAX_CELL_VERTICES];     /* vertex values of the colour field, in its transfer function's domain */
     int rank[GRID_MAX_CELL_VERTICES];    /* rank of each vertex in the lexicographic order of coordinates */
@@ -483,7 +483,8 @@ SIMD_INLINE void kernel_curved_lines(kernel_cell *c, const kernel_frame *f, cons
     c->least[0] = kernel_is_box(c->type) ? (float)INFINITY : kernel_least_weight_bound(most);
 }
 
-static __attribute__((unused)) void kernel_cell_lines(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)
+static __attribute__((unused)) void kernel_cell_compute_lines(kernel_cell *c, const kernel_frame *f,
+                                                              const kernel_tile *tile)
 {
     if (c->has_lines) return;
     c->has_lines = true;

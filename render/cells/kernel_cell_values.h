@@ -39,7 +39,7 @@ SIMD_INLINE double kernel_mirrored_power(double largest)
 
 /* Stores the values minus the isovalue, multiplied by a power of two that brings the largest magnitude near 1. Returns
  * that power of two. */
-SIMD_INLINE double kernel_values_relative(const double *values, int count, double isovalue, float *out)
+SIMD_INLINE double kernel_values_subtract_isovalue(const double *values, int count, double isovalue, float *out)
 {
     double largest = 0;
     for (int i = 0; i < count; i++) {
@@ -51,15 +51,15 @@ SIMD_INLINE double kernel_values_relative(const double *values, int count, doubl
     return scale;
 }
 
-SIMD_INLINE void kernel_cell_relative(kernel_cell *c, double isovalue)
+SIMD_INLINE void kernel_cell_subtract_isovalue(kernel_cell *c, double isovalue)
 {
-    kernel_values_relative(c->values, c->count, isovalue, c->f);
+    kernel_values_subtract_isovalue(c->values, c->count, isovalue, c->f);
 }
 
 /* Reads the colour field at a cell's vertices and converts it to the domain of its transfer function. Returns the
  * mean. */
-SIMD_INLINE double kernel_values_colours(const kernel_surface *s, int part, uint32_t cell, const int64_t *vertices,
-                                         int count, float *out)
+SIMD_INLINE double kernel_read_colour_values(const kernel_surface *s, int part, uint32_t cell, const int64_t *vertices,
+                                             int count, float *out)
 {
     const grid_field *field = &s->layer->colour_field.fields[part];
     double mean = 0;
@@ -96,7 +96,7 @@ SIMD_INLINE bool kernel_cell_is_visible(const kernel_cell *c, const kernel_trans
 
 /* Sets c->f to the values in the transfer function's domain, clamped to +-1e18 so that interpolation cannot overflow,
  * and c->is_constant. */
-SIMD_INLINE void kernel_cell_domain(kernel_cell *c, const kernel_transfer *t)
+SIMD_INLINE void kernel_cell_map_values_to_domain(kernel_cell *c, const kernel_transfer *t)
 {
     c->is_constant = true;
     for (int i = 0; i < c->count; i++) {

@@ -14,7 +14,7 @@
 #include "kernel_shapes.h"
 #include "simd.h"
 
-SIMD_INLINE kernel_line kernel_line_of(const kernel_packet *p, kernel_tile_position a, kernel_tile_position b)
+SIMD_INLINE kernel_line kernel_line_in_packet(const kernel_packet *p, kernel_tile_position a, kernel_tile_position b)
 {
     return kernel_line_between(p->frame, a, b, kernel_position_size(p->frame, p->tile, a),
                                kernel_position_size(p->frame, p->tile, b));
@@ -34,7 +34,7 @@ SIMD_INLINE vf kernel_project_y(const kernel_packet *p, kernel_tile_position a)
  * products of float32 are exact. The magnitude of such a function is negligible next to those of other edges. It is set
  * to KERNEL_EDGE_LEAST, because the weights of a triangle must not all be zero. If the function is exactly zero, the
  * tie is decided by the rule of kernel_cell.h, and stored as the sign of the zero. */
-static __attribute__((noinline, cold)) vf kernel_edge_tied(vf ax, vf ay, vf bx, vf by, vf e)
+static __attribute__((noinline, cold)) vf kernel_decide_edge_ties(vf ax, vf ay, vf bx, vf by, vf e)
 {
     for (int lane = 0; lane < SIMD_WIDTH; lane++) {
         const double x0 = (double)ax[lane], y0 = (double)ay[lane], x1 = (double)bx[lane], y1 = (double)by[lane];
@@ -65,7 +65,7 @@ SIMD_INLINE vf kernel_edge_between(vf ax, vf ay, vf bx, vf by)
 {
     const vf e = vf_diff_of_products(ax, by, bx, ay);
     const vm tie = vf_le(vf_abs(e), vf_set(KERNEL_EDGE_LEAST));
-    return __builtin_expect(vm_any(tie), 0) ? kernel_edge_tied(ax, ay, bx, by, e) : e;
+    return __builtin_expect(vm_any(tie), 0) ? kernel_decide_edge_ties(ax, ay, bx, by, e) : e;
 }
 
 SIMD_INLINE vf kernel_edge_projected(const kernel_packet *p, kernel_tile_position a, kernel_tile_position b)
@@ -87,7 +87,8 @@ SIMD_INLINE vf kernel_line_at(const kernel_packet *p, const kernel_line *l)
 
 /* Returns the edge function of the edge from a to b on the packet's rays, with exact signs and ties decided: the sign
  * bit states the side, even of a zero. a must be before b in the order of coordinates; l: the edge's line. */
-SIMD_INLINE vf kernel_edge(const kernel_packet *p, const kernel_line *l, kernel_tile_position a, kernel_tile_position b)
+SIMD_INLINE vf kernel_edge_function_on_rays(const kernel_packet *p, const kernel_line *l, kernel_tile_position a,
+                                            kernel_tile_position b)
 {
     if (!p->is_pencil) return kernel_edge_projected(p, a, b);
     const vf e = kernel_line_at(p, l);
@@ -96,7 +97,7 @@ SIMD_INLINE vf kernel_edge(const kernel_packet *p, const kernel_line *l, kernel_
 }
 
 /* Returns those of the given rays that cross the triangle i, j, k. ij, jk, ik: its edge functions on the rays. */
-SIMD_INLINE vm kernel_inside(vm rays, vf ij, vf jk, vf ik)
+SIMD_INLINE vm kernel_rays_inside_triangle(vm rays, vf ij, vf jk, vf ik)
 {
     const vi a = vi_from_bits(ij), b = vi_from_bits(jk), c = vi_from_bits(ik);
     return vm_and(rays, vm_sign(~(a ^ b) & (a ^ c)));
@@ -118,7 +119,7 @@ SIMD_INLINE vf kernel_weight(vf ij, vf jk, vf ik)
 SIMD_INLINE kernel_edge_error kernel_edge_error_between(const kernel_packet *p, kernel_tile_position a,
                                                         kernel_tile_position b)
 {
-    const kernel_line l = kernel_line_of(p, a, b);
+    const kernel_line l = kernel_line_in_packet(p, a, b);
     return kernel_line_error(&l, p->tile->radius, a, b);
 }
 
@@ -163,7 +164,7 @@ SIMD_INLINE void kernel_transform(const kernel_packet *p, const double *world, f
 SIMD_INLINE void kernel_cell_transform(kernel_cell *c, const kernel_packet *p, const grid *g)
 {
     kernel_cell_transform_in_tile(c, p->frame, p->tile, g);
-    if (p->is_pencil) kernel_cell_lines(c, p->frame, p->tile);
+    if (p->is_pencil) kernel_cell_compute_lines(c, p->frame, p->tile);
 }
 
 /* The weights of crossings of a triangle. i, j, k: numbers of its vertices in the cell, in the order of coordinates;
@@ -222,7 +223,8 @@ SIMD_INLINE void kernel_curved_edge(kernel_face_search *s, int n, int i, int j)
 {
     const kernel_cell *c = s->cell;
     const int a = c->rank[i] < c->rank[j] ? i : j, b = a == i ? j : i;
-    s->edge[a][b] = kernel_edge(s->packet, &c->lines[n], kernel_cell_position(c, a), kernel_cell_position(c, b));
+    s->edge[a][b] =
+        kernel_edge_function_on_rays(s->packet, &c->lines[n], kernel_cell_position(c, a), kernel_cell_position(c, b));
 }
 
 SIMD_INLINE void kernel_triangle_values(const kernel_face_search *s, const kernel_weights *w, kernel_point *out)
@@ -274,9 +276,10 @@ SIMD_INLINE void kernel_triangle_order(const kernel_cell *c, const int corners[3
 }
 
 /* Returns the rays that cross the triangle, whose vertices are in the order of coordinates. */
-SIMD_INLINE vm kernel_triangle(const kernel_face_search *s, const int ijk[3])
+SIMD_INLINE vm kernel_rays_crossing_triangle(const kernel_face_search *s, const int ijk[3])
 {
-    return kernel_inside(s->rays, s->edge[ijk[0]][ijk[1]], s->edge[ijk[1]][ijk[2]], s->edge[ijk[0]][ijk[2]]);
+    return kernel_rays_inside_triangle(s->rays, s->edge[ijk[0]][ijk[1]], s->edge[ijk[1]][ijk[2]],
+                                       s->edge[ijk[0]][ijk[2]]);
 }
 
 /* Computes the crossings of rays with the triangle of three of the cell's vertices. Returns false if no ray crosses
@@ -286,7 +289,7 @@ SIMD_INLINE bool kernel_triangle_crossing(const kernel_face_search *s, const int
     const kernel_cell *c = s->cell;
     int ijk[3];
     kernel_triangle_order(c, corners, ijk);
-    const vm hit = kernel_triangle(s, ijk);
+    const vm hit = kernel_rays_crossing_triangle(s, ijk);
     if (!vm_any(hit)) return false;
     kernel_weights w = kernel_weights_of(ijk[0], ijk[1], ijk[2], s->edge[ijk[0]][ijk[1]], s->edge[ijk[1]][ijk[2]],
                                          s->edge[ijk[0]][ijk[2]]);
@@ -323,13 +326,13 @@ SIMD_INLINE int kernel_quad_crossings(const kernel_face_search *s, const int cor
         const int corners[3] = {corner[0], corner[half + 1], corner[half + 2]};
         int ijk[3];
         kernel_triangle_order(c, corners, ijk);
-        once = vm_xor(once, kernel_triangle(s, ijk));
+        once = vm_xor(once, kernel_rays_crossing_triangle(s, ijk));
     }
     quad.e01 = s->edge[corner[0]][corner[1]];
     quad.e03 = s->edge[corner[0]][corner[3]];
     quad.e12 = kernel_corner_edge(s, corner[1], corner[2]);
     quad.e32 = kernel_corner_edge(s, corner[3], corner[2]);
-    const vm twice = kernel_quad_sides(s->rays, quad.e01, quad.e32, quad.e03, quad.e12);
+    const vm twice = kernel_quad_sides_allow_two_points(s->rays, quad.e01, quad.e32, quad.e03, quad.e12);
     if (!vm_any(vm_or(once, twice))) return 0;
     if (kernel_quad_collapses(c, corner)) return kernel_collapsed_crossings(s, corner, out);
     for (int i = 0; i < 4; i++) {
@@ -337,7 +340,7 @@ SIMD_INLINE int kernel_quad_crossings(const kernel_face_search *s, const int cor
         quad.y[i] = s->y[corner[i]];
         quad.z[i] = vf_set(c->z[corner[i]]);
     }
-    const int n = kernel_quad_points(&quad, once, twice, places);
+    const int n = kernel_compute_quad_points(&quad, once, twice, places);
     for (int i = 0; i < n; i++) kernel_quad_values(s, corner, &places[i], &out[i]);
     return n;
 }
@@ -385,7 +388,7 @@ SIMD_INLINE bool kernel_take_nearest(kernel_point *list, int count, kernel_point
     for (int n = 0; n < count; n++) {
         const vm nearer = vm_and(list[n].mask, vf_lt(list[n].t, out->t));
         out->mask = vm_or(out->mask, nearer);
-        kernel_point_move(nearer, &list[n], out);
+        kernel_point_copy_lanes(nearer, &list[n], out);
         taken = (vi)vf_select(nearer, (vf)vi_set(n), (vf)taken);
     }
     for (int n = 0; n < count; n++) list[n].mask = vm_andnot(list[n].mask, vf_eq(vf_from_vi(taken), vf_set((float)n)));
@@ -393,7 +396,8 @@ SIMD_INLINE bool kernel_take_nearest(kernel_point *list, int count, kernel_point
 }
 
 /* Sets all members of the interval except w_in and w_out from the crossings at its two ends. */
-SIMD_INLINE void kernel_interval_of(vm mask, const kernel_point *in, const kernel_point *out, kernel_interval *i)
+SIMD_INLINE void kernel_interval_from_points(vm mask, const kernel_point *in, const kernel_point *out,
+                                             kernel_interval *i)
 {
     i->mask = mask;
     i->t_in = in->t;
@@ -416,7 +420,7 @@ static __attribute__((noinline, unused)) int kernel_curved_intervals(const kerne
     int n = 0;
     while (n < KERNEL_MAX_CELL_INTERVALS && kernel_take_nearest(list, crossings, &in) &&
            kernel_take_nearest(list, crossings, &next)) {
-        kernel_interval_of(vm_and(in.mask, next.mask), &in, &next, &out[n]);
+        kernel_interval_from_points(vm_and(in.mask, next.mask), &in, &next, &out[n]);
         n++;
     }
     return n;

@@ -29,7 +29,7 @@ SIMD_INLINE void kernel_curved_ray_add(kernel_pixel_list *to, const kernel_pixel
 
 /* Returns the edge function of the edge from vertex a to vertex b as an integer vector, of which only the exact sign
  * bits are used. x, y: the projected vertices. Lowers *least to the function's magnitude if that is smaller. */
-SIMD_INLINE vi kernel_curved_side(const vf x[8], const vf y[8], int a, int b, vf *least)
+SIMD_INLINE vi kernel_curved_edge_sign(const vf x[8], const vf y[8], int a, int b, vf *least)
 {
     const vf e = vf_diff_of_products(x[a], y[b], x[b], y[a]);
     *least = vf_min(vf_abs(e), *least);
@@ -65,11 +65,11 @@ SIMD_INLINE void kernel_curved_find(const float (*at)[8][SIMD_WIDTH], const kern
         y[i] = (kernel_gather_lane(at[1][i], r->lane) - r->rays.origin_y) - r->rays.slope_y * z;
     }
     for (int n = 0; n < shape->edge_count; n++)
-        side[n] = kernel_curved_side(x, y, shape->edges[n][0], shape->edges[n][1], &least);
+        side[n] = kernel_curved_edge_sign(x, y, shape->edges[n][0], shape->edges[n][1], &least);
     for (int n = 0; n < shape->face_count; n++) {
         const signed char *loop = shape->faces[n].vertices;
         if (shape->faces[n].count == 4)
-            side[shape->edge_count + n] = kernel_curved_side(x, y, loop[0], loop[2], &least);
+            side[shape->edge_count + n] = kernel_curved_edge_sign(x, y, loop[0], loop[2], &least);
     }
     *alone = vm_not(vf_lt(vf_set(KERNEL_EDGE_LEAST), least));
     for (int n = 0; n < shape->face_count; n++) {
@@ -87,7 +87,7 @@ SIMD_INLINE void kernel_curved_find(const float (*at)[8][SIMD_WIDTH], const kern
         }
         faces |= crossed;
     }
-    kernel_curved_count(faces, rays, two, alone, face);
+    kernel_curved_find_two_faces(faces, rays, two, alone, face);
 }
 
 SIMD_INLINE void kernel_curved_faces(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type, vm *two,
@@ -246,9 +246,9 @@ SIMD_INLINE void kernel_curved_cross_corners(const kernel_transformed_curved *h,
         else
             kernel_curved_triangle_edges(&corners[n], e);
         kernel_curved_triangle_point(type, &corners[n], e, &place);
-        kernel_point_move(on_triangle, &place, &out[n]);
+        kernel_point_copy_lanes(on_triangle, &place, &out[n]);
     }
-    kernel_points_order(out);
+    kernel_points_sort_by_depth(out);
 }
 
 /* Computes the crossings at which the active rays enter and leave their cells. faces: the numbers of the two faces that

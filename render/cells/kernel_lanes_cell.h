@@ -42,16 +42,16 @@ SIMD_INLINE void kernel_lanes_transform(const kernel_frame *f, const kernel_tile
         for (int a = 0; a < 3; a++)
             at[a] = f->scaled_axes[a][0] * d[0] + f->scaled_axes[a][1] * d[1] + f->scaled_axes[a][2] * d[2];
         const kernel_f64 depth = f->job->camera.is_orthographic ? f->job->space.scale + 0 * at[2] : at[2];
-        kernel_f64_store_lanes(&out[0], half, at[0] - tile->centre_x * depth);
-        kernel_f64_store_lanes(&out[1], half, at[1] - tile->centre_y * depth);
-        kernel_f64_store_lanes(&out[2], half, at[2] - tile->depth_shift);
+        kernel_f64_store_half_of_vector(&out[0], half, at[0] - tile->centre_x * depth);
+        kernel_f64_store_half_of_vector(&out[1], half, at[1] - tile->centre_y * depth);
+        kernel_f64_store_half_of_vector(&out[2], half, at[2] - tile->depth_shift);
     }
 }
 
 /* Subtracts each lane's isovalue from `count` values in double, and multiplies the differences of each lane by a power
  * of two that brings the largest magnitude near 1. */
-SIMD_INLINE void kernel_lanes_relative(const kernel_f64 (*values)[2], int count, const double isovalues[SIMD_WIDTH],
-                                       vf *out)
+SIMD_INLINE void kernel_lanes_subtract_isovalues(const kernel_f64 (*values)[2], int count,
+                                                 const double isovalues[SIMD_WIDTH], vf *out)
 {
     for (int half = 0; half < 2; half++) {
         kernel_f64 isovalue, v[8], largest = {0};
@@ -66,7 +66,7 @@ SIMD_INLINE void kernel_lanes_relative(const kernel_f64 (*values)[2], int count,
         const kernel_f64_mask high = exponent > 2023;
         exponent = (low & 23) | (high & 2023) | (exponent & ~(low | high));
         const kernel_f64 scale = (kernel_f64)((2046 - exponent) << 52);
-        for (int i = 0; i < count; i++) kernel_f64_store_lanes(&out[i], half, v[i] * scale);
+        for (int i = 0; i < count; i++) kernel_f64_store_half_of_vector(&out[i], half, v[i] * scale);
     }
 }
 
@@ -91,14 +91,14 @@ SIMD_INLINE void kernel_lanes_edge_function(const kernel_frame *f, const vf a[3]
 {
     const bool flat = f->job->camera.is_orthographic;
     for (int half = 0; half < 2; half++) {
-        const kernel_f64 ax = kernel_f64_of(&a[0], half), ay = kernel_f64_of(&a[1], half);
-        const kernel_f64 bx = kernel_f64_of(&b[0], half), by = kernel_f64_of(&b[1], half);
-        kernel_f64 da = kernel_f64_of(&a[2], half) + f->depth_shift;
-        kernel_f64 db = kernel_f64_of(&b[2], half) + f->depth_shift;
+        const kernel_f64 ax = kernel_f64_widen_half(&a[0], half), ay = kernel_f64_widen_half(&a[1], half);
+        const kernel_f64 bx = kernel_f64_widen_half(&b[0], half), by = kernel_f64_widen_half(&b[1], half);
+        kernel_f64 da = kernel_f64_widen_half(&a[2], half) + f->depth_shift;
+        kernel_f64 db = kernel_f64_widen_half(&b[2], half) + f->depth_shift;
         if (flat) da = db = (kernel_f64){0} + 1;
-        kernel_f64_store_lanes(&line[0], half, ax * by - bx * ay);
-        kernel_f64_store_lanes(&line[1], half, db * ay - da * by);
-        kernel_f64_store_lanes(&line[2], half, da * bx - db * ax);
+        kernel_f64_store_half_of_vector(&line[0], half, ax * by - bx * ay);
+        kernel_f64_store_half_of_vector(&line[1], half, db * ay - da * by);
+        kernel_f64_store_half_of_vector(&line[2], half, da * bx - db * ax);
     }
 }
 

@@ -95,7 +95,7 @@ SIMD_INLINE void kernel_pyramid_terms(const vf v[5], vf out[8])
     out[4] = nonlinear_part;
 }
 
-SIMD_INLINE void kernel_local_terms(int type, const vf *v, vf out[8])
+SIMD_INLINE void kernel_local_fit_polynomial(int type, const vf *v, vf out[8])
 {
     if (kernel_is_box(type))
         kernel_hex_terms(v, out);
@@ -252,17 +252,17 @@ SIMD_INLINE void kernel_local_error_bound(int count, const vf places[3][8], cons
 /* Computes the maps of one cell of this type per lane. places: vertices in tile space; values: the field at them.
  * Returns the lanes whose map can be inverted: those with `bend` below most_bent and a small error bound. The data of
  * other lanes must not be used. */
-SIMD_INLINE vm kernel_local_setup(int type, const vf places[3][8], const vf values[8], float most_bent,
-                                  kernel_local_cells *out)
+SIMD_INLINE vm kernel_local_compute_maps(int type, const vf places[3][8], const vf values[8], float most_bent,
+                                         kernel_local_cells *out)
 {
     const int count = grid_type_vertices(type), bends = kernel_nonlinear_count(type);
     vf at[3][8], terms[3][8], field[8], inverse[3][3], offset[3], nonlinear_part[KERNEL_NONLINEAR_TERMS][3];
     for (int a = 0; a < 3; a++) {
         for (int n = 0; n < count; n++) at[a][n] = places[a][n] - places[a][0];
-        kernel_local_terms(type, at[a], terms[a]);
+        kernel_local_fit_polynomial(type, at[a], terms[a]);
         vf_store(out->origin[a], places[a][0]);
     }
-    kernel_local_terms(type, values, field);
+    kernel_local_fit_polynomial(type, values, field);
     for (int n = 0; n < 4 + bends; n++) vf_store(out->field[n], field[n]);
     kernel_local_invert((const vf(*)[8])terms, inverse);
     for (int i = 0; i < 3; i++) {
@@ -349,8 +349,8 @@ SIMD_INLINE vf kernel_local_step(int type, kernel_local_points *p, vm lanes)
 /* Computes the reference coordinates r of the points at the positions `at` in tile space. lane: the lane that holds
  * each point's cell in `cells`. Returns the lanes whose r is accurate to 1e-6. A lane's result does not depend on the
  * other lanes. */
-SIMD_INLINE vm kernel_local_find(int type, const kernel_local_cells *cells, vi lane, const vf at[3],
-                                 kernel_local_points *p)
+SIMD_INLINE vm kernel_local_invert_maps(int type, const kernel_local_cells *cells, vi lane, const vf at[3],
+                                        kernel_local_points *p)
 {
     vf d[3];
     for (int a = 0; a < 3; a++) d[a] = at[a] - kernel_gather_lane(cells->origin[a], lane);

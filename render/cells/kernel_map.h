@@ -106,14 +106,15 @@ SIMD_INLINE kernel_product kernel_product_at(bool is_pyramid, const vf r[3])
 }
 
 /* Returns the polynomial's value at the reference coordinates r. Each lane has its own coefficients. */
-SIMD_INLINE vf kernel_value_of(const vf c[8], bool is_pyramid, const kernel_product *m, const vf r[3])
+SIMD_INLINE vf kernel_polynomial_value(const vf c[8], bool is_pyramid, const kernel_product *m, const vf r[3])
 {
     vf v = ((c[0] + r[0] * c[1]) + (r[1] * c[2] + r[2] * c[3])) + m->m * c[4];
     if (!is_pyramid) v += r[2] * ((r[0] * c[5] + r[1] * c[6]) + m->m * c[7]);
     return v;
 }
 
-SIMD_INLINE void kernel_gradient_of(const vf c[8], bool is_pyramid, const kernel_product *m, const vf r[3], vf out[3])
+SIMD_INLINE void kernel_polynomial_gradient(const vf c[8], bool is_pyramid, const kernel_product *m, const vf r[3],
+                                            vf out[3])
 {
     out[0] = c[1] + m->dr * c[4];
     out[1] = c[2] + m->ds * c[4];
@@ -143,7 +144,7 @@ SIMD_INLINE vf kernel_jacobian(const vf position[3][8], bool is_pyramid, const k
                                vf cross[3][3])
 {
     vf row[3][3];
-    for (int a = 0; a < 3; a++) kernel_gradient_of(position[a], is_pyramid, m, r, row[a]);
+    for (int a = 0; a < 3; a++) kernel_polynomial_gradient(position[a], is_pyramid, m, r, row[a]);
     for (int i = 0; i < 3; i++) kernel_cross(row[(i + 1) % 3], row[(i + 2) % 3], cross[i]);
     return kernel_dot(row[0], cross[0]);
 }
@@ -171,11 +172,11 @@ SIMD_INLINE void kernel_maps_of(const float (*at)[8][SIMD_WIDTH], vi lane, kerne
         if (n < 3) out->origin[n] = v[0];
         for (int half = 0; half < 2; half++) {
             kernel_f64 d[8], *const e = out->exact[half][n];
-            for (int i = 0; i < count; i++) d[i] = kernel_f64_of(&v[i], half);
+            for (int i = 0; i < count; i++) d[i] = kernel_f64_widen_half(&v[i], half);
             if (n < 3)
                 for (int i = count - 1; i >= 0; i--) d[i] -= d[0];
             kernel_f64_fit(type, e, d);
-            for (int i = 0; i < 8; i++) kernel_f64_store_lanes(&c[i], half, e[i]);
+            for (int i = 0; i < 8; i++) kernel_f64_store_half_of_vector(&c[i], half, e[i]);
         }
     }
 }
@@ -210,9 +211,9 @@ SIMD_INLINE void kernel_maps_polynomial(const float (*values)[SIMD_WIDTH], vi la
     for (int i = 0; i < count; i++) v[i] = kernel_gather_lane(values[i], lane);
     for (int half = 0; half < 2; half++) {
         kernel_f64 d[8], e[8];
-        for (int i = 0; i < count; i++) d[i] = kernel_f64_of(&v[i], half);
+        for (int i = 0; i < count; i++) d[i] = kernel_f64_widen_half(&v[i], half);
         kernel_f64_fit(type, e, d);
-        for (int i = 0; i < 8; i++) kernel_f64_store_lanes(&c[i], half, e[i]);
+        for (int i = 0; i < 8; i++) kernel_f64_store_half_of_vector(&c[i], half, e[i]);
     }
 }
 
@@ -223,7 +224,7 @@ SIMD_INLINE vf kernel_maps_value(const float (*values)[SIMD_WIDTH], vi lane, con
     const kernel_product m = kernel_product_at(kernel_has_apex(type), r);
     vf c[8];
     kernel_maps_polynomial(values, lane, c, type);
-    return kernel_value_of(c, kernel_has_apex(type), &m, r);
+    return kernel_polynomial_value(c, kernel_has_apex(type), &m, r);
 }
 
 /* Computes the rays' points at depth t, relative to the map's origin. */
@@ -248,7 +249,8 @@ SIMD_INLINE vm kernel_map_newton(const kernel_rays *rays, const kernel_map *map,
         const vf det = kernel_jacobian(map->position, map->is_pyramid, &m, r, cross);
         const vf inverse = vf_select(vf_eq(det, vf_set(0)), vf_set(0), 1.0f / det);
         vf residual[3], largest = vf_set(0);
-        for (int a = 0; a < 3; a++) residual[a] = target[a] - kernel_value_of(map->position[a], map->is_pyramid, &m, r);
+        for (int a = 0; a < 3; a++)
+            residual[a] = target[a] - kernel_polynomial_value(map->position[a], map->is_pyramid, &m, r);
         for (int a = 0; a < 3; a++) {
             const vf sum = (cross[0][a] * residual[0] + cross[1][a] * residual[1]) + cross[2][a] * residual[2];
             const vf move = vf_clamp(sum * inverse, vf_set(-1), vf_set(1));
@@ -298,7 +300,7 @@ SIMD_INLINE void kernel_lanes_normal(const kernel_map *map, const vf r[3], vf ou
     const kernel_product m = kernel_product_at(map->is_pyramid, r);
     vf cross[3][3], g[3];
     kernel_jacobian(map->position, map->is_pyramid, &m, r, cross);
-    kernel_gradient_of(map->field, map->is_pyramid, &m, r, g);
+    kernel_polynomial_gradient(map->field, map->is_pyramid, &m, r, g);
     /* the gradient is J^-T g, where the columns of J^-1 are cross / det; the sign of det is ignored, because callers
      * orient the normal themselves */
     for (int a = 0; a < 3; a++) out[a] = kernel_dot(cross[a], g);
@@ -349,7 +351,7 @@ SIMD_INLINE vf kernel_solve_lanes(const kernel_rays *rays, const kernel_map *map
         *failures += __builtin_popcount(vm_bits(failed));
     }
     const kernel_product m = kernel_product_at(map->is_pyramid, r);
-    const vf value = kernel_value_of(map->field, map->is_pyramid, &m, r);
+    const vf value = kernel_polynomial_value(map->field, map->is_pyramid, &m, r);
     return has_failed ? vf_select(failed, kernel_line_value(i, t), value) : value;
 }
 

@@ -122,7 +122,8 @@ SIMD_INLINE kernel_tile_position kernel_polyhedron_position(const polyhedron *c,
 
 SIMD_INLINE kernel_edge_error kernel_polyhedron_line(polyhedron *c, const kernel_packet *p, int n, int a, int b)
 {
-    const kernel_line line = kernel_line_of(p, kernel_polyhedron_position(c, a), kernel_polyhedron_position(c, b));
+    const kernel_line line =
+        kernel_line_in_packet(p, kernel_polyhedron_position(c, a), kernel_polyhedron_position(c, b));
     memcpy(c->lines[n], &line, sizeof line);
     return kernel_line_error(&line, p->tile->radius, kernel_polyhedron_position(c, a),
                              kernel_polyhedron_position(c, b));
@@ -164,12 +165,13 @@ SIMD_INLINE void kernel_triangle_values_at(const polyhedron *c, const kernel_wei
     out->w_face = out->w;
 }
 
-SIMD_INLINE void kernel_poly_edge(kernel_poly_crossings *r, int number, int a, int b)
+SIMD_INLINE void kernel_poly_compute_edge_function(kernel_poly_crossings *r, int number, int a, int b)
 {
     const polyhedron *c = r->cell;
     kernel_line line;
     memcpy(&line, c->lines[number], sizeof line);
-    r->edge[number] = kernel_edge(r->packet, &line, kernel_polyhedron_position(c, a), kernel_polyhedron_position(c, b));
+    r->edge[number] = kernel_edge_function_on_rays(r->packet, &line, kernel_polyhedron_position(c, a),
+                                                   kernel_polyhedron_position(c, b));
 }
 
 SIMD_INLINE void kernel_poly_recompute(const kernel_poly_crossings *r, vm hit, kernel_weights *w)
@@ -181,11 +183,11 @@ SIMD_INLINE void kernel_poly_recompute(const kernel_poly_crossings *r, vm hit, k
 
 /* Computes the crossings of a surface triangle and returns the rays that have one. *w gets the weights as computed from
  * lines, also for rays on which they are not accurate enough. */
-static vm kernel_poly_facet(const kernel_poly_crossings *r, const polyhedron_facet *t, kernel_weights *w,
-                            kernel_triangle_crossings *out)
+static vm kernel_poly_cross_facet(const kernel_poly_crossings *r, const polyhedron_facet *t, kernel_weights *w,
+                                  kernel_triangle_crossings *out)
 {
     const vf ij = r->edge[t->edge[0]], jk = r->edge[t->edge[1]], ik = r->edge[t->edge[2]];
-    out->mask = kernel_inside(r->rays, ij, jk, ik);
+    out->mask = kernel_rays_inside_triangle(r->rays, ij, jk, ik);
     if (!vm_any(out->mask)) return out->mask;
     *w = kernel_weights_of(t->vertex[0], t->vertex[1], t->vertex[2], ij, jk, ik);
     kernel_weights mended = *w;
@@ -196,7 +198,7 @@ static vm kernel_poly_facet(const kernel_poly_crossings *r, const polyhedron_fac
 
 /* Returns the edge function of the edge from one of the triangle's vertices to another, negated if `from` is after
  * `to`. */
-SIMD_INLINE vf kernel_facet_side(const polyhedron_facet *t, const kernel_poly_crossings *r, int from, int to)
+SIMD_INLINE vf kernel_facet_edge_function(const polyhedron_facet *t, const kernel_poly_crossings *r, int from, int to)
 {
     const int low = from < to ? from : to, high = from < to ? to : from;
     const int n = low != t->vertex[0] ? 1 : high == t->vertex[1] ? 0 : 2;
@@ -216,16 +218,16 @@ SIMD_INLINE void kernel_quad_of_facets(const kernel_poly_crossings *r, const pol
         out->y[i] = r->y[corner[i]];
         out->z[i] = vf_set(r->cell->z[corner[i]]);
     }
-    out->e01 = kernel_facet_side(t[0], r, corner[0], corner[1]);
-    out->e12 = kernel_facet_side(t[0], r, corner[1], corner[2]);
-    out->e03 = kernel_facet_side(t[1], r, corner[0], corner[3]);
-    out->e32 = kernel_facet_side(t[1], r, corner[3], corner[2]);
+    out->e01 = kernel_facet_edge_function(t[0], r, corner[0], corner[1]);
+    out->e12 = kernel_facet_edge_function(t[0], r, corner[1], corner[2]);
+    out->e03 = kernel_facet_edge_function(t[1], r, corner[0], corner[3]);
+    out->e32 = kernel_facet_edge_function(t[1], r, corner[3], corner[2]);
 }
 
 /* Sets t_face, v_face and w_face of a surface triangle's crossing *m from a crossing of its quad's patch (at), for the
  * rays in `mine`. For those of them that do not cross the triangle itself, t, v and w are also set from the patch. */
-SIMD_INLINE void kernel_facet_face(const polyhedron *c, const int corner[4], const kernel_point *at, vm mine,
-                                   bool has_colour, kernel_triangle_crossings *m)
+SIMD_INLINE void kernel_facet_set_point_of_face(const polyhedron *c, const int corner[4], const kernel_point *at,
+                                                vm mine, bool has_colour, kernel_triangle_crossings *m)
 {
     vf f[4], g[4];
     for (int i = 0; i < 4; i++) f[i] = vf_set(c->f[corner[i]]), g[i] = vf_set(has_colour ? c->g[corner[i]] : 0);
@@ -246,13 +248,13 @@ static __attribute__((noinline, cold)) void kernel_quad_points_pair(kernel_trian
     const vm both = vm_and(places[1].mask, vm_and(m[0]->mask, m[1]->mask));
     const vm swap = vm_and(both, vm_xor(vf_lt(places[0].t, places[1].t), vf_lt(m[0]->t, m[1]->t)));
     const kernel_point own = places[0];
-    kernel_point_move(swap, &places[1], &places[0]);
-    kernel_point_move(swap, &own, &places[1]);
+    kernel_point_copy_lanes(swap, &places[1], &places[0]);
+    kernel_point_copy_lanes(swap, &own, &places[1]);
 }
 
 /* Computes the crossings of a quad's bilinear patch and of its two triangles; those of the patch are bit-identical to
  * the crossings in a hex that shares the quad. first: number of the first of the two triangles. */
-static void kernel_poly_quad(kernel_poly_crossings *r, int first)
+static void kernel_poly_cross_quad(kernel_poly_crossings *r, int first)
 {
     static const signed char loop[4] = {0, 1, 2, 3};
     const polyhedron *c = r->cell;
@@ -271,18 +273,18 @@ static void kernel_poly_quad(kernel_poly_crossings *r, int first)
               half_of[2] = {has_corner ? first : other_half, has_corner ? other_half : first};
     const polyhedron_facet *t[2] = {&c->facets[half_of[0]], &c->facets[half_of[1]]};
     kernel_triangle_crossings *m[2] = {&r->facets[half_of[0]], &r->facets[half_of[1]]};
-    for (int half = 0; half < 2; half++) kernel_poly_facet(r, t[half], &w, m[half]);
+    for (int half = 0; half < 2; half++) kernel_poly_cross_facet(r, t[half], &w, m[half]);
     kernel_quad_of_facets(r, t, corner, &quad);
     const vm once = vm_xor(m[0]->mask, m[1]->mask);
-    const vm twice = kernel_quad_sides(r->rays, quad.e01, quad.e32, quad.e03, quad.e12);
-    const int count = kernel_quad_points(&quad, once, twice, places);
+    const vm twice = kernel_quad_sides_allow_two_points(r->rays, quad.e01, quad.e32, quad.e03, quad.e12);
+    const int count = kernel_compute_quad_points(&quad, once, twice, places);
     if (count == 2) kernel_quad_points_pair(m, places);
     r->uneven = vm_or(r->uneven, vm_xor(vm_and(m[0]->mask, m[1]->mask), count == 2 ? places[1].mask : vm_none()));
     for (int half = 0; half < 2; half++) {
         vm left = count ? vm_and(once, m[half]->mask) : vm_none();
-        if (vm_any(left)) kernel_facet_face(c, corner, &places[0], left, r->has_colour, m[half]);
+        if (vm_any(left)) kernel_facet_set_point_of_face(c, corner, &places[0], left, r->has_colour, m[half]);
         if (count == 2) {
-            kernel_facet_face(c, corner, &places[half], places[1].mask, r->has_colour, m[half]);
+            kernel_facet_set_point_of_face(c, corner, &places[half], places[1].mask, r->has_colour, m[half]);
             left = vm_or(left, places[1].mask);
         }
         r->unassigned[half_of[half]] = left;
@@ -300,14 +302,14 @@ static bool kernel_poly_cross(kernel_poly_crossings *r, vm rays, bool has_colour
         r->x[i] = kernel_project_x(r->packet, kernel_polyhedron_position(c, i));
         r->y[i] = kernel_project_y(r->packet, kernel_polyhedron_position(c, i));
     }
-    for (int i = 0; i < c->edge_count; i++) kernel_poly_edge(r, i, c->edges[i][0], c->edges[i][1]);
+    for (int i = 0; i < c->edge_count; i++) kernel_poly_compute_edge_function(r, i, c->edges[i][0], c->edges[i][1]);
     for (int i = 0; i < c->facet_count; i++) {
         kernel_weights w;
         if (c->facets[i].quad >= 0) {
-            if (i < c->facets[i].other_half) kernel_poly_quad(r, i);
+            if (i < c->facets[i].other_half) kernel_poly_cross_quad(r, i);
             continue;
         }
-        r->unassigned[i] = kernel_poly_facet(r, &c->facets[i], &w, &r->facets[i]);
+        r->unassigned[i] = kernel_poly_cross_facet(r, &c->facets[i], &w, &r->facets[i]);
         if (vm_any(r->unassigned[i])) r->met[r->met_count++] = i;
     }
     return r->met_count > 0;
@@ -354,17 +356,17 @@ static bool kernel_poly_next(kernel_poly_crossings *r)
 
 /* ---- the field inside ---- */
 
-static void kernel_poly_sheets(kernel_poly_crossings *r)
+static void kernel_poly_cross_sheets(kernel_poly_crossings *r)
 {
     const polyhedron *c = r->cell;
     const int centre = c->vertex_count, spokes = c->edge_count;
     if (r->has_sheets) return;
     r->has_sheets = true;
-    for (int i = 0; i < centre; i++) kernel_poly_edge(r, spokes + i, i, centre);
+    for (int i = 0; i < centre; i++) kernel_poly_compute_edge_function(r, spokes + i, i, centre);
     for (int i = 0; i < c->edge_count; i++) {
         const int a = c->edges[i][0], b = c->edges[i][1];
         kernel_triangle_crossings *m = &r->sheets[i];
-        m->mask = kernel_inside(r->rays, r->edge[i], r->edge[spokes + b], r->edge[spokes + a]);
+        m->mask = kernel_rays_inside_triangle(r->rays, r->edge[i], r->edge[spokes + b], r->edge[spokes + a]);
         if (!vm_any(m->mask)) continue;
         kernel_weights w = kernel_weights_of(a, b, centre, r->edge[i], r->edge[spokes + b], r->edge[spokes + a]);
         kernel_poly_recompute(r, m->mask, &w);
@@ -375,7 +377,7 @@ static void kernel_poly_sheets(kernel_poly_crossings *r)
 
 /* Extends the intervals s of the rays in `hit` inside a tet, so that they contain the crossings m of one of the tet's
  * faces. */
-SIMD_INLINE void kernel_subtet_add(kernel_interval *s, const kernel_triangle_crossings *m, vm hit)
+SIMD_INLINE void kernel_subtet_extend(kernel_interval *s, const kernel_triangle_crossings *m, vm hit)
 {
     const vm first = vm_and(hit, vf_lt(m->t, s->t_in)), last = vm_andnot(hit, vf_lt(m->t, s->t_out));
     s->t_in = vf_select(first, m->t, s->t_in);
@@ -388,7 +390,7 @@ SIMD_INLINE void kernel_subtet_add(kernel_interval *s, const kernel_triangle_cro
 }
 
 /* Computes the intervals of the rays in all tets of the cell (r->tets). Tets without volume get none. */
-static void kernel_poly_tets(kernel_poly_crossings *r)
+static void kernel_poly_intersect_tets(kernel_poly_crossings *r)
 {
     const polyhedron *c = r->cell;
     if (r->has_tets) return;
@@ -403,11 +405,12 @@ static void kernel_poly_tets(kernel_poly_crossings *r)
         s->v_in = s->v_out = s->w_in = s->w_out = vf_set(0);
         for (int k = 0; k < 3; k++)
             if (vm_any(r->sheets[t->edge[k]].mask))
-                kernel_subtet_add(s, &r->sheets[t->edge[k]], r->sheets[t->edge[k]].mask);
+                kernel_subtet_extend(s, &r->sheets[t->edge[k]], r->sheets[t->edge[k]].mask);
         /* a ray in the tet crosses at least one of its sheets; it crosses the tet's surface triangle if it is inside
          * all three edges */
-        const vm hit = kernel_inside(r->rays, r->edge[t->edge[0]], r->edge[t->edge[1]], r->edge[t->edge[2]]);
-        if (vm_any(hit)) kernel_subtet_add(s, &r->facets[i], hit);
+        const vm hit =
+            kernel_rays_inside_triangle(r->rays, r->edge[t->edge[0]], r->edge[t->edge[1]], r->edge[t->edge[2]]);
+        if (vm_any(hit)) kernel_subtet_extend(s, &r->facets[i], hit);
     }
 }
 
@@ -428,7 +431,7 @@ SIMD_INLINE vf kernel_subtet_at(const kernel_interval *s, vf t, vf v_in, vf v_ou
  * with the tet's sign. The signs of these tets should sum to 1. By rounding they may not, because the ends of
  * neighbouring tets' intervals, which should be equal, are in the wrong order. Then the sum is computed at slightly
  * smaller and larger t; if that fails too, *v and *w are left unchanged. */
-static void kernel_poly_sum(const kernel_poly_crossings *r, vm rays, vf t, bool before, vf *v, vf *w)
+static void kernel_poly_sum_tet_fields(const kernel_poly_crossings *r, vm rays, vf t, bool before, vf *v, vf *w)
 {
     static const float shifts[7] = {0, 1, -1, 4, -4, 16, -16};
     vm open = rays;
@@ -468,19 +471,19 @@ SIMD_INLINE void kernel_poly_inner_value(const kernel_poly_crossings *r, vm rays
                                          bool before, vf *u, vf *w)
 {
     vf v_sum = end->v, w_sum = end->w;
-    kernel_poly_sum(r, rays, end->t, before, &v_sum, &w_sum);
+    kernel_poly_sum_tet_fields(r, rays, end->t, before, &v_sum, &w_sum);
     *u = end->v_face + (v_sum - end->v);
     *w = end->w_face + (w_sum - end->w);
 }
 
 /* Prepares the profile of the current interval (the piecewise linear field along each ray): computes the field at the
  * crossed sheets and just inside both ends. */
-static void kernel_poly_profile(kernel_poly_crossings *r)
+static void kernel_poly_prepare_profile(kernel_poly_crossings *r)
 {
     kernel_interval *i = &r->interval;
-    kernel_poly_sheets(r);
+    kernel_poly_cross_sheets(r);
     if (r->cell->is_star_shaped) return;
-    kernel_poly_tets(r);
+    kernel_poly_intersect_tets(r);
     kernel_poly_inner_value(r, i->mask, &r->in, false, &r->u_in, &i->w_in);
     kernel_poly_inner_value(r, i->mask, &r->out, true, &r->u_out, &i->w_out);
     for (int n = 0; n < r->sheet_count; n++) {
@@ -488,7 +491,7 @@ static void kernel_poly_profile(kernel_poly_crossings *r)
         const vm held = kernel_poly_interval_contains(r, sheet);
         vf v = sheet->v, w = sheet->w;
         if (!vm_any(held)) continue;
-        kernel_poly_sum(r, held, sheet->t, false, &v, &w);
+        kernel_poly_sum_tet_fields(r, held, sheet->t, false, &v, &w);
         sheet->v_face = vf_select(held, v, sheet->v_face);
         sheet->w_face = vf_select(held, w, sheet->w_face);
     }

@@ -265,7 +265,7 @@ SIMD_INLINE vm kernel_patch_converged(kernel_patch *p, vf s, vf r)
 /* Returns a first guess of the patch parameter s or r: the distance of the ray from one side of the quad, divided by
  * the sum of its distances from this and the opposite side. Instead of distances, the areas of the triangles that the
  * ray forms with the sides are used. The first side has the corners i and j, the opposite one k and l. */
-SIMD_INLINE vf kernel_quad_between(const kernel_quad *q, int i, int j, int k, int l)
+SIMD_INLINE vf kernel_guess_patch_parameter(const kernel_quad *q, int i, int j, int k, int l)
 {
     const vf near = vf_abs(q->x[i] * q->y[j] - q->x[j] * q->y[i]), far = vf_abs(q->x[k] * q->y[l] - q->x[l] * q->y[k]);
     const vf sum = near + far;
@@ -295,8 +295,8 @@ SIMD_INLINE void kernel_quads_cross(const kernel_quad *q, int count, const vm on
     kernel_patch patch[2];
     vf s[2], r[2];
     for (int n = 0; n < count; n++) {
-        s[n] = kernel_quad_between(&q[n], 0, 3, 1, 2);
-        r[n] = kernel_quad_between(&q[n], 0, 1, 3, 2);
+        s[n] = kernel_guess_patch_parameter(&q[n], 0, 3, 1, 2);
+        r[n] = kernel_guess_patch_parameter(&q[n], 0, 1, 3, 2);
         kernel_patch_setup(&patch[n], &q[n]);
     }
     for (int step = 0; step < KERNEL_PATCH_STEPS; step++)
@@ -317,7 +317,7 @@ SIMD_INLINE void kernel_quads_cross(const kernel_quad *q, int count, const vm on
 
 /* Returns those of the rays that may meet the patch twice, as far as the signs of the edge functions of its sides tell.
  * A ray that crosses exactly one triangle is never among them. */
-SIMD_INLINE vm kernel_quad_sides(vm rays, vf e01, vf e32, vf e03, vf e12)
+SIMD_INLINE vm kernel_quad_sides_allow_two_points(vm rays, vf e01, vf e32, vf e03, vf e12)
 {
     const vi b = vi_from_bits(e01) ^ vi_from_bits(e32), a = vi_from_bits(e03) ^ vi_from_bits(e12);
     return vm_and(rays, vm_sign(~(a | b)));
@@ -330,7 +330,7 @@ SIMD_INLINE vf kernel_flip_sign(vf v, vf other)
 }
 
 /* Returns those of the rays that may meet the patch twice if the signs of a1 and b1 are considered too. rays: the
- * result of kernel_quad_sides(). */
+ * result of kernel_quad_sides_allow_two_points(). */
 SIMD_INLINE vm kernel_quad_may_cross_twice(const kernel_quad *q, vm rays)
 {
     const vf across = vf_diff_of_products(q->x[0], q->y[2], q->x[2], q->y[0]);
@@ -384,7 +384,7 @@ SIMD_INLINE vm kernel_curved_may_cross_twice(const vf x[8], const vf y[8], const
 
 /* Computes the points at which rays meet the patch. Rays in `once` meet it once; rays in `twice` meet it twice or
  * never. Returns how many entries of `out` are set, 0 to 2. Rays that meet it twice have a point in both. */
-SIMD_INLINE int kernel_quad_points(const kernel_quad *q, vm once, vm twice, kernel_point out[2])
+SIMD_INLINE int kernel_compute_quad_points(const kernel_quad *q, vm once, vm twice, kernel_point out[2])
 {
     int count = 0;
     if (vm_any(once)) {

@@ -96,11 +96,11 @@ SIMD_INLINE void kernel_tets_edges(const kernel_tets *t, vm rays, bool is_pencil
 }
 
 /* Sets hit[n] to those of the rays that cross face n of their tets (kernel_tet_face). */
-SIMD_INLINE void kernel_tets_faces(vm rays, const vf e[KERNEL_TET_EDGES], vm hit[4])
+SIMD_INLINE void kernel_tets_find_crossed_faces(vm rays, const vf e[KERNEL_TET_EDGES], vm hit[4])
 {
     for (int n = 0; n < 4; n++) {
         const signed char *face = kernel_tet_face[n];
-        hit[n] = kernel_inside(rays, e[(int)face[3]], e[(int)face[4]], e[(int)face[5]]);
+        hit[n] = kernel_rays_inside_triangle(rays, e[(int)face[3]], e[(int)face[4]], e[(int)face[5]]);
     }
 }
 
@@ -118,8 +118,8 @@ typedef struct kernel_sums {
 
 /* Returns the weighted sums of a face (kernel_sums). face: its entry of kernel_tet_face; ij, jk, ik: its edge
  * functions; has_colour: set if the colour field is included, for which all rays must share one tet. */
-SIMD_INLINE kernel_sums kernel_tets_sums(const kernel_tets *t, const signed char *face, vf ij, vf jk, vf ik,
-                                         bool has_colour)
+SIMD_INLINE kernel_sums kernel_tets_weighted_sums(const kernel_tets *t, const signed char *face, vf ij, vf jk, vf ik,
+                                                  bool has_colour)
 {
     return (kernel_sums){.depth = KERNEL_TET_WEIGH(t, face, ij, jk, ik, z, at[2]),
                          .value = KERNEL_TET_WEIGH(t, face, ij, jk, ik, f, f),
@@ -135,7 +135,7 @@ SIMD_INLINE kernel_sums kernel_sums_select(vm m, const kernel_sums *a, const ker
 
 /* Selects, for each ray, the sums of the two faces that it crosses: that of smaller number in ends[0], the other in
  * ends[1]. Either may be the nearer one. */
-SIMD_INLINE void kernel_tets_choose(const vm hit[4], const kernel_sums sums[4], kernel_sums ends[2])
+SIMD_INLINE void kernel_tets_select_crossed_faces(const vm hit[4], const kernel_sums sums[4], kernel_sums ends[2])
 {
     const kernel_sums a = kernel_sums_select(hit[1], &sums[1], &sums[2]);
     const kernel_sums b = kernel_sums_select(hit[2], &sums[2], &sums[1]);
@@ -145,7 +145,7 @@ SIMD_INLINE void kernel_tets_choose(const vm hit[4], const kernel_sums sums[4], 
 
 /* Computes depth and values of both crossings by dividing their sums by the sum of the weights. The nearer crossing
  * becomes the begin of the interval (t_in and so on), the other its end. */
-SIMD_INLINE void kernel_tets_order(const kernel_sums ends[2], bool has_colour, kernel_interval *out)
+SIMD_INLINE void kernel_tets_set_interval(const kernel_sums ends[2], bool has_colour, kernel_interval *out)
 {
     const vf scale_a = 1.0f / ends[0].weight, scale_b = 1.0f / ends[1].weight;
     const vf t_a = ends[0].depth * scale_a, t_b = ends[1].depth * scale_b;
@@ -167,8 +167,8 @@ SIMD_INLINE vm kernel_tets_inaccurate(const kernel_tets *t, int n, vm hit, vf we
     return vm_and(hit, vf_lt(vf_abs(weight), KERNEL_TET_NUMBER(t, least[n], least[n])));
 }
 
-/* Computes the sums of the two crossed faces, as kernel_tets_choose() selects them. For rays whose weights are not
- * accurate enough, the edge functions of projected vertices are used. */
+/* Computes the sums of the two crossed faces, as kernel_tets_select_crossed_faces() selects them. For rays whose
+ * weights are not accurate enough, the edge functions of projected vertices are used. */
 SIMD_INLINE void kernel_tets_choose_in_double(const kernel_tets *t, vm rays, const vf e[KERNEL_TET_EDGES],
                                               bool has_colour, kernel_sums ends[2])
 {
@@ -176,7 +176,7 @@ SIMD_INLINE void kernel_tets_choose_in_double(const kernel_tets *t, vm rays, con
     kernel_sums sums[4];
     vm hit[4];
     kernel_tets_project(t, x, y);
-    kernel_tets_faces(rays, e, hit);
+    kernel_tets_find_crossed_faces(rays, e, hit);
     for (int n = 0; n < 4; n++) {
         const signed char *face = kernel_tet_face[n];
         const int i = face[0], j = face[1], k = face[2];
@@ -187,9 +187,9 @@ SIMD_INLINE void kernel_tets_choose_in_double(const kernel_tets *t, vm rays, con
             jk = vf_select(weak, kernel_edge_between(x[j], y[j], x[k], y[k]), jk);
             ik = vf_select(weak, kernel_edge_between(x[i], y[i], x[k], y[k]), ik);
         }
-        sums[n] = kernel_tets_sums(t, face, ij, jk, ik, has_colour);
+        sums[n] = kernel_tets_weighted_sums(t, face, ij, jk, ik, has_colour);
     }
-    kernel_tets_choose(hit, sums, ends);
+    kernel_tets_select_crossed_faces(hit, sums, ends);
 }
 
 /* Calls kernel_tets_choose_in_double() with is_one as a compile-time constant. It is not inlined, because few packets
@@ -215,15 +215,15 @@ SIMD_INLINE void kernel_tets_interval(const kernel_tets *t, vm rays, bool is_pen
     vm hit[4], weak[4];
     kernel_sums sums[4], ends[2];
     kernel_tets_edges(t, rays, is_pencil, e);
-    kernel_tets_faces(rays, e, hit);
+    kernel_tets_find_crossed_faces(rays, e, hit);
     out->mask = vm_or(vm_or(hit[0], hit[1]), vm_or(hit[2], hit[3]));
     out->t_in = out->t_out = out->v_in = out->v_out = out->w_in = out->w_out = vf_set(0);
     if (!vm_any(out->mask)) return;
     for (int n = 0; n < 4; n++) {
         const signed char *face = kernel_tet_face[n];
-        sums[n] = kernel_tets_sums(t, face, e[(int)face[3]], e[(int)face[4]], e[(int)face[5]], has_colour);
+        sums[n] = kernel_tets_weighted_sums(t, face, e[(int)face[3]], e[(int)face[4]], e[(int)face[5]], has_colour);
     }
-    kernel_tets_choose(hit, sums, ends);
+    kernel_tets_select_crossed_faces(hit, sums, ends);
     if (is_pencil) {
         for (int n = 0; n < 4; n++) weak[n] = kernel_tets_inaccurate(t, n, hit[n], sums[n].weight);
         if (__builtin_expect(vm_any(vm_or(vm_or(weak[0], weak[1]), vm_or(weak[2], weak[3]))), 0)) {
@@ -235,7 +235,7 @@ SIMD_INLINE void kernel_tets_interval(const kernel_tets *t, vm rays, bool is_pen
             ends[1] = exact[1];
         }
     }
-    kernel_tets_order(ends, has_colour, out);
+    kernel_tets_set_interval(ends, has_colour, out);
 }
 
 /* ---- packets and one tet ---- */
@@ -245,7 +245,7 @@ SIMD_INLINE void kernel_tet_faces(const kernel_packet *p, const kernel_cell *c, 
     const kernel_tets tet = {.is_one = true, .packet = p, .one = c};
     vf e[KERNEL_TET_EDGES];
     kernel_tets_edges(&tet, rays, p->is_pencil, e);
-    kernel_tets_faces(rays, e, hit);
+    kernel_tets_find_crossed_faces(rays, e, hit);
 }
 
 SIMD_INLINE void kernel_tet_interval(const kernel_packet *p, const kernel_cell *c, vm rays, bool has_colour,

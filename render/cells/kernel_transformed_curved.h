@@ -1,5 +1,5 @@
 /* Reads, sorts and transforms hexes, wedges or pyramids of one type, one per lane, and computes the edge functions of
- * their triangular faces. The operations are those of kernel_cell_relative(), kernel_transform_in_tile(),
+ * their triangular faces. The operations are those of kernel_cell_subtract_isovalue(), kernel_transform_in_tile(),
  * kernel_cell_order() and kernel_curved_lines(), so the results are bit-identical. Vertices are put in canonical order
  * first (kernel_cell_canonical_order()), so that all data are stored in that order. Computations in double are done for
  * one half of the lanes (kernel_wide.h) after the other. Callers pass the type as a constant, so that loops have
@@ -29,7 +29,8 @@ enum {
 
 /* Transformed cells of one type, one per lane. */
 typedef struct kernel_transformed_curved {
-    /* x, y, z in tile space, and the field minus the isovalue, scaled (kernel_cell_relative()); by vertex and lane */
+    /* x, y, z in tile space, and the field minus the isovalue, scaled (kernel_cell_subtract_isovalue()); by vertex and
+     * lane */
     float at[4][8][SIMD_WIDTH];
     /* By face and lane, a word with the vertex numbers of the face's corners, four bits each, from bit 0 on. Quads are
      * in the order of kernel_quad_corners(), triangles in the order of coordinates (kernel_triangle_order()). */
@@ -381,9 +382,9 @@ SIMD_INLINE void kernel_lattice_cells_transform(const kernel_f64 (*cells)[3][2],
         kernel_f64 at[3];
         for (int a = 0; a < 3; a++) at[a] = parts[a][0][x] + parts[a][1][y] + parts[a][2][z];
         const kernel_f64 depth = f->job->camera.is_orthographic ? f->job->space.scale + 0 * at[2] : at[2];
-        kernel_f64_store(out->at[0][i], half, at[0] - tile->centre_x * depth);
-        kernel_f64_store(out->at[1][i], half, at[1] - tile->centre_y * depth);
-        kernel_f64_store(out->at[2][i], half, at[2] - tile->depth_shift);
+        kernel_f64_store_half(out->at[0][i], half, at[0] - tile->centre_x * depth);
+        kernel_f64_store_half(out->at[1][i], half, at[1] - tile->centre_y * depth);
+        kernel_f64_store_half(out->at[2][i], half, at[2] - tile->depth_shift);
     }
 }
 
@@ -446,7 +447,7 @@ SIMD_INLINE vm kernel_transform_curved_of_type(kernel_transformed_curved *out, c
         memcpy(&vertex, out->vertex[i], sizeof vertex);
         kernel_numbers_gather(&p->values, vertex, values[i]);
     }
-    kernel_lanes_relative((const kernel_f64(*)[2])values, count, isovalues, relative);
+    kernel_lanes_subtract_isovalues((const kernel_f64(*)[2])values, count, isovalues, relative);
     for (int i = 0; i < count; i++) vf_store(out->at[3][i], relative[i]);
     return collapsed;
 }
@@ -491,7 +492,7 @@ SIMD_INLINE vi kernel_least_bit(vi bits)
 /* Finds those of the rays that cross exactly two faces (*two), and the numbers of these faces (face), the smaller one
  * first. faces: per ray, one bit for each face that the ray crosses once. *alone: on entry, rays that must be traced
  * cell by cell in any case; those of the rays that cross more than two faces are added. */
-SIMD_INLINE void kernel_curved_count(vi faces, vm rays, vm *two, vm *alone, vi face[2])
+SIMD_INLINE void kernel_curved_find_two_faces(vi faces, vm rays, vm *two, vm *alone, vi face[2])
 {
     const vi others = faces & (faces - 1), more = others & (others - 1);
     *alone = vm_and(rays, vm_or(*alone, vm_sign(-more)));

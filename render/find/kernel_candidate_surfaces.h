@@ -47,7 +47,7 @@
 typedef struct kernel_curved_lanes {
     int count; /* number of vertices of each cell */
     /* at: vertex positions relative to the eye, in scaled units along the camera's axes; f: vertex values minus the
-     * isovalue, scaled as by kernel_cell_relative() */
+     * isovalue, scaled as by kernel_cell_subtract_isovalue() */
     vf at[8][3], f[8];
     /* lanes in which positions and values are not NaN and neither too large nor too small for computations in float32;
      * the cells of other lanes are tested one by one */
@@ -80,7 +80,7 @@ SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, int type)
     for (int a = 0; a < 4; a++) {
         vf v[8];
         for (int i = 0; i < count; i++) v[i] = a < 3 ? l->at[i][a] : l->f[i];
-        kernel_local_terms(type, v, terms[a]);
+        kernel_local_fit_polynomial(type, v, terms[a]);
     }
     const vf volume = kernel_local_invert((const vf(*)[8])terms, inverse);
     l->fitting_lanes = vm_and(l->fitting_lanes, vf_lt(vf_set(1e-30f), vf_abs(volume)));
@@ -220,7 +220,7 @@ SIMD_INLINE void kernel_add_crossed(kernel_finder *s, const kernel_cells *c, int
                                     const kernel_view_bounds *e)
 {
     const unsigned good = crossed & vm_bits(vm_and(fitting, vf_le(e->near, e->far)));
-    kernel_add_lanes(s, e, kernel_arrays_drawn(&s->arrays, c->cell, good), c->cell, s->source + (uint32_t)value);
+    kernel_add_lanes(s, e, kernel_arrays_drawn_lanes(&s->arrays, c->cell, good), c->cell, s->source + (uint32_t)value);
     for (unsigned odd = crossed & ~vm_bits(fitting); odd; odd &= odd - 1) {
         kernel_cell own;
         kernel_cell_fetch(&own, s->arrays.cells, &s->field->fields[s->part], c->cell[__builtin_ctz(odd)]);
@@ -280,7 +280,7 @@ SIMD_INLINE void kernel_crossed_process(kernel_finder *s, const kernel_cells *c,
     kernel_add_crossed(s, c, c->value, l.fitting_lanes, (1u << c->count) - 1, &e);
 }
 
-static __attribute__((noinline)) void kernel_find_crossed(kernel_finder *s, kernel_cells *c)
+static __attribute__((noinline)) void kernel_process_crossed_cells(kernel_finder *s, kernel_cells *c)
 {
     if (!c->count) return;
     kernel_cells_fill(c);
@@ -297,9 +297,9 @@ static __attribute__((noinline)) void kernel_find_crossed(kernel_finder *s, kern
 SIMD_INLINE void kernel_crossed_add(kernel_finder *s, const kernel_cells *from, int vertices, int value, unsigned lanes)
 {
     kernel_cells *c = &s->crossed[kernel_lane_type_index(from->type)];
-    if (lanes && value != c->value) kernel_find_crossed(s, c);
+    if (lanes && value != c->value) kernel_process_crossed_cells(s, c);
     for (; lanes; lanes &= lanes - 1) {
-        if (c->count == SIMD_WIDTH) kernel_find_crossed(s, c);
+        if (c->count == SIMD_WIDTH) kernel_process_crossed_cells(s, c);
         const int n = __builtin_ctz(lanes), to = c->count++;
         c->value = value;
         c->cell[to] = from->cell[n];

@@ -40,7 +40,7 @@ SIMD_INLINE void kernel_finder_fetch_cell(kernel_finder *s, uint32_t cell)
 }
 
 /* Adds those cells of the list whose values are visible in the volume to the candidates. */
-static __attribute__((noinline)) void kernel_find_volumes(kernel_finder *s, const kernel_cells *c)
+static __attribute__((noinline)) void kernel_find_volume_cells(kernel_finder *s, const kernel_cells *c)
 {
     kernel_view_bounds e = kernel_view_bounds_empty();
     vm fitting = vm_all_lanes();
@@ -59,7 +59,7 @@ static __attribute__((noinline)) void kernel_find_volumes(kernel_finder *s, cons
     }
     const vm shows = kernel_visible_values_overlap_cells(s->visible_values, v, c->vertices);
     const unsigned all = (1u << c->count) - 1;
-    const unsigned good = kernel_arrays_drawn(&s->arrays, c->cell, all & vm_bits(vm_and(fitting, shows)));
+    const unsigned good = kernel_arrays_drawn_lanes(&s->arrays, c->cell, all & vm_bits(vm_and(fitting, shows)));
     if (good) kernel_add_lanes(s, &e, good, c->cell, s->source);
     for (unsigned odd = all & ~vm_bits(fitting); odd; odd &= odd - 1) {
         kernel_finder_fetch_cell(s, c->cell[__builtin_ctz(odd)]);
@@ -71,12 +71,12 @@ static __attribute__((noinline)) void kernel_find_volumes(kernel_finder *s, cons
 
 /* Tests the cells of a list of pending cells, adds those that may be visible to the candidates (or to s->crossed), and
  * empties the list. */
-static void kernel_find_pending(kernel_finder *s, kernel_cells *c)
+static void kernel_process_pending_cells(kernel_finder *s, kernel_cells *c)
 {
     if (!c->count) return;
     kernel_cells_fill(c);
     if (!s->surface)
-        kernel_find_volumes(s, c);
+        kernel_find_volume_cells(s, c);
     else if (kernel_is_linear(c->type))
         kernel_find_tets(s, c);
     else
@@ -100,7 +100,7 @@ static __attribute__((noinline)) void kernel_find_single_cell(kernel_finder *s, 
 
 /* Moves the cells of s->queued, whose connectivity has been prefetched, to the lists s->pending, and prefetches their
  * vertices. A list that is full is processed first. */
-static void kernel_find_queued(kernel_finder *s)
+static void kernel_process_queued_cells(kernel_finder *s)
 {
     const kernel_arrays *p = &s->arrays;
     for (int n = 0; n < s->queued_count; n++) {
@@ -111,7 +111,7 @@ static void kernel_find_queued(kernel_finder *s)
             continue;
         }
         kernel_cells *c = &s->pending[kernel_lane_type_index(type)];
-        if (c->count == SIMD_WIDTH) kernel_find_pending(s, c);
+        if (c->count == SIMD_WIDTH) kernel_process_pending_cells(s, c);
         c->cell[c->count] = cell;
         kernel_arrays_vertices_of_any(p, cell, c->vertices, c->vertex[0] + c->count, SIMD_WIDTH);
         c->count++;
@@ -126,7 +126,7 @@ static void kernel_find_leaf(kernel_finder *s, const uint32_t *cells, int count)
     const char *indices = g->connectivity.data;
     const int64_t stride = g->connectivity.stride * grid_type_vertices(g->cell_type);
     for (int n = 0; n < count; n++) {
-        if (s->queued_count == SIMD_WIDTH) kernel_find_queued(s);
+        if (s->queued_count == SIMD_WIDTH) kernel_process_queued_cells(s);
         s->queued[s->queued_count++] = cells[n];
         if (is_plain)
             __builtin_prefetch(indices + cells[n] * stride);
@@ -137,9 +137,9 @@ static void kernel_find_leaf(kernel_finder *s, const uint32_t *cells, int count)
 
 static void kernel_find_flush(kernel_finder *s)
 {
-    kernel_find_queued(s);
-    for (int i = 0; i < KERNEL_LANE_TYPES; i++) kernel_find_pending(s, &s->pending[i]);
-    for (int i = 0; i < KERNEL_CURVED_TYPES; i++) kernel_find_crossed(s, &s->crossed[i]);
+    kernel_process_queued_cells(s);
+    for (int i = 0; i < KERNEL_LANE_TYPES; i++) kernel_process_pending_cells(s, &s->pending[i]);
+    for (int i = 0; i < KERNEL_CURVED_TYPES; i++) kernel_process_crossed_cells(s, &s->crossed[i]);
 }
 
 /* KERNEL_FRONT: number of nodes that are tested together, so that the memory accesses of their prefetches overlap.
@@ -161,8 +161,8 @@ SIMD_INLINE bool kernel_node_in_picture(const kernel_finder *s, const mmbvh *tre
 /* Keeps those entries whose nodes have visible values and a box that may be visible in the picture, and returns their
  * number. An entry is 2 * node, plus 1 if the node lies completely in the picture. The test of values has no branch,
  * because it rejects about half of the entries unpredictably. */
-SIMD_INLINE int kernel_front_choose(const kernel_finder *s, const mmbvh *tree, const mmbvh_ranges *ranges,
-                                    int64_t entries[KERNEL_FRONT], int count)
+SIMD_INLINE int kernel_front_keep_visible(const kernel_finder *s, const mmbvh *tree, const mmbvh_ranges *ranges,
+                                          int64_t entries[KERNEL_FRONT], int count)
 {
     int left = 0, chosen = 0;
     for (int n = 0; n < count; n++) {
@@ -193,7 +193,7 @@ static void kernel_find_candidates(kernel_finder *s, int64_t root)
         int64_t front[KERNEL_FRONT], leaves[KERNEL_FRONT], children[KERNEL_FRONT];
         int count = top < most ? top : most, leaf_count = 0, child_count = 0;
         for (int n = 0; n < count; n++) front[n] = stack[--top];
-        count = kernel_front_choose(s, tree, ranges, front, count);
+        count = kernel_front_keep_visible(s, tree, ranges, front, count);
         /* lists the leaves among the nodes, and the left children of the inner nodes; prefetches the leaves' cells and
          * the children's ranges of values */
         for (int n = 0; n < count; n++) {

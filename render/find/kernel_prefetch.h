@@ -11,7 +11,7 @@
 SIMD_INLINE void kernel_prefetch_indices(const grid *g, uint32_t cell)
 {
     if (g->lattice) return;
-    const int64_t first = kernel_arrays_first(g, cell, grid_type_vertices(g->cell_type));
+    const int64_t first = kernel_arrays_first_entry(g, cell, grid_type_vertices(g->cell_type));
     __builtin_prefetch(g->connectivity.data + first * g->connectivity.stride);
     if (g->cell_types) __builtin_prefetch(g->cell_types + cell * g->cell_types_stride);
 }
@@ -20,7 +20,7 @@ SIMD_INLINE void kernel_prefetch_indices(const grid *g, uint32_t cell)
 SIMD_INLINE void kernel_prefetch_vertices(const grid *g, const grid_field *field, uint32_t cell)
 {
     const int vertices = grid_type_vertices(grid_cell_type(g, cell));
-    const int64_t first = kernel_arrays_first(g, cell, vertices);
+    const int64_t first = kernel_arrays_first_entry(g, cell, vertices);
     for (int i = 0; i < vertices; i++) {
         const int64_t v =
             g->lattice ? first + g->lattice->corner_offsets[i] : grid_array_index(&g->connectivity, first + i);

@@ -215,8 +215,8 @@ static double widen_by_tree(const kernel_frame *f, const mmbvh *tree, double spa
  * number of their cells; *pixels: sum of the areas of their bounding boxes in the picture, in pixels; all: ranges of
  * columns and rows that the boxes together cover. Returns false if a part does not lie completely in front of the
  * eye. */
-static bool measure_parts(const kernel_frame *f, const mmbvh_ranges *ranges, double *cells, double *pixels,
-                          double all[2][2])
+static bool measure_parts_in_picture(const kernel_frame *f, const mmbvh_ranges *ranges, double *cells, double *pixels,
+                                     double all[2][2])
 {
     *cells = *pixels = 0;
     all[0][0] = all[1][0] = INFINITY;
@@ -241,7 +241,8 @@ static bool measure_parts(const kernel_frame *f, const mmbvh_ranges *ranges, dou
 static bool volume_cells_are_small(const kernel_frame *f)
 {
     double cells, pixels, all[2][2];
-    return measure_parts(f, f->job->volumes[0].field.ranges, &cells, &pixels, all) && cells > SMALL_CELLS * pixels;
+    return measure_parts_in_picture(f, f->job->volumes[0].field.ranges, &cells, &pixels, all) &&
+           cells > SMALL_CELLS * pixels;
 }
 
 /* Adds numbers of cells, counted in `samples` nodes that are spread evenly over the part's tree. *cells: all cells of
@@ -273,7 +274,7 @@ bool render_surfaces_are_small(const kernel_frame *f)
 {
     double cells, boxes, all[2][2], crossed = 0;
     int values = 0;
-    if (f->has_transparent || !measure_parts(f, NULL, &cells, &boxes, all)) return false;
+    if (f->has_transparent || !measure_parts_in_picture(f, NULL, &cells, &boxes, all)) return false;
     /* at least the area of one tile, because the boxes of flat parts may have no area in the picture */
     const double pixels =
         fmax(fmin(boxes, (all[0][1] - all[0][0]) * (all[1][1] - all[1][0])), KERNEL_TILE * KERNEL_TILE);

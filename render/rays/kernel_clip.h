@@ -98,8 +98,8 @@ static inline int kernel_clip_add_hole(kernel_ray_part *holes, int count, kernel
 
 /* Returns interval `number`, counted from 0, of the intervals that a set of clips leaves of a ray beyond t = `begin`;
  * KERNEL_NO_PART if there are fewer. clips: one bit per clip of the job. */
-static inline kernel_ray_part kernel_clip_part(const render_job *job, uint32_t clips, const kernel_clip_ray *ray,
-                                               double begin, int number)
+static inline kernel_ray_part kernel_clip_find_interval(const render_job *job, uint32_t clips,
+                                                        const kernel_clip_ray *ray, double begin, int number)
 {
     kernel_ray_part out = {begin, INFINITY}, holes[RENDER_MAX_CLIPS];
     int hole_count = 0;
@@ -122,7 +122,8 @@ static inline kernel_ray_part kernel_clip_part(const render_job *job, uint32_t c
     return number == 0 && out.begin <= out.end ? out : KERNEL_NO_PART;
 }
 
-static inline bool kernel_clip_has(const render_clip *c, const render_space *s, const kernel_clip_ray *ray, double t)
+static inline bool kernel_clip_contains(const render_clip *c, const render_space *s, const kernel_clip_ray *ray,
+                                        double t)
 {
     double square = 0;
     bool is_within = true;
@@ -141,7 +142,7 @@ static inline bool kernel_clip_keeps(const render_job *job, uint32_t clips, cons
 {
     for (; clips; clips &= clips - 1) {
         const render_clip *c = &job->clips[__builtin_ctz(clips)];
-        if (kernel_clip_has(c, &job->space, ray, t) == c->is_outside) return false;
+        if (kernel_clip_contains(c, &job->space, ray, t) == c->is_outside) return false;
     }
     return true;
 }

@@ -156,7 +156,8 @@ SIMD_INLINE void kernel_shade(const kernel_packet *p, const render_material *m, 
     for (int a = 0; a < 3; a++) colour[a] = colour[a] * diffuse[a] + specular[a];
 }
 
-/* One fragment per ray (fragment.h). `kind` of each lane is added to the kind that is passed to kernel_emit(). */
+/* One fragment per ray (fragment.h). `kind` of each lane is added to the kind that is passed to
+ * kernel_append_fragments(). */
 typedef struct kernel_fragments {
     vf t_in, t_out, colour[3], transmittance, kind;
 } kernel_fragments;
@@ -170,8 +171,8 @@ SIMD_INLINE vm kernel_fragment_is_visible(const vf colour[3], vf transmittance)
 }
 
 /* Appends the fragments of the rays in mask to the thread's list. */
-static __attribute__((noinline, unused)) void kernel_emit(kernel_packet *p, vm mask, uint32_t kind,
-                                                          const kernel_fragments *f)
+static __attribute__((noinline, unused)) void kernel_append_fragments(kernel_packet *p, vm mask, uint32_t kind,
+                                                                      const kernel_fragments *f)
 {
     unsigned bits = vm_bits(mask);
     fragment_list *list = &p->thread->out;
@@ -219,7 +220,7 @@ static __attribute__((noinline)) void kernel_special_colour(const kernel_transfe
     }
 }
 
-SIMD_INLINE void kernel_base_colour(const kernel_surface *s, int value, vf w, vf out[3])
+SIMD_INLINE void kernel_unlit_surface_colour(const kernel_surface *s, int value, vf w, vf out[3])
 {
     if (s->layer->colour_map && (s->colour.is_banded || s->colour.outside)) {
         kernel_special_colour(&s->colour, w, out);

@@ -53,7 +53,7 @@ typedef struct kernel_packet {
 enum { KERNEL_PACKET_COLUMNS = SIMD_WIDTH == 4 ? 2 : 4, KERNEL_PACKET_ROWS = SIMD_WIDTH / KERNEL_PACKET_COLUMNS };
 
 /* Computes a ray in tree space: its point at t is base + t * direction. px, py: slope or offset of the ray's column and
- * row of pixels (kernel_column(), kernel_row()). */
+ * row of pixels (kernel_ray_parameter_of_column(), kernel_ray_parameter_of_row()). */
 static inline void kernel_tree_ray(const kernel_frame *f, double px, double py, double base[3], double direction[3])
 {
     const render_camera *c = &f->job->camera;
@@ -68,11 +68,11 @@ static inline void kernel_tree_ray(const kernel_frame *f, double px, double py, 
 }
 
 /* Computes the slopes or offsets of the columns and rows of a packet's rays (px and py of kernel_tree_ray()). */
-static inline void kernel_packet_lanes(const kernel_packet *p, double px[SIMD_WIDTH], double py[SIMD_WIDTH])
+static inline void kernel_packet_ray_parameters(const kernel_packet *p, double px[SIMD_WIDTH], double py[SIMD_WIDTH])
 {
     for (int i = 0; i < SIMD_WIDTH; i++) {
-        px[i] = kernel_column(p->frame, p->x0 + i % KERNEL_PACKET_COLUMNS);
-        py[i] = kernel_row(p->frame, p->y0 + i / KERNEL_PACKET_COLUMNS);
+        px[i] = kernel_ray_parameter_of_column(p->frame, p->x0 + i % KERNEL_PACKET_COLUMNS);
+        py[i] = kernel_ray_parameter_of_row(p->frame, p->y0 + i / KERNEL_PACKET_COLUMNS);
     }
 }
 
@@ -95,7 +95,7 @@ static inline void kernel_packet_tile_rays(kernel_packet *p)
 
 /* Computes the directions from the scene to the eye (p->view) unless they are already set; kernel_shade() needs
  * them. */
-static inline void kernel_packet_view(kernel_packet *p)
+static inline void kernel_packet_set_view(kernel_packet *p)
 {
     if (p->has_view) return;
     double px[SIMD_WIDTH], py[SIMD_WIDTH], inverse[SIMD_WIDTH];
@@ -106,7 +106,7 @@ static inline void kernel_packet_view(kernel_packet *p)
         p->view[2] = vf_set(-1);
         return;
     }
-    kernel_packet_lanes(p, px, py);
+    kernel_packet_ray_parameters(p, px, py);
     for (int i = 0; i < SIMD_WIDTH; i++) inverse[i] = 1 / sqrt(1 + px[i] * px[i] + py[i] * py[i]);
     for (int i = 0; i < SIMD_WIDTH; i++) {
         view[0][i] = (float)(-px[i] * inverse[i]);
@@ -119,17 +119,17 @@ static inline void kernel_packet_view(kernel_packet *p)
 /* Returns the number of a ray's first sample, the one next to the eye; it is 0 or negative. Sample 0 is near the depth
  * origin, in the scene, so that products of number and step have small rounding errors there. The numbers depend only
  * on the camera and the step. */
-static inline int kernel_sample_first(const kernel_frame *f)
+static inline int kernel_first_sample_number(const kernel_frame *f)
 {
     const double count = floor(f->depth_shift / f->scaled_step);
     return count > 0 && count < 1e9 ? -(int)count : 0;
 }
 
-static inline void kernel_packet_samples(kernel_packet *p, const double px[SIMD_WIDTH], const double py[SIMD_WIDTH])
+static inline void kernel_packet_set_samples(kernel_packet *p, const double px[SIMD_WIDTH], const double py[SIMD_WIDTH])
 {
     const kernel_frame *f = p->frame;
     float base[SIMD_WIDTH], step[SIMD_WIDTH];
-    p->sample_first = kernel_sample_first(f);
+    p->sample_first = kernel_first_sample_number(f);
     for (int i = 0; i < SIMD_WIDTH; i++) {
         const bool flat = f->job->camera.is_orthographic;
         const double length = flat ? 1 : sqrt(1 + px[i] * px[i] + py[i] * py[i]);
@@ -145,16 +145,17 @@ static inline void kernel_packet_samples(kernel_packet *p, const double px[SIMD_
 
 /* Sets clip_in and clip_out to interval `number`, counted from 0, of the intervals that the given clips (a bit mask)
  * leave of the part of each ray in front of the eye. */
-static __attribute__((noinline, cold)) void kernel_packet_part(kernel_packet *p, uint32_t clips, int number)
+static __attribute__((noinline, cold)) void kernel_packet_set_clip_interval(kernel_packet *p, uint32_t clips,
+                                                                            int number)
 {
     const kernel_frame *f = p->frame;
     double px[SIMD_WIDTH], py[SIMD_WIDTH];
     float from[SIMD_WIDTH], to[SIMD_WIDTH], stretch[SIMD_WIDTH];
-    kernel_packet_lanes(p, px, py);
+    kernel_packet_ray_parameters(p, px, py);
     for (int i = 0; i < SIMD_WIDTH; i++) {
         kernel_clip_ray ray;
         kernel_tree_ray(f, px[i], py[i], ray.base, ray.direction);
-        const kernel_ray_part part = kernel_clip_part(f->job, clips, &ray, -f->depth_shift, number);
+        const kernel_ray_part part = kernel_clip_find_interval(f->job, clips, &ray, -f->depth_shift, number);
         const double length = part.end - part.begin;
         from[i] = (float)part.begin;
         to[i] = (float)part.end;
@@ -170,7 +171,7 @@ static __attribute__((noinline, cold)) void kernel_packet_part(kernel_packet *p,
  * nothing is left. */
 static inline void kernel_packet_clip(kernel_packet *p)
 {
-    kernel_packet_part(p, p->frame->common_clips, 0);
+    kernel_packet_set_clip_interval(p, p->frame->common_clips, 0);
     p->t_near = vf_max(p->t_near, p->clip_in);
     p->t_far = p->clip_out;
     p->active = vm_and(p->active, vf_le(p->t_near, p->t_far));
@@ -185,7 +186,7 @@ static inline void kernel_packet_clip_volumes(kernel_packet *p, int turn)
         p->surface_near = p->t_near;
         p->surface_far = p->t_far;
     }
-    kernel_packet_part(p, p->frame->job->volume_clips, turn);
+    kernel_packet_set_clip_interval(p, p->frame->job->volume_clips, turn);
     p->t_near = vf_max(p->surface_near, p->clip_in);
     p->t_far = vf_min(p->surface_far, p->clip_out);
     p->active = vm_and(p->all_active, vf_le(p->t_near, p->t_far));
@@ -241,7 +242,7 @@ typedef struct kernel_point {
 } kernel_point;
 
 /* Copies the points of the rays in the mask; other lanes of *to are unchanged. */
-SIMD_INLINE void kernel_point_move(vm mask, const kernel_point *from, kernel_point *to)
+SIMD_INLINE void kernel_point_copy_lanes(vm mask, const kernel_point *from, kernel_point *to)
 {
     to->t = vf_select(mask, from->t, to->t);
     to->value = vf_select(mask, from->value, to->value);
@@ -249,12 +250,12 @@ SIMD_INLINE void kernel_point_move(vm mask, const kernel_point *from, kernel_poi
 }
 
 /* Exchanges the two points on rays whose second point is nearer than the first. */
-SIMD_INLINE void kernel_points_order(kernel_point ends[2])
+SIMD_INLINE void kernel_points_sort_by_depth(kernel_point ends[2])
 {
     const vm swap = vf_lt(ends[1].t, ends[0].t);
     const kernel_point first = ends[0];
-    kernel_point_move(swap, &ends[1], &ends[0]);
-    kernel_point_move(swap, &first, &ends[1]);
+    kernel_point_copy_lanes(swap, &ends[1], &ends[0]);
+    kernel_point_copy_lanes(swap, &first, &ends[1]);
 }
 
 SIMD_INLINE kernel_rays kernel_packet_rays(const kernel_packet *p)

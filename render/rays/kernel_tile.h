@@ -31,8 +31,8 @@ static inline void kernel_tile_setup(kernel_tile *tile, const kernel_frame *f, i
     tile->x0 = x0;
     tile->y0 = y0;
     tile->depth_shift = f->depth_shift;
-    tile->centre_x = kernel_column(f, x0 + 0.5 * (KERNEL_TILE - 1));
-    tile->centre_y = kernel_row(f, y0 + 0.5 * (KERNEL_TILE - 1));
+    tile->centre_x = kernel_ray_parameter_of_column(f, x0 + 0.5 * (KERNEL_TILE - 1));
+    tile->centre_y = kernel_ray_parameter_of_row(f, y0 + 0.5 * (KERNEL_TILE - 1));
     const bool flat = f->job->camera.is_orthographic;
     tile->shear_x = flat ? 0 : (float)tile->centre_x;
     tile->shear_y = flat ? 0 : (float)tile->centre_y;
@@ -52,8 +52,8 @@ static inline void kernel_tile_rays(kernel_tile *tile, const kernel_frame *f)
     const bool flat = f->job->camera.is_orthographic;
     const double reach = kernel_slope_to_origin(f);
     for (int i = 0; i < KERNEL_TILE; i++) {
-        const double dx = kernel_column(f, tile->x0 + i) - tile->centre_x;
-        const double dy = kernel_row(f, tile->y0 + i) - tile->centre_y;
+        const double dx = kernel_ray_parameter_of_column(f, tile->x0 + i) - tile->centre_x;
+        const double dy = kernel_ray_parameter_of_row(f, tile->y0 + i) - tile->centre_y;
         tile->origin_x[i] = (float)(dx * reach);
         tile->origin_y[i] = (float)(dy * reach);
         tile->slope_x[i] = flat ? 0 : (float)dx;
@@ -86,12 +86,16 @@ typedef struct kernel_planes {
 /* Computes the slopes (perspective) or offsets (orthographic) of the five borders of columns (x) and of rows (y) of the
  * tile's blocks. If tile is NULL, block 0 stands for the whole picture: the borders 0 are its left and upper border,
  * all others its right and lower border. A body that may be visible in the picture then gets the mask of block 0. */
-static inline void kernel_borders(const kernel_frame *f, const kernel_tile *tile, double x[KERNEL_BLOCKS_ACROSS + 1],
-                                  double y[KERNEL_BLOCKS_ACROSS + 1])
+static inline void kernel_compute_block_borders(const kernel_frame *f, const kernel_tile *tile,
+                                                double x[KERNEL_BLOCKS_ACROSS + 1], double y[KERNEL_BLOCKS_ACROSS + 1])
 {
     for (int n = 0; n <= KERNEL_BLOCKS_ACROSS; n++) {
-        x[n] = kernel_column(f, tile ? tile->x0 + n * KERNEL_BLOCK - 0.5 : n ? f->job->camera.width - 0.5 : -0.5);
-        y[n] = kernel_row(f, tile ? tile->y0 + n * KERNEL_BLOCK - 0.5 : n ? f->job->camera.height - 0.5 : -0.5);
+        x[n] = kernel_ray_parameter_of_column(f, tile ? tile->x0 + n * KERNEL_BLOCK - 0.5
+                                                 : n  ? f->job->camera.width - 0.5
+                                                      : -0.5);
+        y[n] = kernel_ray_parameter_of_row(f, tile ? tile->y0 + n * KERNEL_BLOCK - 0.5
+                                              : n  ? f->job->camera.height - 0.5
+                                                   : -0.5);
     }
 }
 
@@ -103,7 +107,7 @@ static inline void kernel_planes_from_eye(const kernel_frame *f, const kernel_ti
     const bool flat = f->job->camera.is_orthographic;
     const double scale = f->job->space.scale;
     double x[KERNEL_BLOCKS_ACROSS + 1], y[KERNEL_BLOCKS_ACROSS + 1];
-    kernel_borders(f, tile, x, y);
+    kernel_compute_block_borders(f, tile, x, y);
     memset(axes, 0, 3 * sizeof *axes);
     memset(offset, 0, KERNEL_LANES * sizeof *offset);
     for (int n = 0; n <= KERNEL_BLOCKS_ACROSS; n++) {
@@ -173,7 +177,7 @@ static inline void kernel_tile_planes(kernel_planes *q, const kernel_frame *f, c
     const double reach = kernel_slope_to_origin(f);
     float normal[3][KERNEL_LANES] = {{0}}, offset[KERNEL_LANES] = {0}, error[KERNEL_LANES];
     double columns[KERNEL_BLOCKS_ACROSS + 1], rows[KERNEL_BLOCKS_ACROSS + 1];
-    kernel_borders(f, tile, columns, rows);
+    kernel_compute_block_borders(f, tile, columns, rows);
     for (int n = 0; n <= KERNEL_BLOCKS_ACROSS; n++) {
         const double x = columns[n] - tile->centre_x, y = rows[n] - tile->centre_y;
         const int row = KERNEL_ROWS_LANE + n;
@@ -212,7 +216,7 @@ SIMD_INLINE void kernel_placement_add(kernel_placement *placement, int v, vf low
 }
 
 /* Computes the mask of the blocks of which the body is, at least with a part, on the inner side of all four borders. */
-SIMD_INLINE void kernel_placement_close(kernel_placement *placement)
+SIMD_INLINE void kernel_placement_find_blocks(kernel_placement *placement)
 {
     const unsigned inner = placement->above & placement->below >> 1;
     placement->blocks = kernel_blocks_at(inner & 15, inner >> KERNEL_ROWS_LANE & 15);
@@ -233,7 +237,7 @@ SIMD_INLINE kernel_placement kernel_box_placement(const kernel_planes *q, const 
         kernel_placement_add(&placement, v, at - reach, at + reach);
         if (v == KERNEL_ALONG_LANE / SIMD_WIDTH) placement.along = at[KERNEL_ALONG_LANE % SIMD_WIDTH];
     }
-    kernel_placement_close(&placement);
+    kernel_placement_find_blocks(&placement);
     return placement;
 }
 
@@ -260,7 +264,7 @@ SIMD_INLINE kernel_placement kernel_points_placement(const kernel_planes *q, con
         const vf size = (q->size[0][v] * most[0] + q->size[1][v] * most[1]) + (q->size[2][v] * most[2] + q->error[v]);
         kernel_placement_add(&placement, v, low - size * KERNEL_OUTLINE_PAD, high + size * KERNEL_OUTLINE_PAD);
     }
-    kernel_placement_close(&placement);
+    kernel_placement_find_blocks(&placement);
     return placement;
 }
 

@@ -42,7 +42,7 @@ typedef struct kernel_tile_trace {
 
 /* Returns a mask of the blocks that contain a ray whose nearest hit is not nearer than the depth `near`, so that a cell
  * at this depth may be visible. */
-SIMD_INLINE unsigned kernel_blocks_beyond(const kernel_tile_trace *t, float near)
+SIMD_INLINE unsigned kernel_blocks_not_hidden_at(const kernel_tile_trace *t, float near)
 {
     unsigned bits = 0;
     for (int v = 0; v < KERNEL_BLOCKS / SIMD_WIDTH; v++)
@@ -98,7 +98,7 @@ SIMD_INLINE void kernel_block_update_far(kernel_tile_trace *t, int block)
 
 /* Returns whether a box of pixels contains one whose nearest hit is not nearer than the depth `near`. box: first and
  * last column, first and last row in the tile, 4 bits each, from bit 0 on. */
-SIMD_INLINE bool kernel_pixels_beyond(const kernel_tile_trace *t, unsigned box, float near)
+SIMD_INLINE bool kernel_box_has_pixel_not_hidden_at(const kernel_tile_trace *t, unsigned box, float near)
 {
     const unsigned columns = (2u << (box >> 4 & 15)) - (1u << (box & 15));
     for (unsigned y = box >> 8 & 15; y <= box >> 12; y++) {
@@ -118,7 +118,7 @@ SIMD_INLINE unsigned kernel_tile_visible_blocks(const kernel_tile_trace *t, cons
 {
     const kernel_placement placement = kernel_points_placement(&t->tile_planes, places, count);
     if (placement.far < t->t_near) return 0;
-    return blocks & placement.blocks & kernel_blocks_beyond(t, placement.near);
+    return blocks & placement.blocks & kernel_blocks_not_hidden_at(t, placement.near);
 }
 
 /* Returns the largest t_far of all rays in blocks that are traced. */
@@ -209,7 +209,7 @@ SIMD_INLINE void kernel_tile_traverse(kernel_tile_trace *t, const mmbvh *tree, c
     if (root.blocks) stack[top++] = (kernel_tile_node){0, root.near, (uint16_t)root.blocks, 0};
     while (top) {
         const kernel_tile_node e = stack[--top];
-        blocks = e.place & kernel_blocks_beyond(t, e.near);
+        blocks = e.place & kernel_blocks_not_hidden_at(t, e.near);
         if (!blocks) continue;
         const int count = mmbvh_node_count(tree, e.ref);
         const int64_t ref = mmbvh_node_ref(tree, e.ref);
@@ -261,7 +261,7 @@ SIMD_INLINE void kernel_pixel_list_add_box(kernel_pixel_list *rays, unsigned box
 }
 
 /* Pads the list with zeros, so that its last rays can be read as a whole vector. */
-SIMD_INLINE void kernel_pixel_list_close(kernel_pixel_list *rays)
+SIMD_INLINE void kernel_pixel_list_pad(kernel_pixel_list *rays)
 {
     memset(rays->pixel + rays->count, 0, SIMD_WIDTH);
     memset(rays->lane + rays->count, 0, SIMD_WIDTH);
@@ -340,7 +340,7 @@ static inline void kernel_tile_set_layer(kernel_tile_trace *t, int layer)
 
 /* Returns whether hits on the current layer can be processed for rays that each have a cell of their own
  * (kernel_ray_accept()); otherwise they are processed by packets that share one cell. */
-SIMD_INLINE bool kernel_tile_layer_batches(const kernel_tile_trace *t)
+SIMD_INLINE bool kernel_tile_layer_allows_lanes(const kernel_tile_trace *t)
 {
     const render_surface_layer *l = t->surface->layer;
     /* rays with clips are not processed in lanes, because they begin at different depths, which only packets store */

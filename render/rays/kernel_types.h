@@ -396,11 +396,11 @@ typedef struct kernel_table {
 
 extern const kernel_table kernel_table_plain, kernel_table_sse42, kernel_table_avx2, kernel_table_avx512;
 
-static inline double kernel_column(const kernel_frame *f, double x)
+static inline double kernel_ray_parameter_of_column(const kernel_frame *f, double x)
 {
     return f->slope_x0 + x * f->slope_dx;
 }
-static inline double kernel_row(const kernel_frame *f, double y)
+static inline double kernel_ray_parameter_of_row(const kernel_frame *f, double y)
 {
     return f->slope_y0 + y * f->slope_dy;
 }

@@ -33,7 +33,7 @@ SIMD_INLINE kernel_f64_floats kernel_f64_narrow(kernel_f64 v)
 
 /* Returns the mask of half the lanes, the first half (half = 0) or the second half (half = 1), for vectors of
  * doubles. */
-SIMD_INLINE kernel_f64_mask kernel_f64_of_mask(vm m, int half)
+SIMD_INLINE kernel_f64_mask kernel_f64_mask_of_half(vm m, int half)
 {
     typedef int32_t kernel_f64_ints __attribute__((vector_size(4 * KERNEL_HALF)));
     int32_t lanes[SIMD_WIDTH];
@@ -51,21 +51,21 @@ SIMD_INLINE kernel_f64 kernel_f64_select(kernel_f64_mask m, kernel_f64 a, kernel
 
 /* Returns the numbers in the first half (half = 0) or the second half (half = 1) of the lanes of *v, converted to
  * double. */
-SIMD_INLINE kernel_f64 kernel_f64_of(const vf *v, int half)
+SIMD_INLINE kernel_f64 kernel_f64_widen_half(const vf *v, int half)
 {
     kernel_f64_floats f;
     memcpy(&f, (const char *)v + half * (int)sizeof f, sizeof f);
     return kernel_f64_widen(f);
 }
 
-SIMD_INLINE void kernel_f64_store_lanes(vf *v, int half, kernel_f64 d)
+SIMD_INLINE void kernel_f64_store_half_of_vector(vf *v, int half, kernel_f64 d)
 {
     const kernel_f64_floats f = kernel_f64_narrow(d);
     memcpy((char *)v + half * (int)sizeof f, &f, sizeof f);
 }
 
 /* Rounds doubles to float32 and stores them in one half of an array with one number per lane. */
-SIMD_INLINE void kernel_f64_store(float lanes[SIMD_WIDTH], int half, kernel_f64 v)
+SIMD_INLINE void kernel_f64_store_half(float lanes[SIMD_WIDTH], int half, kernel_f64 v)
 {
     const kernel_f64_floats floats = kernel_f64_narrow(v);
     memcpy(lanes + half * KERNEL_HALF, &floats, sizeof floats);
@@ -102,13 +102,13 @@ SIMD_INLINE kernel_f64 kernel_f64_clamp(kernel_f64 v, double limit)
 
 SIMD_INLINE void kernel_halves_widen(vf v, kernel_f64 out[2])
 {
-    for (int half = 0; half < 2; half++) out[half] = kernel_f64_of(&v, half);
+    for (int half = 0; half < 2; half++) out[half] = kernel_f64_widen_half(&v, half);
 }
 
 SIMD_INLINE vf kernel_halves_narrow(const kernel_f64 v[2])
 {
     vf out;
-    for (int half = 0; half < 2; half++) kernel_f64_store_lanes(&out, half, v[half]);
+    for (int half = 0; half < 2; half++) kernel_f64_store_half_of_vector(&out, half, v[half]);
     return out;
 }
 

@@ -48,8 +48,9 @@ SIMD_INLINE void kernel_vertex_gradient(const kernel_frame *f, const render_vert
 /* Reads a cell and transforms it into tile space. gradient[k] receives component k of the gradient, in camera axes: in
  * a tet the values at the vertices, in other cells the coefficients of the polynomial that interpolates these values.
  */
-static void kernel_smooth_setup(const kernel_packet *p, const render_surface_layer *layer, int part, uint32_t index,
-                                kernel_cell *c, double gradient[3][GRID_MAX_CELL_VERTICES])
+static void kernel_fetch_gradient_polynomials(const kernel_packet *p, const render_surface_layer *layer, int part,
+                                              uint32_t index, kernel_cell *c,
+                                              double gradient[3][GRID_MAX_CELL_VERTICES])
 {
     const grid *g = p->frame->job->parts[part].cells;
     c->part = part;
@@ -69,7 +70,7 @@ static void kernel_smooth_setup(const kernel_packet *p, const render_surface_lay
 
 /* Computes a point's barycentric coordinates in a tet. Each coordinate outside [-1, 2], which occurs only if the point
  * is far outside or the tet has no volume, is replaced by 1/4. */
-SIMD_INLINE void kernel_barycentric(const double corner[4][3], const double point[3], double out[4])
+SIMD_INLINE void kernel_compute_barycentric(const double corner[4][3], const double point[3], double out[4])
 {
     double d[4][3], sum = 0;
     for (int i = 0; i < 4; i++)
@@ -89,7 +90,7 @@ SIMD_INLINE void kernel_barycentric(const double corner[4][3], const double poin
 }
 
 /* Returns the value of the polynomial with the coefficients c at the reference coordinates r, for one point in double;
- * kernel_value_of() does the same for vectors. */
+ * kernel_polynomial_value() does the same for vectors. */
 SIMD_INLINE double kernel_polynomial_at(const double c[8], bool is_pyramid, const double r[3])
 {
     double m = r[0] * r[1];
@@ -101,10 +102,11 @@ SIMD_INLINE double kernel_polynomial_at(const double c[8], bool is_pyramid, cons
     return is_pyramid ? v : v + r[2] * ((r[0] * c[5] + r[1] * c[6]) + m * c[7]);
 }
 
-/* Computes the gradient at a point by interpolation, in camera axes. gradient: computed by kernel_smooth_setup();
- * place: the point's reference coordinates or, in a tet, its position in tile space. */
-SIMD_INLINE void kernel_smooth_at(const kernel_cell *c, double (*const gradient)[GRID_MAX_CELL_VERTICES],
-                                  const double place[3], float out[3])
+/* Computes the gradient at a point by interpolation, in camera axes. gradient: computed by
+ * kernel_fetch_gradient_polynomials(); place: the point's reference coordinates or, in a tet, its position in tile
+ * space. */
+SIMD_INLINE void kernel_interpolate_gradient(const kernel_cell *c, double (*const gradient)[GRID_MAX_CELL_VERTICES],
+                                             const double place[3], float out[3])
 {
     if (!kernel_is_linear(c->type)) {
         for (int k = 0; k < 3; k++) out[k] = (float)kernel_polynomial_at(gradient[k], kernel_has_apex(c->type), place);
@@ -116,7 +118,7 @@ SIMD_INLINE void kernel_smooth_at(const kernel_cell *c, double (*const gradient)
         corner[i][1] = (double)c->y[i];
         corner[i][2] = (double)c->z[i];
     }
-    kernel_barycentric(corner, place, share);
+    kernel_compute_barycentric(corner, place, share);
     for (int k = 0; k < 3; k++) {
         const double *g = gradient[k];
         out[k] = (float)((share[0] * g[0] + share[1] * g[1]) + (share[2] * g[2] + share[3] * g[3]));
@@ -146,12 +148,13 @@ static __attribute__((noinline)) void kernel_vertex_normals(const kernel_packet 
         double place[3];
         float out[3];
         if (part < 0) continue;
-        if (known.part != part || known.index != index) kernel_smooth_setup(p, s->layer, part, index, &known, gradient);
+        if (known.part != part || known.index != index)
+            kernel_fetch_gradient_polynomials(p, s->layer, part, index, &known, gradient);
         if (kernel_is_linear(known.type))
             kernel_ray_point(p, ray, t[ray], place);
         else
             for (int a = 0; a < 3; a++) place[a] = (double)normal[a][ray];
-        kernel_smooth_at(&known, gradient, place, out);
+        kernel_interpolate_gradient(&known, gradient, place, out);
         for (int a = 0; a < 3; a++) normal[a][ray] = out[a];
     }
 }
@@ -192,7 +195,7 @@ SIMD_INLINE bool kernel_is_opaque(const kernel_packet *p, const kernel_surface *
 }
 
 /* Transforms a gradient from tile space, which is sheared along the tile's middle ray, to camera axes. */
-SIMD_INLINE void kernel_unshear(const kernel_tile *tile, vf g[3])
+SIMD_INLINE void kernel_gradient_to_camera_axes(const kernel_tile *tile, vf g[3])
 {
     g[2] -= g[0] * tile->shear_x + g[1] * tile->shear_y;
 }
@@ -243,7 +246,7 @@ SIMD_INLINE void kernel_paint(kernel_packet *p, const kernel_surface *s, const v
                               kernel_fragments *f)
 {
     const render_paint paint = p->frame->job->paint;
-    kernel_packet_view(p);
+    kernel_packet_set_view(p);
     if (__builtin_expect(paint == RENDER_LIGHT, 1) ||
         (paint == RENDER_UNLIT && !render_takes_light(&s->layer->material)))
         kernel_shade(p, &s->layer->material, normal, f->colour);
@@ -278,7 +281,7 @@ static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, c
     const uint32_t kind = s->first_kind + (uint32_t)h->value;
     kernel_fragments lit = {h->t, h->t, {h->colour[0], h->colour[1], h->colour[2]}, vf_set(0), vf_set(0)};
     kernel_paint(p, s, h->normal, vf_set((float)kind), &lit);
-    kernel_emit(p, tied, kind, &lit);
+    kernel_append_fragments(p, tied, kind, &lit);
 }
 
 /* Adds the hits with a reach above 0, whose normals need samples of other ranks' cells, to the thread's list of pending
@@ -297,7 +300,7 @@ static __attribute__((noinline, cold)) vm kernel_defer_hits(kernel_packet *p, co
     }
     const kernel_fragments place = {
         h->t, h->t, {colour[0], colour[1], colour[2]}, vf_set(RENDER_PENDING_TRANSMITTANCE), vf_set(0)};
-    kernel_emit(p, waits, kind, &place);
+    kernel_append_fragments(p, waits, kind, &place);
     for (unsigned left = vm_bits(waits); left; left &= left - 1) {
         const int i = __builtin_ctz(left);
         list->items[list->count] = (render_pending_hit){p->pixel[i], kind, h->t[i], h->reach[i]};
@@ -325,17 +328,18 @@ SIMD_INLINE vm kernel_changes_sign(const kernel_interval *i)
 }
 
 /* Returns the rays whose interval in the cell begins in front of their nearest hit and ends behind the eye's plane. */
-SIMD_INLINE vm kernel_is_near(const kernel_packet *p, const kernel_interval *i)
+SIMD_INLINE vm kernel_interval_overlaps_ray(const kernel_packet *p, const kernel_interval *i)
 {
     return vm_and(i->mask, vm_and(vf_le(i->t_in, p->t_far), vf_le(p->t_near, i->t_out)));
 }
 
 /* Returns those of the hits at depth t that all of the given clips keep. clips: one bit per clip of the job. */
-static __attribute__((noinline, cold)) vm kernel_clip_hits(const kernel_packet *p, uint32_t clips, vm hit, vf t)
+static __attribute__((noinline, cold)) vm kernel_hits_kept_by_clips(const kernel_packet *p, uint32_t clips, vm hit,
+                                                                    vf t)
 {
     double px[SIMD_WIDTH], py[SIMD_WIDTH];
     unsigned kept = 0;
-    kernel_packet_lanes(p, px, py);
+    kernel_packet_ray_parameters(p, px, py);
     for (unsigned left = vm_bits(hit); left; left &= left - 1) {
         const int i = __builtin_ctz(left);
         kernel_clip_ray ray;
@@ -350,12 +354,12 @@ SIMD_INLINE vm kernel_unclipped_hits(const kernel_packet *p, const kernel_surfac
 {
     const vm in_front = vm_and(hit, vf_le(p->t_near, t));
     if (__builtin_expect(s->own_clips == 0, 1)) return in_front;
-    return kernel_clip_hits(p, s->own_clips, in_front, t);
+    return kernel_hits_kept_by_clips(p, s->own_clips, in_front, t);
 }
 
 /* Returns those of the hits at depth t that the clips keep, in front of the eye and not behind the rays' nearest hits.
  */
-SIMD_INLINE vm kernel_visible(const kernel_packet *p, const kernel_surface *s, vm hit, vf t)
+SIMD_INLINE vm kernel_visible_hits(const kernel_packet *p, const kernel_surface *s, vm hit, vf t)
 {
     return kernel_unclipped_hits(p, s, vm_and(hit, vf_le(t, p->t_far)), t);
 }

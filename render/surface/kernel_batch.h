@@ -56,13 +56,13 @@ typedef struct kernel_batch {
 
 /* Computes a vector along the gradient in each cell of the batch, by the operations of kernel_tet_normal(). It is
  * called when one of the cells is hit for the first time. */
-static __attribute__((noinline)) void kernel_batch_normals(kernel_batch *b, const kernel_frame *f)
+static __attribute__((noinline)) void kernel_batch_compute_normals(kernel_batch *b, const kernel_frame *f)
 {
     const double scale = f->job->space.scale;
     for (int half = 0; half < 2; half++) {
         kernel_f64 d[3][3], df[3], g[3], largest = {0};
         for (int i = 0; i < 3; i++) {
-            df[i] = kernel_f64_of(&b->tets.f[i + 1], half) - kernel_f64_of(&b->tets.f[0], half);
+            df[i] = kernel_f64_widen_half(&b->tets.f[i + 1], half) - kernel_f64_widen_half(&b->tets.f[0], half);
             for (int a = 0; a < 3; a++) d[i][a] = (b->tets.world[i + 1][a][half] - b->tets.world[0][a][half]) * scale;
         }
         for (int a = 0; a < 3; a++) {
@@ -75,7 +75,8 @@ static __attribute__((noinline)) void kernel_batch_normals(kernel_batch *b, cons
             kernel_f64_select((kernel_f64_mask)(largest > 0), 1 / (largest * scale), (kernel_f64){0});
         for (int a = 0; a < 3; a++) {
             const double *axis = f->scaled_axes[a];
-            kernel_f64_store_lanes(&b->normal[a], half, (axis[0] * g[0] + axis[1] * g[1] + axis[2] * g[2]) * inverse);
+            kernel_f64_store_half_of_vector(&b->normal[a], half,
+                                            (axis[0] * g[0] + axis[1] * g[1] + axis[2] * g[2]) * inverse);
         }
     }
     b->has_normals = true;
@@ -84,8 +85,8 @@ static __attribute__((noinline)) void kernel_batch_normals(kernel_batch *b, cons
 /* ---- a cell of the batch that is traced by blocks ---- */
 
 /* Copies the cell in lane n of the batch to *c, with all that kernel_blocks_trace() needs. */
-static __attribute__((noinline)) void kernel_batch_cell(const kernel_tile_trace *t, const kernel_batch *b, int n,
-                                                        kernel_cell *c)
+static __attribute__((noinline)) void kernel_batch_copy_cell(const kernel_tile_trace *t, const kernel_batch *b, int n,
+                                                             kernel_cell *c)
 {
     const render_surface_layer *layer = t->surface->layer;
     kernel_transformed_tets_cell(&b->tets, n, c);
@@ -97,15 +98,15 @@ static __attribute__((noinline)) void kernel_batch_cell(const kernel_tile_trace 
     c->has_line_field = layer->lines != NULL;
     if (!layer->colour_map && !layer->lines) return;
     for (int i = 0; i < 4; i++) c->vertices[i] = b->tets.vertex[i][n];
-    if (layer->colour_map) kernel_values_colours(t->surface, c->part, c->index, c->vertices, 4, c->g);
-    if (layer->lines) kernel_cell_line_of(t->frame, &t->tile, t->surface, c, &c->line);
+    if (layer->colour_map) kernel_read_colour_values(t->surface, c->part, c->index, c->vertices, 4, c->g);
+    if (layer->lines) kernel_compute_tet_line_field(t->frame, &t->tile, t->surface, c, &c->line);
 }
 
 /* ---- lanes are pixels ---- */
 
 /* Returns the rays that hit the surface in their cells between t_near, the depth at which rays begin, and their
  * previous nearest hits (r->far). *out: depths of the hits. */
-SIMD_INLINE vm kernel_batch_hit(const kernel_batch *b, float t_near, const kernel_lane_rays *r, vf *out)
+SIMD_INLINE vm kernel_batch_find_hits(const kernel_batch *b, float t_near, const kernel_lane_rays *r, vf *out)
 {
     const vf far = r->far;
     kernel_interval i;
@@ -120,14 +121,14 @@ SIMD_INLINE vm kernel_batch_hit(const kernel_batch *b, float t_near, const kerne
 }
 
 /* Computes the field of the contour lines in lane n's cell. */
-static __attribute__((noinline)) void kernel_batch_line_field(const kernel_tile_trace *t, kernel_batch *b, int n)
+static __attribute__((noinline)) void kernel_batch_set_line_field(const kernel_tile_trace *t, kernel_batch *b, int n)
 {
     kernel_cell c;
     kernel_tet_line line;
     c.part = b->queued->part;
     for (int i = 0; i < 4; i++) c.vertices[i] = b->tets.vertex[i][n];
     kernel_transformed_tets_double(&b->tets, n, &c);
-    kernel_cell_line_of(t->frame, &t->tile, t->surface, &c, &line);
+    kernel_compute_tet_line_field(t->frame, &t->tile, t->surface, &c, &line);
     b->line_value[n] = line.value;
     b->line_along[n] = line.along;
     for (int a = 0; a < 3; a++) b->line_gradient[a][n] = line.gradient[a];
@@ -151,7 +152,7 @@ static __attribute__((noinline)) void kernel_batch_draw_lines(const kernel_tile_
     for (; hit; hit &= hit - 1) {
         const int i = __builtin_ctz(hit), n = lanes[i];
         const float *own = t->surface->layer->colours + 3 * b->queued->value[n];
-        if (!(b->line_lanes >> n & 1)) kernel_batch_line_field(t, b, n);
+        if (!(b->line_lanes >> n & 1)) kernel_batch_set_line_field(t, b, n);
         for (int a = 0; a < 3; a++) colour[a][i] = own[a];
     }
     field.value = vf_permute(vf_load(b->line_value), r->lane);
@@ -192,7 +193,7 @@ SIMD_INLINE unsigned kernel_batch_accept_coloured(kernel_tile_trace *t, kernel_b
 static unsigned kernel_batch_accept(kernel_tile_trace *t, kernel_batch *b, vi places, const uint8_t *lanes,
                                     unsigned hit, vf depth)
 {
-    if (!b->has_normals) kernel_batch_normals(b, t->frame);
+    if (!b->has_normals) kernel_batch_compute_normals(b, t->frame);
     return kernel_batch_accept_coloured(t, b, places, lanes, hit, depth, NULL);
 }
 
@@ -202,7 +203,7 @@ static __attribute__((noinline)) unsigned kernel_batch_accept_lined(kernel_tile_
                                                                     unsigned hit, vf depth)
 {
     float drawn[3][SIMD_WIDTH];
-    if (!b->has_normals) kernel_batch_normals(b, t->frame);
+    if (!b->has_normals) kernel_batch_compute_normals(b, t->frame);
     kernel_batch_draw_lines(t, b, r, lanes, hit, depth, drawn);
     return kernel_batch_accept_coloured(t, b, r->at, lanes, hit, depth, (const float(*)[SIMD_WIDTH])drawn);
 }
@@ -211,7 +212,7 @@ static __attribute__((noinline)) unsigned kernel_batch_accept_lined(kernel_tile_
 SIMD_INLINE void kernel_batch_trace(kernel_tile_trace *t, kernel_batch *b)
 {
     unsigned nearer = 0;
-    kernel_pixel_list_close(&b->rays);
+    kernel_pixel_list_pad(&b->rays);
     for (int first = 0; first < b->rays.count; first += SIMD_WIDTH) {
         kernel_lane_rays r;
         vf depth;
@@ -219,7 +220,7 @@ SIMD_INLINE void kernel_batch_trace(kernel_tile_trace *t, kernel_batch *b)
         r.far = kernel_pixel_far(t, r.at);
         r.active = vm_and(r.active, vf_le(vf_permute(vf_load(b->queued->near), r.lane), r.far));
         if (!vm_any(r.active)) continue;
-        const vm hit = kernel_batch_hit(b, t->t_near, &r, &depth);
+        const vm hit = kernel_batch_find_hits(b, t->t_near, &r, &depth);
         if (!vm_any(hit)) continue;
         if (__builtin_expect(t->surface->layer->lines != NULL, 0)) {
             const kernel_lane_rays own = r; /* a copy, because taking the address of r would keep r in memory */
@@ -241,18 +242,18 @@ static __attribute__((noinline)) void kernel_batch_process(kernel_tile_trace *t,
 {
     const render_surface_layer *layer = t->surface->layer;
     /* layers with a colour field are traced cell by cell, because the batch does not store the field's values */
-    const bool by_ray = kernel_tile_layer_batches(t) && !layer->colour_map;
+    const bool by_ray = kernel_tile_layer_allows_lanes(t) && !layer->colour_map;
     const int most = by_ray ? KERNEL_BATCH_PIXELS : 0;
     kernel_surface_cells_close(queued);
     kernel_transform_tets(&b->tets, &queued->arrays, t->frame, &t->tile, queued->vertex, queued->count);
-    kernel_lanes_relative(b->tets.values, 4, queued->isovalue, b->tets.f);
+    kernel_lanes_subtract_isovalues(b->tets.values, 4, queued->isovalue, b->tets.f);
     b->queued = queued;
     b->is_of_faces = layer->is_of_faces;
     b->has_normals = false;
     b->line_lanes = 0;
     b->rays.count = 0;
     for (int n = 0; n < queued->count; n++) {
-        unsigned blocks = queued->blocks[n] & kernel_blocks_beyond(t, queued->near[n]);
+        unsigned blocks = queued->blocks[n] & kernel_blocks_not_hidden_at(t, queued->near[n]);
         if (!blocks) continue;
         if (kernel_box_pixels(queued->box[n]) <= most) {
             kernel_pixel_list_add_box(&b->rays, queued->box[n], n);
@@ -260,8 +261,8 @@ static __attribute__((noinline)) void kernel_batch_process(kernel_tile_trace *t,
                 kernel_block_begin(t, __builtin_ctz(blocks));
             continue;
         }
-        if (!b->has_normals) kernel_batch_normals(b, t->frame);
-        kernel_batch_cell(t, b, n, t->cell);
+        if (!b->has_normals) kernel_batch_compute_normals(b, t->frame);
+        kernel_batch_copy_cell(t, b, n, t->cell);
         kernel_blocks_trace(t, blocks, queued->part, t->cell->index, t->cell, queued->value[n]);
     }
     kernel_batch_trace(t, b);

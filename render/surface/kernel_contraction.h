@@ -55,8 +55,8 @@ typedef struct kernel_contraction {
 
 /* Computes the members of *out that depend on the ray (y, w, level and rise). lane: the lane that holds each ray's
  * cell. */
-SIMD_INLINE void kernel_contraction_ray(const kernel_curved *c, const kernel_rays *rays, vi lane,
-                                        kernel_contraction *out)
+SIMD_INLINE void kernel_contraction_set_ray(const kernel_curved *c, const kernel_rays *rays, vi lane,
+                                            kernel_contraction *out)
 {
     vf origin[3], normal[3], g[3];
     for (int a = 0; a < 3; a++) {
@@ -75,7 +75,7 @@ SIMD_INLINE void kernel_contraction_ray(const kernel_curved *c, const kernel_ray
 }
 
 /* Gathers the members of *out that depend only on the cell. */
-SIMD_INLINE void kernel_contraction_of(const kernel_bounds *b, vi lane, int type, kernel_contraction *out)
+SIMD_INLINE void kernel_contraction_set_cell(const kernel_bounds *b, vi lane, int type, kernel_contraction *out)
 {
     for (int i = 0; i < 3; i++) out->offset[i] = kernel_gather_lane(b->offset[i], lane);
     for (int k = 0; k < kernel_nonlinear_count(type); k++) {
@@ -128,7 +128,7 @@ SIMD_INLINE vf kernel_contraction_support(int type, vf domain_margin, const vf s
 
 /* Converts the reference coordinates r to those of kernel_local.h, which differ only for a pyramid: there the first two
  * are counted from the pyramid's axis. */
-SIMD_INLINE void kernel_contraction_local(int type, const vf r[3], vf out[3])
+SIMD_INLINE void kernel_contraction_to_local(int type, const vf r[3], vf out[3])
 {
     for (int i = 0; i < 3; i++) out[i] = r[i];
     if (!kernel_has_apex(type)) return;
@@ -140,7 +140,7 @@ SIMD_INLINE void kernel_contraction_local(int type, const vf r[3], vf out[3])
 SIMD_INLINE vf kernel_contraction_border_distance(int type, const vf r[3])
 {
     vf local[3];
-    kernel_contraction_local(type, r, local);
+    kernel_contraction_to_local(type, r, local);
     const vf inside = kernel_local_border_distance(type, local);
     return inside * (kernel_is_box(type) ? 1.0f : 0.7f);
 }
@@ -177,7 +177,7 @@ SIMD_INLINE void kernel_contract(const kernel_contraction *c, vm rays, kernel_po
     const vm sure = vm_and(rays, vf_lt(c->error_growth, vf_set(INFINITY)));
     for (int n = 0; n < KERNEL_CONTRACTION_STEPS; n++) {
         kernel_contraction_clamp(type, c->domain_margin, q);
-        kernel_contraction_local(type, q, local);
+        kernel_contraction_to_local(type, q, local);
         kernel_nonlinear_terms_at(type, local, term, unused);
         /* kernel_bounds.h computes J0 with a b / k^2 = 1/2 instead of 1/4, the value at the centre, which leaves this
          * linear term */

@@ -63,7 +63,7 @@ SIMD_INLINE void kernel_cuboids_normals(const kernel_transformed_curved *cells, 
         kernel_f64 row[3];
         for (int a = 0; a < 3; a++) row[a] = f->scaled_axes[a][axis] * inverse;
         row[2] += shear_x * row[0] + shear_y * row[1];
-        for (int a = 0; a < 3; a++) kernel_f64_store(out->normal[i][a], half, row[a]);
+        for (int a = 0; a < 3; a++) kernel_f64_store_half(out->normal[i][a], half, row[a]);
     }
 }
 
@@ -81,8 +81,8 @@ SIMD_INLINE vf kernel_cuboids_slope(const float values[8][SIMD_WIDTH], int i)
 
 /* Computes value_error and domain_margin of the lanes in `cuboid`. gap: upper bound of the distance between a face's
  * computed crossing and the ray; own: error bound of a ray's reference coordinates; reach: largest magnitude of the
- * vertices' coordinates. gap and own are derived at kernel_f64_bounds() and kernel_f64_rate(), and are doubled as
- * there. */
+ * vertices' coordinates. gap and own are derived at kernel_f64_bounds() and kernel_f64_contraction_bounds(), and are
+ * doubled as there. */
 SIMD_INLINE void kernel_cuboids_errors(const kernel_transformed_curved *cells, const kernel_beam *beam, vm cuboid,
                                        kernel_cuboids *out)
 {
@@ -113,8 +113,9 @@ SIMD_INLINE void kernel_cuboids_errors(const kernel_transformed_curved *cells, c
 }
 
 /* Computes the coefficients and error bounds of the lanes' cells. */
-static __attribute__((noinline)) void kernel_cuboids_of(const kernel_transformed_curved *cells, const kernel_frame *f,
-                                                        const kernel_tile *tile, kernel_cuboids *out)
+static __attribute__((noinline)) void kernel_cuboids_compute(const kernel_transformed_curved *cells,
+                                                             const kernel_frame *f, const kernel_tile *tile,
+                                                             kernel_cuboids *out)
 {
     const kernel_beam beam = kernel_tile_beam(f, tile);
     vf v[8], c[8];
@@ -174,8 +175,8 @@ SIMD_INLINE void kernel_cuboid_polynomial(const kernel_cuboids *cells, vi lane, 
     for (int i = 0; i < 8; i++) ray->field[i] = kernel_gather_lane(cells->field[i], lane);
     ray->value_error = kernel_gather_lane(cells->value_error, lane);
     const kernel_product m = kernel_product_at(false, r);
-    kernel_gradient_of(c, false, &m, r, g);
-    ray->k[0] = kernel_value_of(c, false, &m, r);
+    kernel_polynomial_gradient(c, false, &m, r, g);
+    ray->k[0] = kernel_polynomial_value(c, false, &m, r);
     ray->k[1] = kernel_dot(g, d);
     ray->k[2] =
         (d[0] * d[1]) * (c[4] + c[7] * r[2]) + d[2] * (d[0] * (c[5] + c[7] * r[1]) + d[1] * (c[6] + c[7] * r[0]));
@@ -185,7 +186,7 @@ SIMD_INLINE void kernel_cuboid_polynomial(const kernel_cuboids *cells, vi lane, 
 /* Finds the rays without a root in their interval (*none) and those with exactly one (*one), by the signs of the
  * Bernstein coefficients. For rays with one root, *s becomes the zero of the line through the field's values at the
  * interval's ends. */
-SIMD_INLINE void kernel_cuboid_count(const kernel_cuboid_ray *ray, vm *none, vm *one, vf *s)
+SIMD_INLINE void kernel_cuboid_count_roots(const kernel_cuboid_ray *ray, vm *none, vm *one, vf *s)
 {
     const vf *k = ray->k, error = ray->value_error, zero = vf_set(0), third = vf_set(1.0f / 3);
     const vf b[4] = {k[0], k[0] + third * k[1], k[0] + third * (2 * k[1] + k[2]), (k[0] + k[1]) + (k[2] + k[3])};
@@ -201,7 +202,7 @@ SIMD_INLINE void kernel_cuboid_count(const kernel_cuboid_ray *ray, vm *none, vm 
 }
 
 /* Returns the derivative of the field's polynomial at s. */
-SIMD_INLINE vf kernel_cuboid_rate(const vf k[4], vf s)
+SIMD_INLINE vf kernel_cuboid_derivative(const vf k[4], vf s)
 {
     return k[1] + s * (2 * k[2] + s * (3 * k[3]));
 }
@@ -219,7 +220,7 @@ SIMD_INLINE vm kernel_cuboid_newton(const kernel_cuboid_ray *ray, vm rays, vf *s
         const vm before = vm_not(vm_xor(falls, vf_lt(vf_set(0), value)));
         low = vf_select(before, *s, low);
         high = vf_select(before, high, *s);
-        vf next = *s - value / kernel_cuboid_rate(ray->k, *s);
+        vf next = *s - value / kernel_cuboid_derivative(ray->k, *s);
         next = vf_select(vm_and(vf_le(low, next), vf_le(next, high)), next, 0.5f * (low + high));
         const vf move = vf_abs(next - *s);
         *s = vf_select(open, next, *s);
@@ -244,8 +245,9 @@ SIMD_INLINE vf kernel_cuboid_value(const float values[8][SIMD_WIDTH], vi lane, c
 /* Finds the roots of the given rays, whose cells must be cuboids. at: x, y, z and the field of the cells' vertices, by
  * vertex and lane. out->mask: rays with exactly one root; *none: rays without a root; other rays are undecided.
  * gradient: the field's gradient at the roots, in tile space. */
-SIMD_INLINE void kernel_cuboid_roots_of(const kernel_cuboids *cells, const float (*at)[8][SIMD_WIDTH],
-                                        const kernel_lane_rays *p, vm rays, kernel_point *out, vm *none, vf gradient[3])
+SIMD_INLINE void kernel_cuboid_find_roots(const kernel_cuboids *cells, const float (*at)[8][SIMD_WIDTH],
+                                          const kernel_lane_rays *p, vm rays, kernel_point *out, vm *none,
+                                          vf gradient[3])
 {
     kernel_cuboid_ray ray;
     vf s, g[3];
@@ -256,13 +258,13 @@ SIMD_INLINE void kernel_cuboid_roots_of(const kernel_cuboids *cells, const float
     if (!vm_any(rays)) return;
     kernel_cuboid_polynomial(cells, p->lane, &ray);
     vm no_root;
-    kernel_cuboid_count(&ray, &no_root, &out->mask, &s);
+    kernel_cuboid_count_roots(&ray, &no_root, &out->mask, &s);
     *none = vm_or(*none, vm_and(rays, no_root));
     out->mask = vm_and(rays, out->mask);
     if (!vm_any(out->mask)) return;
     out->mask = vm_andnot(out->mask, kernel_cuboid_newton(&ray, out->mask, &s));
     for (int i = 0; i < 3; i++) out->r[i] = ray.r[i] + s * ray.d[i];
-    s -= kernel_cuboid_value(at[3], p->lane, out->r) / kernel_cuboid_rate(ray.k, s);
+    s -= kernel_cuboid_value(at[3], p->lane, out->r) / kernel_cuboid_derivative(ray.k, s);
     for (int i = 0; i < 3; i++) {
         out->r[i] = ray.r[i] + s * ray.d[i];
         const vm inside = vm_and(vf_lt(ray.domain_margin, out->r[i]), vf_lt(out->r[i], 1 - ray.domain_margin));
@@ -270,7 +272,7 @@ SIMD_INLINE void kernel_cuboid_roots_of(const kernel_cuboids *cells, const float
     }
     out->t = ray.origin[2] + (ray.begin + s * ray.length);
     const kernel_product m = kernel_product_at(false, out->r);
-    kernel_gradient_of(ray.field, false, &m, out->r, g);
+    kernel_polynomial_gradient(ray.field, false, &m, out->r, g);
     for (int a = 0; a < 3; a++)
         gradient[a] = (g[0] * ray.normal[0][a] + g[1] * ray.normal[1][a]) + g[2] * ray.normal[2][a];
 }

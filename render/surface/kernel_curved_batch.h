@@ -88,12 +88,12 @@ SIMD_INLINE kernel_curved kernel_curved_batch_cells(kernel_curved_batch *h)
 /* ---- single cells of the batch ---- */
 
 /* Copies the cell in lane n to h->cells[n], with its edge functions, unless it has been copied before. */
-SIMD_INLINE void kernel_curved_ready(const kernel_tile_trace *t, kernel_curved_batch *h, int n)
+SIMD_INLINE void kernel_curved_batch_copy_cell(const kernel_tile_trace *t, kernel_curved_batch *h, int n)
 {
     if (h->copied_lanes >> n & 1) return;
     h->copied_lanes |= 1u << n;
     kernel_transformed_curved_cell(&h->transformed, h->queued->type, n, &h->cells[n]);
-    kernel_cell_lines(&h->cells[n], t->frame, &t->tile);
+    kernel_cell_compute_lines(&h->cells[n], t->frame, &t->tile);
     h->cells[n].part = h->queued->part;
     h->cells[n].index = h->queued->cell[n];
     for (int i = 0; i < 8; i++) h->cells[n].g[i] = h->colours[i][n];
@@ -124,7 +124,7 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_trace_singly(kerne
         }
         kernel_packet *p = &t->packets[at[i] / SIMD_WIDTH];
         p->is_nearer = false;
-        kernel_curved_ready(t, h, n);
+        kernel_curved_batch_copy_cell(t, h, n);
         curved.lane = n;
         kernel_cell_surface(p, t->surface, &h->cells[n], &curved, h->queued->value[n],
                             vm_and(p->active, vm_from_bits(same)));
@@ -138,7 +138,7 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_trace_singly(kerne
 /* Returns the rays that have no root because they stay outside of the slab |L| <= thickness in which the isosurface
  * lies (kernel_bounds.h), as long as they are between the cell's bounding planes. The field at the faces then has L's
  * sign. */
-SIMD_INLINE vm kernel_curved_batch_beside(const kernel_curved_batch *h, vi lane, const kernel_contraction *ray)
+SIMD_INLINE vm kernel_curved_batch_misses_slab(const kernel_curved_batch *h, vi lane, const kernel_contraction *ray)
 {
     const vf thick = kernel_gather_lane(h->bounds.thickness, lane);
     vf from = vf_set(-INFINITY), to = vf_set(INFINITY);
@@ -189,10 +189,10 @@ SIMD_INLINE void kernel_curved_batch_contract_of(const kernel_tile_trace *t, ker
         kernel_point at;
         vm none;
         kernel_curved_batch_load(t, h, &h->rays, n, &p);
-        kernel_contraction_ray(&cells, &p.rays, p.lane, &c);
-        p.active = vm_andnot(p.active, kernel_curved_batch_beside(h, p.lane, &c));
+        kernel_contraction_set_ray(&cells, &p.rays, p.lane, &c);
+        p.active = vm_andnot(p.active, kernel_curved_batch_misses_slab(h, p.lane, &c));
         if (!vm_any(p.active)) continue;
-        kernel_contraction_of(&h->bounds, p.lane, type, &c);
+        kernel_contraction_set_cell(&h->bounds, p.lane, type, &c);
         kernel_contract(&c, p.active, &at, &none, type);
         at.t += kernel_gather_lane(h->transformed.at[2][0], p.lane);
         at.value = vf_set(0);
@@ -200,8 +200,8 @@ SIMD_INLINE void kernel_curved_batch_contract_of(const kernel_tile_trace *t, ker
         kept = kernel_curved_batch_keep(h, n, vm_bits(vm_andnot(p.active, vm_or(at.mask, none))), kept);
     }
     h->rays.count = kept;
-    kernel_pixel_list_close(&h->rays);
-    kernel_pixel_list_close(&h->found);
+    kernel_pixel_list_pad(&h->rays);
+    kernel_pixel_list_pad(&h->found);
 }
 
 static __attribute__((noinline)) void kernel_curved_batch_contract(const kernel_tile_trace *t, kernel_curved_batch *h)
@@ -234,7 +234,7 @@ SIMD_INLINE unsigned kernel_curved_batch_find_faces_of_type(kernel_tile_trace *t
         if (__builtin_expect(vm_any(alone), 0))
             nearer |= kernel_curved_batch_trace_singly(t, h, &h->rays, n, p.at, vm_bits(alone));
     }
-    kernel_pixel_list_close(&h->met);
+    kernel_pixel_list_pad(&h->met);
     memset(h->faces + h->met.count, 0, SIMD_WIDTH);
     return nearer;
 }
@@ -264,7 +264,7 @@ SIMD_INLINE void kernel_curved_batch_cross_of(const kernel_tile_trace *t, kernel
         near = vm_and(vm_and(p.active, near), vm_and(vf_lt(ends[0].t, endless), vf_lt(ends[1].t, endless)));
         const vm change = vm_xor(vf_lt(ends[0].value, zero), vf_lt(ends[1].value, zero));
         const vm nonempty = vm_and(near, vm_or(change, vf_lt(ends[0].t, ends[1].t)));
-        const vm left = kernel_ends_decide(&cells, &p.rays, p.lane, nonempty, &ends[0], &ends[1], &found);
+        const vm left = kernel_decide_by_ends(&cells, &p.rays, p.lane, nonempty, &ends[0], &ends[1], &found);
         kernel_curved_ends_add(&h->met, n, ends, 2, vm_bits(found), &h->found, h->found_ends);
         kernel_curved_ends_add(&h->met, n, ends, 2, vm_bits(left), &h->others, h->other_ends);
     }
@@ -323,7 +323,7 @@ static __attribute__((noinline)) void kernel_curved_batch_colours(const kernel_t
     if (layer->colour_map) {
         const vf place =
             kernel_maps_value_of_type((const float(*)[SIMD_WIDTH])h->colours, p->lane, at->r, h->queued->type);
-        kernel_base_colour(t->surface, 0, place, colours);
+        kernel_unlit_surface_colour(t->surface, 0, place, colours);
     } else {
         for (int i = 0; i < SIMD_WIDTH; i++)
             for (int a = 0; a < 3; a++) colours[a][i] = layer->colours[3 * h->queued->value[lanes[i]] + a];
@@ -363,12 +363,12 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile
 /* Computes what hits store as their normals: the field's gradients, transformed from tile space into camera axes. If
  * the layer has normals from vertices (RENDER_VERTEX), the reference coordinates r are stored instead;
  * kernel_vertex_normals() computes the normals from these later. */
-SIMD_INLINE void kernel_curved_batch_orient(const kernel_tile_trace *t, const vf gradient[3], const vf r[3],
-                                            vf normal[3])
+SIMD_INLINE void kernel_curved_batch_store_normal(const kernel_tile_trace *t, const vf gradient[3], const vf r[3],
+                                                  vf normal[3])
 {
     const bool is_later = t->surface->layer->normal == RENDER_VERTEX;
     for (int a = 0; a < 3; a++) normal[a] = is_later ? r[a] : gradient[a];
-    if (!is_later) kernel_unshear(&t->tile, normal);
+    if (!is_later) kernel_gradient_to_camera_axes(&t->tile, normal);
 }
 
 SIMD_INLINE void kernel_curved_batch_normal(const kernel_tile_trace *t, const kernel_map *map, const vf r[3],
@@ -376,7 +376,7 @@ SIMD_INLINE void kernel_curved_batch_normal(const kernel_tile_trace *t, const ke
 {
     vf gradient[3] = {vf_set(0), vf_set(0), vf_set(0)};
     if (t->surface->layer->normal != RENDER_VERTEX) kernel_lanes_normal(map, r, gradient);
-    kernel_curved_batch_orient(t, gradient, r, normal);
+    kernel_curved_batch_store_normal(t, gradient, r, normal);
 }
 
 /* Accepts the visible hits of those rays that have exactly one root in a cuboid. Rays for which that is uncertain, and
@@ -396,24 +396,24 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_cross_cuboids(kern
         kernel_curved_batch_load(t, h, &h->rays, n, &p);
         const vm cuboid = vf_lt(kernel_gather_lane(h->cuboids.domain_margin, p.lane), vf_set(INFINITY));
         const vm rays = vm_and(p.active, cuboid);
-        kernel_cuboid_roots_of(&h->cuboids, at, &p, rays, &root, &none, gradient);
+        kernel_cuboid_find_roots(&h->cuboids, at, &p, rays, &root, &none, gradient);
         const vm hit = vm_and(root.mask, vm_and(vf_le(vf_set(t->t_near), root.t), vf_le(root.t, p.far)));
         if (vm_any(hit)) {
-            kernel_curved_batch_orient(t, gradient, root.r, normal);
+            kernel_curved_batch_store_normal(t, gradient, root.r, normal);
             nearer |= kernel_curved_batch_accept(t, h, &h->rays, n, &p, vm_bits(hit), &root, normal);
         }
         kept = kernel_curved_batch_keep(h, n, vm_bits(vm_andnot(p.active, vm_or(root.mask, none))), kept);
     }
     h->rays.count = kept;
-    kernel_pixel_list_close(&h->rays);
+    kernel_pixel_list_pad(&h->rays);
     return nearer;
 }
 
 /* Refines the roots of the rays in `found`, and accepts those that are visible. is_contracted: the roots come from
  * kernel_curved_batch_contract(), and are so accurate that they need no bracket. Returns a mask of the blocks that
  * contain a ray whose hit is nearer than its previous one. */
-SIMD_INLINE unsigned kernel_curved_batch_hit_of(kernel_tile_trace *t, kernel_curved_batch *h, bool is_contracted,
-                                                int type)
+SIMD_INLINE unsigned kernel_curved_batch_accept_found_of(kernel_tile_trace *t, kernel_curved_batch *h,
+                                                         bool is_contracted, int type)
 {
     unsigned nearer = 0;
     for (int n = 0; n < h->found.count; n += SIMD_WIDTH) {
@@ -427,7 +427,7 @@ SIMD_INLINE unsigned kernel_curved_batch_hit_of(kernel_tile_trace *t, kernel_cur
         kernel_maps_of((const float(*)[8][SIMD_WIDTH])h->transformed.at, p.lane, &map, type);
         if (is_contracted) {
             at = ends[0];
-            kernel_polish_near(&p.rays, &map, p.active, &at);
+            kernel_refine_accurate_roots(&p.rays, &map, p.active, &at);
         } else {
             open = kernel_polish_lanes(&p.rays, &map, p.active, &ends[0], &ends[1], &at);
         }
@@ -442,11 +442,11 @@ SIMD_INLINE unsigned kernel_curved_batch_hit_of(kernel_tile_trace *t, kernel_cur
     return nearer;
 }
 
-static __attribute__((noinline)) unsigned kernel_curved_batch_hit(kernel_tile_trace *t, kernel_curved_batch *h,
-                                                                  bool is_contracted)
+static __attribute__((noinline)) unsigned kernel_curved_batch_accept_found(kernel_tile_trace *t, kernel_curved_batch *h,
+                                                                           bool is_contracted)
 {
-    return is_contracted ? KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_hit_of, t, h, true)
-                         : KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_hit_of, t, h, false);
+    return is_contracted ? KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_accept_found_of, t, h, true)
+                         : KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_accept_found_of, t, h, false);
 }
 
 /* Searches for the first visible root of each ray in the vector that begins at index n of `others`, and accepts it.
@@ -464,18 +464,18 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_search(kernel_tile
     kernel_lane_rays_begin(&p, t, &h->others, n);
     p.far = kernel_pixel_far(t, p.at);
     kernel_curved_ends_load(h->other_ends, n, 2, ends);
-    kernel_interval_of(p.active, &ends[0], &ends[1], &i);
+    kernel_interval_from_points(p.active, &ends[0], &ends[1], &i);
     const kernel_curved cells = kernel_curved_batch_cells(h);
     if (!kernel_search_cells(&s, &cells, &p.rays, p.lane, &i, p.active, &t->thread->map_failures)) return 0;
     do {
         kernel_point at;
         vf normal[3];
         if (!vm_any(s.found)) continue;
-        kernel_polish(&s, &at);
+        kernel_refine_roots(&s, &at);
         const vm hit = vm_and(s.found, vm_and(vf_le(vf_set(t->t_near), at.t), vf_le(at.t, p.far)));
         kernel_curved_batch_normal(t, &s.map, at.r, normal);
         for (int a = 0; a < 3; a++) normals[a] = vf_select(hit, normal[a], normals[a]);
-        kernel_point_move(hit, &at, &first);
+        kernel_point_copy_lanes(hit, &at, &first);
         hits = vm_or(hits, hit);
         kernel_search_close(&s, hit);
     } while (kernel_search_continue(&s));
@@ -501,12 +501,12 @@ static unsigned kernel_curved_batch_trace_others(kernel_tile_trace *t, kernel_cu
     if (!h->rays.count) return 0;
     kernel_curved_batch_set_bounds(t, h);
     kernel_curved_batch_contract(t, h);
-    unsigned nearer = kernel_curved_batch_hit(t, h, true);
+    unsigned nearer = kernel_curved_batch_accept_found(t, h, true);
     nearer |= kernel_curved_batch_find_faces(t, h);
     kernel_curved_batch_cross(t, h);
-    kernel_pixel_list_close(&h->found);
-    kernel_pixel_list_close(&h->others);
-    nearer |= kernel_curved_batch_hit(t, h, false);
+    kernel_pixel_list_pad(&h->found);
+    kernel_pixel_list_pad(&h->others);
+    nearer |= kernel_curved_batch_accept_found(t, h, false);
     for (int n = 0; n < h->others.count; n += SIMD_WIDTH) nearer |= kernel_curved_batch_search(t, h, n);
     return nearer;
 }
@@ -514,7 +514,7 @@ static unsigned kernel_curved_batch_trace_others(kernel_tile_trace *t, kernel_cu
 /* Traces all rays in the list `rays`. */
 static __attribute__((noinline)) void kernel_curved_batch_trace(kernel_tile_trace *t, kernel_curved_batch *h)
 {
-    kernel_pixel_list_close(&h->rays);
+    kernel_pixel_list_pad(&h->rays);
     unsigned nearer = h->transformed.cuboids ? kernel_curved_batch_cross_cuboids(t, h) : 0;
     nearer |= kernel_curved_batch_trace_others(t, h);
     for (; nearer; nearer &= nearer - 1) kernel_block_update_far(t, __builtin_ctz(nearer));
@@ -522,8 +522,8 @@ static __attribute__((noinline)) void kernel_curved_batch_trace(kernel_tile_trac
 }
 
 /* Lists the rays of a cell's box of pixels, and sets up the packets of its blocks. Traces the list if it is full. */
-SIMD_INLINE void kernel_curved_batch_rays_of(kernel_tile_trace *t, kernel_curved_batch *h, int lane, unsigned box,
-                                             unsigned blocks)
+SIMD_INLINE void kernel_curved_batch_list_rays(kernel_tile_trace *t, kernel_curved_batch *h, int lane, unsigned box,
+                                               unsigned blocks)
 {
     kernel_pixel_list_add_box(&h->rays, box, lane);
     for (blocks &= ~t->begun; blocks; blocks &= blocks - 1) kernel_block_begin(t, __builtin_ctz(blocks));
@@ -531,18 +531,18 @@ SIMD_INLINE void kernel_curved_batch_rays_of(kernel_tile_trace *t, kernel_curved
 }
 
 /* Transforms the queued cells into tile space, and lists the rays of their boxes. A cell is instead traced block by
- * block at once if the layer's rays cannot be traced in lanes (kernel_tile_layer_batches()), or if the cell has an edge
- * of length zero. */
+ * block at once if the layer's rays cannot be traced in lanes (kernel_tile_layer_allows_lanes()), or if the cell has an
+ * edge of length zero. */
 static __attribute__((noinline)) void kernel_curved_batch_transform(kernel_tile_trace *t, kernel_curved_batch *h,
                                                                     kernel_surface_cells *queued)
 {
-    const bool by_ray = kernel_tile_layer_batches(t);
+    const bool by_ray = kernel_tile_layer_allows_lanes(t);
     kernel_surface_cells_close(queued);
     h->queued = queued;
     const vm collapsed = kernel_transform_curved(&h->transformed, &queued->arrays, t->frame, &t->tile, queued->vertex,
                                                  queued->isovalue, queued->type);
     h->has_bounds = false;
-    if (h->transformed.cuboids && by_ray) kernel_cuboids_of(&h->transformed, t->frame, &t->tile, &h->cuboids);
+    if (h->transformed.cuboids && by_ray) kernel_cuboids_compute(&h->transformed, t->frame, &t->tile, &h->cuboids);
     if (t->surface->layer->colour_map) kernel_curved_batch_fetch_colours(t, h);
     if (t->surface->layer->lines) kernel_curved_batch_fetch_lines(t, h);
     h->copied_lanes = 0;
@@ -550,14 +550,14 @@ static __attribute__((noinline)) void kernel_curved_batch_transform(kernel_tile_
     kernel_curved cells = kernel_curved_batch_cells(h);
     t->curved = &cells;
     for (int n = 0; n < queued->count; n++) {
-        const unsigned blocks = queued->blocks[n] & t->traced_blocks & kernel_blocks_beyond(t, queued->near[n]);
+        const unsigned blocks = queued->blocks[n] & t->traced_blocks & kernel_blocks_not_hidden_at(t, queued->near[n]);
         if (!blocks) continue;
         if (by_ray && !(vm_bits(collapsed) >> n & 1)) {
-            kernel_curved_batch_rays_of(t, h, n, queued->box[n], queued->blocks[n]);
+            kernel_curved_batch_list_rays(t, h, n, queued->box[n], queued->blocks[n]);
             continue;
         }
         kernel_curved_batch_set_bounds(t, h);
-        kernel_curved_ready(t, h, n);
+        kernel_curved_batch_copy_cell(t, h, n);
         cells.lane = n;
         kernel_blocks_trace(t, blocks, h->queued->part, queued->cell[n], &h->cells[n], queued->value[n]);
     }

@@ -56,7 +56,7 @@ SIMD_INLINE void kernel_probe_values(const kernel_probe *probe, kernel_cell *c)
 
 /* Takes the sample in the cell c on those of the given rays whose sample point lies in it. A ray that already has a
  * sample keeps the lesser of the two values. */
-SIMD_INLINE void kernel_probe_cell(kernel_packet *p, kernel_probe *probe, const kernel_cell *c, vm rays)
+SIMD_INLINE void kernel_probe_sample_cell(kernel_packet *p, kernel_probe *probe, const kernel_cell *c, vm rays)
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     const bool is_tet = kernel_is_linear(c->type);
@@ -103,8 +103,8 @@ SIMD_INLINE vm kernel_probe_in_box(const kernel_packet *p, const kernel_probe *p
 
 /* Takes samples in the cells of a leaf of the tree of mesh part `part`. Cells with values that are not finite, and
  * polyhedra, are skipped. */
-static void kernel_probe_leaf(kernel_packet *p, kernel_probe *probe, int part, const uint32_t *cells, int count,
-                              vm rays)
+static void kernel_probe_sample_leaf(kernel_packet *p, kernel_probe *probe, int part, const uint32_t *cells, int count,
+                                     vm rays)
 {
     const render_field *field = &probe->surface->layer->field;
     for (int n = 0; n < count; n++) {
@@ -114,7 +114,7 @@ static void kernel_probe_leaf(kernel_packet *p, kernel_probe *probe, int part, c
         if (is_fresh) kernel_cell_transform(c, p, p->frame->job->parts[part].cells);
         if (is_fresh || probe->surface->layer->value_count > 1) kernel_probe_values(probe, c);
         const vm near = kernel_probe_in_box(p, probe, c, rays);
-        if (vm_any(near)) kernel_probe_cell(p, probe, c, near);
+        if (vm_any(near)) kernel_probe_sample_cell(p, probe, c, near);
     }
 }
 
@@ -133,7 +133,7 @@ SIMD_INLINE vm kernel_probe_in_node(const kernel_packet *p, const kernel_probe *
 
 /* Takes samples in the cells of a tree. part: the mesh part whose cells the tree holds; -1 for the tree over all parts,
  * whose leaves list parts. */
-static void kernel_probe_tree(kernel_packet *p, kernel_probe *probe, const mmbvh *tree, int part)
+static void kernel_probe_sample_tree(kernel_packet *p, kernel_probe *probe, const mmbvh *tree, int part)
 {
     const render_part *parts = p->frame->job->parts;
     const mmbvh_ranges *ranges = probe->surface->layer->field.ranges;
@@ -149,10 +149,10 @@ static void kernel_probe_tree(kernel_packet *p, kernel_probe *probe, const mmbvh
             stack[top++] = ref;
             stack[top++] = ref + 1;
         } else if (part >= 0) {
-            kernel_probe_leaf(p, probe, part, tree->cells + ref, count, inside);
+            kernel_probe_sample_leaf(p, probe, part, tree->cells + ref, count, inside);
         } else {
             for (const uint32_t *own = tree->cells + ref; own < tree->cells + ref + count; own++)
-                if (ranges[*own].low) kernel_probe_tree(p, probe, parts[*own].tree, (int)*own);
+                if (ranges[*own].low) kernel_probe_sample_tree(p, probe, parts[*own].tree, (int)*own);
         }
     }
 }
@@ -163,7 +163,7 @@ static void kernel_probe_points(const kernel_packet *p, vf t, kernel_probe *prob
 {
     double px[SIMD_WIDTH], py[SIMD_WIDTH];
     double size = 0;
-    kernel_packet_lanes(p, px, py);
+    kernel_packet_ray_parameters(p, px, py);
     for (int i = 0; i < SIMD_WIDTH; i++) {
         double base[3], direction[3];
         kernel_tree_ray(p->frame, px[i], py[i], base, direction);
@@ -177,7 +177,7 @@ static void kernel_probe_points(const kernel_packet *p, vf t, kernel_probe *prob
 
 /* Takes one sample per ray: at the ray's point at depth t, moved by `offset` scaled units along world axis number
  * `axis`. Returns the rays whose sample point is in a cell. */
-SIMD_INLINE vm kernel_probe_at(const kernel_packet *p, kernel_probe *probe, vm rays, vf t, int axis, vf offset)
+SIMD_INLINE vm kernel_probe_sample_at(const kernel_packet *p, kernel_probe *probe, vm rays, vf t, int axis, vf offset)
 {
     const render_job *job = p->frame->job;
     const render_camera *c = &job->camera;
@@ -193,10 +193,10 @@ SIMD_INLINE vm kernel_probe_at(const kernel_packet *p, kernel_probe *probe, vm r
     probe->z = t + offset * forward;
     probe->found = vm_none();
     probe->sample = vf_set(0);
-    if (job->parent) kernel_probe_tree(&points, probe, job->parent, -1);
+    if (job->parent) kernel_probe_sample_tree(&points, probe, job->parent, -1);
     for (int part = 0; part < job->part_count && !job->parent; part++)
         if (probe->surface->layer->field.ranges[part].low)
-            kernel_probe_tree(&points, probe, job->parts[part].tree, part);
+            kernel_probe_sample_tree(&points, probe, job->parts[part].tree, part);
     return probe->found;
 }
 
@@ -213,7 +213,7 @@ static __attribute__((noinline)) void kernel_sample_differences(const kernel_pac
                           .layer = f->surface_count + f->volume_count + (int)(s - f->surfaces),
                           .isovalue = s->layer->values[value]};
     for (int i = 0; i < RENDER_DIFFERENCE_SAMPLES; i++) {
-        found[i] = kernel_probe_at(p, &probe, hit, t, i / 2, i % 2 ? reach : -reach);
+        found[i] = kernel_probe_sample_at(p, &probe, hit, t, i / 2, i % 2 ? reach : -reach);
         /* adding 0 turns -0 into 0, because the sign of a zero sample must not depend on the order of cells */
         values[i] = probe.sample + 0.0f;
     }
@@ -255,8 +255,8 @@ SIMD_INLINE void kernel_normals_by_differences(const kernel_packet *p, const ker
 
 /* Returns the reach of hits in the cell c: half the distance between the two samples of a difference, in scaled units.
  */
-SIMD_INLINE float kernel_difference_reach(const kernel_packet *p, const render_surface_layer *layer,
-                                          const kernel_cell *c)
+SIMD_INLINE float kernel_difference_sample_distance(const kernel_packet *p, const render_surface_layer *layer,
+                                                    const kernel_cell *c)
 {
     return (float)(0.5 * layer->difference * kernel_cell_size(c->world, c->count) * p->frame->job->space.scale);
 }
@@ -275,13 +275,13 @@ typedef struct kernel_pending_group {
 } kernel_pending_group;
 
 /* Marks the tile of a new group as not yet set up. */
-SIMD_INLINE void kernel_pending_packet_begin(kernel_pending_group *group)
+SIMD_INLINE void kernel_pending_group_reset(kernel_pending_group *group)
 {
     group->tile.x0 = group->tile.y0 = -1;
 }
 
 /* Finds the surface and the isovalue to which a pending hit's kind belongs. */
-SIMD_INLINE void kernel_pending_surface(kernel_pending_group *group, const kernel_frame *f, uint32_t kind)
+SIMD_INLINE void kernel_pending_find_surface(kernel_pending_group *group, const kernel_frame *f, uint32_t kind)
 {
     for (int n = 0; n < f->surface_count; n++) {
         const kernel_surface *s = &f->surfaces[n];
@@ -306,7 +306,7 @@ static void kernel_pending_group_begin(kernel_pending_group *group, const kernel
         kernel_tile_rays(&group->tile, f);
         thread->serial++;
     }
-    kernel_pending_surface(group, f, kind);
+    kernel_pending_find_surface(group, f, kind);
     for (group->count = 0; group->count < count; group->count++) {
         const render_pending_hit *hit = &hits[group->count];
         const int column = (int)(hit->pixel % width) - x0, row = (int)(hit->pixel / width) - y0;
@@ -330,7 +330,7 @@ static void kernel_sample_pending(const kernel_frame *f, kernel_thread *thread, 
                                   render_difference_samples *out, int64_t count)
 {
     kernel_pending_group group;
-    kernel_pending_packet_begin(&group);
+    kernel_pending_group_reset(&group);
     for (int64_t i = 0; i < count; i += group.count) {
         vm found[RENDER_DIFFERENCE_SAMPLES];
         vf values[RENDER_DIFFERENCE_SAMPLES];

@@ -15,7 +15,7 @@
 #include "simd.h"
 
 /* Returns the squared distance between points a and b, which are given in each ray's plane. */
-SIMD_INLINE vf kernel_square_between(const vf a[2], const vf b[2])
+SIMD_INLINE vf kernel_squared_distance(const vf a[2], const vf b[2])
 {
     const vf x = b[0] - a[0], y = b[1] - a[1];
     return x * x + y * y;
@@ -23,10 +23,10 @@ SIMD_INLINE vf kernel_square_between(const vf a[2], const vf b[2])
 
 /* Returns the squared distance from each ray, which is at the origin, to the edge between vertices a and b, which are
  * given in the ray's plane. */
-SIMD_INLINE vf kernel_edge_distance(const vf a[2], const vf b[2])
+SIMD_INLINE vf kernel_squared_edge_distance(const vf a[2], const vf b[2])
 {
     const vf zero = vf_set(0), one = vf_set(1);
-    const vf ex = b[0] - a[0], ey = b[1] - a[1], square = kernel_square_between(a, b);
+    const vf ex = b[0] - a[0], ey = b[1] - a[1], square = kernel_squared_distance(a, b);
     const vf along = -(a[0] * ex + a[1] * ey) / vf_select(vf_lt(zero, square), square, one);
     const vf s = vf_clamp(along, zero, one);
     const vf x = a[0] + s * ex, y = a[1] + s * ey;
@@ -44,7 +44,7 @@ SIMD_INLINE void kernel_edge_position(const kernel_packet *p, float x, float y, 
 /* Returns the squared distance from each ray to the nearest edge of a polygon, in the ray's plane. *length is raised to
  * the squared length of the polygon's longest edge. loop: the polygon's entries in render_part.loops: number of
  * vertices around it, number of segments per edge, and the vertices. */
-SIMD_INLINE vf kernel_nearest_of_loop(const kernel_packet *p, const grid *g, const int64_t *loop, vf *length)
+SIMD_INLINE vf kernel_squared_loop_distance(const kernel_packet *p, const grid *g, const int64_t *loop, vf *length)
 {
     const int64_t count = loop[0], step = loop[1], *corners = loop + 2;
     vf last[2], next[2], begin[2], nearest = vf_set(INFINITY);
@@ -54,8 +54,8 @@ SIMD_INLINE vf kernel_nearest_of_loop(const kernel_packet *p, const grid *g, con
         grid_vertex(g, corners[i % count], world);
         kernel_transform_in_tile(p->frame, p->tile, world, &x, &y, &z);
         kernel_edge_position(p, x, y, z, next);
-        if (i > 0) nearest = vf_min(nearest, kernel_edge_distance(last, next));
-        if (i > 0 && i % step == 0) *length = vf_max(*length, kernel_square_between(begin, next));
+        if (i > 0) nearest = vf_min(nearest, kernel_squared_edge_distance(last, next));
+        if (i > 0 && i % step == 0) *length = vf_max(*length, kernel_squared_distance(begin, next));
         memcpy(last, next, sizeof last);
         if (i % step == 0) memcpy(begin, next, sizeof begin);
     }
@@ -64,19 +64,19 @@ SIMD_INLINE vf kernel_nearest_of_loop(const kernel_packet *p, const grid *g, con
 
 /* Returns the squared distance from each ray to the nearest edge of that face of the cell that lies in the surface, in
  * the ray's plane. *length: the squared length of the face's longest edge there. */
-SIMD_INLINE vf kernel_nearest_edge(const kernel_packet *p, const kernel_cell *c, vf *length)
+SIMD_INLINE vf kernel_squared_face_edge_distance(const kernel_packet *p, const kernel_cell *c, vf *length)
 {
     const render_part *part = &p->frame->job->parts[c->part];
     vf places[4][2], nearest = vf_set(INFINITY);
     int count = 0;
     *length = vf_set(0);
     if (part->loops && part->loops[c->index])
-        return kernel_nearest_of_loop(p, part->cells, part->loops + part->loops[c->index], length);
+        return kernel_squared_loop_distance(p, part->cells, part->loops + part->loops[c->index], length);
     for (int i = 0; i < c->count && count < 4; i++)
         if (c->f[i] == 0) kernel_edge_position(p, c->x[i], c->y[i], c->z[i], places[count++]);
     for (int i = 0; i < count; i++) {
-        nearest = vf_min(nearest, kernel_edge_distance(places[i], places[(i + 1) % count]));
-        *length = vf_max(*length, kernel_square_between(places[i], places[(i + 1) % count]));
+        nearest = vf_min(nearest, kernel_squared_edge_distance(places[i], places[(i + 1) % count]));
+        *length = vf_max(*length, kernel_squared_distance(places[i], places[(i + 1) % count]));
     }
     return nearest;
 }
@@ -95,7 +95,7 @@ static __attribute__((noinline)) void kernel_draw_edges(const kernel_packet *p, 
     if (flat) depth = vf_set((float)f->job->space.scale);
     const vf inverse = 1.0f / (depth * pixel);
     vf length;
-    const vf distance = vf_sqrt(kernel_nearest_edge(p, c, &length)) * inverse;
+    const vf distance = vf_sqrt(kernel_squared_face_edge_distance(p, c, &length)) * inverse;
     const vf covered = vf_clamp(0.5f * (width + 1) - distance, zero, one);
     const vf fade = vf_clamp(0.25f * (vf_sqrt(length) * inverse / width - 2), zero, one);
     for (int a = 0; a < 3; a++) colour[a] = colour[a] + covered * fade * (layer->edge_colour[a] - colour[a]);

@@ -72,9 +72,9 @@ SIMD_INLINE void kernel_tet_gradient(const kernel_frame *f, const double *const 
 }
 
 /* Computes the contour lines' field in the tet c, whose world coordinates and vertex indices must be set. */
-static __attribute__((noinline)) void kernel_cell_line_of(const kernel_frame *f, const kernel_tile *tile,
-                                                          const kernel_surface *s, const kernel_cell *c,
-                                                          kernel_tet_line *out)
+static __attribute__((noinline)) void kernel_compute_tet_line_field(const kernel_frame *f, const kernel_tile *tile,
+                                                                    const kernel_surface *s, const kernel_cell *c,
+                                                                    kernel_tet_line *out)
 {
     const grid_field *field = &s->layer->lines->field.fields[c->part];
     const double *const corner[4] = {c->world[0], c->world[1], c->world[2], c->world[3]};
@@ -106,7 +106,7 @@ static __attribute__((noinline)) void kernel_tet_line_field(const kernel_packet 
 {
     const kernel_rays rays = kernel_packet_rays(p);
     kernel_tet_line line = c->line;
-    if (!c->has_line_field) kernel_cell_line_of(p->frame, p->tile, s, c, &line);
+    if (!c->has_line_field) kernel_compute_tet_line_field(p->frame, p->tile, s, c, &line);
     const vf last[3] = {vf_set(c->x[3]), vf_set(c->y[3]), vf_set(c->z[3])};
     out->value = vf_set(line.value);
     for (int a = 0; a < 3; a++) {
@@ -124,15 +124,15 @@ SIMD_INLINE void kernel_map_line_field(const kernel_tile *tile, const kernel_map
     const kernel_product m = kernel_product_at(map->is_pyramid, r);
     vf cross[3][3], n[3], g[3];
     const vf det = kernel_jacobian(map->position, map->is_pyramid, &m, r, cross);
-    kernel_gradient_of(map->field, map->is_pyramid, &m, r, n);
-    kernel_gradient_of(line, map->is_pyramid, &m, r, g);
+    kernel_polynomial_gradient(map->field, map->is_pyramid, &m, r, n);
+    kernel_polynomial_gradient(line, map->is_pyramid, &m, r, g);
     for (int a = 0; a < 3; a++) {
         out->normal[a] = kernel_dot(cross[a], n);
         out->gradient[a] = kernel_dot(cross[a], g) / det;
     }
     out->normal[2] -= out->normal[0] * tile->shear_x + out->normal[1] * tile->shear_y;
     out->gradient[2] -= out->gradient[0] * tile->shear_x + out->gradient[1] * tile->shear_y;
-    out->value = kernel_value_of(line, map->is_pyramid, &m, r);
+    out->value = kernel_polynomial_value(line, map->is_pyramid, &m, r);
 }
 
 /* Computes the contour lines' field, its gradient and the surface's normal at the hits of a packet in one hex, wedge or

@@ -37,7 +37,8 @@ typedef struct kernel_occlusion {
 
 /* Returns the rays whose root at depth t may block them: its distance from the hit is at least the layer's `contact`
  * times the cell's size. */
-static __attribute__((noinline)) vm kernel_occlusion_beyond(const kernel_packet *p, const kernel_occlusion *o, vf t)
+static __attribute__((noinline)) vm kernel_occlusion_is_beyond_contact(const kernel_packet *p,
+                                                                       const kernel_occlusion *o, vf t)
 {
     const double size = kernel_cell_size((const double(*)[3])o->world, o->vertex_count);
     const double reach = (double)o->surface->layer->contact * size * p->frame->job->space.scale;
@@ -46,8 +47,8 @@ static __attribute__((noinline)) vm kernel_occlusion_beyond(const kernel_packet 
 }
 
 /* Returns the rays of `hit` whose root at depth t all clips of the layer keep. */
-static __attribute__((noinline, cold)) vm kernel_occlusion_clip(const kernel_packet *p, const kernel_occlusion *o,
-                                                                vm hit, vf t)
+static __attribute__((noinline, cold)) vm kernel_occlusion_kept_by_clips(const kernel_packet *p,
+                                                                         const kernel_occlusion *o, vm hit, vf t)
 {
     float depth[SIMD_WIDTH];
     unsigned kept = 0;
@@ -67,8 +68,8 @@ SIMD_INLINE vm kernel_occlusion_block(kernel_packet *p, const kernel_occlusion *
 {
     vm hit = vm_and(found, vm_and(vf_le(p->t_near, t), vf_lt(t, p->t_far)));
     if (!vm_any(hit)) return hit;
-    if (o->surface->layer->contact > 0) hit = vm_and(hit, kernel_occlusion_beyond(p, o, t));
-    if (p->frame->job->clip_count) hit = kernel_occlusion_clip(p, o, hit, t);
+    if (o->surface->layer->contact > 0) hit = vm_and(hit, kernel_occlusion_is_beyond_contact(p, o, t));
+    if (p->frame->job->clip_count) hit = kernel_occlusion_kept_by_clips(p, o, hit, t);
     p->t_far = vf_select(hit, vf_set(-INFINITY), p->t_far);
     p->active = vm_andnot(p->active, hit);
     return hit;
@@ -79,7 +80,7 @@ SIMD_INLINE void kernel_occlusion_tet(kernel_packet *p, const kernel_occlusion *
 {
     kernel_interval i;
     kernel_tet_interval(p, c, rays, false, &i);
-    const vm change = vm_and(kernel_is_near(p, &i), kernel_changes_sign(&i));
+    const vm change = vm_and(kernel_interval_overlaps_ray(p, &i), kernel_changes_sign(&i));
     if (vm_any(change)) kernel_occlusion_block(p, o, change, kernel_secant(i.t_in, i.v_in, i.t_out, i.v_out));
 }
 
@@ -93,7 +94,7 @@ SIMD_INLINE void kernel_occlusion_roots(kernel_packet *p, const kernel_occlusion
     do {
         kernel_point at;
         if (!vm_any(s.found)) continue;
-        kernel_polish(&s, &at);
+        kernel_refine_roots(&s, &at);
         kernel_search_close(&s, kernel_occlusion_block(p, o, s.found, at.t));
     } while (kernel_search_continue(&s));
 }
@@ -111,7 +112,7 @@ static __attribute__((noinline)) void kernel_occlusion_curved(kernel_packet *p, 
     for (int n = 0; n < count; n++) {
         const kernel_interval *i = &list[n];
         const vm nonempty = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
-        const vm wanted = vm_and(kernel_is_near(p, i), nonempty);
+        const vm wanted = vm_and(kernel_interval_overlaps_ray(p, i), nonempty);
         if (!vm_any(wanted)) continue;
         if (!curved.is_ready) kernel_curved_single_bounds(c, &beam, &curved);
         kernel_occlusion_roots(p, o, &curved, i, wanted);
@@ -123,7 +124,7 @@ static __attribute__((noinline)) void kernel_occlusion_curved(kernel_packet *p, 
 static void kernel_occlusion_interval(kernel_packet *p, const kernel_occlusion *o, vm wanted, kernel_poly_crossings *r)
 {
     kernel_profile_walk walk;
-    kernel_poly_profile(r);
+    kernel_poly_prepare_profile(r);
     kernel_profile_walk_begin(r, wanted, &walk);
     do {
         const vm found = kernel_profile_walk_next(r, &walk);
@@ -137,7 +138,8 @@ static void kernel_occlusion_polyhedron(kernel_packet *p, const kernel_occlusion
     if (!kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
     while (kernel_poly_next(&r)) {
         const vm changes = kernel_changes_sign(&r.interval);
-        const vm wanted = vm_and(kernel_is_near(p, &r.interval), vm_or(changes, kernel_polyhedron_may_cross(p, c, &r)));
+        const vm wanted =
+            vm_and(kernel_interval_overlaps_ray(p, &r.interval), vm_or(changes, kernel_polyhedron_may_cross(p, c, &r)));
         if (vm_any(wanted)) kernel_occlusion_interval(p, o, wanted, &r);
     }
 }
@@ -156,7 +158,7 @@ static void kernel_occlusion_polyhedra(kernel_packet *p, kernel_occlusion *o, co
     o->vertex_count = c->vertex_count;
     if (!kernel_values_straddle(c->values, c->vertex_count, value)) return;
     kernel_polyhedron_transform(c, p);
-    c->scale = kernel_values_relative(c->values, c->vertex_count + 1, value, c->f);
+    c->scale = kernel_values_subtract_isovalue(c->values, c->vertex_count + 1, value, c->f);
     kernel_occlusion_polyhedron(p, o, c, p->active);
 }
 
@@ -186,7 +188,7 @@ static void kernel_occlusion_cell(kernel_packet *p, kernel_occlusion *o, const k
     o->world = c->world;
     o->vertex_count = c->count;
     kernel_occlusion_transform(p, c, occluder->part);
-    kernel_cell_relative(c, layer->values[occluder->value]);
+    kernel_cell_subtract_isovalue(c, layer->values[occluder->value]);
     if (kernel_is_linear(c->type))
         kernel_occlusion_tet(p, o, c, p->active);
     else

@@ -42,7 +42,8 @@ SIMD_INLINE bool kernel_undecided_add(kernel_secondary_rays *s, int32_t ray, int
 }
 
 /* Fills the given lane of the pairs with a ray and the index of a record of a hex. */
-SIMD_INLINE void kernel_pair_ray(const kernel_secondary_ray *ray, int32_t record, int lane, kernel_curved_pairs *out)
+SIMD_INLINE void kernel_pairs_set_ray(const kernel_secondary_ray *ray, int32_t record, int lane,
+                                      kernel_curved_pairs *out)
 {
     kernel_prepared_ray p;
     kernel_prepared_ray_axes(ray, &p);
@@ -95,7 +96,7 @@ SIMD_INLINE vf kernel_pairs_level(const kernel_curved_pairs *pairs, vf t)
 
 /* Returns the pairs whose ray does not meet the surface between the distances `from` and `to`: at both, |L| exceeds the
  * slab's thickness, with the same sign. */
-SIMD_INLINE vm kernel_pairs_clear(const kernel_curved_pairs *pairs, vf from, vf to)
+SIMD_INLINE vm kernel_pairs_miss_slab(const kernel_curved_pairs *pairs, vf from, vf to)
 {
     const vf first = kernel_pairs_level(pairs, from), last = kernel_pairs_level(pairs, to);
     const vf thick = vf_load(pairs->thickness);
@@ -105,7 +106,8 @@ SIMD_INLINE vm kernel_pairs_clear(const kernel_curved_pairs *pairs, vf from, vf 
 /* Returns the pairs for which the field is monotone along the ray, and at both ends farther from 0 than the jumps at
  * faces (the difference between a face's value and the field next to it). The signs at the ends then decide whether
  * there is a root. */
-static __attribute__((noinline)) vm kernel_pairs_monotone(const kernel_curved_pairs *pairs, const kernel_point ends[2])
+static __attribute__((noinline)) vm kernel_pairs_are_monotone(const kernel_curved_pairs *pairs,
+                                                              const kernel_point ends[2])
 {
     static const kernel_beam beam = {.spread = 0};
     kernel_bounds bounds;
@@ -136,13 +138,13 @@ SIMD_INLINE vm kernel_pairs_classify(const kernel_curved_pairs *pairs, vm active
     /* If the sign changes, the ray's interval in the hex has a root. The root blocks the ray only if it lies between
      * `from` and `to`. So the parts of the interval in front of `from` and behind `to` must be known to have no root.
      */
-    const vm before = vm_or(vf_eq(from, ends[0].t), kernel_pairs_clear(pairs, ends[0].t, from));
-    const vm behind = vm_or(vm_and(vf_eq(to, ends[1].t), vf_lt(to, far)), kernel_pairs_clear(pairs, to, ends[1].t));
+    const vm before = vm_or(vf_eq(from, ends[0].t), kernel_pairs_miss_slab(pairs, ends[0].t, from));
+    const vm behind = vm_or(vm_and(vf_eq(to, ends[1].t), vf_lt(to, far)), kernel_pairs_miss_slab(pairs, to, ends[1].t));
     const vm blocked = vm_and(near, vm_and(change, vm_and(before, behind)));
     const vm whole = vm_and(vf_eq(from, ends[0].t), vf_eq(to, ends[1].t));
-    const vm clear = vm_andnot(kernel_pairs_clear(pairs, from, to), vm_and(change, whole));
+    const vm clear = vm_andnot(kernel_pairs_miss_slab(pairs, from, to), vm_and(change, whole));
     vm left = vm_andnot(vm_andnot(near, blocked), clear);
-    if (vm_any(left)) left = vm_andnot(left, vm_andnot(kernel_pairs_monotone(pairs, ends), change));
+    if (vm_any(left)) left = vm_andnot(left, vm_andnot(kernel_pairs_are_monotone(pairs, ends), change));
     *undecided = vm_or(*undecided, left);
     return blocked;
 }
@@ -157,7 +159,7 @@ static __attribute__((noinline)) bool kernel_pairs_process(const kernel_occluder
     if (!pairs->count) return true;
     for (int i = 0; i < SIMD_WIDTH; i++) {
         const int from = i < pairs->count ? i : 0;
-        kernel_pair_ray(&s->rays[pairs->ray[from]], o->cells[pairs->occluder[from]].record, i, pairs);
+        kernel_pairs_set_ray(&s->rays[pairs->ray[from]], o->cells[pairs->occluder[from]].record, i, pairs);
     }
     kernel_pairs_transform(pairs, o->hexes);
     const vm active = vm_from_bits((1u << pairs->count) - 1);

@@ -17,8 +17,8 @@ enum { KERNEL_PATH_STACK = (MMBVH_MAX_DEPTH + 1) * (SIMD_WIDTH - 1) + 1 };
 
 /* Returns the index of the next leaf that the ray may meet; -1 if there is none. *top: number of nodes on the stack,
  * which at first has only the root. */
-SIMD_INLINE int32_t kernel_path_next(const kernel_occluder_tree *tree, int32_t *stack, int *top,
-                                     const kernel_prepared_ray *p)
+SIMD_INLINE int32_t kernel_find_next_leaf(const kernel_occluder_tree *tree, int32_t *stack, int *top,
+                                          const kernel_prepared_ray *p)
 {
     while (*top) {
         const int64_t at = stack[--*top];
@@ -59,7 +59,7 @@ static bool kernel_meets_triangles(const kernel_frame *f, const kernel_occluder_
     kernel_prepared_ray p;
     stack[0] = 0;
     kernel_prepared_ray_begin(ray, tree->size, &p);
-    for (int64_t leaf; (leaf = kernel_path_next(tree, stack, &top, &p)) >= 0;) {
+    for (int64_t leaf; (leaf = kernel_find_next_leaf(tree, stack, &top, &p)) >= 0;) {
         vf t;
         const unsigned met =
             vm_bits(kernel_prepared_ray_triangles(&p, tree->leaves + leaf * (KERNEL_TRIANGLE_ROWS * SIMD_WIDTH), &t));
@@ -75,7 +75,8 @@ static bool kernel_meets_triangles(const kernel_frame *f, const kernel_occluder_
 /* Finds the cells whose slabs a ray meets, and adds the pair of the ray and each of these cells to a list: to the
  * ray-hex pairs if the cell is a hex with a record, and otherwise to the undecided pairs. ray: index of the ray.
  * Returns false if memory ran out. */
-static bool kernel_meets_slabs(const kernel_occluders *o, kernel_secondary_rays *s, kernel_curved_pairs *pairs, int ray)
+static bool kernel_list_met_slabs(const kernel_occluders *o, kernel_secondary_rays *s, kernel_curved_pairs *pairs,
+                                  int ray)
 {
     const kernel_occluder_tree *tree = &o->slabs;
     int32_t stack[KERNEL_PATH_STACK];
@@ -84,7 +85,7 @@ static bool kernel_meets_slabs(const kernel_occluders *o, kernel_secondary_rays 
     bool is_well = true;
     stack[0] = 0;
     kernel_prepared_ray_begin(&s->rays[ray], tree->size, &p);
-    for (int64_t leaf; s->rays[ray].is_open && (leaf = kernel_path_next(tree, stack, &top, &p)) >= 0;) {
+    for (int64_t leaf; s->rays[ray].is_open && (leaf = kernel_find_next_leaf(tree, stack, &top, &p)) >= 0;) {
         const float *rows = tree->leaves + leaf * (KERNEL_SLAB_ROWS * SIMD_WIDTH);
         vf level, rise, thickness; /* L along the ray is level + rise * t */
         for (unsigned met = vm_bits(kernel_prepared_ray_slabs(&p, rows, &level, &rise, &thickness)); met;
@@ -119,7 +120,7 @@ static void kernel_occlude(const kernel_frame *f, kernel_thread *thread, const k
         if (o->triangles.node_count && kernel_meets_triangles(f, &o->triangles, &s->rays[i]))
             s->rays[i].is_open = false;
     for (int i = 0; i < s->count && o->slabs.node_count; i++)
-        if (s->rays[i].is_open) is_well = kernel_meets_slabs(o, s, &pairs, i) && is_well;
+        if (s->rays[i].is_open) is_well = kernel_list_met_slabs(o, s, &pairs, i) && is_well;
     is_well = kernel_pairs_process(o, s, &pairs) && is_well;
     if (!is_well) thread->out_of_memory = true;
 }

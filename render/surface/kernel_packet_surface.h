@@ -47,7 +47,7 @@ SIMD_INLINE void kernel_emit_opaque(kernel_packet *p, kernel_hits *hits)
         kernel_fragments lit = {
             p->t_far, p->t_far, {hits->colour[0], hits->colour[1], hits->colour[2]}, vf_set(0), hits->kind};
         kernel_paint(p, s, hits->normal, hits->kind, &lit);
-        kernel_emit(p, write, 0, &lit);
+        kernel_append_fragments(p, write, 0, &lit);
     }
 }
 
@@ -59,7 +59,7 @@ static void kernel_light_pending(const kernel_frame *f, kernel_thread *thread, c
                                  int64_t count)
 {
     kernel_pending_group run;
-    kernel_pending_packet_begin(&run);
+    kernel_pending_group_reset(&run);
     for (int64_t i = 0; i < count; i += run.count) {
         vm found[RENDER_DIFFERENCE_SAMPLES];
         vf values[RENDER_DIFFERENCE_SAMPLES], normal[3], colour[3];

@@ -97,17 +97,17 @@ SIMD_INLINE void kernel_search_bounds(const kernel_bounds *b, vi lane, kernel_se
 /* Computes how far the map bends along the chord between two points in reference coordinates. *size: the larger of |e1|
  * and |e2| (the top of this file); *slope: the largest Bernstein coefficient of e's derivative, divided by 3. m: the
  * map's product (kernel_map.h) at both ends; move: to - from. */
-SIMD_INLINE void kernel_chord_bend(const kernel_search *s, const vf from[3], const vf to[3], const kernel_product m[2],
-                                   const vf move[3], vf *size, vf *slope)
+SIMD_INLINE void kernel_compute_chord_bend(const kernel_search *s, const vf from[3], const vf to[3],
+                                           const kernel_product m[2], const vf move[3], vf *size, vf *slope)
 {
     const bool is_pyramid = s->map.is_pyramid;
     vf first = vf_set(0), second = first, between = first;
     for (int i = 0; i < 3; i++) {
         vf g0[3], g1[3];
-        kernel_gradient_of(s->nonlinear_part[i], is_pyramid, &m[0], from, g0);
-        kernel_gradient_of(s->nonlinear_part[i], is_pyramid, &m[1], to, g1);
-        const vf rise = kernel_value_of(s->nonlinear_part[i], is_pyramid, &m[1], to) -
-                        kernel_value_of(s->nonlinear_part[i], is_pyramid, &m[0], from);
+        kernel_polynomial_gradient(s->nonlinear_part[i], is_pyramid, &m[0], from, g0);
+        kernel_polynomial_gradient(s->nonlinear_part[i], is_pyramid, &m[1], to, g1);
+        const vf rise = kernel_polynomial_value(s->nonlinear_part[i], is_pyramid, &m[1], to) -
+                        kernel_polynomial_value(s->nonlinear_part[i], is_pyramid, &m[0], from);
         const vf e1 = (kernel_dot(g0, move) - rise) * (1.0f / 3), e2 = (rise - kernel_dot(g1, move)) * (1.0f / 3);
         first += e1 * e1;
         second += e2 * e2;
@@ -130,9 +130,9 @@ SIMD_INLINE vm kernel_classify_piece(const kernel_search *s, const kernel_point 
     const kernel_product m[2] = {kernel_product_at(is_pyramid, from->r), kernel_product_at(is_pyramid, to->r)};
     vf move[3], g0[3], g1[3], bend, bend_slope;
     for (int a = 0; a < 3; a++) move[a] = to->r[a] - from->r[a];
-    kernel_gradient_of(s->map.field, is_pyramid, &m[0], from->r, g0);
-    kernel_gradient_of(s->map.field, is_pyramid, &m[1], to->r, g1);
-    kernel_chord_bend(s, from->r, to->r, m, move, &bend, &bend_slope);
+    kernel_polynomial_gradient(s->map.field, is_pyramid, &m[0], from->r, g0);
+    kernel_polynomial_gradient(s->map.field, is_pyramid, &m[1], to->r, g1);
+    kernel_compute_chord_bend(s, from->r, to->r, m, move, &bend, &bend_slope);
     const vf d0 = kernel_dot(g0, move), d1 = kernel_dot(g1, move), rise = to->value - from->value;
     vf b1 = from->value + d0 * (1.0f / 3), b2 = to->value - d1 * (1.0f / 3), middle = 3.0f * (b2 - b1);
     vf scale = vf_set(1);
@@ -159,7 +159,7 @@ SIMD_INLINE vm kernel_classify_piece(const kernel_search *s, const kernel_point 
 }
 
 /* Returns -1 for negative numbers and 1 for others. */
-SIMD_INLINE vf kernel_side(vf v)
+SIMD_INLINE vf kernel_sign_of(vf v)
 {
     return vf_select(vf_lt(v, vf_set(0)), vf_set(-1), vf_set(1));
 }
@@ -174,13 +174,14 @@ SIMD_INLINE void kernel_search_value_inside(const kernel_search *s, vm rays, vf 
 
 /* Returns the distance of Y(r) from the ray's point at the same depth, mapped to Y (see the top of this file). r: the
  * reference coordinates of a crossing of a face, which are rounded or belong to a point beside the ray. */
-SIMD_INLINE vf kernel_face_gap(const kernel_search *s, const kernel_point *at)
+SIMD_INLINE vf kernel_face_distance_from_ray(const kernel_search *s, const kernel_point *at)
 {
     const kernel_map *map = &s->map;
     const kernel_product m = kernel_product_at(map->is_pyramid, at->r);
     vf target[3], off[3], sum = vf_set(0);
     kernel_rays_at(&s->rays, map, at->t, target);
-    for (int a = 0; a < 3; a++) off[a] = kernel_value_of(map->position[a], map->is_pyramid, &m, at->r) - target[a];
+    for (int a = 0; a < 3; a++)
+        off[a] = kernel_polynomial_value(map->position[a], map->is_pyramid, &m, at->r) - target[a];
     for (int i = 0; i < 3; i++) {
         const vf *row = s->inverse[i];
         const vf y = (off[0] * row[0] + off[1] * row[1]) + off[2] * row[2];
@@ -195,7 +196,7 @@ SIMD_INLINE void kernel_search_begin(kernel_search *s)
     kernel_point_ends(s->interval, &s->low, &s->high);
     s->from = s->low;
     s->end = s->high;
-    s->side = kernel_side(s->interval->v_in);
+    s->side = kernel_sign_of(s->interval->v_in);
     s->ended = s->found = s->open = vm_none();
     s->number = s->pieces = vf_set(0);
     s->size = vf_set(0.5f);
@@ -216,10 +217,10 @@ SIMD_INLINE vf kernel_linear_at(const kernel_curved *c, const kernel_rays *rays,
 /* Decides as many rays as possible by the values at the ends of their intervals (in, out) and the bounds of their
  * cells. *found becomes the rays with exactly one root. Returns the rays that remain undecided. Rays in neither mask
  * have no root. */
-SIMD_INLINE vm kernel_ends_decide(const kernel_curved *c, const kernel_rays *rays, vi lane, vm wanted,
-                                  const kernel_point *in, const kernel_point *out, vm *found)
+SIMD_INLINE vm kernel_decide_by_ends(const kernel_curved *c, const kernel_rays *rays, vi lane, vm wanted,
+                                     const kernel_point *in, const kernel_point *out, vm *found)
 {
-    const vf zero = vf_set(0), jump = kernel_gather_lane(c->bounds->jump, lane), side = kernel_side(in->value);
+    const vf zero = vf_set(0), jump = kernel_gather_lane(c->bounds->jump, lane), side = kernel_sign_of(in->value);
     const vm change = vm_xor(vf_lt(in->value, zero), vf_lt(out->value, zero)), monotone = vf_le(zero, jump);
     *found = vm_and(wanted, vm_and(monotone, change));
     vm left = vm_andnot(wanted, *found);
@@ -234,11 +235,11 @@ SIMD_INLINE vm kernel_ends_decide(const kernel_curved *c, const kernel_rays *ray
 
 /* Tests the whole interval as one piece, from the reference coordinates and values at the faces. This decides most
  * rays. */
-SIMD_INLINE void kernel_search_whole(kernel_search *s, vm rays)
+SIMD_INLINE void kernel_search_test_whole(kernel_search *s, vm rays)
 {
     const kernel_interval *i = s->interval;
     const vm change = vm_xor(vf_lt(i->v_in, vf_set(0)), vf_lt(i->v_out, vf_set(0)));
-    const vf gap = vf_max(kernel_face_gap(s, &s->low), kernel_face_gap(s, &s->high));
+    const vf gap = vf_max(kernel_face_distance_from_ray(s, &s->low), kernel_face_distance_from_ray(s, &s->high));
     vm is_monotone, unused;
     const vm clear = kernel_classify_piece(s, &s->low, &s->high, gap, &is_monotone, &unused);
     const vf jump = s->slope * s->stretch * gap + KERNEL_ROOT_BAND;
@@ -252,10 +253,10 @@ SIMD_INLINE void kernel_search_whole(kernel_search *s, vm rays)
     kernel_search_value_inside(s, s->open, i->v_out, &s->end);
     /* the field just inside a warped face may have the other sign than the face's value: then there is a root at the
      * face itself */
-    const vm jumps = vm_andnot(s->open, vf_eq(kernel_side(s->from.value), s->side));
-    kernel_point_move(jumps, &s->from, &s->low);
-    kernel_point_move(jumps, &s->from, &s->high);
-    s->side = vf_select(s->open, kernel_side(s->from.value), s->side);
+    const vm jumps = vm_andnot(s->open, vf_eq(kernel_sign_of(s->from.value), s->side));
+    kernel_point_copy_lanes(jumps, &s->from, &s->low);
+    kernel_point_copy_lanes(jumps, &s->from, &s->high);
+    s->side = vf_select(s->open, kernel_sign_of(s->from.value), s->side);
     s->found = vm_or(s->found, jumps);
 }
 
@@ -271,12 +272,12 @@ static __attribute__((noinline, unused)) bool kernel_search_cells(kernel_search 
     s->interval = i;
     s->failures = failures;
     kernel_search_begin(s);
-    wanted = kernel_ends_decide(c, rays, lane, wanted, &s->low, &s->high, &s->found);
+    wanted = kernel_decide_by_ends(c, rays, lane, wanted, &s->low, &s->high, &s->found);
     if (!vm_any(vm_or(wanted, s->found))) return false;
     kernel_maps_of_type((const float(*)[8][SIMD_WIDTH])c->at, lane, c->type, &s->map);
     if (vm_any(wanted)) {
         kernel_search_bounds(c->bounds, lane, s);
-        kernel_search_whole(s, wanted);
+        kernel_search_test_whole(s, wanted);
     }
     return true;
 }
@@ -292,14 +293,14 @@ SIMD_INLINE void kernel_search_piece(const kernel_search *s, vm rays, kernel_poi
     kernel_point at = {.t = vf_select(inner, i->t_in + (i->t_out - i->t_in) * u, i->t_out)};
     kernel_reference_between(&s->from, &s->end, at.t, at.r);
     at.value = kernel_solve_lanes(&s->rays, &s->map, i, inner, at.t, at.r, s->failures);
-    kernel_point_move(inner, &at, to);
+    kernel_point_copy_lanes(inner, &at, to);
 }
 
 /* Advances rays to the next piece, which begins at the end of the current one (to). It is the longest piece that
  * bisection of the whole interval produces there. */
 SIMD_INLINE void kernel_search_advance(kernel_search *s, vm rays, const kernel_point *to)
 {
-    kernel_point_move(rays, to, &s->from);
+    kernel_point_copy_lanes(rays, to, &s->from);
     const vf next = s->number + 1.0f, half = next * 0.5f;
     const vm up = vm_and(vf_eq(vf_floor(half), half), vf_lt(s->size, vf_set(0.5f)));
     s->number = vf_select(rays, vf_select(up, half, next), s->number);
@@ -323,12 +324,12 @@ SIMD_INLINE void kernel_search_next(kernel_search *s)
             vm_or(vf_le(s->size, vf_set(KERNEL_SMALLEST_PIECE)), vf_lt(vf_set(KERNEL_ROOT_PIECES), s->pieces));
         const vm certain = vm_and(vm_or(monotone, clear), vf_le(s->size, s->coarsest));
         const vm decided = vm_and(going, vm_or(vm_or(certain, negligible), small));
-        const vm roots = vm_andnot(decided, vf_eq(kernel_side(to.value), s->side));
+        const vm roots = vm_andnot(decided, vf_eq(kernel_sign_of(to.value), s->side));
         const vm halve = vm_andnot(going, decided);
         /* tested pieces are counted per ray, so that a ray's result does not depend on the other rays */
         s->pieces += vf_select(going, vf_set(1), vf_set(0));
-        kernel_point_move(roots, &s->from, &s->low);
-        kernel_point_move(roots, &to, &s->high);
+        kernel_point_copy_lanes(roots, &s->from, &s->low);
+        kernel_point_copy_lanes(roots, &to, &s->high);
         s->found = vm_or(s->found, roots);
         s->side = vf_select(roots, -s->side, s->side);
         s->number = vf_select(halve, s->number * 2.0f, s->number);
@@ -340,12 +341,12 @@ SIMD_INLINE void kernel_search_next(kernel_search *s)
 
 /* Tests the exit faces of rays whose last piece has been processed: if the field just inside the face has the other
  * sign than the face's value, there is a root at the face itself. */
-SIMD_INLINE void kernel_search_end(kernel_search *s)
+SIMD_INLINE void kernel_search_test_exit_faces(kernel_search *s)
 {
-    s->found = vm_andnot(s->ended, vf_eq(kernel_side(s->interval->v_out), s->side));
+    s->found = vm_andnot(s->ended, vf_eq(kernel_sign_of(s->interval->v_out), s->side));
     s->ended = vm_none();
-    kernel_point_move(s->found, &s->end, &s->low);
-    kernel_point_move(s->found, &s->end, &s->high);
+    kernel_point_copy_lanes(s->found, &s->end, &s->low);
+    kernel_point_copy_lanes(s->found, &s->end, &s->high);
 }
 
 /* Continues the search with the next roots. Returns false if there are none. */
@@ -354,7 +355,7 @@ static __attribute__((noinline, unused)) bool kernel_search_continue(kernel_sear
     if (vm_any(s->open))
         kernel_search_next(s);
     else if (vm_any(s->ended))
-        kernel_search_end(s);
+        kernel_search_test_exit_faces(s);
     else
         return false;
     return true;
@@ -369,7 +370,7 @@ SIMD_INLINE void kernel_search_close(kernel_search *s, vm rays)
 
 /* Refines roots between the points s->low and s->high by regula falsi in the Illinois variant, which halves the value
  * at an end that is kept; every third step is a bisection. */
-SIMD_INLINE void kernel_bracket(const kernel_search *s, vm rays, kernel_point *out)
+SIMD_INLINE void kernel_refine_by_bracketing(const kernel_search *s, vm rays, kernel_point *out)
 {
     kernel_point low = s->low, high = s->high;
     for (int n = 0; n < KERNEL_BRACKET_STEPS && vm_any(rays); n++) {
@@ -377,12 +378,12 @@ SIMD_INLINE void kernel_bracket(const kernel_search *s, vm rays, kernel_point *o
         if (n % 3 == 2) at.t = low.t + (high.t - low.t) * 0.5f;
         kernel_reference_between(&low, &high, at.t, at.r);
         at.value = kernel_solve_lanes(&s->rays, &s->map, s->interval, rays, at.t, at.r, s->failures);
-        const vm same = vf_eq(kernel_side(at.value), kernel_side(low.value));
-        kernel_point_move(rays, &at, out);
+        const vm same = vf_eq(kernel_sign_of(at.value), kernel_sign_of(low.value));
+        kernel_point_copy_lanes(rays, &at, out);
         high.value = vf_select(same, high.value * 0.5f, high.value);
         low.value = vf_select(same, low.value, low.value * 0.5f);
-        kernel_point_move(vm_and(rays, same), &at, &low);
-        kernel_point_move(vm_andnot(rays, same), &at, &high);
+        kernel_point_copy_lanes(vm_and(rays, same), &at, &low);
+        kernel_point_copy_lanes(vm_andnot(rays, same), &at, &high);
         rays = vm_andnot(rays, vf_le(vf_abs(at.value), vf_set(1e-7f)));
     }
 }
@@ -398,26 +399,26 @@ SIMD_INLINE kernel_f64 kernel_f64_value(const kernel_f64 c[8], const kernel_f64 
 
 /* Computes residuals in double: the ray's point at depth t minus the position at the reference coordinates r (off), and
  * the field at r (*value). They are exact except for the rounding of r and t. */
-SIMD_INLINE void kernel_residuals(const kernel_rays *rays, const kernel_map *map, const kernel_point *at, vf off[3],
-                                  vf *value)
+SIMD_INLINE void kernel_compute_residuals(const kernel_rays *rays, const kernel_map *map, const kernel_point *at,
+                                          vf off[3], vf *value)
 {
     for (int half = 0; half < 2; half++) {
         kernel_f64 r[3], target[3];
-        const kernel_f64 t = kernel_f64_of(&at->t, half);
-        for (int a = 0; a < 3; a++) r[a] = kernel_f64_of(&at->r[a], half);
+        const kernel_f64 t = kernel_f64_widen_half(&at->t, half);
+        for (int a = 0; a < 3; a++) r[a] = kernel_f64_widen_half(&at->r[a], half);
         kernel_f64 m = r[0] * r[1];
         if (map->is_pyramid) {
             const vf k = vf_max(at->r[2], vf_set(1e-6f));
-            m /= kernel_f64_of(&k, half);
+            m /= kernel_f64_widen_half(&k, half);
         }
-        target[0] = kernel_f64_of(&rays->origin_x, half) + kernel_f64_of(&rays->slope_x, half) * t;
-        target[1] = kernel_f64_of(&rays->origin_y, half) + kernel_f64_of(&rays->slope_y, half) * t;
+        target[0] = kernel_f64_widen_half(&rays->origin_x, half) + kernel_f64_widen_half(&rays->slope_x, half) * t;
+        target[1] = kernel_f64_widen_half(&rays->origin_y, half) + kernel_f64_widen_half(&rays->slope_y, half) * t;
         target[2] = t;
         for (int a = 0; a < 3; a++)
-            kernel_f64_store_lanes(&off[a], half,
-                                   target[a] - kernel_f64_of(&map->origin[a], half) -
-                                       kernel_f64_value(map->exact[half][a], r, m));
-        kernel_f64_store_lanes(value, half, kernel_f64_value(map->exact[half][3], r, m));
+            kernel_f64_store_half_of_vector(&off[a], half,
+                                            target[a] - kernel_f64_widen_half(&map->origin[a], half) -
+                                                kernel_f64_value(map->exact[half][a], r, m));
+        kernel_f64_store_half_of_vector(value, half, kernel_f64_value(map->exact[half][3], r, m));
     }
 }
 
@@ -431,7 +432,7 @@ SIMD_INLINE vm kernel_polish_step(const kernel_rays *rays, const kernel_map *map
     const vf zero = vf_set(0);
     vf cross[3][3], gradient[3], step[3], speed[3], largest = zero;
     const vf det = kernel_jacobian(map->position, map->is_pyramid, &m, out->r, cross);
-    kernel_gradient_of(map->field, map->is_pyramid, &m, out->r, gradient);
+    kernel_polynomial_gradient(map->field, map->is_pyramid, &m, out->r, gradient);
     const vm flat = vf_eq(det, zero);
     const vf inverse = vf_select(flat, zero, 1.0f / det);
     for (int a = 0; a < 3; a++) {
@@ -456,16 +457,16 @@ SIMD_INLINE void kernel_polish_last(const kernel_rays *rays, const kernel_map *m
 {
     kernel_point last = *out;
     vf off[3], value;
-    kernel_residuals(rays, map, out, off, &value);
+    kernel_compute_residuals(rays, map, out, off, &value);
     /* at a double root the computed derivative of the field is only a rounding error; a step that uses it would lead
      * away from the root, and is not taken */
     const vm away = kernel_polish_step(rays, map, low, high, wanted, off, value, &last);
-    kernel_point_move(vm_andnot(wanted, away), &last, out);
+    kernel_point_copy_lanes(vm_andnot(wanted, away), &last, out);
 }
 
 /* Does the last step of Newton's method for points whose reference coordinates have an error of at most
  * KERNEL_CONTRACTION_END. Changes the map's tolerance. */
-SIMD_INLINE void kernel_polish_near(const kernel_rays *rays, kernel_map *map, vm wanted, kernel_point *at)
+SIMD_INLINE void kernel_refine_accurate_roots(const kernel_rays *rays, kernel_map *map, vm wanted, kernel_point *at)
 {
     const kernel_point low = {.t = vf_set(-INFINITY)}, high = {.t = vf_set(INFINITY)};
     map->tolerance = 4 * KERNEL_CONTRACTION_END;
@@ -488,8 +489,8 @@ SIMD_INLINE vm kernel_polish_lanes(const kernel_rays *rays, const kernel_map *ma
         const kernel_product m = kernel_product_at(map->is_pyramid, out->r);
         vf off[3];
         kernel_rays_at(rays, map, out->t, off);
-        for (int a = 0; a < 3; a++) off[a] -= kernel_value_of(map->position[a], map->is_pyramid, &m, out->r);
-        const vf value = kernel_value_of(map->field, map->is_pyramid, &m, out->r);
+        for (int a = 0; a < 3; a++) off[a] -= kernel_polynomial_value(map->position[a], map->is_pyramid, &m, out->r);
+        const vf value = kernel_polynomial_value(map->field, map->is_pyramid, &m, out->r);
         open = kernel_polish_step(rays, map, low, high, open, off, value, out);
     }
     const vm close = vm_andnot(wanted, open);
@@ -499,10 +500,10 @@ SIMD_INLINE vm kernel_polish_lanes(const kernel_rays *rays, const kernel_map *ma
 
 /* Refines the roots that have been found. Rays for which Newton's method does not converge are refined by
  * bracketing. */
-static __attribute__((noinline, unused)) void kernel_polish(const kernel_search *s, kernel_point *out)
+static __attribute__((noinline, unused)) void kernel_refine_roots(const kernel_search *s, kernel_point *out)
 {
     const vm open = kernel_polish_lanes(&s->rays, &s->map, s->found, &s->low, &s->high, out);
-    if (vm_any(open)) kernel_bracket(s, open, out);
+    if (vm_any(open)) kernel_refine_by_bracketing(s, open, out);
 }
 
 #endif

@@ -98,7 +98,7 @@ SIMD_INLINE void kernel_accept_transparent(kernel_packet *p, const kernel_surfac
     kernel_fragments f = {h->t, h->t, {h->colour[0], h->colour[1], h->colour[2]}, 1.0f - h->opacity, vf_set(0)};
     kernel_paint(p, s, h->normal, vf_set((float)kind), &f);
     for (int a = 0; a < 3; a++) f.colour[a] *= h->opacity;
-    kernel_emit(p, hit, kind, &f);
+    kernel_append_fragments(p, hit, kind, &f);
 }
 
 /* Draws contour lines over the hits' colours or, if the picture is one of values (RENDER_VALUES), stores the lines'
@@ -129,8 +129,9 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, const kernel_surface *s, const 
     h->part = vi_set(c ? c->part : -1);
     h->cell = vi_set(c ? (int32_t)c->index : -1);
     /* in polyhedra normals are gradients in the cell or from the vertices, never central differences */
-    h->reach = vf_set(s->layer->normal == RENDER_DIFFERENCES && c ? kernel_difference_reach(p, s->layer, c) : 0);
-    kernel_base_colour(s, h->value, h->w, h->colour);
+    h->reach =
+        vf_set(s->layer->normal == RENDER_DIFFERENCES && c ? kernel_difference_sample_distance(p, s->layer, c) : 0);
+    kernel_unlit_surface_colour(s, h->value, h->w, h->colour);
     if (__builtin_expect(p->frame->job->paint == RENDER_VALUES, 0))
         h->colour[0] = kernel_surface_value(s, h->value, h->w);
     else if (s->layer->edge_width > 0 && c)
@@ -152,10 +153,10 @@ static __attribute__((noinline)) void kernel_tet_surface(kernel_packet *p, const
     kernel_interval i;
     kernel_tet_interval(p, c, rays, has_colour, &i);
     i.v_out = kernel_end_in_cell(i.v_in, i.v_out, s->layer->is_of_faces);
-    const vm change = vm_and(kernel_is_near(p, &i), kernel_changes_sign(&i));
+    const vm change = vm_and(kernel_interval_overlaps_ray(p, &i), kernel_changes_sign(&i));
     if (!vm_any(change)) return;
     const vf t = kernel_secant(i.t_in, i.v_in, i.t_out, i.v_out);
-    const vm hit = kernel_visible(p, s, change, t);
+    const vm hit = kernel_visible_hits(p, s, change, t);
     if (!vm_any(hit)) return;
     kernel_surface_hits at = {.value = value, .t = t};
     kernel_tet_normal(p, c, at.normal);
@@ -187,14 +188,14 @@ SIMD_INLINE vm kernel_curved_accept(kernel_packet *p, const kernel_surface *s, c
                                     const kernel_curved *curved, int value, const kernel_map *map, vm found,
                                     const kernel_point *at)
 {
-    const vm hit = kernel_visible(p, s, found, at->t);
+    const vm hit = kernel_visible_hits(p, s, found, at->t);
     if (!vm_any(hit)) return hit;
     kernel_surface_hits h = {.value = value, .t = at->t};
     if (s->layer->normal == RENDER_VERTEX) {
         memcpy(h.normal, at->r, sizeof h.normal);
     } else {
         kernel_lanes_normal(map, at->r, h.normal);
-        kernel_unshear(p->tile, h.normal);
+        kernel_gradient_to_camera_axes(p->tile, h.normal);
     }
     if (s->layer->colour_map)
         h.w = kernel_maps_value_of_type((const float(*)[SIMD_WIDTH])curved->colours, vi_set(curved->lane), at->r,
@@ -210,8 +211,9 @@ SIMD_INLINE vm kernel_curved_accept(kernel_packet *p, const kernel_surface *s, c
 
 /* Finds the crossings in the rays' interval i one after the other, by kernel_roots.h, and accepts them. A ray ends at
  * the first visible crossing of an opaque surface. */
-SIMD_INLINE void kernel_curved_robust(kernel_packet *p, const kernel_surface *s, const kernel_cell *c,
-                                      const kernel_curved *curved, int value, const kernel_interval *i, vm wanted)
+SIMD_INLINE void kernel_accept_searched_roots(kernel_packet *p, const kernel_surface *s, const kernel_cell *c,
+                                              const kernel_curved *curved, int value, const kernel_interval *i,
+                                              vm wanted)
 {
     const kernel_rays rays = kernel_packet_rays(p);
     kernel_search search;
@@ -219,7 +221,7 @@ SIMD_INLINE void kernel_curved_robust(kernel_packet *p, const kernel_surface *s,
     do {
         kernel_point at;
         if (!vm_any(search.found)) continue;
-        kernel_polish(&search, &at);
+        kernel_refine_roots(&search, &at);
         const vm hit = kernel_curved_accept(p, s, c, curved, value, &search.map, search.found, &at);
         if (kernel_is_opaque(p, s)) kernel_search_close(&search, hit);
     } while (kernel_search_continue(&search));
@@ -229,8 +231,8 @@ SIMD_INLINE void kernel_contract_rays(const kernel_curved *c, const kernel_rays 
                                       kernel_point *out, vm *none, int type)
 {
     kernel_contraction contraction;
-    kernel_contraction_ray(c, rays, lane, &contraction);
-    kernel_contraction_of(c->bounds, lane, type, &contraction);
+    kernel_contraction_set_ray(c, rays, lane, &contraction);
+    kernel_contraction_set_cell(c->bounds, lane, type, &contraction);
     kernel_contract(&contraction, wanted, out, none, type);
     out->t += kernel_gather_lane(c->at[2][0], lane);
 }
@@ -257,7 +259,7 @@ static __attribute__((noinline)) vm kernel_curved_accept_contracted(kernel_packe
     if (vm_any(at.mask)) {
         kernel_map map;
         kernel_maps_of_type((const float(*)[8][SIMD_WIDTH])curved->at, lane, curved->type, &map);
-        kernel_polish_near(&rays, &map, at.mask, &at);
+        kernel_refine_accurate_roots(&rays, &map, at.mask, &at);
         kernel_curved_accept(p, s, c, curved, value, &map, at.mask, &at);
     }
     return vm_or(at.mask, none);
@@ -277,7 +279,7 @@ static __attribute__((noinline)) void kernel_curved_surface(kernel_packet *p, co
         /* If a ray crosses both triangles of a quad but not its bilinear patch, both ends of the interval are the same
          * point beside the ray; such an interval is skipped. */
         const vm nonempty = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
-        reached[n] = vm_and(kernel_is_near(p, i), nonempty);
+        reached[n] = vm_and(kernel_interval_overlaps_ray(p, i), nonempty);
         any = vm_or(any, reached[n]);
     }
     if (!vm_any(any)) return;
@@ -288,8 +290,8 @@ static __attribute__((noinline)) void kernel_curved_surface(kernel_packet *p, co
     if (!curved->is_contracted) known = kernel_curved_accept_contracted(p, s, c, curved, value, any);
     for (int n = 0; n < count; n++) {
         kernel_interval *i = &list[n];
-        const vm wanted = vm_andnot(vm_and(reached[n], kernel_is_near(p, i)), known);
-        if (vm_any(wanted)) kernel_curved_robust(p, s, c, curved, value, i, wanted);
+        const vm wanted = vm_andnot(vm_and(reached[n], kernel_interval_overlaps_ray(p, i)), known);
+        if (vm_any(wanted)) kernel_accept_searched_roots(p, s, c, curved, value, i, wanted);
     }
 }
 
@@ -358,7 +360,7 @@ static vm kernel_polyhedron_sum_normals(const kernel_packet *p, const kernel_pol
 
 /* Finds, for each hit at depth t, the tet of non-negative sign that contains it or is nearest to it along the ray.
  * out[ray] becomes the index of the tet's surface triangle; -1 if there is none. */
-static void kernel_polyhedron_facets(const kernel_poly_crossings *r, vm hit, vf t, int32_t out[SIMD_WIDTH])
+static void kernel_polyhedron_find_facets(const kernel_poly_crossings *r, vm hit, vf t, int32_t out[SIMD_WIDTH])
 {
     vf nearest = vf_set(INFINITY);
     vi facet = vi_set(-1);
@@ -373,14 +375,14 @@ static void kernel_polyhedron_facets(const kernel_poly_crossings *r, vm hit, vf 
     memcpy(out, &facet, sizeof facet);
 }
 
-/* Computes the field's gradient at the hits, in camera axes: that in the tet of kernel_polyhedron_facets() or, if tets
- * overlap, the signed sum of the gradients in the tets that contain the hit. */
+/* Computes the field's gradient at the hits, in camera axes: that in the tet of kernel_polyhedron_find_facets() or, if
+ * tets overlap, the signed sum of the gradients in the tets that contain the hit. */
 static void kernel_polyhedron_normal(const kernel_packet *p, const kernel_poly_crossings *r, vm hit, vf t, vf out[3])
 {
     int32_t facets[SIMD_WIDTH];
     for (int a = 0; a < 3; a++) out[a] = vf_set(0);
     if (!r->cell->is_star_shaped) hit = vm_andnot(hit, kernel_polyhedron_sum_normals(p, r, hit, t, out));
-    kernel_polyhedron_facets(r, hit, t, facets);
+    kernel_polyhedron_find_facets(r, hit, t, facets);
     for (unsigned left = vm_bits(hit); left; left &= left - 1) {
         const int ray = __builtin_ctz(left);
         double g[3];
@@ -408,8 +410,8 @@ static void kernel_polyhedron_mean_gradient(const kernel_frame *f, const polyhed
 /* Computes the barycentric coordinates (share) of a ray's point at depth t in the tet of surface triangle `facet`.
  * corners: indices of the tet's corners among the polyhedron's vertices, of which the last is the centre. ray: lane of
  * the packet. */
-static void kernel_polyhedron_shares(const kernel_packet *p, const polyhedron *c, int facet, int ray, float t,
-                                     int corners[4], double share[4])
+static void kernel_polyhedron_barycentric(const kernel_packet *p, const polyhedron *c, int facet, int ray, float t,
+                                          int corners[4], double share[4])
 {
     double place[4][3], point[3];
     for (int i = 0; i < 4; i++) {
@@ -419,19 +421,20 @@ static void kernel_polyhedron_shares(const kernel_packet *p, const polyhedron *c
         place[i][2] = (double)c->z[v];
     }
     kernel_ray_point(p, ray, t, point);
-    kernel_barycentric((const double(*)[3])place, point, share);
+    kernel_compute_barycentric((const double(*)[3])place, point, share);
 }
 
 /* Computes the hits' normals, in camera axes, by interpolating the vertices' gradients in the tets that contain the
  * hits (RENDER_VERTEX). */
-static __attribute__((noinline)) void kernel_polyhedron_smooth(const kernel_packet *p, const polyhedron *c,
-                                                               const render_surface_layer *layer,
-                                                               const kernel_poly_crossings *r, vm hit, vf t, vf out[3])
+static __attribute__((noinline)) void kernel_polyhedron_vertex_normals(const kernel_packet *p, const polyhedron *c,
+                                                                       const render_surface_layer *layer,
+                                                                       const kernel_poly_crossings *r, vm hit, vf t,
+                                                                       vf out[3])
 {
     const render_vertex_gradients *gradients = &layer->gradients[c->part];
     int32_t facets[SIMD_WIDTH];
     double of_centre[3];
-    kernel_polyhedron_facets(r, hit, t, facets);
+    kernel_polyhedron_find_facets(r, hit, t, facets);
     kernel_polyhedron_mean_gradient(p->frame, c, gradients, of_centre);
     for (int a = 0; a < 3; a++) out[a] = vf_set((float)of_centre[a]);
     for (unsigned left = vm_bits(hit); left; left &= left - 1) {
@@ -439,7 +442,7 @@ static __attribute__((noinline)) void kernel_polyhedron_smooth(const kernel_pack
         if (facets[ray] < 0) continue;
         int corners[4];
         double g[4][3], share[4];
-        kernel_polyhedron_shares(p, c, facets[ray], ray, t[ray], corners, share);
+        kernel_polyhedron_barycentric(p, c, facets[ray], ray, t[ray], corners, share);
         for (int i = 0; i < 3; i++) kernel_vertex_gradient(p->frame, gradients, c->vertices[corners[i]], g[i]);
         memcpy(g[3], of_centre, sizeof g[3]);
         for (int a = 0; a < 3; a++)
@@ -487,7 +490,7 @@ static __attribute__((noinline)) void kernel_polyhedron_slopes(polyhedron *c, co
 
 /* Returns a bound of the field's slope for the scaled values c->f, limited so that products of two bounds are finite.
  */
-SIMD_INLINE vf kernel_slope_of(const polyhedron *c, double slope)
+SIMD_INLINE vf kernel_scale_slope_bound(const polyhedron *c, double slope)
 {
     const double scaled = slope * c->scale;
     return vf_set(scaled <= 1e15 ? (float)scaled : 1e15f);
@@ -502,7 +505,7 @@ SIMD_INLINE vm kernel_polyhedron_may_cross(const kernel_packet *p, polyhedron *c
     const vm longer = vm_and(i->mask, vf_lt(i->t_in, i->t_out));
     if (!c->is_star_shaped || !p->is_pencil) return longer;
     if (!c->has_slopes) kernel_polyhedron_slopes(c, p);
-    const vf zero = vf_set(0), fall = kernel_slope_of(c, c->fall), rise = kernel_slope_of(c, c->rise);
+    const vf zero = vf_set(0), fall = kernel_scale_slope_bound(c, c->fall), rise = kernel_scale_slope_bound(c, c->rise);
     const vf in = r->in.v, out = r->out.v;
     const vm below = vf_lt(i->v_in, zero);
     const vm differs = vm_or(vm_xor(vf_lt(in, zero), below), vm_xor(vf_lt(out, zero), below));
@@ -539,7 +542,7 @@ static void kernel_profile_walk_begin(const kernel_poly_crossings *r, vm rays, k
 }
 
 /* Copies the ends of the given rays' pieces from one interval to another. */
-SIMD_INLINE void kernel_piece_select(vm rays, const kernel_interval *from, kernel_interval *to)
+SIMD_INLINE void kernel_copy_piece_ends(vm rays, const kernel_interval *from, kernel_interval *to)
 {
     to->t_in = vf_select(rays, from->t_in, to->t_in);
     to->t_out = vf_select(rays, from->t_out, to->t_out);
@@ -563,7 +566,7 @@ SIMD_INLINE vm kernel_profile_walk_advance(const kernel_poly_crossings *r, vm le
     const vm rounding =
         vm_and(kernel_profile_continues(r, &next, inside), vf_le(vf_abs(next.v_out), vf_set(KERNEL_ROOT_BAND)));
     next.v_out = vf_select(rounding, vf_select(walk->below, vf_set(-1e-30f), zero), next.v_out);
-    kernel_piece_select(left, &next, &walk->piece);
+    kernel_copy_piece_ends(left, &next, &walk->piece);
     return vm_and(inside, vm_or(walk->jump_out, kernel_profile_continues(r, &next, inside)));
 }
 
@@ -604,7 +607,7 @@ static __attribute__((noinline)) void kernel_polyhedron_line_field(const kernel_
     const grid_field *field = &s->layer->lines->field.fields[c->part];
     int32_t facets[SIMD_WIDTH];
     double mean = 0;
-    kernel_polyhedron_facets(r, hit, t, facets);
+    kernel_polyhedron_find_facets(r, hit, t, facets);
     for (int i = 0; i < c->vertex_count; i++) mean += kernel_lines_value(s, field, c->vertices[i]) / c->vertex_count;
     *out = (kernel_line_field){.value = vf_set(NAN)};
     for (unsigned left = vm_bits(hit); left; left &= left - 1) {
@@ -613,7 +616,7 @@ static __attribute__((noinline)) void kernel_polyhedron_line_field(const kernel_
         int corners[4];
         const double *corner[4];
         double value[4], share[4], g[3], n[3];
-        kernel_polyhedron_shares(p, c, facets[ray], ray, t[ray], corners, share);
+        kernel_polyhedron_barycentric(p, c, facets[ray], ray, t[ray], corners, share);
         for (int i = 0; i < 4; i++) {
             corner[i] = c->world[corners[i]];
             value[i] = i < 3 ? kernel_lines_value(s, field, c->vertices[corners[i]]) : mean;
@@ -635,9 +638,9 @@ static void kernel_polyhedron_accept(kernel_packet *p, const kernel_surface *s, 
 {
     kernel_surface_hits at = {.value = value, .t = walk->t, .w = walk->w};
     if (!vm_any(hit)) return;
-    kernel_poly_tets(r);
+    kernel_poly_intersect_tets(r);
     if (s->layer->normal == RENDER_VERTEX)
-        kernel_polyhedron_smooth(p, r->cell, s->layer, r, hit, walk->t, at.normal);
+        kernel_polyhedron_vertex_normals(p, r->cell, s->layer, r, hit, walk->t, at.normal);
     else
         kernel_polyhedron_normal(p, r, hit, walk->t, at.normal);
     kernel_line_field along;
@@ -650,11 +653,11 @@ static void kernel_polyhedron_accept(kernel_packet *p, const kernel_surface *s, 
 
 /* Finds the crossings in the current interval of the rays in `wanted`, and accepts them. A ray ends at the first
  * crossing of an opaque surface in front of the eye. */
-static void kernel_polyhedron_cross(kernel_packet *p, const kernel_surface *s, int value, vm wanted,
-                                    kernel_poly_crossings *r)
+static void kernel_polyhedron_accept_crossings(kernel_packet *p, const kernel_surface *s, int value, vm wanted,
+                                               kernel_poly_crossings *r)
 {
     kernel_profile_walk walk;
-    kernel_poly_profile(r);
+    kernel_poly_prepare_profile(r);
     kernel_profile_walk_begin(r, wanted, &walk);
     do {
         const vm found = kernel_profile_walk_next(r, &walk);
@@ -671,10 +674,10 @@ static void kernel_polyhedron_surface(kernel_packet *p, const kernel_surface *s,
     kernel_poly_crossings r;
     if (!kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, rays, layer->colour_map != NULL)) return;
     while (kernel_poly_next(&r)) {
-        const vm near = kernel_is_near(p, &r.interval);
+        const vm near = kernel_interval_overlaps_ray(p, &r.interval);
         if (!vm_any(near)) continue;
         const vm wanted = vm_and(near, vm_or(kernel_changes_sign(&r.interval), kernel_polyhedron_may_cross(p, c, &r)));
-        if (vm_any(wanted)) kernel_polyhedron_cross(p, s, value, wanted, &r);
+        if (vm_any(wanted)) kernel_polyhedron_accept_crossings(p, s, value, wanted, &r);
     }
 }
 
@@ -691,10 +694,10 @@ static void kernel_polyhedron_surfaces(kernel_packet *p, const kernel_surface *s
             kernel_polyhedron_transform(c, p);
             if (layer->colour_map)
                 c->g[c->vertex_count] =
-                    (float)kernel_values_colours(s, part, c->index, c->vertices, c->vertex_count, c->g);
+                    (float)kernel_read_colour_values(s, part, c->index, c->vertices, c->vertex_count, c->g);
         }
         if (is_fresh || layer->value_count > 1)
-            c->scale = kernel_values_relative(c->values, c->vertex_count + 1, layer->values[value], c->f);
+            c->scale = kernel_values_subtract_isovalue(c->values, c->vertex_count + 1, layer->values[value], c->f);
         kernel_polyhedron_surface(p, s, c, value, rays);
     }
 }

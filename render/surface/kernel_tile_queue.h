@@ -24,9 +24,9 @@ SIMD_INLINE void kernel_tile_prepare_cell(kernel_tile_trace *t, int part)
 {
     t->cell->part = part;
     kernel_cell_order(t->cell);
-    kernel_cell_lines(t->cell, t->frame, &t->tile);
+    kernel_cell_compute_lines(t->cell, t->frame, &t->tile);
     if (t->surface->layer->colour_map)
-        kernel_values_colours(t->surface, part, t->cell->index, t->cell->vertices, t->cell->count, t->cell->g);
+        kernel_read_colour_values(t->surface, part, t->cell->index, t->cell->vertices, t->cell->count, t->cell->g);
 }
 
 /* Traces one isovalue's surface (in a polyhedron those of all isovalues) in a candidate by the packets of the given
@@ -43,7 +43,7 @@ static void kernel_tile_process_candidate(kernel_tile_trace *t, const kernel_til
         return;
     }
     kernel_cell_move_to_tile_space(c, t->frame, &t->tile, g);
-    kernel_cell_relative(c, layer->values[value]);
+    kernel_cell_subtract_isovalue(c, layer->values[value]);
     kernel_tile_prepare_cell(t, part);
     t->curved->is_ready = false;
     kernel_blocks_trace(t, blocks, part, c->index, c, value);
@@ -62,7 +62,7 @@ SIMD_INLINE int kernel_tile_set_source(kernel_tile_trace *t, uint32_t source, in
  * nearer hit. */
 SIMD_INLINE unsigned kernel_candidate_blocks(const kernel_tile_trace *t, const kernel_tile_candidate *candidate)
 {
-    return candidate->blocks & t->traced_blocks & kernel_blocks_beyond(t, candidate->near);
+    return candidate->blocks & t->traced_blocks & kernel_blocks_not_hidden_at(t, candidate->near);
 }
 
 /* Maximum number of cells in the list of those that are traced one by one. */

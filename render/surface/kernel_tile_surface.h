@@ -40,7 +40,7 @@ static bool kernel_tile_find_flush(kernel_candidate_list *list)
         int part;
         const int value = kernel_tile_set_source(t, found->source, &part);
         const kernel_tile_candidate candidate = kernel_candidate_in_tile(found, t->tile.x0, t->tile.y0);
-        if (kernel_candidate_blocks(t, &candidate) && kernel_pixels_beyond(t, candidate.box, found->near))
+        if (kernel_candidate_blocks(t, &candidate) && kernel_box_has_pixel_not_hidden_at(t, candidate.box, found->near))
             kernel_tile_queue_add(t, s, &candidate, part, value);
     }
     list->count = 0;
@@ -248,7 +248,7 @@ SIMD_INLINE void kernel_tile_find_cells(kernel_tile_trace *t, int part)
         int inner_count = 0;
         for (int n = 0; n < most && top; n++) {
             const kernel_tile_node e = stack[--top];
-            if (!kernel_pixels_beyond(t, e.place, e.near)) continue;
+            if (!kernel_box_has_pixel_not_hidden_at(t, e.place, e.near)) continue;
             if (e.count) {
                 kernel_tile_find_set_part(t, t->search, part);
                 kernel_find_leaf(t->thread->finder, tree->cells + e.ref, e.count);

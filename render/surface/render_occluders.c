@@ -313,7 +313,8 @@ static void find_in_cell(occluder_search *s)
     s->count = 0;
     s->places.count = s->values.count = 0;
     if (is_polyhedron ? !list_polyhedron_vertices(s, g, field) : !list_cell_vertices(s, &c, g)) return;
-    /* in tree space, in which the trees are; kernel_occlusion_beyond() computes the same from world coordinates */
+    /* in tree space, in which the trees are; kernel_occlusion_is_beyond_contact() computes the same from world
+     * coordinates */
     s->reach = layer->contact > 0 ? (double)layer->contact * kernel_cell_size(s->places.items, s->count) : 0;
     for (s->cell.value = 0; s->cell.value < layer->value_count; s->cell.value++) {
         const double isovalue = layer->values[s->cell.value];

@@ -166,8 +166,8 @@ static kernel_exact_point kernel_exact_point_between(const kernel_bisection *h, 
 
 /* Returns the ray's point between a and b at which the field is x. The values at a and b must lie on different sides of
  * x. It uses regula falsi in the Illinois variant, which halves the value at an end that is kept. */
-static kernel_exact_point kernel_exact_point_where(const kernel_bisection *h, const kernel_exact_point *a,
-                                                   const kernel_exact_point *b, double x)
+static kernel_exact_point kernel_exact_point_of_value(const kernel_bisection *h, const kernel_exact_point *a,
+                                                      const kernel_exact_point *b, double x)
 {
     kernel_exact_point low = *a, high = *b, at = *a;
     double low_v = low.v - x, high_v = high.v - x;
@@ -273,7 +273,7 @@ static const double *kernel_step_between(const kernel_bisection *h, double low, 
 
 /* Computes the range of float32 values between the two neighbouring steps of the opacity between which `inside` lies.
  */
-static void kernel_step_side(const kernel_bisection *h, double inside, float side[2])
+static void kernel_range_between_steps(const kernel_bisection *h, double inside, float side[2])
 {
     const double *steps = h->list->pieces->steps;
     int n = 0;
@@ -299,7 +299,7 @@ static kernel_bound kernel_subinterval_bound(const kernel_bisection *h, const ke
                                              const double *step)
 {
     float side[2];
-    kernel_step_side(h, sub->middle.v, side);
+    kernel_range_between_steps(h, sub->middle.v, side);
     if (step)
         return kernel_bound_of_values(h->list->pieces,
                                       fmin(sub->low, (double)nextafterf(kernel_step_cut(*step), -3e38f)),
@@ -329,7 +329,7 @@ static void kernel_subinterval_add_segment(const kernel_bisection *h, vm lane, c
     const double x[2] = {from->v, sub->end.v}, length = (sub->end.t - from->t) * h->per_t;
     double rest[2] = {0, 0};
     float v[2] = {(float)x[0], (float)x[1]}, side[2];
-    kernel_step_side(h, sub->middle.v, side);
+    kernel_range_between_steps(h, sub->middle.v, side);
     for (int i = 0; i < 2 && !is_cut; i++) kernel_step_round(side, x[i], &v[i], &rest[i]);
     const float t0 = (float)from->t, t1 = (float)sub->end.t;
     const kernel_unit_segment run = kernel_exact_segment(length, v, rest);
@@ -353,7 +353,7 @@ static bool kernel_subinterval_is_good(const kernel_bisection *h, const kernel_s
 
 /* Divides a part of a ray's interval, whose ends and middle are known, into subintervals by bisection, and adds their
  * segments. lane: the ray's lane in its packet; from: begin of the part. */
-static void kernel_subinterval_halve(kernel_bisection *h, int lane, kernel_exact_point from, kernel_subinterval whole)
+static void kernel_subinterval_bisect(kernel_bisection *h, int lane, kernel_exact_point from, kernel_subinterval whole)
 {
     const kernel_segments *list = h->list;
     const vm only = vm_from_bits(1u << lane);
@@ -381,7 +381,7 @@ static void kernel_subinterval_halve(kernel_bisection *h, int lane, kernel_exact
         kernel_subinterval near = {.end = sub.middle, .middle = first, sub.depth + 1, sub.is_monotone};
         kernel_subinterval far = {.end = sub.end, .middle = third, sub.depth + 1, sub.is_monotone};
         if (step && sub.is_monotone) {
-            near.end = kernel_exact_point_where(h, &from, &sub.end, *step);
+            near.end = kernel_exact_point_of_value(h, &from, &sub.end, *step);
             near.middle = kernel_exact_point_between(h, &from, &near.end, 0.5);
             far.middle = kernel_exact_point_between(h, &near.end, &far.end, 0.5);
         }
@@ -400,7 +400,7 @@ static __attribute__((noinline, cold)) void kernel_interval_bisect(kernel_packet
     const bool is_flat = f->job->camera.is_orthographic;
     double map[4][8];
     double px[SIMD_WIDTH], py[SIMD_WIDTH];
-    kernel_packet_lanes(p, px, py);
+    kernel_packet_ray_parameters(p, px, py);
     kernel_exact_setup(map, p, c, &f->volumes[list->volume]);
     for (unsigned bits = vm_bits(rays); bits; bits &= bits - 1) {
         const int n = __builtin_ctz(bits);
@@ -430,7 +430,7 @@ static __attribute__((noinline, cold)) void kernel_interval_bisect(kernel_packet
         begin.t = (double)t0[n];
         sub.end.t = (double)t1[n];
         sub.middle = kernel_exact_point_between(&h, &from, &sub.end, 0.5);
-        kernel_subinterval_halve(&h, n, begin, sub);
+        kernel_subinterval_bisect(&h, n, begin, sub);
     }
 }
 
@@ -443,13 +443,13 @@ SIMD_INLINE kernel_unit_segment kernel_tet_segment(const kernel_packet *p, const
                                                    const kernel_interval *i)
 {
     kernel_unit_segment run = kernel_unit_segment_of(i->t_out - i->t_in, i->v_in, i->v_out);
-    if (list->is_double) kernel_tet_double(p, c, faces, list->u, list->v, i->mask, &run);
+    if (list->is_double) kernel_tet_segment_in_double(p, c, faces, list->u, list->v, i->mask, &run);
     run.length *= list->per_t;
     return run;
 }
 
 /* Adds the rays' intervals in a tet as one segment each, which only surfaces cut. faces: the tet's faces in double
- * (kernel_double_begin()); read only if list->is_double is set. */
+ * (kernel_double_compute_faces()); read only if list->is_double is set. */
 static __attribute__((noinline)) void kernel_tet_segments(kernel_packet *p, kernel_segments *list, const kernel_cell *c,
                                                           const kernel_double_face faces[4], vm rays)
 {
@@ -503,7 +503,7 @@ static void kernel_polyhedron_interval_fill(kernel_packet *p, kernel_samples *s,
     int begin, end;
     kernel_sample_range(p, s, i, &begin, &end);
     if (begin >= end) return;
-    if (!r->cell->is_constant) kernel_poly_profile(r);
+    if (!r->cell->is_constant) kernel_poly_prepare_profile(r);
     kernel_profile_begin(r, &piece);
     while (vm_any(kernel_profile_continues(r, &piece, i->mask))) {
         kernel_profile_next(r, r->u_out, &piece);
@@ -543,7 +543,7 @@ static void kernel_polyhedron_segments(kernel_packet *p, kernel_segments *list, 
     kernel_interval piece;
     if (!c || !kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
     while (kernel_poly_next(&r)) {
-        if (!c->is_constant) kernel_poly_profile(&r);
+        if (!c->is_constant) kernel_poly_prepare_profile(&r);
         kernel_profile_begin(&r, &piece);
         for (;;) {
             piece.mask = kernel_profile_continues(&r, &piece, piece.mask);

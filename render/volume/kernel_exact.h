@@ -61,7 +61,7 @@ typedef struct kernel_double_face {
 SIMD_INLINE void kernel_double_rays_of(const kernel_packet *p, kernel_f64 u[2], kernel_f64 v[2])
 {
     double px[SIMD_WIDTH], py[SIMD_WIDTH];
-    kernel_packet_lanes(p, px, py);
+    kernel_packet_ray_parameters(p, px, py);
     for (int i = 0; i < SIMD_WIDTH; i++) {
         px[i] -= p->tile->centre_x;
         py[i] -= p->tile->centre_y;
@@ -108,8 +108,8 @@ SIMD_INLINE void kernel_double_edge(const kernel_double_vertex *a, const kernel_
 
 /* Computes the affine functions of one face from the tet's vertices (spots) and edge functions. face: a row of
  * kernel_tet_face, with three vertices and three edges; radius: upper bound of the rays' |u| and |v|. */
-SIMD_INLINE void kernel_double_sums(const kernel_double_vertex *spots, double (*const edges)[3],
-                                    const signed char *face, double radius, kernel_double_face *out)
+SIMD_INLINE void kernel_double_compute_face(const kernel_double_vertex *spots, double (*const edges)[3],
+                                            const signed char *face, double radius, kernel_double_face *out)
 {
     const kernel_double_vertex *i = &spots[face[0]], *j = &spots[face[1]], *k = &spots[face[2]];
     const double *ij = edges[face[3]], *jk = edges[face[4]], *ik = edges[face[5]];
@@ -123,9 +123,9 @@ SIMD_INLINE void kernel_double_sums(const kernel_double_vertex *spots, double (*
 }
 
 /* Computes the affine functions of a tet's four faces. The tet's vertices must have been sorted by coordinates. */
-static __attribute__((noinline)) void kernel_double_begin(const kernel_frame *f, const kernel_tile *tile,
-                                                          const kernel_cell *c, const kernel_transfer *transfer,
-                                                          kernel_double_face faces[4])
+static __attribute__((noinline)) void kernel_double_compute_faces(const kernel_frame *f, const kernel_tile *tile,
+                                                                  const kernel_cell *c, const kernel_transfer *transfer,
+                                                                  kernel_double_face faces[4])
 {
     kernel_double_vertex spots[4];
     double edges[KERNEL_TET_EDGES][3];
@@ -135,7 +135,8 @@ static __attribute__((noinline)) void kernel_double_begin(const kernel_frame *f,
     }
     for (int n = 0; n < KERNEL_TET_EDGES; n++)
         kernel_double_edge(&spots[kernel_tet_edge[n][0]], &spots[kernel_tet_edge[n][1]], edges[n]);
-    for (int n = 0; n < 4; n++) kernel_double_sums(spots, edges, kernel_tet_face[n], (double)tile->radius, &faces[n]);
+    for (int n = 0; n < 4; n++)
+        kernel_double_compute_face(spots, edges, kernel_tet_face[n], (double)tile->radius, &faces[n]);
 }
 
 /* ---- rays in a tet ---- */
@@ -148,23 +149,23 @@ SIMD_INLINE kernel_f64 kernel_affine_at(const double c[3], kernel_f64 u, kernel_
 
 /* Rounds doubles to float32, and stores them in one half of the lanes of *v, and the rounding errors in the same half
  * of *rest. */
-SIMD_INLINE void kernel_double_value(kernel_f64 value, int half, vf *v, vf *rest)
+SIMD_INLINE void kernel_store_rounded_doubles(kernel_f64 value, int half, vf *v, vf *rest)
 {
-    kernel_f64_store_lanes(v, half, value);
-    kernel_f64_store_lanes(rest, half, value - kernel_f64_of(v, half));
+    kernel_f64_store_half_of_vector(v, half, value);
+    kernel_f64_store_half_of_vector(rest, half, value - kernel_f64_widen_half(v, half));
 }
 
 /* Computes a tet's segment in double on the rays (u, v), and stores it in one half of the lanes of *out; the length is
  * in units of t. hit: for each face, the rays that cross it, decided in float32. Returns the rays for which the segment
  * is valid: those that cross two faces, none of which is seen edge on. */
-SIMD_INLINE kernel_f64_mask kernel_double_half(const kernel_double_face faces[4], kernel_f64 u, kernel_f64 v,
-                                               const vm hit[4], int half, kernel_unit_segment *out)
+SIMD_INLINE kernel_f64_mask kernel_double_segment_half(const kernel_double_face faces[4], kernel_f64 u, kernel_f64 v,
+                                                       const vm hit[4], int half, kernel_unit_segment *out)
 {
     kernel_f64 t[2] = {{0}, {0}}, value[2] = {{0}, {0}};
     kernel_f64_mask met[2] = {{0}, {0}}, sound = ~(kernel_f64_mask){0};
     for (int n = 0; n < 4; n++) {
         const kernel_double_face *face = &faces[n];
-        const kernel_f64_mask hits = kernel_f64_of_mask(hit[n], half);
+        const kernel_f64_mask hits = kernel_f64_mask_of_half(hit[n], half);
         const kernel_f64 weight = kernel_affine_at(face->weight, u, v), inverse = 1.0 / weight;
         const kernel_f64 depth = kernel_affine_at(face->depth, u, v) * inverse;
         const kernel_f64 own = kernel_affine_at(face->value, u, v) * inverse;
@@ -178,26 +179,28 @@ SIMD_INLINE kernel_f64_mask kernel_double_half(const kernel_double_face faces[4]
         }
     }
     const kernel_f64_mask swap = (kernel_f64_mask)(t[1] < t[0]);
-    kernel_f64_store_lanes(&out->length, half,
-                           kernel_f64_select(swap, t[0], t[1]) - kernel_f64_select(swap, t[1], t[0]));
-    kernel_double_value(kernel_f64_select(swap, value[1], value[0]), half, &out->v_in, &out->rest_in);
-    kernel_double_value(kernel_f64_select(swap, value[0], value[1]), half, &out->v_out, &out->rest_out);
+    kernel_f64_store_half_of_vector(&out->length, half,
+                                    kernel_f64_select(swap, t[0], t[1]) - kernel_f64_select(swap, t[1], t[0]));
+    kernel_store_rounded_doubles(kernel_f64_select(swap, value[1], value[0]), half, &out->v_in, &out->rest_in);
+    kernel_store_rounded_doubles(kernel_f64_select(swap, value[0], value[1]), half, &out->v_out, &out->rest_out);
     return sound & met[0] & met[1];
 }
 
 /* Replaces the length and the values of *run, a tet's segment in float32, by those computed in double, on the given
  * rays for which these are valid. The length is in units of t. */
-static __attribute__((noinline)) void kernel_tet_double(const kernel_packet *p, const kernel_cell *c,
-                                                        const kernel_double_face faces[4], const kernel_f64 u[2],
-                                                        const kernel_f64 v[2], vm active, kernel_unit_segment *run)
+static __attribute__((noinline)) void kernel_tet_segment_in_double(const kernel_packet *p, const kernel_cell *c,
+                                                                   const kernel_double_face faces[4],
+                                                                   const kernel_f64 u[2], const kernel_f64 v[2],
+                                                                   vm active, kernel_unit_segment *run)
 {
     kernel_unit_segment exact = *run;
     vf sound = vf_set(0);
     vm hit[4];
     kernel_tet_faces(p, c, active, hit);
     for (int half = 0; half < 2; half++) {
-        const kernel_f64_mask is_sound = kernel_double_half(faces, u[half], v[half], hit, half, &exact);
-        kernel_f64_store_lanes(&sound, half, kernel_f64_select(is_sound, (kernel_f64){0} + 1, (kernel_f64){0}));
+        const kernel_f64_mask is_sound = kernel_double_segment_half(faces, u[half], v[half], hit, half, &exact);
+        kernel_f64_store_half_of_vector(&sound, half,
+                                        kernel_f64_select(is_sound, (kernel_f64){0} + 1, (kernel_f64){0}));
     }
     const vm better = vm_and(active, vf_lt(vf_set(0), sound));
     run->length = vf_select(better, exact.length, run->length);

@@ -79,8 +79,8 @@ enum { KERNEL_LOCAL_PIXELS = KERNEL_TILE * KERNEL_TILE, KERNEL_LOCAL_LEVELS = 5,
  * of the vertices' values. If there is one segment, its ends exceed them by at most 3/16 of the values' range
  * (kernel_local_leaves_range()). If there are several, their ends exceed them by a sixth of the quadratic part's
  * maximum, which is less than that. */
-SIMD_INLINE void kernel_local_bound(const kernel_frame *f, int volume, const float (*values)[SIMD_WIDTH], int type,
-                                    kernel_local_bounds *out)
+SIMD_INLINE void kernel_local_set_bounds(const kernel_frame *f, int volume, const float (*values)[SIMD_WIDTH], int type,
+                                         kernel_local_bounds *out)
 {
     const kernel_pieces *t = &f->pieces[volume];
     vf low = vf_load(values[0]), high = low, light[KERNEL_LIGHT_ENTRIES];
@@ -116,7 +116,7 @@ SIMD_INLINE void kernel_local_bound_of_cell(const kernel_frame *f, int volume, c
     for (int i = 0; i < c->count; i++) vf_store(values[i], vf_set(c->f[i]));
     vf_store(out->sensitivity, vf_set(0));
     vf_store(out->residual_limit, vf_set(0));
-    kernel_local_bound(f, volume, (const float(*)[SIMD_WIDTH])values, c->type, out);
+    kernel_local_set_bounds(f, volume, (const float(*)[SIMD_WIDTH])values, c->type, out);
     vf_store(out->bend, vf_set(1));
     vf_store(out->unsampled, kernel_local_nonlinear_unsampled(c->type) * (vf_load(out->high) - vf_load(out->low)));
 }

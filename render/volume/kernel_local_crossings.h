@@ -37,9 +37,9 @@ SIMD_INLINE void kernel_local_transpose(vf v[KERNEL_LOCAL_ROW], vi number, int a
 
 /* Stores row number `row` of the numbers of every lane's cell (out->rows), by transposing two lists of up to 8 vectors
  * each, in which lanes are cells. */
-SIMD_INLINE void kernel_local_row_of(const float (*first)[SIMD_WIDTH], int first_count,
-                                     const float (*second)[SIMD_WIDTH], int second_count, int row,
-                                     kernel_transformed_curved *out)
+SIMD_INLINE void kernel_local_store_row(const float (*first)[SIMD_WIDTH], int first_count,
+                                        const float (*second)[SIMD_WIDTH], int second_count, int row,
+                                        kernel_transformed_curved *out)
 {
     static const int32_t numbers[KERNEL_LOCAL_ROW] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
     vf v[KERNEL_LOCAL_ROW];
@@ -75,8 +75,8 @@ SIMD_INLINE void kernel_local_ray_box(const kernel_tile *tile, int32_t ends[4][S
 /* Computes what rays need of the faces of all lanes' cells: the order of their corners, and which quads may look
  * nonconvex. Positions, ranks and field must be set in *cells. ends: first and last column and row of each cell
  * (kernel_local_pixels()). */
-SIMD_INLINE void kernel_local_faces_of(const kernel_tile *tile, kernel_transformed_curved *cells,
-                                       int32_t ends[4][SIMD_WIDTH], int type)
+SIMD_INLINE void kernel_local_compute_faces(const kernel_tile *tile, kernel_transformed_curved *cells,
+                                            int32_t ends[4][SIMD_WIDTH], int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
     const int count = grid_type_vertices(type);
@@ -98,8 +98,8 @@ SIMD_INLINE void kernel_local_faces_of(const kernel_tile *tile, kernel_transform
     }
     if (SIMD_WIDTH < KERNEL_LOCAL_ROW) return;
     const float(*words)[SIMD_WIDTH] = (const float(*)[SIMD_WIDTH])(const void *)cells->corners;
-    for (int n = 0; n < 2; n++) kernel_local_row_of(cells->at[2 * n], count, cells->at[2 * n + 1], count, n, cells);
-    kernel_local_row_of(words, shape->face_count, NULL, 0, 2, cells);
+    for (int n = 0; n < 2; n++) kernel_local_store_row(cells->at[2 * n], count, cells->at[2 * n + 1], count, n, cells);
+    kernel_local_store_row(words, shape->face_count, NULL, 0, 2, cells);
 }
 
 /* ---- rays ---- */

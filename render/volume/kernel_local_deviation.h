@@ -302,7 +302,7 @@ SIMD_INLINE void kernel_local_places_halve(const kernel_local_chord *c, const ke
 
 /* Returns the number at position u of a whole interval (-1/2 to 1/2), at whose ends it is `first` and `last`, by linear
  * interpolation. */
-SIMD_INLINE vf kernel_local_along(vf first, vf last, float u)
+SIMD_INLINE vf kernel_local_interpolate(vf first, vf last, float u)
 {
     if (u < 0.5f) return first + (last - first) * (u + 0.5f);
     return last;
@@ -310,8 +310,8 @@ SIMD_INLINE vf kernel_local_along(vf first, vf last, float u)
 
 /* Makes *out the rays with a part of their intervals: the part's ends, and the field's deviations from the chord
  * between these. whole: the rays with their whole intervals; p: the part's places; rays: the active ones. */
-SIMD_INLINE void kernel_local_pairs_of(const kernel_local_pairs *whole, const kernel_local_places *p, vm rays,
-                                       kernel_local_pairs *out)
+SIMD_INLINE void kernel_local_make_part(const kernel_local_pairs *whole, const kernel_local_places *p, vm rays,
+                                        kernel_local_pairs *out)
 {
     const kernel_point *first = &whole->ends[0], *last = &whole->ends[1];
     *out = *whole;
@@ -319,8 +319,8 @@ SIMD_INLINE void kernel_local_pairs_of(const kernel_local_pairs *whole, const ke
     out->share = whole->share * p->width;
     for (int n = 0; n < 2; n++) {
         const float u = p->u + (float)n * p->width;
-        out->ends[n].t = kernel_local_along(first->t, last->t, u);
-        out->ends[n].value = kernel_local_along(first->value, last->value, u) + p->off[4 * n];
+        out->ends[n].t = kernel_local_interpolate(first->t, last->t, u);
+        out->ends[n].value = kernel_local_interpolate(first->value, last->value, u) + p->off[4 * n];
     }
     for (int i = 0; i < 3; i++)
         out->field[i] = p->off[i + 1] - vf_muladd(p->off[4] - p->off[0], vf_set(0.25f * (float)(i + 1)), p->off[0]);
@@ -353,7 +353,7 @@ SIMD_INLINE vm kernel_local_move_end(const kernel_local_chord *c, const kernel_p
     const vm known = kernel_local_newton(c, &u, 1, rays, type, &at, &residual);
     at.t = t;
     at.value = (ends[0].value + (ends[1].value - ends[0].value) * along) + at.value;
-    kernel_point_move(rays, &at, out);
+    kernel_point_copy_lanes(rays, &at, out);
     return vm_andnot(rays, known);
 }
 

@@ -102,11 +102,12 @@ SIMD_INLINE void kernel_tile_cells_set_part(const kernel_tile_trace *t, kernel_t
 /* Reads the field at the vertices of the current vector's cells (`count` per cell), and converts it to the transfer
  * function's domain, clamped to [-1e18, 1e18]. Returns the lanes whose cells are drawn, have only finite values, and
  * have visible values. */
-SIMD_INLINE vm kernel_local_domain(const kernel_transfer *t, const kernel_tile_cells *cells, int count, vf values[8])
+SIMD_INLINE vm kernel_local_read_values(const kernel_transfer *t, const kernel_tile_cells *cells, int count,
+                                        vf values[8])
 {
     const kernel_arrays *p = &cells->arrays;
     vf plain[8], odd = vf_set(0);
-    vm finite = vm_from_bits(kernel_arrays_drawn(p, cells->current->cell, (1u << SIMD_WIDTH) - 1));
+    vm finite = vm_from_bits(kernel_arrays_drawn_lanes(p, cells->current->cell, (1u << SIMD_WIDTH) - 1));
     for (int i = 0; i < count; i++) {
         vi vertex;
         memcpy(&vertex, p->is_by_cell ? (const void *)cells->current->cell : cells->curved.vertex[i], sizeof vertex);
@@ -114,9 +115,9 @@ SIMD_INLINE vm kernel_local_domain(const kernel_transfer *t, const kernel_tile_c
         kernel_numbers_gather(&p->values, vertex, all);
         for (int half = 0; half < 2; half++) {
             const kernel_f64 v = all[half];
-            kernel_f64_store_lanes(&odd, half, v - v);
-            kernel_f64_store_lanes(&plain[i], half, kernel_f64_clamp(v, 3e38));
-            kernel_f64_store_lanes(&values[i], half, kernel_f64_clamp((v - t->low) * t->inverse_width, 1e18));
+            kernel_f64_store_half_of_vector(&odd, half, v - v);
+            kernel_f64_store_half_of_vector(&plain[i], half, kernel_f64_clamp(v, 3e38));
+            kernel_f64_store_half_of_vector(&values[i], half, kernel_f64_clamp((v - t->low) * t->inverse_width, 1e18));
         }
         finite = vm_and(finite, vf_eq(odd, odd));
     }
@@ -182,13 +183,13 @@ SIMD_INLINE unsigned kernel_local_transform_of_type(const kernel_tile_trace *t, 
     vf places[3][8], values[8];
     for (int i = 0; i < count; i++) memcpy(vertices[i], cells->current->vertex[i], sizeof vertices[i]);
     const vm collapsed = kernel_transform_curved_vertices(h, &cells->arrays, t->frame, &t->tile, vertices, type);
-    const vm shows = kernel_local_domain(&t->frame->volumes[cells->volume], cells, count, values);
+    const vm shows = kernel_local_read_values(&t->frame->volumes[cells->volume], cells, count, values);
     for (int i = 0; i < count; i++) {
         for (int a = 0; a < 3; a++) places[a][i] = vf_load(h->at[a][i]);
         vf_store(h->at[3][i], values[i]);
     }
     kernel_local_pixels(t, count, (const vf(*)[8])places, cells->pixel_ends);
-    const vm smooth = kernel_local_setup(type, (const vf(*)[8])places, values, most_bent, &cells->maps);
+    const vm smooth = kernel_local_compute_maps(type, (const vf(*)[8])places, values, most_bent, &cells->maps);
     *lanes = vm_bits(vm_andnot(vm_and(shows, smooth), collapsed));
     return vm_bits(shows);
 }

@@ -137,7 +137,7 @@ SIMD_INLINE void kernel_local_fill_lanes(kernel_tile_trace *t, kernel_tile_volum
     kernel_lane_rays_of(&rays, &t->tile, bits & (KERNEL_TILE_PIXELS - 1), bits >> KERNEL_LOCAL_LANE);
     const vf place[3] = {rays.rays.origin_x + rays.rays.slope_x * depth, rays.rays.origin_y + rays.rays.slope_y * depth,
                          depth};
-    const vm known = kernel_local_find(type, &cells->maps, rays.lane, place, &points);
+    const vm known = kernel_local_invert_maps(type, &cells->maps, rays.lane, place, &points);
     const vf inside = kernel_local_border_distance(type, points.r),
              error_bound = kernel_gather_lane(cells->maps.error_bound, rays.lane);
     const vm own = vm_and(vm_and(active, known), vf_lt(error_bound, inside));
@@ -203,7 +203,7 @@ SIMD_INLINE void kernel_local_queue_samples_lanes(kernel_tile_trace *t, const ke
 static __attribute__((noinline)) void kernel_local_queue_samples(kernel_tile_trace *t, int type)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
-    kernel_pixel_list_close(&cells->rays);
+    kernel_pixel_list_pad(&cells->rays);
     for (int n = 0; n < cells->rays.count; n += SIMD_WIDTH) kernel_local_queue_samples_lanes(t, cells, type, n);
     cells->rays.count = 0;
 }

@@ -146,7 +146,7 @@ SIMD_INLINE void kernel_local_divide_intervals(kernel_tile_trace *t, const kerne
     for (int count = 1; count > 0;) {
         const kernel_local_places places = stack[--count];
         kernel_local_pairs part;
-        kernel_local_pairs_of(whole, &places, mine[count], &part);
+        kernel_local_make_part(whole, &places, mine[count], &part);
         part.active = vm_and(part.active, vf_lt(part.begin, part.ends[1].t));
         const vm fails = vm_or(kernel_local_count(t->frame, b->volume, bounds, &part), part.has_diverged);
         /* if packets process a cell, nothing bounds the deviation that the three inner places of the whole interval
@@ -371,8 +371,8 @@ SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_tile_s
 
 /* Adds those of the rays from index n on of the list of pixels to KERNEL_LOCAL_MET that may meet their cells within the
  * window. */
-SIMD_INLINE void kernel_local_segments_overlap(const kernel_tile_trace *t, const kernel_tile_cells *cells,
-                                               kernel_tile_segments *b, int n)
+SIMD_INLINE void kernel_local_segments_list_met(const kernel_tile_trace *t, const kernel_tile_cells *cells,
+                                                kernel_tile_segments *b, int n)
 {
     const int left = cells->rays.count - n;
     const vm active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
@@ -402,9 +402,9 @@ static __attribute__((noinline)) void kernel_local_segments_cast(kernel_tile_tra
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
     kernel_tile_segments *b = t->thread->tile_segments;
-    kernel_pixel_list_close(&cells->rays);
+    kernel_pixel_list_pad(&cells->rays);
     b->list_count[KERNEL_LOCAL_MET] = 0;
-    for (int n = 0; n < cells->rays.count; n += SIMD_WIDTH) kernel_local_segments_overlap(t, cells, b, n);
+    for (int n = 0; n < cells->rays.count; n += SIMD_WIDTH) kernel_local_segments_list_met(t, cells, b, n);
     KERNEL_OF_TYPE(type, kernel_local_segments_met, t, b);
     cells->rays.count = 0;
 }
@@ -415,9 +415,9 @@ static __attribute__((noinline)) void kernel_local_segments_cast(kernel_tile_tra
 SIMD_INLINE void kernel_local_segments_prepare(const kernel_tile_trace *t, kernel_tile_cells *cells,
                                                kernel_tile_segments *s, int type)
 {
-    kernel_local_faces_of(&t->tile, &cells->curved, cells->pixel_ends, type);
+    kernel_local_compute_faces(&t->tile, &cells->curved, cells->pixel_ends, type);
     kernel_local_nonlinear_of(&cells->maps, type, &s->bounds);
-    kernel_local_bound(t->frame, s->volume, (const float(*)[SIMD_WIDTH])cells->curved.at[3], type, &s->bounds);
+    kernel_local_set_bounds(t->frame, s->volume, (const float(*)[SIMD_WIDTH])cells->curved.at[3], type, &s->bounds);
 }
 
 /* Transforms the current vector of cells into tile space. Returns a mask of the visible cells; *lanes: mask of those

@@ -108,7 +108,7 @@ SIMD_INLINE vf kernel_preint_channel(const kernel_preintegral *t, vi colour, int
 }
 
 /* Returns an upper bound of the deviation of a colour channel from its chord between two values. */
-SIMD_INLINE vf kernel_preint_bend(const kernel_preintegral *t, vf v0, vf v1)
+SIMD_INLINE vf kernel_preint_colour_deviation(const kernel_preintegral *t, vf v0, vf v1)
 {
     const vf width = vf_abs(v1 - v0), low = vf_min(v0, v1), high = vf_max(v0, v1);
     const vm outside = vm_or(vf_lt(low, vf_set(0)), vf_lt(vf_set(1), high));
@@ -144,7 +144,7 @@ SIMD_INLINE void kernel_preint_between(const kernel_preintegral *t, const kernel
         out->colour[c] = sum[1 + c] * mean - (0.25f * rise) * square;
     }
     const vf table_error = (a->table_error + b->table_error) * vf_min(one, 0.5f * inverse);
-    out->error = (0.25f * change + kernel_preint_bend(t, a->value, b->value)) * square;
+    out->error = (0.25f * change + kernel_preint_colour_deviation(t, a->value, b->value)) * square;
     out->table_error = table_error * length;
     out->allowed = out->absorbed * t->allowed_absorbed + length * t->allowed_length;
 }

@@ -124,8 +124,8 @@ static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p,
         const vf sign = p->frame->job->reproducible ? vf_set(FRAGMENT_LATE) : zero;
         const kernel_fragments clear = {t, t, {zero, zero, zero}, vf_set(1), sign};
         const kernel_fragments sample = {t, t, {colour[0], colour[1], colour[2]}, left, sign};
-        kernel_emit(p, mask, FRAGMENT_VOLUME, &clear);
-        kernel_emit(p, mask, FRAGMENT_VOLUME, &sample);
+        kernel_append_fragments(p, mask, FRAGMENT_VOLUME, &clear);
+        kernel_append_fragments(p, mask, FRAGMENT_VOLUME, &sample);
         return;
     }
     const vf error = vf_max(vf_abs(t), vf_set(1)) * RENDER_FACE_ERROR;
@@ -133,7 +133,7 @@ static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p,
     const vf late = vf_select(vf_lt(cell->t_out - t, error), vf_set(FRAGMENT_LATE), zero);
     const uint32_t kind = FRAGMENT_VOLUME + FRAGMENT_LAYER * (uint32_t)s->volume;
     const kernel_fragments sample = {t, t, {colour[0], colour[1], colour[2]}, left, early + late};
-    kernel_emit(p, mask, kind, &sample);
+    kernel_append_fragments(p, mask, kind, &sample);
 }
 
 /* Sets the values of those of the window's samples begin .. end - 1 that lie in the interval i. A sample keeps the
@@ -185,20 +185,22 @@ SIMD_INLINE void kernel_blend_close(kernel_packet *p, kernel_blend *b, vm mask)
     if (!vm_any(closing)) return;
     const kernel_fragments ended = {
         b->t_first, b->t_last, {b->colour[0], b->colour[1], b->colour[2]}, b->transmittance, vf_set(0)};
-    kernel_emit(p, vm_and(closing, kernel_fragment_is_visible(b->colour, b->transmittance)), FRAGMENT_VOLUME, &ended);
+    kernel_append_fragments(p, vm_and(closing, kernel_fragment_is_visible(b->colour, b->transmittance)),
+                            FRAGMENT_VOLUME, &ended);
     b->open = vm_andnot(b->open, closing);
 }
 
 /* Emits one sample or segment per ray in `has` as a fragment of its own, which render_fold.c joins with others later,
  * and marks those in front of which another rank may have fragments. The ray's current fragment then has no light of
  * its own, so that nothing is emitted when it ends. */
-SIMD_INLINE void kernel_blend_separate(kernel_packet *p, kernel_blend *b, vm has, vf t_in, vf t_out, const vf colour[3],
-                                       vf clear)
+SIMD_INLINE void kernel_emit_separate(kernel_packet *p, kernel_blend *b, vm has, vf t_in, vf t_out, const vf colour[3],
+                                      vf clear)
 {
     const vm fresh = vm_andnot(has, b->open);
     const kernel_fragments own = {
         t_in, t_out, {colour[0], colour[1], colour[2]}, clear, vf_select(fresh, vf_set(FRAGMENT_EARLY), vf_set(0))};
-    kernel_emit(p, vm_and(has, vm_or(fresh, kernel_fragment_is_visible(colour, clear))), FRAGMENT_VOLUME, &own);
+    kernel_append_fragments(p, vm_and(has, vm_or(fresh, kernel_fragment_is_visible(colour, clear))), FRAGMENT_VOLUME,
+                            &own);
     const vf interval_number = vf_floor(t_in * (float)FRAGMENT_INTERVALS);
     const vm next = vm_andnot(has, vf_eq(interval_number, b->interval_number));
     b->light = vf_select(next, b->within, b->light);
@@ -274,7 +276,7 @@ SIMD_INLINE void kernel_blend_window(kernel_packet *p, kernel_samples *s, const 
             b->contact_out = vf_select(has, s->t_out[n], b->contact_out);
         }
         if (is_folded) {
-            kernel_blend_separate(p, b, has, t, t, colour, clear);
+            kernel_emit_separate(p, b, has, t, t, colour, clear);
             continue;
         }
         b->t_first = vf_select(fresh, t, b->t_first);

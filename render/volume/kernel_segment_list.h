@@ -133,7 +133,7 @@ static void kernel_items_sort(kernel_segments *list, int lane)
 }
 
 /* Sets the light of unsorted segments to none on the ray in `lane`. */
-SIMD_INLINE void kernel_heap_clear(kernel_light *unsorted_light, int lane)
+SIMD_INLINE void kernel_unsorted_light_clear(kernel_light *unsorted_light, int lane)
 {
     for (int a = 0; a < 3; a++) unsorted_light->colour[a][lane] = 0;
     unsorted_light->depth[lane] = 0;
@@ -154,7 +154,7 @@ static __attribute__((noinline, cold)) bool kernel_segments_shorten(kernel_segme
         list->t_end[lane] = simd_max(t_in, first);
         if (t_in < first) {
             list->count[lane] = 0;
-            kernel_heap_clear(&list->unsorted_light, lane);
+            kernel_unsorted_light_clear(&list->unsorted_light, lane);
         }
     } else {
         while (items[count][0] == first) count++;
@@ -303,7 +303,7 @@ SIMD_INLINE kernel_unit_segment kernel_unit_segment_part(const kernel_unit_segme
 /* Returns where the part of a segment that begins at `from` ends, so that compositing can mix it. Positions are shares
  * of the segment's length. share: length of a part (kernel_mixed_share()); parts also end where the opacity has a step.
  */
-SIMD_INLINE vf kernel_mixed_end(const kernel_pieces *t, const kernel_unit_segment *whole, vf share, vf from)
+SIMD_INLINE vf kernel_mixed_part_end(const kernel_pieces *t, const kernel_unit_segment *whole, vf share, vf from)
 {
     const vf one = vf_set(1), inverse = one / (whole->v_out - whole->v_in);
     vf to = vf_select(vf_lt(from + 1.5f * share, one), from + share, one);
@@ -342,7 +342,7 @@ static void kernel_emit_segment(kernel_packet *p, const kernel_segments *list, v
                                 const kernel_unit_segment *whole)
 {
     const vf one = vf_set(1), black = vf_set(KERNEL_BLACK), share = kernel_mixed_share(list, whole);
-    vf from = vf_set(0), to = kernel_mixed_end(list->pieces, whole, share, from), depth = vf_set(0);
+    vf from = vf_set(0), to = kernel_mixed_part_end(list->pieces, whole, share, from), depth = vf_set(0);
     for (vm open = rays; vm_any(open);) {
         kernel_light light = kernel_light_none();
         const kernel_unit_segment run = kernel_unit_segment_part(whole, from, to);
@@ -354,12 +354,12 @@ static void kernel_emit_segment(kernel_packet *p, const kernel_segments *list, v
         const vm put = vm_andnot(open, cut);
         const kernel_fragments segment = {
             begin, end, {light.colour[0], light.colour[1], light.colour[2]}, light.transmittance, vf_set(0)};
-        kernel_emit(p, vm_and(put, kernel_fragment_is_visible(light.colour, light.transmittance)), FRAGMENT_VOLUME,
-                    &segment);
+        kernel_append_fragments(p, vm_and(put, kernel_fragment_is_visible(light.colour, light.transmittance)),
+                                FRAGMENT_VOLUME, &segment);
         depth += vf_select(put, light.depth, vf_set(0));
         open = vm_andnot(open, vm_and(put, vm_or(vf_eq(to, one), vf_lt(vf_set(KERNEL_DARK_DEPTH), depth))));
         from = vf_select(put, to, from);
-        to = vf_select(cut, middle, vf_select(put, kernel_mixed_end(list->pieces, whole, share, from), to));
+        to = vf_select(cut, middle, vf_select(put, kernel_mixed_part_end(list->pieces, whole, share, from), to));
     }
 }
 

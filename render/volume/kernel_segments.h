@@ -136,15 +136,15 @@ static void kernel_blend_segments(kernel_packet *p, kernel_segments *list)
             kernel_integrate(pieces, has, &run, &light);
         kernel_segments_close(p, b, vm_and(has, kernel_segment_breaks(p, list, t_in, t_out)));
         if (p->frame->job->reproducible)
-            kernel_blend_separate(p, b, has, t_in, t_out, light.colour, light.transmittance);
+            kernel_emit_separate(p, b, has, t_in, t_out, light.colour, light.transmittance);
         else
             kernel_blend_light(b, has, t_in, t_out, &light);
     }
     const vm heaped = kernel_fragment_is_visible(list->unsorted_light.colour, list->unsorted_light.transmittance);
     if (!vm_any(heaped)) return;
     if (p->frame->job->reproducible)
-        kernel_blend_separate(p, b, heaped, b->t_last, b->t_last, list->unsorted_light.colour,
-                              list->unsorted_light.transmittance);
+        kernel_emit_separate(p, b, heaped, b->t_last, b->t_last, list->unsorted_light.colour,
+                             list->unsorted_light.transmittance);
     else
         kernel_blend_light(b, heaped, b->t_last, b->t_last, &list->unsorted_light);
 }

@@ -131,8 +131,8 @@ static __attribute__((noinline)) unsigned kernel_tile_transform_cell(kernel_tile
     const unsigned meets = kernel_tile_visible_blocks(t, places, c->count, blocks);
     if (!meets) return 0;
     kernel_cell_order(c);
-    kernel_cell_domain(c, transfer);
-    if (cells->method->is_pencil || kernel_is_linear(c->type)) kernel_cell_lines(c, t->frame, &t->tile);
+    kernel_cell_map_values_to_domain(c, transfer);
+    if (cells->method->is_pencil || kernel_is_linear(c->type)) kernel_cell_compute_lines(c, t->frame, &t->tile);
     if (kernel_is_linear(c->type)) return meets & kernel_tet_blocks(cells, c);
     if (!c->is_constant) kernel_map_setup(&cells->map, c);
     return meets;
@@ -189,12 +189,12 @@ SIMD_INLINE unsigned kernel_blocks_box(unsigned blocks)
 /* ---- SIMD_WIDTH tets at once ---- */
 
 /* Sets f of the transformed tets to the values in the transfer function's domain. */
-SIMD_INLINE void kernel_transformed_domain(kernel_transformed_tets *transformed, const kernel_transfer *t)
+SIMD_INLINE void kernel_transformed_set_domain(kernel_transformed_tets *transformed, const kernel_transfer *t)
 {
     for (int half = 0; half < 2; half++)
         for (int i = 0; i < 4; i++) {
             const kernel_f64 f = (transformed->values[i][half] - t->low) * t->inverse_width;
-            kernel_f64_store_lanes(&transformed->f[i], half, kernel_f64_clamp(f, 1e18));
+            kernel_f64_store_half_of_vector(&transformed->f[i], half, kernel_f64_clamp(f, 1e18));
         }
 }
 
@@ -211,8 +211,8 @@ SIMD_INLINE unsigned kernel_transformed_tets_visible(const kernel_tile_trace *t,
     for (int i = 0; i < 4; i++) {
         for (int half = 0; half < 2; half++) {
             const kernel_f64 own = transformed->values[i][half];
-            kernel_f64_store_lanes(&odd, half, own - own);
-            kernel_f64_store_lanes(&v[i], half, kernel_f64_clamp(own, 3e38));
+            kernel_f64_store_half_of_vector(&odd, half, own - own);
+            kernel_f64_store_half_of_vector(&v[i], half, kernel_f64_clamp(own, 3e38));
         }
         is_finite = vm_and(is_finite, vf_eq(odd, odd));
     }
@@ -238,13 +238,13 @@ SIMD_INLINE unsigned kernel_tile_transform_tets(kernel_tile_trace *t, kernel_til
     kernel_local_read_indices(arrays, q, count, GRID_TET);
     for (int i = 0; i < 4; i++) memcpy(vertices[i], q->vertex[i], sizeof vertices[i]);
     kernel_transform_tets(&cells->tets, arrays, t->frame, &t->tile, vertices, count);
-    kernel_transformed_domain(&cells->tets, transfer);
+    kernel_transformed_set_domain(&cells->tets, transfer);
     unsigned candidates =
         kernel_transformed_tets_visible(t, &cells->tets, &transfer->visible_values, near) & ((1u << count) - 1);
-    candidates = kernel_arrays_drawn(arrays, q->cell, candidates);
+    candidates = kernel_arrays_drawn_lanes(arrays, q->cell, candidates);
     for (; candidates; candidates &= candidates - 1) {
         const int n = __builtin_ctz(candidates);
-        q->blocks[n] &= (uint16_t)kernel_blocks_beyond(t, near[n]);
+        q->blocks[n] &= (uint16_t)kernel_blocks_not_hidden_at(t, near[n]);
         lanes |= (unsigned)(q->blocks[n] != 0) << n;
     }
     return lanes;
@@ -276,7 +276,7 @@ static unsigned kernel_tile_list_small_tets(const kernel_tile_trace *t, unsigned
         else
             kernel_pixel_list_add_box(&cells->rays, box, n);
     }
-    kernel_pixel_list_close(&cells->rays);
+    kernel_pixel_list_pad(&cells->rays);
     return others;
 }
 
@@ -426,7 +426,7 @@ SIMD_INLINE void kernel_volume_trees(kernel_tile_trace *t, unsigned blocks)
 
 /* Partitions the items by their least depth: no item before the returned index is farther than the others. There is at
  * least one item before the index and one from it on. */
-static inline int kernel_depth_bin_of(kernel_tile_candidate *items, int count)
+static inline int kernel_partition_by_depth(kernel_tile_candidate *items, int count)
 {
     const float a = items[0].near, b = items[count / 2].near, c = items[count - 1].near;
     const float least = a < b ? a : b, most = a < b ? b : a;
@@ -450,7 +450,7 @@ static void kernel_order_by_depth(kernel_tile_candidate *items, int count)
 {
     enum { PIECE = 8 };
     while (count > PIECE) {
-        const int middle = kernel_depth_bin_of(items, count);
+        const int middle = kernel_partition_by_depth(items, count);
         const bool is_first = middle < count - middle;
         kernel_order_by_depth(is_first ? items : items + middle, is_first ? middle : count - middle);
         items += is_first ? middle : 0;
@@ -470,7 +470,7 @@ static __attribute__((noinline)) void kernel_tile_cells_sort(kernel_tile_cells *
     kernel_tile_candidate *items = cells->items + cells->sorted;
     int count = cells->ends[cells->end_count - 1] - cells->sorted;
     while (count > KERNEL_SORT_PIECE && cells->end_count < KERNEL_SORT_ENDS) {
-        count = kernel_depth_bin_of(items, count);
+        count = kernel_partition_by_depth(items, count);
         cells->ends[cells->end_count++] = cells->sorted + count;
     }
     kernel_order_by_depth(items, count);
@@ -540,7 +540,7 @@ SIMD_INLINE void kernel_volume_candidates(kernel_tile_trace *t, unsigned blocks)
     for (int n = 0; n < cells->open_count; n++) {
         const kernel_tile_candidate *item = &cells->items[n];
         if (n % KERNEL_OPEN_PIECE == 0) kernel_tile_prefetch_window(t, cells, n);
-        const unsigned met = item->blocks & blocks & kernel_blocks_beyond(t, item->near);
+        const unsigned met = item->blocks & blocks & kernel_blocks_not_hidden_at(t, item->near);
         if (met && !kernel_tile_enqueue(t, (int)item->source, item->cell, met, item->box))
             kernel_tile_process_cell(t, (int)item->source, item->cell, met);
     }

@@ -59,7 +59,7 @@ SIMD_INLINE float kernel_depth_next_window(const kernel_tile_volume *d, float at
 }
 
 /* Takes into account how much light is left on a packet's rays after the window. */
-SIMD_INLINE void kernel_depth_add(kernel_tile_volume *d, vm rays, const kernel_blend *b)
+SIMD_INLINE void kernel_depth_add_packet(kernel_tile_volume *d, vm rays, const kernel_blend *b)
 {
     const vf far = vf_set(INFINITY);
     const vm met = vm_and(rays, vf_lt(b->light, vf_set(1))), lit = vm_and(met, vf_lt(vf_set(KERNEL_DARK), b->light));

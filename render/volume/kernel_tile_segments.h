@@ -46,7 +46,7 @@ static void kernel_tile_cell_segments(kernel_tile_trace *t, int part, const kern
 {
     kernel_tile_segments *s = t->thread->tile_segments;
     if (kernel_is_linear(c->type) && t->frame->is_double)
-        kernel_double_begin(t->frame, &t->tile, c, &t->frame->volumes[0], s->precise);
+        kernel_double_compute_faces(t->frame, &t->tile, c, &t->frame->volumes[0], s->precise);
     for (unsigned left = blocks; left; left &= left - 1) {
         const int first = __builtin_ctz(left) * KERNEL_BLOCK_PACKETS;
         for (int i = first; i < first + KERNEL_BLOCK_PACKETS; i++) {
@@ -126,8 +126,8 @@ SIMD_INLINE void kernel_ray_segments_begin(kernel_packet *p, kernel_segments *li
 {
     const kernel_frame *f = p->frame;
     double px[SIMD_WIDTH], py[SIMD_WIDTH];
-    kernel_packet_lanes(p, px, py);
-    kernel_packet_samples(p, px, py);
+    kernel_packet_ray_parameters(p, px, py);
+    kernel_packet_set_samples(p, px, py);
     p->is_pencil = false;
     list->active = p->active;
     list->blend = kernel_blend_begin();

@@ -149,8 +149,8 @@ SIMD_INLINE void kernel_ray_samples_begin(kernel_packet *p, kernel_samples *s, f
                                           int *last)
 {
     double px[SIMD_WIDTH], py[SIMD_WIDTH];
-    kernel_packet_lanes(p, px, py);
-    kernel_packet_samples(p, px, py);
+    kernel_packet_ray_parameters(p, px, py);
+    kernel_packet_set_samples(p, px, py);
     s->active = p->active;
     s->blend = kernel_blend_begin();
     s->overlap_depth = vf_set(INFINITY);
@@ -221,7 +221,7 @@ SIMD_INLINE void kernel_tile_window_blend(kernel_tile_trace *t, kernel_tile_volu
         const int i = packets[n];
         kernel_samples *s = &v->packets[i];
         if (vm_any(t->packets[i].active)) kernel_blend_window(&t->packets[i], s, &t->hits[i]);
-        kernel_depth_add(v, s->active, &s->blend);
+        kernel_depth_add_packet(v, s->active, &s->blend);
     }
     kernel_depth_end_window(v, (float)samples * t->packets[packets[0]].sample_step[0]);
 }
