@@ -95,8 +95,9 @@ MMBVH_INLINE void fetch_value_addresses(const grid *g, const grid_array *values,
 {
     const int count = fetch_vertex_count(g, cell, shape);
     const int64_t first = fetch_first_entry(g, cell, count, shape);
-    for (int i = 0; i < GRID_MAX_CELL_VERTICES; i++)
-        out[i] = values->data + fetch_vertex(g, first, i < count ? i : count - 1, shape, wide_index) * stride;
+    out[0] = values->data + fetch_vertex(g, first, 0, shape, wide_index) * stride;
+    for (int i = 1; i < GRID_MAX_CELL_VERTICES; i++)
+        out[i] = i < count ? values->data + fetch_vertex(g, first, i, shape, wide_index) * stride : out[i - 1];
 }
 
 /* Reads a cell's values from an array of floats. Returns whether all values are finite. */
