@@ -95,8 +95,9 @@ MMBVH_INLINE void fetch_value_addresses(const grid *g, const grid_array *values,
 {
     const int count = fetch_vertex_count(g, cell, shape);
     const int64_t first = fetch_first_entry(g, cell, count, shape);
-    for (int i = 0; i < GRID_MAX_CELL_VERTICES; i++)
-        out[i] = values->data + fetch_vertex(g, first, i < count ? i : count - 1, shape, wide_index) * stride;
+    out[0] = values->data + fetch_vertex(g, first, 0, shape, wide_index) * stride;
+    for (int i = 1; i < GRID_MAX_CELL_VERTICES; i++)
+        out[i] = i < count ? values->data + fetch_vertex(g, first, i, shape, wide_index) * stride : out[i - 1];
 }
 
 /* Reads a cell's values from an array of floats. Returns whether all values are finite. */
@@ -151,22 +152,49 @@ MMBVH_INLINE fetch_range fetch_combine_lanes(const fetch_lane_range *v, bool is_
                          v->high[0] > v->high[1] ? v->high[0] : v->high[1], is_finite};
 }
 
+/* How values or coordinates at vertices are read: as floats, as doubles, or by the accessors of grid.h, which also
+ * handle integers, magnitudes and lattices. */
+typedef enum fetch_numbers { FETCH_FLOATS, FETCH_DOUBLES, FETCH_ANY_NUMBERS } fetch_numbers;
+
+static inline fetch_numbers fetch_field_numbers(const grid_field *field)
+{
+    if (field->component < 0 || field->values.is_integer) return FETCH_ANY_NUMBERS;
+    return field->values.is_wide ? FETCH_DOUBLES : FETCH_FLOATS;
+}
+
+/* Computes the range of the values at the vertices of a cell of any type. */
+MMBVH_INLINE fetch_range fetch_vertex_range(const grid *g, const grid_field *field, int64_t cell,
+                                            const fetch_numbers numbers)
+{
+    const int64_t offset = numbers == FETCH_ANY_NUMBERS ? 0 : field->component * field->component_stride;
+    const grid_array values = {.data = field->values.data + offset, .stride = field->values.stride};
+    double low = INFINITY, high = -INFINITY, nonfinite = 0; /* nonfinite: 0 while all values are finite, then NaN */
+    grid_walk walk = grid_walk_cell(g, cell);
+    do {
+        for (int64_t entry = walk.next; entry < walk.end; entry++) {
+            const int64_t vertex = grid_walk_vertex(&walk, entry);
+            const double v = numbers == FETCH_ANY_NUMBERS ? grid_field_value(field, vertex)
+                                                          : fetch_number(&values, vertex, numbers == FETCH_DOUBLES);
+            low = v < low ? v : low;
+            high = v > high ? v : high;
+            nonfinite += v - v;
+        }
+    } while (grid_walk_next_face(&walk));
+    return (fetch_range){low, high, nonfinite == 0};
+}
+
 /* Computes the range of the values of a cell of any type, for any field. */
 static inline fetch_range fetch_any_cell_range(const grid *g, const grid_field *field, int64_t cell)
 {
-    fetch_range range = {INFINITY, -INFINITY, grid_has_own_value(field, cell)};
     if (field->is_cell_centred) {
         const double v = grid_field_value(field, cell);
         return (fetch_range){v, v, isfinite(v)};
     }
-    grid_walk walk = grid_walk_cell(g, cell);
-    int64_t vertex;
-    while (grid_walk_next(&walk, &vertex)) {
-        const double v = grid_field_value(field, vertex);
-        range.is_finite = range.is_finite && isfinite(v);
-        range.low = v < range.low ? v : range.low;
-        range.high = v > range.high ? v : range.high;
-    }
+    const fetch_numbers numbers = fetch_field_numbers(field);
+    fetch_range range = numbers == FETCH_FLOATS    ? fetch_vertex_range(g, field, cell, FETCH_FLOATS)
+                        : numbers == FETCH_DOUBLES ? fetch_vertex_range(g, field, cell, FETCH_DOUBLES)
+                                                   : fetch_vertex_range(g, field, cell, FETCH_ANY_NUMBERS);
+    range.is_finite = range.is_finite && grid_has_own_value(field, cell);
     return range;
 }
 
@@ -296,15 +324,22 @@ MMBVH_INLINE void round_float_box_outward(const fetch_float_box *float_box, cons
     *upper = vec4_xyz(0.0f - vec4_transform_down(float_box->upper, from, -scale));
 }
 
+/* Returns how the coordinates are read: as floats or doubles if those of all axes are floats or doubles. */
+static inline fetch_numbers fetch_coordinate_numbers(const grid *g)
+{
+    const grid_array *c = g->coordinates;
+    if (c[0].axis || c[0].is_integer || c[1].is_integer || c[2].is_integer) return FETCH_ANY_NUMBERS;
+    if (c[0].is_wide != c[1].is_wide || c[0].is_wide != c[2].is_wide) return FETCH_ANY_NUMBERS;
+    return c[0].is_wide ? FETCH_DOUBLES : FETCH_FLOATS;
+}
+
 /* Returns whether extend_box_by_cells() can read the grid: all coordinates are floats, or all are doubles, they have
  * the same stride, and no cell is a polyhedron. */
 static inline bool fetch_can_read_boxes(const grid *g)
 {
-    if (grid_has_faces(g) || g->coordinates[0].axis) return false;
     const grid_array *c = g->coordinates;
-    const bool integer = c[0].is_integer || c[1].is_integer || c[2].is_integer;
-    return !integer && c[0].is_wide == c[1].is_wide && c[0].is_wide == c[2].is_wide && c[0].stride == c[1].stride &&
-           c[0].stride == c[2].stride;
+    const bool is_alike = c[0].stride == c[1].stride && c[0].stride == c[2].stride;
+    return is_alike && !grid_has_faces(g) && fetch_coordinate_numbers(g) != FETCH_ANY_NUMBERS;
 }
 
 /* Extends the box by a cell of a uniform or rectilinear lattice. Comparisons suffice because the lattice's coordinates
@@ -319,22 +354,37 @@ static inline void extend_box_by_lattice_cell(fetch_box *box, const grid_lattice
     }
 }
 
+/* Extends the box by the vertices of a cell of any type. */
+MMBVH_INLINE void extend_box_by_vertices(fetch_box *box, const grid *g, int64_t cell, const fetch_numbers numbers)
+{
+    fetch_box all = *box; /* local, so that bounds stay in registers */
+    grid_walk walk = grid_walk_cell(g, cell);
+    do {
+        for (int64_t entry = walk.next; entry < walk.end; entry++) {
+            const int64_t vertex = grid_walk_vertex(&walk, entry);
+            for (int axis = 0; axis < 3; axis++) {
+                const grid_array *c = &g->coordinates[axis];
+                const double x = numbers == FETCH_ANY_NUMBERS ? grid_array_number(c, vertex)
+                                                              : fetch_number(c, vertex, numbers == FETCH_DOUBLES);
+                all.lower[axis] = x < all.lower[axis] ? x : all.lower[axis];
+                all.upper[axis] = x > all.upper[axis] ? x : all.upper[axis];
+            }
+        }
+    } while (grid_walk_next_face(&walk));
+    *box = all;
+}
+
 static inline void extend_box_by_any_cell(fetch_box *box, const grid *g, int64_t cell)
 {
-    if (g->coordinates[0].axis) {
+    const fetch_numbers numbers = fetch_coordinate_numbers(g);
+    if (g->coordinates[0].axis)
         extend_box_by_lattice_cell(box, g->lattice, cell);
-        return;
-    }
-    grid_walk walk = grid_walk_cell(g, cell);
-    int64_t vertex;
-    while (grid_walk_next(&walk, &vertex)) {
-        double p[3];
-        grid_vertex(g, vertex, p);
-        for (int axis = 0; axis < 3; axis++) {
-            box->lower[axis] = p[axis] < box->lower[axis] ? p[axis] : box->lower[axis];
-            box->upper[axis] = p[axis] > box->upper[axis] ? p[axis] : box->upper[axis];
-        }
-    }
+    else if (numbers == FETCH_FLOATS)
+        extend_box_by_vertices(box, g, cell, FETCH_FLOATS);
+    else if (numbers == FETCH_DOUBLES)
+        extend_box_by_vertices(box, g, cell, FETCH_DOUBLES);
+    else
+        extend_box_by_vertices(box, g, cell, FETCH_ANY_NUMBERS);
 }
 
 /* Instantiates a function for each cell shape and element type. DEFINE(name, shape, wide_index, wide_number) must

@@ -178,13 +178,19 @@ static inline int64_t grid_element_bytes(const grid_array *a)
     }
 }
 
+/* Reads the element at an address in an array that has data. */
+static inline double grid_element_number(const grid_array *a, const char *element)
+{
+    if (!a->is_integer)
+        return a->is_wide ? *(const double *)(const void *)element : (double)*(const float *)(const void *)element;
+    if (a->unusual_type) return grid_unusual_number(a->unusual_type, element);
+    return a->is_wide ? (double)*(const int64_t *)(const void *)element
+                      : (double)*(const int32_t *)(const void *)element;
+}
+
 static inline double grid_array_number(const grid_array *a, int64_t i)
 {
-    if (a->axis) return grid_axis_coordinate(a->axis, i);
-    const char *p = a->data + i * a->stride;
-    if (!a->is_integer) return a->is_wide ? *(const double *)(const void *)p : (double)*(const float *)(const void *)p;
-    if (a->unusual_type) return grid_unusual_number(a->unusual_type, p);
-    return a->is_wide ? (double)*(const int64_t *)(const void *)p : (double)*(const int32_t *)(const void *)p;
+    return a->axis ? grid_axis_coordinate(a->axis, i) : grid_element_number(a, a->data + i * a->stride);
 }
 
 static inline int64_t grid_array_index(const grid_array *a, int64_t i)
@@ -311,21 +317,21 @@ static inline void grid_face_vertices(const grid *g, int64_t face, int64_t *firs
  * contains it. */
 typedef struct grid_walk {
     const grid *cells;
-    bool is_polyhedron;
+    const grid_array *vertices; /* the vertex indices: connectivity, or for a polyhedron face_connectivity */
     /* for a lattice: differences between the numbers of the cell's vertices and that of its first one; else NULL */
     const int64_t *corner_offsets;
     int64_t base;                /* for a lattice: the number of the cell's first vertex */
-    int64_t next, end;           /* next entry to visit and the end, in connectivity or in corner_offsets */
-    int64_t face_next, face_end; /* next entry to visit and the end, in face_connectivity */
+    int64_t next, end;           /* next entry to visit and the end, in `vertices` or in corner_offsets */
+    int64_t face_next, face_end; /* for a polyhedron: its next face to visit and the end, in connectivity; else equal */
 } grid_walk;
 
 static inline grid_walk grid_walk_cell(const grid *g, int64_t cell)
 {
-    grid_walk w = {.cells = g};
+    grid_walk w = {.cells = g, .vertices = &g->connectivity};
     const int type = grid_cell_type(g, cell), count = grid_type_vertices(type);
-    w.is_polyhedron = type == GRID_POLYHEDRON;
-    if (w.is_polyhedron) {
-        grid_cell_faces(g, cell, &w.next, &w.end);
+    if (type == GRID_POLYHEDRON) {
+        w.vertices = &g->face_connectivity;
+        grid_cell_faces(g, cell, &w.face_next, &w.face_end);
         return w;
     }
     if (g->lattice) {
@@ -339,22 +345,27 @@ static inline grid_walk grid_walk_cell(const grid *g, int64_t cell)
     return w;
 }
 
+/* Continues with the entries of a polyhedron's next face. Returns false after the last face, and for other cells. */
+static inline bool grid_walk_next_face(grid_walk *w)
+{
+    if (w->face_next == w->face_end) return false;
+    const int64_t face = grid_array_index(&w->cells->connectivity, w->face_next++);
+    grid_face_vertices(w->cells, face, &w->next, &w->end);
+    return true;
+}
+
+/* Returns the vertex of an entry between w->next and w->end. */
+static inline int64_t grid_walk_vertex(const grid_walk *w, int64_t entry)
+{
+    return w->corner_offsets ? w->base + w->corner_offsets[entry] : grid_array_index(w->vertices, entry);
+}
+
 /* Stores the next vertex; returns false after the last one. */
 static inline bool grid_walk_next(grid_walk *w, int64_t *vertex)
 {
-    if (!w->is_polyhedron) {
-        if (w->next == w->end) return false;
-        *vertex = w->corner_offsets ? w->base + w->corner_offsets[w->next]
-                                    : grid_array_index(&w->cells->connectivity, w->next);
-        w->next++;
-        return true;
-    }
-    while (w->face_next == w->face_end) {
-        if (w->next == w->end) return false;
-        const int64_t face = grid_array_index(&w->cells->connectivity, w->next++);
-        grid_face_vertices(w->cells, face, &w->face_next, &w->face_end);
-    }
-    *vertex = grid_array_index(&w->cells->face_connectivity, w->face_next++);
+    while (w->next == w->end)
+        if (!grid_walk_next_face(w)) return false;
+    *vertex = grid_walk_vertex(w, w->next++);
     return true;
 }
 
@@ -413,16 +424,20 @@ static inline grid_array grid_field_component(const grid_field *f, int component
     return a;
 }
 
+/* Returns one component of tuple i. The array's description is not copied, because copying it takes longer than reading
+ * the value. */
+static inline double grid_field_component_value(const grid_field *f, int component, int64_t i)
+{
+    if (f->component_arrays) return grid_array_number(&f->component_arrays[component], i);
+    return grid_element_number(&f->values, f->values.data + component * f->component_stride + i * f->values.stride);
+}
+
 static inline double grid_field_value(const grid_field *f, int64_t i)
 {
-    if (f->component >= 0) {
-        const grid_array a = grid_field_component(f, f->component);
-        return grid_array_number(&a, i);
-    }
+    if (f->component >= 0) return grid_field_component_value(f, f->component, i);
     double sum = 0;
     for (int c = 0; c < f->component_count; c++) {
-        const grid_array a = grid_field_component(f, c);
-        const double v = grid_array_number(&a, i);
+        const double v = grid_field_component_value(f, c, i);
         sum += v * v;
     }
     return sqrt(sum);
