@@ -14,6 +14,7 @@
 #include "render_hits.h"
 #include "render_kernels.h"
 #include "render_prepare.h"
+#include "render_thread.h"
 
 enum { CHUNK_HITS = 512, SORTED_HITS = 8192 };
 

@@ -18,6 +18,7 @@
 #include "render_occluders.h"
 #include "render_polyhedra.h"
 #include "render_prepare.h"
+#include "render_thread.h"
 
 /* ---- one hit ------------------------------------------------------------------------------------------------- */
 

@@ -1,4 +1,4 @@
-/* Computes the constants of a frame from a job, and sets up the memory of the threads that draw it. */
+/* Computes the constants of a frame from a job. */
 #ifndef RENDER_RENDER_PREPARE_H
 #define RENDER_RENDER_PREPARE_H
 
@@ -20,14 +20,5 @@ void render_unprepare(kernel_frame *frame);
 /* Computes the minimum and maximum of the field of surface layer number `surface` over this rank's parts; range[0] >
  * range[1] if no part has the field. */
 void render_surface_range(const render_job *job, int surface, double range[2]);
-
-/* Allocates and sets up the thread's memory, unless a former call has done so; at first all members of *thread must be
- * zero. It must be called by the thread itself, so that the memory is on the thread's NUMA node. kernels: the result of
- * render_kernels() in the thread that opened the parallel region. Returns false, with thread->out_of_memory set, if
- * there is no memory. */
-bool render_thread_begin(const kernel_frame *frame, const kernel_table *kernels, kernel_thread *thread);
-
-/* Frees everything that the thread has. */
-void render_thread_end(kernel_thread *thread);
 
 #endif

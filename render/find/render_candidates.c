@@ -8,8 +8,8 @@
 #include "kernel_types.h"
 #include "render.h"
 #include "render_kernels.h"
-#include "render_prepare.h"
 #include "render_subtrees.h"
+#include "render_thread.h"
 
 #include <math.h>
 #include <omp.h>
