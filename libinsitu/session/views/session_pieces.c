@@ -315,15 +315,15 @@ static insitu_status list_pieces(const session_pieces_basis *basis, const sessio
 
 /* Returns the error of surfaces that is allowed, in pixels. By default it is smaller for small isosurfaces. A ray
  * misses an isosurface if a silhouette or a border is displaced across the ray. The share of such pixels is the mean
- * displacement of these lines times their length, divided by the area. The length grows with the root of the area only.
- * On brackets, the mean displacement was at most 1/18 of the bound, and the length at most 8 times the root of the area
- * in pixels. A bound of 1/500 of this root therefore misses less than 0.1 % of the pixels. */
+ * displacement of these lines times their length, divided by the area. The length grows only with the root of the area.
+ * On brackets that gmsh made, the mean displacement was at most 1/18 of the bound, and the length at most 8 times the
+ * root of the area in pixels. With a bound of 1/640 of this root, less than 0.1 % of their pixels are missed. */
 static double find_allowed_error(const scene *scene, const piece_error *of)
 {
     static const double least_share = 0.25;
     const double hits = (double)of->all.area / 16;
     if (scene->is_surface_error_given || of->all.area == 0) return scene->surface_error;
-    return fmin(scene->surface_error, fmax(least_share * scene->surface_error, sqrt(hits) / 500));
+    return fmin(scene->surface_error, fmax(least_share * scene->surface_error, sqrt(hits) / 640));
 }
 
 /* Returns the smallest number of pieces with which the errors of surfaces and of volumes are within the allowed errors.
