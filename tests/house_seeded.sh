@@ -38,50 +38,69 @@ fresh_tree() {
     done
 }
 
-# planted FILE LINE WHAT: with a file of that line in the tree the test of includes complains of what.
-planted() {
-    mkdir -p "$(dirname "$place/tree/$1")"
-    printf '%s\n' "$2" >"$place/tree/$1"
-    refuses "$1.*$3" sh "$here/house_includes.sh" "$place/tree"
-    rm "$place/tree/$1"
+# plant FOLDER SUFFIX LINE WHAT: puts a file of that line into the tree, of which the test of includes is to complain.
+plants=0
+plant() {
+    plants=$((plants + 1))
+    printf '%s\n' "$3" >"$place/tree/$1/seeded_$plants.$2"
+    printf '%s\n' "$1/seeded_$plants.$2.*$4" >>"$place/expected"
 }
 
 fresh_tree
 accepts sh "$here/house_includes.sh" "$place/tree"
-planted libinsitu/base/seeded.c '#include "comp.h"' 'base must not include comp.h of compositing'
-planted libinsitu/session/seeded.c '    FILE *file = fopen(path, "r");' 'opens a file'
-planted libinsitu/base/seeded.c '    if ((file = open(path, O_RDONLY)) < 0) return;' 'opens a file'
-planted libinsitu/base/seeded.c '#include <mpi.h>' 'base knows no MPI'
-planted mmbvh/seeded.c '#include "render.h"' 'mmbvh must not include render.h of render_face'
-planted mmbvh/seeded.c '  #  include <mpi.h>' 'mmbvh knows no MPI'
-planted render/seeded.c '#include "comp.h"' 'render must not include comp.h of compositing'
-planted render/seeded.c '#include <comp.h>' 'comp.h is ours'
-planted render/seeded.h '#include "insitu/insitu.h"' 'render knows no MPI'
-planted render/seeded.c '#include "../libinsitu/session/scene/scene.h"' 'render must not include .*scene.h of scene'
-planted compositing/seeded.c '#include "render.h"' 'compositing must not include render.h of render_face'
-planted render/rays/seeded.h '#include "kernel_cell.h"' 'rays must not include kernel_cell.h of cells'
-planted render/cells/seeded.h '#include "kernel_finder.h"' 'cells must not include kernel_finder.h of find'
-planted render/find/seeded.c '#include "kernel_surface.h"' 'find must not include kernel_surface.h of surface'
-planted render/volume/seeded.h '#include "kernel_roots.h"' 'volume must not include kernel_roots.h of surface'
-planted render/surface/seeded.h '#include "kernel_samples.h"' 'surface must not include kernel_samples.h of volume'
-planted render/volume/seeded.h '#include "render_frame.h"' 'no file of the tree is called render_frame.h'
-planted libinsitu/session/seeded.c '#include "kernel_types.h"' 'session must not include kernel_types.h of rays'
-planted libinsitu/session/seeded.c '#include <vtkPoints.h>' 'session includes vtkPoints.h'
-planted libinsitu/session/common/seeded.h '#include "session_mesh.h"' 'common must not include session_mesh.h of meshes'
-planted libinsitu/session/meshes/seeded.h '#include "session_plan.h"' 'meshes must not include session_plan.h of plan'
-planted libinsitu/session/meshes/seeded.c '#include "scene.h"' 'meshes must not include scene.h of scene'
-planted libinsitu/session/plan/seeded.c '#include "session_frame.h"' 'plan must not include session_frame.h of pictures'
-planted libinsitu/session/pictures/seeded.c '#include "session.h"' 'pictures must not include session.h of session'
-planted libinsitu/session/scene/seeded.c '#include "session.h"' 'scene must not include session.h of session'
-planted libinsitu/session/scene/seeded.h '#include <mpi.h>' 'scene knows no MPI'
-planted libinsitu/session/scene/seeded.h '#include "mmbvh.h"' 'scene must not include mmbvh.h of mmbvh'
-planted libinsitu/include/insitu/seeded.h '#include "error.h"' 'public must not include error.h of base'
-planted adaptors/vtk/seeded.cpp '#include "memory.h"' 'adaptors must not include memory.h of base'
-planted tools/seeded.cpp '#include "scene.h"' 'tools must not include scene.h of scene'
-planted mini-app/seeded.c '#include "error.h"' 'mini-app must not include error.h of base'
-planted mini-app/seeded.c '#include "insitu/nowhere.h"' 'no file of the tree is called nowhere.h'
-planted render/seeded.cpp 'int seeded;' 'the core is C'
-planted tests/comp.c 'int seeded;' 'same name as compositing/comp.c'
+# One violation is enough for a refusal, and each of many is complained of.
+printf 'int seeded;\n' >"$place/tree/tests/comp.c"
+refuses 'tests/comp.c.*same name as compositing/comp.c' sh "$here/house_includes.sh" "$place/tree"
+rm "$place/tree/tests/comp.c"
+: >"$place/expected"
+plant libinsitu/base c '#include "comp.h"' 'base must not include comp.h of compositing'
+plant libinsitu/session c '    FILE *file = fopen(path, "r");' 'opens a file'
+plant libinsitu/base c '    if ((file = open(path, O_RDONLY)) < 0) return;' 'opens a file'
+plant libinsitu/base c '#include <mpi.h>' 'base knows no MPI'
+plant mmbvh c '#include "render.h"' 'mmbvh must not include render.h of render_face'
+plant mmbvh c '  #  include <mpi.h>' 'mmbvh knows no MPI'
+plant render c '#include "comp.h"' 'render must not include comp.h of compositing'
+plant render c '#include <comp.h>' 'comp.h is ours'
+plant render h '#include "insitu/insitu.h"' 'render knows no MPI'
+plant render c '#include "../libinsitu/session/scene/scene.h"' 'render must not include .*scene.h of scene'
+plant compositing c '#include "render.h"' 'compositing must not include render.h of render_face'
+plant render/rays h '#include "kernel_cell.h"' 'rays must not include kernel_cell.h of cells'
+plant render/cells h '#include "kernel_finder.h"' 'cells must not include kernel_finder.h of find'
+plant render/find c '#include "kernel_surface.h"' 'find must not include kernel_surface.h of surface'
+plant render/volume h '#include "kernel_roots.h"' 'volume must not include kernel_roots.h of surface'
+plant render/surface h '#include "kernel_samples.h"' 'surface must not include kernel_samples.h of volume'
+plant render/volume h '#include "render_frame.h"' 'no file of the tree is called render_frame.h'
+plant libinsitu/session c '#include "kernel_types.h"' 'session must not include kernel_types.h of rays'
+plant libinsitu/session c '#include <vtkPoints.h>' 'session includes vtkPoints.h'
+plant libinsitu/session/common h '#include "session_mesh.h"' 'common must not include session_mesh.h of meshes'
+plant libinsitu/session/meshes h '#include "session_plan.h"' 'meshes must not include session_plan.h of plan'
+plant libinsitu/session/meshes c '#include "scene.h"' 'meshes must not include scene.h of scene'
+plant libinsitu/session/plan c '#include "session_frame.h"' 'plan must not include session_frame.h of pictures'
+plant libinsitu/session/pictures c '#include "session.h"' 'pictures must not include session.h of session'
+plant libinsitu/session/scene c '#include "session.h"' 'scene must not include session.h of session'
+plant libinsitu/session/scene h '#include <mpi.h>' 'scene knows no MPI'
+plant libinsitu/session/scene h '#include "mmbvh.h"' 'scene must not include mmbvh.h of mmbvh'
+plant libinsitu/include/insitu h '#include "error.h"' 'public must not include error.h of base'
+plant adaptors/vtk cpp '#include "memory.h"' 'adaptors must not include memory.h of base'
+plant tools cpp '#include "scene.h"' 'tools must not include scene.h of scene'
+plant mini-app c '#include "error.h"' 'mini-app must not include error.h of base'
+plant mini-app c '#include "insitu/nowhere.h"' 'no file of the tree is called nowhere.h'
+plant render cpp 'int seeded;' 'the core is C'
+sh "$here/house_includes.sh" "$place/tree" >"$place/said" 2>&1 && failures=$((failures + 1))
+while read -r what; do
+    grep -q -- "$what" "$place/said" || {
+        printf 'no complaint about "%s"\n' "$what"
+        failures=$((failures + 1))
+    }
+done <"$place/expected"
+
+# A tree of one function a room.
+rooms='libinsitu mmbvh render compositing adaptors mini-app tools'
+rm -rf "$place/tree"
+for room in $rooms; do
+    mkdir -p "$place/tree/$room/seeded"
+    printf 'int seeded_alone(void)\n{\n    return 0;\n}\n' >"$place/tree/$room/alone.c"
+done
 figures() {
     python3 "$here/house_figures.py" --hold "$place/tree"
 }
@@ -93,13 +112,12 @@ accepts figures
 } >"$place/tree/render/seeded.c"
 refuses 'render: lines of a function: 65, more than 60' figures
 rm "$place/tree/render/seeded.c"
-for room in libinsitu mmbvh render compositing adaptors mini-app tools; do
-    mkdir "$place/tree/$room/seeded"
+for room in $rooms; do
     printf 'int seeded_there(void)\n{\n    return seeded_here();\n}\n' >"$place/tree/$room/seeded/seeded_one.c"
     printf 'int seeded_here(void)\n{\n    return seeded_there();\n}\n' >"$place/tree/$room/seeded/seeded_two.c"
 done
 refuses 'circles of calls among files' figures
-for room in libinsitu mmbvh render compositing adaptors mini-app tools; do
+for room in $rooms; do
     if ! grep -q "^$room: circles of calls among files: 1, more than 0" "$place/said"; then
         echo "the circle in $room was not found"
         failures=$((failures + 1))
