@@ -4,9 +4,13 @@
 compilers_read.py clang BUILD    what users build: all but tests and benchmarks; compilers_clang_whole builds these too
 compilers_read.py aarch64 BUILD  the library's C, by the cross compiler for aarch64, without what is compiled for x86 alone
 
-The flags are those of BUILD/compile_commands.json. Ends with 77 if the compiler is not installed.
+The flags are those of BUILD/compile_commands.json. A source in which no fault was found is read again when it, a header of
+the tree that it includes, its flags or the compiler have changed; BUILD/<compiler>_read.json lists what was read. Ends with
+77 if the compiler is not installed.
 """
 
+import functools
+import hashlib
 import json
 import os
 import pathlib
@@ -33,7 +37,8 @@ def clang_command(source, flags):
 
 
 def system_headers(source):
-    return re.findall(r"^#include (<[^>]+>)", source.read_text(), re.MULTILINE)
+    """Without the library's: of these a change is noticed only if a source includes them itself."""
+    return re.findall(r"^#include (<(?!insitu/)[^>]+>)", source.read_text(), re.MULTILINE)
 
 
 def share_headers(pool, place, jobs):
@@ -79,10 +84,29 @@ def entries(build, is_wanted):
     return seen.values()
 
 
-def read(job):
+def read(job, *more):
     folder, command = job
-    answer = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    answer = subprocess.run([*command, *more], cwd=folder, capture_output=True, text=True, check=False)
     return answer.returncode == 0 and not answer.stderr, answer.stdout + answer.stderr
+
+
+@functools.cache
+def digest(path):
+    try:
+        return hashlib.sha256(pathlib.Path(path).read_bytes()).hexdigest()
+    except OSError:
+        return None
+
+
+def read_with_headers(folder, command, rule):
+    """Reads a source. Returns whether it has no fault, what the compiler said, and the digests of the source and of its
+    headers, but for the system's."""
+    is_right, said = read((folder, command), "-MMD", "-MF", str(rule), "-MT", "all")
+    if not is_right:
+        return False, said, {}
+    files = shlex.split(rule.read_text().replace("\\\n", " "))[1:]
+    paths = (os.path.normpath(os.path.join(folder, file)) for file in files)
+    return True, said, {path: digest(path) for path in paths if not path.startswith(f"{rule.parent}/")}
 
 
 def main():
@@ -100,12 +124,22 @@ def main():
 
     jobs = [(folder, command(source, flags)) for folder, source, flags in entries(build, is_wanted)]
     jobs = [job for job in jobs if job[1]]
+    compiler = subprocess.run([jobs[0][1][0], "--version"], capture_output=True, text=True, check=True).stdout if jobs else ""
+    memory = build / f"{who}_read.json"
+    known = json.loads(memory.read_text()) if memory.exists() else {}
+    names = [shlex.join([compiler, folder, *command]) for folder, command in jobs]
+    known = {name: files for name in names if (files := known.get(name))}
+    new = [i for i, name in enumerate(names) if not known.get(name) or any(digest(f) != d for f, d in known[name].items())]
     with ThreadPoolExecutor(os.cpu_count()) as pool, tempfile.TemporaryDirectory() as place:
-        answers = share_headers(pool, pathlib.Path(place), jobs)
-        answers += pool.map(read, jobs)
-    faults = [text for is_right, text in answers if not is_right]
+        place = pathlib.Path(place)
+        answers = share_headers(pool, place, [jobs[i] for i in new])
+        read_now = list(pool.map(lambda i: read_with_headers(*jobs[i], place / f"{i}.d"), new))
+    for i, (_, _, files) in zip(new, read_now):
+        known[names[i]] = files
+    memory.write_text(json.dumps(known, indent=0))
+    faults = [text for is_right, text, *_ in (*answers, *read_now) if not is_right]
     print("".join(faults), end="")
-    print(f"{who} has read {len(jobs)} sources and found fault with {len(faults)}")
+    print(f"{who} has read {len(new)} of {len(jobs)} sources, the others before, and found fault with {len(faults)}")
     return 1 if faults or not jobs else 0
 
 
