@@ -569,10 +569,13 @@ static bool solve_by_newton(const reference_cell *cell, const double *point, dou
     }
 }
 
-static double compute_distance_outside_cell(const double *parameter)
+/* Returns how far the parameters are outside the cell. The points of a pyramid lie beside its base, whose corners may
+ * be half of the pyramid's height above or below them: their third parameter has as much more room. */
+static double compute_distance_outside_cell(const reference_cell *cell, const double *parameter)
 {
+    const double room = cell->type == GRID_PYRAMID ? 0.5 : 0;
     return fmax(compute_distance_outside_unit(parameter[0]),
-                fmax(compute_distance_outside_unit(parameter[1]), compute_distance_outside_unit(parameter[2])));
+                fmax(compute_distance_outside_unit(parameter[1]), compute_distance_outside_unit(parameter[2]) - room));
 }
 
 /* Inverts the map by Newton's method. The starting points are tried in this order: the previous solution of this
@@ -587,8 +590,8 @@ static bool invert_map(const reference_cell *cell, const double *point, double p
     for (int i = 0; i < 10 && best > 0.1; i++) {
         double p[3];
         memcpy(p, starts[i], sizeof p);
-        if (!solve_by_newton(cell, point, p) || compute_distance_outside_cell(p) >= best) continue;
-        best = compute_distance_outside_cell(p);
+        if (!solve_by_newton(cell, point, p) || compute_distance_outside_cell(cell, p) >= best) continue;
+        best = compute_distance_outside_cell(cell, p);
         memcpy(parameter, p, sizeof p);
     }
     if (best <= 0.1) memcpy(starts[0], parameter, sizeof starts[0]);
