@@ -126,7 +126,7 @@ add_executable(test_polygon test_polygon.c)
 target_link_libraries(test_polygon PRIVATE insitu_flags test_truth PkgConfig::CMOCKA)
 add_test(NAME polygon COMMAND test_polygon)
 insitu_render_program(test_render_polyhedra)
-add_test(NAME render_polyhedra COMMAND test_render_polyhedra)
+insitu_add_split_test(render_polyhedra $<TARGET_FILE:test_render_polyhedra>)
 set_tests_properties(render_polyhedra PROPERTIES TIMEOUT 120)
 
 insitu_render_program(test_polyhedron_rays)
@@ -165,7 +165,7 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   insitu_chords(avx2 SIMD_AVX2 -mavx2 -mfma)
   insitu_chords(avx512 SIMD_AVX512 -mavx512f -mavx512dq -mavx512bw -mavx512vl)
 endif()
-insitu_add_set_tests(chords 180)
+insitu_add_set_tests(chords 180 split)
 
 insitu_add_long_test(chords_long test_chords 10000000)
 

@@ -17,6 +17,7 @@
 #include "render_isa.h"
 #include "render_polyhedra.h"
 #include "render_prepare.h"
+#include "test_effort.h"
 #include "test_mesh_honeycomb.h"
 #include "test_mesh_refined.h"
 #include "test_render_fixture.h"
@@ -38,7 +39,7 @@ static const double length_allowed = 1e-6;
  * reach into the next cell's interval, or end before it, by this rounding. */
 static const double doubled_allowed = 5e-7;
 
-static int64_t rays_wanted = 300000;
+static int64_t rays_wanted;
 
 static const chord_table *get_kernel_table(void)
 {
@@ -422,7 +423,7 @@ static void rays_from_inside_add_up_to_their_chords(void **state)
 int main(int argc, char **argv)
 {
     if (fixture_isa_is_unavailable()) return 77;
-    if (argc > 1) rays_wanted = atoll(argv[1]);
+    rays_wanted = argc > 1 ? atoll(argv[1]) : test_case_count(150000, 300000);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(random_rays_add_up_to_their_chords),
         cmocka_unit_test(rays_through_vertices_add_up_to_their_chords),

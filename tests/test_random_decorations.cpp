@@ -36,7 +36,7 @@ void draw_and_check(int width, int height, const insitu_decorations &what)
 void random_decorations_are_drawn_in_time(void **)
 {
     random_decorations random(1);
-    const int pictures = test_case_count(400, 10000), most = test_case_count(200, 2200);
+    const int pictures = test_case_count(150, 10000), most = test_case_count(200, 2200);
     for (int i = 0; i < pictures; i++) {
         const int width = random.draw_integer(1, most), height = random.draw_integer(1, most);
         draw_and_check(width, height, random.make_decorations(width, height));
@@ -54,7 +54,7 @@ void text_over_axes_is_drawn_at_every_height(void **)
     what.words = words;
     what.has_axes = true;
     for (int a = 0; a < 3; a++) what.axes[a][a] = 1;
-    for (int height = 1; height <= 2200; height += test_case_count(5, 1)) draw_and_check(200, height, what);
+    for (int height = 1; height <= 2200; height += test_case_count(13, 1)) draw_and_check(200, height, what);
 }
 
 } // namespace
