@@ -39,11 +39,6 @@ static const plane planes[] = {{{1, 0, 0}, -0.4, 1, 0, false, 0},
                                {{0.3, -0.7, 0.5}, -0.4, 3, 0, false, 0}};
 enum { PLANES = sizeof planes / sizeof *planes };
 
-static double dot_product(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 /* Computes the depth at which the pixel's ray meets the plane; returns false if that position is not inside the cube.
  * *close is set if rounding decides whether it is. */
 static bool intersect_plane(const plane *p, const double base[3], const double direction[3], double *depth, bool *close)

@@ -54,11 +54,6 @@ static const half_space cube[] = {{{1, 0, 0}, 1},  {{-1, 0, 0}, 1}, {{0, 1, 0}, 
 /* The isosurface 0.2 of test_linear_field(), 0.3 x - 0.7 y + 0.5 z + 0.1. */
 static const half_space linear = {{0.3, -0.7, 0.5}, 0.1};
 
-static double dot_product(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 static double intersect_half_space(const ray *r, const half_space *plane)
 {
     return (plane->distance - dot_product(plane->normal, r->base)) / dot_product(plane->normal, r->direction);

@@ -61,12 +61,6 @@ static void assert_similar_pictures(caught_picture *a, caught_picture *b, double
 
 /* ---- ranges by brute force --------------------------------------------------------------------------------------- */
 
-static int compare_values(const void *left, const void *right)
-{
-    const double a = *(const double *)left, b = *(const double *)right;
-    return (a > b) - (a < b);
-}
-
 typedef struct truth {
     double least, most, least_positive;
     int64_t count, positive;
@@ -91,7 +85,7 @@ static truth compute_exact_ranges(void)
         t.middles[c] = 0.5 * low + 0.5 * high;
         t.positive += t.middles[c] > 0;
     }
-    qsort(t.middles, (size_t)t.count, sizeof *t.middles, compare_values);
+    qsort(t.middles, (size_t)t.count, sizeof *t.middles, compare_doubles);
     test_mesh_free(&mesh);
     return t;
 }

@@ -298,12 +298,6 @@ static void corners_in_rows_and_other_orders_match_plain_corners(void **state)
 
 /* ---- means ---------------------------------------------------------------------------------------------------- */
 
-static int compare_magnitudes(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* Returns the mean over all corners of the whole mesh at one position. The summation order, by increasing magnitude, is
  * that of the library's means of cells. */
 static double compute_corner_mean(const test_mesh *whole, const double at[3])
@@ -315,7 +309,7 @@ static double compute_corner_mean(const test_mesh *whole, const double at[3])
             if (memcmp(whole->coordinates + 3 * whole->connectivity[i], at, 3 * sizeof *at) == 0 && count < 256)
                 found[count++] = whole->values[whole->connectivity[i]] + compute_cell_number(whole, cell);
     assert_true(count > 0 && count < 256);
-    qsort(found, (size_t)count, sizeof *found, compare_magnitudes);
+    qsort(found, (size_t)count, sizeof *found, compare_doubles);
     for (int i = 0; i < count; i++) sum += found[i];
     return sum / count;
 }

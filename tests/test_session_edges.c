@@ -31,11 +31,6 @@ static render_camera make_camera(bool is_flat)
     return out;
 }
 
-static double dot_product(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 /* ---- the reference ------------------------------------------------------------------------------------------- */
 
 typedef struct polygon {
@@ -69,11 +64,6 @@ static body make_body(const grid *g, bool is_cube)
         }
     }
     return out;
-}
-
-static void cross_product(const double a[3], const double b[3], double out[3])
-{
-    for (int i = 0; i < 3; i++) out[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
 }
 
 /* Returns the depth at which a ray meets a convex face; infinity if it misses the face. */

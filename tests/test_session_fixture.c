@@ -227,6 +227,22 @@ void check_all_faults_are_reported(session_input *in, const corrupted_case *case
     insitu_destroy(&session);
 }
 
+double dot_product(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+void cross_product(const double a[3], const double b[3], double out[3])
+{
+    for (int i = 0; i < 3; i++) out[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
+}
+
+int compare_doubles(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
 double compute_mean(const double *values, int count)
 {
     double sum = 0, rest = 0; /* Knuth's two-sum: sum + rest has twice the precision */
@@ -317,6 +333,26 @@ bool are_same_pictures(const caught_picture *a, const caught_picture *b)
     if (!are_same_bytes(a->data, b->data, (size_t)a->channel_count * pixels * sizeof(float))) return false;
     if (!are_same_bytes(a->first, b->first, (pixels + 1) * sizeof *a->first)) return false;
     return are_same_bytes(a->samples, b->samples, a->first ? (size_t)a->first[pixels] * sizeof *a->samples : 0);
+}
+
+int count_visible_pixels(const caught_picture *picture)
+{
+    int count = 0;
+    for (int i = 0; i < picture->width * picture->height; i++) count += picture->rgba[4 * i + 3] > 0;
+    return count;
+}
+
+int count_gap_pixels(const caught_picture *picture)
+{
+    const int size = picture->width;
+    int gaps = 0;
+    for (int pixel = 0; pixel < size * size; pixel++) {
+        const double x = 2 * (pixel % size + 0.5) / size - 1, y = 1 - 2 * (pixel / size + 0.5) / size;
+        if (x * x + y * y > 0.6 * 0.6) continue;
+        const double front = 5 - sqrt(0.72 * 0.72 - x * x - y * y);
+        gaps += !(picture->rgba[4 * pixel + 3] > 0 && fabs((double)picture->depth[pixel] - front) < 0.22);
+    }
+    return gaps;
 }
 
 drawn take_caught_pictures(void)

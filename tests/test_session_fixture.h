@@ -34,6 +34,12 @@ void assert_reported(const insitu_session *session, insitu_status status, insitu
  * sum unless the exact sum is this close to the middle between two doubles. */
 double compute_mean(const double *values, int count);
 
+double dot_product(const double a[3], const double b[3]);
+void cross_product(const double a[3], const double b[3], double out[3]);
+
+/* Compares two doubles, for qsort(). */
+int compare_doubles(const void *a, const void *b);
+
 /* Changes to the directory `name`, followed by the number of ranks, in the directory for scene files, so that runs on
  * different numbers of ranks have separate files. */
 bool enter_test_folder(const char *name);
@@ -153,6 +159,14 @@ caught_picture draw_scene(MPI_Comm comm, const char *scene, const session_input 
 
 /* Returns whether two pictures are bitwise equal in all members except for the path. */
 bool are_same_pictures(const caught_picture *a, const caught_picture *b);
+
+/* Counts the pixels that are not transparent; 0 on ranks without the picture. */
+int count_visible_pixels(const caught_picture *picture);
+
+/* Counts the pixels of a picture of [-1, 1]^2 from 5 in front in which the front of a sphere of radius 0.72 is not
+ * visible. Inside a cell the surface is at most half the diagonal of the largest cell, 0.22, away from the sphere.
+ * Within a radius of 0.6 in the picture the sphere's front and back are at least 0.8 apart. */
+int count_gap_pixels(const caught_picture *picture);
 
 /* All pictures that a step draws. */
 enum { MOST_DRAWN = 8 };

@@ -209,21 +209,6 @@ static caught_picture draw_amr(MPI_Comm comm, const char *scene, const amr *a)
     return picture;
 }
 
-/* Counts pixels in which the front of the sphere is not visible. Inside a cell the surface is at most half the diagonal
- * of the largest cell, 0.22, away from the sphere. Within a radius of 0.6 in the picture the sphere's front and back
- * are at least 0.8 apart. */
-static int count_gap_pixels(const caught_picture *picture)
-{
-    int slits = 0;
-    for (int pixel = 0; pixel < PIXELS; pixel++) {
-        const double x = (pixel % SIZE + 0.5) / 100 - 1, y = 1 - (pixel / SIZE + 0.5) / 100, square = x * x + y * y;
-        if (square > 0.6 * 0.6) continue;
-        const double front = 5 - sqrt(0.72 * 0.72 - square);
-        slits += !(picture->rgba[4 * pixel + 3] > 0 && fabs((double)picture->depth[pixel] - front) < 0.22);
-    }
-    return slits;
-}
-
 static void check_surface_continues(int cuts, amr_shape shape, insitu_cell_type type)
 {
     const char *scene = write_scene(scene_text);
@@ -298,13 +283,6 @@ static void make_box(const box *b, int rank, int ranks, part *p)
     }
 }
 
-static int count_covered_pixels(const caught_picture *picture)
-{
-    int count = 0;
-    for (int pixel = 0; pixel < PIXELS && own_rank == 0; pixel++) count += picture->rgba[4 * pixel + 3] > 0;
-    return count;
-}
-
 /* Draws the boxes, each as a mesh. Only the first `givers` ranks pass their part of the second mesh. */
 static caught_picture draw_boxes(const char *layers, const box *boxes, int count, int givers)
 {
@@ -338,8 +316,8 @@ static void layer_of_two_meshes_is_continuous(void **state)
     caught_picture both = draw_boxes("      - isosurface: {field: f, mesh: [a, b], values: [0.25]}\n"
                                      "      - isosurface: {field: f, mesh: b, values: [0.25]}\n",
                                      boxes, 2, rank_count);
-    everywhere(own_rank != 0 || count_covered_pixels(&one) == PIXELS);
-    everywhere(count_covered_pixels(&apart) == 0);
+    everywhere(own_rank != 0 || count_visible_pixels(&one) == PIXELS);
+    everywhere(count_visible_pixels(&apart) == 0);
     everywhere(own_rank != 0 || are_same_pictures(&one, &both));
     free_caught(&one);
     free_caught(&apart);
@@ -356,7 +334,7 @@ static void vertices_on_a_shared_boundary_are_not_hanging(void **state)
     (void)state;
     caught_picture alone = draw_boxes("      - isosurface: {field: f, values: [0.75]}\n", boxes, 1, 0);
     caught_picture both = draw_boxes("      - isosurface: {field: f, values: [0.75]}\n", boxes, 2, rank_count);
-    everywhere(own_rank != 0 || count_covered_pixels(&alone) > PIXELS / 3);
+    everywhere(own_rank != 0 || count_visible_pixels(&alone) > PIXELS / 3);
     everywhere(own_rank != 0 || are_same_pictures(&alone, &both));
     free_caught(&alone);
     free_caught(&both);

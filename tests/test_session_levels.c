@@ -397,21 +397,6 @@ static int64_t count_ghosts(const levels *l)
     return count;
 }
 
-/* Counts pixels in which the front of the sphere is not visible. Inside a cell the surface is at most half the diagonal
- * of the largest cell, 0.217, away from the sphere. Within a radius of 0.6 in the picture the front and the back are at
- * least 0.8 apart. */
-static int count_gap_pixels(const caught_picture *picture)
-{
-    int slits = 0;
-    for (int pixel = 0; pixel < PIXELS; pixel++) {
-        const double x = (pixel % SIZE + 0.5) / 100 - 1, y = 1 - (pixel / SIZE + 0.5) / 100, square = x * x + y * y;
-        if (square > 0.6 * 0.6) continue;
-        const double front = 5 - sqrt(0.72 * 0.72 - square);
-        slits += !(picture->rgba[4 * pixel + 3] > 0 && fabs((double)picture->depth[pixel] - front) < 0.22);
-    }
-    return slits;
-}
-
 static caught_picture step_and_take_picture(insitu_session *session, int cycle)
 {
     discard_pictures();

@@ -200,12 +200,6 @@ static void pictures_of_narrow_ranges_match_closed_forms(void **state)
 
 /* ---- percentiles ------------------------------------------------------------------------------------------------ */
 
-static int compare_doubles(const void *left, const void *right)
-{
-    const double a = *(const double *)left, b = *(const double *)right;
-    return (a > b) - (a < b);
-}
-
 /* Returns the middles of the value ranges of all cells of the whole mesh, sorted. */
 static double *collect_sorted_middles(const narrow_case *c, int64_t *count)
 {

@@ -29,16 +29,6 @@ typedef struct subject {
 
 /* ---- vectors ----------------------------------------------------------------------------------------------------- */
 
-static double dot_product(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void cross_product(const double a[3], const double b[3], double out[3])
-{
-    for (int x = 0; x < 3; x++) out[x] = a[(x + 1) % 3] * b[(x + 2) % 3] - a[(x + 2) % 3] * b[(x + 1) % 3];
-}
-
 static void make_unit(double a[3])
 {
     const double length = sqrt(dot_product(a, a));
@@ -214,6 +204,8 @@ static void intersect_by_newton(const subject *s, const double nodes[NODES][4], 
         for (int c = 0; c < 3; c++) at[c + 1] += way[c];
         at[0] = 1 - at[1] - at[2] - at[3];
         if (!(fmin(fmin(at[0], at[1]), fmin(at[2], at[3])) > -0.1)) return;
+        /* A cell is a few hundred pixels wide, so `rest`, of the point before, is below 1e-10. */
+        if (fabs(way[0]) + fabs(way[1]) + fabs(way[2]) < 1e-13) break;
     }
     if (rest < 1e-9 && fmin(fmin(at[0], at[1]), fmin(at[2], at[3])) > -1e-9)
         depths[pixel] = fmin(depths[pixel], out[2]);
@@ -288,12 +280,6 @@ static double *compute_exact_depths(const subject *s)
 
 /* ---- pictures ---------------------------------------------------------------------------------------------------- */
 
-static int compare_numbers(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static void draw_part(const subject *s, const char *pieces, caught_picture *out, char report[512])
 {
     const data_cells *c = &s->cells;
@@ -346,7 +332,7 @@ static difference compare_picture(const subject *s, const float *drawn, const do
         out.missed += is_drawn != is_true;
         if (is_drawn && is_true) distances[count++] = fabs((double)drawn[pixel] - depths[pixel]) * HEIGHT / s->height;
     }
-    qsort(distances, (size_t)count, sizeof *distances, compare_numbers);
+    qsort(distances, (size_t)count, sizeof *distances, compare_doubles);
     if (count > 0) out.median = distances[count / 2];
     if (count > 0) out.most = distances[count - 1 - count / 1000];
     free(distances);

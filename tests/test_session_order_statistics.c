@@ -423,12 +423,6 @@ static void bins_have_the_volumes_of_the_points_in_them(void **state)
     order_mesh_free(&mesh);
 }
 
-static int compare_numbers(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* Computes two percentiles of the cells' middle values; a cell's middle is half way between the least and the greatest
  * value at its nodes. */
 static void find_percentiles(const order_mesh *whole, const int percents[2], double out[2])
@@ -443,7 +437,7 @@ static void find_percentiles(const order_mesh *whole, const int percents[2], dou
         }
         middles[cell] = 0.5 * low + 0.5 * high;
     }
-    qsort(middles, 27, sizeof *middles, compare_numbers);
+    qsort(middles, 27, sizeof *middles, compare_doubles);
     for (int i = 0; i < 2; i++) out[i] = middles[(int)ceil(percents[i] / 100. * 27) - 1];
 }
 

@@ -102,32 +102,36 @@ static void integrate_ray(const transfer *of, field_function *field, int order, 
     }
 }
 
-static int compare_doubles(const void *a, const void *b)
+/* Sorts errors, and returns the largest of the best 99.9 % of them. */
+static double find_largest(double *errors, int count)
 {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
+    qsort(errors, (size_t)count, sizeof *errors, compare_doubles);
+    return errors[(int64_t)count * 999 / 1000];
 }
 
-/* Sorts the pixels' errors, and returns the largest error of the best 99.9 % of the pixels. */
-static double find_largest(double errors[PIXELS])
+static double compute_largest_component(const float *rgba, const double light[3])
 {
-    qsort(errors, PIXELS, sizeof *errors, compare_doubles);
-    return errors[PIXELS * 999 / 1000];
+    double largest = 0;
+    for (int c = 0; c < 3; c++) largest = fmax(largest, fabs(light[c] - (double)rgba[c]));
+    return largest;
 }
 
-/* Returns, on rank 0, the largest error of a colour component in the best 99.9 % of the pixels. */
-static double find_error(const caught_picture *picture, const transfer *of, field_function *field, int order, int side)
+/* Computes, on rank 0, the largest error of a colour component of each picture in the best 99.9 % of the pixels. The
+ * usual run integrates every third pixel. */
+static void find_errors(caught_picture *const pictures[2], const transfer *of, field_function *field, int order,
+                        int side, double out[2])
 {
-    static double errors[PIXELS];
-    if (own_rank != 0) return 0;
-    for (int pixel = 0; pixel < PIXELS; pixel++) {
+    static double errors[2][PIXELS];
+    int count = 0;
+    out[0] = out[1] = 0;
+    if (own_rank != 0) return;
+    for (int pixel = 0; pixel < PIXELS; pixel += test_case_count(3, 1), count++) {
         double light[3];
-        errors[pixel] = 0;
         integrate_ray(of, field, order, side, pixel, light);
-        for (int c = 0; c < 3; c++)
-            errors[pixel] = fmax(errors[pixel], fabs(light[c] - (double)picture->rgba[4 * pixel + c]));
+        for (int i = 0; i < 2; i++)
+            errors[i][count] = compute_largest_component(pictures[i]->rgba + 4 * (ptrdiff_t)pixel, light);
     }
-    return find_largest(errors);
+    for (int i = 0; i < 2; i++) out[i] = find_largest(errors[i], count);
 }
 
 static double find_difference(const caught_picture *a, const caught_picture *b)
@@ -138,7 +142,7 @@ static double find_difference(const caught_picture *a, const caught_picture *b)
         for (int c = 0; c < 3; c++)
             errors[pixel] = fmax(errors[pixel], fabs((double)(a->rgba[4 * pixel + c] - b->rgba[4 * pixel + c])));
     }
-    return find_largest(errors);
+    return find_largest(errors, PIXELS);
 }
 
 /* ---- drawing ----------------------------------------------------------------------------------------------------- */
@@ -175,7 +179,7 @@ typedef struct volume_case {
     int side;
     order_function *values;
     field_function *field;
-    bool is_usual; /* false: only drawn by the long test */
+    bool is_usual; /* false: only drawn by the long test; true: by default drawn with every second transfer function */
 } volume_case;
 
 static const volume_case cases[] = {
@@ -209,14 +213,15 @@ static void check_case(const volume_case *of, const transfer *with)
     drawn_volume chosen = draw_volume(MPI_COMM_WORLD, with, "", "0.01", &mesh);
     drawn_volume alone = draw_volume(MPI_COMM_SELF, with, "", "0.01", &whole);
     drawn_volume one = draw_volume(MPI_COMM_WORLD, with, "finer_pieces: 1\n", "0.01", &mesh);
-    const double error = find_error(&chosen.pictures.pictures[0], with, of->field, of->kind.order, of->side);
-    const double coarse = find_error(&one.pictures.pictures[0], with, of->field, of->kind.order, of->side);
+    caught_picture *const compared[2] = {&chosen.pictures.pictures[0], &one.pictures.pictures[0]};
+    double errors[2];
+    find_errors(compared, with, of->field, of->kind.order, of->side, errors);
     if (own_rank == 0)
         printf("%s, side %d, %s: %d pieces, off by %.2g, estimate %.2g; with 1 piece by %.2g, estimate %.2g\n",
-               of->kind.name, of->side, with->name, chosen.count, error, chosen.estimate, coarse,
+               of->kind.name, of->side, with->name, chosen.count, errors[0], chosen.estimate, errors[1],
                chosen.estimate * chosen.count * chosen.count);
     everywhere(chosen.count == alone.count && chosen.estimate == alone.estimate);
-    everywhere(own_rank || (error <= 0.01 && coarse > 0.01));
+    everywhere(own_rank || (errors[0] <= 0.01 && errors[1] > 0.01));
     free_picture_set(&chosen.pictures);
     free_picture_set(&alone.pictures);
     free_picture_set(&one.pictures);
@@ -229,7 +234,7 @@ static void volumes_are_within_max_error(void **state)
     (void)state;
     for (size_t k = 0; k < sizeof cases / sizeof *cases; k++)
         for (size_t t = 0; t < sizeof transfers / sizeof *transfers; t++)
-            if (cases[k].is_usual || test_is_long_run()) check_case(&cases[k], &transfers[t]);
+            if (test_is_long_run() || (cases[k].is_usual && (k / 2 + t) % 2 == 0)) check_case(&cases[k], &transfers[t]);
 }
 
 /* Checks bent cells, for which there is no closed form: the reference is drawn with 8 pieces, whose error is a small

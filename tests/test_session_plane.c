@@ -183,12 +183,6 @@ static bool is_picture_of_grey_map(const caught_picture *picture, bool is_of_cel
     return hits > PIXELS / 3;
 }
 
-static bool are_equal_pictures(const caught_picture *a, const caught_picture *b)
-{
-    return memcmp(a->rgba, b->rgba, 4 * PIXELS * sizeof(float)) == 0 &&
-           memcmp(a->depth, b->depth, PIXELS * sizeof(float)) == 0;
-}
-
 /* Checks pictures of the plate without z coordinates and with z = 0, on all ranks and on one rank. */
 static void pictures_are_the_colour_map_of_the_field(void **state)
 {
@@ -204,7 +198,7 @@ static void pictures_are_the_colour_map_of_the_field(void **state)
             bool is_well = true;
             if (own_rank == 0) {
                 alone = draw_plate(MPI_COMM_SELF, scene, &whole, !of_cells);
-                is_well = is_picture_of_grey_map(&ours, of_cells) && are_equal_pictures(&ours, &alone);
+                is_well = is_picture_of_grey_map(&ours, of_cells) && are_same_pictures(&ours, &alone);
             }
             everywhere(is_well);
             free_caught(&ours);
@@ -227,7 +221,7 @@ static void scene_keys_override_defaults(void **state)
     caught_picture plain = draw_plate(MPI_COMM_WORLD, write_scene(IMAGE("", MAP_OF("f"))), &part, false);
     for (size_t i = 0; i < sizeof scenes / sizeof *scenes; i++) {
         caught_picture other = draw_plate(MPI_COMM_WORLD, write_scene(scenes[i]), &part, false);
-        everywhere(own_rank != 0 || !are_equal_pictures(&plain, &other));
+        everywhere(own_rank != 0 || !are_same_pictures(&plain, &other));
         free_caught(&other);
     }
     free_caught(&plain);
@@ -308,7 +302,7 @@ static void isosurfaces_are_contour_lines(void **state)
             bool is_well = true;
             if (own_rank == 0) {
                 alone = draw_plate(MPI_COMM_SELF, scene, &whole, true);
-                is_well = check_contour_lines(&ours, i > 0) && are_equal_pictures(&ours, &alone);
+                is_well = check_contour_lines(&ours, i > 0) && are_same_pictures(&ours, &alone);
             }
             everywhere(is_well);
             free_caught(&ours);
@@ -557,7 +551,7 @@ static void percentiles_weigh_shells_by_area(void **state)
             widen_column(&part);
             caught_picture found = draw_plate(MPI_COMM_WORLD, write_scene(by_area), &part, false);
             caught_picture truth = draw_plate(MPI_COMM_WORLD, write_scene(fixed), &part, false);
-            everywhere(own_rank != 0 || are_equal_pictures(&found, &truth));
+            everywhere(own_rank != 0 || are_same_pictures(&found, &truth));
             free_caught(&found);
             free_caught(&truth);
         }

@@ -208,12 +208,6 @@ static bool has_linear_colours(const caught_picture *picture, const caught_pictu
     return memcmp(picture->depth, other->depth, PIXELS * sizeof(float)) == 0;
 }
 
-static bool are_equal_pictures(const caught_picture *a, const caught_picture *b)
-{
-    return memcmp(a->rgba, b->rgba, 4 * PIXELS * sizeof(float)) == 0 &&
-           memcmp(a->depth, b->depth, PIXELS * sizeof(float)) == 0;
-}
-
 /* Checks pictures of the cube. Every ray crosses surfaces of opacity 1/2 twice, so that the opacity of the pixel is
  * 3/4. */
 static void check_cube_picture(test_mesh_kind kind)
@@ -234,7 +228,7 @@ static void check_cube_picture(test_mesh_kind kind)
         session_input part = {0};
         extract_rank_cells(&whole, way == 1 ? TEST_BLOCK : TEST_RANDOM, way == 2, &part);
         caught_picture picture = draw_input(MPI_COMM_WORLD, scene, &part);
-        everywhere(own_rank != 0 || are_equal_pictures(&picture, &clear));
+        everywhere(own_rank != 0 || are_same_pictures(&picture, &clear));
         free_caught(&picture);
         input_free(&part);
     }
@@ -254,16 +248,6 @@ static void cube_surfaces_are_exact_on_any_ranks(void **state)
 /* The reference intersects each bilinear patch in two stages: first as FINE × FINE squares of two triangles each, and
  * then by STEPS steps of Newton's method for the exact patch. */
 enum { FINE = 16, STEPS = 6 };
-
-static void cross_product(const double a[3], const double b[3], double out[3])
-{
-    for (int i = 0; i < 3; i++) out[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
-}
-
-static double dot_product(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 static void evaluate_patch(const double *const p[4], double u, double v, double out[3])
 {

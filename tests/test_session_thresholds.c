@@ -146,12 +146,6 @@ static face_set compute_face_set(const char *scene, const session_input *whole, 
     return out;
 }
 
-static bool are_equal_pictures(const caught_picture *a, const caught_picture *b)
-{
-    return memcmp(a->rgba, b->rgba, 4 * PIXELS * sizeof(float)) == 0 &&
-           memcmp(a->depth, b->depth, PIXELS * sizeof(float)) == 0;
-}
-
 static void take_caught_picture(caught_picture *out)
 {
     *out = (caught_picture){0};
@@ -184,7 +178,7 @@ static void check_threshold(test_mesh_kind kind, bool is_cell_centred, bool with
                     is_cell_centred, (int)drawn.count, (int)truth.count);
         everywhere(truth.count > 0 && drawn.count == truth.count && drawn.sum == truth.sum);
         take_caught_picture(&picture);
-        everywhere(own_rank != 0 || are_equal_pictures(&picture, &alone));
+        everywhere(own_rank != 0 || are_same_pictures(&picture, &alone));
         free_caught(&picture);
         free_caught(&alone);
     }
