@@ -20,7 +20,7 @@ set_tests_properties(fold PROPERTIES TIMEOUT 60)
 add_executable(test_comp_mpi test_comp_mpi.c)
 target_link_libraries(test_comp_mpi
   PRIVATE insitu_compositing ${INSITU_SHEETS} insitu_base insitu_flags PkgConfig::CMOCKA OpenMP::OpenMP_C m)
-insitu_add_mpi_test(comp_mpi test_comp_mpi 1 2 3 7 WHOLE 5 7 16 TIMEOUT 300)
+insitu_add_mpi_test(comp_mpi test_comp_mpi 1 2 7 WHOLE 3 5 7 16 TIMEOUT 300)
 
 # As above, with threads that share the merging.
 add_test(NAME comp_mpi_4_threads

@@ -1,6 +1,6 @@
 # Sessions: on any ranks, right and wrong input. Pictures are caught by the fixture; test_api writes them. Daily all run on 1
-# and 3 ranks, session and session_recentre on 2 too, and session_partition and invariance on 2 and 7, as compositing's own
-# tests do; the others do so in the long tests.
+# and 3 ranks or, if they are slow, on several alone, session and session_recentre on 2 too, and session_partition and
+# invariance on 2 and 7, as compositing's own tests do; the others do so in the long tests.
 add_library(test_session_fixture OBJECT test_session_fixture.c)
 target_link_libraries(test_session_fixture PUBLIC test_meshes insitu_internal PkgConfig::CMOCKA PRIVATE insitu_quick_flags)
 function(insitu_session_program target)
@@ -37,7 +37,7 @@ insitu_session_program(test_session_slices)
 insitu_add_mpi_test(session_slices test_session_slices 1 3 WHOLE 2 4 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_surfaces)
-insitu_add_mpi_test(session_surfaces test_session_surfaces 1 3 WHOLE 2 4 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_surfaces test_session_surfaces 3 WHOLE 1 2 4 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_channels)
 insitu_add_mpi_test(session_channels test_session_channels 1 3 WHOLE 2 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
@@ -74,7 +74,7 @@ set_tests_properties(session_cores_bound_by_openmp PROPERTIES ENVIRONMENT "${INS
 insitu_session_program(test_session_collectives)
 insitu_add_mpi_test(session_collectives test_session_collectives 2 5 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 insitu_session_program(test_session_many)
-insitu_add_mpi_test(session_many test_session_many 1 2 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_many test_session_many 2 WHOLE 1 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 insitu_session_program(test_session_turns)
 insitu_add_mpi_test(session_turns test_session_turns 1 3 WHOLE 8 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
@@ -91,9 +91,9 @@ insitu_session_program(test_session_outline)
 insitu_add_mpi_test(session_outline test_session_outline 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_concave)
-insitu_add_mpi_test(session_concave test_session_concave 1 3 WHOLE 2 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_concave test_session_concave 3 WHOLE 1 2 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 insitu_session_program(test_session_hanging)
-insitu_add_mpi_test(session_hanging test_session_hanging 1 3 WHOLE 2 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_hanging test_session_hanging 3 WHOLE 1 2 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 insitu_session_program(test_session_shells)
 insitu_add_mpi_test(session_shells test_session_shells 1 3 WHOLE 2 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
@@ -173,12 +173,15 @@ foreach(name zero_counts strides wrong_input)
   insitu_add_mpi_test(session_${name} test_session_${name} 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 endforeach()
 insitu_add_mpi_test(session_wrong_input test_session_wrong_input WHOLE 1 3 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+foreach(name zero_counts strides)
+  insitu_add_mpi_test(session_${name} test_session_${name} WHOLE 3 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+endforeach()
 
 # Meshes that the scene warps or mirrors, of all forms.
 foreach(name warp mirror)
   insitu_session_program(test_session_${name})
   target_sources(test_session_${name} PRIVATE test_transformed.c test_mesh_forms.c test_owned_faces.c test_mesh_order.c)
-  insitu_add_mpi_test(session_${name} test_session_${name} 1 3 WHOLE 2 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+  insitu_add_mpi_test(session_${name} test_session_${name} 3 WHOLE 1 2 3 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 endforeach()
 
 insitu_session_program(test_session_statistics)
@@ -214,7 +217,7 @@ insitu_session_program(test_session_thresholds)
 insitu_add_mpi_test(session_thresholds test_session_thresholds 1 3 WHOLE 2 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_edges)
-insitu_add_mpi_test(session_edges test_session_edges 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_edges test_session_edges 3 WHOLE 1 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_antialias)
 insitu_add_mpi_test(session_antialias test_session_antialias 1 3 WHOLE 2 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
@@ -239,7 +242,7 @@ insitu_session_program(test_session_left_out)
 insitu_add_mpi_test(session_left_out test_session_left_out 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session)
-insitu_add_mpi_test(session test_session 1 2 WHOLE 3 4 7 TIMEOUT 180 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session test_session 1 2 WHOLE 2 3 4 7 TIMEOUT 180 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_regions)
 insitu_add_mpi_test(session_regions test_session_regions 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
@@ -302,7 +305,7 @@ add_executable(test_session_guard test_session_guard.c)
 target_link_libraries(test_session_guard PRIVATE insitu_quick_flags insitu_internal PkgConfig::CMOCKA)
 add_test(NAME session_guard COMMAND test_session_guard)
 
-# Memory runs out: quickly at every 97th allocation, in the long tests at each.
+# Memory runs out: quickly at every 97th or 389th allocation, in the long tests at each.
 insitu_session_program(test_step_memory)
 target_sources(test_step_memory PRIVATE failing_heap_mpi.c)
 target_link_libraries(test_step_memory PRIVATE test_failing_heap)

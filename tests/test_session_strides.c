@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "test_effort.h"
 #include "test_mesh_forms.h"
 
 enum { SIDE = 3, MOST = 40 };
@@ -88,11 +89,17 @@ static int list_patch_arrays(formed_mesh *m, strided *out)
 static const int64_t wild[] = {(int64_t)1 << 60,    (int64_t)1 << 62, (int64_t)1 << 49,   INT64_MIN,
                                -((int64_t)1 << 60), INT64_MAX - 7,    -((int64_t)1 << 49)};
 
-/* Sets each invalid stride on the last rank, and checks that all ranks get the error. */
+/* Sets each invalid stride on the last rank, and checks that all ranks get the error. In the usual run on several
+ * ranks, where each error takes a step of all ranks, each array has one of the strides, and the next array the next
+ * one. */
 static void check_strides_are_refused(insitu_session *session, formed_mesh *m, const strided *s, bool is_last)
 {
-    for (size_t i = 0; i < sizeof wild / sizeof wild[0]; i++) {
+    const size_t count = sizeof wild / sizeof wild[0];
+    static size_t turn;
+    turn++;
+    for (size_t i = 0; i < count; i++) {
         char words[2][64];
+        if (rank_count > 1 && !test_is_long_run() && i != turn % count) continue;
         const int64_t right = *s->stride;
         snprintf(words[0], sizeof words[0], "%s have a stride of %lld bytes", s->name, (long long)wild[i]);
         snprintf(words[1], sizeof words[1], ": %lld of them lie outside of memory", (long long)s->count);

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "session.h"
+#include "test_effort.h"
 #include "test_mesh_order.h"
 #include "test_transformed.h"
 
@@ -138,14 +139,17 @@ static void check_warped_session(const insitu_mesh *mesh, const insitu_field *f,
     check_warped_session_by("", mesh, f, components, what);
 }
 
+/* Checks every third kind of cells of higher order, and by default every sixth: tets, hexes, wedges and pyramids. Finer
+ * pieces are by default those of wedges and pyramids here, and those of hexes in the next test. */
 static void cells_of_higher_order_draw_their_moved_nodes(void **state)
 {
     (void)state;
-    for (int k = 0; k < order_kind_count; k += 3) {
+    for (int k = test_case_count(3, 0); k < order_kind_count; k += test_case_count(6, 3)) {
         order_mesh m;
         order_mesh_create(&order_kinds[k], 2, 0.1, test_wave_field, own_rank, rank_count, &m);
         check_warped_session(&m.mesh, &m.field, 3, order_kinds[k].name);
-        check_warped_session_by("finer_pieces: 2\n", &m.mesh, &m.field, 3, order_kinds[k].name);
+        if (test_is_long_run() || k % 4 == 1)
+            check_warped_session_by("finer_pieces: 2\n", &m.mesh, &m.field, 3, order_kinds[k].name);
         order_mesh_free(&m);
     }
 }

@@ -21,7 +21,7 @@ static int64_t allocation;
  * allocation. The distance is larger on several ranks, because their steps take longer. */
 static int get_allocation_stride(void)
 {
-    return given_stride ? given_stride : rank_count > 1 ? 193 : 97;
+    return given_stride ? given_stride : rank_count > 1 ? 389 : 97;
 }
 
 /* ---- scenes and meshes ---------------------------------------------------------------------------------------- */
