@@ -36,4 +36,4 @@ def wait(what, holds, seconds=20):
     while not holds():
         if time.monotonic() > end:
             raise AssertionError(f"after {seconds} s it is not so: {what}")
-        time.sleep(0.02)
+        time.sleep(0.05)  # a question takes the browser 10 ms

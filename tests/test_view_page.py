@@ -34,6 +34,9 @@ statistics:
 class Page:
     def __init__(self, driver, view):
         self.driver = driver
+        # The page and that of the pictures in it look for news five times as often as they do for a user.
+        driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {
+            "source": "{ const wait = window.setTimeout; window.setTimeout = (f, delay) => wait(f, delay / 5); }"})
         driver.get(view.address)
 
     def at(self, name):
