@@ -81,7 +81,7 @@ set_tests_properties(vtk_structured PROPERTIES TIMEOUT 300)
 
 add_executable(test_vtk_tool test_vtk_tool.cpp)
 target_link_libraries(test_vtk_tool PRIVATE test_vtk_run insitu_quick_flags PkgConfig::CMOCKA VTK::IOLegacy VTK::IOXML)
-add_test(NAME vtk_tool COMMAND test_vtk_tool $<TARGET_FILE:insitu-render> ${plain}/bin/insitu-render
+insitu_add_split_test(vtk_tool $<TARGET_FILE:test_vtk_tool> $<TARGET_FILE:insitu-render> ${plain}/bin/insitu-render
   ${MPIEXEC_EXECUTABLE})
 
 add_executable(test_vtk_images test_vtk_images.cpp)
@@ -115,7 +115,7 @@ foreach(noun volumes polyhedra)
 endforeach()
 target_link_libraries(test_data_polyhedra PRIVATE test_own_tets)
 
-set_tests_properties(vtk_images_whole PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" SKIP_RETURN_CODE 77)
+set_tests_properties(vtk_tool_whole vtk_images_whole PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" SKIP_RETURN_CODE 77)
 set_tests_properties(vtk_tool vtk_images vtk_default PROPERTIES
   ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 300 SKIP_RETURN_CODE 77)
 
