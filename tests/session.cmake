@@ -85,7 +85,7 @@ insitu_session_program(test_session_derived)
 insitu_add_mpi_test(session_derived test_session_derived 1 3 WHOLE 2 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_light)
-insitu_add_mpi_test(session_light test_session_light 3 WHOLE 1 2 7 TIMEOUT 240 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_light test_session_light 3 WHOLE 1 2 3 7 TIMEOUT 240 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_outline)
 insitu_add_mpi_test(session_outline test_session_outline 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
