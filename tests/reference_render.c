@@ -221,15 +221,6 @@ static double find_minimum(const crossing_search *a, double low, double high, do
 
 enum { CROSSING_PIECES = 24 };
 
-/* Returns whether a dip between two depths, at which the field has the values `here` and `there`, stays clear of the
- * isovalue. A convex dip lies above the line through the two values before it and above the one through the two values
- * behind it. Along a ray the field is so smooth that its third derivative, over a piece of 1/24, changes a value by
- * less than a hundredth of the cell's range. */
-static bool is_dip_shallow(const crossing_search *a, double before, double here, double there, double behind)
-{
-    return fmax(here + (here - before), there + (there - behind)) > 0.01 * a->range;
-}
-
 /* Computes depths between which the field crosses the isovalue at most once: evenly spaced depths, and the minimum of
  * every dip towards the isovalue between two neighbouring depths on the same side. */
 static int find_crossing_depths(const crossing_search *a, double z_in, double z_out, double *z, double *v)
@@ -250,9 +241,6 @@ static int find_crossing_depths(const crossing_search *a, double z_in, double z_
         const bool falls = before == i || side * (f[i] - f[before]) <= 0;
         const bool rises = behind == i + 1 || side * (f[behind] - f[i + 1]) >= 0;
         if (!falls || !rises) continue;
-        if (before < i && behind > i + 1 &&
-            is_dip_shallow(a, side * f[before], side * f[i], side * f[i + 1], side * f[behind]))
-            continue;
         z[n] = find_minimum(a, at[i], at[i + 1], side);
         v[n] = compute_relative_value_on_ray(a, z[n]);
         lower_margin(&a->t->out->value_margin, fabs(v[n]) / a->range);
