@@ -88,8 +88,9 @@ static bool is_wanted(const bench_pixels *all, const grid *cells, int64_t cell)
 static void find_cell_entries(const grid *cells, int64_t cell, int64_t *first, int64_t *end)
 {
     const grid_walk walk = grid_walk_cell(cells, cell);
-    *first = walk.next;
-    *end = walk.end;
+    const bool has_faces = grid_cell_type(cells, cell) == GRID_POLYHEDRON;
+    *first = has_faces ? walk.face_next : walk.next;
+    *end = has_faces ? walk.face_end : walk.end;
 }
 
 /* Fills `kept` with the wanted cells, in the order of the mesh. */
