@@ -1,4 +1,5 @@
-/* Splits cells of higher order into linear pieces, which are read instead of the cells. */
+/* Splits cells of higher order into linear pieces, which are read instead of the cells. The row of a cell is its list
+ * of nodes in the connectivity; rows may end with unused entries. */
 #ifndef SESSION_SPLIT_H
 #define SESSION_SPLIT_H
 
