@@ -9,8 +9,7 @@
 
 /* The two meanings of the opacity `a` of a transfer function, which is given per unit distance. */
 typedef enum accuracy_opacity {
-    ACCURACY_OPACITY,   /* extinction -ln(1 - a), `a` being linear between knots: libinsitu, VTK's image mappers
-                         */
+    ACCURACY_OPACITY,   /* extinction -ln(1 - a), `a` being linear between knots: libinsitu, VTK's image mappers */
     ACCURACY_EXTINCTION /* extinction itself is linear between the knots: VTK's mappers of unstructured grids */
 } accuracy_opacity;
 

@@ -22,8 +22,7 @@ typedef struct session_second_difference {
 
 enum { BOUND_MOST_LEVELS = 3 };
 
-/* Matrices for polynomials on a line, a triangle or a tet. The polynomials of a cell are products of such polynomials.
- */
+/* Matrices for polynomials on a line, a triangle or a tet. A cell's polynomials are products of such polynomials. */
 typedef struct session_bound_factor {
     int dimensions;    /* 1: line, 2: triangle, 3: tet; 0: not used */
     int node_count;    /* number of nodes */

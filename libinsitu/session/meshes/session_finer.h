@@ -49,8 +49,7 @@ typedef struct session_finer_choice {
 /* Frees the choices of `count` meshes. */
 void session_free_choices(session_finer_choice *choices, int count);
 
-/* Returns the maximum number of parts into which the mesh's edges between two nodes can be cut.
- */
+/* Returns the maximum number of parts into which the mesh's edges between two nodes can be cut. */
 int session_most_parts(const session_finer_choice *choice);
 
 /* Counts the cells of higher order of each mesh of the catalogue, and sets `parts` to 1. Meshes must have been checked
