@@ -1,4 +1,5 @@
-/* Renders local cells to local fragments: camera, layers, and the one call that draws a frame. It does not use MPI.
+/* Renders this rank's cells to fragments (fragment.h): camera, layers, and the one call that draws a frame. It does not
+ * use MPI. "The thesis" in comments is the one that first described the method (docs/development/architecture.md).
  *
  * A ray through pixel (x, y) is p(z) = eye + offset + z (forward + slope), where z is the depth along the camera's
  * axis: perspective cameras have the slope, orthographic ones the offset. In all files of render/ the ray's parameter
@@ -133,9 +134,9 @@ typedef struct render_field {
 
 typedef enum render_normal {
     RENDER_GRADIENT, /* the field's gradient in the cell that contains the hit */
-    /* Central differences of the field (thesis, section 4.3.4). The difference is one-sided if one of its samples is in
-     * no cell; the cell's own gradient is used along an axis without samples. Samples come from this rank's cells, or,
-     * if the job has a list `waiting`, from those of all ranks. */
+    /* Central differences of the field (thesis, section 4.3.4). The difference is one-sided if one of its two samples
+     * lies in no cell. If neither lies in a cell, the gradient in the hit's cell is used along this axis. Samples come
+     * from this rank's cells, or, if the job has a list `waiting`, from those of all ranks. */
     RENDER_DIFFERENCES,
     RENDER_VERTEX /* gradients that the caller gives at the vertices, interpolated in the hit's cell like values */
 } render_normal;

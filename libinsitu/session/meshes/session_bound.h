@@ -46,7 +46,7 @@ typedef struct session_bound_level {
 typedef struct session_bound {
     session_interpolation nodes; /* the cell's nodes, and all nodes of a complete cell of its order */
     session_nodes
-        lattice; /* same as nodes.complete; for pyramids, which are read as collapsed hexes, the lattice of a hex */
+        lattice;      /* same as nodes.complete; for pyramids, which are read as collapsed hexes, the nodes of a hex */
     double *collapse; /* for pyramids: matrix from nodes.complete to `lattice`; otherwise NULL */
     int axis_count;   /* number of axes of the reference cell, 2 or 3 */
     int level_count;
@@ -54,10 +54,9 @@ typedef struct session_bound {
     session_bound_factor line, simplex;
 } session_bound;
 
-/* Prepares the bounds of one kind of cell, of an order from 1 to BOUND_MOST_ORDER, pyramids up to
- * INTERPOLATION_MOST_PYRAMID. order and
- * is_lobatto: as in session_make_interpolation(). Returns false if memory runs out; the caller must drop *out in any
- * case. */
+/* Prepares the bounds of one kind of cell, of an order from 1 to BOUND_MOST_ORDER, or to INTERPOLATION_MOST_PYRAMID for
+ * pyramids. order, is_lobatto: as in session_make_interpolation(). Returns false if memory runs out; the caller must
+ * drop *out in any case. */
 bool session_make_bound(const session_nodes *of, insitu_vertex_order order, bool is_lobatto, session_bound *out);
 void session_drop_bound(session_bound *bound);
 

@@ -34,7 +34,7 @@ typedef struct session_hanging_vertex {
 /* A vertex that coincides with other vertices except for rounding, and the position that represents all of these
  * vertices. */
 typedef struct session_twin {
-    int64_t vertex;     /* index of the vertex in the part */
+    int64_t vertex;     /* index of the vertex in its part of the mesh */
     double position[3]; /* lexicographically smallest position of the vertex and all vertices that coincide with it */
 } session_twin;
 

@@ -2,7 +2,11 @@
  * session's code uses:
  * - part: one rank's part of a mesh; if the rank has several blocks of the mesh, each block is a part;
  * - piece: one of the linear cells into which a cell of higher order is split (session_split.h);
+ * - caller's cell: a cell as the caller gave it, before it is split into pieces;
+ * - row: list of the nodes of one of the caller's cells in the connectivity (session_rows.h);
  * - finer lattice: additional nodes of a cell of higher order, at which its polynomial is evaluated (session_finer.h);
+ * - recentred values: cell or corner values that were averaged to the vertices (session_recentre.h);
+ * - mirror image: copy of a part with mirrored coordinates, which the scene draws in addition (session_mirror.h);
  * - shell: a triangle, quad or polygon that is drawn; a shell has no volume;
  * - drawn cell: a cell that is not a ghost;
  * - outer surface: the faces that belong to only one of the cells selected by a threshold (session_outer below);
