@@ -7,10 +7,10 @@
 #include "accuracy_subject.h"
 #include "bench_error.h"
 
-/* The two interpretations of a transfer function's opacity a per unit distance. */
+/* The two meanings of the opacity `a` of a transfer function, which is given per unit distance. */
 typedef enum accuracy_opacity {
-    ACCURACY_OPACITY,   /* extinction -ln(1 - a); a is linear between the knots: libinsitu, VTK's image mappers */
-    ACCURACY_EXTINCTION /* extinction that is linear between the knots: VTK's mappers of unstructured grids */
+    ACCURACY_OPACITY,   /* extinction -ln(1 - a), `a` being linear between knots: libinsitu, VTK's image mappers */
+    ACCURACY_EXTINCTION /* extinction itself is linear between the knots: VTK's mappers of unstructured grids */
 } accuracy_opacity;
 
 typedef struct accuracy_reference accuracy_reference;

@@ -1,5 +1,6 @@
-/* Compositing: combines the fragments of many ranks into one image on rank 0. This module has no access to cells, trees
- * or the scene.
+/* Compositing: combines the fragments of many ranks into one picture on rank 0. A fragment is what one rank contributes
+ * to a pixel: a surface hit, or a volume between two depths (fragment.h). This module has no access to cells, trees or
+ * the scene.
  *
  * Blocks of pixels are owned by ranks that have many fragments there (comp_grid.h). Every rank sends each owner its
  * fragments (on the routes of comp_route.h), owners sort them by t and blend front to back, and rank 0 gathers the

@@ -24,8 +24,8 @@ typedef struct comp_deep_list {
 } comp_deep_list;
 
 /* Adds the samples of one pixel. Its fragments must be in the order of comp_merge_pixel(), or of
- * comp_merge_folded_pixel() if is_folded is set. Each sample's z and z_back are set to t. If memory runs out,
- * lacks_memory is set. Local. */
+ * comp_merge_folded_pixel() if is_folded is set, because ranks have blended several fragments into one
+ * (fragment_fold.h). Each sample's z and z_back are set to t. If memory runs out, lacks_memory is set. Local. */
 void comp_deep_add(comp_deep_list *list, fragment *sorted, int64_t count, bool is_folded);
 
 /* Frees the lists' samples. The pointers in a list may be NULL. */

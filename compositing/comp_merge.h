@@ -8,9 +8,9 @@
 typedef void comp_interval_callback(void *state, const fragment *stretch);
 
 /* Calls the callback for each interval that comp_merge_pixel() blends, front to back. Overlapping intervals are split
- * at all of their starts and ends, and each part is passed as the mixture of the intervals that span it. Samples at the
- * same position are passed as one sample. Nothing behind an opaque interval is passed. sorted: the pixel's fragments in
- * the order of comp_merge_pixel(); the order is the same on return. Local. */
+ * at all of their starts and ends, and each of the resulting shorter intervals is passed as the mixture of the
+ * fragments that span it. Samples at the same position are passed as one sample. Nothing behind an opaque interval is
+ * passed. sorted: the pixel's fragments in the order of comp_merge_pixel(); the order is the same on return. Local. */
 void comp_merge_intervals(fragment *sorted, int64_t count, comp_interval_callback *callback, void *state);
 
 /* Does the same as comp_merge_intervals() for the fragments that comp_merge_folded_pixel() blends. There is one such

@@ -1,4 +1,5 @@
-/* Merges the fragments of the strips that a rank owns into finished pixels. */
+/* Merges the fragments of the strips that a rank owns into finished pixels. A strip is a rectangle of pixels
+ * (comp_grid.h). */
 #ifndef COMP_COMP_OWNED_H
 #define COMP_COMP_OWNED_H
 

@@ -21,8 +21,9 @@ void comp_add_overlap(unsigned char *overlaps, uint32_t pixel);
 /* Settings of a merge, and the destinations of its results. */
 typedef struct comp_merge_output {
     const float *background; /* colour of the background: linear premultiplied RGBA */
-    bool is_folded;          /* pixels are merged by comp_merge_folded_pixel() */
-    image *out;              /* picture that receives the pixels on rank 0; NULL on other ranks */
+    bool is_folded; /* set if ranks may have folded the fragments, that is, blended several fragments of a volume into
+                       one (fragment_fold.h); pixels are then merged by comp_merge_folded_pixel() */
+    image *out;     /* picture that receives the pixels on rank 0; NULL on other ranks */
     /* set (pixel_set.h) to which pixels with overlapping fragments are added; NULL: overlaps are not searched */
     unsigned char *overlaps;
     comp_deep_list *deep; /* lists that receive the samples, one per thread; NULL if deep samples are not requested */

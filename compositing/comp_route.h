@@ -4,16 +4,16 @@
  * Every rank gets a number called its place, so that the ranks of one node have consecutive places. The ranks with the
  * first places are the owners of pixels; the number of owners is a product of radices. A place is written with one
  * digit per radix, the least significant first. In round i, places that differ only in digit i are partners, and each
- * sends its partners the fragments for owners with the partner's digit. After the last round all fragments are at their
- * owners:
+ * sends its partners the fragments for those owners whose digit i is the partner's. After the last round all fragments
+ * are at their owners:
  *
  *     direct send   one round, of all ranks
  *     by nodes      a round within each node, then one among the ranks that have the same number on their nodes
  *     radix-k       a round within each node, then rounds of at most k ranks
  *     binary swap   rounds of two ranks, regardless of nodes
  *
- * Ranks whose places follow those of the owners send all their fragments to a partner before the first round; an owner
- * has at most one such partner. */
+ * Ranks whose places are behind those of the owners send all their fragments to a partner before the first round; an
+ * owner has at most one such partner. */
 #ifndef COMP_COMP_ROUTE_H
 #define COMP_COMP_ROUTE_H
 

@@ -1,4 +1,5 @@
-/* Renders local cells to local fragments: camera, layers, and the one call that draws a frame. It does not use MPI.
+/* Renders this rank's cells to fragments (fragment.h): camera, layers, and the one call that draws a frame. It does not
+ * use MPI. "The thesis" in comments is the one that first described the method (docs/development/architecture.md).
  *
  * A ray through pixel (x, y) is p(z) = eye + offset + z (forward + slope), where z is the depth along the camera's
  * axis: perspective cameras have the slope, orthographic ones the offset. In all files of render/ the ray's parameter
@@ -133,9 +134,9 @@ typedef struct render_field {
 
 typedef enum render_normal {
     RENDER_GRADIENT, /* the field's gradient in the cell that contains the hit */
-    /* Central differences of the field (thesis, section 4.3.4). The difference is one-sided if one of its samples is in
-     * no cell; the cell's own gradient is used along an axis without samples. Samples come from this rank's cells, or,
-     * if the job has a list `waiting`, from those of all ranks. */
+    /* Central differences of the field (thesis, section 4.3.4). The difference is one-sided if one of its two samples
+     * lies in no cell. If neither lies in a cell, the gradient in the hit's cell is used along this axis. Samples come
+     * from this rank's cells, or, if the job has a list `waiting`, from those of all ranks. */
     RENDER_DIFFERENCES,
     RENDER_VERTEX /* gradients that the caller gives at the vertices, interpolated in the hit's cell like values */
 } render_normal;
@@ -219,8 +220,9 @@ typedef struct render_surface_layer {
      * such a face only in an edge, so that its interval in the cell has length zero, then also hits the surface. */
     bool is_of_faces;
     uint32_t clips; /* clips of the job that cut the surface: bit i stands for clips[i] */
-    /* Used for shadows and ambient occlusion, whose rays begin at hits (render_light.h). A cell of this surface that a
-     * ray meets nearer to its hit than this number of cell sizes does not occlude the hit. 0: every cell occludes. */
+    /* Used for shadows and ambient occlusion, whose rays begin at hits (render_light.h). The distance from a hit, in
+     * cell sizes, within which a cell of this surface does not occlude the hit, although a ray meets the surface there.
+     * 0: every cell occludes. */
     float contact;
 } render_surface_layer;
 
@@ -286,8 +288,9 @@ typedef struct render_clip {
  * and there must be no volumes. */
 typedef enum render_paint {
     RENDER_LIGHT,
-    /* Surfaces that take light get their colours before lighting, and their normal in place of t_out and transmittance.
-     * render_light_fragment() computes from these the fragments that RENDER_LIGHT would have given (render_light.h). */
+    /* Fragments of surfaces that take light contain the unlit colour, and the surface's normal in place of t_out and
+     * transmittance. render_light_fragment() later computes from them the fragments that RENDER_LIGHT would have given
+     * (render_light.h). */
     RENDER_UNLIT,
     RENDER_NORMALS, /* the unit normal in world axes, on the side of the surface that faces the eye */
     /* the value of the colour field, or the isovalue if the layer has no colour field; and the isovalue's index among

@@ -39,8 +39,8 @@ typedef struct render_hit_rays {
     uint32_t lights, unused;
 } render_hit_rays;
 
-/* Computes the hit of an unlit fragment of the job, and the rays that it has, all open. Returns false if the fragment
- * needs no rays to be lit. */
+/* Computes the hit of an unlit fragment of the job, and marks all rays that the hit has as open. Returns false if the
+ * fragment needs no rays to be lit. */
 bool render_hit_of(const render_job *job, const fragment *f, render_hit *hit, render_hit_rays *rays);
 
 /* Computes the point at which the hit's rays begin, in scene units, and the unit directions of its rays into the

@@ -8,8 +8,8 @@
 
 #include "fragment.h"
 
-/* Maps a float to an unsigned integer, so that the order of the integers is that of the floats. NaN has a position in
- * the order too. */
+/* Maps a float to an unsigned integer, so that the order of the integers is that of the floats. NaN is ordered like any
+ * other bit pattern. */
 static inline uint32_t fragment_sortable_bits(float value)
 {
     uint32_t bits;

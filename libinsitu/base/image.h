@@ -1,4 +1,5 @@
-/* A finished picture on rank 0: linear premultiplied float RGBA and the depth of the nearest surface. */
+/* The struct image: a finished picture on rank 0, with linear premultiplied float RGBA and the depth of the nearest
+ * surface. */
 #ifndef BASE_IMAGE_H
 #define BASE_IMAGE_H
 
@@ -23,7 +24,8 @@ typedef struct image {
      * NULL: depth was not requested. */
     float *depth;
     deep_image *deep; /* samples of the image, only on rank 0; NULL on every rank if samples were not requested */
-    bool is_folded;   /* set if ranks have folded the fragments from which the image is made (fragment_fold.h) */
+    bool is_folded;   /* set if ranks have folded the fragments from which the image is made, that is, blended several
+                         fragments of a volume into one (fragment_fold.h) */
 } image;
 
 #endif

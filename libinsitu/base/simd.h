@@ -456,8 +456,8 @@ SIMD_INLINE void vf_gather_rows(const float *base, const int32_t index[SIMD_WIDT
 /* A vector of doubles with half as many lanes as a vf, so that two such vectors correspond to one vf. */
 typedef double vd __attribute__((vector_size(SIMD_WIDTH * 4)));
 
-/* Gathers one double from the address base + index for each lane of one half, 0 or 1. Indices count floats, not
- * doubles. */
+/* Gathers one double from the address base + index for each lane of one half of the indices: the lower half if `half`
+ * is 0, the upper half if it is 1. Indices count floats, not doubles. */
 SIMD_INLINE vd vd_gather(const float *base, vi index, int half)
 {
 #if defined(SIMD_AVX512)

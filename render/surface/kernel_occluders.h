@@ -1,20 +1,27 @@
 /* Tests whether rays from hits, towards lights or into the hemisphere above a surface, are blocked. Terms:
  *     occluder          cell of this rank that an isovalue of an opaque surface crosses; its surface may block rays
- *     blocked           a ray is blocked if it crosses an opaque surface between its begin (or the reach) and its end
+ *     reach             distance from a ray's hit within which a cell does not block the ray: the member `contact` of
+ *                       the cell's layer (render.h), times the size of the cell
+ *     blocked           a ray is blocked if it crosses the opaque surface in a cell at least `reach` from its hit, and
+ *                       before its end
  *     open              not known to be blocked
- *     reach             distance from a ray's hit within which a cell does not block the ray (contact of the layer)
- *     slab              space between two parallel planes that contains the surface in a cell: |L| <= thickness
- *     record            the numbers of a hex from which a ray's crossings of its faces are computed
+ *     slab              space between two parallel planes that contains the surface in a cell: |L| <= thickness, where
+ *                       L is a linear function fitted to the field minus the isovalue (render_occluders.c)
+ *     record            numbers that are stored for a hex in advance, from which the points are computed at which a
+ *                       ray crosses the hex's faces
  *     undecided pair    a ray and a cell for which neither slab nor record decides; the ray is traced in the cell
  *
  * Once per frame occluders are put into trees of their own, whose nodes have as many children as a vector has lanes.
  * Each ray traverses a tree on its own, and tests all children of a node, or all triangles or slabs of a leaf, at once.
- * So rays need not be coherent, and the traversal ends as soon as the ray is known to be blocked.
- *     tets               the surface in the tet is stored as one or two triangles, which the ray crosses or not
- *     other cells        are stored as a box and a slab, both of which most rays miss
- *     hexes              that are met: the values at the two crossed faces decide most rays, one ray-hex pair per lane
+ * So rays need not be coherent, and the traversal ends as soon as the ray is known to be blocked. The surface in a cell
+ * is tested as follows:
+ *     tets               are stored as the one or two triangles of the surface in the tet, which block a ray that
+ *                        crosses them
+ *     other cells        are stored as a bounding box and a slab; most rays miss one of the two
+ *     hexes              are also stored as records; for a ray that meets the box and the slab, the values at the two
+ *                        faces that it crosses decide in most cases, one ray-hex pair per lane
  *                        (kernel_occlusion_hexes.h)
- *     undecided pairs    the ray is traced in the cell like a primary ray (kernel_occlusion.h)
+ *     undecided pairs    are traced: the ray is intersected with the cell like a primary ray (kernel_occlusion.h)
  * Positions are in tree space (scaled units) in float32. For the test of triangles they are translated to the ray's
  * origin and sheared along the axis of its largest component (Woop, Benthin and Wald 2013). A triangle's vertices lie
  * on edges of the mesh and are computed from the edge alone. The edge functions of an edge in its two triangles differ

@@ -19,8 +19,8 @@
 #include "simd.h"
 
 /* Ray-hex pairs, one per lane: index of the ray, and index of the hex among the occluders. The hex's slab has the
- * linear function L = level + rise * t at the distance t along the ray. thickness, reach: the slab's rows of
- * kernel_occluders.h. */
+ * linear function L = level + rise * t at the distance t along the ray. thickness, reach: copies of the slab's rows
+ * KERNEL_SLAB_THICKNESS and KERNEL_SLAB_REACH. */
 typedef struct kernel_curved_pairs {
     int count;
     int32_t ray[SIMD_WIDTH], occluder[SIMD_WIDTH];

@@ -76,7 +76,7 @@ typedef struct kernel_tile_search {
     kernel_surface_cells pending[KERNEL_LANE_TYPES]; /* one queue per type of cells that are traced in lanes */
     kernel_batch batch;
     kernel_curved_batch curved_batch;
-    /* candidates that are traced one by one, and their number */
+    /* candidates that are traced one by one, each alone in its vectors, and the number of these candidates */
     int alone_count;
     kernel_tile_candidate alone[KERNEL_ALONE];
     /* binned candidates whose cells' vertex indices are being prefetched */

@@ -213,7 +213,8 @@ static __attribute__((noinline)) void kernel_segments_add(kernel_segments *list,
     if (vm_any(rays)) kernel_segments_add_at(list, list->is_double, own, rays, t_in, t_out, run);
 }
 
-/* Returns member 0 to 3 of each ray's segment. item: position of the segment's row in floats, from list->items on. */
+/* Gathers one of the four floats of a segment, for one segment per ray. member: 0 for t_in, 1 for t_out, 2 for v_in, 3
+ * for v_out. item: index of the segment's first float in list->items, counted in floats. */
 SIMD_INLINE vf kernel_items_gather(const kernel_segments *list, int member, vi item)
 {
     return vf_gather(list->items[0][0] + member, item);
@@ -228,7 +229,7 @@ static __attribute__((noinline, cold)) vm kernel_segments_begin_equal(const kern
 }
 
 /* Sorts the segments of all rays by t_in. Element n of the results belongs to the n-th segment of each ray: the depth
- * at which it begins (begins[n]; +inf if the ray has fewer segments), and its position in floats from list->items on
+ * at which it begins (begins[n]; +inf if the ray has fewer segments), and the index of its first float in list->items
  * (items[n]). Returns the largest number of segments of a ray. It uses insertion sort, because the segments are nearly
  * sorted already: the traversal is front to back. */
 static int kernel_segments_sort(const kernel_segments *list, vf begins[KERNEL_WINDOW], vi items[KERNEL_WINDOW])

@@ -34,8 +34,8 @@ class parts_file : public data_file
     vtkSmartPointer<vtkDataObject> read_part(size_t part, size_t step);
 };
 
-/* The parsed name of a file of a parallel run's Exodus output (Nemesis), for example run.e.4.0 of run.e.4.0 to
- * run.e.4.3. */
+/* The parsed name of a file of a parallel run's Exodus output (Nemesis), for example run.e.4.0, which is one of the
+ * four files run.e.4.0 to run.e.4.3. */
 struct nemesis_name {
     std::string start; // beginning of the file name, for example "run.e.4."
     int count = 1;     // number of files of the output, for example 4

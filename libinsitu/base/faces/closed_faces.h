@@ -24,8 +24,8 @@ typedef struct closed_triangle {
 
 /* An edge of the polyhedron. Each face at the edge has one side (see closed_faces) that runs along it. */
 typedef struct closed_edge {
-    int low, high; /* numbers of the two vertices; low is -1 in an unused entry */
-    int side[2];   /* entries at which the two faces' sides along the edge begin; -1: there is no such face */
+    int low, high; /* numbers of the two vertices; low is -1 in an unused slot of the hash table of edges */
+    int side[2];   /* the two faces' sides along the edge, by number; -1: there is no such face */
 } closed_edge;
 
 /* The faces of a polyhedron as lists of entries. An entry is one vertex in the list of one face. A side is the part of

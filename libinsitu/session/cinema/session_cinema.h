@@ -1,5 +1,5 @@
-/* Writes Cinema databases of Spec D. A database is a folder of pictures. The session writes three more files to the
- * folder.
+/* Writes image databases in the format Cinema, Spec D. A database is a folder of pictures. The session writes three
+ * more files to the folder.
  *
  * data.csv is the table: a line of column names, then one line per picture, with its parameters in the first columns
  * and its file in the final column. data.js contains the same lines as a script, because a browser lets a page that was

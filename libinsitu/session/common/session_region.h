@@ -5,8 +5,8 @@
 
 #include "region.h"
 
-/* Returns the number of threads for a loop over `items` items. Returns 1 if there is not enough work for two threads,
- * because a parallel region would then cost more than it saves. */
+/* Returns the number of threads for a loop over `items` cells or vertices. Returns 1 if there is not enough work for
+ * two threads, because a parallel region would then cost more than it saves. */
 static inline int session_choose_loop_threads(int threads, int64_t items)
 {
     return items < 2 * REGION_ITEMS ? 1 : threads;

@@ -66,7 +66,7 @@ typedef enum session_warning_kind {
     WARNING_SHELLS,    /* a layer that needs cells with volume is drawn on a mesh that has only shells */
     WARNING_SAMPLES,   /* several volumes are sampled at the default distance, without an error bound */
     WARNING_SCALE,     /* a field has no value that its logarithmic scale can show */
-    WARNING_NARROW,    /* values are too close to each other for the colours of their range */
+    WARNING_NARROW,    /* a field's colour range is so narrow that the rounding of float32 may be visible */
     WARNING_REPLACED,  /* a picture overwrites an earlier one */
     WARNING_VIEW,      /* a camera sees no cell */
     WARNING_GREY,      /* a surface lacks the field that colours it */

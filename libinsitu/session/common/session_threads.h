@@ -1,5 +1,5 @@
 /* The threads of a step. Determines how many are requested, how many can be started, and whether their stacks are large
- * enough. */
+ * enough. A trial starts the requested number of threads to find this out. */
 #ifndef SESSION_THREADS_H
 #define SESSION_THREADS_H
 

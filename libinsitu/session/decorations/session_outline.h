@@ -1,4 +1,5 @@
-/* Determines the boxes that an image's outline shows: around all data, around each mesh, or around each rank's data. */
+/* Determines the boxes whose edges are drawn as the outline of an image: around all data, around each mesh, or around
+ * each rank's data. */
 #ifndef SESSION_OUTLINE_H
 #define SESSION_OUTLINE_H
 

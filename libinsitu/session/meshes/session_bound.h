@@ -1,17 +1,20 @@
 /* Computes two bounds for cells of higher order, which are drawn as linear pieces: the distance between the isosurfaces
- * of the polynomials and of the pieces, and the distance between positions in the curved cell and in its pieces. */
+ * of the polynomials and of the pieces, and the distance between positions in the curved cell and in its pieces. The
+ * row of a cell is its list of nodes in the connectivity (session_rows.h). A complete cell has all nodes of the regular
+ * grid of its order (session_nodes.h). */
 #ifndef SESSION_BOUND_H
 #define SESSION_BOUND_H
 
 #include "session_interpolation.h"
 #include "session_pattern.h"
 
-/* Cells above this order are drawn between their own nodes, so that no bound is needed. */
+/* Cells above this order are split into pieces only between their own nodes, so that no bound is needed. */
 enum { BOUND_MOST_ORDER = NODES_MOST_ORDER / 2 };
 
 /* A second difference of Bernstein coefficients: a weighted sum of `count` coefficients. */
 typedef struct session_second_difference {
-    int direction; /* number of its direction, in the order of list_differences() (session_bound.c) */
+    int direction; /* number of the edge direction along which the difference is taken, in the order of
+                      list_differences() (session_bound.c) */
     int count;
     int nodes[10]; /* numbers of the coefficients */
     double weights[10];
@@ -19,7 +22,7 @@ typedef struct session_second_difference {
 
 enum { BOUND_MOST_LEVELS = 3 };
 
-/* Matrices for the polynomials on a line, a triangle or a tet. A cell's polynomials are products of these. */
+/* Matrices for polynomials on a line, a triangle or a tet. A cell's polynomials are products of such polynomials. */
 typedef struct session_bound_factor {
     int dimensions;    /* 1: line, 2: triangle, 3: tet; 0: not used */
     int node_count;    /* number of nodes */
@@ -43,7 +46,7 @@ typedef struct session_bound_level {
 typedef struct session_bound {
     session_interpolation nodes; /* the cell's nodes, and all nodes of a complete cell of its order */
     session_nodes
-        lattice; /* same as nodes.complete; for pyramids, which are read as collapsed hexes, the lattice of a hex */
+        lattice;      /* same as nodes.complete; for pyramids, which are read as collapsed hexes, the nodes of a hex */
     double *collapse; /* for pyramids: matrix from nodes.complete to `lattice`; otherwise NULL */
     int axis_count;   /* number of axes of the reference cell, 2 or 3 */
     int level_count;
@@ -51,10 +54,9 @@ typedef struct session_bound {
     session_bound_factor line, simplex;
 } session_bound;
 
-/* Prepares the bounds of one kind of cell, of an order from 1 to BOUND_MOST_ORDER, pyramids up to
- * INTERPOLATION_MOST_PYRAMID. order and
- * is_lobatto: as in session_make_interpolation(). Returns false if memory runs out; the caller must drop *out in any
- * case. */
+/* Prepares the bounds of one kind of cell, of an order from 1 to BOUND_MOST_ORDER, or to INTERPOLATION_MOST_PYRAMID for
+ * pyramids. order, is_lobatto: as in session_make_interpolation(). Returns false if memory runs out; the caller must
+ * drop *out in any case. */
 bool session_make_bound(const session_nodes *of, insitu_vertex_order order, bool is_lobatto, session_bound *out);
 void session_drop_bound(session_bound *bound);
 
@@ -96,8 +98,9 @@ typedef struct session_cell_bound {
 } session_cell_bound;
 
 /* Computes the bounds of a cell. tuples: x, y, z and the field's value at its nodes, in the order of its row.
- * isovalues: NULL if only the bounds of positions and values are needed. level: the lattice to use, 0 .. level_count -
- * 1; a finer lattice mostly gives a smaller bound, but takes longer. work: working memory. */
+ * isovalues: NULL if only the bounds of positions and values are needed. level: index of the lattice to use in
+ * of->levels, 0 .. level_count - 1; a finer lattice mostly gives a smaller bound, but takes longer. work: working
+ * memory. */
 session_cell_bound session_bound_cell(const session_bound *of, const double *tuples, const session_isovalues *isovalues,
                                       int level, double *work);
 

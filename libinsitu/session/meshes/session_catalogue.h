@@ -1,4 +1,6 @@
-/* The catalogue: a list of the meshes and fields of all ranks, which is the same on every rank. */
+/* The catalogue: a list of the meshes and fields of all ranks, which is the same on every rank. A part is one rank's
+ * part of a mesh, or one block of it (session_mesh.h). The key of a vertex identifies the vertex on all ranks: it is
+ * its global id or the bits of its coordinates (session_keys.h). */
 #ifndef SESSION_CATALOGUE_H
 #define SESSION_CATALOGUE_H
 
@@ -32,7 +34,7 @@ typedef struct session_hanging_vertex {
 /* A vertex that coincides with other vertices except for rounding, and the position that represents all of these
  * vertices. */
 typedef struct session_twin {
-    int64_t vertex;     /* index of the vertex in the part */
+    int64_t vertex;     /* index of the vertex in its part of the mesh */
     double position[3]; /* lexicographically smallest position of the vertex and all vertices that coincide with it */
 } session_twin;
 
@@ -115,8 +117,8 @@ typedef struct session_catalogue_mesh {
     session_homes homes;
 } session_catalogue_mesh;
 
-/* A set of meshes across which cell values are averaged at equal vertices: the meshes without vertex ids that have a
- * layer's field. A mesh with ids is a mesh group by itself. */
+/* A set of meshes across which cell values are averaged at equal vertices. It consists of the meshes without vertex ids
+ * that have the field of one layer. A mesh with ids is a mesh group by itself. */
 typedef struct session_mesh_group {
     /* name of the mesh group, as in scene_field.mesh_group_name or session_catalogue_mesh.single_group_name */
     uint64_t name;

@@ -1,4 +1,5 @@
-/* Copies cells whose vertices are not stored in VTK's order, or are stored in rows with more entries than vertices. */
+/* Copies cells whose vertices are not stored in VTK's order, or are stored in rows with more entries than vertices. The
+ * row of a cell is its list of vertices in the connectivity. */
 #ifndef SESSION_CELL_ORDER_H
 #define SESSION_CELL_ORDER_H
 

@@ -1,5 +1,7 @@
 /* Derivatives of the polynomials of cells of higher order at the cells' own nodes. A derivative along an axis of the
- * reference cell is a weighted sum of the values at nodes. */
+ * reference cell is a weighted sum of the values at nodes. A kind of cell is a type with a number of nodes
+ * (session_rows.h). A finer lattice consists of additional nodes of a cell, at which its polynomial is evaluated; such
+ * cells are called refined (session_finer.h). */
 #ifndef SESSION_DERIVATIVES_H
 #define SESSION_DERIVATIVES_H
 

@@ -1,5 +1,5 @@
 /* Measures the largest distance, in pixels, between the polynomials of a mesh's cells of higher order and the linear
- * pieces that are drawn. */
+ * pieces that are drawn. The row of a cell is its list of nodes in the connectivity (session_rows.h). */
 #ifndef SESSION_DEVIATION_H
 #define SESSION_DEVIATION_H
 
@@ -22,7 +22,8 @@ typedef struct session_value_cell {
     const session_cell_bound *bound;
 } session_value_cell;
 
-/* A request to measure a mesh: its isosurfaces, the values of a field, or the positions of its cells. */
+/* A request to measure a mesh: the errors of its isosurfaces, the range of a field's values, or the errors of its
+ * cells' positions. */
 typedef struct session_deviation_request {
     /* values of the field that is measured, or whose isosurfaces are measured. NULL: positions are measured, in the
      * cells that `plane` may cross or, if `plane` is NULL, in the cells of `measured`. */

@@ -1,10 +1,11 @@
 /* Evaluates the polynomials of cells of higher order between their nodes.
  *
  * A cell of order p each of whose edges between two nodes is cut into n parts is read as a cell of order n p whose
- * nodes have the polynomial's values and positions. Cells that are not refined have n = 1. All other code reads
- * these cells in place of the caller's: it splits them into linear pieces, finds their gradients, and counts them by
- * the same numbers. Cells do not share nodes. Nodes on common faces have the same bits in all cells
- * (session_interpolation.h), so that they are found by their coordinates. */
+ * nodes have the polynomial's values and positions. Cells that are not refined have n = 1. All other code reads these
+ * cells in place of the caller's: it splits them into linear pieces, finds their gradients, and counts them by the same
+ * numbers. Cells do not share nodes. Nodes on common faces have the same bits in all cells (session_interpolation.h),
+ * so that they are found by their coordinates. In this file, members and parameters named `parts` are the number n; a
+ * part of a mesh is one rank's part, or one block of it (session_mesh.h). */
 #ifndef SESSION_FINER_H
 #define SESSION_FINER_H
 
@@ -18,7 +19,8 @@ void session_drop_ids(const session_meshes *meshes);
  * cells of order 3 and more further. */
 enum { FINER_MOST_PARTS = 12 };
 
-/* Size of finer lattices in bytes: of their pieces and nodes, and of the values of one component of a field. */
+/* Size of finer lattices in bytes. own: size of their pieces and nodes; per_component: size of the values of one
+ * component of a field at the nodes. */
 typedef struct session_finer_bytes {
     int64_t own, per_component;
 } session_finer_bytes;
@@ -29,8 +31,8 @@ typedef struct session_cell_marks {
     session_piece_set pieces; /* the pieces that are made of refined cells; empty if session_finer_choice.parts is 1 */
 } session_cell_marks;
 
-/* The cells of higher order of a mesh on all ranks, and the number of pieces that was chosen for them; the same on
- * every rank, apart from the marks. */
+/* Counts of a mesh's cells of higher order over all ranks, and the chosen number of pieces along their edges. All
+ * members except the marks are the same on every rank. */
 typedef struct session_finer_choice {
     int order; /* highest order of its cells; 0: no rank has cells of higher order */
     int64_t serendipity_count, shell_count;
@@ -47,7 +49,7 @@ typedef struct session_finer_choice {
 /* Frees the choices of `count` meshes. */
 void session_free_choices(session_finer_choice *choices, int count);
 
-/* Returns the largest number of parts that is supported for the mesh. */
+/* Returns the maximum number of parts into which the mesh's edges between two nodes can be cut. */
 int session_most_parts(const session_finer_choice *choice);
 
 /* Counts the cells of higher order of each mesh of the catalogue, and sets `parts` to 1. Meshes must have been checked
@@ -59,14 +61,14 @@ insitu_status session_count_finer(session_meshes *meshes, const session_catalogu
  * if memory runs out. Local. */
 bool session_begin_marks(session_finer_choice *choice, const session_parts *parts);
 
-/* Returns the marks of a part of the mesh; NULL: all of its cells are refined. */
+/* Returns the marks of the part of the mesh with this index; NULL: all of the part's cells are refined. */
 static inline session_cell_marks *session_marks_of(const session_finer_choice *choice, int part)
 {
     return part < choice->mark_count ? &choice->marks[part] : NULL;
 }
 
-/* Adds, for each number of parts, the size in bytes of finer lattices in marked cells and in all other cells. The size
- * is 0 for 1 part. Local. */
+/* Adds to out[n], for each number n of parts of an edge, the size in bytes of finer lattices in marked cells and in all
+ * other cells. The size is 0 for n = 1. Local. */
 void session_count_finer_bytes(const session_mesh *mesh, const unsigned char *marks,
                                session_finer_bytes out[FINER_MOST_PARTS + 1]);
 

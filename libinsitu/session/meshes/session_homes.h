@@ -37,8 +37,8 @@ typedef struct session_homes {
     int near_count;
     int *near_ranks;
     session_box *boxes; /* bounding box of each near rank */
-    /* Used if by_id is set: the ids are divided into ranges. Each range has its first id and the rank that is the home
-     * of its ids. */
+    /* Used if by_id is set: the ids are divided into share_count ranges. Range i begins with the id first_ids[i], and
+     * owners[i] is the home rank of its ids. */
     int share_count;
     int64_t *first_ids;
     int *owners;

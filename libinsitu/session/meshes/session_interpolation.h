@@ -1,4 +1,5 @@
-/* The values of a cell's polynomial at the nodes of a finer lattice. */
+/* Computes the values of a cell's polynomial at the nodes of a finer lattice: a regular grid of nodes with a multiple
+ * of the cell's order (session_finer.h). The row of a cell is its list of nodes in the connectivity. */
 #ifndef SESSION_INTERPOLATION_H
 #define SESSION_INTERPOLATION_H
 
@@ -17,7 +18,7 @@ typedef struct session_interpolation_sides {
     int node_count, fine_count; /* numbers of nodes of one of them, in the cell's lattice and in the finer one */
     signed char corners[INTERPOLATION_MOST_SIDES][4];
     int *nodes;      /* for each face or edge and each way, the indices of its nodes in `complete` */
-    int *fine_nodes; /* the same in `fine` */
+    int *fine_nodes; /* for each face or edge and each way, the indices of its finer nodes in `fine` */
 } session_interpolation_sides;
 
 /* The interpolation in one kind of cell. */

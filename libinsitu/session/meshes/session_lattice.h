@@ -1,4 +1,4 @@
-/* Structured blocks: checks of the caller's description, and the grid built from it. */
+/* Lattices (structured blocks of cells): checks of the caller's description, and the grid built from it. */
 #ifndef SESSION_LATTICE_H
 #define SESSION_LATTICE_H
 

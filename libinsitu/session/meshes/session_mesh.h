@@ -2,7 +2,11 @@
  * session's code uses:
  * - part: one rank's part of a mesh; if the rank has several blocks of the mesh, each block is a part;
  * - piece: one of the linear cells into which a cell of higher order is split (session_split.h);
+ * - caller's cell: a cell as the caller gave it, before it is split into pieces;
+ * - row: list of the nodes of one of the caller's cells in the connectivity (session_rows.h);
  * - finer lattice: additional nodes of a cell of higher order, at which its polynomial is evaluated (session_finer.h);
+ * - recentred values: cell or corner values that were averaged to the vertices (session_recentre.h);
+ * - mirror image: copy of a part with mirrored coordinates, which the scene draws in addition (session_mirror.h);
  * - shell: a triangle, quad or polygon that is drawn; a shell has no volume;
  * - drawn cell: a cell that is not a ghost;
  * - outer surface: the faces that belong to only one of the cells selected by a threshold (session_outer below);
@@ -271,15 +275,15 @@ typedef struct session_warp {
 
 /* Coordinates of a mirror image (session_mirror.h). insitu_report lists computed coordinates as a copy. */
 typedef struct session_mirrored {
-    /* for each axis along which the image is mirrored, the coordinate of its mirror plane */
+    /* for each axis along which the source mesh is mirrored, the coordinate of the mirror plane */
     double planes[3];
     char *coordinate_memory;     /* memory of the mirrored coordinates (session_own_coordinates.h) */
     insitu_array coordinates[3]; /* the mirrored coordinates; an axis has no data if its coordinates are those of the
                                     source mesh */
     double *axes[3];             /* coordinates along a lattice's axes, owned; NULL: coordinates are given by vertex */
-    insitu_lattice lattice;      /* lattice in the image's description */
+    insitu_lattice lattice;      /* lattice in the mirror image's description */
     int64_t bytes;
-    /* cells_stamp and coordinates_stamp of the source mesh when the image was made */
+    /* cells_stamp and coordinates_stamp of the source mesh when the mirror image was made */
     int64_t cells_stamp, coordinates_stamp;
 } session_mirrored;
 
@@ -505,7 +509,7 @@ session_field *session_add_field(session_mesh *mesh, const char *name);
 session_mesh *session_add_mesh(session_meshes *meshes, const char *name, int64_t block, base_error *error);
 /* Adds an empty mirror image of a part, which must not exist yet. Returns NULL if memory runs out. */
 session_mesh *session_add_image(session_meshes *meshes, session_mesh *source, int mirror_axes, base_error *error);
-/* Returns the image of a part that is mirrored along these axes, or NULL if there is none. */
+/* Returns the mirror image of the part `source` along these axes, or NULL if there is none. */
 session_mesh *session_find_image(const session_meshes *meshes, const session_mesh *source, int mirror_axes);
 void session_remove_image(session_meshes *meshes, session_mesh *image);
 /* Removes a block or, in session_remove_mesh(), a mesh with all its blocks. Mirror images are removed too. Does nothing
@@ -550,7 +554,7 @@ void session_drop_contents(session_mesh *mesh);
 void session_refuse_mesh(session_mesh *mesh);
 void session_meshes_free(session_meshes *meshes);
 
-/* Iterator over the meshes that may be drawn as parts of an image: the caller's meshes, then the meshes built on their
+/* Iterator over the meshes of this rank that pictures may show: the caller's meshes, then the meshes built on their
  * outer faces.
  *
  *     for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) use(walk.part); */

@@ -1,6 +1,6 @@
-/* The types of cells of higher order, and the positions of their nodes in the cell's row of connectivity. The lattice
- * of a cell of order p is the regular grid of its nodes, whose indices i, j, k along the axes of the reference cell are
- * 0 .. p. */
+/* The types of cells of higher order, and the positions of their nodes in the cell's row, which is the list of the
+ * cell's nodes in the connectivity. The lattice of a cell of order p is the regular grid of its nodes, whose indices i,
+ * j, k along the axes of the reference cell are 0 .. p. */
 #ifndef SESSION_NODES_H
 #define SESSION_NODES_H
 

@@ -1,5 +1,6 @@
-/* The linear cells (pieces) into which a type of cell of higher order is split. Their vertices are given as positions
- * of nodes in the cell's row of connectivity. */
+/* Patterns: a pattern lists the linear cells (pieces) into which all cells of higher order of one type and order are
+ * split. The vertices of pieces are given as positions of nodes in the cell's row, which is the list of the cell's
+ * nodes in the connectivity. */
 #ifndef SESSION_PATTERN_H
 #define SESSION_PATTERN_H
 

@@ -63,7 +63,7 @@ static inline int64_t session_find_row_vertex(const session_rows *rows, int64_t 
                                   : session_row_vertex(rows, session_row_first(rows, cell) + node);
 }
 
-/* Returns the index of the kind of cells of this type with `count` nodes, or -1 if it is not listed. */
+/* Returns the index, in rows->kinds, of the cells of this type with `count` nodes, or -1 if they are not listed. */
 int session_find_kind(const session_rows *rows, int type, int64_t count);
 static inline int session_find_kind_of_cell(const session_rows *rows, int64_t cell)
 {

@@ -1,4 +1,5 @@
-/* Splits cells of higher order into linear pieces, which are read instead of the cells. */
+/* Splits cells of higher order into linear pieces, which are read instead of the cells. The row of a cell is its list
+ * of nodes in the connectivity; rows may end with unused entries. */
 #ifndef SESSION_SPLIT_H
 #define SESSION_SPLIT_H
 
@@ -7,8 +8,8 @@
 /* Returns whether some cells are of higher order. If the mesh has mixed types, the types of all cells are read. */
 bool session_has_higher_order(const insitu_mesh *given);
 
-/* Creates the mesh's topology of pieces. Returns an error, and creates nothing, if types, counts, offsets or indices of
- * the caller's cells are invalid. Local. */
+/* Creates mesh->topology with the pieces. Returns an error, and creates nothing, if types, counts, offsets or indices
+ * of the caller's cells are invalid. Local. */
 insitu_status session_split_cells(session_mesh *mesh, int threads, base_error *error);
 
 /* Creates a connectivity of the pieces that contains, instead of vertices, indices of entries of the caller's

@@ -1,4 +1,5 @@
-/* Sums over a mesh's cells that are computed while the mesh is checked: bounds, counts and sizes. */
+/* The tally of a mesh's cells, which is computed while the mesh is checked: bounds, numbers of cells of several kinds,
+ * and a sum of sizes. */
 #ifndef SESSION_TALLY_H
 #define SESSION_TALLY_H
 

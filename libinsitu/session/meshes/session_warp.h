@@ -1,5 +1,6 @@
-/* Draws meshes with their vertices at x + scale * u, where u is a field of the caller. The moved coordinates replace
- * the caller's, so that all other code reads the mesh as if the caller had given these coordinates. */
+/* Warps meshes: draws them with their vertices at x + scale * u, where x is the position of a vertex and u a vector
+ * field of the caller. The moved coordinates replace the caller's, so that all other code reads the mesh as if the
+ * caller had given these coordinates. */
 #ifndef SESSION_WARP_H
 #define SESSION_WARP_H
 

@@ -9,7 +9,8 @@
 typedef struct session_bins {
     double lower[3], bins_per_length; /* lower corner of the bins, and the number of bins per unit of length */
     int64_t counts[3];                /* number of bins along each axis */
-    int64_t *starts, *items;          /* bin b contains the points items[starts[b]] .. items[starts[b + 1] - 1] */
+    int64_t *starts, *items; /* items: indices of the points, sorted by bin; those of bin b are items[starts[b]] ..
+                                items[starts[b + 1] - 1] */
 } session_bins;
 
 /* Sorts `count` points into bins. Their positions begin at `positions` and are `stride` bytes apart. Returns false if

@@ -1,5 +1,5 @@
-/* The linear cells that have the corners of a mesh's cells of higher order. Their faces show which faces of the
- * caller's cells are outer faces. */
+/* The linear cells that have the corners of a mesh's cells of higher order. An outer face of such a linear cell is an
+ * outer face of the higher-order cell with the same corners. */
 #ifndef SESSION_CORNER_CELLS_H
 #define SESSION_CORNER_CELLS_H
 

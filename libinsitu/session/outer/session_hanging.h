@@ -34,8 +34,9 @@ typedef struct session_hanging_basis {
  * treated so in mesh groups of several meshes, and in meshes with levels of refinement. */
 bool session_has_twins(const session_mesh_group *mesh_group);
 
-/* Computes the mesh group's borders, and the twins of its vertices, unless they are up to date. `parts` contains this
- * rank's parts. Collective; all ranks return the same status. */
+/* Computes the mesh group's borders (outer faces of parts, session_catalogue.h), and the twins of its vertices
+ * (vertices that coincide up to rounding, session_twins.h), unless they are up to date. `parts` contains this rank's
+ * parts. Collective; all ranks return the same status. */
 insitu_status session_update_borders(session_mesh_group *mesh_group, const session_mesh_group_parts *parts,
                                      const session_team *team, base_error *error);
 

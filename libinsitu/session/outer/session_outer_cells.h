@@ -1,4 +1,5 @@
-/* Finds the cells of higher order that have outer faces. Images of outer surfaces need finer pieces only in them. */
+/* Finds the cells of higher order that have outer faces. Images of outer surfaces need finer linear pieces
+ * (session_finer.h) only in these cells. */
 #ifndef SESSION_OUTER_CELLS_H
 #define SESSION_OUTER_CELLS_H
 

@@ -21,8 +21,9 @@ typedef struct session_face_part {
 
 /* Finds the outer faces of the parts of one mesh. Two faces are equal if their vertices are equal, that is, have the
  * same global ids or, without ids, bitwise equal coordinates. Therefore a face that touches several smaller faces is an
- * outer face, and the smaller faces are outer faces too. homes must be up to date. Collective; all ranks return the
- * same status. As an exception, if memory for the faces themselves runs out, the error is only stored in *error on this
+ * outer face, and the smaller faces are outer faces too. homes: the home ranks of the mesh, that is, the ranks that
+ * compare faces of several ranks (session_homes.h); they must be up to date. Collective; all ranks return the same
+ * status. As an exception, if memory for the faces themselves runs out, the error is only stored in *error on this
  * rank. */
 insitu_status session_find_outer_faces(const session_face_part *parts, int count, const session_homes *homes,
                                        const session_team *team, base_error *error);

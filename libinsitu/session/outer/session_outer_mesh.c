@@ -330,7 +330,10 @@ static int64_t add_rim(outer_work *w, int64_t cell, int face)
     return loop;
 }
 
-/* Finds the caller's face on which a piece's face lies, and stores it in w->parent and w->face. */
+/* Finds the face on which a face of a linear piece lies, among the faces of the higher-order cell from which the piece
+ * was cut. Stores this cell of the caller in w->parent, and the number of its face in w->face; w->face is negative if
+ * the piece's face lies inside the cell. Sets w->is_curved if normals are requested and can be computed from the cell's
+ * polynomials. */
 static void find_parent_face(outer_work *w, int64_t piece, const face_polygon *p)
 {
     w->parent = w->parents[piece];
@@ -339,8 +342,8 @@ static void find_parent_face(outer_work *w, int64_t piece, const face_polygon *p
     w->is_curved = w->normals && w->face >= 0 && session_has_face_normals(&w->curved, w->whole, w->parent);
 }
 
-/* Sets the loop of the cells from index `first` on, which were built on a piece's face, to the rim of the caller's
- * face. */
+/* Sets the loop of the cells from index `first` on, which were built on a piece's face, to the rim of the face that
+ * find_parent_face() has found: the nodes along that face's edges. Does nothing for a face inside its cell. */
 static void set_rim(outer_work *w, int64_t first)
 {
     if (w->face < 0) return;

@@ -6,7 +6,7 @@
 #include "session_exchange.h"
 #include "session_mesh.h"
 
-/* The groups of equal vertices on this rank. Faces are recognized by the groups of their vertices. */
+/* The groups of equal vertices on this rank. Two faces are equal if their vertices belong to the same groups. */
 typedef struct session_vertex_numbers {
     const session_key_table *keys;  /* keys of the vertices of drawn cells; the numbers of the keys are the groups */
     const int64_t *group_of_vertex; /* for each vertex of mesh->cells, its group; -1: it belongs to no drawn cell */

@@ -1,5 +1,6 @@
 /* The faces of the caller's cells of higher order, and their rims. A rim consists of the nodes along a face's edges.
- * Cells are split into pieces, so that the outer faces of pieces are parts of these faces. */
+ * Cells are split into linear pieces, so that the outer faces of pieces are parts of these faces. The row of a cell is
+ * its list of nodes in the connectivity. */
 #ifndef SESSION_RIMS_H
 #define SESSION_RIMS_H
 

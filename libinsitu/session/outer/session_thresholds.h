@@ -6,8 +6,8 @@
 #include "scene.h"
 #include "session_mesh.h"
 
-/* Returns the outer faces that a surface layer with this threshold shows on the mesh. Returns NULL if
- * session_mark_outer() has not been called for them. */
+/* Returns the outer surface that a surface layer with this threshold shows on the mesh. Returns NULL if
+ * session_mark_outer() has not been called for this threshold. */
 session_outer *session_find_outer(const session_mesh *mesh, const scene_threshold *threshold);
 
 /* Marks the outer faces as shown by an image of this step. Returns false if memory runs out. Local. */

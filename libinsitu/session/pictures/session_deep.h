@@ -1,5 +1,5 @@
 /* Determines whether an image needs a deep picture, and manages its memory on rank 0. A deep picture stores all samples
- * of each pixel, sorted by depth. */
+ * of each pixel, that is, the surfaces and volume intervals along the pixel's ray, sorted by depth. */
 #ifndef SESSION_DEEP_H
 #define SESSION_DEEP_H
 

@@ -1,4 +1,5 @@
-/* Draws the images of the plan, and passes them to the writer of rank 0 (session_writer.h). */
+/* Draws the images that are due in a step (session_plan.h), and passes the pictures to the writer of rank 0
+ * (session_writer.h). An image is an entry of the scene's `images`; a picture is the result of drawing it in a step. */
 #ifndef SESSION_DRAW_H
 #define SESSION_DRAW_H
 
@@ -45,9 +46,9 @@ typedef struct session_drawing {
     session_shared_bars *shared_bars;
 } session_drawing;
 
-/* Draws the plan's images and passes them to the writer. An image that fails is skipped. Returns the error of the plan
- * if there is one, and otherwise the first error of an image. *drawn receives a bit mask of the images that were drawn:
- * bit n stands for image number n of the scene file. Collective. */
+/* Draws the plan's images and passes the pictures to the writer. An image that fails is skipped. Returns the error of
+ * the plan if there is one, and otherwise the first error of an image. *drawn receives a bit mask of the images that
+ * were drawn: bit n stands for image number n of the scene file. Collective. */
 insitu_status session_draw_images(const session_drawing *drawing, const session_plan *plan, uint64_t *drawn,
                                   base_error *error);
 

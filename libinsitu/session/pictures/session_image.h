@@ -8,12 +8,13 @@
 #include "error.h"
 #include "insitu/image_output.h"
 
-/* Writes an image with libinsitu_image. The first call in the process loads this library. If loading fails, an error is
- * returned, and the next call tries again. Local. Thread-safe. */
+/* Writes a picture with libinsitu_image. The first call in the process loads this library. If loading fails, an error
+ * is returned, and the next call tries again. Local. Thread-safe. */
 insitu_status session_write_image(const insitu_image *image, insitu_image_format format, const char *path,
                                   base_error *error);
 
-/* Draws the image with its decorations into its place in a larger picture (image_output.h). Local. Thread-safe. */
+/* Draws the picture `image` with its decorations into its place in a larger picture (image_output.h). Local.
+ * Thread-safe. */
 insitu_status session_place_image(const insitu_image *image, const insitu_place *place, base_error *error);
 
 /* Loads the image library before the first picture is written. Errors are ignored, because writing the picture will

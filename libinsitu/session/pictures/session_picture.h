@@ -1,5 +1,6 @@
-/* Manages the memory of pictures on rank 0. The memory of the previous picture is reused for the next picture, because
- * allocating new pages takes as long as filling them. */
+/* Manages the memory of pictures on rank 0. A picture is the result of drawing an image of the scene in a step. The
+ * memory of the previous picture is reused for the next picture, because allocating new pages takes as long as filling
+ * them. */
 #ifndef SESSION_PICTURE_H
 #define SESSION_PICTURE_H
 

@@ -1,5 +1,6 @@
 /* Determines the candidates of a mesh. These are the cells that the due images can show, according to the cells'
- * values. A partial tree contains only the candidates. */
+ * values. A partial tree, that is, a bounding volume hierarchy over some of the mesh's cells, contains only the
+ * candidates. */
 #ifndef SESSION_CANDIDATES_H
 #define SESSION_CANDIDATES_H
 

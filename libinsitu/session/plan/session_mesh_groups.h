@@ -11,8 +11,8 @@
 #include "session_catalogue.h"
 
 /* Creates the mesh groups of all layers and derived fields of the scene, and stores their names in the fields, unless
- * they are up to date. Drops recentred values of groups that no longer exist. Local; the same on every rank. An error
- * is stored in *error. */
+ * they are up to date. Frees values that were averaged to vertices over groups that no longer exist. Local; the same on
+ * every rank. An error is stored in *error. */
 void session_group_meshes(scene *scene, session_catalogue *catalogue, session_meshes *meshes, base_error *error);
 
 #endif

@@ -1,4 +1,5 @@
-/* Determines the data of the meshes that the due images need. */
+/* Makes the plan of a step: the list of the images that are due and can be drawn, and of the data of the meshes that
+ * they need. An image is an entry of the scene's `images`; drawing it in a step makes one or several pictures. */
 #ifndef SESSION_PLAN_H
 #define SESSION_PLAN_H
 
@@ -15,7 +16,8 @@ typedef struct session_recentring {
     int component; /* number of the component, as in grid_field.component */
 } session_recentring;
 
-/* The images to draw and the data that they need; the same on every rank. Borrows from the scene and the catalogue. */
+/* The images to draw and the data that they need; the same on every rank. Pointers refer to the scene and the
+ * catalogue. */
 typedef struct session_plan {
     int image_count; /* number of images that can be drawn */
     const scene_image **images;

@@ -25,8 +25,8 @@ typedef struct session_run_range {
 
 typedef struct session_image_ranges {
     char *image, *path; /* name of the image, and path of the file that keeps its ranges */
-    /* the combination of the image's sweep to which the ranges belong, by number (scene_variant.layers); 0 without a
-     * sweep */
+    /* number of the combination of field, isovalue and plane, among those of the image's sweep, to which the ranges
+     * belong (scene_variant.layers); 0 without a sweep */
     int layers;
     int count;
     session_run_range *items;

@@ -13,7 +13,7 @@ typedef struct session_rates {
     double build, select, refit;
 } session_rates;
 
-/* The part of the state of trees that does not belong to a single mesh. */
+/* The state of trees that does not belong to a single mesh. */
 typedef struct session_trees {
     session_rates rates;
     mmbvh parent; /* tree over the trees that parent_key identifies; empty if there is at most one tree */

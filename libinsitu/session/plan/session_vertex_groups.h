@@ -15,7 +15,8 @@ typedef struct session_vertex_groups_basis {
     uint64_t positions_hash;
     int part_count;
     const session_mesh *const *parts; /* this rank's parts of all meshes of the mesh group */
-    /* borders of the parts; they contain the twins of vertices; NULL: vertices have no twins */
+    /* outer faces of the parts, with the twins of their vertices (vertices that coincide up to rounding,
+     * session_twins.h); NULL: vertices have no twins */
     const session_border *borders;
     const session_homes *homes;
     bool by_id; /* true: the mesh group is a single mesh with global ids, and vertices with equal ids are equal */

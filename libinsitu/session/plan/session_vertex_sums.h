@@ -1,4 +1,6 @@
-/* Sums gradients at vertices over all ranks (scalars/session_gradients.h). */
+/* Sums gradients at vertices over all ranks (scalars/session_gradients.h). Equal vertices have equal keys: their global
+ * id or the bits of their coordinates (session_keys.h). For a vertex in the bounding boxes of several ranks, each rank
+ * gets the sums of the other ranks and adds them to its own. */
 #ifndef SESSION_VERTEX_SUMS_H
 #define SESSION_VERTEX_SUMS_H
 

@@ -21,11 +21,11 @@ insitu_status session_store_filled(session_mesh *mesh, int index, const insitu_f
 /* Marks the field's scalars as stale, because its values have changed. */
 void session_mark_scalars_stale(session_mesh *mesh, int field);
 
-/* Returns the number of entries of the connectivity that are vertices of cells, without the unused ends of rows. The
- * mesh must not have polyhedra. */
+/* Returns the number of entries of the connectivity that are vertices of cells, without the unused entries at the ends
+ * of the cells' lists. The mesh must not have polyhedra. */
 int64_t session_count_corners(const insitu_mesh *mesh);
-/* Returns the number of the field's values or, if it has an index, of the index's entries. For corners in rows it is
- * the smallest allowed number. */
+/* Returns the number of the field's values or, if it has an index, of the index's entries. For values at corners that
+ * are stored with a fixed distance from cell to cell (insitu_field.corner_row), it is the smallest allowed number. */
 int64_t session_count_field_entries(const insitu_mesh *mesh, const insitu_field *field);
 
 #endif

@@ -16,7 +16,7 @@ typedef struct session_gradient_basis {
     /* true: sums are computed over shells, so that gradients lie in the planes of the shells; false: over cells with a
      * volume */
     bool of_shells;
-    const int32_t *sum_indices; /* for each vertex, the index of its sum; -1: it has none */
+    const int32_t *sum_indices; /* for each vertex, the index of its sum; -1: no gradient is computed at the vertex */
     double length;              /* a power of two near the size of the scene, the same on all ranks */
     int threads;
     /* polynomials of the caller's cells; their gradients are added instead of the linear pieces' gradients; NULL: all

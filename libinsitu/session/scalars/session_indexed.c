@@ -193,8 +193,8 @@ insitu_status session_read_nodes(const session_mesh *mesh, int index, session_us
     return use(of, &values, error);
 }
 
-/* Updates the copy of a field's values if it is stale. If recentred scalars use the copy, the scalars' cell values are
- * updated too. */
+/* Updates the copy of a field's values if it is stale. Then sets original_values of the field's scalars again, because
+ * it contains the address of the copy. */
 static insitu_status update_copy(session_mesh *mesh, int index, int threads, base_error *error)
 {
     session_field *field = &mesh->fields[index];

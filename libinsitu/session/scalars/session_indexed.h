@@ -1,4 +1,5 @@
-/* Copies fields whose values are stored in another order than that of the mesh's vertices or cells. */
+/* Copies fields whose values are stored in another order than that of the mesh's vertices or cells: an index array
+ * gives the position of the value of each vertex or cell. */
 #ifndef SESSION_INDEXED_H
 #define SESSION_INDEXED_H
 

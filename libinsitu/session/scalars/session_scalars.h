@@ -1,5 +1,5 @@
 /* Finds and computes the scalars by which layers are drawn. A scalar is a component or the magnitude of a field, as
- * given or recentred to vertices, or the vertices' distance from a plane. */
+ * given or recentred (averaged to vertices), or the vertices' distance from a plane. */
 #ifndef SESSION_SCALARS_H
 #define SESSION_SCALARS_H
 

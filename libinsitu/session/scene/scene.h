@@ -1,6 +1,7 @@
-/* The contents of a scene file: the images to draw, when to draw them, and the files to write them to. The file is YAML
- * text and is read by a schema; docs/scene.md is generated from the same schema. Colours in the file are sRGB in [0,
- * 1]; colours in these structs are linear. */
+/* The contents of a scene file: the images to draw, when to draw them, and the files to write them to. An image is an
+ * entry of the file's `images`; a picture is one result of drawing an image in a step. The file is YAML text and is
+ * read by a schema; docs/scene.md is generated from the same schema. Colours in the file are sRGB in [0, 1]; colours in
+ * these structs are linear. */
 #ifndef SCENE_SCENE_H
 #define SCENE_SCENE_H
 

@@ -34,7 +34,8 @@ insitu_status scene_find_series(const scene_document *d, const char *path, const
                                 scene_series *out);
 /* Counts the pictures of all images together; more than SCENE_MAX_PICTURES are an error. */
 insitu_status scene_count_pictures(const scene_document *d, const scene_file *in, int *count);
-/* Removes from the image's layers, as the file gives them, everything that its variant does not show. */
+/* Removes from the image's layers, as the file gives them, the fields, isovalues and planes that its variant does not
+ * show. A variant is one of the pictures that an image makes in a step (scene_variant). */
 insitu_status scene_apply_sweep(const scene_document *d, const char *path, const scene_file_image *in,
                                 scene_image *out);
 

@@ -1,4 +1,5 @@
-/* Integrals over cells of higher order, of the polynomials of their positions and values. */
+/* Integrals over cells of higher order, of the polynomials of their positions and values. The row of a cell is its list
+ * of nodes in the connectivity. A complete cell has all nodes of the regular grid of its order (session_nodes.h). */
 #ifndef SESSION_CELL_RULES_H
 #define SESSION_CELL_RULES_H
 

@@ -5,7 +5,8 @@
 #include "session_volume.h"
 
 typedef struct session_cell_value {
-    /* is_counted: the cell is drawn and all its values are finite; is_shell: it is a shell */
+    /* is_counted: the cell is drawn and all its values are finite; is_shell: the cell is a triangle, quad or polygon,
+     * which has no volume */
     bool is_counted, is_shell;
     /* true: the value is a polynomial that varies in the cell, so that `mean` may lie outside minimum .. maximum, and
      * each bin gets a part of the cell's volume */

@@ -1,5 +1,5 @@
-/* Computes the statistics of a step that are written to files, and the conditions of images that are drawn only if a
- * statistic lies between given bounds. */
+/* Processes the events of a step: the statistics that are written to files, and the conditions of images that are drawn
+ * only if a statistic lies between given bounds. */
 #ifndef SESSION_EVENTS_H
 #define SESSION_EVENTS_H
 

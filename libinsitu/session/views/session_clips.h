@@ -1,4 +1,5 @@
-/* Converts the clips of an image to the renderer's form. Clips cut away parts of layers. */
+/* Converts the clips of an image to the renderer's form. A clip is a half space, box or sphere that cuts away a part of
+ * layers. */
 #ifndef SESSION_CLIPS_H
 #define SESSION_CLIPS_H
 

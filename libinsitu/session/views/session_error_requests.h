@@ -48,7 +48,8 @@ typedef struct session_error_requests {
     bool is_complete; /* false if memory has run out */
     bool is_shown;    /* set if some due image shows the mesh */
     bool needs_outer; /* set if a due image shows the outer surface, so that cells with outer faces are refined */
-    bool needs_all;   /* set if all cells are refined, not only these and those that isosurfaces and slices may cross */
+    bool needs_all;   /* set if all cells are refined, not only cells with outer faces and cells that isosurfaces or
+                         slices may cross */
     session_error_request items[SESSION_MOST_ERROR_REQUESTS];
 } session_error_requests;
 

@@ -42,7 +42,7 @@ typedef struct session_layer_basis {
     bool is_flat;         /* set if session_flat_axis() has found an axis */
     bool has_shells;      /* result of session_has_shells() */
     session_report *report;
-    session_image_ranges *run_ranges; /* value ranges over all time steps so far; NULL: no layer uses one */
+    session_image_ranges *run_ranges; /* colour ranges over all steps so far; NULL: no layer has such a range */
     const scene_image *image;
 } session_layer_basis;
 

@@ -1,5 +1,6 @@
-/* Defines the keys of the camera, and of sweeps, which make several pictures of an image. The macros are in
- * scene_schema_lists.h. */
+/* Defines the scene file's keys of the camera and of sweeps. A sweep draws one entry of `images` several times, once
+ * for each combination of its fields, isovalues and planes, as separate pictures. Macros that are not defined here are
+ * in scene_schema_lists.h. */
 #include "scene.h"
 #include "scene_schema_lists.h"
 
