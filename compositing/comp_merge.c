@@ -180,7 +180,7 @@ static void blend_over(blend *b, const fragment *f)
     b->transmittance *= (double)f->transmittance;
 }
 
-static bool has_length(const fragment *f)
+static bool is_volume_of_positive_length(const fragment *f)
 {
     return f->kind < FRAGMENT_SURFACE && f->t_out > f->t_in;
 }
@@ -235,7 +235,7 @@ static float find_next_interval_end(const fragment *items, int64_t count)
 /* Returns whether the second fragment begins before the first one ends. */
 static bool is_overlapped(const fragment *sorted, int64_t count)
 {
-    return count > 1 && has_length(&sorted[0]) && sorted[1].t_in < sorted[0].t_out;
+    return count > 1 && is_volume_of_positive_length(&sorted[0]) && sorted[1].t_in < sorted[0].t_out;
 }
 
 /* The callback that receives the blended intervals, and its state. callback may be NULL. */
@@ -276,7 +276,7 @@ static int64_t blend_overlapping(blend *b, fragment *sorted, int64_t count, cons
     int64_t open = 0, end = 0;
     for (;;) {
         for (; end < count && sorted[end].t_in <= at; end++) {
-            if (has_length(&sorted[end])) {
+            if (is_volume_of_positive_length(&sorted[end])) {
                 swap_fragments(sorted, open++, end);
             } else {
                 blend_over(b, &sorted[end]);
@@ -330,7 +330,7 @@ static __attribute__((noinline)) void blend_sorted(fragment *items, int64_t coun
 
 /* Returns the number of leading fragments that are folded into one (fragment_fold.h): volume fragments in the same
  * interval of the ray. */
-static int64_t count_folded(const fragment *sorted, int64_t count)
+static int64_t count_fragments_to_fold(const fragment *sorted, int64_t count)
 {
     const int32_t interval = fragment_interval_number(sorted[0].t_in);
     int64_t n = 1;
@@ -355,7 +355,7 @@ void comp_merge_folded_pixel(fragment *items, int64_t count, const float backgro
     float colour[3] = {0, 0, 0};
     float transmittance = 1;
     for (int64_t i = 0, n; i < count && !(i > 0 && is_hidden_behind(transmittance, &items[i - 1], &items[i])); i += n) {
-        n = count_folded(items + i, count - i);
+        n = count_fragments_to_fold(items + i, count - i);
         const fragment f = fragment_fold(items + i, n);
         for (int c = 0; c < 3; c++) colour[c] += transmittance * f.colour[c];
         transmittance *= f.transmittance;
@@ -396,7 +396,7 @@ void comp_merge_folded_intervals(const fragment *sorted, int64_t count, comp_int
     float transmittance = 1;
     for (int64_t i = 0, n; i < count && !(i > 0 && is_hidden_behind(transmittance, &sorted[i - 1], &sorted[i]));
          i += n) {
-        n = count_folded(sorted + i, count - i);
+        n = count_fragments_to_fold(sorted + i, count - i);
         const fragment f = fragment_fold(sorted + i, n);
         callback(state, &f);
         transmittance *= f.transmittance;
@@ -411,7 +411,7 @@ bool comp_folded_pixel_overlaps(const fragment *sorted, int64_t count)
     for (int64_t n;
          visible < count && !(visible > 0 && is_hidden_behind(transmittance, &sorted[visible - 1], &sorted[visible]));
          visible += n) {
-        n = count_folded(sorted + visible, count - visible);
+        n = count_fragments_to_fold(sorted + visible, count - visible);
         transmittance *= fragment_fold(sorted + visible, n).transmittance;
     }
     return comp_pixel_overlaps(sorted, visible);

@@ -49,7 +49,7 @@ static void mark_mixed(merge_scratch *m, uint32_t at)
     m->counts[at] = 1;
 }
 
-static bool add_remaining(merge_scratch *m, const fragment *item, uint32_t at)
+static bool add_remaining_fragment(merge_scratch *m, const fragment *item, uint32_t at)
 {
     fragment_list *const left = &m->remaining;
     if (left->count == left->capacity && !reserve_fragments(left, left->count + 256)) return false;
@@ -64,7 +64,7 @@ static bool add_remaining(merge_scratch *m, const fragment *item, uint32_t at)
 static bool join_second(merge_scratch *m, const fragment *item, uint32_t at)
 {
     const fragment other = comp_sheet_get(&m->joined, at, item->pixel);
-    if (!comp_is_opaque(item) || !comp_is_opaque(&other)) return add_remaining(m, item, at);
+    if (!comp_is_opaque(item) || !comp_is_opaque(&other)) return add_remaining_fragment(m, item, at);
     if (fragment_compare(item, &other) < 0) comp_sheet_put(&m->joined, at, item);
     return true;
 }
@@ -95,7 +95,7 @@ static bool join_received_sheet(merge_scratch *m)
         for (unsigned bits = left[r]; bits; bits &= bits - 1) {
             const uint32_t at = r * COMP_LANES + (uint32_t)__builtin_ctz(bits);
             const fragment item = comp_sheet_get(&m->other, at, at);
-            if (!add_remaining(m, &item, at)) return false;
+            if (!add_remaining_fragment(m, &item, at)) return false;
         }
     return true;
 }

@@ -23,16 +23,16 @@ static int find_largest_product(int number, int most)
     return number;
 }
 
-static void add_round(comp_route *route, int radix)
+static void add_route_round(comp_route *route, int radix)
 {
     if (radix > 1) route->radix[route->round_count++] = radix;
 }
 
-static void add_rounds(comp_route *route, int number, int most)
+static void add_route_rounds(comp_route *route, int number, int most)
 {
     while (number > 1) {
         const int radix = find_largest_divisor(number, most);
-        add_round(route, radix);
+        add_route_round(route, radix);
         number /= radix;
     }
 }
@@ -47,11 +47,11 @@ comp_route comp_route_of(comp_schedule schedule, int ranks, comp_nodes nodes, in
     if (schedule == COMP_RADIX || schedule == COMP_BINARY) {
         const int most = schedule == COMP_BINARY || radix < 2 ? 2 : radix;
         groups = find_largest_product(groups, most);
-        add_round(&route, route.nodes.ranks);
-        add_rounds(&route, groups, most);
+        add_route_round(&route, route.nodes.ranks);
+        add_route_rounds(&route, groups, most);
     } else {
-        add_round(&route, route.nodes.ranks);
-        add_round(&route, groups);
+        add_route_round(&route, route.nodes.ranks);
+        add_route_round(&route, groups);
     }
     route.owners = route.nodes.ranks * groups;
     return route;

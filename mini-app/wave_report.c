@@ -65,7 +65,7 @@ void wave_report_step(wave_report *report, int64_t cycle, double time, double si
 
 /* Ends the text after the YAML scalar at its beginning: at the closing quote, or before a comma, a blank or a closing
  * brace that was not opened in the scalar ("{cycle}" contains both braces). */
-static void cut_scalar(char *text)
+static void cut_text_after_scalar(char *text)
 {
     char quote = *text == '"' || *text == '\'' ? *text : 0;
     int open = 0;
@@ -92,7 +92,7 @@ static void print_paths(const char *scene)
         path = strchr(path, ':') + 1;
         path += strspn(path, " \t\r\n");
         if (*path == '[' || *path == 0) continue;
-        cut_scalar(path);
+        cut_text_after_scalar(path);
         printf("  %s\n", path);
     }
     fclose(file);

@@ -161,7 +161,7 @@ static double compute_overlap_of_pair(const mmbvh *tree, int64_t parent, int64_t
     return whole > 0 ? cost_half_area(lower[0], upper[0]) / whole : 0;
 }
 
-static insitu_status check_inner(check_state *w, int64_t index)
+static insitu_status check_inner_node(check_state *w, int64_t index)
 {
     const int64_t pair = mmbvh_node_ref(w->tree, index);
     if (pair != w->next_pair || pair + 2 > w->tree->node_count) {
@@ -192,7 +192,7 @@ static insitu_status check_nodes(check_state *w)
         w->depth = depth > w->depth ? depth : w->depth;
         insitu_status status = check_box(w, index);
         const bool is_leaf = mmbvh_node_count(w->tree, index) > 0;
-        if (!status) status = is_leaf ? check_leaf(w, index) : check_inner(w, index);
+        if (!status) status = is_leaf ? check_leaf(w, index) : check_inner_node(w, index);
         if (status) return status;
         if (is_leaf) continue;
         for (int side = 1; side >= 0; side--) {
@@ -204,7 +204,7 @@ static insitu_status check_nodes(check_state *w)
 }
 
 /* Returns an error if the traversal has not visited all nodes, entries and cells. */
-static insitu_status check_complete(const check_state *w)
+static insitu_status check_all_nodes_visited(const check_state *w)
 {
     if (w->next_pair != w->tree->node_count && w->tree->node_count) {
         return VIOLATION(w, "%" PRId64 " of %" PRId64 " nodes are reached", w->next_pair, w->tree->node_count);
@@ -243,7 +243,7 @@ insitu_status mmbvh_check(const mmbvh *tree, const grid *g, const grid_field *fi
     w.visited = base_calloc((size_t)w.cell_limit / 8 + 1, 1);
     if (!w.visited) return base_fail(error, INSITU_ERROR_MEMORY, "out of memory: checking a tree");
     insitu_status status = tree->node_count > 0 ? check_nodes(&w) : INSITU_OK;
-    if (!status) status = check_complete(&w);
+    if (!status) status = check_all_nodes_visited(&w);
     base_free(w.visited);
     if (!status && out) *out = make_statistics(&w);
     return status;

@@ -225,7 +225,7 @@ bool sweep_reads_floats(const sweep *ranges)
     return ranges->field && can_use_specialized(ranges->g, ranges->field) && !ranges->values.is_wide;
 }
 
-static sweep_run choose_run(const grid *g, const grid_field *field)
+static sweep_run choose_sweep_function(const grid *g, const grid_field *field)
 {
     if (!field) return run_infinite;
     if (!can_use_specialized(g, field)) return run_generic;
@@ -235,7 +235,7 @@ static sweep_run choose_run(const grid *g, const grid_field *field)
 sweep sweep_of_ranges(const mmbvh *tree, const grid *g, const grid_field *field, mmbvh_ranges ranges)
 {
     sweep s = {.tree = tree, .g = g, .field = field, .ranges = ranges};
-    s.run = choose_run(g, field);
+    s.run = choose_sweep_function(g, field);
     if (field && field->component >= 0) {
         s.values = field->values;
         s.values.data += field->component * field->component_stride;

@@ -70,7 +70,7 @@ static void sort(fragment *items, int64_t count)
 
 /* Returns the error bound of a segment's end at t. If a segment of another rank begins or ends within this distance,
  * the two may be parts of touching cells. */
-static float error_at(float t)
+static float compute_segment_end_error(float t)
 {
     return fmaxf(fabsf(t), 1) * RENDER_FACE_ERROR;
 }
@@ -79,7 +79,8 @@ static float error_at(float t)
  * of touching cells for overlapping ones (kernel_segments.h). Samples need no such margin. */
 static void shorten(const render_folding *folding, fragment *items, int64_t count)
 {
-    for (int64_t i = 0; i < count && folding->has_segments; i++) items[i].t_out -= error_at(items[i].t_out);
+    for (int64_t i = 0; i < count && folding->has_segments; i++)
+        items[i].t_out -= compute_segment_end_error(items[i].t_out);
 }
 
 /* Folds the `count` fragments of one run, interval by interval (fragment_interval_number()). Stores the resulting
@@ -92,8 +93,8 @@ static fragment *fold_run(const render_folding *folding, fragment *run, int64_t 
     for (int64_t i = 0; i < count && !is_alone; i++) end = i && end > run[i].t_out ? end : run[i].t_out;
     if (!is_alone) begin = run[0].t_in;
     if (folding->has_segments && !is_alone) {
-        begin += error_at(begin);
-        end -= error_at(end);
+        begin += compute_segment_end_error(begin);
+        end -= compute_segment_end_error(end);
     }
     for (int64_t i = 0, n; i < count; i += n) {
         const int32_t interval_number = fragment_interval_number(run[i].t_in);

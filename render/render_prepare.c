@@ -71,7 +71,8 @@ static void prepare_scale(kernel_transfer *out, const render_transfer *t)
     out->scale_shift = (float)((begin - low) * slope);
 }
 
-/* Returns the position in the colour table of a value, as kernel_colour_position() computes it in float32. */
+/* Returns the position in the colour table of a value, as kernel_find_colour_table_position() computes it in float32.
+ */
 static double ramp_position(const kernel_transfer *out, const render_transfer *t, double value)
 {
     if (t->scale == RENDER_LINEAR) return (value - out->low) * out->inverse_width;

@@ -130,7 +130,8 @@ static void cut_cell_into_pieces(const bound_kind *kind, const cell_functions *o
     out->order = r;
     out->places = malloc((size_t)fine.count * sizeof *out->places);
     out->tuples = malloc((size_t)fine.count * sizeof *out->tuples);
-    assert_true(session_make_pattern(session_lagrange_type(type), &fine, INSITU_ORDER_LEXICOGRAPHIC, &out->pattern));
+    assert_true(
+        session_make_split_pattern(session_lagrange_type(type), &fine, INSITU_ORDER_LEXICOGRAPHIC, &out->pattern));
     for (int i = 0; i < (r + 1) * (r + 1) * (r + 1); i++) {
         const int n[3] = {i % (r + 1), i / (r + 1) % (r + 1), i / (r + 1) / (r + 1)};
         if (!session_has_node(&fine, n[0], n[1], n[2])) continue;
@@ -142,7 +143,7 @@ static void cut_cell_into_pieces(const bound_kind *kind, const cell_functions *o
 
 static void free_cut(cut_cell *of)
 {
-    session_drop_pattern(&of->pattern);
+    session_drop_split_pattern(&of->pattern);
     free(of->places);
     free(of->tuples);
 }

@@ -413,13 +413,14 @@ static void mirrored_images_follow_changes(void **state)
     everywhere(submit_input(session, &in) == INSITU_OK);
     expect_step(session, blocks, &in, by, 0, "the first step");
     const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
-    const session_mesh *its_image = session_find_image(&session->meshes, mesh, 1);
+    const session_mesh *its_image = session_find_mirror_image(&session->meshes, mesh, 1);
     const int64_t stamp = its_image->coordinates_stamp;
 
     in.mesh.changed = in.field.changed = INSITU_CHANGED_NOTHING;
     everywhere(submit_input(session, &in) == INSITU_OK);
     expect_step(session, blocks, &in, by, 1, "nothing new");
-    everywhere(session_find_image(&session->meshes, mesh, 1) == its_image && its_image->coordinates_stamp == stamp);
+    everywhere(session_find_mirror_image(&session->meshes, mesh, 1) == its_image &&
+               its_image->coordinates_stamp == stamp);
 
     for (int64_t v = 0; v < in.part.vertex_count; v++) in.part.values[v] = cos(3 * in.part.values[v]);
     in.field.changed = INSITU_CHANGED_VALUES;

@@ -276,7 +276,7 @@ static void means_follow_values_that_changed_on_one_rank(void **context)
 /* Compares the picture of all ranks with the one that rank 0 draws from the whole mesh. Pictures that show only
  * surfaces are bit-identical. If a volume is behind transparent surfaces, pictures agree up to the rounding of the over
  * operator (1e-6, as in all tests). */
-static void compare_with_alone(const char *scene, double bound)
+static void compare_with_single_rank(const char *scene, double bound)
 {
     for (int distributed = 0; distributed < TEST_PARTITION_COUNT; distributed++) {
         part_input in, all;
@@ -318,20 +318,20 @@ static void compare_with_alone(const char *scene, double bound)
 static void surfaces_do_not_depend_on_the_partition(void **context)
 {
     (void)context;
-    compare_with_alone(surface_scene, 0);
+    compare_with_single_rank(surface_scene, 0);
 }
 
 static void volumes_do_not_depend_on_the_partition(void **context)
 {
     (void)context;
-    compare_with_alone(mixed_scene, 1e-6);
+    compare_with_single_rank(mixed_scene, 1e-6);
 }
 
 static void smooth_volumes_do_not_depend_on_the_partition(void **context)
 {
     (void)context;
-    compare_with_alone(SMOOTH("c", AT_VERTICES, "samples"), 1e-6);
-    compare_with_alone(SMOOTH("c", AT_VERTICES, "segments"), 1e-6);
+    compare_with_single_rank(SMOOTH("c", AT_VERTICES, "samples"), 1e-6);
+    compare_with_single_rank(SMOOTH("c", AT_VERTICES, "segments"), 1e-6);
 }
 
 /* Draws a scene with two fields: c has the cells' values, and v the means at vertices that a search over all cells has

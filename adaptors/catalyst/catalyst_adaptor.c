@@ -63,7 +63,7 @@ static bool is_yaml(const char *path)
 
 /* Returns the path of the first scene in catalyst/scripts, or NULL if there is none. A script is either a path, or a
  * node with a filename. */
-static const char *find_script(const node *root)
+static const char *find_catalyst_script(const node *root)
 {
     node scripts, script, file;
     if (!node_find(root, "catalyst/scripts", &scripts)) return NULL;
@@ -84,7 +84,7 @@ static bool find_scene(const node *root, const char **scene, bool *is_text)
     if (node_has(root, "catalyst/insitu/scene")) return node_read_string(root, "catalyst/insitu/scene", scene);
     *is_text = node_has(root, "catalyst/insitu/scene_text");
     if (*is_text) return node_read_string(root, "catalyst/insitu/scene_text", scene);
-    *scene = find_script(root);
+    *scene = find_catalyst_script(root);
     if (!*scene) *scene = getenv("INSITU_SCENE");
     return *scene || node_set_error(root, "catalyst", INSITU_ERROR_SCENE,
                                     "there is no scene: give insitu/scene, a *.yaml among scripts, or INSITU_SCENE");

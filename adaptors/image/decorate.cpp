@@ -189,7 +189,7 @@ void draw_frame(drawing &s, const area &a)
 }
 
 /* Draws small boxes beyond the ends of the bar, if values outside the range have colours of their own. */
-void draw_out_of_range(drawing &s, const insitu_colour_bar &bar, const block &b)
+void draw_out_of_range_boxes(drawing &s, const insitu_colour_bar &bar, const block &b)
 {
     const double height = 0.45 * b.size;
     const area &g = b.gradient, below = {g.x0, g.y1, g.x1, g.y1 + height}, above = {g.x0, g.y0 - height, g.x1, g.y0};
@@ -203,7 +203,7 @@ void draw_bar(drawing &s, const block &b)
     const insitu_colour_bar &bar = s.decorations.bars[b.index];
     draw_gradient(s, bar, b.gradient);
     draw_frame(s, b.gradient);
-    draw_out_of_range(s, bar, b);
+    draw_out_of_range_boxes(s, bar, b);
     for (const int i : b.ticks) {
         const double y = tick_row(bar.ticks[i], b.gradient);
         draw_stroke_with_halo(s, {{b.gradient.x1, y}, {b.gradient.x1 + 0.3 * b.size, y}, false}, line_width(s), b.size,

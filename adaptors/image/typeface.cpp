@@ -172,7 +172,7 @@ void draw_bitmap(const FT_Bitmap &map, int left, int top, const cover_pixel &cov
 }
 
 /* Covers the pixels within the stroker's radius of the loaded glyph. */
-void draw_widened(FT_GlyphSlot slot, FT_Stroker stroker, int x, const cover_pixel &cover)
+void draw_widened_glyph(FT_GlyphSlot slot, FT_Stroker stroker, int x, const cover_pixel &cover)
 {
     FT_Glyph glyph = nullptr;
     if (slot->format != FT_GLYPH_FORMAT_OUTLINE || !succeeded(FT_Get_Glyph(slot, &glyph))) return;
@@ -257,7 +257,7 @@ void typeface::draw(const std::string &text, int size, double halo, const cover_
     const std::unique_ptr<FT_StrokerRec_, void (*)(FT_Stroker)> guard(stroker, FT_Stroker_Done);
     FT_Stroker_Set(stroker, std::lround(64 * halo), FT_STROKER_LINECAP_ROUND, FT_STROKER_LINEJOIN_ROUND, 0);
     lay_out_glyphs(face_, characters, size, FT_LOAD_NO_BITMAP,
-                   [&](int x) { draw_widened(face_->glyph, stroker, x, cover); });
+                   [&](int x) { draw_widened_glyph(face_->glyph, stroker, x, cover); });
 }
 
 void typeface::record_missing(const std::string &text)

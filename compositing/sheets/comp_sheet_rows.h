@@ -357,7 +357,7 @@ ROWS_INLINE const unsigned char *read_word(const unsigned char *in, const sheet_
     return in;
 }
 
-ROWS_INLINE void fill_word(const sheet_plan *plan, uint32_t value, uint32_t *words)
+ROWS_INLINE void fill_sheet_word(const sheet_plan *plan, uint32_t value, uint32_t *words)
 {
     const lanes values = (lanes){0} + value;
     for (int i = 0; i < plan->rows; i++) store_lanes(words + plan->row[i] * COMP_LANES, values);
@@ -376,7 +376,7 @@ static const unsigned char *read_words(const unsigned char *in, const sheet_plan
         memcpy(&value, in, sizeof value);
         in += sizeof value;
         if (kind == WORD_UNIFORM)
-            fill_word(plan, value, out->words[w]);
+            fill_sheet_word(plan, value, out->words[w]);
         else
             in = read_word(in, plan, kind == WORD_LINEAR, value, out->words[w]);
     }

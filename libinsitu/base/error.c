@@ -13,7 +13,7 @@ static size_t count_control_bytes(const unsigned char *text)
     return text[0] == 0xc2 && text[1] >= 0x80 && text[1] < 0xa0 ? 2 : 0;
 }
 
-static bool has_control(const char *text)
+static bool has_control_character(const char *text)
 {
     for (; *text; text++)
         if (count_control_bytes((const unsigned char *)text)) return true;
@@ -22,7 +22,7 @@ static bool has_control(const char *text)
 
 void base_escape(char *text, size_t capacity)
 {
-    if (!has_control(text)) return;
+    if (!has_control_character(text)) return;
     char escaped[2048];
     const size_t space = capacity < sizeof escaped ? capacity : sizeof escaped;
     size_t size = 0;

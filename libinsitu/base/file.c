@@ -118,7 +118,7 @@ bool file_read(const char *path, size_t limit, file_content *out, file_failure *
     return false;
 }
 
-bool file_read_own(const char *path, size_t limit, file_content *out, file_failure *failure)
+bool file_read_written_by_library(const char *path, size_t limit, file_content *out, file_failure *failure)
 {
     if (file_read(path, limit, out, failure)) return true;
     failure->is_missing = failure->is_missing || (!S_ISREG(out->stamp.st_mode) && is_link(path));

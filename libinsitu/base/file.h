@@ -30,7 +30,7 @@ bool file_read(const char *path, size_t limit, file_content *out, file_failure *
 
 /* Reads, like file_read(), a file that the library itself has written and appends to. A link that does not lead to a
  * regular file counts as missing, because file_replace() replaces the link itself. */
-bool file_read_own(const char *path, size_t limit, file_content *out, file_failure *failure);
+bool file_read_written_by_library(const char *path, size_t limit, file_content *out, file_failure *failure);
 
 /* Replaces a file by these bytes, and creates missing folders. If the path is a link, the link is replaced and its
  * target remains unchanged; a folder, pipe, socket or device is an error. Returns false on a failure: the old file is

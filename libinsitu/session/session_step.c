@@ -68,7 +68,7 @@ static void reload_scene(insitu_session *s, session_changes *changes)
     const bool are_same_pieces = now->finer_pieces == old.finer_pieces && now->finer_memory == old.finer_memory &&
                                  now->is_surface_error_given == old.is_surface_error_given;
     if (are_same_pieces) return;
-    session_end_finer(&s->meshes);
+    session_end_finer_lattices(&s->meshes);
     s->meshes.are_cells_changed = s->meshes.are_names_changed = true;
     changes->are_cells_changed = changes->are_names_changed = true;
 }
@@ -182,9 +182,10 @@ static insitu_status refine_cells(insitu_session *s, const session_moment *momen
     session_finer_choice *choices = base_calloc((size_t)s->catalogue.mesh_count + 1, sizeof *choices);
     if (!choices) session_fail_for_memory(error, s->catalogue.mesh_count * (int64_t)sizeof *choices, "finer pieces");
     insitu_status status = session_agree(s->team.comm, error);
-    if (!status) status = session_count_finer(&s->meshes, &s->catalogue, s->team.comm, choices, error);
+    if (!status) status = session_count_higher_order_cells(&s->meshes, &s->catalogue, s->team.comm, choices, error);
     if (!status) status = session_choose_pieces(&basis, choices, &s->report, error);
-    if (!status) status = session_make_finer(&s->meshes, &s->catalogue, choices, &s->team, &are_changed, error);
+    if (!status)
+        status = session_make_finer_lattices(&s->meshes, &s->catalogue, choices, &s->team, &are_changed, error);
     session_free_choices(choices, s->catalogue.mesh_count);
     if (status || !are_changed) return status;
     *are_cells_changed = true;
@@ -200,7 +201,7 @@ static insitu_status update_meshes(insitu_session *s, const session_changes *cha
     const scene *scene = &s->scene_file.scene;
     base_error reason = {.status = INSITU_OK};
     bool are_cells_changed = changes->are_cells_changed;
-    if (changes->are_levels_changed && session_update_covers(&s->meshes, team, error)) return error->status;
+    if (changes->are_levels_changed && session_update_covered_cells(&s->meshes, team, error)) return error->status;
     if (transform_meshes(s, &are_cells_changed, error)) return error->status;
     if (are_cells_changed) session_check_meshes(&s->meshes, team, &reason);
     if (!refused->status) *refused = reason;
@@ -374,7 +375,7 @@ insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
         session_warn_of_unused_parameters(&session->scene_file.scene, &session->requested_parameters, &session->report);
     insitu_status status = session_find_changes(session, cycle, time, &changes, &session->error);
     if (!status && changes.reporting_rank >= 0)
-        status = session_share_lines(&session->report, changes.reporting_rank, &session->team, &session->error);
+        status = session_share_warnings(&session->report, changes.reporting_rank, &session->team, &session->error);
     if (!status) {
         status = run_phases(session, &changes, &guard, &session->error);
         session_drop_pending(&session->meshes);

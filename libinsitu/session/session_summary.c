@@ -200,7 +200,7 @@ static void report_part(session_report *out, copied_reasons *copied, const sessi
         const session_scalar *scalar = &mesh->scalars[i];
         report_scalar(out, copied, mesh, scalar);
         if (!scalar->is_used || !scalar->needs_ranges || mesh->source) continue;
-        const int64_t count = session_count_unusable(mesh, scalar);
+        const int64_t count = session_count_unusable_cells(mesh, scalar);
         unusable = count > unusable ? count : unusable;
     }
     report->cells_unusable += unusable;
@@ -262,7 +262,7 @@ void session_complete_report(const session_meshes *meshes, const mmbvh *parent, 
     insitu_report *report = &out->public_report;
     if (scene_warning) session_text_add(&out->warnings, "the scene file's last edit was not taken: %s", scene_warning);
     for (int i = 0; i < meshes->count;) {
-        const session_parts parts = session_parts_at(meshes, i);
+        const session_parts parts = session_find_parts_from_index(meshes, i);
         report_parts(out, &parts);
         i += parts.count;
     }

@@ -135,7 +135,7 @@ static bool ensure_bin_capacity(kernel_bin *bin, int64_t count)
     return bin->buffer != NULL;
 }
 
-static int count_in_tile(const struct kernel_bins *bins, int64_t tile)
+static int count_candidates_in_tile(const struct kernel_bins *bins, int64_t tile)
 {
     return (int)(bins->starts[tile + 1] - bins->starts[tile]);
 }
@@ -148,18 +148,18 @@ static bool gather(const struct kernel_bins *bins, int64_t tile, kernel_bin *bin
     int64_t count = 0;
     bin->count = 0;
     for (const struct kernel_bins *b = bins; b; b = b->next)
-        if (count_in_tile(b, tile)) {
+        if (count_candidates_in_tile(b, tile)) {
             last = b;
-            count += count_in_tile(b, tile);
+            count += count_candidates_in_tile(b, tile);
         }
     if (!last) return true;
-    const bool is_shared = count_in_tile(last, tile) < count;
+    const bool is_shared = count_candidates_in_tile(last, tile) < count;
     if (is_shared && !ensure_bin_capacity(bin, count)) return false;
     bin->items = is_shared ? bin->buffer : last->items + last->starts[tile];
     bin->count = (int)count;
     kernel_tile_candidate *to = bin->items;
     for (const struct kernel_bins *b = bins; is_shared && b; b = b->next) {
-        const int own = count_in_tile(b, tile);
+        const int own = count_candidates_in_tile(b, tile);
         memcpy(to, b->items + b->starts[tile], (size_t)own * sizeof *to);
         to += own;
     }

@@ -55,7 +55,7 @@ static __attribute__((noinline)) vf kernel_scaled_position(const kernel_transfer
     return position * t->scale_slope + t->scale_shift;
 }
 
-SIMD_INLINE vf kernel_colour_position(const kernel_transfer *t, vf x)
+SIMD_INLINE vf kernel_find_colour_table_position(const kernel_transfer *t, vf x)
 {
     return t->scale == RENDER_LINEAR ? x : kernel_scaled_position(t, x);
 }
@@ -81,7 +81,7 @@ SIMD_INLINE void kernel_table_at(const kernel_transfer *t, vf along, vf out[3])
  * colour. */
 SIMD_INLINE void kernel_table_colour(const kernel_transfer *t, vf x, vf out[3])
 {
-    kernel_table_at(t, kernel_colour_position(t, x), out);
+    kernel_table_at(t, kernel_find_colour_table_position(t, x), out);
 }
 
 /* Returns the opacity at a position in the colour table. */
@@ -97,7 +97,7 @@ SIMD_INLINE vf kernel_opacity_at(const kernel_transfer *t, vf place)
 
 SIMD_INLINE vf kernel_opacity(const kernel_transfer *t, vf x)
 {
-    return kernel_opacity_at(t, kernel_colour_position(t, x));
+    return kernel_opacity_at(t, kernel_find_colour_table_position(t, x));
 }
 
 SIMD_INLINE vf kernel_inverse_length(const vf v[3], vm *is_zero)
@@ -203,7 +203,7 @@ static __attribute__((noinline, unused)) void kernel_append_fragments(kernel_pac
  * NaN. */
 static __attribute__((noinline)) void kernel_special_colour(const kernel_transfer *t, vf w, vf out[3])
 {
-    const vf place = kernel_colour_position(t, w), one = vf_set(1), zero = vf_set(0);
+    const vf place = kernel_find_colour_table_position(t, w), one = vf_set(1), zero = vf_set(0);
     if (t->is_banded) {
         const vf band = vf_floor(vf_clamp(place, zero, one) * (float)t->colour_count);
         const vi index = vi_from_vf(vf_min(band, vf_set((float)(t->colour_count - 1)))) * 3;

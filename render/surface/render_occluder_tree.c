@@ -27,7 +27,7 @@ typedef struct widening {
 } widening;
 
 /* Computes the bounding box of the piece with index i. */
-static void box_of(const widening *w, int64_t i, float *lower, float *upper)
+static void compute_piece_box(const widening *w, int64_t i, float *lower, float *upper)
 {
     const float *rows = w->pieces[i].rows;
     for (int a = 0; a < 3; a++) {
@@ -56,7 +56,7 @@ static void sum_up(widening *w)
         w->first[node] = count ? ref : w->first[ref];
         w->count[node] = count ? count : w->count[ref] + w->count[ref + 1];
         for (int64_t n = 0; n < count; n++) {
-            box_of(w, w->binary->cells[ref + n], lower, upper);
+            compute_piece_box(w, w->binary->cells[ref + n], lower, upper);
             grow_box(box, lower, upper);
         }
         for (int64_t n = 0; n < (count ? 0 : 2); n++)
@@ -89,7 +89,7 @@ static piece_range leaf_part(const widening *w, int64_t first, int64_t count)
     piece_range out = {-1, first, count, {INFINITY, INFINITY, INFINITY, -INFINITY, -INFINITY, -INFINITY}};
     float lower[3], upper[3];
     for (int64_t n = 0; n < count; n++) {
-        box_of(w, w->binary->cells[first + n], lower, upper);
+        compute_piece_box(w, w->binary->cells[first + n], lower, upper);
         grow_box(out.box, lower, upper);
     }
     return out;
@@ -111,7 +111,7 @@ static void divide(const widening *w, const piece_range *whole, piece_range out[
 
 /* Divides the range `whole` into the ranges of a node's children: the range with the largest box is divided repeatedly,
  * until there are as many ranges as lanes, or each fits into a leaf. Returns the number of ranges. */
-static int divide_all(const widening *w, const piece_range *whole, piece_range *out)
+static int divide_range_among_children(const widening *w, const piece_range *whole, piece_range *out)
 {
     int count = 1;
     out[0] = *whole;
@@ -154,7 +154,7 @@ static int32_t make_node(widening *w, const piece_range *of)
 {
     piece_range children[MOST_LANES];
     const int32_t node = w->out->node_count++;
-    const int count = divide_all(w, of, children), width = w->width;
+    const int count = divide_range_among_children(w, of, children), width = w->width;
     float *boxes = w->out->boxes + (int64_t)node * 6 * width;
     int32_t *links = w->out->children + (int64_t)node * width;
     for (int i = 0; i < width; i++)
@@ -224,7 +224,7 @@ static insitu_status build_boxes(const widening *w, int threads, mmbvh *out, bas
         {
             region_enter();
 #pragma omp for schedule(static) nowait
-            for (int64_t i = 0; i < count; i++) box_of(w, i, lower + 3 * i, upper + 3 * i);
+            for (int64_t i = 0; i < count; i++) compute_piece_box(w, i, lower + 3 * i, upper + 3 * i);
             region_leave();
         }
         status = mmbvh_build_boxes(lower, upper, ranges, count, &options, out, error);

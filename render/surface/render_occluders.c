@@ -79,7 +79,7 @@ static double value_of(const occluder_search *s, int i)
     return ((const double *)s->values.items)[i];
 }
 
-static void bounds_of(const occluder_search *s, double low[3], double high[3])
+static void compute_vertex_bounds(const occluder_search *s, double low[3], double high[3])
 {
     for (int a = 0; a < 3; a++) low[a] = high[a] = place_of(s, 0)[a];
     for (int i = 1; i < s->count; i++)
@@ -200,7 +200,7 @@ static void fill_slab(const occluder_search *s, double isovalue, occluder_piece 
 {
     double low[3], high[3], gradient[3], level, off = 0, steep = 0, size = 0;
     const double scale = scale_of(s, isovalue);
-    bounds_of(s, low, high);
+    compute_vertex_bounds(s, low, high);
     fit_linear_function(s, isovalue, scale, gradient, &level);
     for (int i = 0; i < s->count; i++) {
         double l = level;
@@ -378,7 +378,7 @@ static bool join_lists(occluder_search *to, occluder_search *from)
            join(&to->cells, &from->cells, sizeof(kernel_occluder)) && join(&to->hexes, &from->hexes, HEX_BYTES);
 }
 
-static bool find_all(const kernel_frame *frame, int threads, occluder_search *out)
+static bool find_all_occluders(const kernel_frame *frame, int threads, occluder_search *out)
 {
     int64_t count;
     kernel_subtree *subtrees = render_subtrees(frame, 0, frame->opaque_count, &count);
@@ -422,7 +422,7 @@ insitu_status occluders_build(const kernel_frame *frame, int width, int threads,
     occluder_search all = {0};
     insitu_status status = INSITU_OK;
     *out = (kernel_occluders){.width = width};
-    if (!find_all(frame, threads, &all))
+    if (!find_all_occluders(frame, threads, &all))
         status = base_fail(error, INSITU_ERROR_MEMORY, "no memory for what blocks rays from hits");
     if (!status && (all.triangles.count > INT32_MAX / 2 || all.slabs.count > INT32_MAX / 64))
         status = base_fail(error, INSITU_ERROR_MEMORY, "shadows: %lld pieces of surfaces on a rank are too many",

@@ -507,7 +507,7 @@ static void kernel_polyhedron_interval_fill(kernel_packet *p, kernel_samples *s,
     kernel_profile_begin(r, &piece);
     while (vm_any(kernel_profile_continues(r, &piece, i->mask))) {
         kernel_profile_next(r, r->u_out, &piece);
-        kernel_fill(p, s, NULL, &piece, i);
+        kernel_fill_interval_samples(p, s, NULL, &piece, i);
     }
 }
 

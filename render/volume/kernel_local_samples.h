@@ -120,7 +120,8 @@ static __attribute__((noinline, cold)) void kernel_local_sample_by_crossings(ker
     const vm ray = vm_and(p->active, vm_from_bits(1u << at % SIMD_WIDTH));
     const int intervals = kernel_curved_intervals(p, &cells->cell, ray, list);
     for (int k = 0; k < intervals; k++)
-        kernel_fill_some(p, s, cells->cell.is_constant ? NULL : &cells->map, &list[k], &list[k], number, number + 1);
+        kernel_fill_sample_range(p, s, cells->cell.is_constant ? NULL : &cells->map, &list[k], &list[k], number,
+                                 number + 1);
 }
 
 /* Computes the values of a vector of listed samples, from index n on, if they lie inside their cells. */

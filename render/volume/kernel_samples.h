@@ -139,8 +139,8 @@ static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p,
 /* Sets the values of those of the window's samples begin .. end - 1 that lie in the interval i. A sample keeps the
  * value of the first cell that contains it. map: the cell's inverse map, NULL if the field is linear along i; cell: the
  * rays' intervals in the whole cell, of which i is all or, in a polyhedron, a part. */
-SIMD_INLINE void kernel_fill_some(kernel_packet *p, kernel_samples *s, const kernel_map *map, const kernel_interval *i,
-                                  const kernel_interval *cell, int begin, int end)
+SIMD_INLINE void kernel_fill_sample_range(kernel_packet *p, kernel_samples *s, const kernel_map *map,
+                                          const kernel_interval *i, const kernel_interval *cell, int begin, int end)
 {
     const vf length = i->t_out - i->t_in;
     const vf slope = vf_select(vf_lt(vf_set(0), length), (i->v_out - i->v_in) / length, vf_set(0));
@@ -169,13 +169,13 @@ SIMD_INLINE void kernel_fill_some(kernel_packet *p, kernel_samples *s, const ker
     }
 }
 
-/* Sets the values of the window's samples that lie in the interval i (kernel_fill_some()). */
-SIMD_INLINE void kernel_fill(kernel_packet *p, kernel_samples *s, const kernel_map *map, const kernel_interval *i,
-                             const kernel_interval *cell)
+/* Sets the values of the window's samples that lie in the interval i (kernel_fill_sample_range()). */
+SIMD_INLINE void kernel_fill_interval_samples(kernel_packet *p, kernel_samples *s, const kernel_map *map,
+                                              const kernel_interval *i, const kernel_interval *cell)
 {
     int begin, end;
     kernel_sample_range(p, s, i, &begin, &end);
-    if (begin < end) kernel_fill_some(p, s, map, i, cell, begin, end);
+    if (begin < end) kernel_fill_sample_range(p, s, map, i, cell, begin, end);
 }
 
 /* Ends the current fragments of the rays in `mask`, and emits those that are visible. */
@@ -237,7 +237,7 @@ SIMD_INLINE void kernel_sample_colour(const kernel_packet *p, const kernel_sampl
         const vf value = s->value[v][n];
         const vm has = vf_eq(value, value);
         vf absorbed, c[3];
-        const vf place = kernel_colour_position(&f->volumes[v], value);
+        const vf place = kernel_find_colour_table_position(&f->volumes[v], value);
         const vf opacity = vf_select(has, kernel_opacity_at(&f->volumes[v], place), vf_set(0));
         if (!vm_any(vf_lt(vf_set(0), opacity))) continue;
         const vf left = kernel_transmittance(opacity, f->volumes[v].exponent, &absorbed);

@@ -43,7 +43,7 @@ static __attribute__((noinline)) void kernel_tile_tet_samples(kernel_packet *p, 
 {
     kernel_interval i;
     kernel_tet_interval(p, c, p->active, false, &i);
-    if (vm_any(i.mask)) kernel_fill(p, s, NULL, &i, &i);
+    if (vm_any(i.mask)) kernel_fill_interval_samples(p, s, NULL, &i, &i);
 }
 
 /* Sets the values of a packet's samples in a hex, wedge or pyramid. map: its inverse map; NULL if the field is
@@ -53,7 +53,7 @@ static __attribute__((noinline)) void kernel_tile_curved_samples(kernel_packet *
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     const int intervals = kernel_curved_intervals(p, c, p->active, list);
-    for (int k = 0; k < intervals; k++) kernel_fill(p, s, map, &list[k], &list[k]);
+    for (int k = 0; k < intervals; k++) kernel_fill_interval_samples(p, s, map, &list[k], &list[k]);
 }
 
 /* Sets the values of the samples in the cell, on the rays of the given blocks. */

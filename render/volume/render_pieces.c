@@ -116,16 +116,17 @@ static bool is_bent(const render_transfer *t, int ramp, double low, double high,
 
 /* Stores the values, in the domain, at which a part of a ramp must be cut, unless cuts is NULL. Returns their number. A
  * part is not cut if float32 cannot distinguish its middle from its ends. */
-static int cut_part(const render_transfer *t, int ramp, double low, double high, double tolerance, kernel_real *cuts)
+static int find_ramp_cuts(const render_transfer *t, int ramp, double low, double high, double tolerance,
+                          kernel_real *cuts)
 {
     const double middle = 0.5 * (low + high), at = ramp_value(t, ramp, middle);
     const float rounded = (float)at;
     if (!((float)ramp_value(t, ramp, low) < rounded && rounded < (float)ramp_value(t, ramp, high))) return 0;
     if (!is_bent(t, ramp, low, high, tolerance)) return 0;
-    int count = cut_part(t, ramp, low, middle, tolerance, cuts);
+    int count = find_ramp_cuts(t, ramp, low, middle, tolerance, cuts);
     if (cuts) cuts[count] = (kernel_real)at;
     count++;
-    return count + cut_part(t, ramp, middle, high, tolerance, cuts ? cuts + count : NULL);
+    return count + find_ramp_cuts(t, ramp, middle, high, tolerance, cuts ? cuts + count : NULL);
 }
 
 /* Stores the values at which all ramps must be cut, unless cuts is NULL. Returns their number. */
@@ -135,7 +136,7 @@ static int cut_ramps(const render_transfer *t, double tolerance, kernel_real *cu
     int count = 0;
     for (int i = 0; i + 1 < t->opacity_count && t->scale != RENDER_LINEAR; i++) {
         if (t->opacities[i] == t->opacities[i + 1]) continue;
-        count += cut_part(t, i, 0, 1, share, cuts ? cuts + count : NULL);
+        count += find_ramp_cuts(t, i, 0, 1, share, cuts ? cuts + count : NULL);
     }
     return count;
 }

@@ -76,7 +76,7 @@ static double extinction_at(const kernel_real *p, double x)
 
 /* Returns the extinction for `clear`, which is 1 - opacity. last: the previous argument and result, kept because
  * neighbouring bins share an end, and the function is constant in many bins. */
-static double extinction_again(double last[2], double clear)
+static double get_cached_extinction(double last[2], double clear)
 {
     if (clear != last[0]) {
         last[0] = clear;
@@ -106,7 +106,7 @@ static void integrate(const kernel_real *p, double from, double to, int depth, d
     }
     for (int i = 0; i < 3; i++) {
         const double x = from + node[i] * (to - from);
-        const double s = (a == b ? extinction_again(last, a) : extinction_at(p, x)) * weight[i] * (to - from);
+        const double s = (a == b ? get_cached_extinction(last, a) : extinction_at(p, x)) * weight[i] * (to - from);
         sum[0] += s;
         for (int c = 0; c < 3; c++) sum[1 + c] += s * colour_at(p, x, c);
     }
@@ -115,7 +115,7 @@ static void integrate(const kernel_real *p, double from, double to, int depth, d
 /* Widens the bin's ranges of extinction and colour so that they include those at the value x of the piece p. */
 static void widen(bin_sums *bin, const kernel_real *p, double x, double last[2])
 {
-    const double extinction = extinction_again(last, clear_at(p, x));
+    const double extinction = get_cached_extinction(last, clear_at(p, x));
     bin->low = lesser(extinction, bin->low);
     bin->high = greater(extinction, bin->high);
     for (int c = 0; c < 3; c++) {
@@ -189,7 +189,7 @@ static double colour_change(const bin_sums *bin)
 
 /* Stores the integrals as integers, and the bins' error bounds. Returns the maximum deviation of a colour within a bin
  * from the colour at its middle. */
-static double fill_entries(kernel_preintegral *out, const bin_sums *bins, double width, double contrast)
+static double store_bin_integrals(kernel_preintegral *out, const bin_sums *bins, double width, double contrast)
 {
     double total[2] = {0, 0}, before[CHANNELS] = {0}, change = 0;
     for (int i = 0; i < out->bin_count + 2; i++) {
@@ -279,7 +279,7 @@ static void fill(kernel_preintegral *out, const kernel_pieces *exact, const rend
     out->low = (float)low;
     out->inverse = (float)(1 / width);
     fill_bins(exact, low, width, out->bin_count, bins);
-    const double change = fill_entries(out, bins, width, contrast);
+    const double change = store_bin_integrals(out, bins, width, contrast);
     fill_bends(out, t);
     out->contrast = (float)contrast;
     out->colour_unit = (float)(contrast / COLOUR_LEVELS);

@@ -161,7 +161,7 @@ static insitu_status begin_table(session_table *t, int64_t cycle, base_error *er
         return fail_memory(t->database, "data.csv", "read", error);
     }
     insitu_status status = INSITU_OK;
-    if (!file_read_own(path, MOST_BYTES, &old, &failure) && !failure.is_missing)
+    if (!file_read_written_by_library(path, MOST_BYTES, &old, &failure) && !failure.is_missing)
         status = session_fail_for_database_file(t->database, "data.csv", "read", &failure, error);
     if (!status && old.size) status = copy_earlier_lines(t, &old, cycle, error);
     base_free(old.text);

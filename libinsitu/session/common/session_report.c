@@ -185,7 +185,7 @@ void session_warn_locally(session_report *report, const session_warning *warning
     va_end(arguments);
 }
 
-bool session_is_warned(const session_report *report, const session_warning *warning)
+bool session_has_reported_warning(const session_report *report, const session_warning *warning)
 {
     const uint64_t key = warning_key(warning);
     return reported_key_is_at(report, find_reported(report, key), key);

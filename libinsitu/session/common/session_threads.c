@@ -206,7 +206,7 @@ typedef struct thread_stack {
     int64_t free_bytes, total_bytes;
 } thread_stack;
 
-static thread_stack find_own_stack(void)
+static thread_stack find_stack_of_thread(void)
 {
     pthread_attr_t attributes;
     void *lowest = NULL;
@@ -228,7 +228,7 @@ static thread_stack find_least_worker_stack(int threads)
     {
         region_enter();
         if (omp_get_thread_num() > 0) {
-            const thread_stack own = find_own_stack();
+            const thread_stack own = find_stack_of_thread();
             left = own.free_bytes;
             size = own.total_bytes;
             if (has_key) pthread_setspecific(key, &key);
@@ -250,7 +250,7 @@ static long long needed_stack_kilobytes(const thread_stack *stack, int64_t neede
 static insitu_status check_stacks(session_threads *threads, const session_team *team, const session_guard *guard,
                                   base_error *error)
 {
-    const thread_stack own = find_own_stack();
+    const thread_stack own = find_stack_of_thread();
     session_guard_suspend(guard);
     const thread_stack least = find_least_worker_stack(team->threads);
     session_guard_resume();

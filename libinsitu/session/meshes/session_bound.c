@@ -273,7 +273,8 @@ static bool make_levels(session_bound *out)
         session_bound_level *level = &out->levels[out->level_count++];
         level->order = order;
         level->count = fine.count;
-        is_made = session_make_pattern(session_lagrange_type(type), &fine, INSITU_ORDER_LEXICOGRAPHIC, &level->pieces);
+        is_made =
+            session_make_split_pattern(session_lagrange_type(type), &fine, INSITU_ORDER_LEXICOGRAPHIC, &level->pieces);
     }
     return is_made;
 }
@@ -298,7 +299,7 @@ void session_drop_bound(session_bound *bound)
     session_drop_interpolation(&bound->nodes);
     base_free(bound->collapse);
     bound->collapse = NULL;
-    for (int level = 0; level < bound->level_count; level++) session_drop_pattern(&bound->levels[level].pieces);
+    for (int level = 0; level < bound->level_count; level++) session_drop_split_pattern(&bound->levels[level].pieces);
     drop_factor(&bound->line);
     drop_factor(&bound->simplex);
 }

@@ -146,7 +146,7 @@ static size_t write_table(const session_meshes *meshes, char *text, size_t capac
     }
     at = append_fault(text, capacity, at, &meshes->pending_error);
     for (int i = 0; i < meshes->count;) {
-        const session_parts parts = session_parts_at(meshes, i);
+        const session_parts parts = session_find_parts_from_index(meshes, i);
         at = append_mesh_to_table(text, capacity, at, &parts);
         i += parts.count;
     }
@@ -176,7 +176,7 @@ uint64_t session_hash_names(const session_meshes *meshes)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
     for (int i = 0; i < meshes->count;) {
-        const session_parts parts = session_parts_at(meshes, i);
+        const session_parts parts = session_find_parts_from_index(meshes, i);
         hash_parts(&parts, &hash);
         i += parts.count;
     }

@@ -212,7 +212,7 @@ void session_end_finer_mesh(session_meshes *meshes, session_mesh *mesh)
     drop_node_data(meshes, mesh);
 }
 
-void session_end_finer(session_meshes *meshes)
+void session_end_finer_lattices(session_meshes *meshes)
 {
     for (int i = 0; i < meshes->count; i++) {
         session_end_finer_mesh(meshes, meshes->items[i]);
@@ -346,7 +346,7 @@ static bool sum_counts(const session_meshes *meshes, const char *name, int64_t s
     return is_made;
 }
 
-int session_most_parts(const session_finer_choice *choice)
+int session_find_max_edge_parts(const session_finer_choice *choice)
 {
     const int most = choice->order ? NODES_MOST_ORDER / choice->order : FINER_MOST_PARTS;
     return most < FINER_MOST_PARTS ? most : FINER_MOST_PARTS;
@@ -364,8 +364,8 @@ static session_finer_choice make_choice(const int64_t sums[SESSION_FINER_COUNTS]
     return out;
 }
 
-insitu_status session_count_finer(session_meshes *meshes, const session_catalogue *catalogue, MPI_Comm comm,
-                                  session_finer_choice *choices, base_error *error)
+insitu_status session_count_higher_order_cells(session_meshes *meshes, const session_catalogue *catalogue,
+                                               MPI_Comm comm, session_finer_choice *choices, base_error *error)
 {
     const int words = catalogue->mesh_count * SESSION_FINER_COUNTS;
     int64_t *sums = base_calloc((size_t)words + 1, sizeof *sums);
@@ -435,15 +435,15 @@ void session_count_finer_bytes(const session_mesh *mesh, const unsigned char *ma
         }
 }
 
-insitu_status session_make_finer(session_meshes *meshes, const session_catalogue *catalogue,
-                                 session_finer_choice *choices, const session_team *team, bool *are_changed,
-                                 base_error *error)
+insitu_status session_make_finer_lattices(session_meshes *meshes, const session_catalogue *catalogue,
+                                          session_finer_choice *choices, const session_team *team, bool *are_changed,
+                                          base_error *error)
 {
     int mine = 0, any = 0;
     for (int m = 0; m < catalogue->mesh_count; m++) {
         const session_parts of = session_find_parts(meshes, catalogue->meshes[m].name);
         for (int i = 0; i < of.count && !error->status; i++) {
-            session_cell_marks *marks = choices[m].parts > 1 ? session_marks_of(&choices[m], i) : NULL;
+            session_cell_marks *marks = choices[m].parts > 1 ? session_get_marks_of_part(&choices[m], i) : NULL;
             if (of.items[i]->is_given && of.items[i]->topology.is_split)
                 mine |= make_finer_mesh(meshes, of.items[i], &choices[m], marks, team->threads, error);
         }

@@ -50,19 +50,19 @@ typedef struct session_finer_choice {
 void session_free_choices(session_finer_choice *choices, int count);
 
 /* Returns the maximum number of parts into which the mesh's edges between two nodes can be cut. */
-int session_most_parts(const session_finer_choice *choice);
+int session_find_max_edge_parts(const session_finer_choice *choice);
 
 /* Counts the cells of higher order of each mesh of the catalogue, and sets `parts` to 1. Meshes must have been checked
  * and listed in the catalogue before. Collective; all ranks return the same status. */
-insitu_status session_count_finer(session_meshes *meshes, const session_catalogue *catalogue, MPI_Comm comm,
-                                  session_finer_choice *choices, base_error *error);
+insitu_status session_count_higher_order_cells(session_meshes *meshes, const session_catalogue *catalogue,
+                                               MPI_Comm comm, session_finer_choice *choices, base_error *error);
 
 /* Allocates marks for each part of the mesh; no cell is marked yet. Without marks all cells are refined. Returns false
  * if memory runs out. Local. */
 bool session_begin_marks(session_finer_choice *choice, const session_parts *parts);
 
 /* Returns the marks of the part of the mesh with this index; NULL: all of the part's cells are refined. */
-static inline session_cell_marks *session_marks_of(const session_finer_choice *choice, int part)
+static inline session_cell_marks *session_get_marks_of_part(const session_finer_choice *choice, int part)
 {
     return part < choice->mark_count ? &choice->marks[part] : NULL;
 }
@@ -77,15 +77,15 @@ void session_count_finer_bytes(const session_mesh *mesh, const unsigned char *ma
  * get all nodes of their order. The sets of pieces in the marks are moved to the meshes. *are_changed is set if the
  * cells of some mesh change on any rank; these meshes must be checked again. Collective; all ranks return the same
  * status. */
-insitu_status session_make_finer(session_meshes *meshes, const session_catalogue *catalogue,
-                                 session_finer_choice *choices, const session_team *team, bool *are_changed,
-                                 base_error *error);
+insitu_status session_make_finer_lattices(session_meshes *meshes, const session_catalogue *catalogue,
+                                          session_finer_choice *choices, const session_team *team, bool *are_changed,
+                                          base_error *error);
 
 /* Makes one mesh read the caller's cells again instead of finer lattices. Local. */
 void session_end_finer_mesh(session_meshes *meshes, session_mesh *mesh);
 
 /* Makes all meshes read the caller's cells and vertex ids again. Local. */
-void session_end_finer(session_meshes *meshes);
+void session_end_finer_lattices(session_meshes *meshes);
 
 /* The values at the nodes of the caller's cells. */
 typedef struct session_node_values {

@@ -213,7 +213,7 @@ typedef struct side_axes {
     const signed char *origin, *along, *across;
 } side_axes;
 
-static side_axes axes_of(const session_shape *shape, const signed char *side, int corner_count, int turn)
+static side_axes find_side_axes(const session_shape *shape, const signed char *side, int corner_count, int turn)
 {
     const int first = corner_count == 2 ? turn : turn / 2, step = corner_count > 2 && turn % 2 ? corner_count - 1 : 1;
     const int along = (first + step) % corner_count;
@@ -258,8 +258,8 @@ static bool list_sides(session_interpolation *out, session_interpolation_sides *
     sides->fine_nodes = base_alloc((size_t)(lists * sides->fine_count + 1) * sizeof *sides->fine_nodes);
     if (!sides->nodes || !sides->fine_nodes) return false;
     for (int list = 0; list < lists; list++) {
-        const side_axes axes =
-            axes_of(shape, sides->corners[list / sides->turn_count], sides->corner_count, list % sides->turn_count);
+        const side_axes axes = find_side_axes(shape, sides->corners[list / sides->turn_count], sides->corner_count,
+                                              list % sides->turn_count);
         list_side(&out->complete, &axes, sides->corner_count, sides->nodes + list * sides->node_count);
         list_side(&out->fine, &axes, sides->corner_count, sides->fine_nodes + list * sides->fine_count);
     }
@@ -421,7 +421,7 @@ static double middle_of_hex(const cell_job *job, const int at[3], int component)
     return 0.25 * (edges - corners);
 }
 
-static void fill_missing(const cell_job *job, const int at[3])
+static void fill_missing_node(const cell_job *job, const int at[3])
 {
     int directions[3][3];
     const int count = session_find_missing_node_directions(job->of->of.type, at, directions);
@@ -440,12 +440,12 @@ void session_complete_tuples(const session_interpolation *of, int components, co
         const int at[3] = {n % 3, n / 3 % 3, n / 9};
         if (session_has_node(&of->of, at[0], at[1], at[2]) &&
             of->positions[find_index(&of->complete, at)] >= of->of.count)
-            fill_missing(&job, at);
+            fill_missing_node(&job, at);
     }
 }
 
 /* Computes all fine nodes from the lattice of the cell. */
-static void fill_inside(const cell_job *job)
+static void fill_all_fine_nodes(const cell_job *job)
 {
     const session_interpolation *of = job->of;
     const int c = of->of.order + 1, r = of->fine.order + 1, size = job->size;
@@ -485,7 +485,7 @@ static void rank_corners(int count, const double (*corners)[3], int ranks[8])
 }
 
 /* Chooses the axes of a face or an edge by the positions of its corners. */
-static int choose_turn(const signed char *side, int corner_count, const int ranks[8])
+static int choose_corner_numbering(const signed char *side, int corner_count, const int ranks[8])
 {
     int first = 0;
     for (int n = 1; n < corner_count; n++)
@@ -496,14 +496,15 @@ static int choose_turn(const signed char *side, int corner_count, const int rank
 }
 
 /* Computes the nodes on faces or edges with the same number of corners from the nodes of each of them. */
-static void fill_sides(const cell_job *job, const session_interpolation_sides *sides, const int ranks[8])
+static void fill_side_nodes(const cell_job *job, const session_interpolation_sides *sides, const int ranks[8])
 {
     const session_interpolation *of = job->of;
     const int c = of->of.order + 1, r = of->fine.order + 1, size = job->size, all = sides->count * size;
     double *a = job->spare[0], *b = job->spare[1];
     int lists[INTERPOLATION_MOST_SIDES];
     for (int side = 0; side < sides->count; side++) {
-        lists[side] = side * sides->turn_count + choose_turn(sides->corners[side], sides->corner_count, ranks);
+        lists[side] =
+            side * sides->turn_count + choose_corner_numbering(sides->corners[side], sides->corner_count, ranks);
         const int *nodes = sides->nodes + lists[side] * sides->node_count;
         for (int n = 0; n < sides->node_count; n++)
             for (int s = 0; s < size; s++) a[n * all + side * size + s] = job->lattice[nodes[n] * size + s];
@@ -535,10 +536,10 @@ void session_interpolate(const session_interpolation *of, const double (*corners
     job.spare[0] = work + of->complete.count * components;
     job.spare[1] = job.spare[0] + spare_count(of) * components;
     session_complete_tuples(of, components, tuples, work);
-    fill_inside(&job);
+    fill_all_fine_nodes(&job);
     rank_corners(session_shape_of(of->of.type)->corner_count, corners, ranks);
     for (int n = 0; n < INTERPOLATION_SIDES; n++)
-        if (of->sides[n].count > 0) fill_sides(&job, &of->sides[n], ranks);
+        if (of->sides[n].count > 0) fill_side_nodes(&job, &of->sides[n], ranks);
     for (int n = 0; n < of->own_count; n++)
         for (int s = 0; s < components; s++) out[of->own[n][1] * components + s] = work[of->own[n][0] * components + s];
 }

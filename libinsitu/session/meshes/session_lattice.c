@@ -200,7 +200,7 @@ static insitu_status check_axes(const insitu_lattice *l, base_error *error)
 }
 
 /* Checks that a mesh with a lattice does not also describe its cells by connectivity or faces. */
-static insitu_status check_others(const insitu_mesh *mesh, base_error *error)
+static insitu_status check_no_other_cell_arrays(const insitu_mesh *mesh, base_error *error)
 {
     const struct {
         const char *name;
@@ -221,7 +221,7 @@ static insitu_status check_others(const insitu_mesh *mesh, base_error *error)
 insitu_status session_check_lattice(const insitu_mesh *mesh, base_error *error)
 {
     const insitu_lattice *l = mesh->lattice;
-    insitu_status status = check_others(mesh, error);
+    insitu_status status = check_no_other_cell_arrays(mesh, error);
     if (!status) status = check_cells(l, error);
     if (status || (are_all_zero(l->cells) && !mesh->cell_count)) return status;
     if (are_all_zero(l->cells))

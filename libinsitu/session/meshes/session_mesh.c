@@ -456,7 +456,7 @@ static int find_end_of_name(const session_meshes *meshes, const char *name)
     return find_mesh_index(meshes, name, INT64_MAX, ALL_AXES);
 }
 
-session_parts session_parts_at(const session_meshes *meshes, int first)
+session_parts session_find_parts_from_index(const session_meshes *meshes, int first)
 {
     const char *name = meshes->items[first]->name;
     const bool has_more = first + 1 < meshes->count && strcmp(meshes->items[first + 1]->name, name) == 0;
@@ -481,7 +481,7 @@ session_mesh *session_find_block(const session_meshes *meshes, const char *name,
     return find_part(meshes, name, block, 0);
 }
 
-session_mesh *session_find_image(const session_meshes *meshes, const session_mesh *source, int mirror_axes)
+session_mesh *session_find_mirror_image(const session_meshes *meshes, const session_mesh *source, int mirror_axes)
 {
     return find_part(meshes, source->name, source->block, mirror_axes);
 }
@@ -548,7 +548,7 @@ session_mesh *session_add_mesh(session_meshes *meshes, const char *name, int64_t
     return add_part(meshes, name, block, 0, error);
 }
 
-session_mesh *session_add_image(session_meshes *meshes, session_mesh *source, int mirror_axes, base_error *error)
+session_mesh *session_add_mirror_image(session_meshes *meshes, session_mesh *source, int mirror_axes, base_error *error)
 {
     session_mesh *image = add_part(meshes, source->name, source->block, mirror_axes, error);
     if (image) image->source = source;
@@ -575,7 +575,7 @@ void session_remove_block(session_meshes *meshes, const char *name, int64_t bloc
     remove_meshes(meshes, first, end - first);
 }
 
-void session_remove_image(session_meshes *meshes, session_mesh *image)
+void session_remove_mirror_image(session_meshes *meshes, session_mesh *image)
 {
     remove_meshes(meshes, find_mesh_index(meshes, image->name, image->block, image->mirror_axes), 1);
 }

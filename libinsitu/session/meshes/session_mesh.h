@@ -491,7 +491,7 @@ static inline const insitu_mesh *session_nodal_mesh(const session_mesh *mesh)
 session_parts session_find_parts(const session_meshes *meshes, const char *name);
 /* Returns the parts that have the same name as the part at index `first`, which must be the first part with this
  * name. */
-session_parts session_parts_at(const session_meshes *meshes, int first);
+session_parts session_find_parts_from_index(const session_meshes *meshes, int first);
 /* Returns the block with this name and number, or NULL if there is none. */
 session_mesh *session_find_block(const session_meshes *meshes, const char *name, int64_t block);
 /* Returns the mesh with this name that is not given as blocks, or NULL if there is none. */
@@ -508,10 +508,11 @@ session_field *session_add_field(session_mesh *mesh, const char *name);
 /* Adds an empty mesh or block, which must not exist yet. Returns NULL if memory runs out. */
 session_mesh *session_add_mesh(session_meshes *meshes, const char *name, int64_t block, base_error *error);
 /* Adds an empty mirror image of a part, which must not exist yet. Returns NULL if memory runs out. */
-session_mesh *session_add_image(session_meshes *meshes, session_mesh *source, int mirror_axes, base_error *error);
+session_mesh *session_add_mirror_image(session_meshes *meshes, session_mesh *source, int mirror_axes,
+                                       base_error *error);
 /* Returns the mirror image of the part `source` along these axes, or NULL if there is none. */
-session_mesh *session_find_image(const session_meshes *meshes, const session_mesh *source, int mirror_axes);
-void session_remove_image(session_meshes *meshes, session_mesh *image);
+session_mesh *session_find_mirror_image(const session_meshes *meshes, const session_mesh *source, int mirror_axes);
+void session_remove_mirror_image(session_meshes *meshes, session_mesh *image);
 /* Removes a block or, in session_remove_mesh(), a mesh with all its blocks. Mirror images are removed too. Does nothing
  * if the block or mesh does not exist. */
 void session_remove_block(session_meshes *meshes, const char *name, int64_t block);

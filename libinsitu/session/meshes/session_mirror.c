@@ -149,8 +149,8 @@ static bool mirror_coordinates(session_mesh *image, const double planes[3], unsi
 session_mesh *session_mirror_mesh(session_meshes *meshes, session_mesh *source, int mirror_axes, const double planes[3],
                                   int threads, base_error *error)
 {
-    session_mesh *image = session_find_image(meshes, source, mirror_axes);
-    if (!image) image = session_add_image(meshes, source, mirror_axes, error);
+    session_mesh *image = session_find_mirror_image(meshes, source, mirror_axes);
+    if (!image) image = session_add_mirror_image(meshes, source, mirror_axes, error);
     if (!image) return NULL;
     const unsigned changed = find_changes(image, planes);
     if (changed == INSITU_CHANGED_NOTHING) return image;
@@ -165,6 +165,6 @@ session_mesh *session_mirror_mesh(session_meshes *meshes, session_mesh *source, 
     }
     if (!problem.status) return image;
     *error = problem;
-    session_remove_image(meshes, image);
+    session_remove_mirror_image(meshes, image);
     return NULL;
 }

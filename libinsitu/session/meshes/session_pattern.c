@@ -267,7 +267,7 @@ static bool make_linear(int type, insitu_vertex_order order, session_pattern *ou
     return true;
 }
 
-bool session_make_pattern(int type, const session_nodes *nodes, insitu_vertex_order order, session_pattern *out)
+bool session_make_split_pattern(int type, const session_nodes *nodes, insitu_vertex_order order, session_pattern *out)
 {
     *out = (session_pattern){.type = type, .nodes = *nodes};
     if (type == nodes->type) return make_linear(type, order, out);
@@ -284,7 +284,7 @@ bool session_make_pattern(int type, const session_nodes *nodes, insitu_vertex_or
     return true;
 }
 
-void session_drop_pattern(session_pattern *pattern)
+void session_drop_split_pattern(session_pattern *pattern)
 {
     base_free(pattern->types);
     base_free(pattern->piece_positions);

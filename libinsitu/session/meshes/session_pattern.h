@@ -31,8 +31,8 @@ typedef struct session_pattern {
 
 /* Lists the pieces of a type and order of cell. Returns false if memory runs out. The only piece of a linear cell
  * (order 1) is the cell itself. */
-bool session_make_pattern(int type, const session_nodes *nodes, insitu_vertex_order order, session_pattern *out);
-void session_drop_pattern(session_pattern *pattern);
+bool session_make_split_pattern(int type, const session_nodes *nodes, insitu_vertex_order order, session_pattern *out);
+void session_drop_split_pattern(session_pattern *pattern);
 
 /* Stores the positions of the vertices of a serendipity cell's pieces: 4 for each tet, or 3 for each triangle of a
  * quad. ranks[position]: the number of a midpoint in the order of coordinates. Returns the number of pieces. */

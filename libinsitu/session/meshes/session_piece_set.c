@@ -35,7 +35,7 @@ static bool make_kind(const session_nodes *of, insitu_vertex_order order, int pa
 {
     const int type = session_lagrange_type(of->type);
     if (!session_make_interpolation(of, order, parts, is_lobatto, &out->nodes)) return false;
-    if (!session_make_pattern(type, &out->nodes.fine, INSITU_ORDER_LEXICOGRAPHIC, &out->pieces)) return false;
+    if (!session_make_split_pattern(type, &out->nodes.fine, INSITU_ORDER_LEXICOGRAPHIC, &out->pieces)) return false;
     out->corner_count = of->type == GRID_PYRAMID ? 0 : grid_type_vertices(out->pieces.types[0]);
     out->word_count = (out->pieces.piece_count + 63) / 64;
     return true;
@@ -45,7 +45,7 @@ static void end_work(piece_work *w)
 {
     for (int i = 0; i < w->rows.kind_count; i++) {
         session_drop_interpolation(&w->kinds[i].nodes);
-        session_drop_pattern(&w->kinds[i].pieces);
+        session_drop_split_pattern(&w->kinds[i].pieces);
     }
 }
 

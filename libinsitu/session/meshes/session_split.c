@@ -90,7 +90,7 @@ static insitu_status add_pattern(split_work *w, int64_t cell, int type, int64_t 
                          w->mesh->label, (long long)cell, ROWS_MOST_KINDS);
     session_pattern *made = &w->patterns[w->rows.kind_count];
     w->rows.kinds[w->rows.kind_count++] = (session_row_kind){type, nodes};
-    if (!session_make_pattern(type, &nodes, order, made))
+    if (!session_make_split_pattern(type, &nodes, order, made))
         return base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for the pieces of a cell", w->mesh->label);
     for (int i = 0; i < made->piece_count; i++) w->is_of_type[made->types[i]] = true;
     if (!nodes.is_complete) w->is_of_type[nodes.type == GRID_QUAD ? GRID_TRIANGLE : GRID_TET] = true;
@@ -229,7 +229,7 @@ static int next_piece(piece_walk *walk)
     return walk->next < walk->count ? walk->next++ : -1;
 }
 
-static int count_made(const split_work *w, const session_pattern *of, int64_t cell)
+static int count_made_pieces(const split_work *w, const session_pattern *of, int64_t cell)
 {
     piece_walk walk = begin_piece_walk(w, of, cell);
     int count = 0;
@@ -248,7 +248,7 @@ static void count_pieces(const split_work *w, int64_t cell)
 {
     const session_pattern *of = find_cell_pattern(w, cell);
     int loose[PATTERN_MOST_LOOSE][4];
-    const int count = of->polygon_count ? cut_cell(w, of, cell, loose) : count_made(w, of, cell);
+    const int count = of->polygon_count ? cut_cell(w, of, cell, loose) : count_made_pieces(w, of, cell);
     w->first_pieces[cell + 1] = count;
     if (!w->first_entries) return;
     if (of->polygon_count)
@@ -388,7 +388,7 @@ static insitu_status make_topology(split_work *w, session_mesh *mesh, int thread
 
 static void end_split(split_work *w)
 {
-    for (int i = 0; i < w->rows.kind_count; i++) session_drop_pattern(&w->patterns[i]);
+    for (int i = 0; i < w->rows.kind_count; i++) session_drop_split_pattern(&w->patterns[i]);
     base_free(w->first_pieces);
     base_free(w->first_entries);
 }

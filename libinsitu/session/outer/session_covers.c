@@ -397,7 +397,7 @@ static bool update_block(const cover_search *s, session_meshes *meshes, session_
     return true;
 }
 
-insitu_status session_update_covers(session_meshes *meshes, const session_team *team, base_error *error)
+insitu_status session_update_covered_cells(session_meshes *meshes, const session_team *team, base_error *error)
 {
     cover_search s = {.team = team};
     if (!list_own_boxes(meshes, &s))

@@ -13,7 +13,7 @@
 /* Finds the covered cells of all refined blocks, and marks them as ghosts in an array of the session. Blocks whose
  * covered cells have changed must be checked again. Blocks that do not end at borders of coarser cells get a `misfit`.
  * Collective; all ranks return the same status. */
-insitu_status session_update_covers(session_meshes *meshes, const session_team *team, base_error *error);
+insitu_status session_update_covered_cells(session_meshes *meshes, const session_team *team, base_error *error);
 
 /* Removes the outer faces whose other side is in a block of another level, on any rank. The faces of thresholds and of
  * quads are kept. Ghost flags of the caller are not taken into account, so that a face next to a ghost cell of another

@@ -590,7 +590,8 @@ static insitu_status count_hanging_vertices(const session_team *team, session_ha
     return status;
 }
 
-insitu_status session_update_hanging(const session_hanging_basis *basis, const session_team *team, base_error *error)
+insitu_status session_update_hanging_vertices(const session_hanging_basis *basis, const session_team *team,
+                                              base_error *error)
 {
     session_mesh_group *mesh_group = basis->mesh_group;
     hanging_search search = {.basis = basis, .team = team};
@@ -658,8 +659,8 @@ static insitu_status exchange_and_constrain(const session_hanging *hanging, cons
                              "MPI_Allreduce");
 }
 
-insitu_status session_constrain_hanging(const session_hanging *hanging, const session_team *team, double *means,
-                                        base_error *error)
+insitu_status session_constrain_hanging_vertices(const session_hanging *hanging, const session_team *team,
+                                                 double *means, base_error *error)
 {
     insitu_status status = INSITU_OK;
     int is_changed = hanging->total > 0;

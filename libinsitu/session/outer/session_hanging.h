@@ -42,12 +42,13 @@ insitu_status session_update_borders(session_mesh_group *mesh_group, const sessi
 
 /* Computes the mesh group's hanging vertices, unless they are up to date. Its borders must be up to date. Collective;
  * all ranks return the same status. */
-insitu_status session_update_hanging(const session_hanging_basis *basis, const session_team *team, base_error *error);
+insitu_status session_update_hanging_vertices(const session_hanging_basis *basis, const session_team *team,
+                                              base_error *error);
 
 /* Sets the value of each hanging vertex to the value that is interpolated on its face. `means` contains one value per
  * group. If a face's own values are not finite, its hanging vertices keep their values. Collective; all ranks return
  * the same status. */
-insitu_status session_constrain_hanging(const session_hanging *hanging, const session_team *team, double *means,
-                                        base_error *error);
+insitu_status session_constrain_hanging_vertices(const session_hanging *hanging, const session_team *team,
+                                                 double *means, base_error *error);
 
 #endif

@@ -96,7 +96,7 @@ static bool find_apex(const corner_loop *loop, const double inside[3], double ap
     return true;
 }
 
-static void find_inside(const grid *g, int64_t cell, double out[3])
+static void find_point_inside_cell(const grid *g, int64_t cell, double out[3])
 {
     grid_walk walk = grid_walk_cell(g, cell);
     int64_t vertex, count = 0;
@@ -394,7 +394,7 @@ static void add_face(outer_work *w, const session_face *face)
     face_polygon *p = &w->polygon;
     const int64_t first = w->cell_count;
     double inside[3];
-    find_inside(w->cells, face->cell, inside);
+    find_point_inside_cell(w->cells, face->cell, inside);
     read_polygon(w->cells, &of, p);
     if (w->has_rims) find_parent_face(w, face->cell, p);
     if (p->count > 4 || is_concave(&of, (const double(*)[3])p->positions, p->count)) {

@@ -575,7 +575,7 @@ insitu_status session_draw_images(const session_drawing *drawing, const session_
     }
     warn_of_different_colour_bars(d);
     base_free(own.shared_bars);
-    if (has_lines) session_share_lines(d->report, 0, d->team, &first);
+    if (has_lines) session_share_warnings(d->report, 0, d->team, &first);
     write_tables(d, &first);
     if (first.status) *error = first;
     return error->status;

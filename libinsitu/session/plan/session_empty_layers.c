@@ -246,7 +246,7 @@ static bool find_new_warnings(const session_report *report, layer_batch *batch)
         layer->range = raise_tree_minimum(&layer->range);
         for (int v = 0; v < count_values(layer); v++) {
             const session_warning warning = make_warning(layer, v);
-            if (is_layer_empty(layer, v, &layer->range) && !session_is_warned(report, &warning))
+            if (is_layer_empty(layer, v, &layer->range) && !session_has_reported_warning(report, &warning))
                 layer->is_unreported = true;
         }
         is_any = is_any || layer->is_unreported;
@@ -318,8 +318,8 @@ insitu_status session_warn_of_empty_layers(const session_plan *plan, const sessi
     }
     if (!status && extras.reporting_word)
         status =
-            session_share_lines(report, session_decode_rank_with_warnings(extras.reporting_word, team), team, error);
+            session_share_warnings(report, session_decode_rank_with_warnings(extras.reporting_word, team), team, error);
     if (!status && extras.has_other_cells)
-        status = session_warn_of_unusable(plan, catalogue, meshes, team, report, error);
+        status = session_warn_of_unusable_cells(plan, catalogue, meshes, team, report, error);
     return status;
 }

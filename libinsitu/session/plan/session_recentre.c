@@ -170,7 +170,7 @@ static int compare_groups(const void *a, const void *b)
     return (*x > *y) - (*x < *y);
 }
 
-static void drop_duplicates(cell_groups *list)
+static void drop_duplicate_groups(cell_groups *list)
 {
     int64_t count = 0;
     if (list->count) qsort(list->groups, (size_t)list->count, sizeof *list->groups, compare_groups);
@@ -230,7 +230,7 @@ static void add_split_cell_values(recentring *r, int part, int64_t cell, cell_gr
         int64_t vertex;
         while (grid_walk_next(&walk, &vertex)) append_group(list, field->is_cell_centred ? of_vertex[vertex] : vertex);
     }
-    drop_duplicates(list);
+    drop_duplicate_groups(list);
     for (int64_t i = 0; i < list->count; i++) {
         const int64_t at = list->groups[i];
         if (!field->is_cell_centred) value = grid_field_value(field, at);
@@ -439,8 +439,8 @@ static bool number_records(const session_mail *in, int64_t *groups, session_key_
 }
 
 /* Collects the records' values by group. starts: zero-initialized, one entry more than there are groups. */
-static bool gather_records(const session_mail *in, const int64_t *groups, int64_t count, int64_t *starts,
-                           value_groups *values)
+static bool gather_values_by_group(const session_mail *in, const int64_t *groups, int64_t count, int64_t *starts,
+                                   value_groups *values)
 {
     const uint64_t *end = in->words + in->total;
     int64_t i = 0;
@@ -473,7 +473,7 @@ static bool merge_records(const session_mail *in, int ranks, int threads, sessio
     reply->counts = base_calloc((size_t)ranks, sizeof *reply->counts);
     const bool is_done = groups && starts && reply->words && reply->counts &&
                          number_records(in, groups, &keys, reply->total) &&
-                         gather_records(in, groups, keys.count, starts, &values);
+                         gather_values_by_group(in, groups, keys.count, starts, &values);
     if (is_done) compute_group_means(&values, threads);
     for (int64_t i = 0; i < reply->total && is_done; i++)
         memcpy(&reply->words[i], &values.means[groups[i]], sizeof(double));
@@ -546,8 +546,8 @@ static insitu_status constrain_hanging(const recentring *r, const session_team *
     const session_vertex_groups *groups = &r->mesh_group->groups;
     const session_hanging_basis basis = {r->mesh_group,          r->list.count,           r->list.items,
                                          groups->first_vertices, groups->group_of_vertex, groups->count};
-    const insitu_status status = session_update_hanging(&basis, team, error);
-    return status ? status : session_constrain_hanging(&r->mesh_group->hanging, team, r->values.means, error);
+    const insitu_status status = session_update_hanging_vertices(&basis, team, error);
+    return status ? status : session_constrain_hanging_vertices(&r->mesh_group->hanging, team, r->values.means, error);
 }
 
 /* Allocates memory for the recentred values of each part. */

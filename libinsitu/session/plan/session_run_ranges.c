@@ -118,7 +118,7 @@ static insitu_status read_ranges(session_image_ranges *ranges, base_error *error
     c_locale numbers;
     file_content content;
     file_failure failure;
-    if (!file_read_own(ranges->path, MOST_BYTES, &content, &failure))
+    if (!file_read_written_by_library(ranges->path, MOST_BYTES, &content, &failure))
         return failure.is_missing ? INSITU_OK : fail_at_file(ranges, "read", &failure, error);
     insitu_status status = INSITU_OK;
     if (c_locale_enter(&numbers)) {

@@ -17,7 +17,7 @@ typedef struct surface_request {
 } surface_request;
 
 /* Returns the part's outer faces of the requested surface; NULL if it has none. */
-static session_outer *find_own_outer(const session_mesh *part, const surface_request *request)
+static session_outer *find_outer_surface_of_part(const session_mesh *part, const surface_request *request)
 {
     return part->is_given ? session_find_outer(part, request->threshold) : NULL;
 }
@@ -27,7 +27,7 @@ static bool are_faces_stale(const session_meshes *meshes, const surface_request 
 {
     const session_parts parts = session_find_parts(meshes, request->mesh->name);
     for (int i = 0; i < parts.count; i++) {
-        const session_outer *outer = find_own_outer(parts.items[i], request);
+        const session_outer *outer = find_outer_surface_of_part(parts.items[i], request);
         if (outer && session_is_outer_stale(parts.items[i], outer)) return true;
     }
     return false;
@@ -109,7 +109,7 @@ static insitu_status find_outer_faces_of_request(const session_meshes *meshes, c
     session_face_part *of = base_calloc((size_t)parts.count + 1, sizeof *of);
     if (!of) session_fail_for_memory(error, parts.count * (int64_t)sizeof *of, "surfaces");
     for (int i = 0; i < parts.count && of; i++) {
-        session_outer *outer = find_own_outer(parts.items[i], request);
+        session_outer *outer = find_outer_surface_of_part(parts.items[i], request);
         if (outer) of[count++] = (session_face_part){.mesh = parts.items[i], .outer = outer};
     }
     insitu_status status = session_agree(team->comm, error);

@@ -28,7 +28,7 @@ static const scene_field *next_field(field_walk *walk)
 static int64_t count_unusable(const session_mesh *mesh, const scene_field *field)
 {
     const session_scalar *scalar = mesh->is_given && !mesh->source ? session_find_scalar(mesh, field) : NULL;
-    return scalar ? session_count_unusable(mesh, scalar) : 0;
+    return scalar ? session_count_unusable_cells(mesh, scalar) : 0;
 }
 
 static int64_t count_unusable_of_parts(const session_meshes *meshes, const char *name, const scene_field *field)
@@ -63,9 +63,9 @@ static void warn_of_unusable_cells(const char *mesh, const scene_field *field, i
                  field->name);
 }
 
-insitu_status session_warn_of_unusable(const session_plan *plan, const session_catalogue *catalogue,
-                                       const session_meshes *meshes, const session_team *team, session_report *report,
-                                       base_error *error)
+insitu_status session_warn_of_unusable_cells(const session_plan *plan, const session_catalogue *catalogue,
+                                             const session_meshes *meshes, const session_team *team,
+                                             session_report *report, base_error *error)
 {
     const int mesh_count = catalogue->mesh_count;
     int64_t *counts = base_alloc((size_t)(mesh_count + 1) * sizeof *counts);

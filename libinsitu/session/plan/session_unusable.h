@@ -13,8 +13,8 @@
 uint64_t session_hash_unusable_fields(const session_plan *plan, const session_meshes *meshes);
 
 /* Counts the cells with values that are not finite over all ranks, and warns of them. Collective. */
-insitu_status session_warn_of_unusable(const session_plan *plan, const session_catalogue *catalogue,
-                                       const session_meshes *meshes, const session_team *team, session_report *report,
-                                       base_error *error);
+insitu_status session_warn_of_unusable_cells(const session_plan *plan, const session_catalogue *catalogue,
+                                             const session_meshes *meshes, const session_team *team,
+                                             session_report *report, base_error *error);
 
 #endif

@@ -194,7 +194,7 @@ static void compare_parts(const session_parts *parts, int threads, session_repor
 void session_find_changed_values(const session_meshes *meshes, int threads, session_report *report)
 {
     for (int i = 0; i < meshes->count;) {
-        const session_parts parts = session_parts_at(meshes, i);
+        const session_parts parts = session_find_parts_from_index(meshes, i);
         compare_parts(&parts, threads, report);
         i += parts.count;
     }

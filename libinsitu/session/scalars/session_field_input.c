@@ -183,7 +183,7 @@ static insitu_status check_patches(const session_mesh *mesh, const insitu_field 
 }
 
 /* Checks, before the fill function is called, the description of a field that has one. */
-static insitu_status check_fill(const insitu_field *field, base_error *error)
+static insitu_status check_fill_description(const insitu_field *field, base_error *error)
 {
     if (field->patch_count)
         return base_fail(error, INSITU_ERROR_FIELD, "patches and fill are given: patches are given by fill");
@@ -200,7 +200,7 @@ static insitu_status check_field(const session_mesh *mesh, const insitu_field *f
     if (field->changed & ~(unsigned)INSITU_CHANGED_ALL)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "changed is %u, unknown bits are set", field->changed);
     insitu_status status = check_corners(&mesh->original, field, error);
-    if (!status && field->fill) return check_fill(field, error);
+    if (!status && field->fill) return check_fill_description(field, error);
     if (!status) status = check_field_arrays(mesh, field, error);
     if (!status) status = check_patches(mesh, field, error);
     return status;

@@ -116,9 +116,9 @@ static void update_image(const scene_mirror *mirror, session_meshes *meshes, ses
                          int threads, base_error *error)
 {
     const bool is_drawn = mirror && source->is_given && (axes & ~mirror->axes) == 0;
-    session_mesh *image = session_find_image(meshes, source, axes);
+    session_mesh *image = session_find_mirror_image(meshes, source, axes);
     if (!is_drawn) {
-        if (image) session_remove_image(meshes, image);
+        if (image) session_remove_mirror_image(meshes, image);
         return;
     }
     image = session_mirror_mesh(meshes, source, axes, mirror->planes, threads, error);

@@ -174,7 +174,7 @@ bool session_mark_scalar(session_mesh *mesh, const scene_field *field, bool need
     return true;
 }
 
-int64_t session_count_unusable(const session_mesh *mesh, const session_scalar *scalar)
+int64_t session_count_unusable_cells(const session_mesh *mesh, const session_scalar *scalar)
 {
     const grid *g = &mesh->cells;
     int64_t count = 0;

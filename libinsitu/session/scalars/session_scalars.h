@@ -58,7 +58,7 @@ const char *session_get_scalar_name(const session_mesh *mesh, const session_scal
 grid_field session_get_scalar_values(const session_mesh *mesh, const session_scalar *scalar);
 
 /* Returns the number of the caller's drawn cells that have a value which is not finite. Local. */
-int64_t session_count_unusable(const session_mesh *mesh, const session_scalar *scalar);
+int64_t session_count_unusable_cells(const session_mesh *mesh, const session_scalar *scalar);
 
 /* Returns the ranges of a used scalar's values in the nodes of the tree. */
 mmbvh_ranges session_get_scalar_ranges(const session_mesh *mesh, const session_scalar *scalar);

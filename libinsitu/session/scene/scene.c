@@ -128,7 +128,7 @@ static insitu_status convert_layer_variants(const scene_document *d, const scene
     char path[32];
     scene_series series;
     snprintf(path, sizeof path, "images[%d]", source);
-    insitu_status status = scene_find_series(d, path, &in->images[source], &series);
+    insitu_status status = scene_count_sweep_dimensions(d, path, &in->images[source], &series);
     for (int i = 0; !status && i < series.fields * series.isovalues * series.planes; i++) {
         scene_image *image = &out->images[out->image_count++];
         const int values = i / series.planes;

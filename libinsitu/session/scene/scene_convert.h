@@ -30,8 +30,8 @@ typedef struct scene_series {
 
 /* Checks the image's sweep, and counts the fields, isovalues, planes and views over which it makes pictures. path: path
  * of the image in the file. */
-insitu_status scene_find_series(const scene_document *d, const char *path, const scene_file_image *in,
-                                scene_series *out);
+insitu_status scene_count_sweep_dimensions(const scene_document *d, const char *path, const scene_file_image *in,
+                                           scene_series *out);
 /* Counts the pictures of all images together; more than SCENE_MAX_PICTURES are an error. */
 insitu_status scene_count_pictures(const scene_document *d, const scene_file *in, int *count);
 /* Removes from the image's layers, as the file gives them, the fields, isovalues and planes that its variant does not

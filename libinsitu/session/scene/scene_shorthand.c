@@ -326,7 +326,7 @@ static void expand_key(rewrite *r, int *key)
     if (strcmp(text, written) != 0) *key = make_text(r, text);
 }
 
-static void expand_pair(rewrite *r, yaml_node_pair_t *pair)
+static void expand_key_and_value(rewrite *r, yaml_node_pair_t *pair)
 {
     expand_key(r, &pair->key);
     const char *key = r->has_memory ? node_text(r, pair->key) : NULL;
@@ -343,7 +343,7 @@ static void expand_mapping(rewrite *r, int number)
     yaml_node_pair_t *kept = find_node_by_index(r, number)->data.mapping.pairs.start;
     yaml_node_pair_t *pair = kept, *end = find_node_by_index(r, number)->data.mapping.pairs.top;
     for (; pair < end && r->has_memory; pair++) {
-        expand_pair(r, pair);
+        expand_key_and_value(r, pair);
         if (pair->value) *kept++ = *pair;
     }
     if (r->has_memory) find_node_by_index(r, number)->data.mapping.pairs.top = kept;

@@ -311,7 +311,7 @@ static insitu_status find_spacings(session_meshes *meshes, const session_catalog
     session_finer_choice *choices = base_calloc((size_t)catalogue->mesh_count, sizeof *choices);
     if (!choices) session_fail_for_memory(error, catalogue->mesh_count * (int64_t)sizeof *choices, "statistics");
     insitu_status status = session_agree(comm, error);
-    if (!status) status = session_count_finer(meshes, catalogue, comm, choices, error);
+    if (!status) status = session_count_higher_order_cells(meshes, catalogue, comm, choices, error);
     for (int m = 0; m < catalogue->mesh_count && !status; m++)
         for (int i = 0; i < meshes->count; i++)
             if (strcmp(meshes->items[i]->name, catalogue->meshes[m].name) == 0) are_lobatto[i] = choices[m].is_lobatto;

@@ -90,7 +90,7 @@ static insitu_status begin_file(const char *path, new_lines *lines, base_error *
 {
     file_content old;
     file_failure failure;
-    if (!file_read_own(path, MOST_BYTES, &old, &failure) && !failure.is_missing)
+    if (!file_read_written_by_library(path, MOST_BYTES, &old, &failure) && !failure.is_missing)
         return fail_at_file(path, "read", &failure, error);
     insitu_status status = old.size ? select_kept_lines(path, &old, lines, error) : INSITU_OK;
     if (!status && !text_file_replace(path, write_lines, lines, &failure))

@@ -318,8 +318,8 @@ static const scene_material *choose_face_material(const session_layer_basis *bas
     return basis->is_flat && !layer->has_material && !basis->image->has_lights ? &bare : &layer->material;
 }
 
-static insitu_status fill_outer(const session_layer_basis *basis, const scene_surface *layer, int surface,
-                                session_layers *layers, base_error *error)
+static insitu_status fill_outer_surface_layer(const session_layer_basis *basis, const scene_surface *layer, int surface,
+                                              session_layers *layers, base_error *error)
 {
     const bool is_curved = session_has_curved_faces(basis->catalogue);
     const scene_material *m = choose_face_material(basis, layer);
@@ -440,12 +440,12 @@ insitu_status session_make_layers(const session_layer_basis *basis, const scene_
     for (int i = image->isosurface_count; i < layers.first_outer && !status; i++) {
         const scene_isosurface *isosurface = &image->isosurfaces[i - image->isosurface_count];
         const scene_surface shells = session_make_shell_layer(isosurface, image->height);
-        status = fill_outer(basis, &shells, i, &layers, error);
+        status = fill_outer_surface_layer(basis, &shells, i, &layers, error);
         /* `shells` is a local variable, which does not exist any more when the layer is drawn */
         layers.surfaces[i].colours = isosurface->colours;
     }
     for (int i = 0; i < image->surface_count && !status; i++)
-        status = fill_outer(basis, &image->surfaces[i], layers.first_outer + i, &layers, error);
+        status = fill_outer_surface_layer(basis, &image->surfaces[i], layers.first_outer + i, &layers, error);
     if (!status) status = fill_slices(basis, image, &layers, error);
     for (int i = 0; i < image->volume_count && !status; i++) status = fill_volume(basis, image, i, &layers, error);
     if (status)

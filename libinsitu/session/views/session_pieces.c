@@ -141,7 +141,7 @@ static void measure_or_choose_parts(const mesh_work *w, const char *name, base_e
         if (is_chosen)
             choose_pieces_of_part(w, mesh, &w->choice->marks[i], error);
         else
-            measure_part(w, mesh, session_marks_of(w->choice, i), error);
+            measure_part(w, mesh, session_get_marks_of_part(w->choice, i), error);
     }
 }
 
@@ -334,7 +334,7 @@ static int find_pieces(const scene *scene, const session_finer_choice *choice, c
 {
     enum { MOST_UNASKED = 2, MOST_FOR_VOLUMES = 8 };
     const bool is_limited = of->needs_all && !scene->is_surface_error_given;
-    const int supported = session_most_parts(choice), most = is_limited ? MOST_UNASKED : FINER_MOST_PARTS;
+    const int supported = session_find_max_edge_parts(choice), most = is_limited ? MOST_UNASKED : FINER_MOST_PARTS;
     const double allowed = find_allowed_error(scene, of);
     int parts = 1;
     while (parts < MOST_FOR_VOLUMES && parts < supported && of->light_excess > parts * parts) parts++;
@@ -345,7 +345,7 @@ static int find_pieces(const scene *scene, const session_finer_choice *choice, c
 static void choose_fixed_piece_count(const char *mesh, const scene *scene, const piece_error *of,
                                      session_finer_choice *choice, session_report *report)
 {
-    const int wanted = scene->finer_pieces, most = session_most_parts(choice);
+    const int wanted = scene->finer_pieces, most = session_find_max_edge_parts(choice);
     choice->parts = choice->excluded_count || !of->is_shown ? 1 : wanted < most ? wanted : most;
     session_warn(report, &(session_warning){WARNING_FINER, NULL, mesh, 1}, !choice->excluded_count && most < wanted,
                  "mesh \"%s\": it has cells of order %d, and so finer_pieces is %d on it instead of %d: at most %d "
@@ -474,8 +474,8 @@ static void report_pieces(const char *mesh, const session_finer_choice *choice, 
                      choice->parts > 1 ? "s" : "", bound, cells, volumes);
 }
 
-static void choose_all(const session_pieces_basis *basis, piece_error *errors, piece_step *steps,
-                       session_finer_choice *choices, session_report *report)
+static void choose_pieces_of_all_meshes(const session_pieces_basis *basis, piece_error *errors, piece_step *steps,
+                                        session_finer_choice *choices, session_report *report)
 {
     const scene *scene = basis->scene;
     const session_catalogue *catalogue = basis->catalogue;
@@ -512,7 +512,7 @@ insitu_status session_choose_pieces(const session_pieces_basis *basis, session_f
     if (!status)
         status = session_make_due_views(basis->scene, basis->moment, basis->meshes, basis->team->comm, &views, error);
     if (!status) status = find_errors(basis, &views, choices, errors, report, error);
-    if (!status) choose_all(basis, errors, steps, choices, report);
+    if (!status) choose_pieces_of_all_meshes(basis, errors, steps, choices, report);
     if (!status) status = list_pieces(basis, &views, choices, errors, error);
     session_free_due_views(&views);
     base_free(errors);

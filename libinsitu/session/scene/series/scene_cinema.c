@@ -7,7 +7,7 @@
 
 /* Returns the first control character of the text, or NULL. A database must not contain control characters, so that
  * each picture is exactly one line of the table and an incomplete line can be recognised. */
-static const char *find_control(const char *text)
+static const char *find_control_character(const char *text)
 {
     for (; text && *text; text++)
         if ((unsigned char)*text < 0x20 || *text == 0x7f) return text;
@@ -23,7 +23,7 @@ static insitu_status check_folder(const scene_document *d, const char *path, con
     if (strchr(folder, '{'))
         return scene_fail_at_key(d, path, "cinema",
                                  "\"%.100s\" holds a placeholder, expected one folder for all pictures", folder);
-    return find_control(folder)
+    return find_control_character(folder)
                ? scene_fail_at_key(d, path, "cinema", "holds a control character, expected a folder's name")
                : INSITU_OK;
 }
@@ -33,7 +33,8 @@ static insitu_status check_file(const scene_document *d, const char *path, const
     if (file && (file[0] == '/' || strncmp(file, "../", 3) == 0 || strstr(file, "/../")))
         return scene_fail_at_key(d, path, "path", "\"%.100s\" is not below the folder, expected a file in the database",
                                  file);
-    if (find_control(file) || find_control(image->name) || find_control(image->swept_field))
+    if (find_control_character(file) || find_control_character(image->name) ||
+        find_control_character(image->swept_field))
         return scene_fail_at_key(d, path, file ? "path" : "cinema",
                                  "the picture's name or field holds a control character, expected none in a database");
     return INSITU_OK;

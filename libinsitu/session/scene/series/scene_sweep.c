@@ -70,8 +70,8 @@ static insitu_status find_values(const scene_document *d, const char *path, cons
     return INSITU_OK;
 }
 
-insitu_status scene_find_series(const scene_document *d, const char *path, const scene_file_image *in,
-                                scene_series *out)
+insitu_status scene_count_sweep_dimensions(const scene_document *d, const char *path, const scene_file_image *in,
+                                           scene_series *out)
 {
     char camera[SCENE_PATH_SIZE];
     const char *fields[SCENE_MAX_NAMES];
@@ -93,7 +93,7 @@ insitu_status scene_count_pictures(const scene_document *d, const scene_file *in
         char path[32];
         scene_series s;
         snprintf(path, sizeof path, "images[%d]", i);
-        const insitu_status status = scene_find_series(d, path, &in->images[i], &s);
+        const insitu_status status = scene_count_sweep_dimensions(d, path, &in->images[i], &s);
         if (status) return status;
         sum += (int64_t)s.fields * s.isovalues * s.planes * s.views;
         if (sum > SCENE_MAX_PICTURES)
