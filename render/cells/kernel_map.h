@@ -322,14 +322,14 @@ SIMD_INLINE vf kernel_interval_fraction(const kernel_interval *i, vf t)
     return vf_select(vf_lt(vf_set(0), length), (t - i->t_in) / length, vf_set(0));
 }
 
-/* kernel_line_value() returns the field at depth t, interpolated linearly between the interval's ends.
- * kernel_reference_on_chord() interpolates the reference coordinates in the same way; inside a warped cell they are
- * only a guess. */
+/* Returns the field at depth t, interpolated linearly between the interval's ends. */
 SIMD_INLINE vf kernel_line_value(const kernel_interval *i, vf t)
 {
     return i->v_in + kernel_interval_fraction(i, t) * (i->v_out - i->v_in);
 }
 
+/* Interpolates the reference coordinates at depth t linearly between the interval's ends. Inside a warped cell they are
+ * only a guess. */
 SIMD_INLINE void kernel_reference_on_chord(const kernel_interval *i, vf t, vf r[3])
 {
     const vf along = kernel_interval_fraction(i, t);
