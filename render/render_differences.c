@@ -127,13 +127,12 @@ static insitu_status process_chunks(const render_job *job, const render_pending_
                                     render_difference_samples *samples, fragment *out, int64_t count, base_error *error)
 {
     const kernel_table *kernels = render_kernels();
-    const int threads = job->threads > 0 ? job->threads : omp_get_max_threads();
     kernel_frame frame;
     render_job surfaces;
     bool has_memory = true;
     insitu_status status = render_prepare_surfaces(job, &surfaces, &frame, error);
     if (status != INSITU_OK) return status;
-#pragma omp parallel num_threads(threads) reduction(&& : has_memory)
+#pragma omp parallel num_threads(job->threads > 0 ? job->threads : omp_get_max_threads()) reduction(&& : has_memory)
     {
         region_enter();
         kernel_thread thread = {0};

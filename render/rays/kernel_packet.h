@@ -71,8 +71,9 @@ static inline void kernel_tree_ray(const kernel_frame *f, double px, double py, 
 static inline void kernel_packet_ray_parameters(const kernel_packet *p, double px[SIMD_WIDTH], double py[SIMD_WIDTH])
 {
     for (int i = 0; i < SIMD_WIDTH; i++) {
+        const int row = i / KERNEL_PACKET_COLUMNS;
         px[i] = kernel_ray_parameter_of_column(p->frame, p->x0 + i % KERNEL_PACKET_COLUMNS);
-        py[i] = kernel_ray_parameter_of_row(p->frame, p->y0 + i / KERNEL_PACKET_COLUMNS);
+        py[i] = kernel_ray_parameter_of_row(p->frame, p->y0 + row);
     }
 }
 

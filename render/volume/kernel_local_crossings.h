@@ -133,8 +133,8 @@ SIMD_INLINE bool kernel_local_corners_of_pair(const kernel_transformed_curved *c
                                               vm rays, const vi face[2], kernel_curved_corners out[2])
 {
     enum { WORDS = 2, HALF = KERNEL_LOCAL_ROW / 2 };
+    if (KERNEL_LOCAL_ROW != SIMD_WIDTH || !vm_any(rays)) return false;
     const unsigned bits = vm_bits(rays);
-    if (KERNEL_LOCAL_ROW != SIMD_WIDTH || !bits) return false;
     int32_t lanes[SIMD_WIDTH];
     memcpy(lanes, &own->lane, sizeof lanes);
     const int first = lanes[__builtin_ctz(bits)], last = lanes[31 - __builtin_clz(bits)];

@@ -248,7 +248,7 @@ static void find_pieces_on_faces(const piece_kind *kind, const unsigned char *fa
 /* Returns the words of a set for each face of a kind of cell, allocated by base_alloc(), or NULL if memory runs out. */
 static uint64_t *list_pieces_on_faces(const piece_kind *kind)
 {
-    uint64_t *out = base_calloc((size_t)(SHAPE_MOST_FACES * kind->word_count), sizeof *out);
+    uint64_t *out = base_calloc(SHAPE_MOST_FACES * (size_t)kind->word_count, sizeof *out);
     unsigned char *faces_of_nodes = base_calloc((size_t)kind->nodes.fine.count, 1);
     const bool is_made = out && faces_of_nodes;
     if (is_made && kind->corner_count) {

@@ -11,8 +11,7 @@ static insitu_status add_clip(const scene_document *d, const char *path, const s
                               uint32_t *set)
 {
     int at = 0;
-    /* NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): a duplicate that is not found is applied twice, which does
-     * no harm */
+    /* NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): applying a clip twice does no harm */
     while (at < image->clip_count && memcmp(&image->clips[at], clip, sizeof *clip) != 0) at++;
     if (at == SCENE_MAX_CLIPS)
         return scene_fail_at_key(d, path, "",

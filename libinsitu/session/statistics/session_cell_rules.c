@@ -142,7 +142,7 @@ static bool make_factor(int dimensions, int order, bool is_lobatto, int points, 
     if (!session_make_quadrature(dimensions, points, &out->rule)) return false;
     const int whole = (out->rule.count + LANES - 1) / LANES * LANES;
     out->width = whole < BLOCK ? whole : BLOCK;
-    const size_t blocks = (size_t)((out->rule.count - 1) / out->width + 1);
+    const size_t blocks = (size_t)(out->rule.count - 1) / (size_t)out->width + 1;
     if (dimensions > 1 && blocks * count_block_numbers(out) > MOST_FUNCTIONS) return true;
     out->functions = base_calloc(blocks * count_block_numbers(out), sizeof *out->functions);
     for (size_t b = 0; b < blocks && out->functions; b++)
@@ -254,7 +254,7 @@ static size_t count_lattice_nodes(const session_cell_rules *rules, int lines)
 
 size_t session_cell_rules_work_size(const session_cell_rules *rules)
 {
-    const size_t nodes = (size_t)(rules->nodes.complete.count + rules->lattice.count);
+    const size_t nodes = (size_t)rules->nodes.complete.count + (size_t)rules->lattice.count;
     size_t size = SIZE * nodes + (AXES + 1) * (size_t)rules->bent.first.node_count * BLOCK;
     for (int lines = 0; lines <= rules->line_count; lines++) size += MOST_SIZE * count_lattice_nodes(rules, lines);
     return size;
