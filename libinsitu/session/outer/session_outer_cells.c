@@ -44,13 +44,20 @@ static insitu_status search(const session_parts *parts, const session_team *team
     return status;
 }
 
-insitu_status session_find_outer_cells(const session_parts *parts, bool are_cells_changed, const session_team *team,
-                                       base_error *error)
+void session_forget_outer_cells(const session_meshes *meshes)
 {
-    int is_stale = are_cells_changed;
+    for (int i = 0; i < meshes->count; i++) {
+        base_free(meshes->items[i]->finer.outer_faces);
+        meshes->items[i]->finer.outer_faces = NULL;
+    }
+}
+
+insitu_status session_find_outer_cells(const session_parts *parts, const session_team *team, base_error *error)
+{
+    int is_any_unknown = false;
     for (int i = 0; i < parts->count; i++)
-        is_stale = is_stale || (is_split(parts->items[i]) && !parts->items[i]->finer.outer_faces);
+        is_any_unknown = is_any_unknown || (is_split(parts->items[i]) && !parts->items[i]->finer.outer_faces);
     const insitu_status status = session_check_mpi(
-        error, MPI_Allreduce(MPI_IN_PLACE, &is_stale, 1, MPI_INT, MPI_MAX, team->comm), "MPI_Allreduce");
-    return status || !is_stale ? status : search(parts, team, error);
+        error, MPI_Allreduce(MPI_IN_PLACE, &is_any_unknown, 1, MPI_INT, MPI_MAX, team->comm), "MPI_Allreduce");
+    return status || !is_any_unknown ? status : search(parts, team, error);
 }

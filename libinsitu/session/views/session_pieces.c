@@ -279,13 +279,14 @@ static insitu_status find_outer_cells(const session_pieces_basis *basis, const s
                                       const session_finer_choice *choices, base_error *error)
 {
     insitu_status status = INSITU_OK;
+    if (basis->are_cells_changed) session_forget_outer_cells(basis->meshes);
     for (int m = 0; m < basis->catalogue->mesh_count && !status; m++) {
         const char *name = basis->catalogue->meshes[m].name;
         const session_parts parts = session_find_parts(basis->meshes, name);
         if (choices[m].order > 0 && !choices[m].excluded_count && is_outer_shown(views, name))
-            status = session_find_outer_cells(&parts, basis->are_cells_changed, basis->team, error);
+            status = session_find_outer_cells(&parts, basis->team, error);
     }
-    return status ? status : session_agree(basis->team->comm, error);
+    return status;
 }
 
 static insitu_status find_errors(const session_pieces_basis *basis, const session_due_views *views,
