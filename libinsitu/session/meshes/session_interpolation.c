@@ -191,7 +191,6 @@ static bool make_weights(const session_nodes *of, int parts, bool is_lobatto, se
 
 static void find_positions(const session_nodes *of, insitu_vertex_order order, session_interpolation *out)
 {
-    const session_shape *shape = session_shape_of(of->type);
     const int p = of->order;
     for (int k = 0; k <= p; k++)
         for (int j = 0; j <= p; j++)
@@ -199,10 +198,7 @@ static void find_positions(const session_nodes *of, insitu_vertex_order order, s
                 if (session_has_node(of, i, j, k))
                     out->positions[find_index(&out->complete, (const int[]){i, j, k})] =
                         session_node_index(of, order, i, j, k);
-    for (int c = 0; c < shape->corner_count; c++) {
-        const signed char *at = shape->corners[c];
-        out->corners[c] = session_node_index(of, order, p * at[0], p * at[1], p * at[2]);
-    }
+    session_find_corners(of, order, out->corners);
 }
 
 /* ---- faces and edges ---- */

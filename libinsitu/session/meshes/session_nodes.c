@@ -2,6 +2,7 @@
  * edges, faces and the cell. The nodes inside a triangle or tet are in the order of those of a smaller triangle or tet.
  * The orders of Gmsh and Exodus are permutations of VTK's. */
 #include "session_nodes.h"
+#include "session_shape.h"
 
 #include <stddef.h>
 
@@ -284,6 +285,16 @@ int session_node_index(const session_nodes *of, insitu_vertex_order order, int i
     if (order == INSITU_ORDER_LEXICOGRAPHIC) return number_lexicographic_node(of->type, of->order, i, j, k);
     const bool is_old = order == INSITU_ORDER_VTK_BEFORE_9_1 && of->is_lagrange;
     return session_quadratic_index(of, order, number_vtk_node(of, is_old, i, j, k));
+}
+
+void session_find_corners(const session_nodes *of, insitu_vertex_order order, int out[8])
+{
+    const session_shape *shape = session_shape_of(of->type);
+    const int p = of->order;
+    for (int c = 0; c < shape->corner_count; c++) {
+        const signed char *at = shape->corners[c];
+        out[c] = session_node_index(of, order, p * at[0], p * at[1], p * at[2]);
+    }
 }
 
 bool session_has_node(const session_nodes *of, int i, int j, int k)

@@ -48,6 +48,9 @@ const char *session_explain_refused_order(const session_nodes *of, insitu_vertex
  * the layer below. For a node that a serendipity cell lacks, the result is at least session_nodes.count. */
 int session_node_index(const session_nodes *of, insitu_vertex_order order, int i, int j, int k);
 
+/* Finds the position of each corner in the cell's row of connectivity. Corners are in VTK's order. */
+void session_find_corners(const session_nodes *of, insitu_vertex_order order, int out[8]);
+
 /* Returns whether the lattice of the cell's order has a node with the indices i, j, k; each index must be in 0 ..
  * order. */
 bool session_has_node(const session_nodes *of, int i, int j, int k);

@@ -70,10 +70,7 @@ static bool make_kind(const session_nodes *of, insitu_vertex_order order, straig
     const session_shape *shape = session_shape_of(of->type);
     *out = (straight_kind){.of = *of, .corner_count = shape->corner_count};
     if (of->order == 1 || of->type == GRID_PYRAMID) return true;
-    for (int c = 0; c < shape->corner_count; c++) {
-        const signed char *at = shape->corners[c];
-        out->corners[c] = session_node_index(of, order, of->order * at[0], of->order * at[1], of->order * at[2]);
-    }
+    session_find_corners(of, order, out->corners);
     return fill_weights(of, order, false, &out->weights[0]) &&
            (!session_has_two_spacings(of) || fill_weights(of, order, true, &out->weights[1]));
 }

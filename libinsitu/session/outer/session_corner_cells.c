@@ -2,20 +2,6 @@
 
 #include "memory.h"
 #include "session_rows.h"
-#include "session_shape.h"
-
-/* Finds the positions of a cell's corners in its row, for each kind of row. */
-static void find_corners(const session_rows *rows, insitu_vertex_order order, int corners[ROWS_MOST_KINDS][8])
-{
-    for (int i = 0; i < rows->kind_count; i++) {
-        const session_nodes *of = &rows->kinds[i].nodes;
-        const session_shape *shape = session_shape_of(of->type);
-        for (int c = 0; c < shape->corner_count; c++) {
-            const signed char *at = shape->corners[c];
-            corners[i][c] = session_node_index(of, order, of->order * at[0], of->order * at[1], of->order * at[2]);
-        }
-    }
-}
 
 static bool allocate(int64_t cells, int64_t vertices, session_corner_cells *out)
 {
@@ -68,7 +54,8 @@ bool session_corner_cells_create(const session_mesh *mesh, session_corner_cells 
     int64_t vertices = 0;
     *out = (session_corner_cells){.origins = NULL};
     session_list_kinds(&rows);
-    find_corners(&rows, mesh->given.vertex_order, corners);
+    for (int i = 0; i < rows.kind_count; i++)
+        session_find_corners(&rows.kinds[i].nodes, mesh->given.vertex_order, corners[i]);
     for (int64_t cell = 0; cell < rows.cells.cell_count; cell++)
         vertices += grid_type_vertices(rows.kinds[session_find_kind_of_cell(&rows, cell)].nodes.type);
     if (!allocate(rows.cells.cell_count, vertices, out)) return false;
