@@ -202,7 +202,7 @@ static bool open_parent_folder(const char *path, folder_and_name *target, file_f
 
 enum { TEMPORARY_NAME = 40, TRIES = 8 };
 
-/* Writes a new file with the temporary name, and renames it to its final name. */
+/* Writes the bytes to a new file with the name `temporary`, and renames this file to the target's name. */
 static bool try_to_replace(const folder_and_name *target, const char *temporary, const char *bytes, size_t size)
 {
     const int file = openat(target->folder, temporary, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);

@@ -21,15 +21,16 @@ typedef struct file_failure {
 typedef struct file_content {
     char *text; /* the file's `size` bytes and a NUL, allocated with base_alloc() */
     size_t size;
-    struct stat stamp; /* status of the file when it was opened */
+    struct stat stamp; /* result of fstat() when the file was opened */
 } file_content;
 
 /* Reads a file that the user names, of at most limit bytes. Symbolic links are followed. Returns false on a failure:
  * out->text is NULL, and out->stamp is the status of the file if there is one. */
 bool file_read(const char *path, size_t limit, file_content *out, file_failure *failure);
 
-/* Reads, like file_read(), a file that the library itself has written and appends to. A link that does not lead to a
- * regular file counts as missing, because file_replace() replaces the link itself. */
+/* Reads a file that the library itself has written and will extend, with the rules of file_read() except for symbolic
+ * links: a link that does not lead to a regular file counts as a missing file, because file_replace() replaces the link
+ * itself. */
 bool file_read_written_by_library(const char *path, size_t limit, file_content *out, file_failure *failure);
 
 /* Replaces a file by these bytes, and creates missing folders. If the path is a link, the link is replaced and its

@@ -12,20 +12,21 @@
 #include <stdint.h>
 
 typedef struct fragment {
-    uint32_t pixel; /* number of the pixel, y * width + x, with y = 0 at the top */
+    uint32_t pixel; /* index of the pixel, y * width + x, with y = 0 at the top */
     /* t = (depth - depth_origin) * scale (render.h) of the first sample or of the hit, along the pixel's ray */
     float t_in;
     float t_out; /* t of the last sample, or slightly before the last cell's end (kernel_segments.h); for a hit equal to
                     t_in */
     float colour[3];     /* premultiplied linear RGB */
     float transmittance; /* from 0 for an opaque fragment to 1 for a transparent one */
-    uint32_t kind;       /* kind of the fragment, one of those below */
+    uint32_t kind;       /* FRAGMENT_VOLUME or FRAGMENT_SURFACE, plus the values that the enum below describes */
 } fragment;
 
-/* Kinds of fragments. A single sample has FRAGMENT_VOLUME + FRAGMENT_LAYER times the number of the volume (0 .. 3).
- * FRAGMENT_EARLY or FRAGMENT_LATE is added if the sample lies within rounding of the start or end of its cell,
- * because the cell before or behind may have the same sample. Fragments that combine several samples or segments of
- * a volume have the kind FRAGMENT_VOLUME. Hits have FRAGMENT_SURFACE + surface id (0, 1, ...). */
+/* Values of fragment.kind. A single sample of a volume has FRAGMENT_VOLUME + FRAGMENT_LAYER times the index of its
+ * volume layer (0 .. 3). FRAGMENT_EARLY or FRAGMENT_LATE is added if the sample lies within rounding of the start or
+ * end of its cell, because the cell before or behind may have the same sample. A fragment that combines several samples
+ * or segments of a volume has the kind FRAGMENT_VOLUME. A hit has FRAGMENT_SURFACE + the index (0, 1, ...) of its
+ * surface. */
 enum { FRAGMENT_VOLUME = 0, FRAGMENT_EARLY = 1, FRAGMENT_LATE = 2, FRAGMENT_LAYER = 4, FRAGMENT_SURFACE = 16 };
 
 /* Returns whether a fragment changes the picture. The transmittance of a faint fragment rounds to 1, but its light is
@@ -49,9 +50,9 @@ typedef struct pixel_area {
     int width, height;
 } pixel_area;
 
-/* Callback that receives all fragments of a rank in an area as soon as they are complete: `count` fragments in any
- * order. It may reorder them; they are invalid after the call. thread: the number (0, 1 ...) of the calling thread.
- * Returns false if memory ran out. */
+/* Callback that receives fragments while a rank traces rays. A call receives the rank's `count` fragments of all pixels
+ * in `area`, in any order, as soon as they are complete. The callback may reorder the fragments; they are invalid after
+ * the call. thread: index (0, 1, ...) of the calling thread. Returns false if memory ran out. */
 typedef bool fragment_callback(void *state, int thread, const pixel_area *area, fragment *items, int64_t count);
 
 #endif

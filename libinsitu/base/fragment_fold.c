@@ -11,7 +11,8 @@ static void blend_behind(fragment *front, const fragment *behind)
     if (behind->t_out > front->t_out) front->t_out = behind->t_out;
 }
 
-/* Returns the height above the leaves of the lowest node that contains both leaves. */
+/* Returns the height, above the leaves of the interval's binary tree, of the lowest node that contains both leaves. a
+ * and b are indices of leaves. */
 static int find_common_height(int32_t a, int32_t b)
 {
     return a == b ? 0 : 32 - __builtin_clz((uint32_t)(a ^ b));
@@ -44,14 +45,15 @@ fragment fragment_fold(const fragment *sorted, int64_t count)
 
 /* ---- folding on one rank ----------------------------------------------------------------------------------------- */
 
-/* The state of folding a rank's fragments in one interval of t. */
+/* The state while a rank folds (blends) its fragments of one pixel in one interval of the ray parameter t. */
 typedef struct fold_part {
-    float begin, end; /* range of t in which the rank has all fragments */
+    float begin, end; /* range of the ray parameter in which this rank has all fragments of the pixel */
     fragment *out;    /* the folded fragments */
     int64_t count;    /* number of folded fragments */
 } fold_part;
 
-/* Returns the t at which a leaf starts. The result is exact, because the divisor is a power of two. */
+/* Returns the ray parameter t at which a leaf of the tree begins. leaf: index of the leaf (fragment_find_leaf()). The
+ * result is exact, because the divisor is a power of two. */
 static double find_leaf_begin(int32_t leaf)
 {
     return (double)leaf / (FRAGMENT_INTERVALS << FRAGMENT_HALVINGS);
@@ -63,8 +65,8 @@ static bool has_all_of(const fold_part *part, int32_t first_leaf, int height)
            find_leaf_begin(first_leaf + (1 << height)) <= (double)part->end;
 }
 
-/* Appends the fragments of a node of the tree to part->out. Every descendant of which the rank has all fragments is
- * folded to one fragment. */
+/* Appends the fragments in a node of the interval's binary tree to part->out. If this rank has all of the pixel's
+ * fragments in a descendant of the node, the fragments in that descendant are first folded to one fragment. */
 static void fold_node(fold_part *part, const fragment *sorted, int64_t count, int32_t first_leaf, int height)
 {
     while (count > 1 && height > 0 && !has_all_of(part, first_leaf, height)) {

@@ -26,16 +26,18 @@ enum { FRAGMENT_INTERVALS = 8, FRAGMENT_HALVINGS = 15 };
 
 /* If the transmittance of a rank's own fragments up to the end of an interval is below FRAGMENT_DARK_OF_RANK, the rank
  * may omit all intervals behind it. When a pixel is merged, blending stops at the end of the first interval at which
- * the transmittance is below FRAGMENT_DARK. This limit is larger by more than the sum of possible rounding errors. */
+ * the transmittance is below FRAGMENT_DARK. FRAGMENT_DARK is the larger of the two limits, by more than the sum of
+ * possible rounding errors, so that merging never needs an omitted interval. */
 #define FRAGMENT_DARK_OF_RANK 1e-7f
 #define FRAGMENT_DARK 1.01e-7f
 
-/* Returns the number of the leaf that contains t; the numbers increase with t. The leaves of one interval differ only
- * in the lowest FRAGMENT_HALVINGS bits. All t above 1024, about a thousand times the scene's depth, are in one leaf,
- * and so are all t below -1024. */
+/* Returns the index of the leaf that contains the ray parameter t; indices increase with t. The leaves of one interval
+ * differ only in the lowest FRAGMENT_HALVINGS bits of their indices. All t above 1024, about a thousand times the
+ * scene's depth, are in one leaf, and so are all t below -1024. */
 static inline int32_t fragment_find_leaf(float t)
 {
-    const float most = 1024, at = t < -most ? -most : t < most ? t : most; /* this form of a clamp also replaces NaN */
+    /* NaN becomes `most`, because both comparisons are false */
+    const float most = 1024, at = t < -most ? -most : t < most ? t : most;
     return (int32_t)floorf(at * (float)(FRAGMENT_INTERVALS << FRAGMENT_HALVINGS));
 }
 

@@ -26,9 +26,9 @@ enum {
     GRID_MAX_CELL_VERTICES = 8
 };
 
-/* Computes the three indices of a lattice's vertices or cells from their numbers: the index of number n along an axis
- * is n % outer / stride, where outer is the next larger stride. Strides are nested, so that each triple of indices has
- * a unique number; the numbers in between are padding. */
+/* Converts the flat index n of a vertex or a cell of a lattice (its number) to three indices along the axes. The index
+ * along an axis is n % outer / stride, where outer is the next larger stride. Strides are nested, so that each triple
+ * of indices has a unique flat index. Flat indices to which no triple belongs are padding in the caller's arrays. */
 typedef struct grid_numbering {
     int64_t stride[3];
     double inverse_stride[3]; /* 1 / the stride of each axis; 0 along an axis with a single index */
@@ -36,9 +36,9 @@ typedef struct grid_numbering {
     double inverse_outer[3];  /* 1 / outer; 0 along the axis of the largest stride */
 } grid_numbering;
 
-/* Returns the index of number n along an axis. Each quotient (n + 1/2) / stride is rounded down. It is at least 1/2 /
- * stride away from the next integer. The two rounding errors change it by at most n / stride * 2^-52, and therefore by
- * less than this distance if n < 2^51. */
+/* Returns the index along an axis that belongs to the flat index n. Each quotient (n + 1/2) / stride is rounded down.
+ * It is at least 1/2 / stride away from the next integer. The two rounding errors change it by at most n / stride *
+ * 2^-52, and therefore by less than this distance if n < 2^51. */
 static inline int64_t grid_index_along(const grid_numbering *of, int axis, int64_t n)
 {
     const double whole = (double)n, outer = (double)(int64_t)((whole + 0.5) * of->inverse_outer[axis]);
@@ -53,8 +53,8 @@ typedef struct grid_axis {
     int axis;
 } grid_axis;
 
-/* Returns the coordinate of vertex n. For numbers that are only padding, returns the last coordinate, because loops
- * over all numbers include these. */
+/* Returns the coordinate of the vertex with the flat index n. If n is padding, returns the last coordinate of the axis,
+ * because loops over all flat indices include padding. */
 static inline double grid_axis_coordinate(const grid_axis *axis, int64_t n)
 {
     const int64_t index = grid_index_along(axis->vertices, axis->axis, n);
@@ -88,7 +88,7 @@ typedef struct grid_array {
     int64_t base; /* in an array of indices or offsets, the index base, which is subtracted from each element */
     /* number of entries of an array of offsets whose last entry is omitted; else 0 */
     int64_t implied_end_count;
-    int64_t implied_end; /* the omitted last offset, counted from 0 */
+    int64_t implied_end; /* offset that the omitted last entry would have, counted from 0 */
     /* if not NULL, coordinates are computed from this axis by vertex number, and there is no data */
     const grid_axis *axis;
 } grid_array;
@@ -97,10 +97,11 @@ typedef struct grid_array {
 typedef struct grid_lattice {
     int64_t cells[3]; /* number of cells along each axis; 0 along one axis: the cells are quads */
     grid_numbering vertex_numbering, cell_numbering;
-    int64_t corner_offsets[8]; /* number of each vertex of a cell minus that of its first vertex, in VTK's order */
+    /* flat index of each vertex of a cell minus that of the cell's first vertex, in VTK's order */
+    int64_t corner_offsets[8];
     int64_t drawn_first[3], drawn_end[3]; /* index range of the cells that are not in ghost layers */
     int64_t cell_count;                   /* number of cells, without padding */
-    bool has_ghosts;                      /* set if some cell numbers are padding or belong to ghost layers */
+    bool has_ghosts;                      /* set if some flat indices of cells are padding or belong to ghost layers */
     /* coordinates along the axes; they have no data if coordinates are given by vertex */
     grid_axis axes[3];
 } grid_lattice;
@@ -136,10 +137,10 @@ typedef struct grid_field {
     /* for a magnitude whose components are in separate arrays, these arrays; NULL: all components are in `values` */
     const grid_array *component_arrays;
     int component_count;
-    int component; /* number of the component, from 0, or -1 for the magnitude */
+    int component; /* index of the component, or -1 for the magnitude */
     bool is_cell_centred;
-    /* the cell values from which the values at vertices were computed; NULL: the values were not computed from
-     * cells. A cell whose own value is not finite has no value. */
+    /* If the values at vertices were computed from cell values: these cell values. A cell whose own value is not finite
+     * is treated as a cell without values. NULL: the values were not computed from cells. */
     const struct grid_field *source_cells;
 } grid_field;
 
@@ -239,7 +240,7 @@ static inline int grid_cell_type(const grid *g, int64_t cell)
     return type == (int)type ? (int)type : GRID_NO_TYPE;
 }
 
-/* Returns the axis along which cell numbers are consecutive, or -1 if there is none. */
+/* Returns the axis along which the flat indices of cells are consecutive, or -1 if there is none. */
 static inline int grid_lattice_row_axis(const grid_lattice *l)
 {
     for (int axis = 0; axis < 3; axis++)
@@ -247,7 +248,7 @@ static inline int grid_lattice_row_axis(const grid_lattice *l)
     return -1;
 }
 
-/* Returns the number of a cell's first vertex. */
+/* Returns the flat index of a cell's first vertex. */
 static inline int64_t grid_lattice_first(const grid_lattice *l, int64_t cell)
 {
     int64_t first = 0;
@@ -256,7 +257,7 @@ static inline int64_t grid_lattice_first(const grid_lattice *l, int64_t cell)
     return first;
 }
 
-/* Returns whether the number is that of a cell; otherwise it is padding. */
+/* Returns whether the flat index is that of a cell; otherwise it is padding. */
 static inline bool grid_lattice_is_cell(const grid_lattice *l, int64_t cell)
 {
     int64_t number = 0;
@@ -268,7 +269,7 @@ static inline bool grid_lattice_is_cell(const grid_lattice *l, int64_t cell)
     return number == cell;
 }
 
-/* Returns whether the number is that of a cell outside the ghost layers. */
+/* Returns whether the flat index is that of a cell outside the ghost layers. */
 static inline bool grid_lattice_is_drawn(const grid_lattice *l, int64_t cell)
 {
     for (int axis = 0; axis < 3; axis++) {
@@ -318,11 +319,14 @@ static inline void grid_face_vertices(const grid *g, int64_t face, int64_t *firs
 typedef struct grid_walk {
     const grid *cells;
     const grid_array *vertices; /* the vertex indices: connectivity, or for a polyhedron face_connectivity */
-    /* for a lattice: differences between the numbers of the cell's vertices and that of its first one; else NULL */
+    /* for a lattice: differences between the flat indices of the cell's vertices and that of its first one; else
+     * NULL */
     const int64_t *corner_offsets;
-    int64_t base;                /* for a lattice: the number of the cell's first vertex */
-    int64_t next, end;           /* next entry to visit and the end, in `vertices` or in corner_offsets */
-    int64_t face_next, face_end; /* for a polyhedron: its next face to visit and the end, in connectivity; else equal */
+    int64_t base;      /* for a lattice: flat index of the cell's first vertex */
+    int64_t next, end; /* positions, in `vertices` or in corner_offsets, of the next entry to visit and of the end */
+    /* for a polyhedron: positions, in connectivity, of the next face to visit and of the end; for other cells, both are
+     * equal */
+    int64_t face_next, face_end;
 } grid_walk;
 
 static inline grid_walk grid_walk_cell(const grid *g, int64_t cell)

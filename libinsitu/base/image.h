@@ -10,7 +10,9 @@
 
 /* The samples of an image's pixels sorted by depth, as in insitu_deep; only on rank 0, and all zero on other ranks. */
 typedef struct deep_image {
-    insitu_deep_sample *samples; /* samples of all pixels; some may not belong to any pixel */
+    /* array in which `first` and `counts` select the samples of each pixel; it may also contain samples that no pixel
+     * uses */
+    insitu_deep_sample *samples;
     int64_t count, capacity;
     int64_t *first;   /* index of the first sample of each pixel */
     uint32_t *counts; /* number of samples of each pixel; may be 0 */

@@ -20,7 +20,7 @@ static void count_bytes(long long bytes)
     }
 }
 
-static int should_fail(void)
+static int should_allocation_fail(void)
 {
     atomic_fetch_add(&allocation_count, 1);
     if (atomic_load(&fail_countdown) == 0) return 0;
@@ -32,7 +32,7 @@ static int should_fail(void)
  * pointer to it. */
 static void *make_block(size_t bytes, size_t counted)
 {
-    if (should_fail()) return NULL;
+    if (should_allocation_fail()) return NULL;
     if (bytes > SIZE_MAX - 2 * header_bytes) return NULL;
     const size_t rounded = bytes ? (bytes + header_bytes - 1) / header_bytes * header_bytes : header_bytes;
     char *raw = aligned_alloc(header_bytes, rounded + header_bytes);

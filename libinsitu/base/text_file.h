@@ -29,10 +29,11 @@ void text_print(text_output *out, const char *format, ...) __attribute__((format
 
 typedef void text_writer(text_output *out, const void *what);
 
-/* Replaces a file as file_replace() does by the text that write() produces, with numbers in the C locale. */
+/* Writes the text that write() produces to a file, with numbers in the C locale. An existing file is replaced as by
+ * file_replace(). */
 bool text_file_replace(const char *path, text_writer *write, const void *what, file_failure *failure);
 
-/* Appends the text that write() produces to a file, as file_append() does, with numbers in the C locale. */
+/* Appends the text that write() produces to a file as file_append() does. Numbers are written in the C locale. */
 bool text_file_append(const char *path, text_writer *write, const void *what, file_failure *failure);
 
 /* Keeps only the lines that start with an integer below `number`, and moves them to the start of the text. Returns the

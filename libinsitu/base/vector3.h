@@ -1,4 +1,4 @@
-/* Computes products and lengths of vectors of three numbers, and the order of points. */
+/* Computes products and lengths of vectors with three components, and compares points lexicographically. */
 #ifndef BASE_VECTOR3_H
 #define BASE_VECTOR3_H
 
@@ -23,7 +23,7 @@ static inline double vector3_length(const double v[3])
     return hypot(hypot(v[0], v[1]), v[2]);
 }
 
-/* Compares two points by x, then y, then z: the order of coordinates. Returns -1, 0 or 1. */
+/* Compares two points lexicographically: by x, then by y, then by z. Returns -1, 0 or 1. */
 static inline int vector3_compare(const double a[3], const double b[3])
 {
     for (int axis = 0; axis < 3; axis++)

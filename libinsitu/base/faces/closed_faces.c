@@ -114,7 +114,7 @@ void closed_edges_empty(closed_faces *c)
 }
 
 /* Orients all faces that are connected with the face `first` by shared edges, so that they are consistent with it.
- * These faces are one piece of the surface; its number is stored for each of them. */
+ * These faces are one connected piece of the surface. The index of the piece is stored for each of its faces. */
 static void orient_piece(closed_faces *c, int first)
 {
     int height = 0;
@@ -154,7 +154,7 @@ void closed_faces_orient(closed_faces *c)
         if (!c->orientation[face]) orient_piece(c, face);
 }
 
-static void swap_pair(closed_triangle *t, int i, int j)
+static void sort_vertex_pair(closed_triangle *t, int i, int j)
 {
     if (t->vertex[i] <= t->vertex[j]) return;
     const int v = t->vertex[i];
@@ -167,9 +167,9 @@ static void add_triangle(closed_faces *c, int face, const int corners[3])
 {
     closed_triangle t = {.face = face, .orientation = c->orientation[face]};
     for (int k = 0; k < 3; k++) t.vertex[k] = c->entry_vertices[c->first_entries[face] + corners[k]];
-    swap_pair(&t, 0, 1);
-    swap_pair(&t, 1, 2);
-    swap_pair(&t, 0, 1);
+    sort_vertex_pair(&t, 0, 1);
+    sort_vertex_pair(&t, 1, 2);
+    sort_vertex_pair(&t, 0, 1);
     if (t.vertex[0] != t.vertex[1] && t.vertex[1] != t.vertex[2]) c->triangles[c->triangle_count++] = t;
 }
 

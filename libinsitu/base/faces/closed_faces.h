@@ -14,7 +14,7 @@
 #include "grid.h"
 
 typedef struct closed_triangle {
-    int vertex[3]; /* numbers of the vertices, in increasing order */
+    int vertex[3]; /* indices of the triangle's vertices in the polyhedron, in increasing order */
     int face;
     int orientation; /* 1 if the three vertices run in the direction of the face's vertices, else -1 */
     /* six times the volume of the tet of the triangle and the centre; after closed_faces_orient_outward(), positive
@@ -24,22 +24,24 @@ typedef struct closed_triangle {
 
 /* An edge of the polyhedron. Each face at the edge has one side (see closed_faces) that runs along it. */
 typedef struct closed_edge {
-    int low, high; /* numbers of the two vertices; low is -1 in an unused slot of the hash table of edges */
-    int side[2];   /* the two faces' sides along the edge, by number; -1: there is no such face */
+    /* indices of the two vertices in the polyhedron; low is -1 in an unused slot of the hash table of edges */
+    int low, high;
+    int side[2]; /* indices of the sides that the two faces at the edge have along it; -1: there is no such face */
 } closed_edge;
 
 /* The faces of a polyhedron as lists of entries. An entry is one vertex in the list of one face. A side is the part of
- * a face's boundary from one entry to the next entry of the face. Its number is the number of its first entry. */
+ * a face's boundary from one entry to the next entry of the face. The index of a side is the index of the entry at
+ * which it starts. */
 typedef struct closed_faces {
     int face_count, entry_count, vertex_count, triangle_count, piece_count, table_size;
     int *first_entries;  /* first entry of each face; face_count + 1 elements */
-    int *entry_vertices; /* vertex number of each entry */
+    int *entry_vertices; /* for each entry, the index of its vertex in the polyhedron */
     int *face_of;        /* for each entry, the face to which it belongs */
-    int64_t *vertices;   /* index in the grid of each numbered vertex */
+    int64_t *vertices;   /* for each vertex of the polyhedron, its index in the grid */
     /* -1 for faces that are reversed, otherwise 1; after closed_faces_orient_outward(), 1 if the face's vertices run
      * around the outward normal */
     int *orientation;
-    int *piece; /* number of the connected piece to which each face belongs */
+    int *piece; /* for each face, the index of the connected piece of the surface to which it belongs */
     closed_triangle *triangles;
     closed_edge *edges; /* hash table of edges with 2 * table_size entries */
     /* working memory of the functions below */
@@ -51,7 +53,8 @@ typedef struct closed_faces {
     double *piece_volume;
 } closed_faces;
 
-/* Counts faces and entries. Returns false if their number exceeds int. */
+/* Counts the polyhedron's faces and the entries of their lists. Returns false if there are more than INT32_MAX / 64
+ * faces or entries. */
 bool closed_faces_count(closed_faces *c, const grid *g, int64_t cell);
 
 /* Sets the arrays to sections of `memory`, which must be aligned to 64 bytes, and returns the number of bytes that they
@@ -59,15 +62,15 @@ bool closed_faces_count(closed_faces *c, const grid *g, int64_t cell);
 size_t closed_faces_lay_out(closed_faces *c, char *memory);
 
 /* Reads the faces, and numbers the vertices in the order in which they appear. If a face repeats a vertex in
- * succession, only one entry is stored, so that a quad with repeated corners remains a quad. A face that consists of a
- * single vertex has no entries. */
+ * succession, only one entry is stored. A quad with repeated corners therefore remains a quad. A face that consists of
+ * a single vertex has no entries. */
 void closed_faces_read(closed_faces *c, const grid *g, int64_t cell);
 
 /* Orients the faces of each connected piece consistently with the first face of the piece in the list. */
 void closed_faces_orient(closed_faces *c);
 
-/* Cuts the faces into triangles (polygon.h). positions are indexed by vertex number. A triangle that has the same
- * vertex at two corners has no area and is left out. */
+/* Cuts the faces into triangles (polygon.h). positions: the position of each vertex, by its index in the polyhedron. A
+ * triangle that has the same vertex at two corners has no area and is left out. */
 void closed_faces_triangulate(closed_faces *c, const double (*positions)[3]);
 
 /* Computes the volumes of the tets between the triangles and the centre, and orients the pieces outward. */

@@ -17,11 +17,14 @@ static const double line_slack = 0x1p-46;
 /* The corners of a polygon, numbered in the order that polygon.h defines. */
 typedef struct polygon_work {
     int count;
-    int step; /* 1 if this order has the direction of the caller's list, -1 if it has the opposite one */
+    /* 1 if the order of the corners runs in the direction of the caller's list, -1 if it runs in the opposite
+     * direction */
+    int step;
     int *order;
-    double (*positions)[3];  /* positions relative to the smallest corner, scaled to a width of about 1 */
-    double (*projection)[2]; /* projection of the corners along the normal, in which the order runs counterclockwise */
-    int *next, *previous;    /* doubly linked list of the corners that have not been cut off */
+    double (*positions)[3]; /* positions relative to the smallest corner, scaled to a width of about 1 */
+    /* corners projected into a plane along the polygon's normal; the corners run counterclockwise in this plane */
+    double (*projection)[2];
+    int *next, *previous; /* doubly linked list of the corners that have not been cut off */
     char *is_ear;
     int (*triangles)[3];
     int triangle_count;
@@ -173,8 +176,8 @@ static bool are_coincident(const polygon_work *w, int a, int b)
     return p[0] == q[0] && p[1] == q[1] && p[2] == q[2];
 }
 
-/* The corners `again` and `tip` have the same position. Returns whether an edge at `again` leads into the angle between
- * the edges from `tip` to its neighbours a and c. */
+/* The corners `again` and `tip` have the same position. Returns whether one of the two edges at `again` leads into the
+ * angle at `tip` between the edges to its neighbours a and c. */
 static bool enters_corner(const polygon_work *w, int a, int tip, int c, int again)
 {
     const int ends[2] = {w->previous[again], w->next[again]};
@@ -214,8 +217,8 @@ static int find_ear(const polygon_work *w, int first)
     return -1;
 }
 
-/* Tests all remaining corners for ears again, and returns an ear or -1. Cutting off a corner can turn another corner
- * into an ear if the first one was inside the triangle of the other. */
+/* Tests all remaining corners for ears again, and returns an ear or -1. Another test is needed because cutting off one
+ * corner can turn a second corner into an ear, if the first corner was inside the triangle of the second one. */
 static int find_ear_again(polygon_work *w, int first)
 {
     int i = first;
