@@ -74,7 +74,8 @@ static inline session_cell_faces session_faces_of_cell(const grid *g, int64_t ce
 /* The vertices of a face in cyclic order. session_face_vertex() returns the i-th of them, i = 0 .. size - 1. */
 typedef struct session_face_loop {
     const session_cell_faces *faces;
-    /* corner numbers within the cell; NULL: the vertices are the entries of the list from `first` on */
+    /* positions of the face's vertices within its cell; NULL: the vertices are the entries of `list` from the index
+     * `first` on */
     const signed char *corners;
     const grid_array *list;
     int64_t first, size;

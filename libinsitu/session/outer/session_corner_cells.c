@@ -13,7 +13,9 @@ static bool allocate(int64_t cells, int64_t vertices, session_corner_cells *out)
     return out->origins && out->coordinates && out->connectivity && out->offsets && out->types;
 }
 
-/* Adds the cell's corners. Returns the new number of vertices. */
+/* Appends the linear cell that has the corners of one of the caller's cells, with vertices of its own. corners:
+ * position of each corner in the cell's row of nodes. type: type of the linear cell. vertex: number of vertices stored
+ * so far. Returns the number of vertices afterwards. */
 static int64_t add_cell(const session_mesh *mesh, const session_rows *rows, const int *corners, int64_t cell, int type,
                         int64_t vertex, session_corner_cells *out)
 {

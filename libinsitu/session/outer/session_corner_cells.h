@@ -7,7 +7,7 @@
 
 typedef struct session_corner_cells {
     grid cells;       /* one cell for each of the caller's cells; each cell has vertices of its own */
-    int64_t *origins; /* for each vertex, the vertex of session_mesh.cells at the same corner */
+    int64_t *origins; /* for each vertex of `cells`, the vertex of session_mesh.cells at the same corner */
     double *coordinates;
     int64_t *connectivity, *offsets;
     unsigned char *types;

@@ -24,8 +24,8 @@ enum { BOX_WORDS = sizeof(session_level_box) / sizeof(uint64_t) };
 /* Boxes sorted into bins by their centres, in units of cells of the coarsest level. */
 typedef struct box_bins {
     int64_t count;
-    int64_t *boxes;            /* for each box in the bins, its index in the array that bin_boxes() was given */
-    double (*centres)[3];      /* centre of each box */
+    int64_t *boxes;       /* for each box in the bins, its index in the array of boxes that was passed to bin_boxes() */
+    double (*centres)[3]; /* centre of each box */
     double largest_half_width; /* half of the largest side length of all boxes */
     session_bins bins;
 } box_bins;
@@ -136,8 +136,8 @@ static bool intersects_box(const session_level_box *box, const session_box *comm
     return true;
 }
 
-/* Writes, for each rank, the boxes that intersect the rank's common box. If mail->words is NULL, the words are only
- * counted. */
+/* Packs, for each other rank, those boxes of this rank that intersect that rank's common box. If mail->words is NULL,
+ * the words are only counted. */
 static void write_boxes(const cover_search *s, const session_box *commons, session_mail *mail)
 {
     mail->total = 0;
@@ -225,8 +225,9 @@ static int64_t floor_quotient(int64_t a, int64_t b)
 
 /* The cells of a coarse box that a fine box overlaps, as index ranges of the coarse level. */
 typedef struct overlap {
-    int64_t lower[3], upper[3];             /* cells that the fine box covers wholly or in part */
-    int64_t whole_lower[3], whole_upper[3]; /* cells that the fine box covers wholly along each of these axes */
+    int64_t lower[3], upper[3]; /* index range of the cells that the fine box covers completely or in part */
+    /* along each axis, the part of that range in which the fine box covers cells completely */
+    int64_t whole_lower[3], whole_upper[3];
     /* an axis along which the fine box covers some cells only in part; -1: there is none */
     int cut_axis;
 } overlap;
@@ -237,7 +238,8 @@ static bool find_overlap(const session_level_box *coarse, const session_level_bo
     out->cut_axis = -1;
     for (int axis = 0; axis < 3; axis++) {
         const int64_t of = fine->refinement[axis], by = coarse->refinement[axis];
-        /* ends of the fine box, in units of the size of a coarsest cell divided by (of * by) */
+        /* Ends of the fine box, as integers: in a unit in which a cell of the coarsest level has the length `of` times
+         * `by`. */
         const int64_t begin = fine->lower[axis] * by, end = fine->upper[axis] * by;
         const int64_t first = coarse->lower[axis], last = coarse->upper[axis];
         const int64_t lower = floor_quotient(begin, of), upper = -floor_quotient(-end, of);
@@ -257,12 +259,12 @@ static bool find_overlap(const session_level_box *coarse, const session_level_bo
  * block covers only part of the cell; resolve_cuts() removes this bit. */
 enum { IS_HIDDEN = 1, IS_CUT = 2 };
 
-/* Iterates over the rows of an overlap's cells along the axis i. */
+/* Iterates over the rows of the cells in an overlap. A row contains the cells with the same indices j and k. */
 typedef struct row_walk {
     const session_mesh *mesh;
     const overlap *cells;
     int64_t j, k;
-    int64_t first; /* number of the row's first cell in the mesh */
+    int64_t first; /* flat index of the row's first cell in the mesh */
     bool is_whole; /* true if the fine box covers the row wholly along j and k */
 } row_walk;
 
@@ -298,7 +300,7 @@ static void mark_cells(const session_mesh *mesh, const overlap *cells, unsigned 
         }
 }
 
-/* Returns whether a cell of the overlap is covered only in part. */
+/* Returns whether some cell of the overlap is covered only in part, that is, has the bit IS_CUT without IS_HIDDEN. */
 static bool has_cut_cell(const session_mesh *mesh, const overlap *cells, const unsigned char *covered)
 {
     const int64_t stride = mesh->lattice.cells.cell_numbering.stride[0];

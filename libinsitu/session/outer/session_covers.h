@@ -1,8 +1,8 @@
 /* Finds the cells of refined blocks that finer blocks of the same mesh cover, on any rank.
  *
- * The covered cells are determined by integers: the index of a block's first cell, the numbers of its cells without
- * ghost layers, and its refinement. Finer blocks must begin and end at borders of coarser cells, so that a cell is
- * either covered completely or not at all. A block that begins or ends within a coarser cell is an error. */
+ * The covered cells are determined from integers: the index of a block's first cell, the number of its cells along each
+ * axis without ghost layers, and its refinement. Finer blocks must begin and end at borders of coarser cells, so that a
+ * cell is either covered completely or not at all. A block that begins or ends within a coarser cell is an error. */
 #ifndef SESSION_COVERS_H
 #define SESSION_COVERS_H
 

@@ -41,11 +41,12 @@ static void read_cell(session_face_normals *n, const session_mesh *mesh, int64_t
     n->derivatives = session_find_derivatives_of_cell(&n->polynomials, cell, n->positions, 3);
 }
 
-/* Returns the position of a vertex in the cell's row of connectivity, or -1 if the cell does not have the vertex. */
+/* Returns the position of a vertex in the list of nodes (row) of one of the caller's cells, or -1 if the cell does not
+ * have the vertex. */
 static int find_node(const session_rows *rows, int64_t cell, int64_t vertex)
 {
     const int count = (int)session_row_size(rows, cell);
-    /* in finer lattices, the nodes of a cell are numbered consecutively */
+    /* in finer lattices, the nodes of a cell have consecutive vertex indices */
     const int64_t guess = vertex - session_find_row_vertex(rows, cell, 0);
     if (guess >= 0 && guess < count && session_find_row_vertex(rows, cell, (int)guess) == vertex) return (int)guess;
     for (int i = 0; i < count; i++)

@@ -32,9 +32,11 @@ enum { MOST_ROUNDS = 64 };
 
 typedef struct searched_face {
     session_coarse_face face;
-    int64_t groups[4];     /* groups of the corners if the face belongs to this rank; all -1 if it was received */
+    /* groups of equal vertices of this rank to which the corners belong; all -1 if the face was received from another
+     * rank */
+    int64_t groups[4];
     int source_rank;       /* the rank that sent the face */
-    int64_t message_index; /* index of the face in that rank's message */
+    int64_t message_index; /* index of the face in the message from source_rank */
 } searched_face;
 
 /* A vertex that may hang, and the faces that were found at its position. */
@@ -59,7 +61,7 @@ typedef struct contact {
 typedef struct hanging_search {
     const session_hanging_basis *basis;
     const session_team *team;
-    unsigned char *face_states; /* face_state of each face of the borders */
+    unsigned char *face_states; /* for each outer face in this rank's borders (session_border), its face_state */
     int64_t face_count, own_count, candidate_count, face_capacity;
     /* faces of this rank that may touch candidates, then the received faces, then this rank's faces that were read
      * later */
@@ -80,7 +82,7 @@ static void search_free(hanging_search *s)
     session_bins_free(&s->bins);
 }
 
-/* ---- borders -------------------------------------------------------------------------------------------------- */
+/* ---- borders: outer faces of parts of meshes --------------------------------------------------------------------- */
 
 static bool store_border(const session_mesh *mesh, session_outer *outer, const unsigned char *is_border,
                          session_border *out)
@@ -104,8 +106,8 @@ bool session_has_twins(const session_mesh_group *mesh_group)
     return mesh_group->count > 1 || (mesh_group->meshes[0]->is_refined && !mesh_group->by_id);
 }
 
-/* Stores the mesh of each part, and allocates is_border, one byte per vertex of the part. Returns false if memory runs
- * out. */
+/* Fills the search input of each part of one mesh: stores the mesh, and allocates is_border, one byte per vertex of the
+ * part. Returns false if memory runs out. */
 static bool list_part_faces(const session_mesh_group_parts *parts, int first, int count, session_face_part *out)
 {
     bool is_done = true;
@@ -157,7 +159,8 @@ static bool make_borders(session_hanging *hanging, int count)
     return hanging->borders != NULL;
 }
 
-/* Marks in `stale` the meshes whose borders are out of date on some rank, because cells have changed since. */
+/* Sets the flag in `stale` of each mesh of the group whose borders are out of date, because the mesh's cells have
+ * changed on some rank since the borders were computed. */
 static insitu_status find_stale_borders(const session_mesh_group *mesh_group, const session_mesh_group_parts *parts,
                                         const session_team *team, int *stale, base_error *error)
 {
@@ -250,8 +253,8 @@ static bool is_in_box(const session_box *box, const double position[3], double s
     return true;
 }
 
-/* Returns whether a candidate may lie on the face. If needs_hit is set, only candidates that are known to lie on some
- * face are considered; otherwise all candidates that are not corners of this face. */
+/* Returns whether a candidate may lie on a face of part m without being one of its corners. If needs_hit is set, only
+ * candidates that are already known to lie on some face are considered. */
 static bool may_candidate_lie_on_face(const hanging_search *s, int m, const session_face_outline *f, double slack,
                                       bool needs_hit)
 {
@@ -279,7 +282,7 @@ static bool is_face_needed(const hanging_search *s, int m, const session_face *f
 {
     session_face_outline f;
     if (!session_read_outline(&s->basis->meshes[m]->cells, face, &f)) return false;
-    /* an upper bound of the result of find_face_slack() */
+    /* upper bound of the value that find_face_slack() returns for this face, once the face has been read */
     const double slack = relative_slack * f.diameter + s->rounding;
     return may_candidate_lie_on_face(s, m, &f, slack, needs_hit) ||
            (!needs_hit && intersects_rank_box(s, &f.box, slack));
@@ -349,8 +352,8 @@ static double find_face_slack(const hanging_search *s, const session_coarse_face
     return relative_slack * f->width + s->rounding;
 }
 
-/* Writes, for each rank, the faces that intersect the rank's box. If mail->words is NULL, the words are only
- * counted. */
+/* Packs, for each other rank near this one, the faces of this rank that intersect the other rank's box. If mail->words
+ * is NULL, the words are only counted. */
 static void write_faces(const hanging_search *s, session_mail *mail, int64_t *sent)
 {
     const session_homes *homes = s->basis->mesh_group->homes;
@@ -404,8 +407,8 @@ static bool receive_faces(hanging_search *s, const session_mail *in)
 
 /* ---- contacts ------------------------------------------------------------------------------------------------- */
 
-/* Prepends a face to one of a candidate's linked lists, whose first element is *head. number: index of the face.
- * Returns false if memory runs out. */
+/* Prepends a contact with a face to one of a candidate's linked lists. number: index of the face. weights: weights of
+ * the face's corners at the candidate. *head: index of the list's first element. Returns false if memory runs out. */
 static bool add_contact(hanging_search *s, int64_t number, const double weights[4], int64_t *head)
 {
     if (s->contact_count == s->contact_capacity) {
@@ -434,8 +437,8 @@ static bool test_face_hit(hanging_search *s, int64_t number, candidate *c)
     return add_contact(s, number, weights, &c->hit_list);
 }
 
-/* Adds the face to the list of faces that have the candidate as a corner, if the face has it as a corner and the
- * candidate lies on some face. Returns false if memory runs out. */
+/* If the candidate is a corner of the face, and is known to lie on some other face, adds the face to the candidate's
+ * list of faces with this corner. Returns false if memory runs out. */
 static bool test_face_corner(hanging_search *s, int64_t number, candidate *c)
 {
     const session_coarse_face *f = &s->faces[number].face;
@@ -531,8 +534,8 @@ static bool store_vertices(const hanging_search *s, const int64_t *firsts, sessi
     return true;
 }
 
-/* Stores which of this rank's values the other ranks request. `requests` contains, for each rank, indices of faces
- * within the message that this rank sent to that rank. */
+/* Stores the indices of the values of this rank that other ranks request for their hanging vertices. `requests`
+ * contains, for each rank, indices of faces within the message of faces that this rank sent to that rank. */
 static bool store_requests(const hanging_search *s, const session_mail *mail, const int64_t *sent,
                            const session_mail *requests, session_hanging *out)
 {
@@ -636,8 +639,8 @@ static bool apply_constraints(const session_hanging *hanging, const double *rece
     return is_changed;
 }
 
-/* Exchanges values with other ranks, and then sets the value of each hanging vertex once. *is_changed is set if a value
- * changed on any rank. */
+/* Exchanges the values at corners of faces with other ranks. Then sets the value of each hanging vertex once, from the
+ * values at its face's corners. *is_changed is set if a value changed on any rank. */
 static insitu_status exchange_and_constrain(const session_hanging *hanging, const session_team *team, double *means,
                                             int *is_changed, base_error *error)
 {

@@ -19,14 +19,15 @@
 #include "session_catalogue.h"
 #include "session_exchange.h"
 
-/* This rank's vertices, divided into groups of equal vertices. The vertices of the mesh group's meshes are numbered
- * consecutively, and so are the groups of the vertices of drawn cells. */
+/* Input for finding hanging vertices: this rank's vertices, and the groups of equal vertices. The vertices of all parts
+ * of the mesh group have consecutive indices, part after part. The groups contain the vertices of drawn cells. */
 typedef struct session_hanging_basis {
     session_mesh_group *mesh_group;
     int part_count;
     const session_mesh *const *meshes; /* the parts of the mesh group's meshes on this rank */
-    const int64_t *first_vertices;     /* for each part, the number of its first vertex */
-    const int64_t *group_of_vertex;    /* for each vertex, its group; -1: it belongs to no drawn cell */
+    const int64_t *first_vertices;     /* for each part, the index of its first vertex in this numbering */
+    /* for each vertex of all parts, the index of its group; -1: it belongs to no drawn cell */
+    const int64_t *group_of_vertex;
     int64_t group_count;
 } session_hanging_basis;
 

@@ -5,13 +5,15 @@
 #include "session_homes.h"
 #include "session_outer_faces.h"
 
-/* Returns whether the part's cells are split, so that its outer faces are searched. */
+/* Returns whether the cells of this part are split into linear pieces. Only such parts are searched for cells with
+ * outer faces. */
 static bool is_split(const session_mesh *part)
 {
     return part->is_given && part->topology.is_split;
 }
 
-/* Lists the split parts, with new memory for their outer faces. Returns their number. */
+/* Lists the parts whose cells are split into linear pieces, with new memory for their outer faces. Returns the number
+ * of these parts. */
 static int list_parts(const session_parts *parts, session_face_part *out, base_error *error)
 {
     int count = 0;
@@ -26,7 +28,7 @@ static int list_parts(const session_parts *parts, session_face_part *out, base_e
     return count;
 }
 
-static insitu_status search(const session_parts *parts, const session_team *team, base_error *error)
+static insitu_status find_faces_of_split_parts(const session_parts *parts, const session_team *team, base_error *error)
 {
     session_homes homes = {.is_computed = false};
     int count = 0;
@@ -59,5 +61,5 @@ insitu_status session_find_outer_cells(const session_parts *parts, const session
         is_any_unknown = is_any_unknown || (is_split(parts->items[i]) && !parts->items[i]->finer.outer_faces);
     const insitu_status status = session_check_mpi(
         error, MPI_Allreduce(MPI_IN_PLACE, &is_any_unknown, 1, MPI_INT, MPI_MAX, team->comm), "MPI_Allreduce");
-    return status || !is_any_unknown ? status : search(parts, team, error);
+    return status || !is_any_unknown ? status : find_faces_of_split_parts(parts, team, error);
 }

@@ -62,20 +62,20 @@ typedef struct face_search {
     int part_count;
     int threads;
     part_cells *cells;                /* the cells of each part, with the search's data about them */
-    int64_t cell_count, vertex_count; /* total numbers over all parts */
+    int64_t cell_count, vertex_count; /* numbers of cells and of vertices of all parts together */
     uint64_t *hashes;                 /* hash of each vertex's position or global id, part by part */
-    /* number of tables in vertex_sums; threads share tables if there are more threads than tables */
+    /* number of tables in vertex_sums: at most MOST_TABLES, so that several threads may share a table */
     int table_count;
     uint64_t *vertex_sums; /* exclusive or of the hashes of each vertex's faces, in table_count tables */
-    /* exclusive or of the sums of all vertices whose hashes have the same lowest bits, so that vertices at the same
-     * position are treated as one vertex */
+    /* array indexed by the lowest bits of a vertex's hash: exclusive or of the sums of all vertices with these bits.
+     * Vertices at the same position have equal hashes and are thereby treated as one vertex. */
     uint64_t *hash_sums;
     uint64_t mask;
     unsigned char *may_be_outer; /* one byte per vertex of all parts, nonzero if an outer face may contain the vertex */
     int64_t count;
-    found_face *faces; /* sorted by part and cell */
+    found_face *faces; /* faces that may be outer faces, sorted by part and cell */
     session_key *keys;
-    int64_t *groups;      /* group of each face; faces with equal keys are in one group */
+    int64_t *groups;      /* for each face, the index of its group; faces with equal keys are in one group */
     int64_t *group_sizes; /* number of faces in each group */
 } face_search;
 
@@ -246,7 +246,7 @@ static void add_faces(const xor_table *x, int64_t cell)
 }
 
 /* Adds the sums of a vertex, in all tables, to the element of hash_sums that belongs to the vertex's hash. vertex:
- * number of the vertex among the vertices of all parts. */
+ * index of the vertex, where the vertices of all parts are counted one after the other. */
 static void add_vertex(const face_search *s, int64_t vertex)
 {
     uint64_t sum = 0;
@@ -322,7 +322,8 @@ static bool may_have_outer_face(const part_cells *p, int64_t cell)
     return open >= 3;
 }
 
-/* Appends those faces of the cell to the list that may be outer faces. */
+/* Appends to the list the faces of a cell that may be outer faces: a shell, or faces all of whose vertices have the
+ * flag may_be_outer. */
 static void append_possible_outer_faces(const face_search *s, int part, int64_t cell, face_list *out)
 {
     const part_cells *p = &s->cells[part];
@@ -338,7 +339,8 @@ static void append_possible_outer_faces(const face_search *s, int part, int64_t 
     }
 }
 
-/* Appends the possible outer faces of the cells first .. end - 1 to the list. Cells are numbered over all parts. */
+/* Appends to the list the possible outer faces of the cells first .. end - 1. Cell indices count the cells of all
+ * parts, part after part. */
 static void append_faces_of_cells(const face_search *s, int64_t first, int64_t end, face_list *out)
 {
     for (int part = 0; part < s->part_count; part++) {
@@ -685,7 +687,8 @@ static bool append_faces(const face_search *s, const found_face *found, int64_t 
     return true;
 }
 
-/* Stores the found faces from number `first` to `end` - 1 in their part. */
+/* Stores the found faces with the indices first .. end - 1, all of which belong to one part, in that part's list of
+ * outer faces. */
 static void store_part_faces(const face_search *s, int64_t first, int64_t end, session_outer *outer, base_error *error)
 {
     int64_t capacity = end - first + 1;

@@ -7,7 +7,7 @@
 #include "session_mesh.h"
 #include "session_team.h"
 
-/* One of this rank's parts of a mesh in a search for outer faces. */
+/* A part of a mesh on this rank that is included in a search for outer faces. */
 typedef struct session_face_part {
     const session_mesh *mesh;
     session_outer *outer; /* receives the faces; its threshold selects the cells. NULL: see `masks` */

@@ -132,7 +132,7 @@ typedef struct outer_work {
     float *heights; /* value of the scalar at each vertex of the outer mesh: 0 on a face, -1 at an apex */
     int64_t vertex_count, cell_count, entry_count, pyramid_count;
     face_polygon polygon; /* buffer with space for the largest polygon */
-    int64_t loop_end;     /* number of entries of the stored loops */
+    int64_t loop_end;     /* number of entries of out->loops that have been stored */
     /* Set if cells of higher order are split into pieces. The loop of a piece's face, by which edges are drawn, is then
      * the rim of the caller's face that contains the piece's face (session_rims.h). */
     bool has_rims;
@@ -141,13 +141,14 @@ typedef struct outer_work {
     const session_mesh *whole;
     float (*normals)[3];         /* normal at each vertex of the outer mesh; NULL: the mesh has no normals */
     session_face_normals curved; /* computes normals of curved faces; used only if there are normals and rims */
-    /* parent: the caller's cell that contains the current face; face: number of this cell's face that contains the
-     * current face, or -1 if the current face lies inside the cell */
+    /* parent: index of the caller's cell that contains the current face. face: index, within this cell, of the face of
+     * the cell that contains the current face; -1: the current face lies inside the cell. */
     int64_t parent;
     int face;
-    bool is_curved; /* true: the normals of the parent's face can be computed */
-    /* Used if there are normals: vertex_map then has only vertices of faces that lie on face mapped_face of the cell
-     * mapped_parent. first_mapped: index of the first of these vertices in the outer mesh. */
+    bool is_curved; /* true: normals of face `face` of the cell `parent` can be computed */
+    /* Used if there are normals. vertex_map then contains only the vertices that were added for one curved face: face
+     * mapped_face of the caller's cell mapped_parent. first_mapped: index of the first of these vertices in the outer
+     * mesh. */
     int64_t mapped_parent, first_mapped;
     int mapped_face;
     double normal_scale; /* factor by which the normals at the vertices from first_mapped on are multiplied; 0: not
@@ -330,10 +331,9 @@ static int64_t add_rim(outer_work *w, int64_t cell, int face)
     return loop;
 }
 
-/* Finds the face on which a face of a linear piece lies, among the faces of the higher-order cell from which the piece
- * was cut. Stores this cell of the caller in w->parent, and the number of its face in w->face; w->face is negative if
- * the piece's face lies inside the cell. Sets w->is_curved if normals are requested and can be computed from the cell's
- * polynomials. */
+/* Finds the face of a higher-order cell that contains a face of a linear piece of this cell. Stores the index of the
+ * caller's cell in w->parent, and the index of its face in w->face; w->face is -1 if the piece's face lies inside the
+ * cell. Sets w->is_curved if normals are requested and can be computed from the cell's polynomials. */
 static void find_parent_face(outer_work *w, int64_t piece, const face_polygon *p)
 {
     w->parent = w->parents[piece];
@@ -407,15 +407,16 @@ static void add_face(outer_work *w, const session_face *face)
     if (w->has_rims) set_rim(w, first);
 }
 
-/* Upper bounds of the sizes that the faces require. */
+/* Upper bounds of the sizes of the arrays that a part's outer faces need in the outer mesh. */
 typedef struct outer_counts {
-    int64_t cell_count, entry_count; /* numbers of cells and of connectivity entries */
+    int64_t cell_count, entry_count; /* number of cells, and number of entries of the connectivity */
     int64_t loop_entry_count;        /* number of entries of the loops */
     int64_t largest_corner_count;    /* largest number of corners of one face */
 } outer_counts;
 
-/* Computes upper bounds of the sizes. entry_count also bounds the number of vertices. If there are normals, the
- * triangles of a polygon have no common vertices, and the polygon's loop needs further vertices. */
+/* Computes upper bounds of the sizes of arrays for the outer mesh of a part (outer_counts). entry_count also bounds the
+ * number of vertices. If there are normals, the triangles of a polygon have no common vertices, and the polygon's loop
+ * needs further vertices. */
 static outer_counts find_count_bounds(const grid *g, const session_outer *outer, bool has_normals)
 {
     outer_counts most = {0};
@@ -435,8 +436,8 @@ static outer_counts find_count_bounds(const grid *g, const session_outer *outer,
     return most;
 }
 
-/* Adds the number of entries that the rims of those cells of the caller need that have outer faces. A rim may need
- * further vertices, because some of its nodes may lie on no outer face. */
+/* Increases the upper bounds of sizes by what rims need: the rims of the caller's cells that have outer faces. A rim
+ * may need further vertices, because some of its nodes may lie on no outer face. */
 static void add_rim_bounds(const outer_work *w, const session_outer *outer, outer_counts *most)
 {
     int64_t last = -1;
@@ -532,8 +533,8 @@ static grid describe_grid(const outer_work *w)
     return g;
 }
 
-/* Moves the normals to the scalar as its gradients. Returns false if memory runs out, or if there are too many vertices
- * for 32-bit indices of gradients. */
+/* Makes the normals the gradients of the outer mesh's scalar. Returns false if memory runs out, or if there are too
+ * many vertices for 32-bit indices of gradients. */
 static bool finish_normals(outer_work *w, session_scalar *scalar)
 {
     if (!w->normals) return true;

@@ -22,16 +22,18 @@ typedef struct patch_faces {
     const session_mesh *mesh;
     const session_field *field;
     const session_vertex_numbers *numbers;
-    int64_t count;           /* number of faces of all patches */
-    int64_t *first_groups;   /* index of each face's first group, count + 1 entries */
-    int64_t *groups;         /* groups of the faces' vertices; -1: the vertex belongs to no drawn cell */
+    int64_t count;         /* number of faces of all patches */
+    int64_t *first_groups; /* index, in `groups`, of the first vertex of each face; count + 1 entries */
+    /* for each vertex of each face, the group of equal vertices to which it belongs; -1: the vertex belongs to no drawn
+     * cell */
+    int64_t *groups;
     unsigned char *is_drawn; /* for each face, set if a drawn cell has the face */
 } patch_faces;
 
 /* A face of a patch. */
 typedef struct patch_face {
     session_face_row row;
-    int64_t number; /* number of the face in the mesh, from 0 on; -1: the face is given by its vertices */
+    int64_t number; /* index of the face in the mesh; -1: the caller gives the face by its vertices */
 } patch_face;
 
 static insitu_status fail_for_memory(int64_t entries, base_error *error)
@@ -62,7 +64,8 @@ static insitu_status fail_range_at_face(const patch_faces *p, int patch, int64_t
     return fail_at_face(p, patch, face, words, error);
 }
 
-/* ---- faces ----------------------------------------------------------------------------------------------------- */
+/* ---- faces of all patches
+ * ----------------------------------------------------------------------------------------- */
 
 /* Reads a face's vertices from the patch's own list. */
 static void read_listed_vertices(const insitu_mesh *mesh, const insitu_patch *patch, int64_t i, patch_face *out)
@@ -81,7 +84,7 @@ static void read_listed_vertices(const insitu_mesh *mesh, const insitu_patch *pa
     row->size = grid_array_index(&offsets, i + 1) - row->first;
 }
 
-static insitu_status find_face(const patch_faces *p, int patch, int64_t i, patch_face *out, base_error *error)
+static insitu_status read_patch_face(const patch_faces *p, int patch, int64_t i, patch_face *out, base_error *error)
 {
     const insitu_mesh *mesh = &p->mesh->given;
     const insitu_patch *given = &p->field->given.patches[patch];
@@ -126,7 +129,7 @@ static insitu_status list_faces(patch_faces *p, base_error *error)
     for (int patch = 0; patch < field->patch_count; patch++)
         for (int64_t i = 0; i < field->patches[patch].count; i++) {
             patch_face face;
-            if (find_face(p, patch, i, &face, error)) return error->status;
+            if (read_patch_face(p, patch, i, &face, error)) return error->status;
             p->first_groups[f++] = entries;
             entries += face.row.size;
         }
@@ -137,7 +140,7 @@ static insitu_status list_faces(patch_faces *p, base_error *error)
     for (int patch = 0; patch < field->patch_count; patch++)
         for (int64_t i = 0; i < field->patches[patch].count; i++, f++) {
             patch_face face;
-            if (find_face(p, patch, i, &face, error) ||
+            if (read_patch_face(p, patch, i, &face, error) ||
                 read_face(p, patch, i, &face, p->groups + p->first_groups[f], error))
                 return error->status;
         }
@@ -152,7 +155,7 @@ static insitu_status check_owner(patch_faces *p, int patch, int64_t i, int64_t f
     const session_face_sides sides = session_find_face_sides(&p->mesh->given);
     patch_face face;
     int64_t cells[2];
-    if (find_face(p, patch, i, &face, error)) return error->status;
+    if (read_patch_face(p, patch, i, &face, error)) return error->status;
     session_find_cells_of_face(&sides, face.number, cells);
     if (cells[1] >= 0) return fail_at_face(p, patch, i, "is between two cells, not on the boundary", error);
     unsigned char *taken = &is_taken[face.number / 8], bit = (unsigned char)(1u << face.number % 8);
@@ -184,11 +187,11 @@ static insitu_status check_owners(patch_faces *p, base_error *error)
     return error->status;
 }
 
-/* cells of the faces, by a search of all cells ----------------------------------------------------------------- */
+/* cells of the faces, if the mesh has no owners: a search of all cells --------------------------------------------- */
 
 typedef struct cell_search {
     session_key_table keys; /* keys of the faces all of whose vertices have groups */
-    int64_t *key_of_face;   /* for each face, the index of its key; -1: the face has no key */
+    int64_t *key_of_face;   /* for each face, the index of its key in `keys`; -1: the face has no key */
     /* for each key: number of the patches' faces with this key (given_counts), and number of cells that have a face
      * with this key (cell_counts) */
     int64_t *given_counts, *cell_counts;
@@ -277,7 +280,7 @@ static insitu_status check_cell_counts(const cell_search *s, patch_faces *p, bas
     for (int patch = 0; patch < field->patch_count; patch++)
         for (int64_t i = 0; i < field->patches[patch].count; i++, f++) {
             const int64_t key = s->key_of_face[f];
-            if (key < 0) continue; /* all cells with this face are ghosts */
+            if (key < 0) continue; /* the key was not added, because all cells with this face are ghosts */
             if (s->cell_counts[key] > s->given_counts[key])
                 return fail_at_face(p, patch, i, "is between two cells, not on the boundary", error);
             if (s->cell_counts[key] == 0) return fail_at_face(p, patch, i, "is no face of a cell", error);

@@ -6,15 +6,18 @@
 #include "session_exchange.h"
 #include "session_mesh.h"
 
-/* The groups of equal vertices on this rank. Two faces are equal if their vertices belong to the same groups. */
+/* The groups of equal vertices on this rank. Two faces are treated as equal if their vertices belong to the same
+ * groups. */
 typedef struct session_vertex_numbers {
-    const session_key_table *keys;  /* keys of the vertices of drawn cells; the numbers of the keys are the groups */
+    /* keys of the vertices of drawn cells; the index of a key in this table is the index of the group of all vertices
+     * with this key */
+    const session_key_table *keys;
     const int64_t *group_of_vertex; /* for each vertex of mesh->cells, its group; -1: it belongs to no drawn cell */
     bool by_id;
 } session_vertex_numbers;
 
-/* A list of `count` pairs of a value and a vertex group. The value of each face is listed once for each group of the
- * face's vertices. */
+/* A list of `count` pairs of a value and a vertex group. Each face of the patches contributes several pairs with its
+ * value: one pair for each group to which its vertices belong. */
 typedef struct session_patch_values {
     int64_t count;
     int64_t *groups;

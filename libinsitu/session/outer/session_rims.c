@@ -3,7 +3,7 @@
 #include "memory.h"
 #include "session_shape.h"
 
-/* ---- one kind -------------------------------------------------------------------------------------------------- */
+/* ---- faces and rims of a type and order of cells ----------------------------------------------------------------- */
 
 void session_find_rim_plane(const session_nodes *of, int face, double out[3])
 {
@@ -28,7 +28,7 @@ static void list_rim(const session_nodes *of, insitu_vertex_order order, const s
     }
 }
 
-static bool make_kind(const session_nodes *of, insitu_vertex_order order, session_rim_kind *out)
+static bool make_rim_kind(const session_nodes *of, insitu_vertex_order order, session_rim_kind *out)
 {
     const session_shape *shape = session_shape_of(of->type);
     out->faces_of_node = base_calloc((size_t)of->count, 1);
@@ -46,7 +46,7 @@ static bool make_kind(const session_nodes *of, insitu_vertex_order order, sessio
     return true;
 }
 
-/* ---- all kinds ------------------------------------------------------------------------------------------------- */
+/* ---- faces and rims of a mesh ------------------------------------------------------------------------------------ */
 
 bool session_rims_create(const session_mesh *mesh, session_rims *out)
 {
@@ -56,7 +56,7 @@ bool session_rims_create(const session_mesh *mesh, session_rims *out)
     out->faces_of_vertex = base_calloc((size_t)mesh->cells.vertex_count + 1, 1);
     bool is_made = out->kinds && out->faces_of_vertex;
     for (int i = 0; i < out->rows.kind_count && is_made; i++)
-        is_made = make_kind(&out->rows.kinds[i].nodes, mesh->given.vertex_order, &out->kinds[i]);
+        is_made = make_rim_kind(&out->rows.kinds[i].nodes, mesh->given.vertex_order, &out->kinds[i]);
     return is_made;
 }
 
@@ -76,8 +76,9 @@ int64_t session_count_rim_nodes(const session_rims *rims, int64_t cell)
     return count;
 }
 
-/* Sets faces_of_vertex for all vertices of the cell if are_set is true, and clears it otherwise. A vertex may occur at
- * several positions of the cell's row. */
+/* If are_set is true, adds to faces_of_vertex, for each node of one of the caller's cells, the faces of the cell on
+ * which the node lies. Otherwise clears faces_of_vertex for these nodes. A vertex may occur several times in a cell's
+ * list of nodes, so that the faces of all of its occurrences are combined. */
 static void set_faces_of_vertices(session_rims *rims, int64_t cell, bool are_set)
 {
     const int kind = session_find_kind_of_cell(&rims->rows, cell);

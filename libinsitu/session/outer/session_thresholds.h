@@ -6,11 +6,13 @@
 #include "scene.h"
 #include "session_mesh.h"
 
-/* Returns the outer surface that a surface layer with this threshold shows on the mesh. Returns NULL if
- * session_mark_outer() has not been called for this threshold. */
+/* Returns the outer surface of the mesh that a surface layer with this threshold shows. If threshold->is_given is
+ * false, this is the surface of the whole mesh. Returns NULL if session_mark_outer() has not been called for this
+ * threshold. */
 session_outer *session_find_outer(const session_mesh *mesh, const scene_threshold *threshold);
 
-/* Marks the outer faces as shown by an image of this step. Returns false if memory runs out. Local. */
+/* Records that an image of this step shows the outer surface of the mesh with this threshold. The surface is added to
+ * the mesh if it does not exist yet. Returns false if memory runs out. Local. */
 bool session_mark_outer(session_mesh *mesh, const scene_threshold *threshold);
 
 /* Frees the outer faces of thresholds that no image of this step shows, because the values on which they depend will

@@ -55,8 +55,8 @@ static void measure_edges(const grid *g, const session_face *face, double *edges
     }
 }
 
-/* Appends the corners of a part's outer faces to s->corners, which is large enough. Returns false if memory runs
- * out. */
+/* Appends the corners of a part's outer faces to s->corners, whose memory has been allocated before. Returns false if
+ * memory for the lengths of edges runs out. */
 static bool add_corners(twin_search *s, const session_mesh *mesh, const session_border *border)
 {
     const grid *g = &mesh->cells;
@@ -95,8 +95,8 @@ static bool list_own_corners(twin_search *s)
 
 /* ---- corners of several ranks --------------------------------------------------------------------------------- */
 
-/* Writes, for each rank, the corners that lie in that rank's box. If mail->words is NULL, the words are only
- * counted. */
+/* Packs, for each other rank near this one, the corners of this rank that lie in the other rank's box. If mail->words
+ * is NULL, the words are only counted. */
 static void write_corners(const twin_search *s, session_mail *mail)
 {
     const session_homes *homes = s->mesh_group->homes;
@@ -133,7 +133,7 @@ static bool receive_corners(twin_search *s, const session_mail *in)
     return true;
 }
 
-/* ---- twins ---------------------------------------------------------------------------------------------------- */
+/* ---- least positions of twins ------------------------------------------------------------------------------------ */
 
 static void find_least_corners(twin_search *s)
 {
