@@ -57,8 +57,8 @@ typedef struct camera_frame {
     double right, left, up, down;
 } camera_frame;
 
-/* Extents of the data, measured from the centre of the bounds, for a perspective and for an orthographic camera, and
- * the frames into which they must fit. */
+/* Extents of the data, measured from the centre of the bounds, and the frames into which they must fit: one pair for a
+ * perspective camera and one for an orthographic camera. */
 typedef struct camera_fit {
     corner_reach perspective_reach, orthographic_reach;
     camera_frame tangents, frame_fractions;
@@ -66,8 +66,8 @@ typedef struct camera_fit {
 } camera_fit;
 
 /* Space that decorations take from the picture, as multiples of the height of text: a column of colour bars, a title, a
- * line of text, and the numbers of rulers. The second row of constants is the shape of a colour bar, approximately that
- * of adaptors/image/layout.cpp. */
+ * line of text, and the numbers of rulers. The constants in the second statement describe the shape of a colour bar,
+ * approximately that of adaptors/image/layout.cpp. */
 static const double bar_space = 6.5, title_space = 2.4, line_space = 1.5, ruler_space = 3;
 static const double letter_width = 0.6, label_width = 7, bar_borders = 1.2, bar_height = 5.3, line_height = 1.2;
 
@@ -89,7 +89,7 @@ static int count_bars(const scene_image *image, double *letters)
     return count;
 }
 
-/* Returns whether some file shows the picture's colour bars inside the picture instead of beside it. */
+/* Returns whether some output file of the image has the colour bars inside the picture, instead of beside it. */
 static bool has_bars_inside(const scene_image *image)
 {
     bool is_any = image->output_count == 0;

@@ -7,8 +7,8 @@
 
 _Static_assert((int)RENDER_MAX_LINES == (int)SCENE_MAX_LINES, "a scene's lines have room");
 
-/* Computes the values that divide the range into parts of equal width on its scale. If values are equal after rounding,
- * only one of them is stored. */
+/* Computes values that divide the range into parts of equal width on the range's scale, which may be logarithmic. If
+ * two values are equal after rounding, only one of them is stored. */
 static void divide_range(const render_transfer *range, int count, session_contours *out)
 {
     const double low = render_scaled(range->scale, range->threshold, range->low);

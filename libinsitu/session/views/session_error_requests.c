@@ -122,8 +122,8 @@ static bool is_same_request(const session_error_request *a, const session_error_
     return strcmp(a->field, b->field) == 0 && a->component == b->component;
 }
 
-/* Returns the request that equals `like`; adds it if the list does not contain it. If the list is full, returns the
- * request for positions, and all cells are refined. */
+/* Returns the request in the list that equals `like`, and adds it if the list does not contain it. If the list is full,
+ * returns the first request, which is that for positions, and sets needs_all, so that all cells are refined. */
 static session_error_request *find_request(session_error_requests *requests, const session_due_views *views,
                                            const session_error_request *like)
 {
@@ -164,8 +164,10 @@ static const session_catalogue_field *find_shown_field(const session_catalogue_m
     return scene_field_is_on(field, mesh->name) ? session_catalogue_find_field(mesh, field->name) : NULL;
 }
 
-/* Returns whether the layer shows the caller's values, which do not depend on other cells. */
-static bool is_own(const session_catalogue_mesh *mesh, const session_catalogue_field *field, const scene_field *shown)
+/* Returns whether the layer shows the values that the caller gave, unchanged. These values do not depend on other
+ * cells. */
+static bool shows_given_values(const session_catalogue_mesh *mesh, const session_catalogue_field *field,
+                               const scene_field *shown)
 {
     return field->derived_index < 0 && !session_is_recentred(shown, field->centring, mesh->is_refined);
 }
@@ -175,7 +177,7 @@ static bool is_own(const session_catalogue_mesh *mesh, const session_catalogue_f
 static bool is_polynomial(const session_catalogue_mesh *mesh, const session_catalogue_field *field,
                           const scene_field *shown)
 {
-    return is_own(mesh, field, shown) && field->centring != INSITU_CELL &&
+    return shows_given_values(mesh, field, shown) && field->centring != INSITU_CELL &&
            session_resolve_component(shown, field->component_count) >= 0;
 }
 
@@ -193,7 +195,7 @@ static void add_isosurface(session_error_requests *requests, const session_due_v
     session_error_request *request = show_request(requests, views, &like, index);
     for (int i = 0; i < shown->value_count && request->field && image->variant.view == 0; i++)
         add_value(requests, request, shown->values[i]);
-    /* central differences also sample neighbours of crossed cells */
+    /* central differences sample the field also in neighbours of the cells that the isosurface crosses */
     requests->needs_all = requests->needs_all || !is_bounded || shown->normals == SCENE_DIFFERENCES;
     if (!report) return;
     session_warn(report, &(session_warning){WARNING_PIECES, image->name, mesh->name, layer}, !is_bounded,
@@ -255,7 +257,7 @@ static bool has_fields_of_neighbours(const session_catalogue_mesh *mesh, const s
     scene_field_walk walk = {.image = image};
     for (const scene_field *field; (field = scene_next_field(&walk)) != NULL;) {
         const session_catalogue_field *of = find_shown_field(mesh, field);
-        if (of && !is_own(mesh, of, field)) return true;
+        if (of && !shows_given_values(mesh, of, field)) return true;
     }
     return false;
 }

@@ -28,16 +28,17 @@ void session_free_due_views(session_due_views *views);
  * cells. */
 typedef struct session_error_request {
     const session_due_views *views;
-    bool *images; /* for each image of the scene: whether the image shows the isosurfaces, plane, volume or cells */
+    bool *images; /* one flag per image of the scene: set if the image shows what the request measures */
     bool is_shown;
-    const char *field; /* name of the field; NULL: a plane or positions */
+    /* name of the field whose isosurfaces are measured; NULL: the request is for a plane or for positions */
+    const char *field;
     int component;
     int value_count;
     double *values; /* isovalues of the field */
     bool has_plane;
     session_plane plane;
     const scene_volume *volume; /* the volume whose error is measured; NULL: the request is not for a volume */
-    double allowed;             /* allowed error of the volume's pixels in each colour channel */
+    double allowed;             /* allowed error of the volume in each colour channel of a pixel */
 } session_error_request;
 
 enum { SESSION_MOST_ERROR_REQUESTS = 256 };
@@ -48,8 +49,9 @@ typedef struct session_error_requests {
     bool is_complete; /* false if memory has run out */
     bool is_shown;    /* set if some due image shows the mesh */
     bool needs_outer; /* set if a due image shows the outer surface, so that cells with outer faces are refined */
-    bool needs_all;   /* set if all cells are refined, not only cells with outer faces and cells that isosurfaces or
-                         slices may cross */
+    /* true: all cells are refined; false: only cells with outer faces, and cells that isosurfaces or slices may
+     * cross */
+    bool needs_all;
     session_error_request items[SESSION_MOST_ERROR_REQUESTS];
 } session_error_requests;
 

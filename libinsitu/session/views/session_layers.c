@@ -18,7 +18,7 @@
 #include "session_smooth.h"
 #include "session_thresholds.h"
 
-static bool is_part(const session_mesh *mesh)
+static bool has_tree_to_draw(const session_mesh *mesh)
 {
     return mesh && mesh->is_needed && mesh->has_tree && mesh->tree.node_count > 0;
 }
@@ -35,7 +35,8 @@ static bool allocate_layers(const session_layer_basis *basis, const scene_image 
     const session_meshes *meshes = basis->meshes;
     const int shells = basis->has_shells ? image->isosurface_count : 0;
     const size_t surfaces = (size_t)count_surfaces(image) + (size_t)shells, volumes = (size_t)image->volume_count;
-    for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) out->part_count += is_part(walk.part);
+    for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);)
+        out->part_count += has_tree_to_draw(walk.part);
     const size_t fields = (size_t)out->part_count * (3 * surfaces + volumes);
     out->surface_count = (int)surfaces;
     out->first_outer = image->isosurface_count + shells;
@@ -77,7 +78,7 @@ static void fill_parts(const session_meshes *meshes, session_layers *layers)
     int part = 0;
     for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) {
         const session_mesh *mesh = walk.part;
-        if (is_part(mesh))
+        if (has_tree_to_draw(mesh))
             layers->parts[part++] = (render_part){&mesh->cells, &mesh->tree, walk.outer ? walk.outer->loops : NULL};
     }
 }
@@ -110,7 +111,7 @@ static render_field set_layer_field(const session_meshes *meshes, session_layers
     ptrdiff_t at = first;
     for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) {
         const session_mesh *mesh = walk.part;
-        if (!is_part(mesh)) continue;
+        if (!has_tree_to_draw(mesh)) continue;
         const session_scalar *scalar = session_find_scalar(mesh, field);
         if (scalar && plane) scalar = session_find_distance(mesh, plane);
         set_scalar_field(layers, at++, mesh, scalar, needs_ranges);
@@ -126,7 +127,7 @@ static const render_vertex_gradients *set_gradients(const session_meshes *meshes
     int at = 0;
     for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) {
         const session_mesh *mesh = walk.part;
-        if (!is_part(mesh)) continue;
+        if (!has_tree_to_draw(mesh)) continue;
         const session_scalar *scalar = session_find_scalar(mesh, field);
         if (scalar) out[at] = (render_vertex_gradients){scalar->gradient_indices, (const float(*)[3])scalar->gradients};
         at++;
@@ -153,7 +154,8 @@ static void warn_of_width(const session_layer_basis *basis, const scene_field *f
         basis->image->name, field->name, low, high);
 }
 
-/* Computes a transfer function. Its range may include the values of all steps so far. Collective. */
+/* Computes the transfer function of a colour map for a field, and the opacity of a volume (NULL for a surface). If the
+ * map has a range over the run, the range includes the values of all steps so far. Collective. */
 static insitu_status make_transfer(const session_layer_basis *basis, const scene_field *field,
                                    const scene_colour_map *map, const scene_volume *volume, session_transfer *out,
                                    base_error *error)
@@ -168,7 +170,7 @@ static insitu_status make_transfer(const session_layer_basis *basis, const scene
     warn_of_width(basis, field, low, high);
     if (!session_make_transfer(basis->half_diagonal, map, low, high, volume, out))
         session_fail_for_memory(error, map->count * 3 * (int64_t)sizeof *map->colours, "the colours of a volume");
-    return INSITU_OK; /* if memory ran out, the next phase passes *error to all ranks */
+    return INSITU_OK; /* if only this rank lacks memory, the next phase passes *error to all ranks */
 }
 
 /* Returns the index of the section (set_layer_field()) for the contour lines of a surface. */
@@ -239,7 +241,7 @@ static insitu_status fill_surface(const session_layer_basis *basis, const scene_
 
 /* ---- outer surfaces ------------------------------------------------------------------------------------------ */
 
-/* Returns whether the layer shows the iterator's current part. The part must be a mesh of outer faces. */
+/* Returns whether the layer shows the part at which the iterator is. This part must be a mesh of outer faces. */
 static bool is_shown(const session_part_walk *walk, const scene_surface *layer)
 {
     return walk->outer && session_is_surface_on_mesh(layer, walk->whole) &&
@@ -253,7 +255,7 @@ static render_field set_face_field(const session_meshes *meshes, session_layers 
     ptrdiff_t at = first;
     for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) {
         const session_mesh *mesh = walk.part;
-        if (!is_part(mesh)) continue;
+        if (!has_tree_to_draw(mesh)) continue;
         layers->fields[at] = make_absent_field();
         if (is_shown(&walk, layer)) {
             layers->fields[at] = session_get_scalar_values(mesh, &mesh->scalars[0]);
@@ -271,7 +273,7 @@ static const render_vertex_gradients *set_face_normals(const session_meshes *mes
     render_vertex_gradients *const out = layers->gradients + (ptrdiff_t)surface * layers->part_count;
     int at = 0;
     for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) {
-        if (!is_part(walk.part)) continue;
+        if (!has_tree_to_draw(walk.part)) continue;
         const session_scalar *scalar = &walk.part->scalars[0];
         if (is_shown(&walk, layer))
             out[at] = (render_vertex_gradients){scalar->gradient_indices, (const float(*)[3])scalar->gradients};
@@ -300,7 +302,7 @@ static bool set_gathered_field(const session_meshes *meshes, session_layers *lay
     ptrdiff_t at = (ptrdiff_t)slot * layers->part_count;
     *out = (render_field){layers->fields + at, layers->ranges + at};
     for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) {
-        if (!is_part(walk.part)) continue;
+        if (!has_tree_to_draw(walk.part)) continue;
         const session_scalar *scalar = is_shown(&walk, layer) ? session_find_scalar(walk.whole, field) : NULL;
         layers->fields[at] = make_absent_field();
         if (scalar && !gather_values(walk.whole, walk.outer, scalar, &layers->gathered_values[at], &layers->fields[at]))

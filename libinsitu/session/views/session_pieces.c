@@ -29,38 +29,42 @@ static const double bytes_per_mib = 1048576;
 
 /* ---- errors ------------------------------------------------------------------------------------------------------ */
 
-/* The errors of one mesh, and the numbers of pieces that are chosen from the errors. */
+/* The errors of the linear pieces of one mesh, and the data from which its number of pieces between two nodes is
+ * chosen. */
 typedef struct piece_error {
     bool needs_all; /* same as session_error_requests.needs_all; the same on every rank */
     bool is_shown;  /* true: a due image shows the mesh, or the scene gives a fixed number for all cells; the same on
                        every rank */
-    session_deviation all; /* errors of all requests; the counts of cells are those of isosurfaces */
-    session_finer_bytes bytes[FINER_MOST_PARTS + 1]; /* size of finer lattices on all ranks, for each number of parts */
-    double light_error;  /* largest estimate of the error of a pixel in a volume, if cells have one piece between two
-                            nodes */
-    double light_excess; /* largest quotient of a volume's error and the error that is allowed */
-    int volume_count;    /* number of volumes whose errors were estimated */
-    int components;      /* number of components of the fields that images of the scene show */
-    int wanted;          /* number of pieces that would be chosen without the limit of memory */
+    /* largest errors over all requests of the mesh, and numbers of cells that isosurfaces cross */
+    session_deviation all;
+    /* for each number of pieces between two nodes: bytes that the finer lattices take on all ranks */
+    session_finer_bytes bytes[FINER_MOST_PARTS + 1];
+    double light_error; /* largest estimate of the error of a pixel in a volume, if cells have one piece between two
+                           nodes */
+    /* largest ratio of a volume's estimated error to the error that the scene allows for this volume */
+    double light_excess;
+    int volume_count; /* number of volumes whose errors were estimated */
+    int components;   /* number of components of the fields that images of the scene show */
+    int wanted;       /* number of pieces between two nodes that would be chosen if memory were not limited */
 } piece_error;
 
-/* The work on one mesh. */
+/* The task of measuring the errors of one mesh, or of selecting its pieces. */
 typedef struct mesh_work {
     const session_pieces_basis *basis;
     session_finer_choice *choice;
-    bool marks_only; /* true: cells are only marked, because errors are not needed */
+    /* true: only the cells to be refined are marked, because the number of pieces does not depend on errors */
+    bool marks_only;
     session_error_requests requests;
     piece_error *out;
 } mesh_work;
 
-/* The part of a mesh in which the errors of a request are measured, or in which pieces are selected that a request
- * needs. */
+/* The task of applying one request to one part of a mesh: measuring the part's errors, or selecting the pieces that the
+ * request needs. */
 typedef struct part_work {
     const mesh_work *of;
     const session_mesh *mesh;
     session_deviation_request request;
-    session_piece_set *pieces; /* the set of pieces to which pieces that the request needs are added; NULL: the errors
-                                  of the request are measured */
+    session_piece_set *pieces; /* receives the pieces that the request needs; NULL: the errors are measured instead */
 } part_work;
 
 static insitu_status apply_request(part_work *work, base_error *error)
@@ -289,9 +293,9 @@ static insitu_status find_outer_cells(const session_pieces_basis *basis, const s
     return status;
 }
 
-static insitu_status find_errors(const session_pieces_basis *basis, const session_due_views *views,
-                                 session_finer_choice *choices, piece_error *errors, session_report *report,
-                                 base_error *error)
+static insitu_status find_errors_of_all_meshes(const session_pieces_basis *basis, const session_due_views *views,
+                                               session_finer_choice *choices, piece_error *errors,
+                                               session_report *report, base_error *error)
 {
     if (find_outer_cells(basis, views, choices, error)) return error->status;
     fill_fields(basis, views);
@@ -302,7 +306,7 @@ static insitu_status find_errors(const session_pieces_basis *basis, const sessio
     return estimate_all_volumes(basis, views, choices, errors, error);
 }
 
-/* Selects the pieces that are made in meshes in which only some cells are refined. */
+/* Selects the linear pieces to make in those meshes in which only some cells are refined. */
 static insitu_status list_pieces(const session_pieces_basis *basis, const session_due_views *views,
                                  session_finer_choice *choices, piece_error *errors, base_error *error)
 {
@@ -314,11 +318,12 @@ static insitu_status list_pieces(const session_pieces_basis *basis, const sessio
 
 /* ---- numbers of pieces ------------------------------------------------------------------------------------------- */
 
-/* Returns the error of surfaces that is allowed, in pixels. By default it is smaller for small isosurfaces. A ray
- * misses an isosurface if a silhouette or a border is displaced across the ray. The share of such pixels is the mean
- * displacement of these lines times their length, divided by the area. The length grows only with the root of the area.
- * On brackets that gmsh made, the mean displacement was at most 1/18 of the bound, and the length at most 8 times the
- * root of the area in pixels. With a bound of 1/640 of this root, less than 0.1 % of their pixels are missed. */
+/* Returns the error of surfaces that is allowed, in pixels. By default it is smaller for small isosurfaces, for the
+ * following reason. A ray misses an isosurface if a silhouette or a border of the surface is displaced across the ray.
+ * The share of such pixels is the mean displacement of these lines, times their length, divided by the area of the
+ * surface. The length grows only with the square root of the area. On brackets that gmsh made, the mean displacement
+ * was at most 1/18 of the error bound, and the length at most 8 times the root of the area, in pixels. With an error
+ * bound of 1/640 of this root, less than 0.1 % of the surface's pixels are missed. */
 static double find_allowed_error(const scene *scene, const piece_error *of)
 {
     static const double least_share = 0.25;
@@ -396,8 +401,8 @@ static int count_components(const scene *scene, const session_catalogue_mesh *me
     return count;
 }
 
-/* Returns the number of bytes that the finer lattices of a mesh and their values take, if there are `parts` pieces
- * between two nodes. It does not decrease with `parts`. */
+/* Returns the number of bytes that the finer lattices of a mesh and the values at their nodes take, if there are
+ * `parts` pieces between two nodes. The result never decreases if `parts` increases. */
 static double find_bytes(const piece_error *of, int parts)
 {
     const session_finer_bytes *bytes = &of->bytes[parts];
@@ -493,7 +498,8 @@ static void choose_pieces_of_all_meshes(const session_pieces_basis *basis, piece
     }
     limit_memory(scene, catalogue, errors, steps, choices, report);
     for (int m = 0; m < catalogue->mesh_count && !scene->finer_pieces; m++) {
-        /* the error bound holds for serendipity cells only if their missing nodes are added */
+        /* the error bound is valid for serendipity cells only if the nodes that they lack, compared with complete cells
+         * of their order, are added */
         choices[m].is_completed = errors[m].is_shown && choices[m].parts == 1 && choices[m].serendipity_count > 0;
         if (errors[m].is_shown) report_pieces(catalogue->meshes[m].name, &choices[m], &errors[m], report);
     }
@@ -512,7 +518,7 @@ insitu_status session_choose_pieces(const session_pieces_basis *basis, session_f
     insitu_status status = session_agree(basis->team->comm, error);
     if (!status)
         status = session_make_due_views(basis->scene, basis->moment, basis->meshes, basis->team->comm, &views, error);
-    if (!status) status = find_errors(basis, &views, choices, errors, report, error);
+    if (!status) status = find_errors_of_all_meshes(basis, &views, choices, errors, report, error);
     if (!status) choose_pieces_of_all_meshes(basis, errors, steps, choices, report);
     if (!status) status = list_pieces(basis, &views, choices, errors, error);
     session_free_due_views(&views);

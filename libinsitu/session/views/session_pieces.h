@@ -5,7 +5,7 @@
 #include "session_finer.h"
 #include "session_plan.h"
 
-/* The input of the choice. Scene, moment and catalogue are the same on every rank. */
+/* The input for choosing the numbers of pieces. Scene, moment and catalogue are the same on every rank. */
 typedef struct session_pieces_basis {
     const scene *scene;
     const session_moment *moment;

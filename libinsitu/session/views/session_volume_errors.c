@@ -35,7 +35,7 @@
 
 enum {
     GRID_SIZE = 32,  /* number of cells, along each axis, of the grid over a picture */
-    POSITIONS = 1024 /* number of steps of the tables over the range */
+    POSITIONS = 1024 /* number of equal steps into which tables divide the range of values */
 };
 
 /* Sums are integers, in units of sum_unit. The contribution of a cell to a sum is limited to most_of_cell; a cell
@@ -46,14 +46,15 @@ static const double sum_unit = 1.0 / (1 << 30), most_of_cell = 1024;
  * session_order_volumes, whose cells are 25 to 55 pixels wide, the error of 99.9 % of the pixels was 0.8 to 2.5 times
  * that mean, and 3 times in one case where the opacity has a steep step. */
 static const double worst_pixel = 2.75;
-/* Extinction that an opacity of 1 stands for, times the unit distance (render_pieces.c). */
+/* product of extinction and unit distance that represents an opacity of 1, whose true extinction is infinite
+ * (render_pieces.c) */
 static const double largest_extinction = 1e6;
 
 /* Indices of the quantities that are integrated over the range of values and along rays. */
 enum {
-    IN_DARK = 0,  /* change of light, in 3 channels, if no light arrives from behind */
-    IN_LIGHT = 3, /* change of light, in 3 channels, if light of 1 arrives from behind */
-    EMISSION = 6, /* colour times extinction, in 3 channels */
+    IN_DARK = 0,  /* change of light, in three colour channels, if no light arrives from behind */
+    IN_LIGHT = 3, /* change of light, in three colour channels, if the light that arrives from behind is 1 */
+    EMISSION = 6, /* colour times extinction, in three colour channels */
     EXTINCTION = 9,
     QUANTITIES = 10
 };
@@ -62,11 +63,12 @@ enum {
 typedef struct volume_errors {
     const session_error_request *request;
     session_transfer transfer;
-    /* for each of POSITIONS + 1 equidistant positions in the range, from 0 to 1, the integrals from 0 to the
-     * position */
+    /* table with an entry for each of POSITIONS + 1 equidistant positions in the range of values (0: low end, 1: high
+     * end): the integrals of all quantities from the low end to the position */
     double (*integrals)[QUANTITIES];
-    double slopes[2][QUANTITIES]; /* slopes of the integrals below and above the range */
-    int view_count;               /* number of due views that show the volume */
+    /* increase of the integrals per unit of position, below the range (index 0) and above it (index 1) */
+    double slopes[2][QUANTITIES];
+    int view_count; /* number of due views that show the volume */
     int *views;
     /* For each view and each cell of the grid over its picture, the integrals along rays, for one piece between two
      * nodes. They are sums of integers, so that they do not depend on the order of the mesh's cells or on the
@@ -108,7 +110,7 @@ static bool list_ranges(const scene *scene, const session_due_views *views, sess
     return out->items != NULL;
 }
 
-/* The state of extending a range by the values of one part of a mesh. */
+/* The task of extending a range by the values of one part of a mesh. */
 typedef struct range_work {
     const session_mesh *mesh;
     int threads;
@@ -206,8 +208,8 @@ static void find_colour(const render_transfer *t, double position, double out[3]
     }
 }
 
-/* Computes the integrals up to the position `to`: the integrals `before`, up to the position `from`, plus those over
- * the step between the two positions. */
+/* Integrates the transfer function from the position `from` in the range of values to the position `to`. The integrals
+ * are added to `before`, which are those up to `from`; the result `after` contains those up to `to`. */
 static void integrate_step(const render_transfer *t, double from, double to, const double *before, double *after)
 {
     const double extinctions[2] = {find_extinction(t, from), find_extinction(t, to)};
@@ -273,7 +275,7 @@ static void end_estimate(volume_errors *errors)
 
 /* ---- cells ------------------------------------------------------------------------------------------------------- */
 
-/* Returns an integral over the range from 0 to a position. */
+/* Returns the integral of a quantity from the low end of the range of values (position 0) to a position. */
 static double find_integral_at(const volume_errors *of, int quantity, double position)
 {
     if (position <= 0) return position * of->slopes[0][quantity];
@@ -284,8 +286,8 @@ static double find_integral_at(const volume_errors *of, int quantity, double pos
     return *before + (at - i) * (*after - *before);
 }
 
-/* Computes the means of all quantities over a cell. All values between the smallest and the largest one are assumed to
- * be equally frequent. */
+/* Computes the means of all quantities over a cell of the mesh. All values between the cell's smallest and largest one
+ * are assumed to be equally frequent. */
 static void find_light(const volume_errors *of, const session_value_cell *cell, double out[QUANTITIES])
 {
     static const double least_width = 1e-6;
@@ -391,7 +393,7 @@ static double find_pixel_error(const int64_t sums[QUANTITIES], const float backg
     return worst_pixel * most;
 }
 
-static double find_largest(const volume_errors *errors)
+static double find_largest_pixel_error(const volume_errors *errors)
 {
     const int64_t of_view = errors->sum_count / (errors->view_count > 0 ? errors->view_count : 1);
     double most = 0;
@@ -405,7 +407,7 @@ static double find_largest(const volume_errors *errors)
 
 /* ---- all cells --------------------------------------------------------------------------------------------------- */
 
-/* The state of adding the cells of one part of a mesh to an estimate. */
+/* The task of adding the cells of one part of a mesh to an estimate. */
 typedef struct estimate_work {
     const session_mesh *mesh;
     int threads;
@@ -442,7 +444,7 @@ insitu_status session_estimate_volume_error(const session_error_request *request
         status = session_check_mpi(
             error, MPI_Allreduce(MPI_IN_PLACE, errors.sums, (int)errors.sum_count, MPI_INT64_T, MPI_SUM, team->comm),
             "MPI_Allreduce");
-    if (!status) *out = find_largest(&errors);
+    if (!status) *out = find_largest_pixel_error(&errors);
     end_estimate(&errors);
     return status;
 }

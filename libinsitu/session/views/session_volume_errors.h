@@ -28,7 +28,8 @@ void session_free_volume_ranges(session_value_ranges *ranges);
 /* Estimates the largest error of a colour channel in the pixels of all due views that show the volume, if cells of a
  * mesh have one piece between two nodes. With n pieces between two nodes, the error is this error divided by the square
  * of n. The result is the same on every rank and for every partition. parts: this rank's parts of the mesh. is_lobatto:
- * as in session_make_interpolation(). Collective; all ranks return the same status. */
+ * set if nodes along the axes of hexes and quads are Gauss-Lobatto points. Collective; all ranks return the same
+ * status. */
 insitu_status session_estimate_volume_error(const session_error_request *request, const session_value_ranges *ranges,
                                             const session_parts *parts, bool is_lobatto, const session_team *team,
                                             double *out, base_error *error);
