@@ -67,7 +67,8 @@ static render_job make_opaque_job(const render_job *job, render_surface_layer *s
 
 /* ---- numbers ------------------------------------------------------------------------------------------------- */
 
-/* For each surface of the job: the number of its layer in the scene, and its index within the layer. */
+/* Position in the scene of each surface of the job: the index of its layer in the image's list of layers, and the index
+ * of the surface within this layer (such as the index of its isovalue). */
 typedef struct surface_numbers {
     int count;
     float layer[RENDER_MAX_ISOVALUES], surface[RENDER_MAX_ISOVALUES];
@@ -81,8 +82,9 @@ static void add_numbers_of_layer(surface_numbers *n, int layer, int surfaces)
     }
 }
 
-/* Lists the layer number and the index within the layer for all surfaces of the image. If has_shells is set, each
- * isosurface layer also has contour lines on shells, which are one more surface of the job. */
+/* Lists, for all surfaces of the image in the order of the job, the index of the layer and the index within the
+ * layer. If has_shells is set, each isosurface layer also has contour lines on shells, which are one more surface
+ * of the job. */
 static surface_numbers number_surfaces(const scene_image *image, bool has_shells)
 {
     surface_numbers out = {0};
@@ -96,8 +98,8 @@ static surface_numbers number_surfaces(const scene_image *image, bool has_shells
     return out;
 }
 
-/* Converts each pixel from (value, number of the surface in the job, 0, opacity) to (value, number of the layer, index
- * of the surface within the layer, opacity). */
+/* Converts the data of each pixel from (value, index of the surface in the job, 0, opacity) to (value, index of the
+ * layer, index of the surface within the layer, opacity). */
 static void convert_surface_numbers(const scene_image *image, bool has_shells, float *values, int threads)
 {
     const surface_numbers numbers = number_surfaces(image, has_shells);

@@ -1,5 +1,6 @@
 /* Computes the additional channels that an EXR file may contain besides colours and depth. They describe the nearest
- * surface at each pixel: its normal, its value, the number of its layer, and its index within the layer. */
+ * surface at each pixel: its normal, the value that colours it, the index of its layer in the scene, and its index
+ * within the layer. */
 #ifndef SESSION_CHANNELS_H
 #define SESSION_CHANNELS_H
 
@@ -13,13 +14,13 @@
 enum { SESSION_CHANNELS = 6 };
 
 typedef struct session_channels {
-    /* 4 floats per pixel, on rank 0 only. normals: the three components of the normal; values: the value, the number of
-     * the layer, and the index of the surface within the layer. The fourth float belongs to no channel. */
+    /* 4 floats per pixel, on rank 0 only. normals: the three components of the normal. values: the surface's value, the
+     * index of its layer, and its index within the layer. The fourth float of each pixel belongs to no channel. */
     float *normals, *values;
     insitu_channel items[SESSION_CHANNELS];
 } session_channels;
 
-/* Returns whether an output of the image requests these channels. */
+/* Returns whether an output of the image requests the additional channels. */
 bool session_needs_channels(const scene_image *image);
 
 /* Draws the channels in two frames, in which all surfaces of the job are opaque and sampled at the pixels' centres.

@@ -1,5 +1,6 @@
-/* Determines whether an image needs a deep picture, and manages its memory on rank 0. A deep picture stores all samples
- * of each pixel, that is, the surfaces and volume intervals along the pixel's ray, sorted by depth. */
+/* Determines whether an image needs a deep picture, and manages the memory of deep pictures on rank 0. A deep
+ * picture stores all samples of each pixel, that is, the surfaces and volume intervals along the pixel's ray,
+ * sorted by depth. */
 #ifndef SESSION_DEEP_H
 #define SESSION_DEEP_H
 

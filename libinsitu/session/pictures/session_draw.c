@@ -32,8 +32,9 @@ typedef struct canvas {
     /* block that holds the pixels of `frame`; the writer becomes its owner when the picture is passed to it */
     session_picture memory;
     float *depth; /* depth of the first frame, which is kept here while further frames are drawn without depth */
-    /* If only pixels at edges are drawn several times: samples: the current frame, of which only these pixels are
-     * drawn; edges: numbers of these pixels; edge_sums: sums over the frames for these pixels. */
+    /* Used if only pixels at edges are drawn several times. samples: the current frame, of which only the pixels at
+     * edges are drawn; edges: indices of these edge_count pixels in the picture; edge_sums: sums of their colours over
+     * the frames. */
     image samples;
     int64_t edge_count, *edges;
     double *edge_sums;
@@ -250,7 +251,7 @@ static void warn_of_overlaps(session_report *report, const scene_image *image, i
         image->name, (long long)pixels);
 }
 
-/* The state of drawing the frames of an image. */
+/* The input and results of drawing the frames of an image. */
 typedef struct frames_basis {
     const session_drawing *drawing;
     session_frame_target target;
@@ -411,9 +412,9 @@ static void queue_picture(const session_drawing *d, const scene_image *image, ca
     session_writer_queue(d->writer, files, error);
 }
 
-/* Passes an image to the writer of rank 0. If pictures are written after the step, the only possible error is that rank
- * 0 lacks memory; the next step reports it together with the errors of the writing thread. ranges: the ranges over the
- * run, or NULL. */
+/* Passes a picture to the writer of rank 0. If pictures are written after the step, the only possible error is that
+ * rank 0 lacks memory; the next step reports it together with the errors of the writing thread. ranges: the image's
+ * colour ranges over the run, which are written too; NULL: the image has none. */
 static insitu_status write_outputs(const session_drawing *d, const scene_image *image, canvas *c,
                                    session_image_ranges *ranges, base_error *error)
 {
@@ -431,8 +432,9 @@ static insitu_status write_outputs(const session_drawing *d, const scene_image *
 
 /* ---- images -------------------------------------------------------------------------------------------------- */
 
-/* Finds the areas of the picture that insets of its montage will cover. If several of the image's files have insets,
- * the areas are those of the first such file. Returns the number of areas. */
+/* Finds the areas of the image's picture that insets will cover. Insets are drawn over a montage that contains the
+ * picture. If several of the image's files are montages with insets, the areas are those of the first such file.
+ * Returns the number of areas. */
 static int find_areas_under_insets_of_image(const scene *scene, const scene_image *image,
                                             insitu_rectangle covered[SCENE_ANCHORS])
 {

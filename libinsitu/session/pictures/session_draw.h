@@ -48,7 +48,7 @@ typedef struct session_drawing {
 
 /* Draws the plan's images and passes the pictures to the writer. An image that fails is skipped. Returns the error of
  * the plan if there is one, and otherwise the first error of an image. *drawn receives a bit mask of the images that
- * were drawn: bit n stands for image number n of the scene file. Collective. */
+ * were drawn: bit n stands for the image with index n in the scene file. Collective. */
 insitu_status session_draw_images(const session_drawing *drawing, const session_plan *plan, uint64_t *drawn,
                                   base_error *error);
 

@@ -139,13 +139,13 @@ static insitu_status update_turn_pixels(const session_frame_target *t, int64_t f
 }
 
 /* The order in which a picture's pixels are drawn in turns. Pixels are ordered by squares of SQUARE × SQUARE, so that
- * the rays of a packet are neighbours. Squares that follow each other are far apart: the step between their numbers is
- * about the number of squares divided by the golden ratio. Each turn therefore contains about the same fraction of
- * pixels in dense regions. */
+ * the rays of a packet are neighbours. Squares that follow each other in the order are far apart in the picture: their
+ * indices differ by about the number of squares divided by the golden ratio. Each turn therefore contains about the
+ * same fraction of the pixels in dense regions. */
 typedef struct turn_order {
     int width, height, squares_per_row; /* size of the picture in pixels, and number of squares in a row of squares */
-    /* squares: number of squares; stride: difference between the numbers of consecutive squares in the order. The two
-     * numbers have no common divisor. */
+    /* squares: number of squares. stride: difference, modulo `squares`, between the indices of squares that follow each
+     * other in the order. `squares` and `stride` have no common divisor, so that each square is visited once. */
     int64_t squares, stride;
 } turn_order;
 
@@ -206,7 +206,8 @@ static void copy_pixels(const unsigned char *pixels, const image *from, image *t
     }
 }
 
-/* Removes the samples of these pixels from the deep picture on rank 0, because the pixels are drawn again. */
+/* Removes the samples of the pixels in the set `pixels` from the deep picture on rank 0, because these pixels are drawn
+ * again. */
 static void remove_samples(const unsigned char *pixels, const image *out)
 {
     const int64_t count = (int64_t)out->width * out->height;

@@ -10,7 +10,8 @@ typedef struct session_frame {
     int64_t rays, map_failures, fragments;
     double surface_ms, volume_ms, composite_ms;
     int64_t overlaps; /* number of pixels in which cells overlap */
-    int turns;        /* number of turns (passes over a part of the pixels) in which pixels with overlaps are drawn */
+    /* number of turns in which pixels with overlaps were drawn; a turn is a pass over some of these pixels */
+    int turns;
     int64_t sent_bytes;
     /* schedule of compositing that was used; COMP_AUTOMATIC: nothing was sent to other ranks */
     comp_schedule schedule;

@@ -26,8 +26,8 @@ enum {
     ANSWER_WORDS = sizeof(render_hit_rays) / 8
 };
 
-/* The state of a round: the hits of this rank that are processed in the round, and for each hit the rays that are not
- * blocked yet. */
+/* The data of one round: the hits of this rank whose lighting is computed in the round, and for each hit the rays that
+ * are not blocked yet. */
 typedef struct lighting {
     MPI_Comm comm;
     const render_job *job;
@@ -41,17 +41,18 @@ typedef struct lighting {
     render_hit_rays *rays;
 } lighting;
 
-/* The requests in the order of the hits that need them. Element i of the arrays describes request i. ranks: the rank to
- * which it is sent; hits: the index of its hit; rays: the rays to trace. */
+/* The requests of a round that this rank sends, in the order of the hits that need them. Request i is described by
+ * element i of three arrays: ranks has the rank to which it is sent, hits the index of its hit in the round, and rays
+ * the set of rays to trace. */
 typedef struct request_list {
     int64_t count, capacity;
     int *ranks;
     int64_t *hits;
     render_hit_rays *rays;
-    int64_t current_hit; /* index of the hit to which the requests being added belong */
+    int64_t current_hit; /* index of the hit for which requests are being added */
     const lighting *lighting_state;
     int64_t *first_requests; /* ranks + 1 entries: position in the message of the first request to each rank */
-    int64_t *message_order;  /* for each position in the message, the request's index in this list */
+    int64_t *message_order;  /* for each position of a request in the message, the index of the request in this list */
     bool has_no_memory;
 } request_list;
 

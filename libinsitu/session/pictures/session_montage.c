@@ -11,7 +11,7 @@ static insitu_status fail_for_memory(const scene_montage *montage, base_error *e
                      montage->rows);
 }
 
-static int width_of(const scene_montage *montage)
+static int compute_montage_width(const scene_montage *montage)
 {
     return montage->width * montage->columns + montage->bar_width;
 }
@@ -23,14 +23,15 @@ static int compute_montage_height(const scene_montage *montage)
 
 static int64_t count_pixels(const scene_montage *montage)
 {
-    return (int64_t)width_of(montage) * compute_montage_height(montage);
+    return (int64_t)compute_montage_width(montage) * compute_montage_height(montage);
 }
 
-/* Returns the position of a panel in the montage with the pixels rgba. */
+/* Returns the place of a panel in the montage. rgba: pixels of the montage. */
 static insitu_place find_panel_region(const scene_montage *of, float *rgba, int panel)
 {
     const int left = of->are_bars_left ? of->bar_width : 0;
-    return (insitu_place){rgba, width_of(of), left + panel % of->columns * of->width, panel / of->columns * of->height};
+    return (insitu_place){rgba, compute_montage_width(of), left + panel % of->columns * of->width,
+                          panel / of->columns * of->height};
 }
 
 /* Clips the interval [first, first + length) to [0, end). The length may become negative. */
@@ -88,7 +89,7 @@ static void free_montage(session_montage *m)
     *m = (session_montage){0};
 }
 
-/* Returns row y of the picture at this position of the montage. */
+/* Returns the start of row y of a smaller picture that is stored at this place of the montage. */
 static float *find_row(const insitu_place *place, int y)
 {
     return place->rgba + 4 * ((ptrdiff_t)(place->y + y) * place->width + place->x);
@@ -184,7 +185,8 @@ static const session_decorations *find_shared_bars(const scene_montage *of, cons
     return first;
 }
 
-/* Draws the decorations of a panel over its picture. buffer: memory for a copy of the picture. */
+/* Draws the decorations of a panel over its picture in the montage. has_bars: whether colour bars are drawn, too.
+ * buffer: memory for a copy of the picture. */
 static insitu_status decorate_panel(const scene_montage *of, session_montage *m, int panel, bool has_bars,
                                     float *buffer, base_error *error)
 {
@@ -212,7 +214,7 @@ static insitu_status draw_strip(const scene_montage *of, session_montage *m, con
     float *empty = base_calloc(4 * (size_t)of->bar_width * (size_t)height, sizeof *empty);
     if (!empty) return fail_for_memory(of, error);
     const insitu_image strip = {.width = of->bar_width, .height = height, .rgba = empty, .decorations = &decorations};
-    const insitu_place place = {m->rgba, width_of(of), of->are_bars_left ? 0 : of->width * of->columns, 0};
+    const insitu_place place = {m->rgba, compute_montage_width(of), of->are_bars_left ? 0 : of->width * of->columns, 0};
     const insitu_status status = session_place_image(&strip, &place, error);
     base_free(empty);
     return status;
@@ -236,7 +238,7 @@ static insitu_status finish_panels(const scene_montage *of, session_montage *m, 
 /* Draws the frame around an inset, in a grey that is visible on dark and light backgrounds. */
 static void draw_frame(const scene_montage *of, const insitu_place *place, const scene_rectangle *inset)
 {
-    static const float grey[4] = {0.2140F, 0.2140F, 0.2140F, 1}; /* sRGB 0.5 */
+    static const float grey[4] = {0.2140F, 0.2140F, 0.2140F, 1}; /* grey of sRGB 0.5, in linear light */
     const int frame = of->frame_width;
     for (int y = -frame; y < inset->height + frame; y++)
         for (int x = -frame; x < inset->width + frame; x++) {
@@ -253,7 +255,7 @@ static insitu_status draw_inset(const scene_montage *of, session_montage *m, sce
     const scene_rectangle *at = &of->insets[corner];
     const session_inset *inset = &m->insets[corner];
     const session_decorations *own = inset->decorations;
-    const insitu_place place = {m->rgba, width_of(of), at->x, at->y};
+    const insitu_place place = {m->rgba, compute_montage_width(of), at->x, at->y};
     insitu_decorations decorations = {0};
     if (own) decorations = inset->has_decorations ? own->decorations : own->background;
     if (own && shared && own->bars_hash == shared->bars_hash) decorations.bar_count = 0;
@@ -282,7 +284,8 @@ insitu_status session_write_montages(session_montages *montages, const scene *sc
         session_montage *m = &montages->items[i];
         const scene_montage *of = &scene->montages[i];
         if (!m->has_picture) continue;
-        const insitu_image whole = {.width = width_of(of), .height = compute_montage_height(of), .rgba = m->rgba};
+        const insitu_image whole = {
+            .width = compute_montage_width(of), .height = compute_montage_height(of), .rgba = m->rgba};
         base_error reason = {0};
         const insitu_image_format format = of->format == SCENE_PNG16 ? INSITU_PNG16 : INSITU_PNG8;
         if (finish_montage(of, m, &reason) || session_write_image(&whole, format, m->path, &reason) != INSITU_OK)
