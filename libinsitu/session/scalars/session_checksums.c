@@ -55,7 +55,7 @@ static uint64_t sum_array(const grid_array *a, int64_t count, int threads)
             const char *data = a->data + first * a->stride;
             const uint64_t own =
                 a->stride == size ? sum_words(data, values * size) : sum_strided(data, a->stride, (size_t)size, values);
-            sum += mix_bits(own, (uint64_t)block); /* the order in which blocks are added does not affect the sum */
+            sum += mix_bits(own, (uint64_t)block); /* blocks may be added to the sum in any order */
         }
         region_leave();
     }
@@ -137,9 +137,9 @@ static bool compare_checksum(const session_mesh *mesh, session_scalar *scalar, i
     return false;
 }
 
-/* Compares the checksums of a part's fields. For a block, returns the number of fields whose values are the same as at
- * the most recently drawn picture. For a mesh without blocks, adds these fields to the report and returns 0. The fields
- * of mirror images are not counted. */
+/* Compares the checksums of the fields of one part. If the part is a block, returns the number of its fields whose
+ * values are the same as at the most recently drawn picture, and leaves reporting them to the caller. If the part is a
+ * whole mesh, adds its unchanged fields to the report and returns 0. The fields of mirror images are not counted. */
 static int64_t compare_part(const session_mesh *mesh, int threads, session_report *report)
 {
     int64_t unchanged = 0;

@@ -1,11 +1,11 @@
 /* Defines discontinuous meshes. In such a mesh, every cell has its own vertices. Discontinuous meshes are used for
  * fields with a value at each corner of each cell.
  *
- * All other code finds values by the number of a vertex. Therefore a mesh with a corner field is read as a mesh in
+ * All other code finds a value by the index of a vertex. Therefore a mesh with a corner field is read as a mesh in
  * which every corner is a vertex. Its coordinates are copied corner by corner, and its connectivity is 0, 1, 2, ....
  * All layers of the mesh are drawn in this form, so that fields at corners, vertices and cells can be combined. Code
- * that must find equal vertices (for means at vertices, or for outer faces) compares ids or coordinates across
- * ranks, which also works for corners. */
+ * that must find equal vertices (for means at vertices, or for outer faces) compares ids or coordinates across ranks,
+ * which also works for corners. */
 #ifndef SESSION_DISCONTINUOUS_H
 #define SESSION_DISCONTINUOUS_H
 

@@ -17,7 +17,8 @@ static session_field *add_field(session_mesh *mesh, const char *name, base_error
     return field;
 }
 
-/* Returns the number of entries of the connectivity that are vertices of cells, without the unused ends of rows. */
+/* Returns the number of entries of the connectivity that are vertices of cells. Unused entries at the end of each
+ * cell's entries (insitu_mesh.connectivity_row) are not counted. */
 int64_t session_count_corners(const insitu_mesh *mesh)
 {
     if (mesh->cell_count == 0) return 0;
@@ -26,7 +27,8 @@ int64_t session_count_corners(const insitu_mesh *mesh)
 }
 
 /* Returns the number of values that a field needs: the mesh's number of vertices, cells or corners, depending on the
- * field's centring. For corners in rows, it is the number of all entries from the first to the last corner. */
+ * field's centring. If the field has a corner_row, the result is the number of all entries from the first to the last
+ * corner, including unused ones. */
 int64_t session_count_field_entries(const insitu_mesh *mesh, const insitu_field *field)
 {
     if (field->centring == INSITU_VERTEX) return mesh->vertex_count;
@@ -322,7 +324,7 @@ static void store_field(session_meshes *meshes, session_mesh *mesh, int index, c
                           field->given.component_count != given->component_count || field->problem.status;
     const bool is_stale = is_other || given->changed & INSITU_CHANGED_VALUES || !is_same;
     if (is_other) {
-        /* scalars are dropped, because a component's number may now mean something else */
+        /* scalars are dropped, because the index of a component may now refer to another quantity */
         session_drop_scalars(mesh);
         field->version++;
         meshes->are_names_changed = true;

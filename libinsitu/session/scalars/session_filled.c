@@ -3,7 +3,7 @@
 #include "session_field_input.h"
 #include "session_scalars.h"
 
-static bool is_needed(const session_mesh *mesh, int index, bool of_images)
+static bool are_values_needed(const session_mesh *mesh, int index, bool of_images)
 {
     bool is_used = mesh->fields[index].is_source || (!of_images && mesh->fields[index].is_in_statistics);
     for (int i = 0; i < mesh->scalar_count && of_images; i++)
@@ -50,7 +50,7 @@ static void fill_part(session_meshes *meshes, session_mesh *part, const char *na
 {
     base_error own = {0};
     const int index = part->is_given ? session_find_field(part, name) : -1;
-    if (index < 0 || !part->fields[index].given.fill || !is_needed(part, index, of_images)) return;
+    if (index < 0 || !part->fields[index].given.fill || !are_values_needed(part, index, of_images)) return;
     if (session_fill_field(meshes, part, index, &own)) session_store_problem(&part->fields[index], &own, error);
 }
 

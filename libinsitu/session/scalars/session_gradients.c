@@ -49,14 +49,16 @@ typedef struct node {
 typedef double number_pair __attribute__((vector_size(16)));
 typedef int64_t word_pair __attribute__((vector_size(16)));
 
-/* What the contributions of corners are added to: the fixed-point sums or, if `sums` is NULL, the bounds from which the
- * value of the sums' last bit is chosen. */
+/* The data that one thread uses to add the contributions of corners. It adds them to fixed-point sums or, if `sums` is
+ * NULL, to the bounds from which the value of the last bit of these sums is chosen. */
 typedef struct target {
     const session_gradient_basis *basis;
     int64_t *sums;
-    unsigned char *owners; /* the thread that adds to each sum; NULL: there is only one thread */
-    unsigned char owner;   /* number of this thread in `owners` */
-    double scale;          /* factor by which coordinates are multiplied, a power of two */
+    /* for each sum, the thread that adds to it, as recorded by record_adding_thread(); NULL: there is only one
+     * thread */
+    unsigned char *owners;
+    unsigned char owner; /* value that stands for this thread in `owners` */
+    double scale;        /* factor by which coordinates are multiplied, a power of two */
     number_pair units[MOST_NUMBERS / 2];
     session_gradient_bounds bounds;
 } target;
@@ -275,7 +277,7 @@ static inline __attribute__((always_inline)) void add_typed_cell(target *to, int
     }
 }
 
-/* Adds the contributions of all corners of a cell that has a fixed number of vertices. */
+/* Adds the contributions of all corners of a tet, hex, wedge or pyramid. */
 static void add_solid_cell(target *to, int64_t cell, int type)
 {
     switch (to->basis->field_count) {
@@ -332,8 +334,8 @@ static bool list_nodes(node_list *list, target *to, int64_t cell)
     return list->count > 0;
 }
 
-/* Returns the mean of the vertices without duplicates. The vertices are added in the order of their coordinates, so
- * that the result does not depend on the order of faces. */
+/* Returns the mean of the listed vertices. Vertices that occur several times are counted once, and vertices are added
+ * in the order of their coordinates, so that the result does not depend on the order of faces. */
 static node find_centre(node_list *list, int field_count)
 {
     node centre = {.vertex = -1};
@@ -387,15 +389,17 @@ static bool has_own_values(const session_gradient_basis *basis, int64_t cell)
     return true;
 }
 
-/* Returns whether the cell contributes to sums: it is drawn and has a volume or, if of_shells is set, is a shell. */
+/* Returns whether the cell contributes to sums. If of_shells is set, shells contribute; otherwise drawn cells with a
+ * volume do. */
 static bool is_summed(const session_gradient_basis *basis, int64_t cell)
 {
     return basis->of_shells ? !grid_is_ghost(basis->cells, cell) && grid_is_shell(basis->cells, cell)
                             : grid_is_drawn(basis->cells, cell);
 }
 
-/* Returns whether one of the caller's cells is drawn and has a node with a sum. The cells have polynomials. */
-static bool has_polynomial_cell_a_sum(const session_gradient_basis *basis, int64_t cell)
+/* Returns whether one of the caller's cells is drawn, and a sum of gradients is computed at one of its nodes. The cells
+ * must be those of basis->polynomials. */
+static bool does_polynomial_cell_contribute(const session_gradient_basis *basis, int64_t cell)
 {
     const session_polynomials *p = basis->polynomials;
     const int64_t size = session_row_size(&p->rows, cell);
@@ -409,7 +413,7 @@ static bool has_polynomial_cell_a_sum(const session_gradient_basis *basis, int64
 
 static bool does_cell_contribute(const session_gradient_basis *basis, int64_t cell)
 {
-    if (basis->polynomials) return has_polynomial_cell_a_sum(basis, cell);
+    if (basis->polynomials) return does_polynomial_cell_contribute(basis, cell);
     if (!is_summed(basis, cell)) return false;
     grid_walk walk = grid_walk_cell(basis->cells, cell);
     int64_t vertex;
@@ -418,8 +422,8 @@ static bool does_cell_contribute(const session_gradient_basis *basis, int64_t ce
     return false;
 }
 
-/* Lists the cells that have a vertex with a sum. The cells are counted first, so that threads can fill a list of fixed
- * size. */
+/* Lists the cells with a vertex at which a sum is computed (sum_indices). The cells are counted first, so that threads
+ * can fill a list of fixed size. */
 bool session_list_cells(const session_gradient_basis *basis, session_cell_list *out)
 {
     enum { BLOCK = 4096 };
@@ -476,7 +480,7 @@ static void add_linear_cell(target *to, int64_t cell, node_list *buffer)
         add_solid_cell(to, cell, type);
 }
 
-/* Adds the gradient of a cell's polynomial at the n-th node to that node's sum, if the node has one. */
+/* Adds the gradient of a cell's polynomial at its n-th node to the sum of this node, if a sum is computed there. */
 static void add_row_node(target *to, const session_derivatives *d, const node_list *row, int n)
 {
     const int field_count = to->basis->field_count;
@@ -499,7 +503,8 @@ static void add_row_node(target *to, const session_derivatives *d, const node_li
                           field_count);
 }
 
-/* Reads one node of a row, unless it has been read. Returns whether its values are finite. */
+/* Reads one node in a cell's list of nodes (row), unless it has been read before. Returns whether its values are
+ * finite. */
 static bool read_row_node(target *to, int64_t cell, node_list *row, int n)
 {
     if (row->nodes[n].vertex >= 0) return true;
@@ -507,8 +512,9 @@ static bool read_row_node(target *to, int64_t cell, node_list *row, int n)
                      to->basis->field_count, &row->nodes[n]);
 }
 
-/* Reads the nodes that have sums, and the nodes from which the derivatives at these nodes are computed. In finer
- * lattices of which few pieces are made, these nodes are few. Returns whether all values are finite. */
+/* Reads those nodes of a cell at which sums are computed, and the nodes from which the derivatives at these nodes
+ * are computed. In finer lattices of which few pieces are made, these nodes are few. Returns whether all values are
+ * finite. */
 static bool read_summed_nodes(target *to, int64_t cell, const session_derivatives *d, node_list *row, int size)
 {
     const session_polynomials *p = to->basis->polynomials;
@@ -563,8 +569,8 @@ static void add_cell(target *to, int64_t cell, node_list *buffer)
 
 enum { NO_OWNER = 254, SHARED = 255 };
 
-/* Records that this thread adds to the sum of the vertex, if it has one. If no other thread adds to a sum, the
- * additions need not be atomic. */
+/* Records that this thread adds to the sum of the vertex, if a sum is computed there. Additions to a sum must be atomic
+ * only if several threads add to it. */
 static void record_adding_thread(const target *to, int64_t vertex)
 {
     const session_gradient_basis *basis = to->basis;

@@ -8,7 +8,7 @@
 
 enum { SESSION_GRADIENTS = 3 /* maximum number of scalars whose gradients one pass sums */ };
 
-/* Input for computing sums. The fields have their values at vertices. */
+/* Input for computing sums of gradients at vertices. The fields have their values at vertices. */
 typedef struct session_gradient_basis {
     const grid *cells;
     const grid_field *fields; /* array of field_count scalars, with values at vertices */
@@ -46,23 +46,23 @@ typedef struct session_gradient_bounds {
     double largest_inverse_square;
 } session_gradient_bounds;
 
-/* The cells that have a vertex with a sum, in any order. If there are polynomials, these are the caller's cells;
- * otherwise they are cells of the grid. */
+/* The cells that have a vertex at which a sum is computed, in any order. If the basis has polynomials, these are the
+ * caller's cells; otherwise they are cells of the grid. */
 typedef struct session_cell_list {
     int64_t count;
     int64_t *cells;
 } session_cell_list;
 
-/* Lists the cells that have a vertex with a sum. Returns false if memory runs out. The caller must free out->cells.
- * Local. */
+/* Lists the cells that have a vertex at which a sum is computed. Returns false if memory runs out. The caller must free
+ * out->cells. Local. */
 bool session_list_cells(const session_gradient_basis *basis, session_cell_list *out);
 
 /* Computes the bounds of the numbers that the cells add to any sum. Returns false if memory runs out. Local. */
 bool session_bound_gradients(const session_gradient_basis *basis, const session_cell_list *list,
                              session_gradient_bounds *out);
 
-/* Returns an array with one byte per sum, in which session_add_gradients() records the number of the thread that adds
- * to the sum. It is allocated by base_alloc(); NULL if memory runs out. Local. */
+/* Returns an array with one byte per sum. In it, session_add_gradients() records which thread adds to the sum, or that
+ * several do. It is allocated by base_alloc(); NULL if memory runs out. Local. */
 unsigned char *session_create_sum_owners(int64_t sum_count, int threads);
 
 /* Adds the cells' contributions to the sums. Each sum has session_count_sum_words() words. bounds: the bounds over all

@@ -36,12 +36,15 @@ typedef struct indexed_values {
     /* if there is one value per linear piece of split cells, the index of the caller's cell of each piece; otherwise
      * NULL */
     const uint32_t *parents;
-    grid_array index;  /* index of the tuple at each position; without data, position i has tuple i */
+    /* for each position of the copy, the index of the caller's tuple; without data, position i has tuple i */
+    grid_array index;
     grid_field values; /* the caller's tuples */
-    /* row_length: number of positions in a row; used_length: how many of them are read */
+    /* If values at corners have a corner_row: row_length is the number of the caller's entries from one cell to the
+     * next, and used_length is the number of corners of a cell. Otherwise both are 1. */
     int64_t row_length, used_length;
-    int64_t count, position_count; /* count: number of tuples; position_count: number of positions that have a tuple */
-    bool keeps_type; /* set if values are copied in their own type; otherwise they are converted to double */
+    /* count: number of the caller's tuples; position_count: number of tuples of the copy */
+    int64_t count, position_count;
+    bool keeps_type; /* true: the copy has the type of the caller's values; false: values are converted to double */
 } indexed_values;
 
 static indexed_values make_indexed_values(const session_mesh *mesh, const session_field *field)
@@ -68,8 +71,8 @@ static indexed_values make_indexed_values(const session_mesh *mesh, const sessio
     return out;
 }
 
-/* Returns the index, in the caller's arrays, of the value at a position of the copy: the number of a vertex, cell or
- * corner. */
+/* Returns the index, in the caller's arrays, of the vertex, cell or corner whose value is stored at a position of the
+ * copy. */
 static int64_t find_value_entry(const indexed_values *v, int64_t position)
 {
     if (v->mesh) return session_vertex_of_corner(v->mesh, position);
@@ -135,7 +138,7 @@ static insitu_status copy_values(const session_mesh *mesh, session_field *field,
     return INSITU_OK;
 }
 
-/* Copies the tuple at a vertex or a corner of the caller's cells. */
+/* Reads the tuple at a vertex or a corner of the caller's cells (session_node_values.read). */
 static void read_node(const void *of, int64_t position, double *tuple)
 {
     const indexed_values *v = of;
@@ -193,8 +196,8 @@ insitu_status session_read_nodes(const session_mesh *mesh, int index, session_us
     return use(of, &values, error);
 }
 
-/* Updates the copy of a field's values if it is stale. Then sets original_values of the field's scalars again, because
- * it contains the address of the copy. */
+/* Updates the copy of a field's values if it is out of date. Then updates original_values of the field's scalars,
+ * because this member contains the address of the copy. */
 static insitu_status update_copy(session_mesh *mesh, int index, int threads, base_error *error)
 {
     session_field *field = &mesh->fields[index];

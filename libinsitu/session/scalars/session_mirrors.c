@@ -164,7 +164,7 @@ static void warn_of_mirror(const scene_mirror *mirror, const double ends[ENDS], 
     session_warn_of_absent_mesh(mirror->mesh, mirror->line, SESSION_MIRROR, catalogue, report);
     for (int axis = 0; axis < 3; axis++) {
         const double plane = mirror->planes[axis], below = plane - ends[axis], above = -ends[3 + axis] - plane;
-        /* vertices that lie on the other side of the plane only because of rounding are not reported */
+        /* if cells lie on the other side of the plane only because of rounding, no warning is given */
         const bool is_cut = mirror->axes >> axis & 1 && fmin(below, above) > 1e-6 * fmax(below, above);
         session_warn(
             report, &(session_warning){WARNING_MIRROR, NULL, mirror->mesh, axis}, is_cut,

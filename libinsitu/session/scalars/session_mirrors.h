@@ -1,4 +1,4 @@
-/* Creates and updates the mirror images of this rank's meshes that the scene draws, with their fields
+/* Creates and updates the mirror images of this rank's meshes, for which the scene asks, together with their fields
  * (meshes/session_mirror.h). */
 #ifndef SESSION_MIRRORS_H
 #define SESSION_MIRRORS_H

@@ -104,7 +104,9 @@ grid_field session_get_caller_values(const session_mesh *mesh, int index, int co
     if (!session_is_copied(mesh, field)) {
         if (!field->component_arrays) return out;
         out.component_stride =
-            0; /* the component has a separate array, which is read as a field with a single component */
+            /* Each component has an array of its own. A single component is therefore read as a field with one
+             * component. */
+            0;
         if (component >= 0)
             out.values = field->component_arrays[component];
         else

@@ -22,8 +22,8 @@ typedef struct warp_step {
     base_fail((error), INSITU_ERROR_FIELD, "%s:%d: meshes.%.200s.warp.field: " format, (step)->scene_path,             \
               (warp)->field_line, (warp)->mesh, __VA_ARGS__)
 
-/* Returns whether displacements along x and y suffice. This is the case if all cells are shells of one type, or if no z
- * coordinates are given. */
+/* Returns whether displacements with only the components x and y are allowed. They are allowed if all cells are shells
+ * of one type, or if no z coordinates are given. */
 static bool is_of_shells(const insitu_mesh *mesh)
 {
     return session_may_lack_z(mesh) && (!mesh->coordinates[2].data || !mesh->cell_types.data);
