@@ -49,8 +49,8 @@ static bool clip_at_near_plane(seen_point *a, seen_point *b, double near)
     return true;
 }
 
-/* Returns whether the eye sees the outer side of a face of the box. The face is perpendicular to this axis, at the high
- * or low end of the box. */
+/* Returns whether the eye sees the outer side of the face of the box that is perpendicular to `axis`, at the high end
+ * of the box if `high` is set, and otherwise at the low end. */
 static bool is_seen_outside(const double lower[3], const double upper[3], const render_camera *c, int axis, bool high)
 {
     if (c->is_orthographic) return high ? c->forward[axis] < 0 : c->forward[axis] > 0;

@@ -39,8 +39,8 @@ static void add_boxes(const double *ends, int count, session_outline *out)
     }
 }
 
-/* Computes the bounds of this rank's cells: one row per mesh of the catalogue if by_mesh is set, and otherwise one row
- * for all meshes. */
+/* Computes the bounding boxes of this rank's cells: one box for each mesh of the catalogue if by_mesh is set, and
+ * otherwise one box for all meshes. */
 static void find_bounds(const session_catalogue *catalogue, const session_meshes *meshes, bool by_mesh, double *ends)
 {
     for (int i = 0; i < (by_mesh ? catalogue->mesh_count : 1) * ENDS; i++) ends[i] = INFINITY;

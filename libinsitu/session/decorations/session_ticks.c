@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* A step between ticks of `factor` (1, 2 or 5) times 10^exponent. */
+/* A round distance between ticks: `factor` (1, 2 or 5) times 10^exponent. */
 typedef struct round_step {
     int factor, exponent;
 } round_step;
@@ -111,8 +111,8 @@ static int fill_ticks_at_multiples(const session_scale *s, int most, insitu_tick
 
 /* ---- logarithmic --------------------------------------------------------------------------------------------- */
 
-/* The numbers that get a tick: 1, or 1, 2 and 5, each multiplied by every power of ten whose exponent is a multiple of
- * `step`. */
+/* The choice of values that get a tick on a logarithmic scale. These are powers of ten whose exponents are multiples of
+ * `step`, and also 2 and 5 times these powers if has_2_and_5 is set. */
 typedef struct decade_choice {
     bool has_2_and_5;
     int step;
@@ -172,8 +172,9 @@ static int fill_ticks(const session_scale *s, int most, insitu_tick *ticks)
     return count < 2 ? fill_ticks_at_multiples(s, most, ticks) : count;
 }
 
-/* Adds one tick in the centre of each band if the bands correspond to the integers of the range: the range begins and
- * ends at integers, or half a band beyond them. Otherwise returns 0. */
+/* If the bands correspond to the integers in the range, adds one tick in the centre of each band. This is the case if
+ * the range begins and ends at integers, or half a band beyond them. Returns the number of ticks; 0 if the bands do not
+ * correspond to integers. */
 static int fill_integer_ticks(const session_scale *s, int bands, insitu_tick *ticks)
 {
     const double half = s->high - s->low == bands ? 0.5 : 0, first = s->low + half, largest = 1e9;

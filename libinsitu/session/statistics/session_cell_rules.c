@@ -30,9 +30,11 @@
 #include "session_shape.h"
 
 enum {
-    LANES = 4,                /* number of points whose sums are computed together */
-    BLOCK = 32,               /* maximum number of points in a block */
-    MOST_FUNCTIONS = 1 << 20, /* largest number of doubles for which a factor's functions are stored */
+    LANES = 4,  /* number of points whose sums are computed together */
+    BLOCK = 32, /* maximum number of points in a block */
+    /* maximum number of doubles that the stored functions of a factor may take; larger ones are computed again for each
+     * cell */
+    MOST_FUNCTIONS = 1 << 20,
     MOST_TET_POINTS = 17, /* maximum number of points along an axis of bent tets; higher if straight tets need more */
     SIZE = 4,             /* number of doubles of a tuple: x, y, z and a value */
     MOST_SIZE = SIZE + 6, /* number of doubles of a tuple and of the position's derivatives along two lines */
@@ -113,7 +115,7 @@ static void find_simplex_functions(const session_rule_factor *factor, const doub
             }
 }
 
-/* Returns the number of doubles that the functions and their slopes at one block of points take. */
+/* Returns the number of doubles that the values and derivatives of a factor's functions at one block of points take. */
 static size_t count_block_numbers(const session_rule_factor *factor)
 {
     return (size_t)(1 + factor->rule.dimensions) * (size_t)factor->node_count * (size_t)factor->width;
@@ -150,7 +152,7 @@ static bool make_factor(int dimensions, int order, bool is_lobatto, int points, 
     return out->functions;
 }
 
-/* ---- kinds of cells -------------------------------------------------------------------------------------------- */
+/* ---- rules of a type and order of cells -------------------------------------------------------------------------- */
 
 static bool is_box(int type)
 {
@@ -232,14 +234,14 @@ void session_drop_cell_rules(session_cell_rules *rules)
 
 /* ---- one cell -------------------------------------------------------------------------------------------------- */
 
-/* The state while the points of one cell are visited. The polynomials are evaluated factor by factor: lattices[n] has
- * the nodes of the first factor and of n lines, with one array of numbers for each component. Evaluating it at a point
- * of the last of these lines gives lattices[n - 1], which has three more components: the derivatives of the position
- * along that line. */
+/* The state while the points of one cell are visited. The polynomials are evaluated one factor after the other.
+ * lattices[n] contains one array for each component, with the values at the nodes of the first factor times n lines.
+ * Evaluating lattices[n] at a point of its last line gives lattices[n - 1]. The latter has three more components: the
+ * derivatives of the position along that line. */
 typedef struct cell_visit {
     const session_cell_rules *rules;
     const session_product_rule *rule;
-    double *lattices[AXES]; /* lattices[n]: components at the nodes of the first factor and of the first n lines */
+    double *lattices[AXES]; /* for each n, the components at the nodes of the first factor times the first n lines */
     double *functions;      /* memory for a block of functions that are not stored */
     session_visit_points *visit;
     void *of;
@@ -311,7 +313,8 @@ static void visit_block(const cell_visit *v, int first, const double *functions,
     for (int axis = 0; axis < dimensions; axis++)
         multiply_three_components(functions + (1 + axis) * nodes * width, nodes, width, in, slopes[axis]);
     multiply_one_component(functions, nodes, width, in + 3 * nodes, values);
-    /* the slopes along the last line are the first ones that were added to the components */
+    /* derivatives were added to the components line by line, beginning with the last line, so that they are read in
+     * reverse order */
     for (int line = 0; line < lines; line++)
         multiply_three_components(functions, nodes, width, in + (SIZE + 3 * line) * nodes,
                                   slopes[dimensions + lines - 1 - line]);

@@ -6,8 +6,8 @@
 #include "session_interpolation.h"
 #include "session_quadrature.h"
 
-/* The functions of nodes on a line, triangle or tet, and a quadrature rule at whose points they are evaluated. A cell's
- * functions are products of such functions. */
+/* The nodal functions on a line, triangle or tet, and a quadrature rule at whose points they are evaluated. The nodal
+ * functions of a cell are products of such functions. */
 typedef struct session_rule_factor {
     int order, node_count;
     bool is_lobatto; /* set if the nodes of a line are Gauss-Lobatto points */
@@ -23,13 +23,17 @@ typedef struct session_product_rule {
     session_rule_factor first, line;
 } session_product_rule;
 
-/* The rules of one kind of cell. */
+/* The integration rules for cells of one type with one number of nodes. */
 typedef struct session_cell_rules {
-    /* the cell's nodes, and all nodes of a complete cell of its order; empty if this kind has no rules */
+    /* the cells' nodes, and all nodes of a complete cell of this order; empty if such cells cannot be integrated */
     session_interpolation nodes;
-    session_nodes lattice; /* same as nodes.complete; for pyramids, which are read as collapsed hexes, that of a hex */
-    double *collapse;      /* for pyramids: matrix from nodes.complete to `lattice`; otherwise NULL */
-    int line_count;        /* number of factors that are lines, not counting the first one */
+    /* nodes from which values are interpolated: nodes.complete, or those of a hex for pyramids, which are read as hexes
+     * with coincident corners */
+    session_nodes lattice;
+    /* for pyramids, the matrix that computes values at the nodes of `lattice` from values at nodes.complete; otherwise
+     * NULL */
+    double *collapse;
+    int line_count; /* number of factors that are lines, not counting the first one */
     int corner_count;
     double *corner_weights; /* values of the corners' linear functions at all nodes: a matrix of nodes x corners */
     /* straight: rules of cells whose positions are linear in each factor; bent: rules of other cells. Shells and
@@ -37,8 +41,10 @@ typedef struct session_cell_rules {
     session_product_rule straight, bent;
 } session_cell_rules;
 
-/* Makes the rules of a kind of cell; pyramids have at most the order INTERPOLATION_MOST_PYRAMID. order and is_lobatto:
- * as in session_make_interpolation(). Returns false if memory runs out; the caller must drop *out in any case. */
+/* Makes the rules for cells of one type and number of nodes; pyramids have at most the order
+ * INTERPOLATION_MOST_PYRAMID. order: the order in which nodes are stored in connectivity. is_lobatto: nodes along the
+ * axes of hexes and quads are Gauss-Lobatto points; otherwise they are equispaced. Returns false if memory runs out;
+ * the caller must drop *out in any case. */
 bool session_make_cell_rules(const session_nodes *of, insitu_vertex_order order, bool is_lobatto,
                              session_cell_rules *out);
 void session_drop_cell_rules(session_cell_rules *rules);
@@ -50,8 +56,8 @@ typedef void session_visit_points(void *of, int count, const double *measures, c
 /* Returns the number of doubles that session_visit_cell() needs as working memory. */
 size_t session_cell_rules_work_size(const session_cell_rules *rules);
 
-/* Visits the points of a cell's rule, always in the same order. tuples: x, y, z and a value at the cell's nodes, in the
- * order of its row. work: working memory. */
+/* Visits the quadrature points of a cell, always in the same order. tuples: x, y, z and a value at each of the cell's
+ * nodes, in the order of its nodes in connectivity. work: session_cell_rules_work_size() doubles of working memory. */
 void session_visit_cell(const session_cell_rules *rules, const double *tuples, double *work,
                         session_visit_points *visit, void *of);
 

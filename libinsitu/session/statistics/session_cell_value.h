@@ -14,7 +14,7 @@ typedef struct session_cell_value {
     double minimum, maximum; /* range of the values at the vertices or nodes, or the single value of the cell */
     double mean;             /* the cell's value, or the mean of its values */
     double half_deviation;   /* half the standard deviation of the value in the cell; the half cannot overflow */
-    double volume;           /* volume, or area of a shell */
+    double volume;           /* volume of the cell, or area if it is a shell */
 } session_cell_value;
 
 /* Reads a linear cell. Its mean is the mean of the values at its vertices. */

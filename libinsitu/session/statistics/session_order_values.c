@@ -26,8 +26,9 @@ typedef struct order_pass {
     const session_binned_volumes *binned;
     const session_cell_value *cells; /* the values of all cells, if `binned` is given */
     session_cell_value *out;         /* receives the values of all cells, if `binned` is NULL */
-    session_rows rows;               /* rows of the cells with the caller's nodes */
-    session_rows lattice; /* rows of the cells with the nodes that are read, which may be those of finer lattices */
+    session_rows rows;               /* access to each cell's list of the caller's nodes */
+    /* access to each cell's list of the nodes whose values are read; these may be nodes of finer lattices */
+    session_rows lattice;
     const session_node_values *values; /* the caller's values at nodes; NULL: of->values is read */
     session_cell_rules rules[ROWS_MOST_KINDS];
 } order_pass;
@@ -102,7 +103,7 @@ static void read_values(const order_pass *p, const session_interpolation *nodes,
 
 /* ---- linear cells and pyramids of high order --------------------------------------------------------------------- */
 
-static grid_array array_of(const double *data, int stride)
+static grid_array make_array_of_doubles(const double *data, int stride)
 {
     return (grid_array){.data = (const char *)data, .stride = stride * (int64_t)sizeof *data, .is_wide = true};
 }
@@ -123,11 +124,12 @@ static session_cell_value find_linear_value(const order_pass *p, const session_i
     grid one = {.vertex_count = count, .cell_count = 1, .cell_type = nodes->of.type};
     one.connectivity =
         (grid_array){.data = (const char *)identity, .stride = (int64_t)sizeof *identity, .is_integer = true};
-    for (int axis = 0; axis < 3; axis++) one.coordinates[axis] = array_of(points[0] + axis, 3);
+    for (int axis = 0; axis < 3; axis++) one.coordinates[axis] = make_array_of_doubles(points[0] + axis, 3);
     const uint64_t flat = tally_is_flat(&one, 0);
     one.flat = &flat;
-    const grid_field field = {
-        .values = array_of(values, 1), .component_count = 1, .is_cell_centred = p->of->values.is_cell_centred};
+    const grid_field field = {.values = make_array_of_doubles(values, 1),
+                              .component_count = 1,
+                              .is_cell_centred = p->of->values.is_cell_centred};
     return session_read_cell_value(&one, &field, 0, &buffer->volume);
 }
 
@@ -170,7 +172,7 @@ static session_cell_value sum_pieces(const order_pass *p, int64_t cell, order_bu
 static const double flat_share = 0x1p-40;
 
 typedef struct cell_integrals {
-    double volume, size; /* integrals of the measure, and of its absolute value */
+    double volume, size; /* integrals over the cell of the volume (or area) element, and of its absolute value */
     /* integrals of v and of v^2, where v is the value's position in the range of values, minus 1/2 */
     double first, second;
 } cell_integrals;
@@ -187,11 +189,11 @@ static void add_integrals(void *of, int count, const double *measures, const dou
     }
 }
 
-/* The range of the values at a cell's nodes. The values are scaled so that this range becomes 0 .. 1. */
+/* The range of the values at a cell's nodes. In computations, values are scaled so that this range becomes 0 .. 1. */
 typedef struct scaled_cell {
     bool is_finite;
     double minimum, maximum;
-    double box; /* volume of the bounding box of its nodes */
+    double box; /* volume of the bounding box of the cell's nodes */
 } scaled_cell;
 
 /* Reads the positions and values at a cell's nodes. The values are scaled, so that squares of large values do not
@@ -259,7 +261,8 @@ static session_cell_value find_value(const order_pass *p, int64_t cell, order_bu
 /* The volumes of one cell in bins. */
 typedef struct cell_bins {
     const session_binned_volumes *binned;
-    double minimum, maximum; /* range of the values at the cell's nodes, by which values are scaled */
+    /* range of the values at the cell's nodes; scaled values are 0 at the minimum and 1 at the maximum */
+    double minimum, maximum;
     double total;
     double volumes[SESSION_MAX_BINS];
 } cell_bins;

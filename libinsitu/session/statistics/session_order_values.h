@@ -13,7 +13,8 @@ typedef struct session_order_field {
     const session_mesh *mesh;
     grid_field values; /* values at the vertices or cells of session_mesh.cells */
     int given;         /* index of the field whose values at the caller's nodes are read; -1: only `values` are read */
-    bool is_lobatto;   /* as in session_make_interpolation() */
+    /* set if nodes along the axes of hexes and quads are Gauss-Lobatto points; otherwise they are equispaced */
+    bool is_lobatto;
     int threads;
 } session_order_field;
 

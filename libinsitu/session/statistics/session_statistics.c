@@ -23,11 +23,12 @@
 
 enum { VOLUME = 1, MOMENT = 3, BINS = 5, MAX_SUMS = BINS + 2 * SESSION_MAX_BINS };
 
-/* Results of earlier passes over the cells that a pass needs. */
+/* What a pass over the cells needs from earlier passes. */
 typedef struct sum_basis {
     const session_statistics *first_pass;
-    double largest;          /* volume of the largest cell */
-    double approximate_mean; /* mean of the first pass, as a fraction of the range; used by the second pass */
+    double largest; /* volume of the largest cell */
+    /* mean of the values from the first pass, as a position in the range of values (0 to 1); used by the second pass */
+    double approximate_mean;
     bool is_second;
     bool is_of_shells; /* true: only shells are counted; false: only cells with a volume are counted */
 } sum_basis;

@@ -99,7 +99,7 @@ static insitu_status begin_file(const char *path, new_lines *lines, base_error *
     return status;
 }
 
-static void write_last(text_output *out, const void *what)
+static void write_appended_line(text_output *out, const void *what)
 {
     write_line(out, what);
 }
@@ -109,7 +109,7 @@ insitu_status session_write_statistics(const char *path, bool is_first, int64_t 
 {
     file_failure failure = {.is_missing = is_first};
     new_lines lines = {.cycle = cycle, .time = time, .values = values};
-    if (!is_first && text_file_append(path, write_last, &lines, &failure)) return INSITU_OK;
+    if (!is_first && text_file_append(path, write_appended_line, &lines, &failure)) return INSITU_OK;
     if (!failure.is_missing) return fail_at_file(path, "written", &failure, error);
     char *header = make_header(values->bin_count, values->is_of_shells);
     if (!header) return session_fail_for_memory(error, 1 << 12, "a line of statistics");

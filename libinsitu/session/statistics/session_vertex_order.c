@@ -19,8 +19,8 @@ enum { ORDERS = 3, SAMPLES = 256 /* SAMPLES: approximate number of cells of a me
 enum { JUDGED = 4 };
 static const int judged[JUDGED] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID, GRID_QUAD};
 
-/* Counts of the cells of one type: sampled cells, cells whose corner volumes have both signs, and for each order cells
- * whose corner volumes would have a single sign. */
+/* Indices of the counts for one type of cell: the cells that were sampled, the cells whose corner volumes have both
+ * signs, and, for each possible vertex order, the cells whose corner volumes would all have the same sign. */
 enum type_sum { SAMPLED, BOTH_SIGNS, FITTING, TYPE_SUMS = FITTING + ORDERS };
 
 enum cell_sum { DRAWN, FLAT, INVERTED, SHELLS, SPLIT, BENT, OF_TYPES, CELL_SUMS = OF_TYPES + JUDGED * TYPE_SUMS };
@@ -35,7 +35,8 @@ static bool fits_order(const session_mesh *mesh, int64_t cell, int type, insitu_
     int64_t vertices[GRID_MAX_CELL_VERTICES];
     const int count = grid_cell_vertices(&mesh->cells, cell, vertices);
     for (int i = 0; i < count; i++) {
-        const int given = other ? other[i] : i; /* position in the caller's connectivity */
+        /* position of the vertex in the cell's part of the caller's connectivity */
+        const int given = other ? other[i] : i;
         grid_vertex(&mesh->cells, vertices[read ? read[given] : given], points[i]);
     }
     return !tally_has_both_signs(type, points);

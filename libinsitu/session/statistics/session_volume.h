@@ -12,7 +12,8 @@ typedef struct volume_buffer {
     int vertex_count;
     int64_t corners[GRID_MAX_CELL_VERTICES]; /* memory for the vertices of cells of a fixed size */
     char *bytes;                             /* memory for polyhedra and polygons */
-    size_t size, requested_size;             /* size of `bytes`, and the size of the most recent request */
+    /* size: size of `bytes`; requested_size: number of bytes that were requested most recently */
+    size_t size, requested_size;
     bool is_out_of_memory; /* set if the requested memory was not available, so that a volume could not be computed */
 } volume_buffer;
 
