@@ -34,7 +34,7 @@ typedef struct derive_work {
     int derived_index;
     int recentring_count;
     session_recentring *recentrings;
-    int *stale; /* for each recentring, and later for each mesh, nonzero if its values are out of date */
+    int *stale; /* for each recentring of an input, and later for each mesh: nonzero if its values are out of date */
 } derive_work;
 
 /* ---- meshes and inputs of a derived field ---------------------------------------------------------------------- */
@@ -220,7 +220,8 @@ static int64_t count_values(const session_mesh *part, const session_field *field
     return field->given.centring == INSITU_CELL ? part->cells.cell_count : session_vertex_count(part);
 }
 
-/* Allocates memory for the values, unless it already has the right size. */
+/* Allocates memory for the derived values of a field on one part of a mesh, unless the field already has memory of the
+ * right size. */
 static bool allocate_values(const derive_work *w, session_mesh *part, session_field *field)
 {
     bool is_wide = false;
@@ -280,7 +281,8 @@ static void load_block(const grid_field *field, int64_t first, int count, double
 /* A thread's buffers for evaluating an expression on one block of points. */
 typedef struct block_buffer {
     const double **inputs;
-    double *values; /* values of the inputs, followed by the program's stack */
+    /* memory for the values of the inputs on the block, followed by the stack of the expression's program */
+    double *values;
 } block_buffer;
 
 static bool block_buffers_create(const scene_derived *derived, int threads, block_buffer **out)

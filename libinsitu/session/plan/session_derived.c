@@ -102,7 +102,8 @@ static insitu_status fail_for_component_count(const derived_on_mesh *at, const s
                      OF(at), name, found->component_count, at->mesh->name, name, name);
 }
 
-/* Checks that a vector has the same number of components on the meshes before at->mesh in the catalogue. */
+/* Checks that an input that is a vector has the same number of components on at->mesh as on the meshes before it in the
+ * catalogue. */
 static insitu_status check_other_meshes(const derived_on_mesh *at, const scene_field *input,
                                         const session_catalogue_field *found, base_error *error)
 {

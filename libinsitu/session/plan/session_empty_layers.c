@@ -27,7 +27,9 @@ typedef struct planned_layer {
     const scene_isosurface *isosurface;
     const scene_volume *volume;
     const scene_surface *surface; /* an outer surface with a threshold */
-    int number;                   /* number of the layer's first warning */
+    /* number by which the warning of the layer's first isovalue, volume or threshold is distinguished
+     * (session_warning.number) */
+    int number;
     /* range of the layer's values. In the first reduction the range of a surface is [0, 0] if some cell is within the
      * threshold, and otherwise empty (low > high). */
     field_range range;
@@ -38,12 +40,13 @@ typedef struct planned_layer {
 
 /* ---- layers ---------------------------------------------------------------------------------------------------- */
 
-/* Number of layers that are processed at a time; it limits the memory on the stack. */
+/* Number of layers that are processed together. Their data is on the stack. */
 enum { BATCH = 128 };
 
-/* Some consecutive layers of the plan, which are processed together. */
+/* Consecutive layers of the plan that are processed together. The layers of the plan are numbered from 0 in the order
+ * in which list_layers() visits them. */
 typedef struct layer_batch {
-    int first, next; /* first: number of the first layer in the batch; next: number of the layer that is listed next */
+    int first, next; /* first: number of the first layer in the batch; next: number of the layer that is visited next */
     int count;       /* number of layers in the batch */
     planned_layer layers[BATCH];
 } layer_batch;
@@ -116,8 +119,8 @@ static void add_root_range(const session_mesh *mesh, const session_scalar *scala
     widen_range((double)*(const float *)(const void *)root.low, (double)*(const float *)(const void *)root.high, range);
 }
 
-/* Widens the range by the scalar's range over the cells of this kind. The scalar's range is computed unless it is known
- * already. */
+/* Widens the range by the range of the scalar's values over the set `kind` of the mesh's cells. The latter is computed
+ * here unless it is known already. */
 static void add_extent_range(const session_mesh *mesh, session_scalar *scalar, int threads, session_extent_kind kind,
                              field_range *range)
 {
@@ -154,14 +157,15 @@ static field_range find_own_range(const session_meshes *meshes, const planned_la
     return range;
 }
 
-/* Further data that is reduced together with the layers' ranges. */
+/* Further values that are reduced in the same call as the layers' ranges. */
 typedef struct reduced_extras {
     bool has_other_cells; /* set if some rank has cells that are not shown (session_unusable.h) */
     int reporting_word;   /* maximum of all ranks' session_encode_rank_with_warnings() */
 } reduced_extras;
 
-/* Combines the layers' ranges, earlier errors and the extra data over all ranks in one reduction. The ranges are
- * undefined after an error. Collective. */
+/* Reduces the layers' ranges, earlier errors and *extras over all ranks in one call. of_all_cells: the ranges are
+ * computed from the values of all cells, instead of from the trees. The ranges are undefined after an error.
+ * Collective. */
 static insitu_status reduce_ranges(const session_meshes *meshes, const session_team *team, layer_batch *batch,
                                    bool of_all_cells, reduced_extras *extras, base_error *error)
 {
@@ -216,8 +220,8 @@ static bool is_transparent(const scene_volume *volume, const field_range *range)
     return true;
 }
 
-/* The true minimum may exceed the trees' minimum by the rounding to float32. Returns the trees' range with the minimum
- * raised by that much. */
+/* Returns the range that is found in the trees, with its minimum raised by the largest rounding error of float32. The
+ * true minimum of the values may exceed the trees' minimum by that much. */
 static field_range raise_tree_minimum(const field_range *range)
 {
     const double low = range->low < INFINITY ? (double)nextafterf((float)range->low, INFINITY) : INFINITY;

@@ -52,9 +52,9 @@ static bool add_single_group(session_catalogue *catalogue, session_catalogue_mes
     return true;
 }
 
-/* Forms the group of all meshes without global ids for this purpose, unless it exists already, and computes its name, a
- * hash of the names of its meshes. The name is 0 if there are no such meshes. Each mesh with ids forms a group by
- * itself. Returns false if memory runs out. */
+/* Forms the mesh group for a purpose, unless it exists already: all meshes without global ids to which the purpose
+ * applies. Computes the group's name, a hash of the names of its meshes; the name is 0 if there are no such meshes.
+ * Each mesh with ids forms a group by itself. Returns false if memory runs out. */
 static bool group_meshes(session_catalogue *catalogue, const group_purpose *purpose, uint64_t *mesh_group_name)
 {
     uint64_t hash = SESSION_HASH_BEGIN;

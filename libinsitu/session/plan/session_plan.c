@@ -120,7 +120,8 @@ static insitu_status refuse_missing_field(const session_plan_basis *basis, const
                      basis->scene_path, field->line, field->name, meant, names);
 }
 
-/* Checks that a mesh that the layer names exists. If any rank has cells of it, the mesh must also have the field. */
+/* Checks that a mesh that the scene names for a layer exists, and that it has the layer's field. The second check is
+ * omitted if no rank has cells of the mesh. */
 static insitu_status check_named_mesh(const session_plan_basis *basis, const scene_field *field, const char *name,
                                       base_error *error)
 {
@@ -293,8 +294,8 @@ static bool plan_recentrings(const session_catalogue *catalogue, session_plan *p
 
 /* ---- all images ---------------------------------------------------------------------------------------------- */
 
-/* Returns the number of multiples of the interval up to the time. A multiple is included even if the time is below it
- * by rounding, because ten steps of 0.1 add up to slightly less than 1. */
+/* Returns how many multiples of `interval` are not larger than `time`. A multiple that exceeds `time` only by rounding
+ * is counted too, because ten steps of 0.1 add up to slightly less than 1. */
 static double count_intervals(double time, double interval)
 {
     const double count = time / interval;

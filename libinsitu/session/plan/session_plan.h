@@ -13,7 +13,7 @@
 typedef struct session_recentring {
     session_mesh_group *mesh_group;
     const char *field;
-    int component; /* number of the component, as in grid_field.component */
+    int component; /* index of the component, or -1 for the magnitude (grid_field.component) */
 } session_recentring;
 
 /* The images to draw and the data that they need; the same on every rank. Pointers refer to the scene and the
@@ -21,8 +21,9 @@ typedef struct session_recentring {
 typedef struct session_plan {
     int image_count; /* number of images that can be drawn */
     const scene_image **images;
-    /* Number of layers of each kind in all images; views of an orbit count once. surface_count includes outer surfaces
-     * and, if some meshes contain only shells, isosurfaces. */
+    /* Total number of layers of each type in all images that can be drawn. The views of an orbit have the same layers,
+     * which are counted once. surface_count includes outer surfaces and, if some meshes contain only shells,
+     * isosurfaces. */
     int slice_count, surface_count;
     int recentring_count;
     session_recentring *recentrings;

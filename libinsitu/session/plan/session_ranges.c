@@ -82,8 +82,8 @@ static uint64_t known_bits_mask(int pass)
     return pass ? ~UINT64_C(0) << compute_digit_shift(pass - 1) : 0;
 }
 
-/* MOST_KEPT: maximum number of values that a pass stores for the next passes; FIRST_KEPT: number of the first pass that
- * may store values. */
+/* MOST_KEPT: maximum number of values that a pass stores for the passes after it; FIRST_KEPT: index, from 0, of the
+ * first pass that may store values. */
 enum { MOST_KEPT = 4096, FIRST_KEPT = 2 };
 
 typedef struct weighted_value {
@@ -97,14 +97,15 @@ typedef struct kept_values {
 } kept_values;
 
 typedef struct digit_count {
-    uint64_t known_bits[2]; /* known leading bits of the low and the high percentile; the other bits are 0 */
-    int pass;               /* number of the current pass, from 0; each pass determines one more digit */
-    bool is_positive;       /* true: only positive values are counted */
-    bool is_of_shells;      /* true: only shells are counted; false: only cells with a volume are counted */
-    double largest_area;    /* area of the largest shell that is counted */
+    /* the leading bits that are known of the low and of the high percentile; all other bits are 0 */
+    uint64_t known_bits[2];
+    int pass;            /* index of the current pass, from 0; each pass determines one more digit */
+    bool is_positive;    /* true: only positive values are counted */
+    bool is_of_shells;   /* true: only shells are counted; false: only cells with a volume are counted */
+    double largest_area; /* area of the largest shell that is counted */
     /* for each mesh with cells of higher order, the values of the caller's cells; NULL for all other meshes */
     session_cell_value **order_values;
-    bool is_kept; /* set if the stored values are read instead of cells */
+    bool is_kept; /* set if the values that an earlier pass has stored are read, instead of the cells */
     kept_values kept;
 } digit_count;
 
@@ -134,12 +135,12 @@ static bool add_weight_of_value(const digit_count *of, const weighted_value *val
     return is_counted;
 }
 
-/* The caller's cells of one mesh, with the values of a scalar. */
+/* The caller's cells of one mesh, with their values of one field. */
 typedef struct counted_cells {
     int64_t count;
     const grid *g;
     grid_field field;
-    const session_cell_value *values; /* if some cells are of higher order; otherwise NULL */
+    const session_cell_value *values; /* values of the cells if some of them are of higher order; otherwise NULL */
 } counted_cells;
 
 /* Finds the cells of one mesh, and their values of a field. Returns false if the mesh does not have the field. */
@@ -159,7 +160,7 @@ static bool is_shell(const counted_cells *cells, int64_t cell)
     return cells->values ? cells->values[cell].is_shell : grid_is_shell(cells->g, cell);
 }
 
-static double find_area(const counted_cells *cells, int64_t cell)
+static double find_shell_area(const counted_cells *cells, int64_t cell)
 {
     return cells->values ? cells->values[cell].volume : session_shell_area(cells->g, cell);
 }
@@ -182,7 +183,7 @@ static bool find_mean_of_extremes(const digit_count *of, const counted_cells *ce
 static int64_t find_weight(const digit_count *of, const counted_cells *cells, int64_t cell)
 {
     if (!of->is_of_shells) return 1;
-    return of->largest_area > 0 ? llrint(find_area(cells, cell) / of->largest_area * 0x1p28) : 0;
+    return of->largest_area > 0 ? llrint(find_shell_area(cells, cell) / of->largest_area * 0x1p28) : 0;
 }
 
 static void count_cells(const counted_cells *cells, int threads, digit_count *of, int64_t counts[2 * DIGITS])
@@ -238,7 +239,7 @@ static void find_own_kinds_of_cells(const counted_cells *cells, int threads, con
             double middle;
             if (least[SOLID] < 0 || !find_mean_of_extremes(of, cells, cell, &middle)) continue;
             if (is_shell(cells, cell))
-                least[AREA] = fmin(least[AREA], -find_area(cells, cell));
+                least[AREA] = fmin(least[AREA], -find_shell_area(cells, cell));
             else
                 least[SOLID] = -1;
         }
@@ -273,9 +274,9 @@ static void free_order_values(const session_meshes *meshes, digit_count *of)
     base_free(of->order_values);
 }
 
-/* Determines whether cells with a volume are counted, or shells. */
-static insitu_status find_kind(const session_meshes *meshes, const session_team *team, const scene_field *field,
-                               digit_count *of, base_error *error)
+/* Determines, over all ranks, whether cells with a volume are counted or, if there are none, shells. */
+static insitu_status choose_counted_cells(const session_meshes *meshes, const session_team *team,
+                                          const scene_field *field, digit_count *of, base_error *error)
 {
     double least[KINDS] = {0};
     if (!find_order_values(meshes, team->threads, field, of, error)) least[LACKING] = -1;
@@ -290,8 +291,9 @@ static insitu_status find_kind(const session_meshes *meshes, const session_team 
     return status || least[LACKING] == 0 ? status : session_agree(team->comm, error);
 }
 
-/* Returns the digit of the value at the position *rank of the sorted values. Positions are in units of weight, from 0.
- * *rank becomes the value's position among the values with this digit. */
+/* Finds the digit of the value at a position in the sorted list of values, where each value takes as many positions as
+ * its weight. On entry, *rank is the position among the values whose earlier digits are known; on return, it is the
+ * position among those of them with the digit found. Returns the digit. */
 static int find_digit_at_position(const int64_t counts[DIGITS], int64_t *rank)
 {
     int digit = 0;
@@ -313,7 +315,7 @@ static insitu_status find_percentiles(const session_meshes *meshes, const sessio
     const double percent[2] = {map->range.low, map->range.high};
     int64_t counts[2 * DIGITS], total = 0, ranks[2] = {0, 0};
     digit_count of = {.is_positive = map->scale == SCENE_LOG};
-    insitu_status status = find_kind(meshes, team, field, &of, error);
+    insitu_status status = choose_counted_cells(meshes, team, field, &of, error);
     for (of.pass = 0; of.pass < PASSES && !status; of.pass++) {
         status = count_digits(meshes, team, field, &of, counts, error);
         for (int i = 0; i < DIGITS && of.pass == 0; i++) total += counts[i];

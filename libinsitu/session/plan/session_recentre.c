@@ -32,8 +32,9 @@
 #include "session_scalars.h"
 #include "session_vertex_groups.h"
 
-/* Values by group: those of group g are values[starts[g]] to values[ends[g] - 1]. There is space up to starts[g + 1],
- * because a cell whose value is not finite contributes none. */
+/* Values sorted by the groups of equal vertices to which they belong. Those of group g are values[starts[g]] to
+ * values[ends[g] - 1]. There is space up to starts[g + 1], because a cell whose value is not finite contributes
+ * none. */
 typedef struct value_groups {
     int64_t count;
     const int64_t *starts; /* index of each group's first value; count + 1 entries */
@@ -49,10 +50,10 @@ typedef struct value_groups {
 typedef struct mesh_part {
     session_scalar *scalar; /* scalar that gets the recentred values; NULL: the part does not have the field */
     bool is_of_vertices;
-    grid_field field; /* the values to recentre */
+    grid_field field; /* the values that are averaged to vertices */
 } mesh_part;
 
-/* The data of one recentring on this rank. */
+/* The data of one recentring on this rank. mesh_group->groups are the groups of equal vertices. */
 typedef struct recentring {
     session_mesh_group *mesh_group;
     session_mesh_group_parts list;
@@ -60,7 +61,7 @@ typedef struct recentring {
     /* index of each group's first value if faces of the boundary have values; NULL: no face has a value, and
      * corner_starts in mesh_group->groups is used */
     int64_t *starts;
-    value_groups values; /* the values to be averaged, by group of mesh_group->groups */
+    value_groups values; /* the values to be averaged, sorted by the groups of mesh_group->groups */
 } recentring;
 
 /* ---- values by group ----------------------------------------------------------------------------------------- */
@@ -425,7 +426,7 @@ static bool has_values(const uint64_t *record, const value_groups *values, int64
     return !values->has_face_values[group] || record[RECORD_HEAD - 1] & FACE_VALUES;
 }
 
-/* Assigns the same number to records with the same key. */
+/* Finds the group of each record: records with equal keys get the same index, from 0, in `groups`. */
 static bool number_records(const session_mail *in, int64_t *groups, session_key_table *keys, int64_t records)
 {
     const uint64_t *end = in->words + in->total;

@@ -2,11 +2,11 @@
  * contains the layer's ranges of all steps so far.
  *
  * The ranges are stored in a file NAME.ranges, where NAME is the image's name, in the folder of the image's first
- * output: the part of its path before the last slash that comes before any placeholder. Further pictures of a sweep
- * use NAME.1.ranges and so on. The file is text. It is written anew after each picture for which a range became
- * wider, and read when the first picture of the image is drawn, so that a restarted run continues with the ranges of
- * the previous one. A line has: isosurface, surface, slice or volume; the layer's number among those of its kind
- * from 0 on; the component (scene.h); low; high; and the field. Lines that match no layer of the image are ignored. */
+ * output: the part of its path before the last slash that comes before any placeholder. Further pictures of a sweep use
+ * NAME.1.ranges and so on. The file is text. It is written anew after each picture for which a range became wider, and
+ * read when the first picture of the image is drawn, so that a restarted run continues with the ranges of the previous
+ * one. A line has: isosurface, surface, slice or volume; the layer's index, from 0, among the image's layers of this
+ * type; the component (scene.h); low; high; and the field. Lines that match no layer of the image are ignored. */
 #ifndef SESSION_RUN_RANGES_H
 #define SESSION_RUN_RANGES_H
 
@@ -16,8 +16,8 @@
 
 /* The widest range of a layer over the run; its pointers refer to the scene. */
 typedef struct session_run_range {
-    const char *kind; /* kind of the layer, as written in the file of ranges */
-    int number;       /* number of the layer among those of its kind */
+    const char *kind; /* type of the layer, as written in the file of ranges: isosurface, surface, slice or volume */
+    int number;       /* index of the layer, from 0, among the image's layers of this type */
     const scene_field *field;
     const scene_colour_map *map;
     double low, high; /* ends of the range, the same on all ranks; low > high: there is no range yet */
@@ -25,8 +25,8 @@ typedef struct session_run_range {
 
 typedef struct session_image_ranges {
     char *image, *path; /* name of the image, and path of the file that keeps its ranges */
-    /* number of the combination of field, isovalue and plane, among those of the image's sweep, to which the ranges
-     * belong (scene_variant.layers); 0 without a sweep */
+    /* If the image has a sweep: index of the combination of field, isovalue and plane to which the ranges belong
+     * (scene_variant.layers). 0 without a sweep. */
     int layers;
     int count;
     session_run_range *items;
@@ -42,8 +42,8 @@ typedef struct session_run_ranges {
 insitu_status session_open_run_ranges(session_run_ranges *all, const scene_image *image, const session_team *team,
                                       session_image_ranges **out, base_error *error);
 
-/* Widens the run's range of the layer with this map by the range of this step, low to high, and returns the result in
- * *low and *high. Local. */
+/* Widens the range over the run of the layer that has this colour map by the range of this step. On entry, *low and
+ * *high are the range of this step; on return, they are the widened range. Local. */
 void session_widen_run_range(session_image_ranges *ranges, const scene_colour_map *map, double *low, double *high);
 
 /* Writes the file if a range has changed. Called on rank 0 only. */

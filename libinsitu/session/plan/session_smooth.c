@@ -213,9 +213,9 @@ static void free_work(smooth_work *work)
 
 /* ---- one item ------------------------------------------------------------------------------------------------ */
 
-/* Numbers the vertices of the part whose gradients this rank needs. The other vertices have no sum, or a sum that only
- * other ranks need. key_indices[vertex] becomes the vertex's number or -1, and sum_of[n] becomes the index of the sum
- * of vertex number n. Returns the number of numbered vertices. */
+/* Gives consecutive indices, from 0, to the vertices of the part whose gradients this rank needs. All other vertices
+ * have no sum, or a sum that only other ranks need. key_indices[vertex] becomes the vertex's index or -1, and sum_of[n]
+ * becomes the index of the sum of the vertex with index n. Returns the number of indices. */
 static int64_t number_vertices_with_gradients(session_sum_part *part, int64_t own_count, int32_t *sum_of)
 {
     int64_t count = 0;

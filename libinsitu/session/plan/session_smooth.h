@@ -20,9 +20,9 @@ insitu_status session_find_smooth_gradients(const session_plan *plan, const sess
 bool session_plan_has_smooth_normals(const session_plan *plan, const session_catalogue *catalogue);
 
 /* Returns whether the normals of the isosurface are interpolated between vertices. This is the case if the scene
- * requests smooth normals. It is also the case if the scene requests gradients, and one of the layer's meshes has cells
- * of higher order with values at nodes: the gradient in a linear piece is not that of the cell's polynomial, while
- * gradients at nodes are. The result is the same on all ranks. */
+ * requests smooth normals. It is also the case if the scene requests normals from gradients, and one of the layer's
+ * meshes has cells of higher order with values at nodes. In such cells, the gradient in a linear piece is not that of
+ * the cell's polynomial, while gradients at nodes are. The result is the same on all ranks. */
 bool session_has_smooth_normals(const scene_isosurface *layer, const session_catalogue *catalogue);
 
 /* Returns whether outer surfaces have normals at vertices. This is the case if some mesh has bent cells of higher

@@ -160,7 +160,8 @@ bool session_make_transfer(double half_diagonal, const scene_colour_map *map, do
 int session_visible_intervals(const scene_volume *volume, mmbvh_interval out[RENDER_MAX_INTERVALS])
 {
     const scene_range *range = &volume->colour_map.range;
-    /* the bands and outside colours are removed below, because a map with a single colour allocates no memory */
+    /* the members for bands and for colours outside the range are cleared below, because a map with a single colour
+     * allocates no memory */
     scene_colour_map map = volume->colour_map;
     map.is_banded = map.has_below = map.has_above = false;
     session_transfer t;

@@ -221,7 +221,8 @@ static insitu_status update_bounds(const tree_update *u, session_mesh *mesh, boo
     if (!mesh->is_geometry_stale && !(mesh->are_bounds_partial && is_other)) return INSITU_OK;
     const insitu_status status = refit_bounds(u, mesh, !is_told || !mesh->is_geometry_stale, error);
     mesh->candidates_key =
-        status ? ~key : key; /* if refitting fails, the bounds are not valid for any set of candidates */
+        /* if refitting failed, the stored key matches no set of candidates, because the bounds are invalid */
+        status ? ~key : key;
     return status;
 }
 

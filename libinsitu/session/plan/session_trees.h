@@ -16,7 +16,9 @@ typedef struct session_rates {
 /* The state of trees that does not belong to a single mesh. */
 typedef struct session_trees {
     session_rates rates;
-    mmbvh parent; /* tree over the trees that parent_key identifies; empty if there is at most one tree */
+    /* tree whose leaves are the trees of the meshes; parent_key identifies these trees; empty if there is at most one
+     * of them */
+    mmbvh parent;
     uint64_t parent_key;
     bool is_parent_stale;
 } session_trees;

@@ -19,9 +19,10 @@ static session_key make_key_of_point(const double position[3])
     return key;
 }
 
-/* Assigns groups to the vertices of a part's drawn cells. A twin is a vertex that is equal to another vertex except for
- * rounding (session_twins.h). While this function runs, group_of_vertex contains -2 - i for the i-th twin. If vertices
- * are equal by id, one_vertex receives the number of one vertex of each group; otherwise it is NULL. */
+/* Assigns the vertices of a part's drawn cells to groups of equal vertices. A twin is a vertex that is equal to
+ * another vertex except for rounding (session_twins.h). While this function runs, group_of_vertex contains -2 - i
+ * for the i-th twin. If vertices are equal by id, one_vertex receives the index of one vertex of each group;
+ * otherwise it is NULL. */
 static void group_vertices_of_part(const groups_basis *basis, int part, session_vertex_groups *out, int64_t *one_vertex)
 {
     const session_mesh *mesh = basis->parts[part];
@@ -47,7 +48,7 @@ static void group_vertices_of_part(const groups_basis *basis, int part, session_
     }
 }
 
-/* Groups the vertices of all parts. If vertices are grouped by id, *one_vertex receives an array with the number of one
+/* Groups the vertices of all parts. If vertices are grouped by id, *one_vertex receives an array with the index of one
  * vertex of each group. Returns false if memory runs out. */
 static bool group_vertices(const groups_basis *basis, session_vertex_groups *out, int64_t **one_vertex)
 {
@@ -95,8 +96,8 @@ static void find_group_position(const groups_basis *basis, const session_vertex_
         memcpy(position, groups->keys.keys[group].words, 3 * sizeof *position);
 }
 
-/* Finds the home rank of each group that lies in another rank's box, and counts the groups per home. The home is -1 if
- * only this rank can have the group. */
+/* Finds the home rank of each group that lies in another rank's box, and counts the groups for each home rank.
+ * home[group] becomes -1 if only this rank can have vertices of the group. */
 static void find_home_ranks(const groups_basis *basis, const int64_t *one_vertex, session_vertex_groups *out, int *home)
 {
     for (int64_t group = 0; group < out->count; group++) {

@@ -112,8 +112,8 @@ static bool find_key_positions(const session_vertex_sums *sums, double (**out)[3
     return true;
 }
 
-/* For each other rank, packs the keys whose vertices lie in the rank's box into a message. *numbers receives the index
- * of each packed key, in the order of the messages. */
+/* For each other rank near this one, packs the keys whose vertices lie in the other rank's box into a message. *numbers
+ * receives the index of each packed key, in the order of the messages. */
 static bool write_requests(const session_vertex_sums *sums, const session_team *team, const session_homes *homes,
                            const double (*positions)[3], session_mail *out, int64_t **numbers)
 {
@@ -152,9 +152,9 @@ static bool extend_keys(session_vertex_sums *sums, int64_t more)
     return true;
 }
 
-/* Finds the number of each key that other ranks have requested, and adds the key if it is new. If has_all_vertices is
- * set, no keys are added, because every vertex has one already. *numbers receives the numbers of the keys, in the order
- * of the messages; -1: this rank has no vertex with the key. */
+/* Finds the index of each key that other ranks have requested, and adds the key if it is new. If has_all_vertices is
+ * set, no keys are added, because every vertex has one already. *numbers receives the indices of the requested keys, in
+ * the order of the messages; -1: this rank has no vertex with the key. */
 static bool read_requests(const session_mail *in, session_vertex_sums *sums, int64_t **numbers)
 {
     const int64_t count = in->total / KEY_WORDS;

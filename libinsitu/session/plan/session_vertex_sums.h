@@ -28,10 +28,11 @@ typedef struct session_vertex_sums {
     int field_count;
     /* true: vertices with equal global ids are equal; false: vertices with equal coordinates are equal */
     bool by_id;
-    bool has_all_vertices; /* true: every vertex of each part has a key, so that no key must be added for requests of
-                              other ranks */
+    /* true: every vertex of each part has a key, so that a key that another rank requests is never new on this rank */
+    bool has_all_vertices;
     session_key_table keys;
-    int64_t own_count; /* number of this rank's keys; the keys after them were requested by other ranks */
+    /* number of keys that this rank needs itself; the keys with higher indices were requested by other ranks */
+    int64_t own_count;
     session_gradient_bounds bounds;
     double length;
     int64_t *sums; /* the sums, session_count_sum_words() words per key */
