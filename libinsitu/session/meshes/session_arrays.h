@@ -18,9 +18,9 @@ enum {
 /* The requirements of an array. */
 typedef struct session_array_rule {
     const char *name; /* name of the elements in messages, in the plural */
-    int64_t count;    /* number of the array's elements, without the end that SESSION_HAS_END adds */
-    int flags;        /* a combination of the SESSION_* bits above */
-    int per_tuple;    /* distance from one element to the next, in elements, if no stride is given */
+    int64_t count; /* number of elements that the array must have, not counting the additional one of SESSION_HAS_END */
+    int flags;     /* a combination of the SESSION_* bits above */
+    int per_tuple; /* distance from one element to the next, in elements, if no stride is given */
 } session_array_rule;
 
 /* Checks that the array is given, has an allowed type, is aligned unless the flags allow unaligned arrays, and has a

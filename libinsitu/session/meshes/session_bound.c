@@ -52,7 +52,8 @@ enum {
 /* Number of directions of the edges of pieces in a simplex, by its dimensions. */
 static const int direction_counts[] = {0, 1, 3, MOST_DIRECTIONS};
 
-/* ---- one simplex ----------------------------------------------------------------------------------------------- */
+/* ---- polynomials on one simplex
+ * ----------------------------------------------------------------------------------- */
 
 /* Lists the nodes of a simplex's lattice of this order, each by its barycentric coordinates times the order. If out is
  * NULL, the nodes are only counted. Returns their number. */
@@ -69,13 +70,13 @@ static int list_nodes(int dimensions, int order, int (*out)[4])
 /* Lists of nodes of a simplex, in the form of list_nodes(). */
 typedef struct node_lists {
     int dimensions, order, count;
-    int fine_order, fine_count; /* order of the finer lattice, and its number of nodes */
+    int fine_order, fine_count; /* order of the finer lattice, and number of nodes that it has */
     bool is_lobatto;            /* set if the nodes of a line are Gauss-Lobatto points */
     /* nodes of the cell, of the finer lattice, and of the lattice whose order is lower by 2 */
     int (*nodes)[4], (*fine)[4], (*lower)[4];
 } node_lists;
 
-/* Returns the number of a node in the list. */
+/* Returns the index of a node in the list. */
 static int find_node(int dimensions, int order, const int node[4])
 {
     int at = node[1];
@@ -127,8 +128,8 @@ static void fill_basis(const node_lists *lists, int axis, bool is_fine, double *
     }
 }
 
-/* Adds a second difference of coefficients along a direction. lower: index in lists->lower of the node at which the
- * difference is taken. number: number of the direction. */
+/* Adds a second difference of Bernstein coefficients along a direction. lower: index in lists->lower of the node at
+ * which the difference is taken. number: index of the direction in list_differences(). */
 static void add_difference(const node_lists *lists, int lower, int number, const int direction[4],
                            session_bound_factor *out)
 {
@@ -146,8 +147,8 @@ static void add_difference(const node_lists *lists, int lower, int number, const
         }
 }
 
-/* Lists the second differences along all directions of pieces' edges. In a tet the last direction is that of the
- * diagonals along which octahedra are cut (session_pattern.c). */
+/* Lists the second differences of Bernstein coefficients along the directions of all edges of pieces. In a tet the last
+ * direction is that of the diagonals along which octahedra are cut (session_pattern.c). */
 static void list_differences(const node_lists *lists, session_bound_factor *out)
 {
     static const int directions[MOST_DIRECTIONS][4] = {{-1, 1, 0, 0}, {-1, 0, 1, 0}, {0, -1, 1, 0}, {-1, 0, 0, 1},
@@ -162,8 +163,8 @@ static double *make_matrix(int rows, int columns)
     return base_calloc((size_t)rows * (size_t)columns, sizeof(double));
 }
 
-/* Converts a matrix that is applied to Bernstein coefficients into one that is applied to values at nodes. spare:
- * working memory of the matrix's size. */
+/* Converts a matrix that is applied to Bernstein coefficients into one that is applied to values at the cell's nodes.
+ * spare: working memory of the matrix's size. */
 static void convert_columns(const session_bound_factor *of, int level, double *matrix, double *spare)
 {
     const int rows = of->fine_counts[level], columns = of->node_count;
@@ -251,7 +252,8 @@ static void drop_factor(session_bound_factor *factor)
     *factor = (session_bound_factor){0};
 }
 
-/* ---- products -------------------------------------------------------------------------------------------------- */
+/* ---- products of factors
+ * ------------------------------------------------------------------------------------------ */
 
 static int count_factors(int type)
 {
@@ -306,18 +308,20 @@ void session_drop_bound(session_bound *bound)
 
 /* ---- one cell -------------------------------------------------------------------------------------------------- */
 
-/* The data with which the bounds of one cell are computed. */
+/* The input and intermediate results of computing the bounds of one cell. */
 typedef struct bound_job {
     const session_bound *of;
     const session_isovalues *isovalues;
     int level;
-    /* tuples at the nodes of the complete lattice, and their Bernstein coefficients */
+    /* nodes: tuples (x, y, z and value) at all nodes of a complete cell of the cell's order; coefficients: Bernstein
+     * coefficients of these tuples */
     double *nodes, *coefficients;
-    /* tuples at the nodes of the level's lattice, and their derivatives along the axes */
+    /* fine: tuples at the nodes of the finer lattice that is used; slopes: their derivatives along the axes of the
+     * reference cell */
     double *fine, *slopes[3];
-    double (*gradients)[3]; /* gradient of the field at the nodes of the level's lattice; not finite at nodes where the
-                               cell is flat */
-    double *work;           /* working memory of multiply_by_matrices() */
+    /* gradient of the field at each node of the finer lattice; not finite at nodes where the cell is flat */
+    double (*gradients)[3];
+    double *work; /* working memory of multiply_by_matrices() */
     /* bounds of u (top of the file) if the whole cell is one piece (m = 1): bound of the length of u for positions, and
      * bound of |u| for the field */
     double position_bound, value_bound;
@@ -341,8 +345,9 @@ static void divide_work(bound_job *job, double *work)
     job->work = work + 3 * job->of->levels[job->level].count;
 }
 
-/* Multiplies the tuples, of `size` doubles each, with one matrix for each factor of the reference cell. The matrices
- * lead to the nodes of the level's lattice if is_fine is set, and otherwise to those of the cell. */
+/* Multiplies an array of tuples, of `size` doubles each, by one matrix for each factor of the reference cell. If
+ * is_fine is set, the matrices give tuples at the nodes of the finer lattice; otherwise they give as many tuples as the
+ * cell has nodes. */
 static void multiply_by_matrices(const bound_job *job, int size, const double *const matrices[3], bool is_fine,
                                  const double *in, double *out)
 {
@@ -360,16 +365,16 @@ static void multiply_by_matrices(const bound_job *job, int size, const double *c
     }
 }
 
-/* Returns the largest value of q (top of the file, with m = 1) inside a triangle whose B_ij are a, b and c; 0 if the
- * maximum is not inside. */
+/* Returns the largest value of q inside a triangle whose B_ij are a, b and c; 0 if the maximum is not inside. q and
+ * B_ij are defined at the top of the file; here m = 1. */
 static double largest_q_in_triangle(double a, double b, double c)
 {
     const double x = a * (b + c - a), y = b * (c + a - b), z = c * (a + b - c);
     return a > 0 && b > 0 && c > 0 && x >= 0 && y >= 0 && z >= 0 ? 0.5 * a * b * c / (x + y + z) : 0;
 }
 
-/* Returns the largest value of q inside a tet; 0 if the maximum is not inside. b: B_ij for the pairs of corners 01, 02,
- * 03, 12, 13 and 23. */
+/* Returns the largest value of q inside a tet; 0 if the maximum is not inside. q and B_ij are defined at the top of the
+ * file; here m = 1. b: B_ij for the pairs of corners 01, 02, 03, 12, 13 and 23. */
 static double largest_q_in_tet(const double b[6])
 {
     double matrix[16] = {0, b[0], b[1], b[2], b[0], 0, b[3], b[4], b[1], b[3], 0, b[5], b[2], b[4], b[5], 0};
@@ -415,13 +420,14 @@ static double bound_factor(int dimensions, const double b[MOST_DIRECTIONS])
     return out;
 }
 
-/* Upper bounds of u and of -u for each number of a tuple, for m = 1. */
+/* For each number of a tuple (x, y, z, value): upper bounds of u (`above`) and of -u (`below`), where u is the
+ * difference defined at the top of the file, for m = 1. */
 typedef struct bound_sums {
     double above[SIZE], below[SIZE];
 } bound_sums;
 
-/* Adds the bounds of u for one factor of the reference cell. inner: number of doubles from one coefficient of the
- * factor to the next. */
+/* Adds the bounds of u (top of the file) for one factor of the reference cell. inner: number of doubles from one
+ * coefficient of the factor to the next. */
 static void add_factor(const bound_job *job, const session_bound_factor *factor, int inner, bound_sums *sums)
 {
     const int p = job->of->nodes.of.order, all = SIZE * job->of->lattice.count;
@@ -501,8 +507,8 @@ bool session_is_any_between(const session_isovalues *isovalues, double low, doub
     return false;
 }
 
-/* Computes the gradient of the field at a node of the level's lattice from the derivatives along the axes. For a cell
- * with two axes it is the gradient along the cell's surface. */
+/* Computes the gradient of the field at a node of the finer lattice from the derivatives along the axes of the
+ * reference cell. For a cell with two axes it is the gradient along the cell's surface. */
 static void find_gradient(const bound_job *job, int node, double out[3])
 {
     const double *a = job->slopes[0] + SIZE * node, *b = job->slopes[1] + SIZE * node;
@@ -534,8 +540,8 @@ static void find_gradients(bound_job *job)
     for (int n = 0; n < of->levels[job->level].count; n++) find_gradient(job, n, job->gradients[n]);
 }
 
-/* Returns the number of nodes of the level's lattice that have a gradient: all, except the last layer of pyramids, in
- * which the collapsed hex is flat. */
+/* Returns the number of nodes of the finer lattice that have a gradient: all nodes, except those in the last layer of
+ * pyramids, where the hex as which a pyramid is read is collapsed to a point. */
 static int count_gradients(const bound_job *job)
 {
     const session_bound_level *level = &job->of->levels[job->level];
@@ -619,8 +625,9 @@ static double find_volume(const session_bound *of, const double *tuples)
     return of->axis_count < 3 ? 0 : share * fabs(vector3_dot(cross, axes[2])) / (counts[0] * counts[1] * counts[2]);
 }
 
-/* Finds the mean gradient of the field at the nodes of the level's lattice. In straight cells, whose positions differ
- * by rounding only, it is 0, because it is not needed. In other cells it may be not finite. */
+/* Finds the mean gradient of the field over the nodes of the finer lattice. In straight cells the gradient is set to 0,
+ * because positions in a cell and in its pieces differ only by rounding, so that it is not needed. In other cells it
+ * may be not finite. */
 static void find_mean_gradient(bound_job *job, const session_cell_bound *bound, double out[3])
 {
     static const double straight = 1e-6;
@@ -632,18 +639,23 @@ static void find_mean_gradient(bound_job *job, const session_cell_bound *bound, 
         for (int x = 0; x < 3; x++) out[x] += job->gradients[n][x] / count;
 }
 
-/* Mean of u and of its square over the pieces of a cell, for m = 1. */
+/* Mean of u and mean of the square of u over the pieces of a cell. u is the difference between the polynomial and the
+ * linear interpolation (top of the file), for m = 1. */
 typedef struct difference_means {
     double mean, square;
 } difference_means;
 
-/* Returns the means of u over a piece of a simplex with these second derivatives along its edges, in the order of
- * list_differences(). u is half the sum of -second l_i l_j over the edges; the means of products of l_i are known. */
+/* Returns the means of u and its square over a piece of a simplex. second: second derivatives of u along the edges of
+ * the piece, in the order of list_differences(). Let l_i be the barycentric coordinates in the piece, numbered by its
+ * corners i. Then u is half the sum of -second l_i l_j over the edges from i to j, and the means of products of the l_i
+ * are known. */
 static difference_means find_means(int dimensions, const double *second)
 {
     static const int edge_counts[] = {0, 1, 3, 6};
-    static const double singles[] = {0, 1.0 / 6, 1.0 / 12, 1.0 / 20}; /* mean of l_i l_j, by dimensions */
-    /* means of l_i^2 l_j^2, l_i^2 l_j l_k and l_i l_j l_k l_l */
+    /* mean of l_i l_j over a simplex, by its number of dimensions */
+    static const double singles[] = {0, 1.0 / 6, 1.0 / 12, 1.0 / 20};
+    /* means of products of barycentric coordinates over a simplex, by its number of dimensions: l_i^2 l_j^2, l_i^2 l_j
+     * l_k and l_i l_j l_k l_l, where different indices stand for different corners */
     static const double products[][3] = {{0}, {1.0 / 30}, {1.0 / 90, 1.0 / 180}, {1.0 / 210, 1.0 / 420, 1.0 / 840}};
     difference_means out = {0, 0};
     for (int d = 0; d < edge_counts[dimensions]; d++) {
@@ -656,8 +668,9 @@ static difference_means find_means(int dimensions, const double *second)
     return out;
 }
 
-/* Returns the means of u over a cell for one factor of the reference cell. coefficients: Bernstein coefficients of a
- * scalar. inner: distance, in coefficients, between neighbouring coefficients of the factor. */
+/* Returns the means of u and its square over a cell for one factor of the reference cell (top of the file).
+ * coefficients: Bernstein coefficients of a scalar. inner: distance in the array between neighbouring coefficients of
+ * the factor. */
 static difference_means find_factor_means(const bound_job *job, const session_bound_factor *factor, int inner,
                                           const double *coefficients)
 {
@@ -682,9 +695,10 @@ static difference_means find_factor_means(const bound_job *job, const session_bo
     return (difference_means){out.mean / fmax(1, count), out.square / fmax(1, count)};
 }
 
-/* Returns the root mean square of u in the pieces of the cell, for m = 1, as if its second derivatives were those of
- * the coefficients. At a point of space, the field differs by u of the values minus the gradient times u of the
- * positions, to first order. It is assumed that tets from octahedra have the same shape as the other tets, and that the
+/* Returns the root mean square of the error of the field in the pieces of a cell, if the cell has one piece between two
+ * nodes (m = 1). At a point of space, the error is, to first order, u of the values minus the gradient times u of the
+ * positions (u is defined at the top of the file). The second derivatives of u are approximated by second differences
+ * of the coefficients. It is assumed that tets from octahedra have the same shape as the other tets, and that the
  * differences of the factors are independent. coefficients: working memory with one number per node. */
 static double mean_difference(const bound_job *job, const double gradient[3], double *coefficients)
 {

@@ -13,10 +13,11 @@ enum { BOUND_MOST_ORDER = NODES_MOST_ORDER / 2 };
 
 /* A second difference of Bernstein coefficients: a weighted sum of `count` coefficients. */
 typedef struct session_second_difference {
-    int direction; /* number of the edge direction along which the difference is taken, in the order of
-                      list_differences() (session_bound.c) */
+    /* index of the edge direction along which the difference is taken, in the order of list_differences()
+     * (session_bound.c) */
+    int direction;
     int count;
-    int nodes[10]; /* numbers of the coefficients */
+    int nodes[10]; /* indices of the coefficients in the sum */
     double weights[10];
 } session_second_difference;
 
@@ -28,9 +29,11 @@ typedef struct session_bound_factor {
     int node_count;    /* number of nodes */
     double *bernstein; /* matrix from values at nodes to Bernstein coefficients: node_count x node_count */
     int difference_count;
-    session_second_difference *differences; /* second differences along the directions of all edges of pieces */
-    /* for each level: number of nodes of the finer lattice, and matrices of fine_counts[level] x node_count from values
-     * at the cell's nodes to values and derivatives there */
+    /* second differences of the coefficients along all directions that edges of pieces have */
+    session_second_difference *differences;
+    /* For each finer lattice (session_bound.levels): the number of its nodes in this factor, and matrices that give
+     * values and derivatives at these nodes from values at the cell's nodes. The matrices have fine_counts[level] rows
+     * and node_count columns. */
     int fine_counts[BOUND_MOST_LEVELS];
     double *values[BOUND_MOST_LEVELS], *slopes[BOUND_MOST_LEVELS][3];
 } session_bound_factor;
@@ -42,21 +45,27 @@ typedef struct session_bound_level {
     session_pattern pieces;
 } session_bound_level;
 
-/* The data from which the bounds of one kind of cell are computed. */
+/* Precomputed matrices and patterns for computing the bounds of cells of one type with one number of nodes. */
 typedef struct session_bound {
     session_interpolation nodes; /* the cell's nodes, and all nodes of a complete cell of its order */
     session_nodes
-        lattice;      /* same as nodes.complete; for pyramids, which are read as collapsed hexes, the nodes of a hex */
-    double *collapse; /* for pyramids: matrix from nodes.complete to `lattice`; otherwise NULL */
-    int axis_count;   /* number of axes of the reference cell, 2 or 3 */
+        /* nodes from which polynomials are computed: nodes.complete or, for pyramids, which are read as hexes with an
+         * upper face that is collapsed to the apex, the nodes of a hex */
+        lattice;
+    /* for pyramids, the matrix that computes values at the nodes of `lattice` from values at nodes.complete; otherwise
+     * NULL */
+    double *collapse;
+    int axis_count; /* number of axes of the reference cell, 2 or 3 */
     int level_count;
-    session_bound_level levels[BOUND_MOST_LEVELS]; /* each has twice the order of the one before */
+    /* finer lattices that may be used; the order of each is twice that of the one before */
+    session_bound_level levels[BOUND_MOST_LEVELS];
     session_bound_factor line, simplex;
 } session_bound;
 
-/* Prepares the bounds of one kind of cell, of an order from 1 to BOUND_MOST_ORDER, or to INTERPOLATION_MOST_PYRAMID for
- * pyramids. order, is_lobatto: as in session_make_interpolation(). Returns false if memory runs out; the caller must
- * drop *out in any case. */
+/* Makes the matrices and patterns for cells of one type and number of nodes. Their order must be from 1 to
+ * BOUND_MOST_ORDER, or to INTERPOLATION_MOST_PYRAMID for pyramids. order: the order in which nodes are stored in
+ * connectivity. is_lobatto: nodes along the axes of hexes and quads are Gauss-Lobatto points; otherwise they are
+ * equispaced. Returns false if memory runs out; the caller must drop *out in any case. */
 bool session_make_bound(const session_nodes *of, insitu_vertex_order order, bool is_lobatto, session_bound *out);
 void session_drop_bound(session_bound *bound);
 
@@ -75,12 +84,12 @@ bool session_is_any_between(const session_isovalues *isovalues, double low, doub
 size_t session_bound_work_size(const session_bound *of);
 
 /* Returns whether a cell may contain a part of an isosurface, even after its values are rounded to float32. Returns
- * false if a value is not finite. values: the field at the cell's nodes, in the order of its row. work: working
- * memory. */
+ * false if a value is not finite. values: the field at the cell's nodes, in the order of the nodes in connectivity.
+ * work: session_bound_work_size() doubles of working memory. */
 bool session_may_cross(const session_bound *of, const double *values, const session_isovalues *isovalues, double *work);
 
-/* Bounds of one cell, in units of coordinates, if it has one piece between two nodes. If there are n pieces between two
- * nodes, the errors are divided by the square of n. */
+/* Bounds of the errors of one cell, in units of coordinates, if linear pieces connect neighbouring nodes. If each edge
+ * between two nodes is cut into n pieces, the errors are these divided by the square of n. */
 typedef struct session_cell_bound {
     double centre[3], radius; /* a sphere that contains the cell */
     /* set if the cell may contain a part of an isosurface, or if no isovalues are given. It is false if a value or a
@@ -97,10 +106,10 @@ typedef struct session_cell_bound {
     double value_error, volume;
 } session_cell_bound;
 
-/* Computes the bounds of a cell. tuples: x, y, z and the field's value at its nodes, in the order of its row.
- * isovalues: NULL if only the bounds of positions and values are needed. level: index of the lattice to use in
- * of->levels, 0 .. level_count - 1; a finer lattice mostly gives a smaller bound, but takes longer. work: working
- * memory. */
+/* Computes the bounds of a cell. tuples: x, y, z and the field's value at the cell's nodes, in the order of the nodes
+ * in connectivity. isovalues: NULL if only the bounds of positions and values are needed. level: index in of->levels of
+ * the finer lattice to use; a finer one mostly gives a smaller bound, but takes longer. work: session_bound_work_size()
+ * doubles of working memory. */
 session_cell_bound session_bound_cell(const session_bound *of, const double *tuples, const session_isovalues *isovalues,
                                       int level, double *work);
 

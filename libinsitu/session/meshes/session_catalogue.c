@@ -71,7 +71,8 @@ static const session_field *find_field_of_caller(const session_mesh *part, const
     return index < 0 || part->fields[index].is_derived ? NULL : &part->fields[index];
 }
 
-/* Returns whether the part is the first one that has the field; the table lists the field with this part. */
+/* Returns whether the part with index `part` is the first one that has the field. A rank's table lists each field once,
+ * for the first part that has it. */
 static bool is_first_with_field(const session_parts *parts, int part, const session_field *field)
 {
     for (int i = 0; i < part; i++)
@@ -171,7 +172,7 @@ static void hash_parts(const session_parts *parts, uint64_t *hash)
     }
 }
 
-/* Errors that only some blocks have are hashed too, because other ranks must be informed of these errors. */
+/* Errors of single blocks are included in the hash, because other ranks must be informed of them. */
 uint64_t session_hash_names(const session_meshes *meshes)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
@@ -350,8 +351,9 @@ static session_catalogue_field *record_field(session_catalogue_mesh *mesh, bool 
     return field;
 }
 
-/* Records, for a mesh of a rank's table, the fields that other ranks have but this rank lacks. Called after the last
- * field of the mesh has been read. */
+/* Called after the last field of a mesh in the table of `rank` has been read. If that rank has cells of the mesh, marks
+ * it (lacking_rank) as a rank without the field in each field of the mesh that its table does not list, and updates the
+ * mesh's first_rank and has_ids. */
 static void record_missing_fields(session_catalogue_mesh *mesh, bool has_cells, bool has_ids, int rank)
 {
     if (!mesh || !has_cells) return;

@@ -60,7 +60,7 @@ typedef struct session_hanging {
     int border_count;
     session_border *borders; /* one border per part; NULL: not computed yet */
     uint64_t twins_version;  /* version of the vertex coordinates for which the twins of the borders were found */
-    int64_t count, total;    /* numbers of hanging vertices on this rank and on all ranks */
+    int64_t count, total;    /* number of hanging vertices on this rank, and on all ranks together */
     session_hanging_vertex *vertices; /* the hanging vertices; `count` entries */
     /* sent_counts: number of values sent to each rank; sent_groups: the groups whose values are sent, sorted by the
      * rank that receives them */
@@ -75,8 +75,9 @@ typedef struct session_vertex_groups {
     uint64_t positions_hash;
     /* index of each part's first vertex in group_of_vertex, and at the end the total number of vertices */
     int64_t *first_vertices;
-    int64_t *group_of_vertex; /* group of each vertex; -1: the vertex belongs to no drawn cell */
-    int64_t count;            /* number of groups */
+    /* for each vertex of all parts, the index of its group; -1: the vertex belongs to no drawn cell */
+    int64_t *group_of_vertex;
+    int64_t count; /* number of groups */
     /* for each group, the number of corners of drawn cells in all groups before it; count + 1 entries */
     int64_t *corner_starts;
     session_key_table keys; /* keys of the groups, for the vertices of patches, which are found by key; empty if no mesh
@@ -102,7 +103,8 @@ typedef struct session_catalogue_mesh {
     /* set if some of these cells, on any rank, are bent (session_straight.h); computed by session_check_vertex_order()
      */
     bool has_bent_cells;
-    /* error of the mesh; NULL: there is none. The step ignores a mesh with an error, but its fields' names are kept */
+    /* error of the mesh; NULL: there is none. The step ignores a mesh with an error, but the catalogue keeps the names
+     * of its fields */
     base_error *fault;
     int field_count;
     session_catalogue_field *fields;
@@ -126,8 +128,10 @@ typedef struct session_mesh_group {
     session_catalogue_mesh **meshes; /* the meshes of the mesh group, sorted by name; owned by the catalogue */
     /* set if the mesh group is a single mesh with global vertex ids; vertices are then equal if their ids are equal */
     bool by_id;
-    uint64_t positions_hash;    /* hash of the vertex positions of all its meshes */
-    session_homes own_homes;    /* home ranks, if the mesh group has several meshes; unused if it has one mesh */
+    uint64_t positions_hash; /* hash of the vertex positions of all its meshes */
+    /* home ranks, if the mesh group has several meshes; for a single mesh, session_catalogue_mesh.homes is used
+     * instead */
+    session_homes own_homes;
     const session_homes *homes; /* points to own_homes, or to the homes of the single mesh */
     session_vertex_groups groups;
     session_hanging hanging;

@@ -1,6 +1,6 @@
 /* All other code expects each cell's vertices contiguously and in VTK's order, and kernels process eight such cells at
- * once. If the caller stores them in another order, the connectivity is copied into VTK's order, so that the kernels
- * need no further case. Types of cells that have the same order in both conventions, such as tets, are not copied. */
+ * once. If the caller uses another vertex order, the connectivity is copied into VTK's order, so that kernels need not
+ * distinguish orders. Cells of types for which both orders are the same, such as tets, are not copied. */
 #include "session_cell_order.h"
 
 #include "region.h"
@@ -35,7 +35,8 @@ static bool has_reordered_cells(const session_mesh *mesh)
     return cell < g->cell_count;
 }
 
-/* The entries of the caller's connectivity that belong to cells, and their layout in rows, one row per cell. */
+/* The entries of the caller's connectivity that belong to cells. A row is the sequence of entries from the first vertex
+ * of a cell to the first vertex of the next cell; its last entries may be unused. */
 typedef struct cell_rows {
     const grid_array *connectivity;
     int64_t count;       /* number of entries that belong to cells */

@@ -1,9 +1,9 @@
 /* Validates a mesh before any other code reads it, because the grid's accessors check nothing.
  *
- * The cells are checked in one parallel pass, in blocks. Each thread records its invalid cell with the lowest
- * number, and the lowest of all threads is reported, so that the result does not depend on the number of threads.
- * The error message is composed afterwards, from a second check of this cell. Coordinates are checked only if a
- * drawn cell uses them. Vertices that belong to no cell, or only to ghosts, may have any coordinates. Indices are
+ * The cells are checked in one parallel pass, in blocks. Each thread records the lowest index of the invalid cells that
+ * it has found. The lowest index of all threads is reported, so that the result does not depend on the number of
+ * threads. The error message is composed afterwards, from a second check of this cell. Coordinates are checked only if
+ * a drawn cell uses them. Vertices that belong to no cell, or only to ghosts, may have any coordinates. Indices are
  * checked for ghosts too. */
 #include "session_check.h"
 
@@ -53,7 +53,7 @@ typedef enum face_fault {
 
 typedef struct face_fault_details {
     int64_t count;         /* number of the cell's faces */
-    int64_t face;          /* number of the faulty face, as stored in the connectivity */
+    int64_t face;          /* index of the faulty face, as stored in the connectivity */
     int64_t first, end;    /* start and end of the face's vertices in face_connectivity */
     int64_t vertex, other; /* the faulty vertex, or the two ends of an edge */
     int sharing;           /* number of faces that have the edge */
@@ -206,7 +206,7 @@ typedef enum cell_fault { CELL_GOOD, BAD_TYPE, BAD_OFFSETS, BAD_INDEX, BAD_COORD
 typedef struct fault_details {
     int type;
     int64_t first, end; /* start and end offset of the cell */
-    int64_t vertex;     /* number of the faulty vertex, as stored in the connectivity */
+    int64_t vertex;     /* index of the faulty vertex, as stored in the connectivity */
     double position[3];
     face_fault fault_of_faces;
     face_fault_details faces;

@@ -10,7 +10,7 @@
 #include "region.h"
 #include "session_agree.h"
 
-/* The meaning of the numbers in an array. */
+/* The meaning of an array's elements. */
 typedef enum conform_role { OF_COORDINATES, OF_INDICES, OF_TYPES, OF_FLAGS } conform_role;
 
 /* An array of a mesh that may have to be copied. */
@@ -38,7 +38,7 @@ static conform_array find_array(insitu_mesh *m, int number)
     }
 }
 
-/* Returns the type in which indices of a type are read, in place or from a copy. below: upper bound of valid
+/* Returns the type as which indices of the given type are read, in place or from a copy. below: upper bound of valid
  * indices. */
 static insitu_type choose_index_type(insitu_type type, int64_t below)
 {
@@ -170,9 +170,9 @@ static bool copy_map(const insitu_mesh *original, session_conformed *out)
     return true;
 }
 
-/* Makes the description refer to a copy of the array with this number, if the array cannot be read in place. If
- * is_kept, the copy of the previous description is reused; otherwise a new one is allocated. Returns false if memory
- * runs out. */
+/* If the array with index `number` in the list of the mesh's arrays cannot be read in place, makes the description
+ * refer to a copy of it. If is_kept is set, the copy of the previous description is used again; otherwise a new one is
+ * allocated. Returns false if memory runs out. */
 static bool replace_array_by_copy(session_conformed *last, bool is_kept, int number, insitu_mesh *given,
                                   session_conformed *out)
 {

@@ -1,5 +1,6 @@
 /* Copies arrays of a mesh that other code cannot read in place. These are coordinates given as integers, small
- * integers, flags of more than one byte, cell types in the caller's own numbers, and arrays that are not aligned. */
+ * integers, flags of more than one byte, cell types that the caller numbers in its own way, and arrays that are not
+ * aligned. */
 #ifndef SESSION_CONFORM_H
 #define SESSION_CONFORM_H
 

@@ -26,8 +26,8 @@
 
 enum { MOST_NODES_OF_LINE = NODES_MOST_ORDER + 1 };
 
-/* The terms of derivatives while they are computed, in two passes. The first pass only counts the terms, while
- * out->nodes is NULL; the second pass stores them. */
+/* The terms of derivatives, which are found in two passes. The first pass only counts the terms, and out->nodes is
+ * NULL; the second pass stores them. */
 typedef struct term_list {
     session_derivatives *out;
     const session_nodes *of;
@@ -131,7 +131,8 @@ static void store_term(term_list *list, int position, double weight)
     list->count++;
 }
 
-/* Adds the terms that replace the term of a node that a serendipity cell lacks: one for each of the nodes around it. */
+/* Adds the terms that replace the term of a node that a serendipity cell lacks. `at` are the node's lattice indices.
+ * There is one new term for each node from which its value is computed (see the top of this file). */
 static void add_missing_term(term_list *list, const int at[3], double weight)
 {
     int directions[3][3], step[3];
@@ -159,8 +160,8 @@ static void add_term(term_list *list, int i, int j, int k, double weight)
         add_missing_term(list, (const int[]){i, j, k}, weight);
 }
 
-/* Adds the terms of the derivative along an axis of the lattice. These are terms of nodes on the line through the node
- * `at` along this axis. */
+/* Adds the terms of the derivative at a node along an axis of the lattice. `at` are the lattice indices of the node.
+ * The terms are those of the nodes on the line through this node along the axis. */
 static void add_line(term_list *list, const int at[3], int axis)
 {
     int node[3] = {at[0], at[1], at[2]};
@@ -204,7 +205,7 @@ static void add_derivative(term_list *list, const int at[3], int axis)
     add_barycentric(list, b, 3, at[2], -1);
 }
 
-/* ---- kinds ----------------------------------------------------------------------------------------------------- */
+/* ---- derivatives of cells of one type and number of nodes -------------------------------------------------------- */
 
 /* Lists the terms of the derivatives at all nodes. nodes_at: lattice indices of each node, in the order of the cell's
  * row of connectivity. */
@@ -265,7 +266,8 @@ void session_drop_derivatives(session_derivatives *derivatives)
     *derivatives = (session_derivatives){0};
 }
 
-/* ---- all cells ------------------------------------------------------------------------------------------------- */
+/* ---- derivatives of all cells of a mesh
+ * --------------------------------------------------------------------------- */
 
 bool session_has_two_spacings(const session_nodes *of)
 {

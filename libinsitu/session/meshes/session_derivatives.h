@@ -7,13 +7,14 @@
 
 #include "session_rows.h"
 
-/* The derivatives of one kind of cell. The derivative at node n along axis a consists of the terms from
- * starts[axis_count * n + a] up to the next start. */
+/* The derivatives in cells of one kind. Each derivative is a sum of terms, the products of a weight and the value at a
+ * node. Those of the derivative at node n along axis a have the indices from starts[axis_count * n + a] up to the next
+ * element of `starts`. */
 typedef struct session_derivatives {
     int axis_count;       /* 3; 2 for triangles and quads; 0 for pyramids, whose derivatives are not implemented */
     double first_segment; /* distance between the first two nodes of an edge of length 1 */
     int *starts;
-    int *nodes;      /* for each term, the position of its node in the cell's row of connectivity */
+    int *nodes;      /* for each term, the position of its node in the cell's list of nodes in the connectivity */
     double *weights; /* for each term, the weight of the value at its node; weights of a derivative sum to 0 */
 } session_derivatives;
 
@@ -25,8 +26,8 @@ bool session_make_derivatives(const session_nodes *of, insitu_vertex_order order
                               session_derivatives *out);
 void session_drop_derivatives(session_derivatives *derivatives);
 
-/* Returns whether the nodes may be Gauss-Lobatto points that differ from equispaced ones: hexes and quads of order 3
- * and more. */
+/* Returns whether the cell's nodes may be equispaced or Gauss-Lobatto points, which differ in hexes and quads of order
+ * 3 and more. */
 bool session_has_two_spacings(const session_nodes *of);
 
 /* Computes the positions of the p + 1 nodes of an edge from 0 to 1. */
@@ -47,9 +48,9 @@ typedef struct session_polynomials {
      * Gauss-Lobatto points. With finer lattices: the derivatives at the nodes of refined cells, and those at the nodes
      * of all other cells. */
     session_derivatives *kinds;
-    /* If the mesh has finer lattices: `nodal` has the rows of the caller's cells, and their kinds are the kinds of
-     * `kinds`; refined_counts has the number of nodes of a refined cell of each kind. Otherwise the list of kinds in
-     * `nodal` is empty. */
+    /* If the mesh has finer lattices: `nodal` gives access to the nodes of the caller's cells, and its list of kinds
+     * has the same order as `kinds`; refined_counts has the number of nodes of a refined cell of each kind. Otherwise
+     * the list of kinds in `nodal` is empty. */
     session_rows nodal;
     int64_t refined_counts[ROWS_MOST_KINDS];
 } session_polynomials;
@@ -59,8 +60,8 @@ typedef struct session_polynomials {
 bool session_polynomials_create(const session_mesh *mesh, session_polynomials *out);
 void session_polynomials_free(session_polynomials *polynomials);
 
-/* Returns the derivatives of a cell. positions: positions of the cell's nodes, `stride` doubles apart. In quads and
- * hexes of order 3 and more, the positions show whether nodes are equispaced or Gauss-Lobatto points. */
+/* Returns the derivatives to be used for a cell. positions: positions of the cell's nodes, `stride` doubles apart. In
+ * quads and hexes of order 3 and more, the positions show whether nodes are equispaced or Gauss-Lobatto points. */
 const session_derivatives *session_find_derivatives_of_cell(const session_polynomials *polynomials, int64_t cell,
                                                             const double *positions, int stride);
 

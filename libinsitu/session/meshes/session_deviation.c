@@ -40,16 +40,17 @@ void session_read_request_values(const session_rows *rows, const session_deviati
         read_distances(rows, request->plane, cell, count, out);
 }
 
-/* The data with which a mesh's cells are measured. */
+/* The input of measuring the cells of a mesh. */
 typedef struct deviation_work {
-    session_rows rows; /* rows of the caller's cells */
+    session_rows rows; /* access to each cell's list of nodes */
     const session_deviation_request *request;
-    int field_size;                        /* number of components of the field, or 1 */
-    session_bound bounds[ROWS_MOST_KINDS]; /* empty for kinds of cells that are not measured */
+    int field_size; /* number of components of the field, or 1 */
+    /* matrices for each kind of cell (type and number of nodes); empty for kinds that are not measured */
+    session_bound bounds[ROWS_MOST_KINDS];
 } deviation_work;
 
-/* Returns whether session_make_bound() supports this kind of cell. Linear cells are included: they are not measured,
- * but they are marked, since their neighbours may be of higher order. */
+/* Returns whether session_make_bound() supports cells with these nodes. The result is true for linear cells, too: they
+ * are not measured, but they are marked, since their neighbours may be of higher order. */
 static bool has_bound(const session_nodes *of)
 {
     return of->order <= (of->type == GRID_PYRAMID ? (int)INTERPOLATION_MOST_PYRAMID : (int)BOUND_MOST_ORDER);
@@ -162,7 +163,7 @@ static void measure_values(const deviation_work *w, const session_bound *of, int
  * order. size: the size of a pixel. */
 static int64_t estimate_area(const session_cell_bound *bound, const session_nodes *of, double size)
 {
-    /* V / (4 B) of regular cells whose edges have the length 1 */
+    /* area V / (4 B) of regular cells whose edges have the length 1, by cell type; V and B are explained above */
     static const double tet = 0.032, pyramid = 0.055, wedge = 0.09, hex = 0.167;
     const int type = of->type;
     const double share = type == GRID_TET ? tet : type == GRID_PYRAMID ? pyramid : type == GRID_WEDGE ? wedge : hex;
@@ -170,8 +171,9 @@ static int64_t estimate_area(const session_cell_bound *bound, const session_node
     return (int64_t)fmin(16 * share * edge * edge, 1e12);
 }
 
-/* Measures a cell, and updates *out. A cell whose error is below the largest error so far does not affect the result,
- * so its bound is not refined. The result therefore does not depend on the order of cells. */
+/* Measures a cell, and updates *out. A cell whose error, computed on the coarsest lattice, is below the largest error
+ * so far does not affect the result, so that its bound is not computed on finer lattices. The result therefore does not
+ * depend on the order of cells. */
 static void measure_cell(const deviation_work *w, int64_t cell, double *buffer, session_deviation *out)
 {
     const session_bound *of = &w->bounds[session_find_kind_of_cell(&w->rows, cell)];

@@ -17,8 +17,10 @@ typedef struct session_pixels {
 
 /* A cell that is passed to session_deviation_request.use_cell(). */
 typedef struct session_value_cell {
-    int count;                 /* number of nodes */
-    const double (*tuples)[4]; /* x, y, z and the field's value at each node, in the order of the cell's row */
+    int count; /* number of nodes */
+    /* positions and values: x, y, z and the field's value at each node, in the order of the cell's nodes in
+     * connectivity */
+    const double (*tuples)[4];
     const session_cell_bound *bound;
 } session_value_cell;
 
@@ -38,7 +40,8 @@ typedef struct session_deviation_request {
      * once. NULL: only the range of the values is needed. */
     void (*use_cell)(void *of, const session_value_cell *cell);
     void *of_values;
-    bool is_lobatto; /* as in session_make_interpolation() */
+    /* set if nodes along the axes of hexes and quads are Gauss-Lobatto points; otherwise they are equispaced */
+    bool is_lobatto;
     bool marks_only; /* true: cells are only marked in `marks`, and not measured */
     /* one byte per cell, which is set if an isosurface or the plane may cross the cell; NULL: cells are not marked */
     unsigned char *marks;

@@ -12,19 +12,20 @@
 #include "session_split.h"
 #include "session_topology.h"
 
-/* Indices in session_finer.counts, which the ranks reduce. The first entries count blocks by their highest order; the
- * entries named here count cells. */
+/* Indices in session_finer.counts, which the ranks reduce. The entries before LOBATTO count blocks by the highest order
+ * of their cells; the entries named here count cells. */
 enum { LOBATTO = NODES_MOST_ORDER + 1, EQUISPACED, PYRAMIDS, SERENDIPITY, SHELLS };
 _Static_assert((int)SHELLS < (int)SESSION_FINER_COUNTS, "each count has a place");
 
 /* ---- all cells of a mesh ----------------------------------------------------------------------------------------- */
 
 typedef struct finer_work {
-    session_rows rows; /* rows of the caller's cells */
+    session_rows rows; /* access to the nodes of each of the caller's cells */
     const session_finer *finer;
     const unsigned char *marks; /* while lattices are made: one byte per cell, nonzero if the cell is refined; NULL: all
                                    cells are refined */
-    /* for each kind of row, the interpolation for refined cells, and that for one part per edge between two nodes */
+    /* for each kind of cell (type and number of nodes): the interpolation for refined cells (index 0), and that for all
+     * other cells, which have one part between two nodes (index 1) */
     session_interpolation kinds[ROWS_MOST_KINDS][2];
     int64_t node_count; /* number of nodes of all finer lattices */
 } finer_work;
@@ -47,8 +48,8 @@ static bool begin_work(const session_finer *finer, const unsigned char *marks, f
     return is_made;
 }
 
-/* Returns whether a cell is refined, after lattices have been made. count: number of nodes of refined cells of this
- * cell's kind. */
+/* Returns whether a cell is refined, after finer lattices have been made. count: number of nodes that a refined cell of
+ * this type and order has. */
 static bool is_refined(const session_finer *finer, int count, int64_t cell)
 {
     return !finer->offsets || finer->offsets[cell + 1] - finer->offsets[cell] == count;
@@ -220,7 +221,8 @@ void session_end_finer_lattices(session_meshes *meshes)
     }
 }
 
-/* Returns whether the existing lattices and their pieces were made for these marks. */
+/* Returns whether the existing finer lattices and pieces were made for the same refined cells and the same pieces as
+ * those in `marks`. */
 static bool has_marks(const session_finer *finer, const session_cell_marks *marks)
 {
     static const session_piece_set all = {NULL, NULL};
@@ -238,7 +240,8 @@ static bool has_marks(const session_finer *finer, const session_cell_marks *mark
     return is_same && session_is_same_piece_set(&finer->pieces, marks ? &marks->pieces : &all, finer->nodal.cell_count);
 }
 
-/* Returns whether the mesh has another description than before. */
+/* Makes finer lattices in a part of a mesh according to the choice and the marks. Returns whether the cells that the
+ * session reads have changed. */
 static bool make_finer_mesh(session_meshes *meshes, session_mesh *mesh, const session_finer_choice *choice,
                             session_cell_marks *marks, int threads, base_error *error)
 {
@@ -409,8 +412,8 @@ void session_free_choices(session_finer_choice *choices, int count)
     base_free(choices);
 }
 
-/* Adds the number of bytes that finer lattices of `count` cells take with this number of parts: 4 bytes for each vertex
- * and each parent of a piece, and the nodes. */
+/* Adds the number of bytes that the finer lattices of `cells` cells take if each edge between two nodes is cut into
+ * `parts` parts: the nodes, 4 bytes for each vertex of a piece, and 4 for each piece to store its cell. */
 static void add_bytes(const session_nodes *nodes, int parts, int64_t cells, session_finer_bytes *out)
 {
     const int64_t m = parts * nodes->order, pieces = grid_is_shell_type(nodes->type) ? m * m : m * m * m;

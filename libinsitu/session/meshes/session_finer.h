@@ -40,9 +40,11 @@ typedef struct session_finer_choice {
                                pyramids cannot have finer lattices */
     bool is_lobatto;        /* true: nodes of hexes and quads are treated as Gauss-Lobatto points */
     int parts; /* number of parts of each edge between two nodes, 1 .. FINER_MOST_PARTS; it is chosen by the caller */
-    bool is_completed; /* with `parts` = 1: set by the caller if nodes are added to serendipity cells, so that they have
-                          all nodes of their order */
-    int mark_count;    /* number of parts of the mesh on this rank; 0: all cells are refined */
+    /* used if `parts` is 1: set by the caller if nodes are added to serendipity cells, so that they have all nodes of
+     * their order */
+    bool is_completed;
+    /* number of elements of `marks`, one for each part of the mesh on this rank; 0: all cells are refined */
+    int mark_count;
     session_cell_marks *marks; /* marks for each part of the mesh on this rank */
 } session_finer_choice;
 
@@ -90,8 +92,9 @@ void session_end_finer_lattices(session_meshes *meshes);
 /* The values at the nodes of the caller's cells. */
 typedef struct session_node_values {
     const void *of;
-    bool is_by_entry;    /* set if positions are entries of connectivity, counted without the unused ends of rows;
-                            otherwise they are vertices */
+    /* set if nodes are identified by entries of connectivity, counted without unused entries; otherwise they are
+     * identified by vertices */
+    bool is_by_entry;
     int component_count; /* number of components of a tuple */
     void (*read)(const void *of, int64_t position, double *tuple);
 } session_node_values;

@@ -29,7 +29,7 @@ typedef struct session_box {
 typedef struct session_homes {
     bool is_computed; /* set if the other members are up to date */
     bool by_id;       /* set if homes are found by global vertex ids, and not by positions */
-    int rank;         /* number of this rank */
+    int rank;         /* this rank */
     /* The ranks near this rank, including this rank, in ascending order: ranks whose bounding box of drawn cells
      * intersects that of this rank. The relation is symmetric. A rank without cells has no near ranks. Boxes are
      * extended by 2e-5 of the scene's half diagonal, so that the boxes of a vertex and of a face on which it lies up to
@@ -37,8 +37,8 @@ typedef struct session_homes {
     int near_count;
     int *near_ranks;
     session_box *boxes; /* bounding box of each near rank */
-    /* Used if by_id is set: the ids are divided into share_count ranges. Range i begins with the id first_ids[i], and
-     * owners[i] is the home rank of its ids. */
+    /* Used if by_id is set: global ids are divided into share_count ranges. Range i begins with the id first_ids[i],
+     * and owners[i] is the home rank of the vertices with ids in the range. */
     int share_count;
     int64_t *first_ids;
     int *owners;

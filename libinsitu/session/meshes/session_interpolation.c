@@ -30,7 +30,7 @@
 #include "session_shape.h"
 #include "vector3.h"
 
-static int find_index(const session_nodes *of, const int at[3])
+static int find_lexicographic_index(const session_nodes *of, const int at[3])
 {
     return session_node_index(of, INSITU_ORDER_LEXICOGRAPHIC, at[0], at[1], at[2]);
 }
@@ -105,7 +105,8 @@ static void fill_pyramid_basis(int p, const double at[3], double *out)
         }
 }
 
-/* Fills rows of the basis at all nodes of a collapsed hex of order p. */
+/* Fills a matrix with the pyramid's basis functions at all nodes of a hex of order p whose upper face is collapsed to
+ * the apex: one row per node, one column per function. */
 static void fill_collapsed_rows(int p, double *out)
 {
     const int columns = session_complete_nodes(GRID_PYRAMID, p).count;
@@ -117,7 +118,8 @@ static void fill_collapsed_rows(int p, double *out)
             }
 }
 
-/* Fills rows of the basis at all nodes of a pyramid's lattice of order n. */
+/* Fills a matrix with the pyramid's basis functions at all nodes of a pyramid of order n: one row per node, one column
+ * per function. p: order of the basis. */
 static void fill_pyramid_rows(int p, int n, double *out)
 {
     const int columns = session_complete_nodes(GRID_PYRAMID, p).count;
@@ -127,8 +129,9 @@ static void fill_pyramid_rows(int p, int n, double *out)
                 fill_pyramid_basis(p, (const double[]){(double)i / n, (double)j / n, (double)k / n}, out);
 }
 
-/* Replaces each row, the basis at a point, by the weights of the values at a pyramid's nodes for the value at the
- * point. Returns false if memory runs out. */
+/* Converts rows with the values of a pyramid's basis functions at points. Each row is replaced by the weights with
+ * which the values at the pyramid's nodes are summed to give the value at the row's point. Returns false if memory runs
+ * out. */
 static bool convert_rows(int p, int count, double *rows)
 {
     const int size = session_complete_nodes(GRID_PYRAMID, p).count;
@@ -196,7 +199,7 @@ static void find_positions(const session_nodes *of, insitu_vertex_order order, s
         for (int j = 0; j <= p; j++)
             for (int i = 0; i <= p; i++)
                 if (session_has_node(of, i, j, k))
-                    out->positions[find_index(&out->complete, (const int[]){i, j, k})] =
+                    out->positions[find_lexicographic_index(&out->complete, (const int[]){i, j, k})] =
                         session_node_index(of, order, i, j, k);
     session_find_corners(of, order, out->corners);
 }
@@ -218,7 +221,7 @@ static side_axes find_side_axes(const session_shape *shape, const signed char *s
     return (side_axes){at[(int)side[first]], at[(int)side[along]], at[(int)side[across]]};
 }
 
-/* Lists the indices in the cell's lattice of a face's or an edge's nodes. */
+/* Lists the indices, in the lattice of the cell, of the nodes of a face or an edge. */
 static void list_side(const session_nodes *of, const side_axes *axes, int corner_count, int *out)
 {
     const int p = of->order;
@@ -228,7 +231,7 @@ static void list_side(const session_nodes *of, const side_axes *axes, int corner
             for (int a = 0; a < 3; a++)
                 at[a] = axes->origin[a] * p + i * (axes->along[a] - axes->origin[a]) +
                         j * (axes->across[a] - axes->origin[a]);
-            *out++ = find_index(of, at);
+            *out++ = find_lexicographic_index(of, at);
         }
 }
 
@@ -294,8 +297,8 @@ static bool list_own_nodes(session_interpolation *out, int parts)
                 if (session_has_node(&out->of, i, j, k) && is_own_position(out, parts, i) &&
                     is_own_position(out, parts, j) && is_own_position(out, parts, k)) {
                     int *own = out->own[out->own_count++];
-                    own[0] = find_index(&out->complete, (const int[]){i, j, k});
-                    own[1] = find_index(&out->fine, (const int[]){parts * i, parts * j, parts * k});
+                    own[0] = find_lexicographic_index(&out->complete, (const int[]){i, j, k});
+                    own[1] = find_lexicographic_index(&out->fine, (const int[]){parts * i, parts * j, parts * k});
                 }
     return out->own;
 }
@@ -341,7 +344,8 @@ typedef struct cell_job {
     double *out;
 } cell_job;
 
-/* Returns the largest number of nodes that are computed at once: all fine nodes, or those of all faces or edges. */
+/* Returns the number of nodes for which memory is needed at a time: all nodes of the finer lattice, or the nodes of all
+ * faces or edges, whichever is larger. */
 static int spare_count(const session_interpolation *of)
 {
     int most = of->fine.count;
@@ -357,8 +361,8 @@ size_t session_interpolation_work_size(const session_interpolation *of, int comp
     return ((size_t)of->complete.count + 2 * (size_t)spare_count(of)) * (size_t)components;
 }
 
-/* Computes one row of a product of matrices. Each sum has the same terms in the same order, whether it is computed in a
- * chunk, whose loops the compiler vectorizes, or in the rest. */
+/* Computes one row of the product of a matrix with an array. Each sum has the same terms in the same order, whether it
+ * is computed in a chunk, whose loops the compiler vectorizes, or in the elements that remain after the last chunk. */
 static void apply_row(const double *row, int columns, int inner, const double *restrict in, double *restrict out)
 {
     enum { CHUNK = 4 };
@@ -387,10 +391,11 @@ static void multiply_by_matrix(const double *matrix, int rows, int columns, int 
 static double neighbour_value(const cell_job *job, const int at[3], const int step[3], int component)
 {
     const int node[3] = {at[0] + step[0], at[1] + step[1], at[2] + step[2]};
-    return job->lattice[find_index(&job->of->complete, node) * job->size + component];
+    return job->lattice[find_lexicographic_index(&job->of->complete, node) * job->size + component];
 }
 
-/* Returns the sum of the values at the two nodes that are `step` away from a node. */
+/* Returns the sum of a component's values at two nodes: those with the lattice indices `at` + `step` and `at` -
+ * `step`. */
 static double sum_pair(const cell_job *job, const int at[3], const int step[3], int component)
 {
     const int back[3] = {-step[0], -step[1], -step[2]};
@@ -421,7 +426,7 @@ static void fill_missing_node(const cell_job *job, const int at[3])
 {
     int directions[3][3];
     const int count = session_find_missing_node_directions(job->of->of.type, at, directions);
-    double *out = job->lattice + find_index(&job->of->complete, at) * job->size;
+    double *out = job->lattice + find_lexicographic_index(&job->of->complete, at) * job->size;
     for (int c = 0; c < job->size; c++)
         out[c] = count == 3 ? middle_of_hex(job, at, c) : middle_of_face(job, at, directions[0], directions[1], c);
 }
@@ -435,7 +440,7 @@ void session_complete_tuples(const session_interpolation *of, int components, co
     for (int n = 0; n < 27 && !of->of.is_complete; n++) {
         const int at[3] = {n % 3, n / 3 % 3, n / 9};
         if (session_has_node(&of->of, at[0], at[1], at[2]) &&
-            of->positions[find_index(&of->complete, at)] >= of->of.count)
+            of->positions[find_lexicographic_index(&of->complete, at)] >= of->of.count)
             fill_missing_node(&job, at);
     }
 }
@@ -468,7 +473,7 @@ static void fill_all_fine_nodes(const cell_job *job)
     }
 }
 
-/* Finds how many corners are before each corner in the lexicographic order of positions. */
+/* Computes the rank of each corner in the lexicographic order of positions: the number of corners before it. */
 static void rank_corners(int count, const double (*corners)[3], int ranks[8])
 {
     for (int c = 0; c < count; c++) ranks[c] = 0;
@@ -480,7 +485,8 @@ static void rank_corners(int count, const double (*corners)[3], int ranks[8])
         }
 }
 
-/* Chooses the axes of a face or an edge by the positions of its corners. */
+/* Chooses one of the orders in which the nodes of a face or an edge can be listed, by the ranks of its corners in the
+ * order of positions. All cells that share the face or edge choose the same order of its nodes. */
 static int choose_corner_numbering(const signed char *side, int corner_count, const int ranks[8])
 {
     int first = 0;
@@ -491,7 +497,8 @@ static int choose_corner_numbering(const signed char *side, int corner_count, co
     return 2 * first + (ranks[(int)side[(first + corner_count - 1) % corner_count]] < next);
 }
 
-/* Computes the nodes on faces or edges with the same number of corners from the nodes of each of them. */
+/* Computes the nodes of the finer lattice on all faces with the same number of corners, or on all edges. Those on a
+ * face or edge are computed only from the cell's nodes on it. */
 static void fill_side_nodes(const cell_job *job, const session_interpolation_sides *sides, const int ranks[8])
 {
     const session_interpolation *of = job->of;

@@ -1,6 +1,7 @@
-/* A lattice's cells need no connectivity: the number of a vertex is computed from its three indices. Uniform and
- * rectilinear coordinates are stored as a table along each axis. A uniform coordinate is origin + spacing * index with
- * the index counted in the whole lattice, so that blocks and ranks that share a vertex compute the same bits. */
+/* A lattice's cells need no connectivity: the index of a vertex is computed from its three indices along the axes.
+ * Uniform and rectilinear coordinates are stored as a table along each axis. A uniform coordinate is origin + spacing *
+ * index with the index counted in the whole lattice, so that blocks and ranks that share a vertex compute the same
+ * bits. */
 #include "session_lattice.h"
 
 #include <math.h>

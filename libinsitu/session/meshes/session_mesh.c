@@ -424,7 +424,8 @@ static void free_mesh(session_mesh *mesh)
     base_free(mesh);
 }
 
-/* Compares a mesh with a sort key: name, then block number, then axes of a mirror image. */
+/* Compares a mesh with a sort key that consists of a name, a block's number and the axes of a mirror image, compared in
+ * this order. Returns a negative number, 0 or a positive number. */
 static int compare_mesh(const session_mesh *mesh, const char *name, int64_t block, int mirror_axes)
 {
     const int order = strcmp(mesh->name, name);

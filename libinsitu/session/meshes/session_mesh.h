@@ -83,7 +83,7 @@ typedef struct session_plane {
  * vertices' signed distances from a plane. */
 typedef struct session_scalar {
     int field;                /* index of the field in the mesh; -1: the scalar is the signed distance from a plane */
-    int component;            /* number of the component, in the format of grid_field.component */
+    int component;            /* index of the component, or -1 for the magnitude (grid_field.component) */
     bool is_recentred;        /* set if cell or corner values are averaged to vertices */
     uint64_t mesh_group_name; /* value of scene_field.mesh_group_name, if the values are recentred */
     int64_t computed_count;   /* number of times that the values have been computed */
@@ -100,7 +100,8 @@ typedef struct session_scalar {
     float *distances;    /* distance of each vertex; NULL: not computed yet. insitu_report lists it as a copy */
     /* cell values recentred to vertices; NULL: not computed yet. insitu_report lists them as a copy */
     double *vertex_values;
-    grid_field original_values; /* the caller's values of the cells, if recentred values are used */
+    /* if the values are recentred, the cell or corner values from which they are computed */
+    grid_field original_values;
     /* index of each vertex in `gradients`, or -1; NULL: not computed yet. The gradients are those of the last step that
      * drew smooth normals. insitu_report lists them as a copy */
     int32_t *gradient_indices;
@@ -133,7 +134,7 @@ struct session_mesh;
 typedef struct session_threshold {
     bool is_given; /* if not set, all cells are selected */
     int field;     /* index of the field in the mesh; -1: the mesh does not have it, so that no cell is selected */
-    int component; /* number of the component, in the format of grid_field.component */
+    int component; /* index of the component, or -1 for the magnitude (grid_field.component) */
     double low, high;
 } session_threshold;
 
@@ -165,7 +166,9 @@ typedef struct session_outer {
 typedef struct session_topology {
     /* set if the arrays match the current cells, even if nothing had to be computed */
     bool is_made;
-    bool has_own_order;               /* set if `connectivity` below is read with the caller's offsets and types */
+    /* set if the member `connectivity` below is read instead of the caller's, while the offsets and types are the
+     * caller's */
+    bool has_own_order;
     bool has_own_cells;               /* set if the cells below are read instead of the caller's cells */
     grid_array offsets, connectivity; /* offsets are NULL if all cells have the type cell_type */
     unsigned char *cell_types;        /* type of each cell; NULL: all cells have the type cell_type */
@@ -181,15 +184,16 @@ typedef struct session_topology {
      * consecutive. */
     bool is_split;               /* true: cells are split into pieces; false: the members below are empty */
     bool depends_on_coordinates; /* set if the pieces depend on the coordinates */
-    int64_t cell_count;          /* number of pieces into which the cells are split */
-    uint32_t *parents;           /* for each piece, the caller's cell */
-    int64_t *first_pieces;       /* for each of the caller's cells its first piece, and at the end cell_count */
-    unsigned char *ghosts;       /* one byte per piece, nonzero if its cell is a ghost; NULL: there are no ghosts */
+    int64_t cell_count;          /* total number of pieces of all cells */
+    uint32_t *parents;           /* for each piece, the index of the caller's cell from which it was cut */
+    /* for each of the caller's cells, the index of its first piece; a final entry has the number of pieces */
+    int64_t *first_pieces;
+    unsigned char *ghosts; /* one byte per piece, nonzero if its cell is a ghost; NULL: there are no ghosts */
 } session_topology;
 
 /* Vertices of a discontinuous mesh (session_discontinuous.h): each corner of each cell has a vertex of its own, which
- * is read in place of the vertices that cells share. insitu_report lists them as a copy. Corners are numbered as in the
- * caller's connectivity, without the unused ends of rows. */
+ * is read in place of the vertices that cells share. insitu_report lists them as a copy. The index of a corner is its
+ * position in the caller's connectivity, where unused entries are not counted. */
 typedef struct session_discontinuous {
     bool is_active; /* set if the mesh is discontinuous; otherwise all other members are empty */
     bool is_made;   /* set if the coordinates are up to date */
@@ -211,17 +215,19 @@ typedef struct session_sizes {
     double size_sum;
 } session_sizes;
 
-/* Numbers of cells, one for each kind. Shells are cells that are drawn and have no volume. */
+/* Number of cells in each of several classes. Shells are cells that are drawn and have no volume. */
 typedef struct session_counts {
     int64_t drawn_count, ghost_count, inverted_count, flat_count, shell_count;
 } session_counts;
 
-/* The linear pieces of cells of higher order that are made; the other pieces are not drawn. */
+/* Selects, among the linear pieces of cells of higher order, those that are made; the other pieces are not drawn. */
 typedef struct session_piece_set {
-    /* for each cell, the index of its first word in `bits`; a final entry marks the end. For a cell without words, all
-     * pieces are made. NULL: all pieces of all cells are made */
+    /* for each cell, the index of its first word in `bits`; a final entry marks the end. If a cell has no words, all of
+     * its pieces are made. NULL: all pieces of all cells are made */
     int64_t *first_words;
-    uint64_t *bits; /* one bit per piece of a cell, in the order of the cell's pattern; set if the piece is made */
+    /* one bit per piece of a cell, set if the piece is made; the pieces are in the order of the pattern
+     * (session_pattern.h) by which cells of this type and order are split */
+    uint64_t *bits;
 } session_piece_set;
 
 enum { SESSION_FINER_COUNTS = 64 };
@@ -233,7 +239,7 @@ typedef struct session_finer {
     int64_t counts[SESSION_FINER_COUNTS];
     int parts; /* number of parts into which each segment between two nodes of an edge is divided; 0: the mesh has no
                   finer lattices, and session_mesh.given is the caller's mesh */
-    /* sizes and session_mesh.given_counts that the mesh has without finer lattices */
+    /* sizes, and session_mesh.given_counts, that the mesh would have without finer lattices */
     session_sizes sizes;
     session_counts given_counts;
     session_piece_set pieces;
@@ -308,13 +314,14 @@ typedef struct session_level_box {
 
 /* Describes a finer block that covers only part of a cell of this block, which is an error. */
 typedef struct session_misfit {
-    bool exists;               /* set if there is such a block */
-    int axis;                  /* axis along which the finer block ends within the cell */
-    int64_t block, refinement; /* the finer block's number on its rank, and its refinement along the axis */
-    int rank;                  /* rank that has the finer block */
+    bool exists; /* set if there is such a block */
+    int axis;    /* axis along which the finer block ends within the cell */
+    /* index of the finer block among the blocks of its rank, and its refinement along the axis */
+    int64_t block, refinement;
+    int rank; /* rank that has the finer block */
 } session_misfit;
 
-/* Value of session_mesh.block for a mesh that does not consist of blocks; blocks have numbers from 0 on. */
+/* Value of session_mesh.block for a mesh that does not consist of blocks; blocks are numbered from 0. */
 #define SESSION_WHOLE INT64_MIN
 
 /* One rank's part of a mesh, or one block of it. Blocks of one mesh have the same name. */
@@ -412,7 +419,7 @@ typedef struct session_meshes {
                                 other ranks near them */
     session_level_box *level_boxes;
     int64_t stamp; /* incremented by each change of cells or coordinates */
-    /* set if the last step that drew an image warped or mirrored meshes; the same on all ranks */
+    /* set if the most recent step that drew an image had warped or mirrored meshes; the same on all ranks */
     bool are_transformed;
     /* error of an insitu_set_*() call that belongs to no stored mesh; it is kept for one step */
     base_error pending_error;
@@ -507,7 +514,8 @@ session_field *session_add_field(session_mesh *mesh, const char *name);
 
 /* Adds an empty mesh or block, which must not exist yet. Returns NULL if memory runs out. */
 session_mesh *session_add_mesh(session_meshes *meshes, const char *name, int64_t block, base_error *error);
-/* Adds an empty mirror image of a part, which must not exist yet. Returns NULL if memory runs out. */
+/* Adds an empty mirror image of the part `source`; a mirror image along the same axes must not exist yet. Returns NULL
+ * if memory runs out. */
 session_mesh *session_add_mirror_image(session_meshes *meshes, session_mesh *source, int mirror_axes,
                                        base_error *error);
 /* Returns the mirror image of the part `source` along these axes, or NULL if there is none. */
@@ -534,7 +542,7 @@ void session_drop_fields(session_mesh *mesh);
 void session_drop_copy(session_field *field);
 /* Frees the session's copies of the field's tables of patches and components. */
 void session_drop_field_tables(session_field *field);
-/* Frees the data that depends on the cells, after the cells have changed. Fields are kept. */
+/* Frees the data that depends on a mesh's cells, because the cells have changed. Fields are kept. */
 void session_drop_cell_data(session_meshes *meshes, session_mesh *mesh);
 /* Marks the coordinates of the vertices as changed, while the cells' connectivity is unchanged. */
 void session_mark_moved(session_meshes *meshes, session_mesh *mesh);
@@ -598,14 +606,16 @@ static inline int64_t session_caller_cell(const session_mesh *mesh, int64_t cell
     return mesh->topology.is_split ? (int64_t)mesh->topology.parents[cell] : cell;
 }
 
-/* Returns the first of the cells of `cells` that belong to a cell of the caller. They are consecutive, and end before
- * the first one that belongs to the caller's next cell. */
+/* Returns the index, in session_mesh.cells, of the first piece of one of the caller's cells; if cells are not split,
+ * this is the cell itself. The pieces of a cell are consecutive, and end before the first piece of the caller's next
+ * cell. */
 static inline int64_t session_first_piece(const session_mesh *mesh, int64_t cell)
 {
     return mesh->topology.is_split ? mesh->topology.first_pieces[cell] : cell;
 }
 
-/* Returns the number of the caller's cells if they are split into pieces, and otherwise the number of `cells`. */
+/* Returns the number of the caller's cells if they are split into pieces, and otherwise the number of cells in
+ * session_mesh.cells. */
 static inline int64_t session_count_whole_cells(const session_mesh *mesh)
 {
     return mesh->topology.is_split ? mesh->given.cell_count : mesh->cells.cell_count;
@@ -651,8 +661,8 @@ static inline bool session_has_levels(const insitu_mesh *mesh)
     return l && mesh->cell_count > 0 && (l->refinement[0] || l->refinement[1] || l->refinement[2]);
 }
 
-/* Returns the number of faces that the caller gave, including those of the separate list of boundary faces, which are
- * numbered after the others. */
+/* Returns the number of faces that the caller gave, including those of the separate list of boundary faces. The latter
+ * have the highest indices. */
 static inline int64_t session_face_count(const insitu_mesh *mesh)
 {
     return mesh->face_count + mesh->boundary_face_count;

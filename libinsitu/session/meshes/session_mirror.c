@@ -1,5 +1,6 @@
-/* A mirror image is set again, as by a caller, whenever its source mesh has changed. It reads the source's arrays,
- * which belong to the caller or are copies owned by the source; only mirrored coordinates are its own. */
+/* Whenever its source mesh has changed, a mirror image is set again in the same way as a mesh that the caller sets. It
+ * reads the source's arrays, which belong to the caller or are copies owned by the source; only its mirrored
+ * coordinates are stored with the image. */
 #include "session_mirror.h"
 
 #include <string.h>

@@ -137,7 +137,7 @@ static int number_hex_node(int p, bool is_old, int i, int j, int k)
     return inside + i - 1 + r * (j - 1 + r * (k - 1));
 }
 
-static int find_least(const int *b, int count)
+static int find_smallest_number(const int *b, int count)
 {
     int out = b[0];
     for (int n = 1; n < count; n++) out = b[n] < out ? b[n] : out;
@@ -149,7 +149,7 @@ static int find_least(const int *b, int count)
 static int number_triangle_node(int order, const int b[3])
 {
     int at = 0, max = order, min = 0;
-    for (const int inner = find_least(b, 3); min < inner; min++, max -= 2, order -= 3) at += 3 * order;
+    for (const int inner = find_smallest_number(b, 3); min < inner; min++, max -= 2, order -= 3) at += 3 * order;
     for (int n = 0; n < 3; n++, at++)
         if (b[(n + 2) % 3] == max) return at;
     for (int n = 0; n < 3; n++, at += max - min - 1)
@@ -163,7 +163,8 @@ static int number_tet_node(int order, const int b[4])
     static const signed char edge[6][2] = {{1, 2}, {2, 3}, {0, 2}, {0, 1}, {1, 3}, {0, 3}};
     static const signed char face[4] = {1, 3, 0, 2}, face_sides[4][3] = {{0, 2, 3}, {2, 0, 1}, {2, 1, 3}, {1, 0, 3}};
     int at = 0, max = order, min = 0;
-    for (const int inner = find_least(b, 4); min < inner; min++, max -= 3, order -= 4) at += 2 * (order * order + 1);
+    for (const int inner = find_smallest_number(b, 4); min < inner; min++, max -= 3, order -= 4)
+        at += 2 * (order * order + 1);
     for (int n = 0; n < 4; n++, at++)
         if (b[(int)corner[n]] == max) return at;
     for (int n = 0; n < 6; n++, at += max - min - 1)
@@ -177,7 +178,8 @@ static int number_tet_node(int order, const int b[4])
     return at;
 }
 
-/* Returns the index of a node inside a triangle of order p among all nodes inside it, which are numbered row by row. */
+/* Returns the index of a node inside a triangle of order p, among the nodes inside it. These are numbered row by
+ * row. */
 static int number_inner_triangle_node(int p, int i, int j)
 {
     return i + p * (j - 1) - j * (j + 1) / 2;
@@ -254,8 +256,8 @@ static int number_lexicographic_node(int type, int p, int i, int j, int k)
     }
 }
 
-/* Returns the permutation from VTK's order to the given one for the nodes of a cell of order 2, except its corners;
- * NULL if it is the identity. */
+/* Returns the permutation, for the nodes of a cell of order 2 except its corners, that converts VTK's order to the
+ * given one; NULL if both orders are the same. */
 static const signed char *quadratic_permutation(int type, insitu_vertex_order order)
 {
     static const signed char gmsh_tet[] = {4, 5, 6, 7, 9, 8};

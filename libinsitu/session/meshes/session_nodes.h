@@ -43,9 +43,9 @@ int64_t session_node_count(int type, int order);
 /* Returns the reason why the vertex order is not defined for the cell, or NULL if it is defined. */
 const char *session_explain_refused_order(const session_nodes *of, insitu_vertex_order order);
 
-/* Returns the position, in the cell's row of connectivity, of the node with the lattice indices i, j, k. The axes of
- * the lattice are the edges at the cell's first corner. Each layer k of a pyramid has one node less along i and j than
- * the layer below. For a node that a serendipity cell lacks, the result is at least session_nodes.count. */
+/* Returns the position, in the cell's list of nodes in the connectivity, of the node with the lattice indices i, j, k.
+ * The axes of the lattice are the edges at the cell's first corner. Each layer k of a pyramid has one node less along i
+ * and j than the layer below. For a node that a serendipity cell lacks, the result is at least session_nodes.count. */
 int session_node_index(const session_nodes *of, insitu_vertex_order order, int i, int j, int k);
 
 /* Finds the position of each corner in the cell's row of connectivity. Corners are in VTK's order. */

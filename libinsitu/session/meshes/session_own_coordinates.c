@@ -7,8 +7,7 @@ static bool has_axis(int axes, int axis)
     return axes >> axis & 1;
 }
 
-/* Returns whether exactly the axes whose bits are set in `axes` have coordinates, and these coordinates have the given
- * types. */
+/* Returns whether coordinates exist along exactly those axes whose bits are set in `axes`, and have the given types. */
 static bool have_axes_and_types(const insitu_array coordinates[3], int axes, const insitu_type types[3])
 {
     bool are_so = true;

@@ -44,8 +44,8 @@ static void add_piece(const pattern_list *list, int type, const int nodes[][3])
     out->piece_size += count;
 }
 
-/* Adds a piece whose nodes are at `at` plus 0 or 1 along each axis; bit n of an entry of steps is the offset along axis
- * n. */
+/* Adds a piece. Each of its vertices is the node with the lattice indices `at`, plus 0 or 1 along each axis: bit n of
+ * the vertex's entry in `steps` is the offset along axis n. */
 static void add_steps(const pattern_list *list, int type, const int at[3], const signed char *steps)
 {
     int nodes[GRID_MAX_CELL_VERTICES][3];

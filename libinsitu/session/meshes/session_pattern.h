@@ -15,18 +15,20 @@ typedef struct pattern_polygon {
     int nodes[4]; /* positions of the vertices in the cell's row of nodes */
 } pattern_polygon;
 
-/* The pieces of one type and order of cell. For complete cells they are listed here; those of serendipity cells depend
- * on the coordinates of the nodes (session_cut_serendipity()). */
+/* How cells of one type and order are split into pieces. For complete cells the pieces are listed here; those of
+ * serendipity cells depend on the coordinates of the nodes (session_cut_serendipity()). */
 typedef struct session_pattern {
     int type; /* type of the cells as the caller gives it */
     session_nodes nodes;
-    int piece_count, piece_size; /* number of listed pieces, and of entries of `piece_positions` */
+    /* piece_count: number of listed pieces; piece_size: number of entries of `piece_positions` */
+    int piece_count, piece_size;
     unsigned char *types;
-    int *piece_positions; /* positions of the pieces' vertices, one piece after the other */
-    int polygon_count;    /* number of polygons of a serendipity cell; 0 for all other cells */
+    /* vertices of the pieces, one piece after the other, as positions in the cell's list of nodes */
+    int *piece_positions;
+    int polygon_count; /* number of polygons of a serendipity cell; 0 for all other cells */
     pattern_polygon polygons[PATTERN_MOST_POLYGONS];
     int midpoint_count;
-    int midpoints[12]; /* positions of the midpoints of edges */
+    int midpoints[12]; /* positions of the nodes in the middle of edges, in the cell's list of nodes */
 } session_pattern;
 
 /* Lists the pieces of a type and order of cell. Returns false if memory runs out. The only piece of a linear cell
@@ -34,8 +36,9 @@ typedef struct session_pattern {
 bool session_make_split_pattern(int type, const session_nodes *nodes, insitu_vertex_order order, session_pattern *out);
 void session_drop_split_pattern(session_pattern *pattern);
 
-/* Stores the positions of the vertices of a serendipity cell's pieces: 4 for each tet, or 3 for each triangle of a
- * quad. ranks[position]: the number of a midpoint in the order of coordinates. Returns the number of pieces. */
+/* Stores the vertices of a serendipity cell's pieces, as positions in the cell's list of nodes: 4 for each tet, or 3
+ * for each triangle of a quad. ranks[position]: the rank of a midpoint in the lexicographic order of coordinates.
+ * Returns the number of pieces. */
 int session_cut_serendipity(const session_pattern *pattern, const int *ranks, int pieces[PATTERN_MOST_LOOSE][4]);
 
 #endif

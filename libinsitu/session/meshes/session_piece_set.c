@@ -16,22 +16,23 @@
 #include "session_region.h"
 #include "session_shape.h"
 
-/* The data with which pieces of one kind of cell are chosen. */
+/* The data for choosing pieces in cells of one type and number of nodes. */
 typedef struct piece_kind {
     session_interpolation nodes;
     session_pattern pieces;
     int corner_count; /* number of corners of a piece; 0 for pyramids, which are split into pyramids and tets */
-    int word_count;   /* number of words of a cell's bits */
+    int word_count;   /* number of words in session_piece_set.bits that a refined cell takes */
 } piece_kind;
 
 typedef struct piece_work {
-    session_rows rows; /* rows of the caller's cells */
+    session_rows rows; /* access to the nodes of each of the caller's cells */
     piece_kind kinds[ROWS_MOST_KINDS];
     const session_deviation_request *request;
     session_piece_set *set;
 } piece_work;
 
-static bool make_kind(const session_nodes *of, insitu_vertex_order order, int parts, bool is_lobatto, piece_kind *out)
+static bool make_piece_kind(const session_nodes *of, insitu_vertex_order order, int parts, bool is_lobatto,
+                            piece_kind *out)
 {
     const int type = session_lagrange_type(of->type);
     if (!session_make_interpolation(of, order, parts, is_lobatto, &out->nodes)) return false;
@@ -56,7 +57,7 @@ static bool begin_work(const session_mesh *mesh, int parts, bool is_lobatto, ses
     *w = (piece_work){.rows = session_caller_rows(nodal), .set = set};
     session_list_kinds(&w->rows);
     for (int i = 0; i < w->rows.kind_count && is_made; i++)
-        is_made = make_kind(&w->rows.kinds[i].nodes, nodal->vertex_order, parts, is_lobatto, &w->kinds[i]);
+        is_made = make_piece_kind(&w->rows.kinds[i].nodes, nodal->vertex_order, parts, is_lobatto, &w->kinds[i]);
     return is_made;
 }
 
@@ -77,8 +78,8 @@ static insitu_status fail_for_memory(const session_mesh *mesh, base_error *error
 
 /* ---- pieces at nodes --------------------------------------------------------------------------------------------- */
 
-/* Finds one piece at each of the cell's own nodes, for any order of nodes in the row, and all pieces of pyramids.
- * is_own: buffer of one flag per node of the finer lattice. */
+/* Selects one piece at each of the cell's own nodes, whatever the order of the nodes in connectivity is, and all pieces
+ * of pyramids. is_own: buffer of one flag per node of the finer lattice. out: receives the bits of the pieces. */
 static void find_pieces_at_nodes(const piece_kind *kind, int parts, bool *is_own, uint64_t *out)
 {
     const session_nodes *fine = &kind->nodes.fine;
@@ -231,8 +232,8 @@ static void find_faces_of_nodes(const session_nodes *fine, unsigned char *out)
                         (unsigned char)session_faces_of_node(shape, fine->order, (const int[]){i, j, k});
 }
 
-/* Finds, for each face of the cell, the pieces that have a face on it: those with at least three vertices there. out:
- * the words of a set for each face. */
+/* Finds, for each face of a cell, the pieces that have a face on it: those with at least three vertices there. out: for
+ * each face, kind->word_count words with one bit per piece. */
 static void find_pieces_on_faces(const piece_kind *kind, const unsigned char *faces_of_nodes, uint64_t *out)
 {
     const int *corners = kind->pieces.piece_positions;
@@ -245,7 +246,8 @@ static void find_pieces_on_faces(const piece_kind *kind, const unsigned char *fa
     }
 }
 
-/* Returns the words of a set for each face of a kind of cell, allocated by base_alloc(), or NULL if memory runs out. */
+/* Returns the sets of pieces that find_pieces_on_faces() finds, one for each face of a cell. They are allocated by
+ * base_alloc(); NULL if memory runs out. */
 static uint64_t *list_pieces_on_faces(const piece_kind *kind)
 {
     uint64_t *out = base_calloc(SHAPE_MOST_FACES * (size_t)kind->word_count, sizeof *out);

@@ -15,7 +15,9 @@ typedef struct session_row_kind {
 } session_row_kind;
 
 typedef struct session_rows {
-    grid cells; /* the caller's cells; without connectivity, entry i refers to vertex i */
+    /* the caller's cells. If they have no connectivity, each of its entries is a vertex of its own: entry i refers to
+     * vertex i */
+    grid cells;
     /* Used if cells have no offsets. nodes_per_cell: number of nodes of each cell; row_stride: number of entries from
      * the first node of a cell to the first node of the next cell. */
     int64_t nodes_per_cell, row_stride;
@@ -49,14 +51,14 @@ static inline int64_t session_row_vertex(const session_rows *rows, int64_t entry
     return rows->cells.connectivity.data ? grid_array_index(&rows->cells.connectivity, entry) : entry;
 }
 
-/* Returns the index of a cell's node among the entries of the connectivity, if unused entries at the ends of rows are
- * not counted. */
+/* Returns the index of a cell's node, if the nodes of all cells are counted one after the other and unused entries of
+ * the connectivity are not counted. */
 static inline int64_t session_row_entry(const session_rows *rows, int64_t cell, int node)
 {
     return rows->cells.offsets.data ? session_row_first(rows, cell) + node : cell * rows->nodes_per_cell + node;
 }
 
-/* Returns the vertex of session_mesh.cells at the given position of the cell's row. */
+/* Returns the vertex of session_mesh.cells that is the node at the given position in the cell's row. */
 static inline int64_t session_find_row_vertex(const session_rows *rows, int64_t cell, int node)
 {
     return rows->is_discontinuous ? session_row_entry(rows, cell, node)

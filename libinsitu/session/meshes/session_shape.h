@@ -20,7 +20,8 @@ typedef struct session_shape {
 /* Returns the shape of a linear type. */
 const session_shape *session_shape_of(int type);
 
-/* Computes the normal of a face's plane in the reference cell. It is (0, 0, z) for triangles and quads. */
+/* Computes a normal of a face's plane in the reference cell. For triangles and quads, whose reference cell is in the
+ * plane z = 0, it is parallel to z. */
 void session_find_face_plane(const session_shape *shape, int face, int out[3]);
 
 /* Returns a bit mask of the faces on which a node i, j, k of a lattice of this order lies. */

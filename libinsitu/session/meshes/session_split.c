@@ -1,5 +1,5 @@
 /* Trees and kernels support linear cells only. Cells of higher order are therefore split into linear pieces between
- * their own nodes, once per topology. The pieces of a cell are consecutive, and the number of the cell is stored with
+ * their own nodes, once per topology. The pieces of a cell are consecutive, and the index of the cell is stored with
  * each piece, so that ghost flags, cell values, thresholds and counts refer to the caller's cells.
  *
  * The split of a serendipity cell depends on the lexicographic order of its nodes' positions (session_pattern.c), so
@@ -17,20 +17,21 @@
 
 enum { LINEAR_TYPES = GRID_POLYHEDRON + 1 };
 
-/* The state while the caller's cells are split. */
+/* The input and results of splitting the caller's cells. */
 typedef struct split_work {
     const session_mesh *mesh;
     session_rows rows;
-    session_pattern patterns[ROWS_MOST_KINDS]; /* pattern of pieces for each kind of row (type and number of nodes) */
+    session_pattern patterns[ROWS_MOST_KINDS]; /* pattern of pieces for each kind of cell (type and number of nodes) */
     bool is_of_type[LINEAR_TYPES];             /* for each linear type, set if some piece has this type */
     int only_type;                             /* the type of all pieces; 0 if they differ */
     /* first_pieces: for each cell, the index of its first piece; first_entries: for each cell, the index of its first
      * piece's first entry in piece_entries. A last element has the total. first_entries is NULL if all pieces have one
      * type. */
     int64_t *first_pieces, *first_entries;
-    const session_piece_set *set; /* the pieces that are made of each cell */
-    bool stores_entries;          /* set if pieces store entries of the caller's connectivity instead of vertices */
-    grid_array piece_entries;     /* connectivity of the pieces, piece by piece */
+    const session_piece_set *set; /* selects the pieces that are made of each cell */
+    /* set if a corner of a piece is stored as an entry of the caller's connectivity, instead of as a vertex */
+    bool stores_entries;
+    grid_array piece_entries; /* connectivity of the pieces, piece by piece */
 } split_work;
 
 /* ---- the caller's cells ---------------------------------------------------------------------------------------- */
@@ -204,7 +205,7 @@ static void rank_midpoints(const split_work *w, const session_pattern *of, int64
 typedef struct piece_walk {
     const uint64_t *words; /* NULL: all pieces are made */
     int count;             /* number of pieces of the pattern */
-    int next;              /* number of the first piece that has not been returned */
+    int next;              /* index, in the pattern, of the first piece that has not been returned */
 } piece_walk;
 
 static piece_walk begin_piece_walk(const split_work *w, const session_pattern *of, int64_t cell)
@@ -215,7 +216,7 @@ static piece_walk begin_piece_walk(const split_work *w, const session_pattern *o
     return (piece_walk){has_words ? w->set->bits + first[cell] : NULL, of->piece_count, 0};
 }
 
-/* Returns the number of the next piece, or -1 if there are no more. */
+/* Returns the index, in the pattern, of the next piece that is made, or -1 if there are no more. */
 static int next_piece(piece_walk *walk)
 {
     while (walk->words && walk->next < walk->count) {
@@ -292,8 +293,8 @@ static int64_t entry_count(const split_work *w)
     return w->first_entries ? w->first_entries[cells] : w->first_pieces[cells] * grid_type_vertices(w->only_type);
 }
 
-/* Stores a corner of a piece as a vertex or, if stores_entries is set, as an entry of the caller's connectivity. node:
- * the corner's position in the cell's row. */
+/* Stores a corner of a piece at index `at` of the pieces' connectivity: as a vertex or, if stores_entries is set, as an
+ * entry of the caller's connectivity. node: position of the corner in the cell's list of nodes. */
 static void store_corner(const split_work *w, int64_t cell, int64_t at, int node)
 {
     const int64_t first = session_row_first(&w->rows, cell);
@@ -333,7 +334,7 @@ static void store_cells(const split_work *w, int threads)
 
 /* ---- the topology ---------------------------------------------------------------------------------------------- */
 
-/* Stores for each piece the number and the ghost flag of its cell, and its type and offset. */
+/* Stores for each piece the index and the ghost flag of its cell, and the type and offset of the piece. */
 static void store_parents(const split_work *w, session_topology *t)
 {
     const insitu_mesh *given = &w->mesh->given;

@@ -12,11 +12,12 @@ bool session_has_higher_order(const insitu_mesh *given);
  * of the caller's cells are invalid. Local. */
 insitu_status session_split_cells(session_mesh *mesh, int threads, base_error *error);
 
-/* Creates a connectivity of the pieces that contains, instead of vertices, indices of entries of the caller's
- * connectivity, counted without the unused ends of rows. Local. */
+/* Creates a second connectivity of the pieces. Instead of vertices it contains the indices of entries of the caller's
+ * connectivity, where unused entries at the end of each cell's entries are not counted. Local. */
 insitu_status session_split_entries(const session_mesh *mesh, int threads, grid_array *out, base_error *error);
 
-/* Returns the position in the caller's connectivity of an entry that is counted without the unused ends of rows. */
+/* Converts the index of an entry of the caller's connectivity: from an index that does not count the unused entries at
+ * the end of each cell's entries to the index in the caller's array. */
 int64_t session_entry_index(const insitu_mesh *given, int64_t entry);
 
 /* Counts the caller's cells of a mesh whose cells are split. A cell is flat if all its pieces are flat, and inverted if

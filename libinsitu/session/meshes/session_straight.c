@@ -8,27 +8,30 @@
 #include "session_rows.h"
 #include "session_shape.h"
 
-/* Largest distance of a node from its position in the linear cell, as a fraction of the extent of the cell's corners
- * divided by the order. The slope of a face is then off by at most about 1e-4 times a small factor that depends on the
- * order, which is less than one of 255 levels of brightness. */
+/* Largest distance of a node of a straight cell from its position in the linear cell with the same corners. It is a
+ * fraction of the extent of the cell's corners divided by the order. The slope of a face is then wrong by at most about
+ * 1e-4 times a small factor that depends on the order, which is less than one of 255 levels of brightness. */
 static const double slack = 1e-4;
 
-/* The nodes of a kind of cell, and their positions in the linear cell. */
-typedef struct straight_kind {
+/* For cells of one type with one number of nodes: the positions that their nodes have in the linear cell with the same
+ * corners. */
+typedef struct linear_positions {
     session_nodes of;
     int corner_count;
-    int corners[8]; /* position of each corner in the cell's row */
-    /* for equispaced nodes and for Gauss-Lobatto points, 8 weights of the corners for each node in the order of the
-     * row; NULL: the kind does not have these nodes */
+    int corners[8]; /* for each corner, its position in the cell's list of nodes in the connectivity */
+    /* For equispaced nodes (index 0) and for Gauss-Lobatto points (index 1): for each node, in the order of the cell's
+     * list of nodes, the weights of the corners whose weighted mean is its position in the linear cell. NULL: cells of
+     * this type and order have no such nodes, or are not checked. */
     double (*weights[2])[8];
-} straight_kind;
+} linear_positions;
 
 typedef struct straight_work {
     session_rows rows;
-    straight_kind kinds[ROWS_MOST_KINDS];
+    linear_positions kinds[ROWS_MOST_KINDS];
 } straight_work;
 
-/* Computes the weights of the corners at a point of the linear cell. */
+/* Computes the weights of the corners at a point of a linear cell. at: coordinates of the point in the reference
+ * cell. */
 static void find_corner_weights(int type, const double at[3], double out[8])
 {
     const session_shape *shape = session_shape_of(type);
@@ -65,10 +68,10 @@ static bool fill_weights(const session_nodes *of, insitu_vertex_order order, boo
     return *out;
 }
 
-static bool make_kind(const session_nodes *of, insitu_vertex_order order, straight_kind *out)
+static bool make_linear_positions(const session_nodes *of, insitu_vertex_order order, linear_positions *out)
 {
     const session_shape *shape = session_shape_of(of->type);
-    *out = (straight_kind){.of = *of, .corner_count = shape->corner_count};
+    *out = (linear_positions){.of = *of, .corner_count = shape->corner_count};
     if (of->order == 1 || of->type == GRID_PYRAMID) return true;
     session_find_corners(of, order, out->corners);
     return fill_weights(of, order, false, &out->weights[0]) &&
@@ -81,7 +84,7 @@ static bool begin_work(const insitu_mesh *given, straight_work *w)
     session_list_kinds(&w->rows);
     bool is_made = true;
     for (int i = 0; i < w->rows.kind_count && is_made; i++)
-        is_made = make_kind(&w->rows.kinds[i].nodes, given->vertex_order, &w->kinds[i]);
+        is_made = make_linear_positions(&w->rows.kinds[i].nodes, given->vertex_order, &w->kinds[i]);
     return is_made;
 }
 
@@ -91,8 +94,9 @@ static void end_work(straight_work *w)
         for (int n = 0; n < 2; n++) base_free(w->kinds[i].weights[n]);
 }
 
-/* Returns whether all nodes of a cell are where the linear cell has them. corners: positions of the corners. */
-static bool is_straight(const straight_work *w, const straight_kind *kind, int64_t first, const double (*weights)[8],
+/* Returns whether all nodes of a cell are where the linear cell with the same corners has them. first: index in the
+ * connectivity of the cell's first node. corners: positions of the corners. */
+static bool is_straight(const straight_work *w, const linear_positions *kind, int64_t first, const double (*weights)[8],
                         const double (*corners)[3], double tolerance)
 {
     for (int n = 0; n < kind->of.count; n++) {
@@ -109,7 +113,7 @@ static bool is_straight(const straight_work *w, const straight_kind *kind, int64
 
 static bool is_bent(const straight_work *w, int64_t cell)
 {
-    const straight_kind *kind = &w->kinds[session_find_kind_of_cell(&w->rows, cell)];
+    const linear_positions *kind = &w->kinds[session_find_kind_of_cell(&w->rows, cell)];
     const int64_t first = session_row_first(&w->rows, cell);
     double corners[8][3], extent = 0;
     if (!kind->weights[0] || grid_is_ghost(&w->rows.cells, cell)) return false;

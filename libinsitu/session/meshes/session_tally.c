@@ -210,7 +210,8 @@ bool tally_is_flat(const grid *g, int64_t cell)
     return one.flat_count > 0;
 }
 
-/* ---- runs ---------------------------------------------------------------------------------------------------- */
+/* ---- runs of cells
+ * ------------------------------------------------------------------------------------------------ */
 
 MMBVH_INLINE bool offsets_are_good(const session_mesh *mesh, int64_t cell, int count)
 {
@@ -280,7 +281,8 @@ MMBVH_INLINE lane_cells find_uniform_run(const session_mesh *mesh, int64_t cell,
     return alike;
 }
 
-/* Buffer for the connectivity of consecutive cells in a row of a lattice. */
+/* Buffer for the connectivity of consecutive cells in a row of a lattice. A row contains the cells along the axis on
+ * which cell indices are consecutive. */
 enum { ROW_CELLS = 512 };
 typedef struct lattice_row {
     grid cells;
@@ -352,8 +354,9 @@ MMBVH_INLINE bool may_be_flat(const mesh_tally *t, double least)
 
 /* The lengths of the drawn cells along one axis. */
 typedef struct axis_lengths {
-    int64_t positive_count, negative_count; /* numbers of positive and of negative lengths; other lengths are 0 */
-    double size_sum;                        /* sum of the cube roots of the lengths */
+    /* number of cells with a positive length, and number with a negative length; other lengths are 0 */
+    int64_t positive_count, negative_count;
+    double size_sum; /* sum of the cube roots of the lengths */
     double lower, upper;
 } axis_lengths;
 

@@ -1,5 +1,5 @@
-/* The tally of a mesh's cells, which is computed while the mesh is checked: bounds, numbers of cells of several kinds,
- * and a sum of sizes. */
+/* Computes the tally of a mesh's cells while the mesh is checked: the bounds, the number of drawn, ghost, left-handed,
+ * flat and shell cells, and a sum of sizes. */
 #ifndef SESSION_TALLY_H
 #define SESSION_TALLY_H
 
@@ -7,7 +7,7 @@
 
 typedef struct mesh_tally {
     double lower[3], upper[3];
-    /* numbers of cells; shells are drawn cells of a type without volume: triangles, quads and polygons */
+    /* number of cells in each class; shells are drawn cells of a type without volume: triangles, quads and polygons */
     int64_t drawn_count, ghost_count, inverted_count, flat_count, shell_count;
     /* sum of the cube roots of the volumes; added block by block, which keeps the rounding error small */
     double size_sum;
@@ -36,7 +36,7 @@ bool tally_is_flat(const grid *g, int64_t cell);
 typedef int64_t (*tally_run)(const session_mesh *mesh, int64_t begin, int64_t end, mesh_tally *tally);
 
 /* Adds all cells of a uniform or rectilinear lattice at once, computed from the lengths along its axes. Returns false,
- * without adding anything, if the mesh is of another kind or has ghost flags. */
+ * without adding anything, if the mesh is not such a lattice or has ghost flags. */
 bool tally_lattice_by_axes(const session_mesh *mesh, mesh_tally *tally);
 
 /* Returns the function that checks the cells of the mesh's layout. Returns NULL if cells must be checked one by one,

@@ -165,7 +165,7 @@ static insitu_status copy_face_lists(session_mesh *mesh, base_error *error)
 
 /* ---- cells' faces from owner and neighbour -------------------------------------------------------------------- */
 
-/* number that stands for a cell of another rank, or for the missing cell of a face in the separate list of boundary
+/* value that stands for a cell of another rank, or for the missing cell of a face in the separate list of boundary
  * faces */
 static const int64_t outside = INT64_MIN;
 
@@ -188,7 +188,7 @@ void session_find_cells_of_face(const session_face_sides *sides, int64_t face, i
     if (apart >= 0 && (cells[0] == -1 || cells[0] == -1 - base)) cells[0] = outside;
     for (int i = 0; i < 2; i++)
         if (cells[i] >= given->cell_count && cells[i] - given->cell_count < given->halo_cell_count) cells[i] = outside;
-    /* In CGNS, the number 0 stands for a missing cell, on either side of the face. */
+    /* In CGNS, cell 0 means that there is no cell, on either side of the face. */
     if (cells[1] >= 0 && (cells[0] == outside || (base == 1 && cells[0] == -1))) {
         cells[0] = cells[1];
         cells[1] = -1;
@@ -269,7 +269,8 @@ static insitu_status list_faces(session_mesh *mesh, base_error *error)
     return INSITU_OK;
 }
 
-/* ---- one polyhedron ------------------------------------------------------------------------------------------- */
+/* ---- recognition of one polyhedron
+ * -------------------------------------------------------------------------------- */
 
 enum { MOST_FACES = 6 };
 
@@ -408,7 +409,8 @@ static int recognise_polyhedron(const session_mesh *mesh, int64_t cell, int64_t 
     return GRID_POLYHEDRON;
 }
 
-/* ---- all polyhedra -------------------------------------------------------------------------------------------- */
+/* ---- recognition of all polyhedra
+ * --------------------------------------------------------------------------------- */
 
 enum { TYPES = GRID_POLYHEDRON + 1 };
 

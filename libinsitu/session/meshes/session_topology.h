@@ -15,8 +15,8 @@ static inline const void *session_face_list(const insitu_mesh *mesh, int64_t fac
 /* The position at which the vertices of one of the caller's faces are stored. */
 typedef struct session_face_row {
     grid_array list;
-    int64_t first, size; /* index of the row's first entry in the list, and number of the face's vertices */
-    int64_t limit;       /* number of entries of the list that contains the row */
+    int64_t first, size; /* index in `list` of the face's first vertex, and number of the face's vertices */
+    int64_t limit;       /* number of entries of `list` */
 } session_face_row;
 
 session_face_row session_locate_caller_face(const insitu_mesh *mesh, int64_t face);

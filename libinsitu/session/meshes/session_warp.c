@@ -90,8 +90,8 @@ static bool reserve_coordinates(session_mesh *mesh, int component_count, bool *i
 /* The coordinates along one axis before and after the move. */
 typedef struct moved_axis {
     grid_array from;
-    grid_array by; /* displacements along the axis, in the order of the tuples; without data, vertices do not move along
-                      the axis */
+    /* displacements along the axis, one per tuple of the field; without data, vertices do not move along the axis */
+    grid_array by;
     const insitu_array *to; /* receives the moved coordinates; NULL: coordinates along this axis are not stored */
 } moved_axis;
 

@@ -11,8 +11,8 @@ typedef struct session_displacement {
     int field;                /* index of the field in the mesh */
     uint64_t key;             /* hash of everything that determines the displacements */
     int component_count;      /* number of components: 2 or 3 */
-    grid_array components[3]; /* array of the displacements along each axis, one per tuple */
-    grid_array index;         /* index of each vertex's tuple; if it has no data, vertex i has tuple i */
+    grid_array components[3]; /* for each axis, the array of displacements along it, one per tuple of the field */
+    grid_array index;         /* for each vertex, the index of its tuple; if it has no data, vertex i has tuple i */
     int64_t count;            /* number of tuples of the field */
     double scale;             /* factor by which displacements are multiplied */
 } session_displacement;
