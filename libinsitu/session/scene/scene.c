@@ -214,8 +214,8 @@ bool scene_field_is_on(const scene_field *field, const char *mesh)
     return field->mesh_count == 0;
 }
 
-/* Returns whether the entry with this name selects the mesh and has a longer name than the best entry so far. found:
- * the name of that entry, or NULL. */
+/* Chooses between two entries that select the mesh by their names: returns whether `name` selects the mesh and is
+ * longer than `found`, the name of the best entry so far, which may be NULL. */
 static bool is_nearer(const char *name, const char *found, const char *mesh)
 {
     return scene_name_stands_for(name, mesh) && (!found || strlen(name) > strlen(found));

@@ -23,23 +23,26 @@ enum { SCENE_COMPONENT_ONLY = -3, SCENE_COMPONENT_DEFAULT = -2, SCENE_COMPONENT_
 /* A field that a layer shows, with the meshes on which it is shown. */
 typedef struct scene_field {
     char *name;
-    int component; /* number of the component, from 0, or one of the constants SCENE_COMPONENT_* */
+    int component; /* index of the component, or one of the constants SCENE_COMPONENT_* */
     /* set if cell values are averaged to the vertices; otherwise they are drawn as constants per cell */
     bool at_vertices;
-    bool joins_corners; /* set if different values that cells have at a common vertex are replaced by their mean */
-    bool is_as_given;   /* set if hanging vertices keep the values that the caller gave */
-    int line;           /* line in the scene file, for messages about the field */
-    int mesh_count;     /* number of names in `meshes`; 0: the field is shown on all meshes that have it */
-    char **meshes;      /* names of meshes; the name "a" also selects meshes whose names begin with "a/" */
-    int meshes_line;    /* line of `meshes` in the scene file, for messages */
+    /* set if a field with different values of cells at a common vertex gets the mean of these values there */
+    bool joins_corners;
+    bool is_as_given; /* set if hanging vertices keep the values that the caller gave */
+    int line;         /* line in the scene file, for messages about the field */
+    int mesh_count;   /* number of names in `meshes`; 0: the field is shown on all meshes that have it */
+    char **meshes;    /* names of meshes; the name "a" also selects meshes whose names begin with "a/" */
+    int meshes_line;  /* line of `meshes` in the scene file, for messages */
     /* hash of the set of meshes over which values are averaged at vertices; set by the session (session_mesh_groups.h)
      */
     uint64_t mesh_group_name;
 } scene_field;
 
-/* Returns whether the layer's list of meshes includes a mesh of this name, which may still lack the field. */
+/* Returns whether the layer's list of meshes includes the mesh of this name. The mesh may nevertheless lack the
+ * field. */
 bool scene_field_is_on(const scene_field *field, const char *mesh);
-/* Returns whether a name in a scene selects the mesh: it is the mesh's name, or the beginning of it before a slash. */
+/* Returns whether a name in a scene selects the mesh. It does so if it is the mesh's whole name, or the part of the
+ * mesh's name before a slash. */
 bool scene_name_stands_for(const char *name, const char *mesh);
 
 /* The kind of a derived field. All kinds except SCENE_EXPRESSION are computed from gradients at vertices. */
@@ -60,7 +63,8 @@ typedef struct scene_derived {
     char *name;
     int line; /* line in the scene file, for messages */
     scene_derivation kind;
-    /* key of the scene file that gives the kind, for messages; "" for an expression without a key */
+    /* key of the scene file by which the field is computed, such as "gradient", for messages; "" for an expression
+     * without a key */
     const char *key;
     /* component of a gradient or vorticity; SCENE_COMPONENT_DEFAULT: all three components */
     int component;
@@ -69,7 +73,8 @@ typedef struct scene_derived {
     /* fields from which the field is computed: for an expression its inputs; for a gradient a scalar; for other kinds a
      * vector field, or its two or three components */
     scene_field *inputs;
-    int *derived_indices; /* for each input that is a derived field, the index of this field; otherwise -1 */
+    /* for each input: its index among the scene's derived fields, or -1 if it is a field of the caller */
+    int *derived_indices;
     /* hash of the set of meshes over which gradients are averaged; set by the session (session_mesh_groups.h) */
     uint64_t mesh_group_name;
 } scene_derived;
@@ -392,9 +397,11 @@ typedef struct scene_output {
      * and depth. */
     scene_format format;
     bool has_decorations; /* set if the image's decorations, if it has any, are drawn into this file */
-    bool has_data;        /* set if an EXR file also contains the nearest surface's normal, value and numbers */
-    bool is_deep;         /* set for an EXR file with all samples of each pixel, in order of depth */
-    int database;         /* index of the scene's database that lists the picture in its table; -1: none */
+    /* set if an EXR file also contains the normal and the value of the nearest surface, the index of its layer, and its
+     * index within the layer */
+    bool has_data;
+    bool is_deep; /* set for an EXR file with all samples of each pixel, in order of depth */
+    int database; /* index of the scene's database that lists the picture in its table; -1: none */
     /* number of leading bytes of `path` that are the database's folder and its slash; 0 if there is no database */
     int folder_bytes;
     /* number of columns and rows of pictures in one file; 0: the picture is an inset or has its own file */
@@ -464,9 +471,11 @@ typedef struct scene_statistics {
  * Each is a scene_image. */
 typedef struct scene_variant {
     int source; /* index of the image in the file */
-    /* index of the combination of field, isovalue and plane; 0 without a sweep */
+    /* index of the picture's combination of field, isovalue and plane among all combinations of the sweep; 0 without a
+     * sweep */
     int layers;
-    int field, isovalue, plane; /* indices in the sweep's lists; 0 if the sweep has no such list */
+    /* indices of the picture's field, isovalue and plane in the lists of the sweep; 0 if the sweep has no such list */
+    int field, isovalue, plane;
     /* index of the view. Pictures with the same `source` and `layers` differ only in their view and camera. Pictures
      * with a view above 0 share the data that the picture with view 0 owns. */
     int view;

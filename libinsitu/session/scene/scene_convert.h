@@ -22,8 +22,8 @@ bool scene_normalize(double v[3]);
 /* Returns whether two unit vectors are parallel within a millionth of a radian. */
 bool scene_is_parallel(const double a[3], const double b[3]);
 
-/* The numbers of fields, isovalues, planes and views of an image. Their product is the number of pictures that the
- * image makes in a step. */
+/* Number of fields, of isovalues, of planes and of views of which an image makes pictures. Their product is the number
+ * of pictures that the image makes in a step. */
 typedef struct scene_series {
     int fields, isovalues, planes, views; /* each is at least 1 */
 } scene_series;
@@ -52,7 +52,8 @@ void scene_set_orbit_view(scene_camera *camera, int view);
 /* Converts the path of an output that belongs to a database. */
 insitu_status scene_convert_cinema(const scene_document *d, const char *path, const scene_file_output *in,
                                    const scene_image *image, scene_output *out);
-/* Lists the montages of all images, and numbers their panels. Must be called before views are added to the scene. */
+/* Lists the montages of all images, and assigns indices to their panels. Must be called before views are added to the
+ * scene. */
 insitu_status scene_find_montages(const scene_document *d, scene *s);
 /* Lists the databases of all images. Must be called before views are added to the scene. */
 insitu_status scene_find_databases(const scene_document *d, scene *s);

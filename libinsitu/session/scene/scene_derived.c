@@ -108,8 +108,8 @@ static insitu_status read_scalar(const scene_document *d, const char *path, int 
 
 /* ---- one field -------------------------------------------------------------------------------------------------- */
 
-/* Finds the single key that gives the kind of the derived field. *found receives its index in `keys`, or -1 for an
- * expression. */
+/* Finds the key of a derived field that tells how the field is computed, such as `gradient`, and checks that there is
+ * exactly one. *found receives the key's index in `keys`, or -1 for an expression. */
 static insitu_status find_kind_key(const scene_document *d, const char *path, const scene_file_derived *in, int *found)
 {
     const char *first = in->expression ? "expression" : NULL;
@@ -184,8 +184,8 @@ int scene_find_derived(const scene *s, const char *name)
 typedef struct search {
     const scene_document *d;
     scene *s;
-    /* the fields on the path of the search: the field at which the search began, and the chain of dependencies from it
-     * to the current field */
+    /* the chain of fields that the search follows: from the field at which the search began to the current field, each
+     * followed by a field on which it depends */
     int path[SCENE_MAX_DERIVED], length;
     int order[SCENE_MAX_DERIVED], count; /* indices of the sorted fields, and their number */
     bool is_done[SCENE_MAX_DERIVED];

@@ -519,8 +519,8 @@ static bool is_valid_scalar(const yaml_node_t *node, const cyaml_schema_value_t 
 }
 
 /* Makes *to the address at which `count` values are stored. If the schema has a pointer at *to, memory for the values
- * is allocated, and its address is stored in the pointer. If *to is NULL, nothing is stored: the value is read from the
- * document later. */
+ * is allocated, and its address is stored in the pointer. If *to is NULL on entry, nothing is stored, because the value
+ * will be read from the tree of the document. */
 static bool allocate_values(scene_document *d, const cyaml_schema_value_t *value, int count, void **to)
 {
     if (!*to || !(value->flags & CYAML_FLAG_POINTER)) return true;

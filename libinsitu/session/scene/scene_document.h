@@ -49,8 +49,9 @@ int scene_document_texts(const scene_document *d, const char *path, const char *
  * names that the scene defines. */
 int scene_document_names(const scene_document *d, const char *path, const char **names, int most);
 
-/* scene_document_kind() returns the kind of the node at a path. scene_document_number() returns its value if it is a
- * number, otherwise 0. After the document has been checked, a node has a type that the schema allows for its key. */
+/* scene_document_kind() tells whether the node at a path is a scalar, a list or a mapping, or does not exist.
+ * scene_document_number() returns the node's value if it is a number, otherwise 0. After the document has been checked,
+ * a node has a type that the schema allows for its key. */
 typedef enum scene_node { SCENE_NOTHING, SCENE_SCALAR, SCENE_LIST, SCENE_MAPPING } scene_node;
 scene_node scene_document_kind(const scene_document *d, const char *path);
 /* Returns the length of the list at a path; 0 if there is no list. */

@@ -82,7 +82,7 @@ insitu_status scene_convert_colour_by(const scene_document *d, const char *path,
 
 /* ---- iteration over fields --------------------------------------------------------------------------------------- */
 
-/* Returns the layer's contour lines, or NULL for a volume, because volumes have none. */
+/* Returns the contour lines of a layer; NULL for a volume, because volumes have none. */
 static scene_lines *find_layer_lines(const scene_image *image, scene_layer_kind kind, int layer)
 {
     switch (kind) {
@@ -93,7 +93,7 @@ static scene_lines *find_layer_lines(const scene_image *image, scene_layer_kind 
     }
 }
 
-/* Returns the layer's field with this role; NULL if it has none. */
+/* Returns the field that the layer uses in this role (scene_field_role); NULL if it uses none. */
 static scene_field *find_role_field(const scene_image *image, scene_layer_kind kind, int layer, scene_field_role role)
 {
     scene_isosurface *isosurface = kind == SCENE_ISOSURFACE ? &image->isosurfaces[layer] : NULL;

@@ -121,7 +121,7 @@ static insitu_status convert_volume(const scene_document *d, const char *path, c
 
 typedef struct layer_counts {
     int isosurfaces, volumes, slices, surfaces;
-    int values; /* number of isovalues, planes and outer surfaces, all together */
+    int values; /* number of isovalues, planes and outer surfaces, counted together */
 } layer_counts;
 
 static insitu_status count_layer(const scene_document *d, const char *path, const char *key,
@@ -166,7 +166,8 @@ static const char *get_file_layer_word(const scene_file_layer *layer)
     return layer->volume ? "volume" : layer->slice ? "slice" : layer->surface ? "surface" : "isosurface";
 }
 
-/* Converts the clips of a layer. This must be the most recently converted layer of its kind. */
+/* Converts the clips of a layer. The layer must be the most recently converted one among the image's layers of its type
+ * (isosurface, volume, slice or surface). */
 static insitu_status convert_layer_clip(const scene_document *d, const char *path, const scene_file_layer *in,
                                         scene_image *out)
 {
@@ -184,7 +185,8 @@ static insitu_status convert_layer_clip(const scene_document *d, const char *pat
                              "the first volume is clipped differently, expected one clip for all volumes of an image");
 }
 
-/* Stores the index of a layer. This must be the most recently converted layer of its kind. */
+/* Stores the index of a layer in the image's list of layers. The layer must be the most recently converted one among
+ * the image's layers of its type (isosurface, volume, slice or surface). */
 static void set_layer_number(const scene_file_layer *in, int number, scene_image *out)
 {
     if (in->isosurface) out->isosurfaces[out->isosurface_count - 1].number = number;

@@ -130,8 +130,8 @@ char *scene_expand(const char *pattern, const scene_placeholder_values *moment)
     return text;
 }
 
-/* Returns a description of the key that the placeholder needs if the image lacks this key; otherwise NULL. image: path
- * of the image in the file. */
+/* Placeholders such as {view} need a key of the image. Returns a description of this key if the image lacks it;
+ * otherwise NULL. image: path of the image in the file. */
 static const char *find_missing_key(const scene_document *d, const char *image, placeholder_kind kind)
 {
     static const struct {
@@ -274,7 +274,7 @@ scene_placeholder_values scene_make_placeholder_values(const scene_image *image,
                                       image->isovalue, image->swept_field};
 }
 
-/* The path of an output's file, and the output's position: the index of its image, its index in the image, and its
+/* An output of the scene: the path of its file, the index of its image, its index among the image's outputs, and its
  * index among all outputs of the scene. */
 typedef struct written_file {
     char *path;

@@ -437,7 +437,9 @@ static const cyaml_schema_value_t axis_word = {
 static const scene_form plane_forms[] = {{{CYAML_VALUE_FLOAT(CYAML_FLAG_DEFAULT, double)}, {0}}};
 typedef struct no_members {
     char unused;
-} no_members; /* empty struct for a mapping that is one of several forms of a value, and is read from the document */
+    /* Stands for the struct of a mapping in the schema. The mapping is one of several forms of a value, so that it is
+     * read from the tree of the document and has no struct. */
+} no_members;
 
 #define MIRROR_KEYS(X)                                                                                                 \
     X(CYAML_FIELD_IGNORE("x", OPTIONAL), .help = "The mirror plane perpendicular to x is at this x.",                  \

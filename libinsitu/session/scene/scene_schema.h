@@ -63,7 +63,8 @@ typedef struct scene_file_material {
     double *ambient, *diffuse, *specular, *shininess;
 } scene_file_material;
 
-/* The keys of a colour map. The keys map and range have several forms and are read from the document. */
+/* The keys of a colour map. The keys `map` and `range` have several forms and are read from the tree of the document
+ * instead (scene_document.h). */
 typedef struct scene_file_colour_map {
     bool *reversed;              /* whether the order of the colours is reversed */
     int *discrete;               /* number of bands of equal width */
@@ -210,14 +211,14 @@ typedef struct scene_file_decorations {
     double *size;   /* height of text, as a fraction of the picture's height */
 } scene_file_decorations;
 
-/* The keys of a sweep, except `fields`, which is read from the document. */
+/* The keys of a sweep. The key `fields` is read from the tree of the document instead (scene_document.h). */
 typedef struct scene_file_sweep {
     bool *isovalues, *planes;
 } scene_file_sweep;
 
 typedef struct scene_file_output {
     char *path, *cinema;
-    int *grid; /* numbers of columns and rows of a montage */
+    int *grid; /* number of columns, and number of rows of a montage */
     bool *shared_bars;
     int *inset; /* corner of the montage at which the picture is an inset (scene_anchor) */
     int *bits;  /* bits per channel of a PNG file: 8 or 16 */
@@ -227,7 +228,7 @@ typedef struct scene_file_output {
 typedef struct scene_file_condition {
     char *field, *component;
     int *of;               /* statistic of the field that is compared (scene_statistic) */
-    double *above, *below; /* bounds between which the statistic must lie */
+    double *above, *below; /* bounds between which the statistic must lie; `above` is the lower bound */
 } scene_file_condition;
 
 typedef struct scene_file_histogram {
@@ -241,7 +242,8 @@ typedef struct scene_file_statistics {
     scene_file_histogram *histogram;
 } scene_file_statistics;
 
-/* The keys of a derived field, except the one that names the input fields, which is read from the document. */
+/* The keys of a derived field. The key that names the input fields is read from the tree of the document instead
+ * (scene_document.h). */
 typedef struct scene_file_derived {
     char *name, *expression, *component;
 } scene_file_derived;
@@ -287,8 +289,8 @@ typedef struct scene_file {
     int *schedule;         /* schedule of compositing (scene_schedule) */
     int *writing;          /* when pictures are written: during the step or after it (scene_writing) */
     int *finer_pieces;     /* number of pieces between two nodes of a cell of higher order */
-    double *surface_error; /* bound of the error in pixels, by which the number of pieces is chosen */
-    double *finer_memory;  /* maximum memory of these pieces on all ranks, in MiB */
+    double *surface_error; /* bound of the error of pieces, in pixels, by which the number of pieces is chosen */
+    double *finer_memory;  /* maximum memory of the pieces of cells of higher order, on all ranks together, in MiB */
     scene_file_image *images;
     int images_count;
     scene_file_statistics *statistics;

@@ -31,7 +31,8 @@ static const cyaml_strval_t interpolation_words[] = {{"cell", SCENE_BY_CELL}, {"
     "each cell shows its own values, unless this is `vertex`."
 #define RANGE_DEFAULT "`data`"
 
-/* Declares a value that may have several forms. Such a value is read from the document. */
+/* Declares a value that may have several forms. libcyaml's schema cannot describe such a value, so that it is read from
+ * the tree of the document. */
 #define FORMS(key) CYAML_FIELD_IGNORE(key, OPTIONAL)
 #define TAKES(list) .forms = (list), .form_count = (int)CYAML_ARRAY_LEN(list)
 
@@ -43,7 +44,9 @@ static const scene_form path_forms[] = {{{CYAML_VALUE_STRING(CYAML_FLAG_POINTER,
 static const scene_form name_forms[] = {{{CYAML_VALUE_STRING(CYAML_FLAG_POINTER, char *, 1, 255)}, {0}}};
 typedef struct no_members {
     char unused;
-} no_members; /* empty struct for mappings that are one of several forms of a value, and are read from the document */
+    /* Stands for the struct of a mapping in the schema. The mapping is one of several forms of a value, so that it is
+     * read from the tree of the document and has no struct. */
+} no_members;
 
 #define MAP_KEYS(X)                                                                                                    \
     X(CYAML_FIELD_IGNORE("colours", OPTIONAL),                                                                         \

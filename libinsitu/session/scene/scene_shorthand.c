@@ -1,6 +1,6 @@
 /* Rewrites short forms of values. A short form is recognised by its key and the type of its value, independent of where
  * the key appears, because no key of the schema has two meanings that could have the same short form. Nodes are
- * identified by their numbers, because adding a node may move all nodes in memory. */
+ * identified by libyaml's indices, which begin at 1, because adding a node may move all nodes in memory. */
 #include "scene_shorthand.h"
 
 #include <ctype.h>
@@ -28,9 +28,10 @@ static const char *node_text(const rewrite *r, int number)
     return node->type == YAML_SCALAR_NODE ? (const char *)node->data.scalar.value : NULL;
 }
 
-/* ---- new nodes: each function returns the node's number, 0 if memory ran out ------------------------------------ */
+/* ---- new nodes: each function returns the index of the node, or 0 if memory ran out
+ * ------------------------------- */
 
-static int made(rewrite *r, int number)
+static int finish_new_node(rewrite *r, int number)
 {
     if (number)
         find_node_by_index(r, number)->start_mark = r->mark;
@@ -41,18 +42,18 @@ static int made(rewrite *r, int number)
 
 static int make_text(rewrite *r, const char *text)
 {
-    return made(r, yaml_document_add_scalar(r->document, NULL, (const yaml_char_t *)text, (int)strlen(text),
-                                            YAML_PLAIN_SCALAR_STYLE));
+    return finish_new_node(r, yaml_document_add_scalar(r->document, NULL, (const yaml_char_t *)text, (int)strlen(text),
+                                                       YAML_PLAIN_SCALAR_STYLE));
 }
 
 static int make_list(rewrite *r)
 {
-    return made(r, yaml_document_add_sequence(r->document, NULL, YAML_FLOW_SEQUENCE_STYLE));
+    return finish_new_node(r, yaml_document_add_sequence(r->document, NULL, YAML_FLOW_SEQUENCE_STYLE));
 }
 
 static int make_mapping(rewrite *r)
 {
-    return made(r, yaml_document_add_mapping(r->document, NULL, YAML_FLOW_MAPPING_STYLE));
+    return finish_new_node(r, yaml_document_add_mapping(r->document, NULL, YAML_FLOW_MAPPING_STYLE));
 }
 
 static void append_item(rewrite *r, int list, int item)
@@ -299,8 +300,8 @@ const char *scene_describe_short_form(const char *key, size_t length)
     return NULL;
 }
 
-/* Replaces a word of a text: the first occurrence of `from` becomes `to`, which must be at least as long. Words of the
- * text are separated by underscores. */
+/* Replaces a word in a key: the first occurrence of `from` in `text` becomes `to`, which must be at least as long. The
+ * words of a key are separated by underscores. */
 static void replace_word(char *text, size_t size, const char *from, const char *to)
 {
     char *at = strstr(text, from);
@@ -349,7 +350,7 @@ static void expand_mapping(rewrite *r, int number)
     if (r->has_memory) find_node_by_index(r, number)->data.mapping.pairs.top = kept;
 }
 
-/* Returns the number of the node that is the value of this key at the top of the file; 0 if the file does not have the
+/* Returns the index of the node that is the value of this key at the top of the file; 0 if the file does not have the
  * key. It is used for mappings whose keys are names that the scene defines. */
 static int find_named_mapping(const rewrite *r, const char *name)
 {

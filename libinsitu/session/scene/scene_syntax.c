@@ -18,14 +18,14 @@ typedef struct text_line {
     const char *start;
     size_t length;
     size_t indent; /* number of leading blanks and tabs; equal to the length of the line if it has nothing else */
-    size_t number; /* number of the line, from 0 */
+    size_t number; /* index of the line, from 0 */
 } text_line;
 
 typedef struct fault {
     const yaml_parser_t *parser;
     const char *text;
     size_t size;
-    size_t first_line, last_line; /* range of the lines to examine, from 0 */
+    size_t first_line, last_line; /* indices, from 0, of the first and the last line to examine */
     bool is_flow;                 /* set if the position of the error is within { } or [ ] */
     size_t *line;
     char *words;
@@ -97,7 +97,7 @@ static bool is_in_quotes(text_line l, const char *p, char *quote)
     return true;
 }
 
-static const char *find_colour_comment(text_line l, size_t *length)
+static const char *find_colour_turned_into_comment(text_line l, size_t *length)
 {
     char quote = '\0';
     for (size_t i = 1; i < l.length; i++) {
@@ -113,13 +113,13 @@ static const char *find_colour_comment(text_line l, size_t *length)
 
 const char *scene_find_colour_in_comment(const char *text, size_t size, size_t line, size_t *length)
 {
-    return find_colour_comment(find_line(text, size, line - 1), length);
+    return find_colour_turned_into_comment(find_line(text, size, line - 1), length);
 }
 
-static bool report_colour_comment(const fault *f, text_line l)
+static bool report_colour_turned_into_comment(const fault *f, text_line l)
 {
     size_t length;
-    const char *colour = find_colour_comment(l, &length);
+    const char *colour = find_colour_turned_into_comment(l, &length);
     if (!colour) return false;
     return set_fault(f, l.number, "a # behind a blank begins a comment, expected the colour in quotes: \"%.*s\"",
                      (int)length, colour);
@@ -232,7 +232,8 @@ static bool report_unclosed_bracket(const fault *f, text_line l)
     const char open = strchr(problem, '}') ? '{' : '[', close = open == '{' ? '}' : ']';
     const text_line stop = find_line(f->text, f->size, f->last_line);
     size_t column = f->parser->problem_mark.column;
-    if (column < stop.length && stop.start[column] == ':') /* the key in front of this colon is indented too little */
+    /* the text before this colon is a key that is indented too little */
+    if (column < stop.length && stop.start[column] == ':')
         while (column > stop.indent && !strchr(" {[,", stop.start[column - 1])) column--;
     const size_t length = column < stop.length ? stop.length - column : 0;
     if (l.number == stop.number && length > 0)
@@ -241,7 +242,7 @@ static bool report_unclosed_bracket(const fault *f, text_line l)
     return set_fault(f, l.number, "the %c of this line is not closed, expected %c", open, close);
 }
 
-/* Returns the last line before `number` that has content, or the line itself if there is none. */
+/* Returns the last line with content before the line with index `number`; if there is none, returns the latter. */
 static text_line find_previous_line(const fault *f, size_t number)
 {
     text_line found = find_line(f->text, f->size, number);
@@ -275,8 +276,8 @@ static text_line find_nearest_indent(const fault *f, text_line l, size_t *expect
     return nearest;
 }
 
-/* Reports the previous line if this line cannot continue it, because the previous line lacks a colon, or a blank after
- * its hyphen. */
+/* Reports a faulty line before this one: this line cannot continue the previous line, because the previous line lacks a
+ * colon, or a blank after its hyphen. */
 static bool report_incomplete_line(const fault *f, text_line l)
 {
     const char *problem = f->parser->problem ? f->parser->problem : "";
@@ -383,7 +384,7 @@ void scene_describe_syntax_error(const yaml_parser_t *parser, const char *text, 
     const bool is_before = (f.is_flow || strstr(context, "scan")) && parser->context_mark.line < f.last_line;
     f.first_line = is_before ? parser->context_mark.line : f.last_line;
     const text_line begin = find_line(text, size, f.first_line), stop = find_line(text, size, f.last_line);
-    if (apply_rule_to_lines(&f, report_tab_indent) || apply_rule_to_lines(&f, report_colour_comment) ||
+    if (apply_rule_to_lines(&f, report_tab_indent) || apply_rule_to_lines(&f, report_colour_turned_into_comment) ||
         apply_rule_to_lines(&f, report_bare_placeholder))
         return;
     if (report_unclosed_quote(&f, begin) || report_unclosed_bracket(&f, begin) || report_incomplete_line(&f, stop))

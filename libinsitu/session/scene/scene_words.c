@@ -123,7 +123,7 @@ void scene_describe_expected_value(const char *path, const cyaml_schema_value_t 
         scene_describe_value(value->sequence.entry, &entry, keys);
         append_words(expected, "%s", keys + strlen("a mapping"));
     }
-    /* for lists of names and values of several forms, the words already include all forms */
+    /* for lists of names and values of several forms, the description already contains all forms */
     const char *name = find_last_key(path), *short_form = scene_describe_short_form(name, strlen(name));
     if (short_form && value->type != CYAML_IGNORE) append_words(expected, ", or %s", short_form);
 }

@@ -13,7 +13,8 @@
 
 /* ---- interpolation ----------------------------------------------------------------------------------------------- */
 
-/* Number of interpolated values; the values of a point are stored in one list. */
+/* Number of values of a camera point that are interpolated: eye, focal point and up direction with three coordinates
+ * each, and the angle of view. */
 enum { NUMBERS_OF_POINT = 10 };
 
 static void list_numbers(const scene_camera_point *p, double out[NUMBERS_OF_POINT])
@@ -58,7 +59,7 @@ static void set_camera_to_point(const scene_camera_point *p, scene_camera *out)
     out->angle = p->angle;
 }
 
-/* Interpolates the camera between points i and i + 1. */
+/* Interpolates the camera between its points i and i + 1. at: the time or cycle for which the camera is computed. */
 static void interpolate_camera(const scene_camera *camera, int i, double at, scene_camera *out)
 {
     double numbers[4][NUMBERS_OF_POINT], found[NUMBERS_OF_POINT];

@@ -54,8 +54,8 @@ static insitu_status check_fields(const scene_document *d, const char *path, con
     return INSITU_OK;
 }
 
-static insitu_status find_values(const scene_document *d, const char *path, const scene_file_image *in,
-                                 scene_series *out)
+static insitu_status count_swept_isovalues_and_planes(const scene_document *d, const char *path,
+                                                      const scene_file_image *in, scene_series *out)
 {
     const scene_file_isosurface *isosurface = NULL;
     const scene_file_slice *slice = NULL;
@@ -82,7 +82,7 @@ insitu_status scene_count_sweep_dimensions(const scene_document *d, const char *
     if (!sweeps_over_isovalues(in) && !sweeps_over_planes(in) && field_count == 0)
         return scene_fail_at_key(d, path, "sweep",
                                  "holds nothing, expected isovalues: true, planes: true, fields or several");
-    const insitu_status status = find_values(d, path, in, out);
+    const insitu_status status = count_swept_isovalues_and_planes(d, path, in, out);
     return status ? status : check_fields(d, path, fields, field_count);
 }
 
