@@ -10,12 +10,11 @@ typedef struct session_changes {
     int64_t cycle, lowest_cycle;
     double time;     /* time of the step on rank 0 */
     int failed_rank; /* lowest rank on which an insitu_set_*() call has failed; -1: none */
-    /* each is set if the change has happened on some rank. is_scene_changed: the scene file was edited;
-     * are_cells_changed: cells or coordinates have changed; are_names_changed: names of meshes or fields have
-     * changed. */
+    /* Each member is set if something has changed on some rank since the previous step. is_scene_changed: the scene
+     * file; are_cells_changed: cells or coordinates; are_names_changed: names of meshes or fields. */
     bool is_scene_changed, are_cells_changed, are_names_changed;
     bool are_levels_changed;     /* set if blocks with levels of refinement have changed on some rank */
-    bool are_names_shared;       /* set if all ranks have the same tables of names */
+    bool are_names_shared;       /* set if all ranks have the same names of meshes and fields */
     bool needs_more_threads;     /* set if some rank has too few threads and must start more */
     bool has_unwritten_pictures; /* set if pictures of earlier steps could not be written */
     bool is_filled;              /* set if some field has a fill function, which may call MPI */

@@ -71,7 +71,7 @@ __attribute__((format(printf, 3, 4))) static void add_copied(copied_reasons *rea
     vsnprintf(words, sizeof words, format, arguments);
     va_end(arguments);
     while (at < reasons->count && strcmp(reasons->texts[at], words) != 0) at++;
-    if (at == MOST_REASONS) at--; /* bytes for further reasons are added to the last entry */
+    if (at == MOST_REASONS) at--; /* if there are too many reasons, the bytes are added to the last one */
     if (at == reasons->count) {
         memcpy(reasons->texts[at], words, sizeof words);
         reasons->bytes[at] = 0;

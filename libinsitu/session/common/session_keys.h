@@ -22,18 +22,18 @@ static inline uint64_t session_mix_bits(uint64_t x)
 
 uint64_t session_key_hash(const session_key *key);
 
-/* A hash table of keys. The keys are numbered 0, 1, ... in the order of their first appearance. */
+/* A hash table of keys. Keys get the indices 0, 1, ... in the order in which they are added. */
 typedef struct session_key_table {
     session_key *keys; /* array of `count` keys */
     int64_t count;
-    int64_t *slots; /* mask + 1 slots, each with the number of a key; -1: the slot is empty */
+    int64_t *slots; /* mask + 1 slots, each with the index of a key in `keys`; -1: the slot is empty */
     uint64_t mask;
 } session_key_table;
 
 /* Creates a table with space for `most` keys. Returns false if memory runs out; then there is nothing to free. */
 bool session_keys_create(session_key_table *table, int64_t most);
-/* session_keys_find() returns the number of a key, or -1 if the table does not contain the key. session_keys_add() adds
- * the key in this case and returns its new number. */
+/* session_keys_find() returns the index of a key, or -1 if the table does not contain the key. session_keys_add()
+ * returns the index, too, but first adds the key if the table does not contain it. */
 int64_t session_keys_find(const session_key_table *table, const session_key *key);
 int64_t session_keys_add(session_key_table *table, const session_key *key);
 void session_keys_free(session_key_table *table);

@@ -29,8 +29,8 @@ typedef struct session_report {
     /* reported_count: number of warnings in `reported`; reported_capacity: number of warnings for which it has space */
     int reported_count, reported_capacity;
     uint64_t *reported; /* hashes of warnings that were reported and whose condition still holds, in ascending order */
-    /* result of session_hash_unusable_fields() when warnings of unusable cells were last reported; 0: there were none
-     */
+    /* result of session_hash_unusable_fields() when warnings of cells with values that are not finite were last
+     * reported; 0: there were none */
     uint64_t unusable_key;
 } session_report;
 
@@ -40,10 +40,10 @@ void session_text_add(session_text *text, const char *format, ...) __attribute__
 /* Initializes all texts as empty. No memory is allocated. Local. */
 void session_report_create(session_report *report);
 
-/* Clears the numbers and the lists for a new step. Local. */
+/* Clears all counts, times and texts of the report for a new step. The list of reported warnings is kept. Local. */
 void session_report_begin(session_report *report, int64_t cycle, double time);
 
-/* Copies the lists of texts into the report that the caller reads. Local. */
+/* Sets the texts and the peak of memory in the report that the caller reads. Local. */
 void session_report_end(session_report *report);
 
 void session_report_free(session_report *report);
@@ -60,13 +60,15 @@ typedef enum session_warning_kind {
     WARNING_UNUSABLE,    /* values of cells are not finite */
     WARNING_CLIP,        /* clips remove all of a layer */
     WARNING_NO_CELLS,    /* no mesh contains cells that can be drawn */
-    /* a layer is drawn on several meshes, one of which has vertex ids and is not matched with the others */
+    /* a layer averages values over several meshes, but the vertices of one mesh have global ids and are not matched
+     * with those of the others */
     WARNING_APART,
-    WARNING_NO_LINES,  /* a mesh lacks the field of a layer's contour lines */
-    WARNING_SHELLS,    /* a layer that needs cells with volume is drawn on a mesh that has only shells */
-    WARNING_SAMPLES,   /* several volumes are sampled at the default distance, without an error bound */
-    WARNING_SCALE,     /* a field has no value that its logarithmic scale can show */
-    WARNING_NARROW,    /* a field's colour range is so narrow that the rounding of float32 may be visible */
+    WARNING_NO_LINES, /* a mesh lacks the field of a layer's contour lines */
+    WARNING_SHELLS,   /* a layer that needs cells with volume is drawn on a mesh that has only shells */
+    WARNING_SAMPLES,  /* several volumes are sampled at the default distance, without an error bound */
+    WARNING_SCALE,    /* a field has no value that its logarithmic scale can show */
+    /* a field's colour range is so narrow, compared with its values, that the rounding of float32 may be visible */
+    WARNING_NARROW,
     WARNING_REPLACED,  /* a picture overwrites an earlier one */
     WARNING_VIEW,      /* a camera sees no cell */
     WARNING_GREY,      /* a surface lacks the field that colours it */

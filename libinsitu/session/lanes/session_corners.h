@@ -11,8 +11,9 @@
  * ways to divide the cell into tets. */
 typedef struct cell_corners {
     const signed char (*corners)[4];
-    int count;            /* number of listed corners */
-    double volume_factor; /* value of the sum for a cell of volume 1 */
+    int count; /* number of corners in the list */
+    /* sum over the listed corners for a cell of volume 1, which is the divisor in the formula above */
+    double volume_factor;
 } cell_corners;
 
 /* Constants of the first approximation of the cube root: a third of the upper bits of the double, plus an offset. Its

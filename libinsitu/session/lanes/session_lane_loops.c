@@ -43,7 +43,8 @@ typedef struct lane_bounds {
     doubles lower[3], upper[3];
 } lane_bounds;
 
-/* The sums, minimum and count over the cells that each lane has processed. */
+/* The sums, minimum and count of a call of a lane_run function. Each lane has its own, over the cells that it has
+ * processed. */
 typedef struct lane_sizes {
     doubles sums[PARTS];
     doubles least;         /* smallest absolute volume times the type's volume factor (cell_corners.volume_factor) */

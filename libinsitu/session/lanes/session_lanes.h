@@ -22,7 +22,7 @@ typedef struct lane_cells {
 
 typedef struct lane_sums {
     double lower[3], upper[3]; /* bounds of the vertices */
-    double least;              /* smallest absolute volume of a cell */
+    double least;              /* smallest absolute volume of the cells */
     double size_sum;           /* sum of the cube roots of the volumes */
     int64_t inverted_count;    /* number of cells with a negative volume */
 } lane_sums;
