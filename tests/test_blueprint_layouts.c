@@ -574,8 +574,7 @@ static void make_covered(layout_case *l)
     l->mesh.ghosts = (insitu_array){flags, INSITU_UINT8, 0};
 }
 
-/* ---- list of all layouts
- * ------------------------------------------------------------------------------------------ */
+/* ---- list of all layouts ----------------------------------------------------------------------------------------- */
 
 const layout_kind layout_kinds[] = {
     {"uniform", make_uniform, false},

@@ -239,8 +239,7 @@ static void add_flat_cells(test_mesh *mesh)
     complete_copy(mesh, &copy);
 }
 
-/* ---- pictures that must be bit-identical
- * ---------------------------------------------------------------------------- */
+/* ---- pictures that must be bit-identical ------------------------------------------------------------------------- */
 
 /* Makes a mesh of polyhedra. kind 0: from tets; 1 and 2: from hexes, of which half or all become polyhedra; 3: from
  * mixed cells, of which half become polyhedra. */
@@ -295,8 +294,7 @@ static void polyhedra_without_volume_change_no_pixel(void **state)
     assert_same_bits(add_flat_cells);
 }
 
-/* ---- pictures that must agree with the reference
- * ---------------------------------------------------------------------- */
+/* ---- pictures that must agree with the reference ----------------------------------------------------------------- */
 
 /* Compares surfaces and samples with the brute-force renderer, and segments with the adaptive integral on every ray.
  * The tolerance of 1e-5 for segments covers values in float32, which have an error of about 1e-6, and the same error of

@@ -273,8 +273,7 @@ static void surfaces_continue_across_hanging_nodes(void **state)
     assert_everywhere(good);
 }
 
-/* ---- hanging nodes off the coarse face
- * -------------------------------------------------------------------------------- */
+/* ---- hanging nodes off the coarse face --------------------------------------------------------------------------- */
 
 /* Checks refinement that moves hanging nodes off the coarse face, so that cells do overlap. Any number of ranks must
  * detect the overlap. Pictures agree only to max_error, because whether an overlap that is almost transparent is

@@ -452,8 +452,7 @@ static void isosurfaces_are_within_the_bound(void **state)
     free(of);
 }
 
-/* ---- other cases
- * -------------------------------------------------------------------------------------------------- */
+/* ---- other cases ------------------------------------------------------------------------------------------------- */
 
 /* Checks an isovalue between the values at nodes. The field (x - 0.3)^2 has an extremum between its nodes, so that its
  * values at the nodes do not show that it crosses 0.01. */

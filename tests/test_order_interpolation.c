@@ -133,8 +133,7 @@ static void polynomials_are_reproduced(void **state)
     check_kind(&(order_kind){"hex 4, Gauss-Lobatto", INSITU_LAGRANGE_HEX, INSITU_ORDER_LEXICOGRAPHIC, 4}, 3, true);
 }
 
-/* ---- rotated cells
- * ------------------------------------------------------------------------------------------------ */
+/* ---- rotated cells ----------------------------------------------------------------------------------------------- */
 
 /* Stores the permutation with the index `number` of 0 to count - 1. */
 static void make_permutation(int number, int count, int out[4])

@@ -210,8 +210,7 @@ static void polygons_are_covered_once(void **state)
         }
 }
 
-/* ---- triangles that must be equal
- * --------------------------------------------------------------------------------- */
+/* ---- triangles that must be equal -------------------------------------------------------------------------------- */
 
 static int compare_triangles(const void *a, const void *b)
 {

@@ -41,8 +41,7 @@ static void check_colour(const float c[3], double r, double g, double b)
             fail_msg("channel %d is %.9g, expected %.9g", i, (double)c[i], expected[i]);
 }
 
-/* ---- files that the parser may read
- * ------------------------------------------------------------------------------- */
+/* ---- files that the parser may read ------------------------------------------------------------------------------ */
 
 #define POINTS "\"RGBPoints\": [10, 0, 0, 0, 20, 1, 0, 0, 30, 1, 1, 1]"
 

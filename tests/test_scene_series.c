@@ -288,8 +288,7 @@ static void colour_bar_strips_fit_their_labels(void **state)
     }
 }
 
-/* ---- camera paths
- * -------------------------------------------------------------------------------------------------- */
+/* ---- camera paths ------------------------------------------------------------------------------------------------ */
 
 static const char moving[] = "angle: 30, path: [{time: 1, position: [0, 0, 8], focal: [0, 0, 0]}, "
                              "{time: 2, position: [4, 0, 8], focal: [0, 1, 0], angle: 50}, "

@@ -401,8 +401,7 @@ static void bent_shells_have_their_areas(void **state)
     }
 }
 
-/* ---- histograms, percentiles, and cells that do not count
- * --------------------------------------------------------- */
+/* ---- histograms, percentiles, and cells that do not count -------------------------------------------------------- */
 
 /* Checks that a bin has the volume of the quadrature points whose values are in it. Along x there are two cells with 4
  * points each, and two of these points are in each bin. */

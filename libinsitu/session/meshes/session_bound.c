@@ -52,8 +52,7 @@ enum {
 /* Number of directions of the edges of pieces in a simplex, by its dimensions. */
 static const int direction_counts[] = {0, 1, 3, MOST_DIRECTIONS};
 
-/* ---- polynomials on one simplex
- * ----------------------------------------------------------------------------------- */
+/* ---- polynomials on one simplex ---------------------------------------------------------------------------------- */
 
 /* Lists the nodes of a simplex's lattice of this order, each by its barycentric coordinates times the order. If out is
  * NULL, the nodes are only counted. Returns their number. */
@@ -252,8 +251,7 @@ static void drop_factor(session_bound_factor *factor)
     *factor = (session_bound_factor){0};
 }
 
-/* ---- products of factors
- * ------------------------------------------------------------------------------------------ */
+/* ---- products of factors ----------------------------------------------------------------------------------------- */
 
 static int count_factors(int type)
 {

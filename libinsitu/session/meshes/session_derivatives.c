@@ -266,8 +266,7 @@ void session_drop_derivatives(session_derivatives *derivatives)
     *derivatives = (session_derivatives){0};
 }
 
-/* ---- derivatives of all cells of a mesh
- * --------------------------------------------------------------------------- */
+/* ---- derivatives of all cells of a mesh -------------------------------------------------------------------------- */
 
 bool session_has_two_spacings(const session_nodes *of)
 {

@@ -210,8 +210,7 @@ bool tally_is_flat(const grid *g, int64_t cell)
     return one.flat_count > 0;
 }
 
-/* ---- runs of cells
- * ------------------------------------------------------------------------------------------------ */
+/* ---- runs of cells ----------------------------------------------------------------------------------------------- */
 
 MMBVH_INLINE bool offsets_are_good(const session_mesh *mesh, int64_t cell, int count)
 {

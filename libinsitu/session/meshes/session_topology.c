@@ -269,8 +269,7 @@ static insitu_status list_faces(session_mesh *mesh, base_error *error)
     return INSITU_OK;
 }
 
-/* ---- recognition of one polyhedron
- * -------------------------------------------------------------------------------- */
+/* ---- recognition of one polyhedron ------------------------------------------------------------------------------- */
 
 enum { MOST_FACES = 6 };
 
@@ -409,8 +408,7 @@ static int recognise_polyhedron(const session_mesh *mesh, int64_t cell, int64_t 
     return GRID_POLYHEDRON;
 }
 
-/* ---- recognition of all polyhedra
- * --------------------------------------------------------------------------------- */
+/* ---- recognition of all polyhedra -------------------------------------------------------------------------------- */
 
 enum { TYPES = GRID_POLYHEDRON + 1 };
 

@@ -64,8 +64,7 @@ static insitu_status fail_range_at_face(const patch_faces *p, int patch, int64_t
     return fail_at_face(p, patch, face, words, error);
 }
 
-/* ---- faces of all patches
- * ----------------------------------------------------------------------------------------- */
+/* ---- faces of all patches ---------------------------------------------------------------------------------------- */
 
 /* Reads a face's vertices from the patch's own list. */
 static void read_listed_vertices(const insitu_mesh *mesh, const insitu_patch *patch, int64_t i, patch_face *out)

@@ -28,8 +28,7 @@ static const char *node_text(const rewrite *r, int number)
     return node->type == YAML_SCALAR_NODE ? (const char *)node->data.scalar.value : NULL;
 }
 
-/* ---- new nodes: each function returns the index of the node, or 0 if memory ran out
- * ------------------------------- */
+/* ---- new nodes: each function returns the index of the node, or 0 if memory ran out ------------------------------ */
 
 static int finish_new_node(rewrite *r, int number)
 {
