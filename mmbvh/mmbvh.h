@@ -57,8 +57,9 @@ typedef struct mmbvh {
     double origin[3]; /* origin of the tree's coordinates; a position has the coordinates (position - origin) * scale */
     double scale;
     double built_cost; /* SAH cost (mmbvh_cost()) when the tree was built */
-    double area;       /* sum, over all nodes, of half the surface area of the box times the number of tests in the node
-                          (mmbvh_cost()); updated when bounds are refitted */
+    /* sum over all nodes: half the surface area of the node's box × the number of boxes and cells that a ray tests
+     * after it has hit this box (2 children, or a leaf's cells); updated when bounds are refitted */
+    double area;
     double built_area; /* value of `area` when the tree was built; if `area` has grown faster than the surface area of
                           the mesh, the tree has degraded */
     /* number of cells with non-finite values; the ranges stored in the nodes do not include them */
@@ -120,14 +121,14 @@ typedef struct mmbvh_selection {
 typedef struct mmbvh_options {
     int threads;                      /* number of threads; 0 means the default of OpenMP */
     const mmbvh_selection *selection; /* used by a build: the cells to put in the tree, none of which may be a ghost or
-                                         flat; NULL: all drawn cells */
+                                         flat (grid_is_flat()); NULL: all cells that are neither */
     mmbvh_layout layout;
     mmbvh_builder builder;
 } mmbvh_options;
 
-/* Builds a tree over the grid's cells, except ghosts and flat cells, with the ranges of the field; if field is NULL,
- * all ranges are (-inf, +inf). Parallel; the tree is the same for any number of threads. On success *out owns its
- * memory; free it with mmbvh_free(). On an error *out is zeroed. */
+/* Builds a tree over the grid's cells, except ghosts and flat cells (grid_is_flat()). The nodes store the ranges of the
+ * field; if field is NULL, all ranges are (-inf, +inf). Parallel; the tree is the same for any number of threads. On
+ * success *out owns its memory; free it with mmbvh_free(). On an error *out is zeroed. */
 insitu_status mmbvh_build(const grid *g, const grid_field *field, const double origin[3], double scale,
                           const mmbvh_options *options, mmbvh *out, base_error *error);
 
@@ -215,10 +216,10 @@ typedef struct mmbvh_statistics {
     int64_t bytes;          /* size in bytes of nodes and cell indices */
 } mmbvh_statistics;
 
-/* Checks the tree: every drawn cell is in exactly one leaf, leaves have 1 to 7 cells, every node's bounds and range
- * contain those of its children and cells, siblings are adjacent, and every node is reached exactly once. The first
- * violation is reported as the error. If g or field is NULL (parent tree), only the structure is checked. out may be
- * NULL. */
+/* Checks the tree: every cell that is neither a ghost nor flat is in exactly one leaf, leaves have 1 to 7 cells, every
+ * node's bounds and range contain those of its children and cells, siblings are adjacent, and every node is reached
+ * exactly once. The first violation is reported as the error. If g or field is NULL (parent tree), only the structure
+ * is checked. out may be NULL. */
 insitu_status mmbvh_check(const mmbvh *tree, const grid *g, const grid_field *field, mmbvh_statistics *out,
                           base_error *error);
 

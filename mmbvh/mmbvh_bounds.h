@@ -6,7 +6,8 @@
 #include "mmbvh_item.h"
 #include "mmbvh_sweep.h"
 
-/* Reads the boxes of `count` cells, in the source's own coordinates. */
+/* Reads the boxes of `count` cells. Coordinates are those of the grid or of the given boxes; they are not transformed
+ * to the tree's coordinates. */
 typedef void bounds_read(const bounds_source *source, const uint32_t *cells, int count, fetch_box *boxes);
 
 /* Does the same as bounds_read for coordinates that are floats. */
@@ -48,8 +49,9 @@ static inline void bounds_transform(const bounds_source *source, fetch_box *box)
  * coordinates are finite, but is larger than necessary if some vertices belong to no cell. */
 fetch_box bounds_estimate(const bounds_source *source, int threads);
 
-/* Computes the boxes of `count` items. The indices of the items must be set before the call. Extends *set by the items.
- * Extends *exact by the boxes in the source's coordinates; exact may be NULL. */
+/* Computes the boxes of `count` items from the cells whose indices the caller has stored in the items. Extends *set by
+ * these boxes and their centroids, and *exact by the unquantized boxes of the cells in the source's coordinates. exact
+ * may be NULL. */
 void bounds_fill_items(const bounds_source *source, const item_grid *grid, item *items, int64_t count, item_set *set,
                        fetch_box *exact);
 

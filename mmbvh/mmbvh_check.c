@@ -1,6 +1,6 @@
-/* Checks a whole tree. One traversal follows the order in which the nodes must be numbered; a node or entry at any
- * other position is a violation. Every node and entry is therefore visited exactly once, and the traversal ends even if
- * the tree is broken. */
+/* Checks a whole tree. One traversal visits the nodes and the entries of mmbvh.cells in the order in which mmbvh.h says
+ * that they are stored. A reference to any other position is a violation. Every node and entry is therefore visited
+ * exactly once, and the traversal ends even if the tree is broken. */
 #include "mmbvh.h"
 
 #include <inttypes.h>
@@ -14,8 +14,9 @@ typedef struct check_state {
     const grid *g;
     const grid_field *field;
     unsigned char *visited; /* bit set of the cells visited so far */
-    int64_t cell_limit;     /* number of cells of the grid, or of meshes in a parent tree */
-    int64_t next_pair;      /* index of the pair of nodes that must be reached next */
+    int64_t cell_limit; /* number of cells of the grid, or number of meshes if the tree is a parent tree over the boxes
+                           of meshes */
+    int64_t next_pair;  /* index of the pair of nodes that must be reached next */
     int64_t next_entry;
     int64_t unusable; /* number of drawn cells with a value that is not finite */
     int64_t leaves;   /* number of leaves visited so far */

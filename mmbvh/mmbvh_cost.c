@@ -19,8 +19,8 @@ double cost_half_area(const float lower[3], const float upper[3])
     return d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
 }
 
-/* Returns the sum over nodes [begin, end) of half the surface area of the box times the number of tests in the node:
- * one for each cell of a leaf, or two for the children's boxes. */
+/* Returns the sum over nodes [begin, end) of half the surface area of the node's box times the number of boxes and
+ * cells that a ray tests after it has hit this box: a leaf's cells, or the boxes of the two children. */
 static double sum_areas_of_nodes(const mmbvh *tree, int64_t begin, int64_t end)
 {
     double sum = 0;
@@ -50,14 +50,16 @@ double cost_area_of_tree(const mmbvh *tree, int threads)
     return area;
 }
 
-/* If the root's surface area is 0, every node is assumed to be hit. */
+/* If the root's surface area is 0, no probability can be computed from areas. The cost is then that of a ray that hits
+ * every node. */
 double cost_of_area(const mmbvh *tree, double area)
 {
     if (!tree->node_count) return 0;
     float lower[4], upper[4];
     mmbvh_node_box(tree, 0, lower, upper);
     const double root_area = cost_half_area(lower, upper);
-    if (root_area > 0) return 1 + area / root_area; /* the 1 counts the test of the root's own box */
+    /* the added 1 is the test of the root's box, which area does not include */
+    if (root_area > 0) return 1 + area / root_area;
     double tests = 0;
     for (int64_t i = 0; i < tree->node_count; i++) {
         const int count = mmbvh_node_count(tree, i);

@@ -37,13 +37,15 @@ static sweep_sum sweep_range_with_followers(const sweep *s, int64_t first, int64
     return s->follower ? sweep_range_with_followers(s->follower, first, end) : sum;
 }
 
-/* Returns the index of the first descendant of the right node of the pair at `first`; `end` if that node is a leaf. */
+/* Returns the index of the first descendant of the right sibling, for the pair of siblings whose left node has the
+ * index `first`. Returns `end` if the right sibling is a leaf. */
 static int64_t find_right_subtree(const sweep *s, int64_t first, int64_t end)
 {
     return mmbvh_node_count(s->tree, first + 1) ? end : mmbvh_node_ref(s->tree, first + 1);
 }
 
-/* Sweeps a pair and its descendants, nodes [first, end), on one thread, at most s->range_max nodes at a time. */
+/* Runs the sweep on this thread over the nodes [first, end), which are a pair of siblings and all their descendants. If
+ * s->range_max is not 0, each call of s->run gets at most this number of nodes. */
 static sweep_sum sweep_pair_serially(const sweep *s, int64_t first, int64_t end)
 {
     if (!s->range_max || end - first <= s->range_max) return sweep_range_with_followers(s, first, end);
@@ -54,7 +56,8 @@ static sweep_sum sweep_pair_serially(const sweep *s, int64_t first, int64_t end)
     return sweep_add(sweep_add(left, right), sweep_range_with_followers(s, first, first + 2));
 }
 
-/* Sweeps a pair and its descendants, nodes [first, end), in parallel tasks of at most TASK_NODES nodes. */
+/* Runs the sweep over the nodes [first, end), which are a pair of siblings and all their descendants, in parallel tasks
+ * of at most TASK_NODES nodes. */
 static sweep_sum sweep_pair_in_tasks(const sweep *s, int64_t first, int64_t end)
 {
     if (end - first <= TASK_NODES) return sweep_pair_serially(s, first, end);

@@ -17,7 +17,7 @@ typedef struct part {
     int64_t first;
     int64_t unusable;     /* number of cells with non-finite values */
     int64_t outside_grid; /* number of boxes that the tree's grid cannot represent */
-    double area_change;   /* change of the tree's area, as defined in sweep_sum */
+    double area_change;   /* change of mmbvh.area caused by the nodes of this part */
     fetch_float_box float_boxes[PART_CELLS];
 } part;
 
@@ -110,7 +110,8 @@ MMBVH_INLINE void store_nodes(const sweep *s, part *p, int64_t first, int64_t en
     }
 }
 
-/* Processes the nodes of a pair, or the root, but not their descendants. */
+/* Computes the bounds, and ranges if pass.with_values is set, of the nodes from end - 1 down to `first`. These nodes
+ * are the root, or two siblings whose descendants are not in the interval and have been processed before. */
 MMBVH_INLINE void run_nodes(const sweep *s, part *p, int64_t first, int64_t end, const pass_constants pass)
 {
     for (int64_t i = first; i < end; i++) {

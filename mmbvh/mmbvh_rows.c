@@ -7,7 +7,9 @@
 
 #include "mmbvh_fetch.h"
 
-/* The range over all rows' values, at each position along a row of vertices. */
+/* Up to four rows of vertices surround a row of cells. This struct stores, for each position along the rows, the range
+ * over the values of these rows at this position. The member nonfinite is 0 where all of these values are finite, and
+ * NaN otherwise. */
 typedef struct row_doubles {
     double low[ROWS_CELLS + 1], high[ROWS_CELLS + 1], nonfinite[ROWS_CELLS + 1];
 } row_doubles;
@@ -106,8 +108,9 @@ bool rows_compute_total_range(const grid *g, const grid_field *field, float *low
                                  : float_extent(data, g->vertex_count, low, high);
 }
 
-/* Finds the first drawn cell with a number from `from` to `end` - 1, the index of its first vertex, and the number of
- * drawn cells from it to the end of its row. Returns false if there is none. */
+/* Searches the cells with indices from `from` to `end` - 1 for the first drawn cell. Stores its index and the number of
+ * drawn cells from it to the end of its row (at most ROWS_CELLS) in *out, and the index of its first vertex in *vertex.
+ * Returns false if there is no drawn cell. */
 static bool find_next_drawn_cells(const grid_lattice *l, int along, int64_t from, int64_t end, rows_ranges *out,
                                   int64_t *vertex)
 {

@@ -15,13 +15,13 @@ typedef struct rows_ranges {
                                             the next multiple of 8 are 0 */
 } rows_ranges;
 
-/* Returns whether rows_compute_cell_ranges() can read the grid and field: cells with consecutive numbers are neighbours
- * along an axis of a lattice, and the values are floats or doubles at vertices. */
+/* Returns whether rows_compute_cell_ranges() can read the grid and field: cells with consecutive indices must be
+ * neighbours along an axis of a lattice, and the values must be floats or doubles at vertices. */
 bool rows_can_read(const grid *g, const grid_field *field);
 
-/* Computes the ranges of the next drawn cells of one row, among the cells with numbers from `from` to `end` - 1. Cells
- * in the padding and in ghost layers are skipped, but ghost flags are not checked. Returns false if there are no such
- * cells. */
+/* Searches the cells with indices from `from` to `end` - 1 for the first drawn cell, and computes the ranges of this
+ * cell and of the drawn cells that follow it in its row, at most ROWS_CELLS in all. Cells in the padding and in ghost
+ * layers are skipped, but ghost flags are not checked. Returns false if there are no such cells. */
 bool rows_compute_cell_ranges(const grid *g, const grid_field *field, int64_t from, int64_t end, rows_ranges *out);
 
 /* Computes the range of the values at all vertices, rounded to the nearest float. Returns false if the values are not

@@ -1,4 +1,5 @@
-/* Writes nodes in either layout. */
+/* Stores and reads the boxes of a tree's nodes, in the reference layout or in the compact layout (mmbvh_layout in
+ * mmbvh.h). */
 #ifndef MMBVH_STORE_H
 #define MMBVH_STORE_H
 
@@ -14,11 +15,13 @@ static inline void store_link(const mmbvh *tree, int64_t index, int64_t ref, int
     tree->nodes[index].count = (unsigned)count & 7;
 }
 
-/* Returns the grid of the compact layout over a box. The box must be finite. */
+/* Returns the quantization grid of the compact layout for a tree whose boxes all lie in the given box. The coordinates
+ * of the given box must be finite. */
 mmbvh_grid store_make_grid(const float lower[3], const float upper[3]);
 
-/* Corrects a node's box that store_compact() has rounded inward: extends it one step at a time until it contains the
- * given box. Returns false if the given box is not within the grid. */
+/* Corrects the box that store_compact() has stored in a node if rounding has made it too small: enlarges the stored box
+ * step by step, until it contains the box from `lower` to `upper`. Returns false if the latter box is not within the
+ * grid. */
 bool store_compact_slowly(const mmbvh *tree, int64_t index, vec4 lower, vec4 upper);
 
 /* Stores the smallest representable box that contains the given box. The given box is in lanes 0 to 2; lane 3 must be
@@ -29,7 +32,8 @@ static inline bool store_compact(const mmbvh *tree, int64_t index, vec4 lower, v
     const vec4 origin = *(const compact_vec4 *)(const void *)tree->grid.origin;
     const vec4 step = *(const compact_vec4 *)(const void *)tree->grid.step;
     const vec4 zero = {0},
-               inverse = (vec4)(0x7f000000 - (ivec4)step); /* powers of two, inverted by negating their exponents */
+               inverse = (vec4)(0x7f000000 - (ivec4)step); /* 1 / step; a step is a power of two, so that its inverse is
+                                                              computed by negating its exponent */
     const ivec4 place =
         vec4_truncate(vec4_min(vec4_max((lower - origin) * inverse, zero), vec4_set1(COMPACT_LOWER_MAX)));
     const vec4 extent = vec4_max((upper - (vec4_from_int(place) * step + origin)) * inverse, zero) + 16.0f;

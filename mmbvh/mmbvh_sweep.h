@@ -14,14 +14,14 @@ typedef struct sweep sweep;
 typedef struct bounds_source bounds_source;
 
 typedef struct sweep_sum {
-    /* sweep that computes ranges: number of unusable cells; sweep of bounds only: number of boxes that the nodes cannot
-     * represent */
+    /* If the sweep computes ranges: the number of cells with non-finite values. If it computes only bounds: the number
+     * of boxes that the nodes' layout cannot represent. */
     int64_t count;
     double area_change; /* change of the tree's area (mmbvh.area), if the sweep measures it */
 } sweep_sum;
 
-/* Processes the nodes from end - 1 down to `first`: the root, a pair, or a pair and its descendants. The interval may
- * be empty. */
+/* Computes the nodes from end - 1 down to `first` from their cells and children. These nodes are the root alone, a pair
+ * of siblings alone, or a pair of siblings and all their descendants. The interval may be empty. */
 typedef sweep_sum (*sweep_run)(const sweep *s, int64_t first, int64_t end);
 
 struct sweep {

@@ -115,7 +115,8 @@ static inline vec4 compute_three_half_areas(const lanes boxes[3])
            vec4_from_int(__builtin_shufflevector(xy, zz, 1, 3, 5, 7));
 }
 
-/* Returns the SAH cost of one side per axis. The cost of an empty side is NaN, which never compares as the smallest. */
+/* Returns the SAH costs of one side of three planes, one per axis in lanes 0 to 2: half the surface area of the side's
+ * box times the number of its items. The cost of an empty side is NaN, which never compares as the smallest. */
 static inline vec4 compute_side_costs(const lanes boxes[3], ivec4 counts)
 {
     return (vec4)((ivec4)(compute_three_half_areas(boxes) * vec4_from_int(counts)) | (ivec4)(counts == 0));
@@ -127,7 +128,8 @@ static inline void extend_side(lanes boxes[3], ivec4 *counts, const bins *b, int
     *counts += *(const ivec4 *)b->bin_array[bin].counts;
 }
 
-/* Returns the cheapest of the three axes' splits, without unpredictable branches. */
+/* Compares the best splits of the three axes and returns the one with the lowest cost. Uses no branches that the
+ * processor would often predict wrongly. */
 static bin_split find_cheapest_axis(vec4 costs, ivec4 borders)
 {
     float cost = costs[0];

@@ -36,7 +36,7 @@ typedef struct bin_split {
     float cost;
 } bin_split;
 
-/* The bins with the same number on the three axes. The struct fills one cache line. */
+/* The data of three bins, one per axis, that have the same index on their axes. The struct fills one cache line. */
 typedef struct bin {
     lanes boxes[3]; /* one box per axis; lanes 3 and 7 are scratch */
     uint32_t counts[4];

@@ -23,7 +23,7 @@ enum { FILL_CHUNKS = 256, PARALLEL_MIN_CELLS = 4096, LIST_CELLS = 16384 };
 /* The settings, buffers and counters of one build. */
 typedef struct build {
     bounds_source source;
-    /* indices of the cells to use, none of which is a ghost; NULL: all cells that are drawn */
+    /* indices of the cells to use, none of which is a ghost or flat; NULL: all cells that are neither */
     const uint32_t *selected;
     int64_t candidate_count; /* length of selected, or the number of all cells including ghosts */
     mmbvh_options options;
@@ -243,7 +243,8 @@ static bool list_cells(build *b)
     return true;
 }
 
-/* Builds the topology, and stores the tree's cells in the order of the leaves. Returns NULL if memory ran out. */
+/* Builds the links between the nodes (struct topology), and stores the indices of the tree's cells in the order of the
+ * leaves. Returns NULL if memory ran out. */
 static topology *build_topology(build *b, int threads)
 {
     topology_build t;

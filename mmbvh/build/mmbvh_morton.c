@@ -179,9 +179,9 @@ void morton_make_keys(const bounds_source *source, const morton_coder *coder, ui
 
 /* ---- sorting ---------------------------------------------------------------------------------------------------- */
 
-/* The numbers of keys by digit, for a radix sort that begins with the highest digit. Neighbouring cells mostly have
- * neighbouring indices, so that consecutive keys are written to few output streams. The keys with the same digit then
- * fit in a core's cache, in which they are sorted completely. */
+/* The counts of a radix sort that begins with the highest digit: how many keys have each value of this digit.
+ * Neighbouring cells mostly have neighbouring indices, so that consecutive keys are written to few output streams. The
+ * keys with the same digit then fit in a core's cache, in which they are sorted completely. */
 typedef struct digit_counts {
     int64_t chunk_digits[SORT_CHUNKS_MAX][DIGITS]; /* number of keys of each chunk with each value of the digit */
 } digit_counts;
@@ -189,7 +189,7 @@ typedef struct digit_counts {
 typedef struct sorting {
     int64_t large; /* groups of keys with more keys than this are sorted by all threads together */
     int chunks, threads;
-    digit_counts *counts; /* numbers of keys per chunk and digit */
+    digit_counts *counts; /* count of the keys for each chunk and each value of the digit */
 } sorting;
 
 static inline int extract_digit(uint64_t key, int shift)
@@ -213,7 +213,8 @@ static void count_digits(const sorting *s, const uint64_t *keys, int64_t count, 
     }
 }
 
-/* Converts the numbers of keys per digit to the index of the first key of each digit, overall and for each chunk. */
+/* Replaces the counts of keys in s->counts by the positions to which each chunk's keys are moved, digit by digit.
+ * starts[d] receives the position of the first key with digit d. */
 static void compute_starts_of_digits(const sorting *s, int64_t starts[DIGITS + 1])
 {
     int64_t sum = 0;
