@@ -53,8 +53,8 @@ static double milliseconds_since(double start)
  * interval 11. */
 static const double expected_bytes = 11;
 
-/* Chooses the route on which messages are sent (comp_route.h). fragments is the maximum number over all ranks; the
- * result is the same on all ranks. */
+/* Chooses the route on which messages are sent (comp_route.h). `fragments` is the number of fragments of the rank that
+ * has most. All ranks must pass the same number, and choose the same route. */
 static void choose_message_route(composition *c, int64_t fragments)
 {
     enum { DEFAULT_RADIX = 8 };
@@ -77,7 +77,8 @@ static void choose_owners(composition *c)
         c->owners.places[b] = claims[b].priority ? comp_priority_rank(claims[b].priority) : -1;
 }
 
-/* Computes this rank's claim to each block (comp_claim_priority()) from the number of its fragments in the block. */
+/* Computes this rank's claim to own each block of pixels: the number of its fragments in the block, and from it the
+ * priority (comp_claim_priority()). The rank with the highest priority will own the block. */
 static void claim_blocks(composition *c)
 {
     comp_claim *const claims = c->group->claims->items;
@@ -88,7 +89,8 @@ static void claim_blocks(composition *c)
         claims[b].priority = comp_claim_priority(b, c->transport.rank, claims[b].fragments);
 }
 
-/* Allocates the memory for the three phases. */
+/* Allocates the memory for exchanging and merging fragments, finds this rank's fragments of each strip of the picture,
+ * and computes this rank's claims to blocks. */
 static insitu_status allocate_phases(composition *c, fragment_list *items, base_error *error)
 {
     if (error && error->status) return error->status;
@@ -106,8 +108,8 @@ static insitu_status allocate_phases(composition *c, fragment_list *items, base_
     return status;
 }
 
-/* Merges the pixels that this rank owns. On rank 0 the results are stored in the picture, on other ranks in *finished.
- * Fragments received from other ranks are in *held. */
+/* Merges the fragments of the pixels that this rank owns. On rank 0 the finished pixels are stored in the picture, on
+ * other ranks in *finished. *held contains the fragments that other ranks have sent. */
 static insitu_status merge_owned(composition *c, const comp_messages *held, comp_messages *finished,
                                  insitu_status status, base_error *error)
 {
@@ -168,7 +170,8 @@ static insitu_status begin_composite(composition *c, fragment_list *items, int t
     return INSITU_OK;
 }
 
-/* Gathers the samples of deep pixels, or drops them if an error occurred. The lists are freed. */
+/* For deep pictures: sends the samples that owners have made to rank 0, or drops them if an error occurred. The lists
+ * of samples are freed. */
 static insitu_status gather_deep(composition *c, insitu_status status, base_error *error)
 {
     comp_deep_list *const lists = c->merged.deep;
@@ -223,7 +226,8 @@ insitu_status comp_composite(const comp_group *group, fragment_list *items, cons
 
 /* ---- overlaps --------------------------------------------------------------------------------------------------- */
 
-/* Combines the sets of pixels in which owners found overlaps, and stores the result on all ranks. */
+/* Each owner has found the pixels in which fragments overlap among its own pixels. Computes the union of these sets and
+ * stores it on all ranks. */
 static insitu_status share_overlaps(const composition *c, comp_overlaps *overlaps, base_error *error)
 {
     const int bytes = (int)pixel_set_bytes(pixel_count(c));

@@ -34,7 +34,8 @@ typedef struct comp_group {
     comp_schedule schedule; /* schedule of messages; COMP_AUTOMATIC chooses the fastest one for each picture */
     /* largest number of ranks in a dense round (comp_messages.h); 0: the default of comp_route.h */
     int max_dense_ranks;
-    comp_claims *claims; /* buffer for the agreement on owners, created by comp_claims_create() */
+    comp_claims *claims; /* buffer in which ranks agree on the owners of blocks, created by comp_claims_create(); one
+                            buffer serves all pictures */
 } comp_group;
 
 /* Blends one pixel's fragments in place: they are sorted by t_in, at equal t_in with surfaces before volumes, and then

@@ -4,11 +4,12 @@
 
 const comp_machine comp_default_machine = {2e-6, 1e-6, 1e-10, 1e-6, 5e-7, 5e-11};
 
-/* Number of pixels of the renderer's tiles. Fragments are made tile by tile, so that all fragments of a tile, or of a
- * block if blocks are smaller than tiles, go to the same owner. */
+/* Number of pixels of a tile, in which the renderer makes fragments. All pixels of a tile, or of a block if blocks are
+ * smaller than tiles, have the same owner. */
 enum { TILE_PIXELS = 256 };
 
-/* Returns the number of partners to which a rank sends fragments in a round. */
+/* Returns the number of partners to which the busiest rank sends messages in a round: all partners in a dense round,
+ * and in a sparse round at most one per tile (or block, if it is smaller) in which the rank has fragments. */
 static double count_partners(const comp_route *route, int round, const comp_load *load)
 {
     const uint32_t together = load->block_pixels < TILE_PIXELS ? load->block_pixels : TILE_PIXELS;
@@ -47,7 +48,8 @@ comp_route comp_cheapest_route(int ranks, comp_nodes nodes, const comp_load *loa
         int radix;
     } tried[] = {{COMP_NODES, 0},  {COMP_RADIX, 4},  {COMP_RADIX, 8},
                  {COMP_RADIX, 16}, {COMP_RADIX, 32}, {COMP_BINARY, 2}};
-    if (nodes.ranks >= ranks) nodes = (comp_nodes){1, false}; /* all ranks are treated as one node */
+    /* all ranks are on one node, so that a separate round within the node would leave nothing for further rounds */
+    if (nodes.ranks >= ranks) nodes = (comp_nodes){1, false};
     comp_route best = comp_route_of(COMP_DIRECT, ranks, nodes, 0);
     double least = comp_estimate_cost(&best, load, machine).seconds;
     for (unsigned i = 0; i < sizeof tried / sizeof *tried; i++) {

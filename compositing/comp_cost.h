@@ -19,7 +19,7 @@ typedef struct comp_machine {
  * between nodes; half of these times within a node. */
 extern const comp_machine comp_default_machine;
 
-/* The number of fragments of the busiest rank, and their size in messages. */
+/* The fragments of the busiest rank, which is the rank with most fragments. The cost of a route is estimated for it. */
 typedef struct comp_load {
     int64_t fragments;
     double bytes;          /* average size of a fragment in a message, in bytes (comp_sheet.h) */
@@ -38,8 +38,8 @@ comp_cost comp_estimate_cost(const comp_route *route, const comp_load *load, con
 /* Returns the route with the lowest estimated time. */
 comp_route comp_cheapest_route(int ranks, comp_nodes nodes, const comp_load *load, const comp_machine *machine);
 
-/* Returns the number of messages that the rank at this place (its number in the route, comp_route.h) sends in all
- * rounds of the route, if all rounds are dense and no message must be split. */
+/* Returns the number of messages that the rank at this place (comp_route.h) sends in all rounds of the route, if all
+ * rounds are dense and no message must be divided because of its length. */
 int64_t comp_route_messages(const comp_route *route, int place);
 
 #endif

@@ -106,7 +106,8 @@ static int receive_items(MPI_Comm comm, int rank, int tag, void *items, int64_t 
     return code;
 }
 
-/* Stores the index of each pixel's first sample in out. */
+/* Stores in out->first, for each of the given pixels, the index of its first sample. The samples of the pixels are
+ * consecutive, and begin at index `at`. */
 static void store_sample_offsets(deep_image *out, const comp_deep_pixel *pixels, int64_t count, int64_t at)
 {
     for (int64_t i = 0; i < count; i++) {
@@ -127,10 +128,10 @@ static void copy_own_samples(deep_image *out, const comp_deep_list *lists, int c
     }
 }
 
-/* The numbers of pixels and samples that each rank sends. Only rank 0 uses this struct. */
+/* Number of pixels and number of samples that rank 0 receives from each rank. Only rank 0 uses this struct. */
 typedef struct deep_inbox {
     int ranks;
-    int64_t (*counts)[2];    /* for each rank, the numbers of pixels and of samples that it sends */
+    int64_t (*counts)[2];    /* for each rank: [0] the number of pixels, [1] the number of samples that it sends */
     comp_deep_pixel *pixels; /* receive buffer, large enough for any other rank's pixels */
 } deep_inbox;
 
@@ -148,7 +149,7 @@ static int receive_all(MPI_Comm comm, const deep_inbox *in, deep_image *out)
     return code;
 }
 
-/* Allocates space on rank 0 for everything that the ranks send. */
+/* Allocates space on rank 0 for the pixels and samples of all ranks. Their numbers must be in in->counts. */
 static insitu_status open_inbox(deep_inbox *in, deep_image *out, base_error *error)
 {
     int64_t pixels = 0, samples = out->count;

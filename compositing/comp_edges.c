@@ -5,8 +5,9 @@
 #include "memory.h"
 #include "region.h"
 
-/* Number of rows in a chunk. One thread processes a chunk, and also marks pixels in the first row of the next chunk.
- * Another thread may process the next chunk at the same time. */
+/* Number of rows of pixels that one thread processes at once. The thread compares each row with the next one and marks
+ * pixels in both, so it also marks pixels in the first row of the next chunk, which another thread may be
+ * processing. */
 enum { ROWS = 32 };
 
 /* Compares two rows of pixels, and stores one byte per channel, nonzero if the channel differs. An sRGB code is nearly
@@ -18,7 +19,8 @@ static void compare_rows(const float *restrict a, const float *restrict b, int64
     for (int64_t i = 0; i < 4 * pixels; i++) out[i] = (a[i] - b[i]) * (a[i] - b[i]) > limit * (a[i] + b[i]);
 }
 
-/* Marks a pixel in its byte. If two threads may mark the row, both do so atomically. */
+/* Sets the byte of a pixel at an edge. If is_shared is set, another thread may set bytes of the same row, and the byte
+ * is set atomically. */
 static void mark_pixel(unsigned char *pixel, bool is_shared)
 {
     if (is_shared) {
@@ -41,8 +43,8 @@ static void mark_pairs(const unsigned char *differ, int64_t pixels, unsigned cha
     }
 }
 
-/* Marks the pixels of row y that differ from a neighbour, and these neighbours: the pixel to the right, and the three
- * pixels of the next row. `differ` is a buffer of 4 bytes per pixel. */
+/* Marks the pixels of row y that differ from the pixel to their right, or from one of the three nearest pixels of the
+ * next row. Also marks the pixel from which they differ. `differ` is a buffer of 4 bytes per pixel. */
 static void mark_row(const image *picture, int64_t y, unsigned char *differ, unsigned char *marks)
 {
     const int64_t width = picture->width;

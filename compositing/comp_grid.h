@@ -90,7 +90,8 @@ static inline uint32_t comp_grid_pixel(const comp_grid *grid, uint32_t strip, ui
 
 /* ---- who owns a block ------------------------------------------------------------------------------------------- */
 
-/* A rank's claim to own a block. The combination of all ranks' claims has the largest priority and the sum of the
+/* A rank's claim to own a block. Claims of several ranks are combined by comp_claim_add(): the combined claim has the
+ * largest of their priorities, which contains the rank that will be the owner, and the sum of their numbers of
  * fragments. */
 typedef struct comp_claim {
     int32_t priority;   /* the rank with the largest priority is the owner; 0: the block has no fragments */
@@ -106,7 +107,7 @@ static inline int comp_priority_rank(int32_t priority)
     return priority & 0xfffff;
 }
 
-/* Returns the same priority with another rank. */
+/* Returns the priority with the rank that is encoded in it replaced by `rank`. */
 static inline int32_t comp_priority_with_rank(int32_t priority, int rank)
 {
     return (int32_t)(((uint32_t)priority & ~0xfffffu) | ((uint32_t)rank & 0xfffff));

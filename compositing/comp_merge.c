@@ -124,8 +124,9 @@ static bool are_of_one_volume(const fragment *samples, int64_t count)
  * include that header. */
 static const float face_error = 4e-6f;
 
-/* Advances *next to the first fragment that does not begin in front of t by more than rounding. Returns the larger of
- * `reach` and the largest t_out of the volume fragments before *next. */
+/* Advances *next behind all fragments that begin in front of the depth t by more than the rounding error of a face's
+ * depth. Returns the depth at which the volume fragments in front of the new *next end: the largest of their t_out, or
+ * `reach` if it is larger. */
 static float find_furthest_end_before(const fragment *sorted, int64_t *next, float t, float reach)
 {
     const float begin = t - face_error * fmaxf(fabsf(t), 1);
@@ -188,7 +189,8 @@ static bool is_volume_of_positive_length(const fragment *f)
 /* Finite value that is used as the optical depth of an opaque medium; the true value is infinite. */
 static const double opaque_depth = 1e6;
 
-/* Blends the mixture of the intervals between the depths `from` and `to`. All intervals must span these depths. */
+/* Blends a homogeneous mixture of media behind what *b contains. The mixture reaches from depth `from` to depth `to`;
+ * each of its media is the volume fragment of an interval that spans these depths. */
 static void blend_mixture(blend *b, const fragment *items, int64_t count, float from, float to)
 {
     double colour[3] = {0, 0, 0}, depth = 0;
@@ -198,7 +200,7 @@ static void blend_mixture(blend *b, const fragment *items, int64_t count, float 
         const double share = ((double)to - (double)from) / ((double)f->t_out - (double)f->t_in);
         const double own = share * (absorbed < 1 ? -log((double)f->transmittance) : opaque_depth);
         const double emitted =
-            /* the limit of own / absorbed, if transmittances are so close to 1 that absorbed is 0 */
+            /* own / absorbed, or its limit if transmittance is so close to 1 that absorbed is 0 */
             absorbed > 0 ? own / absorbed : share;
         for (int c = 0; c < 3; c++) colour[c] += (double)f->colour[c] * emitted;
         depth += own;
@@ -215,7 +217,8 @@ static void swap_fragments(fragment *items, int64_t a, int64_t b)
     items[b] = kept;
 }
 
-/* Moves the intervals that extend behind the depth to the front and keeps their order. Returns their number. */
+/* Moves the intervals that end behind `depth` to the front of the list, without changing their order. Returns the
+ * number of these intervals. */
 static int64_t move_open_to_front(fragment *items, int64_t count, float depth)
 {
     int64_t open = 0;
@@ -232,7 +235,8 @@ static float find_next_interval_end(const fragment *items, int64_t count)
     return to;
 }
 
-/* Returns whether the second fragment begins before the first one ends. */
+/* Returns whether the second fragment of the sorted list begins before the first one ends. `count` is the length of the
+ * list. */
 static bool is_overlapped(const fragment *sorted, int64_t count)
 {
     return count > 1 && is_volume_of_positive_length(&sorted[0]) && sorted[1].t_in < sorted[0].t_out;
@@ -302,7 +306,8 @@ static void blend_single(const fragment *f, const float background[4], float out
     *out_depth = find_depth_of_nearest_surface(f, 1);
 }
 
-/* Not inlined, because inlining it would slow down the frequent case of a single fragment. */
+/* Blends the fragments of a pixel, sorted front to back, over the background. Not inlined, because inlining would slow
+ * down pixels with a single fragment, which are frequent and do not need this function. */
 static __attribute__((noinline)) void blend_sorted(fragment *items, int64_t count, const float background[4],
                                                    float out_rgba[4], float *out_depth)
 {
@@ -403,7 +408,8 @@ void comp_merge_folded_intervals(const fragment *sorted, int64_t count, comp_int
     }
 }
 
-/* Invisible fragments are not tested for overlaps, because their number depends on the partition. */
+/* Fragments behind the depth at which blending stops are not tested for overlaps. Their number depends on the
+ * partition, because ranks may omit them. */
 bool comp_folded_pixel_overlaps(const fragment *sorted, int64_t count)
 {
     float transmittance = 1;

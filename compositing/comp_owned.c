@@ -40,7 +40,8 @@ static bool reserve_fragments(fragment_list *list, int64_t count)
 
 /* ---- joined ----------------------------------------------------------------------------------------------------- */
 
-/* Marks the pixel as mixed, and counts the fragment that the sheet contains for the pixel. */
+/* Adds a pixel to the mixed ones, whose fragments are listed and merged one by one. The fragment that m->joined
+ * contains for the pixel is counted as its first. */
 static void mark_mixed(merge_scratch *m, uint32_t at)
 {
     const unsigned bit = 1u << at % COMP_LANES;
@@ -60,7 +61,8 @@ static bool add_remaining_fragment(merge_scratch *m, const fragment *item, uint3
     return true;
 }
 
-/* Joins a fragment with the fragment that the sheet already contains for the same pixel. */
+/* Adds a fragment for a pixel for which the sheet m->joined already contains one. If both are hits of opaque surfaces,
+ * the sheet keeps the nearer one. Otherwise the pixel becomes mixed. */
 static bool join_second(merge_scratch *m, const fragment *item, uint32_t at)
 {
     const fragment other = comp_sheet_get(&m->joined, at, item->pixel);
@@ -128,8 +130,8 @@ static uint32_t next_mixed_pixel(const merge_scratch *m, uint32_t from)
     return COMP_STRIP_PIXELS;
 }
 
-/* Lists all fragments of mixed pixels by pixel. On return, the fragments of pixel k begin at index ends[k]. Returns
- * false if memory ran out. */
+/* Copies all fragments of mixed pixels to m->listed, sorted by pixel. On return, the fragments of pixel k begin at
+ * index ends[k] of this list. Returns false if memory ran out. */
 static bool list_mixed_pixels(merge_scratch *m)
 {
     uint32_t sum = 0;
@@ -145,7 +147,8 @@ static bool list_mixed_pixels(merge_scratch *m)
     return true;
 }
 
-/* Marks all pixels as mixed, for deep pictures, which need the fragments of all pixels. */
+/* For deep pictures: adds all pixels with a fragment to the mixed pixels, because the samples of a deep picture are
+ * made from the listed fragments of mixed pixels. */
 static void mark_all_mixed(merge_scratch *m)
 {
     for (uint32_t k = 0; k < COMP_STRIP_PIXELS; k++)

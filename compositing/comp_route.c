@@ -1,6 +1,6 @@
 #include "comp_route.h"
 
-/* Returns the largest divisor of the number that is at most `most`. */
+/* Returns the largest divisor of `number` that does not exceed `most`. */
 static int find_largest_divisor(int number, int most)
 {
     for (int k = most; k > 1; k--)
@@ -15,8 +15,8 @@ static bool has_radices(int number, int most)
     return number == 1;
 }
 
-/* Returns the largest product of radices that does not exceed the number. It exceeds half of the number, because the
- * largest power of two does. */
+/* Returns the largest product of numbers from 2 to `most` that does not exceed `number`. It is more than half of
+ * `number`, because the largest power of two that does not exceed `number` is such a product. */
 static int find_largest_product(int number, int most)
 {
     while (!has_radices(number, most)) number--;

@@ -50,8 +50,8 @@ typedef struct comp_route {
     int max_dense_ranks;
 } comp_route;
 
-/* Returns the route of a schedule other than COMP_AUTOMATIC. radix is the maximum number of ranks that exchange in a
- * round of COMP_RADIX. */
+/* Returns the route of a schedule; COMP_AUTOMATIC is not allowed. The schedule COMP_RADIX has rounds of at most `radix`
+ * ranks; other schedules ignore `radix`. */
 comp_route comp_route_of(comp_schedule schedule, int ranks, comp_nodes nodes, int radix);
 
 /* comp_route_position() converts a rank to its place, and comp_route_rank() a place to its rank. */
@@ -66,7 +66,8 @@ static inline int comp_route_digit(const comp_route *route, int round, int strid
     return place / stride % route->radix[round];
 }
 
-/* Returns the place of the partner whose digit in the round is `digit`. */
+/* Returns the place of one of the partners of `place` in the round: the partner whose digit of this round is `digit`.
+ * The places of all partners are equal in their other digits. */
 static inline int comp_route_partner(const comp_route *route, int round, int stride, int place, int digit)
 {
     return place + (digit - comp_route_digit(route, round, stride, place)) * stride;
@@ -79,8 +80,8 @@ static inline bool comp_route_is_dense(const comp_route *route, int round)
     return route->radix[round] <= route->max_dense_ranks;
 }
 
-/* Converts the owners in the claims from ranks to places. Only the first places of a route can own blocks; blocks that
- * other ranks have claimed are given to the partners of these ranks. */
+/* The owner of a block is stored as a rank in its claim; replaces it by the rank's place. If the place is not one of
+ * the first ones, which belong to owners, the block is given to the rank's partner. */
 void comp_route_assign_positions(const comp_route *route, comp_claim *claims, uint32_t blocks);
 
 /* Returns "direct", "nodes", "radix" or "binary". */

@@ -141,8 +141,8 @@ static uint32_t find_index_in_area(const comp_tiles *tiles, const pixel_area *ar
     return row * (uint32_t)area->width + (from - row * width);
 }
 
-/* Sorts the indices of fragments by pixel. The fragments of pixel k of the area have the indices order[starts[k]] to
- * order[starts[k + 1] - 1]. */
+/* Sorts the indices of fragments by pixel. After this, the fragments of pixel k of the area are items[order[j]], for j
+ * from starts[k] to starts[k + 1] - 1. */
 static void sort_by_pixel(const comp_tiles *tiles, const pixel_area *area, const fragment *items, int64_t count,
                           int64_t *starts, int64_t *order)
 {
@@ -154,8 +154,8 @@ static void sort_by_pixel(const comp_tiles *tiles, const pixel_area *area, const
     starts[pixels] = count;
 }
 
-/* Copies one pixel's fragments to the thread's buffer; a single fragment is returned in place. Returns NULL if memory
- * ran out. */
+/* Returns one pixel's fragments as an array: copies them to the thread's buffer, or returns the address of a single
+ * fragment in `items`. Returns NULL if memory ran out. */
 static fragment *copy_pixel(comp_tile_scratch *own, fragment *items, const int64_t *order, int64_t count)
 {
     if (count == 1) return &items[*order];

@@ -16,8 +16,9 @@ typedef struct comp_tiles {
     comp_tile_scratch *scratch; /* scratch memory, one per thread */
 } comp_tiles;
 
-/* Begins tiles for at most this number of threads. out is the same as for comp_composite(). If finds_overlaps is set,
- * pixels whose fragments overlap are recorded. Local; after an error there is nothing to end. */
+/* Prepares blending by at most this number of threads. `out` is the picture; its members must be set as for
+ * comp_composite(). If finds_overlaps is set, pixels whose fragments overlap are recorded. Local. After an error,
+ * comp_tiles_end() must not be called. */
 insitu_status comp_tiles_begin(comp_tiles *tiles, const float background[4], int threads, bool finds_overlaps,
                                image *out, base_error *error);
 

@@ -16,8 +16,8 @@ const comp_sheet_loops *comp_sheet_loops_of(cpu_isa isa)
     return &comp_sheet_plain;
 }
 
-/* Plans a compacted sheet: `count` values stored one after the other in rows of 16. Sheets with many gaps are compacted
- * before packing, because a row with few values takes as long to pack as a full one. */
+/* Plans how to pack a sheet with many gaps: its `count` values are first moved together, so that they fill rows of 16
+ * without gaps. A row with few values would take as long to pack as a full one. */
 static void plan_compact(int count, sheet_plan *plan)
 {
     plan->rows = (count + COMP_LANES - 1) / COMP_LANES;

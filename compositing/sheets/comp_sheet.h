@@ -38,7 +38,7 @@ typedef struct comp_sheet {
     bool is_opaque;
 } comp_sheet;
 
-/* Makes the sheet empty. */
+/* Makes the sheet empty and assigns it to the strip. */
 static inline void comp_sheet_begin(comp_sheet *sheet, uint32_t strip)
 {
     memset(sheet->masks, 0, sizeof sheet->masks);
@@ -108,9 +108,9 @@ const unsigned char *comp_sheet_read(const unsigned char *in, int words, comp_sh
 unsigned char *comp_sheet_write_by(cpu_isa isa, const comp_sheet *sheet, int words, unsigned char *out);
 const unsigned char *comp_sheet_read_by(cpu_isa isa, const unsigned char *in, int words, comp_sheet *sheet);
 
-/* Adds the fragments of `other` to `all`. In pixels that both contain, the nearer fragment is kept if all fragments of
- * both sheets are opaque hits. Otherwise `all` keeps its fragment, and left[] receives per row the mask of the pixels
- * whose fragment of `other` was not added. */
+/* Adds the fragments of `other` to `all`. If both contain a fragment for a pixel and all fragments of both sheets are
+ * hits of opaque surfaces, `all` keeps the nearer fragment. If some fragment is not, `all` keeps its own fragment, and
+ * the pixel's bit in left[] is set, one mask per row: the caller must then merge the fragment of `other`. */
 void comp_sheet_join(comp_sheet *all, const comp_sheet *other, uint16_t left[COMP_ROWS]);
 
 /* Blends each fragment over the background. The result equals that of comp_merge_pixel() for a pixel that has only this

@@ -126,7 +126,8 @@ ROWS_INLINE void store_row(const lanes values[5], const picture_row *to)
     }
 }
 
-/* Stores a row of fewer than 16 pixels, at the picture's right edge. */
+/* Stores the pixels of a strip's row that is cut off by the picture's right edge, and therefore has fewer than 16
+ * pixels. */
 static inline void store_cut_row(const lanes values[5], uint32_t width, const picture_row *to)
 {
     float words[COMP_PIXEL_WORDS][COMP_LANES];

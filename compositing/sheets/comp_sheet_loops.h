@@ -6,9 +6,9 @@
 
 #include "comp_sheet.h"
 
-/* The rows of a sheet that contain pixels, and how their values are predicted. In a compacted sheet, the pixels of a
- * sheet with many gaps are stored one after the other, row by row, without the gaps. A fresh lane has a pixel in this
- * row but none in the rows above, so that its value is predicted from another lane. */
+/* Describes the rows of a sheet that contain pixels, and how their values are predicted. If the sheet has many gaps,
+ * its pixels are first moved together, so that they fill rows without gaps (a compacted sheet). A lane is fresh in a
+ * row if it has a pixel in this row but none in the rows above. Its value is then predicted from another lane. */
 typedef struct sheet_plan {
     int rows, count;
     bool is_sparse; /* the sheet is compacted before packing; fresh and source are then not set */

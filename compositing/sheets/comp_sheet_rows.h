@@ -10,7 +10,8 @@
  * because the word equals the preceding word. */
 enum word_kind { WORD_LINEAR, WORD_CONSTANT, WORD_UNIFORM, WORD_REPEATED };
 
-/* Returns the nearest lane in `known` to the left of `lane`, or the nearest to the right if there is none. */
+/* Returns the nearest lane to the left of `lane` whose bit in the mask `known` is set, or the nearest such lane to the
+ * right if there is none. */
 static uint8_t find_nearest_lane(unsigned known, int lane)
 {
     const unsigned left = known & ((1u << lane) - 1);
@@ -162,7 +163,8 @@ ROWS_INLINE const unsigned char *unpack_residuals(const unsigned char *in, unsig
     return in + (nibbles & 1) * (size_t)pairs;
 }
 
-/* Moves the lanes in the mask to the front (compress), and sets the other lanes to 0. */
+/* Moves the lanes whose bits are set in the mask to the front, without changing their order, and sets the lanes behind
+ * them to 0. */
 ROWS_INLINE lanes compress_lanes(lanes from, unsigned mask)
 {
 #if defined(__AVX512F__)

@@ -14,7 +14,8 @@ insitu_status comp_mpi_status(int code, base_error *error)
     return base_fail(error, INSITU_ERROR_MPI, "compositing: %s", text);
 }
 
-/* Returns the worst status. On ranks whose own status differs, the error message names the rank that failed. */
+/* Returns the largest status of all ranks, `worst`. If this rank's status `own` is a different one, *error receives a
+ * message that names the rank that failed. */
 static insitu_status report_status(insitu_status own, insitu_status worst, int64_t rank, base_error *error)
 {
     if (worst == INSITU_OK || worst == own) return worst;

@@ -14,7 +14,8 @@
  * status. */
 typedef struct comp_claims {
     MPI_Op add;
-    comp_claim items[]; /* one claim per block, and two more entries that contain the status and the maximum */
+    comp_claim items[]; /* one claim per block; two further entries serve to reduce the status and the maximum together
+                           with the claims */
 } comp_claims;
 
 /* Allocates a buffer that is large enough for the claims to any picture shared by this number of ranks. Returns NULL if

@@ -151,8 +151,9 @@ static void send_data(round *r, const unsigned char *data, int bytes, int rank)
     r->transport->sent_messages++;
 }
 
-/* Allocates an MPI request for each message. If memory runs out, the requests allocated beforehand are used and the
- * fragments are dropped; these requests suffice for the empty messages that every partner must receive. */
+/* Allocates an MPI request for each message. If this rank has failed or memory runs out, drops the fragments and uses
+ * the requests that comp_transport_open() has allocated. These suffice for the empty messages that this rank must still
+ * send to every partner. */
 static void make_requests(round *r, comp_messages *out, int partners)
 {
     int count = r->is_sparse ? 0 : partners;

@@ -60,8 +60,8 @@ static bool pack_sheet(void *state, const comp_sheet *sheet, int count)
     return true;
 }
 
-/* Packs one of `shares` equal parts of the strips with fragments for an owner; `share` is the number of the part.
- * Returns false if memory ran out. */
+/* Packs the fragments of a part of the strips for one owner. The owner's strips with fragments are divided into
+ * `shares` parts of about equal length; `share` is the index of the part. Returns false if memory ran out. */
 static bool pack_owner(const owner_strips *c, uint32_t owner, int share, int shares, comp_layers *layers,
                        comp_writer *writer)
 {
@@ -76,8 +76,9 @@ static bool pack_owner(const owner_strips *c, uint32_t owner, int share, int sha
     return is_ok;
 }
 
-/* The fragments that a thread packs for one partner in the first round: those for all owners that have the partner's
- * digit, except this place itself. */
+/* What a thread packs at once: a part of the fragments for one partner of the first round. They are the fragments for
+ * all owners whose first digit is `digit` (comp_route.h), except for the owner at this rank's own place. The part has
+ * the index `share` of `shares`. */
 typedef struct batch {
     int digit, radix, place;
     int share, shares;
@@ -136,8 +137,9 @@ insitu_status comp_pack(const comp_strips *strips, const comp_owners *owners, co
 
 /* ---- forwarding ------------------------------------------------------------------------------------------------- */
 
-/* Forwards the parcels for owners whose place has this digit at the round's position. Parcels for places that differ
- * from this rank's place in a digit of an earlier round have already been sent in that round. */
+/* Writes the parcels that belong to one partner of the round: those for owners whose place has the digit `digit` in
+ * this round. Skips parcels for places that differ from this rank's place in a digit of an earlier round, because these
+ * have been sent in that round. */
 static bool forward_parcels_with_digit(const comp_messages *in, const comp_route *route, int round, int place,
                                        int digit, comp_writer *writer)
 {
@@ -176,8 +178,8 @@ insitu_status comp_forward(const comp_messages *in, const comp_route *route, int
 
 /* ---- unpacking -------------------------------------------------------------------------------------------------- */
 
-/* If sheets is NULL, adds the number of each strip's sheets to starts. Otherwise stores the address of each sheet at
- * the position that counting sort gives it in `sheets`. */
+/* Runs the two passes of a counting sort over the received sheets of an owner. If `sheets` is NULL, adds the number of
+ * sheets of each strip to starts[strip]. Otherwise stores the address of each sheet in `sheets`. */
 static void count_or_store_sheets(const comp_messages *in, int owner, uint32_t *starts, const unsigned char **sheets)
 {
     for (const comp_message *m = in->first; m; m = m->next) {

@@ -146,8 +146,9 @@ static bool fill_sheet_of_single_fragments(const comp_strips *s, uint32_t strip,
     return true;
 }
 
-/* Sorts a pixel's fragments front to back, unless the pixel has very many. The n-th fragments of neighbouring pixels
- * then mostly belong to the same surface, and compress well. */
+/* Sorts the fragments of one pixel front to back, unless the pixel has very many. Sheet n gets the n-th fragment of
+ * every pixel; if pixels are sorted, neighbouring fragments of a sheet mostly belong to the same surface, so that the
+ * sheet compresses well. */
 static void sort_pixel(const fragment **order, uint32_t count)
 {
     if (count > LONGEST_SORTED) return;
@@ -159,8 +160,8 @@ static void sort_pixel(const fragment **order, uint32_t count)
     }
 }
 
-/* Lists the strip's fragments sorted by pixel. On return, the fragments of pixel k begin at index ends[k]. Returns
- * false if memory ran out. */
+/* Lists the fragments of a strip in layers->order, sorted by pixel. On return, the fragments of pixel k begin at index
+ * layers->ends[k]. Returns false if memory ran out. */
 static bool list_fragments_by_pixel(const comp_strips *s, uint32_t strip, comp_layers *layers)
 {
     const int64_t count = comp_strips_count(s, strip);
@@ -185,8 +186,8 @@ static bool list_fragments_by_pixel(const comp_strips *s, uint32_t strip, comp_l
     return true;
 }
 
-/* Fills a sheet with the n-th fragment of each pixel that has at least n + 1 fragments; returns the number of these
- * pixels. */
+/* Fills a sheet with the fragment of index n of each pixel of the strip, for all pixels that have more than n
+ * fragments. Returns the number of these pixels. */
 static int fill_layer(const comp_layers *layers, uint32_t n, comp_sheet *sheet, uint32_t strip)
 {
     int count = 0;
