@@ -172,7 +172,8 @@ static void find_jumps(const wave_grid *grid, double time_step)
     }
 }
 
-/* One side of a face: the cell's jump relative to the face's mean (NULL behind a wall), and its layer. */
+/* The state on one side of a face. It is the mean over the face's vertices plus the jump of the cell on this side;
+ * layer is the cell's layer. If the face is on a wall, the far side has no cell, and its jump is NULL. */
 typedef struct face_side {
     const real *jump;
     int layer;
@@ -184,7 +185,7 @@ INLINE face_side get_face_side(const wave_grid *grid, int32_t cell)
                     : (face_side){(const real *)grid->jump + 4 * (int64_t)cell, grid->layers[cell]};
 }
 
-/* Computes p* and u* of a face with normal n. Both sides have the same mean. */
+/* Computes p* and u* of a face with normal n, from the mean over the face's vertices and the jumps of both sides. */
 INLINE void solve_riemann(const wave_grid *grid, const layer_table *layers, const real *n, const real mean[4],
                           face_side near, face_side far, real star[2])
 {

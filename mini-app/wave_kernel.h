@@ -30,7 +30,7 @@ typedef struct wave_grid {
     const uint8_t *layers;           /* layer of the medium for each cell */
     const void *vertex_cell_weights; /* real; for each entry of wave_mesh.vertex_cells: weight of the cell in the value
                                         at the vertex */
-    const void *faces;               /* real; outward unit normal and area of each own face */
+    const void *faces;               /* real; outward unit normal and area of each face of each own cell */
     const void *inverse_volume;      /* real; 1 / volume of each own cell */
     wave_values state;               /* pressure and velocity of each cell */
     wave_values vertex_state;        /* for each vertex: pressure, velocity; values is NULL in the first-order scheme */
@@ -45,7 +45,7 @@ typedef struct wave_grid {
 typedef struct wave_kernel {
     /* Computes vertex_state from the states of the cells around each vertex. */
     void (*average_to_vertices)(const wave_grid *grid);
-    /* Computes the jumps of own cells at the middle of the time step. */
+    /* Computes the jump of each own cell (see wave_kernel.c), from its state at the middle of the time step. */
     void (*find_jumps)(const wave_grid *grid, double time_step);
     /* Advances the state of own cells by a time step, from the jumps of all cells. */
     void (*apply_fluxes)(const wave_grid *grid, double time_step);

@@ -16,7 +16,7 @@ typedef struct wave_report {
     double bytes_peak, bytes_grown; /* maximum memory so far over all ranks */
 } wave_report;
 
-/* Prints the numbers of cells, ranks and steps, and the head of the table of steps. Collective. */
+/* Prints how many cells, ranks and steps the run has, and the head of the table of steps. Collective. */
 void wave_report_begin(MPI_Comm comm, const wave_options *options, const wave_mesh *mesh, const wave_solver *solver,
                        wave_report *report);
 

@@ -6,7 +6,8 @@
 #include "wave_kernel.h"
 
 typedef struct wave_setup {
-    int real_bytes;  /* size in bytes of all values, both computed and drawn: 4 or 8 */
+    int real_bytes;  /* size in bytes of a floating-point number in all arrays, those that are computed and those that
+                        are drawn: 4 or 8 */
     bool is_soa;     /* components are in separate arrays (SoA); otherwise interleaved (AoS) */
     bool reflecting; /* true if walls are rigid, false if they absorb */
     int order;       /* order of the scheme: 1 or 2 */
@@ -24,7 +25,8 @@ typedef struct wave_solver {
     MPI_Comm comm; /* communicator, borrowed from the caller */
     wave_grid grid;
     wave_halo halo;
-    void *vertex_cell_weights, *faces, *inverse_volume; /* arrays to which grid points, owned by the solver */
+    void *vertex_cell_weights, *faces,
+        *inverse_volume; /* arrays that the solver owns and whose addresses it has stored in `grid` */
     uint8_t *layers;
     void *speed;               /* real; speed of sound in each cell */
     double *volume;            /* volume of each own cell */

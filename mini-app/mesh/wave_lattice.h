@@ -41,7 +41,8 @@ int wave_lattice_cells(const wave_lattice *lattice, int64_t cube, wave_cell cell
 /* Returns the type of all cells, or 0 if they are mixed. */
 uint8_t wave_lattice_uniform_type(const wave_lattice *lattice);
 
-/* Computes the indices of a vertex. For a vertex at the centre of a cube, returns false and the cube's indices. */
+/* Computes the indices (i, j, k) of a vertex of the lattice, and returns true. If the vertex is the centre of a cube,
+ * returns false, and *ijk receives the indices of the cube. */
 bool wave_lattice_vertex_ijk(const wave_lattice *lattice, int64_t vertex, int ijk[3]);
 void wave_lattice_vertex(const wave_lattice *lattice, int64_t vertex, double xyz[3]);
 
