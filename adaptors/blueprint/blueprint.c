@@ -33,11 +33,13 @@ struct insitu_blueprint {
     int64_t step_number;   /* step counter: the number of steps so far */
     bool has_pending_sets; /* true if something has been set for the next step */
     node_log log;          /* errors and reports of the calls since the last step */
-    bool has_cycle;        /* a domain of the next step has state/cycle; cycle is the largest */
+    bool has_cycle; /* set if a domain that was set for the next step has state/cycle; `cycle` is the largest of these
+                       values */
     int64_t cycle, last_cycle;
     bool has_time;
     double time;
-    named_lattices lattices; /* lattices of this rank's blocks when the ranks last agreed on lattices */
+    named_lattices lattices; /* the lattices of this rank's blocks that entered the last agreement of the ranks on
+                                common lattices */
     named_lattices common;   /* the lattices on which all ranks agreed, for the same meshes */
     insitu_blueprint_report report;
     char error[NODE_MESSAGE + 64];
@@ -96,7 +98,8 @@ static mesh_target target_of(const insitu_blueprint *adaptor, const known_mesh *
     return (mesh_target){adaptor->session, known->name, known->number};
 }
 
-/* Returns whether the whole mesh has been replaced by blocks of the same name. */
+/* Returns whether blocks have been set under the name of `whole` after `whole` was set. `whole` is a mesh that was set
+ * as one mesh. Such blocks replace it in the session. */
 static bool is_replaced_by_blocks(const insitu_blueprint *adaptor, const known_mesh *whole)
 {
     for (int i = 0; i < adaptor->known_count; i++) {

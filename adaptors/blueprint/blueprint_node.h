@@ -10,7 +10,7 @@
 
 enum { NODE_NAME = 256, NODE_PATH = 512, NODE_MESSAGE = 1024 };
 
-/* The first error, and reports of what was left out or copied. */
+/* Collects the first error, and the reports of what the adaptor has left out or copied. */
 typedef struct node_log {
     insitu_status status;
     char message[NODE_MESSAGE];

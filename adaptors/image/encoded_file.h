@@ -1,5 +1,6 @@
-/* Encodes a picture with OpenImageIO, in memory, because its PNG writer does not report a full disk. OpenEXR's writer
- * of deep files does not report write errors when the file is closed. */
+/* Encodes pictures with OpenImageIO. Flat pictures are encoded in memory, because OpenImageIO's PNG writer does not
+ * report a full disk. Deep files can only be written to a path. Here this must be the path of a file in memory, because
+ * OpenEXR's writer of deep files does not report write errors when the file is closed. */
 #ifndef ADAPTORS_ENCODED_FILE_H
 #define ADAPTORS_ENCODED_FILE_H
 

@@ -199,8 +199,8 @@ bool place_words(layout_state &s, int index)
 
 /* ---- colour bars ------------------------------------------------------------------------------------------------ */
 
-/* The colour bars of a side with text of one size. All bars have the width of the widest one, and leave space for the
- * highest label. */
+/* The colour bars at one side of the picture, with texts of the height `size`. All bars get the width of the widest
+ * one, and above each bar there is space for the highest label. */
 struct bar_group {
     std::vector<int> bars;
     insitu_anchor anchor;
@@ -275,8 +275,8 @@ block make_bar(const layout_state &s, const bar_group &g, std::size_t n, const a
     return b;
 }
 
-/* Finds the range of heights that other blocks leave free in the vertical strip from x0 to x1. The range is the one
- * around the middle of the picture. */
+/* Finds the free range of heights in the vertical strip of the picture from x0 to x1. Blocks in the strip whose middle
+ * is above the middle of the picture limit the range at the top, other blocks limit it at the bottom. */
 void find_free_height(const layout_state &s, double x0, double x1, double &top, double &bottom)
 {
     top = s.y0, bottom = s.y1;

@@ -29,7 +29,7 @@ struct placed_line {
 
 struct block {
     block_kind kind;
-    int index; /* index of the decoration among those of its kind */
+    int index; /* index of the decoration in the image's list of this kind, for example of the colour bars */
     int size;  /* height of the block's text in pixels */
     area bounds;
     std::vector<placed_line> lines;

@@ -59,7 +59,7 @@ struct failure {
     std::string message;
 };
 
-/* The accumulated result over all leaves of one insitu_vtk_set(). */
+/* The results of one insitu_vtk_set(), summed over all leaves of the data set. */
 struct set_result {
     conversion_log log;
     cell_counts cells;

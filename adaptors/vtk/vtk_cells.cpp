@@ -181,7 +181,8 @@ template <typename Id> struct raw_cells {
     }
 };
 
-/* The sizes of the new lists, and whether each cell corresponds to VTK's cell of the same index. */
+/* The sizes of the cell lists that are made from VTK's, and whether every cell of the new list has the index that it
+ * has in VTK's list. */
 struct new_size {
     int64_t cells = 0;
     int64_t vertices = 0;
