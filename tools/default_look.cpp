@@ -82,8 +82,8 @@ std::vector<std::string> names_of_fields(const grid_list &grids)
     return names;
 }
 
-/* Returns the first field that both steps have, otherwise the first of the last step: because at its first step a run
- * often lacks fields that it computes later. "" if there are no fields. */
+/* Returns the first field that both steps have, or otherwise the first field of the last step, or "" if there are no
+ * fields. The last step is preferred because the first step of a run often lacks fields that are computed later. */
 std::string choose_field(const std::vector<std::string> &first, const std::vector<std::string> &last)
 {
     for (const std::string &name : first)

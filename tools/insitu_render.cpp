@@ -99,8 +99,8 @@ class render_session
     render_session(const render_session &) = delete;
     render_session &operator=(const render_session &) = delete;
 
-    /* Sets this rank's part. A part without drawable cells is not an error, because the rest of the data may be on
-     * other ranks. */
+    /* Passes this rank's part of a step to the session. A part without drawable cells is not an error, because the rest
+     * of the data may be on other ranks. */
     insitu_vtk_report set(vtkDataObject *data)
     {
         insitu_vtk_report report;

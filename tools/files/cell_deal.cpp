@@ -34,7 +34,7 @@ namespace
 
 struct leaf {
     vtkDataObject *data; // data of the leaf; null if the leaf is empty
-    int64_t first_cell;  // number of the leaf's first cell among all cells
+    int64_t first_cell;  // index of the leaf's first cell among the cells of all leaves
 };
 
 /* Returns a hash of the number (the finalizer of splitmix64). */
@@ -124,7 +124,8 @@ vtkSmartPointer<vtkDataObject> extract_part(vtkUnstructuredGrid *grid, int64_t f
     return extract_cells(grid, mine);
 }
 
-/* Returns a copy of a structured grid in which the cells of other ranks are hidden, or null if this rank has none. */
+/* Returns a copy of a structured grid in which the cells that belong to other ranks are hidden. Returns null if no cell
+ * belongs to this rank. */
 vtkSmartPointer<vtkDataObject> hide_others(vtkDataSet *grid, int64_t first_cell, const owner &owners, int rank)
 {
     const vtkIdType count = grid->GetNumberOfCells();
@@ -147,7 +148,7 @@ vtkSmartPointer<vtkDataObject> hide_others(vtkDataSet *grid, int64_t first_cell,
     return copy;
 }
 
-/* How data is distributed. */
+/* How the cells of a data set are distributed, and the rank whose part is made. */
 struct deal {
     const owner &owners;
     partition how;

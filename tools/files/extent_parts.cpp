@@ -29,7 +29,8 @@ size_t longest_axis(const extent &of)
     return longest;
 }
 
-/* Returns the number of the rank's first cell if all cells are divided into equal parts. */
+/* All distributed cells are divided into equal parts, one per rank. Returns the index of the first cell of the rank's
+ * part. */
 double first_of_rank(const cell_range &range, int rank, int ranks)
 {
     return static_cast<double>(range.total) * rank / ranks;

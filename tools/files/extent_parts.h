@@ -28,9 +28,10 @@ struct cell_range {
     int64_t first, count, total;
 };
 
-/* Finds the rank's part of an extent whose cells are this range. Each rank gets at most one part. If all distributed
- * cells are divided equally among ranks, a rank has some cells of the range; the size of its part is proportional to
- * their number. Returns false if the rank gets no part. */
+/* Finds the rank's part of one structured data set: `whole` is its extent, and `range` says which of all distributed
+ * cells are its cells. All distributed cells are divided into equal parts, one per rank. The size of the part that a
+ * rank gets of this data set is proportional to the number of cells that the rank's equal part and `range` have in
+ * common. Returns false if the rank gets no part. */
 bool part_of_extent(const extent &whole, const cell_range &range, int rank, int ranks, extent &part);
 
 /* Copies the part of a structured data set. */

@@ -23,7 +23,7 @@ struct file_kind {
 
 const std::vector<file_kind> &file_kinds();
 
-/* Returns null if the extension is unknown. */
+/* Returns the table's entry for the extension of the path, or null if the extension is unknown. */
 const file_kind *kind_of(const std::string &path);
 
 } // namespace render_tool

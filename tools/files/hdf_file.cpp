@@ -9,8 +9,8 @@
  *         Values                  times
  *         PartOffsets, NumberOfParts
  *         PointOffsets, CellOffsets, ConnectivityIdOffsets        first index of the step's first part
- *         PointDataOffsets/NAME, CellDataOffsets/NAME             the same for fields; by default as for points or
- * cells */
+ *         PointDataOffsets/NAME, CellDataOffsets/NAME             the same for fields; by default as for points
+ *                                                                 or cells */
 #include "hdf_file.h"
 
 #include <algorithm>
@@ -305,8 +305,9 @@ class hdf_grids : public data_file
                in_.number(offsets, at.offset) == 0 && in_.number(offsets, at.offset + at.cells) == at.ids;
     }
 
-    /* Returns the difference between a part's first index in the list of offsets and in the list of cells. It is one
-     * for each earlier part, except parts that reuse the cells of an earlier step and have no entries. */
+    /* A part has one more entry in the list of offsets than in the list of cells. Returns by how much the part's first
+     * index in the list of offsets is greater than that in the list of cells. This is the number of earlier parts,
+     * without parts that have no entries because they reuse the cells of an earlier step. */
     int64_t offset_lead(const part_position &at) const
     {
         int64_t parts = 0;

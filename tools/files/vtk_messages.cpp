@@ -61,10 +61,9 @@ vtkStandardNewMacro(message_catcher)
 
     message_catcher *catcher = nullptr; // the output window, which VTK owns after catch_vtk_messages()
 
-/* Extracts the part that is useful to the user from VTK's messages, which have the form "ERROR: In file, line n
- * class (0x...): what
- *
- * "; the class may be missing. */
+/* Extracts the part of VTK's messages that is useful to the user. A message begins with "ERROR: In file, line n",
+ * continues on the next line with "class (0x...): " and the useful text, and ends with empty lines. The class may be
+ * missing. */
 std::string message_text(std::string text)
 {
     if (text.find("returned failure for request") != std::string::npos) return "VTK's reader failed";
