@@ -7,8 +7,8 @@
 /* Returns half the surface area of a node's box, or 0 if the box is empty. */
 double cost_half_area(const float lower[3], const float upper[3]);
 
-/* Returns the value of mmbvh.area: the sum over all nodes of half the surface area times the number of tests. The
- * rounding does not depend on the number of threads. */
+/* Computes the value of mmbvh.area, which mmbvh.h defines, for the whole tree. The rounding does not depend on the
+ * number of threads. */
 double cost_area_of_tree(const mmbvh *tree, int threads);
 
 /* Returns the tree's SAH cost (mmbvh_cost()), given the value of cost_area_of_tree(). */

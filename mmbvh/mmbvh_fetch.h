@@ -324,7 +324,8 @@ MMBVH_INLINE void round_float_box_outward(const fetch_float_box *float_box, cons
     *upper = vec4_xyz(0.0f - vec4_transform_down(float_box->upper, from, -scale));
 }
 
-/* Returns how the coordinates are read: as floats or doubles if those of all axes are floats or doubles. */
+/* Returns FETCH_FLOATS if the coordinates of all three axes are floats, FETCH_DOUBLES if all are doubles, and otherwise
+ * FETCH_ANY_NUMBERS. */
 static inline fetch_numbers fetch_coordinate_numbers(const grid *g)
 {
     const grid_array *c = g->coordinates;

@@ -6,8 +6,8 @@
 #include "mmbvh_store.h"
 #include "mmbvh_sweep.h"
 
-/* Returns half the surface area of a node's box times the number of tests in the node. A leaf tests each of its cells;
- * an inner node tests the boxes of its two children. Lane 3 of the box must be 0. */
+/* Returns half the surface area of a node's box times the number of tests that a ray makes after it has hit the box:
+ * one for each cell of a leaf, or two for the boxes of an inner node's children. Lane 3 of the box must be 0. */
 static inline double node_area(const mmbvh *tree, int64_t node, vec4 lower, vec4 upper)
 {
     const vec4 d = upper - lower;

@@ -45,8 +45,8 @@ struct sweep {
                               this sweep, while they are in the cache */
 };
 
-/* Sweeps the whole tree. Returns the sum of the results of all calls of `run`; if the sweep has followers, of the last
- * follower's `run`. The rounding of the sum does not depend on the number of threads. */
+/* Sweeps the whole tree. Returns the sum of the results of all calls of `run`. If the sweep has followers, returns the
+ * sum for the last follower's `run` instead. The rounding of the sum does not depend on the number of threads. */
 sweep_sum sweep_tree(const sweep *s, int threads);
 
 /* Returns a sweep that computes the ranges of the field; if field is NULL, they are infinite. */

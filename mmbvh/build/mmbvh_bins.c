@@ -13,8 +13,8 @@ bin_mapping bin_mapping_make(lanes centroids, int64_t item_count)
     const int count = wanted < BINS_MAX ? wanted : BINS_MAX;
     const lanes used = centroids & (lanes){-1, -1, -1, 0, -1, -1, -1, 0};
     const ivec4 least = -lanes_lower(used), extent = lanes_upper(used) - least;
-    /* If the quotient is below 2^15, its rounding error is too small to reach the next integer; larger quotients are
-     * clamped. */
+    /* The quotient is truncated to an integer. If it is below 2^15, its rounding error is too small to change that
+     * integer; larger quotients are clamped. */
     const vec4 quotient = vec4_set1((float)(count * 65536)) / vec4_from_int(extent + 1);
     /* the limit ensures that a bin is at least as wide as a step of the item_grid */
     const ivec4 factor = vec4_truncate(vec4_min(quotient, vec4_set1(32768)));
