@@ -42,7 +42,7 @@ typedef struct comp_parcel {
  * the first parcel. Returns false if there are no more parcels. */
 bool comp_next_parcel(const comp_message *message, size_t *offset, comp_parcel *out);
 
-/* Writes the messages to one rank. */
+/* The messages to one rank while they are being written. */
 typedef struct comp_writer {
     comp_messages messages;
     int rank;
