@@ -21,7 +21,8 @@ class face_list
      * cell's faces are incomplete. */
     bool add_cell(vtkUnstructuredGrid *grid, int64_t cell, int type, const int64_t *points);
 
-    /* Returns the faces of the cell that was added after `number` other cells. */
+    /* Returns the faces of the cell with the index `number`. Cells are counted from 0 in the order in which they were
+     * added. */
     const int64_t *cell_faces(size_t number) const { return cells.data() + cell_starts[number]; }
     int64_t cell_size(size_t number) const { return cell_starts[number + 1] - cell_starts[number]; }
 

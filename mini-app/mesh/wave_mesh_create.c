@@ -110,8 +110,8 @@ static bool add_foreign_cubes(mesh_builder *m, int64_t cube, int owner[3][3][3])
     return true;
 }
 
-/* Adds a send of the cell to the rank, unless the list contains it. Earlier sends of the same cell are at the end of
- * the list. */
+/* Adds an entry to the list of sends: the cell is to be sent to the rank. Does nothing if the list has this entry
+ * already. Earlier entries of the same cell are at the end of the list. */
 static bool add_send(mesh_builder *m, int rank, int32_t cell)
 {
     for (int64_t i = m->sends.count - 1; i >= 0 && m->sends.items[i].value == cell; --i) {
@@ -120,7 +120,8 @@ static bool add_send(mesh_builder *m, int rank, int32_t cell)
     return add_to_pair_list(&m->sends, rank, cell);
 }
 
-/* Adds a send to every rank that owns a cube with one of the cell's lattice vertices. */
+/* Adds entries to the list of sends, so that the cell is sent to every rank that owns a cube with one of the cell's
+ * lattice vertices as a corner. */
 static bool add_sends(mesh_builder *m, int64_t cube, int32_t cell, const wave_cell *c, int owner[3][3][3])
 {
     const wave_lattice *lattice = &m->mesh->partition.lattice;

@@ -37,7 +37,7 @@ bool has_text_values(const std::string &tag)
     return format == std::string::npos || tag.compare(format + 9, 5, "ascii") == 0;
 }
 
-/* Checks the words up to the next tag. */
+/* Throws if one of the words before the next tag is not a number. */
 void check_words(const std::string &path, std::streambuf *in, int64_t &offset)
 {
     std::string word;
