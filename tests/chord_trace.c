@@ -58,7 +58,7 @@ static void chord_trace_cell(kernel_packet *p, const chord_state *state, const g
         for (int i = 0; i < c->count; i++) c->f[i] = 0;
     }
     if (c->type == GRID_TET)
-        kernel_tet_interval(p, c, rays, false, &list[0]);
+        kernel_tet_interval(p, c, rays, &list[0]);
     else
         intervals = kernel_curved_intervals(p, c, rays, list);
     for (int n = 0; n < intervals; n++) chord_store_intervals(state, list[n].mask, list[n].t_in, list[n].t_out);

@@ -150,21 +150,13 @@ SIMD_INLINE float kernel_least_weight_bound(kernel_edge_error most)
 
 enum { KERNEL_MAX_CROSSINGS = 12, KERNEL_MAX_CELL_INTERVALS = KERNEL_MAX_CROSSINGS / 2 };
 
-/* The field of contour lines, which is linear in a tet. Values are in the domain of kernel_lines, in which the first
- * level is 0. */
-typedef struct kernel_tet_line {
-    float value;       /* value at the tet's last vertex */
-    float gradient[3]; /* per scaled unit, in camera axes */
-    float along;       /* change of the value per scaled unit of depth along the tile's middle ray */
-} kernel_tet_line;
-
 typedef struct kernel_cell {
     uint32_t serial, index; /* key of the cell cache: number of the tile, index of the cell */
     int part, layer;        /* key of the cell cache: mesh part, and the layer whose field the cell has */
     bool is_finite;         /* set if the values at all vertices are finite */
     bool is_transformed;    /* set if x, y and z are computed */
     bool is_constant;       /* set if all values in f are equal; computed for volumes only */
-    bool has_lines, has_normal, has_line_field; /* set if `lines`, `normal` and `line` are computed */
+    bool has_lines;         /* set if `lines` is computed */
     int type, count;
     int64_t vertices[GRID_MAX_CELL_VERTICES];
     double world[GRID_MAX_CELL_VERTICES][3];
@@ -174,16 +166,14 @@ typedef struct kernel_cell {
     /* vertex values as the layer needs them: minus an isovalue and scaled (kernel_cell_subtract_isovalue()), or in the
      * domain of a volume's transfer function */
     float f[GRID_MAX_CELL_VERTICES];
-    float g[GRID_MAX_CELL_VERTICES];     /* vertex values of the colour field, in its transfer function's domain */
+    /* vertex values of the colour field, in its transfer function's domain; not set for tets */
+    float g[GRID_MAX_CELL_VERTICES];
     int rank[GRID_MAX_CELL_VERTICES];    /* rank of each vertex in the lexicographic order of coordinates */
     kernel_line lines[KERNEL_MAX_LINES]; /* edge functions of the edges, then of the quads' diagonals */
     float doubt;                         /* for a tet: the largest `bound` of its lines */
     /* least sum of weights at which a crossing is accurate (kernel_least_weight()): for a tet, that of each face; for
      * other cells, least[0] is an upper bound for all triangles */
     float least[4];
-    /* for a tet: direction of the field's gradient, by kernel_tet_normal(); valid if has_normal is set */
-    float normal[3];
-    kernel_tet_line line; /* for a tet: the field of contour lines; valid if has_line_field is set */
 } kernel_cell;
 
 /* An interval of each ray inside a cell. _in and _out: at the crossings at which the ray enters and leaves. t: ray
@@ -394,7 +384,7 @@ static __attribute__((noinline, unused)) void kernel_cell_move_to_tile_space(ker
     for (int i = 0; i < c->count; i++) grid_vertex(g, c->vertices[i], c->world[i]);
     for (int i = 0; i < c->count; i++) kernel_transform_in_tile(f, tile, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
     c->is_transformed = true;
-    c->has_lines = c->has_normal = c->has_line_field = false;
+    c->has_lines = false;
 }
 
 SIMD_INLINE void kernel_cell_transform_in_tile(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile,

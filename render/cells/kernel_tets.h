@@ -106,7 +106,7 @@ SIMD_INLINE void kernel_tets_find_crossed_faces(vm rays, const vf e[KERNEL_TET_E
 
 /* At the crossings of a face: the sums of the depths, values and colour values of the face's three vertices, each
  * multiplied by the vertex's weight (kernel_cell.h), and the sum of the weights. A sum divided by the sum of the
- * weights is the number at the crossing. */
+ * weights is the number at the crossing. Only rays that have a tet each may have colour values. */
 typedef struct kernel_sums {
     vf depth, value, colour, weight;
 } kernel_sums;
@@ -117,13 +117,13 @@ typedef struct kernel_sums {
                         (jk)*KERNEL_TET_NUMBER(t, of_one[(int)(face)[0]], of_transformed[(int)(face)[0]])))
 
 /* Returns the weighted sums of a face (kernel_sums). face: its entry of kernel_tet_face; ij, jk, ik: its edge
- * functions; has_colour: set if the colour field is included, for which all rays must share one tet. */
+ * functions; has_colour: set if the colour field is included. */
 SIMD_INLINE kernel_sums kernel_tets_weighted_sums(const kernel_tets *t, const signed char *face, vf ij, vf jk, vf ik,
                                                   bool has_colour)
 {
     return (kernel_sums){.depth = KERNEL_TET_WEIGH(t, face, ij, jk, ik, z, at[2]),
                          .value = KERNEL_TET_WEIGH(t, face, ij, jk, ik, f, f),
-                         .colour = has_colour ? KERNEL_TET_WEIGH(t, face, ij, jk, ik, g, f) : vf_set(0),
+                         .colour = has_colour ? KERNEL_TET_WEIGH(t, face, ij, jk, ik, f, colours) : vf_set(0),
                          .weight = kernel_weight(ij, jk, ik)};
 }
 
@@ -200,9 +200,9 @@ kernel_tets_recompute(const kernel_tets *t, vm rays, const vf e[KERNEL_TET_EDGES
     const kernel_tets one = {.is_one = true, .packet = t->packet, .one = t->one};
     const kernel_tets several = {.lane_rays = t->lane_rays, .transformed = t->transformed};
     if (t->is_one)
-        kernel_tets_choose_in_double(&one, rays, e, has_colour, ends);
+        kernel_tets_choose_in_double(&one, rays, e, false, ends);
     else
-        kernel_tets_choose_in_double(&several, rays, e, false, ends);
+        kernel_tets_choose_in_double(&several, rays, e, has_colour, ends);
 }
 
 /* Computes the depths at which the rays enter and leave their tets, and the values there. The weighted sums
@@ -248,20 +248,20 @@ SIMD_INLINE void kernel_tet_faces(const kernel_packet *p, const kernel_cell *c, 
     kernel_tets_find_crossed_faces(rays, e, hit);
 }
 
-SIMD_INLINE void kernel_tet_interval(const kernel_packet *p, const kernel_cell *c, vm rays, bool has_colour,
-                                     kernel_interval *out)
+SIMD_INLINE void kernel_tet_interval(const kernel_packet *p, const kernel_cell *c, vm rays, kernel_interval *out)
 {
     const kernel_tets tet = {.is_one = true, .packet = p, .one = c};
-    kernel_tets_interval(&tet, rays, p->is_pencil, has_colour, out);
+    kernel_tets_interval(&tet, rays, p->is_pencil, false, out);
 }
 
 /* ---- rays with a tet each ---- */
 
+/* has_colour: set if w_in and w_out are computed, too. */
 SIMD_INLINE void kernel_tet_rays_interval(const kernel_transformed_tets *transformed, const kernel_lane_rays *r,
-                                          kernel_interval *out)
+                                          bool has_colour, kernel_interval *out)
 {
     const kernel_tets tets = {.lane_rays = r, .transformed = transformed};
-    kernel_tets_interval(&tets, r->active, true, false, out);
+    kernel_tets_interval(&tets, r->active, true, has_colour, out);
 }
 
 #endif

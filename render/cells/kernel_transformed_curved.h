@@ -472,7 +472,7 @@ static __attribute__((noinline)) void kernel_transformed_curved_cell(const kerne
     c->type = type;
     c->count = grid_type_vertices(type);
     c->is_finite = c->is_transformed = true;
-    c->has_lines = c->has_normal = c->has_line_field = false;
+    c->has_lines = false;
     for (int i = 0; i < c->count; i++) {
         c->x[i] = h->at[0][i][n];
         c->y[i] = h->at[1][i][n];

@@ -19,11 +19,11 @@
 
 /* The data of kernel_cell for one tet per lane. at: x, y and z in tile space, by vertex; c, cu, cv and bound: the
  * members of kernel_line, by edge; doubt, least: as in kernel_cell; vertex: indices in the mesh. The caller sets f, the
- * values as the layer needs them. */
+ * values as the layer needs them, and colours, the values of the colour field, if the layer has one. */
 typedef struct kernel_transformed_tets {
     /* world coordinates and values as the caller of the library passed them, in two halves of the lanes */
     kernel_f64 world[4][3][2], values[4][2];
-    vf at[3][4], f[4];
+    vf at[3][4], f[4], colours[4];
     vf c[KERNEL_TET_EDGES], cu[KERNEL_TET_EDGES], cv[KERNEL_TET_EDGES], bound[KERNEL_TET_EDGES];
     vf doubt, least[4];
     vi vertex[4];
@@ -87,6 +87,14 @@ SIMD_INLINE void kernel_transformed_lines(kernel_transformed_tets *out, const ke
     }
 }
 
+/* Transforms tets whose world coordinates are given in the order of coordinates. */
+static __attribute__((noinline)) void kernel_transform_sorted_tets(kernel_transformed_tets *out, const kernel_frame *f,
+                                                                   const kernel_tile *tile)
+{
+    kernel_transformed_positions(out, f, tile);
+    kernel_transformed_lines(out, f, tile);
+}
+
 /* Fetches, sorts and transforms `count` tets. vertices: their indices in the mesh, by vertex and lane. The remaining
  * lanes get the vertices of the first tet. */
 static __attribute__((noinline)) void kernel_transform_tets(kernel_transformed_tets *out, const kernel_arrays *p,
@@ -99,8 +107,7 @@ static __attribute__((noinline)) void kernel_transform_tets(kernel_transformed_t
         kernel_transformed_sort(out, p, true, vertices);
     else
         kernel_transformed_sort(out, p, false, vertices);
-    kernel_transformed_positions(out, f, tile);
-    kernel_transformed_lines(out, f, tile);
+    kernel_transform_sorted_tets(out, f, tile);
 }
 
 /* Copies the tet in lane n to a kernel_cell, with all float32 data that rays need. */

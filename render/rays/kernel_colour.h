@@ -220,7 +220,9 @@ static __attribute__((noinline)) void kernel_special_colour(const kernel_transfe
     }
 }
 
-SIMD_INLINE void kernel_unlit_surface_colour(const kernel_surface *s, int value, vf w, vf out[3])
+/* Computes the colours of a surface's hits before lighting. value: index of each hit's isovalue in the layer; w: the
+ * value of the colour field, if there is one, in the domain of its transfer function. */
+SIMD_INLINE void kernel_unlit_surface_colour(const kernel_surface *s, vi value, vf w, vf out[3])
 {
     if (s->layer->colour_map && (s->colour.is_banded || s->colour.outside)) {
         kernel_special_colour(&s->colour, w, out);
@@ -231,7 +233,10 @@ SIMD_INLINE void kernel_unlit_surface_colour(const kernel_surface *s, int value,
         for (int a = 0; a < 3; a++) out[a] = vf_select(vf_eq(w, w), out[a], vf_set(RENDER_NO_COLOUR));
         return;
     }
-    for (int a = 0; a < 3; a++) out[a] = vf_set(s->layer->colours[3 * value + a]);
+    for (int a = 0; a < 3; a++) {
+        const float *colour = s->layer->colours + a;
+        out[a] = s->layer->value_count == 1 ? vf_set(*colour) : vf_gather(colour, value * 3);
+    }
 }
 
 #endif

@@ -23,7 +23,7 @@ typedef struct kernel_hits {
      * normals come from differences */
     vf reach;
     vf kind;
-    int cut_count; /* number of rows in `cut` */
+    int cut_count; /* number of rows in `cut`; 0 if the frame has no volumes */
     /* row n holds t of the crossing of each ray that was found as its n-th, so that rows are not sorted; +inf if a ray
      * has fewer */
     vf cut[KERNEL_MAX_CUTS];
@@ -39,20 +39,18 @@ static inline void kernel_hits_begin(kernel_hits *hits)
     for (int a = 0; a < 3; a++) hits->normal[a] = hits->colour[a] = vf_set(0);
 }
 
-/* Adds a crossing at t to each ray in `hit`. Each ray fills its own lane from row 0 on, whatever the other rays of the
- * packet do. So the depths at which a ray's fragments are split do not depend on the other rays. */
-SIMD_INLINE void kernel_hits_add_crossing(kernel_hits *hits, vm hit, vf t)
+/* Adds a crossing at t to the ray in lane `ray`. Each ray fills its own lane from row 0 on, whatever the other rays of
+ * the packet do. So the depths at which a ray's fragments are split do not depend on the other rays. */
+static inline void kernel_hits_add_crossing(kernel_hits *hits, int ray, float t)
 {
-    for (int n = 0; vm_any(hit); n++) {
-        if (n == KERNEL_MAX_CUTS) {
-            hits->overflowed = vm_or(hits->overflowed, hit);
-            return;
-        }
-        if (n == hits->cut_count) hits->cut[hits->cut_count++] = vf_set(INFINITY);
-        const vm room = vm_andnot(hit, vf_lt(hits->cut[n], vf_set(INFINITY)));
-        hits->cut[n] = vf_select(room, t, hits->cut[n]);
-        hit = vm_andnot(hit, room);
+    int n = 0;
+    while (n < hits->cut_count && hits->cut[n][ray] < INFINITY) n++;
+    if (n == KERNEL_MAX_CUTS) {
+        vm_set_lane(&hits->overflowed, ray);
+        return;
     }
+    if (n == hits->cut_count) hits->cut[hits->cut_count++] = vf_set(INFINITY);
+    hits->cut[n][ray] = t;
 }
 
 #endif

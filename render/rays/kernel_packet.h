@@ -18,7 +18,7 @@ typedef struct kernel_packet {
     const kernel_tile *tile;
     kernel_thread *thread;
     kernel_hits *hits; /* hits on surfaces; set only for packets of a tile that is being traced */
-    int x0, y0;        /* column and row of the packet's upper left pixel */
+    vi column, row;    /* column and row of each ray's pixel */
     vm active;
     bool is_nearer; /* set when a nearer hit has decreased t_far of some ray; callers clear it */
     bool has_view;
@@ -71,23 +71,27 @@ static inline void kernel_tree_ray(const kernel_frame *f, double px, double py, 
 static inline void kernel_packet_ray_parameters(const kernel_packet *p, double px[SIMD_WIDTH], double py[SIMD_WIDTH])
 {
     for (int i = 0; i < SIMD_WIDTH; i++) {
-        const int row = i / KERNEL_PACKET_COLUMNS;
-        px[i] = kernel_ray_parameter_of_column(p->frame, p->x0 + i % KERNEL_PACKET_COLUMNS);
-        py[i] = kernel_ray_parameter_of_row(p->frame, p->y0 + row);
+        px[i] = kernel_ray_parameter_of_column(p->frame, p->column[i]);
+        py[i] = kernel_ray_parameter_of_row(p->frame, p->row[i]);
     }
 }
 
-static inline void kernel_packet_tile_rays(kernel_packet *p)
+/* Sets the rays of the packet whose upper left pixel is (x0, y0), and their pixels' columns and rows. */
+static inline void kernel_packet_tile_rays(kernel_packet *p, int x0, int y0)
 {
     const kernel_tile *tile = p->tile;
-    const int column = p->x0 - tile->x0, row = p->y0 - tile->y0;
+    const int column = x0 - tile->x0, row = y0 - tile->y0;
     float lanes[4][SIMD_WIDTH];
     for (int i = 0; i < SIMD_WIDTH; i++) {
         lanes[0][i] = tile->origin_x[column + i % KERNEL_PACKET_COLUMNS];
         lanes[1][i] = tile->slope_x[column + i % KERNEL_PACKET_COLUMNS];
         lanes[2][i] = tile->origin_y[row + i / KERNEL_PACKET_COLUMNS];
         lanes[3][i] = tile->slope_y[row + i / KERNEL_PACKET_COLUMNS];
+        p->column[i] = i % KERNEL_PACKET_COLUMNS;
+        p->row[i] = i / KERNEL_PACKET_COLUMNS;
     }
+    p->column += x0;
+    p->row += y0;
     p->origin_x = vf_load(lanes[0]);
     p->slope_x = vf_load(lanes[1]);
     p->origin_y = vf_load(lanes[2]);
@@ -203,8 +207,6 @@ static inline void kernel_packet_begin(kernel_packet *p, const kernel_frame *f, 
     p->frame = f;
     p->tile = tile;
     p->thread = thread;
-    p->x0 = x0;
-    p->y0 = y0;
     p->has_view = p->is_nearer = false;
     for (int lane = 0; lane < SIMD_WIDTH; lane++) {
         const int x = x0 + lane % KERNEL_PACKET_COLUMNS, y = y0 + lane / KERNEL_PACKET_COLUMNS;
@@ -215,7 +217,7 @@ static inline void kernel_packet_begin(kernel_packet *p, const kernel_frame *f, 
     for (int lane = 0; f->job->pixels && lane < SIMD_WIDTH; lane++)
         if (bits >> lane & 1 && !pixel_set_has(f->job->pixels, p->pixel[lane])) bits &= ~(1u << lane);
     p->active = vm_from_bits(bits);
-    kernel_packet_tile_rays(p);
+    kernel_packet_tile_rays(p, x0, y0);
     p->is_pencil = true;
     p->u = camera->is_orthographic ? p->origin_x : p->slope_x;
     p->v = camera->is_orthographic ? p->origin_y : p->slope_y;

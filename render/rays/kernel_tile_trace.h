@@ -260,6 +260,25 @@ SIMD_INLINE void kernel_pixel_list_add_box(kernel_pixel_list *rays, unsigned box
     }
 }
 
+/* Appends the rays of all pixels of the given blocks, packet by packet. */
+SIMD_INLINE void kernel_pixel_list_add_blocks(kernel_pixel_list *rays, unsigned blocks, int lane)
+{
+    /* pixels of the tile's first block by position in the block (kernel_pixel_position()) */
+    static const uint8_t quads[16] = {0, 1, 16, 17, 2, 3, 18, 19, 32, 33, 48, 49, 34, 35, 50, 51};
+    static const uint8_t rows[16] = {0, 1, 2, 3, 16, 17, 18, 19, 32, 33, 34, 35, 48, 49, 50, 51};
+    typedef uint8_t kernel_block_bytes __attribute__((vector_size(KERNEL_BLOCK * KERNEL_BLOCK)));
+    const kernel_block_bytes lanes = (kernel_block_bytes){0} + (uint8_t)lane;
+    for (; blocks; blocks &= blocks - 1, rays->count += KERNEL_BLOCK * KERNEL_BLOCK) {
+        const int block = __builtin_ctz(blocks);
+        kernel_block_bytes pixels;
+        memcpy(&pixels, SIMD_WIDTH == 4 ? quads : rows, sizeof pixels);
+        pixels +=
+            (uint8_t)(KERNEL_BLOCK * (KERNEL_TILE * (block / KERNEL_BLOCKS_ACROSS) + block % KERNEL_BLOCKS_ACROSS));
+        memcpy(rays->pixel + rays->count, &pixels, sizeof pixels);
+        memcpy(rays->lane + rays->count, &lanes, sizeof lanes);
+    }
+}
+
 /* Pads the list with zeros, so that its last rays can be read as a whole vector. */
 SIMD_INLINE void kernel_pixel_list_pad(kernel_pixel_list *rays)
 {
@@ -290,11 +309,12 @@ SIMD_INLINE vi kernel_pixel_position(vi column, vi row)
     return block * (KERNEL_BLOCK * KERNEL_BLOCK) + within;
 }
 
-SIMD_INLINE vf kernel_pixel_far(const kernel_tile_trace *t, vi at)
+/* Returns, for pixels at the given positions among the tile's packets, the numbers of 32 bits that a member of the
+ * packets holds for them, one per ray. of_first: that member of the first packet. */
+SIMD_INLINE vf kernel_gather_of_packets(const void *of_first, vi at)
 {
     const int stride = (int)(sizeof(kernel_packet) / sizeof(float));
-    return vf_gather((const float *)(const void *)&t->packets[0].t_far,
-                     at / SIMD_WIDTH * stride + (at & (SIMD_WIDTH - 1)));
+    return vf_gather((const float *)of_first, at / SIMD_WIDTH * stride + (at & (SIMD_WIDTH - 1)));
 }
 
 /* The rays of SIMD_WIDTH pixels, one per lane, each of which has a cell of its own. */
@@ -306,7 +326,7 @@ typedef struct kernel_lane_rays {
     /* lanes that have a ray; active, u and v are set only by kernel_lane_rays_begin() */
     vm active;
     vf u, v; /* slope of the ray or, if the camera is orthographic, its origin */
-    vf far;  /* t of the ray's nearest hit so far; set only when surfaces are traced */
+    vf far;  /* t of the ray's nearest hit so far (kernel_packet.t_far); set only when surfaces are traced */
 } kernel_lane_rays;
 
 /* Computes the rays through the given pixels of the tile (16 * row + column). lane: lane of each ray's cell. */
@@ -332,21 +352,51 @@ SIMD_INLINE void kernel_lane_rays_begin(kernel_lane_rays *out, const kernel_tile
     out->v = flat ? out->rays.origin_y : out->rays.slope_y;
 }
 
+/* Returns the depths at which the rays begin. Only clips of all layers make rays begin at different depths. */
+SIMD_INLINE vf kernel_lane_rays_near(const kernel_tile_trace *t, const kernel_lane_rays *r)
+{
+    if (__builtin_expect(t->frame->common_clips == 0, 1)) return vf_set(t->t_near);
+    return kernel_gather_of_packets(&t->packets[0].t_near, r->at);
+}
+
+SIMD_INLINE void kernel_lane_rays_set_far(kernel_lane_rays *r, const kernel_tile_trace *t)
+{
+    r->far = kernel_gather_of_packets(&t->packets[0].t_far, r->at);
+}
+
+/* Returns the index in the tile of the packet that has a pixel (16 * row + column). */
+SIMD_INLINE int kernel_packet_of_pixel(int pixel)
+{
+    const int column = pixel & (KERNEL_TILE - 1), row = pixel >> 4;
+    const int block = (row & ~3) + (column >> 2);
+    const int within = SIMD_WIDTH == 4 ? (row & 2) + (column >> 1 & 1) : (row & 3) * KERNEL_BLOCK / SIMD_WIDTH;
+    return block * KERNEL_BLOCK_PACKETS + within;
+}
+
+/* Sets the rays to all rays of a packet, which share the cell in the given lane. packet: its index in the tile. */
+SIMD_INLINE void kernel_lane_rays_of_packet(kernel_lane_rays *out, const kernel_tile_trace *t, int packet, int lane)
+{
+    static const int32_t ramp[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+    const kernel_packet *p = &t->packets[packet];
+    memcpy(&out->at, ramp, sizeof out->at);
+    out->at += packet * SIMD_WIDTH;
+    out->lane = vi_set(lane);
+    out->rays = kernel_packet_rays(p);
+    out->active = p->active;
+    out->u = p->u;
+    out->v = p->v;
+    out->far = p->t_far;
+}
+
 static inline void kernel_tile_set_layer(kernel_tile_trace *t, int layer)
 {
     t->layer = layer;
     t->surface = &t->frame->surfaces[layer];
 }
 
-/* Returns whether hits on the current layer can be processed for rays that each have a cell of their own
- * (kernel_ray_accept()); otherwise they are processed by packets that share one cell. */
-SIMD_INLINE bool kernel_tile_layer_allows_lanes(const kernel_tile_trace *t)
+SIMD_INLINE bool kernel_tile_layer_is_opaque(const kernel_tile_trace *t)
 {
-    const render_surface_layer *l = t->surface->layer;
-    /* rays with clips are not processed in lanes, because they begin at different depths, which only packets store */
-    if (t->frame->common_clips || t->surface->own_clips || t->frame->job->paint == RENDER_VALUES) return false;
-    if (l->lines && l->lines->is_alone) return false;
-    return t->layer < t->frame->opaque_count && !(l->edge_width > 0) && l->normal != RENDER_DIFFERENCES;
+    return t->layer < t->frame->opaque_count;
 }
 
 #endif

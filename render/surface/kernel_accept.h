@@ -20,8 +20,6 @@
 #include "kernel_lines.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
-#include "kernel_surface_cells.h"
-#include "kernel_tile_trace.h"
 #include "kernel_types.h"
 #include "render.h"
 #include "simd.h"
@@ -159,35 +157,6 @@ static __attribute__((noinline)) void kernel_vertex_normals(const kernel_packet 
     }
 }
 
-/* Computes a vector along the gradient of a tet's field, in camera axes, by Cramer's rule in double. The vector's
- * length and sign are arbitrary. */
-SIMD_INLINE void kernel_tet_normal(const kernel_packet *p, const kernel_cell *c, vf out[3])
-{
-    double d[3][3], df[3], g[3];
-    if (c->has_normal) {
-        for (int a = 0; a < 3; a++) out[a] = vf_set(c->normal[a]);
-        return;
-    }
-    for (int i = 0; i < 3; i++) {
-        df[i] = (double)c->f[i + 1] - (double)c->f[0];
-        for (int a = 0; a < 3; a++) d[i][a] = (c->world[i + 1][a] - c->world[0][a]) * p->frame->job->space.scale;
-    }
-    for (int a = 0; a < 3; a++) {
-        const int b = (a + 1) % 3, e = (a + 2) % 3;
-        g[a] = df[0] * (d[1][b] * d[2][e] - d[1][e] * d[2][b]) + df[1] * (d[2][b] * d[0][e] - d[2][e] * d[0][b]) +
-               df[2] * (d[0][b] * d[1][e] - d[0][e] * d[1][b]);
-    }
-    double largest = 0;
-    for (int a = 0; a < 3; a++) largest = fabs(g[a]) > largest ? fabs(g[a]) : largest;
-    const double scale = largest > 0 ? 1 / (largest * p->frame->job->space.scale) : 0;
-    for (int a = 0; a < 3; a++) {
-        const double *axis = p->frame->scaled_axes[a];
-        out[a] = vf_set((float)((axis[0] * g[0] + axis[1] * g[1] + axis[2] * g[2]) * scale));
-    }
-}
-
-/* ---- hits of a packet ---- */
-
 /* Returns whether the surface is one of the frame's opaque ones, which come first. */
 SIMD_INLINE bool kernel_is_opaque(const kernel_packet *p, const kernel_surface *s)
 {
@@ -256,10 +225,10 @@ SIMD_INLINE void kernel_paint(kernel_packet *p, const kernel_surface *s, const v
         kernel_paint_numbers(p, normal, kind, f->colour);
 }
 
-/* Hits on one isovalue of a surface, one ray per lane. */
+/* Hits on a surface, one ray per lane. All cells that are hit are of one mesh part. */
 typedef struct kernel_surface_hits {
-    int value; /* index of the isovalue in the layer */
-    vf t;      /* depth of each hit, in scaled units */
+    vi value; /* index of each hit's isovalue in the layer */
+    vf t;     /* depth of each hit, in scaled units */
     /* a vector of any length along the normal, in camera axes; or, until kernel_vertex_normals() replaces them, the
      * reference coordinates of the hits */
     vf normal[3];
@@ -270,7 +239,18 @@ typedef struct kernel_surface_hits {
     vf reach;
     vf opacity;    /* used only by transparent surfaces */
     vi part, cell; /* the cells that are hit, as in kernel_hits */
+    /* The vertices of the cells: x, y and z in tile space, and the field minus the isovalue, scaled; by vertex and
+     * lane. lane: the lane that holds each ray's cell. The number of vertices is 0 for polyhedra. */
+    int vertex_count;
+    vi lane;
+    const float (*vertices[4])[SIMD_WIDTH];
 } kernel_surface_hits;
+
+/* Returns the kinds of the hits, as floats. */
+SIMD_INLINE vf kernel_hit_kinds(const kernel_surface *s, const kernel_surface_hits *h)
+{
+    return vf_from_vi(h->value + (int)s->first_kind);
+}
 
 /* Emits each tied hit (a hit with the same depth as its ray's nearest hit) as a fragment of its own. Tied hits occur if
  * a cell's map is folded. Compositing compares the bits of fragments of equal depth to select one of them, so that the
@@ -278,10 +258,10 @@ typedef struct kernel_surface_hits {
 static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, const kernel_surface *s, vm tied,
                                                              const kernel_surface_hits *h)
 {
-    const uint32_t kind = s->first_kind + (uint32_t)h->value;
-    kernel_fragments lit = {h->t, h->t, {h->colour[0], h->colour[1], h->colour[2]}, vf_set(0), vf_set(0)};
-    kernel_paint(p, s, h->normal, vf_set((float)kind), &lit);
-    kernel_append_fragments(p, tied, kind, &lit);
+    const vf kind = kernel_hit_kinds(s, h);
+    kernel_fragments lit = {h->t, h->t, {h->colour[0], h->colour[1], h->colour[2]}, vf_set(0), kind};
+    kernel_paint(p, s, h->normal, kind, &lit);
+    kernel_append_fragments(p, tied, 0, &lit);
 }
 
 /* Adds the hits with a reach above 0, whose normals need samples of other ranks' cells, to the thread's list of pending
@@ -290,8 +270,7 @@ static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, c
 static __attribute__((noinline, cold)) vm kernel_defer_hits(kernel_packet *p, const kernel_surface *s, vm hit,
                                                             const kernel_surface_hits *h)
 {
-    const vf *normal = h->normal, *colour = h->colour;
-    const uint32_t kind = s->first_kind + (uint32_t)h->value;
+    const vf *normal = h->normal, *colour = h->colour, kind = kernel_hit_kinds(s, h);
     render_pending_list *list = &p->thread->waiting;
     const vm waits = vm_and(hit, vf_lt(vf_set(0), h->reach));
     if (list->capacity - list->count < SIMD_WIDTH && !render_grow_pending(list)) {
@@ -299,11 +278,11 @@ static __attribute__((noinline, cold)) vm kernel_defer_hits(kernel_packet *p, co
         return vm_none();
     }
     const kernel_fragments place = {
-        h->t, h->t, {colour[0], colour[1], colour[2]}, vf_set(RENDER_PENDING_TRANSMITTANCE), vf_set(0)};
-    kernel_append_fragments(p, waits, kind, &place);
+        h->t, h->t, {colour[0], colour[1], colour[2]}, vf_set(RENDER_PENDING_TRANSMITTANCE), kind};
+    kernel_append_fragments(p, waits, 0, &place);
     for (unsigned left = vm_bits(waits); left; left &= left - 1) {
         const int i = __builtin_ctz(left);
-        list->items[list->count] = (render_pending_hit){p->pixel[i], kind, h->t[i], h->reach[i]};
+        list->items[list->count] = (render_pending_hit){p->pixel[i], (uint32_t)kind[i], h->t[i], h->reach[i]};
         for (int a = 0; a < 3; a++) {
             list->shadings[list->count][0][a] = normal[a][i];
             list->shadings[list->count][1][a] = colour[a][i];
@@ -315,10 +294,12 @@ static __attribute__((noinline, cold)) vm kernel_defer_hits(kernel_packet *p, co
 
 /* Returns the value of the field that colours the surface, in that field's units. If there is no colour field, returns
  * the isovalue. w: the value in the domain of the colour field's transfer function; value: index of the isovalue. */
-SIMD_INLINE vf kernel_surface_value(const kernel_surface *s, int value, vf w)
+SIMD_INLINE vf kernel_surface_value(const kernel_surface *s, vi value, vf w)
 {
-    if (!s->layer->colour_map) return vf_set((float)s->layer->values[value]);
-    return w * (float)(1 / s->colour.inverse_width) + (float)s->colour.low;
+    vf isovalue;
+    if (s->layer->colour_map) return w * (float)(1 / s->colour.inverse_width) + (float)s->colour.low;
+    for (int i = 0; i < SIMD_WIDTH; i++) isovalue[i] = (float)s->layer->values[value[i]];
+    return isovalue;
 }
 
 /* Returns the rays on which the field minus the isovalue has different signs at the two ends of the interval. */
@@ -362,57 +343,6 @@ SIMD_INLINE vm kernel_unclipped_hits(const kernel_packet *p, const kernel_surfac
 SIMD_INLINE vm kernel_visible_hits(const kernel_packet *p, const kernel_surface *s, vm hit, vf t)
 {
     return kernel_unclipped_hits(p, s, vm_and(hit, vf_le(t, p->t_far)), t);
-}
-
-/* ---- hits of rays in lanes, each with its own cell ---- */
-
-/* Emits a ray's hit on the n-th of the cells as a fragment, if the ray's nearest hit has the same depth. ray: lane of
- * the packet p. */
-static __attribute__((noinline, cold)) void kernel_ray_emit_equal_depth(kernel_packet *p, const kernel_surface *s,
-                                                                        int ray, const kernel_surface_cells *cells,
-                                                                        int n, float depth, const float normal[3],
-                                                                        const float colour[3])
-{
-    const vm tied = vm_from_bits(1u << ray);
-    kernel_surface_hits h = {.value = cells->value[n], .t = vf_set(depth)};
-    for (int a = 0; a < 3; a++) {
-        h.normal[a] = vf_set(normal[a]);
-        h.colour[a] = vf_set(colour[a]);
-    }
-    if (s->layer->normal == RENDER_VERTEX)
-        kernel_vertex_normals(p, s, tied, h.t, vi_set(cells->part), vi_set((int32_t)cells->cell[n]), h.normal);
-    kernel_emit_tied(p, s, tied, &h);
-}
-
-/* Accepts a hit on the n-th of the cells: keeps it if it is the nearest hit of its ray, as kernel_accept() does for the
- * rays of a packet. at: position of the ray among those of the tile's packets (packet * SIMD_WIDTH + lane); normal: as
- * in kernel_hits; colour: before lighting. Hits are accepted one by one, because several lanes may hold rays of the
- * same pixel. Returns the bit of the ray's block if the hit is nearer than the ray's previous one, and otherwise 0. */
-SIMD_INLINE unsigned kernel_ray_accept(kernel_tile_trace *t, int at, const kernel_surface_cells *cells, int n,
-                                       float depth, const float normal[3], const float colour[3])
-{
-    const kernel_surface *s = t->surface;
-    const int ray = at % SIMD_WIDTH;
-    kernel_packet *p = &t->packets[at / SIMD_WIDTH];
-    kernel_hits *hits = p->hits;
-    const float far = p->t_far[ray];
-    if (!(depth <= far) || !(vm_bits(p->active) >> ray & 1)) return 0;
-    if (depth == far && far < INFINITY) {
-        kernel_ray_emit_equal_depth(p, s, ray, cells, n, depth, normal, colour);
-        return 0;
-    }
-    p->t_far[ray] = depth;
-    vm_set_lane(&hits->found, ray);
-    for (int a = 0; a < 3; a++) {
-        hits->normal[a][ray] = normal[a];
-        hits->colour[a][ray] = colour[a];
-    }
-    if (s->layer->normal == RENDER_VERTEX) {
-        hits->part[ray] = cells->part;
-        hits->cell[ray] = (int32_t)cells->cell[n];
-    }
-    hits->kind[ray] = (float)((int)s->first_kind + cells->value[n]);
-    return 1u << at / (KERNEL_BLOCK * KERNEL_BLOCK);
 }
 
 #endif

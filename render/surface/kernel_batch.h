@@ -1,24 +1,24 @@
 /* Traces tets in a tile by batches. A batch is the vector of up to SIMD_WIDTH cells, one per lane, that a queue
  * (kernel_surface_cells) has collected:
  *     lanes are cells:     fetched, sorted, transformed; edge functions computed    (once per batch)
- *     lanes are pixels:    each uses the edge functions of its own cell             (cells of few pixels)
- *                          or a packet of a block's rays, all with one cell         (other cells)
- * A block is a square of 4 × 4 pixels of the tile; the box of a cell is the rectangle of the tile's pixels that may see
- * the cell. If cells are small, most rays of a block's packet miss the cell. So the pixels of several cells' boxes are
+ *     lanes are pixels:    each uses the edge functions of its own cell
+ * The box of a cell is the rectangle of the tile's pixels that may see the cell. The pixels of the cells' boxes are
  * listed one after the other, and SIMD_WIDTH of these rays are traced at once. Each lane then has a ray and the index
- * of the lane that holds its cell, and reads the cell's numbers from the batch's vectors by a permutation. All
- * operations are those for a single cell (kernel_crossings.h, kernel_surface.h) in the same order, so the two methods
- * compute bit-identical hits. */
+ * of the lane that holds its cell, and reads the cell's numbers from the batch's vectors by a permutation.
+ *
+ * If a box fills most of its blocks (squares of 4 × 4 pixels), all pixels of the blocks are listed instead. Vectors of
+ * such rays are whole packets of the tile. Their hits are accepted with all lanes at once. */
 #ifndef RENDER_KERNEL_BATCH_H
 #define RENDER_KERNEL_BATCH_H
 
 #include <math.h>
 #include <string.h>
 
+#include "grid.h"
 #include "kernel_accept.h"
 #include "kernel_cell.h"
-#include "kernel_cell_values.h"
 #include "kernel_crossings.h"
+#include "kernel_lane_hits.h"
 #include "kernel_lines.h"
 #include "kernel_map.h"
 #include "kernel_transformed_tets.h"
@@ -31,31 +31,89 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
-enum {
-    /* maximum number of pixels in a cell's box; a cell with more pixels is traced block by block */
-    KERNEL_BATCH_PIXELS = 32
-};
-
-_Static_assert(SIMD_WIDTH *KERNEL_BATCH_PIXELS <= KERNEL_LIST_PIXELS, "a batch's rays have room in a list");
-
 typedef struct kernel_batch {
     const kernel_surface_cells *queued; /* the cells that are being traced */
     /* the cells in tile space; f is the field minus the isovalue, times a power of two */
     kernel_transformed_tets tets;
+    /* indices in the mesh of the sorted vertices, by vertex and lane; set only if the layer has a colour field or
+     * contour lines */
+    int64_t vertices[4][SIMD_WIDTH];
     bool is_of_faces; /* copy of the layer's is_of_faces */
+    bool is_plain;    /* kernel_tile_hits_are_plain() of the layer */
     bool has_normals; /* set if `normal` is computed */
     vf normal[3];     /* a vector along the gradient in each cell, of any length, in camera axes */
     /* the contour lines' field in each lane's cell (members of kernel_tet_line); valid in the lanes whose bits are set
      * in line_lanes */
     unsigned line_lanes;
     float line_value[SIMD_WIDTH], line_gradient[3][SIMD_WIDTH], line_along[SIMD_WIDTH];
-    kernel_pixel_list rays; /* rays to be traced: pixel, and lane of the cell */
+    /* rays to be traced: pixel, and lane of the cell. The first whole_count rays are whole packets. */
+    kernel_pixel_list rays;
+    int whole_count;
 } kernel_batch;
 
 /* ---- lanes are cells ---- */
 
-/* Computes a vector along the gradient in each cell of the batch, by the operations of kernel_tet_normal(). It is
- * called when one of the cells is hit for the first time. */
+/* Fetches the cells one by one (kernel_cell_fetch()), because kernel_arrays.h cannot read them in lanes. The remaining
+ * lanes get copies of the last cell. */
+static __attribute__((noinline)) void kernel_batch_fetch_singly(const kernel_tile_trace *t, kernel_batch *b,
+                                                                const kernel_surface_cells *queued)
+{
+    const int part = queued->part;
+    const grid *cells = t->frame->job->parts[part].cells;
+    kernel_cell c;
+    for (int n = 0; n < SIMD_WIDTH; n++) {
+        const int half = n / KERNEL_HALF, lane = n % KERNEL_HALF;
+        if (n < queued->count) {
+            kernel_cell_fetch(&c, cells, &t->surface->layer->field.fields[part], queued->cell[n]);
+            kernel_cell_transform_in_tile(&c, t->frame, &t->tile, cells);
+        }
+        for (int i = 0; i < 4; i++) {
+            b->vertices[i][n] = c.vertices[i];
+            b->tets.values[i][half][lane] = c.values[i];
+            for (int a = 0; a < 3; a++) b->tets.world[i][a][half][lane] = c.world[i][a];
+        }
+    }
+    kernel_transform_sorted_tets(&b->tets, t->frame, &t->tile);
+}
+
+/* Reads the colour field at the vertices of the cells, in the domain of its transfer function. */
+static __attribute__((noinline)) void kernel_batch_fetch_colours(const kernel_tile_trace *t, kernel_batch *b)
+{
+    const kernel_surface *s = t->surface;
+    for (int n = 0; n < b->queued->count; n++) {
+        float own[4];
+        const int64_t vertices[4] = {b->vertices[0][n], b->vertices[1][n], b->vertices[2][n], b->vertices[3][n]};
+        kernel_read_colour_values(s, b->queued->part, b->queued->cell[n], vertices, 4, own);
+        for (int i = 0; i < 4; i++) b->tets.colours[i][n] = own[i];
+    }
+}
+
+/* Sets up the batch with the queue's cells. */
+static __attribute__((noinline)) void kernel_batch_begin(const kernel_tile_trace *t, kernel_batch *b,
+                                                         kernel_surface_cells *queued)
+{
+    const render_surface_layer *layer = t->surface->layer;
+    kernel_surface_cells_close(queued);
+    if (queued->is_fetched_singly) {
+        kernel_batch_fetch_singly(t, b, queued);
+    } else {
+        kernel_transform_tets(&b->tets, &queued->arrays, t->frame, &t->tile, queued->vertex, queued->count);
+        for (int i = 0; (layer->colour_map || layer->lines) && i < 4; i++)
+            for (int n = 0; n < SIMD_WIDTH; n++) b->vertices[i][n] = b->tets.vertex[i][n];
+    }
+    kernel_lanes_subtract_isovalues(b->tets.values, 4, queued->isovalue, b->tets.f);
+    kernel_surface_cells_set_reach(t, queued, (const kernel_f64(*)[3][2])b->tets.world, 4);
+    b->queued = queued;
+    b->is_of_faces = layer->is_of_faces;
+    b->is_plain = kernel_tile_hits_are_plain(t);
+    b->has_normals = false;
+    b->line_lanes = 0;
+    b->rays.count = b->whole_count = 0;
+    if (layer->colour_map) kernel_batch_fetch_colours(t, b);
+}
+
+/* Computes a vector along the gradient of the field in each cell of the batch, by Cramer's rule in double. The vector's
+ * length and sign are arbitrary. It is called when one of the cells is hit for the first time. */
 static __attribute__((noinline)) void kernel_batch_compute_normals(kernel_batch *b, const kernel_frame *f)
 {
     const double scale = f->job->space.scale;
@@ -82,190 +140,192 @@ static __attribute__((noinline)) void kernel_batch_compute_normals(kernel_batch 
     b->has_normals = true;
 }
 
-/* ---- a cell of the batch that is traced by blocks ---- */
-
-/* Copies the cell in lane n of the batch to *c, with all that kernel_blocks_trace() needs. */
-static __attribute__((noinline)) void kernel_batch_copy_cell(const kernel_tile_trace *t, const kernel_batch *b, int n,
-                                                             kernel_cell *c)
-{
-    const render_surface_layer *layer = t->surface->layer;
-    kernel_transformed_tets_cell(&b->tets, n, c);
-    c->part = b->queued->part;
-    c->index = b->queued->cell[n];
-    c->has_normal = true;
-    for (int a = 0; a < 3; a++) c->normal[a] = b->normal[a][n];
-    if (layer->normal == RENDER_DIFFERENCES || layer->lines) kernel_transformed_tets_double(&b->tets, n, c);
-    c->has_line_field = layer->lines != NULL;
-    if (!layer->colour_map && !layer->lines) return;
-    for (int i = 0; i < 4; i++) c->vertices[i] = b->tets.vertex[i][n];
-    if (layer->colour_map) kernel_read_colour_values(t->surface, c->part, c->index, c->vertices, 4, c->g);
-    if (layer->lines) kernel_compute_tet_line_field(t->frame, &t->tile, t->surface, c, &c->line);
-}
-
 /* ---- lanes are pixels ---- */
 
-/* Returns the rays that hit the surface in their cells between t_near, the depth at which rays begin, and their
- * previous nearest hits (r->far). *out: depths of the hits. */
-SIMD_INLINE vm kernel_batch_find_hits(const kernel_batch *b, float t_near, const kernel_lane_rays *r, vf *out)
+/* Returns the rays that hit the surface in their cells where they are visible. *depth: depths of the hits; has_colour:
+ * set if *w, the values of the colour field at the hits, are computed, too. */
+SIMD_INLINE vm kernel_batch_find_hits(const kernel_tile_trace *t, const kernel_batch *b, const kernel_lane_rays *r,
+                                      bool has_colour, vf *depth, vf *w)
 {
-    const vf far = r->far;
     kernel_interval i;
-    kernel_tet_rays_interval(&b->tets, r, &i);
+    kernel_tet_rays_interval(&b->tets, r, has_colour, &i);
     if (!vm_any(i.mask)) return i.mask;
     const vf v_out = kernel_end_in_cell(i.v_in, i.v_out, b->is_of_faces);
-    const vm near = vm_and(i.mask, vm_and(vf_le(i.t_in, far), vf_le(vf_set(t_near), i.t_out)));
+    const vm near = vm_and(i.mask, vm_and(vf_le(i.t_in, r->far), vf_le(kernel_lane_rays_near(t, r), i.t_out)));
     const vm change = vm_and(near, vm_xor(vf_lt(i.v_in, vf_set(0)), vf_lt(v_out, vf_set(0))));
     if (!vm_any(change)) return change;
-    *out = kernel_secant(i.t_in, i.v_in, i.t_out, v_out);
-    return vm_and(change, vm_and(vf_le(vf_set(t_near), *out), vf_le(*out, far)));
+    *depth = kernel_secant(i.t_in, i.v_in, i.t_out, v_out);
+    if (has_colour) {
+        const vf length = i.t_out - i.t_in;
+        const vf along = vf_select(vf_lt(vf_set(0), length), (*depth - i.t_in) / length, vf_set(0));
+        *w = i.w_in + along * (i.w_out - i.w_in);
+    }
+    return kernel_visible_lane_hits(t, r, change, *depth);
 }
 
 /* Computes the field of the contour lines in lane n's cell. */
 static __attribute__((noinline)) void kernel_batch_set_line_field(const kernel_tile_trace *t, kernel_batch *b, int n)
 {
-    kernel_cell c;
+    double world[4][3];
+    int64_t vertices[4];
     kernel_tet_line line;
-    c.part = b->queued->part;
-    for (int i = 0; i < 4; i++) c.vertices[i] = b->tets.vertex[i][n];
-    kernel_transformed_tets_double(&b->tets, n, &c);
-    kernel_compute_tet_line_field(t->frame, &t->tile, t->surface, &c, &line);
+    for (int i = 0; i < 4; i++) {
+        vertices[i] = b->vertices[i][n];
+        for (int a = 0; a < 3; a++) world[i][a] = kernel_halves_lane(b->tets.world[i][a], n);
+    }
+    kernel_compute_tet_line_field(t->frame, &t->tile, t->surface, b->queued->part, (const double(*)[3])world, vertices,
+                                  &line);
     b->line_value[n] = line.value;
     b->line_along[n] = line.along;
     for (int a = 0; a < 3; a++) b->line_gradient[a][n] = line.gradient[a];
     b->line_lanes |= 1U << n;
 }
 
-/* Computes the colours of hits: those of their isovalues, with contour lines drawn over them. lanes[i]: the lane that
- * holds the cell of hit i, below SIMD_WIDTH; hit: mask of the lanes with a hit. */
-static __attribute__((noinline)) void kernel_batch_draw_lines(const kernel_tile_trace *t, kernel_batch *b,
-                                                              const kernel_lane_rays *r, const uint8_t *lanes,
-                                                              unsigned hit, vf depth, float colour[3][SIMD_WIDTH])
+/* Computes the contour lines' field, its gradient and the surface's normal at the hits. */
+static __attribute__((noinline)) void kernel_batch_line_field(const kernel_tile_trace *t, kernel_batch *b,
+                                                              const kernel_lane_rays *r, unsigned hit, vf depth,
+                                                              kernel_line_field *out)
 {
-    vf last[3], drawn[3];
-    kernel_line_field field;
-    memset(colour, 0, 3 * sizeof *colour);
+    vf last[3];
     if (!b->line_lanes) {
         memset(b->line_value, 0, sizeof b->line_value);
         memset(b->line_along, 0, sizeof b->line_along);
         memset(b->line_gradient, 0, sizeof b->line_gradient);
     }
     for (; hit; hit &= hit - 1) {
-        const int i = __builtin_ctz(hit), n = lanes[i];
-        const float *own = t->surface->layer->colours + 3 * b->queued->value[n];
+        const int n = r->lane[__builtin_ctz(hit)];
         if (!(b->line_lanes >> n & 1)) kernel_batch_set_line_field(t, b, n);
-        for (int a = 0; a < 3; a++) colour[a][i] = own[a];
     }
-    field.value = vf_permute(vf_load(b->line_value), r->lane);
+    out->value = kernel_gather_lane(b->line_value, r->lane);
     for (int a = 0; a < 3; a++) {
-        field.gradient[a] = vf_permute(vf_load(b->line_gradient[a]), r->lane);
-        field.normal[a] = vf_permute(b->normal[a], r->lane);
+        out->gradient[a] = kernel_gather_lane(b->line_gradient[a], r->lane);
+        out->normal[a] = vf_permute(b->normal[a], r->lane);
         last[a] = vf_permute(b->tets.at[a][3], r->lane);
-        drawn[a] = vf_load(colour[a]);
     }
-    kernel_line_field_move(&field, &r->rays, depth, last, vf_permute(vf_load(b->line_along), r->lane));
-    kernel_draw_lines(t->frame, &t->tile, t->surface, &r->rays, depth, &field, drawn);
-    for (int a = 0; a < 3; a++) vf_store(colour[a], drawn[a]);
+    kernel_line_field_move(out, &r->rays, depth, last, kernel_gather_lane(b->line_along, r->lane));
 }
 
-/* Accepts the hits of one vector of rays (kernel_ray_accept()). places: position of each ray among the tile's packets;
- * lanes[i]: the lane that holds the cell of ray i; hit: mask of the rays that hit; colours: the hits' colours, or NULL
- * for those of their isovalues. Returns a mask of the blocks that contain a ray whose hit is nearer than its previous
- * one. */
-SIMD_INLINE unsigned kernel_batch_accept_coloured(kernel_tile_trace *t, kernel_batch *b, vi places,
-                                                  const uint8_t *lanes, unsigned hit, vf depth,
-                                                  const float (*colours)[SIMD_WIDTH])
+/* Accepts plain hits of one vector of rays (kernel_ray_accept()) with the colours of their isovalues. places: position
+ * of each ray among the tile's packets; lanes[i]: the lane that holds the cell of ray i. Returns a mask of the blocks
+ * that contain a ray whose hit is nearer than its previous one. */
+static unsigned kernel_batch_accept_plain(kernel_tile_trace *t, kernel_batch *b, vi places, const uint8_t *lanes,
+                                          unsigned hit, vf depth)
 {
     unsigned blocks = 0;
     int32_t at[SIMD_WIDTH];
+    if (!b->has_normals) kernel_batch_compute_normals(b, t->frame);
     memcpy(at, &places, sizeof at);
     for (; hit; hit &= hit - 1) {
         const int i = __builtin_ctz(hit), n = lanes[i];
-        const float *plain = t->surface->layer->colours + 3 * b->queued->value[n];
         const float normal[3] = {b->normal[0][n], b->normal[1][n], b->normal[2][n]};
-        float colour[3];
-        for (int a = 0; a < 3; a++) colour[a] = colours ? colours[a][i] : plain[a];
+        const float *colour = t->surface->layer->colours + 3 * b->queued->value[n];
         blocks |= kernel_ray_accept(t, at[i], b->queued, n, depth[i], normal, colour);
     }
     return blocks;
 }
 
-/* Accepts the hits of one vector of rays with the colours of their isovalues (kernel_batch_accept_coloured()). */
-static unsigned kernel_batch_accept(kernel_tile_trace *t, kernel_batch *b, vi places, const uint8_t *lanes,
-                                    unsigned hit, vf depth)
+/* Accepts the hits of one vector of rays on a layer of any kind. is_whole: set if the rays are a whole packet; w:
+ * values of the colour field at the hits. Returns the same as kernel_batch_accept_plain(). */
+static __attribute__((noinline)) unsigned kernel_batch_accept(kernel_tile_trace *t, kernel_batch *b,
+                                                              const kernel_lane_rays *r, bool is_whole, vm hit,
+                                                              vf depth, vf w)
 {
+    kernel_line_field along;
+    kernel_surface_hits h = {.t = depth, .w = w, .vertex_count = 4};
     if (!b->has_normals) kernel_batch_compute_normals(b, t->frame);
-    return kernel_batch_accept_coloured(t, b, places, lanes, hit, depth, NULL);
+    for (int a = 0; a < 3; a++) {
+        h.normal[a] = vf_permute(b->normal[a], r->lane);
+        h.vertices[a] = (const float(*)[SIMD_WIDTH])b->tets.at[a];
+    }
+    h.vertices[3] = (const float(*)[SIMD_WIDTH])b->tets.f;
+    if (t->surface->layer->lines) {
+        kernel_batch_line_field(t, b, r, vm_bits(hit), depth, &along);
+        h.along = &along;
+    }
+    if (!is_whole) return kernel_lane_hits_accept(t, b->queued, r, hit, &h);
+    kernel_packet *p = &t->packets[r->at[0] / SIMD_WIDTH];
+    kernel_lane_hits_set_cells(t, b->queued, r->lane, &h);
+    kernel_accept(p, t->surface, hit, &h);
+    return kernel_tile_layer_is_opaque(t) ? 1u << r->at[0] / (KERNEL_BLOCK * KERNEL_BLOCK) : 0;
 }
 
-/* Accepts the hits of one vector of rays as kernel_batch_accept() does, with contour lines drawn over their colours. */
-static __attribute__((noinline)) unsigned kernel_batch_accept_lined(kernel_tile_trace *t, kernel_batch *b,
-                                                                    const kernel_lane_rays *r, const uint8_t *lanes,
-                                                                    unsigned hit, vf depth)
+/* Loads the vector of rays that begins at index `first` of the list. Rays whose cells lie behind their nearest hits are
+ * inactive. */
+SIMD_INLINE void kernel_batch_load(const kernel_tile_trace *t, const kernel_batch *b, int first, kernel_lane_rays *out)
 {
-    float drawn[3][SIMD_WIDTH];
-    if (!b->has_normals) kernel_batch_compute_normals(b, t->frame);
-    kernel_batch_draw_lines(t, b, r, lanes, hit, depth, drawn);
-    return kernel_batch_accept_coloured(t, b, r->at, lanes, hit, depth, (const float(*)[SIMD_WIDTH])drawn);
+    if (first < b->whole_count) {
+        kernel_lane_rays_of_packet(out, t, kernel_packet_of_pixel(b->rays.pixel[first]), b->rays.lane[first]);
+    } else {
+        kernel_lane_rays_begin(out, t, &b->rays, first);
+        kernel_lane_rays_set_far(out, t);
+    }
+    out->active = vm_and(out->active, vf_le(kernel_gather_lane(b->queued->near, out->lane), out->far));
 }
 
-/* Traces all rays in the batch's list, and empties the list. */
-SIMD_INLINE void kernel_batch_trace(kernel_tile_trace *t, kernel_batch *b)
+SIMD_INLINE void kernel_batch_trace_rays(kernel_tile_trace *t, kernel_batch *b, bool has_colour)
 {
     unsigned nearer = 0;
     kernel_pixel_list_pad(&b->rays);
     for (int first = 0; first < b->rays.count; first += SIMD_WIDTH) {
         kernel_lane_rays r;
-        vf depth;
-        kernel_lane_rays_begin(&r, t, &b->rays, first);
-        r.far = kernel_pixel_far(t, r.at);
-        r.active = vm_and(r.active, vf_le(vf_permute(vf_load(b->queued->near), r.lane), r.far));
+        vf depth, w = vf_set(0);
+        kernel_batch_load(t, b, first, &r);
         if (!vm_any(r.active)) continue;
-        const vm hit = kernel_batch_find_hits(b, t->t_near, &r, &depth);
+        const vm hit = kernel_batch_find_hits(t, b, &r, has_colour, &depth, &w);
         if (!vm_any(hit)) continue;
-        if (__builtin_expect(t->surface->layer->lines != NULL, 0)) {
-            const kernel_lane_rays own = r; /* a copy, because taking the address of r would keep r in memory */
-            nearer |= kernel_batch_accept_lined(t, b, &own, b->rays.lane + first, vm_bits(hit), depth);
+        const bool is_whole = first < b->whole_count;
+        if (!has_colour && b->is_plain && !is_whole) {
+            nearer |= kernel_batch_accept_plain(t, b, r.at, b->rays.lane + first, vm_bits(hit), depth);
         } else {
-            nearer |= kernel_batch_accept(t, b, r.at, b->rays.lane + first, vm_bits(hit), depth);
+            const kernel_lane_rays own = r; /* a copy, because taking the address of r would keep r in memory */
+            nearer |= kernel_batch_accept(t, b, &own, is_whole, hit, depth, w);
         }
     }
     for (; nearer; nearer &= nearer - 1) kernel_block_update_far(t, __builtin_ctz(nearer));
-    b->rays.count = 0;
+    b->rays.count = b->whole_count = 0;
+}
+
+/* Traces all rays in the batch's list, and empties the list. */
+static __attribute__((noinline)) void kernel_batch_trace(kernel_tile_trace *t, kernel_batch *b)
+{
+    if (t->surface->layer->colour_map)
+        kernel_batch_trace_rays(t, b, true);
+    else
+        kernel_batch_trace_rays(t, b, false);
 }
 
 /* ---- batches ---- */
 
-/* Traces the queue's cells, and empties the queue: lists the rays of small cells, traces larger cells block by block,
- * and then traces the listed rays. */
+/* Sets up the packets of the n-th cell's blocks, and lists its rays. Traces the list if it is full. is_whole: set if
+ * all rays of the given blocks are listed, instead of those of the cell's box. */
+SIMD_INLINE void kernel_batch_list_rays(kernel_tile_trace *t, kernel_batch *b, int n, unsigned blocks, bool is_whole)
+{
+    for (unsigned left = b->queued->blocks[n] & ~t->begun; left; left &= left - 1)
+        kernel_block_begin(t, __builtin_ctz(left));
+    if (is_whole)
+        kernel_pixel_list_add_blocks(&b->rays, blocks, n);
+    else
+        kernel_pixel_list_add_box(&b->rays, b->queued->box[n], n);
+    if (is_whole) b->whole_count = b->rays.count;
+    if (b->rays.count >= KERNEL_LIST_PIXELS) kernel_batch_trace(t, b);
+}
+
+/* Traces the queue's cells, which become the current batch, and empties the queue. */
 static __attribute__((noinline)) void kernel_batch_process(kernel_tile_trace *t, kernel_batch *b,
                                                            kernel_surface_cells *queued)
 {
-    const render_surface_layer *layer = t->surface->layer;
-    /* layers with a colour field are traced cell by cell, because the batch does not store the field's values */
-    const bool by_ray = kernel_tile_layer_allows_lanes(t) && !layer->colour_map;
-    const int most = by_ray ? KERNEL_BATCH_PIXELS : 0;
-    kernel_surface_cells_close(queued);
-    kernel_transform_tets(&b->tets, &queued->arrays, t->frame, &t->tile, queued->vertex, queued->count);
-    kernel_lanes_subtract_isovalues(b->tets.values, 4, queued->isovalue, b->tets.f);
-    b->queued = queued;
-    b->is_of_faces = layer->is_of_faces;
-    b->has_normals = false;
-    b->line_lanes = 0;
-    b->rays.count = 0;
+    unsigned small = 0;
+    kernel_batch_begin(t, b, queued);
     for (int n = 0; n < queued->count; n++) {
-        unsigned blocks = queued->blocks[n] & kernel_blocks_not_hidden_at(t, queued->near[n]);
+        const unsigned blocks = queued->blocks[n] & t->traced_blocks & kernel_blocks_not_hidden_at(t, queued->near[n]);
         if (!blocks) continue;
-        if (kernel_box_pixels(queued->box[n]) <= most) {
-            kernel_pixel_list_add_box(&b->rays, queued->box[n], n);
-            for (blocks = queued->blocks[n] & ~t->begun; blocks; blocks &= blocks - 1)
-                kernel_block_begin(t, __builtin_ctz(blocks));
-            continue;
-        }
-        if (!b->has_normals) kernel_batch_compute_normals(b, t->frame);
-        kernel_batch_copy_cell(t, b, n, t->cell);
-        kernel_blocks_trace(t, blocks, queued->part, t->cell->index, t->cell, queued->value[n]);
+        if (2 * KERNEL_BLOCK * KERNEL_BLOCK * __builtin_popcount(blocks) <= 3 * kernel_box_pixels(queued->box[n]))
+            kernel_batch_list_rays(t, b, n, blocks, true);
+        else
+            small |= 1u << n;
     }
-    kernel_batch_trace(t, b);
+    for (; small; small &= small - 1) kernel_batch_list_rays(t, b, __builtin_ctz(small), 0, false);
+    if (b->rays.count) kernel_batch_trace(t, b);
     queued->count = 0;
 }
 

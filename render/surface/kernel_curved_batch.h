@@ -30,6 +30,7 @@
 #include "kernel_contraction.h"
 #include "kernel_cuboids.h"
 #include "kernel_curved_rays.h"
+#include "kernel_lane_hits.h"
 #include "kernel_lines.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
@@ -126,8 +127,8 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_trace_singly(kerne
         p->is_nearer = false;
         kernel_curved_batch_copy_cell(t, h, n);
         curved.lane = n;
-        kernel_cell_surface(p, t->surface, &h->cells[n], &curved, h->queued->value[n],
-                            vm_and(p->active, vm_from_bits(same)));
+        kernel_curved_surface(p, t->surface, &h->cells[n], &curved, h->queued->value[n],
+                              vm_and(p->active, vm_from_bits(same)));
         if (p->is_nearer) blocks |= 1u << at[i] / (KERNEL_BLOCK * KERNEL_BLOCK);
     }
     return blocks;
@@ -171,7 +172,7 @@ SIMD_INLINE void kernel_curved_batch_load(const kernel_tile_trace *t, const kern
                                           const kernel_pixel_list *rays, int n, kernel_lane_rays *out)
 {
     kernel_lane_rays_begin(out, t, rays, n);
-    out->far = kernel_pixel_far(t, out->at);
+    kernel_lane_rays_set_far(out, t);
     out->active = vm_and(out->active, vf_le(kernel_gather_lane(h->queued->near, out->lane), out->far));
 }
 
@@ -258,9 +259,10 @@ SIMD_INLINE void kernel_curved_batch_cross_of(const kernel_tile_trace *t, kernel
         const vf zero = vf_set(0), endless = vf_set(INFINITY);
         const vi faces = kernel_load_bytes(h->faces + n);
         kernel_lane_rays_begin(&p, t, &h->met, n);
-        p.far = kernel_pixel_far(t, p.at);
+        kernel_lane_rays_set_far(&p, t);
         kernel_curved_cross(&h->transformed, &p, type, faces, ends);
-        vm near = vm_and(vf_le(ends[0].t, p.far), vf_le(vf_set(t->t_near), ends[1].t));
+        ends[1].value = kernel_end_in_cell(ends[0].value, ends[1].value, t->surface->layer->is_of_faces);
+        vm near = vm_and(vf_le(ends[0].t, p.far), vf_le(kernel_lane_rays_near(t, &p), ends[1].t));
         near = vm_and(vm_and(p.active, near), vm_and(vf_lt(ends[0].t, endless), vf_lt(ends[1].t, endless)));
         const vm change = vm_xor(vf_lt(ends[0].value, zero), vf_lt(ends[1].value, zero));
         const vm nonempty = vm_and(near, vm_or(change, vf_lt(ends[0].t, ends[1].t)));
@@ -312,52 +314,44 @@ static __attribute__((noinline)) void kernel_curved_batch_fetch_lines(const kern
             h->lines[i][n] = (float)kernel_lines_value(t->surface, field, h->transformed.vertex[i][n]);
 }
 
-/* Computes the colours of hits, before lighting, if the surface has a colour field or contour lines. lanes[i]: the lane
- * that holds the cell of hit i. */
-static __attribute__((noinline)) void kernel_curved_batch_colours(const kernel_tile_trace *t,
-                                                                  const kernel_curved_batch *h, const uint8_t *lanes,
-                                                                  const kernel_lane_rays *p, const kernel_point *at,
-                                                                  vf colours[3])
+/* Accepts plain hits of one vector of rays (kernel_ray_accept()) with the colours of their isovalues. */
+SIMD_INLINE unsigned kernel_curved_batch_accept_plain(kernel_tile_trace *t, const kernel_curved_batch *h,
+                                                      const kernel_lane_rays *p, vm hit, const kernel_point *points,
+                                                      const vf normal[3])
 {
-    const render_surface_layer *layer = t->surface->layer;
-    if (layer->colour_map) {
-        const vf place =
-            kernel_maps_value_of_type((const float(*)[SIMD_WIDTH])h->colours, p->lane, at->r, h->queued->type);
-        kernel_unlit_surface_colour(t->surface, 0, place, colours);
-    } else {
-        for (int i = 0; i < SIMD_WIDTH; i++)
-            for (int a = 0; a < 3; a++) colours[a][i] = layer->colours[3 * h->queued->value[lanes[i]] + a];
-    }
-    if (!layer->lines) return;
-    kernel_line_field along;
-    KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_line_field, t, h, p->lane, at->r, &along);
-    kernel_draw_lines(t->frame, &t->tile, t->surface, &p->rays, at->t, &along, colours);
-}
-
-/* Accepts hits of the vector of rays from index `first` on in a list (kernel_ray_accept()). hit: mask of the rays that
- * hit; normal: as in kernel_hits, a vector along the normal or reference coordinates. Returns a mask of the blocks that
- * contain a ray whose hit is nearer than its previous one. */
-static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile_trace *t, const kernel_curved_batch *h,
-                                                                     const kernel_pixel_list *rays, int first,
-                                                                     const kernel_lane_rays *p, unsigned hit,
-                                                                     const kernel_point *points, const vf normal[3])
-{
-    const render_surface_layer *layer = t->surface->layer;
-    const bool has_own = layer->colour_map || layer->lines;
     unsigned blocks = 0;
-    int32_t at[SIMD_WIDTH];
-    vf colours[3];
-    if (has_own) kernel_curved_batch_colours(t, h, rays->lane + first, p, points, colours);
-    memcpy(at, &p->at, sizeof at);
-    for (; hit; hit &= hit - 1) {
-        const int i = __builtin_ctz(hit), n = rays->lane[first + i];
-        const float *plain = layer->colours + 3 * h->queued->value[n];
+    int32_t at[SIMD_WIDTH], lanes[SIMD_WIDTH];
+    vi_store(at, p->at);
+    vi_store(lanes, p->lane);
+    for (unsigned left = vm_bits(hit); left; left &= left - 1) {
+        const int i = __builtin_ctz(left), n = lanes[i];
         const float own_normal[3] = {normal[0][i], normal[1][i], normal[2][i]};
-        float colour[3];
-        for (int a = 0; a < 3; a++) colour[a] = has_own ? colours[a][i] : plain[a];
+        const float *colour = t->surface->layer->colours + 3 * h->queued->value[n];
         blocks |= kernel_ray_accept(t, at[i], h->queued, n, points->t[i], own_normal, colour);
     }
     return blocks;
+}
+
+/* Accepts the hits of one vector of rays. points: the hits; normal: as in kernel_hits, a vector along the normal or
+ * reference coordinates. Returns a mask of the blocks that contain a ray whose hit is nearer than its previous one. */
+static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile_trace *t, const kernel_curved_batch *h,
+                                                                     const kernel_lane_rays *p, vm hit,
+                                                                     const kernel_point *points, const vf normal[3])
+{
+    const render_surface_layer *layer = t->surface->layer;
+    const int type = h->queued->type;
+    if (kernel_tile_hits_are_plain(t)) return kernel_curved_batch_accept_plain(t, h, p, hit, points, normal);
+    kernel_line_field along;
+    kernel_surface_hits hits = {.t = points->t, .vertex_count = grid_type_vertices(type)};
+    memcpy(hits.normal, normal, sizeof hits.normal);
+    for (int a = 0; a < 4; a++) hits.vertices[a] = (const float(*)[SIMD_WIDTH])h->transformed.at[a];
+    if (layer->colour_map)
+        hits.w = kernel_maps_value_of_type((const float(*)[SIMD_WIDTH])h->colours, p->lane, points->r, type);
+    if (layer->lines) {
+        KERNEL_OF_TYPE(type, kernel_curved_batch_line_field, t, h, p->lane, points->r, &along);
+        hits.along = &along;
+    }
+    return kernel_lane_hits_accept(t, h->queued, p, hit, &hits);
 }
 
 /* Computes what hits store as their normals: the field's gradients, transformed from tile space into camera axes. If
@@ -397,10 +391,10 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_cross_cuboids(kern
         const vm cuboid = vf_lt(kernel_gather_lane(h->cuboids.domain_margin, p.lane), vf_set(INFINITY));
         const vm rays = vm_and(p.active, cuboid);
         kernel_cuboid_find_roots(&h->cuboids, at, &p, rays, &root, &none, gradient);
-        const vm hit = vm_and(root.mask, vm_and(vf_le(vf_set(t->t_near), root.t), vf_le(root.t, p.far)));
+        const vm hit = kernel_visible_lane_hits(t, &p, root.mask, root.t);
         if (vm_any(hit)) {
             kernel_curved_batch_store_normal(t, gradient, root.r, normal);
-            nearer |= kernel_curved_batch_accept(t, h, &h->rays, n, &p, vm_bits(hit), &root, normal);
+            nearer |= kernel_curved_batch_accept(t, h, &p, hit, &root, normal);
         }
         kept = kernel_curved_batch_keep(h, n, vm_bits(vm_andnot(p.active, vm_or(root.mask, none))), kept);
     }
@@ -422,7 +416,7 @@ SIMD_INLINE unsigned kernel_curved_batch_accept_found_of(kernel_tile_trace *t, k
         kernel_point ends[2], at;
         vm open = vm_none();
         kernel_lane_rays_begin(&p, t, &h->found, n);
-        p.far = kernel_pixel_far(t, p.at);
+        kernel_lane_rays_set_far(&p, t);
         kernel_curved_ends_load(h->found_ends, n, is_contracted ? 1 : 2, ends);
         kernel_maps_of((const float(*)[8][SIMD_WIDTH])h->transformed.at, p.lane, &map, type);
         if (is_contracted) {
@@ -431,13 +425,13 @@ SIMD_INLINE unsigned kernel_curved_batch_accept_found_of(kernel_tile_trace *t, k
         } else {
             open = kernel_polish_lanes(&p.rays, &map, p.active, &ends[0], &ends[1], &at);
         }
-        const vm hit = vm_and(vm_andnot(p.active, open), vm_and(vf_le(vf_set(t->t_near), at.t), vf_le(at.t, p.far)));
+        const vm hit = kernel_visible_lane_hits(t, &p, vm_andnot(p.active, open), at.t);
         if (__builtin_expect(vm_any(open), 0))
             nearer |= kernel_curved_batch_trace_singly(t, h, &h->found, n, p.at, vm_bits(open));
         if (!vm_any(hit)) continue;
         vf normal[3];
         kernel_curved_batch_normal(t, &map, at.r, normal);
-        nearer |= kernel_curved_batch_accept(t, h, &h->found, n, &p, vm_bits(hit), &at, normal);
+        nearer |= kernel_curved_batch_accept(t, h, &p, hit, &at, normal);
     }
     return nearer;
 }
@@ -449,20 +443,19 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_accept_found(kerne
                          : KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_accept_found_of, t, h, false);
 }
 
-/* Searches for the first visible root of each ray in the vector that begins at index n of `others`, and accepts it.
- * Returns a mask of the blocks that contain a ray whose hit is nearer than its previous one. */
+/* Searches for the roots of each ray in the vector that begins at index n of `others`, and accepts those that are
+ * visible. A ray ends at the first visible root of an opaque surface. Returns a mask of the blocks that contain a ray
+ * whose hit is nearer than its previous one. */
 static __attribute__((noinline)) unsigned kernel_curved_batch_search(kernel_tile_trace *t, kernel_curved_batch *h,
                                                                      int n)
 {
     kernel_lane_rays p;
     kernel_point ends[2];
     kernel_interval i = {.w_in = vf_set(0), .w_out = vf_set(0)};
-    kernel_point first = {.t = vf_set(0)};
-    vf normals[3] = {vf_set(0), vf_set(0), vf_set(0)};
     kernel_search s;
-    vm hits = vm_none();
+    unsigned nearer = 0;
     kernel_lane_rays_begin(&p, t, &h->others, n);
-    p.far = kernel_pixel_far(t, p.at);
+    kernel_lane_rays_set_far(&p, t);
     kernel_curved_ends_load(h->other_ends, n, 2, ends);
     kernel_interval_from_points(p.active, &ends[0], &ends[1], &i);
     const kernel_curved cells = kernel_curved_batch_cells(h);
@@ -472,14 +465,13 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_search(kernel_tile
         vf normal[3];
         if (!vm_any(s.found)) continue;
         kernel_refine_roots(&s, &at);
-        const vm hit = vm_and(s.found, vm_and(vf_le(vf_set(t->t_near), at.t), vf_le(at.t, p.far)));
+        const vm hit = kernel_visible_lane_hits(t, &p, s.found, at.t);
+        if (!vm_any(hit)) continue;
         kernel_curved_batch_normal(t, &s.map, at.r, normal);
-        for (int a = 0; a < 3; a++) normals[a] = vf_select(hit, normal[a], normals[a]);
-        kernel_point_copy_lanes(hit, &at, &first);
-        hits = vm_or(hits, hit);
-        kernel_search_close(&s, hit);
+        nearer |= kernel_curved_batch_accept(t, h, &p, hit, &at, normal);
+        if (kernel_tile_layer_is_opaque(t)) kernel_search_close(&s, hit);
     } while (kernel_search_continue(&s));
-    return vm_any(hits) ? kernel_curved_batch_accept(t, h, &h->others, n, &p, vm_bits(hits), &first, normals) : 0;
+    return nearer;
 }
 
 /* ---- batches ---- */
@@ -530,19 +522,29 @@ SIMD_INLINE void kernel_curved_batch_list_rays(kernel_tile_trace *t, kernel_curv
     if (h->rays.count >= KERNEL_LIST_PIXELS) kernel_curved_batch_trace(t, h);
 }
 
-/* Transforms the queued cells into tile space, and lists the rays of their boxes. A cell is instead traced block by
- * block at once if the layer's rays cannot be traced in lanes (kernel_tile_layer_allows_lanes()), or if the cell has an
- * edge of length zero. */
+/* Returns whether rays in cuboids are decided by kernel_cuboids.h. */
+static bool kernel_curved_batch_allows_cuboids(const kernel_tile_trace *t)
+{
+    const render_surface_layer *l = t->surface->layer;
+    if (t->frame->common_clips || t->surface->own_clips || t->frame->job->paint == RENDER_VALUES) return false;
+    if (l->lines && l->lines->is_alone) return false;
+    return kernel_tile_layer_is_opaque(t) && !(l->edge_width > 0) && l->normal != RENDER_DIFFERENCES;
+}
+
+/* Transforms the queued cells into tile space, and lists the rays of their boxes. A cell that has an edge of length
+ * zero is instead traced block by block at once. */
 static __attribute__((noinline)) void kernel_curved_batch_transform(kernel_tile_trace *t, kernel_curved_batch *h,
                                                                     kernel_surface_cells *queued)
 {
-    const bool by_ray = kernel_tile_layer_allows_lanes(t);
     kernel_surface_cells_close(queued);
     h->queued = queued;
     const vm collapsed = kernel_transform_curved(&h->transformed, &queued->arrays, t->frame, &t->tile, queued->vertex,
                                                  queued->isovalue, queued->type);
     h->has_bounds = false;
-    if (h->transformed.cuboids && by_ray) kernel_cuboids_compute(&h->transformed, t->frame, &t->tile, &h->cuboids);
+    kernel_surface_cells_set_reach(t, queued, (const kernel_f64(*)[3][2])h->transformed.world,
+                                   grid_type_vertices(queued->type));
+    if (!kernel_curved_batch_allows_cuboids(t)) h->transformed.cuboids = 0;
+    if (h->transformed.cuboids) kernel_cuboids_compute(&h->transformed, t->frame, &t->tile, &h->cuboids);
     if (t->surface->layer->colour_map) kernel_curved_batch_fetch_colours(t, h);
     if (t->surface->layer->lines) kernel_curved_batch_fetch_lines(t, h);
     h->copied_lanes = 0;
@@ -552,7 +554,7 @@ static __attribute__((noinline)) void kernel_curved_batch_transform(kernel_tile_
     for (int n = 0; n < queued->count; n++) {
         const unsigned blocks = queued->blocks[n] & t->traced_blocks & kernel_blocks_not_hidden_at(t, queued->near[n]);
         if (!blocks) continue;
-        if (by_ray && !(vm_bits(collapsed) >> n & 1)) {
+        if (!(vm_bits(collapsed) >> n & 1)) {
             kernel_curved_batch_list_rays(t, h, n, queued->box[n], queued->blocks[n]);
             continue;
         }

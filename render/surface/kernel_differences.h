@@ -62,7 +62,7 @@ SIMD_INLINE void kernel_probe_sample_cell(kernel_packet *p, kernel_probe *probe,
     const bool is_tet = kernel_is_linear(c->type);
     int count = 1;
     if (is_tet)
-        kernel_tet_interval(p, c, rays, false, &list[0]);
+        kernel_tet_interval(p, c, rays, &list[0]);
     else
         count = kernel_curved_intervals(p, c, rays, list);
     for (int n = 0; n < count; n++) {
@@ -253,12 +253,13 @@ SIMD_INLINE void kernel_normals_by_differences(const kernel_packet *p, const ker
     kernel_normals_from_samples(p, found, values, hit, normal);
 }
 
-/* Returns the reach of hits in the cell c: half the distance between the two samples of a difference, in scaled units.
- */
-SIMD_INLINE float kernel_difference_sample_distance(const kernel_packet *p, const render_surface_layer *layer,
-                                                    const kernel_cell *c)
+/* Returns the reach of hits in a cell: half the distance between the two samples of a difference, in scaled units. It
+ * is 0 if the layer's normals do not come from differences. world: the cell's `count` vertices. */
+SIMD_INLINE float kernel_difference_sample_distance(const kernel_frame *f, const render_surface_layer *layer,
+                                                    const double (*world)[3], int count)
 {
-    return (float)(0.5 * layer->difference * kernel_cell_size(c->world, c->count) * p->frame->job->space.scale);
+    if (layer->normal != RENDER_DIFFERENCES) return 0;
+    return (float)(0.5 * layer->difference * kernel_cell_size(world, count) * f->job->space.scale);
 }
 
 /* ---- pending hits, which need samples of other ranks ---- */

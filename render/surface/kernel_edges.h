@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "grid.h"
+#include "kernel_accept.h"
 #include "kernel_cell.h"
 #include "kernel_packet.h"
 #include "kernel_types.h"
@@ -33,9 +34,9 @@ SIMD_INLINE vf kernel_squared_edge_distance(const vf a[2], const vf b[2])
     return x * x + y * y;
 }
 
-/* Computes the position of a vertex of tile space in each ray's plane: x and y minus those of the ray at the vertex's
- * depth. */
-SIMD_INLINE void kernel_edge_position(const kernel_packet *p, float x, float y, float z, vf out[2])
+/* Computes the position of a vertex of tile space, one per ray, in each ray's plane: x and y minus those of the ray at
+ * the vertex's depth. */
+SIMD_INLINE void kernel_edge_position(const kernel_packet *p, vf x, vf y, vf z, vf out[2])
 {
     out[0] = x - (p->origin_x + p->slope_x * z);
     out[1] = y - (p->origin_y + p->slope_y * z);
@@ -53,7 +54,7 @@ SIMD_INLINE vf kernel_squared_loop_distance(const kernel_packet *p, const grid *
         float x, y, z;
         grid_vertex(g, corners[i % count], world);
         kernel_transform_in_tile(p->frame, p->tile, world, &x, &y, &z);
-        kernel_edge_position(p, x, y, z, next);
+        kernel_edge_position(p, vf_set(x), vf_set(y), vf_set(z), next);
         if (i > 0) nearest = vf_min(nearest, kernel_squared_edge_distance(last, next));
         if (i > 0 && i % step == 0) *length = vf_max(*length, kernel_squared_distance(begin, next));
         memcpy(last, next, sizeof last);
@@ -62,43 +63,85 @@ SIMD_INLINE vf kernel_squared_loop_distance(const kernel_packet *p, const grid *
     return nearest;
 }
 
-/* Returns the squared distance from each ray to the nearest edge of that face of the cell that lies in the surface, in
- * the ray's plane. *length: the squared length of the face's longest edge there. */
-SIMD_INLINE vf kernel_squared_face_edge_distance(const kernel_packet *p, const kernel_cell *c, vf *length)
+/* Finds those vertices of each ray's cell that lie in the surface, in the order of the cell's vertices, and at most
+ * four. places: their positions in the ray's plane. Returns the number of each ray's vertices. */
+SIMD_INLINE vf kernel_edge_face_vertices(const kernel_packet *p, const kernel_surface_hits *h, vf places[4][2])
 {
-    const render_part *part = &p->frame->job->parts[c->part];
+    vf count = vf_set(0);
+    for (int k = 0; k < 4; k++) places[k][0] = places[k][1] = vf_set(0);
+    for (int i = 0; i < h->vertex_count; i++) {
+        vf own[2];
+        const vm is_in_surface = vf_eq(kernel_gather_lane(h->vertices[3][i], h->lane), vf_set(0));
+        kernel_edge_position(p, kernel_gather_lane(h->vertices[0][i], h->lane),
+                             kernel_gather_lane(h->vertices[1][i], h->lane),
+                             kernel_gather_lane(h->vertices[2][i], h->lane), own);
+        for (int k = 0; k < 4; k++) {
+            const vm is_next = vm_and(is_in_surface, vf_eq(count, vf_set((float)k)));
+            for (int a = 0; a < 2; a++) places[k][a] = vf_select(is_next, own[a], places[k][a]);
+        }
+        count = vf_select(is_in_surface, count + 1.0f, count);
+    }
+    return vf_min(count, vf_set(4));
+}
+
+/* Returns the squared distance from each ray to the nearest edge of that face of its cell that lies in the surface, in
+ * the ray's plane. *length: the squared length of the face's longest edge there. */
+SIMD_INLINE vf kernel_squared_face_edge_distance(const kernel_packet *p, const kernel_surface_hits *h, vf *length)
+{
     vf places[4][2], nearest = vf_set(INFINITY);
-    int count = 0;
+    const vf count = kernel_edge_face_vertices(p, h, places);
     *length = vf_set(0);
-    if (part->loops && part->loops[c->index])
-        return kernel_squared_loop_distance(p, part->cells, part->loops + part->loops[c->index], length);
-    for (int i = 0; i < c->count && count < 4; i++)
-        if (c->f[i] == 0) kernel_edge_position(p, c->x[i], c->y[i], c->z[i], places[count++]);
-    for (int i = 0; i < count; i++) {
-        nearest = vf_min(nearest, kernel_squared_edge_distance(places[i], places[(i + 1) % count]));
-        *length = vf_max(*length, kernel_squared_distance(places[i], places[(i + 1) % count]));
+    for (int i = 0; i < 4; i++) {
+        const vm is_edge = vf_lt(vf_set((float)i), count), is_last = vf_eq(vf_set((float)(i + 1)), count);
+        vf next[2];
+        for (int a = 0; a < 2; a++) next[a] = vf_select(is_last, places[0][a], places[(i + 1) & 3][a]);
+        const vf away = vf_min(nearest, kernel_squared_edge_distance(places[i], next));
+        const vf longer = vf_max(*length, kernel_squared_distance(places[i], next));
+        nearest = vf_select(is_edge, away, nearest);
+        *length = vf_select(is_edge, longer, *length);
     }
     return nearest;
 }
 
-/* Draws edge lines over the colours, before lighting, of hits at depth t. The weight of the line's colour is the share
+/* Replaces the distances and lengths of kernel_squared_face_edge_distance() on the rays in `hit` whose cell lies on a
+ * polygon by those of the polygon's edges. */
+static __attribute__((noinline)) void kernel_set_polygon_distances(const kernel_packet *p, const kernel_surface_hits *h,
+                                                                   vm hit, vf *nearest, vf *length)
+{
+    const render_part *part = &p->frame->job->parts[h->part[0]];
+    for (unsigned left = vm_bits(hit); left;) {
+        const int64_t cell = h->cell[__builtin_ctz(left)];
+        unsigned same = 0;
+        for (unsigned more = left; more; more &= more - 1)
+            if (h->cell[__builtin_ctz(more)] == cell) same |= more & -more;
+        left &= ~same;
+        if (!part->loops[cell]) continue;
+        vf longest = vf_set(0);
+        const vf away = kernel_squared_loop_distance(p, part->cells, part->loops + part->loops[cell], &longest);
+        *nearest = vf_select(vm_from_bits(same), away, *nearest);
+        *length = vf_select(vm_from_bits(same), longest, *length);
+    }
+}
+
+/* Draws edge lines over the colours, before lighting, of the hits. The weight of the line's colour is the share
  * of the pixel that a strip of the line's width covers. Lines fade out on faces whose longest edge is shorter than six
  * line widths, because otherwise only lines would be visible there. */
 static __attribute__((noinline)) void kernel_draw_edges(const kernel_packet *p, const render_surface_layer *layer,
-                                                        const kernel_cell *c, vf t, vf colour[3])
+                                                        vm hit, kernel_surface_hits *h)
 {
     const kernel_frame *f = p->frame;
     const vf zero = vf_set(0), one = vf_set(1);
     const float pixel = (float)f->slope_dx, width = layer->edge_width;
     const bool flat = f->job->camera.is_orthographic;
-    vf depth = t + (float)f->depth_shift;
+    vf depth = h->t + (float)f->depth_shift;
     if (flat) depth = vf_set((float)f->job->space.scale);
     const vf inverse = 1.0f / (depth * pixel);
-    vf length;
-    const vf distance = vf_sqrt(kernel_squared_face_edge_distance(p, c, &length)) * inverse;
+    vf length, nearest = kernel_squared_face_edge_distance(p, h, &length);
+    if (f->job->parts[h->part[0]].loops) kernel_set_polygon_distances(p, h, hit, &nearest, &length);
+    const vf distance = vf_sqrt(nearest) * inverse;
     const vf covered = vf_clamp(0.5f * (width + 1) - distance, zero, one);
     const vf fade = vf_clamp(0.25f * (vf_sqrt(length) * inverse / width - 2), zero, one);
-    for (int a = 0; a < 3; a++) colour[a] = colour[a] + covered * fade * (layer->edge_colour[a] - colour[a]);
+    for (int a = 0; a < 3; a++) h->colour[a] = h->colour[a] + covered * fade * (layer->edge_colour[a] - h->colour[a]);
 }
 
 #endif

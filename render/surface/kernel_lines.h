@@ -71,15 +71,25 @@ SIMD_INLINE void kernel_tet_gradient(const kernel_frame *f, const double *const 
     }
 }
 
-/* Computes the contour lines' field in the tet c, whose world coordinates and vertex indices must be set. */
+/* The field of contour lines, which is linear in a tet. Values are in the domain of kernel_lines, in which the first
+ * level is 0. */
+typedef struct kernel_tet_line {
+    float value;       /* value at the tet's last vertex */
+    float gradient[3]; /* per scaled unit, in camera axes */
+    float along;       /* change of the value per scaled unit of depth along the tile's middle ray */
+} kernel_tet_line;
+
+/* Computes the contour lines' field in a tet of a mesh part. world, vertices: the tet's world coordinates and vertex
+ * indices. */
 static __attribute__((noinline)) void kernel_compute_tet_line_field(const kernel_frame *f, const kernel_tile *tile,
-                                                                    const kernel_surface *s, const kernel_cell *c,
+                                                                    const kernel_surface *s, int part,
+                                                                    const double (*world)[3], const int64_t *vertices,
                                                                     kernel_tet_line *out)
 {
-    const grid_field *field = &s->layer->lines->field.fields[c->part];
-    const double *const corner[4] = {c->world[0], c->world[1], c->world[2], c->world[3]};
+    const grid_field *field = &s->layer->lines->field.fields[part];
+    const double *const corner[4] = {world[0], world[1], world[2], world[3]};
     double value[4], g[3];
-    for (int i = 0; i < 4; i++) value[i] = kernel_lines_value(s, field, c->vertices[i]);
+    for (int i = 0; i < 4; i++) value[i] = kernel_lines_value(s, field, vertices[i]);
     kernel_tet_gradient(f, corner, value, g);
     /* in tile space the third axis is the direction of the tile's middle ray */
     const double shear[2] = {(double)tile->shear_x, (double)tile->shear_y};
@@ -96,24 +106,6 @@ SIMD_INLINE void kernel_line_field_move(kernel_line_field *out, const kernel_ray
 {
     const vf x = (rays->origin_x + rays->slope_x * t) - last[0], y = (rays->origin_y + rays->slope_y * t) - last[1];
     out->value = (out->value + x * out->gradient[0]) + (y * out->gradient[1] + (t - last[2]) * along);
-}
-
-/* Computes the contour lines' field, its gradient and the surface's normal at a packet's hits in the tet c. t: depths
- * of the hits; normal: the normals that kernel_tet_normal() computes. */
-static __attribute__((noinline)) void kernel_tet_line_field(const kernel_packet *p, const kernel_surface *s,
-                                                            const kernel_cell *c, vf t, const vf normal[3],
-                                                            kernel_line_field *out)
-{
-    const kernel_rays rays = kernel_packet_rays(p);
-    kernel_tet_line line = c->line;
-    if (!c->has_line_field) kernel_compute_tet_line_field(p->frame, p->tile, s, c, &line);
-    const vf last[3] = {vf_set(c->x[3]), vf_set(c->y[3]), vf_set(c->z[3])};
-    out->value = vf_set(line.value);
-    for (int a = 0; a < 3; a++) {
-        out->gradient[a] = vf_set(line.gradient[a]);
-        out->normal[a] = normal[a];
-    }
-    kernel_line_field_move(out, &rays, t, last, vf_set(line.along));
 }
 
 /* Computes the contour lines' field, its gradient and the surface's normal at the reference coordinates r, each lane in

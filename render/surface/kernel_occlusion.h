@@ -79,7 +79,7 @@ SIMD_INLINE vm kernel_occlusion_block(kernel_packet *p, const kernel_occlusion *
 SIMD_INLINE void kernel_occlusion_tet(kernel_packet *p, const kernel_occlusion *o, const kernel_cell *c, vm rays)
 {
     kernel_interval i;
-    kernel_tet_interval(p, c, rays, false, &i);
+    kernel_tet_interval(p, c, rays, &i);
     const vm change = vm_and(kernel_interval_overlaps_ray(p, &i), kernel_changes_sign(&i));
     if (vm_any(change)) kernel_occlusion_block(p, o, change, kernel_secant(i.t_in, i.v_in, i.t_out, i.v_out));
 }
@@ -171,7 +171,7 @@ SIMD_INLINE void kernel_occlusion_transform(const kernel_packet *p, kernel_cell 
         return;
     }
     for (int i = 0; i < c->count; i++) kernel_transform(p, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
-    c->has_lines = c->has_normal = c->has_line_field = false;
+    c->has_lines = false;
 }
 
 /* Removes the rays that the cell's surface blocks from the packet's active rays. */

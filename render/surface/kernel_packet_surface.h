@@ -19,16 +19,11 @@
  * ranks' cells. */
 SIMD_INLINE vm kernel_opaque_differences(kernel_packet *p, const kernel_surface *s, vm rays, kernel_hits *hits)
 {
-    vm ready = vm_none();
-    for (int value = 0; value < s->layer->value_count; value++) {
-        const vm mine = vm_and(rays, vf_eq(hits->kind, vf_set((float)((int)s->first_kind + value))));
-        if (!vm_any(mine)) continue;
-        kernel_surface_hits h = {.value = value, .t = p->t_far, .reach = hits->reach};
-        memcpy(h.normal, hits->normal, sizeof h.normal);
-        memcpy(h.colour, hits->colour, sizeof h.colour);
-        ready = vm_or(ready, kernel_sample_or_defer_hits(p, s, mine, &h));
-        memcpy(hits->normal, h.normal, sizeof h.normal);
-    }
+    kernel_surface_hits h = {.value = vi_from_vf(hits->kind) - (int)s->first_kind, .t = p->t_far, .reach = hits->reach};
+    memcpy(h.normal, hits->normal, sizeof h.normal);
+    memcpy(h.colour, hits->colour, sizeof h.colour);
+    const vm ready = kernel_sample_or_defer_hits(p, s, rays, &h);
+    memcpy(hits->normal, h.normal, sizeof h.normal);
     return ready;
 }
 

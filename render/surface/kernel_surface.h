@@ -30,7 +30,6 @@
 #include "kernel_packet.h"
 #include "kernel_polyhedron.h"
 #include "kernel_roots.h"
-#include "kernel_tets.h"
 #include "kernel_tile.h"
 #include "kernel_tile_trace.h"
 #include "kernel_types.h"
@@ -44,7 +43,10 @@
 SIMD_INLINE vm kernel_sample_or_defer_hits(kernel_packet *p, const kernel_surface *s, vm hit, kernel_surface_hits *h)
 {
     if (p->frame->job->waiting) return kernel_defer_hits(p, s, hit, h);
-    kernel_normals_by_differences(p, s, h->value, hit, h->t, h->reach, h->normal);
+    for (int value = 0; value < s->layer->value_count; value++) {
+        const vm mine = vm_and(hit, vf_eq(vf_from_vi(h->value), vf_set((float)value)));
+        if (vm_any(mine)) kernel_normals_by_differences(p, s, value, mine, h->t, h->reach, h->normal);
+    }
     return hit;
 }
 
@@ -86,19 +88,19 @@ SIMD_INLINE void kernel_accept_opaque(kernel_packet *p, const kernel_surface *s,
         hits->part = vi_select(hit, h->part, hits->part);
         hits->cell = vi_select(hit, h->cell, hits->cell);
     }
-    hits->kind = vf_select(hit, vf_set((float)((int)s->first_kind + h->value)), hits->kind);
+    hits->kind = vf_select(hit, kernel_hit_kinds(s, h), hits->kind);
 }
 
 /* Computes the lighting of a transparent surface's hits, and emits them as fragments. */
-SIMD_INLINE void kernel_accept_transparent(kernel_packet *p, const kernel_surface *s, vm hit, kernel_surface_hits *h)
+static __attribute__((noinline)) void kernel_emit_transparent(kernel_packet *p, const kernel_surface *s, vm hit,
+                                                              kernel_surface_hits *h)
 {
-    const uint32_t kind = s->first_kind + (uint32_t)h->value;
-    kernel_hits_add_crossing(p->hits, hit, h->t);
+    const vf kind = kernel_hit_kinds(s, h);
     hit = kernel_hit_normals(p, s, hit, h);
-    kernel_fragments f = {h->t, h->t, {h->colour[0], h->colour[1], h->colour[2]}, 1.0f - h->opacity, vf_set(0)};
-    kernel_paint(p, s, h->normal, vf_set((float)kind), &f);
+    kernel_fragments f = {h->t, h->t, {h->colour[0], h->colour[1], h->colour[2]}, 1.0f - h->opacity, kind};
+    kernel_paint(p, s, h->normal, kind, &f);
     for (int a = 0; a < 3; a++) f.colour[a] *= h->opacity;
-    kernel_append_fragments(p, hit, kind, &f);
+    kernel_append_fragments(p, hit, 0, &f);
 }
 
 /* Draws contour lines over the hits' colours or, if the picture is one of values (RENDER_VALUES), stores the lines'
@@ -120,57 +122,34 @@ static __attribute__((noinline)) vm kernel_accept_lines(const kernel_packet *p, 
     return vm_and(hit, vf_lt(vf_set(0), share));
 }
 
-/* Accepts hits: a hit of an opaque surface is stored as the nearest hit of its ray; hits of a transparent surface are
- * lit and emitted as fragments at once. c: the cell that is hit; NULL for polyhedra. The caller must have set the
- * members of *h from `value` to `along`, except for the colour. */
-SIMD_INLINE void kernel_accept(kernel_packet *p, const kernel_surface *s, const kernel_cell *c, vm hit,
-                               kernel_surface_hits *h)
+/* Computes the colours of hits before lighting, with edges and contour lines, and their opacities. The caller must have
+ * set the other members of *h. Returns the visible hits (kernel_accept_lines()). */
+SIMD_INLINE vm kernel_colour_hits(const kernel_packet *p, const kernel_surface *s, vm hit, kernel_surface_hits *h)
 {
-    h->part = vi_set(c ? c->part : -1);
-    h->cell = vi_set(c ? (int32_t)c->index : -1);
-    /* in polyhedra normals are gradients in the cell or from the vertices, never central differences */
-    h->reach =
-        vf_set(s->layer->normal == RENDER_DIFFERENCES && c ? kernel_difference_sample_distance(p, s->layer, c) : 0);
     kernel_unlit_surface_colour(s, h->value, h->w, h->colour);
     if (__builtin_expect(p->frame->job->paint == RENDER_VALUES, 0))
         h->colour[0] = kernel_surface_value(s, h->value, h->w);
-    else if (s->layer->edge_width > 0 && c)
-        kernel_draw_edges(p, s->layer, c, h->t, h->colour);
+    else if (s->layer->edge_width > 0 && h->vertex_count)
+        kernel_draw_edges(p, s->layer, hit, h);
     h->opacity = vf_set(s->layer->opacity);
-    if (__builtin_expect(h->along != NULL, 0)) hit = kernel_accept_lines(p, s, hit, h);
-    if (kernel_is_opaque(p, s))
-        kernel_accept_opaque(p, s, hit, h);
-    else
-        kernel_accept_transparent(p, s, hit, h);
+    return __builtin_expect(h->along != NULL, 0) ? kernel_accept_lines(p, s, hit, h) : hit;
 }
 
-/* Traces an isosurface in a tet. This function is separate from that for other cells, which needs more vectors, so that
- * its own vectors stay in registers. value: index of the isovalue in the layer. */
-static __attribute__((noinline)) void kernel_tet_surface(kernel_packet *p, const kernel_surface *s,
-                                                         const kernel_cell *c, int value, vm rays)
+/* Accepts the hits of a packet of the tile: a hit of an opaque surface is stored as the nearest hit of its ray; hits of
+ * a transparent surface are lit and emitted as fragments at once. The caller must have set all members of *h except
+ * colour and opacity. */
+SIMD_INLINE void kernel_accept(kernel_packet *p, const kernel_surface *s, vm hit, kernel_surface_hits *h)
 {
-    const bool has_colour = s->layer->colour_map != NULL;
-    kernel_interval i;
-    kernel_tet_interval(p, c, rays, has_colour, &i);
-    i.v_out = kernel_end_in_cell(i.v_in, i.v_out, s->layer->is_of_faces);
-    const vm change = vm_and(kernel_interval_overlaps_ray(p, &i), kernel_changes_sign(&i));
-    if (!vm_any(change)) return;
-    const vf t = kernel_secant(i.t_in, i.v_in, i.t_out, i.v_out);
-    const vm hit = kernel_visible_hits(p, s, change, t);
-    if (!vm_any(hit)) return;
-    kernel_surface_hits at = {.value = value, .t = t};
-    kernel_tet_normal(p, c, at.normal);
-    if (has_colour) {
-        const vf length = i.t_out - i.t_in;
-        const vf along = vf_select(vf_lt(vf_set(0), length), (t - i.t_in) / length, vf_set(0));
-        at.w = i.w_in + along * (i.w_out - i.w_in);
+    hit = kernel_colour_hits(p, s, hit, h);
+    if (kernel_is_opaque(p, s)) {
+        kernel_accept_opaque(p, s, hit, h);
+        return;
     }
-    kernel_line_field along;
-    if (s->layer->lines) {
-        kernel_tet_line_field(p, s, c, t, at.normal, &along);
-        at.along = &along;
+    for (unsigned left = p->frame->volume_count ? vm_bits(hit) : 0; left; left &= left - 1) {
+        const int ray = __builtin_ctz(left);
+        kernel_hits_add_crossing(p->hits, ray, h->t[ray]);
     }
-    kernel_accept(p, s, c, hit, &at);
+    if (vm_any(hit)) kernel_emit_transparent(p, s, hit, h);
 }
 
 /* Returns a field at the reference coordinates r in each ray's own cell, from its values by vertex and lane. lane: the
@@ -190,7 +169,15 @@ SIMD_INLINE vm kernel_curved_accept(kernel_packet *p, const kernel_surface *s, c
 {
     const vm hit = kernel_visible_hits(p, s, found, at->t);
     if (!vm_any(hit)) return hit;
-    kernel_surface_hits h = {.value = value, .t = at->t};
+    kernel_surface_hits h = {
+        .value = vi_set(value),
+        .t = at->t,
+        .reach = vf_set(kernel_difference_sample_distance(p->frame, s->layer, (const double(*)[3])c->world, c->count)),
+        .part = vi_set(c->part),
+        .cell = vi_set((int32_t)c->index),
+        .vertex_count = c->count,
+        .lane = vi_set(curved->lane)};
+    for (int a = 0; a < 4; a++) h.vertices[a] = (const float(*)[SIMD_WIDTH])curved->at[a];
     if (s->layer->normal == RENDER_VERTEX) {
         memcpy(h.normal, at->r, sizeof h.normal);
     } else {
@@ -205,7 +192,7 @@ SIMD_INLINE vm kernel_curved_accept(kernel_packet *p, const kernel_surface *s, c
         kernel_curved_line_field(p, s, c, map, at->r, &along);
         h.along = &along;
     }
-    kernel_accept(p, s, c, hit, &h);
+    kernel_accept(p, s, hit, &h);
     return hit;
 }
 
@@ -265,6 +252,8 @@ static __attribute__((noinline)) vm kernel_curved_accept_contracted(kernel_packe
     return vm_or(at.mask, none);
 }
 
+/* Traces one isovalue's surface in a hex, wedge or pyramid with finite values, which must have been transformed into
+ * tile space. value: index of the isovalue in the layer. */
 static __attribute__((noinline)) void kernel_curved_surface(kernel_packet *p, const kernel_surface *s,
                                                             const kernel_cell *c, kernel_curved *curved, int value,
                                                             vm rays)
@@ -293,17 +282,6 @@ static __attribute__((noinline)) void kernel_curved_surface(kernel_packet *p, co
         const vm wanted = vm_andnot(vm_and(reached[n], kernel_interval_overlaps_ray(p, i)), known);
         if (vm_any(wanted)) kernel_accept_searched_roots(p, s, c, curved, value, i, wanted);
     }
-}
-
-/* Traces one isovalue's surface in a cell with finite values that is not a polyhedron. The cell must have been
- * transformed into tile space. */
-SIMD_INLINE void kernel_cell_surface(kernel_packet *p, const kernel_surface *s, const kernel_cell *c,
-                                     kernel_curved *curved, int value, vm rays)
-{
-    if (kernel_is_linear(c->type))
-        kernel_tet_surface(p, s, c, value, rays);
-    else
-        kernel_curved_surface(p, s, c, curved, value, rays);
 }
 
 /* A ray's profile is the piecewise linear field along the ray in a polyhedron (kernel_polyhedron.h). Hits on
@@ -636,7 +614,9 @@ static __attribute__((noinline)) void kernel_polyhedron_line_field(const kernel_
 static void kernel_polyhedron_accept(kernel_packet *p, const kernel_surface *s, int value, kernel_poly_crossings *r,
                                      vm hit, const kernel_profile_walk *walk)
 {
-    kernel_surface_hits at = {.value = value, .t = walk->t, .w = walk->w};
+    /* in polyhedra normals are gradients in the cell or from the vertices, never central differences */
+    kernel_surface_hits at = {
+        .value = vi_set(value), .t = walk->t, .w = walk->w, .part = vi_set(-1), .cell = vi_set(-1)};
     if (!vm_any(hit)) return;
     kernel_poly_intersect_tets(r);
     if (s->layer->normal == RENDER_VERTEX)
@@ -648,7 +628,7 @@ static void kernel_polyhedron_accept(kernel_packet *p, const kernel_surface *s, 
         kernel_polyhedron_line_field(p, s, r, hit, walk->t, &along);
         at.along = &along;
     }
-    kernel_accept(p, s, NULL, hit, &at);
+    kernel_accept(p, s, hit, &at);
 }
 
 /* Finds the crossings in the current interval of the rays in `wanted`, and accepts them. A ray ends at the first
@@ -717,7 +697,7 @@ SIMD_INLINE void kernel_block_trace(kernel_tile_trace *t, int block, int part, u
         kernel_packet *p = &t->packets[i];
         p->is_nearer = false;
         if (cell)
-            kernel_cell_surface(p, t->surface, cell, t->curved, value, p->active);
+            kernel_curved_surface(p, t->surface, cell, t->curved, value, p->active);
         else
             kernel_polyhedron_surfaces(p, t->surface, part, index, p->active);
         is_nearer = is_nearer || p->is_nearer;

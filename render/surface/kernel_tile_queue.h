@@ -37,11 +37,11 @@ static void kernel_tile_process_candidate(kernel_tile_trace *t, const kernel_til
     const render_surface_layer *layer = t->surface->layer;
     const grid *g = t->frame->job->parts[part].cells;
     kernel_cell *c = t->cell;
-    kernel_cell_fetch(c, g, &layer->field.fields[part], candidate->cell);
-    if (kernel_has_own_faces(c->type)) {
+    if (kernel_has_own_faces(grid_cell_type(g, candidate->cell))) {
         kernel_blocks_trace(t, blocks, part, candidate->cell, NULL, 0);
         return;
     }
+    kernel_cell_fetch(c, g, &layer->field.fields[part], candidate->cell);
     kernel_cell_move_to_tile_space(c, t->frame, &t->tile, g);
     kernel_cell_subtract_isovalue(c, layer->values[value]);
     kernel_tile_prepare_cell(t, part);
@@ -68,12 +68,15 @@ SIMD_INLINE unsigned kernel_candidate_blocks(const kernel_tile_trace *t, const k
 /* Maximum number of cells in the list of those that are traced one by one. */
 enum { KERNEL_ALONE = SIMD_WIDTH };
 
+enum { KERNEL_SURFACE_QUEUES = KERNEL_LANE_TYPES + 1 };
+
 /* A tile's cells that are queued for tracing, and the state of the tile's search for cells in trees
  * (kernel_tile_surface.h). A thread keeps the struct from tile to tile. */
 typedef struct kernel_tile_search {
     int layer, part;      /* layer and mesh part of the cells that are being queued; -1: no cell has been queued yet */
     kernel_arrays arrays; /* arrays of the layer's field on the mesh part */
-    kernel_surface_cells pending[KERNEL_LANE_TYPES]; /* one queue per type of cells that are traced in lanes */
+    /* one queue per type of cells that are read in lanes, and a queue of tets that are fetched one by one */
+    kernel_surface_cells pending[KERNEL_SURFACE_QUEUES];
     kernel_batch batch;
     kernel_curved_batch curved_batch;
     /* candidates that are traced one by one, each alone in its vectors, and the number of these candidates */
@@ -94,8 +97,9 @@ typedef struct kernel_tile_search {
 static void kernel_tile_queue_begin(kernel_tile_search *m)
 {
     m->layer = m->part = -1;
-    for (int i = 0; i < KERNEL_LANE_TYPES; i++) {
-        m->pending[i].type = kernel_lane_types[i];
+    for (int i = 0; i < KERNEL_SURFACE_QUEUES; i++) {
+        m->pending[i].type = i < KERNEL_LANE_TYPES ? kernel_lane_types[i] : GRID_TET;
+        m->pending[i].is_fetched_singly = i == KERNEL_LANE_TYPES;
         m->pending[i].count = 0;
         m->pending[i].layer = m->pending[i].part = -1;
     }
@@ -156,7 +160,7 @@ SIMD_INLINE void kernel_tile_queue_append(kernel_tile_trace *t, kernel_tile_sear
 static void kernel_tile_queue_trace_singly(kernel_tile_trace *t, kernel_tile_search *m)
 {
     if (!m->alone_count) return;
-    for (int i = 0; i < KERNEL_LANE_TYPES; i++) kernel_tile_queue_trace(t, m, &m->pending[i]);
+    for (int i = 0; i < KERNEL_SURFACE_QUEUES; i++) kernel_tile_queue_trace(t, m, &m->pending[i]);
     for (int n = 0; n < m->alone_count; n++) {
         int part;
         const int value = kernel_tile_set_source(t, m->alone[n].source, &part);
@@ -164,6 +168,14 @@ static void kernel_tile_queue_trace_singly(kernel_tile_trace *t, kernel_tile_sea
         if (blocks) kernel_tile_process_candidate(t, &m->alone[n], part, value, blocks);
     }
     m->alone_count = 0;
+}
+
+/* Returns whether a candidate that is not read in lanes is a tet. */
+SIMD_INLINE bool kernel_is_single_tet(const kernel_tile_search *m, const kernel_tile_candidate *candidate, int type)
+{
+    int64_t vertices[4];
+    return kernel_has_own_faces(type) ? kernel_is_tet(m->arrays.cells, candidate->cell, vertices)
+                                      : kernel_is_linear(type);
 }
 
 /* Adds a candidate of the current layer and the given part to the queue of its type or, if it cannot be traced in a
@@ -177,6 +189,10 @@ SIMD_INLINE void kernel_tile_queue_add(kernel_tile_trace *t, kernel_tile_search 
         kernel_tile_queue_append(t, m, &m->pending[kernel_lane_type_index(type)], candidate, value);
         return;
     }
+    if (kernel_is_single_tet(m, candidate, type)) {
+        kernel_tile_queue_append(t, m, &m->pending[KERNEL_LANE_TYPES], candidate, value);
+        return;
+    }
     if (m->alone_count == KERNEL_ALONE) kernel_tile_queue_trace_singly(t, m);
     m->alone[m->alone_count++] = *candidate;
 }
@@ -185,7 +201,7 @@ SIMD_INLINE void kernel_tile_queue_add(kernel_tile_trace *t, kernel_tile_search 
 static void kernel_tile_queue_finish(kernel_tile_trace *t, kernel_tile_search *m)
 {
     kernel_tile_queue_trace_singly(t, m);
-    for (int i = 0; i < KERNEL_LANE_TYPES; i++) kernel_tile_queue_trace(t, m, &m->pending[i]);
+    for (int i = 0; i < KERNEL_SURFACE_QUEUES; i++) kernel_tile_queue_trace(t, m, &m->pending[i]);
 }
 
 #endif

@@ -454,7 +454,7 @@ static __attribute__((noinline)) void kernel_tet_segments(kernel_packet *p, kern
                                                           const kernel_double_face faces[4], vm rays)
 {
     kernel_interval i;
-    kernel_tet_interval(p, c, rays, false, &i);
+    kernel_tet_interval(p, c, rays, &i);
     if (!vm_any(i.mask)) return;
     vm cut = vm_or(vf_lt(i.t_in, p->t_near), vf_lt(list->t_cut, i.t_out));
     if (list->cut) cut = vm_or(cut, vf_lt(kernel_next_cut(p, list, i.t_in, true), i.t_out));

@@ -63,7 +63,7 @@ typedef struct kernel_segments {
 /* Returns the lane of the packet that holds the pixel, or -1 if the pixel is not in the packet. */
 SIMD_INLINE int kernel_packet_lane_of_pixel(const kernel_packet *p, uint32_t pixel)
 {
-    const int width = p->frame->job->camera.width, left = width - p->x0;
+    const int width = p->frame->job->camera.width, left = width - p->column[0];
     const int columns = left < KERNEL_PACKET_COLUMNS ? left : KERNEL_PACKET_COLUMNS;
     int64_t column = (int64_t)pixel - p->pixel[0];
     for (int row = 0; row < KERNEL_PACKET_ROWS; row++, column -= width)

@@ -96,7 +96,7 @@ static __attribute__((noinline)) unsigned kernel_tet_segments_small(kernel_tile_
         const vi at = r.at;
         vf_gather_pair(s->window, 2 * at, &begin, &end);
         r.active = vm_and(r.active, vf_lt(begin, end));
-        kernel_tet_rays_interval(&t->thread->tile_cells->tets, &r, &i);
+        kernel_tet_rays_interval(&t->thread->tile_cells->tets, &r, false, &i);
         if (!vm_any(i.mask)) continue;
         vf_gather_pair(s->reach, 2 * at, &near, &far);
         const vm met = vm_and(i.mask, vm_and(vf_le(begin, i.t_out), vf_lt(i.t_in, end)));

@@ -42,7 +42,7 @@
 static __attribute__((noinline)) void kernel_tile_tet_samples(kernel_packet *p, kernel_samples *s, const kernel_cell *c)
 {
     kernel_interval i;
-    kernel_tet_interval(p, c, p->active, false, &i);
+    kernel_tet_interval(p, c, p->active, &i);
     if (vm_any(i.mask)) kernel_fill_interval_samples(p, s, NULL, &i, &i);
 }
 
@@ -128,7 +128,7 @@ static __attribute__((noinline)) unsigned kernel_tet_samples_small(kernel_tile_t
         kernel_lane_rays_begin(&r, t, rays, n);
         const vi at = r.at;
         r.active = vm_and(r.active, vf_lt(vf_set(-INFINITY), vf_gather(b->far, at)));
-        kernel_tet_rays_interval(&t->thread->tile_cells->tets, &r, &i);
+        kernel_tet_rays_interval(&t->thread->tile_cells->tets, &r, false, &i);
         if (vm_any(i.mask)) kernel_tet_samples_fill(t, b, &i, at);
     }
     return others;
