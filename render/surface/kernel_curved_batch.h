@@ -522,15 +522,6 @@ SIMD_INLINE void kernel_curved_batch_list_rays(kernel_tile_trace *t, kernel_curv
     if (h->rays.count >= KERNEL_LIST_PIXELS) kernel_curved_batch_trace(t, h);
 }
 
-/* Returns whether rays in cuboids are decided by kernel_cuboids.h. */
-static bool kernel_curved_batch_allows_cuboids(const kernel_tile_trace *t)
-{
-    const render_surface_layer *l = t->surface->layer;
-    if (t->frame->common_clips || t->surface->own_clips || t->frame->job->paint == RENDER_VALUES) return false;
-    if (l->lines && l->lines->is_alone) return false;
-    return kernel_tile_layer_is_opaque(t) && !(l->edge_width > 0) && l->normal != RENDER_DIFFERENCES;
-}
-
 /* Transforms the queued cells into tile space, and lists the rays of their boxes. A cell that has an edge of length
  * zero is instead traced block by block at once. */
 static __attribute__((noinline)) void kernel_curved_batch_transform(kernel_tile_trace *t, kernel_curved_batch *h,
@@ -543,7 +534,6 @@ static __attribute__((noinline)) void kernel_curved_batch_transform(kernel_tile_
     h->has_bounds = false;
     kernel_surface_cells_set_reach(t, queued, (const kernel_f64(*)[3][2])h->transformed.world,
                                    grid_type_vertices(queued->type));
-    if (!kernel_curved_batch_allows_cuboids(t)) h->transformed.cuboids = 0;
     if (h->transformed.cuboids) kernel_cuboids_compute(&h->transformed, t->frame, &t->tile, &h->cuboids);
     if (t->surface->layer->colour_map) kernel_curved_batch_fetch_colours(t, h);
     if (t->surface->layer->lines) kernel_curved_batch_fetch_lines(t, h);
