@@ -15,8 +15,9 @@ typedef struct kernel_hits {
     /* A vector of any length along the gradient, in camera axes. With normals from vertices (RENDER_VERTEX) it holds
      * the hit's reference coordinates in its cell until the tile ends. */
     vf normal[3];
-    /* The cell that each ray has hit: mesh part and index in it; set only with normals from vertices (RENDER_VERTEX).
-     * Part -1: the hit's normal has been computed, or there is no hit, so that the cell is not needed. */
+    /* The cell that each ray has hit: index of the mesh part, and of the cell in the part; set only with normals from
+     * vertices (RENDER_VERTEX). Part -1: the hit's normal has been computed, or there is no hit, so that the cell is
+     * not needed. */
     vi part, cell;
     vf colour[3]; /* colour of each hit before lighting */
     /* distance from the hit, in scaled units, at which the field is sampled for central differences; set only if

@@ -24,8 +24,8 @@ typedef struct kernel_packet {
     bool has_view;
     /* the rays in tile space: at depth Z they are at origin + slope * Z */
     vf origin_x, origin_y, slope_x, slope_y;
-    /* Set if these are the tile's own primary rays. They then differ only in (u, v), which is their slope or, if the
-     * camera is orthographic, their origin (kernel_cell.h). */
+    /* Set if the rays are camera rays through the tile's pixels, and not rays that begin at hits. Camera rays of a tile
+     * differ only in (u, v), which is their slope or, if the camera is orthographic, their origin (kernel_cell.h). */
     bool is_pencil;
     vf u, v;
     vf t_near; /* t at which the rays begin: that of the eye's plane, or clip_in if that is farther */
@@ -37,8 +37,9 @@ typedef struct kernel_packet {
      * sample_step */
     vf sample_base, sample_step, sample_inverse;
     int sample_first;
-    /* The interval of t that clips leave of each ray for volumes; -inf and +inf if there are no clips. Set only if the
-     * frame has volumes or common clips. */
+    /* The interval of t that clips leave of each ray: the common clips, or, while volumes with clips of their own are
+     * traced, the clips of volumes. -inf and +inf if there are no clips. Set only if the frame has volumes or common
+     * clips. */
     vf clip_in, clip_out;
     /* Exact length of the interval from clip_in to clip_out, divided by the difference of these two rounded numbers.
      * The ratio is far from 1 if a ray grazes a sphere, so that the interval is very short. */
@@ -121,9 +122,9 @@ static inline void kernel_packet_set_view(kernel_packet *p)
     for (int a = 0; a < 3; a++) p->view[a] = vf_load(view[a]);
 }
 
-/* Returns the number of a ray's first sample, the one next to the eye; it is 0 or negative. Sample 0 is near the depth
- * origin, in the scene, so that products of number and step have small rounding errors there. The numbers depend only
- * on the camera and the step. */
+/* Returns the index of the first sample on a ray, the one next to the eye. The index is 0 or negative. Sample 0 is near
+ * the depth origin, in the scene, so that products of an index and the step have small rounding errors in the scene.
+ * The indices depend only on the camera and the step. */
 static inline int kernel_first_sample_number(const kernel_frame *f)
 {
     const double count = floor(f->depth_shift / f->scaled_step);
@@ -148,8 +149,8 @@ static inline void kernel_packet_set_samples(kernel_packet *p, const double px[S
     p->sample_inverse = 1.0f / p->sample_step;
 }
 
-/* Sets clip_in and clip_out to interval `number`, counted from 0, of the intervals that the given clips (a bit mask)
- * leave of the part of each ray in front of the eye. */
+/* Sets clip_in and clip_out of each ray. The clips in the mask `clips` may divide the part of the ray in front of the
+ * eye into several intervals; the one with the index `number` is chosen, counted from 0. */
 static __attribute__((noinline, cold)) void kernel_packet_set_clip_interval(kernel_packet *p, uint32_t clips,
                                                                             int number)
 {
@@ -182,8 +183,8 @@ static inline void kernel_packet_clip(kernel_packet *p)
     p->active = vm_and(p->active, vf_le(p->t_near, p->t_far));
 }
 
-/* Restricts each of the packet's rays to interval number `turn`, counted from 0, of the intervals that the clips of
- * volumes leave. All surfaces must have been traced before. */
+/* Restricts each of the packet's rays to one of the intervals that the clips of volumes leave of it: the one with the
+ * index `turn`, counted from 0. All surfaces must have been traced before. */
 static inline void kernel_packet_clip_volumes(kernel_packet *p, int turn)
 {
     if (turn == 0) {

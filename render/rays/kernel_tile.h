@@ -40,8 +40,8 @@ static inline void kernel_tile_setup(kernel_tile *tile, const kernel_frame *f, i
     tile->radius = (float)(0.5 * KERNEL_TILE * widest);
 }
 
-/* Returns the factor by which a ray's slope (orthographic: offset) minus that of the tile's centre is multiplied to get
- * its origin at Z = 0 in tile space. */
+/* Let d be the slope (perspective) or the offset (orthographic) of a ray minus that of the ray through the tile's
+ * centre. Returns the factor by which d must be multiplied to get the ray's origin, at Z = 0, in tile space. */
 static inline double kernel_slope_to_origin(const kernel_frame *f)
 {
     return f->job->camera.is_orthographic ? f->job->space.scale : f->depth_shift;
@@ -204,7 +204,7 @@ typedef struct kernel_placement {
     float near, far, along;
 } kernel_placement;
 
-/* Sets the bits of one vector of planes in the placement. v: number of the vector; low, high: the body's least and
+/* Sets the bits of one vector of planes in the placement. v: index of the vector; low, high: the body's least and
  * greatest signed distance from each plane. */
 SIMD_INLINE void kernel_placement_add(kernel_placement *placement, int v, vf low, vf high)
 {
@@ -215,7 +215,8 @@ SIMD_INLINE void kernel_placement_add(kernel_placement *placement, int v, vf low
     placement->far = high[KERNEL_DEPTH_LANE % SIMD_WIDTH];
 }
 
-/* Computes the mask of the blocks of which the body is, at least with a part, on the inner side of all four borders. */
+/* Sets placement->blocks to the mask of the blocks that the body may overlap. For each of a block's four borders, some
+ * part of the body must be on the block's side of the border. */
 SIMD_INLINE void kernel_placement_find_blocks(kernel_placement *placement)
 {
     const unsigned inner = placement->above & placement->below >> 1;

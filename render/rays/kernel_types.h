@@ -39,9 +39,9 @@ enum {
 
 _Static_assert((int)KERNEL_MAX_INTERVALS >= (int)RENDER_MAX_INTERVALS, "a volume's intervals fit");
 
-/* KERNEL_BLACK: transmittance below which the rest of a segment is dropped. KERNEL_SHORT: shortest integration step, in
- * unit distances (render_transfer), and also as a share of the ray's interval in a piece of the transfer function
- * (kernel_integral.h). */
+/* KERNEL_BLACK: a segment is integrated only until its transmittance falls below this value. KERNEL_SHORT: no
+ * integration step needs to be shorter than this, in unit distances (render_transfer). It need not be shorter than this
+ * fraction of the length that the ray has in one piece of the transfer function either (kernel_integral.h). */
 #if defined(KERNEL_REAL_IS_DOUBLE)
 typedef double kernel_real;
 #define KERNEL_BLACK 1e-16
@@ -56,12 +56,14 @@ enum { KERNEL_PIECE_BINS = 256, KERNEL_VARIATION_BINS = 128, KERNEL_VARIATION_WI
 
 /* Entries of a piece of a transfer function: a range of values on which opacity and colour are linear. At a value x in
  * the range from low to high, each is its value at low + (x - low) * its slope. 1 - opacity has entries of its own,
- * because near an opacity of 1 the difference would consist of rounding errors only. If the function is constant beyond
- * its ends, the outermost pieces end at -+2^100, so that KERNEL_PIECE_INVERSE times the width is still 1. */
+ * because near an opacity of 1 the difference would consist of rounding errors only. The function is constant before
+ * its first and behind its last point. The first and the last piece therefore end at -+2^100, so that
+ * KERNEL_PIECE_INVERSE times the width is still 1. */
 enum {
     KERNEL_PIECE_LOW,
     KERNEL_PIECE_HIGH,
-    KERNEL_PIECE_LOW_REST, /* rounding errors of the piece's two ends as kernel_real; 0 unless has_rests is set */
+    KERNEL_PIECE_LOW_REST, /* exact lower end minus KERNEL_PIECE_LOW, which is rounded to kernel_real; 0 unless
+                              kernel_pieces.has_rests is set. The next entry is the same for the upper end. */
     KERNEL_PIECE_HIGH_REST,
     KERNEL_PIECE_OPACITY,
     KERNEL_PIECE_OPACITY_HIGH, /* opacity at the upper end */
@@ -80,10 +82,11 @@ typedef struct kernel_bound {
     float extinction_low, extinction_high, extinction_slope, colour_slope;
 } kernel_bound;
 
-/* Entries of a row of kernel_pieces.variations: bounds of a transfer function over a range of values in which the
- * opacity has no step. If the field errs by d over one unit distance of a ray, a pixel's light changes by at most the
- * cost times d. Within the range of values, for fixed light from behind, that change varies by at most the variation
- * times d. */
+/* Entries of a row of kernel_pieces.variations: bounds over a range of values in which the opacity has no step. Let g
+ * be the change of a pixel's light, in any channel, if the field has an error along one unit distance of the ray,
+ * divided by this error. KERNEL_LIGHT_COST is the maximum of |g| over the range of values and over all colours of the
+ * light from behind. KERNEL_LIGHT_VARIATION is the largest difference of g between two values of the range, for the
+ * same light from behind. */
 enum {
     KERNEL_LIGHT_VARIATION,
     KERNEL_LIGHT_COST,
@@ -92,10 +95,10 @@ enum {
     KERNEL_LIGHT_ENTRIES
 };
 
-/* A bin (a range of values) of the table of sums for preintegration (kernel_preintegral.h). Each array holds the sum of
- * the extinction first, then those of the emission in three channels. Sums are integers: a sum divided by its number of
- * bins is the mean extinction in units of depth_unit, or the mean emission in units of light_unit. The struct is read
- * as rows of four floats. */
+/* A bin (a range of values) of the table of sums for preintegration (kernel_preintegral.h). In each array, element 0 is
+ * a sum of extinctions, and elements 1 to 3 are sums of the emission in the three colour channels. Sums are integers. A
+ * sum over n bins, divided by n, is the mean extinction in units of depth_unit, or the mean emission in units of
+ * light_unit. The struct is read as rows of four floats. */
 typedef struct kernel_preint_entry {
     int32_t before[4]; /* sums over all earlier bins */
     float own[4];
@@ -122,16 +125,16 @@ typedef struct kernel_pieces {
      * +infinity */
     kernel_real (*pieces)[KERNEL_PIECE_ENTRIES];
     /* A table to find the piece of a value: KERNEL_PIECE_BINS bins of equal width (1 / bin_inverse), the first of which
-     * begins at bin_low. Each holds the number of the piece in which the bin begins. */
+     * begins at bin_low. bin_first contains, for each bin, the index of the piece in which the bin begins. */
     kernel_real bin_low, bin_inverse;
     kernel_real bin_first[KERNEL_PIECE_BINS];
-    /* Bounds over ranges of values, in a table of KERNEL_VARIATION_WIDTHS × KERNEL_VARIATION_BINS. The row is the class
-     * of the range's width. The column is the bin in which the range begins; these bins have the width 1 /
-     * variation_inverse, and the first begins at bin_low (kernel_light_bounds()). */
+    /* Bounds over ranges of values, in a table of KERNEL_VARIATION_WIDTHS × KERNEL_VARIATION_BINS. The row is chosen by
+     * the width of the range, and the column by the bin in which the range begins (kernel_light_bounds()). These bins
+     * have the width 1 / variation_inverse, and the first begins at bin_low. */
     float variation_inverse;
     float (*variations)[KERNEL_LIGHT_ENTRIES];
-    /* Set if a ramp of the opacity is so narrow that the rounding of its ends is visible: values near it then use the
-     * ends' rounding errors (KERNEL_PIECE_LOW_REST). */
+    /* Set if the opacity rises or falls so steeply that the rounding of a piece's ends to kernel_real would be visible.
+     * The rounding errors of the ends (KERNEL_PIECE_LOW_REST) are then added to the ends. */
     bool has_rests;
     int step_count;
     /* values at which the opacity has a step, sorted; pieces end at these values, rounded to kernel_real */
@@ -177,8 +180,8 @@ typedef struct kernel_transfer {
     int colour_count;
     /* The position in the colour table on a logarithmic or symlog scale s is s(value) * scale_slope + scale_shift. */
     render_scale scale;
-    /* in the domain; symmetric logarithmic scale: s is linear for magnitudes up to the threshold; logarithmic scale:
-     * smaller values are raised to the threshold */
+    /* A value of the transfer function's domain. Symmetric logarithmic scale: the scale's function is linear for
+     * magnitudes up to this threshold. Logarithmic scale: smaller values are replaced by the threshold. */
     float threshold;
     float inverse_threshold; /* 1 divided by the threshold */
     float scale_slope, scale_shift;
@@ -277,7 +280,8 @@ typedef struct kernel_candidate_list {
     int64_t count, capacity;       /* number of items in the current chunk, and how many fit */
     /* set if no more candidates can be added, because memory ran out or the maximum number is reached */
     bool is_full;
-    int64_t *bound; /* number of candidates for which space may still be added; shared by the lists of all threads */
+    /* number of candidates for which chunks may still be allocated; all threads' lists share this counter */
+    int64_t *bound;
 } kernel_candidate_list;
 
 /* A unit of work in the search for candidates: a subtree of one mesh's tree, searched for one layer. */
