@@ -260,8 +260,8 @@ static __attribute__((noinline)) void kernel_find_tets(kernel_finder *s, const k
 
 /* ---- hexes, wedges and pyramids ---- */
 
-/* Adds the cells of the list to the candidates, with the bounds of the isosurface in them. The isovalue c->value
- * crosses all of them. */
+/* Adds the cells of the list to the candidates, with the bounds of the isosurface in them. All cells must be crossed by
+ * the layer's isovalue with the index c->value. */
 SIMD_INLINE void kernel_crossed_process(kernel_finder *s, const kernel_cells *c, int vertices)
 {
     const kernel_level level = kernel_level_of(s->surface->layer->values[c->value]);
@@ -291,7 +291,7 @@ static __attribute__((noinline)) void kernel_process_crossed_cells(kernel_finder
     c->count = 0;
 }
 
-/* Appends the cells of the given lanes (a bit mask), which the isovalue number `value` of the layer crosses, to the
+/* Appends the cells of the given lanes (a bit mask), which the layer's isovalue with the index `value` crosses, to the
  * list s->crossed of their type. A list has cells of one isovalue; if it is full or has another isovalue, its cells are
  * processed first. */
 SIMD_INLINE void kernel_crossed_add(kernel_finder *s, const kernel_cells *from, int vertices, int value, unsigned lanes)

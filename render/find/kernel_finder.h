@@ -24,7 +24,8 @@
 typedef struct kernel_cells {
     int type, vertices; /* cell type (grid.h), and number of vertices of each cell */
     int count;
-    int value; /* for cells that an isovalue crosses: its index in the layer, the same for all cells */
+    int value; /* for cells that an isovalue crosses: the isovalue's index in the layer; all cells of the list have the
+                  same one */
     uint32_t cell[SIMD_WIDTH];
     int32_t vertex[8][SIMD_WIDTH];
 } kernel_cells;
@@ -269,7 +270,7 @@ static __attribute__((noinline)) void kernel_add_cell_box(kernel_finder *s, cons
     kernel_add_lanes(s, &e, 1, &c->index, source);
 }
 
-/* Adds the fetched cell c to the candidates if the isovalue number `value` of the layer crosses it. */
+/* Adds the fetched cell c to the candidates if it is crossed by the layer's isovalue with the index `value`. */
 SIMD_INLINE void kernel_find_surface(kernel_finder *s, const kernel_cell *c, int value)
 {
     if (c->is_finite && kernel_values_straddle(c->values, c->count, s->surface->layer->values[value]))

@@ -245,9 +245,9 @@ static bool volume_cells_are_small(const kernel_frame *f)
            cells > SMALL_CELLS * pixels;
 }
 
-/* Adds numbers of cells, counted in `samples` nodes that are spread evenly over the part's tree. *cells: all cells of
- * these nodes; *crossed: cells of nodes whose range of values contains an isovalue, counted once per isovalue. About
- * half of the nodes are leaves; inner nodes have no cells and add 0. */
+/* Visits `samples` nodes that are spread evenly over the part's tree, and counts the cells in those that are leaves.
+ * Adds the number of these cells to *cells. For each isovalue, adds to *crossed the number of cells in leaves whose
+ * range of values contains the isovalue. About half of the nodes are leaves. */
 static void sample_leaves(const kernel_frame *f, const kernel_surface *s, int part, int64_t samples, double *cells,
                           double *crossed)
 {
