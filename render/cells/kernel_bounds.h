@@ -65,8 +65,8 @@ typedef struct kernel_bounds_lanes {
     kernel_f64 gradient[3], e[8]; /* gradient of the linear function L, and the coefficients of E = F - L */
     /* Derivatives along the reference coordinates at the domain's corners: of the map's nonlinear part N minus those at
      * the centre (bend), of the field (df) and of E (de). Derivatives that are equal at several corners are stored
-     * once. The indices are the component of N (for bend only), the axis, and the number in the table of derivatives
-     * (kernel_domain). */
+     * once. The indices are the component of N (for bend only), the axis, and the index in the list of different
+     * derivatives (kernel_domain). */
     kernel_f64 bend[3][3][4], df[3][4], de[3][4];
     /* upper bounds over the cell of derivatives along the reference coordinates. slope: of |grad F|; theta: of the norm
      * of J0^-1 J - I; slant: of |grad E|; most_along: of |grad E . w|; most_turn: of |N' w|, where w = J0^-1 d is the
@@ -101,7 +101,7 @@ static const double kernel_wedge_corners[6][3] = {
 
 /* The extended reference domain of a cell type: its middle and its corners. Derivatives of a polynomial along axis a
  * are equal at some corners. slope_count[a]: number of different derivatives; first[a][n]: corner at which derivative n
- * is computed; at[a][c]: number of the derivative that corner c has. For a hex a derivative depends on the two other
+ * is computed; at[a][c]: index of the derivative that corner c has. For a hex a derivative depends on the two other
  * coordinates. For a wedge it depends only on the last coordinate; along the last axis it depends on the two others.
  * For a pyramid it depends only on the coordinate along which it is taken. */
 typedef struct kernel_domain {

@@ -267,11 +267,11 @@ SIMD_INLINE bool kernel_rank_before(const kernel_cell *c, int i, int j)
 
 /* Computes the canonical order of the vertices of a hex, wedge or pyramid. It begins at the vertex of least rank (of
  * the base, for a pyramid). The neighbours of that vertex then follow in the order of their ranks, as far as the cell's
- * shape allows. from[i] is the present number of the vertex that becomes vertex i. The order may mirror the cell,
+ * shape allows. from[i] is the present index of the vertex that becomes vertex i. The order may mirror the cell,
  * because intersections do not depend on orientation. */
 SIMD_INLINE void kernel_cell_canonical_order(const kernel_cell *c, int from[GRID_MAX_CELL_VERTICES])
 {
-    /* maps a hex's vertex number to the bits of its reference coordinates x, y, z, and back */
+    /* maps the index of a hex's vertex to the bits of its reference coordinates x, y, z, and back */
     static const signed char corner[8] = {0, 1, 3, 2, 4, 5, 7, 6};
     const int begins = kernel_has_apex(c->type) ? 4 : c->count;
     int least = 0, swap;

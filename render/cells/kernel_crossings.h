@@ -123,7 +123,7 @@ SIMD_INLINE kernel_edge_error kernel_edge_error_between(const kernel_packet *p, 
     return kernel_line_error(&l, p->tile->radius, a, b);
 }
 
-/* Returns the sum of weights from which on crossings of the triangle i, j, k are accurate (kernel_least_weight()). The
+/* Returns the least sum of weights at which crossings of the triangle i, j, k are accurate (kernel_least_weight()). The
  * vertices must be in the order of coordinates. */
 static __attribute__((noinline, cold)) float kernel_triangle_least(const kernel_packet *p, kernel_tile_position i,
                                                                    kernel_tile_position j, kernel_tile_position k)
@@ -167,7 +167,7 @@ SIMD_INLINE void kernel_cell_transform(kernel_cell *c, const kernel_packet *p, c
     if (p->is_pencil) kernel_cell_compute_lines(c, p->frame, p->tile);
 }
 
-/* The weights of crossings of a triangle. i, j, k: numbers of its vertices in the cell, in the order of coordinates;
+/* The weights of crossings of a triangle. i, j, k: indices of its vertices in the cell, in the order of coordinates;
  * ij, jk, ik: its edge functions; inverse: 1 divided by the sum of the weights. Tets use the same weights, so that
  * depth and value of a crossing are bit-identical in both cells of a face. */
 typedef struct kernel_weights {
@@ -218,7 +218,8 @@ typedef struct kernel_face_search {
     vf edge[GRID_MAX_CELL_VERTICES][GRID_MAX_CELL_VERTICES];
 } kernel_face_search;
 
-/* Computes the edge function of line number n of the cell, which connects the vertices i and j in any order. */
+/* Computes the edge function from cell->lines[n], the line that connects the vertices i and j. These may be given in
+ * any order. */
 SIMD_INLINE void kernel_curved_edge(kernel_face_search *s, int n, int i, int j)
 {
     const kernel_cell *c = s->cell;

@@ -49,10 +49,10 @@ SIMD_INLINE vm kernel_curved_cross_one_triangle(const vf x[8], const vf y[8], co
     return kernel_cross_one_triangle(side, vm_sign(diagonal));
 }
 
-/* Finds the rays that cross exactly two faces of their cells, each once (*two), and the numbers of these faces (face).
- * A ray crosses a face if all edge functions of the face have the same sign. *alone: rays that must be traced cell by
- * cell. Rays in neither mask miss their cells. at: x, y and z of the cells' vertices, by vertex and lane. nonconvex:
- * per ray, one bit for each quad that may not look convex; NULL: there are no such quads. */
+/* Finds the rays that cross exactly two faces of their cells, each once (*two), and the indices of these faces in the
+ * cell (face). A ray crosses a face if all edge functions of the face have the same sign. *alone: rays that must be
+ * traced cell by cell. Rays in neither mask miss their cells. at: x, y and z of the cells' vertices, by vertex and
+ * lane. nonconvex: per ray, one bit for each quad that may not look convex; NULL: there are no such quads. */
 SIMD_INLINE void kernel_curved_find(const float (*at)[8][SIMD_WIDTH], const kernel_lane_rays *r, const vi *nonconvex,
                                     vm rays, vm *two, vm *alone, vi face[2], int type)
 {
@@ -99,9 +99,9 @@ SIMD_INLINE void kernel_curved_faces(const kernel_transformed_curved *h, const k
 
 /* ---- crossing points ---- */
 
-/* The corners of one face of each ray's cell, in the order of kernel_transformed_curved.corners. vertex: number in the
- * cell; at[i]: x, y (relative to the ray once they are projected), depth, and field of corner i. The fourth corner of a
- * triangle is meaningless. */
+/* The corners of one face of each ray's cell, in the order of kernel_transformed_curved.corners. vertex: its index in
+ * the cell; at[i]: x, y (relative to the ray once they are projected), depth, and field of corner i. The fourth corner
+ * of a triangle is meaningless. */
 typedef struct kernel_curved_corners {
     vi vertex[4];
     vf at[4][4];
@@ -152,7 +152,7 @@ SIMD_INLINE void kernel_curved_triangle_edges(const kernel_curved_corners *c, vf
     e[2] = vf_diff_of_products(i[0], k[1], k[0], i[1]);
 }
 
-/* Returns the rays on which the sum of the triangle's weights is too small for an accurate crossing. number: number of
+/* Returns the rays on which the sum of the triangle's weights is too small for an accurate crossing. number: index of
  * each ray's triangle among its cell's triangles; e: edge functions ij, jk, ik. */
 SIMD_INLINE vm kernel_curved_triangle_inaccurate(const kernel_transformed_curved *h, vi lane, vm rays, vi number,
                                                  const vf e[3])
@@ -175,8 +175,8 @@ static __attribute__((noinline, cold)) void kernel_curved_triangle_recompute(con
     for (int i = 0; i < 3; i++) e[i] = vf_select(weak, exact[i], e[i]);
 }
 
-/* Computes the edge functions ij, jk and ik of the triangular face number `face` on the given rays, from the lines of
- * the cells; other lanes get meaningless numbers. */
+/* Computes the edge functions ij, jk and ik of a triangular face of each ray's cell, for the given rays, from the lines
+ * of the cells. face: index of the face in the cell. Other lanes get meaningless numbers. */
 SIMD_INLINE void kernel_curved_triangle_lines(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type,
                                               vm rays, vi face, const kernel_curved_corners *c, vf e[3])
 {
@@ -212,9 +212,9 @@ SIMD_INLINE void kernel_curved_triangle_point(int type, const kernel_curved_corn
     *out = (kernel_point){.t = v[0][0], .value = v[1][0], .r = {v[2][0], v[3][0], v[4][0]}};
 }
 
-/* Computes the two crossings of each active ray, the nearer one first. face: numbers of the two crossed faces; corners:
- * their projected corners. h: the cells, whose lines are used for triangles; NULL: edge functions are computed from the
- * corners. */
+/* Computes the two crossings of each active ray, the nearer one first. face: indices of the two crossed faces in the
+ * cell; corners: their projected corners. h: the cells, whose lines are used for triangles; NULL: edge functions are
+ * computed from the corners. */
 SIMD_INLINE void kernel_curved_cross_corners(const kernel_transformed_curved *h, const kernel_lane_rays *p, vm active,
                                              int type, const vi face[2], const kernel_curved_corners corners[2],
                                              kernel_point out[2])
@@ -251,8 +251,8 @@ SIMD_INLINE void kernel_curved_cross_corners(const kernel_transformed_curved *h,
     kernel_points_sort_by_depth(out);
 }
 
-/* Computes the crossings at which the active rays enter and leave their cells. faces: the numbers of the two faces that
- * each ray crosses, the first plus 8 times the second. */
+/* Computes the crossings at which the active rays enter and leave their cells. faces: index of the first face that a
+ * ray crosses, plus 8 times the index of the second one. */
 SIMD_INLINE void kernel_curved_cross(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type, vi faces,
                                      kernel_point out[2])
 {
@@ -262,9 +262,9 @@ SIMD_INLINE void kernel_curved_cross(const kernel_transformed_curved *h, const k
     kernel_curved_cross_corners(h, p, p->active, type, face, corners, out);
 }
 
-/* Appends those of the rays n to n + SIMD_WIDTH - 1 of the list `met` whose bit is set in `bits` to the list `rays`.
- * ends: `end_count` crossings of each of these rays; their depth, value and reference coordinates are appended to
- * `out`. */
+/* The list `met` has rays that cross their cells. Of its entries n to n + SIMD_WIDTH - 1, those whose bit is set in
+ * `bits` are appended to the list `rays`. ends: `end_count` crossings of each of these entries, one entry per lane; the
+ * depth, value and reference coordinates of the crossings are appended to `out`. */
 SIMD_INLINE void kernel_curved_ends_add(const kernel_pixel_list *met, int n, const kernel_point *ends, int end_count,
                                         unsigned bits, kernel_pixel_list *rays, float (*out)[5][KERNEL_LIST_ROOM])
 {

@@ -103,7 +103,7 @@ SIMD_INLINE void kernel_lanes_edge_function(const kernel_frame *f, const vf a[3]
 }
 
 /* Computes the largest error of the edge function and the edge's extent (kernel_edge_error). line: c, cu and cv of the
- * edge function; radius: that of the tile. */
+ * edge function; radius: kernel_tile.radius. */
 SIMD_INLINE void kernel_lanes_edge_extent(const vf line[3], float radius, const vf a[3], const vf b[3], vf *error,
                                           vf *extent)
 {

@@ -187,7 +187,7 @@ static __attribute__((noinline)) void kernel_maps_of_type(const float (*at)[8][S
     KERNEL_OF_TYPE(type, kernel_maps_of, at, lane, out);
 }
 
-/* Stores a cell's `count` vertex numbers in all lanes, and 0 for missing vertices. */
+/* Copies `count` numbers, one for each vertex of a cell, to all lanes of `out`. Vertices that the cell lacks get 0. */
 SIMD_INLINE void kernel_map_spread(const float *numbers, int count, float out[8][SIMD_WIDTH])
 {
     for (int i = 0; i < 8; i++) vf_store(out[i], vf_set(i < count ? numbers[i] : 0));
@@ -263,7 +263,7 @@ SIMD_INLINE vm kernel_map_newton(const kernel_rays *rays, const kernel_map *map,
     return open;
 }
 
-/* Returns by how much a coordinate of r is below 0 or above 1, at most; 0 if r is in [0, 1]^3. */
+/* Returns the largest amount by which one of the coordinates of r is below 0 or above 1; 0 if r is in [0, 1]^3. */
 SIMD_INLINE vf kernel_map_distance_outside(const vf r[3])
 {
     vf most = vf_set(0);

@@ -39,8 +39,9 @@
 #include "simd.h"
 
 /* Crossings of rays with a triangle. t: depth; v: value; w: value of the colour field; all are linear on the triangle.
- * t_face, v_face and w_face: for a surface triangle, the same on its face, which is a bilinear patch if it is a quad;
- * for a sheet, v_face and w_face are the fields of the cell there. */
+ * If the triangle is on the polyhedron's surface, t_face, v_face and w_face are the same quantities on the face of
+ * which it is a part; if this face is a quad, its surface is a bilinear patch. If the triangle is a sheet, v_face and
+ * w_face are the fields of the cell at the crossing. */
 typedef struct kernel_triangle_crossings {
     vm mask;
     vf t, v, w;
@@ -57,7 +58,8 @@ typedef struct kernel_poly_crossings {
     vf *x, *y;       /* x and y, relative to the rays, of the projected vertices and centre */
     vf *edge;        /* edge functions of the edges, then of the lines from each vertex to the centre */
     kernel_triangle_crossings
-        /* crossings of surface triangles by number; only those of triangles that are listed in `met` are set */
+        /* crossings of surface triangles, by the index of the triangle; only those of triangles that are listed in
+         * `met` are set */
         *facets;
     vm *unassigned; /* for each surface triangle, the rays whose crossing has not been assigned to an interval yet */
     /* rays that cross both triangles of a quad but do not cross its bilinear patch, or cross the patch twice but
@@ -65,7 +67,8 @@ typedef struct kernel_poly_crossings {
     vm uneven;
     int *met;
     int met_count;
-    kernel_triangle_crossings *sheets; /* crossings of sheets by edge number; only those listed in met_sheets are set */
+    /* crossings of sheets, by the index of the edge; only those listed in met_sheets are set */
+    kernel_triangle_crossings *sheets;
     int *met_sheets;
     int sheet_count;
     kernel_interval *tets; /* for each surface triangle, the intervals of the rays in its tet */
@@ -253,7 +256,7 @@ static __attribute__((noinline, cold)) void kernel_quad_points_pair(kernel_trian
 }
 
 /* Computes the crossings of a quad's bilinear patch and of its two triangles; those of the patch are bit-identical to
- * the crossings in a hex that shares the quad. first: number of the first of the two triangles. */
+ * the crossings in a hex that shares the quad. first: index of the first of the two triangles. */
 static void kernel_poly_cross_quad(kernel_poly_crossings *r, int first)
 {
     static const signed char loop[4] = {0, 1, 2, 3};
@@ -414,8 +417,9 @@ static void kernel_poly_intersect_tets(kernel_poly_crossings *r)
     }
 }
 
-/* Returns the rays for which t is in the interval inside the tet: [t_in, t_out), or (t_in, t_out] if `before` is set,
- * because the field just before t is needed. */
+/* Returns the rays for which t is in the ray's interval inside the tet. The interval is [t_in, t_out), or (t_in, t_out]
+ * if `before` is set. Callers set `before` if they need the limit of the field as t is approached from smaller
+ * depths. */
 SIMD_INLINE vm kernel_subtet_contains(const kernel_interval *s, vf t, bool before)
 {
     if (before) return vm_and(s->mask, vm_and(vf_lt(s->t_in, t), vf_le(t, s->t_out)));

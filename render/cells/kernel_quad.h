@@ -402,18 +402,20 @@ SIMD_INLINE int kernel_compute_quad_points(const kernel_quad *q, vm once, vm twi
     return vm_any(out[1].mask) ? 2 : count;
 }
 
-/* ---- quads that look convex, one cell per lane ---- A quad looks convex along a ray if, going around the projected
- * quad, all its corners turn in the same direction. A ray crosses a convex quad once if it is on the same side of all
- * four edges, else never: neither the quad's diagonal nor the curvature of its patch need be tested. The turn at a
- * corner is p × q of the projected edges p and q there, which is N · (u, v, 1) with their normal N = p × q in space and
- * the ray's slopes u and v. Over a box of rays (the rays through a rectangle of pixels) it differs from the middle
- * ray's by at most |Nx| half width + |Ny| half height, which is no more than |p| |q| (half width + half height).
+/* ---- quads that look convex, one cell per lane ---- */
+
+/* A quad looks convex along a ray if, going around the projected quad, all its corners turn in the same direction. A
+ * ray crosses a convex quad once if it is on the same side of all four edges, else never: neither the quad's
+ * diagonal nor the curvature of its patch need be tested. The turn at a corner is p × q of the projected edges p and
+ * q there, which is N · (u, v, 1) with their normal N = p × q in space and the ray's slopes u and v. Over a box of
+ * rays (the rays through a rectangle of pixels) it differs from the middle ray's by at most |Nx| half width + |Ny|
+ * half height, which is no more than |p| |q| (half width + half height).
  *
- * Rounding: let l be the longest edge, h the sum of the largest |u| and |v|, and S a bound of positions minus origins
- * plus slopes times depth. A projected edge is no longer than k = sqrt(2 + h h) l, as |x| + |y| + h |z|. A vertex
- * projected in float32 errs by at most two units (6e-8) of S, d = 1.2e-7 S; a turn of such vertices errs by 2 d in each
- * coordinate of both edges: 4 d k + 8 d d. The products that are computed here have magnitudes that sum to at most k k,
- * and each is rounded at most 10 times: 6e-7 k k. */
+ * Rounding: let l be the longest edge, h the sum of the largest |u| and |v|, and S a bound of positions minus
+ * origins plus slopes times depth. A projected edge is no longer than k = sqrt(2 + h h) l, as |x| + |y| + h |z|. A
+ * vertex projected in float32 errs by at most two units (6e-8) of S, d = 1.2e-7 S; a turn of such vertices errs by 2
+ * d in each coordinate of both edges: 4 d k + 8 d d. The products that are computed here have magnitudes that sum to
+ * at most k k, and each is rounded at most 10 times: 6e-7 k k. */
 
 /* Returns the lanes whose quad looks convex along all rays of the box. edge: the cell's edges as seen by the middle ray
  * of the box; square: the squares of their lengths in space; spread: half width plus half height of the range of the

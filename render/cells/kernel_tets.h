@@ -71,8 +71,8 @@ static __attribute__((noinline)) void kernel_tets_in_double(const kernel_tets *t
     }
 }
 
-/* Computes the edge functions e of the tets' six edges on the rays. is_pencil: set if the rays are the tile's own
- * primary rays, for which the edges' lines are valid (kernel_cell.h). */
+/* Computes the edge functions e of the tets' six edges on the rays. is_pencil: set if the rays are camera rays through
+ * the tile's pixels, for which the edges' lines are valid (kernel_cell.h). */
 SIMD_INLINE void kernel_tets_edges(const kernel_tets *t, vm rays, bool is_pencil, vf e[KERNEL_TET_EDGES])
 {
     const vf u = t->is_one ? t->packet->u : t->lane_rays->u, v = t->is_one ? t->packet->v : t->lane_rays->v;
@@ -133,8 +133,8 @@ SIMD_INLINE kernel_sums kernel_sums_select(vm m, const kernel_sums *a, const ker
                          vf_select(m, a->colour, b->colour), vf_select(m, a->weight, b->weight)};
 }
 
-/* Selects, for each ray, the sums of the two faces that it crosses: that of smaller number in ends[0], the other in
- * ends[1]. Either may be the nearer one. */
+/* Selects, for each ray, the sums of the two faces that it crosses. ends[0] gets those of the face with the smaller
+ * index, ends[1] those of the other face. Either face may be the nearer one. */
 SIMD_INLINE void kernel_tets_select_crossed_faces(const vm hit[4], const kernel_sums sums[4], kernel_sums ends[2])
 {
     const kernel_sums a = kernel_sums_select(hit[1], &sums[1], &sums[2]);

@@ -32,14 +32,15 @@ typedef struct kernel_transformed_curved {
     /* x, y, z in tile space, and the field minus the isovalue, scaled (kernel_cell_subtract_isovalue()); by vertex and
      * lane */
     float at[4][8][SIMD_WIDTH];
-    /* By face and lane, a word with the vertex numbers of the face's corners, four bits each, from bit 0 on. Quads are
-     * in the order of kernel_quad_corners(), triangles in the order of coordinates (kernel_triangle_order()). */
+    /* By face and lane, a word with the indices, in the cell, of the vertices at the face's corners, four bits each,
+     * from bit 0 on. Quads are in the order of kernel_quad_corners(), triangles in the order of coordinates
+     * (kernel_triangle_order()). */
     int32_t corners[KERNEL_CURVED_FACES * SIMD_WIDTH];
     /* Lines of the triangular faces, which come in the order of the faces in kernel_shape. By triangle: the members c,
      * cu, cv and bound of kernel_line, each for the edges ij, jk and ik, where i, j, k are the triangle's corners in
      * the order of coordinates. */
     float triangles[KERNEL_MAX_TRIANGLES][4][3][SIMD_WIDTH];
-    /* for each triangle, the sum of weights from which on its crossings are accurate (kernel_triangle_least()) */
+    /* for each triangle, the least sum of weights at which its crossings are accurate (kernel_triangle_least()) */
     float least[KERNEL_MAX_TRIANGLES][SIMD_WIDTH];
     unsigned cuboids; /* mask of the lanes with a hex whose edges are parallel to the world axes */
     /* The following two members are used only for segments of volumes (kernel_local_crossings.h). Per cell, a bit for
@@ -55,7 +56,7 @@ typedef struct kernel_transformed_curved {
     int32_t rank[8][SIMD_WIDTH], vertex[8][SIMD_WIDTH];
 } kernel_transformed_curved;
 
-/* Returns the number of the type's first triangular face in its shape; further triangles follow it. */
+/* Returns the index, in the type's shape, of its first triangular face; further triangles follow it. */
 SIMD_INLINE int kernel_first_triangle(int type)
 {
     return kernel_has_apex(type) ? 1 : 0;
@@ -63,9 +64,9 @@ SIMD_INLINE int kernel_first_triangle(int type)
 
 /* ---- numbers of each ray's own cell ---- */
 
-/* Returns of[corner][lane] for each ray: the number of vertex (or face) `corner` of the cell in `lane`. Cells have
- * `count` vertices (or faces). With 16 lanes, permutations of all rows are faster than a gather; with 8 they are
- * slower. */
+/* Returns of[corner][lane] for each ray: a number that belongs to the vertex (or face) with the index `corner` of the
+ * cell in `lane`. Cells have `count` vertices (or faces). With 16 lanes, permutations of all rows are faster than a
+ * gather; with 8 they are slower. */
 SIMD_INLINE vf kernel_curved_gather_vertex(const float (*of)[SIMD_WIDTH], int count, vi lane, vi corner)
 {
     if (SIMD_WIDTH < 16) return vf_gather(of[0], corner * SIMD_WIDTH + lane);
@@ -108,7 +109,7 @@ SIMD_INLINE void kernel_sorted_curved_rank(kernel_sorted_vertices *h, bool is_na
  * that the ranks of its three neighbours along them increase. */
 SIMD_INLINE void kernel_sorted_curved_hex(kernel_sorted_vertices *h, bool is_narrow)
 {
-    /* vertex number for the bits of its reference coordinates x, y, z */
+    /* index of the vertex whose reference coordinates x, y, z have these three bits */
     static const signed char vertex[8] = {0, 1, 3, 2, 4, 5, 7, 6};
     vm turn[3] = {vm_none(), vm_none(), vm_none()};
     for (int b = 1; b < 8; b++) {
@@ -225,9 +226,9 @@ SIMD_INLINE vm kernel_sorted_curved_fetch(kernel_transformed_curved *out, const 
 
 /* ---- edge functions ---- */
 
-/* Returns a word with the vertex numbers of a quad's corners, four bits each, from bit 0 on. They begin at the corner
- * of smallest rank and go around the quad towards that one of its neighbours with the smaller rank. loop: the quad's
- * vertices in cyclic order. */
+/* Returns a word with the indices, in the cell, of the vertices at a quad's corners, four bits each, from bit 0 on.
+ * They begin at the corner of smallest rank and go around the quad towards that one of its neighbours with the smaller
+ * rank. loop: the quad's vertices in cyclic order. */
 SIMD_INLINE vi kernel_curved_quad_word(const signed char *loop, const vf rank[8])
 {
     const vf r[4] = {rank[loop[0]], rank[loop[1]], rank[loop[2]], rank[loop[3]]};
@@ -249,9 +250,9 @@ SIMD_INLINE vi kernel_curved_quad_word(const signed char *loop, const vf rank[8]
     return word;
 }
 
-/* Returns a word with the vertex numbers of a triangle's corners, sorted by rank, four bits each, from bit 0 on.
- * first[n], last[n]: the lanes in which vertex n of the loop has the smallest and the largest rank; falls[n]: the lanes
- * in which the rank decreases from vertex n of the loop to the next. */
+/* Returns a word with the indices, in the cell, of the vertices at a triangle's corners, sorted by rank, four bits
+ * each, from bit 0 on. first[n], last[n]: the lanes in which vertex n of the loop has the smallest and the largest
+ * rank; falls[n]: the lanes in which the rank decreases from vertex n of the loop to the next. */
 SIMD_INLINE vi kernel_triangle_word(const signed char *loop, const vf rank[8], vm first[3], vm last[3], vm falls[3])
 {
     const vf r[3] = {rank[(int)loop[0]], rank[(int)loop[1]], rank[(int)loop[2]]};
@@ -267,7 +268,7 @@ SIMD_INLINE vi kernel_triangle_word(const signed char *loop, const vf rank[8], v
 }
 
 /* Permutes three numbers that belong to a triangle's sides into the order ij, jk, ik, where i, j, k are the corners
- * sorted by rank. opposite[n]: number of the side that is opposite to corner n of the loop. first, last: from
+ * sorted by rank. opposite[n]: the number that belongs to the side opposite to corner n of the loop. first, last: from
  * kernel_triangle_word(). The sides ij, jk and ik are opposite to the corners k, i and j. */
 SIMD_INLINE void kernel_order_sides(const vm first[3], const vm last[3], const vf opposite[3], vf out[3])
 {
@@ -296,8 +297,9 @@ SIMD_INLINE void kernel_lanes_edge_functions(const kernel_transformed_curved *tr
     }
 }
 
-/* Stores the data of a triangular face: its corners sorted by rank, the lines of its edges, and the sum of weights from
- * which on its crossings are accurate. face: its number in the shape; lines: from kernel_lanes_edge_functions(). */
+/* Stores the data of a triangular face: its corners sorted by rank, the lines of its edges, and the least sum of
+ * weights at which its crossings are accurate. face: index of the face in the shape; lines: from
+ * kernel_lanes_edge_functions(). */
 SIMD_INLINE void kernel_transformed_triangle(kernel_transformed_curved *out, int type, int face, const vf rank[8],
                                              vf (*const lines)[6])
 {
@@ -394,7 +396,7 @@ SIMD_INLINE void kernel_lattice_cells_store(const kernel_f64 (*cells)[3][2], int
                                             const kernel_frame *f, const kernel_tile *tile,
                                             kernel_transformed_curved *out, int type)
 {
-    /* for each vertex in canonical order: its number in the lattice's cell, and its rank */
+    /* for each vertex in canonical order: its index in the lattice's cell, and its rank */
     static const signed char given[8] = {0, 4, 7, 3, 1, 5, 6, 2}, rank[8] = {0, 1, 3, 2, 4, 5, 7, 6};
     for (int i = 0; i < 8; i++) {
         const vi own_rank = vi_set(rank[i]);
@@ -489,9 +491,9 @@ SIMD_INLINE vi kernel_least_bit(vi bits)
     return ((vi_from_bits(vf_from_vi(bits & -bits)) >> 23) - 127) & 7;
 }
 
-/* Finds those of the rays that cross exactly two faces (*two), and the numbers of these faces (face), the smaller one
- * first. faces: per ray, one bit for each face that the ray crosses once. *alone: on entry, rays that must be traced
- * cell by cell in any case; those of the rays that cross more than two faces are added. */
+/* Finds those of the rays that cross exactly two faces (*two), and the indices of these faces in the cell (face), the
+ * smaller one first. faces: per ray, one bit for each face that the ray crosses once. *alone: on entry, rays that must
+ * be traced cell by cell in any case; those of the rays that cross more than two faces are added. */
 SIMD_INLINE void kernel_curved_find_two_faces(vi faces, vm rays, vm *two, vm *alone, vi face[2])
 {
     const vi others = faces & (faces - 1), more = others & (others - 1);

@@ -59,8 +59,8 @@ SIMD_INLINE void kernel_transformed_positions(kernel_transformed_tets *out, cons
     }
 }
 
-/* Computes the edge functions, and for each face the least sum of weights that is accurate enough
- * (kernel_least_weight()). */
+/* Computes the edge functions. Also computes, for each face, the least sum of weights at which a crossing of the face
+ * is accurate enough (kernel_least_weight()). */
 SIMD_INLINE void kernel_transformed_lines(kernel_transformed_tets *out, const kernel_frame *f, const kernel_tile *tile)
 {
     vf size[4], at[4][3], error[KERNEL_TET_EDGES], extent[KERNEL_TET_EDGES];

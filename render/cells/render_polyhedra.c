@@ -91,7 +91,7 @@ static void *store_alloc(polyhedron_store *store, size_t bytes)
 typedef struct work_vertex {
     double position[3], value;
     int64_t vertex;
-    int input_index; /* number of the vertex before sorting */
+    int input_index; /* index of the vertex before sorting */
 } work_vertex;
 
 /* Temporary data of one cell while it is decomposed. */
@@ -99,7 +99,7 @@ typedef struct work {
     const grid *g;
     const grid_field *field;
     closed_faces faces;
-    int *rank; /* rank of each vertex by its number before sorting */
+    int *rank; /* rank of each vertex, by the index that it has before sorting */
     double (*positions)[3];
     work_vertex *vertices;
 } work;
@@ -146,7 +146,8 @@ static size_t lay_out(work *w, char *buffer)
     return at.used;
 }
 
-/* Reads the cell's faces and sorts the vertices. In the faces, vertices are then numbered by their rank. */
+/* Reads the cell's faces and sorts the vertices by coordinates. In the faces, each vertex is then identified by its
+ * rank in this order. */
 static void read_faces(work *w, int64_t cell)
 {
     closed_faces *c = &w->faces;

@@ -8,21 +8,20 @@
 
 #include "grid.h"
 
-/* A triangle of the surface. vertex: numbers of its vertices a < b < c in the polyhedron; edge: numbers of its edges
- * ab, bc and ac. */
+/* A triangle of the polyhedron's surface. vertex: indices a < b < c of its vertices in the polyhedron; edge: indices of
+ * its edges ab, bc and ac. */
 typedef struct polyhedron_facet {
     int vertex[3];
     int edge[3];
-    int quad;       /* number of the quad that the triangle is a half of, or -1 */
-    int other_half; /* number of the quad's other triangle, or -1 */
+    int quad;       /* index in `quads` of the quad of which the triangle is one half, or -1 */
+    int other_half; /* index of the triangle that is the quad's other half, or -1 */
     /* sign of the volume of the tet between the triangle and the centre: 1; -1 if the tet is inverted; 0 if it has no
      * volume */
     float sign;
 } polyhedron_facet;
 
-/* A decomposed polyhedron. Vertices are numbered in the lexicographic order of coordinates, so that a < b means that
- * vertex a comes first; the centre is number vertex_count, after all others. The numbering of vertices, edges and
- * facets depends only on the vertices' coordinates and values. */
+/* A decomposed polyhedron. Vertices are stored in the lexicographic order of coordinates. The centre follows them, at
+ * index vertex_count. The order of vertices, edges and facets depends only on the vertices' coordinates and values. */
 typedef struct polyhedron {
     struct polyhedron *next; /* next polyhedron in the same slot of the store's hash table */
     uint32_t index;
@@ -44,7 +43,7 @@ typedef struct polyhedron {
     double fall, rise;
     /* members of kernel_line (kernel_cell.h): for the edges, then for the edges from each vertex to the centre */
     float (*lines)[4];
-    /* sum of weights from which on the crossings of all triangles are accurate (kernel_least_weight_bound()) */
+    /* least sum of weights at which the crossings of all triangles are accurate (kernel_least_weight_bound()) */
     float least;
     int64_t *vertices; /* vertex indices in the mesh, vertex_count of them */
     int (*edges)[2];
