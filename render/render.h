@@ -76,12 +76,17 @@ typedef enum render_scale { RENDER_LINEAR, RENDER_LOG, RENDER_SYMLOG } render_sc
 double render_scaled(render_scale scale, double threshold, double value);
 double render_unscaled(render_scale scale, double threshold, double scaled);
 
-/* Colour and opacity of a value. A value's position in the colour table is (s(value) - s(low)) / (s(high) - s(low)), s
- * being the scale. Colours are a table of linear RGB, evenly spaced over the positions from 0 to 1, interpolated
- * linearly by position (in volumes with a scale, by value between entries), clamped outside. Opacity is piecewise
- * linear by position through points of rising value (two of the same value make a step), constant outside; with a scale
- * the points lie between low and high. Opacities are those of a path of length unit_distance: extinction = -ln(1 -
- * opacity) / unit_distance. */
+/* Colour and opacity as functions of a value. The position of a value in the colour table is (s(value) - s(low)) /
+ * (s(high) - s(low)), where s is the function of the scale (render_scaled()).
+ *
+ * The colour table has linear RGB colours at evenly spaced positions from 0 to 1. Between two entries, colours are
+ * interpolated linearly by position; in volumes with a logarithmic or symlog scale, linearly by value. Positions below
+ * 0 and above 1 get the first and the last colour.
+ *
+ * The opacity is given at points of increasing value. Two points of the same value make a step. Between two points, the
+ * opacity is interpolated linearly by position; before the first and behind the last point it is constant. With a
+ * logarithmic or symlog scale the points must lie between low and high. An opacity is that of a path of length
+ * unit_distance: extinction = -ln(1 - opacity) / unit_distance. */
 typedef struct render_transfer {
     double low, high;
     int colour_count;     /* number of entries in the colour table, >= 2 */
@@ -372,7 +377,8 @@ typedef struct render_statistics {
     double surface_ms, volume_ms;
 } render_statistics;
 
-/* Returns the position in [0, 1) of a pixel's first sample in a frame, in steps. It is a hash of both numbers. */
+/* Returns the position of a pixel's first sample in a frame, in steps, in [0, 1). The position is a hash of the pixel's
+ * index and the frame's number. */
 double render_jitter(uint32_t pixel, uint32_t frame);
 
 /* Compute intervals of visible values: a cell is invisible if its range of values, rounded to float, overlaps none of

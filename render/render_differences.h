@@ -14,7 +14,8 @@
 #include "insitu/status.h"
 #include "render.h"
 
-/* Returns the bounding box of all cells on this rank that may contain samples. */
+/* Returns the bounding box of all cells on this rank in which a sample around a hit may lie, on whichever rank the hit
+ * is. */
 render_box render_differences_box(const render_job *job);
 
 /* Returns whether the job has surfaces whose hits may need samples of other ranks. */

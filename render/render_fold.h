@@ -17,11 +17,13 @@ typedef struct render_folding {
     int64_t capacity, *starts;
 } render_folding;
 
-/* Folds the list of a tile's fragments, in which each sample or segment of the volume is one fragment. Where this rank
- * certainly has all volume fragments of a pixel in one of the halved intervals of fragment_fold.h, they become one
- * fragment. In the list, the kind FRAGMENT_EARLY marks a fragment in front of which a surface or another rank's
- * fragment may lie. FRAGMENT_LATE marks the extra fragment of a ray on which cells overlap. Returns false if memory ran
- * out. */
+/* Replaces the list of a tile's fragments, in which each sample or segment of the volume is one fragment.
+ * fragment_fold.h divides a ray into intervals and halves of intervals. If this rank certainly has all volume fragments
+ * of a pixel in one of these, they are blended into one fragment.
+ *
+ * On input, a fragment of the kind FRAGMENT_EARLY may be preceded by a surface or by fragments of other ranks. A
+ * fragment of the kind FRAGMENT_LATE is an extra fragment that marks a ray on which cells overlap. Returns false if
+ * memory ran out. */
 bool render_fold(render_folding *folding, const pixel_area *area, fragment_list *list);
 
 void render_folding_free(render_folding *folding);

@@ -27,7 +27,8 @@ static hit_frame place_of(const render_job *job, const render_hit *hit)
     return hit_frame_of(job, hit->pixel, hit->t, hit->normal, RENDER_LIFT);
 }
 
-/* Returns the surface layer to which the fragment belongs, by the number of its isovalue. */
+/* Returns the surface layer to which a hit's fragment belongs. The fragment's kind contains the index of an isovalue,
+ * and each isovalue belongs to one layer. */
 static const render_surface_layer *layer_of(const render_job *job, const fragment *f)
 {
     int value = (int)(f->kind - FRAGMENT_SURFACE), i = 0;
@@ -83,7 +84,7 @@ struct render_occluders {
  * tile space has a different camera. */
 typedef struct tracer {
     const render_occluders *of;
-    const render_job *job; /* that of the occluders */
+    const render_job *job; /* the job from which the occluders were collected */
     render_job moved_job;  /* the job with the camera of the current tile space, used by `frame` */
     kernel_frame frame;
     kernel_thread thread;

@@ -60,8 +60,9 @@ static void prepare_scale(kernel_transfer *out, const render_transfer *t)
     const double low = render_scaled(t->scale, t->threshold, t->low);
     const double high = render_scaled(t->scale, t->threshold, t->high);
     const double slope = high > low ? 1 / (high - low) : 1;
-    /* Values are raised to low / 2 before logarithms are taken. Its position is below that of `low` by more than
-     * RENDER_END of the table, so that smaller values still count as below the range. */
+    /* Values below low / 2 are replaced by low / 2 before logarithms are taken. The position of low / 2 in the colour
+     * table is below that of `low` by more than RENDER_END, so that the replaced values still count as below the
+     * range. */
     const double least = t->scale == RENDER_LOG ? t->low / 2 : t->threshold;
     const double begin = t->scale == RENDER_LOG ? log(least) : 0;
     out->scale = t->scale;
@@ -166,7 +167,7 @@ static double value_scale(const render_job *job, int surface)
     return width > 0 && isfinite(width) ? ldexp(1, -ilogb(width)) : 1;
 }
 
-/* Sets common_clips to the clips that all layers share and that leave a single interval of a ray, and volume_intervals
+/* Sets common_clips to the clips that belong to all layers and leave a single interval of a ray. Sets volume_intervals
  * to the largest number of intervals that the clips of volumes can leave of a ray. */
 static void prepare_clips(kernel_frame *f)
 {
@@ -181,8 +182,8 @@ static void prepare_clips(kernel_frame *f)
         f->volume_intervals = 1 + __builtin_popcount(job->volume_clips & outside);
 }
 
-/* Fills frame->surfaces, opaque layers first. Fragments of an isovalue get the kind FRAGMENT_SURFACE + its number among
- * all isovalues of the job, in the job's order of layers. */
+/* Fills frame->surfaces, opaque layers first. Fragments of an isovalue get the kind FRAGMENT_SURFACE + the isovalue's
+ * index among all isovalues of the job, which are counted layer by layer in the job's order. */
 static void prepare_surfaces(kernel_frame *f)
 {
     const render_job *job = f->job;
