@@ -376,19 +376,25 @@ SIMD_INLINE void kernel_f64_terms_about_middle(int type, const kernel_f64 nonlin
     for (int j = 0; j < 3; j++) out[j] += 0.5 * nonlinear_part[3];
 }
 
-/* Computes error_growth, K / (1 - K) with the contraction's constant K, and the bounds of rounding errors, in reference
- * coordinates r. Let u = 6e-8, e the vertices' largest distance from vertex 0 along an axis, and `wide` the maximum |x|
- * and |y| of rays and vertices; y and w are those of kernel_contraction.h.
- * - y and w have errors of about 4 u |inverse| times `wide` across the ray and times e along each axis, including the
- *   rounding of the inverse itself: an eighth of the 2e-6 that kernel_f64_bounds() uses for the positions of faces, and
- *   3e-7 e.
- * - L and E have errors of 4 u times 2, the bound of values (domain_margin has a factor 2 for this), times the gradient
- *   times `wide` across and e along the ray, and as much again for the gradient's own rounding: 5e-7. Divided by the
- *   field's derivative along the ray, and times |w|, that is an error of r.
- * - An iteration adds a few units in the last place of r, and near a pyramid's apex k is at least 1e-6: 1e-6.
- * error_bound is the sum of these errors. The computed crossings of faces lie within `gap` of the ray, and the values
- * there differ from the field by at most KERNEL_FACE_BAND. Each error moves the root by at most itself / (1 - K), and
- * domain_margin is twice the sum of all. */
+/* Computes error_growth = K / (1 - K), where K is the contraction's constant, and the bounds of rounding errors in
+ * reference coordinates r. Let u = 6e-8, let e be the largest distance of a vertex from vertex 0 along an axis, and let
+ * `wide` be the maximum of |x| and |y| over rays and vertices. y, w, L and E are those of kernel_contraction.h. Three
+ * errors of r add up to error_bound:
+ *
+ * y and w have errors of about 4 u |inverse| times `wide` across the ray, and times e along each axis. The rounding of
+ * the inverse itself is included. The code takes an eighth of the 2e-6 that kernel_f64_bounds() uses for the positions
+ * of faces, and 3e-7 e.
+ *
+ * L and E have errors of 4 u times 2, the bound of values (domain_margin has a factor 2 for this), and of 4 u times the
+ * gradient, times `wide` across and e along the ray. The rounding of the gradient itself adds as much again: 5e-7 in
+ * all. Divided by the field's derivative along the ray, and multiplied by |w|, this is an error of r.
+ *
+ * The iteration adds a few units in the last place of r. Near a pyramid's apex k is at least 1e-6. The code takes 1e-6.
+ *
+ * domain_margin is an upper bound of the distance by which rounding errors move a root, compared with the root that is
+ * found between the computed crossings of faces. These crossings lie within `gap` of the ray, and the values there
+ * differ from the field by at most KERNEL_FACE_BAND. Each error moves the root by at most itself / (1 - K).
+ * domain_margin is twice the sum of all these. */
 SIMD_INLINE void kernel_f64_contraction_bounds(const kernel_bounds_lanes *b, int type, int half, kernel_bounds *out)
 {
     const kernel_f64 zero = {0}, one = zero + 1, speed = b->length / b->rise, wide = b->across * 5e5;

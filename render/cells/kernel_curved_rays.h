@@ -161,8 +161,9 @@ SIMD_INLINE vm kernel_curved_triangle_inaccurate(const kernel_transformed_curved
                   vf_lt(vf_abs(kernel_weight(e[0], e[1], e[2])), vf_gather(h->least[0], number * SIMD_WIDTH + lane)));
 }
 
-/* Replaces edge functions by those of projected corners: each of uncertain sign (doubt), and all three of a triangle
- * whose weights are not accurate enough. */
+/* Replaces edge functions by more accurate ones, which are computed from the projected corners. This is done for each
+ * edge function whose sign is uncertain (doubt), and for all three of a triangle whose weights are not accurate
+ * enough. */
 static __attribute__((noinline, cold)) void kernel_curved_triangle_recompute(const kernel_transformed_curved *h,
                                                                              vi lane, vm rays, vi number,
                                                                              const vm doubt[3],

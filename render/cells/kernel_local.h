@@ -230,10 +230,10 @@ SIMD_INLINE void kernel_local_affine_bounds(int count, const vf at[3][8], const 
     }
 }
 
-/* Computes the error bound of r (kernel_local_cells.error_bound). Crossings of faces (kernel_quad.h) err by 3e-7 of the
- * cell's size and by half a unit in the last place of their depth; projected vertices err by a few units of their
- * positions across the ray; and r errs by the 2e-6 that Newton's method leaves, and by a few units in the last place of
- * a position. */
+/* Computes an upper bound of the error of the reference coordinates r (kernel_local_cells.error_bound). Four errors add
+ * up: crossings of faces (kernel_quad.h) err by 3e-7 of the cell's size, and by half a unit in the last place of their
+ * depth; positions of vertices across the ray err by a few units in the last place; Newton's method leaves an error of
+ * 2e-6 in r; and positions from which r is computed err by a few units in the last place. */
 SIMD_INLINE void kernel_local_error_bound(int count, const vf places[3][8], const vf inverse[3][3],
                                           kernel_local_cells *out)
 {

@@ -184,8 +184,9 @@ SIMD_INLINE void kernel_poly_recompute(const kernel_poly_crossings *r, vm hit, k
                              kernel_polyhedron_position(c, w->j), kernel_polyhedron_position(c, w->k), w);
 }
 
-/* Computes the crossings of a surface triangle and returns the rays that have one. *w gets the weights as computed from
- * lines, also for rays on which they are not accurate enough. */
+/* Computes the crossings of a surface triangle and returns the rays that have one. *w receives the weights that are
+ * computed from the lines of the triangle's edges. Where these weights are not accurate enough, the crossings are
+ * computed from other weights, but *w still receives the former ones. */
 static vm kernel_poly_cross_facet(const kernel_poly_crossings *r, const polyhedron_facet *t, kernel_weights *w,
                                   kernel_triangle_crossings *out)
 {

@@ -365,9 +365,9 @@ static __attribute__((noinline)) vm kernel_curved_may_cross_twice_by_discriminan
 }
 
 /* Returns the rays that may meet a quad's patch twice: those of kernel_quad_may_cross_twice() and, because of rounding,
- * a few more. x, y: projected vertices; loop: corners 0 to 3 in cyclic order; side[i]: the rays on the negative side of
- * the edge from corner i to the next. Only rays that are on different sides of opposite edges, taken in cyclic order,
- * can meet it twice. */
+ * a few more. Let all four edges be directed around the quad. Only a ray that is on different sides of two opposite
+ * edges can meet the patch twice. x, y: projected vertices; loop: corners 0 to 3 in cyclic order; side[i]: the rays on
+ * the negative side of the edge from corner i to the next. */
 SIMD_INLINE vm kernel_curved_may_cross_twice(const vf x[8], const vf y[8], const signed char *loop, vm rays,
                                              const vm side[4])
 {

@@ -167,8 +167,8 @@ SIMD_INLINE vm kernel_tets_inaccurate(const kernel_tets *t, int n, vm hit, vf we
     return vm_and(hit, vf_lt(vf_abs(weight), KERNEL_TET_NUMBER(t, least[n], least[n])));
 }
 
-/* Computes the sums of the two crossed faces, as kernel_tets_select_crossed_faces() selects them. For rays whose
- * weights are not accurate enough, the edge functions of projected vertices are used. */
+/* Selects the sums of the two crossed faces as kernel_tets_select_crossed_faces() does. But for rays on which a face's
+ * weights are not accurate enough, the sums are first computed anew from edge functions of projected vertices. */
 SIMD_INLINE void kernel_tets_choose_in_double(const kernel_tets *t, vm rays, const vf e[KERNEL_TET_EDGES],
                                               bool has_colour, kernel_sums ends[2])
 {

@@ -105,8 +105,9 @@ SIMD_INLINE void kernel_sorted_curved_rank(kernel_sorted_vertices *h, bool is_na
         }
 }
 
-/* Permutes a hex's vertices: the one of smallest rank becomes vertex 0. The reference coordinates are then exchanged so
- * that the ranks of its three neighbours along them increase. */
+/* Puts a hex's vertices in canonical order. First the hex is mirrored along its reference coordinates such that the
+ * vertex of smallest rank becomes vertex 0. Then its three reference coordinates are exchanged such that the ranks of
+ * the neighbours of vertex 0 increase along x, y, z. */
 SIMD_INLINE void kernel_sorted_curved_hex(kernel_sorted_vertices *h, bool is_narrow)
 {
     /* index of the vertex whose reference coordinates x, y, z have these three bits */
@@ -129,8 +130,8 @@ SIMD_INLINE void kernel_sorted_curved_hex(kernel_sorted_vertices *h, bool is_nar
     }
 }
 
-/* Permutes a wedge's vertices: the one of smallest rank becomes vertex 0, the neighbour of smaller rank in its triangle
- * vertex 1. */
+/* Puts a wedge's vertices in canonical order. Vertex 0 is the vertex of smallest rank. Vertex 1 is that one of the two
+ * other vertices of its triangle that has the smaller rank. */
 SIMD_INLINE void kernel_sorted_curved_wedge(kernel_sorted_vertices *h, bool is_narrow)
 {
     vm over = vm_none();
@@ -146,8 +147,8 @@ SIMD_INLINE void kernel_sorted_curved_wedge(kernel_sorted_vertices *h, bool is_n
     kernel_sorted_curved_swap(h, is_narrow, swap, 4, 5);
 }
 
-/* Permutes a pyramid's vertices: the vertex of the base of smallest rank becomes vertex 0, its neighbour of smaller
- * rank in the base vertex 1; the apex stays last. */
+/* Puts a pyramid's vertices in canonical order. Vertex 0 is the vertex of the base with the smallest rank. Vertex 1 is
+ * that one of its two neighbours in the base that has the smaller rank. The apex stays last. */
 SIMD_INLINE void kernel_sorted_curved_pyramid(kernel_sorted_vertices *h, bool is_narrow)
 {
     const vf least = vf_min(vf_min(h->rank[0], h->rank[1]), vf_min(h->rank[2], h->rank[3]));
@@ -346,7 +347,8 @@ SIMD_INLINE void kernel_transformed_faces_of(kernel_transformed_curved *out, con
     }
 }
 
-/* Computes the words with the corners of all faces, and the lines of the triangular faces. */
+/* Computes, for all faces, the words that list their corners (the member `corners`), and the lines of the triangular
+ * faces. */
 static __attribute__((noinline)) void kernel_transformed_faces(kernel_transformed_curved *out, const kernel_frame *f,
                                                                const kernel_tile *tile, int type)
 {
