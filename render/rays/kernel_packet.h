@@ -37,9 +37,9 @@ typedef struct kernel_packet {
      * sample_step */
     vf sample_base, sample_step, sample_inverse;
     int sample_first;
-    /* The interval of t that clips leave of each ray: the common clips, or, while volumes with clips of their own are
-     * traced, the clips of volumes. -inf and +inf if there are no clips. Set only if the frame has volumes or common
-     * clips. */
+    /* The interval of t that clips leave of each ray. While volumes with clips of their own are traced, these are the
+     * clips of volumes; otherwise they are the common clips. Without clips the interval is from -inf to +inf. Set only
+     * if the frame has volumes or common clips. */
     vf clip_in, clip_out;
     /* Exact length of the interval from clip_in to clip_out, divided by the difference of these two rounded numbers.
      * The ratio is far from 1 if a ray grazes a sphere, so that the interval is very short. */

@@ -169,8 +169,9 @@ static inline void kernel_tree_planes(kernel_planes *q, const kernel_frame *f, c
     kernel_planes_load(q, normal, offset, error);
 }
 
-/* Computes the planes in tile space, against which cells are tested: X - slope * Z - origin for columns, and likewise Y
- * for rows. The lane of the distance along the tile's middle ray is not used. */
+/* Computes the planes in tile space, against which cells are tested. The signed distance of a position from the plane
+ * of a border between columns is X - slope * Z - origin, where slope and origin are those of the border. For borders
+ * between rows it is slope * Z + origin - Y. The lane of the distance along the tile's middle ray is not used. */
 static inline void kernel_tile_planes(kernel_planes *q, const kernel_frame *f, const kernel_tile *tile)
 {
     const bool flat = f->job->camera.is_orthographic;

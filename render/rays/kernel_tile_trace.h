@@ -40,8 +40,8 @@ typedef struct kernel_tile_trace {
     kernel_hits hits[KERNEL_TILE_PACKETS];
 } kernel_tile_trace;
 
-/* Returns a mask of the blocks that contain a ray whose nearest hit is not nearer than the depth `near`, so that a cell
- * at this depth may be visible. */
+/* Returns a mask of the blocks in which a cell at the depth `near` may be visible: those with at least one ray that has
+ * no nearer hit. */
 SIMD_INLINE unsigned kernel_blocks_not_hidden_at(const kernel_tile_trace *t, float near)
 {
     unsigned bits = 0;
@@ -96,8 +96,8 @@ SIMD_INLINE void kernel_block_update_far(kernel_tile_trace *t, int block)
     }
 }
 
-/* Returns whether a box of pixels contains one whose nearest hit is not nearer than the depth `near`. box: first and
- * last column, first and last row in the tile, 4 bits each, from bit 0 on. */
+/* Returns whether a cell at the depth `near` may be visible in a box of pixels, that is, whether at least one of these
+ * pixels has no nearer hit. box: first and last column, first and last row in the tile, 4 bits each, from bit 0 on. */
 SIMD_INLINE bool kernel_box_has_pixel_not_hidden_at(const kernel_tile_trace *t, unsigned box, float near)
 {
     const unsigned columns = (2u << (box >> 4 & 15)) - (1u << (box & 15));
@@ -174,8 +174,8 @@ struct kernel_map;
 typedef void kernel_tile_trace_cell(kernel_tile_trace *t, int part, const struct kernel_cell *c,
                                     const struct kernel_map *map, unsigned blocks);
 
-/* Returns the node's placement, with those of the given blocks in which it may be visible; with no blocks if the node
- * contains no visible values. visible_values: NULL if all values are visible. */
+/* Returns the node's placement. Its mask of blocks has those of the given blocks in which the node may be visible. The
+ * mask is 0 if the node contains no visible values. visible_values: NULL if all values are visible. */
 SIMD_INLINE kernel_placement kernel_tile_classify_node(const kernel_tile_trace *t, const mmbvh *tree,
                                                        const mmbvh_ranges *ranges,
                                                        const kernel_visible_values *visible_values, int64_t node,

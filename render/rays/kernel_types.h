@@ -381,8 +381,8 @@ typedef struct kernel_table {
     /* Adds to the list the candidates of a subtree. grow() adds space, or marks the list as full. */
     void (*find_candidates)(const kernel_frame *frame, kernel_thread *thread, const kernel_subtree *subtree,
                             kernel_candidate_list *list, bool (*grow)(kernel_candidate_list *list));
-    /* Closes those of the secondary rays (rays from hits to lights or into the hemisphere) that an opaque surface
-     * certainly blocks, and records the ray-cell pairs that must be tested exactly. */
+    /* Secondary rays lead from hits to lights or into the hemisphere. Clears the bits of those that an opaque surface
+     * certainly blocks, and records the pairs of a ray and a cell that must be tested exactly. */
     void (*occlude)(const kernel_frame *frame, kernel_thread *thread, const struct kernel_occluders *occluders,
                     struct kernel_secondary_rays *rays);
     /* Clears the bits in bundle->open of the rays that the surface in this cell blocks. */

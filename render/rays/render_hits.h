@@ -16,8 +16,8 @@ static inline double hit_dot(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Returns the bounding box, in the scene's coordinates, of this rank's trees on which a surface layer accepted by
- * is_wanted() has values. */
+/* Returns the bounding box, in the scene's coordinates, of this rank's mesh parts on which a surface layer has a field.
+ * Only layers for which is_wanted() returns true are considered. */
 render_box hit_box(const render_job *job, bool (*is_wanted)(const render_surface_layer *layer));
 
 /* Computes an orthonormal set of axes (right, up, forward) whose last one is the unit vector n. */
