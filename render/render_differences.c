@@ -1,5 +1,6 @@
-/* CHUNK_HITS: number of hits that a thread processes at once, so that cells fetched for one hit are cached for its
- * neighbours. SORTED_HITS: number of hits that are sorted at once. */
+/* Finds the ranks whose samples a hit needs, samples the field around hits, and lights hits. CHUNK_HITS is the number
+ * of hits that a thread processes at once, so that cells fetched for one hit are cached for its neighbours. SORTED_HITS
+ * is the number of hits that are sorted at once. */
 #include "render_differences.h"
 
 #include <math.h>

@@ -75,7 +75,7 @@ enum { LIGHT_TILES = 32 };
 struct render_occluders {
     const kernel_table *kernels;
     render_job job;     /* the job that the caller gave, without volumes */
-    kernel_frame frame; /* the constants of its frame */
+    kernel_frame frame; /* the constants of this job's frame */
     kernel_occluders trees;
     int threads;
 };

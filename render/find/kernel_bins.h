@@ -23,7 +23,7 @@ static inline kernel_tile_candidate kernel_candidate_in_tile(const kernel_candid
                                    .box = (uint16_t)(ends[0] | ends[1] << 4 | ends[2] << 8 | ends[3] << 12)};
 }
 
-/* Returns the number of the depth bin for cells that begin at the depth `near`. It never decreases as the depth
+/* Returns the index of the depth bin for cells that begin at the depth `near`. The index never decreases as the depth
  * grows. */
 SIMD_INLINE int kernel_depth_bin(const kernel_bin *q, float near)
 {

@@ -146,8 +146,9 @@ static void kernel_find_flush(kernel_finder *s)
  * KERNEL_FRONT_ROOM: number of entries of the stack. */
 enum { KERNEL_FRONT = 16, KERNEL_FRONT_ROOM = KERNEL_FRONT * MMBVH_MAX_DEPTH };
 
-/* Returns whether the node's box may be visible in the picture. *is_inside: set if the whole box lies in the picture,
- * so that its children need not be tested; on entry, that of the node's parent. */
+/* Returns whether the node's box may be visible in the picture. On entry, *is_inside states whether the parent's whole
+ * box lies in the picture; then the node's box does too and need not be tested. On return, *is_inside states whether
+ * the node's whole box lies in the picture. */
 SIMD_INLINE bool kernel_node_in_picture(const kernel_finder *s, const mmbvh *tree, int64_t node, bool *is_inside)
 {
     if (*is_inside) return true;
